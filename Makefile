@@ -1,0 +1,55 @@
+# Two commands are enough: `make demo` and `make test`. Both do all the set-up.
+PYTHON ?= python3.11
+VENV := .venv
+BIN := $(VENV)/bin
+# An interpreter by another name is fine as long as it is recent enough.
+ifeq ($(shell command -v $(PYTHON) 2>/dev/null),)
+PYTHON := python3
+endif
+
+.PHONY: demo test check bench kernels lock clean help
+
+help:  ## List the commands
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 10
+
+$(VENV)/installer: bootstrap.lock
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "asperity needs Python 3.11 or newer")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r bootstrap.lock
+	touch $@
+
+$(VENV)/runtime: requirements.lock pyproject.toml | $(VENV)/installer
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation --editable .
+	touch $@
+
+$(VENV)/development: requirements-dev.lock | $(VENV)/runtime
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements-dev.lock
+	touch $@
+
+demo: $(VENV)/runtime  ## Set up, compare the laws on a bundled surface, write report.html
+	$(BIN)/asperity compare examples/demo.toml --html report.html
+
+test: $(VENV)/development  ## Set up and run the whole test suite
+	$(BIN)/python -m pytest -n auto
+
+check: $(VENV)/development  ## Lint, types, import layers, generated files fresh
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/python -m asperity.derive.generate --check
+
+bench: $(VENV)/development  ## Speed and memory, as ratios against C and peers
+	$(BIN)/python -m bench
+
+kernels: $(VENV)/runtime  ## Derive the shipped laws again
+	$(BIN)/python -m asperity.derive.generate
+
+lock: $(VENV)/installer  ## Resolve the dependencies anew
+	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --only-group installer -o bootstrap.lock
+	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --no-default-groups --group build -o requirements.lock
+	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --no-default-groups --group build --group dev -o requirements-dev.lock
+
+clean:  ## Remove the virtual environment and what the tools left
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis report.html

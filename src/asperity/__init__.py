@@ -1,0 +1,80 @@
+"""Haptic textures that neither buzz nor feel alive, on the device you have.
+
+Public names are imported when they are first used: starting up costs no SymPy, no SciPy, no
+Numba and no matplotlib.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from asperity.errors import AsperityError, LawError, ParameterError, SurfaceFileError
+
+if TYPE_CHECKING:
+    from asperity.analysis import (
+        Bound,
+        Comparison,
+        characteristic_number,
+        compare,
+        loop_work,
+        one_sided_number,
+    )
+    from asperity.devices import Device, load_device
+    from asperity.laws import Law
+    from asperity.surface import Surface
+    from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, load_texture
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "Bound": "asperity.analysis",
+    "Comparison": "asperity.analysis",
+    "Device": "asperity.devices",
+    "Fourier": "asperity.textures",
+    "HeightMap": "asperity.textures",
+    "Law": "asperity.laws",
+    "Profile": "asperity.textures",
+    "Sinusoid": "asperity.textures",
+    "Surface": "asperity.surface",
+    "characteristic_number": "asperity.analysis",
+    "compare": "asperity.analysis",
+    "load_device": "asperity.devices",
+    "load_texture": "asperity.textures",
+    "loop_work": "asperity.analysis",
+    "one_sided_number": "asperity.analysis",
+}
+
+__all__ = [
+    "AsperityError",
+    "Bound",
+    "Comparison",
+    "Device",
+    "Fourier",
+    "HeightMap",
+    "Law",
+    "LawError",
+    "ParameterError",
+    "Profile",
+    "Sinusoid",
+    "Surface",
+    "SurfaceFileError",
+    "__version__",
+    "characteristic_number",
+    "compare",
+    "load_device",
+    "load_texture",
+    "loop_work",
+    "one_sided_number",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'asperity' has no attribute {name!r}")
+    import importlib
+
+    return getattr(importlib.import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

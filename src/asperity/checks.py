@@ -1,0 +1,76 @@
+"""Checks of arguments at the public edge, each made once."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from asperity.errors import ParameterError
+
+FloatArray = NDArray[np.float64]
+
+
+def real(name: str, value: object, unit: str = "") -> float:
+    """Return a finite number.
+
+    Raises:
+        ParameterError: if it is none.
+    """
+    unit = f" [{unit}]" if unit else ""
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise ParameterError(name, f"must be a number{unit}", value)
+    if not math.isfinite(value):
+        raise ParameterError(name, f"must be finite{unit}", value)
+    return float(value)
+
+
+def positive(name: str, value: object, unit: str = "") -> float:
+    """Return a positive finite number; see :func:`real`."""
+    number = real(name, value, unit)
+    if number <= 0.0:
+        unit = f" [{unit}]" if unit else ""
+        raise ParameterError(name, f"must be positive{unit}", value)
+    return number
+
+
+def fraction(name: str, value: object) -> float:
+    """Return a number in [0, 1]; see :func:`real`."""
+    number = real(name, value)
+    if not 0.0 <= number <= 1.0:
+        raise ParameterError(name, "must be in [0, 1]", value)
+    return number
+
+
+def array(name: str, value: ArrayLike, shape: tuple[int | None, ...], unit: str) -> FloatArray:
+    """Return a contiguous float array of the shape, ``None`` standing for any length.
+
+    Raises:
+        ParameterError: for another shape, or a value that is not finite.
+
+    Example:
+        >>> array("points", [[0, 0, 1]], (None, 3), "m").shape
+        (1, 3)
+    """
+    described = f"({', '.join('n' if length is None else str(length) for length in shape)})"
+    try:
+        result: FloatArray = np.ascontiguousarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError(name, f"must be numbers of shape {described} [{unit}]") from None
+    fits = result.ndim == len(shape) and all(
+        wanted is None or wanted == length
+        for wanted, length in zip(shape, result.shape, strict=True)
+    )
+    if not fits:
+        raise ParameterError(name, f"must have shape {described} [{unit}]", result.shape)
+    if not np.isfinite(result).all():
+        raise ParameterError(name, f"must be finite [{unit}]; {_first_bad(result)}")
+    return result
+
+
+def _first_bad(values: FloatArray) -> str:
+    index: Any = np.argwhere(~np.isfinite(values))[0]
+    place = ", ".join(str(int(i)) for i in index)
+    return f"the value at [{place}] is {float(values[tuple(index)])}"

@@ -1,0 +1,1 @@
+"""What follows from a law: Jacobian, curl, definition in many digits, kernels."""

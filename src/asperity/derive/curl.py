@@ -1,0 +1,94 @@
+"""Is a law's force field conservative? A proof, or a point where the curl is not zero."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import sympy as sp
+
+from asperity.derive.jacobian import derive, explicit
+from asperity.laws.contacts import contact_derivatives
+from asperity.laws.law import Law
+from asperity.laws.symbols import DEPTH, HX, HY, POSITION, H
+
+# s = |w| = √(1 + h_x² + h_y²), as a symbol of its own so that the curl becomes rational.
+_S = sp.Symbol("s", positive=True)
+_S_SQUARED = 1 + HX**2 + HY**2
+
+
+@dataclass(frozen=True)
+class CurlVerdict:
+    """What the symbolic curl of a law says.
+
+    Attributes:
+        conservative: whether the work around every closed path is zero.
+        curl: the simplified curl, (3, 1) SymPy matrix in the contact symbols.
+        reason: one sentence.
+    """
+
+    conservative: bool
+    curl: Any
+    reason: str
+
+
+@lru_cache(maxsize=64)
+def curl_verdict(law: Law) -> CurlVerdict:
+    """Prove that a law is conservative, or say why it is not.
+
+    The curl is reduced to rational functions of the contact symbols and of s = |w|, modulo
+    s² = 1 + h_x² + h_y²: it vanishes identically exactly if every numerator reduces to zero.
+    Zero curl is enough where the force is continuous. Where the contact point can jump (the
+    nearest contact), the force must also be a function of the depth alone times the gradient of
+    the depth: then it has a potential in the depth, which does not jump.
+
+    Example:
+        >>> from asperity.laws import find_law
+        >>> curl_verdict(find_law("C")).conservative, curl_verdict(find_law("B")).conservative
+        (True, False)
+    """
+    derivation = derive(law)
+    jacobian = explicit(derivation, derivation.jacobian)
+    curl = sp.Matrix(
+        [
+            jacobian[2, 1] - jacobian[1, 2],
+            jacobian[0, 2] - jacobian[2, 0],
+            jacobian[1, 0] - jacobian[0, 1],
+        ]
+    ).applyfunc(_reduce)
+    if law.stateful:
+        reason = "the force depends on the deflection of the anchor: it is no field of position"
+        return CurlVerdict(False, curl, reason)
+    if any(entry != 0 for entry in curl):
+        return CurlVerdict(False, curl, "the curl is not zero")
+    if derivation.force.subs(DEPTH, 0).applyfunc(_reduce) != sp.zeros(3, 1):
+        return CurlVerdict(False, curl, "the force jumps where contact begins")
+    if contact_derivatives(law.contact).single_valued:
+        return CurlVerdict(True, curl, "the curl is zero identically, and the force continuous")
+    if _has_depth_potential(law, derivation.force):
+        return CurlVerdict(True, curl, "the force is the gradient of a potential in the depth")
+    return CurlVerdict(False, curl, "the curl is zero, but its potential jumps with the contact")
+
+
+def _has_depth_potential(law: Law, force: Any) -> bool:
+    gradient = contact_derivatives(law.contact).depth_gradient.T
+    along = (force.T * gradient)[0, 0] / (gradient.T * gradient)[0, 0]
+    residual = (force - along * gradient).applyfunc(_reduce)
+    if residual != sp.zeros(3, 1):
+        return False
+    return all(_reduce(sp.diff(along, symbol)) == 0 for symbol in (H, HX, HY, *POSITION))
+
+
+def _reduce(expression: Any) -> Any:
+    """Return a canonical form: zero exactly if the expression vanishes identically."""
+    root = sp.sqrt(_S_SQUARED)
+    # Every power of the root, odd or even, becomes a power of s.
+    rational = expression.replace(
+        lambda e: e.is_Pow and e.base == _S_SQUARED, lambda e: _S ** (2 * e.exp)
+    ).subs(root, _S)
+    numerator, denominator = sp.fraction(sp.together(rational))
+    remainder = sp.rem(sp.expand(numerator), _S**2 - _S_SQUARED, _S)
+    if sp.expand(remainder) == 0:
+        return sp.Integer(0)
+    return sp.simplify(sp.factor(remainder) / denominator).subs(_S, root)

@@ -1,0 +1,1 @@
+"""Kernels of the shipped laws, derived by `make kernels`: do not edit."""

@@ -1,0 +1,130 @@
+"""The exact Jacobian of a law, by the chain rule through its contact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import sympy as sp
+
+from asperity.errors import LawError
+from asperity.laws.contacts import contact_derivatives
+from asperity.laws.law import Law
+from asperity.laws.symbols import (
+    ARGUMENT_ORDER,
+    DEPTH,
+    DX,
+    DY,
+    HX,
+    HXX,
+    HXY,
+    HY,
+    HYY,
+    POSITION,
+    SXX,
+    SXY,
+    SYY,
+    ContactSymbols,
+    H,
+)
+
+
+@dataclass(frozen=True)
+class Derivation:
+    """A law with what follows from it, as SymPy matrices.
+
+    Attributes:
+        law: the law.
+        force: force on the probe [N], shape (3, 1).
+        jacobian: J[i, j] = ∂f_i/∂p_j [N/m], shape (3, 3).
+        jacobian_saturated: the same where a clamp holds the depth constant.
+        definitions: names that the Jacobians use for parts of the contact's derivative, with
+            their values, in order; see :func:`explicit` for a Jacobian without them.
+    """
+
+    law: Law
+    force: Any
+    jacobian: Any
+    jacobian_saturated: Any
+    definitions: tuple[tuple[Any, Any], ...] = ()
+
+
+@lru_cache(maxsize=64)
+def derive(law: Law) -> Derivation:
+    """Derive the Jacobian of a law.
+
+    J = ∂f/∂depth ∇depth + ∂f/∂(h, h_x, h_y) ∂(h, h_x, h_y)/∂(X, Y) ∂(X, Y)/∂p
+        + ∂f/∂d ∂d/∂p + ∂f/∂p.
+
+    Raises:
+        LawError: if the formula fails, or uses what a contact does not offer.
+
+    Example:
+        >>> from asperity.laws import find_law
+        >>> derive(find_law("A")).jacobian
+        Matrix([
+        [   0,    0,  0],
+        [   0,    0,  0],
+        [hx*k, hy*k, -k]])
+    """
+    force = symbolic_force(law)
+    contact = contact_derivatives(law.contact)
+    by_height = force.jacobian([H, HX, HY])
+    height_by_point = sp.Matrix([[HX, HY], [HXX, HXY], [HXY, HYY]])
+    saturated = by_height * height_by_point * contact.point_derivative
+    saturated += force.jacobian(list(POSITION))
+    if law.stateful:
+        # ∂d/∂p is handed in: the identity while sticking, I - u uᵀ while sliding.
+        saturated += force.jacobian([DX, DY]) * sp.Matrix([[SXX, SXY, 0], [SXY, SYY, 0]])
+    full = saturated + force.diff(DEPTH) * contact.depth_gradient
+    return Derivation(law, force, _tidy(full), _tidy(saturated), contact.definitions)
+
+
+def explicit(derivation: Derivation, matrix: Any) -> Any:
+    """Return a matrix of a derivation in the contact symbols alone."""
+    for name, value in reversed(derivation.definitions):
+        matrix = matrix.subs(name, value)
+    return matrix
+
+
+def symbolic_force(law: Law) -> Any:
+    """Return the force of a law as a (3, 1) SymPy matrix, checked.
+
+    Raises:
+        LawError: see :func:`derive`.
+    """
+    symbols = ContactSymbols(tuple(law.parameters))
+    reserved = {str(symbol) for symbol in ARGUMENT_ORDER}
+    for name in law.parameters:
+        if name in reserved or not name.isidentifier():
+            raise LawError(f"law {law.letter}: {name!r} cannot be the name of a parameter")
+    try:
+        force = sp.Matrix(law.force(symbols))
+    except Exception as error:  # whatever a user's formula raises is a defect of the formula
+        raise LawError(
+            f"law {law.letter}: its force is not a symbolic formula ({error}); "
+            "it must return three SymPy expressions in the contact symbols"
+        ) from error
+    if force.shape != (3, 1):
+        raise LawError(f"law {law.letter}: force must have 3 components, got {force.shape}")
+    _check_symbols(law, force)
+    return force
+
+
+def _check_symbols(law: Law, force: Any) -> None:
+    allowed = {*POSITION, DEPTH, H, HX, HY} | {sp.Symbol(n, real=True) for n in law.parameters}
+    allowed |= set(ARGUMENT_ORDER[-3:])  # k, h_mid, h_half
+    if law.stateful:
+        allowed |= {DX, DY}
+    unknown = sorted(str(symbol) for symbol in force.free_symbols - allowed)
+    if unknown:
+        raise LawError(
+            f"law {law.letter}: force uses {', '.join(unknown)}, which the contact does not offer; "
+            "known: depth, h, slope, position, k, the parameters, and deflection if stateful "
+            "(second derivatives of h enter through the Jacobian only)"
+        )
+
+
+def _tidy(matrix: Any) -> Any:
+    return matrix.applyfunc(lambda entry: sp.factor_terms(sp.powsimp(entry)))

@@ -1,0 +1,58 @@
+"""The few kinds of error that asperity raises on purpose."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class AsperityError(Exception):
+    """Base of every error that asperity raises on purpose."""
+
+
+class ParameterError(AsperityError, ValueError):
+    """An argument that cannot be used.
+
+    The message names the argument, says what it must be and what was given.
+
+    Attributes:
+        argument: name of the argument.
+
+    Example:
+        >>> raise ParameterError("stiffness", "must be positive and finite [N/m]", -3.0)
+        Traceback (most recent call last):
+        ...
+        asperity.errors.ParameterError: stiffness must be positive and finite [N/m], got -3.0
+    """
+
+    def __init__(self, argument: str, requirement: str, given: object = None) -> None:
+        self.argument = argument
+        self.requirement = requirement
+        self.given = given
+        tail = "" if given is None else f", got {given!r}"
+        super().__init__(f"{argument} {requirement}{tail}")
+
+
+class SurfaceFileError(AsperityError):
+    """A surface file that cannot be read, with the reason."""
+
+
+class LawError(AsperityError):
+    """A law whose mathematics cannot be used, with the reason."""
+
+
+def nearest_names(name: str, known: Iterable[str]) -> str:
+    """Return a hint such as ``did you mean 'omega.3'?`` and the full choice.
+
+    Args:
+        name: what was given.
+        known: the names that exist.
+
+    Returns:
+        A phrase for the end of an error message.
+    """
+    choice = sorted(known)
+    close = difflib.get_close_matches(name.lower(), [c.lower() for c in choice], n=2, cutoff=0.5)
+    hits = [c for c in choice if c.lower() in close]
+    hint = f"did you mean {' or '.join(repr(h) for h in hits)}? " if hits else ""
+    return f"{hint}known: {', '.join(choice)}"

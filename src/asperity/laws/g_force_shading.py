@@ -1,0 +1,30 @@
+"""G, force shading: f = k δ₀ n, the smooth wall's force turned along the texture's normal.
+
+Paper: (28) field (the trailing n there is stray), (29) energy. The paper finds no closed form of
+the Jacobian; here it is exact: -k(n e_zᵀ - δ₀ N Eᵀ), singular values k and k δ₀ σ_i(N). Not
+conservative, and on an asymmetric profile it pushes steadily along a straight scan.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from asperity.laws.law import Law
+
+if TYPE_CHECKING:
+    from asperity.laws.symbols import ContactSymbols
+
+
+def force(c: ContactSymbols) -> Any:
+    """Return k δ₀ n."""
+    return c.k * c.depth * c.normal
+
+
+LAW = Law(
+    letter="G",
+    name="force-shading",
+    contact="nominal",
+    force=force,
+    summary="smooth wall with a force along the texture normal",
+    clampable=True,
+)

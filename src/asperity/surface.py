@@ -1,0 +1,242 @@
+"""A surface: a texture, a law and its parameters, with compiled force and Jacobian."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from asperity.checks import FloatArray, array, fraction, positive, real
+from asperity.derive.driver import CLAMPS, ClampName
+from asperity.errors import ParameterError, nearest_names
+from asperity.laws import Law, find_law
+from asperity.textures.texture import Texture
+
+DEFAULT_STIFFNESS = 1000.0
+DEFAULT_FRICTION = 0.8
+DEFAULT_MAX_DEFLECTION = 1e-3
+DEFAULT_MODULATION_DEPTH = 0.8
+# max_depth unless given: the peak-to-valley height of the texture, at most this [m].
+LARGEST_DEFAULT_DEPTH = 1e-3
+
+
+def default_max_depth(texture: Texture) -> float:
+    """Return the peak-to-valley height of the texture, at most 1 mm [m]."""
+    height = texture.peak_to_valley
+    return min(height, LARGEST_DEFAULT_DEPTH) if height > 0.0 else LARGEST_DEFAULT_DEPTH
+
+
+class Surface:
+    """A textured surface as a force field: the body is z < h(x, y), z points out of it.
+
+    Args:
+        texture: the height function.
+        law: letter, name, or a :class:`~asperity.laws.Law` of your own.
+        stiffness: k [N/m] of the smooth wall.
+        max_depth: D [m], the depth to which the surface is meant to be pressed; it bounds the
+            working region of the analysis and is where a clamp acts. Default: the peak-to-valley
+            height of the texture, at most 1 mm.
+        friction: μ of law F.
+        max_deflection: d_max [m] of law F, the greatest deflection of the anchor.
+        modulation_depth: a_m of law F, in [0, 1].
+        clamp: ``"none"`` (the law as it is), ``"whole"`` (the depth is held at max_depth),
+            ``"lateral"`` (only for the lateral force, the paper's Remark 3), ``"backed"`` (whole,
+            with a backing wall k (z_b - z) e_z below z_b = min h - max_depth, or -max_depth for
+            laws on the nominal contact). Laws W, D and E are never clamped.
+        law_parameters: values for the further parameters of a law of your own.
+
+    Raises:
+        ParameterError: for a value that cannot be used; it names the argument.
+
+    Example:
+        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> surface = Surface(Sinusoid(amplitude=0.8e-3, period=1e-3), law="A", stiffness=500.0)
+        >>> surface.force([[0.25e-3, 0.0, 0.0], [0.25e-3, 0.0, 1e-3]])
+        array([[0. , 0. , 0.4],
+               [0. , 0. , 0. ]])
+    """
+
+    def __init__(
+        self,
+        texture: Texture,
+        law: str | Law = "C",
+        stiffness: float = DEFAULT_STIFFNESS,
+        max_depth: float | None = None,
+        friction: float = DEFAULT_FRICTION,
+        max_deflection: float = DEFAULT_MAX_DEFLECTION,
+        modulation_depth: float = DEFAULT_MODULATION_DEPTH,
+        clamp: ClampName = "none",
+        law_parameters: Mapping[str, float] | None = None,
+    ) -> None:
+        if not isinstance(texture, Texture):
+            raise ParameterError("texture", "must be a texture such as Sinusoid", texture)
+        self.texture = texture
+        self.law = find_law(law)
+        self.stiffness = positive("stiffness", stiffness, "N/m")
+        self.max_depth = (
+            default_max_depth(texture)
+            if max_depth is None
+            else positive("max_depth", max_depth, "m")
+        )
+        self.friction = real("friction", friction)
+        if self.friction < 0.0:
+            raise ParameterError("friction", "must not be negative", friction)
+        self.max_deflection = positive("max_deflection", max_deflection, "m")
+        self.modulation_depth = fraction("modulation_depth", modulation_depth)
+        if clamp not in CLAMPS:
+            raise ParameterError("clamp", f"must be one of {', '.join(CLAMPS)}", clamp)
+        self.clamp: ClampName = clamp
+        self.law_parameters = self._own_parameters(dict(law_parameters or {}))
+
+    def _own_parameters(self, given: dict[str, float]) -> dict[str, float]:
+        shared = ("friction", "max_deflection", "modulation_depth")
+        values = {name: float(default) for name, default in self.law.parameters.items()}
+        values |= {name: float(getattr(self, name)) for name in shared if name in values}
+        for name, value in given.items():
+            if name not in values:
+                hint = nearest_names(name, values) if values else "it has none"
+                raise ParameterError("law_parameters", f"names {name!r}; law {self.law}: {hint}")
+            values[name] = real(name, value)
+        return values
+
+    def __repr__(self) -> str:
+        return (
+            f"Surface({self.texture!r}, law={self.law.letter!r}, stiffness={self.stiffness!r}, "
+            f"max_depth={self.max_depth!r}, clamp={self.clamp!r})"
+        )
+
+    @property
+    def floor(self) -> float:
+        """z_b [m], below which ``clamp="backed"`` adds its wall."""
+        if self.law.contact == "nominal":
+            return -self.max_depth
+        return self.texture.extremes[0] - self.max_depth
+
+    @cached_property
+    def law_arguments(self) -> tuple[float, ...]:
+        """What the kernels receive of the law: see ``asperity.derive.driver``."""
+        needs_heights = self.law.stateful or self.law.contact == "nominal"
+        low, high = self.texture.extremes if needs_heights else (-1.0, 1.0)
+        half = 0.5 * (high - low)
+        return (
+            self.stiffness,
+            0.5 * (low + high),
+            half if half > 0.0 else 1.0,  # a flat texture modulates nothing
+            self.max_depth,
+            self.floor if self.clamp == "backed" else 0.0,
+            *self.law_parameters.values(),
+        )
+
+    @cached_property
+    def _loops(self) -> ModuleType:
+        from asperity.derive.fuse import fuse_surface
+
+        clamp: ClampName = self.clamp if self.law.clampable else "none"
+        return fuse_surface(self.law, self.texture.sampler, clamp)
+
+    def force(self, points: ArrayLike, deflection: ArrayLike | None = None) -> FloatArray:
+        """Return the force on the probe (what the device applies to the hand).
+
+        Args:
+            points: probe positions p [m], shape (n, 3).
+            deflection: tangential deflection d of the anchor [m], shape (n, 2), for laws with
+                state; zero by default.
+
+        Returns:
+            f [N], shape (n, 3); zero out of contact.
+
+        Raises:
+            ParameterError: for another shape, values that are not finite, a deflection longer
+                than max_deflection, or a deflection for a law without state.
+
+        Reference:
+            The paper's Table I, with the corrections named in each law.
+        """
+        probes = array("points", points, (None, 3), "m")
+        out = np.empty((len(probes), 3))
+        state = self._state(len(probes), deflection)
+        self._loops.force_batch(probes, *state, out, self.texture.arguments, self.law_arguments)
+        return out
+
+    def jacobian(
+        self,
+        points: ArrayLike,
+        deflection: ArrayLike | None = None,
+        sliding: ArrayLike | None = None,
+    ) -> FloatArray:
+        """Return the exact Jacobian of the force.
+
+        J[i, j] = ∂f_i/∂p_j, with the curvature of the surface; zero out of contact.
+
+        Args:
+            points: probe positions p [m], shape (n, 3).
+            deflection: see :meth:`force`.
+            sliding: whether the anchor is dragged, shape (n,), for laws with state; the
+                derivative of the deflection is then I - u uᵀ, u = d/|d|. False by default.
+
+        Returns:
+            J [N/m], shape (n, 3, 3).
+
+        Raises:
+            ParameterError: see :meth:`force`.
+
+        Reference:
+            The paper's (7), (15), (18), (20), (23); B and G, for which it has none, are exact.
+        """
+        probes = array("points", points, (None, 3), "m")
+        count = len(probes)
+        state = self._state(count, deflection)
+        if self.law.stateful:
+            slides = np.zeros(count, dtype=bool) if sliding is None else np.asarray(sliding)
+            if slides.shape != (count,) or slides.dtype != bool:
+                raise ParameterError("sliding", f"must be {count} truth values", sliding)
+            state = (*state, np.ascontiguousarray(slides))
+        elif sliding is not None:
+            raise ParameterError("sliding", f"is meaningless for law {self.law}, without state")
+        forces, jacobians = np.empty((count, 3)), np.empty((count, 3, 3))
+        self._loops.jacobian_batch(
+            probes, *state, forces, jacobians, self.texture.arguments, self.law_arguments
+        )
+        return jacobians
+
+    def trace(self, path: ArrayLike) -> FloatArray:
+        """Return the forces along a path, the law's state carried from point to point.
+
+        The anchor of a law with state is set where contact begins, dragged so that the
+        deflection never exceeds max_deflection, and released where contact is lost; it is
+        released before the first point.
+
+        Args:
+            path: successive probe positions [m], shape (n, 3).
+
+        Returns:
+            f [N], shape (n, 3).
+
+        Raises:
+            ParameterError: for another shape, or positions that are not finite.
+        """
+        probes = array("path", path, (None, 3), "m")
+        if not self.law.stateful:
+            return self.force(probes)
+        out = np.empty((len(probes), 3))
+        self._loops.trace_batch(probes, out, self.texture.arguments, self.law_arguments)
+        return out
+
+    def _state(self, count: int, deflection: ArrayLike | None) -> tuple[Any, ...]:
+        if not self.law.stateful:
+            if deflection is not None:
+                raise ParameterError("deflection", f"is meaningless for law {self.law}, stateless")
+            return ()
+        if deflection is None:
+            return (np.zeros((count, 2)),)
+        given = array("deflection", deflection, (count, 2), "m")
+        longest = float(np.hypot(given[:, 0], given[:, 1]).max(initial=0.0))
+        # Rounding of a deflection of exactly that length is forgiven.
+        if longest > self.max_deflection * (1.0 + 1e-12):
+            limit = f"must not be longer than max_deflection = {self.max_deflection} m"
+            raise ParameterError("deflection", limit, longest)
+        return (given,)

@@ -1,0 +1,21 @@
+"""What a surface looks like: one kind of texture per file, and reading measured ones."""
+
+from __future__ import annotations
+
+from asperity.textures.fourier import Fourier
+from asperity.textures.heightmap import HeightMap
+from asperity.textures.loading import load_texture
+from asperity.textures.profile import Profile
+from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.texture import Domain, ScanLine, Texture
+
+__all__ = [
+    "Domain",
+    "Fourier",
+    "HeightMap",
+    "Profile",
+    "ScanLine",
+    "Sinusoid",
+    "Texture",
+    "load_texture",
+]

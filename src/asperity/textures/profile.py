@@ -1,0 +1,129 @@
+"""A measured or drawn profile h(x): a cubic B-spline through equally spaced heights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from types import ModuleType
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from asperity.checks import FloatArray, array, positive, real
+from asperity.errors import ParameterError
+from asperity.textures.heightmap import LEAST_NODES, padded_coefficients
+from asperity.textures.texture import Domain, ScanLine, Texture
+
+
+class Profile(Texture):
+    """The C² cubic B-spline through heights[j] at x = origin + j pitch; constant along y.
+
+    A finite profile is mirrored at its border nodes; a periodic one repeats after n pitch.
+
+    Args:
+        heights: [m], shape (n,), at least 4.
+        pitch: distance of the nodes [m].
+        periodic: whether the profile repeats.
+        origin: position of heights[0] [m].
+        preparation: what was done to the heights, in words, for reports.
+
+    Raises:
+        ParameterError: for fewer than 4 heights, heights that are not finite, or a pitch that
+            is not positive.
+
+    Example:
+        >>> ridge = Profile([0.0, 0.0, 1e-3, 0.0, 0.0], pitch=1e-3)
+        >>> ridge.height([[2e-3, 7.0], [3e-3, 7.0]]).round(9)
+        array([0.001, 0.   ])
+    """
+
+    kind: ClassVar[str] = "profile"
+
+    def __init__(
+        self,
+        heights: ArrayLike,
+        pitch: float,
+        *,
+        periodic: bool = False,
+        origin: float = 0.0,
+        preparation: Sequence[str] = (),
+    ) -> None:
+        self.heights = array("heights", heights, (None,), "m")
+        if len(self.heights) < LEAST_NODES:
+            raise ParameterError("heights", f"must be at least 4 points, got {len(self.heights)}")
+        self.pitch = positive("pitch", pitch, "m")
+        self.periodic = bool(periodic)
+        self.origin = real("origin", origin, "m")
+        self.preparation = tuple(preparation)
+
+    def __repr__(self) -> str:
+        edge = "periodic" if self.periodic else "finite"
+        return f"<Profile of {len(self.heights)} points, pitch {self.pitch} m, {edge}>"
+
+    @property
+    def sampler(self) -> tuple[ModuleType, ...]:
+        """See :class:`Texture`."""
+        from asperity.textures.samplers import profile, search, spline
+
+        return profile, spline, search
+
+    @cached_property
+    def coefficients(self) -> FloatArray:
+        """B-spline coefficients [m], one before the first cell, two after the last."""
+        return padded_coefficients(self.heights, self.periodic)
+
+    @cached_property
+    def arguments(self) -> tuple[Any, ...]:
+        """Coefficients, nodes per metre, origin, periodic."""
+        return self.coefficients, 1.0 / self.pitch, self.origin, self.periodic
+
+    @cached_property
+    def extremes(self) -> tuple[float, float]:
+        """Least and greatest height of the spline [m]: nodes and roots of h' in every cell."""
+        c = np.lib.stride_tricks.sliding_window_view(self.coefficients, 4)
+        c0, c1, c2, c3 = c.T
+        # h'(t) = a t² + b t + d on the cell, t in [0, 1].
+        a, b, d = 0.5 * (c3 - 3 * c2 + 3 * c1 - c0), c0 - 2 * c1 + c2, 0.5 * (c2 - c0)
+        root = np.sqrt(np.maximum(b * b - 4 * a * d, 0.0))
+        half = -0.5 * (b + np.copysign(root, b))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            candidates = np.stack([half / a, d / half, np.zeros_like(a), np.ones_like(a)])
+        t = np.clip(np.nan_to_num(candidates, nan=0.0), 0.0, 1.0)
+        h = (c0 + 4 * c1 + c2) / 6 + t * (d + t * (b / 2 + t * a / 3))
+        return float(h.min()), float(h.max())
+
+    @cached_property
+    def bounds(self) -> tuple[float, float]:
+        """Greatest differences of coefficients (convex hull property of B-splines)."""
+        inflate = 1.0 + 1e-12
+        slope = float(np.abs(np.diff(self.coefficients)).max()) / self.pitch
+        bend = float(np.abs(np.diff(self.coefficients, 2)).max()) / self.pitch**2
+        return inflate * slope, inflate * bend
+
+    @property
+    def _extent(self) -> float:
+        return (len(self.heights) - (0 if self.periodic else 1)) * self.pitch
+
+    @cached_property
+    def domain(self) -> Domain:
+        """One period, or the extent of the profile."""
+        text = "one period" if self.periodic else "the extent of the profile"
+        corner: FloatArray = np.array([self.origin, 0.0])
+        spans = np.array([[self._extent, 0.0]])
+        return Domain(corner, spans, periodic=self.periodic, description=text)
+
+    def scan_line(self) -> ScanLine:
+        """Along x over the whole profile."""
+        start = np.array([self.origin, 0.0])
+        return ScanLine(start, np.array([1.0, 0.0]), self._extent, periodic=self.periodic)
+
+    def describe(self) -> dict[str, Any]:
+        """See :class:`Texture`."""
+        return {
+            "kind": self.kind,
+            "points": len(self.heights),
+            "pitch": self.pitch,
+            "periodic": self.periodic,
+            "preparation": list(self.preparation),
+        }

@@ -1,0 +1,91 @@
+"""h = A sin(k_x x + k_y y + phase)."""
+
+import math
+
+
+def height(x: float, y: float, a: float, kx: float, ky: float, phase: float) -> float:
+    """Return h [m]."""
+    return a * math.sin(kx * x + ky * y + phase)
+
+
+def slope(
+    x: float, y: float, a: float, kx: float, ky: float, phase: float
+) -> tuple[float, float, float]:
+    """Return h [m], h_x, h_y [1]."""
+    angle = kx * x + ky * y + phase
+    c = a * math.cos(angle)
+    return a * math.sin(angle), kx * c, ky * c
+
+
+def curvature(
+    x: float, y: float, a: float, kx: float, ky: float, phase: float
+) -> tuple[float, float, float, float, float, float]:
+    """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
+    angle = kx * x + ky * y + phase
+    h = a * math.sin(angle)
+    c = a * math.cos(angle)
+    return h, kx * c, ky * c, -kx * kx * h, -kx * ky * h, -ky * ky * h
+
+
+def nearest(
+    x: float, y: float, z: float, a: float, kx: float, ky: float, phase: float
+) -> tuple[float, float]:
+    """Return X, Y of the globally nearest surface point.
+
+    Let ψ be the phase angle from the crest on the probe's side (for a probe outside the body,
+    turn the picture over). The foot of a probe at angle u in [0, π] lies on the same monotone
+    flank, in [u, π]: the flank beyond the trough and the one beyond the crest are mirror images
+    and farther away, and at the foot the surface falls in the direction of the foot. There
+
+        F(ψ) = (ψ - u) - k² A sin ψ (A cos ψ - z)
+
+    changes sign exactly once: it is convex from u to the inflection π/2 with F(u) <= 0, and
+    increasing from there on while the surface is above the probe.
+    """
+    k2 = kx * kx + ky * ky
+    angle = kx * x + ky * y + phase
+    amplitude = abs(a)
+    if a < 0.0:
+        angle += math.pi
+    if amplitude == 0.0:
+        return x, y
+    if z > amplitude * math.sin(angle):
+        angle += math.pi
+        z = -z
+    turns = angle / (2.0 * math.pi) - 0.25
+    u = 2.0 * math.pi * (turns - math.floor(turns + 0.5))  # angle from the nearest crest
+    side = 1.0 if u >= 0.0 else -1.0
+    u = abs(u)
+    k2a = k2 * amplitude
+    depth = amplitude * math.cos(u) - z
+    lo = u
+    hi = min(math.pi, u + math.sqrt(k2) * max(depth, 0.0))
+    mid = 0.5 * math.pi
+    if lo < mid < hi:
+        if mid - u + k2a * z <= 0.0:
+            lo = mid
+        else:
+            hi = mid
+    # From the right end: there Newton falls monotonically to the root of a convex F.
+    psi = hi
+    for _ in range(100):
+        s = math.sin(psi)
+        c = math.cos(psi)
+        gap = amplitude * c - z
+        value = psi - u - k2a * s * gap
+        if value == 0.0:
+            break
+        if value > 0.0:
+            hi = psi
+        else:
+            lo = psi
+        rate = 1.0 + k2a * (amplitude * s * s - c * gap)
+        new = psi - value / rate if rate > 0.0 else 0.5 * (lo + hi)
+        if new < lo or new > hi:
+            new = 0.5 * (lo + hi)
+        if abs(new - psi) <= 4e-16 * psi:
+            psi = new
+            break
+        psi = new
+    shift = side * (psi - u) / k2
+    return x + kx * shift, y + ky * shift

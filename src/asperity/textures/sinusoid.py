@@ -1,0 +1,106 @@
+"""The paper's texture: one sinusoid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cached_property
+from types import ModuleType
+from typing import Any, ClassVar
+
+import numpy as np
+
+from asperity.checks import array, positive, real
+from asperity.errors import ParameterError
+from asperity.textures.texture import Domain, ScanLine, Texture
+
+
+class Sinusoid(Texture):
+    """h(x, y) = A sin(2π (x u_x + y u_y)/l + phase).
+
+    Args:
+        amplitude: A [m], half of the peak-to-valley height; positive.
+        period: l [m], positive.
+        phase: [rad].
+        direction: (u_x, u_y) along which the height varies; made a unit vector.
+
+    Raises:
+        ParameterError: for an amplitude or a period that is not positive and finite, or a
+            direction without length.
+
+    Reference:
+        Campion and Hayward, section IV, h(x) = A sin(2π x/l).
+
+    Example:
+        >>> texture = Sinusoid(amplitude=0.8e-3, period=1e-3)
+        >>> texture.height([[0.25e-3, 0.0]])
+        array([0.0008])
+    """
+
+    kind: ClassVar[str] = "sinusoid"
+
+    def __init__(
+        self,
+        amplitude: float,
+        period: float,
+        phase: float = 0.0,
+        direction: Sequence[float] = (1.0, 0.0),
+    ) -> None:
+        self.amplitude = positive("amplitude", amplitude, "m")
+        self.period = positive("period", period, "m")
+        self.phase = real("phase", phase, "rad")
+        vector = array("direction", direction, (2,), "1")
+        length = math.hypot(*vector)
+        if length == 0.0:
+            raise ParameterError("direction", "must have a length", tuple(direction))
+        self.direction = (float(vector[0] / length), float(vector[1] / length))
+
+    def __repr__(self) -> str:
+        return (
+            f"Sinusoid(amplitude={self.amplitude!r}, period={self.period!r}, "
+            f"phase={self.phase!r}, direction={self.direction!r})"
+        )
+
+    @property
+    def sampler(self) -> tuple[ModuleType, ...]:
+        """See :class:`Texture`."""
+        from asperity.textures.samplers import sinusoid
+
+        return (sinusoid,)
+
+    @property
+    def arguments(self) -> tuple[Any, ...]:
+        """Amplitude [m], k_x, k_y [rad/m], phase [rad]."""
+        k = 2.0 * math.pi / self.period
+        return (self.amplitude, k * self.direction[0], k * self.direction[1], self.phase)
+
+    @cached_property
+    def extremes(self) -> tuple[float, float]:
+        """-A and A [m], exactly."""
+        return -self.amplitude, self.amplitude
+
+    @cached_property
+    def bounds(self) -> tuple[float, float]:
+        """2πA/l and 4π²A/l²."""
+        k = 2.0 * math.pi / self.period
+        return k * self.amplitude, k * k * self.amplitude
+
+    @cached_property
+    def domain(self) -> Domain:
+        """One period along the direction."""
+        span = self.period * np.array([self.direction])
+        return Domain(np.zeros(2), span, periodic=True, description="one period")
+
+    def scan_line(self) -> ScanLine:
+        """One period along the direction, through the origin."""
+        return ScanLine(np.zeros(2), np.array(self.direction), self.period, periodic=True)
+
+    def describe(self) -> dict[str, Any]:
+        """See :class:`Texture`."""
+        return {
+            "kind": self.kind,
+            "amplitude": self.amplitude,
+            "period": self.period,
+            "phase": self.phase,
+            "direction": list(self.direction),
+        }
