@@ -9,6 +9,16 @@ x = 0 mod l/2, not mod π/l. Table I agrees. The curl is (-h_y, h_x, 0)·(-k): n
 
 import math
 
+# What the symbols say of this law.
+FACTS = {
+    'conservative': False,
+    'reason': 'the curl is not zero',
+    'curl': ('hy*k', '-hx*k', '0'),
+    'begins_at_zero': True,
+    'looks_at_surface': False,
+    'affine_in_depth': True,
+}
+
 
 def law_force(depth, k):
     """Force on the probe: fx, fy, fz [N]."""

@@ -9,6 +9,16 @@ inside, the force is k δ (-h_x, -h_y, 1), and the Jacobian -k(w wᵀ + δ diag(
 
 import math
 
+# What the symbols say of this law.
+FACTS = {
+    'conservative': True,
+    'reason': 'the curl is zero identically, and the force continuous',
+    'curl': ('0', '0', '0'),
+    'begins_at_zero': True,
+    'looks_at_surface': True,
+    'affine_in_depth': True,
+}
+
 
 def law_force(depth, hx, hy, k):
     """Force on the probe: fx, fy, fz [N]."""

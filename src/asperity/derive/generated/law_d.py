@@ -11,6 +11,16 @@ entry (1, 2) and (41) entry (2, 1) are misprinted.
 
 import math
 
+# What the symbols say of this law.
+FACTS = {
+    'conservative': True,
+    'reason': 'the force is the gradient of a potential in the depth',
+    'curl': ('0', '0', '0'),
+    'begins_at_zero': True,
+    'looks_at_surface': True,
+    'affine_in_depth': False,
+}
+
 
 def law_force(depth, hx, hy, k):
     """Force on the probe: fx, fy, fz [N]."""

@@ -9,6 +9,16 @@ k-Lipschitz even across the medial axis; not conservative.
 
 import math
 
+# What the symbols say of this law.
+FACTS = {
+    'conservative': False,
+    'reason': 'the curl is not zero',
+    'curl': ('hy*k/sqrt(hx**2 + hy**2 + 1)', '-hx*k/sqrt(hx**2 + hy**2 + 1)', '0'),
+    'begins_at_zero': True,
+    'looks_at_surface': False,
+    'affine_in_depth': True,
+}
+
 
 def law_force(depth, k):
     """Force on the probe: fx, fy, fz [N]."""

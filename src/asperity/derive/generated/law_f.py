@@ -14,6 +14,16 @@ phase keeps its transverse stiffness, ∂d/∂p = I - u uᵀ.
 
 import math
 
+# What the symbols say of this law.
+FACTS = {
+    'conservative': False,
+    'reason': 'the force depends on the deflection of the anchor: it is no field of position',
+    'curl': ('dy*friction*k*(h*modulation_depth - h_half - h_mid*modulation_depth)/(2*h_half*max_deflection)', 'dx*friction*k*(-h*modulation_depth + h_half + h_mid*modulation_depth)/(2*h_half*max_deflection)', 'depth*friction*k*modulation_depth*(-dx*hy + dy*hx)/(2*h_half*max_deflection)'),
+    'begins_at_zero': True,
+    'looks_at_surface': True,
+    'affine_in_depth': True,
+}
+
 
 def law_force(depth, h, dx, dy, k, h_mid, h_half, friction, max_deflection, modulation_depth):
     """Force on the probe: fx, fy, fz [N]."""

@@ -7,6 +7,16 @@ Paper: (30). The force is a spring to the nominal plane; q = q⁺ = 1, conservat
 
 import math
 
+# What the symbols say of this law.
+FACTS = {
+    'conservative': True,
+    'reason': 'the curl is zero identically, and the force continuous',
+    'curl': ('0', '0', '0'),
+    'begins_at_zero': True,
+    'looks_at_surface': False,
+    'affine_in_depth': True,
+}
+
 
 def law_force(depth, k):
     """Force on the probe: fx, fy, fz [N]."""

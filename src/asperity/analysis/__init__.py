@@ -1,0 +1,19 @@
+"""A surface (and a device) in, a frozen result out."""
+
+from asperity.analysis.bound import Bound
+from asperity.analysis.characteristic import characteristic_number, one_sided_number
+from asperity.analysis.comparison import Comparison, compare
+from asperity.analysis.leak import Leak
+from asperity.analysis.loops import loop_work
+from asperity.analysis.row import LawRow
+
+__all__ = [
+    "Bound",
+    "Comparison",
+    "LawRow",
+    "Leak",
+    "characteristic_number",
+    "compare",
+    "loop_work",
+    "one_sided_number",
+]

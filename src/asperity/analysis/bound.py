@@ -1,0 +1,53 @@
+"""A number with its pedigree."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Method = Literal["theorem", "closed form", "certified", "sampled"]
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A supremum, with what is known of it.
+
+    Attributes:
+        lower: a value that is attained at ``at``.
+        upper: a proved upper bound; infinity if none is.
+        method: ``"theorem"``, ``"closed form"``, ``"certified"`` or ``"sampled"``.
+        at: the probe position [m] that attains ``lower``, or approaches it from inside; for an
+            infinite number the point where it first becomes so; ``None`` if there is none.
+        note: one sentence on how the number came about.
+
+    Example:
+        >>> Bound(2.0, math.inf, "sampled", (0.0, 0.0, -1e-3)).value
+        2.0
+    """
+
+    lower: float
+    upper: float
+    method: Method
+    at: tuple[float, float, float] | None = None
+    note: str = ""
+
+    @property
+    def value(self) -> float:
+        """``upper`` where one is proved, else ``lower``."""
+        return self.upper if math.isfinite(self.upper) else self.lower
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data; an unbounded number is written as the string "inf"."""
+        return {
+            "value": _plain(self.value),
+            "lower": _plain(self.lower),
+            "upper": _plain(self.upper),
+            "method": self.method,
+            "at": None if self.at is None else list(self.at),
+            "note": self.note,
+        }
+
+
+def _plain(number: float) -> float | str:
+    return number if math.isfinite(number) else "inf"

@@ -1,0 +1,82 @@
+"""Characteristic numbers in closed form, for h = A sin(2πx/l) and depths in [0, D].
+
+G₁ = 2πA/l is the greatest slope, y = 4π²AD/l² the greatest curvature times the depth. All are
+proved in MATH section 4; the tests compare them with the symbolic definition.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from asperity.textures.sinusoid import Sinusoid
+
+ClosedForm = Callable[[Sinusoid, float], float]
+
+
+def _slope(texture: Sinusoid) -> float:
+    return 2.0 * math.pi * texture.amplitude / texture.period
+
+
+def _bend(texture: Sinusoid, depth: float) -> float:
+    return 4.0 * math.pi**2 * texture.amplitude * depth / texture.period**2
+
+
+def q_a(texture: Sinusoid, depth: float) -> float:  # noqa: ARG001 - one signature for all
+    """q_A = √(1 + G₁²); the paper's (10)."""
+    return math.hypot(1.0, _slope(texture))
+
+
+def q_b(texture: Sinusoid, depth: float) -> float:
+    """q_B = max(√(1 + G₁²), y)."""
+    return max(math.hypot(1.0, _slope(texture)), _bend(texture, depth))
+
+
+def q_c(texture: Sinusoid, depth: float) -> float:
+    """q_C = max{1, y, feasible roots λ of the cubic}.
+
+    λ³ - (1 + G₁² + E²/4) λ² + (E²/2) λ - E²/4 = 0 with E = 2πD/l; a root is feasible if λ > 1 and
+    E (λ - 1) <= 2 G₁ λ. At depth 0 the norm is 1 + G₁².
+    """
+    g, e = _slope(texture), 2.0 * math.pi * depth / texture.period
+    cubic = [1.0, -(1.0 + g * g + e * e / 4.0), e * e / 2.0, -e * e / 4.0]
+    roots = np.roots(cubic)
+    real = [float(r.real) for r in roots if abs(r.imag) <= 1e-9 * abs(r)]
+    polished = [_polish(cubic, root) for root in real]
+    feasible = [r for r in polished if r > 1.0 and e * (r - 1.0) <= 2.0 * g * r * (1.0 + 1e-12)]
+    return max(1.0, _bend(texture, depth), *feasible)
+
+
+def _polish(cubic: list[float], root: float) -> float:
+    """Return the root after Newton steps: np.roots loses digits where coefficients differ much."""
+    derivative = np.polyder(cubic)
+    for _ in range(4):
+        rate = float(np.polyval(derivative, root))
+        if rate == 0.0:
+            break
+        root -= float(np.polyval(cubic, root)) / rate
+    return root
+
+
+def q_d(texture: Sinusoid, depth: float) -> float:
+    """q_D = 1 if y <= 1/2, y/(1 - y) if y < 1, infinite from y = 1 on."""
+    y = _bend(texture, depth)
+    if y >= 1.0:
+        return math.inf
+    return max(1.0, y / (1.0 - y))
+
+
+def q_g(texture: Sinusoid, depth: float) -> float:
+    """q_G = max(1, y)."""
+    return max(1.0, _bend(texture, depth))
+
+
+def one_sided_a(texture: Sinusoid, depth: float) -> float:  # noqa: ARG001 - one signature for all
+    """q⁺_A = (1 + √(1 + G₁²))/2: the symmetric part of e_z wᵀ has that eigenvalue."""
+    return 0.5 * (1.0 + math.hypot(1.0, _slope(texture)))
+
+
+Q: dict[str, ClosedForm] = {"A": q_a, "B": q_b, "C": q_c, "D": q_d, "G": q_g}
+ONE_SIDED: dict[str, ClosedForm] = {"A": one_sided_a, "C": q_c}

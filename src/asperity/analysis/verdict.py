@@ -1,0 +1,207 @@
+"""From numbers to words: one line per law, a recommendation, and what was assumed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from asperity.analysis.row import LawRow
+from asperity.devices import Device
+from asperity.surface import Surface
+from asperity.units import engineering
+
+# A texture force below this is taken as not felt where the device's resolution is unknown [N].
+DEFAULT_FELT_FORCE = 0.01
+
+
+def verdict(row: LawRow) -> str:
+    """Return what will go wrong with a law, in one line."""
+    surface, k = row.surface, row.surface.stiffness
+    parts = []
+    if row.safe_stiffness < k:
+        parts.append(f"may buzz: {k:g} N/m is above its {limit_text(row.safe_stiffness)}")
+    if not row.conservative:
+        gain = engineering(row.leak.energy, "J")
+        parts.append(f"feels alive: a loop gains up to {gain}")
+    if not row.continuous:
+        parts.append("clicks: " + row.continuous_reason)
+    if row.texture_force == 0.0:
+        parts.append("no texture")
+    if not parts:
+        parts.append(f"safe at {k:.4g} N/m: passive, conservative, continuous")
+    if row.contact_lost > 0.0 and surface.law.contact != "nominal":
+        parts.append(f"no contact on {100.0 * row.contact_lost:.0f} % of the scan")
+    return "; ".join(parts)
+
+
+def limit_text(stiffness: float) -> str:
+    """Return a greatest stiffness in three digits, rounded down: a limit is never overstated.
+
+    Example:
+        >>> limit_text(975.6), limit_text(5000.0), limit_text(0.8793)
+        ('975 N/m', '5000 N/m', '0.879 N/m')
+    """
+    if stiffness <= 0.0 or not math.isfinite(stiffness):
+        return f"{stiffness:g} N/m"
+    unit = 10.0 ** (math.floor(math.log10(stiffness)) - 2)
+    # The tiny share keeps 5000 from becoming 4990 by rounding of the quotient.
+    return f"{math.floor(stiffness / unit * (1.0 + 1e-12)) * unit:.10g} N/m"
+
+
+def recommend(rows: Sequence[LawRow], device: Device) -> tuple[str, str]:
+    """Return the letter of the recommended law and the reason, in words.
+
+    A law that is conservative and continuous cannot feel alive and does not click; of those the
+    one with the strongest texture at its own safe stiffness is recommended, if it can be felt.
+    Else, of the continuous laws that can be felt, the one that leaks least for its texture force.
+    """
+    textured = [row for row in rows if row.texture_force > 0.0]
+    if not textured:
+        return "", "None of the laws compared renders a texture on this surface."
+    threshold, _source = felt_force(device)
+    felt = [row for row in textured if row.texture_force >= threshold] or textured
+    sound = [row for row in felt if row.conservative and row.continuous]
+    if sound:
+        best = max(sound, key=lambda row: row.texture_force)
+    else:
+        best = min([row for row in felt if row.continuous] or felt, key=_aliveness)
+    head = (
+        f"Use law {best.law.letter} ({_spoken(best)}) at up to {limit_text(best.safe_stiffness)} "
+        f"on the {device.name}"
+    )
+    why = _sound_reason(best) if sound else _least_leak_reason(best, textured, threshold)
+    tail = _price(best, felt) + _saturation(best, device)
+    return best.law.letter, f"{head}: {why}.{tail}"
+
+
+def felt_force(device: Device) -> tuple[float, str]:
+    """Return the texture force below which nothing is felt [N], and where that comes from."""
+    known = device.value("force_resolution")
+    if known is not None:
+        return known, f"the force resolution of the {device.name}"
+    return DEFAULT_FELT_FORCE, "a default, the device's force resolution being unknown"
+
+
+def _sound_reason(best: LawRow) -> str:
+    force = engineering(best.texture_force, "N")
+    return (
+        "its field is conservative and continuous, so it can neither feel alive nor click, "
+        f"and at that stiffness it still gives {force} RMS of texture"
+    )
+
+
+def _least_leak_reason(best: LawRow, textured: Sequence[LawRow], threshold: float) -> str:
+    force = engineering(best.texture_force, "N")
+    gain = engineering(best.leak.energy * best.safe_stiffness / best.surface.stiffness, "J")
+    faint = [row for row in textured if row.conservative and row.continuous]
+    if faint:
+        weak = max(faint, key=lambda row: row.texture_force)
+        why_not = (
+            f"law {weak.law.letter}, conservative and continuous, gives only "
+            f"{engineering(weak.texture_force, 'N')} RMS at its {limit_text(weak.safe_stiffness)}, "
+            f"below the {engineering(threshold, 'N')} that can be felt"
+        )
+    else:
+        why_not = "none of the laws compared is conservative and continuous"
+    return (
+        f"{why_not}; of the continuous laws this one leaks least for its texture force "
+        f"({force} RMS, up to {gain} per loop, so it can feel alive)"
+    )
+
+
+def _spoken(row: LawRow) -> str:
+    return row.law.name.replace("-", " ")
+
+
+def _aliveness(row: LawRow) -> float:
+    """Leak at the law's own safe stiffness over texture force times length of the scan [1]."""
+    if row.safe_stiffness == 0.0:
+        return math.inf
+    gained = row.leak.energy * row.safe_stiffness / row.surface.stiffness
+    return gained / (row.texture_force * row.leak.line.length)
+
+
+def _price(best: LawRow, textured: Sequence[LawRow]) -> str:
+    """Return what the recommended law gives up against the others."""
+    stiffer = [row for row in textured if row.safe_stiffness > 1.5 * best.safe_stiffness]
+    if not stiffer:
+        return ""
+    rival = max(stiffer, key=lambda row: row.safe_stiffness)
+    trouble = []
+    if not rival.conservative:
+        gained = rival.leak.energy * rival.safe_stiffness / rival.surface.stiffness
+        trouble.append(f"gains up to {engineering(gained, 'J')} per loop there")
+    if not rival.continuous:
+        trouble.append("its force jumps")
+    return (
+        f" The price is stiffness: law {rival.law.letter} can be rendered at "
+        f"{limit_text(rival.safe_stiffness)}, but {' and '.join(trouble) or 'has less texture'}."
+    )
+
+
+def _saturation(best: LawRow, device: Device) -> str:
+    """Return a warning if pressing to the full depth asks for more force than there is."""
+    limit = device.value("max_force")
+    pressed = best.safe_stiffness * best.surface.max_depth
+    if limit is None or pressed <= limit:
+        return ""
+    return (
+        f" Pressed to {engineering(best.surface.max_depth, 'm')} it asks for "
+        f"{engineering(pressed, 'N')}; the device gives {engineering(limit, 'N')}."
+    )
+
+
+def assumptions(
+    rows: Sequence[LawRow], device: Device, defaults: Mapping[str, bool], given: set[str]
+) -> tuple[str, ...]:
+    """Return what was assumed, in sentences.
+
+    Args:
+        rows: the laws compared.
+        device: the device.
+        defaults: whether stiffness and max_depth are defaults.
+        given: names of the arguments of the surface that the user gave.
+    """
+    first = rows[0].surface
+    result = [*getattr(first.texture, "preparation", ())]
+    result += _defaulted(rows, defaults, given)
+    datum = device.data["max_stiffness"]
+    mark = "" if datum.verified else " (not verified)"
+    result.append(f"K₀ = {datum.value:g} N/m for the {device.name}{mark}: {datum.source}")
+    unverified = [
+        field.replace("_", " ") for field, d in device.data.items()
+        if not d.verified and field != "max_stiffness"
+    ]  # fmt: skip
+    if unverified:
+        result.append(f"Not verified for the {device.name}: {', '.join(unverified)}")
+    force, source = felt_force(device)
+    result.append(f"Texture below {engineering(force, 'N')} RMS counts as not felt: {source}")
+    if any(row.q.method == "sampled" or row.one_sided.method == "sampled" for row in rows):
+        region = first.texture.domain.description
+        result.append(
+            f"Numbers marked sampled are the greatest found over {region} and depths to "
+            f"{engineering(first.max_depth, 'm')}, not bounds"
+        )
+    result.append(
+        "The leak is a field's work on one slow turn of its worst loop; delay, quantisation and "
+        "friction of the device are not in it"
+    )
+    return tuple(result)
+
+
+def _defaulted(rows: Sequence[LawRow], defaults: Mapping[str, bool], given: set[str]) -> list[str]:
+    first: Surface = rows[0].surface
+    result = []
+    if defaults["stiffness"]:
+        result.append(f"Default stiffness {first.stiffness:g} N/m")
+    if defaults["max_depth"]:
+        depth = engineering(first.max_depth, "m")
+        result.append(f"Default max depth {depth}: the peak-to-valley height, at most 1 mm")
+    for row in rows:
+        for name in row.law.parameters:
+            if name not in given and name in {"friction", "max_deflection", "modulation_depth"}:
+                value = getattr(row.surface, name)
+                text = engineering(value, "m") if name == "max_deflection" else f"{value:g}"
+                spoken = name.replace("_", " ")
+                result.append(f"Default {spoken} {text} for law {row.law.letter}")
+    return result

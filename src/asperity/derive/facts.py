@@ -1,0 +1,85 @@
+"""What the mathematics of a law says once and for all, without loading SymPy for shipped laws."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+
+from asperity.laws import LAWS, Law
+
+
+@dataclass(frozen=True)
+class LawFacts:
+    """Facts about a law that follow from its symbols.
+
+    Attributes:
+        conservative: whether the work around every closed path is zero.
+        reason: why, or why not.
+        curl: the three components of the symbolic curl, as text.
+        begins_at_zero: whether the force vanishes with the depth.
+        looks_at_surface: whether the force depends on more of the surface than the depth.
+        affine_in_depth: whether the Jacobian is affine in the depth at a fixed contact point; a
+            norm of it is then convex, and greatest at an end of the depth range.
+    """
+
+    conservative: bool
+    reason: str
+    curl: tuple[str, str, str]
+    begins_at_zero: bool
+    looks_at_surface: bool
+    affine_in_depth: bool
+
+
+@lru_cache(maxsize=64)
+def law_facts(law: Law) -> LawFacts:
+    """Return the facts of a law: from its generated file, or derived now for a law of your own.
+
+    Example:
+        >>> from asperity.laws import find_law
+        >>> law_facts(find_law("D")).conservative
+        True
+    """
+    if LAWS.get(law.letter) is not law:
+        return derive_facts(law)
+    from asperity.derive.generate import generated_path
+
+    tree = ast.parse(generated_path(law).read_text(encoding="utf-8"))
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "FACTS":
+            return LawFacts(**ast.literal_eval(node.value))
+    raise AssertionError(f"no FACTS in the generated file of law {law.letter}")
+
+
+def derive_facts(law: Law) -> LawFacts:
+    """Derive the facts of a law from its symbols.
+
+    Raises:
+        LawError: see :func:`asperity.derive.jacobian.derive`.
+    """
+    import sympy as sp
+
+    from asperity.derive.curl import curl_verdict
+    from asperity.derive.jacobian import derive, explicit
+    from asperity.laws.symbols import DEPTH, HX, HY, POSITION, H
+
+    verdict = curl_verdict(law)
+    derivation = derive(law)
+    force = derivation.force
+    bend = explicit(derivation, derivation.jacobian).diff(DEPTH, 2)
+    moves = bool(derivation.jacobian.free_symbols & set(POSITION))
+    x, y, z = (str(component) for component in verdict.curl)
+    return LawFacts(
+        conservative=verdict.conservative,
+        reason=verdict.reason,
+        curl=(x, y, z),
+        begins_at_zero=bool(force.subs(DEPTH, 0) == sp.zeros(3, 1)),
+        looks_at_surface=bool(force.free_symbols & {H, HX, HY}),
+        affine_in_depth=not moves and all(sp.simplify(entry) == 0 for entry in bend),
+    )
+
+
+def facts_source(law: Law) -> str:
+    """Return the facts as the assignment that the generated file carries."""
+    lines = [f"    {name!r}: {value!r}," for name, value in asdict(derive_facts(law)).items()]
+    return "\n".join(["FACTS = {", *lines, "}"])
