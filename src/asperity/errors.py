@@ -33,12 +33,26 @@ class ParameterError(AsperityError, ValueError):
         super().__init__(f"{argument} {requirement}{tail}")
 
 
-class SurfaceFileError(AsperityError):
-    """A surface file that cannot be read, with the reason."""
+class SurfaceFileError(ParameterError):
+    """A surface file that cannot be read, with the reason; the argument is ``path``."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__("path", reason)
+        self.args = (reason,)
+
+    def __str__(self) -> str:
+        return self.requirement
 
 
-class LawError(AsperityError):
-    """A law whose mathematics cannot be used, with the reason."""
+class LawError(ParameterError):
+    """A law whose mathematics cannot be used, with the reason; the argument is ``law``."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__("law", reason)
+        self.args = (reason,)
+
+    def __str__(self) -> str:
+        return self.requirement
 
 
 def nearest_names(name: str, known: Iterable[str]) -> str:
@@ -52,7 +66,7 @@ def nearest_names(name: str, known: Iterable[str]) -> str:
         A phrase for the end of an error message.
     """
     choice = sorted(known)
-    close = difflib.get_close_matches(name.lower(), [c.lower() for c in choice], n=2, cutoff=0.5)
-    hits = [c for c in choice if c.lower() in close]
+    lowered = {c.lower(): c for c in choice}
+    hits = [lowered[c] for c in difflib.get_close_matches(name.lower(), lowered, n=2, cutoff=0.65)]
     hint = f"did you mean {' or '.join(repr(h) for h in hits)}? " if hits else ""
     return f"{hint}known: {', '.join(choice)}"

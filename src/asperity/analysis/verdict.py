@@ -28,7 +28,7 @@ def verdict(row: LawRow) -> str:
     if row.texture_force == 0.0:
         parts.append("no texture")
     if not parts:
-        parts.append(f"safe at {k:.4g} N/m: passive, conservative, continuous")
+        parts.append(f"sound at {k:g} N/m: below its limit, conservative, continuous")
     if row.contact_lost > 0.0 and surface.law.contact != "nominal":
         parts.append(f"no contact on {100.0 * row.contact_lost:.0f} % of the scan")
     return "; ".join(parts)

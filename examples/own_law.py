@@ -1,0 +1,38 @@
+"""A ninth law in ten lines, and everything that follows from it.
+
+Run it: ``python examples/own_law.py``. The law below is C with a spring that stiffens with depth,
+f = -∇(k δ⁴/(4 D²)): it is written as mathematics, and its Jacobian, the proof that it is
+conservative, its compiled kernel and its row in the comparison are derived.
+"""
+
+import asperity as asp
+from asperity.derive.curl import curl_verdict
+from asperity.derive.jacobian import derive
+from asperity.derive.python_source import law_source
+
+STIFFENING = asp.Law(
+    letter="S",
+    name="stiffening-change-of-height",
+    contact="vertical",
+    force=lambda c: c.k * c.depth**3 / c.parameter("reference_depth") ** 2 * c.w,
+    summary="gradient of the energy k δ⁴/(4 D²)",
+    parameters={"reference_depth": 0.3e-3},
+)
+
+
+def main() -> None:
+    """Show what follows from the law."""
+    print("Jacobian:", derive(STIFFENING).jacobian)
+    print("Curl:", curl_verdict(STIFFENING).reason)
+    print("Kernel:", law_source(STIFFENING), sep="\n")
+    texture = asp.Sinusoid(amplitude=0.1e-3, period=2e-3)
+    result = asp.compare(texture, laws=["C", STIFFENING], max_depth=0.3e-3)
+    for row in result.rows:
+        print(
+            f"{row.law.letter}: q = {row.q.value:.3f} ({row.q.method}), "
+            f"up to {row.safe_stiffness:.0f} N/m, conservative: {row.conservative}; {row.verdict}"
+        )
+
+
+if __name__ == "__main__":
+    main()

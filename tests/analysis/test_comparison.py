@@ -1,0 +1,172 @@
+"""The main job: rows, rules, recommendation, words and plain data."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+import asperity as asp
+from asperity.analysis.verdict import limit_text
+from asperity.devices import parse_device
+from asperity.errors import ParameterError
+from asperity.laws import Law
+
+PAPER = asp.Sinusoid(amplitude=0.8e-3, period=1e-3)
+
+
+@pytest.fixture(scope="module")
+def result() -> asp.Comparison:
+    return asp.compare(PAPER, device="omega.3")
+
+
+def test_one_row_per_law_in_order(result: asp.Comparison) -> None:
+    assert "".join(row.law.letter for row in result.rows) == "WABCDEFG"
+
+
+def test_safe_stiffness_follows_the_named_rule(result: asp.Comparison) -> None:
+    for row in result.rows:
+        number = row.one_sided if row.conservative else row.q
+        assert row.rule == ("K₀/q⁺" if row.conservative else "K₀/q")
+        assert row.safe_stiffness == pytest.approx(5000.0 / number.value, rel=1e-15)
+
+
+def test_the_paper_s_table_ii(result: asp.Comparison) -> None:
+    conservative = "".join(row.law.letter for row in result.rows if row.conservative)
+    jumps = "".join(row.law.letter for row in result.rows if not row.continuous)
+    assert (conservative, jumps) == ("WCD", "D")
+
+
+def test_texture_force_is_the_ripple_at_the_safe_stiffness(result: asp.Comparison) -> None:
+    row = result.row("A")
+    surface = asp.Surface(PAPER, "A", stiffness=row.safe_stiffness)
+    x = (np.arange(5000) + 0.5) / 5000 * 1e-3
+    z = np.full(5000, PAPER.amplitude - result.max_depth)
+    force = surface.force(np.column_stack([x, 0 * x, z]))
+    assert row.texture_force == pytest.approx(math.sqrt(force.var(axis=0).sum()), rel=1e-3)
+
+
+def test_leak_scales_with_the_stiffness(result: asp.Comparison) -> None:
+    doubled = asp.compare(PAPER, laws="A", stiffness=2000.0)
+    assert doubled.row("A").leak.energy == pytest.approx(2 * result.row("A").leak.energy, rel=1e-12)
+    assert doubled.row("A").safe_stiffness == result.row("A").safe_stiffness
+
+
+def test_verdicts_name_what_goes_wrong(result: asp.Comparison) -> None:
+    assert "may buzz" in result.row("A").verdict
+    assert "feels alive" in result.row("E").verdict
+    assert "clicks" in result.row("D").verdict
+    assert result.row("W").verdict == "no texture"
+
+
+def test_recommends_a_sound_law_that_can_be_felt(result: asp.Comparison) -> None:
+    assert result.recommended == "C"
+    assert "conservative and continuous" in result.recommendation
+
+
+def test_recommends_the_least_leak_where_no_sound_law_can_be_felt() -> None:
+    steep = asp.Sinusoid(amplitude=2e-3, period=0.5e-3)
+    found = asp.compare(steep, device="touch")
+    weak = found.row("C")
+    assert weak.texture_force < 0.01  # the premise
+    assert found.recommended != "C"
+    assert "can be felt" in found.recommendation
+    chosen = found.row(found.recommended)
+    assert chosen.continuous
+    assert not chosen.conservative
+
+
+def test_nothing_to_recommend_without_texture() -> None:
+    assert asp.compare(PAPER, laws="W").recommended == ""
+
+
+def test_every_default_is_named(result: asp.Comparison) -> None:
+    text = " ".join(result.assumptions)
+    for part in ("stiffness 1000", "max depth 1 mm", "friction 0.8", "max deflection 1 mm",
+                 "modulation depth 0.8", "K₀ = 5000", "update rate"):  # fmt: skip
+        assert part in text
+    given = asp.compare(PAPER, laws="F", stiffness=500.0, max_depth=1e-4, friction=0.5)
+    text = " ".join(given.assumptions)
+    assert "Default stiffness" not in text
+    assert "Default max depth" not in text
+    assert "Default friction" not in text
+    assert "Default modulation depth" in text
+
+
+def test_plain_data_is_json_without_nan(result: asp.Comparison) -> None:
+    text = json.dumps(result.to_dict(), allow_nan=False)
+    data = json.loads(text)
+    assert data["schema"] == 1
+    god_object = data["laws"][4]
+    assert god_object["law"] == "D"
+    assert god_object["q"]["value"] == "inf"
+    assert data["laws"][1]["q"]["value"] == pytest.approx(5.125054855, abs=1e-8)
+
+
+def test_a_law_of_one_s_own_gets_a_row() -> None:
+    own = Law(
+        "S", "stiffening", "vertical",
+        lambda c: c.k * c.depth**3 / c.parameter("reference") ** 2 * c.w,
+        parameters={"reference": 0.3e-3},
+    )  # fmt: skip
+    gentle = asp.Sinusoid(amplitude=0.1e-3, period=2e-3)
+    row = asp.compare(gentle, laws=["C", own], max_depth=0.3e-3).row("S")
+    assert row.conservative
+    assert row.q.method == "sampled"
+    # ‖J‖ at full depth by hand: on a grid of phases.
+    x = np.linspace(0, 2e-3, 4001)
+    d = gentle.derivatives(np.column_stack([x, 0 * x]))
+    depth = 0.3e-3
+    xx = (3 * d[:, 1] ** 2 + depth * d[:, 3]) * depth**2 / 0.3e-3**2
+    xz, zz = -3 * d[:, 1] * depth**2 / 0.3e-3**2, 3 * depth**2 / 0.3e-3**2
+    matrices = np.stack([np.stack([xx, xz], -1), np.stack([xz, np.full_like(xz, zz)], -1)], -2)
+    assert row.q.value == pytest.approx(np.linalg.norm(matrices, 2, axis=(1, 2)).max(), rel=1e-6)
+
+
+def test_measured_profile_and_map_have_finite_rows() -> None:
+    rng = np.random.default_rng(4)
+    for texture in (
+        asp.Profile(1e-5 * rng.normal(size=40), 1e-4),
+        asp.HeightMap(1e-5 * rng.normal(size=(12, 15)), 1e-4),
+    ):
+        found = asp.compare(texture, laws="ABCEG", max_depth=2e-5)
+        for row in found.rows:
+            assert math.isfinite(row.q.value)
+            assert row.q.value >= 1.0 - 1e-12
+            assert row.leak.energy >= 0.0
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "text"),
+    [(975.69, "975 N/m"), (5000.0, "5000 N/m"), (0.8793, "0.879 N/m"), (12_345.0, "12300 N/m")],
+)
+def test_limits_are_rounded_down(stiffness: float, text: str) -> None:
+    assert limit_text(stiffness) == text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        ({"stiffness": -1.0}, "stiffness"),
+        ({"stiffness": math.nan}, "stiffness"),
+        ({"max_depth": 0.0}, "max_depth"),
+        ({"laws": "WX"}, "law"),
+        ({"laws": "WW"}, "laws"),
+        ({"laws": ""}, "laws"),
+        ({"device": "omega3"}, "device"),
+        ({"modulation_depth": 1.5}, "modulation_depth"),
+        ({"friction": -0.1}, "friction"),
+        ({"max_deflection": math.inf}, "max_deflection"),
+    ],
+)
+def test_bad_arguments_are_named(arguments: dict[str, object], name: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        asp.compare(PAPER, **arguments)  # type: ignore[arg-type]
+    assert caught.value.argument == name
+
+
+def test_a_device_without_stiffness_is_refused() -> None:
+    with pytest.raises(ParameterError, match="max_stiffness"):
+        asp.compare(PAPER, device=parse_device({"max_force": "3 N"}, "mine"))

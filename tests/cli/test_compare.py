@@ -1,0 +1,261 @@
+"""The command line as its users see it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity.cli.main import main
+
+Call = Callable[..., tuple[int, str, str]]
+
+SPEC = "sinusoid:amplitude=0.8mm,period=1mm"
+DATA = Path(__file__).parents[3] / "shared" / "data"
+needs_data = pytest.mark.skipif(
+    not DATA.is_dir(), reason="the real surfaces of ../shared/data are not there"
+)
+
+
+def run(
+    arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> tuple[int, str, str]:
+    """Run the command in this process; return exit code, standard output, standard error."""
+    monkeypatch.setattr(sys, "argv", ["asperity", *arguments])
+    code = 0
+    try:
+        main()
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+@pytest.fixture
+def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+    return lambda *arguments: run(list(arguments), monkeypatch, capsys)
+
+
+def test_table_has_one_row_per_law_with_the_letter_first(call: Call) -> None:
+    code, out, err = call("compare", SPEC)
+    assert code == 0
+    assert err == ""
+    rows = [line.split()[0] for line in out.splitlines() if line[:2].strip() and line[1:2] == " "]
+    for letter in "WABCDEFG":
+        assert letter in rows
+    assert "omega.3" in out
+    assert "Default stiffness 1000 N/m" in out
+
+
+def test_json_on_standard_output_is_alone(call: Call) -> None:
+    code, out, err = call("compare", SPEC, "--laws", "AD", "--json", "-")
+    data = json.loads(out)
+    assert (code, err) == (0, "")
+    assert [row["law"] for row in data["laws"]] == ["A", "D"]
+    assert data["laws"][1]["q"]["value"] == "inf"
+
+
+def test_html_on_standard_output_is_alone(call: Call) -> None:
+    code, out, err = call("compare", SPEC, "--laws", "WA", "--html", "-")
+    assert (code, err) == (0, "")
+    assert out.lstrip().lower().startswith("<!doctype html>")
+    assert out.rstrip().endswith("</html>")
+
+
+def test_files_are_written_whole(call: Call, tmp_path: Path) -> None:
+    json_path, html_path = tmp_path / "a.json", tmp_path / "a.html"
+    code, out, _err = call(
+        "compare", SPEC, "--laws", "WC", "--json", str(json_path), "--html", str(html_path)
+    )
+    assert code == 0
+    assert json.loads(json_path.read_text("utf-8"))["schema"] == 1
+    assert "</html>" in html_path.read_text("utf-8")
+    assert html_path.stat().st_size < 3_000_000
+    assert str(html_path) in out.replace("\n", "")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.html", "a.json"]
+
+
+def test_a_stiffness_above_the_limit_is_a_verdict(call: Call) -> None:
+    code, out, _err = call("compare", SPEC, "--laws", "A", "--stiffness", "9000N/m")
+    assert code == 0
+    assert "may buzz" in out
+
+
+def test_options_reach_the_result(call: Call) -> None:
+    given = "--stiffness=500 N/m;--max-depth=0.2mm;--friction=0.3;--max-deflection=0.5mm"
+    options = [*given.split(";"), "--modulation-depth=0.5", "--device=TOUCH"]
+    _code, out, _err = call("compare", SPEC, "--laws", "F", *options, "--json", "-")
+    data = json.loads(out)
+    assert (data["stiffness"], data["max_depth"], data["device"]["id"]) == (500.0, 0.0002, "touch")
+    # q_F of these parameters by the exact one-dimensional maximum, on a grid of phases.
+    x = np.linspace(0, 1e-3, 200_001)
+    m = (1 + 0.5 * np.sin(2 * np.pi * x / 1e-3)) / 2
+    slope = np.abs(0.25 * 2 * np.pi / 1e-3 * np.cos(2 * np.pi * x / 1e-3))
+    a, b = 0.3 * 0.2e-3 * ((1 - m) / 0.5e-3 + slope), 0.3 * (1 - m)
+    t = 1 + a**2 + b**2
+    expected = np.sqrt((t + np.sqrt(t**2 - 4 * a**2)) / 2).max()
+    assert data["laws"][0]["q"]["value"] == pytest.approx(expected, rel=1e-8)
+
+
+def test_scene_file_with_an_option_that_overrides_it(call: Call, tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        '[texture]\nkind = "sinusoid"\namplitude = "0.4 mm"\nperiod = "1.5 mm"\n'
+        '[surface]\nlaw = "C"\nstiffness = "800 N/m"\nmax_depth = "0.5 mm"\n'
+        '[device]\nid = "pantograph"\n'
+    )
+    _code, out, _err = call("compare", str(scene), "--laws", "A", "--json", "-")
+    data = json.loads(out)
+    assert (data["stiffness"], data["device"]["id"]) == (800.0, "pantograph")
+    _code, out, _err = call("compare", str(scene), "--laws", "A", "--json", "-",
+                            "--stiffness", "300", "--device", "inverse3")  # fmt: skip
+    data = json.loads(out)
+    assert (data["stiffness"], data["device"]["id"]) == (300.0, "inverse3")
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("sample-land.x3p", ["--magnify", "20", "--device", "touch"]),
+        ("testing.x3p", ["--magnify", "0.01"]),
+        ("dektak-1.csv", ["--magnify", "20", "--magnify-height", "500"]),
+    ],
+)
+def test_real_surfaces(call: Call, name: str, options: list[str]) -> None:
+    code, out, _err = call("compare", str(DATA / name), *options, "--laws", "WACG", "--json", "-")
+    data = json.loads(out)
+    assert code == 0
+    assert len(data["laws"]) == 4
+    assert any("magnified" in step for step in data["texture"]["preparation"])
+    assert all(row["q"]["value"] >= 1.0 for row in data["laws"])
+
+
+@needs_data
+def test_foreign_real_file_is_refused(call: Call) -> None:
+    code, _out, err = call("compare", str(DATA / "frt-2.frt"))
+    assert code == 2
+    assert "frt-2.frt" in err
+
+
+BAD = [
+    (["none.x3p"], "none.x3p"),
+    (["sinusoid:amplitude=0.8mm"], "period"),
+    (["sinusoid:amplitude=nan,period=1mm"], "amplitude"),
+    (["sinusoid:amplitude=0.8mm,period=-1mm"], "period"),
+    (["sinusiod:amplitude=0.8mm,period=1mm"], "did you mean 'sinusoid'"),
+    ([SPEC, "--stiffness", "0"], "stiffness"),
+    ([SPEC, "--stiffness", "-5N/m"], "stiffness"),
+    ([SPEC, "--stiffness", "nan"], "stiffness"),
+    ([SPEC, "--max-depth", "0mm"], "max_depth"),
+    ([SPEC, "--max-depth", "inf"], "max_depth"),
+    ([SPEC, "--modulation-depth", "1.2"], "modulation_depth"),
+    ([SPEC, "--laws", "AXB"], "law"),
+    ([SPEC, "--laws", "god-objct"], "did you mean 'god-object'"),
+    ([SPEC, "--device", "omga.3"], "did you mean 'omega.3'"),
+    ([SPEC, "--device", "none.toml"], "none.toml"),
+    ([SPEC, "--magnify", "2"], "magnify"),
+    ([SPEC, "--html", "no/such/folder/r.html"], "html"),
+    ([SPEC, "--json", "no/such/folder/r.json"], "json"),
+    ([SPEC, "--json", "-", "--html", "-"], "standard output"),
+    ([SPEC, "--no-such-option"], "--no-such-option"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD, ids=lambda v: str(v)[-40:])
+def test_bad_input_is_one_line_and_writes_nothing(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = call("compare", *arguments)
+    assert code == 2
+    assert out == ""
+    assert message in err
+    assert "Traceback" not in err
+    if "--no-such-option" not in arguments:
+        assert len(err.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def _bad_maps(folder: Path) -> dict[str, list[str]]:
+    """Write surfaces that must be refused; return the options to read each with."""
+    rng = np.random.default_rng(0)
+    good = rng.normal(size=(8, 8)) * 1e-5
+    holes = good.copy()
+    holes[:3] = np.nan
+    for name, array in {
+        "row.npy": good[:1], "small.npy": good[:3, :3], "missing.npy": good * np.nan,
+        "holes.npy": holes, "infinite.npy": np.where(good > 1e-5, np.inf, good), "good.npy": good,
+    }.items():  # fmt: skip
+        np.save(folder / name, array)
+    (folder / "empty.x3p").write_bytes(b"")
+    (folder / "cut.npy").write_bytes((folder / "good.npy").read_bytes()[:200])
+    (folder / "words.txt").write_text("this is no surface\n")
+    (folder / "picture.png").write_bytes(b"\x89PNG\r\n\x1a\n" + hashlib.sha256(b"x").digest())
+    pitch = ["--pitch", "10um"]
+    names = [path.name for path in folder.iterdir() if path.name != "good.npy"]
+    bad = dict.fromkeys(names, pitch)
+    bad["good.npy"] = []  # the pitch is missing
+    return bad
+
+
+def test_bad_files_are_one_line(call: Call, tmp_path: Path) -> None:
+    for name, options in _bad_maps(tmp_path).items():
+        code, out, err = call("compare", str(tmp_path / name), *options)
+        assert (code, out) == (2, ""), name
+        assert len(err.strip().splitlines()) == 1, (name, err)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [["--magnify", "0"], ["--magnify", "-2"], ["--magnify", "nan"], ["--cutoff", "5um"],
+     ["--cutoff", "-1mm"], ["--pitch", "0"], ["--height-range", "-1mm"], ["--magnify-height", "0"]],
+)  # fmt: skip
+def test_bad_preparation_is_one_line(call: Call, tmp_path: Path, options: list[str]) -> None:
+    path = tmp_path / "map.npy"
+    np.save(path, np.random.default_rng(0).normal(size=(8, 8)) * 1e-5)
+    code, out, err = call("compare", str(path), "--pitch", "10um", *options)
+    assert (code, out) == (2, "")
+    assert options[0].removeprefix("--").replace("-", "_") in err
+
+
+def test_help_and_version(call: Call) -> None:
+    code, out, _err = call("--help")
+    assert code == 0
+    assert "compare" in out
+    code, out, _err = call("--version")
+    assert (code, out.split()[0]) == (0, "asperity,")
+
+
+def test_starting_up_loads_nothing_heavy() -> None:
+    """Start-up is a feature: --help must not import the numerical libraries."""
+    code = (
+        "import sys; sys.argv = ['asperity', '--help']\n"
+        "from asperity.cli.main import main\n"
+        "try: main()\nexcept SystemExit: pass\n"
+        "heavy = {'numpy', 'scipy', 'sympy', 'numba', 'matplotlib', 'pint', 'rich', 'jinja2'}\n"
+        "sys.exit(str(sorted(heavy & set(sys.modules))) if heavy & set(sys.modules) else 0)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, env=os.environ
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_comparing_shipped_laws_does_not_load_sympy() -> None:
+    code = (
+        "import sys, asperity as asp\n"
+        "asp.compare(asp.Sinusoid(amplitude=1e-4, period=1e-3))\n"
+        "sys.exit('sympy was loaded' if 'sympy' in sys.modules else 0)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, env=os.environ
+    )
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,56 @@
+"""Quantities as text."""
+
+from __future__ import annotations
+
+import pytest
+
+from asperity.errors import ParameterError
+from asperity.units import engineering, quantity
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("0.8mm", "m", 0.0008),
+        ("0.8 mm", "m", 0.0008),
+        ("500N/m", "N/m", 500.0),
+        ("500 N/m", "N/m", 500.0),
+        ("0.5 N/mm", "N/m", 500.0),
+        ("5 µm", "m", 5e-6),
+        ("5um", "m", 5e-6),
+        ("1e-3 m", "m", 1e-3),
+        ("2 rad/mm", "rad/m", 2000.0),
+        ("90 deg", "rad", 1.5707963267948966),
+        ("3", "N/m", 3.0),
+        (3, "N/m", 3.0),
+        ("20", "", 20.0),
+    ],
+)
+def test_quantities(text: str | float, unit: str, value: float) -> None:
+    assert quantity("x", text, unit) == value
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [("5 N", "m"), ("abc", "m"), ("5 foo", "m"), ("nan", "m"), ("inf", "m"), ("", "m"),
+     ("5 mm", ""), (True, "m"), (None, "m"), ("5 m; import os", "m"), ("1e999", "m")],
+)  # fmt: skip
+def test_bad_quantities_name_the_argument(text: object, unit: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        quantity("period", text, unit)  # type: ignore[arg-type]
+    assert caught.value.argument == "period"
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.0008, "m", "0.8 mm"),
+        (5e-6, "m", "5 µm"),
+        (0.00165, "J", "1.65 mJ"),
+        (5000.0, "N/m", "5000 N/m"),
+        (975.69, "N/m", "976 N/m"),
+        (0.0, "J", "0 J"),
+    ],
+)
+def test_engineering(value: float, unit: str, text: str) -> None:
+    assert engineering(value, unit) == text
