@@ -1,0 +1,33 @@
+"""Run the parts of the benchmark that are named on the command line, or all of them."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+
+from rich.console import Console
+
+from bench import cache, kernels, nearest, startup
+
+PARTS: dict[str, Callable[[Console], None]] = {
+    "kernels": kernels.run,
+    "cache": cache.run,
+    "nearest": nearest.run,
+    "startup": startup.run,
+}
+
+
+def main(arguments: Sequence[str]) -> int:
+    unknown = [name for name in arguments if name not in PARTS]
+    if unknown:
+        print(f"unknown part {unknown[0]!r}; choose from {', '.join(PARTS)}", file=sys.stderr)
+        return 2
+    console = Console(width=100, highlight=False)
+    for name in arguments or PARTS:
+        console.rule(name)
+        PARTS[name](console)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
