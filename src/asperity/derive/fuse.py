@@ -13,7 +13,6 @@ import inspect
 import os
 import sys
 import tempfile
-from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
@@ -35,12 +34,14 @@ import numpy as np
 from numba import njit
 
 scalar = njit(error_model="numpy")
+inlined = njit(error_model="numpy", forceinline=True)
 loop = njit(error_model="numpy", cache=True, nogil=True)
 
 
 '''
 
 
+@lru_cache(maxsize=256)
 def kernel_source(law: Law) -> str:
     """Return the kernels of a law: the shipped file, or derived now for a user's own law."""
     if LAWS.get(law.letter) is law:
@@ -50,7 +51,8 @@ def kernel_source(law: Law) -> str:
     return law_source(law)
 
 
-def fuse_surface(law: Law, sampler: Iterable[ModuleType], clamp: ClampName) -> ModuleType:
+@lru_cache(maxsize=256)
+def fuse_surface(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) -> ModuleType:
     """Return the compiled loops of a law on a texture kind.
 
     Args:
@@ -62,12 +64,12 @@ def fuse_surface(law: Law, sampler: Iterable[ModuleType], clamp: ClampName) -> M
         A module with ``force_batch``, ``jacobian_batch``, ``trace_batch`` if the law has state.
     """
     plan = DriverPlan(law, kernel_source(law), clamp)
-    modules = tuple(sampler)
-    title = f"Law {law.letter} on {modules[0].__name__.rpartition('.')[2]}, clamp {clamp}."
-    source = "\n\n".join([sampler_source(modules), plan.source, driver_source(plan)])
+    title = f"Law {law.letter} on {sampler[0].__name__.rpartition('.')[2]}, clamp {clamp}."
+    source = "\n\n".join([sampler_source(sampler), plan.source, driver_source(plan)])
     return load_fused(_HEADER.format(title=title) + decorate(source))
 
 
+@lru_cache(maxsize=256)
 def fuse_contact(law: Law) -> ModuleType:
     """Return the compiled loop of a law over given contacts: ``contact_batch``."""
     plan = DriverPlan(law, kernel_source(law), "none")
@@ -75,15 +77,15 @@ def fuse_contact(law: Law) -> ModuleType:
     return load_fused(_HEADER.format(title=f"Law {law.letter} at contacts.") + decorate(source))
 
 
-def fuse_sampler(sampler: Iterable[ModuleType]) -> ModuleType:
+@lru_cache(maxsize=64)
+def fuse_sampler(sampler: tuple[ModuleType, ...]) -> ModuleType:
     """Return the compiled loops of a texture kind.
 
     Functions ``height_batch``, ``slope_batch``, ``curvature_batch`` (points (n, 2), result array)
     and ``nearest_batch`` (points (n, 3), result (n, 2)).
     """
-    modules = tuple(sampler)
-    title = f"Texture {modules[0].__name__.rpartition('.')[2]}."
-    source = "\n\n".join([sampler_source(modules), _SAMPLER_LOOPS])
+    title = f"Texture {sampler[0].__name__.rpartition('.')[2]}."
+    source = "\n\n".join([sampler_source(sampler), _SAMPLER_LOOPS])
     return load_fused(_HEADER.format(title=title) + decorate(source))
 
 
@@ -143,9 +145,20 @@ def decorate(source: str) -> str:
     for line in source.splitlines():
         if line.startswith("def "):
             name = line[4 : line.index("(")]
-            lines.append("@loop" if name.endswith("_batch") else "@scalar")
+            lines.append(_decorator(name))
         lines.append(line)
     return "\n".join(lines) + "\n"
+
+
+# Too large to be copied to every place that calls them.
+_CALLED = {"nearest", "search_cell", "search_box", "descend", "polish", "patch_bounds"}
+
+
+def _decorator(name: str) -> str:
+    """Return how a function is compiled; LLVM leaves calls of mid-sized ones, 20 to 40 ns each."""
+    if name.endswith("_batch"):
+        return "@loop"
+    return "@scalar" if name in _CALLED else "@inlined"
 
 
 @lru_cache(maxsize=1)

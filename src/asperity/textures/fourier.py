@@ -12,12 +12,14 @@ from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray, array
 from asperity.errors import ParameterError
-from asperity.textures.lattice import integer_basis, multiples_of
+from asperity.textures.lattice import integer_lattice
 from asperity.textures.texture import Domain, ScanLine, Texture
 
 # How many of the longest waves stand for a sum that never repeats.
 _WAVES_OF_AN_ENDLESS_SUM = 16
 _CELL_LIMIT = 400_000
+# Suprema are searched over at most this many independent phases.
+_LARGEST_TORUS = 3
 
 
 class Fourier(Texture):
@@ -90,9 +92,9 @@ class Fourier(Texture):
         return bool(np.abs(cross).max() < 1e-14)
 
     @cached_property
-    def basis(self) -> FloatArray:
-        """Independent wave vectors [rad/m], shape (r, 2): all others are integer sums of them."""
-        return integer_basis(self.wavevectors)
+    def lattice(self) -> tuple[FloatArray, FloatArray]:
+        """Independent wave vectors B [rad/m], (r, 2), and integers N with wavevectors = N @ B."""
+        return integer_lattice(self.wavevectors)
 
     @cached_property
     def extremes(self) -> tuple[float, float]:
@@ -110,12 +112,12 @@ class Fourier(Texture):
     @cached_property
     def _periods(self) -> FloatArray | None:
         """Edge vectors of one period [m], or nothing for a sum that never repeats."""
-        rank = len(self.basis)
-        if rank == 1:
-            wave = self.basis[0]
+        basis, _multiples = self.lattice
+        if len(basis) == 1:
+            wave = basis[0]
             return 2.0 * math.pi * wave[None, :] / (wave @ wave)
-        if rank == 2 and not self._parallel:
-            return np.ascontiguousarray(2.0 * math.pi * np.linalg.inv(self.basis).T)
+        if len(basis) == 2 and not self._parallel:
+            return np.ascontiguousarray(2.0 * math.pi * np.linalg.inv(basis).T)
         return None
 
     @cached_property
@@ -167,10 +169,10 @@ class Fourier(Texture):
     def _supremum(self, amplitudes: FloatArray) -> float:
         """Return sup Σ a_i sin(θ_i + phase_i) by branch and bound on the torus of phases."""
         total = float(np.abs(amplitudes).sum())
-        if len(self.basis) == len(amplitudes):
-            return total  # every phase is free
-        multiples = multiples_of(self.basis, self.wavevectors)
+        _basis, multiples = self.lattice
         rank = multiples.shape[1]
+        if rank == len(amplitudes) or rank > _LARGEST_TORUS:
+            return total  # every phase is free, or more are than can be searched: a safe bound
         bend = float(np.abs(amplitudes) @ (multiples**2).sum(axis=1))
         start = min(4 * int(np.abs(multiples).max()) + 4, int(_CELL_LIMIT ** (1.0 / rank)))
         half = math.pi / start

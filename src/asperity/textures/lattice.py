@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from fractions import Fraction
 
@@ -12,55 +11,52 @@ from asperity.checks import FloatArray
 
 _LARGEST_DENOMINATOR = 64
 _LARGEST_MULTIPLE = 8
+# Relations between more independent waves than this are not looked for.
+_LARGEST_SEARCHED_RANK = 3
 _TOLERANCE = 1e-9
 
 
-def integer_basis(waves: FloatArray) -> FloatArray:
-    """Return a basis B, shape (r, 2), with every wave vector an integer combination of its rows.
+def integer_lattice(waves: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a basis B and integers N with waves = N @ B.
 
-    r is the number of independent phases: 1 for a periodic profile, 2 for a doubly periodic
-    map, more for sums that never repeat. Ratios are recognised as rational up to denominator 64
-    and a relative error of 1e-9.
+    The number of rows of B is the number of independent phases: 1 for a periodic profile, 2 for a
+    doubly periodic map, more for sums that never repeat. Ratios are recognised as rational up to
+    denominator 64 (8 where three waves or parallel ones are combined) and a relative error of
+    1e-9. A relation that is not recognised leaves more phases independent than there are: a
+    supremum over all phases is then an upper bound, never too low.
 
     Args:
         waves: wave vectors [rad/m], shape (n, 2).
 
+    Returns:
+        B [rad/m], shape (r, 2), and N, shape (n, r).
+
     Example:
-        >>> integer_basis(np.array([[4.0, 0.0], [6.0, 0.0]]))
-        array([[2., 0.]])
+        >>> basis, multiples = integer_lattice(np.array([[4.0, 0.0], [6.0, 0.0]]))
+        >>> basis.tolist(), multiples.tolist()
+        ([[2.0, 0.0]], [[2.0], [3.0]])
     """
-    basis = np.zeros((0, 2))
-    for wave in waves[np.argsort(np.hypot(*waves.T), kind="stable")]:
+    basis, multiples = np.zeros((0, 2)), np.zeros((len(waves), 0))
+    for index in np.argsort(np.hypot(*waves.T), kind="stable"):
+        wave = waves[index]
         if not wave.any():
             continue
         relation = _relation(basis, wave)
         if relation is None:
             basis = np.vstack([basis, wave])
+            multiples = np.pad(multiples, ((0, 0), (0, 1)))
+            multiples[index, -1] = 1.0
             continue
-        denominator, multiples = relation
+        denominator, row = relation
         if denominator > 1:
-            rows = [
-                [denominator * int(i == j) for j in range(len(basis))] for i in range(len(basis))
-            ]
-            basis = np.array(_row_basis([*rows, multiples]), dtype=float) @ basis / denominator
-    return _shorten(basis)
-
-
-def multiples_of(basis: FloatArray, waves: FloatArray) -> FloatArray:
-    """Return integers N, shape (n, r), with waves = N @ basis.
-
-    Example:
-        >>> multiples_of(np.array([[2.0, 0.0]]), np.array([[4.0, 0.0], [6.0, 0.0]]))
-        array([[2.],
-               [3.]])
-    """
-    result = np.zeros((len(waves), len(basis)))
-    for row, wave in enumerate(waves):
-        if wave.any():
-            relation = _relation(basis, wave)
-            assert relation is not None
-            result[row] = relation[1]
-    return result
+            # The rows of `finer` span the old basis and the wave, in units of basis/denominator.
+            identity = denominator * np.eye(len(basis), dtype=int)
+            finer = np.array(_row_basis([*identity.tolist(), row]), dtype=float)
+            basis = finer @ basis / denominator
+            multiples = np.round(multiples @ np.linalg.inv(finer / denominator))
+            row = np.round(np.array(row) @ np.linalg.inv(finer)).tolist()
+        multiples[index] = row
+    return _shorten(basis, multiples)
 
 
 def _relation(basis: FloatArray, wave: FloatArray) -> tuple[int, list[int]] | None:
@@ -68,23 +64,34 @@ def _relation(basis: FloatArray, wave: FloatArray) -> tuple[int, list[int]] | No
     rank = len(basis)
     if rank == 0:
         return None
-    scale = float(np.hypot(*wave))
     if rank <= 2 and np.linalg.matrix_rank(basis, tol=_TOLERANCE * np.abs(basis).max()) == rank:
-        real = np.linalg.lstsq(basis.T, wave, rcond=None)[0]
-        if np.abs(real @ basis - wave).max() > _TOLERANCE * scale:
-            return None
-        parts = [Fraction(float(c)).limit_denominator(_LARGEST_DENOMINATOR) for c in real]
-        close = np.array([float(p) for p in parts]) @ basis - wave
-        if np.abs(close).max() > _TOLERANCE * scale:
-            return None
-        q = math.lcm(*(p.denominator for p in parts))
-        return q, [int(p * q) for p in parts]
-    span = range(-_LARGEST_MULTIPLE, _LARGEST_MULTIPLE + 1)
+        return _rational_relation(basis, wave)
+    if rank > _LARGEST_SEARCHED_RANK:
+        return None
+    span = np.arange(-_LARGEST_MULTIPLE, _LARGEST_MULTIPLE + 1)
+    combinations = np.stack(np.meshgrid(*[span] * rank, indexing="ij"), axis=-1).reshape(-1, rank)
+    # Small combinations first: of equal sums the simplest is taken.
+    combinations = combinations[np.argsort(np.abs(combinations).sum(axis=1), kind="stable")]
+    sums = combinations @ basis
     for q in range(1, _LARGEST_MULTIPLE + 1):
-        for combination in itertools.product(span, repeat=rank):
-            if np.abs(np.array(combination) @ basis - q * wave).max() <= _TOLERANCE * scale:
-                return q, list(combination)
+        close = np.abs(sums - q * wave).max(axis=1) <= _TOLERANCE * float(np.hypot(*wave))
+        if close.any():
+            return q, combinations[int(np.argmax(close))].tolist()
     return None
+
+
+def _rational_relation(basis: FloatArray, wave: FloatArray) -> tuple[int, list[int]] | None:
+    """Solve for the coefficients and recognise them as ratios of integers."""
+    scale = float(np.hypot(*wave))
+    real = np.linalg.lstsq(basis.T, wave, rcond=None)[0]
+    if np.abs(real @ basis - wave).max() > _TOLERANCE * scale:
+        return None
+    parts = [Fraction(float(c)).limit_denominator(_LARGEST_DENOMINATOR) for c in real]
+    close = np.array([float(p) for p in parts]) @ basis - wave
+    if np.abs(close).max() > _TOLERANCE * scale:
+        return None
+    q = math.lcm(*(p.denominator for p in parts))
+    return q, [int(p * q) for p in parts]
 
 
 def _row_basis(rows: list[list[int]]) -> list[list[int]]:
@@ -104,15 +111,17 @@ def _row_basis(rows: list[list[int]]) -> list[list[int]]:
     return result
 
 
-def _shorten(basis: FloatArray) -> FloatArray:
+def _shorten(basis: FloatArray, multiples: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return a basis of short vectors of a planar lattice (Lagrange-Gauss reduction)."""
     if len(basis) != 2 or abs(np.linalg.det(basis)) < _TOLERANCE * np.abs(basis).max() ** 2:
-        return basis
+        return basis, multiples
     a, b = basis
     while True:
         if a @ a > b @ b:
             a, b = b, a
         factor = round(float(a @ b / (a @ a)))
         if factor == 0:
-            return np.array([a, b])
+            break
         b = b - factor * a
+    short = np.array([a, b])
+    return short, np.round(multiples @ basis @ np.linalg.inv(short))
