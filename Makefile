@@ -49,7 +49,7 @@ kernels: $(VENV)/runtime  ## Derive the shipped laws again
 lock: $(VENV)/installer  ## Resolve the dependencies anew
 	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --only-group installer -o bootstrap.lock
 	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --no-default-groups --group build -o requirements.lock
-	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --no-default-groups --group build --group dev -o requirements-dev.lock
+	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --no-default-groups --group build --group dev --group docs --extra formats -o requirements-dev.lock
 
 clean:  ## Remove the virtual environment and what the tools left
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis report.html
