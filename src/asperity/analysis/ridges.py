@@ -145,11 +145,12 @@ def crest_number(surface: Surface) -> Bound:
     if isinstance(texture, Sinusoid):
         assert crest is not None
         value = closed_forms.q_d(texture, depth)
-        at = crest.centre if math.isinf(value) else _below(crest, depth if value > 1.0 else 0.0)
+        below = crest.radius if math.isinf(value) else depth if value > 1.0 else 0.0
+        at = _below(crest, below)
         return Bound(value, value, "closed form", at, "MATH section 4")
     if depth * texture.bounds[1] <= 0.5:
-        at = crest.foot if crest is not None else None
-        return Bound(1.0, 1.0, "theorem", at, "depth times the curvature bound is at most 1/2")
+        level = None if crest is None else crest.foot
+        return Bound(1.0, 1.0, "theorem", level, "depth times the curvature bound is at most 1/2")
     if crest is None:
         return Bound(1.0, math.inf, "sampled", None, "no sampled crest has a free ball")
     y = depth / crest.radius

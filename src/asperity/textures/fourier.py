@@ -83,7 +83,8 @@ class Fourier(Texture):
 
     @cached_property
     def _directions(self) -> FloatArray:
-        return self.wavevectors / np.hypot(*self.wavevectors.T)[:, None]
+        directions: FloatArray = self.wavevectors / np.hypot(*self.wavevectors.T)[:, None]
+        return directions
 
     @cached_property
     def _parallel(self) -> bool:
@@ -114,8 +115,8 @@ class Fourier(Texture):
         """Edge vectors of one period [m], or nothing for a sum that never repeats."""
         basis, _multiples = self.lattice
         if len(basis) == 1:
-            wave = basis[0]
-            return 2.0 * math.pi * wave[None, :] / (wave @ wave)
+            periods: FloatArray = 2.0 * math.pi * basis / np.sum(basis**2)
+            return periods
         if len(basis) == 2 and not self._parallel:
             return np.ascontiguousarray(2.0 * math.pi * np.linalg.inv(basis).T)
         return None

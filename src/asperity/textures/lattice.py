@@ -36,15 +36,16 @@ def integer_lattice(waves: FloatArray) -> tuple[FloatArray, FloatArray]:
         >>> basis.tolist(), multiples.tolist()
         ([[2.0, 0.0]], [[2.0], [3.0]])
     """
-    basis, multiples = np.zeros((0, 2)), np.zeros((len(waves), 0))
+    basis: FloatArray = np.zeros((0, 2))
+    multiples: FloatArray = np.zeros((len(waves), 0))
     for index in np.argsort(np.hypot(*waves.T), kind="stable"):
         wave = waves[index]
         if not wave.any():
             continue
         relation = _relation(basis, wave)
         if relation is None:
-            basis = np.vstack([basis, wave])
-            multiples = np.pad(multiples, ((0, 0), (0, 1)))
+            basis = np.concatenate([basis, wave[None, :]])
+            multiples = np.column_stack([multiples, np.zeros(len(waves))])
             multiples[index, -1] = 1.0
             continue
         denominator, row = relation
@@ -53,8 +54,9 @@ def integer_lattice(waves: FloatArray) -> tuple[FloatArray, FloatArray]:
             identity = denominator * np.eye(len(basis), dtype=int)
             finer = np.array(_row_basis([*identity.tolist(), row]), dtype=float)
             basis = finer @ basis / denominator
-            multiples = np.round(multiples @ np.linalg.inv(finer / denominator))
-            row = np.round(np.array(row) @ np.linalg.inv(finer)).tolist()
+            inverse: FloatArray = np.linalg.inv(finer)
+            multiples = np.round(denominator * multiples @ inverse)
+            row = np.round(np.array(row, dtype=float) @ inverse).tolist()
         multiples[index] = row
     return _shorten(basis, multiples)
 
