@@ -20,6 +20,9 @@ DEFAULT_STIFFNESS = 1000.0
 DEFAULT_FRICTION = 0.8
 DEFAULT_MAX_DEFLECTION = 1e-3
 DEFAULT_MODULATION_DEPTH = 0.8
+DEFAULT_CONTINUITY = 1.0
+# Parameters of laws that are arguments of the surface.
+SURFACE_PARAMETERS = ("friction", "max_deflection", "modulation_depth", "continuity")
 # max_depth unless given: the peak-to-valley height of the texture, at most this [m].
 LARGEST_DEFAULT_DEPTH = 1e-3
 
@@ -46,7 +49,8 @@ class Surface:
         clamp: ``"none"`` (the law as it is), ``"whole"`` (the depth is held at max_depth),
             ``"lateral"`` (only for the lateral force, the paper's Remark 3), ``"backed"`` (whole,
             with a backing wall k (z_b - z) e_z below z_b = min h - max_depth, or -max_depth for
-            laws on the nominal contact). Laws W, D and E are never clamped.
+            laws on the nominal contact). Laws W, D, E and H are never clamped.
+        continuity: c of law H, positive: its characteristic number is max(1, c).
         law_parameters: values for the further parameters of a law of your own.
 
     Raises:
@@ -70,6 +74,7 @@ class Surface:
         max_deflection: float = DEFAULT_MAX_DEFLECTION,
         modulation_depth: float = DEFAULT_MODULATION_DEPTH,
         clamp: ClampName = "none",
+        continuity: float = DEFAULT_CONTINUITY,
         law_parameters: Mapping[str, float] | None = None,
     ) -> None:
         if not isinstance(texture, Texture):
@@ -90,12 +95,14 @@ class Surface:
         if clamp not in CLAMPS:
             raise ParameterError("clamp", f"must be one of {', '.join(CLAMPS)}", clamp)
         self.clamp: ClampName = clamp
+        self.continuity = positive("continuity", continuity)
         self.law_parameters = self._own_parameters(dict(law_parameters or {}))
 
     def _own_parameters(self, given: dict[str, float]) -> dict[str, float]:
-        shared = ("friction", "max_deflection", "modulation_depth")
         values = {name: float(default) for name, default in self.law.parameters.items()}
-        values |= {name: float(getattr(self, name)) for name in shared if name in values}
+        values |= {
+            name: float(getattr(self, name)) for name in SURFACE_PARAMETERS if name in values
+        }
         for name, value in given.items():
             if name not in values:
                 hint = nearest_names(name, values) if values else "it has none"
@@ -136,7 +143,12 @@ class Surface:
         from asperity.derive.fuse import fuse_surface
 
         clamp: ClampName = self.clamp if self.law.clampable else "none"
-        return fuse_surface(self.law, self.texture.sampler, clamp)
+        sampler = self.texture.sampler
+        if self.law.contact == "split":
+            from asperity.textures.samplers import split
+
+            sampler = (*sampler, split)
+        return fuse_surface(self.law, sampler, clamp)
 
     def force(self, points: ArrayLike, deflection: ArrayLike | None = None) -> FloatArray:
         """Return the force on the probe (what the device applies to the hand).
@@ -187,6 +199,15 @@ class Surface:
         Reference:
             The paper's (7), (15), (18), (20), (23); B and G, for which it has none, are exact.
         """
+        return self.force_and_jacobian(points, deflection, sliding)[1]
+
+    def force_and_jacobian(
+        self,
+        points: ArrayLike,
+        deflection: ArrayLike | None = None,
+        sliding: ArrayLike | None = None,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return both f [N], (n, 3), and J [N/m], (n, 3, 3), for the price of :meth:`jacobian`."""
         probes = array("points", points, (None, 3), "m")
         count = len(probes)
         state = self._state(count, deflection)
@@ -201,7 +222,7 @@ class Surface:
         self._loops.jacobian_batch(
             probes, *state, forces, jacobians, self.texture.arguments, self.law_arguments
         )
-        return jacobians
+        return forces, jacobians
 
     def trace(self, path: ArrayLike) -> FloatArray:
         """Return the forces along a path, the law's state carried from point to point.

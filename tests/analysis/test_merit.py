@@ -27,6 +27,7 @@ BELOW_CREST, BELOW_NOMINAL = 0.65 * PERIOD, 0.45 * PERIOD
         ("D", 0.0, 0.0),
         ("E", 0.072, 0.85),
         ("G", 0.080, 0.22),
+        ("H", 0.117, 0.89),
     ],
 )
 def test_reference_points(letter: str, strength: float, support: float) -> None:

@@ -74,7 +74,14 @@ def test_proved_one_for_gentle_maps() -> None:
 
 @pytest.mark.parametrize(
     ("letter", "depth", "expected"),
-    [("D", 1.5, False), ("D", 0.5, True), ("E", 1.5, True), ("C", 1.5, True), ("F", 1.5, True)],
+    [
+        ("D", 1.5, False),
+        ("D", 0.5, True),
+        ("E", 1.5, True),
+        ("C", 1.5, True),
+        ("F", 1.5, True),
+        ("H", 1.5, True),
+    ],
 )
 def test_continuity(letter: str, depth: float, expected: bool) -> None:
     surface = Surface(WAVE, letter, max_depth=depth * RADIUS)

@@ -48,7 +48,7 @@ def test_table_has_one_row_per_law_with_the_letter_first(call: Call) -> None:
     assert code == 0
     assert err == ""
     rows = [line.split()[0] for line in out.splitlines() if line[:2].strip() and line[1:2] == " "]
-    for letter in "WABCDEFG":
+    for letter in "WABCDEFGH":
         assert letter in rows
     assert "omega.3" in out
     assert "Default stiffness 1000 N/m" in out

@@ -23,7 +23,7 @@ from asperity.textures.sinusoid import Sinusoid
 def characteristic_number(surface: Surface) -> Bound:
     """Return q = sup ‖J‖₂/k over the working region.
 
-    Closed form for sinusoids (A, B, C, D, G), theorem for W and E and for D where the depth times
+    Closed form for sinusoids (A, B, C, D, G), theorem for W, E, H and for D where the depth times
     the curvature bound is at most 1/2, certified for F on a sinusoid, else densely sampled and
     zoomed in on: then ``upper`` is infinite and ``lower`` a value that is attained.
 
@@ -42,16 +42,19 @@ def characteristic_number(surface: Surface) -> Bound:
     """
     letter = surface.law.letter
     if letter in {"W", "E"} and _shipped(surface):
-        return _one(surface, "‖J‖ is exactly k everywhere")
+        return _constant(surface, 1.0, "‖J‖ is exactly k everywhere")
     if letter == "D" and _shipped(surface):
         return crest_number(surface)
+    if letter == "H" and _shipped(surface):
+        reason = "-c <= Hess U <= 1 for any surface: q = max(1, c)"
+        return _constant(surface, max(1.0, surface.continuity), reason)
     return _number(surface, spectral_norm, closed_forms.Q)
 
 
 def one_sided_number(surface: Surface) -> Bound:
     """Return q⁺ = sup λ_max(-sym J)/k over the working region; see :func:`characteristic_number`.
 
-    1 by theorem for W, D and E; closed form for A and C on a sinusoid.
+    1 by theorem for W, D, E and H; closed form for A and C on a sinusoid.
 
     Example:
         >>> from asperity.textures.sinusoid import Sinusoid
@@ -62,10 +65,11 @@ def one_sided_number(surface: Surface) -> Bound:
     reasons = {
         "W": "-J = k e_z e_zᵀ",
         "D": "the potential is half a squared distance, whose Hessian is at most the identity",
+        "H": "the potential is an infimum of functions whose Hessian is the identity",
         "E": "λ_max of the symmetric part of e_z nᵀ is (1 + n_z)/2, 1 where the surface is level",
     }
     if surface.law.letter in reasons and _shipped(surface):
-        return _one(surface, reasons[surface.law.letter])
+        return _constant(surface, 1.0, reasons[surface.law.letter])
     return _number(surface, one_sided, closed_forms.ONE_SIDED)
 
 
@@ -75,14 +79,20 @@ def _shipped(surface: Surface) -> bool:
     return LAWS.get(surface.law.letter) is surface.law
 
 
-def _one(surface: Surface, reason: str) -> Bound:
-    """Return exactly 1, attained just inside a crest, where the normal is e_z."""
+def _constant(surface: Surface, value: float, reason: str) -> Bound:
+    """Return a number that a theorem gives for every surface.
+
+    1 is attained just inside a crest, where the normal is e_z. A number of law H above 1 is
+    approached where the god-object is split; no witness is given for it.
+    """
     if surface.law.contact == "nominal":
-        at = (0.0, 0.0, 0.0)
-    else:
-        # The foot where -J_zz = k n_z² or k n_z is greatest: a level point.
-        at = greatest(surface, lambda matrices: -matrices[:, 2, 2], _zero_depth).probe
-    return Bound(1.0, 1.0, "theorem", at, reason)
+        return Bound(value, value, "theorem", (0.0, 0.0, 0.0), reason)
+    if value > 1.0:
+        return Bound(value, value, "theorem", None, reason)
+    # The foot where -J_zz of law D, k n_z² there, is greatest: a level point.
+    god_object = Surface(surface.texture, "D", max_depth=surface.max_depth)
+    at = greatest(god_object, lambda matrices: -matrices[:, 2, 2], _zero_depth).probe
+    return Bound(value, value, "theorem", at, reason)
 
 
 def _zero_depth(derivatives: FloatArray) -> FloatArray:

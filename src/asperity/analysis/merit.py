@@ -73,7 +73,8 @@ def scan_height(surface: Surface) -> float:
 def scan_points(surface: Surface, line: ScanLine, height: float) -> FloatArray:
     """Return the probe points of the scan, shape (lines, points, 3) [m]."""
     profile = surface.texture.is_profile
-    count = _NEAREST_POINTS[profile] if surface.law.contact == "nearest" else _POINTS
+    costly = surface.law.contact in {"nearest", "split"}
+    count = _NEAREST_POINTS[profile] if costly else _POINTS
     xy = line.points(count)
     shifts = np.zeros((1, 2))
     if not profile:
@@ -95,11 +96,10 @@ def _scan(surface: Surface, line: ScanLine, height: float) -> tuple[FloatArray, 
     flat = points.reshape(-1, 3)
     if surface.law.stateful:
         trailing = np.tile(surface.max_deflection * line.direction, (len(flat), 1))
-        forces = surface.force(flat, deflection=trailing)
         sliding = np.ones(len(flat), dtype=bool)
-        jacobians = surface.jacobian(flat, deflection=trailing, sliding=sliding)
+        forces, jacobians = surface.force_and_jacobian(flat, trailing, sliding)
     else:
-        forces, jacobians = surface.force(flat), surface.jacobian(flat)
+        forces, jacobians = surface.force_and_jacobian(flat)
     lost = float(np.mean(~jacobians.any(axis=(1, 2))))
     shape = points.shape[:2]
     slopes = -jacobians[:, 2, 2].reshape(shape) / surface.stiffness
@@ -111,6 +111,8 @@ def _gain_above(surface: Surface, height: float) -> float:
     contact, letter = surface.law.contact, surface.law.letter
     if letter in {"W", "E"}:
         return 1.0
+    if letter == "H":
+        return max(1.0, surface.continuity)
     if letter == "D":
         return _god_object_gain(surface, height)
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from asperity.checks import FloatArray
 from asperity.derive.facts import law_facts
 from asperity.derive.fuse import fuse_contact
+from asperity.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.fourier import Fourier
 from asperity.textures.heightmap import HeightMap
@@ -179,7 +180,12 @@ def greatest(surface: Surface, measure: Measure, depth_limit: DepthLimit) -> Fou
         surface: the surface; its clamp is not looked at.
         measure: :func:`spectral_norm` or :func:`one_sided`.
         depth_limit: greatest depth [m] of each contact from its height derivatives (n, 6).
+
+    Raises:
+        ParameterError: for a law of your own on the split contact.
     """
+    if surface.law.contact == "split":
+        raise ParameterError("law", f"{surface.law} is on the split contact, which has no samples")
     field = ContactField(surface)
     fractions, spacing = sample_fractions(surface.texture)
     levels = (0.0, 1.0) if law_facts(surface.law).affine_in_depth else DEPTH_FRACTIONS

@@ -11,7 +11,7 @@ import sympy as sp
 from asperity.derive.jacobian import derive, explicit
 from asperity.laws.contacts import contact_derivatives
 from asperity.laws.law import Law
-from asperity.laws.symbols import DEPTH, HX, HY, POSITION, H
+from asperity.laws.symbols import DEPTH, HX, HY, POSITION, TOWARD, H
 
 # s = |w| = √(1 + h_x² + h_y²), as a symbol of its own so that the curl becomes rational.
 _S = sp.Symbol("s", positive=True)
@@ -62,13 +62,19 @@ def curl_verdict(law: Law) -> CurlVerdict:
         return CurlVerdict(False, curl, reason)
     if any(entry != 0 for entry in curl):
         return CurlVerdict(False, curl, "the curl is not zero")
-    if derivation.force.subs(DEPTH, 0).applyfunc(_reduce) != sp.zeros(3, 1):
+    if not begins_at_zero(derivation.force):
         return CurlVerdict(False, curl, "the force jumps where contact begins")
     if contact_derivatives(law.contact).single_valued:
         return CurlVerdict(True, curl, "the curl is zero identically, and the force continuous")
     if _has_depth_potential(law, derivation.force):
         return CurlVerdict(True, curl, "the force is the gradient of a potential in the depth")
     return CurlVerdict(False, curl, "the curl is zero, but its potential jumps with the contact")
+
+
+def begins_at_zero(force: Any) -> bool:
+    """Return whether a symbolic force vanishes where contact begins."""
+    nothing = dict.fromkeys([DEPTH, *TOWARD], 0)
+    return bool(force.subs(nothing).applyfunc(_reduce) == sp.zeros(3, 1))
 
 
 def _has_depth_potential(law: Law, force: Any) -> bool:

@@ -69,6 +69,8 @@ def driver_source(plan: DriverPlan) -> str:
     parts += [_force_batch(plan), _jacobian_batch(plan)]
     if plan.law.stateful:
         parts += [_ANCHOR, _trace_batch(plan)]
+    if plan.law.contact == "split":
+        parts.append(_SPLIT_BATCH.format(unpack=_unpack(plan.law)))
     return "\n\n".join(parts)
 
 
@@ -106,7 +108,7 @@ def _enter_contact(plan: DriverPlan, what: str) -> list[str]:
         return ["depth = -z", "if not depth > 0.0:"]
     if contact == "vertical":
         return [here, "depth = h - z", "if not depth > 0.0:"]
-    return ["if not height(x, y, *texture) - z > 0.0:"]
+    return ["if not height(x, y, *texture) - z > 0.0:"]  # nearest and split
 
 
 def _after_contact(plan: DriverPlan, what: str) -> list[str]:
@@ -115,6 +117,11 @@ def _after_contact(plan: DriverPlan, what: str) -> list[str]:
     names = "h, hx, hy" if plan.needs_slope else "h"
     if what == "jacobian":
         width, names = "curvature", "h, hx, hy, hxx, hxy, hyy"
+    if plan.law.contact == "split":
+        if what == "force":
+            return ["tx, ty, tz = split_contact(x, y, z, continuity, texture)"]
+        derivative = "tx, ty, tz, mxx, mxy, mxz, myy, myz, mzz"
+        return [f"{derivative} = split_derivative(x, y, z, continuity, texture)"]
     if plan.law.contact == "nearest":
         return [
             "foot_x, foot_y = nearest(x, y, z, *texture)",
@@ -246,6 +253,27 @@ def _trace_batch(plan: DriverPlan) -> str:
         out[i, 0] = fx
         out[i, 1] = fy
         out[i, 2] = fz
+'''
+
+
+_SPLIT_BATCH = '''def split_batch(points, out, texture, law):
+    """Potential/k [m²], number of atoms and gap [m²] of the split god-object at the points [m]."""
+    {unpack}
+    atoms = np.empty((5, 3))
+    weights = np.empty(5)
+    p = np.empty(3)
+    for i in range(points.shape[0]):
+        p[0] = points[i, 0]
+        p[1] = points[i, 1]
+        p[2] = points[i, 2]
+        out[i, 0] = 0.0
+        out[i, 1] = 0.0
+        out[i, 2] = 0.0
+        if height(p[0], p[1], *texture) > p[2]:
+            count, gap = split_atoms(p[0], p[1], p[2], continuity, atoms, weights, texture)
+            out[i, 0] = primal_value(atoms, p, 1.0 / (1.0 + continuity), count, weights)
+            out[i, 1] = count
+            out[i, 2] = gap
 '''
 
 

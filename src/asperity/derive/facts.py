@@ -59,7 +59,7 @@ def derive_facts(law: Law) -> LawFacts:
     """
     import sympy as sp
 
-    from asperity.derive.curl import curl_verdict
+    from asperity.derive.curl import begins_at_zero, curl_verdict
     from asperity.derive.jacobian import derive, explicit
     from asperity.laws.symbols import DEPTH, HX, HY, POSITION, H
 
@@ -73,7 +73,7 @@ def derive_facts(law: Law) -> LawFacts:
         conservative=verdict.conservative,
         reason=verdict.reason,
         curl=(x, y, z),
-        begins_at_zero=bool(force.subs(DEPTH, 0) == sp.zeros(3, 1)),
+        begins_at_zero=begins_at_zero(force),
         looks_at_surface=bool(force.free_symbols & {H, HX, HY}),
         affine_in_depth=not moves and all(sp.simplify(entry) == 0 for entry in bend),
     )

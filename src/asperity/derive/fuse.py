@@ -66,7 +66,8 @@ def fuse_surface(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) ->
     plan = DriverPlan(law, kernel_source(law), clamp)
     title = f"Law {law.letter} on {sampler[0].__name__.rpartition('.')[2]}, clamp {clamp}."
     source = "\n\n".join([sampler_source(sampler), plan.source, driver_source(plan)])
-    return load_fused(_HEADER.format(title=title) + decorate(source))
+    inline = law.contact != "split"
+    return load_fused(_HEADER.format(title=title) + decorate(source, inline=inline))
 
 
 @lru_cache(maxsize=256)
@@ -139,13 +140,19 @@ def _functions(text: str) -> str:
     return text[text.index("def ") :]
 
 
-def decorate(source: str) -> str:
-    """Return the source with every top-level function compiled by Numba."""
+def decorate(source: str, *, inline: bool = True) -> str:
+    """Return the source with every top-level function compiled by Numba.
+
+    Args:
+        source: plain functions.
+        inline: whether small functions are copied into their callers. LLVM leaves calls of
+            mid-sized ones, 20 to 40 ns each; long iterations would only compile more slowly.
+    """
     lines = []
     for line in source.splitlines():
         if line.startswith("def "):
             name = line[4 : line.index("(")]
-            lines.append(_decorator(name))
+            lines.append(_decorator(name, inline))
         lines.append(line)
     return "\n".join(lines) + "\n"
 
@@ -154,11 +161,10 @@ def decorate(source: str) -> str:
 _CALLED = {"nearest", "search_cell", "search_box", "descend", "polish", "patch_bounds"}
 
 
-def _decorator(name: str) -> str:
-    """Return how a function is compiled; LLVM leaves calls of mid-sized ones, 20 to 40 ns each."""
+def _decorator(name: str, inline: bool) -> str:
     if name.endswith("_batch"):
         return "@loop"
-    return "@scalar" if name in _CALLED else "@inlined"
+    return "@scalar" if name in _CALLED or not inline else "@inlined"
 
 
 @lru_cache(maxsize=1)

@@ -25,6 +25,8 @@ from asperity.laws.symbols import (
     SXX,
     SXY,
     SYY,
+    TOWARD,
+    TOWARD_DERIVATIVE,
     ContactSymbols,
     H,
 )
@@ -77,6 +79,8 @@ def derive(law: Law) -> Derivation:
     if law.stateful:
         # ∂d/∂p is handed in: the identity while sticking, I - u uᵀ while sliding.
         saturated += force.jacobian([DX, DY]) * sp.Matrix([[SXX, SXY, 0], [SXY, SYY, 0]])
+    if law.contact == "split":
+        saturated += force.jacobian(list(TOWARD)) * TOWARD_DERIVATIVE
     full = saturated + force.diff(DEPTH) * contact.depth_gradient
     return Derivation(law, force, _tidy(full), _tidy(saturated), contact.definitions)
 
@@ -94,7 +98,7 @@ def symbolic_force(law: Law) -> Any:
     Raises:
         LawError: see :func:`derive`.
     """
-    symbols = ContactSymbols(tuple(law.parameters))
+    symbols = ContactSymbols(tuple(law.parameters), law.contact)
     reserved = {str(symbol) for symbol in ARGUMENT_ORDER}
     for name in law.parameters:
         if name in reserved or not name.isidentifier():
@@ -113,7 +117,8 @@ def symbolic_force(law: Law) -> Any:
 
 
 def _check_symbols(law: Law, force: Any) -> None:
-    allowed = {*POSITION, DEPTH, H, HX, HY} | {sp.Symbol(n, real=True) for n in law.parameters}
+    here = TOWARD if law.contact == "split" else (DEPTH, H, HX, HY)
+    allowed = {*POSITION, *here} | {sp.Symbol(n, real=True) for n in law.parameters}
     allowed |= set(ARGUMENT_ORDER[-3:])  # k, h_mid, h_half
     if law.stateful:
         allowed |= {DX, DY}
@@ -121,8 +126,9 @@ def _check_symbols(law: Law, force: Any) -> None:
     if unknown:
         raise LawError(
             f"law {law.letter}: force uses {', '.join(unknown)}, which the contact does not offer; "
-            "known: depth, h, slope, position, k, the parameters, and deflection if stateful "
-            "(second derivatives of h enter through the Jacobian only)"
+            "known: depth, h, slope (on the split contact toward instead), position, k, the "
+            "parameters, and deflection if stateful (second derivatives of h enter through the "
+            "Jacobian only)"
         )
 
 

@@ -11,6 +11,7 @@ from asperity.laws import (
     e_god_object_wall_normal,
     f_friction_modulation,
     g_force_shading,
+    h_split_god_object,
     w_smooth_wall,
 )
 from asperity.laws.law import ContactName, Law
@@ -29,6 +30,7 @@ LAWS: dict[str, Law] = {
         e_god_object_wall_normal,
         f_friction_modulation,
         g_force_shading,
+        h_split_god_object,
     )
 }
 

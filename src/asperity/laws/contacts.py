@@ -42,8 +42,10 @@ def contact_derivatives(contact: ContactName) -> ContactDerivatives:
     * nearest: depth = distance to the nearest surface point; ∇depth = -n there, and by the
       implicit function theorem ∂(X, Y)/∂p = Q⁻¹ [I g] with Q = I + g gᵀ + (h - z) H, where
       h - z = depth / s because the foot lies along the normal (MATH section 3).
+    * split: the vector to the contact point is all there is; its derivative comes with it.
     """
-    return {"nominal": _nominal, "vertical": _vertical, "nearest": _nearest}[contact]()
+    known = {"nominal": _nominal, "vertical": _vertical, "nearest": _nearest, "split": _split}
+    return known[contact]()
 
 
 def _nominal() -> ContactDerivatives:
@@ -70,3 +72,8 @@ def _nearest() -> ContactDerivatives:
         single_valued=False,
         definitions=definitions,
     )
+
+
+def _split() -> ContactDerivatives:
+    nothing = sp.zeros(1, 3)
+    return ContactDerivatives(nothing, sp.zeros(2, 3), single_valued=True)

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 
 def force(c: ContactSymbols) -> Any:
-    """Return k δₙ n, which is k (p_h - p)."""
-    return c.k * c.depth * c.normal
+    """Return k (p_h - p), which is k δₙ n."""
+    return c.k * c.toward
 
 
 LAW = Law(

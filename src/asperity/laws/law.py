@@ -12,7 +12,7 @@ from asperity.errors import LawError
 if TYPE_CHECKING:
     from asperity.laws.symbols import ContactSymbols
 
-ContactName = Literal["nominal", "vertical", "nearest"]
+ContactName = Literal["nominal", "vertical", "nearest", "split"]
 ForceFormula = Callable[["ContactSymbols"], Any]
 
 
@@ -28,8 +28,8 @@ class Law:
         letter: one letter, or a short word for a law of your own.
         name: the name in words, joined with hyphens.
         contact: the point where the surface is felt: ``"nominal"`` (the smooth wall below the
-            probe), ``"vertical"`` (the textured surface above or below the probe) or
-            ``"nearest"`` (the god-object).
+            probe), ``"vertical"`` (the textured surface above or below the probe),
+            ``"nearest"`` (the god-object) or ``"split"`` (the split god-object).
         force: the formula.
         summary: one line for tables.
         clampable: whether a depth clamp changes this law (MATH: W, D and E are never clamped).

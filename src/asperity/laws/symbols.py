@@ -8,6 +8,8 @@ from typing import Any
 
 import sympy as sp
 
+from asperity.laws.law import ContactName
+
 # Probe position [m]. The body is z < h(x, y).
 X, Y, Z = sp.symbols("x y z", real=True)
 POSITION = (X, Y, Z)
@@ -19,6 +21,11 @@ HEIGHT_DERIVATIVES = (H, HX, HY, HXX, HXY, HYY)
 # Tangential deflection of the dragged anchor [m] and its derivative by the probe position.
 DX, DY = sp.symbols("dx dy", real=True)
 SXX, SXY, SYY = sp.symbols("sxx sxy syy", real=True)
+# From the probe to the contact point where that is no point of the surface, as for the split
+# god-object [m], and the derivative of that vector by the probe position, symmetric.
+TOWARD = sp.symbols("tx ty tz", real=True)
+MXX, MXY, MXZ, MYY, MYZ, MZZ = sp.symbols("mxx mxy mxz myy myz mzz", real=True)
+TOWARD_DERIVATIVE = sp.Matrix([[MXX, MXY, MXZ], [MXY, MYY, MYZ], [MXZ, MYZ, MZZ]])
 # Stiffness of the smooth wall [N/m].
 K = sp.Symbol("k", positive=True)
 # Middle and half of the range of the heights of the texture [m].
@@ -27,7 +34,8 @@ H_HALF = sp.Symbol("h_half", positive=True)
 
 # The order in which a kernel takes its arguments; it takes those that it uses.
 ARGUMENT_ORDER = (
-    *POSITION, DEPTH, *HEIGHT_DERIVATIVES, DX, DY, SXX, SXY, SYY, K, H_MID, H_HALF,
+    *POSITION, DEPTH, *HEIGHT_DERIVATIVES, DX, DY, SXX, SXY, SYY,
+    *TOWARD, MXX, MXY, MXZ, MYY, MYZ, MZZ, K, H_MID, H_HALF,
 )  # fmt: skip
 
 
@@ -37,6 +45,7 @@ class ContactSymbols:
 
     Attributes:
         parameter_names: names of the law's own parameters.
+        contact: of the law.
 
     Example:
         >>> c = ContactSymbols()
@@ -48,6 +57,7 @@ class ContactSymbols:
     """
 
     parameter_names: tuple[str, ...] = ()
+    contact: ContactName = "nearest"
 
     k = K
     depth = DEPTH
@@ -66,6 +76,11 @@ class ContactSymbols:
     def normal(self) -> Any:
         """Unit normal of the textured surface at the contact point, n = w / |w|."""
         return self.w / sp.sqrt(1 + HX**2 + HY**2)
+
+    @cached_property
+    def toward(self) -> Any:
+        """From the probe to the contact point [m]: p_h - p for the god-object, z̄ - p if split."""
+        return sp.Matrix(TOWARD) if self.contact == "split" else self.depth * self.normal
 
     @cached_property
     def relative_height(self) -> Any:
