@@ -79,10 +79,42 @@ def _text(name: str, given: Any) -> str:
     return given
 
 
+def _switch(name: str, given: Any) -> bool:
+    words = {"yes": True, "true": True, "no": False, "false": False}
+    if isinstance(given, bool):
+        return given
+    if str(given).strip().lower() not in words:
+        raise ParameterError(name, "must be true or false", given)
+    return words[str(given).strip().lower()]
+
+
+def _whole(name: str, given: Any) -> int:
+    number = quantity(name, given, "")
+    if number != round(number):
+        raise ParameterError(name, "must be a whole number", given)
+    return round(number)
+
+
+def _channel(name: str, given: Any) -> str | int:
+    if isinstance(given, bool) or not isinstance(given, (str, int)):
+        raise ParameterError(name, "must be a name or a whole number", given)
+    return int(given) if str(given).strip().isdecimal() else given
+
+
 FILE_ARGUMENTS: dict[str, Reader] = {
+    "channel": _channel,
+    "unit": _text,
+    "integrate_normals": _switch,
     "pitch": _pitch,
     "height_range": _quantity("m"),
+    "outliers": _quantity(""),
+    "max_missing": _quantity(""),
+    "form": _whole,
     "cutoff": _quantity("m"),
+    "l_cutoff": _quantity("m"),
+    "tip_radius": _quantity("m"),
+    "periodic": _switch,
+    "blend": _quantity("m"),
     "magnify": _quantity(""),
     "magnify_height": _quantity(""),
 }
@@ -110,6 +142,7 @@ SURFACE_ARGUMENTS: dict[str, Reader] = {
     "max_deflection": _quantity("m"),
     "modulation_depth": _quantity(""),
     "clamp": _text,
+    "continuity": _quantity(""),
 }
 
 

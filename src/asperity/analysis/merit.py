@@ -11,7 +11,7 @@ from asperity.analysis.ridges import sharpest_crest
 from asperity.analysis.search import greatest, spectral_norm
 from asperity.checks import FloatArray
 from asperity.surface import Surface
-from asperity.textures.texture import ScanLine
+from asperity.textures.texture import ScanLine, Texture
 
 _POINTS = 2048
 _LINES = 16
@@ -72,22 +72,26 @@ def scan_height(surface: Surface) -> float:
 
 def scan_points(surface: Surface, line: ScanLine, height: float) -> FloatArray:
     """Return the probe points of the scan, shape (lines, points, 3) [m]."""
-    profile = surface.texture.is_profile
     costly = surface.law.contact in {"nearest", "split"}
-    count = _NEAREST_POINTS[profile] if costly else _POINTS
+    count = _NEAREST_POINTS[surface.texture.is_profile] if costly else _POINTS
+    xy = parallel_lines(surface.texture, line, count)
+    return np.concatenate([xy, np.full((*xy.shape[:2], 1), height)], axis=2)
+
+
+def parallel_lines(texture: Texture, line: ScanLine, count: int) -> FloatArray:
+    """Return points (lines, count, 2) [m] of the scan line of a profile, or 16 lines of a map.
+
+    The lines of a map are parallel to its scan line and spread evenly over the domain.
+    """
     xy = line.points(count)
-    shifts = np.zeros((1, 2))
-    if not profile:
-        # Parallel lines spread over the domain, each span visited evenly.
-        spans = surface.texture.domain.spans
-        parts = (np.arange(_LINES) + 0.5) / _LINES
-        across = spans[np.argmin(np.abs(spans @ line.direction) / np.hypot(*spans.T))]
-        middle = line.start if line.periodic else surface.texture.domain.origin
-        shifts = parts[:, None] * across + (middle - line.start) * [[1.0, 1.0]]
-    points = np.empty((len(shifts), count, 3))
-    points[..., :2] = xy + shifts[:, None, :]
-    points[..., 2] = height
-    return points
+    if texture.is_profile:
+        return xy[None]
+    spans = texture.domain.spans
+    parts = (np.arange(_LINES) + 0.5) / _LINES
+    across = spans[np.argmin(np.abs(spans @ line.direction) / np.hypot(*spans.T))]
+    first = line.start if line.periodic else texture.domain.origin
+    shifts = parts[:, None] * across + (first - line.start)
+    return np.asarray(xy + shifts[:, None, :])
 
 
 def _scan(surface: Surface, line: ScanLine, height: float) -> tuple[FloatArray, FloatArray, float]:

@@ -1,0 +1,39 @@
+"""Results for reading: tables for a terminal, pictures, one HTML file.
+
+Everything is imported when it is first used: a table needs no matplotlib.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from asperity.report.html import html_text
+    from asperity.report.plots import plot
+    from asperity.report.table import comparison_table, print_comparison
+
+_HOMES = {
+    "comparison_table": "asperity.report.table",
+    "html_text": "asperity.report.html",
+    "plot": "asperity.report.plots",
+    "print_comparison": "asperity.report.table",
+}
+
+__all__ = [
+    "comparison_table",
+    "html_text",
+    "plot",
+    "print_comparison",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'asperity.report' has no attribute {name!r}")
+    import importlib
+
+    return getattr(importlib.import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,221 @@
+"""The force field as arrows over its curl, one panel per law, on shared scales."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+
+from asperity.report import style
+from asperity.report.section import (
+    ArrowField,
+    CurlField,
+    Stretch,
+    arrow_field,
+    curl_field,
+    feature_length,
+    field_range,
+    scan_height,
+    stretch_of,
+)
+from asperity.report.wording import law_title
+from asperity.surface import Surface
+
+_WIDTH = 10.0
+_MOST_COLUMNS = 3
+# Body and width of a panel are drawn true to scale unless that makes it flatter or taller.
+_FLATTEST, _TALLEST = 2.4, 0.8
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """What all panels share."""
+
+    stretch: Stretch
+    bottom: float
+    top: float
+    wide: style.Unit
+    high: style.Unit
+    limit: float
+    per_inch: float
+    true_to_scale: bool
+
+
+def field_stretch(surfaces: Sequence[Surface]) -> Stretch:
+    """Return the part of the scan line that the pictures of the field show."""
+    texture = surfaces[0].texture
+    depth = max(surface.max_depth for surface in surfaces)
+    length = feature_length(texture)
+    wanted = 1.3 * (texture.peak_to_valley + depth)
+    return stretch_of(texture, min(max(wanted, length), 3.0 * length), 3.0 * length)
+
+
+def field_size(surfaces: Sequence[Surface]) -> tuple[float, float]:
+    """Return width and height of the picture [inch]."""
+    columns = _columns(len(surfaces))
+    ratio = _panel_ratio(surfaces)
+    panel = (_WIDTH - 1.0) / columns
+    rows = math.ceil(len(surfaces) / columns)
+    return _WIDTH, rows * (panel / ratio + 0.5) + 1.2
+
+
+def _columns(count: int) -> int:
+    return min(count, _MOST_COLUMNS if count > 4 else 2)
+
+
+def _panel_ratio(surfaces: Sequence[Surface]) -> float:
+    stretch = field_stretch(surfaces)
+    bottom, top = field_range(surfaces, stretch)
+    return min(max(stretch.length / (top - bottom), _TALLEST), _FLATTEST)
+
+
+def draw_fields(
+    figure: Figure | SubFigure, surfaces: Sequence[Surface], remarks: Sequence[str] = ()
+) -> None:
+    """Draw the field of every law: arrows over the curl, the same scales for all.
+
+    Args:
+        figure: where to.
+        surfaces: one per law, on the same texture.
+        remarks: a line below the title of each panel.
+    """
+    stretch = field_stretch(surfaces)
+    bottom, top = field_range(surfaces, stretch)
+    curls = [curl_field(surface, stretch, bottom) for surface in surfaces]
+    arrows = [arrow_field(surface, stretch, bottom, top) for surface in surfaces]
+    scene = _scene(surfaces, stretch, curls, arrows)
+    columns = _columns(len(surfaces))
+    rows = math.ceil(len(surfaces) / columns)
+    grid: Any = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    panels = list(grid.ravel())
+    mesh: Any = None
+    quiver: Any = None
+    for index, surface in enumerate(surfaces):
+        axes = panels[index]
+        mesh = _draw_curl(axes, curls[index], scene)
+        quiver = _draw_arrows(axes, arrows[index], scene)
+        _draw_outline(axes, surface, scene)
+        remark = remarks[index] if index < len(remarks) else ""
+        style.entitle(axes, surface.law.letter, law_title(surface.law.name), remark)
+    _finish(figure, panels, len(surfaces), scene, (mesh, quiver))
+
+
+def _scene(
+    surfaces: Sequence[Surface],
+    stretch: Stretch,
+    curls: Sequence[CurlField],
+    arrows: Sequence[ArrowField],
+) -> _Scene:
+    bottom, top = field_range(surfaces, stretch)
+    true_ratio = stretch.length / (top - bottom)
+    strong = [np.abs(c.curl).ravel() for c in curls if np.abs(c.curl).max() > 1e-9 * c.norm]
+    limit = float(np.quantile(np.concatenate(strong), 0.97)) if strong else surfaces[0].stiffness
+    sizes = np.concatenate([np.hypot(a.tangential, a.normal) for a in arrows])
+    usual = float(np.quantile(sizes, 0.9)) if sizes.size else 1.0
+    return _Scene(
+        stretch,
+        bottom,
+        top,
+        style.length_unit(stretch.length),
+        style.length_unit(top - bottom),
+        _rounded_limit(limit),
+        usual / 0.32,
+        _TALLEST <= true_ratio <= _FLATTEST,
+    )
+
+
+def _rounded_limit(limit: float) -> float:
+    return 2.0 * style.nice_length(0.5 * limit) if limit > 0.0 else 1.0
+
+
+def _draw_curl(axes: Axes, field: CurlField, scene: _Scene) -> Any:
+    mesh = axes.pcolormesh(
+        field.along * scene.wide.scale,
+        field.z * scene.high.scale,
+        field.curl,
+        cmap=style.CURL,
+        vmin=-scene.limit,
+        vmax=scene.limit,
+        shading="flat",
+        rasterized=True,
+        zorder=1,
+    )
+    axes.set_facecolor(style.FREE)
+    return mesh
+
+
+def _draw_arrows(axes: Axes, field: ArrowField, scene: _Scene) -> Any:
+    return axes.quiver(
+        field.along * scene.wide.scale,
+        field.z * scene.high.scale,
+        field.tangential,
+        field.normal,
+        angles="uv",
+        units="inches",
+        scale_units="inches",
+        scale=scene.per_inch,
+        width=0.011,
+        headwidth=4.0,
+        headlength=4.5,
+        headaxislength=4.0,
+        minlength=0.6,
+        color=style.INK,
+        zorder=4,
+    )
+
+
+def _draw_outline(axes: Axes, surface: Surface, scene: _Scene) -> None:
+    """Draw the textured body, the nominal surface where the law acts below it, and the scan."""
+    along = scene.stretch.steps(600)
+    x = along * scene.wide.scale
+    heights = surface.texture.height(scene.stretch.xy(along)) * scene.high.scale
+    nominal = surface.law.contact == "nominal"
+    axes.plot(x, heights, color=style.INK, linewidth=1.3, linestyle=":" if nominal else "-")
+    if nominal:
+        axes.axhline(0.0, color=style.INK, linewidth=1.3)
+    axes.axhline(
+        scan_height(surface) * scene.high.scale, color=style.GREEN, linewidth=1.0, linestyle="--"
+    )
+
+
+def _finish(
+    figure: Figure | SubFigure, panels: list[Axes], count: int, scene: _Scene, drawn: Any
+) -> None:
+    mesh, quiver = drawn
+    columns = _columns(count)
+    for axes in panels[count:]:
+        axes.set_visible(False)
+    for index, axes in enumerate(panels[:count]):
+        style.dress(axes)
+        lowest = index + columns >= count
+        axes.tick_params(labelbottom=lowest)
+        style.label(
+            axes,
+            f"along the scan line [{scene.wide.name}]" if lowest else "",
+            f"z [{scene.high.name}]" if index % columns == 0 else "",
+        )
+        axes.set_xlim(0.0, scene.stretch.length * scene.wide.scale)
+        axes.set_ylim(scene.bottom * scene.high.scale, scene.top * scene.high.scale)
+        if scene.true_to_scale and scene.wide == scene.high:
+            axes.set_aspect("equal")
+    bar = figure.colorbar(
+        mesh, ax=panels[:count], location="bottom", shrink=0.5, aspect=40, extend="both", pad=0.02
+    )
+    style.dress_bar(bar, "curl [N/m]: white is conservative")
+    force = style.nice_length(0.35 * scene.per_inch)
+    unit = style.force_unit(force)
+    quiver.axes.quiverkey(
+        quiver,
+        0.9,
+        1.04,
+        force,
+        f"{force * unit.scale:g} {unit.name}",
+        labelpos="E",
+        fontproperties={"size": style.TICK},
+        labelcolor=style.INK,
+    )

@@ -1,0 +1,46 @@
+"""The strength-support diagram: what each law gives for the loop gain that it costs."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from asperity.analysis.comparison import Comparison
+from asperity.report import style
+from asperity.report.wording import strength_has_unit
+
+
+def merit_figure(comparison: Comparison) -> Figure:
+    """Return strength T against support S, a point per law.
+
+    Laws whose loop gain is unbounded lie at the origin: any texture costs them everything.
+    """
+    figure = style.new_figure(10.0, 4.6)
+    axes = figure.add_subplot()
+    style.dress(axes)
+    scale, unit = (1e3, " · l [mm]") if strength_has_unit(comparison) else (1.0, "")
+    widest = max(max(row.strength for row in comparison.rows) * scale, 1e-12)
+    for row in comparison.rows:
+        sound = row.conservative and row.continuous
+        x, y = row.strength * scale, row.support
+        axes.plot(x, y, "o", ms=8, color=style.GREEN if sound else style.ORANGE, clip_on=False)
+        axes.annotate(
+            row.law.letter,
+            (x, y),
+            xytext=(0, 7),
+            textcoords="offset points",
+            ha="center",
+            fontsize=style.TITLE,
+            color=style.INK,
+            fontweight="bold" if row.law.letter == comparison.recommended else "normal",
+        )
+    axes.set_xlim(0.0, 1.15 * widest)
+    axes.set_ylim(0.0, 1.15)
+    axes.grid(color=style.FAINT, lw=0.5)
+    style.label(axes, f"strength T{unit}", "support S")
+    for name, colour in (
+        ("conservative and continuous", style.GREEN),
+        ("leaks or jumps", style.ORANGE),
+    ):
+        axes.plot([], [], "o", color=colour, label=name)
+    axes.legend(frameon=False, fontsize=style.TICK, loc="upper right")
+    return figure

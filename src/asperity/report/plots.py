@@ -1,0 +1,108 @@
+"""Pictures of results: ``plot(result)`` returns a Matplotlib figure; no global state."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from asperity.analysis.comparison import Comparison
+from asperity.analysis.row import LawRow
+from asperity.report import style
+from asperity.report.field_picture import draw_fields, field_size
+from asperity.report.force_picture import draw_forces, force_size
+from asperity.report.surface_picture import draw_surface, surface_size
+from asperity.report.wording import leak_text
+from asperity.surface import Surface
+from asperity.textures.texture import Texture
+
+
+@singledispatch
+def plot(result: Any) -> Figure:
+    """Return a picture of a result.
+
+    Args:
+        result: a :class:`~asperity.analysis.comparison.Comparison` (the surface, the forces and
+            the fields of all laws), a :class:`~asperity.surface.Surface` (forces and field of its
+            law) or a texture (the surface).
+
+    Returns:
+        A figure; ``figure.savefig(path)`` writes it.
+
+    Raises:
+        TypeError: for a result without a picture.
+
+    Example:
+        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> [axes.get_ylabel() for axes in plot(Sinusoid(0.4e-3, 1.5e-3)).axes]
+        ['height [mm]']
+    """
+    raise TypeError(f"no picture is known for a {type(result).__name__}")
+
+
+@plot.register
+def _texture(result: Texture) -> Figure:
+    return surface_figure(result)
+
+
+@plot.register
+def _surface(result: Surface) -> Figure:
+    sizes = [force_size(1), field_size([result])]
+    figure, parts = _stacked(sizes)
+    draw_forces(parts[0], [result])
+    draw_fields(parts[1], [result])
+    return figure
+
+
+@plot.register
+def _comparison(result: Comparison) -> Figure:
+    surfaces = [row.surface for row in result.rows]
+    sizes = [surface_size(result.texture), force_size(len(surfaces)), field_size(surfaces)]
+    figure, parts = _stacked(sizes)
+    draw_surface(parts[0], result.texture)
+    draw_forces(parts[1], surfaces)
+    draw_fields(parts[2], surfaces, _remarks(result))
+    return figure
+
+
+def surface_figure(texture: Texture) -> Figure:
+    """Return the picture of a surface."""
+    figure = style.new_figure(*surface_size(texture))
+    draw_surface(figure, texture)
+    return figure
+
+
+def force_figure(comparison: Comparison) -> Figure:
+    """Return the forces along the scan, one panel per law, on shared axes."""
+    figure = style.new_figure(*force_size(len(comparison.rows)))
+    draw_forces(figure, [row.surface for row in comparison.rows])
+    return figure
+
+
+def field_figure(comparison: Comparison) -> Figure:
+    """Return the force fields over their curl, one panel per law, on shared scales."""
+    surfaces = [row.surface for row in comparison.rows]
+    figure = style.new_figure(*field_size(surfaces))
+    draw_fields(figure, surfaces, _remarks(comparison))
+    return figure
+
+
+def _remarks(comparison: Comparison) -> list[str]:
+    return [_remark(row, comparison) for row in comparison.rows]
+
+
+def _remark(row: LawRow, comparison: Comparison) -> str:
+    if row.conservative:
+        return "conservative"
+    return f"leaks up to {leak_text(row, comparison)} per loop"
+
+
+def _stacked(sizes: list[tuple[float, float]]) -> tuple[Figure, list[Any]]:
+    """Return a figure with one part below the other."""
+    heights = [height for _, height in sizes]
+    figure = style.new_figure(max(width for width, _ in sizes), sum(heights))
+    parts: Any = figure.subfigures(len(sizes), 1, height_ratios=heights, squeeze=False)
+    for part in parts.ravel():
+        part.set_facecolor(style.CARD)
+    return figure, list(parts.ravel())

@@ -1,0 +1,232 @@
+"""The data behind the pictures: a stretch of the scan line, forces on it, the field below it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.surface import Surface
+from asperity.textures.texture import ScanLine, Texture
+
+_SURVEY_POINTS = 4096
+_CURL_COLUMNS, _CURL_ROWS = 160, 90
+_ARROW_COLUMNS, _ARROW_ROWS = 20, 12
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """The part of a scan line that a picture shows; several periods of a short one.
+
+    Attributes:
+        line: the scan line.
+        start: distance from the start of the line [m].
+        length: [m].
+    """
+
+    line: ScanLine
+    start: float
+    length: float
+
+    def xy(self, along: FloatArray) -> FloatArray:
+        """Return points (n, 2) [m] at distances (n,) [m] from the start of the stretch."""
+        distance = self.start + np.asarray(along)
+        return np.ascontiguousarray(self.line.start + distance[:, None] * self.line.direction)
+
+    def steps(self, count: int) -> FloatArray:
+        """Return distances (count,) [m] from end to end of the stretch."""
+        return np.linspace(0.0, self.length, count)
+
+    @property
+    def description(self) -> str:
+        """What is shown, in words."""
+        if self.line.periodic and self.length >= self.line.length * (1.0 - 1e-9):
+            periods = round(self.length / self.line.length)
+            return "one period" if periods == 1 else f"{periods} periods"
+        if self.length >= self.line.length * (1.0 - 1e-9):
+            return "the whole scan line"
+        return f"{100.0 * self.length / self.line.length:.2g} % of the scan line"
+
+
+def feature_length(texture: Texture) -> float:
+    """Return the typical wavelength along the scan line [m]: 2π RMS height / RMS slope."""
+    line = texture.scan_line()
+    xy = line.points(_SURVEY_POINTS)
+    heights = texture.height(xy)
+    slope = float(np.sqrt(np.mean((texture.gradient(xy) @ line.direction) ** 2)))
+    spread = float(heights.std())
+    if slope * line.length <= 1e-12 * spread or spread == 0.0:
+        return line.length
+    return min(2.0 * math.pi * spread / slope, line.length)
+
+
+def stretch_of(texture: Texture, wanted: float, most: float) -> Stretch:
+    """Return a stretch of about the wanted length.
+
+    Whole periods if one is no longer than ``most``, else a part about the highest point.
+
+    Args:
+        texture: whose scan line is taken.
+        wanted: length [m].
+        most: greatest length [m].
+    """
+    line = texture.scan_line()
+    if line.length <= most * (1.0 + 1e-9):
+        periods = max(1, round(min(wanted, most) / line.length)) if line.periodic else 1
+        return Stretch(line, 0.0, periods * line.length)
+    length = min(max(wanted, 0.0) or most, most)
+    highest = int(np.argmax(texture.height(line.points(_SURVEY_POINTS))))
+    centre = (highest + 0.5) * line.length / _SURVEY_POINTS
+    start = min(max(centre - 0.5 * length, 0.0), line.length - length)
+    return Stretch(line, start, length)
+
+
+def scan_height(surface: Surface) -> float:
+    """Return z [m] of the scan: max h - D, or -D for laws on the nominal surface."""
+    if surface.law.contact == "nominal":
+        return -surface.max_depth
+    return surface.texture.extremes[1] - surface.max_depth
+
+
+def sliding_state(surface: Surface, count: int, *, jacobian: bool = False) -> dict[str, FloatArray]:
+    """Return the state arguments of a law with state: fully deflected, sliding along the line."""
+    if not surface.law.stateful:
+        return {}
+    direction = surface.texture.scan_line().direction
+    # Not a rounding error longer than allowed.
+    deflection = np.tile(surface.max_deflection * direction, (count, 1))
+    if not jacobian:
+        return {"deflection": deflection}
+    return {"deflection": deflection, "sliding": np.ones(count, dtype=bool)}
+
+
+@dataclass(frozen=True)
+class ScanForces:
+    """Forces along a straight scan.
+
+    Attributes:
+        along: distance [m], shape (n,).
+        tangential: component along the scan [N], shape (n,).
+        normal: component out of the body [N], shape (n,).
+    """
+
+    along: FloatArray
+    tangential: FloatArray
+    normal: FloatArray
+
+
+def scan_forces(surface: Surface, stretch: Stretch, count: int = 900) -> ScanForces:
+    """Return the forces along the stretch at the height of the scan."""
+    along = stretch.steps(count)
+    points = np.column_stack([stretch.xy(along), np.full(count, scan_height(surface))])
+    forces = surface.force(points, **sliding_state(surface, count))
+    return ScanForces(along, forces[:, :2] @ stretch.line.direction, forces[:, 2])
+
+
+def field_range(surfaces: Iterable[Surface], stretch: Stretch) -> tuple[float, float]:
+    """Return bottom and top [m] of the field pictures, the same for all laws."""
+    surfaces = list(surfaces)
+    heights = surfaces[0].texture.height(stretch.xy(stretch.steps(1000)))
+    low = min([float(heights.min()), *(scan_height(surface) for surface in surfaces)])
+    high = max(float(heights.max()), 0.0)
+    margin = 0.06 * (high - low)
+    return low - margin, high + margin
+
+
+@dataclass(frozen=True)
+class CurlField:
+    """The curl of a force field in the vertical plane of the scan.
+
+    The cells fill the region of contact from the bottom of the picture up to the surface.
+
+    Attributes:
+        along: corners of the cells [m], shape (n + 1, m + 1).
+        z: corners of the cells [m], shape (n + 1, m + 1).
+        curl: ∂f_t/∂z - ∂f_z/∂t [N/m] in the middle of each cell, shape (n, m).
+        norm: the largest ‖J‖₂ of the cells [N/m].
+    """
+
+    along: FloatArray
+    z: FloatArray
+    curl: FloatArray
+    norm: float
+
+
+def curl_field(
+    surface: Surface,
+    stretch: Stretch,
+    bottom: float,
+    columns: int = _CURL_COLUMNS,
+    rows: int = _CURL_ROWS,
+) -> CurlField:
+    """Return the curl below the surface, from the exact Jacobian.
+
+    Args:
+        surface: a law with state is taken sliding along the line, fully deflected.
+        stretch: the part of the scan line.
+        bottom: of the region [m], below the surface everywhere.
+        columns: number of cells along the scan.
+        rows: number of cells upwards.
+    """
+    edges = stretch.steps(columns + 1)
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    xy = stretch.xy(middles)
+    tops, corner_tops = _contact_top(surface, xy), _contact_top(surface, stretch.xy(edges))
+    fractions = (np.arange(rows) + 0.5) / rows
+    z = bottom + (tops - bottom)[:, None] * fractions
+    points = np.column_stack([np.repeat(xy, rows, axis=0), z.ravel()])
+    J = surface.jacobian(points, **sliding_state(surface, len(points), jacobian=True))
+    direction = stretch.line.direction
+    curl = J[:, :2, 2] @ direction - J[:, 2, :2] @ direction
+    corner_z = bottom + (corner_tops - bottom)[:, None] * np.linspace(0.0, 1.0, rows + 1)
+    corner_t = np.broadcast_to(edges[:, None], corner_z.shape).copy()
+    norm = float(np.linalg.norm(J, axis=(1, 2)).max(initial=0.0))
+    return CurlField(corner_t, corner_z, curl.reshape(columns, rows), norm)
+
+
+def _contact_top(surface: Surface, xy: FloatArray) -> FloatArray:
+    """Return the height below which the law acts [m]."""
+    if surface.law.contact == "nominal":
+        return np.zeros(len(xy))
+    return surface.texture.height(xy)
+
+
+@dataclass(frozen=True)
+class ArrowField:
+    """Forces on a regular grid, in contact only.
+
+    Attributes:
+        along: position along the scan [m], shape (n,).
+        z: height [m], shape (n,).
+        tangential: component along the scan [N], shape (n,).
+        normal: component out of the body [N], shape (n,).
+    """
+
+    along: FloatArray
+    z: FloatArray
+    tangential: FloatArray
+    normal: FloatArray
+
+
+def arrow_field(
+    surface: Surface,
+    stretch: Stretch,
+    bottom: float,
+    top: float,
+    columns: int = _ARROW_COLUMNS,
+    rows: int = _ARROW_ROWS,
+) -> ArrowField:
+    """Return forces on a regular grid between bottom and top [m]; see :func:`curl_field`."""
+    steps = (np.arange(columns) + 0.5) * (stretch.length / columns)
+    levels = bottom + (np.arange(rows) + 0.5) * ((top - bottom) / rows)
+    along, z = (grid.ravel() for grid in np.meshgrid(steps, levels, indexing="ij"))
+    xy = stretch.xy(along)
+    inside = z < _contact_top(surface, xy)
+    points = np.column_stack([xy, z])[inside]
+    forces = surface.force(points, **sliding_state(surface, len(points)))
+    return ArrowField(
+        along[inside], z[inside], forces[:, :2] @ stretch.line.direction, forces[:, 2]
+    )

@@ -1,0 +1,147 @@
+"""One look for every picture: colours, type sizes, units, and writing as SVG."""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+import re
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+
+CARD = "#ffffff"
+"""Background of every picture, light in both themes."""
+FREE = "#eceef1"
+"""Free space: where the probe touches nothing."""
+INK, SOFT, FAINT = "#1d2733", "#5b6673", "#c9ced6"
+BODY = "#d9cdb8"
+# Okabe and Ito's palette: told apart by colour-blind readers.
+BLUE, ORANGE, GREEN = "#0072b2", "#d55e00", "#009e73"
+TITLE, LABEL, TICK = 10.0, 9.0, 8.0
+HEIGHTS = "cividis"
+
+# ColorBrewer's PuOr with a middle that is truly white: white is "no curl".
+CURL = LinearSegmentedColormap.from_list(
+    "asperity_curl",
+    ["#4d1a6b", "#8073ac", "#c5bfdf", "#ffffff", "#fbc98a", "#e08214", "#7f3b08"],
+)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit for an axis.
+
+    Attributes:
+        name: such as "mm".
+        scale: the number that an SI value is multiplied by.
+    """
+
+    name: str
+    scale: float
+
+
+def length_unit(extent: float) -> Unit:
+    """Return the unit in which lengths up to the extent [m] are best read.
+
+    Example:
+        >>> length_unit(1e-3).name, length_unit(2e-6).name, length_unit(0.5).name
+        ('mm', 'µm', 'mm')
+    """
+    if extent < 2e-7:
+        return Unit("nm", 1e9)
+    return Unit("µm", 1e6) if extent < 1e-4 else Unit("mm", 1e3)
+
+
+def force_unit(extent: float) -> Unit:
+    """Return the unit in which forces up to the extent [N] are best read."""
+    return Unit("mN", 1e3) if extent < 0.1 else Unit("N", 1.0)
+
+
+def nice_length(target: float) -> float:
+    """Return 1, 2 or 5 times a power of ten, at most the target.
+
+    Example:
+        >>> nice_length(0.37), nice_length(6.0)
+        (0.2, 5.0)
+    """
+    power: float = 10.0 ** math.floor(math.log10(target))
+    step = max(m for m in (1.0, 2.0, 5.0) if m * power <= target * (1.0 + 1e-9))
+    return round(step * power, 12)
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure [inch] that belongs to nobody: no pyplot, no global state."""
+    figure = Figure(figsize=(width, height), facecolor=CARD, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def dress(axes: Axes) -> None:
+    """Give axes the common look."""
+    axes.tick_params(labelsize=TICK, colors=SOFT, length=3, width=0.6)
+    for side, spine in axes.spines.items():
+        spine.set_visible(side in {"left", "bottom"})
+        spine.set_color(FAINT)
+        spine.set_linewidth(0.8)
+
+
+def entitle(axes: Axes, letter: str, name: str, remark: str = "") -> None:
+    """Write a title: the letter bold, the name after it, and a remark below them."""
+    above = TICK + 6.0 if remark else 0.0
+    if remark:
+        axes.set_title(remark, loc="left", fontsize=TICK, color=SOFT, pad=5.0)
+    _above(axes, letter, 0.0, above, fontweight="bold")
+    _above(axes, name, 0.72 * TITLE * len(letter) + 7.0, above)
+
+
+def _above(axes: Axes, text: str, right: float, up: float, **style: Any) -> None:
+    """Write text above the upper left corner of the axes, shifted by points."""
+    axes.annotate(
+        text,
+        (0.0, 1.0),
+        (right, up + 5.0),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        fontsize=TITLE,
+        color=INK,
+        parse_math=False,
+        annotation_clip=False,
+        **style,
+    )
+
+
+def svg_text(figure: Figure) -> str:
+    """Return the figure as SVG, the same text for the same figure."""
+    buffer = io.BytesIO()
+    options: dict[str, Any] = {"facecolor": CARD, "metadata": {"Date": None, "Creator": None}}
+    figure.savefig(buffer, format="svg", dpi=160, **options)
+    text = buffer.getvalue().decode("utf-8")
+    # Matplotlib draws its identifiers at random; numbered in order, the text is reproducible.
+    found = dict.fromkeys(re.findall(r'id="([a-zA-Z][0-9a-f]{10})"', text))
+    for number, identifier in enumerate(found):
+        text = text.replace(identifier, f"i{number}")
+    return text
+
+
+def data_uri(figure: Figure) -> str:
+    """Return the figure as a data URI for an HTML image."""
+    encoded = base64.b64encode(svg_text(figure).encode("utf-8")).decode("ascii")
+    return f"data:image/svg+xml;base64,{encoded}"
+
+
+def label(axes: Axes, x: str = "", y: str = "") -> None:
+    """Name the axes, unit included."""
+    axes.set_xlabel(x, fontsize=LABEL, color=SOFT)
+    axes.set_ylabel(y, fontsize=LABEL, color=SOFT)
+
+
+def dress_bar(bar: Any, text: str) -> None:
+    """Give a colour bar the common look."""
+    bar.ax.tick_params(labelsize=TICK, colors=SOFT, length=3, width=0.6)
+    bar.outline.set_edgecolor(FAINT)
+    bar.set_label(text, fontsize=LABEL, color=SOFT)

@@ -1,0 +1,155 @@
+"""The surface as a picture: a map with a section, or a section alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LightSource, Normalize
+from matplotlib.figure import Figure, SubFigure
+
+from asperity.checks import FloatArray
+from asperity.report import style
+from asperity.report.section import Stretch, feature_length, stretch_of
+from asperity.textures.texture import Texture
+
+_MAP_POINTS = 320
+_SECTION_POINTS = 1600
+
+
+def surface_size(texture: Texture) -> tuple[float, float]:
+    """Return width and height of the picture [inch]."""
+    return (10.0, 2.6) if texture.is_profile else (10.0, 5.4)
+
+
+def draw_surface(figure: Figure | SubFigure, texture: Texture) -> None:
+    """Draw the surface: from above with its scan line, and cut along that line."""
+    if texture.is_profile:
+        length = feature_length(texture)
+        stretch = stretch_of(texture, 4.0 * length, 24.0 * length)
+        draw_section(figure.subplots(), texture, stretch)
+        return
+    upper, lower = figure.subplots(2, 1, height_ratios=[3.0, 1.0])
+    _draw_map(figure, upper, texture)
+    line = texture.scan_line()
+    draw_section(lower, texture, Stretch(line, 0.0, line.length))
+
+
+def draw_section(axes: Axes, texture: Texture, stretch: Stretch) -> None:
+    """Draw the body cut along the stretch, filled, with the exaggeration of its heights."""
+    along = stretch.steps(_SECTION_POINTS)
+    heights = texture.height(stretch.xy(along))
+    wide = style.length_unit(stretch.length)
+    high = style.length_unit(texture.peak_to_valley)
+    x, z = along * wide.scale, heights * high.scale
+    low, top = float(z.min()), float(z.max())
+    margin = 0.12 * max(top - low, 1e-9)
+    axes.fill_between(x, z, low - 3.0 * margin, color=style.BODY, linewidth=0.0)
+    axes.plot(x, z, color=style.INK, linewidth=1.1)
+    axes.set_xlim(x[0], x[-1])
+    axes.set_ylim(low - 3.0 * margin, top + margin)
+    axes.set_facecolor(style.CARD)
+    style.dress(axes)
+    style.label(axes, f"along the scan line [{wide.name}]", f"height [{high.name}]")
+    axes.set_title(
+        f"cut along the scan line: {stretch.description}",
+        loc="left",
+        fontsize=style.LABEL,
+        color=style.INK,
+    )
+
+
+def _rectangle(texture: Texture) -> tuple[FloatArray, FloatArray]:
+    """Return origin and size [m] of the rectangle about the domain."""
+    domain = texture.domain
+    corners = domain.points(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]))
+    low = corners.min(axis=0)
+    return low, corners.max(axis=0) - low
+
+
+def _map_grid(texture: Texture) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return origin, size [m] and heights (rows, columns) [m] of the map."""
+    low, size = _rectangle(texture)
+    step = float(size.max()) / _MAP_POINTS
+    columns, rows = (max(2, round(float(side) / step)) for side in size)
+    x = low[0] + (np.arange(columns) + 0.5) * size[0] / columns
+    y = low[1] + (np.arange(rows) + 0.5) * size[1] / rows
+    grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    return low, size, texture.height(grid).reshape(rows, columns)
+
+
+def _draw_map(figure: Figure | SubFigure, axes: Axes, texture: Texture) -> None:
+    low, size, heights = _map_grid(texture)
+    wide = style.length_unit(float(size.max()))
+    high = style.length_unit(texture.peak_to_valley)
+    norm = Normalize(float(heights.min()) * high.scale, float(heights.max()) * high.scale)
+    colours = matplotlib.colormaps[style.HEIGHTS]
+    step = size[0] / heights.shape[1]
+    # Steep enough to shade, whatever the magnification: the steepest tenth is at 45 degrees.
+    slopes = np.hypot(*np.gradient(heights, step))
+    steepness = 1.0 / max(float(np.quantile(slopes, 0.9)), 1e-300)
+    shaded = LightSource(azdeg=315, altdeg=50).shade(
+        heights * high.scale,
+        cmap=colours,
+        norm=norm,
+        blend_mode="soft",
+        vert_exag=steepness / high.scale,
+        dx=step,
+        dy=step,
+    )
+    x0, y0 = low * wide.scale
+    x1, y1 = (low + size) * wide.scale
+    axes.imshow(shaded, origin="lower", extent=(x0, x1, y0, y1), interpolation="bilinear")
+    axes.set_anchor("W")
+    style.dress(axes)
+    style.label(axes, f"x [{wide.name}]", f"y [{wide.name}]")
+    _draw_scan_line(axes, texture, wide)
+    _draw_scale_bar(axes, float(size[0]), wide)
+    bar: Any = figure.colorbar(ScalarMappable(norm, colours), ax=axes, pad=0.02, aspect=18)
+    style.dress_bar(bar, f"height [{high.name}]")
+
+
+def _draw_scan_line(axes: Axes, texture: Texture, unit: style.Unit) -> None:
+    line = texture.scan_line()
+    ends = np.stack([line.start, line.start + line.length * line.direction]) * unit.scale
+    axes.plot(*ends.T, color="white", linewidth=2.6, solid_capstyle="butt")
+    axes.plot(*ends.T, color=style.ORANGE, linewidth=1.4, solid_capstyle="butt")
+    axes.annotate(
+        "scan line",
+        tuple(ends[0]),
+        (6, 5),
+        textcoords="offset points",
+        fontsize=style.TICK,
+        color=style.INK,
+        bbox={"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.5},
+    )
+
+
+def _draw_scale_bar(axes: Axes, width: float, unit: style.Unit) -> None:
+    """Draw a bar of a round length in the lower right corner."""
+    length = style.nice_length(0.22 * width)
+    right, span = 0.97, length / width
+    box = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 2.5}
+    axes.text(
+        right - 0.5 * span,
+        0.085,
+        f"{length * unit.scale:g} {unit.name}",
+        transform=axes.transAxes,
+        ha="center",
+        va="bottom",
+        fontsize=style.TICK,
+        color=style.INK,
+        bbox=box,
+    )
+    for colour, thickness in (("white", 6.0), (style.INK, 3.0)):
+        axes.plot(
+            [right - span, right],
+            [0.06, 0.06],
+            transform=axes.transAxes,
+            color=colour,
+            linewidth=thickness,
+            solid_capstyle="butt",
+        )
