@@ -11,11 +11,12 @@ import sympy as sp
 from asperity.derive.jacobian import derive, explicit
 from asperity.laws.contacts import contact_derivatives
 from asperity.laws.law import Law
-from asperity.laws.symbols import DEPTH, HX, HY, POSITION, TOWARD, H
+from asperity.laws.symbols import DEPTH, HX, HY, TOWARD
 
 # s = |w| = √(1 + h_x² + h_y²), as a symbol of its own so that the curl becomes rational.
 _S = sp.Symbol("s", positive=True)
 _S_SQUARED = 1 + HX**2 + HY**2
+_IN_PIECES = (sp.Piecewise, sp.Abs, sp.sign, sp.Max, sp.Min, sp.Heaviside, sp.floor, sp.ceiling)
 
 
 @dataclass(frozen=True)
@@ -39,9 +40,11 @@ def curl_verdict(law: Law) -> CurlVerdict:
 
     The curl is reduced to rational functions of the contact symbols and of s = |w|, modulo
     s² = 1 + h_x² + h_y²: it vanishes identically exactly if every numerator reduces to zero.
-    Zero curl is enough where the force is continuous. Where the contact point can jump (the
-    nearest contact), the force must also be a function of the depth alone times the gradient of
-    the depth: then it has a potential in the depth, which does not jump.
+    Three things are asked besides. No state. At depth zero the force lies along the gradient of
+    the depth, so that its potential is the same wherever contact begins. And one smooth formula,
+    not pieces: where the nearest point jumps, a smooth force with zero curl on every surface is
+    c(p, δ) n + b(p, δ), because its Jacobian must be symmetric for every curvature there; it has
+    a potential in p and the distance δ, which do not jump.
 
     Example:
         >>> from asperity.laws import find_law
@@ -62,13 +65,13 @@ def curl_verdict(law: Law) -> CurlVerdict:
         return CurlVerdict(False, curl, reason)
     if any(entry != 0 for entry in curl):
         return CurlVerdict(False, curl, "the curl is not zero")
-    if not begins_at_zero(derivation.force):
-        return CurlVerdict(False, curl, "the force jumps where contact begins")
+    if derivation.force.has(*_IN_PIECES):
+        return CurlVerdict(False, curl, "not proved: the formula is in pieces")
+    if not _starts_along_the_normal(law, derivation.force):
+        return CurlVerdict(False, curl, "where contact begins the force has a tangential part")
     if contact_derivatives(law.contact).single_valued:
-        return CurlVerdict(True, curl, "the curl is zero identically, and the force continuous")
-    if _has_depth_potential(law, derivation.force):
-        return CurlVerdict(True, curl, "the force is the gradient of a potential in the depth")
-    return CurlVerdict(False, curl, "the curl is zero, but its potential jumps with the contact")
+        return CurlVerdict(True, curl, "the curl is zero identically")
+    return CurlVerdict(True, curl, "the curl is zero identically, its potential does not jump")
 
 
 def begins_at_zero(force: Any) -> bool:
@@ -77,13 +80,12 @@ def begins_at_zero(force: Any) -> bool:
     return bool(force.subs(nothing).applyfunc(_reduce) == sp.zeros(3, 1))
 
 
-def _has_depth_potential(law: Law, force: Any) -> bool:
-    gradient = contact_derivatives(law.contact).depth_gradient.T
-    along = (force.T * gradient)[0, 0] / (gradient.T * gradient)[0, 0]
-    residual = (force - along * gradient).applyfunc(_reduce)
-    if residual != sp.zeros(3, 1):
-        return False
-    return all(_reduce(sp.diff(along, symbol)) == 0 for symbol in (H, HX, HY, *POSITION))
+def _starts_along_the_normal(law: Law, force: Any) -> bool:
+    start = force.subs(dict.fromkeys([DEPTH, *TOWARD], 0))
+    if law.contact == "split":
+        return begins_at_zero(force)
+    across = start.cross(contact_derivatives(law.contact).depth_gradient.T)
+    return bool(across.applyfunc(_reduce) == sp.zeros(3, 1))
 
 
 def _reduce(expression: Any) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import keyword
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -29,6 +31,15 @@ from asperity.laws.symbols import (
     TOWARD_DERIVATIVE,
     ContactSymbols,
     H,
+)
+
+# Names that the kernels use themselves: symbols, intermediate values, loops and libraries.
+_RESERVED = re.compile(
+    "|".join(str(symbol) for symbol in ARGUMENT_ORDER)
+    + r"|s|r|q\d\d|t\d+|f[xyz]|j\d\d|i|p|a[xy]|below|square|atoms|weights|count|gap"
+    + r"|floor|clamp_depth|texture|law|points?|depths?|derivatives|deflection|sliding|xy|out"
+    + r"|force|jacobian|held|foot_[xy]|height|slope|curvature|nearest|split_\w+|law_\w+|probe_\w+"
+    + r"|\w+_batch|drag_anchor|primal_value|math|np|min|max|abs|range|njit|scalar|inlined|loop|_\w*"
 )
 
 
@@ -99,10 +110,11 @@ def symbolic_force(law: Law) -> Any:
         LawError: see :func:`derive`.
     """
     symbols = ContactSymbols(tuple(law.parameters), law.contact)
-    reserved = {str(symbol) for symbol in ARGUMENT_ORDER}
     for name in law.parameters:
-        if name in reserved or not name.isidentifier():
+        if not name.isidentifier() or keyword.iskeyword(name) or _RESERVED.fullmatch(name):
             raise LawError(f"law {law.letter}: {name!r} cannot be the name of a parameter")
+    if law.stateful and "max_deflection" not in law.parameters:
+        raise LawError(f"law {law.letter}: a law with state needs the parameter max_deflection")
     try:
         force = sp.Matrix(law.force(symbols))
     except Exception as error:  # whatever a user's formula raises is a defect of the formula
@@ -112,6 +124,8 @@ def symbolic_force(law: Law) -> Any:
         ) from error
     if force.shape != (3, 1):
         raise LawError(f"law {law.letter}: force must have 3 components, got {force.shape}")
+    if force.has(sp.oo, -sp.oo, sp.zoo, sp.nan, sp.I):
+        raise LawError(f"law {law.letter}: force must be real and finite, got {force.T}")
     _check_symbols(law, force)
     return force
 

@@ -9,6 +9,7 @@ import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
 from asperity.derive.jacobian import Derivation, derive
+from asperity.errors import LawError
 from asperity.laws.law import Law
 from asperity.laws.symbols import ARGUMENT_ORDER, HX, HY
 
@@ -27,6 +28,9 @@ class _ScalarPrinter(PythonCodePrinter):  # type: ignore[misc]  # SymPy is untyp
             product = "*".join([base] * abs(int(exponent)))
             return f"({product})" if exponent > 0 else f"(1.0/({product}))"
         return str(super()._print_Pow(expr, rational=rational))
+
+    def _print_not_supported(self, expr: Any) -> str:
+        raise LawError(f"the kernels know no function {type(expr).__name__}")
 
 
 def law_source(law: Law) -> str:

@@ -14,7 +14,7 @@ import math
 # What the symbols say of this law.
 FACTS = {
     'conservative': True,
-    'reason': 'the force is the gradient of a potential in the depth',
+    'reason': 'the curl is zero identically, its potential does not jump',
     'curl': ('0', '0', '0'),
     'begins_at_zero': True,
     'looks_at_surface': True,

@@ -18,7 +18,7 @@ import math
 # What the symbols say of this law.
 FACTS = {
     'conservative': True,
-    'reason': 'the curl is zero identically, and the force continuous',
+    'reason': 'the curl is zero identically',
     'curl': ('0', '0', '0'),
     'begins_at_zero': True,
     'looks_at_surface': False,

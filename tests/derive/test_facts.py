@@ -1,0 +1,50 @@
+"""What the generated files say of the laws is what the symbols say."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from asperity.derive.facts import derive_facts, law_facts
+from asperity.laws import LAWS, Law
+
+CONSERVATIVE = "WCD"
+# Whose force depends on the slope or the height at the contact, not on the depth alone.
+LOOKING = "BCDFG"
+
+
+@pytest.mark.parametrize("letter", "WABCDEFG")
+def test_the_facts_of_the_shipped_laws(letter: str):
+    facts = law_facts(LAWS[letter])
+    assert facts.conservative == (letter in CONSERVATIVE)
+    assert facts.begins_at_zero
+    assert facts.looks_at_surface == (letter in LOOKING)
+    assert facts.affine_in_depth == (letter != "D")
+    assert (facts.curl == ("0", "0", "0")) == (letter in CONSERVATIVE)
+
+
+@pytest.mark.parametrize("letter", "WABCEFG")
+def test_the_file_says_what_is_derived(letter: str):
+    assert law_facts(LAWS[letter]) == derive_facts(LAWS[letter])
+
+
+def test_facts_of_a_law_of_ones_own_are_derived():
+    square = Law("A", "square", "vertical", lambda c: c.depth**3 * c.w)
+    facts = law_facts(square)
+    assert facts.conservative
+    assert not facts.affine_in_depth
+    assert facts.looks_at_surface
+    jumping = Law("J", "jump", "nominal", lambda c: (c.depth + 1) * c.position[0] * c.e_z)
+    facts = law_facts(jumping)
+    assert not facts.begins_at_zero
+    assert not facts.affine_in_depth  # the position is no constant along the depth
+
+
+def test_shipped_facts_need_no_sympy():
+    code = (
+        "import sys; from asperity.derive.facts import law_facts; from asperity.laws import LAWS;"
+        "facts = [law_facts(law) for law in LAWS.values()]; sys.exit('sympy' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
