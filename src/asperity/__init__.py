@@ -22,7 +22,18 @@ if TYPE_CHECKING:
     from asperity.devices import Device, load_device
     from asperity.laws import Law
     from asperity.surface import Surface
-    from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, load_texture
+    from asperity.textures import (
+        Fourier,
+        Grating,
+        HeightMap,
+        Noise,
+        NoiseProfile,
+        Profile,
+        Sinusoid,
+        load_texture,
+        named_surface,
+        surface_names,
+    )
 
 __version__ = "0.1.0"
 
@@ -31,8 +42,11 @@ _HOMES = {
     "Comparison": "asperity.analysis",
     "Device": "asperity.devices",
     "Fourier": "asperity.textures",
+    "Grating": "asperity.textures",
     "HeightMap": "asperity.textures",
     "Law": "asperity.laws",
+    "Noise": "asperity.textures",
+    "NoiseProfile": "asperity.textures",
     "Profile": "asperity.textures",
     "Sinusoid": "asperity.textures",
     "Surface": "asperity.surface",
@@ -41,7 +55,9 @@ _HOMES = {
     "load_device": "asperity.devices",
     "load_texture": "asperity.textures",
     "loop_work": "asperity.analysis",
+    "named_surface": "asperity.textures",
     "one_sided_number": "asperity.analysis",
+    "surface_names": "asperity.textures",
 }
 
 __all__ = [
@@ -50,9 +66,12 @@ __all__ = [
     "Comparison",
     "Device",
     "Fourier",
+    "Grating",
     "HeightMap",
     "Law",
     "LawError",
+    "Noise",
+    "NoiseProfile",
     "ParameterError",
     "Profile",
     "Sinusoid",
@@ -64,7 +83,9 @@ __all__ = [
     "load_device",
     "load_texture",
     "loop_work",
+    "named_surface",
     "one_sided_number",
+    "surface_names",
 ]
 
 

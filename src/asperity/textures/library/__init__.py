@@ -1,0 +1,8 @@
+"""Named surfaces of physical size, drawn by rules: deterministic, periodic, band-limited."""
+
+from __future__ import annotations
+
+from asperity.textures.library.named import NamedSurface
+from asperity.textures.library.registry import LIBRARY, named_surface, surface_names
+
+__all__ = ["LIBRARY", "NamedSurface", "named_surface", "surface_names"]

@@ -1,0 +1,168 @@
+"""``asperity surfaces``: the list, its data, and the page of pictures."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from PIL import Image
+
+from asperity.cli.gallery import gallery_text, picture
+from asperity.cli.surfaces import listed_surfaces, surfaces_command
+from asperity.errors import ParameterError
+from asperity.scene import KINDS, load_scene
+from asperity.textures import Sinusoid
+from asperity.textures.catalogue import CATALOGUE, TEXTURE_KINDS
+from asperity.units import quantity
+
+
+def call(*arguments: str) -> Result:
+    return CliRunner().invoke(surfaces_command, arguments, env={"COLUMNS": "80"})
+
+
+def content_of(*arguments: str) -> dict[str, dict]:
+    result = call(*arguments, "--json", "-")
+    assert result.exit_code == 0
+    data = json.loads(result.output)
+    assert data["schema"] == 1
+    return {one["name"]: one for one in data["surfaces"]}
+
+
+def test_the_table_lists_everything_in_80_columns_with_the_name_alone_in_front():
+    result = call()
+    assert result.exit_code == 0
+    lines = result.stdout.splitlines()
+    assert max(len(line.rstrip()) for line in lines) <= 80
+    # A name starts its row; the further lines of a row are indented.
+    first = [line[:16].strip() for line in lines if re.match(r" ?[a-z]", line)]
+    assert first[1 : 1 + len(CATALOGUE)] == list(CATALOGUE)
+    for word in ("grit=P120", "spacing=420µm", "rms [m]", "duty=0.5", "3.5 mm"):
+        assert word in result.stdout
+
+
+def test_the_table_shows_size_and_height():
+    text = call("tile", "sinusoid").stdout
+    assert "0.8 mm" in text
+    assert "1.5 mm" in text
+    assert "50 mm x" in text
+
+
+def test_a_name_is_told_about_in_detail():
+    text = call("sandpaper").stdout
+    assert "FEPA 43-1" in text
+    assert "P60, P80, P120" in text
+    assert "cloth" not in text
+    assert max(len(line.rstrip()) for line in text.splitlines()) <= 80
+
+
+@pytest.mark.parametrize("name", ["Cloth", "cloth:", "CLOTH"])
+def test_names_are_taken_as_they_are_written_elsewhere(name: str):
+    assert list(content_of(name)) == ["cloth"]
+
+
+def test_the_json_says_everything():
+    content = content_of()
+    assert list(content) == list(CATALOGUE)
+    assert [name for name, one in content.items() if not one["named"]] == list(TEXTURE_KINDS)
+    paper = content["sandpaper"]
+    assert paper["size"] == pytest.approx([3.5e-3, 3.5e-3])
+    assert paper["texture"]["kind"] == "sandpaper"
+    assert paper["arguments"][0]["name"] == "grit"
+    assert paper["arguments"][0]["choices"][0] == "P60"
+    assert content["sinusoid"]["peak_to_valley"] == pytest.approx(0.8e-3)
+    assert content["noise"]["arguments"][0] == {
+        "name": "rms", "words": "root mean square height", "unit": "m", "default": None,
+        "default_words": "", "form": "quantity", "required": True, "choices": [],
+    }  # fmt: skip
+
+
+def test_the_specification_makes_the_texture():
+    for listed in listed_surfaces():
+        kind, _, rest = listed.specification.partition(":")
+        assert kind == listed.kind.name
+        given = dict(part.split("=") for part in rest.split(",") if part)
+        assert set(given) == set(listed.kind.example)
+        arguments = {one.name: one for one in listed.kind.arguments}
+        for name, text in given.items():
+            if arguments[name].form == "quantity":
+                value = quantity(name, text, arguments[name].unit)
+                assert value == pytest.approx(listed.kind.example[name], rel=1e-12)
+
+
+@pytest.mark.skipif(
+    not set(CATALOGUE) <= set(KINDS), reason="scenes do not read the catalogue of textures"
+)
+@pytest.mark.parametrize("name", list(CATALOGUE))
+def test_other_commands_take_the_specification(name: str):
+    listed = listed_surfaces([name])[0]
+    assert load_scene(listed.specification).texture.describe() == listed.texture.describe()
+
+
+def test_every_required_argument_is_in_the_example():
+    for kind in CATALOGUE.values():
+        assert {one.name for one in kind.required} <= set(kind.example)
+        assert set(kind.example) <= {one.name for one in kind.arguments}
+
+
+def test_the_page_is_whole_and_needs_no_network(tmp_path: Path):
+    path = tmp_path / "surfaces.html"
+    result = call("--html", str(path))
+    assert result.exit_code == 0
+    assert "Pictures:" in result.stdout
+    assert [one.name for one in tmp_path.iterdir()] == ["surfaces.html"]
+    page = path.read_text("utf-8")
+    assert page.lower().startswith("<!doctype html>")
+    assert page.rstrip().endswith("</html>")
+    assert path.stat().st_size < 3_000_000
+    assert not re.search(r"https?://|<script|<link|url\(", page)
+    pictures = re.findall(r'<img src="data:image/png;base64,([^"]+)" alt="([^"]+)"', page)
+    assert page.count("<img") == len(pictures) == len(CATALOGUE)
+    for encoded, words in pictures:
+        image = np.asarray(Image.open(io.BytesIO(base64.b64decode(encoded))).convert("L"))
+        assert image.shape[1] > 400, words
+        assert image.std() > 20.0, words  # something is drawn
+    for name, kind in CATALOGUE.items():
+        assert f'id="{name}"' in page
+        assert f"asperity compare {name}:" in page or f"asperity compare &#39;{name}:" in page
+        for argument in kind.arguments:
+            assert argument.name in page
+
+
+def test_pictures_of_different_surfaces_differ_and_of_the_same_do_not():
+    one, again, other = (picture(Sinusoid(a, 1e-3)) for a in (1e-4, 1e-4, 4e-4))
+    assert one == again
+    assert one != other
+
+
+def test_a_page_of_few():
+    page = gallery_text(listed_surfaces(["knurl"]))
+    assert page.count("<img") == 1
+    assert "Kinds of textures" not in page
+
+
+def test_html_on_standard_output_is_alone():
+    result = call("knurl", "--html", "-")
+    assert result.stdout.startswith("<!DOCTYPE html>")
+    assert result.stdout.rstrip().endswith("</html>")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["cloht"], "did you mean 'cloth'"),
+        (["--json", "-", "--html", "-"], "cannot both go to standard output"),
+        (["--json", "/nowhere/at/all.json"], "must lie in a folder that exists"),
+        (["--html", "."], "must be a file"),
+    ],
+)
+def test_bad_input_is_one_sentence(arguments: list[str], words: str):
+    result = call(*arguments)
+    assert isinstance(result.exception, ParameterError)
+    assert words in str(result.exception)
+    assert result.stdout == ""
