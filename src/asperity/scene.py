@@ -11,7 +11,9 @@ from typing import Any
 
 from asperity.devices import Device, load_device, parse_device
 from asperity.errors import ParameterError, nearest_names
-from asperity.textures import Fourier, Sinusoid, Texture, load_texture
+from asperity.textures import Texture, load_texture
+from asperity.textures.arguments import Argument, Form
+from asperity.textures.catalogue import CATALOGUE
 from asperity.units import quantity
 
 # Reads one argument: its name for messages, and what was given (text, number or list).
@@ -65,12 +67,16 @@ def _split(given: Any, separator: str | None) -> list[Any]:
     return [part for part in str(given).split(separator) if part.strip()]
 
 
-def _pitch(name: str, given: Any) -> Any:
-    parts = _split(given, ";")
-    values = [quantity(name, part, "m") for part in parts]
-    if len(values) not in {1, 2}:
-        raise ParameterError(name, "must be one quantity, or two for x and y: '1um; 2um'", given)
-    return values[0] if len(values) == 1 else values
+def _pair(unit: str) -> Reader:
+    """Read "1um" or "1um; 2um", for x and y."""
+
+    def read(name: str, given: Any) -> Any:
+        values = [quantity(name, part, unit) for part in _split(given, ";")]
+        if len(values) not in {1, 2}:
+            raise ParameterError(name, "must be one quantity, or two for x and y: 'a; b'", given)
+        return values[0] if len(values) == 1 else values
+
+    return read
 
 
 def _text(name: str, given: Any) -> str:
@@ -105,7 +111,7 @@ FILE_ARGUMENTS: dict[str, Reader] = {
     "channel": _channel,
     "unit": _text,
     "integrate_normals": _switch,
-    "pitch": _pitch,
+    "pitch": _pair("m"),
     "height_range": _quantity("m"),
     "outliers": _quantity(""),
     "max_missing": _quantity(""),
@@ -119,20 +125,30 @@ FILE_ARGUMENTS: dict[str, Reader] = {
     "magnify_height": _quantity(""),
 }
 
+
+def _reader(argument: Argument) -> Reader:
+    unit = argument.unit
+    readers: dict[Form, Reader] = {
+        "quantity": _quantity(unit),
+        "pair": _pair(unit),
+        "vector": _vector(unit),
+        "items": _items(unit),
+        "vectors": _vectors(unit),
+        "integer": _whole,
+        "text": _text,
+    }
+    return readers[argument.form]
+
+
 # Texture kinds: what makes one, its required and its optional arguments.
 KINDS: dict[str, tuple[Callable[..., Texture], dict[str, Reader], dict[str, Reader]]] = {
-    "sinusoid": (
-        Sinusoid,
-        {"amplitude": _quantity("m"), "period": _quantity("m")},
-        {"phase": _quantity("rad"), "direction": _vector("")},
-    ),
-    "fourier": (
-        Fourier,
-        {"amplitudes": _items("m"), "wavevectors": _vectors("rad/m")},
-        {"phases": _items("rad")},
-    ),
-    "file": (load_texture, {"path": _text}, FILE_ARGUMENTS),
-}
+    kind.name: (
+        kind.make,
+        {argument.name: _reader(argument) for argument in kind.required},
+        {argument.name: _reader(argument) for argument in kind.optional},
+    )
+    for kind in CATALOGUE.values()
+} | {"file": (load_texture, {"path": _text}, FILE_ARGUMENTS)}
 
 SURFACE_ARGUMENTS: dict[str, Reader] = {
     "law": _text,
@@ -181,7 +197,7 @@ def _refuse_file_arguments(extra: Mapping[str, Any]) -> None:
 
 def _parse_arguments(text: str) -> dict[str, str]:
     arguments: dict[str, str] = {}
-    for part in text.split(","):
+    for part in text.split(",") if text.strip() else ():
         name, equals, value = part.partition("=")
         name = name.strip().replace("-", "_")
         if not equals or not name:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,12 +10,16 @@ import pytest
 from numpy.typing import NDArray
 
 from asperity.errors import ParameterError
-from asperity.textures import filling
+from asperity.textures import load_texture
 from asperity.textures.filling import fill_harmonic
 from asperity.textures.preparation import ALPHA, gaussian_filter, prepare
 from asperity.textures.reading import RawSurface
 
 P = 1e-6
+DATA = Path(__file__).parents[3] / "shared" / "data"
+needs_data = pytest.mark.skipif(
+    not DATA.is_dir(), reason="the real surfaces of ../shared/data are not there"
+)
 
 
 def surface(heights: NDArray[np.float64], **changes: Any) -> RawSurface:
@@ -33,9 +38,6 @@ def bumpy(ny: int = 40, nx: int = 50) -> NDArray[np.float64]:
     return np.asarray(1e-6 * rng.standard_normal((ny, nx)) + plane(ny, nx))
 
 
-# --- filling ---------------------------------------------------------------------------------
-
-
 def holed(heights: NDArray[np.float64]) -> NDArray[np.float64]:
     ny, nx = heights.shape
     with_holes = heights.copy()
@@ -44,59 +46,17 @@ def holed(heights: NDArray[np.float64]) -> NDArray[np.float64]:
     return with_holes
 
 
-@pytest.mark.parametrize("direct", [filling._DIRECT, 10], ids=["direct", "conjugate gradients"])
-@pytest.mark.parametrize("ratio", [1.0, 2.0, 20.0])
-def test_filling_continues_a_plane(
-    monkeypatch: pytest.MonkeyPatch, direct: int, ratio: float
-) -> None:
-    monkeypatch.setattr(filling, "_DIRECT", direct)
-    monkeypatch.setattr(filling, "_TOLERANCE", 1e-10)
-    exact = plane(61, 80)
-    filled = fill_harmonic(holed(exact), (P, ratio * P))
-    assert np.max(np.abs(filled - exact)) < 1e-8 * np.ptp(exact)
-
-
-@pytest.mark.parametrize("direct", [filling._DIRECT, 10], ids=["direct", "conjugate gradients"])
-def test_filling_is_harmonic_and_keeps_valid_points(
-    monkeypatch: pytest.MonkeyPatch, direct: int
-) -> None:
-    monkeypatch.setattr(filling, "_DIRECT", direct)
-    monkeypatch.setattr(filling, "_TOLERANCE", 1e-10)
-    heights = holed(bumpy())
-    heights[0, :5] = heights[-3:, -1] = np.nan  # holes at the outer border, too
-    missing = np.isnan(heights)
-    filled = fill_harmonic(heights, (P, 2 * P))
-    np.testing.assert_array_equal(filled[~missing], heights[~missing])
-    mirrored = np.pad(filled, 1, mode="edge")  # no slope across the border
-    centre = mirrored[1:-1, 1:-1]
-    laplacian = (mirrored[1:-1, 2:] - 2 * centre + mirrored[1:-1, :-2]) / 1.0
-    laplacian += (mirrored[2:, 1:-1] - 2 * centre + mirrored[:-2, 1:-1]) / 4.0
-    assert np.max(np.abs(laplacian[missing])) < 1e-7 * np.ptp(filled)
-    assert np.max(np.abs(laplacian[~missing])) > 0.1 * np.ptp(filled)  # the check can fail
-    assert filled[missing].max() < np.nanmax(heights)
-    assert filled[missing].min() > np.nanmin(heights)
-
-
-def test_filling_of_a_profile_is_linear() -> None:
-    n = np.nan
-    filled = fill_harmonic(np.array([n, 1.0, n, n, 4.0, 0.0, n]))
-    np.testing.assert_allclose(filled, [1, 1, 2, 3, 4, 0, 0])
-
-
-def test_filling_of_a_quarter_of_a_million_points() -> None:
-    y, x = np.mgrid[:1000, :1000] / 100.0
-    exact = x**2 - y**2 + 3 * x  # harmonic, also for the five-point equation
-    heights = exact.copy()
-    heights[100:599, 300:800] = np.nan
-    assert np.isnan(heights).mean() > 0.249
-    assert np.max(np.abs(fill_harmonic(heights) - exact)) < 1e-7 * np.ptp(exact)
+# --- steps ---------------------------------------------------------------------------------------
 
 
 def test_step_names_the_missing_points() -> None:
     heights = bumpy(20, 30)
     heights.ravel()[[33, 34, 70, 71, 72, 73, 74, 200, 300, 400, 500, 501]] = np.nan
     steps = prepare(surface(heights)).steps
-    assert steps[0] == "filled 12 of 600 missing points (2 %) by harmonic interpolation"
+    assert (
+        steps[0]
+        == "filled 12 of 600 missing points (2 %) by harmonic interpolation on the fitted tilt"
+    )
     assert prepare(surface(bumpy())).steps[0] == "no missing points"
 
 
@@ -121,6 +81,21 @@ def test_levelling_fits_the_valid_points_only() -> None:
     expected = gaussian_filter(flat, (P, 2 * P), 8 * P)
     got = prepare(surface(heights), cutoff=8 * P).heights
     np.testing.assert_allclose(got, expected, atol=1e-17)
+
+
+@pytest.mark.parametrize("form", [1, 2])
+def test_a_hole_at_the_border_continues_the_form(form: int) -> None:
+    """Filling before the form was known would leave a hill as high as the form in the hole."""
+    y, x = np.mgrid[:50, :60] * 1.0
+    shape = 0.02 * P * x + (form - 1) * 1e-2 * P * ((x - 30) ** 2 + y**2)
+    wave = 1e-3 * P * np.cos(np.pi * x / 5)
+    heights = shape + wave
+    heights[:, 50:] = np.nan
+    prepared = prepare(surface(heights), form=form, cutoff=4 * P)
+    assert np.max(np.abs(prepared.heights)) < 3e-3 * P
+    assert np.ptp(shape) > 1.0 * P
+    assert prepared.filled is not None
+    np.testing.assert_array_equal(prepared.filled, np.isnan(heights))
 
 
 def test_levelling_of_a_profile() -> None:
@@ -297,3 +272,39 @@ def test_a_quarter_missing_is_accepted() -> None:
     heights = bumpy(20, 20)
     heights.ravel()[:100] = np.nan
     assert np.isfinite(prepare(surface(heights)).heights).all()
+
+
+def test_more_than_a_quarter_missing_needs_consent() -> None:
+    heights = bumpy(20, 20)
+    heights.ravel()[:109] = np.nan
+    with pytest.raises(ParameterError, match=r"misses 27.3% .* a quarter .* max_missing=0.28 "):
+        prepare(surface(heights))
+    with pytest.raises(ParameterError, match=r"misses 27.3% .* at most 27.0% can be filled"):
+        prepare(surface(heights), max_missing=0.27)
+    allowed = prepare(surface(heights), max_missing=0.28)
+    assert allowed.filled is not None
+    assert allowed.filled.sum() == 109
+    for wrong in (0.0, 1.0, -0.1, 28.0, np.nan, "0.3"):
+        with pytest.raises(ParameterError, match="max_missing must lie between 0 and 1"):
+            prepare(surface(heights), max_missing=wrong)  # type: ignore[arg-type]  # partly text
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("name", "shape", "allowed"),
+    [
+        ("sample-land.x3p", (256, 918), None),
+        ("testing.x3p", (20, 30), None),
+        ("dektak-1.csv", (9600,), None),
+        ("frt-2.frt", (300, 150), 0.28),
+    ],
+)
+def test_real_surfaces(name: str, shape: tuple[int, ...], allowed: float | None) -> None:
+    if name.endswith("frt"):
+        pytest.importorskip("SurfaceTopography", reason="the extra 'formats' is not installed")
+    texture = load_texture(DATA / name, max_missing=allowed, outliers=10.0, form=2)
+    assert texture.heights.shape == shape
+    assert np.isfinite(texture.heights).all()
+    if allowed is not None:
+        with pytest.raises(ParameterError, match=r"misses 27.4% .* max_missing=0.28"):
+            load_texture(DATA / name)

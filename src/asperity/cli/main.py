@@ -8,6 +8,8 @@ import click
 
 import asperity
 from asperity.cli.compare import compare_command
+from asperity.cli.prepare import prepare_command
+from asperity.cli.surfaces import surfaces_command
 from asperity.errors import AsperityError
 
 BAD_INPUT = 2
@@ -23,6 +25,8 @@ def cli() -> None:
 
 
 cli.add_command(compare_command)
+cli.add_command(prepare_command)
+cli.add_command(surfaces_command)
 
 
 def main() -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
@@ -30,6 +30,8 @@ class HeightMap(Texture):
         periodic: whether the map repeats.
         origin: position of heights[0, 0] [m].
         preparation: what was done to the heights, in words, for reports.
+        filled: where heights were missing and have been interpolated, shape (ny, nx), so that
+            pictures can mask them.
 
     Raises:
         ParameterError: for fewer than 4 × 4 heights, heights that are not finite, or a pitch
@@ -51,6 +53,7 @@ class HeightMap(Texture):
         periodic: bool = False,
         origin: Sequence[float] = (0.0, 0.0),
         preparation: Sequence[str] = (),
+        filled: ArrayLike | None = None,
     ) -> None:
         self.heights = array("heights", heights, (None, None), "m")
         if min(self.heights.shape) < LEAST_NODES:
@@ -63,6 +66,7 @@ class HeightMap(Texture):
         self.periodic = bool(periodic)
         self.origin = array("origin", origin, (2,), "m")
         self.preparation = tuple(preparation)
+        self.filled = mask("filled", filled, self.heights.shape)
 
     def __repr__(self) -> str:
         ny, nx = self.heights.shape
@@ -137,6 +141,21 @@ class HeightMap(Texture):
         }
 
 
+def mask(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
+    """Return a mask of the shape, or None for none.
+
+    Raises:
+        ParameterError: for another shape, or values that are neither true nor false.
+    """
+    if value is None:
+        return None
+    result = np.ascontiguousarray(value)
+    if result.dtype != np.bool_ or result.shape != shape:
+        wanted = f"must be true or false for each height, shape {shape}"
+        raise ParameterError(name, wanted, f"{result.dtype} of shape {result.shape}")
+    return result
+
+
 def padded_coefficients(heights: FloatArray, periodic: bool) -> FloatArray:
     """Return the cubic B-spline coefficients of heights on a grid of any dimension.
 
@@ -145,7 +164,7 @@ def padded_coefficients(heights: FloatArray, periodic: bool) -> FloatArray:
     """
     from scipy.ndimage import spline_filter
 
-    mode = "grid-wrap" if periodic else "mirror"
+    mode: Literal["grid-wrap", "mirror"] = "grid-wrap" if periodic else "mirror"
     inner = spline_filter(heights, order=3, output=np.float64, mode=mode)
     if periodic:
         return np.ascontiguousarray(np.pad(inner, (1, 2), mode="wrap"))

@@ -3,33 +3,59 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
+from asperity.errors import ParameterError
 from asperity.textures.heightmap import HeightMap
 from asperity.textures.profile import Profile
+
+if TYPE_CHECKING:
+    from asperity.textures.prepared import Prepared
 
 
 def load_texture(
     path: str | os.PathLike[str],
     *,
+    channel: str | int | None = None,
+    unit: str | None = None,
+    integrate_normals: bool = False,
     pitch: float | Sequence[float] | None = None,
     height_range: float | None = None,
+    outliers: float | None = None,
+    max_missing: float | None = None,
+    form: int | None = None,
     cutoff: float | None = None,
+    l_cutoff: float | None = None,
+    tip_radius: float | None = None,
+    periodic: bool = False,
+    blend: float | None = None,
     magnify: float = 1.0,
     magnify_height: float | None = None,
 ) -> HeightMap | Profile:
     """Return a measured surface as a texture.
 
-    Reads X3P, NPY, text matrices and two-column profiles, then prepares: fill missing points,
-    level, Gaussian band limit, magnify. What was done is in the ``preparation`` of the result.
+    Reads the file and prepares it: remove outliers, fill missing points, level, Gaussian band
+    limit, stylus tip, periodic continuation, magnify. What was done is in the ``preparation`` of
+    the result. A file that ``asperity prepare`` has written is taken as it is.
 
     Args:
         path: the file; its kind is told by its content.
+        channel: which one of several data channels, by name or number.
+        unit: of the heights, where the file names none.
+        integrate_normals: whether the image is a normal map, to be integrated.
         pitch: distance of the points [m], one number or (p_x, p_y); required where the file has
             none, else it overrides the file's.
         height_range: peak-to-valley height [m] that the heights are scaled to.
-        cutoff: cut-off wavelength of the Gaussian filter [m], in the surface's own metres before
-            magnification; chosen from the sampling if not given.
+        outliers: spikes beyond so many robust standard deviations become missing points.
+        max_missing: share of the points that may be missing; a quarter if not given.
+        form: degree of the polynomial that is subtracted; 1, which levels, if not given.
+        cutoff: cut-off wavelength of the Gaussian S-filter [m], in the surface's own metres
+            before magnification, as all lengths here; chosen from the sampling if not given.
+        l_cutoff: cut-off wavelength of the Gaussian L-filter [m], which removes longer waves.
+        tip_radius: radius of the ball that feels the surface [m].
+        periodic: whether opposite borders are blended so that the surface repeats.
+        blend: width of the blended band [m]; a tenth of each side if not given.
         magnify: factor of the lateral size, and of the height unless told otherwise.
         magnify_height: factor of the height.
 
@@ -37,17 +63,84 @@ def load_texture(
         SurfaceFileError: for a file that cannot be read, with the reason.
         ParameterError: for an argument that cannot be used.
     """
-    from asperity.textures.preparation import prepare
-    from asperity.textures.reading import read_surface
-
-    prepared = prepare(
-        read_surface(path),
+    prepared = prepare_file(
+        path,
+        channel=channel,
+        unit=unit,
+        integrate_normals=integrate_normals,
         pitch=pitch,
         height_range=height_range,
+        outliers=outliers,
+        max_missing=max_missing,
+        form=form,
         cutoff=cutoff,
+        l_cutoff=l_cutoff,
+        tip_radius=tip_radius,
+        periodic=periodic,
+        blend=blend,
         magnify=magnify,
         magnify_height=magnify_height,
     )
+    return texture_of(prepared)
+
+
+def prepare_file(
+    path: str | os.PathLike[str],
+    *,
+    progress: Callable[[str], None] | None = None,
+    magnify: float = 1.0,
+    magnify_height: float | None = None,
+    **arguments: Any,
+) -> Prepared:
+    """Read and prepare a surface, or load one that was prepared before.
+
+    Args:
+        path: the file.
+        progress: called with the name of each stage before it begins.
+        magnify: see :func:`load_texture`; also for a prepared surface.
+        magnify_height: see :func:`load_texture`; also for a prepared surface.
+        **arguments: the others of :func:`load_texture`; None and False mean not given.
+
+    Raises:
+        SurfaceFileError: for a file that cannot be read, with the reason.
+        ParameterError: for an argument that cannot be used, or one that would prepare a second
+            time.
+    """
+    from asperity.textures.preparation import magnified, prepare
+    from asperity.textures.prepared import is_prepared, load_prepared
+    from asperity.textures.reading import read_surface
+
+    given = {k: v for k, v in arguments.items() if v is not None and v is not False}
+    begin = progress or (lambda _stage: None)
+    begin("read")
+    if is_prepared(path):
+        for name in given:
+            raise ParameterError(name, f"cannot be applied: {os.fspath(path)} was prepared already")
+        return magnified(load_prepared(path), magnify, magnify_height)
+    reading = {k: given.pop(k) for k in ("channel", "unit", "integrate_normals") if k in given}
+    return prepare(
+        read_surface(path, **reading),
+        magnify=magnify,
+        magnify_height=magnify_height,
+        progress=progress,
+        **given,
+    )
+
+
+def texture_of(prepared: Prepared) -> HeightMap | Profile:
+    """Return the spline through a prepared surface."""
     if prepared.heights.ndim == 1:
-        return Profile(prepared.heights, prepared.pitch[0], preparation=prepared.steps)
-    return HeightMap(prepared.heights, prepared.pitch, preparation=prepared.steps)
+        return Profile(
+            prepared.heights,
+            prepared.pitch[0],
+            periodic=prepared.periodic,
+            preparation=prepared.steps,
+            filled=prepared.filled,
+        )
+    return HeightMap(
+        prepared.heights,
+        prepared.pitch,
+        periodic=prepared.periodic,
+        preparation=prepared.steps,
+        filled=prepared.filled,
+    )

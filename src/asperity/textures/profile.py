@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray, array, positive, real
 from asperity.errors import ParameterError
-from asperity.textures.heightmap import LEAST_NODES, padded_coefficients
+from asperity.textures.heightmap import LEAST_NODES, mask, padded_coefficients
 from asperity.textures.texture import Domain, ScanLine, Texture
 
 
@@ -27,6 +27,7 @@ class Profile(Texture):
         periodic: whether the profile repeats.
         origin: position of heights[0] [m].
         preparation: what was done to the heights, in words, for reports.
+        filled: where heights were missing and have been interpolated, shape (n,).
 
     Raises:
         ParameterError: for fewer than 4 heights, heights that are not finite, or a pitch that
@@ -48,6 +49,7 @@ class Profile(Texture):
         periodic: bool = False,
         origin: float = 0.0,
         preparation: Sequence[str] = (),
+        filled: ArrayLike | None = None,
     ) -> None:
         self.heights = array("heights", heights, (None,), "m")
         if len(self.heights) < LEAST_NODES:
@@ -56,6 +58,7 @@ class Profile(Texture):
         self.periodic = bool(periodic)
         self.origin = real("origin", origin, "m")
         self.preparation = tuple(preparation)
+        self.filled = mask("filled", filled, self.heights.shape)
 
     def __repr__(self) -> str:
         edge = "periodic" if self.periodic else "finite"
