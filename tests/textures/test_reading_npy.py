@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.errors import AsperityError, SurfaceFileError
+from asperity.errors import AsperityError, ParameterError, SurfaceFileError
 from asperity.textures.reading import RawSurface, read_surface
 
 MAP = np.array([[1.0, 2.0, np.nan, 4.0, 5.0], [-6.0, 7.0, 8.0, 9.0, 0.25]])
@@ -116,10 +116,14 @@ def test_mutated_files_fail_only_as_surface_files(tmp_path: Path) -> None:
     ("content", "match"),
     [
         (b"", "is empty"),
-        (b"\x89PNG\r\n\x1a\n" + bytes(40), "a PNG image: not a surface format that asperity reads"),
-        (b"II*\x00" + bytes(40), "a TIFF image"),
+        (
+            b"\xff\xd8\xff\xe0" + bytes(40),
+            "a JPEG image: not a surface format .*16 bit if possible",
+        ),
+        (b"GIF89a" + bytes(40), "a GIF image"),
+        (b"BM" + bytes(40), "a BMP image"),
+        (b"\x1f\x8b" + bytes(40), "a gzip archive.*unpack it first"),
         (b"%PDF-1.7\n1 0 obj", "a PDF document"),
-        (b"FRTM_GLIDERV1.00:\x00", "an? FRT file"),
         (bytes(range(256)), "a binary file"),
         (b"\x01\x02\x03\x04", "a binary file"),
     ],
@@ -129,6 +133,32 @@ def test_foreign_files(tmp_path: Path, content: bytes, match: str) -> None:
     path.write_bytes(content)
     with pytest.raises(SurfaceFileError, match=match):
         read_surface(path)
+
+
+def test_a_unit_scales_the_heights_of_an_npy_file(tmp_path: Path) -> None:
+    raw = read_surface(saved(tmp_path, MAP), unit="um")
+    np.testing.assert_allclose(raw.heights, MAP * 1e-6, rtol=1e-15)
+    assert raw.has_units
+    assert raw.notes == ("no unit in an NPY file: 1e-06 m as given",)
+
+
+@pytest.mark.parametrize(
+    ("argument", "given", "match"),
+    [
+        ("channel", "Height", "must not be given.*an NPY file.*no channels"),
+        ("channel", 0, "must not be given.*no channels"),
+        ("integrate_normals", True, "must not be given.*is no image"),
+        ("unit", "furlong", "must be a unit of length: m, cm, mm, um"),
+        ("unit", "", "must be a unit of length"),
+        ("unit", "MM", "must be a unit of length"),
+    ],
+)
+def test_arguments_that_say_nothing_about_the_file(
+    tmp_path: Path, argument: str, given: object, match: str
+) -> None:
+    with pytest.raises(ParameterError, match=match) as caught:
+        read_surface(saved(tmp_path, MAP), **{argument: given})  # type: ignore[arg-type]
+    assert caught.value.argument == argument
 
 
 def test_no_file_and_directory(tmp_path: Path) -> None:
@@ -144,5 +174,5 @@ def test_too_large_a_file_is_refused_unread(tmp_path: Path) -> None:
     path = tmp_path / "large.txt"
     with path.open("wb") as stream:
         stream.truncate(2_100_000_000)  # sparse: takes no disk space
-    with pytest.raises(SurfaceFileError, match=r"2\.1 GB; at most 2 GB"):
+    with pytest.raises(SurfaceFileError, match=r"2\.1 GB; at most 2 GB are read: cut out a part"):
         read_surface(path)

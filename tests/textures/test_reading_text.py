@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.errors import AsperityError, SurfaceFileError
+from asperity.errors import AsperityError, ParameterError, SurfaceFileError
 from asperity.textures.reading import RawSurface, read_surface
+from asperity.textures.reading import read as reading
 from asperity.textures.reading.spacing import spacing
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
@@ -49,6 +50,30 @@ def test_real_profile_of_a_stylus() -> None:
     assert raw.pitch == pytest.approx((0.15625e-6,), rel=1e-4)  # 64 samples in 10 um
     assert raw.notes == ()
     assert raw.has_units
+
+
+def test_a_unit_for_a_file_that_names_none(tmp_path: Path) -> None:
+    path = tmp_path / "test.txt"
+    path.write_text(lines(","))
+    raw = read_surface(path, unit="nm")
+    np.testing.assert_allclose(raw.heights, HEIGHTS * 1e-9, rtol=1e-15)
+    assert raw.has_units
+    assert raw.notes == ("no unit in the file: 1e-09 m as given",)
+    path.write_text("0 5\n20 6\n40 8\n60 5\n")
+    with pytest.raises(SurfaceFileError, match="look not to be in metres"):
+        read_surface(path)
+    raw = read_surface(path, unit="um")
+    assert raw.pitch == pytest.approx((20e-6,), rel=1e-12)
+    np.testing.assert_allclose(raw.heights, np.array([5, 6, 8, 5]) * 1e-6, rtol=1e-15)
+    path.write_text("x [um],z [nm]\n0,1\n1,2\n2,3\n3,1\n")
+    with pytest.raises(ParameterError, match=r"unit must not be given: test\.txt names its units"):
+        read_surface(path, unit="um")
+
+
+def test_gigabytes_of_text_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reading, "_MAX_TEXT", 20)
+    with pytest.raises(SurfaceFileError, match=r"of text; at most 2e-08 GB are read: cut out"):
+        read(tmp_path, lines(","))
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r", "\r\r\n"])

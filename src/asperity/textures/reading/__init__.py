@@ -1,4 +1,4 @@
-"""Reading measured surfaces: X3P, NPY, text matrix, two-column profile."""
+"""Reading surfaces: X3P, SDF, NPY, text, images, meshes, and instruments' files by an extra."""
 
 from __future__ import annotations
 

@@ -14,11 +14,12 @@ from .raw import MAX_POINTS, RawSurface
 NPY_MAGIC = b"\x93NUMPY"
 
 
-def read_npy(path: Path) -> RawSurface:
-    """Read a 1-D (profile) or 2-D (map) real array; heights are taken as metres.
+def read_npy(path: Path, metres: float | None = None) -> RawSurface:
+    """Read a 1-D (profile) or 2-D (map) real array; heights are metres unless told otherwise.
 
     Args:
         path: the file.
+        metres: length of the unit of the heights [m].
 
     Returns:
         The heights [m]; an NPY file has no pitch.
@@ -28,10 +29,16 @@ def read_npy(path: Path) -> RawSurface:
     """
     array = _mapped(path)
     _check_array(array, path.name)
-    with np.errstate(over="ignore"):  # a long double beyond float64 becomes inf, refused later
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # a long double beyond float64 becomes inf, refused later
         heights = np.array(array, dtype=np.float64, order="C")
-    note = "no unit in an NPY file: heights taken as metres"
-    return RawSurface(heights, None, path.name, (note,), has_units=False)
+    if metres is None:
+        note = "no unit in an NPY file: heights taken as metres"
+        return RawSurface(heights, None, path.name, (note,), has_units=False)
+    note = f"no unit in an NPY file: {metres:g} m as given"
+    with np.errstate(over="ignore"):  # infinities are refused later
+        return RawSurface(heights * metres, None, path.name, (note,))
 
 
 def _mapped(path: Path) -> np.ndarray[Any, np.dtype[Any]]:

@@ -9,7 +9,7 @@ from decimal import Decimal, InvalidOperation
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import SurfaceFileError
+from ...errors import ParameterError, SurfaceFileError
 from .numbers import parse_number
 from .raw import MAX_POINTS, RawSurface
 from .spacing import spacing
@@ -20,7 +20,7 @@ _LEAST_POINTS = 4
 _LONGEST = 10.0  # [m]; a longer measurement is rather one whose unit is not the metre
 
 
-def read_text(content: bytes, name: str) -> RawSurface:
+def read_text(content: bytes, name: str, metres: float | None = None) -> RawSurface:
     """Read a text matrix, a two-column profile (position, height) or a column of heights.
 
     Cells are separated by tabs, semicolons, commas or white space. Empty cells and "nan"
@@ -30,19 +30,21 @@ def read_text(content: bytes, name: str) -> RawSurface:
     Args:
         content: the bytes of the file.
         name: its name, for messages.
+        metres: length of the unit of all numbers [m] where the file names none.
 
     Returns:
         Heights [m]; the pitch [m] of a two-column profile, else None.
 
     Raises:
         SurfaceFileError: no table of numbers, or one that cannot be read without guessing.
+        ParameterError: a unit for a file that names its own.
     """
     try:
         table = find_table(_decode(content))
         _check_table(table)
         if table.values.shape[1] == 2 and _is_monotonic(table):
-            return _profile(table, name)
-        return _matrix(table, name)
+            return _profile(table, name, metres)
+        return _matrix(table, name, metres)
     except SurfaceFileError as error:
         raise SurfaceFileError(f"{name}: {error}") from error
 
@@ -91,9 +93,9 @@ def _is_monotonic(table: Table) -> bool:
     )
 
 
-def _profile(table: Table, name: str) -> RawSurface:
-    units = _near(table, two_columns=True)
-    notes = _notes(table, known=units is not None)
+def _profile(table: Table, name: str, metres: float | None) -> RawSurface:
+    units = _units(table, name, metres, two_columns=True)
+    notes = _notes(table, units, metres)
     unit_x, unit_z = units or (1.0, 1.0)
     positions, heights = table.values[:, 0], table.values[:, 1] * unit_z
     resolution = _resolution(table)
@@ -113,14 +115,14 @@ def _profile(table: Table, name: str) -> RawSurface:
     if units is None and pitch * (len(heights) - 1) > _LONGEST:
         raise SurfaceFileError(
             f"positions span {pitch * (len(heights) - 1):.4g} and look not to be in metres;"
-            " name the units in the column header, such as 'x [um], z [nm]'"
+            " name the units in the column header, such as 'x [um], z [nm]', or give unit='mm'"
         )
     return RawSurface(
         np.ascontiguousarray(heights), (pitch,), name, notes, has_units=units is not None
     )
 
 
-def _matrix(table: Table, name: str) -> RawSurface:
+def _matrix(table: Table, name: str, metres: float | None) -> RawSurface:
     values = table.values
     _refuse_numbering(values)
     notes = []
@@ -128,8 +130,8 @@ def _matrix(table: Table, name: str) -> RawSurface:
     if code is not None:
         values = np.where(values == code, np.nan, values)
         notes.append(f"the header says that {code:g} is a missing point")
-    units = _near(table, two_columns=False)
-    notes.extend(_notes(table, known=units is not None))
+    units = _units(table, name, metres, two_columns=False)
+    notes.extend(_notes(table, units, metres))
     heights = np.ascontiguousarray(values * (units[1] if units else 1.0))
     if heights.shape[1] == 1:
         heights = heights[:, 0]
@@ -175,6 +177,18 @@ def _pitch_of_size(table: Table) -> tuple[float, float] | None:
     return sizes["width"] / columns, sizes["height"] / rows
 
 
+def _units(
+    table: Table, name: str, metres: float | None, *, two_columns: bool
+) -> tuple[float, float] | None:
+    """Return the units that the header names, else the one that was given, else None."""
+    units = _near(table, two_columns=two_columns)
+    if metres is None:
+        return units
+    if units is not None:
+        raise ParameterError("unit", f"must not be given: {name} names its units")
+    return metres, metres
+
+
 def _near(table: Table, *, two_columns: bool) -> tuple[float, float] | None:
     """Return the units that the last header line names, right before the numbers."""
     line = next((line for line in reversed(table.header) if line.strip(" \t,;")), "")
@@ -185,10 +199,14 @@ def _near(table: Table, *, two_columns: bool) -> tuple[float, float] | None:
     return None if unit is None else (unit, unit)
 
 
-def _notes(table: Table, *, known: bool) -> tuple[str, ...]:
+def _notes(
+    table: Table, units: tuple[float, float] | None, metres: float | None
+) -> tuple[str, ...]:
     notes = []
-    if not known:
+    if units is None:
         notes.append("no unit in the file: taken as metres")
+    elif metres is not None:
+        notes.append(f"no unit in the file: {metres:g} m as given")
     if table.footer:
         notes.append(f"{table.footer} lines of text after the numbers ignored")
     if table.dialect.decimal == ",":

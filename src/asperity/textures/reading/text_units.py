@@ -5,29 +5,8 @@ from __future__ import annotations
 import re
 
 from ...errors import SurfaceFileError
+from .lengths import METRES
 
-_METRES = {
-    "m": 1.0,
-    "meter": 1.0,
-    "metre": 1.0,
-    "cm": 1e-2,
-    "mm": 1e-3,
-    "millimeter": 1e-3,
-    "millimetre": 1e-3,
-    "um": 1e-6,
-    "µm": 1e-6,  # U+00B5, the micro sign
-    "μm": 1e-6,  # U+03BC, the Greek letter
-    "micron": 1e-6,
-    "micrometer": 1e-6,
-    "micrometre": 1e-6,
-    "nm": 1e-9,
-    "nanometer": 1e-9,
-    "nanometre": 1e-9,
-    "angstrom": 1e-10,
-    "ångström": 1e-10,
-    "å": 1e-10,
-    "pm": 1e-12,
-}
 # Units of other things or of other systems: never to be mistaken for metres.
 _REFUSED = {"in", "inch", "inche", "mil", "thou", "ft", "feet", "volt", "px", "pixel", "mv", "kå"}
 _WORD = re.compile(r"[^\W\d_]+")
@@ -61,8 +40,8 @@ def units_of(text: str) -> list[float]:
         key = _key(word)
         if bracketed and word == "A":
             found.append(1e-10)
-        elif key in _METRES and _case_fits(word):
-            found.append(_METRES[key])
+        elif key in METRES and _case_fits(word):
+            found.append(METRES[key])
         elif key in _REFUSED and (bracketed or key not in ("in", "mil", "px", "mv", "ft")):
             raise _unknown(word)
     if not found:

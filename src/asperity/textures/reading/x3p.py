@@ -21,6 +21,8 @@ from .x3p_document import Axis, Document, Link, parse_document
 
 ZIP_MAGIC = (b"PK\x03\x04", b"PK\x05\x06")  # the second begins an empty archive
 _MAX_XML = 64 * 2**20
+_SMALL = 64 * 2**20
+_BOMB = 500  # heights of an instrument, even with many points missing, pack far less
 _DAMAGE = (
     zipfile.BadZipFile,
     zlib.error,
@@ -51,7 +53,7 @@ def read_x3p(path: Path) -> RawSurface:
     """
     try:
         with zipfile.ZipFile(path) as file:
-            return _read(_archive(file), path.name)
+            return _read(_archive(file, path.stat().st_size), path.name)
     except SurfaceFileError as error:
         raise SurfaceFileError(f"{path.name}: {error}") from error
     except _DAMAGE as error:
@@ -78,6 +80,7 @@ class _Archive:
 
     file: zipfile.ZipFile
     members: dict[str, zipfile.ZipInfo]
+    size: int  # of the whole archive [bytes]
 
     def read(self, name: str, *, limit: int = 0, expected: int = 0) -> bytes:
         """Return a member's bytes; the size is checked before anything is unpacked."""
@@ -93,6 +96,13 @@ class _Archive:
             raise SurfaceFileError(
                 f"{name} {fault}: {info.file_size} bytes,"
                 f" the matrix dimension and data types ask for {expected}"
+            )
+        if info.compress_size > self.size:  # zipfile would reserve so much memory
+            raise SurfaceFileError(f"{name} is truncated")
+        if info.file_size > max(_BOMB * info.compress_size, _SMALL):
+            raise SurfaceFileError(
+                f"{name} unpacks from {info.compress_size} bytes to {info.file_size}:"
+                " no measured surface does; the archive is damaged or a zip bomb"
             )
         content = self.file.read(info)
         if len(content) != info.file_size:
@@ -111,7 +121,7 @@ def _normal(name: str) -> str:
     return "/".join(part for part in parts if part not in ("", "."))
 
 
-def _archive(file: zipfile.ZipFile) -> _Archive:
+def _archive(file: zipfile.ZipFile, size: int) -> _Archive:
     named = [
         (_normal(info.filename), info)
         for info in file.infolist()
@@ -127,7 +137,7 @@ def _archive(file: zipfile.ZipFile) -> _Archive:
     for name, info in named:
         if name.startswith(folder) and members.setdefault(name[len(folder) :], info) is not info:
             raise SurfaceFileError(f"the archive has {name} twice")
-    return _Archive(file, members)
+    return _Archive(file, members, size)
 
 
 def _checksum_notes(archive: _Archive, document: Document, main: bytes) -> list[str]:

@@ -115,6 +115,8 @@ def parse_document(content: bytes) -> Document:
 def _tree(content: bytes, notes: list[str]) -> ET.Element:
     try:
         root = _parsed(content)
+    except SurfaceFileError:  # a ValueError too: not to be taken for a wrong encoding
+        raise
     except (ET.ParseError, ValueError, LookupError) as error:
         if _is_utf8(content):
             raise SurfaceFileError(f"main.xml is not valid XML ({error})") from error
@@ -122,6 +124,8 @@ def _tree(content: bytes, notes: list[str]) -> ET.Element:
         text = re.sub(r"^\s*<\?xml[^>]*\?>", "", content.decode("latin-1"))
         try:
             root = _parsed(text.encode())
+        except SurfaceFileError:
+            raise
         except (ET.ParseError, ValueError) as again:
             raise SurfaceFileError(f"main.xml is not valid XML ({again})") from again
         notes.append("main.xml is not in the encoding it names: read as Latin-1")

@@ -1,0 +1,202 @@
+"""Long fuzz run of the readers: ``python -m bench.fuzz [count] [reader ...]``.
+
+Every reader gets count mutated files (10 000 by default) from a fixed seed. A worker process
+reads them with 1 GB of memory and 20 s for each; anything but a surface or one of asperity's own
+errors is counted as "other", and so is a file for which the memory did not do.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from bench import fuzz_seeds
+
+COUNT = 10_000
+MEMORY = 2**30  # [bytes] of data that a worker may hold, its own start included
+SECONDS = 20  # for one file
+_SHOWN = 3  # faults of a reader that are printed
+_WORDS = (b"0", b"-1", b"65535", b"4294967296", b"1e308", b"nan", b"inf", b"\0", b"<", b",", b" ")
+
+
+class _TooSlowError(Exception):
+    """A file took longer than SECONDS."""
+
+
+def mutated(content: bytes, rng: random.Random) -> bytes:
+    """Damage a file in one to four places: bits, bytes, numbers, cuts, copies, other text."""
+    data = bytearray(content)
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        if not data:
+            break
+        # Half of the damage goes where headers are.
+        at = rng.randrange(min(len(data), 512) if rng.random() < 0.5 else len(data))
+        _damage(data, at, rng)
+    return bytes(data)
+
+
+def _damage(data: bytearray, at: int, rng: random.Random) -> None:
+    length = rng.choice((1, 2, 4, 16, 64))
+    kind = rng.randrange(8)
+    if kind == 0:
+        data[at] ^= 1 << rng.randrange(8)
+    elif kind == 1:
+        data[at] = rng.randrange(256)
+    elif kind == 2:
+        data[at : at + length] = rng.randbytes(length)
+    elif kind == 3:
+        del data[at : at + length]
+    elif kind == 4:
+        data[at:at] = data[at : at + length] * rng.choice((1, 3))
+    elif kind == 5:
+        data[at : at + rng.choice((0, 1, 4))] = rng.choice(_WORDS)
+    elif kind == 6:
+        data[at : at + 4] = rng.choice((b"\xff\xff\xff\xff", b"\0\0\0\0", b"\xff\xff\xff\x7f"))
+    else:
+        del data[at + rng.randrange(len(data)) :]
+
+
+def outcomes(reader: str, count: int, folder: Path) -> Iterator[tuple[str, str]]:
+    """Read mutated files in this process: ("read" | "refused" | "other", what) for each."""
+    from asperity.errors import AsperityError
+    from asperity.textures.reading import read_surface
+
+    seed = fuzz_seeds.SEEDS[reader](folder)
+    options = fuzz_seeds.OPTIONS.get(reader, {})
+    path = folder / "mutated.dat"
+    for trial in range(count):
+        rng = random.Random(f"{reader} {trial}")
+        whole = rng.choice(seed)
+        content = fuzz_seeds.repaired(reader, whole, mutated(whole, rng), rng)
+        path.write_bytes(content)
+        try:
+            signal.alarm(SECONDS)
+            raw = read_surface(path, **options)
+            signal.alarm(0)
+        except AsperityError as error:
+            yield _judged(str(error))
+        except BaseException as error:  # the very thing that is looked for
+            if isinstance(error, KeyboardInterrupt):
+                raise
+            yield "other", f"trial {trial}: {type(error).__name__}: {error}"
+        else:
+            yield ("read", "") if _sound(raw) else ("other", f"trial {trial}: unsound surface")
+        finally:
+            signal.alarm(0)
+
+
+def _judged(message: str) -> tuple[str, str]:
+    if "not enough memory" in message:
+        return "other", message
+    if "\n" in message or not message:
+        return "other", f"message of several lines or none: {message!r}"
+    return "refused", message
+
+
+def _sound(raw: Any) -> bool:
+    """A surface whose numbers can be used: no infinity, a positive pitch."""
+    import numpy as np
+
+    if raw.heights.ndim not in (1, 2) or np.isinf(raw.heights).any() or not raw.heights.size:
+        return False
+    return raw.pitch is None or all(p > 0 and np.isfinite(p) for p in raw.pitch)
+
+
+def work(readers: Sequence[str], count: int) -> None:
+    """Be the worker: print one JSON object a line for each reader."""
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+    warnings.simplefilter("error")  # a warning on the terminal is no clear error either
+    signal.signal(signal.SIGALRM, _too_slow)
+    for reader in readers:
+        print(json.dumps(_totals(reader, count)), flush=True)
+
+
+def _totals(reader: str, count: int) -> dict[str, Any]:
+    totals = {"read": 0, "refused": 0, "other": 0}
+    faults: list[str] = []
+    start = time.monotonic()
+    with tempfile.TemporaryDirectory() as folder:
+        for outcome, what in outcomes(reader, count, Path(folder)):
+            totals[outcome] += 1
+            if outcome == "other" and len(faults) < _SHOWN:
+                faults.append(what[:300])
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    taken = time.monotonic() - start
+    return {**totals, "faults": faults, "peak": peak, "seconds": taken}
+
+
+def _too_slow(*_: object) -> None:
+    raise _TooSlowError(f"longer than {SECONDS} s")
+
+
+def run(readers: Sequence[str], count: int, console: Console) -> int:
+    """Fuzz the readers, print the table, return how many outcomes were neither of the two."""
+    table = Table("reader", "files", "read", "refused", "other", "peak [MB]", "time [s]")
+    faults: list[str] = []
+    bad = 0
+    for reader in readers:
+        result = results([reader], count)[0]
+        bad += result["other"]
+        faults += [f"{reader}: {fault}" for fault in result["faults"]]
+        numbers = [str(result[key]) for key in ("read", "refused", "other")]
+        table.add_row(
+            reader, str(count), *numbers, f"{result['peak']:.0f}", f"{result['seconds']:.0f}"
+        )
+        console.print(f"{reader}: {' / '.join(numbers)}", style="dim")
+    console.print(table)
+    for fault in faults:
+        console.print(fault, markup=False, soft_wrap=True)
+    return bad
+
+
+def results(readers: Sequence[str], count: int) -> list[dict[str, Any]]:
+    """Fuzz some readers in one worker: a dictionary of totals, faults, peak and time for each."""
+    command = [sys.executable, "-m", "bench.fuzz", "--worker", str(count), *readers]
+    # One thread: the stacks of others would count as data.
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, env=environment, cwd=_ROOT
+    )
+    found = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+    if done.returncode == 0 and len(found) == len(readers):
+        return found
+    last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+    fault = f"worker ended with code {done.returncode}: {last}"
+    lost = {"read": 0, "refused": 0, "other": 1, "faults": [fault], "peak": 0.0, "seconds": 0.0}
+    return [*found, *[lost] * (len(readers) - len(found))]
+
+
+_ROOT = Path(__file__).parent.parent
+
+
+def main(arguments: Sequence[str]) -> int:
+    if arguments[:1] == ["--worker"]:
+        work(arguments[2:], int(arguments[1]))
+        return 0
+    counts = [int(word) for word in arguments if word.isdecimal()]
+    readers = [word for word in arguments if not word.isdecimal()] or fuzz_seeds.available()
+    unknown = [reader for reader in readers if reader not in fuzz_seeds.SEEDS]
+    if unknown:
+        known = ", ".join(fuzz_seeds.SEEDS)
+        print(f"unknown reader {unknown[0]!r}; choose from {known}", file=sys.stderr)
+        return 2
+    bad = run(readers, counts[0] if counts else COUNT, Console(width=100, highlight=False))
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
