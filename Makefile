@@ -7,7 +7,7 @@ ifeq ($(shell command -v $(PYTHON) 2>/dev/null),)
 PYTHON := python3
 endif
 
-.PHONY: demo test check bench kernels lock clean help
+.PHONY: demo test check docs bench kernels lock clean help
 
 help:  ## List the commands
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 10
@@ -39,6 +39,10 @@ check: $(VENV)/development  ## Lint, types, import layers, generated files fresh
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m asperity.derive.generate --check
+	$(MAKE) --no-print-directory docs
+
+docs: $(VENV)/development  ## Build the documentation into docs/_build/html
+	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 
 bench: $(VENV)/development  ## Speed and memory, as ratios against C and peers
 	$(BIN)/python -m bench
@@ -52,4 +56,4 @@ lock: $(VENV)/installer  ## Resolve the dependencies anew
 	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --no-default-groups --group build --group dev --group docs --extra formats -o requirements-dev.lock
 
 clean:  ## Remove the virtual environment and what the tools left
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis report.html
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis report.html docs/_build docs/_generated docs/gallery

@@ -1,0 +1,208 @@
+"""Code that runs when the pages are built: what a page prints is what the package does.
+
+``{run}`` executes Python and shows it with its output; ``{shell}`` does the same for the command
+``asperity``. The blocks of a page share their variables and a temporary folder.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import io
+import os
+import shlex
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+from docutils import nodes
+from docutils.parsers.rst import Directive, directives
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
+COLUMNS = "88"  # characters that fit the width of a page
+_DPI = 130
+
+
+@dataclass
+class Page:
+    """What the blocks of a page share."""
+
+    folder: str = field(default_factory=lambda: tempfile.mkdtemp(prefix="asperity-docs-"))
+    names: dict[str, Any] = field(default_factory=lambda: {"__name__": "__main__"})
+    pictures: int = 0
+
+
+_PAGES: dict[str, Page] = {}
+
+
+def execute(source: str, names: dict[str, Any], expect_error: bool = False) -> tuple[str, Any]:
+    """Run a block; return what it printed and the value of its last line.
+
+    Args:
+        source: Python statements, the last of which may be an expression.
+        names: variables, which are changed.
+        expect_error: whether the block must end with one of asperity's own errors, whose
+            message is then printed.
+
+    Raises:
+        RuntimeError: if an expected error does not happen.
+    """
+    from asperity.errors import AsperityError
+
+    tree = ast.parse(source)
+    last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
+    value, printed = None, io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        try:
+            exec(compile(tree, "<page>", "exec"), names)
+            if last is not None and isinstance(last, ast.Expr):
+                value = eval(compile(ast.Expression(last.value), "<page>", "eval"), names)
+        except AsperityError as error:
+            if not expect_error:
+                raise
+            print(f"{type(error).__name__}: {error}")
+            return printed.getvalue(), None
+    if expect_error:
+        raise RuntimeError("the block was expected to be refused, but ran")
+    return printed.getvalue(), value
+
+
+class _Block(SphinxDirective):
+    has_content = True
+
+    def page(self) -> Page:
+        return _PAGES.setdefault(self.env.docname, Page())
+
+    def failed(self, error: Exception) -> list[nodes.Node]:
+        text = f"{type(error).__name__}: {error}"
+        return [self.state_machine.reporter.error(f"block failed: {text}", line=self.lineno)]
+
+    def literal(self, text: str, language: str, css_class: str = "") -> nodes.Node:
+        block = nodes.literal_block(text, text, language=language)
+        if css_class:
+            return nodes.container("", block, classes=[css_class])
+        return block
+
+
+class Run(_Block):
+    """Python that runs; ``:hide-code:``, ``:error:``, ``:table:``, ``:figure: what it shows``."""
+
+    option_spec: ClassVar[dict[str, Any]] = {
+        "hide-code": directives.flag,
+        "error": directives.flag,
+        "table": directives.flag,
+        "figure": directives.unchanged,
+    }
+
+    def run(self) -> list[nodes.Node]:
+        """Execute the block and return code, output and picture."""
+        page, source = self.page(), "\n".join(self.content)
+        try:
+            with contextlib.chdir(page.folder):
+                printed, value = execute(source, page.names, "error" in self.options)
+        except Exception as error:  # the page says which block failed, the build goes on
+            return self.failed(error)
+        result: list[nodes.Node] = []
+        if "hide-code" not in self.options:
+            result.append(self.literal(source, "python"))
+        if printed.strip():
+            result.append(self.literal(printed.rstrip(), "text", "output"))
+        if "table" in self.options:
+            result.append(table_of(value))
+        if "figure" in self.options:
+            result.append(self.picture(page, value))
+        return result
+
+    def picture(self, page: Page, figure: Any) -> nodes.Node:
+        """Save a figure and return the node that shows it."""
+        page.pictures += 1
+        folder = Path(self.env.srcdir) / "_generated"
+        folder.mkdir(exist_ok=True)
+        name = f"{self.env.docname.replace('/', '-')}-{page.pictures}.png"
+        figure.savefig(folder / name, dpi=_DPI)
+        image = nodes.image(uri=f"/_generated/{name}", alt=self.options["figure"])
+        _relative, path = self.env.relfn2path(image["uri"])
+        image["uri"] = os.path.relpath(path, Path(self.env.doc2path(self.env.docname)).parent)
+        return image
+
+
+class Shell(_Block):
+    """Commands ``$ asperity ...`` that run; ``:quiet:``; ``:exit: 2`` where one must be refused."""
+
+    option_spec: ClassVar[dict[str, Any]] = {
+        "exit": directives.nonnegative_int,
+        "quiet": directives.flag,
+    }
+
+    def run(self) -> list[nodes.Node]:
+        """Execute the commands and return them with their output."""
+        page, result = self.page(), []
+        for line in self.content:
+            try:
+                code, text = run_command(line.removeprefix("$").strip(), page.folder)
+            except Exception as error:  # a traceback of the command is a fault of the page
+                return self.failed(error)
+            if code != self.options.get("exit", 0):
+                return self.failed(RuntimeError(f"{line}: exit code {code}: {text[-300:]}"))
+            result.append(self.literal(line, "console"))
+            if text.strip() and "quiet" not in self.options:
+                result.append(self.literal(text.rstrip(), "text", "output"))
+        return result
+
+
+def run_command(command: str, folder: str) -> tuple[int, str]:
+    """Run ``asperity ...`` in this process; return its exit code and what it printed."""
+    from unittest import mock
+
+    from asperity.cli import main
+
+    words = shlex.split(command)
+    if words[0] != "asperity":
+        raise ValueError(f"not an asperity command: {command}")
+    printed, code = io.StringIO(), 0
+    environment = {**os.environ, "COLUMNS": COLUMNS, "NO_COLOR": "1"}
+    with (
+        contextlib.chdir(folder),
+        mock.patch("sys.argv", words),
+        mock.patch.dict(os.environ, environment),
+        contextlib.redirect_stdout(printed),
+        contextlib.redirect_stderr(printed),
+    ):
+        try:
+            main.main()
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+    return code, "\n".join(line.rstrip() for line in printed.getvalue().splitlines())
+
+
+def table_of(rows: Sequence[Sequence[str]]) -> nodes.table:
+    """Return a table whose first row is the head."""
+    group = nodes.tgroup(cols=len(rows[0]))
+    group += [nodes.colspec(colwidth=1) for _ in rows[0]]
+    head, body = nodes.thead(), nodes.tbody()
+    for index, row in enumerate(rows):
+        line = nodes.row()
+        for cell in row:
+            line += nodes.entry("", nodes.paragraph(text=str(cell)))
+        if index:
+            body += line
+        else:
+            head += line
+    group += [head, body]
+    return nodes.table("", group, classes=["numbers"])
+
+
+def _forget(_app: Sphinx, _env: Any, docname: str) -> None:
+    _PAGES.pop(docname, None)
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register the directives."""
+    run: type[Directive] = Run
+    app.add_directive("run", run)
+    app.add_directive("shell", Shell)
+    app.connect("env-purge-doc", _forget)
+    return {"version": "1", "parallel_read_safe": False, "parallel_write_safe": True}
