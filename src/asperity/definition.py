@@ -45,16 +45,16 @@ def exact_height(texture: Texture) -> ExactHeight:
     if isinstance(texture, HeightMap):
         return lambda x, y, m, n: _spline_surface(texture, x, y, m, n)
     if isinstance(texture, Profile):
-        return lambda x, y, m, n: _spline_profile(texture, x, m, n)
+        return lambda x, _y, m, n: _spline_profile(texture, x, m, n)
     raise ParameterError("texture", "has no exact definition", texture)
 
 
 def _wave_sum(waves: Sequence[Any], x: Any, y: Any, m: int, n: int) -> Any:
     total = mpmath.mpf(0)
     for a, kx, ky, phase in waves:
-        kx, ky = mpmath.mpf(kx), mpmath.mpf(ky)
-        angle = kx * x + ky * y + mpmath.mpf(phase)
-        total += mpmath.mpf(a) * kx**m * ky**n * mpmath.sin(angle + (m + n) * mpmath.pi / 2)
+        u, v = mpmath.mpf(kx), mpmath.mpf(ky)
+        angle = u * x + v * y + mpmath.mpf(phase)
+        total += mpmath.mpf(a) * u**m * v**n * mpmath.sin(angle + (m + n) * mpmath.pi / 2)
     return total
 
 

@@ -126,8 +126,11 @@ class Surface:
     @cached_property
     def law_arguments(self) -> tuple[float, ...]:
         """What the kernels receive of the law: see ``asperity.derive.driver``."""
-        needs_heights = self.law.stateful or self.law.contact == "nominal"
-        low, high = self.texture.extremes if needs_heights else (-1.0, 1.0)
+        from asperity.derive.fuse import kernel_source
+
+        # The extremes of a map cost time: only for a law that looks at the relative height.
+        relative = "h_mid" in kernel_source(self.law)
+        low, high = self.texture.extremes if relative else (-1.0, 1.0)
         half = 0.5 * (high - low)
         return (
             self.stiffness,

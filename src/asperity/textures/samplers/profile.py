@@ -1,6 +1,7 @@
 """h = Σ c_j β(x/p - j), a cubic B-spline profile; constant along y.
 
-Arguments: ``c``, coefficients with one extra before the first cell and two after the last; ``ix``, nodes per metre; ``x0``, the first node [m]; ``periodic``.
+Arguments: ``c``, coefficients with one extra before the first cell and two after the last; ``ix``,
+nodes per metre; ``x0``, the first node [m]; ``periodic``.
 """
 
 import math
