@@ -56,9 +56,12 @@ def array(name: str, value: ArrayLike, shape: tuple[int | None, ...], unit: str)
     """
     described = f"({', '.join('n' if length is None else str(length) for length in shape)})"
     try:
-        result: FloatArray = np.ascontiguousarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ParameterError(name, f"must be numbers of shape {described} [{unit}]") from None
+        given = np.asarray(value)
+    except (TypeError, ValueError):  # rows of different length
+        given = np.array(None)
+    if given.dtype.kind not in "fiu" and given.size:
+        raise ParameterError(name, f"must be numbers of shape {described} [{unit}]")
+    result: FloatArray = np.ascontiguousarray(given, dtype=np.float64)
     fits = result.ndim == len(shape) and all(
         wanted is None or wanted == length
         for wanted, length in zip(shape, result.shape, strict=True)

@@ -17,12 +17,13 @@ from asperity.laws import Law, find_law
 from asperity.textures.texture import Texture
 
 DEFAULT_STIFFNESS = 1000.0
-DEFAULT_FRICTION = 0.8
-DEFAULT_MAX_DEFLECTION = 1e-3
-DEFAULT_MODULATION_DEPTH = 0.8
-DEFAULT_CONTINUITY = 1.0
-# Parameters of laws that are arguments of the surface.
-SURFACE_PARAMETERS = ("friction", "max_deflection", "modulation_depth", "continuity")
+# Parameters of laws that are arguments of the surface, unless the law has its own defaults.
+DEFAULT_PARAMETERS = {
+    "friction": 0.8,
+    "max_deflection": 1e-3,
+    "modulation_depth": 0.8,
+    "continuity": 1.0,
+}
 # max_depth unless given: the peak-to-valley height of the texture, at most this [m].
 LARGEST_DEFAULT_DEPTH = 1e-3
 
@@ -43,14 +44,14 @@ class Surface:
         max_depth: D [m], the depth to which the surface is meant to be pressed; it bounds the
             working region of the analysis and is where a clamp acts. Default: the peak-to-valley
             height of the texture, at most 1 mm.
-        friction: μ of law F.
-        max_deflection: d_max [m] of law F, the greatest deflection of the anchor.
-        modulation_depth: a_m of law F, in [0, 1].
+        friction: μ of law F; default 0.8.
+        max_deflection: d_max [m] of law F, the greatest deflection of the anchor; default 1 mm.
+        modulation_depth: a_m of law F, in [0, 1]; default 0.8.
         clamp: ``"none"`` (the law as it is), ``"whole"`` (the depth is held at max_depth),
             ``"lateral"`` (only for the lateral force, the paper's Remark 3), ``"backed"`` (whole,
             with a backing wall k (z_b - z) e_z below z_b = min h - max_depth, or -max_depth for
             laws on the nominal contact). Laws W, D, E and H are never clamped.
-        continuity: c of law H, positive: its characteristic number is max(1, c).
+        continuity: c of law H, positive: its characteristic number is max(1, c); default 1.
         law_parameters: values for the further parameters of a law of your own.
 
     Raises:
@@ -70,11 +71,11 @@ class Surface:
         law: str | Law = "C",
         stiffness: float = DEFAULT_STIFFNESS,
         max_depth: float | None = None,
-        friction: float = DEFAULT_FRICTION,
-        max_deflection: float = DEFAULT_MAX_DEFLECTION,
-        modulation_depth: float = DEFAULT_MODULATION_DEPTH,
+        friction: float | None = None,
+        max_deflection: float | None = None,
+        modulation_depth: float | None = None,
         clamp: ClampName = "none",
-        continuity: float = DEFAULT_CONTINUITY,
+        continuity: float | None = None,
         law_parameters: Mapping[str, float] | None = None,
     ) -> None:
         if not isinstance(texture, Texture):
@@ -87,21 +88,26 @@ class Surface:
             if max_depth is None
             else positive("max_depth", max_depth, "m")
         )
-        self.friction = real("friction", friction)
+        own = {**DEFAULT_PARAMETERS, **self.law.parameters}
+        self.friction = real("friction", own["friction"] if friction is None else friction)
         if self.friction < 0.0:
             raise ParameterError("friction", "must not be negative", friction)
-        self.max_deflection = positive("max_deflection", max_deflection, "m")
-        self.modulation_depth = fraction("modulation_depth", modulation_depth)
+        longest = own["max_deflection"] if max_deflection is None else max_deflection
+        self.max_deflection = positive("max_deflection", longest, "m")
+        swing = own["modulation_depth"] if modulation_depth is None else modulation_depth
+        self.modulation_depth = fraction("modulation_depth", swing)
         if clamp not in CLAMPS:
             raise ParameterError("clamp", f"must be one of {', '.join(CLAMPS)}", clamp)
         self.clamp: ClampName = clamp
-        self.continuity = positive("continuity", continuity)
+        self.continuity = positive(
+            "continuity", own["continuity"] if continuity is None else continuity
+        )
         self.law_parameters = self._own_parameters(dict(law_parameters or {}))
 
     def _own_parameters(self, given: dict[str, float]) -> dict[str, float]:
         values = {name: float(default) for name, default in self.law.parameters.items()}
         values |= {
-            name: float(getattr(self, name)) for name in SURFACE_PARAMETERS if name in values
+            name: float(getattr(self, name)) for name in DEFAULT_PARAMETERS if name in values
         }
         for name, value in given.items():
             if name not in values:

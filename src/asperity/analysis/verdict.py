@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from asperity.analysis.row import LawRow
 from asperity.devices import Device
-from asperity.surface import SURFACE_PARAMETERS, Surface
+from asperity.surface import DEFAULT_PARAMETERS, Surface
 from asperity.units import engineering
 
 # A texture force below this is taken as not felt where the device's resolution is unknown [N].
@@ -199,7 +199,7 @@ def _defaulted(rows: Sequence[LawRow], defaults: Mapping[str, bool], given: set[
         result.append(f"Default max depth {depth}: the peak-to-valley height, at most 1 mm")
     for row in rows:
         for name in row.law.parameters:
-            if name not in given and name in SURFACE_PARAMETERS:
+            if name not in given and name in DEFAULT_PARAMETERS:
                 value = getattr(row.surface, name)
                 text = engineering(value, "m") if name == "max_deflection" else f"{value:g}"
                 spoken = name.replace("_", " ")

@@ -32,8 +32,10 @@ class Law:
             ``"nearest"`` (the god-object) or ``"split"`` (the split god-object).
         force: the formula.
         summary: one line for tables.
-        clampable: whether a depth clamp changes this law (MATH: W, D and E are never clamped).
-        stateful: whether the force depends on the tangential deflection of a dragged anchor.
+        clampable: whether a depth clamp changes this law (W, D, E and H are never clamped); on
+            the nominal and the vertical contact only.
+        stateful: whether the force depends on the tangential deflection of a dragged anchor; on
+            the nominal contact only, where the anchor is held while z < 0.
         parameters: names of the further parameters of the formula, with their defaults [SI].
 
     Example:
@@ -59,6 +61,10 @@ class Law:
             raise LawError(
                 f"law {self.letter}: contact must be one of {choice}, got {self.contact!r}"
             )
+        if self.clampable and self.contact in {"nearest", "split"}:
+            raise LawError(f"law {self.letter}: a law on the {self.contact} contact is not clamped")
+        if self.stateful and self.contact != "nominal":
+            raise LawError(f"law {self.letter}: a law with state must be on the nominal contact")
         if not callable(self.force):
             raise LawError(f"law {self.letter}: force must be a function of the contact symbols")
         object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))

@@ -138,7 +138,7 @@ def position_text(at: tuple[float, float, float] | None) -> str:
 
     Example:
         >>> position_text((0.25e-3, 0.0, -1e-3))
-        'x = 0.25 mm, y = 0 m, z = -1 mm'
+        'x = 250 µm, y = 0 m, z = -1 mm'
     """
     if at is None:
         return ""

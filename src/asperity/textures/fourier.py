@@ -36,7 +36,7 @@ class Fourier(Texture):
 
     Example:
         >>> texture = Fourier([1e-3, 0.5e-3], [[2000.0, 0.0], [4000.0, 0.0]])
-        >>> texture.is_profile, round(texture.domain.spans[0, 0] * 1e3, 6)
+        >>> texture.is_profile, round(float(texture.domain.spans[0, 0]) * 1e3, 6)
         (True, 3.141593)
     """
 

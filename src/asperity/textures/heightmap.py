@@ -39,8 +39,8 @@ class HeightMap(Texture):
 
     Example:
         >>> bumps = HeightMap(np.eye(4) * 1e-3, pitch=1e-3)
-        >>> bumps.height([[1e-3, 1e-3], [2e-3, 1e-3]]).round(9)
-        array([0.001, 0.   ])
+        >>> bumps.height([[1e-3, 1e-3], [2e-3, 1e-3]]).round(9).tolist()[0]
+        0.001
     """
 
     kind: ClassVar[str] = "heightmap"

@@ -35,8 +35,8 @@ class Profile(Texture):
 
     Example:
         >>> ridge = Profile([0.0, 0.0, 1e-3, 0.0, 0.0], pitch=1e-3)
-        >>> ridge.height([[2e-3, 7.0], [3e-3, 7.0]]).round(9)
-        array([0.001, 0.   ])
+        >>> ridge.height([[2e-3, 7.0], [2e-3, 9.0]]).round(9)
+        array([0.001, 0.001])
     """
 
     kind: ClassVar[str] = "profile"

@@ -1,0 +1,706 @@
+"""A surface: contact, defaults, force, Jacobian, clamp, state; and what it refuses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from asperity.definition import exact_force
+from asperity.errors import LawError, ParameterError
+from asperity.laws import LAWS, Law
+from asperity.laws.symbols import ContactSymbols
+from asperity.surface import Surface
+from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
+
+Check = Callable[..., Any]
+LETTERS = "WABCDEFG"
+NOMINAL = "WFG"
+D = 0.2e-3  # the depth of the clamps
+STATE = {"friction": 0.7, "max_deflection": 0.8e-3}
+CLAMPS = ["none", "whole", "lateral", "backed"]
+
+
+@pytest.fixture
+def wave(make_texture: Check) -> Sinusoid:
+    return make_texture("sinusoid")
+
+
+# --- contact --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("letter", LETTERS)
+def test_outside_the_force_is_exactly_zero(letter: str, wave: Sinusoid, scatter: Check):
+    xy = scatter(wave, 40, seed=1)
+    zero = 0.0 * xy[:, 0] if letter in NOMINAL else wave.height(xy)
+    surface = Surface(wave, letter)
+    for above in (0.0, 1e-12, 1e-3):
+        points = np.column_stack([xy, zero + above])
+        assert not surface.force(points).any()
+        assert not surface.jacobian(points).any()
+
+
+@pytest.mark.parametrize("letter", LETTERS)
+def test_inside_there_is_a_force_from_the_first_nanometre(
+    letter: str, wave: Sinusoid, scatter: Check
+):
+    xy = scatter(wave, 40, seed=2)
+    zero = 0.0 * xy[:, 0] if letter in NOMINAL else wave.height(xy)
+    surface = Surface(wave, letter)
+    for depth in (1e-9, 1e-3):
+        points = np.column_stack([xy, zero - depth])
+        assert (surface.force(points)[:, 2] > 0.0).all()
+        assert (np.abs(surface.jacobian(points)).max(axis=(1, 2)) > 100.0).all()
+
+
+@pytest.mark.parametrize("letter", NOMINAL)
+def test_a_nominal_law_does_not_feel_the_height(letter: str, wave: Sinusoid):
+    crest = wave.domain.points(np.array([[0.25 - 0.7 / (2 * math.pi)]]))
+    below_the_crest = np.column_stack([crest, [0.1e-3]])
+    assert wave.height(crest)[0] == pytest.approx(0.4e-3)
+    assert not Surface(wave, letter).force(below_the_crest).any()
+    assert Surface(wave, "B").force(below_the_crest).any()
+
+
+# --- force and Jacobian ---------------------------------------------------------------------------
+
+
+def contact(surface: Surface, p: np.ndarray) -> dict[str, Any]:
+    """Return what the formulas by hand need of the contact of one probe in the body."""
+    texture = surface.texture
+    xy = texture.nearest(p[None, :])[:, :2] if surface.law.contact == "nearest" else p[None, :2]
+    h, hx, hy, hxx, hxy, hyy = texture.derivatives(xy)[0]
+    low, high = texture.extremes
+    half = (high - low) / 2
+    depth = {
+        "nominal": -p[2],
+        "vertical": h - p[2],
+        "nearest": float(np.linalg.norm([*(xy[0] - p[:2]), h - p[2]])),
+    }[surface.law.contact]
+    return {
+        "k": surface.stiffness, "depth": depth, "g": (hx, hy),
+        "hessian": np.array([[hxx, hxy], [hxy, hyy]]),
+        "m": (1 + surface.modulation_depth * (h - (low + high) / 2) / half) / 2,
+        "m_slope": surface.modulation_depth * np.array([hx, hy]) / half / 2,
+    }  # fmt: skip
+
+
+def force_of(surface: Surface, p: np.ndarray, d: np.ndarray, by_hand: Check) -> np.ndarray:
+    here = contact(surface, p)
+    here = {name: here[name] for name in ("k", "depth", "g", "m")}
+    return np.asarray(by_hand(surface.law.letter, **here, d=d, **STATE))
+
+
+def deflections(count: int, seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    turn = rng.uniform(0, 2 * np.pi, count)
+    length = STATE["max_deflection"] * np.sqrt(rng.random(count))
+    return np.column_stack([length * np.cos(turn), length * np.sin(turn)])
+
+
+def given_state(letter: str, deflection: np.ndarray) -> dict[str, Any]:
+    return {"deflection": deflection} if letter == "F" else {}
+
+
+@pytest.mark.parametrize("texture", ["sinusoid", "fourier", "periodic map"], indirect=True)
+@pytest.mark.parametrize("letter", LETTERS)
+def test_the_force_is_the_formula(
+    letter: str, texture: Texture, inside: Check, plain: Check, force_by_hand: Check
+):
+    surface = plain(Surface(texture, letter, stiffness=650.0, modulation_depth=0.6, **STATE))
+    points, d = inside(texture, 6, 3, 1e-3), deflections(6, 4)
+    forces = surface.force(points, **given_state(letter, d))
+    for i, p in enumerate(points):
+        expected = force_of(surface, p, d[i], force_by_hand)
+        assert np.abs(forces[i] - expected).max() <= 1e-12 * np.linalg.norm(expected)
+
+
+@pytest.mark.parametrize("texture", ["sinusoid", "fourier", "periodic map"], indirect=True)
+@pytest.mark.parametrize("letter", LETTERS)
+def test_the_jacobian_is_the_closed_form(
+    letter: str, texture: Texture, inside: Check, plain: Check, jacobian_by_hand: Check
+):
+    surface = plain(Surface(texture, letter, stiffness=650.0, modulation_depth=0.6, **STATE))
+    points, d = inside(texture, 6, 3, 1e-3), deflections(6, 4)
+    for sliding in (False, True) if letter == "F" else (False,):
+        state = given_state(letter, d)
+        if letter == "F":
+            state["sliding"] = np.full(6, sliding)
+        jacobians = surface.jacobian(points, **state)
+        for i, p in enumerate(points):
+            here = contact(surface, p)
+            if letter == "F":
+                here |= {"d": d[i], "sliding": sliding, **STATE}
+            else:
+                del here["m"], here["m_slope"]
+            expected = jacobian_by_hand(letter, **here)
+            error = np.abs(jacobians[i] - expected).max()
+            assert error <= 1e-9 * np.linalg.norm(expected, 2)
+
+
+@pytest.mark.parametrize("texture", ["sinusoid", "fourier", "map"], indirect=True)
+@pytest.mark.parametrize("letter", LETTERS)
+def test_the_jacobian_is_the_derivative_of_the_force(
+    letter: str, texture: Texture, inside: Check, plain: Check, differences: Check
+):
+    surface = plain(Surface(texture, letter, modulation_depth=0.6, **STATE))
+    points, d = inside(texture, 4, 5, 0.3e-3), 0.9 * deflections(4, 6)
+    anchor = points[:, :2] - d
+
+    def force(moved: np.ndarray) -> np.ndarray:
+        return np.asarray(surface.force(moved, **given_state(letter, moved[:, :2] - anchor)))
+
+    jacobian = surface.jacobian(points, **given_state(letter, d))
+    numeric = differences(force, points, step=3e-7)
+    norms = np.linalg.norm(jacobian, 2, axis=(1, 2))
+    assert (np.abs(numeric - jacobian).max(axis=(1, 2)) <= 2e-8 * norms).all()
+
+
+def test_a_sliding_anchor_is_differentiated_along_its_circle(wave: Sinusoid, differences: Check):
+    surface = Surface(wave, "F", **STATE)
+    points = np.array([[1e-4, 2e-4, -0.3e-3]])
+    d = np.array([[0.48e-3, -0.64e-3]])
+    anchor = points[:, :2] - d
+
+    def force(moved: np.ndarray) -> np.ndarray:
+        pulled = moved[:, :2] - anchor
+        length = np.hypot(*pulled.T)[:, None]
+        return np.asarray(surface.force(moved, deflection=0.8e-3 * pulled / length))
+
+    numeric = differences(force, points, step=3e-7)
+    sliding = surface.jacobian(points, deflection=d, sliding=[True])
+    sticking = surface.jacobian(points, deflection=d, sliding=[False])
+    np.testing.assert_allclose(sliding, numeric, rtol=0, atol=1e-8 * np.abs(numeric).max())
+    u = d[0] / np.hypot(*d[0])
+    across = np.array([-u[1], u[0]])
+    lateral = (sticking - sliding)[0, :2, :2]
+    assert np.abs(lateral @ across).max() < 1e-12 * np.abs(lateral).max()
+    # Without a deflection there is no direction to slide in.
+    np.testing.assert_array_equal(
+        surface.jacobian(points, sliding=[True]), surface.jacobian(points, sliding=[False])
+    )
+
+
+@pytest.mark.parametrize("clamp", CLAMPS)
+@pytest.mark.parametrize("letter", LETTERS)
+def test_force_and_jacobian_are_linear_in_the_stiffness(
+    letter: str, clamp: str, wave: Sinusoid, inside: Check, plain: Check
+):
+    points = inside(wave, 5, 7, 1e-3)
+    soft, hard = (
+        plain(Surface(wave, letter, stiffness=k, clamp=clamp, max_depth=D))  # type: ignore[arg-type]
+        for k in (250.0, 1000.0)
+    )
+    np.testing.assert_array_equal(hard.force(points), 4.0 * soft.force(points))
+    np.testing.assert_allclose(hard.jacobian(points), 4.0 * soft.jacobian(points), rtol=1e-14)
+
+
+# --- clamps ---------------------------------------------------------------------------------------
+
+
+def clamped_by_hand(surface: Surface, p: np.ndarray, d: np.ndarray, by_hand: Check) -> np.ndarray:
+    here = contact(surface, p)
+    here = {name: here[name] for name in ("k", "depth", "g", "m")}
+    letter, clamp = surface.law.letter, surface.clamp
+    free = by_hand(letter, **here, d=d, **STATE)
+    held = by_hand(letter, **(here | {"depth": min(here["depth"], D)}), d=d, **STATE)
+    if clamp == "none":
+        return np.asarray(free)
+    if clamp == "lateral":
+        return np.array([held[0], held[1], free[2]])
+    if clamp == "backed":
+        low = -D if letter in NOMINAL else surface.texture.extremes[0] - D
+        held = held + np.array([0.0, 0.0, surface.stiffness * max(low - p[2], 0.0)])
+    return np.asarray(held)
+
+
+def shallow_and_deep(texture: Texture, nominal: bool, scatter: Check) -> np.ndarray:
+    """Return probes above and below the clamp's depth and above and below the backing wall."""
+    xy = scatter(texture, 9, seed=8)
+    top = np.zeros(9) if nominal else texture.height(xy)
+    points = np.column_stack([xy, top - D * np.tile([0.3, 0.95, 1.5], 3)])
+    points[6:, 2] = min(texture.extremes[0], 0.0) - np.array([1.01, 1.5, 8.0]) * D
+    return points
+
+
+@pytest.mark.parametrize("clamp", CLAMPS)
+@pytest.mark.parametrize("letter", "ABCFG")
+def test_the_clamped_force_is_the_formula(
+    letter: str, clamp: Any, make_texture: Check, scatter: Check, plain: Check,
+    force_by_hand: Check,
+):  # fmt: skip
+    texture = make_texture("fourier")
+    surface = plain(Surface(texture, letter, max_depth=D, clamp=clamp, **STATE))
+    points, d = shallow_and_deep(texture, letter in NOMINAL, scatter), deflections(9, 9)
+    forces = surface.force(points, **given_state(letter, d))
+    for i, p in enumerate(points):
+        expected = clamped_by_hand(surface, p, d[i], force_by_hand)
+        assert np.abs(forces[i] - expected).max() <= 1e-12 * np.linalg.norm(expected)
+
+
+@pytest.mark.parametrize("clamp", CLAMPS[1:])
+@pytest.mark.parametrize("letter", "ABCFG")
+def test_the_clamped_jacobian_is_the_derivative_of_the_force(
+    letter: str, clamp: Any, make_texture: Check, scatter: Check, plain: Check, differences: Check
+):
+    texture = make_texture("fourier")
+    surface = plain(Surface(texture, letter, max_depth=D, clamp=clamp, **STATE))
+    points, d = shallow_and_deep(texture, letter in NOMINAL, scatter), deflections(9, 10) / 2
+    anchor = points[:, :2] - d
+
+    def force(moved: np.ndarray) -> np.ndarray:
+        return np.asarray(surface.force(moved, **given_state(letter, moved[:, :2] - anchor)))
+
+    jacobian = surface.jacobian(points, **given_state(letter, d))
+    error = np.abs(differences(force, points, step=3e-7) - jacobian).max(axis=(1, 2))
+    assert (error <= 1e-8 * 1000.0).all()
+
+
+@pytest.mark.parametrize("clamp", CLAMPS[1:])
+@pytest.mark.parametrize("letter", "WDE")
+def test_a_bounded_law_is_never_clamped(letter: str, clamp: Any, wave: Sinusoid, scatter: Check):
+    points = shallow_and_deep(wave, letter in NOMINAL, scatter)
+    free, clamped = Surface(wave, letter), Surface(wave, letter, max_depth=D, clamp=clamp)
+    np.testing.assert_array_equal(clamped.force(points), free.force(points))
+    np.testing.assert_array_equal(clamped.jacobian(points), free.jacobian(points))
+
+
+@pytest.mark.parametrize(("name", "letter"), [("sinusoid", "C"), ("sinusoid", "F"), ("map", "G")])
+@pytest.mark.parametrize("clamp", ["lateral", "backed"])
+def test_compiled_clamps(
+    name: str, letter: str, clamp: Any, make_texture: Check, scatter: Check, plain: Check
+):
+    texture = make_texture(name)
+    points = shallow_and_deep(texture, letter in NOMINAL, scatter)
+    surface = Surface(texture, letter, max_depth=D, clamp=clamp)
+    forces, jacobians = surface.force(points), surface.jacobian(points)
+    interpreted = plain(Surface(make_texture(name), letter, max_depth=D, clamp=clamp))
+    np.testing.assert_allclose(interpreted.force(points), forces, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(interpreted.jacobian(points), jacobians, rtol=0, atol=1e-10)
+
+
+def curl(surface: Surface, points: np.ndarray, differences: Check) -> np.ndarray:
+    jacobian = differences(surface.force, points, step=3e-7)
+    return np.asarray(np.abs(jacobian - jacobian.transpose(0, 2, 1)).max(axis=(1, 2)))
+
+
+@pytest.mark.parametrize(
+    ("clamp", "conservative"),
+    [("none", True), ("whole", True), ("backed", True), ("lateral", False)],
+)
+def test_which_clamp_keeps_change_of_height_conservative(
+    clamp: Any, conservative: bool, make_texture: Check, scatter: Check, plain: Check,
+    differences: Check,
+):  # fmt: skip
+    texture = make_texture("fourier")
+    surface = plain(Surface(texture, "C", max_depth=D, clamp=clamp))
+    deep = shallow_and_deep(texture, False, scatter)[2:]
+    deep = deep[texture.height(deep[:, :2]) - deep[:, 2] > D]
+    turning = curl(surface, deep, differences)
+    assert len(deep) >= 5
+    assert (turning < 1e-6).all() if conservative else (turning > 10.0).all()
+
+
+def test_the_backing_wall_leaves_no_hole(wave: Sinusoid, scatter: Check):
+    """Whole alone saturates at k D: a strong hand falls through."""
+    xy = scatter(wave, 10, seed=11)
+    points = np.column_stack([xy, np.full(10, -5e-3)])
+    whole = Surface(wave, "B", max_depth=D, clamp="whole").force(points)
+    backed = Surface(wave, "B", max_depth=D, clamp="backed").force(points)
+    assert np.linalg.norm(whole, axis=1) == pytest.approx(1000.0 * D)
+    np.testing.assert_allclose((backed - whole)[:, 2], 1000.0 * (5e-3 - 0.4e-3 - D), rtol=1e-12)
+    assert not (backed - whole)[:, :2].any()
+
+
+@pytest.mark.parametrize(("letter", "floor"), [("C", -0.4e-3 - D), ("G", -D), ("F", -D)])
+def test_the_floor(letter: str, floor: float, wave: Sinusoid):
+    assert Surface(wave, letter, max_depth=D, clamp="backed").floor == pytest.approx(floor)
+
+
+# --- friction: deflection and trace ---------------------------------------------------------------
+
+
+def test_without_a_deflection_there_is_no_friction(wave: Sinusoid, inside: Check):
+    points = inside(wave, 5, 12, 1e-3)
+    surface = Surface(wave, "F")
+    forces = surface.force(points)
+    np.testing.assert_array_equal(forces, surface.force(points, deflection=np.zeros((5, 2))))
+    assert not forces[:, :2].any()
+    np.testing.assert_allclose(forces[:, 2], -1000.0 * points[:, 2])
+
+
+def test_a_deflection_as_long_as_allowed(wave: Sinusoid):
+    surface = Surface(wave, "F", max_deflection=0.8e-3)
+    turn = np.linspace(0.0, 2 * np.pi, 100)
+    longest = 0.8e-3 * np.column_stack([np.cos(turn), np.sin(turn)])
+    points = np.tile([1e-4, 0.0, -1e-4], (100, 1))
+    assert np.isfinite(surface.force(points, deflection=longest)).all()
+    for method in (surface.force, surface.jacobian):
+        with pytest.raises(ParameterError, match="max_deflection") as caught:
+            method(points, deflection=longest * (1 + 1e-9))
+        assert caught.value.argument == "deflection"
+
+
+@pytest.mark.parametrize("letter", LETTERS.replace("F", ""))
+def test_a_law_without_state_takes_none(letter: str, wave: Sinusoid):
+    surface, point = Surface(wave, letter), [[0.0, 0.0, -1e-3]]
+    for call in (
+        lambda: surface.force(point, deflection=[[0.0, 0.0]]),
+        lambda: surface.jacobian(point, deflection=[[0.0, 0.0]]),
+        lambda: surface.jacobian(point, sliding=[False]),
+    ):
+        with pytest.raises(ParameterError, match="meaningless"):
+            call()
+
+
+class Anchor:
+    """Stick and slip, told slowly: a thread of fixed length drags the anchor."""
+
+    def __init__(self, length: float) -> None:
+        self.length = length
+        self.place: complex | None = None
+
+    def deflection(self, x: float, y: float, touching: bool) -> complex:
+        if not touching:
+            self.place = None
+            return 0j
+        here = complex(x, y)
+        if self.place is None:
+            self.place = here
+        if abs(here - self.place) > self.length:
+            self.place = here - self.length * (here - self.place) / abs(here - self.place)
+        return here - self.place
+
+
+def wandering_path(count: int, seed: int) -> np.ndarray:
+    """Return a walk that drags, reverses, leaves the surface and comes back."""
+    rng = np.random.default_rng(seed)
+    steps = (
+        rng.normal(size=(count, 2)) * 0.15e-3 + 0.05e-3 * np.sin(np.arange(count) / 40.0)[:, None]
+    )
+    heights = 0.4e-3 * np.sin(np.arange(count) / 25.0) - 0.1e-3
+    return np.column_stack([np.cumsum(steps, axis=0), heights])
+
+
+def test_a_trace_of_friction_carries_its_anchor(
+    make_texture: Check, plain: Check, force_by_hand: Check
+):
+    texture = make_texture("fourier")
+    surface = plain(Surface(texture, "F", modulation_depth=0.6, **STATE))
+    path = wandering_path(400, seed=13)
+    traced = surface.trace(path)
+    anchor, dragged, touched = Anchor(STATE["max_deflection"]), 0, 0
+    for i, p in enumerate(path):
+        d = anchor.deflection(p[0], p[1], p[2] < 0.0)
+        dragged += abs(d) > 0.999 * STATE["max_deflection"]
+        touched += p[2] < 0.0
+        expected = np.zeros(3)
+        if p[2] < 0.0:
+            expected = force_of(surface, p, np.array([d.real, d.imag]), force_by_hand)
+        assert np.abs(traced[i] - expected).max() <= 1e-12
+    assert 50 < dragged < touched - 50  # the path sticks and slips
+    assert touched < 350  # and loses contact
+
+
+def test_the_compiled_trace_is_the_plain_one(make_texture: Check, plain: Check):
+    path = wandering_path(400, seed=14)
+    compiled = Surface(make_texture("sinusoid"), "F", **STATE).trace(path)
+    interpreted = plain(Surface(make_texture("sinusoid"), "F", **STATE)).trace(path)
+    np.testing.assert_allclose(compiled, interpreted, rtol=0, atol=1e-15)
+
+
+def test_the_anchor_is_released_when_contact_is_lost(wave: Sinusoid):
+    surface = Surface(wave, "F")
+    push, lift = [0.0, 0.0, -1e-4], [0.2e-3, 0.0, 0.0]
+    path = [push, [0.3e-3, 0.0, -1e-4], lift, [0.4e-3, 0.0, -1e-4], [0.5e-3, 0.0, -1e-4]]
+    friction = surface.trace(path)[:, 0]
+    assert friction[0] == friction[2] == friction[3] == 0.0  # set, released, set again
+    assert friction[1] < 0.0
+    assert friction[4] < 0.0
+
+
+def test_every_trace_begins_released(wave: Sinusoid):
+    surface = Surface(wave, "F")
+    path = np.array([[0.0, 0.0, -1e-4], [0.3e-3, 0.0, -1e-4]])
+    np.testing.assert_array_equal(surface.trace(path), surface.trace(path))
+    assert not surface.trace(path + np.array([1.0, 2.0, 0.0]))[0, :2].any()
+
+
+@pytest.mark.parametrize("letter", LETTERS.replace("F", ""))
+def test_a_trace_without_state_is_the_force(letter: str, wave: Sinusoid):
+    path = wandering_path(60, seed=15)
+    surface = Surface(wave, letter)
+    np.testing.assert_array_equal(surface.trace(path), surface.force(path))
+
+
+def test_an_empty_path_has_an_empty_trace(wave: Sinusoid):
+    for letter in "CF":
+        surface = Surface(wave, letter)
+        assert surface.trace(np.zeros((0, 3))).shape == (0, 3)
+        assert surface.force(np.zeros((0, 3))).shape == (0, 3)
+        assert surface.jacobian(np.zeros((0, 3))).shape == (0, 3, 3)
+
+
+# --- compiled = plain = definition ----------------------------------------------------------------
+
+COMBINATIONS = [
+    *(("sinusoid", letter) for letter in LETTERS),
+    ("fourier", "B"),
+    ("fourier", "F"),
+    ("map", "D"),
+    ("map", "G"),
+    ("profile", "E"),
+]
+anywhere = st.tuples(*2 * [st.floats(-1.5, 2.5)], st.floats(-0.5, 2.0))
+
+
+@pytest.mark.parametrize(("name", "letter"), COMBINATIONS)
+def test_compiled_plain_and_exact_are_one(
+    name: str, letter: str, make_texture: Check, plain: Check
+):
+    compiled = Surface(make_texture(name), letter)
+    interpreted = plain(Surface(make_texture(name), letter))
+    spans, origin = compiled.texture.domain.spans, compiled.texture.domain.origin
+    size = compiled.texture.peak_to_valley
+
+    @settings(
+        max_examples=25, deadline=None, derandomize=True, database=None,
+        suppress_health_check=list(HealthCheck),
+    )  # fmt: skip
+    @given(anywhere)
+    def holds(place: tuple[float, float, float]) -> None:
+        xy = origin + np.array(place[: len(spans)]) @ spans
+        h = compiled.texture.height(xy[None, :])[0]
+        p = np.array([*xy, min(h, 0.0) - place[2] * size])
+        d = (0.3e-3, -0.2e-3)
+        state = given_state(letter, np.array([d]))
+        force = compiled.force([p], **state)[0]
+        scale = 1000.0 * max(abs(h), abs(p[2]))
+        if letter not in "DE" or name == "sinusoid":  # else too slow; see test_nearest.py
+            assert np.abs(force - interpreted.force([p], **state)[0]).max() <= 1e-12 * scale
+        exact = np.array(exact_force(compiled, p, d).tolist(), dtype=float)[:, 0]
+        assert np.abs(force - exact).max() <= 1e-10 * scale
+
+    holds()
+
+
+# --- laws of one's own ----------------------------------------------------------------------------
+
+
+def own_law(contact: Any, force: Callable[[ContactSymbols], Any], **options: Any) -> Law:
+    return Law("V", "own", contact, force, **options)
+
+
+def test_a_law_of_ones_own_with_a_parameter(wave: Sinusoid, inside: Check, plain: Check):
+    law = own_law(
+        "vertical",
+        lambda c: c.k * c.depth * (1 + c.parameter("hardening") * c.depth) * c.normal,
+        parameters={"hardening": 2000.0},
+    )
+    points = inside(wave, 5, 16, 1e-3)
+    depth = wave.height(points[:, :2]) - points[:, 2]
+    plain_b = plain(Surface(wave, "B")).force(points)
+    for chosen, value in ((None, 2000.0), ({"hardening": 500.0}, 500.0)):
+        forces = plain(Surface(wave, law, law_parameters=chosen)).force(points)
+        expected = plain_b * (1.0 + value * depth)[:, None]
+        np.testing.assert_allclose(forces, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("contact", ["nominal", "vertical", "nearest"])
+def test_the_relative_height_runs_from_minus_one_to_one(contact: Any, wave: Sinusoid, plain: Check):
+    law = own_law(contact, lambda c: c.k * c.depth * (2 + c.relative_height) * c.e_z)
+    turns = np.array([[0.25], [0.75]]) - 0.7 / (2 * math.pi)
+    xy = wave.domain.points(turns)  # a crest and a trough
+    shallow = np.zeros(2) if contact == "nominal" else wave.height(xy)
+    forces = plain(Surface(wave, law)).force(np.column_stack([xy, shallow - 1e-6]))
+    np.testing.assert_allclose(forces[:, 2], [3e-3, 1e-3], rtol=1e-9)
+
+
+@pytest.mark.parametrize("contact", ["nominal", "vertical"])
+@pytest.mark.parametrize("clamp", ["whole", "lateral"])
+def test_a_clamped_law_of_ones_own_has_its_derivative(
+    contact: Any, clamp: Any, make_texture: Check, inside: Check, plain: Check, differences: Check
+):
+    texture = make_texture("fourier")
+    law = own_law(contact, lambda c: c.k * c.depth * c.normal, clampable=True)
+    surface = plain(Surface(texture, law, max_depth=0.1e-3, clamp=clamp))
+    points = inside(texture, 4, 17, 0.4e-3)
+    numeric = differences(surface.force, points, step=3e-7)
+    np.testing.assert_allclose(surface.jacobian(points), numeric, rtol=0, atol=1e-5)
+
+
+@pytest.mark.parametrize("contact", ["vertical", "nearest", "split"])
+def test_a_law_with_state_is_on_the_nominal_contact(contact: Any):
+    """Its anchor is held while z < 0: elsewhere contact would mean something else."""
+    with pytest.raises(LawError, match="nominal contact"):
+        own_law(contact, lambda c: c.k * c.e_z, stateful=True)
+
+
+@pytest.mark.parametrize("contact", ["nearest", "split"])
+def test_a_law_on_the_nearest_contact_is_not_clamped(contact: Any):
+    with pytest.raises(LawError, match="not clamped"):
+        own_law(contact, lambda c: c.k * c.e_z, clampable=True)
+
+
+def test_a_default_of_ones_own_law_is_its_own(wave: Sinusoid):
+    law = own_law(
+        "nominal",
+        lambda c: c.k * c.depth * c.parameter("friction") * c.e_z,
+        parameters={"friction": 0.3},
+    )
+    assert Surface(wave, law).law_parameters == {"friction": 0.3}
+
+
+def test_a_law_of_ones_own_may_reuse_a_letter(wave: Sinusoid, plain: Check):
+    law = Law("C", "not-the-shipped-one", "nominal", lambda c: 2 * c.k * c.depth * c.e_z)
+    force = plain(Surface(wave, law)).force([[0.0, 0.0, -1e-3]])
+    np.testing.assert_allclose(force, [[0.0, 0.0, 2.0]])
+
+
+def test_a_law_in_pieces_has_a_kernel(wave: Sinusoid, plain: Check):
+    law = own_law("nominal", lambda c: c.k * sp.Min(c.depth, D) * c.e_z)
+    forces = plain(Surface(wave, law)).force([[0.0, 0.0, -D / 2], [0.0, 0.0, -3 * D]])
+    np.testing.assert_allclose(forces[:, 2], [500.0 * D, 1000.0 * D])
+
+
+# --- arguments ------------------------------------------------------------------------------------
+
+
+def test_defaults():
+    surface = Surface(Sinusoid(0.2e-3, 1e-3))
+    assert (surface.law, surface.stiffness, surface.clamp) == (LAWS["C"], 1000.0, "none")
+    assert (surface.friction, surface.max_deflection, surface.modulation_depth) == (0.8, 1e-3, 0.8)
+    assert surface.max_depth == 0.4e-3
+
+
+@pytest.mark.parametrize(
+    ("texture", "depth"),
+    [
+        (Sinusoid(0.2e-3, 1e-3), 0.4e-3),
+        (Sinusoid(0.8e-3, 1e-3), 1e-3),  # at most 1 mm
+        (Fourier([1e-4, 2e-4], [1e3, math.sqrt(2) * 1e3]), 0.6e-3),
+        (HeightMap(np.full((4, 4), 1e-3), 1e-3), 1e-3),  # flat
+        (Profile(np.zeros(4), 1e-3), 1e-3),
+    ],
+)
+def test_the_default_depth_is_the_height_at_most_a_millimetre(texture: Texture, depth: float):
+    assert Surface(texture, "A").max_depth == pytest.approx(depth)
+
+
+def test_a_flat_texture_modulates_nothing(plain: Check):
+    flat = Profile(np.zeros(4), 1e-3)
+    point, d = [[0.0, 0.0, -1e-3]], [[0.5e-3, 0.0]]
+    force = plain(Surface(flat, "F")).force(point, deflection=d)
+    np.testing.assert_allclose(force, [[-0.8 * 0.5 * 0.5, 0.0, 1.0]])
+
+
+WRONG: list[tuple[str, Any]] = [
+    *[("texture", value) for value in (None, "sinusoid", np.zeros((4, 4)))],
+    *[("law", value) for value in ("X", "", None, 1)],
+    *[("stiffness", value) for value in (0.0, -1.0, math.nan, math.inf, "500 N/m", None, True)],
+    *[("max_depth", value) for value in (0.0, -1e-3, math.nan, "1 mm")],
+    *[("friction", value) for value in (-0.1, math.nan, math.inf, "high")],
+    *[("max_deflection", value) for value in (0.0, -1e-3, math.nan)],
+    *[("modulation_depth", value) for value in (-0.01, 1.01, math.nan, "0.5")],
+    *[("clamp", value) for value in ("", "hole", "None", None, 1)],
+    *[("law_parameters", value) for value in ({"gain": 1.0}, {"Friction": 0.5})],
+]
+
+
+@pytest.mark.parametrize(("argument", "value"), WRONG)
+def test_arguments_that_cannot_be_used(argument: str, value: Any, wave: Sinusoid):
+    arguments: dict[str, Any] = {"texture": wave, "law": "F", argument: value}
+    with pytest.raises(ParameterError, match=f"^{argument} ") as caught:
+        Surface(**arguments)
+    assert caught.value.argument == argument
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0])
+def test_the_ends_of_the_modulation_depth_are_allowed(value: float, wave: Sinusoid):
+    assert Surface(wave, "F", modulation_depth=value).modulation_depth == value
+    assert Surface(wave, "F", friction=0.0).friction == 0.0
+
+
+def test_parameters_of_a_law_that_has_none(wave: Sinusoid):
+    with pytest.raises(ParameterError, match="it has none"):
+        Surface(wave, "B", law_parameters={"friction": 0.5})
+
+
+def test_a_law_parameter_must_be_a_number(wave: Sinusoid):
+    for value in (math.nan, "0.5", None):
+        with pytest.raises(ParameterError) as caught:
+            Surface(wave, "F", law_parameters={"friction": value})  # type: ignore[dict-item]
+        assert caught.value.argument == "friction"
+
+
+POINTS: list[Any] = [
+    0.0,
+    [],
+    [0.0, 0.0, 0.0],
+    [[0.0, 0.0]],
+    [[0.0, 0.0, 0.0, 0.0]],
+    np.zeros((2, 2, 3)),
+    [[0.0, 0.0, math.nan]],
+    [[math.inf, 0.0, 0.0]],
+    [[0.0, 0.0, 0.0], [0.0, 0.0]],
+    [["a", "b", "c"]],
+    [[None, 0.0, 0.0]],
+    None,
+    np.array([[1.0 + 2.0j, 0.0, 0.0]]),
+    np.ones((1, 3), dtype="datetime64[s]"),
+]
+
+
+@pytest.mark.parametrize("points", POINTS, ids=repr)
+def test_points_that_cannot_be_used(points: Any, wave: Sinusoid):
+    for letter in "CF":
+        surface = Surface(wave, letter)
+        for method, argument in (("force", "points"), ("jacobian", "points"), ("trace", "path")):
+            with pytest.raises(ParameterError) as caught:
+                getattr(surface, method)(points)
+            assert caught.value.argument == argument
+
+
+def test_points_of_any_layout_are_the_same_points(wave: Sinusoid):
+    points = np.random.default_rng(18).normal(size=(6, 3)) * 1e-3
+    surface = Surface(wave, "B")
+    expected = surface.force(points)
+    layouts = [points.tolist(), np.asfortranarray(points), points[::-1][::-1], points.astype(">f8")]
+    for same in layouts:
+        np.testing.assert_array_equal(surface.force(same), expected)
+    frozen = points.copy()
+    frozen.setflags(write=False)
+    np.testing.assert_array_equal(surface.force(frozen), expected)
+
+
+@pytest.mark.parametrize(
+    ("argument", "value"),
+    [
+        ("deflection", np.zeros((2, 2))),
+        ("deflection", np.zeros((3, 3))),
+        ("deflection", np.zeros(3)),
+        ("deflection", np.full((3, 2), math.nan)),
+        ("deflection", [["a", "b"]] * 3),
+        ("sliding", [True, False]),
+        ("sliding", [0, 1, 0]),
+        ("sliding", [[True], [False], [True]]),
+        ("sliding", True),
+    ],
+)
+def test_state_that_cannot_be_used(argument: str, value: Any, wave: Sinusoid):
+    surface = Surface(wave, "F")
+    with pytest.raises(ParameterError) as caught:
+        surface.jacobian(np.zeros((3, 3)) - 1e-4, **{argument: value})
+    assert caught.value.argument == argument
+
+
+def test_the_representation_says_what_it_is(wave: Sinusoid):
+    text = repr(Surface(wave, "B", stiffness=500.0, max_depth=D, clamp="backed"))
+    for part in ("Sinusoid(", "law='B'", "stiffness=500.0", "max_depth=0.0002", "clamp='backed'"):
+        assert part in text

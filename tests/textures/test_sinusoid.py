@@ -1,0 +1,134 @@
+"""The sinusoid: everything about it is known in closed form."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.errors import ParameterError
+from asperity.textures import Sinusoid
+
+Check = Callable[..., Any]
+
+
+@pytest.fixture
+def wave() -> Sinusoid:
+    return Sinusoid(0.4e-3, 1.5e-3, phase=0.7, direction=(3.0, -4.0))
+
+
+def test_the_height_is_the_formula(wave: Sinusoid, scatter: Check):
+    xy = scatter(wave, 50, seed=1, stretch=5.0)
+    along = xy @ np.array([0.6, -0.8])
+    expected = 0.4e-3 * np.sin(2 * np.pi * along / 1.5e-3 + 0.7)
+    np.testing.assert_allclose(wave.height(xy), expected, rtol=0, atol=1e-14 * 0.4e-3 * 10)
+
+
+@pytest.mark.parametrize("texture", ["sinusoid", "steep sinusoid"], indirect=True)
+def test_slopes_and_hessian_are_derivatives(
+    texture: Sinusoid, scatter: Check, check_derivatives: Check
+):
+    check_derivatives(texture, scatter(texture, 50, seed=2), step=texture.period * 1e-4)
+
+
+def test_a_sinusoid_is_a_profile_constant_across_its_direction(wave: Sinusoid, scatter: Check):
+    xy = scatter(wave, 20, seed=3)
+    across = np.array([0.8, 0.6]) * 7e-3
+    np.testing.assert_allclose(wave.height(xy + across), wave.height(xy), rtol=0, atol=1e-17)
+    np.testing.assert_allclose(wave.gradient(xy) @ across, 0.0, atol=1e-17)
+    assert wave.is_profile
+
+
+def test_it_repeats_after_its_period(wave: Sinusoid, scatter: Check):
+    xy = scatter(wave, 20, seed=4)
+    span = wave.domain.spans[0]
+    assert np.hypot(*span) == pytest.approx(1.5e-3, rel=1e-15)
+    np.testing.assert_allclose(wave.height(xy + 3 * span), wave.height(xy), rtol=0, atol=1e-17)
+    assert np.abs(wave.height(xy + 0.5 * span) + wave.height(xy)).max() < 1e-17
+
+
+def test_the_scan_line_is_one_period(wave: Sinusoid):
+    line = wave.scan_line()
+    end = line.start + line.length * line.direction
+    assert line.periodic
+    assert np.hypot(*line.direction) == pytest.approx(1.0, rel=1e-15)
+    np.testing.assert_allclose(wave.height([line.start]), wave.height([end]), atol=1e-17)
+    points = line.points(4)
+    np.testing.assert_allclose(np.diff(points, axis=0), np.tile(end / 4, (3, 1)), rtol=1e-12)
+    np.testing.assert_allclose(points[0], end / 8, rtol=1e-12)
+
+
+def test_extremes_and_bounds_are_exact(
+    wave: Sinusoid, sampled_extremes: Check, sampled_bounds: Check
+):
+    assert wave.extremes == (-0.4e-3, 0.4e-3)
+    assert wave.peak_to_valley == 0.8e-3
+    np.testing.assert_allclose(sampled_extremes(wave, 100), wave.extremes, rtol=1e-12)
+    k = 2 * math.pi / 1.5e-3
+    np.testing.assert_allclose(wave.bounds, (0.4e-3 * k, 0.4e-3 * k * k), rtol=1e-15)
+    np.testing.assert_allclose(sampled_bounds(wave, 5000), wave.bounds, rtol=1e-6)
+
+
+def test_the_description_makes_the_same_texture(wave: Sinusoid):
+    description = wave.describe()
+    assert description.pop("kind") == "sinusoid"
+    xy = [[1e-4, 2e-4]]
+    assert Sinusoid(**description).height(xy) == wave.height(xy)
+    assert eval(repr(wave)).height(xy) == wave.height(xy)
+
+
+@pytest.mark.parametrize(
+    ("argument", "value"),
+    [
+        ("amplitude", 0.0),
+        ("amplitude", -1e-3),
+        ("amplitude", math.inf),
+        ("amplitude", True),
+        ("amplitude", "1 mm"),
+        ("period", 0.0),
+        ("period", -1e-3),
+        ("period", math.nan),
+        ("period", None),
+        ("phase", math.nan),
+        ("phase", "0"),
+        ("direction", (0.0, 0.0)),
+        ("direction", (1.0, 0.0, 0.0)),
+        ("direction", (math.nan, 1.0)),
+        ("direction", 1.0),
+    ],
+)
+def test_arguments_that_cannot_be_used(argument: str, value: object):
+    arguments: dict[str, Any] = {"amplitude": 1e-3, "period": 1e-3, argument: value}
+    with pytest.raises(ParameterError, match=f"^{argument} ") as caught:
+        Sinusoid(**arguments)
+    assert caught.value.argument == argument
+
+
+@pytest.mark.parametrize("method", ["height", "gradient", "hessian", "derivatives", "nearest"])
+def test_positions_that_cannot_be_used(wave: Sinusoid, method: str):
+    width = 3 if method == "nearest" else 2
+    argument = "points" if method == "nearest" else "xy"
+    wrong: list[Any] = [
+        np.zeros(width),
+        np.zeros((4, width + 1)),
+        np.full((2, width), np.nan),
+        np.full((1, width), np.inf),
+        [["a"] * width],
+        [[None] * width],
+        5.0,
+    ]
+    for positions in wrong:
+        with pytest.raises(ParameterError) as caught:
+            getattr(wave, method)(positions)
+        assert caught.value.argument == argument
+
+
+def test_shapes_of_the_answers(wave: Sinusoid):
+    xy = np.zeros((5, 2), dtype=np.float32)
+    shapes = [wave.height(xy).shape, wave.gradient(xy).shape, wave.hessian(xy).shape]
+    assert shapes == [(5,), (5, 2), (5, 2, 2)]
+    assert wave.nearest(np.zeros((5, 3), dtype=int)).shape == (5, 3)
+    assert wave.height(np.zeros((0, 2))).shape == (0,)
