@@ -88,6 +88,11 @@ def _starts_along_the_normal(law: Law, force: Any) -> bool:
     return bool(across.applyfunc(_reduce) == sp.zeros(3, 1))
 
 
+def is_zero(expression: Any) -> bool:
+    """Return whether an expression in the contact symbols vanishes identically."""
+    return bool(_reduce(expression) == 0)
+
+
 def _reduce(expression: Any) -> Any:
     """Return a canonical form: zero exactly if the expression vanishes identically."""
     root = sp.sqrt(_S_SQUARED)

@@ -45,18 +45,18 @@ class Fourier(Texture):
     def __init__(
         self, amplitudes: ArrayLike, wavevectors: ArrayLike, phases: ArrayLike | None = None
     ) -> None:
-        self.amplitudes = array("amplitudes", amplitudes, (None,), "m")
+        self.amplitudes = array("amplitudes", amplitudes, (None,), "m").copy()
         count = len(self.amplitudes)
         if count == 0:
             raise ParameterError("amplitudes", "must name at least one wave")
         waves = np.asarray(wavevectors, dtype=object)
         if waves.ndim == 1 and len(waves) == count:
             wavevectors = [[k, 0.0] for k in waves]
-        self.wavevectors = array("wavevectors", wavevectors, (count, 2), "rad/m")
+        self.wavevectors = array("wavevectors", wavevectors, (count, 2), "rad/m").copy()
         if not self.wavevectors.any(axis=1).all():
             raise ParameterError("wavevectors", "must not contain a vector of length zero")
         given = np.zeros(count) if phases is None else phases
-        self.phases = array("phases", given, (count,), "rad")
+        self.phases = array("phases", given, (count,), "rad").copy()
 
     def __repr__(self) -> str:
         return (

@@ -55,7 +55,7 @@ class HeightMap(Texture):
         preparation: Sequence[str] = (),
         filled: ArrayLike | None = None,
     ) -> None:
-        self.heights = array("heights", heights, (None, None), "m")
+        self.heights = array("heights", heights, (None, None), "m").copy()
         if min(self.heights.shape) < LEAST_NODES:
             ny, nx = self.heights.shape
             raise ParameterError("heights", f"must be at least 4 x 4 points, got {ny} x {nx}")

@@ -51,7 +51,7 @@ class Profile(Texture):
         preparation: Sequence[str] = (),
         filled: ArrayLike | None = None,
     ) -> None:
-        self.heights = array("heights", heights, (None,), "m")
+        self.heights = array("heights", heights, (None,), "m").copy()
         if len(self.heights) < LEAST_NODES:
             raise ParameterError("heights", f"must be at least 4 points, got {len(self.heights)}")
         self.pitch = positive("pitch", pitch, "m")
