@@ -322,6 +322,21 @@ def test_a_packed_size_that_lies_asks_for_no_memory(tmp_path: Path) -> None:
         read_surface(path)
 
 
+def test_a_member_without_a_name(tmp_path: Path) -> None:
+    path = write_x3p(tmp_path / "nameless.x3p", SPEC)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("x", b"")
+    data = path.read_bytes()
+    at = data.rindex(b"PK\x01\x02")  # its entry: length of the name at byte 28
+    data = data[: at + 28] + b"\0\0" + data[at + 30 : at + 46] + data[at + 47 :]
+    end = data.rindex(b"PK\x05\x06")  # the directory is one byte shorter
+    size = struct.unpack_from("<I", data, end + 12)[0] - 1
+    path.write_bytes(data[: end + 12] + struct.pack("<I", size) + data[end + 16 :])
+    with zipfile.ZipFile(path) as archive:
+        assert "" in archive.namelist()
+    np.testing.assert_array_equal(read_surface(path).heights, SPEC.stored)
+
+
 def test_bomb_of_heights_is_refused(tmp_path: Path) -> None:
     """Zeros that pack 1000-fold, of just the size that main.xml asks for."""
     path = write_x3p(tmp_path / "small.x3p", replace(SPEC, size=("9000", "1000", "1")))

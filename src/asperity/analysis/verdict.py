@@ -62,7 +62,7 @@ def recommend(rows: Sequence[LawRow], device: Device) -> tuple[str, str]:
     felt = [row for row in textured if row.texture_force >= threshold] or textured
     sound = [row for row in felt if row.conservative and row.continuous]
     if sound:
-        best = max(sound, key=lambda row: row.texture_force)
+        best = _soundest(sound)
     else:
         best = min([row for row in felt if row.continuous] or felt, key=_aliveness)
     head = (
@@ -72,6 +72,13 @@ def recommend(rows: Sequence[LawRow], device: Device) -> tuple[str, str]:
     why = _sound_reason(best) if sound else _least_leak_reason(best, textured, threshold)
     tail = _price(best, felt) + _saturation(best, device)
     return best.law.letter, f"{head}: {why}.{tail}"
+
+
+def _soundest(sound: Sequence[LawRow]) -> LawRow:
+    """Return the strongest law; of nearly equal ones one whose force cannot jump at any depth."""
+    strongest = max(row.texture_force for row in sound)
+    equal = [row for row in sound if row.texture_force >= 0.98 * strongest]
+    return min(equal, key=lambda row: row.surface.law.contact == "nearest")
 
 
 def felt_force(device: Device) -> tuple[float, str]:

@@ -29,9 +29,8 @@ def read_npy(path: Path, metres: float | None = None) -> RawSurface:
     """
     array = _mapped(path)
     _check_array(array, path.name)
-    with np.errstate(
-        over="ignore", invalid="ignore"
-    ):  # a long double beyond float64 becomes inf, refused later
+    # A long double beyond float64 becomes inf, refused later; a signalling NaN is missing too.
+    with np.errstate(over="ignore", invalid="ignore"):
         heights = np.array(array, dtype=np.float64, order="C")
     if metres is None:
         note = "no unit in an NPY file: heights taken as metres"

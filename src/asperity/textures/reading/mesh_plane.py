@@ -71,14 +71,19 @@ def best_plane(
             " cut off the textured side"
         )
     normal = normal * math.copysign(1.0, facing)
-    first = np.eye(3)[0 if abs(normal[0]) < 0.9 else 1]
-    x = first - (first @ normal) * normal
-    x /= np.linalg.norm(x)
-    axes = np.stack((x, np.cross(normal, x), normal))
+    axes = _frame(normal)
     angle = _turn(moved.reshape(-1, 3) @ axes[:2].T)
     turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     axes[:2] = turn @ axes[:2]
     return Plane(centre, axes, (_sentence(normal, angle),))
+
+
+def _frame(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return axes with this normal and x along the file's x, or y where that is the normal."""
+    first = np.eye(3)[0 if abs(normal[0]) < 0.9 else 1]
+    x = first - (first @ normal) * normal
+    x /= np.linalg.norm(x)
+    return np.stack((x, np.cross(normal, x), normal))
 
 
 def _sentence(normal: NDArray[np.float64], angle: float) -> str:

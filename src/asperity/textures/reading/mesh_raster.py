@@ -59,18 +59,7 @@ def rasterise(corners: NDArray[np.float64]) -> Grid:
     extent = flat.max(axis=(0, 1)) - low
     if not (target > 0.0 and np.all(extent > 0.0)):
         raise SurfaceFileError("the mesh stands on edge over its best plane")
-    cells = np.maximum(np.rint(extent / target), 1.0)
-    if np.any(cells + 1 < _LEAST):
-        raise SurfaceFileError(
-            f"too coarse a mesh: {cells[0] + 1:.0f} x {cells[1] + 1:.0f} points at the median edge"
-            f" of {1e3 * target:.4g} mm; at least {_LEAST} x {_LEAST} are expected"
-        )
-    most = max(_ALWAYS, min(_EACH * len(corners), _MOST))
-    if float(np.prod(cells + 1)) > most:
-        raise SurfaceFileError(
-            f"too uneven a mesh: the median edge of {1e3 * target:.4g} mm asks for"
-            f" {np.prod(cells + 1):.3g} grid points, at most {most} are made; remesh it evenly"
-        )
+    cells = _cells(extent, target, len(corners))
     pitch = extent / cells
     shape = (int(cells[1]) + 1, int(cells[0]) + 1)
     local = (corners - (*low, 0.0)) / (*pitch, 1.0)
@@ -93,6 +82,23 @@ def rasterise(corners: NDArray[np.float64]) -> Grid:
         ),
     )
     return Grid(heights, (px, py), folded, notes)
+
+
+def _cells(extent: NDArray[np.float64], target: float, triangles: int) -> NDArray[np.float64]:
+    """Return the number of grid steps along x and y, refused where too few or too many."""
+    cells = np.maximum(np.rint(extent / target), 1.0)
+    if np.any(cells + 1 < _LEAST):
+        raise SurfaceFileError(
+            f"too coarse a mesh: {cells[0] + 1:.0f} x {cells[1] + 1:.0f} points at the median edge"
+            f" of {1e3 * target:.4g} mm; at least {_LEAST} x {_LEAST} are expected"
+        )
+    most = max(_ALWAYS, min(_EACH * triangles, _MOST))
+    if float(np.prod(cells + 1)) > most:
+        raise SurfaceFileError(
+            f"too uneven a mesh: the median edge of {1e3 * target:.4g} mm asks for"
+            f" {np.prod(cells + 1):.3g} grid points, at most {most} are made; remesh it evenly"
+        )
+    return np.asarray(cells)
 
 
 def _extremes(

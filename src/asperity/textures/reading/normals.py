@@ -78,17 +78,26 @@ def integrate(values: NDArray[Any]) -> tuple[NDArray[np.float64], tuple[str, ...
     fits = {kind: _curl(along_x, slope_y) for kind, slope_y in kinds.items()}
     kind = min(fits, key=lambda k: fits[k])
     heights = _poisson(along_x, kinds[kind])
-    mismatch = _rms(np.diff(heights, axis=1) - along_x, np.diff(heights, axis=0) - kinds[kind])
-    total = _rms(along_x, along_y)
-    share = f" ({mismatch / total:.3g} of their RMS {total:.3g})" if total > 0 else ""
     notes = [
-        "normal map integrated by least squares with a mirrored border: heights are multiples"
-        f" of the pixel pitch; RMS mismatch of the slopes {mismatch:.3g}{share}",
+        _quality(heights, along_x, kinds[kind]),
         f"green channel read as pointing {kind}, which fits {_better(fits)}",
     ]
     if bounded:
         notes.append(f"{bounded} normals near or below the horizon: slope bounded to {_STEEPEST:g}")
     return heights, tuple(notes)
+
+
+def _quality(
+    heights: NDArray[np.float64], along_x: NDArray[np.float64], along_y: NDArray[np.float64]
+) -> str:
+    """State the error of integration: what no height could take up of the slopes."""
+    mismatch = _rms(np.diff(heights, axis=1) - along_x, np.diff(heights, axis=0) - along_y)
+    total = _rms(along_x, along_y)
+    share = f" ({mismatch / total:.3g} of their RMS {total:.3g})" if total > 0 else ""
+    return (
+        "normal map integrated by least squares with a mirrored border: heights are multiples"
+        f" of the pixel pitch; RMS mismatch of the slopes {mismatch:.3g}{share}"
+    )
 
 
 def _better(fits: dict[str, float]) -> str:

@@ -125,7 +125,10 @@ def _archive(file: zipfile.ZipFile, size: int) -> _Archive:
     named = [
         (_normal(info.filename), info)
         for info in file.infolist()
-        if not info.is_dir() and "__macosx" not in _normal(info.filename).split("/")
+        # ZipInfo.is_dir fails for a member without a name.
+        if info.filename
+        and not info.filename.endswith("/")
+        and "__macosx" not in _normal(info.filename).split("/")
     ]
     mains = [name for name, _ in named if name.rpartition("/")[2] == "main.xml"]
     if not mains:
