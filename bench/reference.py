@@ -61,7 +61,7 @@ def _texture(texture: Texture) -> ctypes.Structure:
     if isinstance(texture, Sinusoid):
         return _Sinusoid(*texture.arguments)
     assert isinstance(texture, HeightMap)
-    coefficients, *numbers, periodic = texture.arguments
+    coefficients, *numbers, periodic = texture.arguments[:6]
     rows, columns = coefficients.shape
     address = coefficients.ctypes.data
     return _HeightMap(address, columns - 3, rows - 3, *numbers, int(periodic))

@@ -158,7 +158,15 @@ def decorate(source: str, *, inline: bool = True) -> str:
 
 
 # Too large to be copied to every place that calls them.
-_CALLED = {"nearest", "search_cell", "search_box", "descend", "polish", "patch_bounds"}
+_CALLED = {
+    "nearest",
+    "search_cell",
+    "search_box",
+    "descend",
+    "polish",
+    "patch_bounds",
+    "search_tile",
+}
 
 
 def _decorator(name: str, inline: bool) -> str:

@@ -2,7 +2,7 @@
 
 Arguments: ``c``, coefficients with one extra row and column before the first cell and two after the
 last; ``ix``, ``iy``, nodes per metre; ``x0``, ``y0``, the first node
-[m]; ``periodic``.
+[m]; ``periodic``; ``low``, ``high``, the hull of the coefficients of each block of 8 × 8 cells [m].
 """
 
 import math
@@ -34,8 +34,9 @@ def cells_of(c: FloatArray) -> tuple[int, int]:
 
 
 def height(
-    x: float, y: float, c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool
-) -> float:
+    x: float, y: float, c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool,
+    low: FloatArray, high: FloatArray,
+) -> float:  # fmt: skip
     """Return h [m]."""
     nx, ny = cells_of(c)
     u, _su = fold((x - x0) * ix, nx, periodic)
@@ -53,8 +54,9 @@ def height(
 
 
 def slope(
-    x: float, y: float, c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool
-) -> tuple[float, float, float]:
+    x: float, y: float, c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool,
+    low: FloatArray, high: FloatArray,
+) -> tuple[float, float, float]:  # fmt: skip
     """Return h [m], h_x, h_y [1]."""
     nx, ny = cells_of(c)
     u, su = fold((x - x0) * ix, nx, periodic)
@@ -81,8 +83,9 @@ def slope(
 
 
 def curvature(
-    x: float, y: float, c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool
-) -> tuple[float, float, float, float, float, float]:
+    x: float, y: float, c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool,
+    low: FloatArray, high: FloatArray,
+) -> tuple[float, float, float, float, float, float]:  # fmt: skip
     """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
     nx, ny = cells_of(c)
     u, su = fold((x - x0) * ix, nx, periodic)
@@ -166,41 +169,85 @@ def patch_bounds(p: FloatArray, ix: float, iy: float) -> tuple[float, float]:
 def nearest(
     x: float, y: float, z: float,
     c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool,
+    low: FloatArray, high: FloatArray,
 ) -> tuple[float, float]:  # fmt: skip
     """Return X, Y of the globally nearest surface point.
 
-    Rings of cells around the probe, nearest first, until a ring is farther away than the best
-    point. A cell is searched only if the hull of its coefficients comes near enough.
+    Downhill from the probe, then the cells around it, give a distance; only cells within that
+    distance can hold a nearer point. They are visited in blocks of 8 × 8, and a block or a cell
+    is searched only if the hull of its coefficients comes near enough.
     """
-    texture = (c, ix, iy, x0, y0, periodic)
+    texture = (c, ix, iy, x0, y0, periodic, low, high)
     best_x, best_y, best = descend(x, y, z, x, y, texture)
     u = (x - x0) * ix
     v = (y - y0) * iy
-    j0 = math.floor(u)
-    i0 = math.floor(v)
     patch = np.empty((4, 4))
-    px = 1.0 / ix
-    py = 1.0 / iy
-    ring = 0
-    while True:
-        if ring > 0:
-            side_x = min(u - (j0 - ring + 1), j0 + ring - u) * px
-            side_y = min(v - (i0 - ring + 1), i0 + ring - v) * py
-            side = max(min(side_x, side_y), 0.0)
-            if side * side >= best:
-                break
-        i = i0 - ring
-        while i <= i0 + ring:
-            step = 1 if abs(i - i0) == ring else 2 * ring
-            j = j0 - ring
-            while j <= j0 + ring:
-                best_x, best_y, best = search_cell(
-                    x, y, z, u, v, i, j, best_x, best_y, best, patch, texture
-                )
-                j += max(step, 1)
-            i += 1
-        ring += 1
+    i0 = math.floor(v)
+    j0 = math.floor(u)
+    for i in range(i0 - 2, i0 + 3):
+        for j in range(j0 - 2, j0 + 3):
+            best_x, best_y, best = search_cell(
+                x, y, z, u, v, i, j, best_x, best_y, best, patch, texture
+            )
+    nx, ny = cells_of(c)
+    reach = math.sqrt(best)
+    i_low = math.floor(v - reach * iy)
+    i_high = math.floor(v + reach * iy)
+    j_low = math.floor(u - reach * ix)
+    j_high = math.floor(u + reach * ix)
+    # The plane is tiled by copies of the map, every other one mirrored if it is finite.
+    for ti in range(i_low // ny, i_high // ny + 1):
+        for tj in range(j_low // nx, j_high // nx + 1):
+            window = (
+                max(i_low - ti * ny, 0), min(i_high - ti * ny, ny - 1),
+                max(j_low - tj * nx, 0), min(j_high - tj * nx, nx - 1),
+            )  # fmt: skip
+            best_x, best_y, best = search_tile(
+                x, y, z, u, v, ti, tj, window, best_x, best_y, best, patch, texture
+            )
     return best_x, best_y
+
+
+def block_span(first: int, cells: int, tile: int, mirrored: bool) -> tuple[int, int]:
+    """Return the cells [start, stop) of the plane that a block of 8 covers in a tile."""
+    last = min(first + 8, cells)
+    if mirrored:
+        return tile * cells + cells - last, tile * cells + cells - first
+    return tile * cells + first, tile * cells + last
+
+
+def search_tile(
+    x: float, y: float, z: float, u: float, v: float, ti: int, tj: int,
+    window: tuple[int, int, int, int],
+    best_x: float, best_y: float, best: float, patch: FloatArray, texture: Any,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Return the nearest point of one copy of the map if it is nearer than the best so far."""
+    c, ix, iy, _x0, _y0, periodic, low, high = texture
+    nx, ny = cells_of(c)
+    i_first, i_last, j_first, j_last = window
+    flip_i = not periodic and ti % 2 != 0
+    flip_j = not periodic and tj % 2 != 0
+    if flip_i:
+        i_first, i_last = ny - 1 - i_last, ny - 1 - i_first
+    if flip_j:
+        j_first, j_last = nx - 1 - j_last, nx - 1 - j_first
+    for bi in range(i_first // 8, i_last // 8 + 1):
+        i_start, i_stop = block_span(8 * bi, ny, ti, flip_i)
+        near_y = max(i_start - v, v - i_stop, 0.0) / iy
+        if near_y * near_y >= best:
+            continue
+        for bj in range(j_first // 8, j_last // 8 + 1):
+            gap = max(low[bi, bj] - z, z - high[bi, bj], 0.0)
+            j_start, j_stop = block_span(8 * bj, nx, tj, flip_j)
+            near_x = max(j_start - u, u - j_stop, 0.0) / ix
+            if near_x * near_x + near_y * near_y + gap * gap >= best:
+                continue
+            for i in range(i_start, i_stop):
+                for j in range(j_start, j_stop):
+                    best_x, best_y, best = search_cell(
+                        x, y, z, u, v, i, j, best_x, best_y, best, patch, texture
+                    )
+    return best_x, best_y, best
 
 
 def search_cell(
@@ -208,7 +255,7 @@ def search_cell(
     best_x: float, best_y: float, best: float, patch: FloatArray, texture: Any,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Return the nearest point of cell (i, j) if it is nearer than the best so far."""
-    c, ix, iy, _x0, _y0, periodic = texture
+    c, ix, iy, _x0, _y0, periodic, _low, _high = texture
     px = 1.0 / ix
     py = 1.0 / iy
     near_x = max(j - u, u - (j + 1.0), 0.0) * px

@@ -349,7 +349,7 @@ def split_atoms(
         # accurate to the root of the gap, so they are polished before they are believed.
         if gap <= rounding and (count == 1 or polished):
             break
-        if count > 1 and not polished and gap <= max(1e-6 * value, rounding):
+        if count > 1 and not polished and gap <= max(0.02 * value, rounding):
             before = atoms.copy()
             weight_before = weights.copy()
             if newton_polish(atoms, weights, p, mu, count, texture):
