@@ -13,6 +13,7 @@ from rich.console import Console
 import asperity as asp
 from asperity.devices import parse_device
 from asperity.report import comparison_table, html_text, plot, print_comparison
+from asperity.report.gain_picture import gain_figure
 from asperity.report.merit_picture import merit_figure
 from asperity.report.section import curl_field, stretch_of
 from asperity.report.spectrum_picture import device_limits, line_spectrum, spectrum_figure
@@ -119,7 +120,7 @@ def test_every_picture_has_axes_with_units(result: asp.Comparison) -> None:
     surface = Surface(TEXTURE, "A", max_depth=0.3e-3)
     for figure in (
         plot(result), plot(surface), plot(TEXTURE),
-        merit_figure(result), spectrum_figure(TEXTURE, result.device),
+        merit_figure(result), gain_figure(result), spectrum_figure(TEXTURE, result.device),
     ):  # fmt: skip
         labels = [axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes]
         labels += [axes.get_ylabel() for part in figure.subfigs for axes in part.axes]
@@ -142,6 +143,23 @@ def test_drawn_curl_is_zero_for_c_and_not_for_a() -> None:
     assert np.nanmax(np.abs(fields["A"].curl)) == pytest.approx(
         1000.0 * 2 * np.pi * 0.2 / 2, rel=0.05
     )
+
+
+def test_drawn_gain_of_a_is_its_norm() -> None:
+    """‖J_A‖ = k √(1 + h'²), at every depth."""
+    stretch = stretch_of(TEXTURE, 2e-3, 4e-3)
+    field = curl_field(Surface(TEXTURE, "A", 700.0, 0.3e-3), stretch, -0.4e-3, 20, 3)
+    middles = 0.5 * (field.along[1:, 0] + field.along[:-1, 0])
+    slope = TEXTURE.gradient(stretch.xy(middles))[:, 0]
+    expected = np.tile(np.hypot(1.0, slope)[:, None], (1, 3))
+    np.testing.assert_allclose(field.gain, expected, rtol=1e-12)
+
+
+def test_notebook_table_has_a_row_per_law(result: asp.Comparison) -> None:
+    text = result._repr_html_()
+    assert text.count("<tr>") == 1 + len(result.rows)
+    assert "<td>∞" not in text
+    assert result.recommendation[:20] in text
 
 
 def test_spectrum_of_a_sinusoid_is_its_amplitude() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -62,6 +63,27 @@ class Comparison:
             if row.law.letter == letter:
                 return row
         raise KeyError(letter)
+
+    def _repr_html_(self) -> str:
+        """Return the answer and a table for a notebook."""
+        head = ["law", "q", "q⁺", "stiffness up to [N/m]", "conservative", "continuous", "verdict"]
+        rows = [
+            [
+                row.law.letter,
+                f"{row.q.value:.4g} ({row.q.method})",
+                f"{row.one_sided.value:.4g} ({row.one_sided.method})",
+                f"{row.safe_stiffness:.4g}",
+                "yes" if row.conservative else "no",
+                "yes" if row.continuous else "no",
+                row.verdict,
+            ]
+            for row in self.rows
+        ]
+        cells = "".join(
+            f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows
+        )
+        titles = "".join(f"<th>{name}</th>" for name in head)
+        return f"<p>{html.escape(self.recommendation)}</p><table><tr>{titles}</tr>{cells}</table>"
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""

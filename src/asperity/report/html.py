@@ -12,6 +12,7 @@ import asperity
 from asperity.analysis.comparison import Comparison
 from asperity.analysis.row import LawRow
 from asperity.report import style
+from asperity.report.gain_picture import gain_figure
 from asperity.report.merit_picture import merit_figure
 from asperity.report.plots import field_figure, force_figure, surface_figure
 from asperity.report.spectrum_picture import spectrum_figure
@@ -158,6 +159,12 @@ def _pictures(comparison: Comparison) -> list[_Picture]:
             "gains energy on a loop around one colour. White everywhere: conservative. The dashed "
             "line is the scan. Law F is drawn sliding, its anchor trailing at full deflection.",
             field_figure(comparison),
+        ),
+        (
+            "Loop gain",
+            "‖J‖/k in the same plane: by how much the law multiplies the stiffness of the smooth "
+            "wall at each place. The cross is the witness of q where it lies in the picture.",
+            gain_figure(comparison),
         ),
         (
             "Strength and support",

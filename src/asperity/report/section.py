@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from asperity.analysis.search import spectral_norm
 from asperity.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine, Texture
@@ -148,12 +149,14 @@ class CurlField:
         along: corners of the cells [m], shape (n + 1, m + 1).
         z: corners of the cells [m], shape (n + 1, m + 1).
         curl: ∂f_t/∂z - ∂f_z/∂t [N/m] in the middle of each cell, shape (n, m).
-        norm: the largest ‖J‖₂ of the cells [N/m].
+        gain: ‖J‖₂/k in the middle of each cell [1], shape (n, m).
+        norm: the largest Frobenius norm of J over the cells [N/m].
     """
 
     along: FloatArray
     z: FloatArray
     curl: FloatArray
+    gain: FloatArray
     norm: float
 
 
@@ -189,7 +192,8 @@ def curl_field(
     corner_z = bottom + (corner_tops - bottom)[:, None] * np.linspace(0.0, 1.0, rows + 1)
     corner_t = np.broadcast_to(edges[:, None], corner_z.shape).copy()
     norm = float(np.linalg.norm(J, axis=(1, 2)).max(initial=0.0))
-    return CurlField(corner_t, corner_z, curl.reshape(columns, rows), norm)
+    gain = spectral_norm(J).reshape(columns, rows) / surface.stiffness
+    return CurlField(corner_t, corner_z, curl.reshape(columns, rows), gain, norm)
 
 
 def _contact_top(surface: Surface, xy: FloatArray) -> FloatArray:
