@@ -155,6 +155,20 @@ def test_drawn_gain_of_a_is_its_norm() -> None:
     np.testing.assert_allclose(field.gain, expected, rtol=1e-12)
 
 
+def test_filled_places_are_pale_in_the_picture() -> None:
+    heights = 1e-4 * np.random.default_rng(0).normal(size=(40, 60))
+    filled = np.zeros((40, 60), dtype=bool)
+    filled[:, 30:] = True
+    pictures = [
+        plot(asp.HeightMap(heights, 1e-4, filled=mask)).axes[0].images[0].get_array()
+        for mask in (None, filled)
+    ]
+    change = np.abs(np.asarray(pictures[1]) - np.asarray(pictures[0])).max(axis=2)
+    middle = change.shape[1] // 2
+    assert change[:, : middle - 2].max() == 0.0
+    assert change[:, middle + 2 :].mean() > 0.1
+
+
 def test_notebook_table_has_a_row_per_law(result: asp.Comparison) -> None:
     text = result._repr_html_()
     assert text.count("<tr>") == 1 + len(result.rows)

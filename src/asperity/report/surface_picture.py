@@ -100,6 +100,7 @@ def _draw_map(figure: Figure | SubFigure, axes: Axes, texture: Texture) -> None:
         dx=step,
         dy=step,
     )
+    shaded = _greyed(shaded, texture)
     x0, y0 = low * wide.scale
     x1, y1 = (low + size) * wide.scale
     axes.imshow(shaded, origin="lower", extent=(x0, x1, y0, y1), interpolation="bilinear")
@@ -110,6 +111,21 @@ def _draw_map(figure: Figure | SubFigure, axes: Axes, texture: Texture) -> None:
     _draw_scale_bar(axes, float(size[0]), wide)
     bar: Any = figure.colorbar(ScalarMappable(norm, colours), ax=axes, pad=0.02, aspect=18)
     style.dress_bar(bar, f"height [{high.name}]")
+
+
+def _greyed(shaded: FloatArray, texture: Texture) -> FloatArray:
+    """Return the picture with the places greyed where heights were missing and are filled in."""
+    filled = getattr(texture, "filled", None)
+    if filled is None or not filled.any():
+        return shaded
+    rows, columns = (
+        np.minimum((np.arange(count) + 0.5) * extent / count, extent - 1).astype(int)
+        for count, extent in zip(shaded.shape[:2], filled.shape, strict=True)
+    )
+    there = filled[np.ix_(rows, columns)]
+    result = shaded.copy()
+    result[there, :3] = 0.25 * result[there, :3] + 0.75 * np.array([0.80, 0.82, 0.85])
+    return result
 
 
 def _draw_scan_line(axes: Axes, texture: Texture, unit: style.Unit) -> None:
