@@ -139,10 +139,11 @@ def test_real_surfaces(call: Call, name: str, options: list[str]) -> None:
 
 
 @needs_data
-def test_foreign_real_file_is_refused(call: Call) -> None:
-    code, _out, err = call("compare", str(DATA / "frt-2.frt"))
-    assert code == 2
-    assert "frt-2.frt" in err
+def test_a_real_file_that_misses_too_much_is_refused(call: Call) -> None:
+    code, out, err = call("compare", str(DATA / "frt-2.frt"))
+    assert (code, out) == (2, "")
+    assert "27.4% of its points" in err
+    assert "--max-missing" in err
 
 
 BAD = [

@@ -64,6 +64,7 @@ def test_a_force_with_symbols_that_the_contact_does_not_offer(force: Formula, na
 def test_deflection_is_offered_to_a_law_with_state():
     own = law(
         lambda c: -c.k * c.tangential(c.deflection),
+        contact="nominal",
         stateful=True,
         parameters={"max_deflection": 1e-3},
     )
@@ -108,6 +109,6 @@ def test_a_force_that_cannot_be_printed_for_the_kernels():
 
 
 def test_a_law_with_state_needs_to_know_how_far_its_anchor_may_lag():
-    own = law(lambda c: -c.k * c.tangential(c.deflection), stateful=True)
+    own = law(lambda c: -c.k * c.tangential(c.deflection), contact="nominal", stateful=True)
     with pytest.raises(LawError, match="max_deflection"):
         law_source(own)
