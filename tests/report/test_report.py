@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from rich.console import Console
 
 import asperity as asp
 from asperity.devices import parse_device
+from asperity.errors import ParameterError
 from asperity.report import comparison_table, html_text, plot, print_comparison
 from asperity.report.gain_picture import gain_figure
 from asperity.report.merit_picture import merit_figure
@@ -125,6 +127,18 @@ def test_every_picture_has_axes_with_units(result: asp.Comparison) -> None:
         labels = [axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes]
         labels += [axes.get_ylabel() for part in figure.subfigs for axes in part.axes]
         assert any("[" in label or "strength" in label for label in labels)
+
+
+def test_every_picture_of_the_report_can_be_had_alone(
+    result: asp.Comparison, tmp_path: Path
+) -> None:
+    for name in ("surface", "spectrum", "force", "field", "gain", "merit"):
+        for ending in ("png", "svg"):
+            path = tmp_path / f"{name}.{ending}"
+            plot(result, picture=name).savefig(path)
+            assert path.stat().st_size > 3000
+    with pytest.raises(ParameterError, match="one of surface, spectrum"):
+        plot(result, picture="curl")
 
 
 def test_no_picture_for_anything_else() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import singledispatch
 from typing import Any
 
@@ -9,9 +10,13 @@ from matplotlib.figure import Figure
 
 from asperity.analysis.comparison import Comparison
 from asperity.analysis.row import LawRow
+from asperity.errors import ParameterError
 from asperity.report import style
 from asperity.report.field_picture import draw_fields, field_size
 from asperity.report.force_picture import draw_forces, force_size
+from asperity.report.gain_picture import gain_figure
+from asperity.report.merit_picture import merit_figure
+from asperity.report.spectrum_picture import spectrum_figure
 from asperity.report.surface_picture import draw_surface, surface_size
 from asperity.report.wording import leak_text
 from asperity.surface import Surface
@@ -19,35 +24,41 @@ from asperity.textures.texture import Texture
 
 
 @singledispatch
-def plot(result: Any) -> Figure:
+def plot(result: Any, picture: str | None = None) -> Figure:
     """Return a picture of a result.
 
     Args:
         result: a :class:`~asperity.analysis.comparison.Comparison` (the surface, the forces and
             the fields of all laws), a :class:`~asperity.surface.Surface` (forces and field of its
             law) or a texture (the surface).
+        picture: of a comparison, one picture of the report alone: "surface", "spectrum", "force",
+            "field", "gain" or "merit".
 
     Returns:
-        A figure; ``figure.savefig(path)`` writes it.
+        A figure; ``figure.savefig(path)`` writes it, as PNG or SVG by the path.
 
     Raises:
         TypeError: for a result without a picture.
+        ParameterError: for a picture that the result does not have.
 
     Example:
         >>> from asperity.textures.sinusoid import Sinusoid
         >>> [axes.get_ylabel() for axes in plot(Sinusoid(0.4e-3, 1.5e-3)).axes]
         ['height [mm]']
     """
+    del picture  # the registered functions take it
     raise TypeError(f"no picture is known for a {type(result).__name__}")
 
 
 @plot.register
-def _texture(result: Texture) -> Figure:
+def _texture(result: Texture, picture: str | None = None) -> Figure:
+    _known(picture, ("surface",))
     return surface_figure(result)
 
 
 @plot.register
-def _surface(result: Surface) -> Figure:
+def _surface(result: Surface, picture: str | None = None) -> Figure:
+    _known(picture, ())
     sizes = [force_size(1), field_size([result])]
     figure, parts = _stacked(sizes)
     draw_forces(parts[0], [result])
@@ -56,7 +67,10 @@ def _surface(result: Surface) -> Figure:
 
 
 @plot.register
-def _comparison(result: Comparison) -> Figure:
+def _comparison(result: Comparison, picture: str | None = None) -> Figure:
+    _known(picture, tuple(PICTURES))
+    if picture is not None:
+        return PICTURES[picture](result)
     surfaces = [row.surface for row in result.rows]
     sizes = [surface_size(result.texture), force_size(len(surfaces)), field_size(surfaces)]
     figure, parts = _stacked(sizes)
@@ -106,3 +120,20 @@ def _stacked(sizes: list[tuple[float, float]]) -> tuple[Figure, list[Any]]:
     for part in parts.ravel():
         part.set_facecolor(style.CARD)
     return figure, list(parts.ravel())
+
+
+def _known(picture: str | None, names: tuple[str, ...]) -> None:
+    if picture is not None and picture not in names:
+        known = f"one of {', '.join(names)}" if names else "left out for this result"
+        raise ParameterError("picture", f"must be {known}", picture)
+
+
+# The pictures of a comparison, as the report shows them.
+PICTURES: dict[str, Callable[[Comparison], Figure]] = {
+    "surface": lambda result: surface_figure(result.texture),
+    "spectrum": lambda result: spectrum_figure(result.texture, result.device),
+    "force": force_figure,
+    "field": field_figure,
+    "gain": gain_figure,
+    "merit": merit_figure,
+}

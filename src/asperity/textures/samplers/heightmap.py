@@ -184,8 +184,8 @@ def nearest(
     patch = np.empty((4, 4))
     i0 = math.floor(v)
     j0 = math.floor(u)
-    for i in range(i0 - 2, i0 + 3):
-        for j in range(j0 - 2, j0 + 3):
+    for i in range(i0 - 1, i0 + 2):
+        for j in range(j0 - 1, j0 + 2):
             best_x, best_y, best = search_cell(
                 x, y, z, u, v, i, j, best_x, best_y, best, patch, texture
             )
@@ -225,6 +225,11 @@ def search_tile(
     c, ix, iy, _x0, _y0, periodic, low, high = texture
     nx, ny = cells_of(c)
     i_first, i_last, j_first, j_last = window
+    # The same window in cells of the plane, where a block is cut to it.
+    i_from = ti * ny + i_first
+    i_to = ti * ny + i_last + 1
+    j_from = tj * nx + j_first
+    j_to = tj * nx + j_last + 1
     flip_i = not periodic and ti % 2 != 0
     flip_j = not periodic and tj % 2 != 0
     if flip_i:
@@ -242,8 +247,8 @@ def search_tile(
             near_x = max(j_start - u, u - j_stop, 0.0) / ix
             if near_x * near_x + near_y * near_y + gap * gap >= best:
                 continue
-            for i in range(i_start, i_stop):
-                for j in range(j_start, j_stop):
+            for i in range(max(i_start, i_from), min(i_stop, i_to)):
+                for j in range(max(j_start, j_from), min(j_stop, j_to)):
                     best_x, best_y, best = search_cell(
                         x, y, z, u, v, i, j, best_x, best_y, best, patch, texture
                     )
