@@ -105,3 +105,17 @@ def engineering(value: float, unit: str, digits: int = 3) -> str:
     exponent = 3 * math.floor((math.log10(abs(value)) + 1e-12 + 0.1) / 3)
     exponent = min(max(exponent, min(_PREFIXES)), max(_PREFIXES))
     return f"{float(f'{value / 10.0**exponent:.{digits}g}'):.10g} {_PREFIXES[exponent]}{unit}"
+
+
+def rounded_down(value: float, digits: int = 3) -> float:
+    """Return the value with so many digits, never more than it is: a limit stays one.
+
+    Example:
+        >>> rounded_down(995.9), rounded_down(1000.0), rounded_down(0.0)
+        (995.0, 1000.0, 0.0)
+    """
+    if value <= 0.0 or not math.isfinite(value):
+        return value
+    step = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    # What rounding of the value itself took away is given back: 1000.0 stays 1000.
+    return round(math.floor(value / step * (1.0 + 1e-12)) * step, 12)

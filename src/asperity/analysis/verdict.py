@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from asperity.analysis.row import LawRow
 from asperity.devices import Device
 from asperity.surface import DEFAULT_PARAMETERS, Surface
-from asperity.units import engineering
+from asperity.units import engineering, rounded_down
 
 # A texture force below this is taken as not felt where the device's resolution is unknown [N].
 DEFAULT_FELT_FORCE = 0.01
@@ -41,11 +41,7 @@ def limit_text(stiffness: float) -> str:
         >>> limit_text(975.6), limit_text(5000.0), limit_text(0.8793)
         ('975 N/m', '5000 N/m', '0.879 N/m')
     """
-    if stiffness <= 0.0 or not math.isfinite(stiffness):
-        return f"{stiffness:g} N/m"
-    unit = 10.0 ** (math.floor(math.log10(stiffness)) - 2)
-    # The tiny share keeps 5000 from becoming 4990 by rounding of the quotient.
-    return f"{math.floor(stiffness / unit * (1.0 + 1e-12)) * unit:.10g} N/m"
+    return f"{rounded_down(stiffness):.10g} N/m"
 
 
 def recommend(rows: Sequence[LawRow], device: Device) -> tuple[str, str]:

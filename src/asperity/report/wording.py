@@ -7,7 +7,7 @@ import math
 from asperity.analysis.bound import Bound
 from asperity.analysis.comparison import Comparison
 from asperity.analysis.row import LawRow
-from asperity.units import engineering
+from asperity.units import engineering, rounded_down
 
 INFINITE = "∞"
 SAMPLED = "~"
@@ -47,20 +47,6 @@ def bound_text(bound: Bound) -> str:
 def is_sampled(bound: Bound) -> bool:
     """Return whether nothing proves the number."""
     return bound.method == "sampled" and math.isfinite(bound.value)
-
-
-def rounded_down(value: float, digits: int = 3) -> float:
-    """Return the value with so many digits, never more than it is: a limit stays one.
-
-    Example:
-        >>> rounded_down(995.9), rounded_down(1000.0), rounded_down(0.0)
-        (995.0, 1000.0, 0.0)
-    """
-    if value <= 0.0 or not math.isfinite(value):
-        return value
-    step = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
-    # What rounding of the value itself took away is given back: 1000.0 stays 1000.
-    return round(math.floor(value / step * (1.0 + 1e-12)) * step, 12)
 
 
 def stiffness_text(row: LawRow) -> str:
