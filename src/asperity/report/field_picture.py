@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
+from asperity.analysis.merit import scan_height
 from asperity.report import style
 from asperity.report.section import (
     ArrowField,
@@ -20,7 +21,6 @@ from asperity.report.section import (
     curl_field,
     feature_length,
     field_range,
-    scan_height,
     stretch_of,
 )
 from asperity.report.wording import law_title

@@ -10,13 +10,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
+from asperity.analysis.merit import scan_height
 from asperity.report import style
 from asperity.report.section import (
     ScanForces,
     Stretch,
     feature_length,
     scan_forces,
-    scan_height,
     stretch_of,
 )
 from asperity.report.wording import law_title

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from asperity.analysis.merit import scan_height
 from asperity.analysis.search import spectral_norm
 from asperity.checks import FloatArray
 from asperity.surface import Surface
@@ -83,13 +84,6 @@ def stretch_of(texture: Texture, wanted: float, most: float) -> Stretch:
     centre = (highest + 0.5) * line.length / _SURVEY_POINTS
     start = min(max(centre - 0.5 * length, 0.0), line.length - length)
     return Stretch(line, start, length)
-
-
-def scan_height(surface: Surface) -> float:
-    """Return z [m] of the scan: max h - D, or -D for laws on the nominal surface."""
-    if surface.law.contact == "nominal":
-        return -surface.max_depth
-    return surface.texture.extremes[1] - surface.max_depth
 
 
 def sliding_state(surface: Surface, count: int, *, jacobian: bool = False) -> dict[str, FloatArray]:
