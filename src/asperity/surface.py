@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from functools import cached_property
 from types import ModuleType
 from typing import Any
@@ -121,6 +122,18 @@ class Surface:
             f"Surface({self.texture!r}, law={self.law.letter!r}, stiffness={self.stiffness!r}, "
             f"max_depth={self.max_depth!r}, clamp={self.clamp!r})"
         )
+
+    def to_depth(self, max_depth: float) -> Surface:
+        """Return the same surface for another max_depth [m].
+
+        Raises:
+            ParameterError: for a depth that is not positive.
+        """
+        result = copy(self)
+        for cached in ("law_arguments", "_loops"):
+            result.__dict__.pop(cached, None)
+        result.max_depth = positive("max_depth", max_depth, "m")
+        return result
 
     @property
     def floor(self) -> float:

@@ -115,7 +115,7 @@ def test_a_law_of_one_s_own_gets_a_row() -> None:
     gentle = asp.Sinusoid(amplitude=0.1e-3, period=2e-3)
     row = asp.compare(gentle, laws=["C", own], max_depth=0.3e-3).row("S")
     assert row.conservative
-    assert row.q.method == "sampled"
+    assert row.q.method == "certified"
     # ‖J‖ at full depth by hand: on a grid of phases.
     x = np.linspace(0, 2e-3, 4001)
     d = gentle.derivatives(np.column_stack([x, 0 * x]))

@@ -52,8 +52,8 @@ def test_infinite_from_the_centre_on_with_the_onset() -> None:
     assert bound.at == pytest.approx((0.5e-3, 0.0, 0.1e-3 - RADIUS), rel=1e-9)
 
 
-def test_a_ball_that_other_surface_enters_does_not_count() -> None:
-    """The sharpest curvature lies on a lip above a ditch: its centre is outside the body."""
+def test_the_ball_of_the_sharpest_crest_is_free() -> None:
+    """Also on a lip above a ditch: no other surface point is nearer to the centre."""
     x = np.linspace(0.0, 1.0, 201)
     ditch = np.where((x > 0.47) & (x < 0.53), -0.4, 0.0) + 0.02 * np.sin(6 * np.pi * x)
     from scipy.ndimage import gaussian_filter1d

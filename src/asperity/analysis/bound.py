@@ -20,6 +20,9 @@ class Bound:
         at: the probe position [m] that attains ``lower``, or approaches it from inside; for an
             infinite number the point where it first becomes so; ``None`` if there is none.
         note: one sentence on how the number came about.
+        deflection: the state of a law with an anchor at ``at``: its deflection [m], shape (2,);
+            ``None`` for a law without state.
+        sliding: whether that anchor is dragged.
 
     Example:
         >>> Bound(2.0, math.inf, "sampled", (0.0, 0.0, -1e-3)).value
@@ -31,11 +34,20 @@ class Bound:
     method: Method
     at: tuple[float, float, float] | None = None
     note: str = ""
+    deflection: tuple[float, float] | None = None
+    sliding: bool = False
 
     @property
     def value(self) -> float:
         """``upper`` where one is proved, else ``lower``."""
         return self.upper if math.isfinite(self.upper) else self.lower
+
+    @property
+    def gap(self) -> float:
+        """Relative gap (upper - lower)/lower; zero where both are infinite."""
+        if math.isinf(self.lower):
+            return 0.0
+        return (self.upper - self.lower) / self.lower if self.lower > 0.0 else math.inf
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data; an unbounded number is written as the string "inf"."""
@@ -46,6 +58,8 @@ class Bound:
             "method": self.method,
             "at": None if self.at is None else list(self.at),
             "note": self.note,
+            "deflection": None if self.deflection is None else list(self.deflection),
+            "sliding": self.sliding,
         }
 
 

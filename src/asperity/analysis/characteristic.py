@@ -12,24 +12,47 @@ import numpy as np
 
 from asperity.analysis import closed_forms
 from asperity.analysis.bound import Bound
-from asperity.analysis.friction import friction_number
-from asperity.analysis.ridges import crest_number
-from asperity.analysis.search import Measure, greatest, one_sided, spectral_norm
-from asperity.checks import FloatArray
+from asperity.analysis.branch_and_bound import DEFAULT_WORK_LIMIT
+from asperity.analysis.certificate import Search, certified, is_shipped, sinusoid_number
+from asperity.analysis.god_object import crest_number
+from asperity.analysis.highest import highest_point
+from asperity.analysis.keeping import kept
+from asperity.analysis.measures import CURL, NORM, ONE_SIDED, Number
+from asperity.analysis.witness import attained
+from asperity.checks import positive
+from asperity.derive.facts import law_facts
+from asperity.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
 
-def characteristic_number(surface: Surface) -> Bound:
-    """Return q = sup ‖J‖₂/k over the working region.
+def characteristic_number(
+    surface: Surface,
+    tolerance: float | None = None,
+    work_limit: int = DEFAULT_WORK_LIMIT,
+    extent: tuple[float, float] | None = None,
+) -> Bound:
+    """Return q = sup ‖J‖₂/k over the working region, between proved bounds.
 
-    Closed form for sinusoids (A, B, C, D, G), theorem for W, E, H and for D where the depth times
-    the curvature bound is at most 1/2, certified for F on a sinusoid, else densely sampled and
-    zoomed in on: then ``upper`` is infinite and ``lower`` a value that is attained.
+    Theorem for W, E and H; closed form for A, B, C, D and G on a sinusoid; else certified by
+    branch and bound with enclosures of the height's derivatives. What cannot be certified is
+    sampled and says so.
+
+    Args:
+        surface: the surface.
+        tolerance: relative gap (upper - lower)/lower at which to stop; by default 1e-6 on
+            profiles and periodic sums, 1e-4 on sums of three independent waves, 1e-3 on maps.
+        work_limit: greatest number of cells to look at; if it is reached the bounds found by then
+            are returned, and the note says so.
+        extent: width and depth [m] of the part of the plane that counts, from the origin, for
+            sums of waves; the whole plane by default.
 
     Returns:
         A :class:`Bound`; infinite for D where the depth reaches the medial axis, ``at`` then
         being the onset, the least depth of the medial axis.
+
+    Raises:
+        ParameterError: for a tolerance, a limit or an extent that is not positive.
 
     Reference:
         The paper's (5), (10) and Table II; MATH section 4 for the rest.
@@ -40,18 +63,24 @@ def characteristic_number(surface: Surface) -> Bound:
         >>> round(characteristic_number(Surface(paper, "A")).value, 4)
         5.1251
     """
-    letter = surface.law.letter
-    if letter in {"W", "E"} and _shipped(surface):
-        return _constant(surface, 1.0, "‖J‖ is exactly k everywhere")
-    if letter == "D" and _shipped(surface):
-        return crest_number(surface)
-    if letter == "H" and _shipped(surface):
+    search = _search(tolerance, work_limit, extent)
+    letter = surface.law.letter if is_shipped(surface) else ""
+    if letter in {"W", "E"}:
+        return _constant(surface, NORM, 1.0, "‖J‖ is exactly k everywhere")
+    if letter == "D":
+        return kept(surface, "q", search, lambda: crest_number(surface, search))
+    if letter == "H":
         reason = "-c <= Hess U <= 1 for any surface: q = max(1, c)"
-        return _constant(surface, max(1.0, surface.continuity), reason)
-    return _number(surface, spectral_norm, closed_forms.Q)
+        return _split_number(surface, max(1.0, surface.continuity), reason)
+    return _number(surface, NORM, search, closed_forms.Q)
 
 
-def one_sided_number(surface: Surface) -> Bound:
+def one_sided_number(
+    surface: Surface,
+    tolerance: float | None = None,
+    work_limit: int = DEFAULT_WORK_LIMIT,
+    extent: tuple[float, float] | None = None,
+) -> Bound:
     """Return q⁺ = sup λ_max(-sym J)/k over the working region; see :func:`characteristic_number`.
 
     1 by theorem for W, D, E and H; closed form for A and C on a sinusoid.
@@ -62,55 +91,86 @@ def one_sided_number(surface: Surface) -> Bound:
         >>> one_sided_number(Surface(paper, "D")).value
         1.0
     """
+    search = _search(tolerance, work_limit, extent)
     reasons = {
         "W": "-J = k e_z e_zᵀ",
         "D": "the potential is half a squared distance, whose Hessian is at most the identity",
-        "H": "the potential is an infimum of functions whose Hessian is the identity",
         "E": "λ_max of the symmetric part of e_z nᵀ is (1 + n_z)/2, 1 where the surface is level",
     }
-    if surface.law.letter in reasons and _shipped(surface):
-        return _constant(surface, 1.0, reasons[surface.law.letter])
-    return _number(surface, one_sided, closed_forms.ONE_SIDED)
+    letter = surface.law.letter if is_shipped(surface) else ""
+    if letter in reasons:
+        return _constant(surface, ONE_SIDED, 1.0, reasons[letter])
+    if letter == "H":
+        reason = "the potential is an infimum of functions whose Hessian is the identity"
+        return _split_number(surface, 1.0, reason)
+    return _number(surface, ONE_SIDED, search, closed_forms.ONE_SIDED)
 
 
-def _shipped(surface: Surface) -> bool:
-    from asperity.laws import LAWS
+def curl_number(
+    surface: Surface,
+    tolerance: float | None = None,
+    work_limit: int = DEFAULT_WORK_LIMIT,
+    extent: tuple[float, float] | None = None,
+) -> Bound:
+    """Return sup |curl f|/k over the working region: the greatest work per area of a small loop.
 
-    return LAWS.get(surface.law.letter) is surface.law
+    Zero by theorem for a conservative law; see :func:`characteristic_number` for the rest.
 
+    Raises:
+        ParameterError: for a law with state, whose force is no field of position.
 
-def _constant(surface: Surface, value: float, reason: str) -> Bound:
-    """Return a number that a theorem gives for every surface.
-
-    1 is attained just inside a crest, where the normal is e_z. A number of law H above 1 is
-    approached where the god-object is split; no witness is given for it.
+    Example:
+        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> paper = Sinusoid(amplitude=0.8e-3, period=1e-3)
+        >>> round(curl_number(Surface(paper, "A")).value, 4)  # the greatest slope, 2πA/l
+        5.0265
     """
-    if surface.law.contact == "nominal":
-        return Bound(value, value, "theorem", (0.0, 0.0, 0.0), reason)
-    if value > 1.0:
-        return Bound(value, value, "theorem", None, reason)
-    # The foot where -J_zz of law D, k n_z² there, is greatest: a level point.
-    god_object = Surface(surface.texture, "D", max_depth=surface.max_depth)
-    at = greatest(god_object, lambda matrices: -matrices[:, 2, 2], _zero_depth).probe
-    return Bound(value, value, "theorem", at, reason)
+    if surface.law.stateful:
+        raise ParameterError("law", f"{surface.law} has state: its force is no field with a curl")
+    facts = law_facts(surface.law)
+    if facts.conservative:
+        return Bound(0.0, 0.0, "theorem", None, facts.reason)
+    search = _search(tolerance, work_limit, extent)
+    return _number(surface, CURL, search, closed_forms.CURL)
 
 
-def _zero_depth(derivatives: FloatArray) -> FloatArray:
-    return np.zeros(len(derivatives))
+def _search(tolerance: float | None, work_limit: int, extent: tuple[float, float] | None) -> Search:
+    gap = None if tolerance is None else positive("tolerance", tolerance)
+    limit = int(positive("work_limit", work_limit))
+    if extent is not None:
+        width, depth = (positive("extent", side, "m") for side in extent)
+        extent = (width, depth)
+    return Search(gap, limit, extent)
 
 
 def _number(
-    surface: Surface, measure: Measure, formulas: dict[str, closed_forms.ClosedForm]
+    surface: Surface,
+    number: Number,
+    search: Search,
+    formulas: dict[str, closed_forms.ClosedForm],
 ) -> Bound:
-    depth = surface.max_depth
-    if surface.law.letter == "F" and _shipped(surface) and isinstance(surface.texture, Sinusoid):
-        return friction_number(surface, measure is one_sided)
-    found = greatest(surface, measure, lambda derivatives: np.full(len(derivatives), depth))
-    formula = formulas.get(surface.law.letter) if _shipped(surface) else None
-    if formula is not None and isinstance(surface.texture, Sinusoid):
-        value = formula(surface.texture, depth)
-        # The witness attains the closed form to rounding; the two are one number.
-        lower = min(found.value, value)
-        return Bound(lower, value, "closed form", found.probe, "MATH section 4")
-    note = f"greatest of {found.samples} samples; not a proof"
-    return Bound(found.value, math.inf, "sampled", found.probe, note)
+    texture, letter = surface.texture, surface.law.letter
+    if is_shipped(surface) and isinstance(texture, Sinusoid) and letter in formulas:
+        value = formulas[letter](texture, surface.max_depth)
+        phase = closed_forms.PHASES[letter](texture, surface.max_depth)
+        return sinusoid_number(surface, number, value, phase)
+    return kept(surface, number.name, search, lambda: certified(surface, number, search))
+
+
+def _constant(surface: Surface, number: Number, value: float, reason: str) -> Bound:
+    """Return a number that a theorem gives for every surface, attained where it is level.
+
+    Just inside the highest point the normal is e_z.
+    """
+    witness = attained(surface, number, highest_point(surface.texture), 0.0)
+    return Bound(min(value, witness.value), value, "theorem", witness.at, reason)
+
+
+def _split_number(surface: Surface, value: float, reason: str) -> Bound:
+    """Return law H's number; for c > 1 it is approached where the god-object is split."""
+    if value > 1.0 and not math.isclose(value, 1.0):
+        return Bound(value, value, "theorem", None, reason)
+    xy = highest_point(surface.texture)
+    height = float(surface.texture.height(np.array([xy]))[0])
+    at = (float(xy[0]), float(xy[1]), height - 1e-9 * surface.max_depth)
+    return Bound(value, value, "theorem", at, reason)

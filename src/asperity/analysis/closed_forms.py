@@ -40,13 +40,16 @@ def q_c(texture: Sinusoid, depth: float) -> float:
     λ³ - (1 + G₁² + E²/4) λ² + (E²/2) λ - E²/4 = 0 with E = 2πD/l; a root is feasible if λ > 1 and
     E (λ - 1) <= 2 G₁ λ. At depth 0 the norm is 1 + G₁².
     """
+    return max(1.0, _bend(texture, depth), *_feasible_roots(texture, depth))
+
+
+def _feasible_roots(texture: Sinusoid, depth: float) -> list[float]:
     g, e = _slope(texture), 2.0 * math.pi * depth / texture.period
     cubic = [1.0, -(1.0 + g * g + e * e / 4.0), e * e / 2.0, -e * e / 4.0]
     roots = np.roots(cubic)
     real = [float(r.real) for r in roots if abs(r.imag) <= 1e-9 * abs(r)]
     polished = [_polish(cubic, root) for root in real]
-    feasible = [r for r in polished if r > 1.0 and e * (r - 1.0) <= 2.0 * g * r * (1.0 + 1e-12)]
-    return max(1.0, _bend(texture, depth), *feasible)
+    return [r for r in polished if r > 1.0 and e * (r - 1.0) <= 2.0 * g * r * (1.0 + 1e-12)]
 
 
 def _polish(cubic: list[float], root: float) -> float:
@@ -78,5 +81,49 @@ def one_sided_a(texture: Sinusoid, depth: float) -> float:  # noqa: ARG001 - one
     return 0.5 * (1.0 + math.hypot(1.0, _slope(texture)))
 
 
+def _steepest(texture: Sinusoid, depth: float) -> float:  # noqa: ARG001 - one signature for all
+    return 0.0
+
+
+def _trough(texture: Sinusoid, depth: float) -> float:  # noqa: ARG001 - one signature for all
+    return -0.5 * math.pi
+
+
+def _phase_b(texture: Sinusoid, depth: float) -> float:
+    steep = math.hypot(1.0, _slope(texture)) >= _bend(texture, depth)
+    return _steepest(texture, depth) if steep else _trough(texture, depth)
+
+
+def _phase_c(texture: Sinusoid, depth: float) -> float:
+    """sin(phase) = -E (λ - 1)/(2 G₁ λ): there λ is stationary along the profile."""
+    root = max(_feasible_roots(texture, depth), default=0.0)
+    if root < max(1.0, _bend(texture, depth)):
+        return _trough(texture, depth)
+    e = 2.0 * math.pi * depth / texture.period
+    return math.asin(max(-1.0, -0.5 * e * (root - 1.0) / (root * _slope(texture))))
+
+
+# The phase of the sinusoid at which the number is attained, at full depth.
+PHASES: dict[str, ClosedForm] = {
+    "A": _steepest,
+    "B": _phase_b,
+    "C": _phase_c,
+    "E": _steepest,
+    "G": _trough,
+}
+
 Q: dict[str, ClosedForm] = {"A": q_a, "B": q_b, "C": q_c, "D": q_d, "G": q_g}
+
+
+def curl_a(texture: Sinusoid, depth: float) -> float:  # noqa: ARG001 - one signature for all
+    """Sup |curl f_A|/k = G₁: the curl of k δ e_z has the length of k ∇h."""
+    return _slope(texture)
+
+
+def curl_e(texture: Sinusoid, depth: float) -> float:  # noqa: ARG001 - one signature for all
+    """Sup |curl f_E|/k = G₁/√(1 + G₁²): the curl of k δₙ e_z has the length of k (n_x, n_y)."""
+    return _slope(texture) / math.hypot(1.0, _slope(texture))
+
+
 ONE_SIDED: dict[str, ClosedForm] = {"A": one_sided_a, "C": q_c}
+CURL: dict[str, ClosedForm] = {"A": curl_a, "E": curl_e}

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from asperity.analysis.measures import spectral_norm
 from asperity.analysis.ridges import sharpest_crest
-from asperity.analysis.search import greatest, spectral_norm
+from asperity.analysis.search import greatest
 from asperity.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine, Texture

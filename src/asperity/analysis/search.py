@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.analysis.measures import Measure, precise_norm, precise_one_sided, spectral_norm
 from asperity.checks import FloatArray
 from asperity.derive.facts import law_facts
 from asperity.derive.fuse import fuse_contact
@@ -29,7 +30,6 @@ _CANDIDATES = 12
 _ZOOM_STEPS = 44
 DEPTH_FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
-Measure = Callable[[FloatArray], FloatArray]
 DepthLimit = Callable[[FloatArray], FloatArray]
 
 
@@ -54,39 +54,6 @@ class Found:
     samples: int
 
 
-def spectral_norm(matrices: FloatArray) -> FloatArray:
-    """Return the largest singular values, shape (n,), of matrices (n, 3, 3)."""
-    a, b, c = matrices[:, :, 0].T, matrices[:, :, 1].T, matrices[:, :, 2].T
-    gram = (_dot(a, a), _dot(b, b), _dot(c, c), _dot(a, b), _dot(a, c), _dot(b, c))
-    return np.sqrt(_largest_eigenvalue(*gram))
-
-
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    result: FloatArray = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    return result
-
-
-def one_sided(matrices: FloatArray) -> FloatArray:
-    """Return λ_max of minus the symmetric part, shape (n,), of matrices (n, 3, 3)."""
-    m = -matrices
-    xy, xz, yz = (0.5 * (m[:, i, j] + m[:, j, i]) for i, j in ((0, 1), (0, 2), (1, 2)))
-    return _largest_eigenvalue(m[:, 0, 0], m[:, 1, 1], m[:, 2, 2], xy, xz, yz)
-
-
-def _largest_eigenvalue(
-    xx: FloatArray, yy: FloatArray, zz: FloatArray, xy: FloatArray, xz: FloatArray, yz: FloatArray
-) -> FloatArray:
-    """Closed form for symmetric 3 × 3 matrices (Smith 1961), good to about 1e-14 of the norm."""
-    centre = (xx + yy + zz) / 3.0
-    x, y, z = xx - centre, yy - centre, zz - centre
-    spread = np.sqrt((x * x + y * y + z * z + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0)
-    det = x * (y * z - yz * yz) - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz)
-    cube = np.where(spread > 0.0, spread, 1.0) ** 3
-    angle = np.arccos(np.clip(0.5 * det / cube, -1.0, 1.0)) / 3.0
-    result: FloatArray = centre + 2.0 * spread * np.cos(angle)
-    return result
-
-
 class ContactField:
     """The Jacobian of a surface as a function of the contact, in units of the stiffness."""
 
@@ -97,14 +64,20 @@ class ContactField:
         self._law = (1.0, *surface.law_arguments[1:])
 
     def jacobians(
-        self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray, deflection: FloatArray
+        self,
+        xy: FloatArray,
+        depth: FloatArray,
+        derivatives: FloatArray,
+        deflection: FloatArray,
+        *,
+        sliding: bool = False,
     ) -> FloatArray:
-        """Return J/k at contacts, sticking, shape (n, 3, 3)."""
+        """Return J/k at contacts, shape (n, 3, 3)."""
         n = len(xy)
         force, jacobian = np.empty((n, 3)), np.empty((n, 3, 3))
-        sliding = np.zeros(n, dtype=bool)
+        slides = np.full(n, sliding)
         self._loops.contact_batch(
-            xy, depth, derivatives, deflection, sliding, force, jacobian, self._law
+            xy, depth, derivatives, deflection, slides, force, jacobian, self._law
         )
         return jacobian
 
@@ -178,7 +151,7 @@ def greatest(surface: Surface, measure: Measure, depth_limit: DepthLimit) -> Fou
 
     Args:
         surface: the surface; its clamp is not looked at.
-        measure: :func:`spectral_norm` or :func:`one_sided`.
+        measure: :func:`~asperity.analysis.measures.spectral_norm` or ``one_sided``.
         depth_limit: greatest depth [m] of each contact from its height derivatives (n, 6).
 
     Raises:
@@ -275,10 +248,8 @@ def _found(
 ) -> Found:
     xy, depth, derivatives, deflection = _contacts(field, depth_limit, row[None, :])
     matrix = field.jacobians(xy, depth, derivatives, deflection)[0]
-    if measure is spectral_norm:
-        value = float(np.linalg.norm(matrix, 2))
-    else:
-        value = float(np.linalg.eigvalsh(-0.5 * (matrix + matrix.T))[-1])
+    careful = precise_norm if measure is spectral_norm else precise_one_sided
+    value = float(careful(matrix[None])[0])
     x, y, z = (float(c) for c in field.probe(xy[0], float(depth[0]), derivatives[0]))
     return Found(
         value=value,

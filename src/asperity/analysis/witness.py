@@ -1,0 +1,67 @@
+"""The point, and the state, at which a number is attained: what anybody can evaluate again."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity.analysis.measures import Number
+from asperity.checks import FloatArray
+from asperity.surface import Surface
+
+# A witness is strictly inside: at depth zero the force has just ended.
+_LEAST_DEPTH = 1e-9
+
+
+@dataclass(frozen=True)
+class Witness:
+    """A probe position and what is measured there.
+
+    Attributes:
+        value: of the measure of J/k [1].
+        at: probe position [m].
+        deflection: of the anchor [m], for a law with state.
+        sliding: whether the anchor is dragged.
+    """
+
+    value: float
+    at: tuple[float, float, float]
+    deflection: tuple[float, float] | None = None
+    sliding: bool = False
+
+
+def probe_of(surface: Surface, xy: FloatArray, depth: float) -> FloatArray:
+    """Return the probe position (3,) [m] in contact at a point of the plane, at a depth."""
+    level = min(max(depth, _LEAST_DEPTH * surface.max_depth), surface.max_depth)
+    if surface.clamp != "none":
+        # At the very depth of the clamp rounding decides on which side the probe is.
+        level = min(level, (1.0 - _LEAST_DEPTH) * surface.max_depth)
+    h, hx, hy = surface.texture.derivatives(np.ascontiguousarray(xy[None]))[0, :3]
+    if surface.law.contact == "nominal":
+        return np.array([xy[0], xy[1], -level])
+    if surface.law.contact == "vertical":
+        return np.array([xy[0], xy[1], h - level])
+    below = level / math.sqrt(1.0 + hx * hx + hy * hy)
+    return np.array([xy[0] + below * hx, xy[1] + below * hy, h - below])
+
+
+def attained(
+    surface: Surface,
+    number: Number,
+    xy: FloatArray,
+    depth: float,
+    deflection: FloatArray | None = None,
+    *,
+    sliding: bool = False,
+) -> Witness:
+    """Return what the surface's own Jacobian gives for a contact."""
+    probe = probe_of(surface, xy, depth)
+    state = None if deflection is None else deflection[None]
+    slides = None if deflection is None else np.array([sliding])
+    jacobian = surface.jacobian(probe[None], state, slides)
+    value = float(number.careful(jacobian / surface.stiffness)[0])
+    x, y, z = (float(v) for v in probe)
+    held = None if deflection is None else (float(deflection[0]), float(deflection[1]))
+    return Witness(value, (x, y, z), held, sliding)
