@@ -1,91 +1,269 @@
-"""The catalogue and device files."""
+"""The catalogue: every number that is known, with its source, and nothing that is not."""
 
 from __future__ import annotations
 
-from pathlib import Path
+import math
 
 import pytest
 
-from asperity.devices import device_names, load_device, parse_device
+from asperity.devices import (
+    FIELD_TABLE,
+    FIELDS,
+    Datum,
+    Device,
+    device_names,
+    load_device,
+    parse_device,
+)  # fmt: skip
+from asperity.devices.five_bar import FiveBar, handle_damping
 from asperity.errors import ParameterError
 
+# What was read (True) or is remembered (False), written down apart from the catalogue.
+KNOWN: dict[str, dict[str, list[tuple[float, bool]]]] = {
+    "omega.3": {
+        "max_force": [(12, True)],
+        "max_stiffness": [(5000, True), (14500, False)],
+        "position_resolution": [(1e-5, False)],
+        "update_rate": [(4000, False), (8000, False)],
+        "controller_damping": [(30, True)],
+        "workspace_diameter": [(0.160, False)],
+        "workspace_length": [(0.110, False)],
+    },
+    "delta.3": {
+        "max_force": [(20, True)],
+        "max_stiffness": [(5000, True)],
+        "position_resolution": [(2e-5, False)],
+        "apparent_mass": [(0.4, True), (0.5, True)],
+        "update_rate": [(4000, True)],
+        "controller_damping": [(30, True)],
+    },
+    "sigma.7": {
+        "max_force": [(12, True), (20, False)],
+        "max_stiffness": [(4000, True)],
+        "position_resolution": [(1.5e-6, False)],
+    },
+    "lambda.7": {"max_force": [(12, True)], "max_stiffness": [(8000, True)]},
+    "falcon": {
+        "max_force": [(8, True)],
+        "max_stiffness": [(3000, True)],
+        "position_resolution": [(38e-6, True), (64e-6, False)],
+        "update_rate": [(1000, True), (300, True)],
+    },
+    "touch": {
+        "max_force": [(3.3, True)],
+        "max_stiffness": [(400, True)],
+        "position_resolution": [(55e-6, False)],
+        "friction": [(0.26, False)],
+        "apparent_mass": [(0.045, False)],
+        "continuous_force": [(0.88, False)],
+    },
+    "omni": {
+        "max_force": [(3.3, True)],
+        "max_stiffness": [(700, True)],
+        "position_resolution": [(55e-6, False)],
+        "update_rate": [(1000, False)],
+    },
+    "touch-x": {
+        "max_force": [(7.9, True)],
+        "max_stiffness": [(1000, True)],
+        "position_resolution": [(23e-6, False)],
+        "friction": [(0.06, False)],
+        "apparent_mass": [(0.045, False)],
+    },
+    "premium-1.5": {
+        "max_force": [(8.5, True)],
+        "max_stiffness": [(800, True), (3500, False)],
+        "position_resolution": [(3e-5, False)],
+        "friction": [(0.04, False)],
+        "apparent_mass": [(0.075, False)],
+    },
+    "premium-3.0": {
+        "max_force": [(22, True)],
+        "max_stiffness": [(1000, True)],
+        "position_resolution": [(2e-5, False)],
+    },
+    "inverse3": {
+        "max_force": [(10, True)],
+        "continuous_force": [(4, True)],
+        "max_stiffness": [(1000, True)],
+        "position_resolution": [(1e-5, True)],
+        "force_resolution": [(0.014, True)],
+        "velocity_rate": [(200, True)],
+        "update_rate": [(4000, True)],
+    },
+    "2diy": {
+        "position_resolution": [(90e-6, True), (41e-6, True)],
+        "encoder_counts": [(4880, True), (10752, True)],
+        "proximal_link": [(0.070, True)],
+        "distal_link": [(0.090, True)],
+    },
+    "pantograph": {
+        "max_stiffness": [(2000, True)],
+        "position_resolution": [(15e-6, True), (10e-6, True)],
+        "bandwidth": [(400, True)],
+        "update_rate": [(10_000, True)],
+        "joint_damping": [(4.7e-3, True), (4.0e-3, True)],
+        "proximal_link": [(0.063, False)],
+        "distal_link": [(0.075, False)],
+        "base_distance": [(0.025, False)],
+    },
+}
+EVERY = [(name, field) for name, fields in KNOWN.items() for field in fields]
+# Further numbers that come with a source: a driver's constants, what follows from others.
+FURTHER = {"controller_damping", "workspace_radius", "damping", "base_distance"}
 
-def test_catalogue_has_the_four_devices_with_sources() -> None:
-    assert {"omega.3", "touch", "inverse3", "pantograph"} <= set(device_names())
-    for name in device_names():
-        device = load_device(name)
-        assert device.max_stiffness > 0.0
-        for datum in device.data.values():
-            assert datum.source
-            assert datum.value > 0.0
+
+def entries() -> list[tuple[Device, str, Datum]]:
+    devices = [load_device(name) for name in device_names()]
+    return [
+        (device, field, datum)
+        for device in devices
+        for field, first in device.data.items()
+        for datum in (first, *first.also)
+    ]
 
 
-@pytest.mark.parametrize(
-    ("name", "field", "value"),
-    [
-        ("omega.3", "max_stiffness", 5000.0),
-        ("omega.3", "max_force", 12.0),
-        ("touch", "max_stiffness", 400.0),
-        ("touch", "max_force", 3.3),
-        ("inverse3", "max_stiffness", 1000.0),
-        ("inverse3", "force_resolution", 0.014),
-        ("pantograph", "position_resolution", 15e-6),
-    ],
-)
-def test_sourced_numbers(name: str, field: str, value: float) -> None:
+def test_the_catalogue_has_every_device() -> None:
+    assert set(device_names()) == set(KNOWN)
+
+
+@pytest.mark.parametrize(("name", "field"), EVERY)
+def test_every_known_number_is_there(name: str, field: str) -> None:
     datum = load_device(name).data[field]
-    assert datum.value == pytest.approx(value, rel=1e-12)
-    assert datum.verified
+    found = [(one.value, one.verified) for one in (datum, *datum.also)]
+    expected = KNOWN[name][field]
+    assert len(found) == len(expected)
+    for one, (value, verified) in zip(found, expected, strict=True):
+        assert one == (pytest.approx(value, rel=1e-12), verified)
 
 
-def test_remembered_numbers_are_not_verified() -> None:
-    assert not load_device("omega.3").data["update_rate"].verified
-    assert not load_device("touch").data["friction"].verified
+@pytest.mark.parametrize("name", list(KNOWN))
+def test_nothing_is_there_that_is_not_known(name: str) -> None:
+    assert set(load_device(name).data) <= set(KNOWN[name]) | FURTHER
+
+
+def test_every_number_has_a_unit_and_a_source() -> None:
+    every = entries()
+    assert len(every) > 80
+    for device, field, datum in every:
+        place = f"{device.id}.{field}"
+        assert datum.unit == FIELDS[field], place
+        assert len(datum.source) > 10, place
+        assert math.isfinite(datum.value), place
+        # What is remembered is never called verified, and what is not verified says why.
+        assert datum.verified != any(
+            word in datum.source for word in ("remembered", "not verified", "derived likewise")
+        ), place
+
+
+def test_a_sourced_number_goes_before_a_remembered_one() -> None:
+    for device, field, datum in entries():
+        if not datum.verified:
+            continue
+        assert device.data[field].verified, f"{device.id}.{field}"
+
+
+def test_resolutions_that_are_derived_follow_from_their_sources() -> None:
+    haply = load_device("2diy").data
+    length = haply["proximal_link"].value
+    counts = [haply["encoder_counts"], *haply["encoder_counts"].also]
+    steps = [haply["position_resolution"], *haply["position_resolution"].also]
+    for count, step in zip(counts, steps, strict=True):
+        assert step.value == pytest.approx(2 * math.pi * length / count.value, rel=0.005)
+    # libnifalcon: 320 slots read in quadrature, capstan 14.25 mm on an arc of 110 mm, arm 60 mm.
+    falcon = 60e-3 * 2 * math.pi / (4 * 320) * 14.25 / 110
+    assert load_device("falcon").value("position_resolution") == pytest.approx(falcon, rel=0.005)
+
+
+def test_damping_of_the_pantograph_follows_from_its_joints() -> None:
+    """σ₀(B) with B = J⁻ᵀ b J⁻¹; a limit, so it is rounded down."""
+    device = load_device("pantograph")
+    data = device.data
+    linkage = FiveBar(*(data[f].value for f in ("proximal_link", "distal_link", "base_distance")))
+    joint = data["joint_damping"].value
+    stated = [data["damping"], *data["damping"].also]
+    for datum, point in zip(stated, [(-12.5e-3, 0.1), (37.5e-3, 0.1)], strict=True):
+        x, y = (f"{1e3 * value:g}" for value in point)
+        assert f"({x}, {y}) mm" in datum.source
+        sigma = float(
+            min(abs(value) for value in _eigenvalues(handle_damping(linkage, joint, point)))
+        )
+        assert 0.0 <= sigma - datum.value < 1e-3
+        assert not datum.verified
+
+
+def _eigenvalues(matrix: object) -> tuple[float, float]:
+    (a, b), (_b, d) = matrix  # type: ignore[misc, attr-defined]  # a symmetric 2 x 2 array
+    middle, half = (a + d) / 2, math.hypot((a - d) / 2, b)
+    return middle - half, middle + half
+
+
+def test_a_force_filter_of_the_driver_is_said() -> None:
+    assert any("filters the force" in note for note in load_device("inverse3").notes)
+
+
+def test_frames_are_named() -> None:
+    assert load_device("omega.3").axes.startswith("x towards the user, y to the right, z up")
+    assert load_device("touch").axes.startswith("x to the right, y up, z towards the user")
+    assert load_device("inverse3").axes == "x to the right, y forward, z up"
 
 
 def test_case_does_not_matter() -> None:
     assert load_device("OMEGA.3").id == "omega.3"
 
 
-def test_unknown_device_offers_the_nearest() -> None:
-    with pytest.raises(ParameterError, match=r"did you mean 'omega\.3'"):
-        load_device("omega3")
-
-
-def test_device_file(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    path.write_text(
-        'name = "My arm"\nmax_stiffness = "1.2 N/mm"\n'
-        '[update_rate]\nvalue = 2\nunit = "kHz"\nsource = "measured"\nverified = true\n'
-    )
-    device = load_device(path)
-    assert (device.id, device.name) == ("mine", "My arm")
-    assert device.max_stiffness == pytest.approx(1200.0)
-    assert device.data["update_rate"].value == pytest.approx(2000.0)
-    assert device.data["update_rate"].verified
-    assert not device.data["max_stiffness"].verified
+def test_a_device_is_taken_as_it_is() -> None:
+    device = load_device("touch")
+    assert load_device(device) is device
 
 
 @pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ({"max_stifness": "3 N/m"}, "did you mean 'max_stiffness'"),
-        ({"max_stiffness": "3 N"}, "another dimension"),
-        ({"max_stiffness": 0}, "positive"),
-        ({"max_stiffness": "many"}, "quantity"),
-        ({"max_stiffness": {"source": "x"}}, "no value"),
-        ({"max_stiffness": {"value": 3, "units": "N/m"}}, "unknown key 'units'"),
-        ({"max_stiffness": {"value": 3, "verified": "yes"}}, "true or false"),
-    ],
+    ("given", "nearest"),
+    [("omega3", r"'omega\.3'"), ("premium1.5", r"'premium-1\.5'"), ("toch", "'touch'")],
 )
-def test_bad_content(content: dict[str, object], message: str) -> None:
-    with pytest.raises(ParameterError, match=message):
-        parse_device(content, "mine")
+def test_unknown_device_offers_the_nearest(given: str, nearest: str) -> None:
+    with pytest.raises(ParameterError, match=f"did you mean {nearest}"):
+        load_device(given)
 
 
-def test_bad_files(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="cannot be read"):
-        load_device(tmp_path / "none.toml")
-    (tmp_path / "bad.toml").write_text("a = = b")
-    with pytest.raises(ParameterError, match="not valid TOML"):
-        load_device(tmp_path / "bad.toml")
+@pytest.mark.parametrize("given", [None, 5, b"touch", ["touch"]])
+def test_what_is_no_name_is_refused(given: object) -> None:
+    with pytest.raises(ParameterError, match="must be an id, a TOML file or a Device"):
+        load_device(given)  # type: ignore[arg-type]  # the point
+
+
+def test_what_is_not_known_is_none_and_a_stiffness_that_is_needed_an_error() -> None:
+    device = load_device("2diy")
+    assert device.value("max_stiffness") is None
+    with pytest.raises(ParameterError, match="2diy needs max_stiffness"):
+        _ = device.max_stiffness
+
+
+def test_plain_data_says_everything() -> None:
+    content = load_device("omega.3").to_dict()
+    stiffness = content["data"]["max_stiffness"]
+    assert (stiffness["value"], stiffness["unit"], stiffness["verified"]) == (5000.0, "N/m", True)
+    other = stiffness["also"][0]
+    assert (other["value"], other["verified"], other["also"]) == (14500.0, False, [])
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (0.0, "1", "0"), (10752.0, "1", "10752"), (0.045, "kg", "45 g"), (1.2, "kg", "1.2 kg"),
+        (0.0047, "N*m*s", "4.7 mN·m·s"), (30.0, "N*s/m", "30 N·s/m"), (14500.0, "N/m", "14500 N/m"),
+        (4000.0, "Hz", "4 kHz"), (1.5e-6, "m", "1.5 µm"),
+    ],
+)  # fmt: skip
+def test_values_for_reading(value: float, unit: str, text: str) -> None:
+    assert Datum(value, unit, "", True).text == text
+
+
+def test_every_field_can_be_given() -> None:
+    content = {
+        field: {"value": 1, "unit": kind.unit, "source": "s"} for field, kind in FIELD_TABLE.items()
+    }
+    device = parse_device(content, "whole")
+    assert {field: datum.value for field, datum in device.data.items()} == dict.fromkeys(
+        FIELDS, 1.0
+    )

@@ -8,6 +8,7 @@ import click
 
 import asperity
 from asperity.cli.compare import compare_command
+from asperity.cli.devices import devices_command
 from asperity.cli.prepare import prepare_command
 from asperity.cli.surfaces import surfaces_command
 from asperity.errors import AsperityError
@@ -25,6 +26,7 @@ def cli() -> None:
 
 
 cli.add_command(compare_command)
+cli.add_command(devices_command)
 cli.add_command(prepare_command)
 cli.add_command(surfaces_command)
 

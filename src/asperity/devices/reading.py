@@ -1,0 +1,190 @@
+"""From text to a device: the catalogue, and files of users."""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from asperity.devices.device import Datum, Device
+from asperity.devices.fields import FIELD_TABLE, WORDS
+from asperity.errors import ParameterError, nearest_names
+from asperity.units import quantity
+
+_KEYS = ("value", "unit", "source", "verified", "also")
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*")
+
+
+def device_names() -> list[str]:
+    """Return the ids of the catalogue."""
+    return sorted(_catalogue())
+
+
+@lru_cache(maxsize=1)
+def _catalogue() -> dict[str, dict[str, Any]]:
+    """Return the content of every catalogue entry by id."""
+    folder = resources.files("asperity.devices") / "catalogue"
+    texts = [item.read_text("utf-8") for item in folder.iterdir() if item.name.endswith(".toml")]
+    contents = [tomllib.loads(text) for text in texts]
+    return {str(content["id"]): content for content in contents}
+
+
+def load_device(device: str | os.PathLike[str] | Device) -> Device:
+    """Return a device of the catalogue by its id, or one from a TOML file.
+
+    A file gives ``id``, ``name`` and any of the fields of the catalogue, each as a quantity
+    ("12 N"), or as a table with ``value``, ``unit``, ``source``, ``verified`` and ``also``.
+
+    Raises:
+        ParameterError: for an id that is unknown, or a file with unknown or wrong fields.
+
+    Example:
+        >>> load_device("Touch").name
+        '3D Systems Touch'
+    """
+    if isinstance(device, Device):
+        return device
+    text = os.fspath(device) if isinstance(device, os.PathLike) else device
+    if not isinstance(text, str):
+        raise ParameterError("device", "must be an id, a TOML file or a Device", device)
+    for known, content in _catalogue().items():
+        if known.lower() == text.strip().lower():
+            return parse_device(content, known)
+    if text.lower().endswith(".toml"):
+        return _load_file(Path(text))
+    hint = nearest_names(text, _catalogue())
+    raise ParameterError("device", f"is unknown: {text!r}; {hint}, or a TOML file")
+
+
+def _load_file(path: Path) -> Device:
+    try:
+        # Editors of some systems put a mark of the encoding in front.
+        content = tomllib.loads(path.read_text("utf-8-sig"))
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ParameterError("device", f"file {path} cannot be read: {reason}") from None
+    except RecursionError:
+        raise ParameterError("device", f"file {path} is nested too deeply") from None
+    except ValueError as error:  # of TOML, of the encoding, of an impossible path or number
+        raise ParameterError("device", f"file {path} is not valid TOML: {error}") from None
+    return parse_device(content, path.stem)
+
+
+def parse_device(content: Mapping[str, Any], default_id: str) -> Device:
+    """Return a device from the content of a file; see :func:`load_device`.
+
+    Raises:
+        ParameterError: for unknown or wrong fields.
+
+    Example:
+        >>> mine = parse_device({"max_stiffness": "1.2 N/mm", "delay_samples": 1}, "mine")
+        >>> mine.max_stiffness, mine.data["max_stiffness"].source
+        (1200.0, 'given by the user')
+    """
+    unknown = [key for key in content if key not in FIELD_TABLE and key not in WORDS]
+    if unknown:
+        hint = nearest_names(unknown[0], [*FIELD_TABLE, *WORDS])
+        raise ParameterError("device", f"has an unknown field {unknown[0]!r}; {hint}")
+    identity = _text("device.id", content.get("id", default_id))
+    name = _text("device.name", content.get("name", identity))
+    axes = _text("device.axes", content["axes"]) if "axes" in content else ""
+    notes = content.get("notes", [])
+    if not isinstance(notes, (list, tuple)):
+        raise ParameterError("device.notes", "must be a list of sentences", notes)
+    sentences = tuple(_text("device.notes", note) for note in notes)
+    data = {field: _datum(field, given) for field, given in content.items() if field in FIELD_TABLE}
+    _check_forces(data)
+    return Device(identity, name, data, axes, sentences)
+
+
+def _text(name: str, given: Any) -> str:
+    if not isinstance(given, str) or not given.strip() or _CONTROL.search(given):
+        raise ParameterError(name, "must be text on one line", given)
+    return given.strip()
+
+
+def _check_forces(data: Mapping[str, Datum]) -> None:
+    most, lasting = data.get("max_force"), data.get("continuous_force")
+    if most is not None and lasting is not None and lasting.value > most.value:
+        limit = f"must not be greater than max_force, {most.text}"
+        raise ParameterError("device.continuous_force", limit, lasting.text)
+
+
+def _datum(field: str, given: Any, nested: bool = False) -> Datum:
+    """Return a number of a device from what a file says of it, with all that is said besides."""
+    name = f"device.{field}.also" if nested else f"device.{field}"
+    table = given if isinstance(given, dict) else {"value": given}
+    keys = _KEYS[:-1] if nested else _KEYS
+    unknown = [key for key in table if key not in keys]
+    if unknown or "value" not in table:
+        problem = f"unknown key {unknown[0]!r}" if unknown else "no value"
+        raise ParameterError(name, f"has {problem}; known: {', '.join(keys)}")
+    value = _value(name, field, table)
+    verified = table.get("verified", False)
+    if not isinstance(verified, bool):
+        raise ParameterError(name, "verified must be true or false", verified)
+    source = _text(f"{name}.source", table.get("source", "given by the user"))
+    others = table.get("also", [])
+    if not isinstance(others, list) or not all(isinstance(other, dict) for other in others):
+        raise ParameterError(f"{name}.also", "must be a list of tables with value and unit", others)
+    also = tuple(_datum(field, other, nested=True) for other in others)
+    return Datum(value, FIELD_TABLE[field].unit, source, verified, also)
+
+
+def _value(name: str, field: str, table: Mapping[str, Any]) -> float:
+    """Return the value [SI] of a table with a value and perhaps a unit."""
+    kind = FIELD_TABLE[field]
+    given, named = table["value"], table.get("unit")
+    if named is None:
+        value = _quantity(name, given, kind.unit)
+    else:
+        value = _with_named_unit(name, given, named, kind.unit)
+    shown = f" [{kind.unit}]"
+    if kind.allowed == "positive" and value <= 0.0:
+        raise ParameterError(name, f"must be positive{shown}", given)
+    if kind.allowed == "not negative" and value < 0.0:
+        raise ParameterError(name, f"must not be negative{shown}", given)
+    if kind.whole and value != round(value):
+        raise ParameterError(name, "must be a whole number", given)
+    return value
+
+
+def _quantity(name: str, given: Any, unit: str) -> float:
+    """Return a finite quantity [SI]; "1" is the unit of plain numbers."""
+    if isinstance(given, int) and not isinstance(given, bool) and abs(given) > 10**300:
+        raise ParameterError(name, f"must be finite [{unit}]", "a number of more than 300 digits")
+    return quantity(name, given, "" if unit == "1" else unit)
+
+
+def _with_named_unit(name: str, given: Any, named: Any, unit: str) -> float:
+    """Return a value whose unit is named beside it; a unit of its own must be the same."""
+    if unit == "1":
+        if named != "1":
+            raise ParameterError(f"{name}.unit", "must be '1': it is a plain number", named)
+        return _quantity(name, given, unit)
+    if not isinstance(named, str) or not named.strip() or _NUMBER.fullmatch(named):
+        raise ParameterError(f"{name}.unit", f"must be text such as '{unit}'", named)
+    if isinstance(given, str):
+        number = _NUMBER.match(given)
+        own = given[number.end() :].strip() if number else ""
+        if own and not _same_unit(own, named):
+            words = f"has the value {given!r} and the unit {named!r}, which contradict each other"
+            raise ParameterError(name, words)
+        if own:
+            return _quantity(name, given, unit)
+    quantity(f"{name}.unit", f"1 {named}", unit)  # a wrong unit is told apart from a wrong value
+    plain = _quantity(name, given, unit)
+    return plain if named.strip() == unit else quantity(name, f"{given} {named}", unit)
+
+
+def _same_unit(one: str, other: str) -> bool:
+    try:
+        return abs(quantity("unit", f"1 {one}", other) - 1.0) < 1e-12
+    except ParameterError:
+        return False

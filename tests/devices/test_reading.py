@@ -1,0 +1,194 @@
+"""Devices of users: what a file may say, and what is refused, with the reason."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from asperity.devices import load_device, parse_device
+from asperity.errors import ParameterError
+
+
+def test_device_file(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        'name = "My arm"\naxes = "x right"\nnotes = ["old"]\nmax_stiffness = "1.2 N/mm"\n'
+        '[update_rate]\nvalue = 2\nunit = "kHz"\nsource = "measured"\nverified = true\n'
+        '[[update_rate.also]]\nvalue = "1 kHz"\nsource = "by USB 2"\n'
+    )
+    device = load_device(path)
+    assert (device.id, device.name, device.axes, device.notes) == (
+        "mine",
+        "My arm",
+        "x right",
+        ("old",),
+    )
+    assert device.max_stiffness == pytest.approx(1200.0)
+    rate = device.data["update_rate"]
+    assert (rate.value, rate.source, rate.verified) == (2000.0, "measured", True)
+    assert [(one.value, one.source, one.verified) for one in rate.also] == [
+        (1000.0, "by USB 2", False)
+    ]
+    stiffness = device.data["max_stiffness"]
+    assert (stiffness.source, stiffness.verified, stiffness.also) == (
+        "given by the user",
+        False,
+        (),
+    )
+
+
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
+def test_a_mark_of_the_encoding_does_no_harm(tmp_path: Path, mark: bytes) -> None:
+    path = tmp_path / "mine.TOML"
+    path.write_bytes(mark + b"max_force = '5 N'\r\n")
+    assert load_device(str(path)).value("max_force") == 5.0
+
+
+@pytest.mark.parametrize(
+    ("content", "field", "value"),
+    [
+        ({"delay_samples": 0}, "delay_samples", 0.0),
+        ({"delay_samples": "3"}, "delay_samples", 3.0),
+        ({"delay_samples": {"value": 2, "unit": "1"}}, "delay_samples", 2.0),
+        ({"virtual_damping": 0}, "virtual_damping", 0.0),
+        ({"virtual_damping": "-3 N*s/m"}, "virtual_damping", -3.0),
+        ({"friction": 0}, "friction", 0.0),
+        ({"base_distance": 0}, "base_distance", 0.0),
+        ({"damping": "0.5 N*s/m"}, "damping", 0.5),
+        ({"damping": {"value": 0.5, "unit": "N s/mm"}}, "damping", 500.0),
+        # A unit that is said twice must be the same unit, however written.
+        ({"max_force": {"value": "12 N", "unit": "N"}}, "max_force", 12.0),
+        ({"max_force": {"value": "12 N", "unit": "newton"}}, "max_force", 12.0),
+        ({"max_stiffness": {"value": "5 N/mm", "unit": "kN/m"}}, "max_stiffness", 5000.0),
+        ({"max_stiffness": {"value": "5", "unit": "N/mm"}}, "max_stiffness", 5000.0),
+        ({"position_resolution": {"value": 55, "unit": "um"}}, "position_resolution", 5.5e-5),
+    ],
+)  # fmt: skip
+def test_values_that_are_allowed(content: dict[str, object], field: str, value: float) -> None:
+    assert parse_device(content, "mine").value(field) == value
+
+
+CONTRADICTIONS = [
+    ("max_force", "12 N", "mm"),
+    ("max_stiffness", "5 N/mm", "N/m"),
+    ("max_stiffness", "5000 N/m", "N/mm"),
+    ("position_resolution", "10 um", "m"),
+    ("update_rate", "1 kHz", "Hz"),
+    ("apparent_mass", "45 g", "kg"),
+    ("max_force", "12 N", "no unit at all"),
+]
+
+
+@pytest.mark.parametrize(("field", "value", "unit"), CONTRADICTIONS)
+def test_contradictory_units_are_refused(field: str, value: str, unit: str) -> None:
+    with pytest.raises(ParameterError, match="contradict each other") as caught:
+        parse_device({field: {"value": value, "unit": unit}}, "mine")
+    assert f"device.{field}" in str(caught.value)
+    assert value in str(caught.value)
+    assert unit in str(caught.value)
+
+
+WRONG = [
+    ({"max_stifness": "3 N/m"}, "did you mean 'max_stiffness'"),
+    ({"dampening": 3}, "did you mean 'damping'"),
+    ({"max_stiffness": "3 N"}, "another dimension"),
+    ({"max_stiffness": {"value": 3, "unit": "N"}}, r"max_stiffness\.unit .*another dimension"),
+    ({"max_stiffness": {"value": 3, "unit": "furlongg"}}, "not understood"),
+    ({"max_stiffness": {"value": 3, "unit": "2 N/m"}}, r"max_stiffness\.unit"),
+    ({"max_stiffness": {"value": 3, "unit": ""}}, r"max_stiffness\.unit"),
+    ({"max_stiffness": {"value": 3, "unit": 7}}, "must be text such as 'N/m'"),
+    ({"max_stiffness": {"value": 3, "unit": "1"}}, "must be text such as 'N/m'"),
+    ({"delay_samples": {"value": 3, "unit": 1}}, "plain number"),
+    ({"max_stiffness": 0}, "must be positive"),
+    ({"max_stiffness": -1}, "must be positive"),
+    ({"max_stiffness": "1e-400 N/m"}, "must be positive"),
+    ({"max_stiffness": "many"}, "quantity"),
+    ({"max_stiffness": [3]}, "quantity"),
+    ({"max_stiffness": True}, "quantity"),
+    ({"max_stiffness": {"value": False, "unit": "N/m"}}, "quantity"),
+    ({"max_stiffness": {"value": True, "unit": "N/mm"}}, "quantity"),
+    ({"max_stiffness": math.inf}, "must be finite"),
+    ({"max_stiffness": math.nan}, "must be finite"),
+    ({"max_stiffness": {"value": math.nan, "unit": "N/mm"}}, "must be finite"),
+    ({"max_stiffness": "inf N/m"}, "quantity"),
+    ({"max_stiffness": "1e400 N/m"}, "must be finite"),
+    ({"max_stiffness": {"value": 1e308, "unit": "kN/mm"}}, "must be finite"),
+    ({"max_stiffness": 10**400}, "must be finite"),
+    ({"max_stiffness": {"source": "x"}}, "no value"),
+    ({"max_stiffness": {}}, "no value"),
+    ({"max_stiffness": {"value": 3, "units": "N/m"}}, "unknown key 'units'"),
+    ({"max_stiffness": {"value": 3, "verified": "yes"}}, "true or false"),
+    ({"max_stiffness": {"value": 3, "verified": 1}}, "true or false"),
+    ({"max_stiffness": {"value": 3, "source": 4}}, r"source must be text"),
+    ({"max_stiffness": {"value": 3, "source": ""}}, r"source must be text"),
+    ({"max_stiffness": {"value": 3, "also": 4}}, "must be a list of tables"),
+    ({"max_stiffness": {"value": 3, "also": [4]}}, "must be a list of tables"),
+    ({"max_stiffness": {"value": 3, "also": [{"value": 0}]}}, r"also must be positive"),
+    ({"max_stiffness": {"value": 3, "also": [{"value": 1, "also": []}]}}, "unknown key 'also'"),
+    ({"damping": 0}, r"damping must be positive"),
+    ({"damping": -0.5}, r"damping must be positive"),
+    ({"joint_damping": 0.0}, r"joint_damping must be positive"),
+    ({"update_rate": 0}, r"update_rate must be positive"),
+    ({"update_rate": "0 kHz"}, r"update_rate must be positive"),
+    ({"friction": -0.1}, "must not be negative"),
+    ({"delay_samples": -1}, "must not be negative"),
+    ({"delay_samples": 1.5}, "whole number"),
+    ({"delay_samples": "1 ms"}, "must be a number"),
+    ({"delay_samples": {"value": 1, "unit": "ms"}}, "plain number"),
+    ({"delay_samples": True}, "must be a number"),
+    ({"encoder_counts": 0}, "must be positive"),
+    ({"virtual_damping": math.inf}, "must be finite"),
+    ({"max_force": "3 N", "continuous_force": "4 N"}, "must not be greater than max_force, 3 N"),
+    ({"id": 5}, r"device\.id must be text"),
+    ({"id": " "}, r"device\.id must be text"),
+    ({"name": "two\nlines"}, r"device\.name must be text on one line"),
+    ({"name": "\x1b[31mred"}, r"device\.name must be text on one line"),
+    ({"axes": 3}, r"device\.axes must be text"),
+    ({"notes": "one"}, "list of sentences"),
+    ({"notes": [1]}, r"device\.notes must be text"),
+]
+
+
+@pytest.mark.parametrize(("content", "message"), WRONG, ids=lambda value: str(value)[:60])
+def test_bad_content_is_refused(content: dict[str, object], message: str) -> None:
+    with pytest.raises(ParameterError, match=message) as caught:
+        parse_device(content, "mine")
+    assert "device" in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 700
+
+
+def test_the_same_without_the_mistake_is_taken() -> None:
+    """What is refused above is refused for its mistake alone."""
+    parse_device({"max_force": "3 N", "continuous_force": "3 N"}, "mine")
+    parse_device({"max_stiffness": {"value": 3, "unit": "N/m", "verified": True}}, "mine")
+    parse_device({"name": "μ-arm · 2", "notes": ["a", "b"]}, "mine")
+
+
+BAD_FILES = {
+    "broken.toml": b"a = = b",
+    "twice.toml": b"max_force = 1\nmax_force = 2",
+    "latin.toml": "name = 'Gerät'".encode("latin-1"),
+    "sixteen.toml": "max_force = 1".encode("utf-16"),
+    "digits.toml": b"max_force = " + b"9" * 5000,
+    "deep.toml": b"max_force = " + b"[" * 3000,
+}
+
+
+@pytest.mark.parametrize("name", list(BAD_FILES))
+def test_bad_files(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_bytes(BAD_FILES[name])
+    with pytest.raises(ParameterError, match=f"{name} is (not valid TOML|nested too deeply)"):
+        load_device(tmp_path / name)
+
+
+def test_files_that_are_none(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="cannot be read"):
+        load_device(tmp_path / "none.toml")
+    (tmp_path / "folder.toml").mkdir()
+    with pytest.raises(ParameterError, match="cannot be read"):
+        load_device(tmp_path / "folder.toml")
+    with pytest.raises(ParameterError, match="device"):
+        load_device("a\0b.toml")
