@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import dblquad
 
 from asperity.analysis import loop_work
+from asperity.analysis.columns import curl_integral, sampled_sides
 from asperity.analysis.leak import worst_loop
 from asperity.surface import Surface
 from asperity.textures.fourier import Fourier
@@ -20,12 +21,16 @@ TEXTURE = Sinusoid(A, L, direction=(3.0, 4.0))
 
 
 def leak(letter: str, **arguments: float) -> float:
-    return worst_loop(Surface(TEXTURE, letter, K, D, **arguments), conservative=False).energy  # type: ignore[arg-type]
+    return worst_loop(Surface(TEXTURE, letter, K, D, **arguments)).energy  # type: ignore[arg-type]
 
 
 def test_a_leaks_the_total_rise_times_the_depth() -> None:
     """∬ k h'⁺ over one period and the depth: k D · 2A."""
-    assert leak("A") == pytest.approx(2 * K * D * A, rel=1e-6)
+    found = worst_loop(Surface(TEXTURE, "A", K, D))
+    exact = 2 * K * D * A
+    assert found.energy <= exact * (1 + 1e-12)
+    assert found.energy == pytest.approx(exact, rel=2e-5)
+    assert exact <= found.upper <= exact * (1 + 1e-4)
 
 
 def test_g_leaks_the_integral_of_its_curl() -> None:
@@ -53,29 +58,33 @@ def test_e_leaks_the_integral_of_its_curl() -> None:
     # ∫ over the depth of (1 + δκ), with ds = s dx.
     integrand = K * np.abs(slope / s) * s * (depth + 0.5 * depth**2 * kappa)
     expected = 0.5 * integrand.sum() * L / 4000
-    found = worst_loop(Surface(texture, "E", K, depth), conservative=False).energy
+    found = worst_loop(Surface(texture, "E", K, depth)).energy
     assert found == pytest.approx(expected, rel=5e-3)
 
 
 def test_friction_leak_is_reproduced_by_its_vertices() -> None:
     surface = Surface(TEXTURE, "F", K, D)
-    result = worst_loop(surface, conservative=False)
+    result = worst_loop(surface)
     assert loop_work(surface, result.vertices) == pytest.approx(result.energy, rel=1e-9)
     # Constant modulation: the paper's (27).
-    still = worst_loop(Surface(TEXTURE, "F", K, D, modulation_depth=0.0), conservative=False)
+    still = worst_loop(Surface(TEXTURE, "F", K, D, modulation_depth=0.0))
     assert still.energy == pytest.approx(K * 0.8 * 0.5 * D * 1e-3 / 2, rel=1e-5)
 
 
 def test_conservative_laws_leak_nothing_by_theorem() -> None:
-    result = worst_loop(Surface(TEXTURE, "C", K, D), conservative=True)
+    result = worst_loop(Surface(TEXTURE, "C", K, D))
     assert (result.energy, result.method) == (0.0, "theorem")
 
 
 @pytest.mark.parametrize("letter", "CW")
 def test_a_field_without_curl_is_measured_as_zero(letter: str) -> None:
-    """Negative control of the sampling: told nothing, it finds no leak where there is none."""
+    """Negative control: the integrals of the curl are zero where the theorem says so."""
     surface = Surface(TEXTURE, letter, K, D)
-    assert worst_loop(surface, conservative=False).energy < 1e-12 * K * D * A
+    line = TEXTURE.scan_line()
+    assert max(sampled_sides(surface, line)) < 1e-12 * K * D * A
+    bounds = curl_integral(surface, line)
+    assert bounds is not None
+    assert max(high for _low, high in bounds) < 1e-6 * K * D * A
 
 
 def test_a_loop_through_the_curl_of_one_sign_gains_that_energy() -> None:
@@ -87,7 +96,7 @@ def test_a_loop_through_the_curl_of_one_sign_gains_that_energy() -> None:
     top = np.column_stack([x, 0 * x, h])
     bottom = np.column_stack([x, 0 * x, h - D])[::-1]
     gained = abs(loop_work(surface, np.concatenate([top, bottom])))
-    assert gained == pytest.approx(worst_loop(surface, False).energy, rel=1e-4)
+    assert gained == pytest.approx(worst_loop(surface).energy, rel=1e-4)
 
 
 def test_maps_are_searched_along_several_lines() -> None:
@@ -95,7 +104,7 @@ def test_maps_are_searched_along_several_lines() -> None:
     y, x = np.mgrid[:41, :41]
     heights = 1e-4 * np.exp(-((x - 20.0) ** 2 + (y - 33.0) ** 2) / 18.0)
     surface = Surface(HeightMap(heights, 1e-4), "A", K, 1e-4)
-    result = worst_loop(surface, conservative=False)
+    result = worst_loop(surface)
     assert 3.2e-3 < result.line.start[1] < 3.4e-3
     # One rise to the top of the hump; the nearest line passes within 0.06 mm of it.
     assert result.energy == pytest.approx(K * 1e-4 * 1e-4, rel=0.03)
@@ -103,5 +112,5 @@ def test_maps_are_searched_along_several_lines() -> None:
 
 def test_scan_direction_is_the_profile_s_own() -> None:
     wave = Fourier([A, A / 2], [[0.0, 3000.0], [0.0, 6000.0]])
-    line = worst_loop(Surface(wave, "A", K, D), conservative=False).line
+    line = worst_loop(Surface(wave, "A", K, D)).line
     np.testing.assert_allclose(np.abs(line.direction), [0.0, 1.0])

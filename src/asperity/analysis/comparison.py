@@ -174,7 +174,7 @@ def _row(surface: Surface, limit: float) -> LawRow:
         rule=rule,
         conservative=facts.conservative,
         conservative_reason=facts.reason,
-        leak=worst_loop(surface, facts.conservative),
+        leak=worst_loop(surface),
         continuous=smooth.continuous,
         continuous_reason=smooth.reason,
         strength=scan.strength,

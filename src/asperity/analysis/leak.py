@@ -1,26 +1,28 @@
-"""How much energy the worst simple loop gains."""
+"""How much energy the worst simple loop gains, and how fast one has to be to lose it again."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from asperity.analysis.columns import column_loop, curl_integral, sampled_sides
 from asperity.analysis.loops import loop_work
-from asperity.checks import FloatArray
-from asperity.derive.fuse import fuse_contact
+from asperity.analysis.nearest_loop import nearest_outlines
+from asperity.analysis.state_loops import in_plane_loop, light_then_deep_loop
+from asperity.analysis.thrust import mean_thrust
+from asperity.checks import FloatArray, array, positive
+from asperity.derive.facts import law_facts
+from asperity.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine
 
-_POINTS = 4096
 _LINES = 33
-_STARTS = 64
-# The grid of the nearest contact, whose points cost most: along the line, and in depth.
-_NEAREST_GRID = {True: (1024, 128), False: (256, 32)}
 _NEAREST_LINES = 4
-# Gauss-Legendre abscissae in depth: exact for every law that is polynomial in the depth.
-_DEPTHS, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+# Relative error of the work where each force is a search for the nearest point.
+_COSTLY = 1e-4
 
 
 @dataclass(frozen=True)
@@ -28,32 +30,66 @@ class Leak:
     """The worst simple loop, turned once, in a vertical plane along a scan line.
 
     Its energy is the larger of ∬curl⁺ and ∬curl⁻ over the length of the line and the depth range,
-    curl = ∂f_t/∂z - ∂f_z/∂t, t along the line.
+    curl = ∂f_t/∂z - ∂f_z/∂t, t along the line. For a law with state also loops in a plane of
+    constant depth are looked at.
 
     Attributes:
-        energy: work of the field on the probe [J]; 0 for a conservative law.
+        energy: work of the field on the probe around ``vertices`` [J]; 0 for a conservative law.
+        upper: proved bound for every simple loop in that plane [J]; infinite if none is proved.
         line: the scan line of the plane.
-        method: ``"theorem"`` (zero by proof) or ``"sampled"``.
+        method: ``"theorem"`` (zero by proof), ``"certified"`` or ``"sampled"``.
         description: the loop in words.
-        vertices: the loop as a polygon (n, 3) [m] where it is one, else empty.
+        vertices: the loop as a closed polygon (n, 3) [m], empty if no loop gains anything;
+            ``loop_work(surface, vertices)`` is ``energy``.
+        thrust: mean tangential force on a straight scan along the line at the scan height [N],
+            > 0 along it; ``None`` for a law with state, whose friction resists anyway, and for a
+            conservative law on a line that does not repeat.
     """
 
     energy: float
+    upper: float
     line: ScanLine
     method: str
     description: str
     vertices: FloatArray
+    thrust: float | None
+
+    @property
+    def worst(self) -> float:
+        """``upper`` where one is proved, else ``energy`` [J]."""
+        return self.upper if math.isfinite(self.upper) else self.energy
+
+    @property
+    def length(self) -> float:
+        """Length of the loop [m]."""
+        edges = self.vertices - np.roll(self.vertices, 1, axis=0)
+        return float(np.linalg.norm(edges, axis=1).sum())
 
     @property
     def per_length(self) -> float:
         """Energy over the length of the line [J/m]: a mean thrust [N]."""
         return self.energy / self.line.length
 
+    def speed(self, damping: float) -> float:
+        """Return v* = W/(σ₀ · length), the speed below which damping does not absorb the loop.
+
+        Args:
+            damping: σ₀(B), the least damping of the device [N s/m].
+
+        Raises:
+            ParameterError: for a damping that is not positive.
+        """
+        sigma = positive("damping", damping, "N s/m")
+        return self.energy / (sigma * self.length) if self.energy > 0.0 else 0.0
+
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data."""
+        """Return plain data; an unbounded number is written as the string "inf"."""
         return {
             "energy": self.energy,
+            "upper": self.upper if math.isfinite(self.upper) else "inf",
             "per_length": self.per_length,
+            "length": self.length,
+            "thrust": self.thrust,
             "line": {
                 "start": self.line.start.tolist(),
                 "direction": self.line.direction.tolist(),
@@ -66,36 +102,67 @@ class Leak:
         }
 
 
-def worst_loop(surface: Surface, conservative: bool) -> Leak:
-    """Return the worst simple loop over the working region, sampled.
+def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -> Leak:
+    """Return the worst simple loop over the working region.
 
-    For a law on the nominal or the vertical contact the depth is measured from its own boundary;
-    for the nearest contact the region is where the distance to the surface is at most max_depth.
-    Maps are searched along several parallel lines. For law F, whose force is no field of
-    position, the paper's path of (27) is traced with its state from many starting points.
+    For a law on the nominal or the vertical contact the depth is measured from its own boundary
+    and the energy is certified; for the nearest contact the region is where the distance to the
+    surface is at most max_depth. On maps the worst of several parallel lines is taken. For a law
+    with state, whose force is no field of position, loops are traced from many starting points.
 
     Args:
         surface: the surface.
-        conservative: what the symbolic curl says; then the energy is zero by theorem.
+        direction: of the vertical plane, (x, y); the texture's scan line by default.
+
+    Raises:
+        ParameterError: for a direction without length.
+
+    Reference:
+        The paper's section III.C and (27); MATH section 4.
+
+    Example:
+        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> surface = Surface(Sinusoid(amplitude=0.8e-3, period=2e-3), "A", max_depth=0.8e-3)
+        >>> leak = worst_loop(surface)  # k D 2A, down one flank and up the other
+        >>> round(leak.energy * 1e3, 3), round(leak.upper * 1e3, 3)
+        (1.28, 1.28)
     """
-    line = surface.texture.scan_line()
+    line = surface.texture.scan_line() if direction is None else scan_line(surface, direction)
     nothing = np.zeros((0, 3))
-    if conservative:
-        return Leak(0.0, line, "theorem", "every closed loop: zero by the symbolic curl", nothing)
     if surface.law.stateful:
-        return _friction_loop(surface, line)
-    lines = _parallel_lines(surface, line)
+        return _state_leak(surface, line)
+    facts = law_facts(surface.law)
+    if facts.conservative:
+        text = "every closed loop: zero by the symbolic curl"
+        thrust = 0.0 if line.periodic else None
+        return Leak(0.0, 0.0, line, "theorem", text, nothing, thrust)
+    lines = parallel_lines(surface, line)
     if surface.law.contact == "nearest":
-        energies = [_nearest_leak(surface, candidate) for candidate in lines]
+        leak = _nearest_leak(surface, lines)
     else:
-        energies = [_column_leak(surface, candidate) for candidate in lines]
-    worst = int(np.argmax(energies))
-    among = f", the worst of {len(lines)} parallel lines" if len(lines) > 1 else ""
-    text = f"around the region of one sign of the curl, depth to {surface.max_depth * 1e3:g} mm"
-    return Leak(float(energies[worst]), lines[worst], "sampled", text + among, nothing)
+        leak = _column_leak(surface, lines)
+    if len(lines) > 1:
+        return replace(leak, description=f"{leak.description}, the worst of {len(lines)} lines")
+    return leak
 
 
-def _parallel_lines(surface: Surface, line: ScanLine) -> list[ScanLine]:
+def scan_line(surface: Surface, direction: tuple[float, float]) -> ScanLine:
+    """Return the line in a direction through the start of the texture's own, as long as that."""
+    vector = array("direction", direction, (2,), "1")
+    size = math.hypot(*vector)
+    if size == 0.0:
+        raise ParameterError("direction", "must have a length", direction)
+    own = surface.texture.scan_line()
+    unit = vector / size
+    if abs(float(unit @ own.direction)) > 1.0 - 1e-12:
+        return own
+    domain = surface.texture.domain
+    reach = float(np.abs(domain.spans @ unit).max())
+    return ScanLine(domain.origin, unit, reach if reach > 0.0 else own.length, periodic=False)
+
+
+def parallel_lines(surface: Surface, line: ScanLine) -> list[ScanLine]:
+    """Return lines parallel to a line, spread over a map; on a profile the line alone."""
     domain = surface.texture.domain
     if surface.texture.is_profile:
         return [line]
@@ -111,93 +178,49 @@ def _parallel_lines(surface: Surface, line: ScanLine) -> list[ScanLine]:
     ]
 
 
-def _larger_side(curl: FloatArray, area: float | FloatArray) -> float:
-    """Return the larger of the integrals of the positive and the negative part."""
-    weighted = curl * area
-    return float(max(weighted[weighted > 0.0].sum(), -weighted[weighted < 0.0].sum(), 0.0))
+def _column_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
+    """Return the loop around the curl of one sign, certified in the plane of the worst line."""
+    sides = [sampled_sides(surface, line) for line in lines]
+    worst = int(np.argmax([max(side) for side in sides]))
+    line = lines[worst]
+    sign = 1.0 if sides[worst][0] >= sides[worst][1] else -1.0
+    vertices, energy = gaining(surface, column_loop(surface, line, sign))
+    bounds = curl_integral(surface, line)
+    upper = math.inf if bounds is None else max(high for _low, high in bounds)
+    method = "sampled" if bounds is None else "certified"
+    text = f"around the region of one sign of the curl, depth to {surface.max_depth * 1e3:g} mm"
+    thrust = mean_thrust(surface, line)
+    return Leak(energy, max(upper, energy), line, method, text, vertices, thrust)
 
 
-def _column_leak(surface: Surface, line: ScanLine) -> float:
-    """∬curl⁺ or ∬curl⁻ for a contact above or below the probe: exact in depth, dense in t."""
-    xy = line.points(_POINTS)
-    derivatives = surface.texture.derivatives(xy)
-    loops = fuse_contact(surface.law)
-    n, depth = len(xy), surface.max_depth
-    deflection, sliding = np.zeros((n, 2)), np.zeros(n, dtype=bool)
-    force, jacobian = np.empty((n, 3)), np.empty((n, 3, 3))
-    # A curl that keeps its sign over the depth is integrated exactly; panels keep it honest else.
-    curl = np.empty((len(_DEPTHS), n))
-    for row, node in enumerate(_DEPTHS):
-        level = np.full(n, 0.5 * depth * (1.0 + node))
-        loops.contact_batch(
-            xy, level, derivatives, deflection, sliding, force, jacobian, surface.law_arguments
-        )
-        curl[row] = _curl(jacobian, line)
-    area = 0.5 * depth * _WEIGHTS[:, None] * line.length / n
-    return _larger_side(curl, area)
+def gaining(
+    surface: Surface, vertices: FloatArray, tolerance: float = 1e-12
+) -> tuple[FloatArray, float]:
+    """Return a polygon in the sense in which it gains energy, and its work [J]."""
+    if len(vertices) < 2:
+        return np.zeros((0, 3)), 0.0
+    work = loop_work(surface, vertices, tolerance)
+    return (vertices, work) if work >= 0.0 else (np.ascontiguousarray(vertices[::-1]), -work)
 
 
-def _curl(jacobian: FloatArray, line: ScanLine) -> FloatArray:
-    """∂f_t/∂z - ∂f_z/∂t in the vertical plane along the line."""
-    along = line.direction
-    result: FloatArray = jacobian[:, :2, 2] @ along - jacobian[:, 2, :2] @ along
-    return result
-
-
-def _nearest_leak(surface: Surface, line: ScanLine) -> float:
-    """∬curl⁺ or ∬curl⁻ where the distance to the surface is at most max_depth.
-
-    The distance grows on the way down, so a column ends where it first exceeds max_depth.
-    """
-    columns, rows = _NEAREST_GRID[surface.texture.is_profile]
-    xy = line.points(columns)
-    heights = surface.texture.height(xy)
-    # Deeper than the lowest point by max_depth, no point is near enough.
-    step = (heights - float(heights.min()) + surface.max_depth) / rows
-    active = np.arange(columns)
-    curl, area = [np.zeros(0)], [np.zeros(0)]
-    for row in range(rows):
-        z = heights[active] - (row + 0.5) * step[active]
-        points = np.column_stack([xy[active], z])
-        feet = surface.texture.nearest(points)
-        near = np.linalg.norm(feet - points, axis=1) <= surface.max_depth
-        points, active = points[near], active[near]
-        curl.append(_curl(surface.jacobian(points), line))
-        area.append(step[active] * (line.length / columns))
-    return _larger_side(np.concatenate(curl), np.concatenate(area))
-
-
-def friction_path(surface: Surface, start: FloatArray, along: FloatArray) -> FloatArray:
-    """Return the paper's path of (27) from a point of the plane, vertices (5, 3) [m].
-
-    Down to light contact, along by max_deflection, down to max_depth, back, and up.
-    """
-    depth, light = surface.max_depth, 1e-6 * surface.max_depth
-    end = start + surface.max_deflection * along
-    above = 0.1 * depth
-    return np.array(
-        [
-            [*start, above],
-            [*start, -light],
-            [*end, -light],
-            [*end, -depth],
-            [*start, -depth],
-        ]
-    )
-
-
-def _friction_loop(surface: Surface, line: ScanLine) -> Leak:
-    """The paper's path of (27), both ways, from starting points all along the line."""
-    paths = [
-        friction_path(surface, start, sign * line.direction)
-        for start in line.points(_STARTS)
-        for sign in (1.0, -1.0)
-    ]
-    energies = [loop_work(surface, path) for path in paths]
-    worst = int(np.argmax(energies))
+def _nearest_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
+    """Return the loop around the curl of one sign where the surface is near enough."""
+    outlines = [outline for line in lines for outline in nearest_outlines(surface, line)]
+    worst = max(outlines, key=lambda outline: outline.promise)
+    vertices, energy = gaining(surface, worst.vertices, _COSTLY)
     text = (
-        f"the paper's path of (27), worst of {len(paths)} starts: "
-        f"{surface.max_deflection * 1e3:g} mm along in light contact, "
-        f"back at {surface.max_depth * 1e3:g} mm"
+        "around the region of one sign of the curl where the surface is nearer than "
+        f"{surface.max_depth * 1e3:g} mm"
     )
-    return Leak(max(float(energies[worst]), 0.0), line, "sampled", text, paths[worst])
+    thrust = mean_thrust(surface, worst.line)
+    return Leak(energy, math.inf, worst.line, "sampled", text, vertices, thrust)
+
+
+def _state_leak(surface: Surface, line: ScanLine) -> Leak:
+    """Return the worst of the paper's path of (27) and of loops at constant depth."""
+    found = [light_then_deep_loop(surface, line), in_plane_loop(surface, line)]
+    worst = max(found, key=lambda loop: loop.energy)
+    if worst.energy <= 0.0:
+        text = "no loop that was tried gains energy"
+        return Leak(0.0, math.inf, line, "sampled", text, np.zeros((0, 3)), None)
+    return Leak(worst.energy, math.inf, line, "sampled", worst.description, worst.vertices, None)

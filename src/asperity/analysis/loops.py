@@ -12,11 +12,12 @@ from asperity.checks import FloatArray, array
 from asperity.errors import ParameterError
 from asperity.surface import Surface
 
-# Panels are halved until two nested rules agree to this fraction of the absolute work.
-_RELATIVE_ERROR = 1e-13
+DEFAULT_TOLERANCE = 1e-13
 # A panel that holds a jump is halved until it is this short; what it adds is then negligible.
 _DEEPEST = 52
 _MOST_PANELS = 4096
+# From so many edges on each of them is short.
+_MANY_EDGES = 64
 
 # Clenshaw-Curtis: its nodes include both ends of a panel, so a jump close to one is seen.
 _ORDER = 16
@@ -37,7 +38,7 @@ _FINE = _clenshaw_curtis(_ORDER)
 _COARSE = _clenshaw_curtis(_ORDER // 2)
 
 
-def loop_work(surface: Surface, vertices: ArrayLike) -> float:
+def loop_work(surface: Surface, vertices: ArrayLike, tolerance: float = DEFAULT_TOLERANCE) -> float:
     """Return the work of the field on the probe around a closed polygon.
 
     W = ∮ f · dp, by adaptive Clenshaw-Curtis quadrature along the edges. W > 0 feeds the hand. For
@@ -47,6 +48,7 @@ def loop_work(surface: Surface, vertices: ArrayLike) -> float:
     Args:
         surface: the surface.
         vertices: of the polygon [m], shape (n, 3), n >= 2; the last is joined to the first.
+        tolerance: at which two nested rules agree, relative to the absolute work of an edge.
 
     Returns:
         W [J].
@@ -69,12 +71,41 @@ def loop_work(surface: Surface, vertices: ArrayLike) -> float:
     if len(corners) < 2:
         raise ParameterError("vertices", "must be at least 2 points (n, 3) [m]", len(corners))
     ends = np.roll(corners, -1, axis=0)
-    if surface.law.stateful:
-        stretches = anchored_stretches(corners, ends, surface.max_deflection)
-    else:
-        stretches = [Stretch(a, b, None) for a, b in zip(corners, ends, strict=True)]
     wave = _wavelength(surface)
-    return float(sum(_stretch_work(surface, stretch, wave) for stretch in stretches))
+    if not surface.law.stateful:
+        return _field_work(surface, corners, ends, wave, tolerance)
+    stretches = anchored_stretches(corners, ends, surface.max_deflection)
+    return float(sum(_stretch_work(surface, stretch, wave, tolerance) for stretch in stretches))
+
+
+def _field_work(
+    surface: Surface, starts: FloatArray, ends: FloatArray, wave: float, tolerance: float
+) -> float:
+    """Return the work along all edges together: one quadrature of panels of all of them."""
+    along = ends - starts
+    counts = [_panels(float(length), wave, len(along)) for length in np.linalg.norm(along, axis=1)]
+    edge = np.repeat(np.arange(len(along)), counts)
+    first = np.concatenate([np.arange(count) for count in counts])
+    parts = np.repeat(1.0 / np.array(counts), counts)
+    # The abscissa of panel p of edge e is e + part; its integrand is the work per edge.
+    left, width = edge + first * parts, parts
+
+    def integrand(s: FloatArray) -> FloatArray:
+        which = np.minimum(np.floor(s).astype(np.int64), len(along) - 1)
+        points = starts[which] + (s - which)[:, None] * along[which]
+        return np.asarray(np.einsum("ni,ni->n", surface.force(points), along[which]))
+
+    return _adaptive(integrand, left, width, tolerance)
+
+
+def smooth_panels(surface: Surface, length: float) -> int:
+    """Return how many panels to begin with on a straight way of a length [m]."""
+    return _panels(length, _wavelength(surface), 1)
+
+
+def _panels(length: float, wave: float, edges: int) -> int:
+    least = 4 if edges < _MANY_EDGES else 1
+    return int(min(max(np.ceil(2.0 * length / wave), least), _MOST_PANELS))
 
 
 def _wavelength(surface: Surface) -> float:
@@ -83,7 +114,7 @@ def _wavelength(surface: Surface) -> float:
     return 2.0 * np.pi * slope / bend if bend > 0.0 else np.inf
 
 
-def _stretch_work(surface: Surface, stretch: Stretch, wave: float) -> float:
+def _stretch_work(surface: Surface, stretch: Stretch, wave: float, tolerance: float) -> float:
     along = stretch.end - stretch.start
     length = float(np.linalg.norm(along))
     if length == 0.0:
@@ -95,26 +126,44 @@ def _stretch_work(surface: Surface, stretch: Stretch, wave: float) -> float:
             return surface.force(points) @ along
         return surface.force(points, deflection=stretch.deflection(s)) @ along
 
-    panels = int(min(max(np.ceil(2.0 * length / wave), 4), _MOST_PANELS))
-    return integrate(integrand, panels)
+    return integrate(integrand, _panels(length, wave, 1), tolerance)
 
 
-def integrate(integrand: Callable[[FloatArray], FloatArray], panels: int) -> float:
+def integrate(
+    integrand: Callable[[FloatArray], FloatArray],
+    panels: int,
+    tolerance: float = DEFAULT_TOLERANCE,
+) -> float:
     """Return the integral over [0, 1] of a function with kinks and jumps at unknown places.
 
     Args:
         integrand: of an array of abscissae.
         panels: how many equal panels to start with.
+        tolerance: panels are halved until two nested rules agree to this part of the integral of
+            the absolute value.
     """
-    left = np.arange(panels) / panels
-    width = np.full(panels, 1.0 / panels)
+    return _adaptive(
+        integrand, np.arange(panels) / panels, np.full(panels, 1.0 / panels), tolerance
+    )
+
+
+def _adaptive(
+    integrand: Callable[[FloatArray], FloatArray],
+    left: FloatArray,
+    width: FloatArray,
+    tolerance: float,
+) -> float:
+    """Return the integral over panels, halved until two nested rules agree."""
     total, scale = 0.0, 0.0
     for level in range(_DEEPEST):
-        values = integrand((left[:, None] + width[:, None] * _S).ravel()).reshape(-1, len(_S))
+        nodes = left[:, None] + width[:, None] * _S
+        # The last node must not be taken for the first one of the next edge.
+        nodes[:, -1] = np.nextafter(nodes[:, -1], nodes[:, 0])
+        values = integrand(nodes.ravel()).reshape(-1, len(_S))
         fine = width * (values @ _FINE)
         error = np.abs(fine - width * (values[:, ::2] @ _COARSE))
         scale = max(scale, float((width * (np.abs(values) @ _FINE)).sum()))
-        refine = error > _RELATIVE_ERROR * scale
+        refine = error > tolerance * scale
         if level == _DEEPEST - 1:
             refine[:] = False
         total += float(fine[~refine].sum())

@@ -21,7 +21,7 @@ def verdict(row: LawRow) -> str:
     if row.safe_stiffness < k:
         parts.append(f"may buzz: {k:g} N/m is above its {limit_text(row.safe_stiffness)}")
     if not row.conservative:
-        gain = engineering(row.leak.energy, "J")
+        gain = engineering(row.leak.worst, "J")
         parts.append(f"feels alive: a loop gains up to {gain}")
     if not row.continuous:
         parts.append("clicks: " + row.continuous_reason)
@@ -95,7 +95,7 @@ def _sound_reason(best: LawRow) -> str:
 
 def _least_leak_reason(best: LawRow, textured: Sequence[LawRow], threshold: float) -> str:
     force = engineering(best.texture_force, "N")
-    gain = engineering(best.leak.energy * best.safe_stiffness / best.surface.stiffness, "J")
+    gain = engineering(best.leak.worst * best.safe_stiffness / best.surface.stiffness, "J")
     faint = [row for row in textured if row.conservative and row.continuous]
     if faint:
         weak = max(faint, key=lambda row: row.texture_force)
@@ -120,7 +120,7 @@ def _aliveness(row: LawRow) -> float:
     """Leak at the law's own safe stiffness over texture force times length of the scan [1]."""
     if row.safe_stiffness == 0.0:
         return math.inf
-    gained = row.leak.energy * row.safe_stiffness / row.surface.stiffness
+    gained = row.leak.worst * row.safe_stiffness / row.surface.stiffness
     return gained / (row.texture_force * row.leak.line.length)
 
 
@@ -132,7 +132,7 @@ def _price(best: LawRow, textured: Sequence[LawRow]) -> str:
     rival = max(stiffer, key=lambda row: row.safe_stiffness)
     trouble = []
     if not rival.conservative:
-        gained = rival.leak.energy * rival.safe_stiffness / rival.surface.stiffness
+        gained = rival.leak.worst * rival.safe_stiffness / rival.surface.stiffness
         trouble.append(f"gains up to {engineering(gained, 'J')} per loop there")
     if not rival.continuous:
         trouble.append("its force jumps")

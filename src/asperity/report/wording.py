@@ -71,12 +71,12 @@ def leak_text(row: LawRow, comparison: Comparison) -> str:
     if leak.energy == 0.0 and leak.method == "theorem":
         return "0"
     mark = SAMPLED if leak.method == "sampled" else ""
-    largest = max(abs(other.leak.energy) for other in comparison.rows)
+    largest = max(abs(other.leak.worst) for other in comparison.rows)
     unit = engineering(largest, "J", digits=2).split()[-1]
     scale = {"J": 1.0, "mJ": 1e3, "µJ": 1e6, "nJ": 1e9, "pJ": 1e12}.get(unit)
-    if scale is None or not math.isfinite(leak.energy):
-        return f"{mark}{engineering(leak.energy, 'J', digits=2)}"
-    return f"{mark}{float(f'{leak.energy * scale:.2g}'):g} {unit}"
+    if scale is None or not math.isfinite(leak.worst):
+        return f"{mark}{engineering(leak.worst, 'J', digits=2)}"
+    return f"{mark}{float(f'{leak.worst * scale:.2g}'):g} {unit}"
 
 
 def yes_no(answer: bool) -> str:

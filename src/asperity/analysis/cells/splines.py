@@ -81,6 +81,10 @@ class MapCells(Cells):
         """See :class:`Cells`."""
         return np.ascontiguousarray(self._origin + coordinates / self._per)
 
+    def coordinates(self, xy: FloatArray) -> FloatArray:
+        """Return the coordinates (n, 2) of points of the plane."""
+        return np.asarray((xy - self._origin) * self._per)
+
     def inside(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""
         return np.clip(coordinates, 0.0, self._counts)
@@ -137,6 +141,10 @@ class ProfileCells(Cells):
         """See :class:`Cells`."""
         x = self._origin + coordinates[:, 0] / self._per
         return np.ascontiguousarray(np.stack([x, np.zeros_like(x)], axis=-1))
+
+    def coordinates(self, xy: FloatArray) -> FloatArray:
+        """Return the coordinates (n, 1) of points of the plane."""
+        return np.asarray((xy[:, :1] - self._origin) * self._per)
 
     def inside(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""

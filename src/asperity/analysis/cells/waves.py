@@ -26,13 +26,17 @@ class WaveCells(Cells):
     Args:
         texture: a sinusoid or a sum.
         extent: width and depth [m] of the rectangle from the origin; the whole plane by default.
+        margin: how far the rectangle reaches beyond that on every side [m].
     """
 
     def __init__(
-        self, texture: Sinusoid | Fourier, extent: tuple[float, float] | None = None
+        self,
+        texture: Sinusoid | Fourier,
+        extent: tuple[float, ...] | None = None,
+        margin: float = 0.0,
     ) -> None:
-        self._texture = texture
-        self._extent = extent
+        self._extent = None if extent is None else tuple(side + 2.0 * margin for side in extent)
+        self._margin, self._miss = margin, 0.0
         if isinstance(texture, Sinusoid):
             amplitude, kx, ky, phase = texture.arguments
             self._amplitudes, self._phases = np.array([amplitude]), np.array([phase])
@@ -43,8 +47,10 @@ class WaveCells(Cells):
             self._waves = texture.wavevectors
             if extent is None:
                 self._basis, self._multiples = texture.lattice
+                self._miss = _missed(texture)
         if extent is not None:
             self._basis, self._multiples = np.eye(2), self._waves
+            self._phases = self._phases - self._waves.sum(axis=1) * margin
         self.dimensions = self._multiples.shape[1]
         self.gap = GAPS.get(self.dimensions, 1e-3)
 
@@ -92,7 +98,9 @@ class WaveCells(Cells):
             1: bend * np.minimum(1.0, np.abs(cosine) + reach),
         }
         # What the rounding of the phases costs.
-        slack = 16.0 * EPS * (1.0 + float(np.abs(angles).max(initial=0.0)) + len(sine[0]))
+        most = np.abs(centres).max(axis=0, initial=0.0) @ np.abs(self._multiples).T
+        largest = float((most + np.abs(self._phases)).max())
+        slack = 16.0 * EPS * (1.0 + largest + len(sine[0])) + self._miss
         result: dict[str, Number] = {}
         for name in names:
             weight, odd, values, slopes = self._terms(name, sine, cosine)
@@ -130,7 +138,7 @@ class WaveCells(Cells):
     def plane(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`; the nearest phases among many points for more than two phases."""
         if self._extent is not None:
-            return np.ascontiguousarray(coordinates)
+            return np.ascontiguousarray(coordinates - self._margin)
         if self.dimensions <= np.linalg.matrix_rank(self._basis):
             inverse = np.linalg.pinv(self._basis)
             return np.ascontiguousarray(coordinates @ inverse.T)
@@ -141,6 +149,19 @@ class WaveCells(Cells):
         if self._extent is None:
             return coordinates
         return np.clip(coordinates, 0.0, self._extent)
+
+
+def _missed(texture: Fourier) -> float:
+    """Return how far phases are from those on the torus, within the domain of a texture.
+
+    Ratios of waves count as rational up to a relative error: see ``integer_lattice``.
+    """
+    basis, multiples = texture.lattice
+    off = np.hypot(*(texture.wavevectors - multiples @ basis).T)
+    reach = float(np.hypot(*texture.domain.spans.T).sum())
+    # What rounding alone leaves is within the slack anyway.
+    rounding = 16.0 * EPS * np.abs(multiples) @ np.hypot(*basis.T)
+    return float(np.where(off > rounding, off, 0.0).max() * reach)
 
 
 def nearest_phases(basis: FloatArray, wanted: FloatArray, reach: int = 400) -> FloatArray:
