@@ -30,9 +30,17 @@ _DPI = 130
 class Page:
     """What the blocks of a page share."""
 
-    folder: str = field(default_factory=lambda: tempfile.mkdtemp(prefix="asperity-docs-"))
+    # Removed when the build ends.
+    directory: tempfile.TemporaryDirectory[str] = field(
+        default_factory=lambda: tempfile.TemporaryDirectory(prefix="asperity-docs-")
+    )
     names: dict[str, Any] = field(default_factory=lambda: {"__name__": "__main__"})
     pictures: int = 0
+
+    @property
+    def folder(self) -> str:
+        """The folder in which the blocks run."""
+        return self.directory.name
 
 
 _PAGES: dict[str, Page] = {}

@@ -14,10 +14,13 @@ if TYPE_CHECKING:
     from asperity.analysis import (
         Bound,
         Comparison,
+        Leak,
         characteristic_number,
         compare,
+        curl_number,
         loop_work,
         one_sided_number,
+        worst_loop,
     )
     from asperity.devices import Device, load_device
     from asperity.laws import Law
@@ -45,6 +48,7 @@ _HOMES = {
     "Grating": "asperity.textures",
     "HeightMap": "asperity.textures",
     "Law": "asperity.laws",
+    "Leak": "asperity.analysis",
     "Noise": "asperity.textures",
     "NoiseProfile": "asperity.textures",
     "Profile": "asperity.textures",
@@ -52,12 +56,14 @@ _HOMES = {
     "Surface": "asperity.surface",
     "characteristic_number": "asperity.analysis",
     "compare": "asperity.analysis",
+    "curl_number": "asperity.analysis",
     "load_device": "asperity.devices",
     "load_texture": "asperity.textures",
     "loop_work": "asperity.analysis",
     "named_surface": "asperity.textures",
     "one_sided_number": "asperity.analysis",
     "surface_names": "asperity.textures",
+    "worst_loop": "asperity.analysis",
 }
 
 __all__ = [
@@ -70,6 +76,7 @@ __all__ = [
     "HeightMap",
     "Law",
     "LawError",
+    "Leak",
     "Noise",
     "NoiseProfile",
     "ParameterError",
@@ -80,12 +87,14 @@ __all__ = [
     "__version__",
     "characteristic_number",
     "compare",
+    "curl_number",
     "load_device",
     "load_texture",
     "loop_work",
     "named_surface",
     "one_sided_number",
     "surface_names",
+    "worst_loop",
 ]
 
 

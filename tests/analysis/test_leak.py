@@ -11,6 +11,8 @@ from scipy.integrate import dblquad
 from asperity.analysis import loop_work
 from asperity.analysis.columns import curl_integral, sampled_sides
 from asperity.analysis.leak import worst_loop
+from asperity.analysis.state_loops import in_plane_loop
+from asperity.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.fourier import Fourier
 from asperity.textures.heightmap import HeightMap
@@ -114,3 +116,83 @@ def test_scan_direction_is_the_profile_s_own() -> None:
     wave = Fourier([A, A / 2], [[0.0, 3000.0], [0.0, 6000.0]])
     line = worst_loop(Surface(wave, "A", K, D)).line
     np.testing.assert_allclose(np.abs(line.direction), [0.0, 1.0])
+
+
+@pytest.mark.parametrize("letter", "ABEFG")
+def test_the_vertices_reproduce_the_energy(letter: str) -> None:
+    surface = Surface(Sinusoid(A, L), letter, K, D)
+    found = worst_loop(surface)
+    assert found.energy > 0.0
+    assert found.energy <= found.upper
+    # E's quadrature stops at 1e-4 of the work of an edge.
+    tolerance = 1e-4 if letter == "E" else 1e-9
+    assert loop_work(surface, found.vertices) == pytest.approx(found.energy, rel=tolerance)
+
+
+@pytest.mark.parametrize("letter", "ABG")
+def test_the_bound_is_tight(letter: str) -> None:
+    """Lowered by twice the gap, the bound would be below what the polygon attains."""
+    found = worst_loop(Surface(Fourier([A, A / 2], [3000.0, 6000.0], [0.3, 1.0]), letter, K, D))
+    assert found.method == "certified"
+    gap = found.upper / found.energy - 1.0
+    assert 0.0 <= gap < 1e-3
+    assert found.upper * (1 - 2 * gap) < found.energy
+
+
+def test_a_law_that_is_not_affine_in_depth_is_certified_too() -> None:
+    """The curl of k δ² e_z/D is 2 k δ h'/D, over the depth k D h', over the flank 2A k D."""
+    from asperity.laws import Law
+
+    law = Law("Q", "square", "vertical", lambda c: c.k * c.depth**2 / c.parameter("size") * c.e_z,
+              parameters={"size": D})  # fmt: skip
+    found = worst_loop(Surface(Sinusoid(A, L), law, K, D))
+    exact = 2 * K * D * A
+    assert found.method == "certified"
+    assert exact <= found.upper <= exact * 1.01
+    assert found.energy == pytest.approx(exact, rel=1e-3)
+
+
+def test_damping_absorbs_the_loop_above_the_speed() -> None:
+    """W = σ₀ v L: on a loop of length L viscous loss at speed v is σ₀ v L."""
+    found = worst_loop(Surface(Sinusoid(A, L), "A", K, D))
+    edges = np.linalg.norm(np.roll(found.vertices, -1, axis=0) - found.vertices, axis=1)
+    assert found.length == pytest.approx(edges.sum(), rel=1e-12)
+    assert found.speed(2.0) * 2.0 * edges.sum() == pytest.approx(found.energy, rel=1e-12)
+    with pytest.raises(ParameterError, match="damping"):
+        found.speed(0.0)
+
+
+def test_force_shading_pushes_along_an_asymmetric_profile_only() -> None:
+    """The mean is -k D ⟨h'/√(1 + h'²)⟩: zero by symmetry for a sinusoid."""
+    numbers = np.arange(1.0, 6.0)
+    saw = Fourier(A / numbers, 2 * np.pi / L * numbers)
+    x = (np.arange(20_000) + 0.5) * L / 20_000
+    slope = saw.gradient(np.column_stack([x, 0 * x]))[:, 0]
+    expected = -K * D * np.mean(slope / np.sqrt(1 + slope**2))
+    thrust = worst_loop(Surface(saw, "G", K, D)).thrust
+    assert abs(expected) > 0.04 * K * D
+    assert thrust == pytest.approx(expected, rel=1e-9)
+    assert worst_loop(Surface(Sinusoid(A, L), "G", K, D)).thrust == pytest.approx(0.0, abs=1e-12)
+
+
+def test_friction_gains_at_constant_depth_where_modulation_changes() -> None:
+    surface = Surface(Sinusoid(0.8e-3, 2e-3), "F", K, 0.8e-3)
+    found = in_plane_loop(surface, surface.texture.scan_line())
+    assert found.energy > 0.3e-3
+    assert np.ptp(found.vertices[1:, 2]) == 0.0
+    assert loop_work(surface, found.vertices) == pytest.approx(found.energy, rel=1e-9)
+    # Without modulation the field in the plane has no curl.
+    plain = Surface(Sinusoid(0.8e-3, 2e-3), "F", K, 0.8e-3, modulation_depth=0.0)
+    assert abs(in_plane_loop(plain, plain.texture.scan_line()).energy) < 1e-9
+
+
+def test_the_plane_can_be_turned() -> None:
+    y = np.mgrid[:24, :24][0]
+    waves = HeightMap(2e-5 * np.sin(2 * np.pi * y / 24), 1e-4, periodic=True)
+    surface = Surface(waves, "A", K, 1e-4)
+    along, across = worst_loop(surface, (0.0, 1.0)), worst_loop(surface, (1.0, 0.0))
+    assert along.energy == pytest.approx(2 * K * 1e-4 * 2e-5, rel=1e-3)
+    assert along.upper < 2 * K * 1e-4 * 2e-5 * 1.001
+    assert across.energy < 1e-9 * along.energy
+    with pytest.raises(ParameterError, match="direction"):
+        worst_loop(surface, (0.0, 0.0))

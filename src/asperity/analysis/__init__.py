@@ -1,9 +1,13 @@
 """A surface (and a device) in, a frozen result out."""
 
 from asperity.analysis.bound import Bound
-from asperity.analysis.characteristic import characteristic_number, one_sided_number
+from asperity.analysis.characteristic import (
+    characteristic_number,
+    curl_number,
+    one_sided_number,
+)
 from asperity.analysis.comparison import Comparison, compare
-from asperity.analysis.leak import Leak
+from asperity.analysis.leak import Leak, worst_loop
 from asperity.analysis.loops import loop_work
 from asperity.analysis.row import LawRow
 
@@ -14,6 +18,8 @@ __all__ = [
     "Leak",
     "characteristic_number",
     "compare",
+    "curl_number",
     "loop_work",
     "one_sided_number",
+    "worst_loop",
 ]
