@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         Bound,
         Comparison,
         Leak,
+        Passivity,
         characteristic_number,
         compare,
         curl_number,
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
         one_sided_number,
         worst_loop,
     )
+    from asperity.analysis.passivity import passivity
     from asperity.devices import Device, load_device
     from asperity.laws import Law
     from asperity.surface import Surface
@@ -51,6 +53,7 @@ _HOMES = {
     "Leak": "asperity.analysis",
     "Noise": "asperity.textures",
     "NoiseProfile": "asperity.textures",
+    "Passivity": "asperity.analysis",
     "Profile": "asperity.textures",
     "Sinusoid": "asperity.textures",
     "Surface": "asperity.surface",
@@ -62,6 +65,7 @@ _HOMES = {
     "loop_work": "asperity.analysis",
     "named_surface": "asperity.textures",
     "one_sided_number": "asperity.analysis",
+    "passivity": "asperity.analysis.passivity",
     "surface_names": "asperity.textures",
     "worst_loop": "asperity.analysis",
 }
@@ -80,6 +84,7 @@ __all__ = [
     "Noise",
     "NoiseProfile",
     "ParameterError",
+    "Passivity",
     "Profile",
     "Sinusoid",
     "Surface",
@@ -93,6 +98,7 @@ __all__ = [
     "loop_work",
     "named_surface",
     "one_sided_number",
+    "passivity",
     "surface_names",
     "worst_loop",
 ]

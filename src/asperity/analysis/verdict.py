@@ -171,6 +171,11 @@ def assumptions(
     datum = device.data["max_stiffness"]
     mark = "" if datum.verified else " (not verified)"
     result.append(f"K₀ = {datum.value:g} N/m for the {device.name}{mark}: {datum.source}")
+    if any("⁺" in row.rule for row in rows):
+        result.append(
+            "K₀/q⁺ is proved for a loop without delay beyond the hold; K₀/q for every delay, if the "
+            "law is conservative"
+        )
     unverified = [
         field.replace("_", " ") for field, d in device.data.items()
         if not d.verified and field != "max_stiffness"
