@@ -23,6 +23,8 @@ if TYPE_CHECKING:
         one_sided_number,
         worst_loop,
     )
+    from asperity.analysis.limit_result import Limits
+    from asperity.analysis.limits import limits
     from asperity.analysis.passivity import passivity
     from asperity.devices import Device, load_device
     from asperity.laws import Law
@@ -51,6 +53,7 @@ _HOMES = {
     "HeightMap": "asperity.textures",
     "Law": "asperity.laws",
     "Leak": "asperity.analysis",
+    "Limits": "asperity.analysis.limit_result",
     "Noise": "asperity.textures",
     "NoiseProfile": "asperity.textures",
     "Passivity": "asperity.analysis",
@@ -60,6 +63,7 @@ _HOMES = {
     "characteristic_number": "asperity.analysis",
     "compare": "asperity.analysis",
     "curl_number": "asperity.analysis",
+    "limits": "asperity.analysis.limits",
     "load_device": "asperity.devices",
     "load_texture": "asperity.textures",
     "loop_work": "asperity.analysis",
@@ -81,6 +85,7 @@ __all__ = [
     "Law",
     "LawError",
     "Leak",
+    "Limits",
     "Noise",
     "NoiseProfile",
     "ParameterError",
@@ -93,6 +98,7 @@ __all__ = [
     "characteristic_number",
     "compare",
     "curl_number",
+    "limits",
     "load_device",
     "load_texture",
     "loop_work",

@@ -169,7 +169,7 @@ def plane_curl(jacobian: FloatArray, line: ScanLine) -> FloatArray:
 
 def column_loop(surface: Surface, line: ScanLine, sign: float) -> FloatArray:
     """Return the loop around the region where the curl has a sign, vertices (n, 3) [m]."""
-    along: FloatArray = np.linspace(0.0, line.length, _node_count(surface.texture, line) + 1)
+    along = np.asarray(np.linspace(0.0, line.length, _node_count(surface.texture, line) + 1))
     affine = law_facts(surface.law).affine_in_depth
     levels = np.linspace(0.0, surface.max_depth, 2 if affine else _LAYERS + 1)
     curls = np.stack(

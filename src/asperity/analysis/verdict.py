@@ -173,8 +173,8 @@ def assumptions(
     result.append(f"K₀ = {datum.value:g} N/m for the {device.name}{mark}: {datum.source}")
     if any("⁺" in row.rule for row in rows):
         result.append(
-            "K₀/q⁺ is proved for a loop without delay beyond the hold; K₀/q for every delay, if the "
-            "law is conservative"
+            "K₀/q⁺ is proved for a loop without delay beyond the hold; K₀/q for every delay, if "
+            "the law is conservative"
         )
     unverified = [
         field.replace("_", " ") for field, d in device.data.items()

@@ -10,8 +10,10 @@ import jinja2
 
 import asperity
 from asperity.analysis.comparison import Comparison
+from asperity.analysis.inspection import Analysis
 from asperity.analysis.row import LawRow
 from asperity.report import style
+from asperity.report.analysis_html import analysis_html
 from asperity.report.gain_picture import gain_figure
 from asperity.report.merit_picture import merit_figure
 from asperity.report.plots import field_figure, force_figure, surface_figure
@@ -47,11 +49,15 @@ class _Picture:
     source: str
 
 
-def html_text(comparison: Comparison) -> str:
-    """Return the report: answer, table, pictures, pedigree and assumptions, in one HTML text.
+def html_text(result: Comparison | Analysis) -> str:
+    """Return the report: answer, tables, pictures, pedigree and assumptions, in one HTML text.
 
     Pictures are inlined; nothing is loaded from elsewhere; light, dark and print are cared for.
     """
+    return analysis_html(result) if isinstance(result, Analysis) else _comparison_html(result)
+
+
+def _comparison_html(comparison: Comparison) -> str:
     return _template().render(
         title=f"Haptic texture on {comparison.device.name}",
         comparison=comparison,
@@ -192,7 +198,7 @@ def _device_rows(comparison: Comparison) -> list[dict[str, Any]]:
     return [
         {
             "field": field.replace("_", " "),
-            "value": engineering(datum.value, datum.unit),
+            "value": datum.text,
             "source": datum.source,
             "verified": datum.verified,
         }

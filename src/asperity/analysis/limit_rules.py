@@ -1,0 +1,221 @@
+"""The six conditions of the paper's section II.B, each between two quantities of one dimension.
+
+With the period T, position steps δ, force steps b, stiffest wall K₀ and first resonance F₀ of the
+device; α, β and γ samples per wave; a wave of length l scanned at speed v that pushes with
+amplitude A_F; and a surface of stiffness k that multiplies it by q:
+
+1. α v T < l, 2. β δ < l, 3. α δ < l, 4. γ b < A_F, 5. q k <= K₀, 6. v/l < F₀.
+
+The paper prints 4 as γ b/l < A, a force over a length against a force, and 5 as 2πA/l < A₀, a
+number against a stiffness. 2 and 3 are one condition as printed, but for the number of samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.checks import FloatArray
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One of the six conditions.
+
+    Attributes:
+        number: the paper's.
+        name: the paper's, without "limit".
+        inequality: as used here.
+        unit: of both sides.
+        field: of the device that it needs.
+    """
+
+    number: int
+    name: str
+    inequality: str
+    unit: str
+    field: str
+
+
+RULES = (
+    Rule(1, "scanning velocity", "α v T < l", "m", "update_rate"),
+    Rule(2, "low speed reconstruction", "β δ < l", "m", "position_resolution"),
+    Rule(3, "high speed reconstruction", "α δ < l", "m", "position_resolution"),
+    Rule(4, "force reconstruction", "γ b < A_F", "N", "force_resolution"),
+    Rule(5, "gain", "q k ≤ K₀", "N/m", "max_stiffness"),
+    Rule(6, "device structure", "v / l < F₀", "Hz", "bandwidth"),
+)
+
+
+@dataclass(frozen=True)
+class Case:
+    """What the conditions are asked of.
+
+    Attributes:
+        device: the device's numbers [SI] by field; those that are not known are missing.
+        speed: v [m/s].
+        time_samples: α.
+        position_samples: β.
+        force_steps: γ.
+        wavelengths: l [m], shape (n,).
+        forces: A_F [N], shape (n,).
+        shares: of the variance of the heights, shape (n,).
+        gain: q, or q⁺ where that decides.
+        stiffness: k [N/m].
+    """
+
+    device: Mapping[str, float]
+    speed: float
+    time_samples: float
+    position_samples: float
+    force_steps: float
+    wavelengths: FloatArray
+    forces: FloatArray
+    shares: FloatArray
+    gain: float
+    stiffness: float
+
+
+@dataclass(frozen=True)
+class Limit:
+    """One of the six limits, decided for all waves at once.
+
+    Attributes:
+        number: the paper's.
+        name: the paper's, without "limit".
+        inequality: left and right side in symbols.
+        unit: of both sides.
+        left: left side [SI], for the wave that comes closest to breaking it; ``None`` if the limit
+            cannot be decided.
+        right: right side [SI].
+        wavelength: of that wave [m]; ``None`` where the limit is on the surface as a whole.
+        holds: whether it holds for every wave at this speed; ``None`` if it cannot be decided.
+        share: of the variance of the heights, in waves for which it holds.
+        speeds: scanning speeds [m/s], from the first up to but without the second, at which it
+            holds for every wave: (0, inf) all, (0, 0) none.
+        uses: the field of the device that it needs.
+        needs: what is missing to decide it.
+    """
+
+    number: int
+    name: str
+    inequality: str
+    unit: str
+    left: float | None
+    right: float | None
+    wavelength: float | None
+    holds: bool | None
+    share: float | None
+    speeds: tuple[float, float] | None
+    uses: str
+    needs: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data; an unbounded number is written as the string "inf"."""
+        return {
+            "number": self.number,
+            "name": self.name,
+            "inequality": self.inequality,
+            "unit": self.unit,
+            "left": plain(self.left),
+            "right": plain(self.right),
+            "wavelength": self.wavelength,
+            "holds": self.holds,
+            "share": self.share,
+            "speeds": None if self.speeds is None else [plain(end) for end in self.speeds],
+            "uses": self.uses,
+            "needs": list(self.needs),
+        }
+
+
+def plain(number: float | None) -> float | str | None:
+    """Return a number for JSON, which has no infinity."""
+    return "inf" if number is not None and math.isinf(number) else number
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A limit with its answer wave by wave.
+
+    Attributes:
+        limit: for all waves at once.
+        holds: whether it holds for each wave, shape (n,); ``None`` if it cannot be decided.
+        top: speed [m/s] below which it holds for each wave, shape (n,).
+    """
+
+    limit: Limit
+    holds: NDArray[np.bool_] | None
+    top: FloatArray | None
+
+
+def decide(rule: Rule, case: Case, inequality: str | None = None) -> Decision:
+    """Return whether a condition holds, wave by wave and for all.
+
+    Args:
+        rule: the condition.
+        case: what it is asked of.
+        inequality: in symbols, where it differs from the rule's.
+    """
+    shown = inequality or rule.inequality
+    needs = [] if rule.field in case.device else [rule.field]
+    if not len(case.wavelengths) and rule.number != 5:
+        needs.append("waves: the surface is flat")
+    if needs:
+        limit = Limit(rule.number, rule.name, shown, rule.unit, None, None, None, None, None,
+                      None, rule.field, tuple(needs))  # fmt: skip
+        return Decision(limit, None, None)
+    left, right = sides(rule.number, case)
+    # A stiffness that was made K₀/q may miss it by rounding; the other limits are strict.
+    holds = left <= right * (1.0 + 1e-12) if rule.number == 5 else left < right
+    top = _top_speed(rule.number, case, holds)
+    worst = int(np.argmin(right / left))
+    limit = Limit(
+        number=rule.number,
+        name=rule.name,
+        inequality=shown,
+        unit=rule.unit,
+        left=float(left[worst]),
+        right=float(right[worst]),
+        wavelength=None if rule.number == 5 else float(case.wavelengths[worst]),
+        holds=bool(holds.all()),
+        share=None if rule.number == 5 else _share(case, holds),
+        speeds=(0.0, float(top.min())),
+        uses=rule.field,
+        needs=(),
+    )
+    return Decision(limit, holds, top)
+
+
+def _share(case: Case, holds: NDArray[np.bool_]) -> float:
+    return float(case.shares[holds].sum() / case.shares.sum())
+
+
+def sides(number: int, case: Case) -> tuple[FloatArray, FloatArray]:
+    """Return the two sides of a condition [SI], for each wave; one value for the gain limit."""
+    device, lengths = case.device, case.wavelengths
+    same = np.ones_like(lengths)
+    if number == 1:
+        return case.time_samples * case.speed / device["update_rate"] * same, lengths
+    if number == 2:
+        return case.position_samples * device["position_resolution"] * same, lengths
+    if number == 3:
+        return case.time_samples * device["position_resolution"] * same, lengths
+    if number == 4:
+        return case.force_steps * device["force_resolution"] * same, case.forces
+    if number == 5:
+        return np.array([case.gain * case.stiffness]), np.array([device["max_stiffness"]])
+    return case.speed / lengths, device["bandwidth"] * same
+
+
+def _top_speed(number: int, case: Case, holds: NDArray[np.bool_]) -> FloatArray:
+    """Return the speed [m/s] below which a condition holds; most do not depend on it."""
+    if number == 1:
+        return np.asarray(case.wavelengths * case.device["update_rate"] / case.time_samples)
+    if number == 6:
+        return np.asarray(case.wavelengths * case.device["bandwidth"])
+    return np.where(holds, math.inf, 0.0)
