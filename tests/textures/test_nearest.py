@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import importlib
+import json
+import os
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+search = importlib.import_module("bench.nearest_exhaustive")
 
 Check = Callable[..., Any]
 
@@ -86,6 +97,23 @@ def test_no_surface_point_is_nearer(texture: Texture, scatter: Check):
     assert np.abs(found - best).max() <= 1e-9 * extent  # the exhaustive search found it as well
 
 
+@pytest.mark.parametrize("kind", search.CASES)
+def test_every_kind_meets_the_exhaustive_search(kind: str):
+    """On random probes (1e5 of each kind by ``python -m bench.nearest_exhaustive``).
+
+    The negative control: downhill from the probe's x, y is not enough on the same probes.
+    """
+    if kind.startswith("bullet") and not search.REAL.exists():
+        pytest.skip(f"{search.REAL.name} is missing")
+    case = search.CASES[kind]()
+    points = search.probes(case, 2500, seed=77)
+    extent = search.extent_of(case.texture)
+    found, best = distances(case.texture, points), search.exhaustive(case, points)
+    assert np.abs(found - best).max() <= search.TOLERANCE * extent
+    local = search.local_minima(case.texture, points, points[:, :2].copy(), case.step)
+    assert (local - found > 1e-5 * extent).sum() >= 5
+
+
 @pytest.mark.parametrize(
     "texture", ["steep sinusoid", "fourier", "steep map", "periodic profile"], indirect=True
 )
@@ -148,6 +176,88 @@ def test_a_wall_many_cells_away_is_nearer_than_the_top(kind: str, side: int):
     found = distances(texture, probe[None, :])[0]
     assert found == pytest.approx(exhaustive(texture, probe), rel=1e-9)
     assert found < 8.5e-4
+
+
+def test_far_probes_have_finite_feet(texture: Texture):
+    """Metres away from a texture of millimetres: through thousands of copies, never NaN."""
+    offsets = np.array([[3.0, -2.0], [0.011, 0.013], [-40.0, 5.0]])
+    for z in (-1e3, -0.3, 0.2, 5e2, 1e12):
+        points = np.column_stack([texture.domain.origin + offsets, np.full(3, z)])
+        found = distances(texture, points)
+        low, high = texture.extremes
+        nearest, farthest = sorted((abs(z - low), abs(z - high)))
+        assert (found >= nearest * (1 - 1e-12)).all()
+        assert (found <= farthest * (1 + 1e-12)).all()
+
+
+def test_force_of_law_d_points_to_the_foot(texture: Texture, scatter: Check):
+    """Height and slope at the foot come from the search itself, in mirrored copies too."""
+    xy = scatter(texture, 300, seed=26, stretch=4.0)
+    depth = np.random.default_rng(27).uniform(0.02, 1.0, 300) * texture.peak_to_valley
+    points = np.column_stack([xy, texture.height(xy) - depth])
+    spring = 800.0 * (texture.nearest(points) - points)
+    force = Surface(texture, "D", stiffness=800.0).force(points)
+    scale = 800.0 * np.maximum(np.abs(points[:, 2]), depth)
+    assert (np.linalg.norm(force - spring, axis=1) / scale).max() < 1e-10
+
+
+# --- no allocation --------------------------------------------------------------------------------
+
+# Numba counts allocations only where it is told so before it starts.
+_COUNT_ALLOCATIONS = """
+import json, sys
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+from numba import njit
+from numba.core.runtime import rtsys
+from asperity.surface import Surface
+from bench.nearest_exhaustive import CASES, probes
+
+@njit
+def allocating_batch(points, out, texture):
+    for i in range(points.shape[0]):
+        patch = np.empty((4, 4))
+        patch[i % 4, 0] = points[i, 0]
+        out[i, 0] = patch[i % 4, 0]
+
+def allocations(loop, *arguments):
+    before = rtsys.get_allocation_stats().alloc
+    loop(*arguments)
+    return rtsys.get_allocation_stats().alloc - before
+
+answer = {}
+for kind in sys.argv[2:]:
+    case = CASES[kind]()
+    points = probes(case, 400)
+    surface = Surface(case.texture, "D")
+    texture, law = case.texture.arguments, surface.law_arguments
+    loops = {
+        "nearest": (case.texture._loops.nearest_batch, np.empty((400, 2)), texture),
+        "force": (surface._loops.force_batch, np.empty((400, 3)), texture, law),
+        "control": (allocating_batch, np.empty((400, 2)), 0.0),
+    }
+    for name, (loop, out, *rest) in loops.items():
+        loop(points[:1], out, *rest)
+        one = allocations(loop, points[:1], out, *rest)
+        answer[f"{kind} {name}"] = allocations(loop, points, out, *rest) - one
+print(json.dumps(answer))
+"""
+
+
+def test_no_query_allocates():
+    """Neither nearest point nor force; the control allocates once a query and is seen."""
+    kinds = ["sinusoid", "Fourier, 1-D", "Fourier, 2-D", "map, finite", "map, periodic", "square"]
+    done = subprocess.run(
+        [sys.executable, "-c", _COUNT_ALLOCATIONS, str(ROOT), *kinds],
+        env={**os.environ, "NUMBA_NRT_STATS": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    counts = json.loads(done.stdout)
+    assert len(counts) == 3 * len(kinds)
+    for name, count in counts.items():
+        assert count == (399 if name.endswith("control") else 0), name
 
 
 # --- ties -----------------------------------------------------------------------------------------

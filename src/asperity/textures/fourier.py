@@ -67,17 +67,18 @@ class Fourier(Texture):
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
-        from asperity.textures.samplers import fourier, search
+        from asperity.textures.samplers import fourier, fourier_line, line, search
 
-        return fourier, search
+        return (fourier_line, fourier, line) if self._parallel else (fourier, search)
 
     @cached_property
     def arguments(self) -> tuple[Any, ...]:
         """Amplitudes, k_x, k_y, phases, and the description of the search (see the sampler)."""
-        slope, bend = self.bounds
-        direction = self._directions[0]
-        shortest = float(np.hypot(*self.wavevectors.T).max())
-        search = np.array([slope, bend, *direction, float(self._parallel), shortest])
+        length = np.hypot(*self.wavevectors.T)
+        inflate = 1.0 + 1e-14 * len(length)
+        twist = inflate * float(np.abs(self.amplitudes) @ length**3)
+        shortest = float(length.max())
+        search = np.array([self.bounds[1], twist, *self.extremes, shortest, *self._directions[0]])
         kx, ky = (np.ascontiguousarray(column) for column in self.wavevectors.T)
         return self.amplitudes, kx, ky, self.phases, search
 

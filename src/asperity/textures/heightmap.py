@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
 from asperity.textures.bernstein import greatest_height
+from asperity.textures.pyramid import plane_pyramid
 from asperity.textures.texture import Domain, ScanLine, Texture
 
 LEAST_NODES = 4
@@ -87,11 +88,10 @@ class HeightMap(Texture):
 
     @cached_property
     def arguments(self) -> tuple[Any, ...]:
-        """Coefficients, nodes per metre along x and y, origin, periodic, hulls of blocks."""
+        """Coefficients, nodes per metre along x and y, origin, periodic, pyramid of bounds."""
         x0, y0 = (float(value) for value in self.origin)
         c, (px, py) = self.coefficients, self.pitch
-        low, high = -block_hulls(-c), block_hulls(c)
-        return c, 1.0 / px, 1.0 / py, x0, y0, self.periodic, low, high
+        return c, 1.0 / px, 1.0 / py, x0, y0, self.periodic, *plane_pyramid(c, self.pitch)
 
     @cached_property
     def extremes(self) -> tuple[float, float]:
@@ -156,19 +156,6 @@ def mask(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[
         wanted = f"must be true or false for each height, shape {shape}"
         raise ParameterError(name, wanted, f"{result.dtype} of shape {result.shape}")
     return result
-
-
-def block_hulls(coefficients: FloatArray) -> FloatArray:
-    """Return the greatest coefficient that any cell of each block of 8 × 8 cells uses [m].
-
-    A cell uses 4 × 4 coefficients, so a block uses up to 11 × 11; the spline lies below.
-    """
-    rows = [
-        coefficients[first : first + 8 + 3].max(axis=0)
-        for first in range(0, coefficients.shape[0] - 3, 8)
-    ]
-    columns = range(0, coefficients.shape[1] - 3, 8)
-    return np.array([[row[first : first + 8 + 3].max() for first in columns] for row in rows])
 
 
 def padded_coefficients(heights: FloatArray, periodic: bool) -> FloatArray:

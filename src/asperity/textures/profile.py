@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from asperity.checks import FloatArray, array, positive, real
 from asperity.errors import ParameterError
 from asperity.textures.heightmap import LEAST_NODES, mask, padded_coefficients
+from asperity.textures.pyramid import line_pyramid
 from asperity.textures.texture import Domain, ScanLine, Texture
 
 
@@ -67,9 +68,9 @@ class Profile(Texture):
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
-        from asperity.textures.samplers import profile, search, spline
+        from asperity.textures.samplers import line, profile, spline
 
-        return profile, spline, search
+        return profile, spline, line
 
     @cached_property
     def coefficients(self) -> FloatArray:
@@ -78,8 +79,9 @@ class Profile(Texture):
 
     @cached_property
     def arguments(self) -> tuple[Any, ...]:
-        """Coefficients, nodes per metre, origin, periodic."""
-        return self.coefficients, 1.0 / self.pitch, self.origin, self.periodic
+        """Coefficients, nodes per metre, origin, periodic, pyramid of bounds."""
+        c = self.coefficients
+        return c, 1.0 / self.pitch, self.origin, self.periodic, *line_pyramid(c, self.pitch)
 
     @cached_property
     def extremes(self) -> tuple[float, float]:

@@ -1,14 +1,16 @@
 """h = Σ a_i sin(k_i · (x, y) + phase_i).
 
-The last arguments describe the search for nearest points: ``bounds`` = (slope bound M,
-curvature bound K, cosine and sine of the direction of a profile, 1 if the waves are all parallel).
+Arguments: ``a`` [m], ``kx``, ``ky`` [rad/m], ``phase`` [rad], and ``bounds`` for the search of
+nearest points: of second and third derivatives [1/m, 1/m²], least and greatest height [m], the
+greatest wave number [rad/m], and the direction of the first wave.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
-from asperity.textures.samplers.search import descend, search_box
+from asperity.textures.samplers.search import descend, judge, next_box
 
 FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
@@ -58,20 +60,49 @@ def curvature(
     return h, hx, hy, hxx, hxy, hyy
 
 
-def nearest(
+def nearest(x: float, y: float, z: float, *texture: Any) -> tuple[float, float]:
+    """Return X, Y of the globally nearest surface point."""
+    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, *texture)
+    return foot_x, foot_y
+
+
+def foot(
     x: float, y: float, z: float, a: FloatArray, kx: FloatArray, ky: FloatArray,
     phase: FloatArray, bounds: FloatArray,
-) -> tuple[float, float]:  # fmt: skip
-    """Return X, Y of the globally nearest surface point.
+) -> tuple[float, float, float, float, float]:  # fmt: skip
+    """Return X, Y of the globally nearest surface point, and h, h_x, h_y there.
 
-    Newton's method from the point above or below the probe gives a distance; only a box of that
-    half-width can hold a nearer point, and it is searched by branch and bound.
+    Downhill from the probe, a distance; only a square of that half-width, less what the heights
+    leave over, can hold a nearer point. It is quartered from the whole down.
     """
     texture = (a, kx, ky, phase, bounds)
-    best_x, best_y, best = descend(x, y, z, x, y, texture)
-    reach = math.sqrt(best)
-    box = (0.0, 0.0, reach, 0.0 if bounds[4] > 0.0 else reach)
-    terminal = 2.0**-6 / max(bounds[5], 1e-300)
-    frame = (bounds[2], bounds[3], bounds[0], bounds[1], terminal)
-    best_x, best_y, best = search_box(x, y, z, box, frame, best_x, best_y, best, texture)
-    return best_x, best_y
+    best = descend(x, y, z, x, y, texture)
+    gap = max(bounds[2] - z, z - bounds[3], 0.0)
+    reach = math.sqrt(max(best[2] - gap * gap, 0.0))
+    u = 0.5 + 0.5 * (best[0] - x) / max(reach, 1e-300)
+    v = 0.5 + 0.5 * (best[1] - y) / max(reach, 1e-300)
+    level = 0 if reach > 0.0 else 1
+    i = j = 0
+    side = 1.0
+    while level <= 0:
+        half = reach * side
+        cx = (2 * j + 1) * half - reach
+        cy = (2 * i + 1) * half - reach
+        near_x = max(abs(cx) - half, 0.0)
+        near_y = max(abs(cy) - half, 0.0)
+        deeper = near_x * near_x + near_y * near_y + gap * gap < best[2] * (1.0 - 1e-13)
+        # In a box of several waves Taylor's formula says nothing.
+        if deeper and half * bounds[4] < 1.5:
+            best, deeper = judge(
+                x, y, z, x + cx, y + cy, half, half, bounds[0], bounds[1],
+                best, texture,
+            )  # fmt: skip
+            deeper = deeper and level > -48
+        if deeper:
+            level -= 1
+            side *= 0.5
+            i = 2 * i + (1 if v >= (2 * i + 1) * side else 0)
+            j = 2 * j + (1 if u >= (2 * j + 1) * side else 0)
+        else:
+            level, side, i, j = next_box(level, side, i, j, 0, u, v)
+    return best[0], best[1], best[3], best[4], best[5]

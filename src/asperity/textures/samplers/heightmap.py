@@ -1,8 +1,8 @@
 """h = Σ c_ij β(x/p_x - j) β(y/p_y - i), a bicubic B-spline.
 
 Arguments: ``c``, coefficients with one extra row and column before the first cell and two after the
-last; ``ix``, ``iy``, nodes per metre; ``x0``, ``y0``, the first node
-[m]; ``periodic``; ``low``, ``high``, the hull of the coefficients of each block of 8 × 8 cells [m].
+last; ``ix``, ``iy``, nodes per metre; ``x0``, ``y0``, the first node [m]; ``periodic``; ``nodes``
+and ``levels``, the pyramid of bounds (see ``asperity.textures.pyramid``).
 """
 
 import math
@@ -10,11 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from asperity.textures.samplers.search import descend, search_box
+from asperity.textures.samplers.search import Point, descend, judge, next_box
 from asperity.textures.samplers.spline import (
+    box_bounds,
     cell_of,
     fold,
-    fold_index,
+    foreseeable,
+    nearest_copy,
+    reach_of,
+    tile_frame,
     weights,
     weights_first,
     weights_second,
@@ -35,7 +39,7 @@ def cells_of(c: FloatArray) -> tuple[int, int]:
 
 def height(
     x: float, y: float, c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool,
-    low: FloatArray, high: FloatArray,
+    nodes: FloatArray, levels: FloatArray,
 ) -> float:  # fmt: skip
     """Return h [m]."""
     nx, ny = cells_of(c)
@@ -55,7 +59,7 @@ def height(
 
 def slope(
     x: float, y: float, c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool,
-    low: FloatArray, high: FloatArray,
+    nodes: FloatArray, levels: FloatArray,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Return h [m], h_x, h_y [1]."""
     nx, ny = cells_of(c)
@@ -84,7 +88,7 @@ def slope(
 
 def curvature(
     x: float, y: float, c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool,
-    low: FloatArray, high: FloatArray,
+    nodes: FloatArray, levels: FloatArray,
 ) -> tuple[float, float, float, float, float, float]:  # fmt: skip
     """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
     nx, ny = cells_of(c)
@@ -122,157 +126,117 @@ def curvature(
     )
 
 
-def patch_coefficients(
-    c: FloatArray, i: int, j: int, periodic: bool, out: FloatArray
-) -> tuple[float, float]:
-    """Copy the 16 coefficients of cell (i, j), any integers; return their least and greatest."""
-    nx, ny = cells_of(c)
-    low = np.inf
-    high = -np.inf
-    for a in range(4):
-        row = i - 1 + a
-        if row < -1 or row > ny + 1:
-            row = fold_index(row, ny, periodic)
-        for b in range(4):
-            column = j - 1 + b
-            if column < -1 or column > nx + 1:
-                column = fold_index(column, nx, periodic)
-            value = c[row + 1, column + 1]
-            out[a, b] = value
-            low = min(low, value)
-            high = max(high, value)
-    return low, high
+def nearest(x: float, y: float, z: float, *texture: Any) -> tuple[float, float]:
+    """Return X, Y of the globally nearest surface point."""
+    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, *texture)
+    return foot_x, foot_y
 
 
-def patch_bounds(p: FloatArray, ix: float, iy: float) -> tuple[float, float]:
-    """Return bounds of |∇h| and of ‖Hess h‖ over a cell, from differences of coefficients."""
-    gx = gy = hxx = hxy = hyy = 0.0
-    for a in range(4):
-        for b in range(3):
-            gx = max(gx, abs(p[a, b + 1] - p[a, b]))
-            gy = max(gy, abs(p[b + 1, a] - p[b, a]))
-        for b in range(2):
-            hxx = max(hxx, abs(p[a, b + 2] - 2.0 * p[a, b + 1] + p[a, b]))
-            hyy = max(hyy, abs(p[b + 2, a] - 2.0 * p[b + 1, a] + p[b, a]))
-    for a in range(3):
-        for b in range(3):
-            hxy = max(hxy, abs(p[a + 1, b + 1] - p[a + 1, b] - p[a, b + 1] + p[a, b]))
-    hxx *= ix * ix
-    hyy *= iy * iy
-    hxy *= ix * iy
-    # Inflated against the rounding of the differences.
-    inflate = 1.0 + 1e-12
-    slope_bound = inflate * math.sqrt(gx * ix * gx * ix + gy * iy * gy * iy)
-    return slope_bound, inflate * math.sqrt(hxx * hxx + hyy * hyy + 2.0 * hxy * hxy)
-
-
-def nearest(
+def foot(
     x: float, y: float, z: float,
     c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool,
-    low: FloatArray, high: FloatArray,
-) -> tuple[float, float]:  # fmt: skip
-    """Return X, Y of the globally nearest surface point.
+    nodes: FloatArray, levels: FloatArray,
+) -> tuple[float, float, float, float, float]:  # fmt: skip
+    """Return X, Y of the globally nearest surface point, and h, h_x, h_y there.
 
-    Downhill from the probe, then the cells around it, give a distance; only cells within that
-    distance can hold a nearer point. They are visited in blocks of 8 × 8, and a block or a cell
-    is searched only if the hull of its coefficients comes near enough.
+    Downhill from the probe, a distance; only points within it can be nearer. The plane is tiled
+    by copies of the map, every other one mirrored if it is finite; each is searched from the
+    coarsest boxes of the pyramid down.
     """
-    texture = (c, ix, iy, x0, y0, periodic, low, high)
-    best_x, best_y, best = descend(x, y, z, x, y, texture)
-    u = (x - x0) * ix
-    v = (y - y0) * iy
-    patch = np.empty((4, 4))
-    i0 = math.floor(v)
-    j0 = math.floor(u)
-    for i in range(i0 - 1, i0 + 2):
-        for j in range(j0 - 1, j0 + 2):
-            best_x, best_y, best = search_cell(
-                x, y, z, u, v, i, j, best_x, best_y, best, patch, texture
-            )
+    texture = (c, ix, iy, x0, y0, periodic, nodes, levels)
+    best = descend(x, y, z, x, y, texture)
     nx, ny = cells_of(c)
-    reach = math.sqrt(best)
-    i_low = math.floor(v - reach * iy)
-    i_high = math.floor(v + reach * iy)
-    j_low = math.floor(u - reach * ix)
-    j_high = math.floor(u + reach * ix)
-    # The plane is tiled by copies of the map, every other one mirrored if it is finite.
-    for ti in range(i_low // ny, i_high // ny + 1):
-        for tj in range(j_low // nx, j_high // nx + 1):
-            window = (
-                max(i_low - ti * ny, 0), min(i_high - ti * ny, ny - 1),
-                max(j_low - tj * nx, 0), min(j_high - tj * nx, nx - 1),
-            )  # fmt: skip
-            best_x, best_y, best = search_tile(
-                x, y, z, u, v, ti, tj, window, best_x, best_y, best, patch, texture
-            )
-    return best_x, best_y
-
-
-def block_span(first: int, cells: int, tile: int, mirrored: bool) -> tuple[int, int]:
-    """Return the cells [start, stop) of the plane that a block of 8 covers in a tile."""
-    last = min(first + 8, cells)
-    if mirrored:
-        return tile * cells + cells - last, tile * cells + cells - first
-    return tile * cells + first, tile * cells + last
+    tile_i = math.floor((y - y0) * iy / ny)
+    tile_j = math.floor((x - x0) * ix / nx)
+    best = search_tile(x, y, z, tile_i, tile_j, best, texture)
+    reach = reach_of(z, best[2], nodes)
+    # Of the copies of a point only the nearest counts.
+    reach_x = min(reach, nearest_copy(nx / ix, periodic))
+    reach_y = min(reach, nearest_copy(ny / iy, periodic))
+    i_first = math.floor((y - reach_y - y0) * iy / ny)
+    i_last = math.floor((y + reach_y - y0) * iy / ny)
+    j_first = math.floor((x - reach_x - x0) * ix / nx)
+    j_last = math.floor((x + reach_x - x0) * ix / nx)
+    for i in range(i_first, i_last + 1):
+        for j in range(j_first, j_last + 1):
+            if i != tile_i or j != tile_j:
+                best = search_tile(x, y, z, i, j, best, texture)
+    return best[0], best[1], best[3], best[4], best[5]
 
 
 def search_tile(
-    x: float, y: float, z: float, u: float, v: float, ti: int, tj: int,
-    window: tuple[int, int, int, int],
-    best_x: float, best_y: float, best: float, patch: FloatArray, texture: Any,
-) -> tuple[float, float, float]:  # fmt: skip
-    """Return the nearest point of one copy of the map if it is nearer than the best so far."""
-    c, ix, iy, _x0, _y0, periodic, low, high = texture
+    x: float, y: float, z: float, tile_i: int, tile_j: int, best: Point, texture: Any
+) -> Point:
+    """Return the best point after a search of one copy of the map.
+
+    Probe and best point are moved to where they are seen from the map itself.
+    """
+    c, ix, iy, x0, y0, periodic, nodes, levels = texture
     nx, ny = cells_of(c)
-    i_first, i_last, j_first, j_last = window
-    # The same window in cells of the plane, where a block is cut to it.
-    i_from = ti * ny + i_first
-    i_to = ti * ny + i_last + 1
-    j_from = tj * nx + j_first
-    j_to = tj * nx + j_last + 1
-    flip_i = not periodic and ti % 2 != 0
-    flip_j = not periodic and tj % 2 != 0
-    if flip_i:
-        i_first, i_last = ny - 1 - i_last, ny - 1 - i_first
-    if flip_j:
-        j_first, j_last = nx - 1 - j_last, nx - 1 - j_first
-    for bi in range(i_first // 8, i_last // 8 + 1):
-        i_start, i_stop = block_span(8 * bi, ny, ti, flip_i)
-        near_y = max(i_start - v, v - i_stop, 0.0) / iy
-        if near_y * near_y >= best:
-            continue
-        for bj in range(j_first // 8, j_last // 8 + 1):
-            gap = max(low[bi, bj] - z, z - high[bi, bj], 0.0)
-            j_start, j_stop = block_span(8 * bj, nx, tj, flip_j)
-            near_x = max(j_start - u, u - j_stop, 0.0) / ix
-            if near_x * near_x + near_y * near_y + gap * gap >= best:
-                continue
-            for i in range(max(i_start, i_from), min(i_stop, i_to)):
-                for j in range(max(j_start, j_from), min(j_stop, j_to)):
-                    best_x, best_y, best = search_cell(
-                        x, y, z, u, v, i, j, best_x, best_y, best, patch, texture
-                    )
-    return best_x, best_y, best
+    reach = reach_of(z, best[2], nodes)
+    turn_x, shift_x = tile_frame(tile_j, nx, ix, x0, periodic)
+    turn_y, shift_y = tile_frame(tile_i, ny, iy, y0, periodic)
+    x = turn_x * x + shift_x
+    y = turn_y * y + shift_y
+    found = (
+        turn_x * best[0] + shift_x, turn_y * best[1] + shift_y, best[2],
+        best[3], turn_x * best[4], turn_y * best[5],
+    )  # fmt: skip
+    # Boxes of two by two cells that are within reach.
+    j_low = max(math.floor((x - reach - x0) * ix), 0) >> 1
+    j_high = min(math.floor((x + reach - x0) * ix), nx - 1) >> 1
+    i_low = max(math.floor((y - reach - y0) * iy), 0) >> 1
+    i_high = min(math.floor((y + reach - y0) * iy), ny - 1) >> 1
+    top = 1
+    while top < levels.shape[0] and ((i_high - i_low) | (j_high - j_low)) >> (top - 1) > 0:
+        top += 1
+    for i in range(i_low >> (top - 1), (i_high >> (top - 1)) + 1):
+        for j in range(j_low >> (top - 1), (j_high >> (top - 1)) + 1):
+            found = search_tree(x, y, z, top, i, j, found, texture)
+    if found[2] >= best[2]:
+        return best
+    return (
+        turn_x * (found[0] - shift_x), turn_y * (found[1] - shift_y), found[2],
+        found[3], turn_x * found[4], turn_y * found[5],
+    )  # fmt: skip
 
 
-def search_cell(
-    x: float, y: float, z: float, u: float, v: float, i: int, j: int,
-    best_x: float, best_y: float, best: float, patch: FloatArray, texture: Any,
-) -> tuple[float, float, float]:  # fmt: skip
-    """Return the nearest point of cell (i, j) if it is nearer than the best so far."""
-    c, ix, iy, _x0, _y0, periodic, _low, _high = texture
+def search_tree(
+    x: float, y: float, z: float, top: int, i: int, j: int, best: Point, texture: Any
+) -> Point:
+    """Return the best point after a search of box (i, j) of level top, its sides 2^top cells."""
+    c, ix, iy, x0, y0, _periodic, nodes, levels = texture
     px = 1.0 / ix
     py = 1.0 / iy
-    near_x = max(j - u, u - (j + 1.0), 0.0) * px
-    near_y = max(i - v, v - (i + 1.0), 0.0) * py
-    flat = near_x * near_x + near_y * near_y
-    if flat >= best:
-        return best_x, best_y, best
-    low, high = patch_coefficients(c, i, j, periodic, patch)
-    gap = max(low - z, z - high, 0.0)
-    if flat + gap * gap >= best:
-        return best_x, best_y, best
-    slope_bound, curvature_bound = patch_bounds(patch, ix, iy)
-    box = ((j + 0.5 - u) * px, (i + 0.5 - v) * py, 0.5 * px, 0.5 * py)
-    frame = (1.0, 0.0, slope_bound, curvature_bound, min(px, py) * 2.0**-6)
-    return search_box(x, y, z, box, frame, best_x, best_y, best, texture)
+    u = (x - x0) * ix
+    v = (y - y0) * iy
+    level = top
+    side = 2.0**top
+    low = high = bend = twist = 0.0
+    while level <= top:
+        i_end = min((i + 1) * side, c.shape[0] - 3.0)
+        j_end = min((j + 1) * side, c.shape[1] - 3.0)
+        deeper = i * side < i_end and j * side < j_end
+        if deeper:
+            if level > 0:
+                k = levels[level - 1, 0] + i * levels[level - 1, 2] + j
+                low, high, bend, twist = box_bounds(nodes, k)
+            near_x = max(j * side - u, u - j_end, 0.0) * px
+            near_y = max(i * side - v, v - i_end, 0.0) * py
+            gap = max(low - z, z - high, 0.0)
+            deeper = near_x * near_x + near_y * near_y + gap * gap < best[2] * (1.0 - 1e-13)
+        if deeper and (level <= 1 or foreseeable(z, low, high, bend, twist, side, ix)):
+            best, deeper = judge(
+                x, y, z, x0 + 0.5 * (j * side + j_end) * px, y0 + 0.5 * (i * side + i_end) * py,
+                0.5 * (j_end - j * side) * px, 0.5 * (i_end - i * side) * py,
+                bend * ix, twist * ix * ix, best, texture,
+            )  # fmt: skip
+            deeper = deeper and level > -20
+        if deeper:
+            level -= 1
+            side *= 0.5
+            i = 2 * i + (1 if v >= (2 * i + 1) * side else 0)
+            j = 2 * j + (1 if u >= (2 * j + 1) * side else 0)
+        else:
+            level, side, i, j = next_box(level, side, i, j, top, u, v)
+    return best

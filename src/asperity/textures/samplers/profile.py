@@ -1,7 +1,8 @@
 """h = Σ c_j β(x/p - j), a cubic B-spline profile; constant along y.
 
 Arguments: ``c``, coefficients with one extra before the first cell and two after the last; ``ix``,
-nodes per metre; ``x0``, the first node [m]; ``periodic``.
+nodes per metre; ``x0``, the first node [m]; ``periodic``; ``nodes`` and ``levels``, the pyramid of
+bounds (see ``asperity.textures.pyramid``).
 """
 
 import math
@@ -9,11 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from asperity.textures.samplers.search import descend, search_box
+from asperity.textures.samplers.line import Point, descend, judge, next_part
 from asperity.textures.samplers.spline import (
+    box_bounds,
     cell_of,
     fold,
-    fold_index,
+    foreseeable,
+    nearest_copy,
+    reach_of,
+    tile_frame,
     weights,
     weights_first,
     weights_second,
@@ -27,7 +32,16 @@ def dot4(c: FloatArray, j: int, w0: float, w1: float, w2: float, w3: float) -> f
     return float(w0 * c[j] + w1 * c[j + 1] + w2 * c[j + 2] + w3 * c[j + 3])
 
 
-def height(x: float, y: float, c: FloatArray, ix: float, x0: float, periodic: bool) -> float:
+def height(
+    x: float,
+    y: float,
+    c: FloatArray,
+    ix: float,
+    x0: float,
+    periodic: bool,
+    nodes: FloatArray,
+    levels: FloatArray,
+) -> float:
     """Return h [m]."""
     cells = c.size - 3
     u, _sign = fold((x - x0) * ix, cells, periodic)
@@ -37,7 +51,14 @@ def height(x: float, y: float, c: FloatArray, ix: float, x0: float, periodic: bo
 
 
 def slope(
-    x: float, y: float, c: FloatArray, ix: float, x0: float, periodic: bool
+    x: float,
+    y: float,
+    c: FloatArray,
+    ix: float,
+    x0: float,
+    periodic: bool,
+    nodes: FloatArray,
+    levels: FloatArray,
 ) -> tuple[float, float, float]:
     """Return h [m], h_x, h_y [1]."""
     cells = c.size - 3
@@ -49,7 +70,14 @@ def slope(
 
 
 def curvature(
-    x: float, y: float, c: FloatArray, ix: float, x0: float, periodic: bool
+    x: float,
+    y: float,
+    c: FloatArray,
+    ix: float,
+    x0: float,
+    periodic: bool,
+    nodes: FloatArray,
+    levels: FloatArray,
 ) -> tuple[float, float, float, float, float, float]:
     """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
     cells = c.size - 3
@@ -63,52 +91,95 @@ def curvature(
     return h, hx, 0.0, ix * ix * dot4(c, j, f0, f1, f2, f3), 0.0, 0.0
 
 
-def nearest(
-    x: float, y: float, z: float, c: FloatArray, ix: float, x0: float, periodic: bool
-) -> tuple[float, float]:
-    """Return X, Y of the globally nearest surface point; Y = y.
+def along(x: float, texture: Any) -> tuple[float, float, float]:
+    """Return h [m], h' [1], h'' [1/m]."""
+    h, h1, _hy, h2, _hxy, _hyy = curvature(x, 0.0, *texture)
+    return h, h1, h2
 
-    Cells to the left and right of the probe, nearest first, until they are farther away than
-    the best point. A cell is searched only if the hull of its coefficients comes near enough.
+
+def nearest(x: float, y: float, z: float, *texture: Any) -> tuple[float, float]:
+    """Return X, Y of the globally nearest surface point; Y = y."""
+    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, *texture)
+    return foot_x, foot_y
+
+
+def foot(
+    x: float, y: float, z: float, c: FloatArray, ix: float, x0: float, periodic: bool,
+    nodes: FloatArray, levels: FloatArray,
+) -> tuple[float, float, float, float, float]:  # fmt: skip
+    """Return X, Y of the globally nearest surface point, and h, h_x, h_y there; Y = y.
+
+    Downhill from the probe, a distance; only points within it can be nearer. The line is tiled by
+    copies of the profile, every other one mirrored if it is finite; each is searched from the
+    coarsest intervals of the pyramid down.
     """
-    texture = (c, ix, x0, periodic)
-    best_x, best_y, best = descend(x, y, z, x, y, texture)
-    u = (x - x0) * ix
-    j0 = math.floor(u)
-    pitch = 1.0 / ix
-    ring = 0
-    while True:
-        if ring > 0:
-            side = max(min(u - (j0 - ring + 1), j0 + ring - u), 0.0) * pitch
-            if side * side >= best:
-                break
-        best_x, best_y, best = search_cell(x, y, z, u, j0 - ring, best_x, best_y, best, texture)
-        if ring > 0:
-            best_x, best_y, best = search_cell(x, y, z, u, j0 + ring, best_x, best_y, best, texture)
-        ring += 1
-    return best_x, best_y
-
-
-def search_cell(
-    x: float, y: float, z: float, u: float, j: int,
-    best_x: float, best_y: float, best: float, texture: Any,
-) -> tuple[float, float, float]:  # fmt: skip
-    """Return the nearest point of cell j if it is nearer than the best so far."""
-    c, ix, _x0, periodic = texture
+    texture = (c, ix, x0, periodic, nodes, levels)
+    best = descend(x, z, x, texture)
     cells = c.size - 3
+    middle = math.floor((x - x0) * ix / cells)
+    best = search_tile(x, z, middle, best, texture)
+    # Of the copies of a point only the nearest counts.
+    reach = min(reach_of(z, best[1], nodes), nearest_copy(cells / ix, periodic))
+    first = math.floor((x - reach - x0) * ix / cells)
+    last = math.floor((x + reach - x0) * ix / cells)
+    for tile in range(first, last + 1):
+        if tile != middle:
+            best = search_tile(x, z, tile, best, texture)
+    return best[0], y, best[2], best[3], 0.0
+
+
+def search_tile(x: float, z: float, tile: int, best: Point, texture: Any) -> Point:
+    """Return the best point after a search of one copy of the profile.
+
+    Probe and best point are moved to where they are seen from the profile itself.
+    """
+    c, ix, x0, periodic, nodes, levels = texture
+    cells = c.size - 3
+    reach = reach_of(z, best[1], nodes)
+    turn, shift = tile_frame(tile, cells, ix, x0, periodic)
+    x = turn * x + shift
+    found = (turn * best[0] + shift, best[1], best[2], turn * best[3])
+    low = max(math.floor((x - reach - x0) * ix), 0)
+    high = min(math.floor((x + reach - x0) * ix), cells - 1)
+    top = 0
+    while top < levels.shape[0] - 1 and (high - low) >> top > 0:
+        top += 1
+    for i in range(low >> top, (high >> top) + 1):
+        found = search_tree(x, z, top, i, found, texture)
+    if found[1] < best[1]:
+        return turn * (found[0] - shift), found[1], found[2], turn * found[3]
+    return best
+
+
+def search_tree(x: float, z: float, top: int, i: int, best: Point, texture: Any) -> Point:
+    """Return the best point after a search of interval i of level top, 2^top cells long."""
+    c, ix, x0, _periodic, nodes, levels = texture
+    cells = float(c.size - 3)
     pitch = 1.0 / ix
-    near = max(j - u, u - (j + 1.0), 0.0) * pitch
-    c0 = c[fold_index(j - 1, cells, periodic) + 1]
-    c1 = c[fold_index(j, cells, periodic) + 1]
-    c2 = c[fold_index(j + 1, cells, periodic) + 1]
-    c3 = c[fold_index(j + 2, cells, periodic) + 1]
-    gap = max(min(c0, c1, c2, c3) - z, z - max(c0, c1, c2, c3), 0.0)
-    if near * near + gap * gap >= best:
-        return best_x, best_y, best
-    # Inflated against the rounding of the differences.
-    inflate = 1.0 + 1e-12
-    slope_bound = inflate * ix * max(abs(c1 - c0), abs(c2 - c1), abs(c3 - c2))
-    bend = max(abs(c2 - 2.0 * c1 + c0), abs(c3 - 2.0 * c2 + c1))
-    box = ((j + 0.5 - u) * pitch, 0.0, 0.5 * pitch, 0.0)
-    frame = (1.0, 0.0, slope_bound, inflate * ix * ix * bend, pitch * 2.0**-6)
-    return search_box(x, y, z, box, frame, best_x, best_y, best, texture)
+    u = (x - x0) * ix
+    level = top
+    side = 2.0**top
+    low = high = bend = twist = 0.0
+    while level <= top:
+        start = i * side
+        end = min(start + side, cells)
+        deeper = start < end
+        if deeper:
+            if level >= 0:
+                low, high, bend, twist = box_bounds(nodes, levels[level, 0] + i)
+            near = max(start - u, u - end, 0.0) * pitch
+            gap = max(low - z, z - high, 0.0)
+            deeper = near * near + gap * gap < best[1] * (1.0 - 1e-13)
+        if deeper and (level <= 0 or foreseeable(z, low, high, bend, twist, side, ix)):
+            best, deeper = judge(
+                x, z, x0 + 0.5 * (start + end) * pitch, 0.5 * (end - start) * pitch,
+                bend * ix, twist * ix * ix, best, texture,
+            )  # fmt: skip
+            deeper = deeper and level > -20
+        if deeper:
+            level -= 1
+            side *= 0.5
+            i = 2 * i + (1 if u >= (2 * i + 1) * side else 0)
+        else:
+            level, side, i = next_part(level, side, i, top, u)
+    return best

@@ -1,7 +1,13 @@
-"""Branch and bound for the nearest surface point, shared by the samplers that need it.
+"""Certified search for the nearest surface point, shared by the samplers of maps and waves.
 
-``curvature`` is the sampler's own; the fused module binds it. φ(X, Y) = |(X, Y) - (x, y)|² +
-(h(X, Y) - z)² is the squared distance from the probe.
+Let φ(X, Y) = |(X, Y) - (x, y)|² + (h(X, Y) - z)² be the squared distance from the probe, with
+p = ∇φ/2 and Q = Hess φ/2 = I + ∇h ∇hᵀ + (h - z) Hess h. A global minimum is a point with p = 0 and
+no negative eigenvalue of Q. Over a box of half-diagonal r in which ‖Hess h‖ <= K and ‖D³h‖ <= T,
+Q differs from its value at the centre by at most L r, L = 3 K max|∇h| + T max|h - z|: Taylor's
+formula at the centre decides most boxes at once.
+
+``curvature`` is the sampler's own; the fused module binds it. Boxes are quartered without a stack:
+the next one follows from the numbers of the last.
 """
 
 import math
@@ -17,161 +23,183 @@ def curvature(x: float, y: float, *texture: Any) -> tuple[float, ...]:
 
 # fused from here
 
+# A point of the surface: X, Y, φ, h, h_x, h_y.
+Point = tuple[float, float, float, float, float, float]
+
+
+def eigenvalues(qxx: float, qxy: float, qyy: float) -> tuple[float, float]:
+    """Return the smaller and the larger eigenvalue of a symmetric matrix."""
+    mean = 0.5 * (qxx + qyy)
+    half = 0.5 * (qxx - qyy)
+    spread = math.sqrt(half * half + qxy * qxy)
+    return mean - spread, mean + spread
+
 
 def newton_step(
-    dx: float, dy: float, gap: float, hx: float, hy: float, hxx: float, hxy: float, hyy: float
+    px: float, py: float, qxx: float, qxy: float, qyy: float
 ) -> tuple[float, float, bool]:
-    """Return the Newton step of φ/2 and whether φ is convex here."""
-    px = dx + gap * hx
-    py = dy + gap * hy
-    qxx = 1.0 + hx * hx + gap * hxx
-    qxy = hx * hy + gap * hxy
-    qyy = 1.0 + hy * hy + gap * hyy
+    """Return a step down φ, Newton's where φ is convex, and whether it is."""
+    low, high = eigenvalues(qxx, qxy, qyy)
+    convex = low > 1e-9 * high
+    if not convex:
+        # Raised so far that the steepest fall keeps its size, and nothing is flat.
+        shift = max(abs(low), 0.05 * abs(high), 1e-9) - low
+        qxx += shift
+        qyy += shift
     det = qxx * qyy - qxy * qxy
-    if det <= 0.0 or qxx + qyy <= 0.0:
-        return -px, -py, False
-    return (qxy * py - qyy * px) / det, (qxy * px - qxx * py) / det, True
+    return (qxy * py - qyy * px) / det, (qxy * px - qxx * py) / det, convex
 
 
-def descend(
-    x: float, y: float, z: float, start_x: float, start_y: float, texture: Any
-) -> tuple[float, float, float]:
-    """Return a local minimum of φ near the start, to rounding, and φ there."""
-    fx = start_x
-    fy = start_y
-    h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, *texture)
-    gap = h - z
-    value = (fx - x) * (fx - x) + (fy - y) * (fy - y) + gap * gap
-    # Downhill, with halved steps while φ does not fall.
-    for _ in range(60):
-        sx, sy, _convex = newton_step(fx - x, fy - y, gap, hx, hy, hxx, hxy, hyy)
-        scale = 1.0
-        fell = False
-        for _halving in range(30):
-            tx = fx + scale * sx
-            ty = fy + scale * sy
-            h, hx, hy, hxx, hxy, hyy = curvature(tx, ty, *texture)
-            new_gap = h - z
-            new = (tx - x) * (tx - x) + (ty - y) * (ty - y) + new_gap * new_gap
-            if new < value:
-                fell = True
-                break
-            scale *= 0.5
-            if scale * (abs(sx) + abs(sy)) < 1e-9 * math.sqrt(value):
-                break
-        if not fell:
-            break
-        drop = value - new
-        fx = tx
-        fy = ty
-        gap = new_gap
-        value = new
-        if drop <= 1e-15 * value:
-            break
-    return polish(x, y, z, fx, fy, value, texture)
-
-
-def polish(
-    x: float, y: float, z: float, fx: float, fy: float, value: float, texture: Any
-) -> tuple[float, float, float]:
-    """Return the minimum after Newton steps that shrink: φ alone resolves half the digits."""
-    last = np.inf
-    for _ in range(12):
+def descend(x: float, y: float, z: float, fx: float, fy: float, texture: Any) -> Point:
+    """Return a local minimum of φ downhill from a start, to rounding."""
+    best = (fx, fy, np.inf, 0.0, 0.0, 0.0)
+    sx = sy = last = 0.0
+    close = False
+    for _ in range(200):
         h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, *texture)
         gap = h - z
-        sx, sy, convex = newton_step(fx - x, fy - y, gap, hx, hy, hxx, hxy, hyy)
-        size = sx * sx + sy * sy
-        if not convex or size >= 0.25 * last or size > 1e-8 * value:
-            break
-        fx += sx
-        fy += sy
-        last = size
-    h = curvature(fx, fy, *texture)[0]
-    return fx, fy, (fx - x) * (fx - x) + (fy - y) * (fy - y) + (h - z) * (h - z)
-
-
-def box_bound(
-    t1: float, t2: float, half1: float, half2: float, gap: float, p1: float, p2: float,
-    slope_bound: float, curvature_bound: float,
-) -> float:  # fmt: skip
-    """Return a lower bound of φ over a box, from values at its centre.
-
-    Two bounds: the distance to the box with the least height gap that the slope bound allows,
-    and the tangent plane less half the curvature bound, -∇²φ <= 2(|h - z| K - 1).
-    """
-    near1 = max(abs(t1) - half1, 0.0)
-    near2 = max(abs(t2) - half2, 0.0)
-    radius = math.sqrt(half1 * half1 + half2 * half2)
-    gap_low = max(abs(gap) - slope_bound * radius, 0.0)
-    first = near1 * near1 + near2 * near2 + gap_low * gap_low
-    gap_high = abs(gap) + slope_bound * radius
-    concavity = max(gap_high * curvature_bound - 1.0, 0.0)
-    value = t1 * t1 + t2 * t2 + gap * gap
-    second = value - 2.0 * (abs(p1) * half1 + abs(p2) * half2) - concavity * radius * radius
-    return max(first, second)
-
-
-def search_box(
-    x: float, y: float, z: float, box: tuple[float, float, float, float],
-    frame: tuple[float, float, float, float, float],
-    best_x: float, best_y: float, best: float, texture: Any,
-) -> tuple[float, float, float]:  # fmt: skip
-    """Return the nearest point in a box if it is nearer than the best so far.
-
-    Args:
-        x: probe.
-        y: probe.
-        z: probe [m].
-        box: centre relative to the probe and half-widths along the axes of the frame [m].
-        frame: cosine and sine of the first axis, slope bound, curvature bound [1/m] in the box,
-            and the half-width at which a box is handed to Newton's method [m].
-        best_x: best point so far.
-        best_y: best point so far.
-        best: φ there [m²].
-        texture: the arguments of the sampler.
-    """
-    cosine, sine, slope_bound, curvature_bound, terminal = frame
-    stack = np.empty((128, 4))
-    stack[0, 0] = box[0]
-    stack[0, 1] = box[1]
-    stack[0, 2] = box[2]
-    stack[0, 3] = box[3]
-    count = 1
-    while count > 0:
-        count -= 1
-        t1 = stack[count, 0]
-        t2 = stack[count, 1]
-        half1 = stack[count, 2]
-        half2 = stack[count, 3]
-        cx = x + cosine * t1 - sine * t2
-        cy = y + sine * t1 + cosine * t2
-        h, hx, hy, hxx, hxy, hyy = curvature(cx, cy, *texture)
-        gap = h - z
-        p1 = t1 + gap * (cosine * hx + sine * hy)
-        p2 = t2 + gap * (cosine * hy - sine * hx)
-        bound = box_bound(t1, t2, half1, half2, gap, p1, p2, slope_bound, curvature_bound)
-        if bound >= best * (1.0 - 1e-14):
-            continue
-        if max(half1, half2) <= terminal or count > 124:
-            fx, fy, value = descend(x, y, z, cx, cy, texture)
-            if value < best:
-                best_x = fx
-                best_y = fy
-                best = value
-            continue
-        # Halve the longer side; the half nearer to lower φ is searched first.
-        if half1 >= half2:
-            half1 *= 0.5
-            step1 = half1 if p1 > 0.0 else -half1
-            step2 = 0.0
+        dx = fx - x
+        dy = fy - y
+        new = dx * dx + dy * dy + gap * gap
+        rounding = 1e-31 * (fx * fx + fy * fy + h * h + z * z)
+        if new <= best[2] or close:
+            best = (fx, fy, new, h, hx, hy)
+            sx, sy, convex = newton_step(
+                dx + gap * hx, dy + gap * hy,
+                1.0 + hx * hx + gap * hxx, hx * hy + gap * hxy, 1.0 + hy * hy + gap * hyy,
+            )  # fmt: skip
+            size = sx * sx + sy * sy
+            if size <= 1e-16 * new + rounding:
+                h += hx * sx + hy * sy
+                return fx + sx, fy + sy, new, h, hx + hxx * sx + hxy * sy, hy + hxy * sx + hyy * sy
+            # φ alone resolves half the digits: from here on the steps must shrink instead.
+            if close and size >= 0.6 * last:
+                break
+            close = convex and size <= 1e-6 * new
+            last = size
         else:
-            half2 *= 0.5
-            step1 = 0.0
-            step2 = half2 if p2 > 0.0 else -half2
-        for sign in (1.0, -1.0):
-            stack[count, 0] = t1 + sign * step1
-            stack[count, 1] = t2 + sign * step2
-            stack[count, 2] = half1
-            stack[count, 3] = half2
-            count += 1
-    return best_x, best_y, best
+            sx *= 0.5
+            sy *= 0.5
+            if sx * sx + sy * sy <= 1e-20 * best[2] + rounding:
+                break
+        fx = best[0] + sx
+        fy = best[1] + sy
+    return best
+
+
+def remainders(
+    r: float, gap: float, steep: float, bent: float, bend: float, twist: float
+) -> tuple[float, float]:
+    """Return how far Q can be from its value at r = 0, and h from its tangent plane [m].
+
+    From h - z, |∇h| and ‖Hess h‖ there and K and T all over.
+    """
+    bend = min(bend, bent + twist * r)
+    steep += bend * r
+    change = (3.0 * steep * bend + (abs(gap) + steep * r) * twist) * r
+    return change, (0.5 * bent + twist * r / 6.0) * r * r
+
+
+def clearance(
+    away: tuple[float, float, float], hx: float, hy: float, r: float, lift: float
+) -> float:
+    """Return a lower bound of √φ: the distance of a piece of the tangent plane, less the lift.
+
+    The middle of the piece is away from the probe, its half-width at most r seen from above.
+    """
+    dx, dy, gap = away
+    square = 1.0 + hx * hx + hy * hy
+    normal = gap - hx * dx - hy * dy
+    straight = normal * normal / square
+    aside = math.sqrt(max(dx * dx + dy * dy + gap * gap - straight, 0.0)) - r * math.sqrt(square)
+    aside = max(aside, 0.0)
+    return max(math.sqrt(straight + aside * aside) - lift, 0.0)
+
+
+def hopeless(
+    away: tuple[float, float, float], hx: float, hy: float, q: tuple[float, float, float],
+    low: float, change: float, lift: float, a: float, b: float, enough: float,
+) -> bool:  # fmt: skip
+    """Return whether no point of a box with half-widths a, b is a minimum with φ < enough.
+
+    From what is known at its centre; the small numbers leave room for rounding.
+    """
+    dx, dy, gap = away
+    qxx, qxy, qyy = q
+    px = dx + gap * hx
+    py = dy + gap * hy
+    r = math.sqrt(a * a + b * b)
+    margin = 1e-6 * (abs(qxx) + abs(qyy))
+    # Nowhere convex, so without a minimum; or too far by Taylor's formula.
+    bound = dx * dx + dy * dy + gap * gap - 2.0 * (abs(px) * a + abs(py) * b)
+    if low + change < -margin or bound + (min(low, 0.0) - change / 3.0) * r * r >= enough:
+        return True
+    # Too steep at the centre to become level in the box; or too far by the tangent plane.
+    fall = math.sqrt(px * px + py * py)
+    turn = abs(qxx * px + qxy * py) * a + abs(qxy * px + qyy * py) * b
+    if fall * (fall - (0.5 * change + margin) * r) > turn:
+        return True
+    clear = clearance(away, hx, hy, r, lift)
+    return clear * clear >= enough
+
+
+def judge(
+    x: float, y: float, z: float, cx: float, cy: float, a: float, b: float,
+    bend: float, twist: float, best: Point, texture: Any,
+) -> tuple[Point, bool]:  # fmt: skip
+    """Return the best point after a look at one box, and whether its parts need a look.
+
+    The box is (cx, cy) ± (a, b) [m], with K = bend [1/m] and T = twist [1/m²].
+    """
+    h, hx, hy, hxx, hxy, hyy = curvature(cx, cy, *texture)
+    gap = h - z
+    away = (cx - x, cy - y, gap)
+    q = (1.0 + hx * hx + gap * hxx, hx * hy + gap * hxy, 1.0 + hy * hy + gap * hyy)
+    low, _high = eigenvalues(q[0], q[1], q[2])
+    r = math.sqrt(a * a + b * b)
+    bent = math.sqrt(hxx * hxx + 2.0 * hxy * hxy + hyy * hyy)
+    change, lift = remainders(r, gap, math.sqrt(hx * hx + hy * hy), bent, bend, twist)
+    enough = best[2] * (1.0 - 1e-13)
+    if hopeless(away, hx, hy, q, low, change, lift, a, b, enough):
+        return best, False
+    if low <= change:
+        return best, True
+    det = q[0] * q[2] - q[1] * q[1]
+    sx = (q[1] * (away[1] + gap * hy) - q[2] * (away[0] + gap * hx)) / det
+    sy = (q[1] * (away[0] + gap * hx) - q[0] * (away[1] + gap * hy)) / det
+    # Convex in the box: the only minimum is where Newton's method leads, or not in the box.
+    error = 1e-6 * r + 0.5 * change * r / low
+    if abs(sx) > a or abs(sy) > b:
+        return best, abs(sx) <= a + error and abs(sy) <= b + error
+    known = abs(best[0] - cx) <= a and abs(best[1] - cy) <= b
+    start_x = best[0] if known else cx + sx
+    start_y = best[1] if known else cy + sy
+    found = descend(x, y, z, start_x, start_y, texture)
+    outside = abs(found[0] - cx) > a * (1.0 + 1e-9) or abs(found[1] - cy) > b * (1.0 + 1e-9)
+    if found[2] < best[2]:
+        return found, outside
+    return best, outside
+
+
+def next_box(
+    level: int, side: float, i: int, j: int, top: int, u: float, v: float
+) -> tuple[int, float, int, int]:
+    """Return the box after box (i, j) of a level and all its parts; a level above top at the end.
+
+    Boxes of a level have equal sides, twice as long as those of the level below. Of the four
+    parts of a box the one nearest to (u, v) comes first.
+    """
+    while level < top:
+        half_i = i >> 1
+        half_j = j >> 1
+        near_i = 1 if v >= (2 * half_i + 1) * side else 0
+        near_j = 1 if u >= (2 * half_j + 1) * side else 0
+        k = 2 * ((i & 1) ^ near_i) + ((j & 1) ^ near_j)
+        if k < 3:
+            k += 1
+            return level, side, 2 * half_i + ((k >> 1) ^ near_i), 2 * half_j + ((k & 1) ^ near_j)
+        level += 1
+        side *= 2.0
+        i = half_i
+        j = half_j
+    return top + 1, side, i, j

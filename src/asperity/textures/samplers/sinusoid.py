@@ -1,6 +1,7 @@
 """h = A sin(k_x x + k_y y + phase)."""
 
 import math
+from typing import Any
 
 
 def height(x: float, y: float, a: float, kx: float, ky: float, phase: float) -> float:
@@ -27,10 +28,16 @@ def curvature(
     return h, kx * c, ky * c, -kx * kx * h, -kx * ky * h, -ky * ky * h
 
 
-def nearest(
+def nearest(x: float, y: float, z: float, *texture: Any) -> tuple[float, float]:
+    """Return X, Y of the globally nearest surface point."""
+    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, *texture)
+    return foot_x, foot_y
+
+
+def foot(
     x: float, y: float, z: float, a: float, kx: float, ky: float, phase: float
-) -> tuple[float, float]:
-    """Return X, Y of the globally nearest surface point.
+) -> tuple[float, float, float, float, float]:
+    """Return X, Y of the globally nearest surface point, and h, h_x, h_y there.
 
     Let ψ be the phase angle from the crest on the probe's side (for a probe outside the body,
     turn the picture over). The foot of a probe at angle u in [0, π] lies on the same monotone
@@ -42,20 +49,29 @@ def nearest(
     changes sign exactly once: it is convex from u to the inflection π/2 with F(u) <= 0, and
     increasing from there on while the surface is above the probe.
     """
+    amplitude = abs(a)
+    if amplitude == 0.0:
+        return x, y, 0.0, 0.0, 0.0
     k2 = kx * kx + ky * ky
     angle = kx * x + ky * y + phase
-    amplitude = abs(a)
     if a < 0.0:
         angle += math.pi
-    if amplitude == 0.0:
-        return x, y
+    over = 1.0
     if z > amplitude * math.sin(angle):
         angle += math.pi
-        z = -z
+        over = -1.0
     turns = angle / (2.0 * math.pi) - 0.25
     u = 2.0 * math.pi * (turns - math.floor(turns + 0.5))  # angle from the nearest crest
     side = 1.0 if u >= 0.0 else -1.0
     u = abs(u)
+    psi, c, s = flank_root(u, over * z, amplitude, k2)
+    shift = side * (psi - u) / k2
+    rate = -over * side * amplitude * s
+    return x + kx * shift, y + ky * shift, over * amplitude * c, kx * rate, ky * rate
+
+
+def flank_root(u: float, z: float, amplitude: float, k2: float) -> tuple[float, float, float]:
+    """Return the root ψ of F in [u, π] for a probe below the surface, cos ψ and sin ψ."""
     k2a = k2 * amplitude
     depth = amplitude * math.cos(u) - z
     lo = u
@@ -68,6 +84,7 @@ def nearest(
             hi = mid
     # From the right end: there Newton falls monotonically to the root of a convex F.
     psi = hi
+    c = s = 0.0
     for _ in range(100):
         s = math.sin(psi)
         c = math.cos(psi)
@@ -87,5 +104,4 @@ def nearest(
             psi = new
             break
         psi = new
-    shift = side * (psi - u) / k2
-    return x + kx * shift, y + ky * shift
+    return psi, c, s

@@ -1,6 +1,10 @@
-"""Cubic B-spline weights and border folding, shared by heightmap and profile."""
+"""Cubic B-spline weights, border folding, and boxes of the pyramid, shared by both splines."""
 
 import math
+
+import numpy as np
+
+FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
 # fused from here
 
@@ -54,9 +58,45 @@ def weights_second(t: float) -> tuple[float, float, float, float]:
     return r, 3.0 * t - 2.0, 3.0 * r - 2.0, t
 
 
-def fold_index(i: int, cells: int, periodic: bool) -> int:
-    """Return the node index inside [0, cells] that repeats or mirrors node i."""
-    if periodic:
-        return i % cells
-    i = i % (2 * cells)
-    return 2 * cells - i if i > cells else i
+def tile_frame(
+    tile: int, cells: int, per_metre: float, start: float, periodic: bool
+) -> tuple[float, float]:
+    """Return t, s with which x -> t x + s moves a copy of the cells onto the cells themselves."""
+    length = cells / per_metre
+    if periodic or tile % 2 == 0:
+        return 1.0, -tile * length
+    return -1.0, 2.0 * start + (tile + 1) * length
+
+
+def box_bounds(nodes: FloatArray, k: int) -> tuple[float, float, float, float]:
+    """Return the least and greatest height and the bounds K and T of box k of the pyramid."""
+    return float(nodes[k, 0]), float(nodes[k, 1]), float(nodes[k, 2]), float(nodes[k, 3])
+
+
+def reach_of(z: float, best: float, nodes: FloatArray) -> float:
+    """Return the lateral distance beyond which no surface point is nearer than the best [m].
+
+    From the least and greatest height of all, which the last box knows.
+    """
+    low, high, _bend, _twist = box_bounds(nodes, nodes.shape[0] - 1)
+    gap = max(low - z, z - high, 0.0)
+    return math.sqrt(max(best - gap * gap, 0.0))
+
+
+def nearest_copy(length: float, periodic: bool) -> float:
+    """Return how far the nearest copy of a point is at most, along an axis of the tiled plane [m].
+
+    Copies that are mirrored may all lie a length away; the factor leaves room for rounding.
+    """
+    return length * (0.5 if periodic else 1.0) * (1.0 + 1e-9)
+
+
+def foreseeable(
+    z: float, low: float, high: float, bend: float, twist: float, side: float, per_metre: float
+) -> bool:
+    """Return whether Taylor's formula at its centre may decide a box of several cells.
+
+    Whether Q (see ``search``) changes by less than 1 there, if the surface is not very steep.
+    """
+    gap = max(abs(low - z), abs(high - z)) * per_metre
+    return (gap * twist + 3.0 * bend) * side < 1.0
