@@ -160,17 +160,22 @@ class Surface:
             *self.law_parameters.values(),
         )
 
+    @property
+    def sampler(self) -> tuple[ModuleType, ...]:
+        """The modules that are compiled together with the law: the texture's and the contact's."""
+        sampler = self.texture.sampler
+        if self.law.contact == "split":
+            from asperity.textures.samplers import sinusoid, split, split_sinusoid
+
+            sampler = (*sampler, split_sinusoid if sampler[0] is sinusoid else split)
+        return sampler
+
     @cached_property
     def _loops(self) -> ModuleType:
         from asperity.derive.fuse import fuse_surface
 
         clamp: ClampName = self.clamp if self.law.clampable else "none"
-        sampler = self.texture.sampler
-        if self.law.contact == "split":
-            from asperity.textures.samplers import split
-
-            sampler = (*sampler, split)
-        return fuse_surface(self.law, sampler, clamp)
+        return fuse_surface(self.law, self.sampler, clamp)
 
     def force(self, points: ArrayLike, deflection: ArrayLike | None = None) -> FloatArray:
         """Return the force on the probe (what the device applies to the hand).

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from asperity.derive import fuse
-from asperity.derive.driver import CLAMPS
+from asperity.derive.driver import CLAMPS, DriverPlan, driver_source
+from asperity.errors import ParameterError
 from asperity.laws import LAWS, Law
 from asperity.textures import Texture
 
@@ -135,3 +136,24 @@ def test_forces_and_jacobians_at_given_contacts(
         hessian = np.array([[hxx, hxy], [hxy, hyy]])
         expected = jacobian_by_hand(letter, g=(hx, hy), hessian=hessian, **here, **state)
         assert np.abs(jacobian[i] - expected).max() <= 1e-11 * np.linalg.norm(expected, 2)
+
+
+def test_a_texture_without_second_derivatives_serves_the_laws_that_need_none():
+    """A and E need slopes; B needs curvature, and says so."""
+    from asperity.textures.samplers import sinusoid
+
+    text = Path(sinusoid.__file__ or "").read_text(encoding="utf-8")
+    tree = ast.parse(text)
+    tree.body = [node for node in tree.body if getattr(node, "name", "") != "curvature"]
+    kept = ast.unparse(tree)
+    assert "def slope(" in kept
+    fuse._require(LAWS["A"], kept, driver_source(_plan("A")))
+    fuse._require(LAWS["E"], kept, driver_source(_plan("E")))
+    with pytest.raises(ParameterError, match=r"texture must offer second derivatives.*law B"):
+        fuse._require(LAWS["B"], kept, driver_source(_plan("B")))
+    with pytest.raises(ParameterError, match="nearest points"):
+        fuse._require(LAWS["D"], "", "foot_x, foot_y = nearest(x)")
+
+
+def _plan(letter: str) -> DriverPlan:
+    return DriverPlan(LAWS[letter], fuse.kernel_source(LAWS[letter]), "none")

@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from asperity.analysis import characteristic_number
 from asperity.derive.jacobian import derive, symbolic_force
 from asperity.derive.python_source import law_source
 from asperity.errors import LawError
 from asperity.laws import Law
 from asperity.laws.symbols import HXX, ContactSymbols
+from asperity.surface import Surface
+from asperity.textures.sinusoid import Sinusoid
 
 Formula = Callable[[ContactSymbols], Any]
 
@@ -33,12 +36,38 @@ def law(force: Formula, **options: Any) -> Law:
         lambda c: None,  # noqa: ARG005 - a formula that forgot its return
         lambda c: c.depth,
         lambda c: c.parameter("gain") * c.e_z,
+        lambda p: -500.0 * np.asarray(p)[2:3],  # a function of positions
+        lambda c: c.k * c.depth * c.w if c.depth > 1e-3 else c.w,
     ],
-    ids=["math", "numpy", "float", "attribute", "nothing", "scalar", "undeclared"],
+    ids=[
+        "math",
+        "numpy",
+        "float",
+        "attribute",
+        "nothing",
+        "scalar",
+        "undeclared",
+        "position",
+        "if",
+    ],
 )
 def test_a_force_that_is_no_formula(force: Formula):
     with pytest.raises(LawError, match=r"law V: its force is not a symbolic formula \("):
         symbolic_force(law(force))
+
+
+def test_a_function_that_only_computes_is_refused_with_the_reason():
+    """Wherever its numbers are asked for: nothing can be derived from them."""
+    own = law(lambda c: np.sqrt(c.depth) * np.array([0.0, 0.0, 1.0]))
+    surface = Surface(Sinusoid(amplitude=1e-4, period=1e-3), own)
+    for ask in (lambda: surface.force([[0.0, 0.0, -1e-4]]), lambda: characteristic_number(surface)):
+        with pytest.raises(LawError) as caught:
+            ask()
+        message = str(caught.value)
+        assert message.startswith("law V: its force is not a symbolic formula (")
+        assert "no callable sqrt method" in message
+        assert "Functions of math and NumPy only compute numbers: use SymPy's" in message
+        assert "\n" not in message
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])

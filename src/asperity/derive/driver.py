@@ -58,6 +58,11 @@ class DriverPlan:
         return not {"hx", "hy"}.isdisjoint(self.arguments("law_force"))
 
     @property
+    def needs_curvature(self) -> bool:
+        """Whether the Jacobian needs second derivatives of the height."""
+        return not {"hxx", "hxy", "hyy"}.isdisjoint(self.arguments("law_jacobian"))
+
+    @property
     def needs_texture(self) -> bool:
         """Whether the force looks at the texture once contact is known."""
         return self.needs_slope or "h" in self.arguments("law_force")
@@ -99,7 +104,9 @@ def _enter_contact(plan: DriverPlan, what: str) -> list[str]:
         "force": "h, hx, hy = slope({}, *texture)"
         if plan.needs_slope
         else "h = height({}, *texture)",
-        "jacobian": "h, hx, hy, hxx, hxy, hyy = curvature({}, *texture)",
+        "jacobian": "h, hx, hy, hxx, hxy, hyy = curvature({}, *texture)"
+        if plan.needs_curvature
+        else "h, hx, hy = slope({}, *texture)",
     }[what]
     here = sampled.format("x, y")
     contact: ContactName = plan.law.contact
@@ -115,8 +122,10 @@ def _after_contact(plan: DriverPlan, what: str) -> list[str]:
     """Return the lines that sample the texture once contact is known."""
     width = "slope" if plan.needs_slope else "height"
     names = "h, hx, hy" if plan.needs_slope else "h"
-    if what == "jacobian":
+    if what == "jacobian" and plan.needs_curvature:
         width, names = "curvature", "h, hx, hy, hxx, hxy, hyy"
+    elif what == "jacobian":
+        width, names = "slope", "h, hx, hy"
     if plan.law.contact == "split":
         if what == "force":
             return ["tx, ty, tz = split_contact(x, y, z, continuity, texture)"]
@@ -124,8 +133,8 @@ def _after_contact(plan: DriverPlan, what: str) -> list[str]:
         return [f"{derivative} = split_derivative(x, y, z, continuity, texture)"]
     if plan.law.contact == "nearest":
         return [
-            "foot_x, foot_y = nearest(x, y, z, *texture)",
-            f"{names} = {width}(foot_x, foot_y, *texture)",
+            "foot_x, foot_y, h, hx, hy = foot(x, y, z, *texture)",
+            *([f"{names} = curvature(foot_x, foot_y, *texture)"] if width == "curvature" else []),
             "depth = math.sqrt((x - foot_x)**2 + (y - foot_y)**2 + (z - h)**2)",
         ]
     if plan.law.contact == "nominal" and plan.needs_texture:
@@ -259,21 +268,18 @@ def _trace_batch(plan: DriverPlan) -> str:
 _SPLIT_BATCH = '''def split_batch(points, out, texture, law):
     """Potential/k [m²], number of atoms and gap [m²] of the split god-object at the points [m]."""
     {unpack}
-    atoms = np.empty((5, 3))
-    weights = np.empty(5)
-    p = np.empty(3)
     for i in range(points.shape[0]):
-        p[0] = points[i, 0]
-        p[1] = points[i, 1]
-        p[2] = points[i, 2]
-        out[i, 0] = 0.0
-        out[i, 1] = 0.0
-        out[i, 2] = 0.0
-        if height(p[0], p[1], *texture) > p[2]:
-            count, gap = split_atoms(p[0], p[1], p[2], continuity, atoms, weights, texture)
-            out[i, 0] = primal_value(atoms, p, 1.0 / (1.0 + continuity), count, weights)
-            out[i, 1] = count
-            out[i, 2] = gap
+        x = points[i, 0]
+        y = points[i, 1]
+        z = points[i, 2]
+        value = 0.0
+        count = 0
+        gap = 0.0
+        if height(x, y, *texture) > z:
+            value, count, gap = split_energy(x, y, z, continuity, texture)
+        out[i, 0] = value
+        out[i, 1] = count
+        out[i, 2] = gap
 '''
 
 

@@ -19,6 +19,7 @@ from types import ModuleType
 
 from asperity.derive.driver import ClampName, DriverPlan, contact_source, driver_source
 from asperity.derive.generate import generated_path
+from asperity.errors import ParameterError
 from asperity.laws import LAWS, Law
 
 _HEADER = '''"""{title}
@@ -33,12 +34,26 @@ import math
 import numpy as np
 from numba import njit
 
-scalar = njit(error_model="numpy")
-inlined = njit(error_model="numpy", forceinline=True)
-loop = njit(error_model="numpy", cache=True, nogil=True)
+# Nothing allocates, so nothing is counted: counting references to the arrays of a texture at every
+# call costs more than the arithmetic. Only the loops are called from Python; the others need no
+# wrapper, a fifth of the compile time.
+plain = dict(error_model="numpy", _nrt=False)
+internal = dict(**plain, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+scalar = njit(**internal)
+inlined = njit(**internal, forceinline=True)
+loop = njit(**plain, cache=True, nogil=True)
 
 
 '''
+
+
+# Law H iterates on small arrays; on the stack they cost no allocation.
+_SPLIT_HEADER = """from asperity.textures.samplers.stack_memory import local_array
+
+merged = njit(error_model="numpy", inline="always")
+
+
+"""
 
 
 @lru_cache(maxsize=256)
@@ -52,22 +67,44 @@ def kernel_source(law: Law) -> str:
 
 
 @lru_cache(maxsize=256)
-def fuse_surface(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) -> ModuleType:
+def fuse_surface(
+    law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName, further: str = ""
+) -> ModuleType:
     """Return the compiled loops of a law on a texture kind.
 
     Args:
         law: the law.
         sampler: the modules whose functions make up the sampler.
         clamp: the depth clamp.
+        further: source of more functions, which may call those of the law.
 
     Returns:
         A module with ``force_batch``, ``jacobian_batch``, ``trace_batch`` if the law has state.
     """
     plan = DriverPlan(law, kernel_source(law), clamp)
     title = f"Law {law.letter} on {sampler[0].__name__.rpartition('.')[2]}, clamp {clamp}."
-    source = "\n\n".join([sampler_source(sampler), plan.source, driver_source(plan)])
-    inline = law.contact != "split"
-    return load_fused(_HEADER.format(title=title) + decorate(source, inline=inline))
+    driver = driver_source(plan)
+    _require(law, sampler_source(sampler), driver)
+    source = "\n\n".join([sampler_source(sampler), plan.source, driver, further])
+    iterative = any(module.__name__.endswith(".split") for module in sampler)
+    header = _HEADER.format(title=title) + (_SPLIT_HEADER if iterative else "")
+    return load_fused(header + decorate(source, inline=not iterative))
+
+
+_OFFERED = {
+    "height": "heights",
+    "slope": "slopes",
+    "curvature": "second derivatives",
+    "nearest": "nearest points",
+}
+
+
+def _require(law: Law, sampler: str, driver: str) -> None:
+    """Refuse a texture that lacks what a law looks at."""
+    for name, words in _OFFERED.items():
+        if f" {name}(" in driver and f"def {name}(" not in sampler:
+            need = f"must offer {words} (a sampler function {name!r}), which law {law} needs"
+            raise ParameterError("texture", need)
 
 
 @lru_cache(maxsize=256)
@@ -76,6 +113,14 @@ def fuse_contact(law: Law) -> ModuleType:
     plan = DriverPlan(law, kernel_source(law), "none")
     source = "\n\n".join([plan.source, contact_source(plan)])
     return load_fused(_HEADER.format(title=f"Law {law.letter} at contacts.") + decorate(source))
+
+
+@lru_cache(maxsize=16)
+def fuse_module(module: ModuleType, *, inline: bool = True) -> ModuleType:
+    """Return a module of plain functions compiled; those named ``..._batch`` are for Python."""
+    title = f"{module.__name__.rpartition('.')[2]}."
+    source = sampler_source((module,))
+    return load_fused(_HEADER.format(title=title) + decorate(source, inline=inline))
 
 
 @lru_cache(maxsize=64)
@@ -159,19 +204,35 @@ def decorate(source: str, *, inline: bool = True) -> str:
 
 # Too large to be copied to every place that calls them.
 _CALLED = {
-    "nearest",
-    "search_cell",
-    "search_box",
-    "descend",
-    "polish",
-    "patch_bounds",
+    "foot",
     "search_tile",
+    "search_tree",
+    "judge",
+    "descend",
+    "newton_step",
+}
+
+
+# LLVM optimises everything again at each level of calls: a chain of single calls is made one
+# function before it compiles, which nearly halves the time.
+_MERGED = {
+    "probe_force",
+    "probe_jacobian",
+    "law_force",
+    "law_jacobian",
+    "split_contact",
+    "split_derivative",
+    "split_energy",
+    "split_polish",
+    "split_try_polish",
 }
 
 
 def _decorator(name: str, inline: bool) -> str:
     if name.endswith("_batch"):
         return "@loop"
+    if name in _MERGED and not inline:
+        return "@merged"
     return "@scalar" if name in _CALLED or not inline else "@inlined"
 
 

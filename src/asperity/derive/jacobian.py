@@ -118,9 +118,12 @@ def symbolic_force(law: Law) -> Any:
     try:
         force = sp.Matrix(law.force(symbols))
     except Exception as error:  # whatever a user's formula raises is a defect of the formula
+        what = " ".join(str(error).split())
         raise LawError(
-            f"law {law.letter}: its force is not a symbolic formula ({error}); "
-            "it must return three SymPy expressions in the contact symbols"
+            f"law {law.letter}: its force is not a symbolic formula ({what}); it must return three "
+            "SymPy expressions in the contact symbols, from which Jacobian, kernel and bounds are "
+            "derived. Functions of math and NumPy only compute numbers: use SymPy's, such as "
+            "sympy.sqrt or sympy.Piecewise"
         ) from error
     if force.shape != (3, 1):
         raise LawError(f"law {law.letter}: force must have 3 components, got {force.shape}")

@@ -1,0 +1,167 @@
+"""The split god-object below a sinusoid, in closed form: one root on one flank.
+
+Let u be the phase of the probe from the nearest crest, ψ that of a foot, κ the wave number and
+R = 1/(κ² A) the radius of the crest. Every point that has two nearest points lies straight below
+a crest. Where the god-object is split, y (``split.py``) is such a point and its feet are ±ψ, so
+p = (1 - μ) y + μ z̄ leaves one equation that does not know u,
+
+    (1 - μ) ψ - κ² A sin ψ (A cos ψ - z) = 0,
+
+the condition of a foot with its first term scaled, and with the same single root: there is one
+below the crest by more than (1 - μ) R, and the god-object is split if it exceeds |u|/μ. The force
+is then k (c u/κ, A cos ψ - z), else law D's.
+"""
+
+import math
+
+
+def nearest(
+    x: float, y: float, z: float, a: float, kx: float, ky: float, phase: float
+) -> tuple[float, float]:
+    """Stand in for the sampler's own function, which replaces this one."""
+    raise AssertionError
+
+
+# fused from here
+
+
+def split_root(share: float, u: float, z: float, amplitude: float, bend: float) -> float:
+    """Return the root ψ in [u, π] of share ψ - u - κ² A sin ψ (A cos ψ - z).
+
+    Args:
+        share: 1 for the foot of a probe; 1 - μ, with u = 0, for feet of a split god-object.
+        u: phase from the crest, in [0, π].
+        z: height of the probe, below the surface [m].
+        amplitude: A [m].
+        bend: κ² A [1/m].
+    """
+    low = u
+    high = math.pi
+    middle = 0.5 * math.pi
+    if low < middle:
+        if share * middle - u + bend * z <= 0.0:
+            low = middle
+        else:
+            high = middle
+    # From the right end: there Newton falls monotonically to the root of a convex function.
+    psi = high
+    for _ in range(100):
+        s = math.sin(psi)
+        c = math.cos(psi)
+        gap = amplitude * c - z
+        value = share * psi - u - bend * s * gap
+        if value == 0.0:
+            break
+        if value > 0.0:
+            high = psi
+        else:
+            low = psi
+        rate = share + bend * (amplitude * s * s - c * gap)
+        new = psi - value / rate if rate > 0.0 else 0.5 * (low + high)
+        if new < low or new > high:
+            new = 0.5 * (low + high)
+        if abs(new - psi) <= 4e-16 * psi:
+            return new
+        psi = new
+    return psi
+
+
+def split_phase(x: float, y: float, a: float, kx: float, ky: float, phase: float) -> float:
+    """Return the phase from the nearest crest, in [-π, π]."""
+    angle = kx * x + ky * y + phase
+    turns = angle / (2.0 * math.pi) - (0.25 if a >= 0.0 else 0.75)
+    return 2.0 * math.pi * (turns - math.floor(turns + 0.5))
+
+
+def split_foot(
+    u: float, z: float, continuity: float, amplitude: float, bend: float
+) -> tuple[bool, float]:
+    """Return whether the god-object is split at |u|, and the phase of its feet, or of its foot."""
+    mu = 1.0 / (1.0 + continuity)
+    share = continuity * mu
+    # No foot is farther from the crest than the trough; none is split above this height.
+    if u < mu * math.pi and bend * (amplitude - z) > share:
+        psi = split_root(share, 0.0, z, amplitude, bend)
+        if u < mu * psi:
+            return True, psi
+    return False, split_root(1.0, u, z, amplitude, bend)
+
+
+def split_contact(
+    x: float, y: float, z: float, continuity: float, texture: tuple[float, float, float, float]
+) -> tuple[float, float, float]:
+    """Return z̄ - p, from the probe to the mean of the split god-object [m]."""
+    a, kx, ky, phase = texture
+    k2 = kx * kx + ky * ky
+    u = split_phase(x, y, a, kx, ky, phase)
+    split, psi = split_foot(abs(u), z, continuity, abs(a), k2 * abs(a))
+    shift = continuity * u if split else math.copysign(psi - abs(u), u)
+    return kx * shift / k2, ky * shift / k2, abs(a) * math.cos(psi) - z
+
+
+def split_derivative(
+    x: float, y: float, z: float, continuity: float, texture: tuple[float, float, float, float]
+) -> tuple[float, float, float, float, float, float, float, float, float]:
+    """Return z̄ - p [m] and its derivative by p as m_xx, m_xy, m_xz, m_yy, m_yz, m_zz."""
+    a, kx, ky, phase = texture
+    amplitude = abs(a)
+    k2 = kx * kx + ky * ky
+    wave = math.sqrt(k2)
+    u = split_phase(x, y, a, kx, ky, phase)
+    split, psi = split_foot(abs(u), z, continuity, amplitude, k2 * amplitude)
+    s = math.sin(psi)
+    c = math.cos(psi)
+    gap = amplitude * c - z
+    if split:
+        share = continuity / (1.0 + continuity)
+        shift = continuity * u
+        rate = share + k2 * amplitude * (amplitude * s * s - c * gap)
+        along = continuity
+        mixed = 0.0
+        upward = amplitude * k2 * amplitude * s * s / rate - 1.0
+    else:
+        shift = math.copysign(psi - abs(u), u)
+        slope = -amplitude * wave * math.copysign(s, u)
+        q = 1.0 + slope * slope - gap * amplitude * k2 * c
+        # At the crest's centre of curvature q is zero: the stiffness of law D is unbounded there,
+        # but the god-object is split before the probe comes so deep.
+        along = 1.0 / q - 1.0
+        mixed = slope / q
+        upward = slope * slope / q - 1.0
+    ex = kx / wave
+    ey = ky / wave
+    return (
+        kx * shift / k2, ky * shift / k2, gap,
+        ex * ex * along, ex * ey * along, ex * mixed, ey * ey * along, ey * mixed, upward,
+    )  # fmt: skip
+
+
+def split_energy(
+    x: float, y: float, z: float, continuity: float, texture: tuple[float, float, float, float]
+) -> tuple[float, int, float]:
+    """Return U [m²], the number of atoms, and the gap between U and the dual's lower bound [m²].
+
+    The lower bound takes the globally nearest point of y from the sampler's own search.
+    """
+    a, kx, ky, phase = texture
+    k2 = kx * kx + ky * ky
+    share = continuity / (1.0 + continuity)
+    u = split_phase(x, y, a, kx, ky, phase)
+    split, psi = split_foot(abs(u), z, continuity, abs(a), k2 * abs(a))
+    foot = psi if split else math.copysign(psi, u)
+    shift = continuity * u if split else foot - u
+    h = abs(a) * math.cos(psi)
+    # Variance of the atoms ±ψ around their mean (1 + c) u.
+    mean = (1.0 + continuity) * u
+    spread = (psi - mean) * (psi + mean) / k2 if split else 0.0
+    value = 0.5 * (shift * shift / k2 + (h - z) * (h - z) + share * spread)
+    far = u - shift / continuity
+    far_x = x - kx * (shift / continuity) / k2
+    far_y = y - ky * (shift / continuity) / k2
+    far_z = z - (h - z) / continuity
+    near_x, near_y = nearest(far_x, far_y, far_z, a, kx, ky, phase)
+    near = far + kx * (near_x - far_x) + ky * (near_y - far_y)
+    near_h = a * math.sin(kx * near_x + ky * near_y + phase)
+    # Products of sums and differences: squares would cancel.
+    gap = (foot - near) * (foot + near - 2.0 * far) / k2 + (h - near_h) * (h + near_h - 2.0 * far_z)
+    return value, 2 if split else 1, max(0.5 * share * gap, 0.0)

@@ -1,0 +1,206 @@
+"""Law H from a table: a quadratic B-spline whose coefficients are the exact potential at nodes.
+
+Arguments, after the probe: ``c``, coefficients [m²] by second axis, first axis and z, with one
+node before the first and one or two after the last along both axes (a profile has no second one);
+``x0``, ``y0``, ``z0``, the first node [m]; ``m00``, ``m01``, ``m10``, ``m11``, nodes per metre
+along the two axes of the texture; ``iz``, nodes per metre along z; ``mirrored`` at the border, else
+periodic.
+
+Below the floor, halfway between the two lowest nodes, the table goes on with its value and slope
+there and the curvature of the flat wall: there the force stays the gradient of a potential, and
+continuous.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+Weights = tuple[float, float, float]
+
+
+def table_fold(u: float, cells: int, mirrored: bool) -> tuple[float, float]:
+    """Return the coordinate inside [0, cells] and the sign of its derivative."""
+    if 0.0 <= u <= cells:
+        return u, 1.0
+    if not mirrored:
+        return min(u - cells * math.floor(u / cells), float(cells)), 1.0
+    u -= 2.0 * cells * math.floor(u / (2.0 * cells))
+    if u > cells:
+        return max(2.0 * cells - u, 0.0), -1.0
+    return u, 1.0
+
+
+def table_weights(t: float) -> tuple[float, float, float]:
+    """Return the three quadratic B-spline weights at t in [-1/2, 1/2] from the middle node."""
+    return 0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)
+
+
+def table_slopes(t: float) -> tuple[float, float, float]:
+    """Return the derivatives of the weights by t."""
+    return t - 0.5, -2.0 * t, t + 0.5
+
+
+def table_height(w: float) -> tuple[int, float, Weights, Weights]:
+    """Return node, height above the floor where that is negative, and weights along z.
+
+    Below the floor the weights are continued in a straight line.
+    """
+    if w >= 0.5:
+        m = int(w + 0.5)
+        return m, 0.0, table_weights(w - m), table_slopes(w - m)
+    t = w - 0.5
+    return 1, t, (0.5 - t, 0.5 + t, 0.0), (-1.0, 1.0, 0.0)
+
+
+def table_dot(c: FloatArray, i: int, j: int, m: int, w: Weights) -> float:
+    """Return the weighted sum of three coefficients along z."""
+    return float(w[0] * c[i, j, m - 1] + w[1] * c[i, j, m] + w[2] * c[i, j, m + 1])
+
+
+def profile_gradient(
+    x: float, y: float, z: float, c: FloatArray, x0: float, y0: float, z0: float,
+    m00: float, m01: float, m10: float, m11: float, iz: float, mirrored: bool,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Return ∇U [m]."""
+    w = (z - z0) * iz
+    if w >= c.shape[2] - 1.5:
+        return 0.0, 0.0, 0.0
+    u, sign = table_fold((x - x0) * m00 + (y - y0) * m01, c.shape[1] - 3, mirrored)
+    j = int(u + 0.5)
+    u0, u1, u2 = table_weights(u - j)
+    d0, d1, d2 = table_slopes(u - j)
+    m, below, values, slopes = table_height(w)
+    gu = d0 * table_dot(c, 0, j, m, values)
+    gu += d1 * table_dot(c, 0, j + 1, m, values)
+    gu += d2 * table_dot(c, 0, j + 2, m, values)
+    gw = u0 * table_dot(c, 0, j, m, slopes)
+    gw += u1 * table_dot(c, 0, j + 1, m, slopes)
+    gw += u2 * table_dot(c, 0, j + 2, m, slopes)
+    gu *= sign
+    return m00 * gu, m01 * gu, iz * gw + below / iz
+
+
+def map_gradient(
+    x: float, y: float, z: float, c: FloatArray, x0: float, y0: float, z0: float,
+    m00: float, m01: float, m10: float, m11: float, iz: float, mirrored: bool,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Return ∇U [m]."""
+    w = (z - z0) * iz
+    if w >= c.shape[2] - 1.5:
+        return 0.0, 0.0, 0.0
+    u, u_sign = table_fold((x - x0) * m00 + (y - y0) * m01, c.shape[1] - 3, mirrored)
+    v, v_sign = table_fold((x - x0) * m10 + (y - y0) * m11, c.shape[0] - 3, mirrored)
+    j = int(u + 0.5)
+    i = int(v + 0.5)
+    u0, u1, u2 = table_weights(u - j)
+    d0, d1, d2 = table_slopes(u - j)
+    v0, v1, v2 = table_weights(v - i)
+    e0, e1, e2 = table_slopes(v - i)
+    m, below, values, slopes = table_height(w)
+    a0 = table_dot(c, i, j, m, values)
+    a1 = table_dot(c, i, j + 1, m, values)
+    a2 = table_dot(c, i, j + 2, m, values)
+    b0 = table_dot(c, i + 1, j, m, values)
+    b1 = table_dot(c, i + 1, j + 1, m, values)
+    b2 = table_dot(c, i + 1, j + 2, m, values)
+    c0 = table_dot(c, i + 2, j, m, values)
+    c1 = table_dot(c, i + 2, j + 1, m, values)
+    c2 = table_dot(c, i + 2, j + 2, m, values)
+    gu = v0 * (d0 * a0 + d1 * a1 + d2 * a2)
+    gu += v1 * (d0 * b0 + d1 * b1 + d2 * b2)
+    gu += v2 * (d0 * c0 + d1 * c1 + d2 * c2)
+    gv = e0 * (u0 * a0 + u1 * a1 + u2 * a2)
+    gv += e1 * (u0 * b0 + u1 * b1 + u2 * b2)
+    gv += e2 * (u0 * c0 + u1 * c1 + u2 * c2)
+    gw = 0.0
+    for k in range(3):
+        along = u0 * table_dot(c, i + k, j, m, slopes)
+        along += u1 * table_dot(c, i + k, j + 1, m, slopes)
+        along += u2 * table_dot(c, i + k, j + 2, m, slopes)
+        gw += (v0, v1, v2)[k] * along
+    gu *= u_sign
+    gv *= v_sign
+    return m00 * gu + m10 * gv, m01 * gu + m11 * gv, iz * gw + below / iz
+
+
+def table_expansion(
+    x: float, y: float, z: float, c: FloatArray, x0: float, y0: float, z0: float,
+    m00: float, m01: float, m10: float, m11: float, iz: float, mirrored: bool,
+) -> tuple[float, float, float, float, float, float, float]:  # fmt: skip
+    """Return U [m²] and its second derivatives xx, xy, xz, yy, yz, zz [1], of profile or map."""
+    w = (z - z0) * iz
+    if w >= c.shape[2] - 1.5:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    u, u_sign = table_fold((x - x0) * m00 + (y - y0) * m01, c.shape[1] - 3, mirrored)
+    j = int(u + 0.5)
+    u0 = table_weights(u - j)
+    u1 = table_slopes(u - j)
+    i = 0
+    v_sign = 1.0
+    v0 = (1.0, 0.0, 0.0)
+    v1 = (0.0, 0.0, 0.0)
+    rows = 1
+    if c.shape[0] > 1:
+        v, v_sign = table_fold((x - x0) * m10 + (y - y0) * m11, c.shape[0] - 3, mirrored)
+        i = int(v + 0.5)
+        v0 = table_weights(v - i)
+        v1 = table_slopes(v - i)
+        rows = 3
+    m, below, w0, w1 = table_height(w)
+    bend = 1.0 if below == 0.0 else 0.0
+    second = (1.0, -2.0, 1.0)
+    value = uu = uv = uw = vv = vw = ww = 0.0
+    for a in range(rows):
+        for b in range(3):
+            s0 = table_dot(c, i + a, j + b, m, w0)
+            s1 = table_dot(c, i + a, j + b, m, w1)
+            s2 = bend * table_dot(c, i + a, j + b, m, second)
+            value += v0[a] * u0[b] * s0
+            uu += v0[a] * second[b] * s0
+            uv += v1[a] * u1[b] * s0
+            uw += v0[a] * u1[b] * s1
+            if rows > 1:
+                vv += second[a] * u0[b] * s0
+            vw += v1[a] * u0[b] * s1
+            ww += v0[a] * u0[b] * s2
+    uv *= u_sign * v_sign
+    uw *= u_sign
+    vw *= v_sign
+    drop = below / iz
+    return (
+        value + 0.5 * drop * drop,
+        m00 * m00 * uu + 2.0 * m00 * m10 * uv + m10 * m10 * vv,
+        m00 * m01 * uu + (m00 * m11 + m01 * m10) * uv + m10 * m11 * vv,
+        iz * (m00 * uw + m10 * vw),
+        m01 * m01 * uu + 2.0 * m01 * m11 * uv + m11 * m11 * vv,
+        iz * (m01 * uw + m11 * vw),
+        iz * iz * ww + (1.0 - bend),
+    )
+
+
+def profile_force_batch(points: FloatArray, out: FloatArray, k: float, table: Any) -> None:
+    """Forces [N] at the points [m]."""
+    for i in range(points.shape[0]):
+        gx, gy, gz = profile_gradient(points[i, 0], points[i, 1], points[i, 2], *table)
+        out[i, 0] = -k * gx
+        out[i, 1] = -k * gy
+        out[i, 2] = -k * gz
+
+
+def map_force_batch(points: FloatArray, out: FloatArray, k: float, table: Any) -> None:
+    """Forces [N] at the points [m]."""
+    for i in range(points.shape[0]):
+        gx, gy, gz = map_gradient(points[i, 0], points[i, 1], points[i, 2], *table)
+        out[i, 0] = -k * gx
+        out[i, 1] = -k * gy
+        out[i, 2] = -k * gz
+
+
+def expansion_batch(points: FloatArray, out: FloatArray, table: Any) -> None:
+    """U [m²] and its second derivatives [1] at the points [m]."""
+    for i in range(points.shape[0]):
+        values = table_expansion(points[i, 0], points[i, 1], points[i, 2], *table)
+        for d in range(7):
+            out[i, d] = values[d]
