@@ -21,8 +21,9 @@ from asperity.analysis.problems import (
 )
 from asperity.analysis.ridges import sharpest_crest
 from asperity.analysis.sampling import sampled, sampling_cells
-from asperity.analysis.witness import Witness, attained
+from asperity.analysis.witness import Witness, attained, lower_of
 from asperity.checks import FloatArray
+from asperity.errors import ParameterError
 from asperity.laws import LAWS
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
@@ -30,6 +31,8 @@ from asperity.textures.sinusoid import Sinusoid
 # Rounding of the few operations between a problem's bound and the number.
 _INFLATE = 1.0 + 1e-14
 _ABOVE_THE_AXIS = 0.999
+# A number that is as good as zero has no relative gap.
+_NOTHING = 1e-8
 Step = Callable[[float], float]
 
 
@@ -49,6 +52,14 @@ class Search:
     work_limit: int = DEFAULT_WORK_LIMIT
     extent: tuple[float, float] | None = None
 
+    def margin(self, surface: Surface) -> float:
+        """Return how far beyond the extent the surface is felt [m]: feet are not below probes."""
+        return surface.max_depth if surface.law.contact in {"nearest", "split"} else 0.0
+
+    def wish(self, cells: Cells) -> float | None:
+        """Return the gap to try for where it costs little."""
+        return cells.wish if self.tolerance is None else None
+
     def gap(self, cells: Cells) -> float:
         """Return the relative gap to reach."""
         if self.tolerance is not None:
@@ -66,8 +77,13 @@ def certified(surface: Surface, number: Number, search: Search) -> Bound:
 
     Sampling remains for sums of more than three independent waves without an extent, for which
     the safe bound stands as ``upper``, and for laws of your own that are written in pieces.
+
+    Raises:
+        ParameterError: for a law of your own on the split contact.
     """
-    cells = cells_of(surface.texture, search.extent)
+    if surface.law.contact == "split":
+        raise ParameterError("law", f"{surface.law} is on the split contact, which has no samples")
+    cells = cells_of(surface.texture, search.extent, search.margin(surface))
     if cells is None:
         problem, step = _problem(surface, sampling_cells(surface.texture), number)
         found = sampled(problem)
@@ -75,20 +91,41 @@ def certified(surface: Surface, number: Number, search: Search) -> Bound:
         return _bound(surface, number, problem, found, safe_bound(surface, number), text)
     radius = _least_radius(surface, search)
     if surface.max_depth >= radius:
-        shallow = certified(surface.to_depth(_ABOVE_THE_AXIS * radius), number, search)
+        above = _ABOVE_THE_AXIS * radius if radius > 0.0 else 1e-3 * surface.max_depth
+        shallow = certified(surface.to_depth(above), number, search)
         text = "attained above the medial axis; where the contact point jumps nothing is proved"
         return replace(shallow, upper=math.inf, method="sampled", note=text)
     problem, step = _problem(surface, cells, number)
+    at_once = _at_once(surface, problem, search)
+    if at_once is not None:
+        text = f"convex on an ellipse, within {at_once.cells} of its tangents"
+        return _bound(surface, number, problem, at_once, step(at_once.upper), text)
     try:
-        found = supremum(problem, search.gap(problem.cells), search.work_limit)
-    except TypeError:
-        text = "the law is written in pieces, which have no interval kernel; not a proof"
+        found = supremum(
+            problem, search.gap(problem.cells), search.work_limit, search.wish(problem.cells)
+        )
+    except TypeError as error:
+        text = f"the law has no interval kernel ({error}); not a proof"
         return _bound(surface, number, problem, sampled(problem), math.inf, text)
     upper = step(found.upper) * _INFLATE
     text = f"branch and bound, {found.cells} cells"
     if not found.reached:
         text += "; the work limit was reached before the tolerance"
-    return _bound(surface, number, problem, found, upper, text)
+    bound = _bound(surface, number, problem, found, upper, text)
+    if found.reached and bound.gap > 1.01 * search.gap(problem.cells) and bound.upper > _NOTHING:
+        return replace(bound, note=f"{text}; the witness is only near the supremum")
+    return bound
+
+
+def _at_once(surface: Surface, problem: Problem, search: Search) -> Supremum | None:
+    """Return bounds that need no search, if they are as near as was asked for."""
+    texture, gap = surface.texture, search.wish(problem.cells) or search.gap(problem.cells)
+    if not isinstance(problem, FrictionProblem) or not isinstance(texture, Sinusoid):
+        return None
+    if search.extent is not None:
+        return None
+    found = problem.around(texture)
+    return found if found.upper <= found.lower * (1.0 + gap) else None
 
 
 def _problem(surface: Surface, cells: Cells, number: Number) -> tuple[Problem, Step]:
@@ -115,7 +152,8 @@ def _least_radius(surface: Surface, search: Search) -> float:
     """
     if surface.law.contact != "nearest" or (is_shipped(surface) and surface.law.letter == "E"):
         return math.inf
-    crest = sharpest_crest(surface.texture, extent=search.extent)
+    margin = search.margin(surface)
+    crest = sharpest_crest(surface.texture, extent=search.extent, margin=margin)
     return math.inf if crest is None else crest.least_radius
 
 
@@ -204,11 +242,13 @@ def safe_bound(surface: Surface, number: Number) -> float:
 
 
 def sinusoid_number(surface: Surface, number: Number, value: float, phase: float) -> Bound:
-    """Return a number that a closed form gives, with its witness at a phase, at full depth."""
+    """Return a number that a closed form gives, with its witness at a phase.
+
+    At full depth; law E's is attained at every depth at which the foot is the nearest point.
+    """
     texture = surface.texture
     assert isinstance(texture, Sinusoid)
     along = (phase - texture.phase) * texture.period / (2.0 * math.pi)
-    witness = attained(surface, number, along * np.array(texture.direction), surface.max_depth)
-    # The two are one number but for rounding.
-    lower = min(witness.value, value)
-    return Bound(lower, value, "closed form", witness.at, "MATH section 4")
+    depth = 0.0 if surface.law.contact == "nearest" else surface.max_depth
+    witness = attained(surface, number, along * np.array(texture.direction), depth)
+    return Bound(lower_of(value, witness), value, "closed form", witness.at, "MATH section 4")

@@ -6,19 +6,17 @@ section 4). Both are taken over the working region: depths up to the surface's m
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
+from collections.abc import Sequence
 
 from asperity.analysis import closed_forms
 from asperity.analysis.bound import Bound
 from asperity.analysis.branch_and_bound import DEFAULT_WORK_LIMIT
 from asperity.analysis.certificate import Search, certified, is_shipped, sinusoid_number
-from asperity.analysis.god_object import crest_number
+from asperity.analysis.god_object import crest_number, split_number
 from asperity.analysis.highest import highest_point
 from asperity.analysis.keeping import kept
 from asperity.analysis.measures import CURL, NORM, ONE_SIDED, Number
-from asperity.analysis.witness import attained
+from asperity.analysis.witness import attained, lower_of
 from asperity.checks import positive
 from asperity.derive.facts import law_facts
 from asperity.errors import ParameterError
@@ -45,14 +43,16 @@ def characteristic_number(
         work_limit: greatest number of cells to look at; if it is reached the bounds found by then
             are returned, and the note says so.
         extent: width and depth [m] of the part of the plane that counts, from the origin, for
-            sums of waves; the whole plane by default.
+            sums of waves; the whole plane by default. For laws that feel the nearest point it is
+            widened by the depth on every side.
 
     Returns:
         A :class:`Bound`; infinite for D where the depth reaches the medial axis, ``at`` then
         being the onset, the least depth of the medial axis.
 
     Raises:
-        ParameterError: for a tolerance, a limit or an extent that is not positive.
+        ParameterError: for a tolerance, a limit or an extent that is not positive, or a law of
+            your own on the split contact.
 
     Reference:
         The paper's (5), (10) and Table II; MATH section 4 for the rest.
@@ -63,15 +63,14 @@ def characteristic_number(
         >>> round(characteristic_number(Surface(paper, "A")).value, 4)
         5.1251
     """
-    search = _search(tolerance, work_limit, extent)
+    search = _search(surface, tolerance, work_limit, extent)
     letter = surface.law.letter if is_shipped(surface) else ""
     if letter in {"W", "E"}:
         return _constant(surface, NORM, 1.0, "‖J‖ is exactly k everywhere")
     if letter == "D":
         return kept(surface, "q", search, lambda: crest_number(surface, search))
     if letter == "H":
-        reason = "-c <= Hess U <= 1 for any surface: q = max(1, c)"
-        return _split_number(surface, max(1.0, surface.continuity), reason)
+        return kept(surface, "q", search, lambda: split_number(surface, search))
     return _number(surface, NORM, search, closed_forms.Q)
 
 
@@ -91,18 +90,16 @@ def one_sided_number(
         >>> one_sided_number(Surface(paper, "D")).value
         1.0
     """
-    search = _search(tolerance, work_limit, extent)
+    search = _search(surface, tolerance, work_limit, extent)
     reasons = {
         "W": "-J = k e_z e_zᵀ",
         "D": "the potential is half a squared distance, whose Hessian is at most the identity",
         "E": "λ_max of the symmetric part of e_z nᵀ is (1 + n_z)/2, 1 where the surface is level",
+        "H": "the potential is an infimum of functions whose Hessian is the identity",
     }
     letter = surface.law.letter if is_shipped(surface) else ""
     if letter in reasons:
         return _constant(surface, ONE_SIDED, 1.0, reasons[letter])
-    if letter == "H":
-        reason = "the potential is an infimum of functions whose Hessian is the identity"
-        return _split_number(surface, 1.0, reason)
     return _number(surface, ONE_SIDED, search, closed_forms.ONE_SIDED)
 
 
@@ -125,19 +122,28 @@ def curl_number(
         >>> round(curl_number(Surface(paper, "A")).value, 4)  # the greatest slope, 2πA/l
         5.0265
     """
+    search = _search(surface, tolerance, work_limit, extent)
     if surface.law.stateful:
         raise ParameterError("law", f"{surface.law} has state: its force is no field with a curl")
     facts = law_facts(surface.law)
     if facts.conservative:
         return Bound(0.0, 0.0, "theorem", None, facts.reason)
-    search = _search(tolerance, work_limit, extent)
     return _number(surface, CURL, search, closed_forms.CURL)
 
 
-def _search(tolerance: float | None, work_limit: int, extent: tuple[float, float] | None) -> Search:
+def _search(
+    surface: Surface,
+    tolerance: float | None,
+    work_limit: int,
+    extent: tuple[float, float] | None,
+) -> Search:
+    if not isinstance(surface, Surface):
+        raise ParameterError("surface", "must be a Surface", surface)
     gap = None if tolerance is None else positive("tolerance", tolerance)
     limit = int(positive("work_limit", work_limit))
     if extent is not None:
+        if not isinstance(extent, Sequence) or isinstance(extent, str) or len(extent) != 2:
+            raise ParameterError("extent", "must be (width, depth) [m]", extent)
         width, depth = (positive("extent", side, "m") for side in extent)
         extent = (width, depth)
     return Search(gap, limit, extent)
@@ -150,7 +156,8 @@ def _number(
     formulas: dict[str, closed_forms.ClosedForm],
 ) -> Bound:
     texture, letter = surface.texture, surface.law.letter
-    if is_shipped(surface) and isinstance(texture, Sinusoid) and letter in formulas:
+    whole = isinstance(texture, Sinusoid) and search.extent is None
+    if is_shipped(surface) and isinstance(texture, Sinusoid) and whole and letter in formulas:
         value = formulas[letter](texture, surface.max_depth)
         phase = closed_forms.PHASES[letter](texture, surface.max_depth)
         return sinusoid_number(surface, number, value, phase)
@@ -163,14 +170,4 @@ def _constant(surface: Surface, number: Number, value: float, reason: str) -> Bo
     Just inside the highest point the normal is e_z.
     """
     witness = attained(surface, number, highest_point(surface.texture), 0.0)
-    return Bound(min(value, witness.value), value, "theorem", witness.at, reason)
-
-
-def _split_number(surface: Surface, value: float, reason: str) -> Bound:
-    """Return law H's number; for c > 1 it is approached where the god-object is split."""
-    if value > 1.0 and not math.isclose(value, 1.0):
-        return Bound(value, value, "theorem", None, reason)
-    xy = highest_point(surface.texture)
-    height = float(surface.texture.height(np.array([xy]))[0])
-    at = (float(xy[0]), float(xy[1]), height - 1e-9 * surface.max_depth)
-    return Bound(value, value, "theorem", at, reason)
+    return Bound(lower_of(value, witness), value, "theorem", witness.at, reason)

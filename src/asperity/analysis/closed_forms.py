@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-
-import numpy as np
+from itertools import pairwise
 
 from asperity.textures.sinusoid import Sinusoid
 
@@ -44,23 +43,38 @@ def q_c(texture: Sinusoid, depth: float) -> float:
 
 
 def _feasible_roots(texture: Sinusoid, depth: float) -> list[float]:
+    """Return the feasible roots by t = 1/λ: (E²/4) t (1 - t)² + (1 + G₁²) t = 1, 0 < t < 1."""
     g, e = _slope(texture), 2.0 * math.pi * depth / texture.period
-    cubic = [1.0, -(1.0 + g * g + e * e / 4.0), e * e / 2.0, -e * e / 4.0]
-    roots = np.roots(cubic)
-    real = [float(r.real) for r in roots if abs(r.imag) <= 1e-9 * abs(r)]
-    polished = [_polish(cubic, root) for root in real]
-    return [r for r in polished if r > 1.0 and e * (r - 1.0) <= 2.0 * g * r * (1.0 + 1e-12)]
+    bend, rate = e * e / 4.0, 1.0 + g * g
+    # Between these the left side is monotone: 3t² - 4t + 1 + rate/bend = 0.
+    inner = 4.0 - 3.0 * (1.0 + rate / bend) if rate < bend else -1.0
+    turns = [(2.0 - math.sqrt(inner)) / 3.0, (2.0 + math.sqrt(inner)) / 3.0] if inner > 0.0 else []
+    ends = [0.0, *turns, 1.0]
+    roots = [_root(bend, rate, low, high) for low, high in pairwise(ends)]
+    found = [1.0 / t for t in roots if t is not None]
+    return [r for r in found if r > 1.0 and e * (r - 1.0) <= 2.0 * g * r * (1.0 + 1e-12)]
 
 
-def _polish(cubic: list[float], root: float) -> float:
-    """Return the root after Newton steps: np.roots loses digits where coefficients differ much."""
-    derivative = np.polyder(cubic)
-    for _ in range(4):
-        rate = float(np.polyval(derivative, root))
-        if rate == 0.0:
-            break
-        root -= float(np.polyval(cubic, root)) / rate
-    return root
+def _root(bend: float, rate: float, low: float, high: float) -> float | None:
+    """Return where bend t (1 - t)² + rate t = 1 between two points, by Newton and halving."""
+
+    def excess(t: float) -> float:
+        return (bend * (1.0 - t) ** 2 + rate) * t - 1.0
+
+    sign = 1.0 if excess(high) > 0.0 else -1.0
+    if sign * excess(low) > 0.0:
+        return None
+    t = min(max(1.0 / rate, low), high)
+    for _ in range(200):
+        off = sign * excess(t)
+        low, high = (t, high) if off <= 0.0 else (low, t)
+        slope = sign * (bend * (1.0 - t) * (1.0 - 3.0 * t) + rate)
+        step = t - off / slope if slope > 0.0 else low
+        step = step if low < step < high else 0.5 * (low + high)
+        if abs(step - t) <= 1e-16 * t:
+            return step
+        t = step
+    return t
 
 
 def q_d(texture: Sinusoid, depth: float) -> float:

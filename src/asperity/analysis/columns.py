@@ -139,7 +139,8 @@ def _lifted(model: Number) -> Number:
 
 def sampled_sides(surface: Surface, line: ScanLine) -> tuple[float, float]:
     """Return ∬curl⁺ and ∬curl⁻ [J] by sampling: what is certified later for the worst line."""
-    along = (np.arange(_NODES) + 0.5) * (line.length / _NODES)
+    steps: FloatArray = np.arange(_NODES, dtype=np.float64) + 0.5
+    along = np.asarray(steps * (line.length / _NODES), dtype=np.float64)
     layers = _layers(surface.max_depth, law_facts(surface.law).affine_in_depth)
     total = np.zeros(2)
     for top, bottom in layers:
@@ -172,9 +173,7 @@ def column_loop(surface: Surface, line: ScanLine, sign: float) -> FloatArray:
     along = np.asarray(np.linspace(0.0, line.length, _node_count(surface.texture, line) + 1))
     affine = law_facts(surface.law).affine_in_depth
     levels = np.linspace(0.0, surface.max_depth, 2 if affine else _LAYERS + 1)
-    curls = np.stack(
-        [sign * curl_along(surface, line, np.asarray(along), float(level)) for level in levels]
-    )
+    curls = np.stack([sign * curl_along(surface, line, along, float(level)) for level in levels])
     top, bottom = positive_interval(levels, curls)
     xy = line.start + along[:, None] * line.direction
     surface_z = np.zeros(len(xy))

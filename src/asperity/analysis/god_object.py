@@ -15,9 +15,13 @@ from asperity.analysis.highest import highest_point
 from asperity.analysis.measures import NORM
 from asperity.analysis.problems import CrestProblem
 from asperity.analysis.ridges import Crest, sharpest_crest
-from asperity.analysis.witness import attained
+from asperity.analysis.witness import attained, lower_of
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
+
+_ROUNDING = 1e-14
+_ONSET = "the depth reaches the medial axis, where the force jumps; its onset is given"
+_UNDECIDED = "crest curvature: whether the depth reaches the medial axis is not settled"
 
 
 def crest_number(surface: Surface, search: Search) -> Bound:
@@ -27,34 +31,74 @@ def crest_number(surface: Surface, search: Search) -> Bound:
     the nearest point down to the least radius of all crests (see ``ridges.py``).
     """
     texture, depth = surface.texture, surface.max_depth
-    if depth * texture.bounds[1] <= 0.5 and not isinstance(texture, Sinusoid):
+    if isinstance(texture, Sinusoid) and search.extent is None:
+        return _sinusoid_number(surface, texture)
+    if depth * texture.bounds[1] <= 0.5:
         witness = attained(surface, NORM, highest_point(texture), depth)
         note = "depth times the bound of the second derivatives is at most 1/2"
-        return Bound(min(witness.value, 1.0), 1.0, "theorem", witness.at, note)
-    crest = sharpest_crest(texture, extent=search.extent)
+        return Bound(lower_of(1.0, witness), 1.0, "theorem", witness.at, note)
+    margin = search.margin(surface)
+    crest = sharpest_crest(texture, extent=search.extent, margin=margin)
     if crest is None:
-        return Bound(1.0, 1.0, "certified", None, "the surface has no crest")
+        witness = attained(surface, NORM, highest_point(texture), 0.0)
+        note = "the surface has no crest"
+        return Bound(lower_of(1.0, witness), 1.0, "certified", witness.at, note)
     if depth >= crest.radius:
-        method: Method = "closed form" if isinstance(texture, Sinusoid) else _method(crest)
-        note = "the depth reaches the medial axis, where the force jumps; its onset is given"
-        return Bound(math.inf, math.inf, method, crest.centre, note)
+        return Bound(math.inf, math.inf, _method(crest), crest.centre, _ONSET)
     foot, least = np.array(crest.foot[:2]), crest.least_radius
-    if isinstance(texture, Sinusoid):
-        value = closed_forms.q_d(texture, depth)
-        witness = attained(surface, NORM, foot, depth)
-        return Bound(min(witness.value, value), value, "closed form", witness.at, "MATH section 4")
-    cells = cells_of(texture, search.extent)
+    cells = cells_of(texture, search.extent, margin)
     if cells is not None:
-        found = supremum(CrestProblem(cells, depth), search.gap(cells), search.work_limit)
+        found = supremum(
+            CrestProblem(cells, depth), search.gap(cells), search.work_limit, search.wish(cells)
+        )
         least = 1.0 / found.upper
         if found.at is not None:
             foot = cells.plane(found.at[None])[0]
     elif texture.bounds[1] > 0.0:
         least = max(least, 1.0 / texture.bounds[1])
     witness = attained(surface, NORM, foot, depth)
-    upper = _number(depth / least) * (1.0 + 1e-13)
+    # What rounding costs grows towards the medial axis.
+    upper = _number(depth / least * (1.0 + _ROUNDING)) * (1.0 + _ROUNDING)
     proof: Method = "certified" if math.isfinite(upper) else "sampled"
-    return Bound(witness.value, max(upper, witness.value), proof, witness.at, "crest curvature")
+    note = "crest curvature" if proof == "certified" else _UNDECIDED
+    return Bound(witness.value, max(upper, witness.value), proof, witness.at, note)
+
+
+def _sinusoid_number(surface: Surface, texture: Sinusoid) -> Bound:
+    value, crest = closed_forms.q_d(texture, surface.max_depth), sharpest_crest(texture)
+    assert crest is not None
+    if math.isinf(value):
+        return Bound(math.inf, math.inf, "closed form", crest.centre, _ONSET)
+    witness = attained(surface, NORM, np.array(crest.foot[:2]), surface.max_depth)
+    lower = lower_of(value, witness)
+    return Bound(lower, value, "closed form", witness.at, "MATH section 4")
+
+
+def split_number(surface: Surface, search: Search) -> Bound:
+    """Return q_H: max(1, c) by theorem, less only where nothing is deep enough to split.
+
+    Down to the fraction c/(1 + c) of the crest's radius H is law D, whose number grows to c there.
+    """
+    c = surface.continuity
+    reason = "-c <= Hess U <= 1 for any surface: q = max(1, c)"
+    crest = None
+    if c > 1.0:
+        margin = search.margin(surface)
+        crest = sharpest_crest(surface.texture, extent=search.extent, margin=margin)
+    if crest is None:
+        witness = attained(surface, NORM, highest_point(surface.texture), 0.0)
+        return Bound(lower_of(1.0, witness), 1.0, "theorem", witness.at, reason)
+    share = c / (1.0 + c) * crest.radius
+    foot = np.array(crest.foot[:2])
+    # The very depth at which the foot splits has two derivatives.
+    depths = (min(surface.max_depth, (1.0 - 1e-6) * share), min(surface.max_depth, 1.05 * share))
+    witness = max((attained(surface, NORM, foot, d) for d in depths), key=lambda w: w.value)
+    least = crest.least_radius
+    y = surface.max_depth / least * (1.0 + _ROUNDING) if least > 0.0 else math.inf
+    upper = min(c, _number(y) * (1.0 + _ROUNDING))
+    if upper < c:
+        reason = "law D's number: the depth is too small for the god-object to split"
+    return Bound(lower_of(upper, witness), upper, "theorem", witness.at, reason)
 
 
 def _number(y: float) -> float:

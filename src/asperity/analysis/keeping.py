@@ -1,8 +1,8 @@
 """Certificates are kept on disk by the content of what they certify, so none is made twice.
 
 The key is a digest of the texture's arguments, the law's kernel, all parameters, the search, and
-the source of this package's analysis: whatever changes, the certificate is made anew. A file that
-cannot be read or written only costs time.
+the source of this package: whatever changes, the certificate is made anew. A file that cannot be
+read or written, or that says what no certificate says, only costs time.
 """
 
 from __future__ import annotations
@@ -15,10 +15,11 @@ from collections.abc import Callable
 from dataclasses import astuple
 from functools import lru_cache
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
-from asperity.analysis.bound import Bound
+from asperity.analysis.bound import Bound, Method
 from asperity.analysis.certificate import Search
 from asperity.derive.fuse import cache_directory, kernel_source
 from asperity.surface import Surface
@@ -52,7 +53,7 @@ def _key(surface: Surface, name: str, search: Search) -> str:
         surface.clamp,
     )
     said = repr((name, surface.law.contact, parameters, astuple(search)))
-    parts = [said, kernel_source(surface.law), texture_digest(surface.texture), _analysis_digest()]
+    parts = [said, kernel_source(surface.law), texture_digest(surface.texture), _source_digest()]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
 
 
@@ -68,9 +69,9 @@ def texture_digest(texture: Texture) -> str:
 
 
 @lru_cache(maxsize=1)
-def _analysis_digest() -> str:
+def _source_digest() -> str:
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.rglob("*.py")):
+    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
@@ -78,32 +79,41 @@ def _analysis_digest() -> str:
 def _read(path: Path) -> Bound | None:
     try:
         saved = json.loads(path.read_text(encoding="utf-8"))
-        numbers = {name: _number(saved[name]) for name in ("lower", "upper")}
+        lower, upper = _number(saved["lower"]), _number(saved["upper"])
         at, held = (saved[name] for name in ("at", "deflection"))
+        if not lower <= upper or saved["method"] not in get_args(Method):
+            return None
         return Bound(
-            method=saved["method"],
-            at=None if at is None else (float(at[0]), float(at[1]), float(at[2])),
+            lower,
+            upper,
+            saved["method"],
+            at=None if at is None else (_number(at[0]), _number(at[1]), _number(at[2])),
             note=str(saved["note"]),
-            deflection=None if held is None else (float(held[0]), float(held[1])),
+            deflection=None if held is None else (_number(held[0]), _number(held[1])),
             sliding=bool(saved["sliding"]),
-            **numbers,
         )
     except (OSError, ValueError, KeyError, TypeError, IndexError):
         return None
 
 
 def _number(text: float | str) -> float:
-    return math.inf if text == "inf" else float(text)
+    value = math.inf if text == "inf" else float(text)
+    if math.isnan(value):
+        raise ValueError("not a number")
+    return value
 
 
 def _write(path: Path, bound: Bound) -> None:
+    beside = None
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         # Written beside and renamed: another process never reads half a file.
         with tempfile.NamedTemporaryFile(
             "w", dir=path.parent, suffix=".tmp", delete=False, encoding="utf-8"
         ) as file:
+            beside = Path(file.name)
             json.dump(bound.to_dict(), file)
-        Path(file.name).replace(path)
+        beside.replace(path)
     except OSError:
-        return
+        if beside is not None:
+            beside.unlink(missing_ok=True)

@@ -1,11 +1,13 @@
 """What is measured of a Jacobian: its norm, its greatest symmetric eigenvalue, its curl.
 
 All three are convex functions of the matrix and change by at most its change in the Frobenius
-norm, so on a cell where the matrix is affine up to a known error they are greatest at a corner.
+norm, the curl by √2 times it, so on a cell where the matrix is affine up to a known error they are
+greatest at a corner.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -65,14 +67,24 @@ def _largest_eigenvalue(
 
 
 def precise_norm(matrices: FloatArray) -> FloatArray:
-    """Return the largest singular values by LAPACK."""
-    return np.asarray(np.linalg.svd(matrices, compute_uv=False)[..., 0])
+    """Return the largest singular values by LAPACK, NaN for a matrix that is not finite."""
+    return _of_finite(lambda m: np.asarray(np.linalg.svd(m, compute_uv=False)[..., 0]), matrices)
 
 
 def precise_one_sided(matrices: FloatArray) -> FloatArray:
-    """Return λ_max of minus the symmetric part by LAPACK."""
+    """Return λ_max of minus the symmetric part by LAPACK, NaN where it is not finite."""
     symmetric = -0.5 * (matrices + np.swapaxes(matrices, -1, -2))
-    return np.asarray(np.linalg.eigvalsh(symmetric)[..., -1])
+    return _of_finite(lambda m: np.asarray(np.linalg.eigvalsh(m)[..., -1]), symmetric)
+
+
+def _of_finite(measure: Measure, matrices: FloatArray) -> FloatArray:
+    """Return a measure of the matrices that are finite: LAPACK fails on any other."""
+    finite = np.isfinite(matrices).all(axis=(-2, -1))
+    if finite.all():
+        return np.asarray(measure(matrices))
+    result = np.full(finite.shape, np.nan)
+    result[finite] = measure(matrices[finite])
+    return result
 
 
 @dataclass(frozen=True)
@@ -84,12 +96,14 @@ class Number:
         quick: for many matrices; its error is at most ``quick_slack`` times the Frobenius norm.
         careful: by a backward stable method.
         quick_slack: see ``quick``.
+        rate: the most that it changes per change of the matrix in the Frobenius norm.
     """
 
     name: str
     quick: Measure
     careful: Measure
     quick_slack: float
+    rate: float = 1.0
 
     def at_most(self, c: FloatArray, g: FloatArray, e: FloatArray, above: float) -> FloatArray:
         """Return proved upper bounds over cells where the matrix is c + Σ g_i ξ_i ± e.
@@ -100,8 +114,9 @@ class Number:
             e: shape (n, 3, 3), not negative, entry by entry.
             above: cells that a rough bound leaves below this are not looked at more closely.
         """
-        size, unknown = _frobenius(c), _frobenius(e) * (1.0 + 1e-12)
-        moved = np.sqrt(np.einsum("dnij,dnij->dn", g, g)).sum(axis=0) * (1.0 + 1e-12)
+        size, unknown = _frobenius(c), self.rate * _frobenius(e) * (1.0 + 1e-12)
+        moved = np.sqrt(np.einsum("dnij,dnij->dn", g, g)).sum(axis=0)
+        moved *= self.rate * (1.0 + 1e-12)
         slack = self.quick_slack * (size + moved)
         bound = self.quick(c) + moved + unknown + slack
         bound = np.where(np.isnan(bound), np.inf, bound)
@@ -127,7 +142,8 @@ def _at_corners(measure: Measure, c: FloatArray, g: FloatArray) -> FloatArray:
         for axis, part in enumerate(g):
             moved += part if corner >> axis & 1 else -part
         best = np.maximum(best, measure(moved))
-    return best
+    # A number that overflows on the way is not known.
+    return np.where(np.isnan(best), np.inf, best)
 
 
 def _frobenius(matrices: FloatArray) -> FloatArray:
@@ -136,4 +152,4 @@ def _frobenius(matrices: FloatArray) -> FloatArray:
 
 NORM = Number("norm", spectral_norm, precise_norm, _QUICK_SLACK)
 ONE_SIDED = Number("one-sided", one_sided, precise_one_sided, _QUICK_SLACK)
-CURL = Number("curl", curl, curl, 1e-15)
+CURL = Number("curl", curl, curl, 4e-15, math.sqrt(2.0))

@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from asperity.analysis.branch_and_bound import Problem
+from asperity.analysis.branch_and_bound import Problem, Supremum
 from asperity.analysis.cells import NAMES, Cells
 from asperity.analysis.cells.products import (
     ANGLE,
@@ -33,6 +34,7 @@ from asperity.checks import FloatArray
 from asperity.derive.facts import law_facts
 from asperity.laws import Law
 from asperity.surface import Surface
+from asperity.textures.sinusoid import Sinusoid
 
 Entries = Sequence[Sequence[Number]]
 # Numbers of J/k below this are not resolved; a flat surface would have no relative gap.
@@ -76,7 +78,7 @@ class MatrixProblem(Problem):
         """See :class:`Problem`."""
         n, d = len(centres), len(half)
         best = np.full(n, -np.inf)
-        with np.errstate(invalid="ignore", over="ignore"):
+        with np.errstate(all="ignore"):
             models = self.cells.models(centres, half, self._names)
             for entries in self._matrices(models):
                 c, g, e = _stacked(entries, n, d)
@@ -89,7 +91,8 @@ class MatrixProblem(Problem):
 
     def levels(self, coordinates: FloatArray) -> FloatArray:
         """Return the measure of each of the matrices, shape (matrices, n)."""
-        return np.stack([self._number.careful(m) for m in self._exact(coordinates)])
+        with np.errstate(all="ignore"):
+            return np.stack([self._number.careful(m) for m in self._exact(coordinates)])
 
 
 def _stacked(entries: Entries, n: int, d: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -156,6 +159,8 @@ class LawProblem(MatrixProblem):
             for end in self._ends:
                 known = {**models, **state, **({} if end is None else {DEPTH: end})}
                 taken = {name: known[name] for name in self._taken if name in known}
+                if len(taken) + len(self._constants) < len(self._taken):
+                    raise TypeError("the force depends on the position itself")
                 result.append(_rows(self._kernel(**taken, **self._constants)[3:]))
         return result
 
@@ -346,3 +351,32 @@ class FrictionProblem(Problem):
         """See :class:`Problem`."""
         derivatives = self.cells.derivatives(coordinates)
         return self._entries(derivatives[:, 0], np.hypot(derivatives[:, 1], derivatives[:, 2]))
+
+    def around(self, texture: Sinusoid) -> Supremum:
+        """Return bounds on a sinusoid at once, without cells.
+
+        There (h, |∇h|) runs along half an ellipse, which a polygon of tangents encloses; a convex
+        number that grows with |∇h| is greatest at its corners, or where they touch.
+        """
+        touch, corner, radius = _half_circle()
+        height, slope = texture.amplitude, texture.bounds[0]
+        values = self._entries(height * np.sin(touch), slope * np.cos(touch))
+        beyond = self._entries(height * radius * np.sin(corner), slope * radius * np.cos(corner))
+        upper = max(float(values.max()), float(beyond.max())) * (1.0 + 1e-13)
+        index = min(max(int(values.argmax()), 1), len(values) - 2)
+        before, here, after = values[index - 1 : index + 2]
+        bend = before - 2.0 * here + after
+        shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+        step = float(touch[1] - touch[0])
+        tries = touch[index] + step * np.array([-1.0, 0.0, 1.0, min(max(shift, -1.0), 1.0)])
+        found = self._entries(height * np.sin(tries), slope * np.cos(tries))
+        best = int(found.argmax())
+        at = np.array([tries[best] - texture.phase])
+        return Supremum(float(found[best]), upper, at, len(corner), reached=True)
+
+
+@lru_cache(maxsize=1)
+def _half_circle(count: int = 1024) -> tuple[FloatArray, FloatArray, float]:
+    """Return the angles where tangents touch half a circle and where they meet, and how far out."""
+    touch = np.linspace(-0.5 * math.pi, 0.5 * math.pi, count + 1)
+    return touch, 0.5 * (touch[1:] + touch[:-1]), 1.0 / math.cos(0.5 * math.pi / count)

@@ -66,20 +66,22 @@ def sharpest_crest(
     tolerance: float = _TOLERANCE,
     work_limit: int = DEFAULT_WORK_LIMIT,
     extent: tuple[float, float] | None = None,
+    margin: float = 0.0,
 ) -> Crest | None:
     """Return the crest of least radius, certified; nothing for a surface without crests.
 
     Exact for a sinusoid; else by branch and bound to a relative tolerance of the curvature. A sum
-    of more than three independent waves is sampled unless an extent is given.
+    of more than three independent waves is sampled unless an extent is given, which is then
+    looked at with a margin on every side.
     """
-    if isinstance(texture, Sinusoid):
+    if isinstance(texture, Sinusoid) and extent is None:
         return _sinusoid_crest(texture)
-    cells = cells_of(texture, extent)
+    cells = cells_of(texture, extent, margin)
     found: Supremum
     if cells is None:
         cells, found = sampled_supremum(texture, CrestProblem)
     else:
-        found = supremum(CrestProblem(cells), tolerance, work_limit)
+        found = supremum(CrestProblem(cells), tolerance, work_limit, cells.wish)
     if found.at is None:
         return None
     return _crest(texture, _plane(cells, found.at), found.upper)

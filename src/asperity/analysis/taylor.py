@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeAlias
 
 import numpy as np
@@ -29,7 +30,7 @@ _FUNCTION = 16.0 * _EPS
 Number: TypeAlias = "float | Taylor"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Taylor:
     """One quantity on n cells of d coordinates.
 
@@ -43,7 +44,22 @@ class Taylor:
     g: FloatArray
     e: FloatArray
 
-    @property
+    # A NumPy number leaves the operation to this class.
+    __array_ufunc__ = None
+    __hash__ = None  # type: ignore[assignment]  # nothing is equal to an enclosure
+
+    def __eq__(self, other: object) -> bool:
+        raise TypeError("what an enclosure is equal to is not known")
+
+    def __bool__(self) -> bool:
+        raise TypeError("whether an enclosure is zero is not known")
+
+    def _compared(self, _other: object) -> bool:
+        raise TypeError("it is written in pieces")
+
+    __lt__ = __le__ = __gt__ = __ge__ = _compared
+
+    @cached_property
     def spread(self) -> FloatArray:
         """Greatest change of the linear part, Σ |g_i|."""
         return np.asarray(np.abs(self.g).sum(axis=0))
@@ -140,7 +156,7 @@ class Taylor:
         return Taylor(c, np.where(settled, sign * self.g, 0.0), np.where(settled, self.e, top))
 
 
-_LARGEST_POWER = 12
+_LARGEST_POWER = 64
 
 
 def _rounded(error: FloatArray, scale: FloatArray) -> FloatArray:
@@ -212,10 +228,24 @@ def reciprocal(x: Taylor) -> Taylor:
     return Taylor(sign * one.c, sign * one.g, one.e)
 
 
-class TaylorMath:
-    """What ``math`` is to numbers: the functions that generated kernels may use."""
+class _OnlyThese(type):
+    def __getattr__(cls, name: str) -> Callable[..., Number]:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        raise TypeError(f"there is no enclosure of the function {name}")
 
-    pi = np.pi
+
+def _larger(low: FloatArray, high: FloatArray) -> FloatArray:
+    return np.asarray(np.maximum(np.abs(low), np.abs(high)))
+
+
+class TaylorMath(metaclass=_OnlyThese):
+    """What ``math`` is to numbers: the functions that generated kernels may use.
+
+    Any other function is a TypeError, as a comparison is.
+    """
+
+    pi, e = np.pi, np.e
 
     @staticmethod
     def sqrt(x: Number) -> Number:
@@ -255,6 +285,42 @@ class TaylorMath:
         return _curved(x, np.cos, lambda v: -np.sin(v), lambda low, _high: np.ones_like(low))
 
     @staticmethod
+    def tan(x: Number) -> Number:
+        """Tangent; unbounded where x may be at a pole."""
+        return TaylorMath.sin(x) / TaylorMath.cos(x)
+
+    @staticmethod
+    def asin(x: Number) -> Number:
+        """Arc sine; unbounded where |x| may be 1."""
+        if not isinstance(x, Taylor):
+            return float(np.arcsin(x))
+
+        def bend(low: FloatArray, high: FloatArray) -> FloatArray:
+            most = _larger(low, high)
+            return np.asarray(np.where(most < 1.0, most * (1.0 - most * most) ** -1.5, np.inf))
+
+        return _curved(x, np.arcsin, lambda v: (1.0 - v * v) ** -0.5, bend)
+
+    @staticmethod
+    def acos(x: Number) -> Number:
+        """Arc cosine; unbounded where |x| may be 1."""
+        return 0.5 * np.pi - TaylorMath.asin(x)
+
+    @staticmethod
+    def sinh(x: Number) -> Number:
+        """Hyperbolic sine."""
+        if not isinstance(x, Taylor):
+            return float(np.sinh(x))
+        return _curved(x, np.sinh, np.cosh, lambda low, high: np.sinh(_larger(low, high)))
+
+    @staticmethod
+    def cosh(x: Number) -> Number:
+        """Hyperbolic cosine."""
+        if not isinstance(x, Taylor):
+            return float(np.cosh(x))
+        return _curved(x, np.cosh, np.sinh, lambda low, high: np.cosh(_larger(low, high)))
+
+    @staticmethod
     def tanh(x: Number) -> Number:
         """Hyperbolic tangent; |f''| <= 4/(3√3)."""
         if not isinstance(x, Taylor):
@@ -279,5 +345,14 @@ class TaylorMath:
     def pow(x: Number, power: float) -> Number:
         """X to a constant power."""
         return x**power
+
+    @staticmethod
+    def copysign(size: float, x: Number) -> Number:
+        """±size, by the sign of x; anything between where that is not settled."""
+        if not isinstance(x, Taylor):
+            return float(np.copysign(size, x))
+        settled = np.abs(x.c) > x.radius
+        c = np.where(settled, np.copysign(size, x.c), 0.0)
+        return Taylor(c, np.zeros_like(x.g), np.where(settled, 0.0, abs(size)))
 
     fabs = staticmethod(abs)

@@ -13,6 +13,8 @@ from asperity.surface import Surface
 
 # A witness is strictly inside: at depth zero the force has just ended.
 _LEAST_DEPTH = 1e-9
+_LEAST_OF_SIZE = 1e-14
+_AGREES = 1e-13
 
 
 @dataclass(frozen=True)
@@ -34,17 +36,32 @@ class Witness:
 
 def probe_of(surface: Surface, xy: FloatArray, depth: float) -> FloatArray:
     """Return the probe position (3,) [m] in contact at a point of the plane, at a depth."""
-    level = min(max(depth, _LEAST_DEPTH * surface.max_depth), surface.max_depth)
+    h, hx, hy = surface.texture.derivatives(np.ascontiguousarray(xy[None]))[0, :3]
+    # Not so little inside that rounding of the position decides.
+    least = max(_LEAST_DEPTH * surface.max_depth, _LEAST_OF_SIZE * _size(surface, xy, h))
+    level = min(max(depth, least), surface.max_depth)
     if surface.clamp != "none":
         # At the very depth of the clamp rounding decides on which side the probe is.
         level = min(level, (1.0 - _LEAST_DEPTH) * surface.max_depth)
-    h, hx, hy = surface.texture.derivatives(np.ascontiguousarray(xy[None]))[0, :3]
     if surface.law.contact == "nominal":
         return np.array([xy[0], xy[1], -level])
     if surface.law.contact == "vertical":
         return np.array([xy[0], xy[1], h - level])
     below = level / math.sqrt(1.0 + hx * hx + hy * hy)
     return np.array([xy[0] + below * hx, xy[1] + below * hy, h - below])
+
+
+def lower_of(value: float, witness: Witness) -> float:
+    """Return what is attained of a number that a theorem gives: all of it, but for rounding."""
+    return value if witness.value >= value * (1.0 - _AGREES) else witness.value
+
+
+def _size(surface: Surface, xy: FloatArray, height: float) -> float:
+    """Return the size of the coordinates that the depth is a difference of [m]."""
+    contact = surface.law.contact
+    if contact == "nominal":
+        return 0.0
+    return abs(height) if contact == "vertical" else float(abs(height) + np.abs(xy).max())
 
 
 def attained(

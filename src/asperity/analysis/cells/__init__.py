@@ -17,16 +17,19 @@ __all__ = ["LARGEST_TORUS", "NAMES", "Cells", "WaveCells", "cells_of"]
 LARGEST_TORUS = 3
 
 
-def cells_of(texture: Texture, extent: tuple[float, float] | None = None) -> Cells | None:
+def cells_of(
+    texture: Texture, extent: tuple[float, float] | None = None, margin: float = 0.0
+) -> Cells | None:
     """Return the cells of a texture, or nothing for a kind of your own.
 
     Args:
         texture: the texture.
         extent: width and depth [m] of the part of the plane to look at, for sums of waves; a sum
             of more than three independent phases has no cells without it.
+        margin: how far beyond the extent to look on every side [m].
     """
     if isinstance(texture, (Sinusoid, Fourier)):
-        cells = WaveCells(texture, extent)
+        cells = WaveCells(texture, extent, margin)
         return cells if cells.dimensions <= LARGEST_TORUS else None
     if isinstance(texture, HeightMap):
         return MapCells(texture)

@@ -18,6 +18,7 @@ SAMPLES = 4096
 EPS = float(np.finfo(float).eps)
 # By the number of coordinates.
 GAPS = {1: 1e-6, 2: 1e-6, 3: 1e-4}
+WISHES = {1: 1e-10, 2: 1e-9, 3: 1e-7}
 
 
 class Cells(ABC):
@@ -26,10 +27,12 @@ class Cells(ABC):
     Attributes:
         dimensions: how many coordinates they have.
         gap: the relative gap that is reached in reasonable time.
+        wish: a smaller one that is worth a try.
     """
 
     dimensions: int
     gap: float
+    wish: float | None = None
 
     @abstractmethod
     def start(self) -> tuple[Iterator[FloatArray], FloatArray]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from asperity.analysis.cells.base import GAPS, SAMPLES, Cells, spread
+from asperity.analysis.cells.base import GAPS, SAMPLES, WISHES, Cells, spread
 from asperity.analysis.taylor import Number, Taylor, TaylorMath
 from asperity.checks import FloatArray
 
@@ -25,6 +25,7 @@ class ProductCells(Cells):
         self._tops = np.array(list(further.values()))
         self.dimensions = flat.dimensions + len(further)
         self.gap = max(flat.gap, GAPS.get(self.dimensions, 1e-3))
+        self.wish = None if flat.wish is None else max(flat.wish, WISHES.get(self.dimensions, 1e-6))
 
     def start(self) -> tuple[Iterator[FloatArray], FloatArray]:
         """See :class:`Cells`."""

@@ -1,6 +1,7 @@
 """Spline surfaces, cut along their own cells.
 
-There every derivative is a polynomial, which its Bernstein coefficients enclose.
+There every derivative is a polynomial, which its Bernstein coefficients enclose. On blocks of
+several cells of a map its B-spline coefficients do.
 """
 
 from __future__ import annotations
@@ -27,10 +28,14 @@ _TO_BERNSTEIN = {
 }
 
 
-class MapCells(Cells):
-    """The cells of a bicubic spline, in units of its nodes."""
+# Cells along the side of the blocks that are looked at first: a power of two.
+_BLOCK = 4
 
-    dimensions, gap = 2, 1e-3
+
+class MapCells(Cells):
+    """The cells of a bicubic spline, in units of its nodes, and at first blocks of them."""
+
+    dimensions, gap, wish = 2, 1e-3, 1e-6
 
     def __init__(self, texture: HeightMap) -> None:
         self._texture = texture
@@ -40,14 +45,19 @@ class MapCells(Cells):
 
     def start(self) -> tuple[Iterator[FloatArray], FloatArray]:
         """See :class:`Cells`."""
-        nx, ny = (int(n) for n in self._counts)
+        side = _BLOCK
+        while side > self._counts.min():
+            side //= 2
+        # The last blocks overlap where the cells are no multiple of the side.
+        x, y = (np.append(np.arange(0, n - side, side), n - side) for n in self._counts)
+        total = len(x) * len(y)
 
         def chunks() -> Iterator[FloatArray]:
-            for first in range(0, nx * ny, CHUNK):
-                rows, columns = np.divmod(np.arange(first, min(first + CHUNK, nx * ny)), nx)
-                yield np.stack([columns, rows], axis=-1) + 0.5
+            for first in range(0, total, CHUNK):
+                rows, columns = np.divmod(np.arange(first, min(first + CHUNK, total)), len(x))
+                yield np.stack([x[columns], y[rows]], axis=-1) + 0.5 * side
 
-        return chunks(), np.array([0.5, 0.5])
+        return chunks(), np.full(2, 0.5 * side)
 
     def samples(self, count: int = SAMPLES) -> FloatArray:
         """See :class:`Cells`; at nodes, where second derivatives of a spline are extreme."""
@@ -57,20 +67,24 @@ class MapCells(Cells):
         self, centres: FloatArray, half: FloatArray, names: Sequence[str]
     ) -> dict[str, Number]:
         """See :class:`Cells`."""
-        cell = np.minimum(np.floor(centres).astype(np.int64), self._counts - 1)
-        left = centres - half - cell
-        step = np.arange(4)
+        side = max(1, round(2.0 * float(half.max())))
+        first = centres if side == 1 else centres - half
+        cell = np.minimum(np.floor(first).astype(np.int64), self._counts - side)
+        step = np.arange(side + 3)
         patch = self._c[
             (cell[:, 1, None] + step)[:, :, None], (cell[:, 0, None] + step)[:, None, :]
         ]
-        matrices = _AxisMatrices(left, 2.0 * half)
-        slack = 64.0 * EPS * np.abs(patch).max(axis=(1, 2))
+        matrices = _AxisMatrices(centres - half - cell, 2.0 * half)
+        slack = 256.0 * EPS * np.abs(patch).max(axis=(1, 2))
         result: dict[str, Number] = {}
         for name in names:
             nx, ny = ORDERS[name]
             scale = float(self._per[0] ** nx * self._per[1] ** ny)
             part = np.diff(np.diff(patch, nx, axis=2), ny, axis=1)
-            result[name] = _fit(matrices.both(part), scale, slack)
+            if side > 1:
+                result[name] = _fit_block(part, side, scale, slack)
+            else:
+                result[name] = _fit(matrices.both(part), scale, slack)
         return result
 
     def derivatives(self, coordinates: FloatArray) -> FloatArray:
@@ -93,7 +107,7 @@ class MapCells(Cells):
 class ProfileCells(Cells):
     """The cells of a cubic spline along x, in units of its nodes."""
 
-    dimensions, gap = 1, 1e-6
+    dimensions, gap, wish = 1, 1e-6, 1e-9
 
     def __init__(self, texture: Profile) -> None:
         self._texture = texture
@@ -122,7 +136,7 @@ class ProfileCells(Cells):
         cell = np.minimum(np.floor(centres).astype(np.int64), self._count - 1)
         patch = self._c[cell + np.arange(4)][:, None, :]
         matrices = _AxisMatrices(centres - half - cell, 2.0 * half)
-        slack = 64.0 * EPS * np.abs(patch).max(axis=(1, 2))
+        slack = 256.0 * EPS * np.abs(patch).max(axis=(1, 2))
         result: dict[str, Number] = {}
         for name in names:
             nx, ny = ORDERS[name]
@@ -211,3 +225,26 @@ def _fit(bernstein: FloatArray, scale: float, slack: FloatArray) -> Taylor:
     # The conversion multiplies and adds at most 16 coefficients, each weight at most one.
     e = 0.5 * (high - low) * (1.0 + 8.0 * EPS) + slack
     return Taylor(scale * c, scale * np.stack(slopes), scale * e * (1.0 + 8.0 * EPS))
+
+
+def _fit_block(part: FloatArray, side: int, scale: float, slack: FloatArray) -> Taylor:
+    """Return a linear function on blocks of cells, and the hull of what it leaves out.
+
+    The B-spline coefficients of a linear function are its values at the Greville points; those of
+    the rest enclose it.
+
+    Args:
+        part: coefficients, shape (n, side + degree along y, side + degree along x).
+        side: cells along the side of a block.
+        scale: factor of the derivative.
+        slack: error of the coefficients by rounding.
+    """
+    y, x = (
+        (2.0 * np.arange(count) - (count - side - 1) - side) / side for count in part.shape[1:]
+    )
+    gx = part.mean(axis=1) @ x / (x @ x)
+    gy = part.mean(axis=2) @ y / (y @ y)
+    rest = part - gx[:, None, None] * x - gy[:, None, None] * y[:, None]
+    low, high = rest.min(axis=(1, 2)), rest.max(axis=(1, 2))
+    c, e = 0.5 * (low + high), 0.5 * (high - low) * (1.0 + 8.0 * EPS) + slack
+    return Taylor(scale * c, scale * np.stack([gx, gy]), scale * e * (1.0 + 8.0 * EPS))

@@ -10,7 +10,17 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from asperity.analysis.cells.base import CHUNK, EPS, GAPS, NAMES, ORDERS, SAMPLES, Cells, spread
+from asperity.analysis.cells.base import (
+    CHUNK,
+    EPS,
+    GAPS,
+    NAMES,
+    ORDERS,
+    SAMPLES,
+    WISHES,
+    Cells,
+    spread,
+)
 from asperity.analysis.taylor import Number, Taylor
 from asperity.checks import FloatArray
 from asperity.textures.fourier import Fourier
@@ -18,6 +28,10 @@ from asperity.textures.sinusoid import Sinusoid
 
 # Sines per chunk.
 _SINES = 2_000_000
+# First samples of each wave of a profile.
+_PER_WAVE = 64
+_ODD = [i for i, name in enumerate(NAMES) if sum(ORDERS[name]) == 1]
+_EVEN = [i for i in range(len(NAMES)) if i not in _ODD]
 
 
 class WaveCells(Cells):
@@ -51,16 +65,21 @@ class WaveCells(Cells):
         if extent is not None:
             self._basis, self._multiples = np.eye(2), self._waves
             self._phases = self._phases - self._waves.sum(axis=1) * margin
+        self._weights = {name: self._weight(*ORDERS[name]) for name in NAMES}
+        every = np.stack(list(self._weights.values()), axis=-1)
+        self._even, self._odd = every[:, _EVEN], every[:, _ODD]
         self.dimensions = self._multiples.shape[1]
-        self.gap = GAPS.get(self.dimensions, 1e-3)
+        self.gap, self.wish = GAPS.get(self.dimensions, 1e-3), WISHES.get(self.dimensions)
 
     def start(self) -> tuple[Iterator[FloatArray], FloatArray]:
         """See :class:`Cells`."""
         sizes = np.full(self.dimensions, 2.0 * math.pi) if self._extent is None else self._extent
-        # Cells on which the fastest wave turns by about a third of a radian.
+        # Cells on which the fastest wave turns by about a third of a radian, but not fewer than
+        # cost as much as one.
+        least = 64 if self.dimensions == 1 else 16
         turns = np.abs(self._multiples).max(axis=0) * np.asarray(sizes)
         limit = 4_000_000 ** (1.0 / self.dimensions)
-        counts = [int(min(max(math.ceil(turn / 0.7), 16), limit)) for turn in turns]
+        counts = [int(min(max(math.ceil(turn / 0.7), least), limit)) for turn in turns]
         half = 0.5 * np.asarray(sizes) / counts
         total = math.prod(counts)
 
@@ -76,6 +95,8 @@ class WaveCells(Cells):
         """See :class:`Cells`."""
         sizes = np.full(self.dimensions, 2.0 * math.pi) if self._extent is None else self._extent
         count = min(count, max(64, _SINES // len(self._amplitudes)))
+        if self.dimensions == 1 and self._extent is None:
+            count = min(count, _PER_WAVE * (1 + int(np.abs(self._multiples).max())))
         return np.asarray(spread(count, self.dimensions) * np.asarray(sizes))
 
     def chunk(self) -> int:
@@ -93,17 +114,15 @@ class WaveCells(Cells):
         sine, cosine = np.sin(angles), np.cos(angles)
         reach = np.abs(self._multiples) @ half
         bend = 0.5 * reach * reach
-        rest = {
-            0: bend * np.minimum(1.0, np.abs(sine) + reach),
-            1: bend * np.minimum(1.0, np.abs(cosine) + reach),
-        }
+        rest = [bend * np.minimum(1.0, np.abs(part) + reach) for part in (sine, cosine)]
         # What the rounding of the phases costs.
         most = np.abs(centres).max(axis=0, initial=0.0) @ np.abs(self._multiples).T
         largest = float((most + np.abs(self._phases)).max())
         slack = 16.0 * EPS * (1.0 + largest + len(sine[0])) + self._miss
         result: dict[str, Number] = {}
         for name in names:
-            weight, odd, values, slopes = self._terms(name, sine, cosine)
+            weight, odd = self._weights[name], sum(ORDERS[name]) % 2
+            values, slopes = (cosine, -sine) if odd else (sine, cosine)
             if not weight.any():
                 result[name] = 0.0
                 continue
@@ -113,32 +132,25 @@ class WaveCells(Cells):
             result[name] = Taylor(values @ weight, g, e)
         return result
 
-    def _terms(
-        self, name: str, sine: FloatArray, cosine: FloatArray
-    ) -> tuple[FloatArray, int, FloatArray, FloatArray]:
-        """Return weights, whether odd, values and slopes by the phase of a derivative's waves."""
-        nx, ny = ORDERS[name]
+    def _weight(self, nx: int, ny: int) -> FloatArray:
+        """Return the weights of a derivative's waves: cosines for a slope, else sines."""
         weight = self._amplitudes * self._waves[:, 0] ** nx * self._waves[:, 1] ** ny
-        if nx + ny == 1:
-            return weight, 1, cosine, -sine
-        if nx + ny == 2:
-            return -weight, 0, sine, cosine
-        return weight, 0, sine, cosine
+        return np.asarray(-weight if nx + ny == 2 else weight)
 
     def derivatives(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""
         angles = coordinates @ self._multiples.T + self._phases
-        sine, cosine = np.sin(angles), np.cos(angles)
-        columns = []
-        for name in NAMES:
-            weight, _odd, values, _slopes = self._terms(name, sine, cosine)
-            columns.append(values @ weight)
-        return np.ascontiguousarray(np.stack(columns, axis=-1))
+        result = np.empty((len(coordinates), len(NAMES)))
+        result[:, _EVEN], result[:, _ODD] = np.sin(angles) @ self._even, np.cos(angles) @ self._odd
+        return result
 
     def plane(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`; the nearest phases among many points for more than two phases."""
         if self._extent is not None:
             return np.ascontiguousarray(coordinates - self._margin)
+        if self.dimensions == 1:
+            wave = self._basis[0]
+            return np.ascontiguousarray(coordinates * (wave / (wave @ wave)))
         if self.dimensions <= np.linalg.matrix_rank(self._basis):
             inverse = np.linalg.pinv(self._basis)
             return np.ascontiguousarray(coordinates @ inverse.T)

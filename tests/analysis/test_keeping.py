@@ -1,0 +1,251 @@
+"""Certificates on disk: found again, made anew when anything changes, never a source of harm."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.analysis import keeping
+from asperity.analysis.bound import Bound
+from asperity.analysis.certificate import Search
+from asperity.analysis.characteristic import characteristic_number, one_sided_number
+from asperity.laws import Law
+from asperity.surface import Surface
+from asperity.textures import HeightMap, Sinusoid, Texture
+
+HEIGHTS = 1e-4 * np.random.default_rng(1).normal(size=(8, 9))
+BOUND = Bound(1.0, 2.0, "certified", (0.1, 0.2, -0.3), "a note", (1e-4, -1e-4), sliding=True)
+
+
+@pytest.fixture
+def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of the certificates, empty."""
+    monkeypatch.setattr(keeping, "cache_directory", lambda: tmp_path / "kernels")
+    return tmp_path / "certificates"
+
+
+def texture(**changes: Any) -> HeightMap:
+    return HeightMap(**{"heights": HEIGHTS, "pitch": 3e-4, **changes})
+
+
+def surface(law: str | Law = "B", like: Texture | None = None, **options: Any) -> Surface:
+    return Surface(like or texture(), law, **{"max_depth": 1e-4, **options})
+
+
+class Maker:
+    """Makes certificates and counts them."""
+
+    def __init__(self, bound: Bound = BOUND) -> None:
+        self.bound, self.made = bound, 0
+
+    def __call__(self) -> Bound:
+        self.made += 1
+        return self.bound
+
+    def asked(self, of: Surface, name: str = "norm", search: Search | None = None) -> Bound:
+        return keeping.kept(of, name, search or Search(), self)
+
+
+BOUNDS = [
+    BOUND,
+    Bound(math.inf, math.inf, "certified", (0.0, 0.0, -1.0), "onset"),
+    Bound(1.0, math.inf, "sampled", None),
+    Bound(0.1 + 0.2, 1.0 / 3.0 + 1.0, "closed form", (1e-300, -0.0, 5e-324)),
+]
+
+
+@pytest.mark.parametrize("bound", BOUNDS, ids=["state", "infinite", "unproved", "digits"])
+def test_a_certificate_comes_back_as_it_was(kept: Path, bound: Bound) -> None:
+    maker = Maker(bound)
+    assert maker.asked(surface()) == bound
+    assert maker.asked(surface()) == bound
+    assert maker.made == 1
+    assert [path.suffix for path in kept.iterdir()] == [".json"]
+
+
+def test_a_certificate_is_that_of_the_content_not_of_the_object(kept: Path) -> None:
+    maker = Maker()
+    maker.asked(surface())
+    # The numbers are those of J/k, and how a surface was prepared is only words.
+    maker.asked(surface(like=texture(preparation=("as measured",)), stiffness=77.0))
+    assert maker.made == 1
+    assert len(list(kept.iterdir())) == 1
+
+
+other = HEIGHTS.copy()
+other[3, 4] *= 1.0 + 1e-14
+
+
+def law(factor: float) -> Law:
+    return Law("U", "own", "vertical", lambda c: factor * c.k * c.depth * c.normal)
+
+
+CHANGES = {
+    "one height by a few digits": lambda: surface(like=texture(heights=other)),
+    "pitch": lambda: surface(like=texture(pitch=(3e-4, 3.1e-4))),
+    "origin": lambda: surface(like=texture(origin=(1e-3, 0.0))),
+    "periodic": lambda: surface(like=texture(periodic=True)),
+    "depth": lambda: surface(max_depth=1.0000001e-4),
+    "clamp": lambda: surface(clamp="whole"),
+    "law": lambda: surface("C"),
+    "law of one's own": lambda: surface(law(1.5)),
+    "another law of the same name": lambda: surface(law(1.25)),
+    "friction": lambda: surface("F", friction=0.5),
+    "deflection": lambda: surface("F", max_deflection=2e-3),
+    "modulation": lambda: surface("F", modulation_depth=0.5),
+    "law F": lambda: surface("F"),
+}
+
+
+@pytest.mark.usefixtures("kept")
+def test_whatever_changes_the_certificate_is_made_anew() -> None:
+    maker = Maker()
+    maker.asked(surface())
+    for index, change in enumerate(CHANGES.values()):
+        maker.asked(change())
+        assert maker.made == index + 2
+    for search in (Search(1e-4), Search(work_limit=10), Search(extent=(1.0, 1.0))):
+        maker.asked(surface(), search=search)
+    maker.asked(surface(), name="curl")
+    assert maker.made == len(CHANGES) + 5
+    for change in CHANGES.values():  # all of them are still there
+        maker.asked(change())
+    assert maker.made == len(CHANGES) + 5
+
+
+@pytest.mark.usefixtures("kept")
+def test_a_law_with_another_parameter_is_another() -> None:
+    maker = Maker()
+    for value in (1.0, 2.0):
+        with_parameter = Law(
+            "P", "own", "vertical", lambda c: c.parameter("a") * c.k * c.depth * c.e_z,
+            parameters={"a": 1.0},
+        )  # fmt: skip
+        maker.asked(surface(with_parameter, law_parameters={"a": value}))
+    assert maker.made == 2
+    for continuity in (2.0, 3.0):
+        maker.asked(surface("H", continuity=continuity), name="q")
+    assert maker.made == 4
+
+
+@pytest.mark.usefixtures("kept")
+def test_another_version_of_the_package_makes_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    maker = Maker()
+    maker.asked(surface())
+    monkeypatch.setattr(keeping, "_source_digest", lambda: "another")
+    maker.asked(surface())
+    assert maker.made == 2
+
+
+def test_small_textures_are_not_kept(kept: Path) -> None:
+    maker = Maker()
+    for _ in range(2):
+        maker.asked(surface(like=Sinusoid(1e-4, 1e-3)))
+    assert maker.made == 2
+    assert not kept.exists()
+
+
+CORRUPT = {
+    "empty": "",
+    "cut short": json.dumps(BOUND.to_dict())[:-9],
+    "no object": "[1, 2]",
+    "null": "null",
+    "a word": '"certified"',
+    "a field missing": json.dumps({"lower": 1.0, "upper": 2.0}),
+    "no number": json.dumps({**BOUND.to_dict(), "upper": "many"}),
+    "not a number": json.dumps({**BOUND.to_dict(), "lower": math.nan}),
+    "crossed": json.dumps({**BOUND.to_dict(), "lower": 3.0}),
+    "no method": json.dumps({**BOUND.to_dict(), "method": "guessed"}),
+    "no point": json.dumps({**BOUND.to_dict(), "at": [1.0]}),
+    "a point of nothing": json.dumps({**BOUND.to_dict(), "at": [1.0, math.nan, 2.0]}),
+    "null number": json.dumps({**BOUND.to_dict(), "lower": None}),
+}
+
+
+@pytest.mark.parametrize("text", CORRUPT.values(), ids=list(CORRUPT))
+def test_a_corrupted_certificate_is_made_anew(kept: Path, text: str) -> None:
+    maker = Maker()
+    maker.asked(surface())
+    (path,) = kept.iterdir()
+    path.write_text(text)
+    assert maker.asked(surface()) == BOUND
+    assert maker.made == 2
+    assert maker.asked(surface()) == BOUND  # and repaired
+    assert maker.made == 2
+
+
+def test_bytes_that_are_no_text_are_made_anew(kept: Path) -> None:
+    maker = Maker()
+    maker.asked(surface())
+    (path,) = kept.iterdir()
+    path.write_bytes(b"\xff\xfe\x00{")
+    assert maker.asked(surface()) == BOUND
+    assert maker.made == 2
+
+
+def test_a_folder_that_cannot_be_written_is_harmless(kept: Path) -> None:
+    kept.write_text("a file where the folder should be")
+    maker = Maker()
+    assert [maker.asked(surface()) for _ in range(2)] == [BOUND, BOUND]
+    assert maker.made == 2
+
+
+def test_a_full_disk_leaves_nothing_behind(kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_arguments: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(json, "dump", full)
+    assert Maker().asked(surface()) == BOUND
+    assert list(kept.iterdir()) == []
+
+
+def test_numbers_are_read_where_they_are_kept(kept: Path) -> None:
+    """A certificate that was doctored comes back doctored: nothing was computed again."""
+    first = {name: number(surface()) for name, number in NUMBERS.items()}
+    files = sorted(kept.iterdir())
+    assert len(files) == len(NUMBERS)
+    for path in files:
+        saved = json.loads(path.read_text())
+        path.write_text(json.dumps({**saved, "upper": saved["upper"] + 1.0}))
+    for name, number in NUMBERS.items():
+        assert number(surface()) == replace(first[name], upper=first[name].upper + 1.0)
+        assert number(surface(max_depth=1.1e-4)).upper < first[name].upper + 0.9
+
+
+NUMBERS = {"q": characteristic_number, "q+": one_sided_number}
+
+_SECOND = """
+import sys, numpy as np
+from asperity import HeightMap, Surface, characteristic_number
+from asperity.analysis import branch_and_bound, certificate
+def refuse(*_arguments):
+    raise SystemExit("computed again")
+certificate.supremum = refuse
+heights = 1e-4 * np.random.default_rng(1).normal(size=(8, 9))
+print(repr(characteristic_number(Surface(HeightMap(heights, 3e-4), "B", max_depth=1e-4))))
+"""
+
+
+def test_another_process_reads_it(kept: Path, tmp_path: Path) -> None:
+    bound = characteristic_number(surface())
+    environment = {"ASPERITY_CACHE_DIR": str(tmp_path), "PYTHONPATH": ":".join(sys.path)}
+    done = subprocess.run(
+        [sys.executable, "-c", _SECOND],
+        capture_output=True, text=True, check=True, env=environment, timeout=120,
+    )  # fmt: skip
+    assert done.stdout.strip() == repr(bound)
+    for path in kept.iterdir():
+        path.unlink()
+    again = subprocess.run(
+        [sys.executable, "-c", _SECOND],
+        capture_output=True, text=True, check=False, env=environment, timeout=120,
+    )  # fmt: skip
+    assert "computed again" in again.stderr
