@@ -7,8 +7,10 @@ import sys
 import click
 
 import asperity
+from asperity.cli.analyze import analyze_command
 from asperity.cli.compare import compare_command
 from asperity.cli.devices import devices_command
+from asperity.cli.limits import limits_command
 from asperity.cli.prepare import prepare_command
 from asperity.cli.surfaces import surfaces_command
 from asperity.errors import AsperityError
@@ -25,8 +27,10 @@ def cli() -> None:
     """
 
 
+cli.add_command(analyze_command)
 cli.add_command(compare_command)
 cli.add_command(devices_command)
+cli.add_command(limits_command)
 cli.add_command(prepare_command)
 cli.add_command(surfaces_command)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from asperity.report.analysis_table import print_analysis
     from asperity.report.html import html_text
     from asperity.report.plots import plot
     from asperity.report.table import comparison_table, print_comparison
@@ -16,6 +17,7 @@ _HOMES = {
     "comparison_table": "asperity.report.table",
     "html_text": "asperity.report.html",
     "plot": "asperity.report.plots",
+    "print_analysis": "asperity.report.analysis_table",
     "print_comparison": "asperity.report.table",
 }
 
@@ -23,6 +25,7 @@ __all__ = [
     "comparison_table",
     "html_text",
     "plot",
+    "print_analysis",
     "print_comparison",
 ]
 

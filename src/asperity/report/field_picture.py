@@ -33,6 +33,21 @@ _FLATTEST, _TALLEST = 2.4, 0.8
 
 
 @dataclass(frozen=True)
+class Window:
+    """The part of a vertical plane that a picture shows.
+
+    Attributes:
+        stretch: of the line that the plane stands on.
+        bottom: [m].
+        top: [m].
+    """
+
+    stretch: Stretch
+    bottom: float
+    top: float
+
+
+@dataclass(frozen=True)
 class _Scene:
     """What all panels share."""
 
@@ -74,21 +89,35 @@ def _panel_ratio(surfaces: Sequence[Surface]) -> float:
     return min(max(stretch.length / (top - bottom), _TALLEST), _FLATTEST)
 
 
+def field_window(surfaces: Sequence[Surface]) -> Window:
+    """Return the part of the plane along the scan line that shows the fields."""
+    stretch = field_stretch(surfaces)
+    return Window(stretch, *field_range(surfaces, stretch))
+
+
 def draw_fields(
-    figure: Figure | SubFigure, surfaces: Sequence[Surface], remarks: Sequence[str] = ()
-) -> None:
+    figure: Figure | SubFigure,
+    surfaces: Sequence[Surface],
+    remarks: Sequence[str] = (),
+    window: Window | None = None,
+) -> list[Axes]:
     """Draw the field of every law: arrows over the curl, the same scales for all.
 
     Args:
         figure: where to.
         surfaces: one per law, on the same texture.
         remarks: a line below the title of each panel.
+        window: what to show; see :func:`field_window` for what is shown by default.
+
+    Returns:
+        The panels, one per law; lengths on their axes are in the units of
+        :func:`asperity.report.style.length_unit` for the width and the height of the window.
     """
-    stretch = field_stretch(surfaces)
-    bottom, top = field_range(surfaces, stretch)
+    window = window or field_window(surfaces)
+    stretch, bottom, top = window.stretch, window.bottom, window.top
     curls = [curl_field(surface, stretch, bottom) for surface in surfaces]
     arrows = [arrow_field(surface, stretch, bottom, top) for surface in surfaces]
-    scene = _scene(surfaces, stretch, curls, arrows)
+    scene = _scene(surfaces, window, curls, arrows)
     columns = _columns(len(surfaces))
     rows = math.ceil(len(surfaces) / columns)
     grid: Any = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
@@ -103,15 +132,16 @@ def draw_fields(
         remark = remarks[index] if index < len(remarks) else ""
         style.entitle(axes, surface.law.letter, law_title(surface.law.name), remark)
     _finish(figure, panels, len(surfaces), scene, (mesh, quiver))
+    return panels[: len(surfaces)]
 
 
 def _scene(
     surfaces: Sequence[Surface],
-    stretch: Stretch,
+    window: Window,
     curls: Sequence[CurlField],
     arrows: Sequence[ArrowField],
 ) -> _Scene:
-    bottom, top = field_range(surfaces, stretch)
+    stretch, bottom, top = window.stretch, window.bottom, window.top
     true_ratio = stretch.length / (top - bottom)
     strong = [np.abs(c.curl).ravel() for c in curls if np.abs(c.curl).max() > 1e-9 * c.norm]
     limit = float(np.quantile(np.concatenate(strong), 0.97)) if strong else surfaces[0].stiffness

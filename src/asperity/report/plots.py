@@ -9,9 +9,11 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from asperity.analysis.comparison import Comparison
+from asperity.analysis.inspection import Analysis
 from asperity.analysis.row import LawRow
 from asperity.errors import ParameterError
 from asperity.report import style
+from asperity.report.analysis_pictures import analysis_figure, picture_size, pictures_of
 from asperity.report.field_picture import draw_fields, field_size
 from asperity.report.force_picture import draw_forces, force_size
 from asperity.report.gain_picture import gain_figure
@@ -30,9 +32,11 @@ def plot(result: Any, picture: str | None = None) -> Figure:
     Args:
         result: a :class:`~asperity.analysis.comparison.Comparison` (the surface, the forces and
             the fields of all laws), a :class:`~asperity.surface.Surface` (forces and field of its
-            law) or a texture (the surface).
-        picture: of a comparison, one picture of the report alone: "surface", "spectrum", "force",
-            "field", "gain" or "merit".
+            law), a texture (the surface) or an :class:`~asperity.analysis.inspection.Analysis`
+            (the field with the worst loop, the loop gain, the singular values).
+        picture: one picture of the report alone; of a comparison "surface", "spectrum", "force",
+            "field", "gain" or "merit", of an analysis "field", "gain", "depth", for a map also
+            "top", and where the force jumps "jumps".
 
     Returns:
         A figure; ``figure.savefig(path)`` writes it, as PNG or SVG by the path.
@@ -77,6 +81,18 @@ def _comparison(result: Comparison, picture: str | None = None) -> Figure:
     draw_surface(parts[0], result.texture)
     draw_forces(parts[1], surfaces)
     draw_fields(parts[2], surfaces, _remarks(result))
+    return figure
+
+
+@plot.register
+def _analysis(result: Analysis, picture: str | None = None) -> Figure:
+    drawings = pictures_of(result)
+    _known(picture, tuple(drawings))
+    if picture is not None:
+        return analysis_figure(result, picture)
+    figure, parts = _stacked([picture_size(result, name) for name in drawings])
+    for draw, part in zip(drawings.values(), parts, strict=True):
+        draw(part, result)
     return figure
 
 

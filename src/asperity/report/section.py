@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.analysis.merit import scan_height
 from asperity.analysis.measures import spectral_norm
+from asperity.analysis.merit import scan_height
 from asperity.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine, Texture

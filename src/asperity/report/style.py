@@ -122,7 +122,7 @@ def svg_text(figure: Figure) -> str:
     figure.savefig(buffer, format="svg", dpi=160, **options)
     text = buffer.getvalue().decode("utf-8")
     # Matplotlib draws its identifiers at random; numbered in order, the text is reproducible.
-    found = dict.fromkeys(re.findall(r'id="([a-zA-Z][0-9a-f]{10})"', text))
+    found = dict.fromkeys(re.findall(r'id="((?:image|[a-zA-Z])[0-9a-f]{10})"', text))
     for number, identifier in enumerate(found):
         text = text.replace(identifier, f"i{number}")
     return text

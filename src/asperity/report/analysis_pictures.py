@@ -1,0 +1,340 @@
+"""The pictures of an analysis: field and worst loop, ‖J‖, singular values, jumps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.patheffects import Stroke, withStroke
+from matplotlib.quiver import Quiver
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator, SymmetricalLogLocator
+
+from asperity.analysis.inspection import Analysis
+from asperity.checks import FloatArray
+from asperity.report import style
+from asperity.report.analysis_region import (
+    gain_window,
+    in_window,
+    loop_window,
+    top_view,
+    witness,
+    witness_column,
+    working_depth,
+)
+from asperity.report.analysis_words import interval_text, span_text
+from asperity.report.field_picture import Window, draw_fields
+from asperity.report.section import CurlField, curl_field
+from asperity.report.wording import law_title, number_text
+from asperity.units import engineering
+
+Part = Figure | SubFigure
+Draw = Callable[[Part, Analysis], None]
+
+_WIDTH = 10.0
+# Width and height of a panel [inch]; flatter ones are not drawn true to scale.
+_BROAD, _TALL, _LOW = 9.0, 4.6, 2.4
+_FLATTEST = 2.4
+# Titles, labels and the colour bar below a panel [inch].
+_AROUND = 1.9
+_CELLS = (200, 110)
+_HALO = [withStroke(linewidth=4.0, foreground="white")]
+# Where the numbers of a picture grow without bound it is cut off here.
+_HIGHEST = 1e3
+_ARROWS = 5
+
+
+def pictures_of(analysis: Analysis) -> dict[str, Draw]:
+    """Return the pictures that an analysis has, by name."""
+    found: dict[str, Draw] = {"field": draw_field, "gain": draw_gain}
+    if not analysis.surface.texture.is_profile:
+        found["top"] = draw_top
+    found["depth"] = draw_depth
+    if analysis.continuity.jumps:
+        found["jumps"] = draw_jumps
+    return found
+
+
+def picture_size(analysis: Analysis, name: str) -> tuple[float, float]:
+    """Return width and height of a picture [inch]."""
+    if name == "top":
+        spans = np.abs(analysis.surface.texture.domain.spans).sum(axis=0)
+        return _WIDTH, min(_BROAD * float(spans[1] / spans[0]), 6.5) + _AROUND
+    if name not in {"field", "gain"}:
+        return _WIDTH, 3.6
+    window = loop_window(analysis) if name == "field" else gain_window(analysis)
+    ratio = (window.top - window.bottom) / window.stretch.length
+    return _WIDTH, min(max(_BROAD * ratio, _LOW), _TALL) + _AROUND
+
+
+def analysis_figure(analysis: Analysis, name: str) -> Figure:
+    """Return one picture of an analysis."""
+    figure = style.new_figure(*picture_size(analysis, name))
+    pictures_of(analysis)[name](figure, analysis)
+    return figure
+
+
+# --- the field and the worst loop -----------------------------------------------------------------
+
+
+def draw_field(figure: Part, analysis: Analysis) -> None:
+    """Draw the force over its curl in the plane of the worst loop, and the loop.
+
+    What lies deeper than the working region is paled; the vertices of the loop are projected on
+    the plane.
+    """
+    window, leak = loop_window(analysis), analysis.leak
+    remark = "conservative: no loop gains"
+    if len(leak.vertices):
+        gain = span_text(leak.energy, leak.upper, "J")
+        remark = f"the worst loop gains {gain}"
+    elif not analysis.conservative:
+        remark = "no loop found that gains"
+    axes = draw_fields(figure, [analysis.surface], [remark], window)[0]
+    for arrows in axes.findobj(Quiver):
+        # Seen on the darkest curl, too.
+        arrows.set_path_effects([withStroke(linewidth=1.2, foreground="white")])
+    wide, high = _units(window)
+    if not _is_true(window):
+        axes.set_aspect("auto")
+    style.label(axes, f"{_along_text(window)} [{wide.name}]", f"z [{high.name}]")
+    field = curl_field(analysis.surface, window.stretch, window.bottom, *_CELLS)
+    _pale(axes, analysis, window, field)
+    if len(leak.vertices):
+        offset = leak.vertices[:, :2] - window.stretch.xy(np.zeros(1))[0]
+        along = offset @ window.stretch.line.direction
+        _draw_loop(axes, along * wide.scale, leak.vertices[:, 2] * high.scale)
+
+
+def _is_true(window: Window) -> bool:
+    """Return whether a picture true to scale fills its panel well."""
+    return _BROAD / _TALL <= window.stretch.length / (window.top - window.bottom) <= _FLATTEST
+
+
+def _units(window: Window) -> tuple[style.Unit, style.Unit]:
+    return (
+        style.length_unit(window.stretch.length),
+        style.length_unit(window.top - window.bottom),
+    )
+
+
+def _draw_loop(axes: Axes, x: FloatArray, z: FloatArray) -> None:
+    """Draw a closed polygon with arrows that tell its sense."""
+    x, z = np.append(x, x[0]), np.append(z, z[0])
+    axes.plot(x, z, color=style.BLUE, lw=1.6, zorder=5.0, path_effects=_HALO)
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    steps = np.hypot(np.diff(x) / (right - left), np.diff(z) / (high - low))
+    seen = (np.maximum(x[1:], x[:-1]) > left) & (np.minimum(x[1:], x[:-1]) < right)
+    passed = np.concatenate([[0.0], np.cumsum(np.where(seen, steps, 0.0))])
+    arrow = {"arrowstyle": "-|>", "color": style.BLUE, "lw": 1.6, "mutation_scale": 14}
+    for part in (np.arange(_ARROWS) + 0.5) / _ARROWS:
+        ways = part * passed[-1] + np.array([-0.004, 0.004])
+        start, end = zip(np.interp(ways, passed, x), np.interp(ways, passed, z), strict=True)
+        axes.annotate("", end, start, arrowprops=arrow, zorder=6.0, annotation_clip=True)
+
+
+def _pale(axes: Axes, analysis: Analysis, window: Window, field: CurlField) -> None:
+    """Pale what is deeper than the working region, and draw its border."""
+    points = np.column_stack([window.stretch.xy(field.along.ravel()), field.z.ravel()])
+    depth = working_depth(analysis.surface, points).reshape(field.z.shape)
+    beyond = depth - analysis.surface.max_depth
+    if beyond.max() <= 0.0:
+        return
+    wide, high = _units(window)
+    places = (field.along * wide.scale, field.z * high.scale)
+    axes.contourf(*places, beyond, [0.0, math.inf], colors=[style.FREE], alpha=0.8, zorder=4.5)
+    axes.contour(*places, beyond, [0.0], colors=[style.SOFT], linewidths=0.9, zorder=4.6)
+
+
+def _along_text(window: Window) -> str:
+    """Return where the horizontal axis begins and where it goes."""
+    x, y = (engineering(float(v) + 0.0, "m") for v in window.stretch.xy(np.zeros(1))[0])
+    u, v = (float(part) for part in window.stretch.line.direction)
+    return f"from x = {x}, y = {y} along ({u:.4g}, {v:.4g})"
+
+
+# --- the loop gain --------------------------------------------------------------------------------
+
+
+def _gain_scale(analysis: Analysis, values: FloatArray) -> LogNorm:
+    """Return a logarithmic scale that ends at q, or where the picture is cut off."""
+    known = values[np.isfinite(values) & (values > 0.0)]
+    top = max(analysis.q.lower, 2.0)
+    if math.isinf(top):
+        top = min(_HIGHEST, max(float(np.quantile(known, 0.995)), 10.0))
+    low = min(0.5, 0.5 * top, float(np.quantile(known, 0.02)) if known.size else 0.5)
+    return LogNorm(max(low, 1e-3 * top), top)
+
+
+def draw_gain(figure: Part, analysis: Analysis) -> None:
+    """Draw ‖J‖/k in the vertical plane through the witness of q, and the witness."""
+    window, surface = gain_window(analysis), analysis.surface
+    wide, high = _units(window)
+    field = curl_field(surface, window.stretch, window.bottom, *_CELLS)
+    scale = _gain_scale(analysis, field.gain)
+    axes: Axes = figure.subplots()
+    style.dress(axes)
+    axes.set_facecolor(style.FREE)
+    mesh = axes.pcolormesh(
+        field.along * wide.scale,
+        field.z * high.scale,
+        np.maximum(field.gain, scale.vmin or 0.0),
+        norm=scale,
+        cmap="magma_r",
+        shading="flat",
+        rasterized=True,
+    )
+    _pale(axes, analysis, window, field)
+    at = in_window(window, witness(analysis)) if analysis.q.at is not None else None
+    if at is not None:
+        _mark(axes, at[0] * wide.scale, at[1] * high.scale)
+    axes.set_xlim(0.0, window.stretch.length * wide.scale)
+    axes.set_ylim(window.bottom * high.scale, window.top * high.scale)
+    axes.set_aspect("equal" if wide == high and _is_true(window) else "auto")
+    style.label(axes, f"{_along_text(window)} [{wide.name}]", f"z [{high.name}]")
+    style.entitle(axes, surface.law.letter, law_title(surface.law.name), _gain_remark(analysis))
+    _gain_bar(figure, mesh, axes)
+
+
+def _gain_remark(analysis: Analysis) -> str:
+    if math.isinf(analysis.q.lower):
+        return "q = ∞; the cross is where it first becomes so"
+    cross = "; the cross attains the lower end" if analysis.q.at is not None else ""
+    return f"q = {interval_text(analysis.q)} ({analysis.q.method}){cross}"
+
+
+def _gain_bar(figure: Part, mesh: Any, axes: Axes) -> None:
+    ticks = LogLocator(subs=(1.0, 2.0, 5.0))
+    bar = figure.colorbar(
+        mesh, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.02, extend="both",
+        ticks=ticks, format=FuncFormatter(lambda value, _place: number_text(value)),
+    )  # fmt: skip
+    bar.ax.xaxis.set_minor_locator(NullLocator())
+    style.dress_bar(bar, "‖J‖ / k [1]")
+
+
+def _mark(axes: Axes, x: float, y: float) -> None:
+    """Draw a cross that is seen on dark and on light."""
+    halo = [Stroke(linewidth=5.0, foreground="white"), withStroke(linewidth=2.0)]
+    axes.plot(x, y, "x", color=style.BLUE, ms=10, mew=2.2, zorder=7, path_effects=halo[:1])
+    axes.plot(x, y, "x", color=style.BLUE, ms=10, mew=2.2, zorder=8, clip_on=False)
+
+
+def draw_top(figure: Part, analysis: Analysis) -> None:
+    """Draw the greatest ‖J‖/k found over depth, from above, with the witness of q."""
+    view, surface = top_view(analysis), analysis.surface
+    scale = _gain_scale(analysis, view.gain)
+    unit = style.length_unit(float(view.size.max()))
+    (x0, y0), (x1, y1) = view.low * unit.scale, (view.low + view.size) * unit.scale
+    axes: Axes = figure.subplots()
+    style.dress(axes)
+    shown = np.maximum(view.gain, scale.vmin or 0.0)
+    mesh = axes.imshow(
+        shown, norm=scale, cmap="magma_r", origin="lower", extent=(x0, x1, y0, y1),
+        interpolation="nearest",
+    )  # fmt: skip
+    at = analysis.q.at
+    if at is not None:
+        spans = surface.texture.domain
+        x, y = _into(np.array(at[:2]), view.low, view.size, periodic=spans.periodic) * unit.scale
+        _mark(axes, float(x), float(y))
+        line = analysis.leak.line
+        start = np.array([x, y])
+        axes.axline(
+            tuple(start), tuple(start + line.direction), color=style.BLUE, lw=0.8, ls=":", zorder=3
+        )
+        axes.set_xlim(x0, x1)
+        axes.set_ylim(y0, y1)
+    style.label(axes, f"x [{unit.name}]", f"y [{unit.name}]")
+    remark = "greatest of five depths, sampled; dotted: the vertical plane of the other picture"
+    style.entitle(axes, surface.law.letter, "seen from above", remark)
+    _gain_bar(figure, mesh, axes)
+
+
+def _into(at: FloatArray, low: FloatArray, size: FloatArray, *, periodic: bool) -> FloatArray:
+    """Return a point moved into the rectangle of a texture that repeats along x and y."""
+    inside = np.all((at >= low) & (at <= low + size))
+    return at if inside or not periodic else low + (at - low) % size
+
+
+# --- depth ----------------------------------------------------------------------------------------
+
+
+def draw_depth(figure: Part, analysis: Analysis) -> None:
+    """Draw the singular values of J/k against depth at the witness column, with q's bounds."""
+    column, q = witness_column(analysis), analysis.q
+    unit = style.length_unit(analysis.surface.max_depth)
+    axes: Axes = figure.subplots()
+    style.dress(axes)
+    colours = (style.BLUE, style.GREEN, style.SOFT)
+    for index, colour in enumerate(colours):
+        name = f"σ{'₁₂₃'[index]}"
+        values = np.minimum(column.values[:, index], 2.0 * _HIGHEST)
+        width = 2.2 - 0.5 * index
+        axes.plot(column.depth * unit.scale, values, color=colour, lw=width, label=name)
+    top = float(np.quantile(column.values[:, 0], 0.98))
+    if math.isfinite(q.lower):
+        top = max(top, q.lower)
+        axes.axhline(q.lower, color=style.ORANGE, lw=1.1, label="q, lower")
+        if math.isfinite(q.upper):
+            axes.axhline(q.upper, color=style.INK, lw=1.1, ls=(0, (6, 6)), label="q, upper")
+    if q.at is not None:
+        words = "witness" if math.isfinite(q.lower) else "onset: from here down the force jumps"
+        axes.axvline(column.witness * unit.scale, color=style.FAINT, lw=1.2, zorder=0)
+        _beside(axes, column.witness / analysis.surface.max_depth, words)
+    if top > 30.0:
+        axes.set_yscale("symlog", linthresh=1.0)
+        axes.yaxis.set_major_locator(SymmetricalLogLocator(base=10, linthresh=1, subs=[1, 2, 5]))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
+    highest = 1.12 * min(top, _HIGHEST)
+    axes.set_ylim(-0.03 * highest if top <= 30.0 else -0.1, highest)
+    axes.set_xlim(0.0, analysis.surface.max_depth * unit.scale)
+    along = "along the normal" if abs(column.below[2]) < 1.0 else "below the surface"
+    if analysis.surface.law.contact == "nominal":
+        along = "below the smooth wall"
+    style.label(axes, f"depth {along} [{unit.name}]", "singular values of J/k [1]")
+    style.entitle(axes, analysis.surface.law.letter, "down to the witness", _gain_words(analysis))
+    axes.legend(frameon=False, fontsize=style.TICK, loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _beside(axes: Axes, part: float, words: str) -> None:
+    """Write words beside a vertical line at a part of the width, on the side with more room."""
+    left = part > 0.5
+    axes.annotate(
+        words,
+        (min(part, 1.0), 0.5),
+        (-4 if left else 4, 0),
+        xycoords="axes fraction",
+        textcoords="offset points",
+        ha="right" if left else "left",
+        va="center",
+        fontsize=style.TICK,
+        color=style.SOFT,
+        bbox={"facecolor": style.CARD, "edgecolor": "none", "pad": 1.0, "alpha": 0.85},
+    )
+
+
+def _gain_words(analysis: Analysis) -> str:
+    return f"q = {interval_text(analysis.q)} ({analysis.q.method})"
+
+
+def draw_jumps(figure: Part, analysis: Analysis) -> None:
+    """Draw by how much the force jumps at each depth where that was located."""
+    jumps = analysis.continuity.jumps
+    depth = np.array([jump.depth for jump in jumps])
+    size = np.array([jump.size for jump in jumps])
+    wide, high = style.length_unit(float(depth.max())), style.force_unit(float(size.max()))
+    axes: Axes = figure.subplots()
+    style.dress(axes)
+    axes.plot(depth * wide.scale, size * high.scale, "o-", color=style.BLUE, lw=1.0, ms=5.5)
+    axes.set_xlim(0.0, 1.05 * max(float(depth.max()), 1e-12) * wide.scale)
+    axes.set_ylim(0.0, 1.12 * float(size.max()) * high.scale)
+    axes.grid(color=style.FAINT, lw=0.5)
+    style.label(axes, f"depth [{wide.name}]", f"jump of the force [{high.name}]")
+    surface = analysis.surface
+    remark = f"at {surface.stiffness:g} N/m; every point has two witnesses on either side"
+    style.entitle(axes, surface.law.letter, "how far the force jumps", remark)
