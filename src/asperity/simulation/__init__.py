@@ -1,0 +1,1 @@
+"""Texture, device and hand in one loop, with the energy accounted for exactly."""
