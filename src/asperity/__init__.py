@@ -23,9 +23,12 @@ if TYPE_CHECKING:
         one_sided_number,
         worst_loop,
     )
+    from asperity.analysis.inspection import Analysis, analyze
     from asperity.analysis.limit_result import Limits
     from asperity.analysis.limits import limits
     from asperity.analysis.passivity import passivity
+    from asperity.analysis.split import PopThrough, SplitState, pop_through, split_state
+    from asperity.analysis.split_table import TabulatedSurface, tabulate
     from asperity.devices import Device, load_device
     from asperity.laws import Law
     from asperity.surface import Surface
@@ -45,6 +48,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "Analysis": "asperity.analysis.inspection",
     "Bound": "asperity.analysis",
     "Comparison": "asperity.analysis",
     "Device": "asperity.devices",
@@ -57,9 +61,13 @@ _HOMES = {
     "Noise": "asperity.textures",
     "NoiseProfile": "asperity.textures",
     "Passivity": "asperity.analysis",
+    "PopThrough": "asperity.analysis.split",
     "Profile": "asperity.textures",
     "Sinusoid": "asperity.textures",
+    "SplitState": "asperity.analysis.split",
     "Surface": "asperity.surface",
+    "TabulatedSurface": "asperity.analysis.split_table",
+    "analyze": "asperity.analysis.inspection",
     "characteristic_number": "asperity.analysis",
     "compare": "asperity.analysis",
     "curl_number": "asperity.analysis",
@@ -70,11 +78,15 @@ _HOMES = {
     "named_surface": "asperity.textures",
     "one_sided_number": "asperity.analysis",
     "passivity": "asperity.analysis.passivity",
+    "pop_through": "asperity.analysis.split",
+    "split_state": "asperity.analysis.split",
     "surface_names": "asperity.textures",
+    "tabulate": "asperity.analysis.split_table",
     "worst_loop": "asperity.analysis",
 }
 
 __all__ = [
+    "Analysis",
     "AsperityError",
     "Bound",
     "Comparison",
@@ -90,11 +102,15 @@ __all__ = [
     "NoiseProfile",
     "ParameterError",
     "Passivity",
+    "PopThrough",
     "Profile",
     "Sinusoid",
+    "SplitState",
     "Surface",
     "SurfaceFileError",
+    "TabulatedSurface",
     "__version__",
+    "analyze",
     "characteristic_number",
     "compare",
     "curl_number",
@@ -105,7 +121,10 @@ __all__ = [
     "named_surface",
     "one_sided_number",
     "passivity",
+    "pop_through",
+    "split_state",
     "surface_names",
+    "tabulate",
     "worst_loop",
 ]
 

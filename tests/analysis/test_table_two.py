@@ -116,10 +116,9 @@ def test_what_changed_is_said_with_its_numbers(table: TableTwo) -> None:
     assert len(cells) == 7
     assert {len(row) for row in cells} == {len(head)}
     assert cells[3][2] == "∞ (closed form)"
-    assert [row[-1] for row in cells] == [
-        "yes", "now a number", "now a number", "no: number", "yes",
-        "no: number, conservativity", "now a number",
-    ]  # fmt: skip
+    assert [row[4] for row in cells] == ["no", "no", "yes", "yes", "no", "no (Almost)", "no"]
+    assert [row[5] for row in cells] == ["yes", "yes", "yes", "no", "yes", "yes", "yes"]
+    assert [row[-1] for row in cells] == ["yes", "new", "new", "no", "yes", "no", "new"]
 
 
 def test_a_row_with_another_number_does_not_stand(table: TableTwo) -> None:
@@ -129,6 +128,8 @@ def test_a_row_with_another_number_does_not_stand(table: TableTwo) -> None:
     assert not replace(row, conservative=True).conservativity_agrees
     assert not replace(row, continuous=False).continuity_agrees
     assert not replace(row, energy=row.energy * (1.0 + 1e-6)).energy_agrees
+    assert replace(row, continuous=False).verdict == "no"
+    assert replace(table.row("B"), conservative=True).verdict == "no"
     assert not replace(table.row("E"), energy=0.0).energy_agrees
     assert not replace(table.row("D"), continuous=True).continuity_agrees
 
@@ -139,5 +140,5 @@ def test_plain_data_and_html(table: TableTwo) -> None:
     assert plain["rows"][5]["number_agrees"] is False
     text = table._repr_html_()
     assert text.count("<tr>") == 8
-    assert "No. Even if h continuous" in text
+    assert "no (Almost)" in text
     assert "nan" not in text

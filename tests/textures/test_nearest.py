@@ -318,3 +318,17 @@ def test_the_plain_functions_find_the_same(texture: Texture, scatter: Check, pla
     points = probes(texture, scatter)[::3]
     compiled = texture.nearest(points)
     np.testing.assert_allclose(plain(texture).nearest(points), compiled, rtol=0, atol=1e-13)
+
+
+def test_mirror_lines_of_a_finite_map() -> None:
+    """A foot exactly on the border between two boxes is a candidate of both, not of none."""
+    rough = 5e-5 * np.random.default_rng(3).normal(size=(7, 8))
+    texture = HeightMap(rough, (1e-4, 1.3e-4))
+    rng = np.random.default_rng(0)
+    n = 1500
+    for line in (0.0, 7e-4):
+        z = rng.uniform(-6e-4, -1e-4, n)
+        on = np.column_stack([np.full(n, line), rng.uniform(-1.5e-3, 1.5e-3, n), z])
+        beside = on + np.array([1e-12, 0.0, 0.0])
+        distances = [np.linalg.norm(texture.nearest(p) - p, axis=1) for p in (on, beside)]
+        np.testing.assert_allclose(distances[0], distances[1], rtol=0.0, atol=1e-11)

@@ -95,7 +95,8 @@ def split_number(surface: Surface, search: Search) -> Bound:
     witness = max((attained(surface, NORM, foot, d) for d in depths), key=lambda w: w.value)
     least = crest.least_radius
     y = surface.max_depth / least * (1.0 + _ROUNDING) if least > 0.0 else math.inf
-    upper = min(c, _number(y) * (1.0 + _ROUNDING))
+    alone = _number(y)
+    upper = min(c, alone * (1.0 + _ROUNDING) if alone > 1.0 else 1.0)
     if upper < c:
         reason = "law D's number: the depth is too small for the god-object to split"
     return Bound(lower_of(upper, witness), upper, "theorem", witness.at, reason)

@@ -197,8 +197,8 @@ def _refuse_if_too_large(surface: Surface, grid: Grid, limit: int) -> None:
         fits = f"{_rounded_up(_resolution_for(surface, limit)):.3g} m fits"
     raise ParameterError(
         "resolution",
-        f"would need a table of {nodes} nodes, {grid.bytes / 1e6:.4g} MB, more than max_bytes = "
-        f"{limit / 1e6:.4g} MB; {fits}",
+        f"would need a table of {nodes} nodes, {grid.bytes / 1e6:,.1f} MB, more than max_bytes = "
+        f"{limit / 1e6:,.1f} MB; {fits}",
         max(grid.spacing),
     )
 

@@ -108,6 +108,14 @@ class TableTwoRow:
         parts = (self.conservativity_agrees, self.continuity_agrees, self.energy_agrees)
         return self.number_agrees is True and all(parts)
 
+    @property
+    def verdict(self) -> str:
+        """``"yes"`` if the row stands, ``"new"`` if only a number is added, else ``"no"``."""
+        if self.agrees:
+            return "yes"
+        parts = (self.conservativity_agrees, self.continuity_agrees, self.energy_agrees)
+        return "new" if self.number_agrees is None and all(parts) else "no"
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
         return {
@@ -203,9 +211,14 @@ def _mm(length: float) -> str:
 
 def _surface(letter: str) -> Surface:
     """Return the surface of section V.A."""
-    texture = Sinusoid(_AMPLITUDE, _PERIOD)
-    options = {"friction": _FRICTION, "max_deflection": _DEFLECTION}
-    return Surface(texture, letter, stiffness=_STIFFNESS, max_depth=_DEPTH, **options)
+    return Surface(
+        Sinusoid(_AMPLITUDE, _PERIOD),
+        letter,
+        stiffness=_STIFFNESS,
+        max_depth=_DEPTH,
+        friction=_FRICTION,
+        max_deflection=_DEFLECTION,
+    )
 
 
 def _row(letter: str) -> TableTwoRow:
@@ -263,9 +276,8 @@ def _appendix_one() -> float:
 
 def _loop_surface(letter: str) -> Surface:
     """Return the surface of section V.B; law F without texture, as in (27)."""
-    texture = Sinusoid(_AMPLITUDE, _LOOP_PERIOD)
     return Surface(
-        texture,
+        Sinusoid(_AMPLITUDE, _LOOP_PERIOD),
         letter,
         stiffness=_LOOP_STIFFNESS,
         max_depth=_DEPTH,
@@ -279,13 +291,8 @@ def _path(letter: str) -> Sequence[Sequence[float]]:
     """Return the path of Fig. 3 on which the paper looks at a law's energy, vertices [m]."""
     quarter = 0.25 * _LOOP_PERIOD
     if letter == "F":
-        turns = [
-            (0.0, 1e-3),
-            (0.0, -_A),
-            (_DEFLECTION, -_A),
-            (_DEFLECTION, -_DEPTH),
-            (0.0, -_DEPTH),
-        ]
+        x, z = _DEFLECTION, -_DEPTH
+        turns = [(0.0, 1e-3), (0.0, -_A), (x, -_A), (x, z), (0.0, z)]
     elif letter == "G":
         turns = [(quarter, _A), (quarter, -_A), (3.0 * quarter, -_A), (3.0 * quarter, _A)]
     else:
@@ -299,11 +306,12 @@ def _change(letter: str, printed: Printed, q: Bound) -> str:
     radius = _mm(_DEPTH / y)
     closed = f"There is a closed form, and it grows with the depth: y = {y:.2f} here."
     if letter == "F":
+        own = printed.value or 0.0
         return (
-            f"The paper uses 8.3. Its own formula gives {printed.value:.2f}, and √2 times that "
-            f"{math.sqrt(2.0) * (printed.value or 0.0):.2f}: a factor √2/2 was dropped. The formula "
-            "bounds each entry by itself, with a factor 2 that 0 <= h <= 1 rules out; the law as "
-            f"defined has {q.value:.4f}. 'Almost' is no: the loop of (27) gains energy every turn."
+            f"The paper uses 8.3. Its own formula gives {own:.2f}, and √2 times that "
+            f"{math.sqrt(2.0) * own:.2f}: a factor √2/2 was dropped. The formula bounds each entry "
+            "by itself, with a factor 2 that 0 <= h <= 1 rules out; the law as defined has "
+            f"{q.value:.4f}. 'Almost' is no: the loop of (27) gains energy."
         )
     return {
         "A": "Nothing, but that it is attained at x = 0 modulo l/2.",
@@ -321,24 +329,20 @@ def _change(letter: str, printed: Printed, q: Bound) -> str:
 def _cells(row: TableTwoRow) -> list[str]:
     printed = row.printed
     number = printed.number if printed.value is None else f"{printed.number} = {printed.value:.4g}"
-    stands = {True: "yes", False: "no", None: "now a number"}
-    parts = {
-        "number": row.number_agrees,
-        "conservativity": row.conservativity_agrees,
-        "continuity": row.continuity_agrees,
-        "energy": row.energy_agrees,
-    }
-    failed = [name for name, agrees in parts.items() if agrees is False]
     return [
         row.law,
         "1" if printed.number == "1" else number,
         f"{_number(row.q)} ({row.q.method})",
-        f"{_number(row.one_sided)} ({row.one_sided.method})",
-        f"{'yes' if row.conservative else 'no'} (printed: {printed.conservative})",
-        f"{'yes' if row.continuous else 'no'} (printed: {printed.continuous})",
+        _number(row.one_sided),
+        _said(row.conservative, printed.conservative, row.conservativity_agrees),
+        _said(row.continuous, printed.continuous, row.continuity_agrees),
         f"{row.energy * 1e6 + 0.0:.1f} µJ",
-        stands[row.number_agrees] if not failed else f"no: {', '.join(failed)}",
+        row.verdict,
     ]
+
+
+def _said(fact: bool, printed: str, agrees: bool) -> str:
+    return ("yes" if fact else "no") + ("" if agrees else f" ({printed})")
 
 
 def _number(bound: Bound) -> str:

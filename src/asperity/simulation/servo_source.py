@@ -44,10 +44,11 @@ cx, cy, cz = probe_force(mx, my, mz, dx, dy, texture, law)
 def servo_source(law: Law) -> str:
     """Return ``servo_batch`` for a law.
 
-    ``servo_batch(x, queue, memory, ledger, anchor, motion, loss, anchor_work, mass, parts,
+    ``servo_batch(x, z, queue, memory, ledger, anchor, motion, loss, anchor_work, mass, parts,
     settings, texture, law, trace)`` runs one sample for each row of ``anchor`` but the last:
 
     * x: state of the body (n,), changed;
+    * z: room for (x, f, a, v), (n + 9,): nothing is allocated;
     * queue: forces that wait (d + 1, 3), changed;
     * memory: whether begun, last measured position (3), filtered velocity (3), the law's anchor
       (2) and whether it is held, the head of the queue, samples done, last commanded force (3);
@@ -127,14 +128,13 @@ def move(x, z, motion, loss, anchor_work, mass, friction, ledger):
 
 
 def servo_batch(
-    x, queue, memory, ledger, anchor, motion, loss, anchor_work, mass, parts,
+    x, z, queue, memory, ledger, anchor, motion, loss, anchor_work, mass, parts,
     settings, texture, law, trace
 ):
     """Run the servo loop; returns the samples done, fewer if the state leaves all bounds."""
     {unpack} = law
     position_step, force_step, max_force, damper, velocity_share, friction, period = settings
     n = x.shape[0]
-    z = np.zeros(n + 9)
     slots = queue.shape[0]
     head = int(memory[10])
     samples = anchor.shape[0] - 1

@@ -239,9 +239,7 @@ def _fit_block(part: FloatArray, side: int, scale: float, slack: FloatArray) -> 
         scale: factor of the derivative.
         slack: error of the coefficients by rounding.
     """
-    y, x = (
-        (2.0 * np.arange(count) - (count - side - 1) - side) / side for count in part.shape[1:]
-    )
+    y, x = ((2.0 * np.arange(count) - (count - side - 1) - side) / side for count in part.shape[1:])
     gx = part.mean(axis=1) @ x / (x @ x)
     gy = part.mean(axis=2) @ y / (y @ y)
     rest = part - gx[:, None, None] * x - gy[:, None, None] * y[:, None]

@@ -169,8 +169,9 @@ def judge(
     sy = (q[1] * (away[0] + gap * hx) - q[0] * (away[1] + gap * hy)) / det
     # Convex in the box: the only minimum is where Newton's method leads, or not in the box.
     error = 1e-6 * r + 0.5 * change * r / low
-    if abs(sx) > a or abs(sy) > b:
-        return best, abs(sx) <= a + error and abs(sy) <= b + error
+    # Nor is it dropped where it is on the border itself, as on the mirror lines of a finite map.
+    if abs(sx) > a + error or abs(sy) > b + error:
+        return best, False
     known = abs(best[0] - cx) <= a and abs(best[1] - cy) <= b
     start_x = best[0] if known else cx + sx
     start_y = best[1] if known else cy + sy
