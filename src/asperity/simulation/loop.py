@@ -149,8 +149,9 @@ class Simulation:
         first = self._memory[11]
         done = self._loops.servo_batch(
             self._state, np.zeros(self.moved.order + 9), self._queue, self._memory, self._ledger,
-            way, step.motion, step.loss, step.anchor_work, self._stopping_mass(), self._parts, self._settings(),
-            self.surface.texture.arguments, self.surface.law_arguments, trace,
+            way, step.motion, step.loss, step.anchor_work, self._stopping_mass(), self._parts,
+            self._settings(), self.surface.texture.arguments,
+            self.surface.law_arguments, trace,
         )  # fmt: skip
         after = self._stored(way[done])
         trace = trace[:done]
