@@ -272,3 +272,14 @@ def test_the_notebook_table_escapes_names(rig: Device) -> None:
     assert hostile not in text
     assert "&lt;script&gt;" in text
     assert text.count("<tr>") == 2 + 3 + len(analyze(surface("A"), rig).passivity.criteria)
+
+
+def test_a_finite_surface_is_not_pressed_deeper_than_it_is_wide() -> None:
+    heights = 1e-5 * np.random.default_rng(2).normal(size=(8, 9))
+    shallow = asp.Surface(asp.HeightMap(heights, 1e-5), "A", max_depth=6e-5)
+    assert analyze(shallow).q.method == "certified"
+    deep = asp.Surface(asp.HeightMap(heights, 1e-5), "A", max_depth=8e-5)
+    with pytest.raises(asp.ParameterError, match="max_depth must not exceed the width"):
+        analyze(deep)
+    endless = asp.Surface(asp.HeightMap(heights, 1e-5, periodic=True), "A", max_depth=8e-5)
+    assert analyze(endless).q.method == "certified"

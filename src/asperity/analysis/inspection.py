@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from asperity.analysis.bound import Bound
 from asperity.analysis.branch_and_bound import DEFAULT_WORK_LIMIT
 from asperity.analysis.characteristic import (
@@ -31,6 +33,8 @@ from asperity.surface import (
     Surface,
     default_max_depth,
 )
+from asperity.textures.heightmap import HeightMap
+from asperity.textures.profile import Profile
 from asperity.units import engineering, rounded_down
 
 SCHEMA = 1
@@ -178,7 +182,8 @@ def analyze(
         An :class:`Analysis`. What the device's data cannot decide is listed with what is missing.
 
     Raises:
-        ParameterError: for a value that cannot be used; it names the argument.
+        ParameterError: for a value that cannot be used, it names the argument; and for a finite
+            measured surface that would be pressed deeper than it is wide.
 
     Reference:
         Campion and Hayward, (1), (5), III.B and III.C; MATH sections 3 and 4.
@@ -194,6 +199,7 @@ def analyze(
     """
     if not isinstance(surface, Surface):
         raise ParameterError("surface", "must be a Surface", surface)
+    _refuse_beyond(surface)
     known = load_device(device)
     begin: Progress = progress or (lambda _step: None)
     begin(STEPS[0])
@@ -232,6 +238,18 @@ def analyze(
 
 
 # --- words ----------------------------------------------------------------------------------------
+
+
+def _refuse_beyond(surface: Surface) -> None:
+    """Refuse a depth at which a finite surface is felt through its mirror images only."""
+    domain = surface.texture.domain
+    if domain.periodic or not isinstance(surface.texture, (HeightMap, Profile)):
+        return
+    width = float(np.hypot(*domain.spans.T).min())
+    if surface.max_depth > width:
+        limit = f"must not exceed the width of the surface, {engineering(width, 'm')}"
+        reason = "further down only its mirror images are felt"
+        raise ParameterError("max_depth", f"{limit}: {reason} [m]", surface.max_depth)
 
 
 def _answer(result: Analysis) -> str:
