@@ -136,6 +136,15 @@ def test_what_is_not_finite_is_not_bounded(number: Number) -> None:
     assert np.isposinf(huge[[0, 4]]).all()  # its squares overflow
 
 
+def test_corners_that_overflow_leave_the_rough_bound() -> None:
+    """The middle of the cell does not overflow: its number is finite, theirs is not a number."""
+    c = np.diag([2e51, 1e51, 1e51])[None]
+    still, empty = np.zeros_like(c), np.zeros((0, 1, 3, 3))
+    assert np.isfinite(NORM.at_most(c, empty, still, 0.0)).all()
+    with np.errstate(all="ignore"):
+        assert NORM.at_most(c, 2.0 * c[None], still, 0.0)[0] >= 6e51
+
+
 def test_careful_measures_of_what_is_not_finite_are_nan() -> None:
     matrices = np.stack([np.eye(3), np.full((3, 3), np.nan), -2.0 * np.eye(3)])
     for measure, expected in ((precise_norm, [1, np.nan, 2]), (precise_one_sided, [-1, np.nan, 2])):

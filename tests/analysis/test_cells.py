@@ -15,6 +15,7 @@ from asperity.analysis.branch_and_bound import _parts, _split
 from asperity.analysis.cells import NAMES, Cells, WaveCells, cells_of
 from asperity.analysis.cells.base import ORDERS, spread
 from asperity.analysis.cells.products import ProductCells, anchor_models, with_deflection
+from asperity.analysis.cells.splines import MapCells
 from asperity.analysis.cells.waves import nearest_phases
 from asperity.analysis.taylor import Taylor
 from asperity.definition import exact_height
@@ -259,6 +260,42 @@ def test_the_error_shrinks_with_the_square_of_the_cell(name: str) -> None:
         errors.append(model.e.mean())
     order = -np.polyfit(levels, np.log2(errors), 1)[0]
     assert order == pytest.approx(2.0, abs=0.1)
+
+
+def test_blocks_of_a_tilted_plane_are_exact() -> None:
+    """A linear height is its own linear part: next to nothing is left, also of its slopes."""
+    y, x = np.mgrid[0:16.0, 0:16.0]
+    found = MapCells(HeightMap(1e-4 * x - 3e-4 * y, (3e-4, 7e-4)))
+    centres, half = np.array([[8.0, 8.0]]), np.array([2.0, 2.0])
+    models = found.models(centres, half, ["h", "hx", "hy"])
+    # The border is mirrored, which reaches a little into the middle.
+    expected = {"h": (-16e-4, 2e-4, -6e-4), "hx": (1 / 3, 0.0, 0.0), "hy": (-3 / 7, 0.0, 0.0)}
+    for name, (c, gx, gy) in expected.items():
+        model = models[name]
+        assert isinstance(model, Taylor)
+        near = 2e-2 * abs(c)
+        assert model.c[0] == pytest.approx(c, abs=near)
+        assert model.g[:, 0] == pytest.approx([gx, gy], abs=near)
+        assert model.e[0] < near
+        assert name != "h" or model.e[0] < 2e-3 * abs(c)
+
+
+def test_blocks_of_ridges_touch_their_bounds() -> None:
+    """Second derivatives along a ridged map are linear between nodes: its hull is attained."""
+    texture = HeightMap(1e-4 * np.tile(ROUGH[0], (9, 1)), 3e-4)
+    found = MapCells(texture)
+    chunks, half = found.start()
+    centres = np.concatenate(list(chunks))
+    assert half.tolist() == [2.0, 2.0]
+    model = found.models(centres, half, ["hxx"])["hxx"]
+    assert isinstance(model, Taylor)
+    most = np.zeros(len(centres))
+    for xi in np.linspace(-1.0, 1.0, 5):
+        exact = found.derivatives(centres + half * [xi, 0.3])[:, 3]
+        most = np.maximum(most, np.abs(exact - model.c - model.g[0] * xi) / model.e)
+    assert most.max() <= 1.0
+    # Not the coefficients beyond the block, but it is near.
+    assert most.min() > 0.99
 
 
 def test_a_margin_widens_the_extent_on_every_side() -> None:

@@ -336,7 +336,7 @@ def _cells(row: TableTwoRow) -> list[str]:
         _number(row.one_sided),
         _said(row.conservative, printed.conservative, row.conservativity_agrees),
         _said(row.continuous, printed.continuous, row.continuity_agrees),
-        f"{row.energy * 1e6 + 0.0:.1f} µJ",
+        f"{row.energy * 1e6 + 0.0:.0f} µJ",
         row.verdict,
     ]
 
