@@ -165,9 +165,10 @@ class Surface:
         """The modules that are compiled together with the law: the texture's and the contact's."""
         sampler = self.texture.sampler
         if self.law.contact == "split":
-            from asperity.textures.samplers import sinusoid, split, split_sinusoid
+            from asperity.textures.samplers import sinusoid, split, split_conditions, split_sinusoid
 
-            sampler = (*sampler, split_sinusoid if sampler[0] is sinusoid else split)
+            known = sampler[0] is sinusoid
+            sampler = (*sampler, *((split_sinusoid,) if known else (split, split_conditions)))
         return sampler
 
     @cached_property

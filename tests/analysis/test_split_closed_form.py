@@ -12,7 +12,7 @@ from asperity.analysis.split import split_state
 from asperity.checks import FloatArray
 from asperity.derive.fuse import fuse_surface
 from asperity.surface import Surface
-from asperity.textures.samplers import split
+from asperity.textures.samplers import split, split_conditions
 from asperity.textures.sinusoid import Sinusoid
 
 PERIOD = 1e-3
@@ -26,7 +26,7 @@ def _surface(part: float, c: float) -> Surface:
 
 def _general(surface: Surface) -> ModuleType:
     """Return the loops that know nothing of sinusoids but their nearest points."""
-    return fuse_surface(surface.law, (*surface.texture.sampler, split), "none")
+    return fuse_surface(surface.law, (*surface.texture.sampler, split, split_conditions), "none")
 
 
 def _probes(surface: Surface, count: int) -> FloatArray:

@@ -106,6 +106,24 @@ def test_a_plate_pops_through_where_it_is_said_to() -> None:
     assert plate.barrier == pytest.approx(c / (1.0 + c) * plate.barrier_god_object)
 
 
+@pytest.mark.parametrize("c", [0.5, 1.0, 3.0])
+def test_the_depth_is_that_of_a_flat_plate(c: float) -> None:
+    """There it is sharp: 3 per cent deeper the plate's energy is another."""
+    thickness = 0.8e-3
+    surface = Surface(Profile(np.zeros(8), 1e-3), "H", 1.0, continuity=c, max_depth=1e-3)
+    plate = pop_through(surface, thickness)
+
+    def distance(y: np.ndarray) -> np.ndarray:
+        return np.maximum(np.minimum(-y[:, 1], y[:, 1] + thickness), 0.0)
+
+    for part, same in ((0.9, True), (0.999, True), (1.03, False)):
+        z = -part * plate.depth
+        whole = split_state(surface, [[3e-3, 0.0, z]]).potential[0]
+        assert whole == pytest.approx(0.5 * z * z)
+        energy = _definition(distance, np.array([3e-3, z]), c)
+        assert bool(abs(energy / whole - 1.0) < 1e-4) is same, part
+
+
 @pytest.mark.parametrize("thickness", [0.0, -1.0, 0.1e-3, math.nan])
 def test_a_plate_with_holes_is_refused(thickness: float) -> None:
     with pytest.raises(ParameterError) as caught:

@@ -117,10 +117,13 @@ def test_bounds_of_a_paraboloid_are_exact():
     assert corner <= inner[0, 0, 1] <= corner + 1e-8
 
 
-def test_bounds_of_a_cubic_are_exact():
-    x = np.arange(80) * 1e-4
-    boxes = finest(HeightMap(np.tile(5e3 * x**3, (12, 1)), (1e-4, 2e-4)))
-    assert just_above(boxes[2:4, 18:22, 3], 3e4 * 1e-8 * (1 - 1e-9), boxes[..., 3].max())
+@pytest.mark.parametrize("power", [3, 2, 1, 0])
+def test_bounds_of_third_derivatives_are_exact(power: int):
+    """Of x^n y^(3 - n): the root of the sum of the squares of all eight third derivatives."""
+    y, x = np.mgrid[0:80, 0:80] * np.array([2e-4, 1e-4])[:, None, None]
+    boxes = finest(HeightMap(1e3 * x**power * y ** (3 - power), (1e-4, 2e-4)))
+    exact = 1e3 * np.sqrt([36.0, 12.0, 12.0, 36.0][power]) * 1e-8
+    assert just_above(boxes[18:22, 18:22, 3], exact * (1 - 1e-9), boxes[..., 3].max())
 
 
 def test_tiles_make_no_difference(monkeypatch: pytest.MonkeyPatch):

@@ -1,0 +1,177 @@
+"""Energy and conditions of optimality of law H for given atoms (``split.py``).
+
+Rows of ``atoms`` are x, y, z [m] and weight. Differences of squared distances are products of
+sums and differences: near a crest the atoms are so close together that squares would cancel.
+"""
+
+from typing import Any
+
+import numpy as np
+
+
+def height(x: float, y: float, *texture: Any) -> float:
+    """Stand in for the sampler's own function, which replaces this one."""
+    raise AssertionError
+
+
+def curvature(x: float, y: float, *texture: Any) -> tuple[float, ...]:
+    """Stand in for the sampler's own function, which replaces this one."""
+    raise AssertionError
+
+
+# Compiled, these are arrays on the stack: see stack_memory.
+local_array = np.empty
+
+# fused from here
+
+FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+
+
+def split_farther(atoms: FloatArray, i: int, j: int, y: FloatArray) -> float:
+    """Return half of |w_i - y|² - |w_j - y|²."""
+    total = 0.0
+    for d in range(3):
+        total += (atoms[i, d] - atoms[j, d]) * (atoms[i, d] + atoms[j, d] - 2.0 * y[d])
+    return 0.5 * total
+
+
+def split_value(atoms: FloatArray, count: int, p: FloatArray, mu: float, pull: FloatArray) -> float:
+    """Write z̄ - p and return ½ [|z̄ - p|² + (1 - μ) Σ λ_i |w_i - z̄|²]."""
+    total = 0.0
+    for d in range(3):
+        pull[d] = 0.0
+        for i in range(count):
+            pull[d] += atoms[i, 3] * (atoms[i, d] - p[d])
+        total += pull[d] * pull[d]
+        for i in range(count):
+            total += (1.0 - mu) * atoms[i, 3] * (atoms[i, d] - p[d] - pull[d]) ** 2
+    return 0.5 * total
+
+
+def split_copy(source: FloatArray, target: FloatArray, count: int) -> None:
+    """Copy the first rows."""
+    for i in range(count):
+        for d in range(4):
+            target[i, d] = source[i, d]
+
+
+def split_solve(a: FloatArray, n: int, width: int) -> bool:
+    """Solve n equations in place, right-hand sides in columns n to width; are they regular?"""
+    for i in range(n):
+        pivot = i
+        for r in range(i + 1, n):
+            if abs(a[r, i]) > abs(a[pivot, i]):
+                pivot = r
+        size = a[pivot, i]
+        if abs(size) < 1e-300:
+            return False
+        for j in range(i, width):
+            upper = a[pivot, j] / size
+            a[pivot, j] = a[i, j]
+            a[i, j] = upper
+        for r in range(n):
+            factor = a[r, i]
+            if r != i and factor != 0.0:
+                for j in range(i, width):
+                    a[r, j] -= factor * a[i, j]
+    return True
+
+
+def split_system(
+    atoms: FloatArray, count: int, p: FloatArray, y: FloatArray, mu: float, a: FloatArray
+) -> None:
+    """Write the linearised conditions of optimality for y and the weights, the atoms fixed.
+
+    (1 - μ) (y - p) + μ Σ λ_i (w_i - p) = 0; |y - w_i| equal; Σ λ_i = 1. The right-hand side,
+    column 3 + count, is minus their residual; the conditions are linear, one step solves them.
+    """
+    n = 3 + count
+    for i in range(n):
+        for j in range(n + 1):
+            a[i, j] = 0.0
+    for d in range(3):
+        a[d, d] = 1.0 - mu
+        a[d, n] = (1.0 - mu) * (p[d] - y[d])
+    a[3, n] = 1.0
+    for i in range(count):
+        for d in range(3):
+            a[d, 3 + i] = mu * (atoms[i, d] - p[d])
+            a[d, n] -= atoms[i, 3] * a[d, 3 + i]
+        a[3, 3 + i] = 1.0
+        a[3, n] -= atoms[i, 3]
+        if i > 0:
+            for d in range(3):
+                difference = atoms[0, d] - atoms[i, d]
+                a[3 + i, d] = difference
+                a[3 + i, n] += 0.5 * difference * (atoms[0, d] + atoms[i, d] - 2.0 * y[d])
+
+
+def split_projection(
+    y: FloatArray, atoms: FloatArray, row: int, out: FloatArray, texture: Any
+) -> bool:
+    """Write ∂w/∂y, (3, 3), of a foot w on the surface; return whether it is a minimum."""
+    _h, hx, hy, hxx, hxy, hyy = curvature(atoms[row, 0], atoms[row, 1], *texture)
+    gap = atoms[row, 2] - y[2]
+    q11 = 1.0 + hx * hx + gap * hxx
+    q12 = hx * hy + gap * hxy
+    q22 = 1.0 + hy * hy + gap * hyy
+    det = q11 * q22 - q12 * q12
+    if det <= 0.0 or q11 + q22 <= 0.0:
+        return False
+    out[0, 0] = q22 / det
+    out[0, 1] = -q12 / det
+    out[1, 1] = q11 / det
+    out[0, 2] = out[0, 0] * hx + out[0, 1] * hy
+    out[1, 2] = out[0, 1] * hx + out[1, 1] * hy
+    out[2, 2] = out[0, 2] * hx + out[1, 2] * hy
+    out[1, 0] = out[0, 1]
+    out[2, 0] = out[0, 2]
+    out[2, 1] = out[1, 2]
+    return True
+
+
+def split_moving(
+    atoms: FloatArray, count: int, y: FloatArray, mu: float, a: FloatArray, texture: Any
+) -> bool:
+    """Let the atoms of the system move with y, as feet do; return whether all are minima."""
+    projection = local_array((3, 3))
+    for i in range(count):
+        if not split_projection(y, atoms, i, projection, texture):
+            return False
+        for r in range(3):
+            for s in range(3):
+                a[r, s] += mu * atoms[i, 3] * projection[r, s]
+    return True
+
+
+def split_follow(y: FloatArray, atoms: FloatArray, row: int, texture: Any) -> bool:
+    """Move a foot to the stationary point near it that belongs to y; return success."""
+    fx = atoms[row, 0]
+    fy = atoms[row, 1]
+    last = np.inf
+    stalled = 0
+    for _ in range(25):
+        h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, *texture)
+        gap = h - y[2]
+        px = fx - y[0] + gap * hx
+        py = fy - y[1] + gap * hy
+        q11 = 1.0 + hx * hx + gap * hxx
+        q12 = hx * hy + gap * hxy
+        q22 = 1.0 + hy * hy + gap * hyy
+        det = q11 * q22 - q12 * q12
+        if det <= 0.0 or q11 + q22 <= 0.0:
+            return False
+        sx = (q12 * py - q22 * px) / det
+        sy = (q12 * px - q11 * py) / det
+        fx += sx
+        fy += sy
+        size = sx * sx + sy * sy
+        stalled += size >= 0.25 * last
+        last = size
+        # Near a centre of curvature the first steps need not shrink.
+        if stalled > 2 or size <= 1e-32 * (gap * gap + fx * fx + fy * fy):
+            break
+    atoms[row, 0] = fx
+    atoms[row, 1] = fy
+    atoms[row, 2] = height(fx, fy, *texture)
+    return True
