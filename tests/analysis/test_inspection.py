@@ -283,3 +283,13 @@ def test_a_finite_surface_is_not_pressed_deeper_than_it_is_wide() -> None:
         analyze(deep)
     endless = asp.Surface(asp.HeightMap(heights, 1e-5, periodic=True), "A", max_depth=8e-5)
     assert analyze(endless).q.method == "certified"
+
+
+def test_the_default_depth_of_a_tiny_map_is_answered_and_named() -> None:
+    flat = asp.Surface(asp.HeightMap(np.full((8, 8), 1e-3), 1e-5), "A")
+    assert flat.max_depth == 1e-3  # 1 mm below a surface of 70 um
+    said = "Below 70 µm, the surface's width, only its mirror images are felt"
+    assert said in analyze(flat).assumptions
+    wide = asp.Surface(asp.HeightMap(np.full((8, 8), 1e-3), 1e-3), "A")
+    assert said not in analyze(wide).assumptions
+    assert not any("mirror" in words for words in analyze(wide).assumptions)

@@ -35,6 +35,7 @@ from asperity.surface import (
 )
 from asperity.textures.heightmap import HeightMap
 from asperity.textures.profile import Profile
+from asperity.textures.texture import Texture
 from asperity.units import engineering, rounded_down
 
 SCHEMA = 1
@@ -241,15 +242,22 @@ def analyze(
 
 
 def _refuse_beyond(surface: Surface) -> None:
-    """Refuse a depth at which a finite surface is felt through its mirror images only."""
-    domain = surface.texture.domain
-    if domain.periodic or not isinstance(surface.texture, (HeightMap, Profile)):
-        return
-    width = float(np.hypot(*domain.spans.T).min())
-    if surface.max_depth > width:
+    """Refuse a depth at which a finite surface is felt through its mirror images only.
+
+    The default depth of a texture is always answered; ``_assumptions`` says when it is too deep.
+    """
+    width = _width(surface.texture)
+    if surface.max_depth > width and surface.max_depth != default_max_depth(surface.texture):
         limit = f"must not exceed the width of the surface, {engineering(width, 'm')}"
         reason = "further down only its mirror images are felt"
         raise ParameterError("max_depth", f"{limit}: {reason} [m]", surface.max_depth)
+
+
+def _width(texture: Texture) -> float:
+    """Return how wide a finite surface is, the shorter way [m]; infinite where it goes on."""
+    if texture.domain.periodic or not isinstance(texture, (HeightMap, Profile)):
+        return math.inf
+    return float(np.hypot(*texture.domain.spans.T).min())
 
 
 def _answer(result: Analysis) -> str:
@@ -316,6 +324,9 @@ def _defaults(surface: Surface) -> list[str]:
     if surface.max_depth == default_max_depth(surface.texture):
         depth = engineering(surface.max_depth, "m")
         said.append(f"Default max depth {depth}: the peak-to-valley height, at most 1 mm")
+    if surface.max_depth > _width(surface.texture):
+        width = engineering(_width(surface.texture), "m")
+        said.append(f"Below {width}, the surface's width, only its mirror images are felt")
     for name, default in surface.law.parameters.items():
         value = surface.law_parameters[name]
         if name in DEFAULT_PARAMETERS and value == default:
