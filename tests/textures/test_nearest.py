@@ -178,6 +178,35 @@ def test_a_wall_many_cells_away_is_nearer_than_the_top(kind: str, side: int):
     assert found < 8.5e-4
 
 
+def on_borders(texture: Texture) -> np.ndarray:
+    """Return points (n, 2) on nodes, on borders of boxes of the search, and on mirror lines."""
+    spans = texture.domain.spans
+    pitch = getattr(texture, "pitch", 1e-4)
+    step = np.broadcast_to(pitch, len(spans)) if np.ndim(pitch) < 2 else pitch
+    directions = spans / np.hypot(*spans.T)[:, None]
+    ticks = [np.arange(-12, 13) * 0.5 * length for length in step]
+    mesh = np.stack(np.meshgrid(*ticks), axis=-1).reshape(-1, len(spans))
+    edge = np.random.default_rng(28).random((60, len(spans)))
+    edge[::2, 0] = np.repeat([0.0, 0.5, 1.0], 10)
+    edge[1::2, -1] = np.repeat([0.0, 0.5, 1.0], 10)
+    inner = texture.domain.origin + mesh @ directions
+    return np.concatenate([inner, texture.domain.points(edge)])
+
+
+def test_a_foot_on_the_border_of_a_box_is_found(texture: Texture):
+    """No probe is farther away than a depth below a surface point, along its normal there."""
+    xy = on_borders(texture)
+    slope = texture.gradient(xy)
+    down = np.column_stack([slope, -np.ones(len(xy))])
+    down /= np.linalg.norm(down, axis=1)[:, None]
+    surface = np.column_stack([xy, texture.height(xy)])
+    extent = search.extent_of(texture)
+    for share in (1e-6, 1e-3, 0.02, 0.1, 0.3, 1.0, -0.02, -0.3):
+        depth = share * texture.peak_to_valley
+        found = distances(texture, surface + depth * down)
+        assert (found - abs(depth)).max() <= 1e-15 + 1e-12 * extent
+
+
 def test_far_probes_have_finite_feet(texture: Texture):
     """Metres away from a texture of millimetres: through thousands of copies, never NaN."""
     offsets = np.array([[3.0, -2.0], [0.011, 0.013], [-40.0, 5.0]])

@@ -76,7 +76,7 @@ def judge(
     # The slope of φ at the centre is too great to vanish in the interval.
     if abs(p) > (abs(q) * (1.0 + 1e-6) + 0.5 * change + 1e-6) * r:
         return best, False
-    if q <= change or abs(p) > q * r:
+    if q <= change:
         return best, True
     start = best[0] if abs(best[0] - centre) <= r else centre - p / q
     found = descend(x, z, start, texture)
