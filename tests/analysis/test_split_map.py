@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
@@ -123,26 +124,45 @@ def test_a_finite_map_goes_on_in_the_mirror() -> None:
     assert np.abs(force[:, 0]).max() > 1e-6 * K
 
 
-@pytest.mark.parametrize("kind", ["map", "sinusoid"])
-def test_nothing_is_allocated(kind: str) -> None:
+def _allocations(run: Callable[[], object]) -> int:
+    """Return how many arrays compiled code allocates in a call."""
     from numba.core.runtime import _nrt_python, rtsys
 
+    enabled = _nrt_python.memsys_stats_enabled()
+    _nrt_python.memsys_enable_stats()
+    try:
+        before = rtsys.get_allocation_stats().alloc
+        run()
+        return int(rtsys.get_allocation_stats().alloc - before)
+    finally:
+        if not enabled:
+            _nrt_python.memsys_disable_stats()
+
+
+@pytest.mark.parametrize("kind", ["map", "sinusoid"])
+def test_nothing_is_allocated(kind: str) -> None:
     texture = _texture("rough") if kind == "map" else asp.Sinusoid(4e-4, 1e-3)
     surface, points = Surface(texture, "H", K), np.zeros((200, 3))
     points[:, :2] = np.random.default_rng(0).uniform(0.0, 1e-3, (200, 2))
     points[:, 2] = texture.extremes[0]
     out, arguments = np.empty((200, 3)), (texture.arguments, surface.law_arguments)
     surface.force(points[:1])  # compiled
-    enabled = _nrt_python.memsys_stats_enabled()
-    _nrt_python.memsys_enable_stats()
-    try:
-        before = rtsys.get_allocation_stats().alloc
-        surface._loops.force_batch(points, out, *arguments)
-        assert rtsys.get_allocation_stats().alloc == before
-    finally:
-        if not enabled:
-            _nrt_python.memsys_disable_stats()
+    assert _allocations(lambda: surface._loops.force_batch(points, out, *arguments)) == 0
     assert out.any()
+
+
+def test_an_allocation_would_be_counted() -> None:
+    from numba import njit
+
+    @njit
+    def careless(count: int) -> float:
+        total = 0.0
+        for i in range(count):
+            total += np.full(3, float(i)).sum()
+        return total
+
+    careless(1)
+    assert _allocations(lambda: careless(50)) >= 50
 
 
 def test_threads_do_not_disturb_each_other() -> None:

@@ -160,14 +160,17 @@ def tabulate(
         raise ParameterError("surface", "has a texture that never repeats: no table holds it")
     limit = int(positive("max_bytes", max_bytes, "byte"))
     if resolution is None:
-        slope, bend = texture.bounds
-        wave = 2.0 * math.pi * slope / bend if bend > 0.0 else math.inf
-        fitting = _resolution_for(surface, min(8 * _DEFAULT_NODES, limit))
-        grid = Grid.fit(surface, max(fitting, wave / _FINEST if math.isfinite(wave) else 0.0))
+        grid = _default_grid(surface, limit)
     else:
         grid = Grid.fit(surface, positive("resolution", resolution, "m"))
         _refuse_if_too_large(surface, grid, limit)
     return _tabulated(surface, grid, potentials(surface, grid, progress))
+
+
+def _default_grid(surface: Surface, limit: int) -> Grid:
+    slope, bend = surface.texture.bounds
+    finest = 2.0 * math.pi * slope / bend / _FINEST if bend > 0.0 else 0.0
+    return Grid.fit(surface, max(_resolution_for(surface, min(8 * _DEFAULT_NODES, limit)), finest))
 
 
 def _resolution_for(surface: Surface, most_bytes: int) -> float:

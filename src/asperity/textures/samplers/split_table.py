@@ -125,6 +125,34 @@ def map_gradient(
     return m00 * gu + m10 * gv, m01 * gu + m11 * gv, iz * gw + below / iz
 
 
+def table_sums(
+    c: FloatArray, u: float, v: float, w: float
+) -> tuple[float, float, float, float, float, float, float]:
+    """Return U and its second derivatives by u, v, w: value, uu, uv, uw, vv, vw, ww."""
+    j = int(u + 0.5)
+    u0 = table_weights(u - j)
+    u1 = table_slopes(u - j)
+    rows = min(c.shape[0], 3)  # one for a profile
+    i = int(v + 0.5)
+    v0 = table_weights(v - i) if rows > 1 else (1.0, 0.0, 0.0)
+    v1 = table_slopes(v - i) if rows > 1 else (0.0, 0.0, 0.0)
+    m, below, w0, w1 = table_height(w)
+    second = (1.0, -2.0, 1.0)
+    value = uu = uv = uw = vv = vw = ww = 0.0
+    for a in range(rows):
+        for b in range(3):
+            s0 = table_dot(c, i + a, j + b, m, w0)
+            s1 = table_dot(c, i + a, j + b, m, w1)
+            value += v0[a] * u0[b] * s0
+            uu += v0[a] * second[b] * s0
+            uv += v1[a] * u1[b] * s0
+            uw += v0[a] * u1[b] * s1
+            vv += second[a] * u0[b] * s0
+            vw += v1[a] * u0[b] * s1
+            ww += v0[a] * u0[b] * table_dot(c, i + a, j + b, m, second)
+    return value, uu, uv, uw, vv if rows > 1 else 0.0, vw, ww if below == 0.0 else 0.0
+
+
 def table_expansion(
     x: float, y: float, z: float, c: FloatArray, x0: float, y0: float, z0: float,
     m00: float, m01: float, m10: float, m11: float, iz: float, mirrored: bool,
@@ -134,41 +162,15 @@ def table_expansion(
     if w >= c.shape[2] - 1.5:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     u, u_sign = table_fold((x - x0) * m00 + (y - y0) * m01, c.shape[1] - 3, mirrored)
-    j = int(u + 0.5)
-    u0 = table_weights(u - j)
-    u1 = table_slopes(u - j)
-    i = 0
+    v = 0.0
     v_sign = 1.0
-    v0 = (1.0, 0.0, 0.0)
-    v1 = (0.0, 0.0, 0.0)
-    rows = 1
     if c.shape[0] > 1:
         v, v_sign = table_fold((x - x0) * m10 + (y - y0) * m11, c.shape[0] - 3, mirrored)
-        i = int(v + 0.5)
-        v0 = table_weights(v - i)
-        v1 = table_slopes(v - i)
-        rows = 3
-    m, below, w0, w1 = table_height(w)
-    bend = 1.0 if below == 0.0 else 0.0
-    second = (1.0, -2.0, 1.0)
-    value = uu = uv = uw = vv = vw = ww = 0.0
-    for a in range(rows):
-        for b in range(3):
-            s0 = table_dot(c, i + a, j + b, m, w0)
-            s1 = table_dot(c, i + a, j + b, m, w1)
-            s2 = bend * table_dot(c, i + a, j + b, m, second)
-            value += v0[a] * u0[b] * s0
-            uu += v0[a] * second[b] * s0
-            uv += v1[a] * u1[b] * s0
-            uw += v0[a] * u1[b] * s1
-            if rows > 1:
-                vv += second[a] * u0[b] * s0
-            vw += v1[a] * u0[b] * s1
-            ww += v0[a] * u0[b] * s2
+    value, uu, uv, uw, vv, vw, ww = table_sums(c, u, v, w)
     uv *= u_sign * v_sign
     uw *= u_sign
     vw *= v_sign
-    drop = below / iz
+    drop = min(w - 0.5, 0.0) / iz
     return (
         value + 0.5 * drop * drop,
         m00 * m00 * uu + 2.0 * m00 * m10 * uv + m10 * m10 * vv,
@@ -176,7 +178,7 @@ def table_expansion(
         iz * (m00 * uw + m10 * vw),
         m01 * m01 * uu + 2.0 * m01 * m11 * uv + m11 * m11 * vv,
         iz * (m01 * uw + m11 * vw),
-        iz * iz * ww + (1.0 - bend),
+        iz * iz * ww + (1.0 if drop < 0.0 else 0.0),
     )
 
 
