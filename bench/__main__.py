@@ -7,12 +7,13 @@ from collections.abc import Callable, Sequence
 
 from rich.console import Console
 
-from bench import cache, certificates, kernels, nearest, startup
+from bench import cache, certificates, kernels, nearest, split, startup
 
 PARTS: dict[str, Callable[[Console], None]] = {
     "kernels": kernels.run,
     "cache": cache.run,
     "nearest": nearest.run,
+    "split": split.run,
     "certificates": certificates.run,
     "startup": startup.run,
 }

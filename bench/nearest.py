@@ -26,7 +26,7 @@ from bench.timing import Batch, median_ratio, seconds, take_turns
 
 ROUNDS = 7
 BATCH_SECONDS = 0.1
-LEAST, MOST = 100, 20_000
+LEAST, MOST = 100, 5_000
 WRONG = 1e-6  # of the extent
 TREE_STEP = 0.5  # of the pitch
 # Pixels of a map; elsewhere shares of the peak-to-valley height.
