@@ -1,23 +1,24 @@
-"""From text to a surface: a specification, a scene file or a measured file."""
+"""From text to a texture: a specification, a scene file or a measured file."""
 
 from __future__ import annotations
 
 import re
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from asperity.devices import Device, load_device, parse_device
 from asperity.errors import ParameterError, nearest_names
+from asperity.scene import readers
+from asperity.scene.readers import Reader, read_arguments
 from asperity.textures import Texture, load_texture
 from asperity.textures.arguments import Argument, Form
 from asperity.textures.catalogue import CATALOGUE
-from asperity.units import quantity
 
-# Reads one argument: its name for messages, and what was given (text, number or list).
-Reader = Callable[[str, Any], Any]
+LOOP_SECTIONS = ("hand", "motion", "run")
+SECTIONS = ("texture", "surface", "device", *LOOP_SECTIONS)
 
 
 @dataclass(frozen=True)
@@ -28,116 +29,49 @@ class Scene:
         texture: the texture.
         surface: arguments of :class:`~asperity.surface.Surface` that were given.
         device: the device, if one was given.
+        loop: the sections [hand], [motion] and [run] as they were given; see
+            :func:`~asperity.scene.setup.make_setup`.
+        folder: to which paths in these sections are relative.
     """
 
     texture: Texture
     surface: Mapping[str, Any] = field(default_factory=dict)
     device: Device | None = None
-
-
-def _quantity(unit: str) -> Reader:
-    return lambda name, given: quantity(name, given, unit)
-
-
-def _items(unit: str) -> Reader:
-    """Read "1mm; 2mm" or a list."""
-    return lambda name, given: [quantity(name, item, unit) for item in _split(given, ";")]
-
-
-def _vector(unit: str) -> Reader:
-    """Read "1 0.4" or a list of two numbers."""
-    return lambda name, given: [quantity(name, item, unit) for item in _split(given, None)]
-
-
-def _vectors(unit: str) -> Reader:
-    """Read "3000 500; -1000 4000" or a list of lists; single numbers lie along x."""
-
-    def read(name: str, given: Any) -> Any:
-        rows = [
-            [quantity(name, item, unit) for item in _split(row, None)] for row in _split(given, ";")
-        ]
-        return [row[0] for row in rows] if all(len(row) == 1 for row in rows) else rows
-
-    return read
-
-
-def _split(given: Any, separator: str | None) -> list[Any]:
-    if isinstance(given, list):
-        return given
-    return [part for part in str(given).split(separator) if part.strip()]
-
-
-def _pair(unit: str) -> Reader:
-    """Read "1um" or "1um; 2um", for x and y."""
-
-    def read(name: str, given: Any) -> Any:
-        values = [quantity(name, part, unit) for part in _split(given, ";")]
-        if len(values) not in {1, 2}:
-            raise ParameterError(name, "must be one quantity, or two for x and y: 'a; b'", given)
-        return values[0] if len(values) == 1 else values
-
-    return read
-
-
-def _text(name: str, given: Any) -> str:
-    if not isinstance(given, str):
-        raise ParameterError(name, "must be text", given)
-    return given
-
-
-def _switch(name: str, given: Any) -> bool:
-    words = {"yes": True, "true": True, "no": False, "false": False}
-    if isinstance(given, bool):
-        return given
-    if str(given).strip().lower() not in words:
-        raise ParameterError(name, "must be true or false", given)
-    return words[str(given).strip().lower()]
-
-
-def _whole(name: str, given: Any) -> int:
-    number = quantity(name, given, "")
-    if number != round(number):
-        raise ParameterError(name, "must be a whole number", given)
-    return round(number)
-
-
-def _channel(name: str, given: Any) -> str | int:
-    if isinstance(given, bool) or not isinstance(given, (str, int)):
-        raise ParameterError(name, "must be a name or a whole number", given)
-    return int(given) if str(given).strip().isdecimal() else given
+    loop: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    folder: Path = Path()
 
 
 FILE_ARGUMENTS: dict[str, Reader] = {
-    "channel": _channel,
-    "unit": _text,
-    "integrate_normals": _switch,
-    "pitch": _pair("m"),
-    "height_range": _quantity("m"),
-    "outliers": _quantity(""),
-    "max_missing": _quantity(""),
-    "form": _whole,
-    "cutoff": _quantity("m"),
-    "l_cutoff": _quantity("m"),
-    "tip_radius": _quantity("m"),
-    "periodic": _switch,
-    "blend": _quantity("m"),
-    "magnify": _quantity(""),
-    "magnify_height": _quantity(""),
+    "channel": readers.channel,
+    "unit": readers.text,
+    "integrate_normals": readers.switch,
+    "pitch": readers.pair("m"),
+    "height_range": readers.in_unit("m"),
+    "outliers": readers.in_unit(""),
+    "max_missing": readers.in_unit(""),
+    "form": readers.whole,
+    "cutoff": readers.in_unit("m"),
+    "l_cutoff": readers.in_unit("m"),
+    "tip_radius": readers.in_unit("m"),
+    "periodic": readers.switch,
+    "blend": readers.in_unit("m"),
+    "magnify": readers.in_unit(""),
+    "magnify_height": readers.in_unit(""),
 }
 
 
 def _reader(argument: Argument) -> Reader:
     unit = argument.unit
-    readers: dict[Form, Reader] = {
-        "quantity": _quantity(unit),
-        "pair": _pair(unit),
-        "vector": _vector(unit),
-        "items": _items(unit),
-        "vectors": _vectors(unit),
-        "integer": _whole,
-        "text": _text,
+    by_form: dict[Form, Reader] = {
+        "quantity": readers.in_unit(unit),
+        "pair": readers.pair(unit),
+        "vector": readers.vector(unit),
+        "items": readers.items(unit),
+        "vectors": readers.vectors(unit),
+        "integer": readers.whole,
+        "text": readers.text,
     }
-    return readers[argument.form]
+    return by_form[argument.form]
 
 
 # Texture kinds: what makes one, its required and its optional arguments.
@@ -148,17 +82,17 @@ KINDS: dict[str, tuple[Callable[..., Texture], dict[str, Reader], dict[str, Read
         {argument.name: _reader(argument) for argument in kind.optional},
     )
     for kind in CATALOGUE.values()
-} | {"file": (load_texture, {"path": _text}, FILE_ARGUMENTS)}
+} | {"file": (load_texture, {"path": readers.text}, FILE_ARGUMENTS)}
 
 SURFACE_ARGUMENTS: dict[str, Reader] = {
-    "law": _text,
-    "stiffness": _quantity("N/m"),
-    "max_depth": _quantity("m"),
-    "friction": _quantity(""),
-    "max_deflection": _quantity("m"),
-    "modulation_depth": _quantity(""),
-    "clamp": _text,
-    "continuity": _quantity(""),
+    "law": readers.text,
+    "stiffness": readers.in_unit("N/m"),
+    "max_depth": readers.in_unit("m"),
+    "friction": readers.in_unit(""),
+    "max_deflection": readers.in_unit("m"),
+    "modulation_depth": readers.in_unit(""),
+    "clamp": readers.text,
+    "continuity": readers.in_unit(""),
 }
 
 
@@ -217,27 +151,18 @@ def build_texture(kind: str, arguments: Mapping[str, Any]) -> Texture:
     if kind not in KINDS:
         raise ParameterError("surface", f"kind is unknown: {kind!r}; {nearest_names(kind, KINDS)}")
     make, required, optional = KINDS[kind]
-    values = _read_arguments(kind, arguments, required | optional)
+    values = read_arguments(kind, arguments, required | optional)
     missing = [name for name in required if name not in values]
     if missing:
         raise ParameterError(missing[0], f"is missing: a {kind} needs {', '.join(required)}")
     return make(**values)
 
 
-def _read_arguments(
-    where: str, arguments: Mapping[str, Any], readers: Mapping[str, Reader]
-) -> dict[str, Any]:
-    for name in arguments:
-        if name not in readers:
-            raise ParameterError(f"{where}.{name}", f"is unknown; {nearest_names(name, readers)}")
-    return {name: readers[name](name, value) for name, value in arguments.items()}
-
-
 def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
     content = _read_toml(path)
     for name in content:
-        if name not in {"texture", "surface", "device"}:
-            hint = nearest_names(name, ["texture", "surface", "device"])
+        if name not in SECTIONS:
+            hint = nearest_names(name, SECTIONS)
             raise ParameterError("scene", f"{path.name} has an unknown section [{name}]; {hint}")
     for name, section in content.items():
         if not isinstance(section, dict):
@@ -252,9 +177,10 @@ def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
             texture["path"] = str(path.parent / texture["path"])
     else:
         _refuse_file_arguments(extra)
-    surface = _read_arguments("surface", content.get("surface", {}), SURFACE_ARGUMENTS)
+    surface = read_arguments("surface", content.get("surface", {}), SURFACE_ARGUMENTS)
     device = _scene_device(content["device"]) if "device" in content else None
-    return Scene(build_texture(kind, texture), surface, device)
+    loop = {name: content[name] for name in LOOP_SECTIONS if name in content}
+    return Scene(build_texture(kind, texture), surface, device, loop, path.parent)
 
 
 def _kinds() -> str:
@@ -262,9 +188,14 @@ def _kinds() -> str:
 
 
 def _scene_device(section: Mapping[str, Any]) -> Device:
-    if set(section) == {"id"}:
-        return load_device(str(section["id"]))
-    return parse_device(section, "the scene's device")
+    """Return a device of the catalogue, with what the scene says besides; or one of its own."""
+    own = {name: value for name, value in section.items() if name != "id"}
+    if "id" not in section:
+        return parse_device(own, "the scene's device")
+    known = load_device(readers.text("device.id", section["id"]))
+    changed = parse_device(own, known.id)
+    words = {name: getattr(changed, name) for name in ("name", "axes", "notes") if name in own}
+    return replace(known, data={**known.data, **changed.data}, **words)
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
