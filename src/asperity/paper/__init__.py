@@ -1,0 +1,15 @@
+"""The paper as runnable code: each of its claims computed, and the data of its figures."""
+
+from asperity.paper.claim import VERDICTS, Claim, Evidence, Result, Verdict
+from asperity.paper.registry import CLAIMS, claim, reproduce_claims
+
+__all__ = [
+    "CLAIMS",
+    "VERDICTS",
+    "Claim",
+    "Evidence",
+    "Result",
+    "Verdict",
+    "claim",
+    "reproduce_claims",
+]

@@ -1,0 +1,358 @@
+"""Section IV.F: friction modulated by the texture.
+
+The paper's h has no dimension here, h = A sin(2πx/l) with A a number; where it is compared with
+the package's law, its h is the law's modulation m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.paper.claim import Check, Claim, Finding, decide, judge, settle
+from asperity.paper.plane import SCANNING, Setting, path_points, random_settings, spots
+
+_TURN = 2.0 * math.pi
+
+
+@dataclass(frozen=True)
+class Rub:
+    """Numbers of the paper's law F: friction, d_max [m], A [1], l [m], |p^z| [m]."""
+
+    friction: float
+    deflection: float
+    amplitude: float
+    period: float
+    depth: float
+
+    def modulation(self, x: Any, order: int = 0) -> Any:
+        """Return h = A sin(2πx/l), or its derivative."""
+        import mpmath
+
+        wave = _TURN / self.period
+        return self.amplitude * wave**order * mpmath.sin(wave * x + order * mpmath.pi / 2)
+
+
+# In V.A the paper puts A = 0.8 mm where its h wants a number: in millimetres it is 0.8.
+PAPER = Rub(0.8, 1e-3, 0.8, 1e-3, 1e-3)
+
+
+def random_rubs(count: int = 4, seed: int = 7) -> Iterator[Rub]:
+    """Yield parameter sets at random, 0 < A < 1."""
+    draw = np.random.default_rng(seed)
+    for _ in range(count):
+        yield Rub(
+            friction=draw.uniform(0.1, 1.2),
+            deflection=draw.uniform(0.1e-3, 3e-3),
+            amplitude=draw.uniform(0.1, 0.95),
+            period=draw.uniform(0.5e-3, 4e-3),
+            depth=draw.uniform(0.1e-3, 2e-3),
+        )
+
+
+def stick_entries(r: Rub) -> tuple[float, float]:
+    """Entries (1, 1) and (1, 2) of the printed (26), over -κ₀."""
+    a = 2.0 * r.friction * r.depth * (1.0 / r.deflection + math.pi * r.amplitude / r.period)
+    return a, 2.0 * r.friction
+
+
+def norm_of(a: float, b: float) -> float:
+    """‖[[a, b], [0, 1]]‖ from the matrix itself."""
+    return float(np.linalg.norm(np.array([[a, b], [0.0, 1.0]]), 2))
+
+
+# --- field and Jacobian ---------------------------------------------------------------------------
+
+
+def field_f() -> Finding:
+    """(22): against the definition, and by the work of friction on a sliding probe."""
+    from asperity.definition import exact_force
+
+    printed, corrected, truth = [], [], []
+    draw = np.random.default_rng(9)
+    for spot in spots("F"):
+        surface = spot.surface
+        k, middle, half = surface.law_arguments[:3]
+        m = 0.5 * (1.0 + surface.modulation_depth * (spot.h - middle) / half)
+        d = draw.uniform(-1.0, 1.0) * surface.max_deflection
+        pull = surface.friction * (1.0 - m) * d / surface.max_deflection
+        exact = exact_force(surface, [spot.x, 0.0, spot.z], [d, 0.0])
+        printed.append([-k * pull * spot.z, -k * spot.z])
+        corrected.append([k * pull * spot.z, -k * spot.z])
+        truth.append([float(exact[0]), float(exact[2])])
+    correction = "the x part with a plus sign: friction must oppose the deflection"
+    fields = judge("force of F at 4 generic probes", printed=printed, corrected=corrected,
+                   truth=truth, correction=correction)  # fmt: skip
+    return settle(fields, _sliding_check(correction))
+
+
+def _sliding_check(correction: str) -> Check:
+    """Judge the sign of friction by one millimetre of sliding with d = d_max, at h = 0."""
+    depth, way = -1e-3, 1e-3
+    work = -SCANNING.stiffness * SCANNING.friction * depth * way
+    return decide(
+        f"work of the printed friction over 1 mm of sliding {work * 1e3:+.2f} mJ",
+        printed=work < 0.0,
+        corrected=-work < 0.0,
+        correction=correction,
+        work_as_printed=work,
+    )
+
+
+def jacobian_f() -> Finding:
+    """(23) against differences of (22) as printed."""
+    import mpmath
+
+    draw = np.random.default_rng(13)
+    printed, corrected, truth = [], [], []
+    for r in random_rubs(6):
+        x, d = draw.uniform(0.0, r.period), draw.uniform(-1.0, 1.0) * r.deflection
+        for rate in (1.0, 0.0):  # sticking, sliding
+            force = _printed_force(r, x, d, rate)
+            with mpmath.workdps(50):
+                step = mpmath.mpf(10) ** -20
+                z = mpmath.mpf(-r.depth)
+                pairs = [
+                    (force(step, z), force(-step, z)),
+                    (force(0, z + step), force(0, z - step)),
+                ]
+                truth.append(
+                    [[float((a[i] - b[i]) / (2 * step)) for a, b in pairs] for i in (0, 1)]
+                )
+            h, slope = float(r.modulation(x)), float(r.modulation(x, 1))
+            printed.append(_formula(r, d, h, rate, slope))
+            corrected.append(_formula(r, d, h, rate, slope * d))
+    return settle(
+        judge("Jacobian of (22) at 12 random states", printed=printed, corrected=corrected,
+              truth=truth, correction="h' must be h' d^x (as printed it has another dimension)")
+    )  # fmt: skip
+
+
+def _printed_force(r: Rub, x: float, d: float, rate: float) -> Any:
+    def force(dx: Any, z: Any) -> tuple[Any, Any]:
+        deflection = d + rate * dx
+        still = 1 - r.modulation(x + dx)
+        return -r.friction * still * deflection / r.deflection * z, -z
+
+    return force
+
+
+def _formula(r: Rub, d: float, h: float, rate: float, slope: float) -> list[list[float]]:
+    """Return (23) over κ₀ with something in the place of h'."""
+    first = r.friction * -r.depth / r.deflection * (rate - h * rate - slope)
+    return [[-first, -r.friction * (1.0 - h) * d / r.deflection], [0.0, -1.0]]
+
+
+def phases() -> Finding:
+    """(24): a probe goes forth and back, the package's anchor follows."""
+    case = random_settings(1, 21)[0]
+    surface = case.surface("F", modulation_depth=0.0)
+    reach = case.deflection
+    x = np.concatenate([np.linspace(0.0, 3.3, 1001), np.linspace(3.3, -1.7, 1489)[1:]]) * reach
+    path = np.column_stack([x, 0.0 * x, np.full(len(x), -case.depth)])
+    force = surface.trace(path)
+    d = -force[:, 0] * reach / (0.5 * case.friction * force[:, 2])
+    rate = np.diff(d) / np.diff(x)
+    # A step in which sticking ends is neither: those are left out.
+    whole = (np.abs(rate) < 1e-6) | (np.abs(rate - 1.0) < 1e-6)
+    end, rate = d[1:][whole], rate[whole]
+    slips = np.abs(rate) < 0.5
+    forward = slips == (np.abs(end - reach) < 1e-9 * reach)
+    both = slips == (np.abs(np.abs(end) - reach) < 1e-9 * reach)
+    return settle(
+        decide(
+            f"of {len(end)} steps forth and back d = d_max tells slip from stick in "
+            f"{forward.mean():.3f}, |d| = d_max in {both.mean():.3f}",
+            printed=bool(forward.all() and len(whole) - whole.sum() <= 3),
+            corrected=bool(both.all() and len(whole) - whole.sum() <= 3),
+            correction="|d^x| in place of d^x: the anchor is dragged both ways",
+            share_as_printed=float(forward.mean()),
+            share_with_absolute_value=float(both.mean()),
+        )
+    )
+
+
+def _suprema(r: Rub) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the greatest entries (1, 1) and (1, 2) over x and |d| <= d_max: slip, then stick."""
+    wave = _TURN / r.period
+    x = np.linspace(0.0, r.period, 200001)
+    still, slope = 1.0 - r.amplitude * np.sin(wave * x), r.amplitude * wave * np.cos(wave * x)
+    pull = r.friction * r.depth / r.deflection
+    across = float(r.friction * still.max())
+    slip = float(pull * r.deflection * np.abs(slope).max())
+    stick = float(pull * (still + r.deflection * np.abs(slope)).max())
+    return (slip, across), (stick, across)
+
+
+def slip_entries() -> Finding:
+    """(25)."""
+    rubs = [PAPER, *random_rubs()]
+    wave = [_TURN * r.friction * r.depth * r.amplitude / r.period for r in rubs]
+    return settle(
+        judge(
+            "greatest entries while sliding, 5 parameter sets",
+            printed=[[w, 2.0 * r.friction] for w, r in zip(wave, rubs, strict=True)],
+            corrected=[
+                [w, r.friction * (1.0 + r.amplitude)] for w, r in zip(wave, rubs, strict=True)
+            ],
+            truth=[_suprema(r)[0] for r in rubs],
+            tolerance=1e-8,
+            correction="bounds, entry by entry: (1,2) is at most μ(1 + A) for h = A sin, and μ "
+            "where 0 <= h <= 1 as (22) assumes",
+        )
+    )
+
+
+def stick_bound() -> Finding:
+    """(26)."""
+    rubs = [PAPER, *random_rubs()]
+    right = [
+        [r.friction * r.depth / r.deflection
+         * (1.0 + r.amplitude * math.hypot(1.0, _TURN * r.deflection / r.period)),
+         r.friction * (1.0 + r.amplitude)]
+        for r in rubs
+    ]  # fmt: skip
+    truth = [_suprema(r)[1] for r in rubs]
+    entries = judge(
+        "greatest entries while sticking, 5 parameter sets",
+        printed=[stick_entries(r) for r in rubs],
+        corrected=right,
+        truth=truth,
+        tolerance=1e-8,
+        correction="a bound, entry by entry: the greatest are "
+        "μp/d_max (1 + A √(1 + (2πd_max/l)²)) and μ(1 + A)",
+    )
+    slack = [p / t for r, row in zip(rubs, truth, strict=True)
+             for p, t in zip(stick_entries(r), row, strict=True)]  # fmt: skip
+    bound = decide(
+        f"as bounds the entries exceed the greatest {min(slack):.2f} to {max(slack):.2f} times",
+        printed=min(slack) >= 1.0,
+        ratios_to_the_greatest=slack,
+    )
+    return settle(entries, bound)
+
+
+# --- energy ---------------------------------------------------------------------------------------
+
+
+def friction_loop(case: Setting, light: float) -> list[tuple[float, float, float]]:
+    """Return the path of (27): out at the small depth a, back at the greater."""
+    x, deep = case.deflection, -case.depth
+    return path_points((0.0, 1e-3), (0.0, -light), (x, -light), (x, deep), (0.0, deep))
+
+
+def energy_f() -> Finding:
+    """(27): the law without texture; twice the friction makes its m = 1/2 the paper's h = 0."""
+    from asperity.analysis.loops import loop_work
+
+    cases, share = [SCANNING, *random_settings(4)], 0.2
+    printed, corrected, truth, limit = [], [], [], 0.0
+    for case in cases:
+        surface = case.surface("F", modulation_depth=0.0, friction=2.0 * case.friction)
+        whole = 0.5 * case.stiffness * case.friction * case.depth * case.deflection
+        printed.append(whole)
+        corrected.append(whole * (1.0 - share))
+        truth.append(loop_work(surface, friction_loop(case, share * case.depth)))
+        lightest = loop_work(surface, friction_loop(case, 1e-7 * case.depth))
+        limit = max(limit, abs(lightest / whole - 1.0))
+    return settle(
+        judge(
+            f"energy around the path with a = {share:g} d_max^z, {len(cases)} parameter sets",
+            printed=printed,
+            corrected=corrected,
+            truth=truth,
+            correction="κ₀μ/2 · d_max^x (d_max^z - a): the printed energy is the limit a → 0",
+        ),
+        decide(
+            f"with a = 1e-7 d_max^z the printed energy is off by {limit:.1e}",
+            printed=limit < 1e-6,
+            error_in_the_limit=limit,
+        ),
+    )
+
+
+def compliant() -> Finding:
+    """The energy grows with d_max."""
+    from asperity.analysis.loops import loop_work
+
+    found = []
+    for reach in (1e-3, 1e-2):
+        case = replace(SCANNING, deflection=reach)
+        surface = case.surface("F", modulation_depth=0.0, friction=2.0 * case.friction)
+        found.append(loop_work(surface, friction_loop(case, 1e-7 * case.depth)))
+    ratio = found[1] / found[0]
+    return settle(
+        decide(
+            f"d_max from 1 mm to 1 cm multiplies the energy by {ratio:.6f}, to "
+            f"{found[1] * 1e3:.2f} mJ",
+            printed=abs(ratio - 10.0) < 1e-6,
+            energies=found,
+        )
+    )
+
+
+def deflections() -> Finding:
+    """Values of d_max that are realistic."""
+    return settle(decide("a statement on real materials: nothing here can be computed",
+                         printed=None))  # fmt: skip
+
+
+def generative_stick() -> Finding:
+    """Generative in the stick phase only, which is at most 2 d_max wide."""
+    case = SCANNING
+    surface, reach = case.surface("F"), case.deflection
+    x = np.concatenate([np.linspace(0.0, 4.0, 8001), np.linspace(4.0, -2.0, 12001)[1:]]) * reach
+    path = np.column_stack([x, 0.0 * x, np.full(len(x), -case.depth)])
+    force = surface.trace(path)[:, 0]
+    gain = 0.5 * (force[1:] + force[:-1]) * np.diff(x)
+    d = _anchored(x, reach)
+    slips = np.abs(np.abs(d[1:]) - reach) + np.abs(np.abs(d[:-1]) - reach) < 1e-9 * reach
+    worst, sticks = float(gain[slips].max()), float(gain[~slips].max())
+    back = np.flatnonzero(~slips & (np.arange(len(gain)) >= 8000))
+    width = float(np.abs(np.diff(x)[back]).sum()) / reach
+    return settle(
+        decide(
+            f"greatest gain of a sliding step {worst * 1e9:+.3g} nJ, of a sticking step "
+            f"{sticks * 1e9:+.3g} nJ; after turning it sticks over {width:.3f} d_max",
+            printed=worst < 0.0 < sticks and width <= 2.0 + 1e-3,
+            sliding=worst,
+            sticking=sticks,
+            width_over_d_max=width,
+        )
+    )
+
+
+def _anchored(x: FloatArray, reach: float) -> FloatArray:
+    """Return the deflection along a way by (24), |d| <= d_max."""
+    d = np.zeros(len(x))
+    for i in range(1, len(x)):
+        d[i] = min(max(d[i - 1] + x[i] - x[i - 1], -reach), reach)
+    return d
+
+
+FRICTION = (
+    Claim("eq-22", ("(22)",), "IV.F", "Force of F: the wall, and friction that h modulates.",
+          field_f),
+    Claim("eq-23", ("(23)",), "IV.F", "Jacobian of F.", jacobian_f),
+    Claim("eq-24", ("(24)",), "IV.F",
+          "d follows the probe while d < d_max and does not change while d = d_max.", phases),
+    Claim("eq-25", ("(25)",), "IV.F", "Greatest entries of F's Jacobian while sliding.",
+          slip_entries),
+    Claim("eq-26", ("(26)",), "IV.F", "Greatest entries of F's Jacobian while sticking.",
+          stick_bound),
+    Claim("sentence-IV.F-deflections", (), "IV.F",
+          "Realistic d_max go from 1e-2 m (tissue) to 1e-6 m (metal).", deflections),
+    Claim("eq-27", ("(27)",), "IV.F", "Energy of F without texture around its path of Fig. 3.",
+          energy_f),
+    Claim("sentence-IV.F-stick", (), "IV.F",
+          "F generates energy while sticking only, which is at most 2 d_max wide.",
+          generative_stick),
+    Claim("sentence-IV.F-compliant", (), "IV.F",
+          "The energy that is not conserved is proportional to d_max, as with d_max = 1 cm.",
+          compliant),
+)  # fmt: skip

@@ -1,0 +1,380 @@
+"""Sections IV.A to IV.C and IV.G: the laws A, B, C and G, their fields, Jacobians and energies."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.paper.claim import Claim, Finding, decide, judge, settle
+from asperity.paper.comparisons import (
+    curl_check,
+    energy_sign_check,
+    field_check,
+    gradient_of,
+    greatest_norm,
+    groove_path,
+    jacobian_check,
+    leg_work,
+    loop_check,
+    outside_check,
+    q_of,
+)
+from asperity.paper.plane import (
+    BUMP,
+    PASSIVITY,
+    SCANNING,
+    Setting,
+    Spot,
+    path_points,
+    random_settings,
+    spots,
+)
+
+# --- A --------------------------------------------------------------------------------------------
+
+
+def field_a() -> Finding:
+    """(6)."""
+    printed = field_check("A", lambda s: np.array([0.0, -s.k * s.d]), None, "")
+    return settle(printed, outside_check("A"))
+
+
+def jacobian_a() -> Finding:
+    """(7)."""
+    return settle(
+        jacobian_check("A", lambda s: -s.k * np.array([[0.0, 0.0], [-s.slope, 1.0]]), None, "")
+    )
+
+
+def _norms_a() -> tuple[list[Spot], FloatArray]:
+    places = list(spots("A"))
+    return places, np.array([np.linalg.norm(spot.jacobian(), 2) for spot in places])
+
+
+def norm_a() -> Finding:
+    """(8)."""
+    places, norms = _norms_a()
+    printed = np.array([spot.k * math.hypot(1.0, spot.slope) for spot in places])
+    return settle(judge("norm of the Jacobian of A", printed=printed, truth=norms))
+
+
+def number_a() -> Finding:
+    """(9): a ratio of the greatest norm is set equal to a value at each place."""
+    places = list(spots("A"))
+    texture = places[0].surface.texture
+    x = np.linspace(0.0, 2.0 * math.pi / 1e3, 20001) * 1.0
+    steepest = float(np.abs(texture.gradient(np.column_stack([x, 0 * x]))[:, 0]).max())
+    norms = [np.linalg.norm(p.jacobian(), 2) / p.k for p in places]
+    here = np.array([math.hypot(1.0, spot.slope) for spot in places])
+    whole = np.full(len(places), math.hypot(1.0, steepest))
+    local = judge("‖J‖/κ₀ at each place against √(1 + h'²)", printed=here, truth=np.array(norms))
+    ratio = judge(
+        "κ_A^max/κ₀ against √(1 + h'²) at generic places",
+        printed=here,
+        corrected=np.full(len(places), math.sqrt(1.0 + steepest**2)),
+        correction="q_A = max over p^x of √(1 + h'(p^x)²); κ_A, a stiffness, is κ₀ times that",
+        truth=whole,
+    )
+    return settle(local, ratio)
+
+
+def sinusoid_a() -> Finding:
+    """(10): the value, and where it is attained."""
+    cases = [PASSIVITY, SCANNING, *random_settings()]
+    printed = [c.stiffness * math.hypot(1.0, 2.0 * math.pi * c.amplitude / c.period) for c in cases]
+    found = [case.stiffness * greatest_norm(case.surface("A")) for case in cases]
+    value = judge("greatest norm for 5 sinusoids", printed=printed, truth=found)
+    as_printed, half = (_reaches(cases, printed, step) for step in (_pi_over_period, _half_period))
+    place = decide(
+        f"the norm at x = nπ/l is {as_printed:.4f} of the greatest at worst, at n l/2 {half:.4f}",
+        printed=as_printed > 1.0 - 1e-9,
+        corrected=half > 1.0 - 1e-9,
+        correction="attained at p^x = 0 mod l/2 (π/l is no length)",
+        least_share_at_multiples_of_pi_over_l=as_printed,
+        least_share_at_multiples_of_half_a_period=half,
+    )
+    return settle(value, place)
+
+
+def _pi_over_period(case: Setting) -> float:
+    return math.pi / case.period
+
+
+def _half_period(case: Setting) -> float:
+    return 0.5 * case.period
+
+
+def _reaches(
+    cases: list[Setting], greatest: list[float], step: Callable[[Setting], float]
+) -> float:
+    """Return the least share of the greatest norm at multiples of a step on each texture."""
+    least = math.inf
+    for case, most in zip(cases, greatest, strict=True):
+        x = np.arange(1, 6) * step(case)
+        slope = case.texture.gradient(np.column_stack([x, 0 * x]))[:, 0]
+        norms = case.stiffness * np.hypot(1.0, slope)
+        least = min(least, float(norms.min()) / most)
+    return least
+
+
+def proportional_a() -> Finding:
+    """The number is nearly 2πA/l: within a tenth in each of the paper's settings."""
+    cases = {"V.A": PASSIVITY, "V.B": SCANNING, "V.C": BUMP}
+    slopes = {name: 2.0 * math.pi * case.amplitude / case.period for name, case in cases.items()}
+    ratios = {name: q_of(case, "A") / slopes[name] for name, case in cases.items()}
+    said = ", ".join(f"{name} {slopes[name]:.2f} ({ratios[name]:.3f})" for name in cases)
+    return settle(
+        decide(
+            f"2πA/l, and q_A over it: {said}",
+            printed=max(abs(ratio - 1.0) for ratio in ratios.values()) < 0.1,
+            numbers={f"q_A over 2πA/l in {name}": ratio for name, ratio in ratios.items()},
+        )
+    )
+
+
+def energy_a() -> Finding:
+    """The loop of Fig. 3."""
+    printed = loop_check("A", lambda c: 0.5 * c.stiffness * c.amplitude**2)
+    return settle(printed, curl_check("A", conservative=False))
+
+
+# --- B --------------------------------------------------------------------------------------------
+
+
+def field_b() -> Finding:
+    """(11)."""
+
+    def printed(s: Spot) -> FloatArray:
+        return -s.k * s.d * np.array([-s.slope, 1.0]) / math.sqrt(1.0 + s.slope**2)
+
+    return settle(field_check("B", printed, None, ""), outside_check("B"))
+
+
+def energy_b() -> Finding:
+    """(12)."""
+
+    def printed(c: Setting) -> float:
+        a, length = c.amplitude, c.period
+        root = math.sqrt((length**2 + 4.0 * a**2 * math.pi**2) / length**2)
+        return 0.5 * c.stiffness * a**2 + c.stiffness * length**2 / (4.0 * math.pi**2) * (1 - root)
+
+    return settle(loop_check("B", printed))
+
+
+def remark_4() -> Finding:
+    """A and B have a curl; what is felt is not computed."""
+    return settle(curl_check("A", conservative=False), curl_check("B", conservative=False))
+
+
+def closed_forms() -> Finding:
+    """The paper finds no closed form for B, C and G: do ours give what a search finds?"""
+    from asperity.analysis.closed_forms import Q
+
+    cases = [PASSIVITY, SCANNING, *random_settings(6)]
+    checks = []
+    for law in "BCG":
+        worst = 0.0
+        for case in cases:
+            found = greatest_norm(case.surface(law))
+            worst = max(worst, abs(found / Q[law](case.texture, case.depth) - 1.0))
+        checks.append(
+            decide(
+                f"{law}: closed form and search differ by {worst:.1e} on {len(cases)} sinusoids",
+                printed=worst > 1e-6,
+                correction=_CLOSED[law],
+                numbers={f"greatest relative difference for {law}": worst},
+            )
+        )
+    return settle(*checks)
+
+
+_CLOSED = {
+    "B": "q_B = max(√(1 + G²), y)",
+    "C": "q_C = the greatest of 1, y and the feasible roots of a cubic",
+    "G": "q_G = max(1, y), with G = 2πA/l and y = 4π²AD/l²",
+}
+
+
+# --- C --------------------------------------------------------------------------------------------
+
+
+def _force_c(s: Spot) -> FloatArray:
+    return -s.k * np.array([-s.d * s.slope, s.d])
+
+
+def potential_c() -> Finding:
+    """(13): its gradient, and its sign as an energy."""
+    places = list(spots("C"))
+    gradient = judge(
+        "+∇U against the force of C",
+        printed=[gradient_of(_printed_potential(s), s) for s in places],
+        truth=np.array([s.force() for s in places]),
+    )
+    return settle(gradient, energy_sign_check("C", places, [0.5 * s.d**2 for s in places]))
+
+
+def _printed_potential(spot: Spot) -> Callable[[Any, Any], Any]:
+    profile = spot.profile()
+    return lambda x, z: -spot.k * (z - profile(x, 0)) ** 2 / 2
+
+
+def field_c() -> Finding:
+    """(14)."""
+    return settle(field_check("C", _force_c, None, ""), outside_check("C"))
+
+
+def jacobian_c() -> Finding:
+    """(15)."""
+
+    def printed(s: Spot) -> FloatArray:
+        corner = s.slope**2 - s.d * s.bend
+        return -s.k * np.array([[corner, -s.slope], [-s.slope, 1.0]])
+
+    return settle(jacobian_check("C", printed, None, ""))
+
+
+def curvature_c() -> Finding:
+    """At crests and troughs the norm is κ₀ times the greater of 1 and depth times curvature."""
+    printed, truth = [], []
+    for case in [PASSIVITY, SCANNING, *random_settings()]:
+        x = np.array([0.25, 0.75]) * case.period
+        top = case.texture.height(np.column_stack([x, 0 * x]))
+        bend = np.abs(case.texture.hessian(np.column_stack([x, 0 * x]))[:, 0, 0])
+        for depth in (0.3 * case.depth, case.depth):
+            points = np.column_stack([x, 0 * x, top - depth])
+            truth.append(np.linalg.norm(case.surface("C").jacobian(points), 2, axis=(1, 2)))
+            printed.append(case.stiffness * np.maximum(1.0, depth * bend))
+    return settle(judge("norm of C's Jacobian at crests and troughs", printed=printed, truth=truth))
+
+
+def conservative_c() -> Finding:
+    """Conservative by construction: curl and loops."""
+    from asperity.analysis.loops import loop_work
+
+    energies = [
+        loop_work(case.surface("C"), groove_path(case)) / (case.stiffness * case.amplitude**2)
+        for case in [SCANNING, *random_settings()]
+    ]
+    most = max(abs(energy) for energy in energies)
+    loops = decide(f"energy around the path {most:.1e} of κ₀A²", printed=most < 1e-9, greatest=most)
+    return settle(curl_check("C", conservative=True), loops)
+
+
+def remark_5() -> Finding:
+    """The normalisation alone takes the conservativity."""
+    import sympy as sp
+
+    from asperity.derive.curl import curl_verdict
+    from asperity.laws import Law, find_law
+
+    without = curl_verdict(
+        Law("Bs", "b-times-root", "vertical",
+            lambda c: sp.sqrt(1 + c.slope.dot(c.slope)) * find_law("B").force(c))
+    )  # fmt: skip
+    return settle(
+        curl_check("B", conservative=False),
+        curl_check("C", conservative=True),
+        decide(
+            f"B times the factor: {without.reason}",
+            printed=without.conservative,
+            curl_of_B_times_the_factor=", ".join(str(entry) for entry in without.curl),
+        ),
+    )
+
+
+# --- G --------------------------------------------------------------------------------------------
+
+
+def field_g() -> Finding:
+    """(28): a column times a column."""
+    import sympy as sp
+
+    column = sp.Matrix(sp.symbols("nx nz"))
+    try:
+        product = column * column
+    except sp.ShapeError:
+        product = None
+
+    def right(s: Spot) -> FloatArray:
+        return -s.k * s.z * np.array([-s.slope, 1.0]) / math.sqrt(1.0 + s.slope**2)
+
+    def printed(s: Spot) -> FloatArray:
+        return np.full(2, np.nan) if product is None else right(s)
+
+    correction = "without the n that follows the fraction, which already is n"
+    return settle(field_check("G", printed, right, correction), outside_check("G"))
+
+
+def energy_g() -> Finding:
+    """(29)."""
+    from asperity.analysis.loops import loop_work
+
+    worst, least = 0.0, math.inf
+    for case in [SCANNING, *random_settings()]:
+        a, quarter = 0.5 * case.depth, 0.25 * case.period
+        surface = case.surface("G")
+        turns = [(quarter, a), (quarter, -a), (3 * quarter, -a), (3 * quarter, a)]
+        points = np.array(path_points(*turns))
+        scale = case.stiffness * a**2
+        ends = np.roll(points, -1, axis=0)
+        legs = [leg_work(surface, *leg) for leg in zip(points, ends, strict=True)]
+        expected = [-0.5 * scale, legs[1], 0.5 * scale, 0.0]
+        total = loop_work(surface, points)
+        worst = max(worst, *(abs(leg - e) / scale for leg, e in zip(legs, expected, strict=True)))
+        worst = max(worst, abs(total - legs[1]) / scale)
+        least = min(least, legs[1] / scale)
+    return settle(
+        decide(
+            f"legs are -κ₀a²/2, ΔE₂, +κ₀a²/2, 0 within {worst:.1e} κ₀a²; ΔE₂ >= {least:.3f} κ₀a²",
+            printed=worst < 1e-9 and least > 0.0,
+            worst_leg=worst,
+            least_gain=least,
+        ),
+        curl_check("G", conservative=False),
+    )
+
+
+LAW_A = (
+    Claim("eq-6", ("(6)",), "IV.A", "Force of A: the vertical depth, along the wall's normal.",
+          field_a),
+    Claim("eq-7", ("(7)",), "IV.A", "Jacobian of A inside.", jacobian_a),
+    Claim("eq-8", ("(8)",), "IV.A", "Norm of that Jacobian: κ₀ √(1 + h'²).", norm_a),
+    Claim("eq-9", ("(9)",), "IV.A", "The increase of stiffness by A is √(1 + h'²).", number_a),
+    Claim("eq-10", ("(10)",), "IV.A",
+          "On a sinusoid the greatest norm is κ₀ √(1 + (2πA/l)²), at x = 0 mod π/l.", sinusoid_a),
+    Claim("sentence-IV.A-proportional", (), "IV.A",
+          "2πA/l is large, so A's number is nearly proportional to A and 1/l.", proportional_a),
+    Claim("sentence-IV.A-energy", (), "IV.A",
+          "A is not conservative; around a path of Fig. 3 it generates κ₀A²/2.", energy_a),
+)  # fmt: skip
+LAW_B = (
+    Claim("eq-11", ("(11)",), "IV.B", "Force of B: the vertical depth, along the groove's normal.",
+          field_b),
+    Claim("sentence-IV-closed-form", (), "IV.B",
+          "There is no manageable closed form for the numbers of B, C and G.", closed_forms),
+    Claim("eq-12", ("(12)",), "IV.B", "Energy of B around the path of Fig. 3.", energy_b),
+    Claim("remark-4", ("Remark 4",), "IV.B",
+          "A and B are not conservative (that they feel active is not computed).", remark_4),
+)  # fmt: skip
+LAW_C = (
+    Claim("eq-13", ("(13)",), "IV.C", "Potential of C.", potential_c),
+    Claim("eq-14", ("(14)",), "IV.C", "Force of C, the gradient of that potential.", field_c),
+    Claim("eq-15", ("(15)",), "IV.C", "Jacobian of C, with the second derivative of h.",
+          jacobian_c),
+    Claim("sentence-IV.C-curvature", (), "IV.C",
+          "C's stiffness grows with curvature, very large in sharp asperities and crevices.",
+          curvature_c),
+    Claim("sentence-IV.C-conservative", (), "IV.C", "C is conservative.", conservative_c),
+    Claim("remark-5", ("Remark 5",), "IV.C",
+          "The factor √(1 + h'²) is what keeps B from being conservative.", remark_5),
+)  # fmt: skip
+LAW_G = (
+    Claim("eq-28", ("(28)",), "IV.G", "Force of G: the wall's depth, along the texture's normal.",
+          field_g),
+    Claim("eq-29", ("(29)",), "IV.G", "Around its path of Fig. 3 G gains energy on one leg.",
+          energy_g),
+)  # fmt: skip

@@ -1,0 +1,148 @@
+"""What the claims on the laws share: a printed formula against the definition of a law."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.paper.claim import Check, decide, judge
+from asperity.paper.plane import SCANNING, Setting, Spot, path_points, random_settings, spots
+from asperity.surface import Surface
+
+Formula = Callable[[Spot], FloatArray]
+
+
+def field_check(law: str, printed: Formula, corrected: Formula | None, correction: str) -> Check:
+    """Compare a printed force with the law's definition at generic probes."""
+    places = list(spots(law))
+    return judge(
+        f"force of {law} at {len(places)} generic probes",
+        printed=np.array([printed(spot) for spot in places]),
+        corrected=None if corrected is None else np.array([corrected(spot) for spot in places]),
+        correction=correction,
+        truth=np.array([spot.force() for spot in places]),
+    )
+
+
+def jacobian_check(law: str, printed: Formula, corrected: Formula | None, correction: str) -> Check:
+    """Compare a printed Jacobian with differences of the law's definition at generic probes."""
+    places = list(spots(law))
+    return judge(
+        f"Jacobian of {law} at {len(places)} generic probes",
+        printed=np.array([printed(spot) for spot in places]),
+        corrected=None if corrected is None else np.array([corrected(spot) for spot in places]),
+        correction=correction,
+        truth=np.array([spot.jacobian() for spot in places]),
+    )
+
+
+def outside_check(law: str) -> Check:
+    """Judge that a law is silent just outside the body."""
+    surface = SCANNING.surface(law)
+    x = np.linspace(0.0, SCANNING.period, 17)
+    height = surface.texture.height(np.column_stack([x, 0 * x]))
+    level = 0.0 * x if law in "WFG" else height
+    force = surface.force(np.column_stack([x, 0 * x, level + 1e-9]))
+    most = float(np.abs(force).max())
+    return decide(f"force 1 nm outside at most {most:g} N", printed=most == 0.0, outside=most)
+
+
+def curl_check(law: str, *, conservative: bool) -> Check:
+    """Judge whether a law is conservative by its symbolic curl."""
+    from asperity.derive.curl import curl_verdict
+    from asperity.laws import find_law
+
+    verdict = curl_verdict(find_law(law))
+    kind = "conservative" if verdict.conservative else "not conservative"
+    return decide(
+        f"{law} is {kind}: {verdict.reason}",
+        printed=verdict.conservative is conservative,
+        numbers={f"curl of {law}": ", ".join(str(entry) for entry in verdict.curl)},
+    )
+
+
+def groove_path(case: Setting) -> list[tuple[float, float, float]]:
+    """Return the path of Fig. 3 for A, B and E."""
+    quarter, top = 0.25 * case.period, case.amplitude
+    return path_points((0.0, 0.0), (quarter, 0.0), (quarter, top), (0.0, top))
+
+
+def loop_check(law: str, printed: Callable[[Setting], float]) -> Check:
+    """Compare a printed energy of the path of Fig. 3 with quadrature of the force."""
+    from asperity.analysis.loops import loop_work
+
+    cases = [SCANNING, *random_settings()]
+    return judge(
+        f"energy of {law} around the path for {len(cases)} parameter sets",
+        printed=np.array([printed(case) for case in cases]),
+        truth=np.array([loop_work(case.surface(law), groove_path(case)) for case in cases]),
+    )
+
+
+def gradient_of(potential: Callable[[Any, Any], Any], spot: Spot) -> list[float]:
+    """Return the gradient at a probe by differences in many digits."""
+    import mpmath
+
+    with mpmath.workdps(60):
+        x, z, step = mpmath.mpf(spot.x), mpmath.mpf(spot.z), mpmath.mpf(10) ** -20
+        pairs = [(potential(x + step, z), potential(x - step, z)),
+                 (potential(x, z + step), potential(x, z - step))]  # fmt: skip
+        return [float((ahead - behind) / (2 * step)) for ahead, behind in pairs]
+
+
+def energy_sign_check(law: str, places: list[Spot], halves: list[float]) -> Check:
+    """Compare a printed energy -κ₀ · half with the work that pressing straight in takes."""
+    from asperity.analysis.loops import integrate
+
+    taken = []
+    for spot in places:
+        top = float(spot.profile()(spot.x, 0))
+        span = top - spot.z
+
+        def against(s: FloatArray, spot: Spot = spot, top: float = top) -> FloatArray:
+            points = np.column_stack([np.full(len(s), spot.x), 0 * s, top - s * (top - spot.z)])
+            return np.asarray(spot.surface.force(points)[:, 2])
+
+        taken.append(span * integrate(against, 4))
+    own = np.array([spot.k * half for spot, half in zip(places, halves, strict=True)])
+    return judge(
+        f"U against the work that pressing into {law} takes",
+        printed=-own,
+        corrected=own,
+        correction="the stored energy is -U as printed, and the force minus its gradient",
+        truth=taken,
+        tolerance=1e-8,
+    )
+
+
+def greatest_norm(surface: Surface) -> float:
+    """Return the greatest ‖J‖/κ₀ at full depth, by a search over compiled Jacobians."""
+    from asperity.analysis.measures import spectral_norm
+    from asperity.analysis.search import greatest
+
+    def depths(heights: FloatArray) -> FloatArray:
+        return np.full(len(heights), surface.max_depth)
+
+    return greatest(surface, spectral_norm, depths).value
+
+
+def leg_work(surface: Surface, start: FloatArray, end: FloatArray) -> float:
+    """Return the work of the force on a straight way [J]."""
+    from asperity.analysis.loops import integrate
+
+    along = end - start
+
+    def integrand(s: FloatArray) -> FloatArray:
+        return np.asarray(surface.force(start + s[:, None] * along) @ along)
+
+    return integrate(integrand, 8, 1e-10)
+
+
+def q_of(case: Setting, law: str) -> float:
+    """Return the characteristic number of a law in a setting of the paper."""
+    from asperity.analysis.characteristic import characteristic_number
+
+    return characteristic_number(case.surface(law)).value

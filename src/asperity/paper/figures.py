@@ -1,0 +1,188 @@
+"""What the paper's figures 2 and 3 show, as arrays computed from the laws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.paper.claims_friction import friction_loop
+from asperity.paper.comparisons import groove_path
+from asperity.paper.plane import LAWS, SCANNING, path_points
+from asperity.surface import Surface
+
+_COLUMNS, _ROWS, _PROFILE = 33, 13, 401
+_DEPTH = 0.6e-3  # of the handles in figure 2 [m]
+_TURN = 0.1e-3  # a in the paths of (27) and (29) [m]
+_STEPS = 400  # on each leg of a path of figure 3
+
+
+@dataclass(frozen=True)
+class ForceField:
+    """One panel of figure 2: a law's force in the x-z plane.
+
+    Attributes:
+        law: its letter.
+        name: in words.
+        measured_from: ``"texture"`` or ``"wall"``, the line from which penetration is counted.
+        x: of the profile [m], shape (n,).
+        height: of the texture there [m], shape (n,).
+        points: of a grid [m], shape (rows, columns, 2), x and z.
+        forces: at the grid [N], shape (rows, columns, 2), f_x and f_z; zero outside the body.
+        handles: two positions of the handle [m], shape (2, 2).
+        handle_forces: [N], shape (2, 2).
+    """
+
+    law: str
+    name: str
+    measured_from: str
+    x: FloatArray
+    height: FloatArray
+    points: FloatArray
+    forces: FloatArray
+    handles: FloatArray
+    handle_forces: FloatArray
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units."""
+        return {name: _listed(value) for name, value in vars(self).items()}
+
+
+@dataclass(frozen=True)
+class LoopEnergy:
+    """One panel of figure 3: a closed path and the energy that a law gives along it.
+
+    Attributes:
+        law: its letter.
+        name: in words.
+        x: of the profile [m], shape (n,).
+        height: of the texture there [m], shape (n,); zero for law F, whose path has no texture.
+        vertices: of the path [m], shape (m, 2), x and z; the last is joined to the first.
+        way: length along the path [m], shape (p,).
+        work: of the force on the probe up to there [J], shape (p,).
+        energy: around the whole path [J], by quadrature.
+        equation: of the paper that gives it; empty where it gives none.
+    """
+
+    law: str
+    name: str
+    x: FloatArray
+    height: FloatArray
+    vertices: FloatArray
+    way: FloatArray
+    work: FloatArray
+    energy: float
+    equation: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units."""
+        return {name: _listed(value) for name, value in vars(self).items()}
+
+
+def _listed(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _profile() -> tuple[FloatArray, FloatArray]:
+    x = np.linspace(-0.25, 1.25, _PROFILE) * SCANNING.period
+    return x, SCANNING.texture.height(np.column_stack([x, 0 * x]))
+
+
+def _plane_force(surface: Surface, points: FloatArray) -> FloatArray:
+    """Return (f_x, f_z) at points (n, 2); for law F while the handle slides towards +x."""
+    probes = np.column_stack([points[:, 0], 0 * points[:, 0], points[:, 1]])
+    if not surface.law.stateful:
+        return surface.force(probes)[:, [0, 2]]
+    dragged = np.tile([surface.max_deflection, 0.0], (len(probes), 1))
+    return surface.force(probes, deflection=dragged)[:, [0, 2]]
+
+
+def force_fields() -> tuple[ForceField, ...]:
+    """Return the force fields of laws A to G on the texture of section V.B.
+
+    Each with the force at two positions of the handle, on either flank of a crest.
+
+    Reference:
+        The paper's Fig. 2.
+
+    Example:
+        >>> [panel.law for panel in force_fields()]
+        ['A', 'B', 'C', 'D', 'E', 'F', 'G']
+    """
+    x, height = _profile()
+    length, top = SCANNING.period, SCANNING.amplitude
+    columns = np.linspace(0.0, 1.0, _COLUMNS) * length
+    rows = np.linspace(-top - _DEPTH, top, _ROWS)
+    points = np.stack(np.meshgrid(columns, rows), axis=-1)
+    handles = np.array([[0.1, 0.0], [0.4, 0.0]]) * length - [0.0, _DEPTH]
+    panels = []
+    for law in LAWS:
+        surface = SCANNING.surface(law)
+        forces = _plane_force(surface, points.reshape(-1, 2)).reshape(points.shape)
+        start = "wall" if surface.law.contact == "nominal" else "texture"
+        panels.append(
+            ForceField(law, surface.law.name, start, x, height, points, forces, handles,
+                       _plane_force(surface, handles))
+        )  # fmt: skip
+    return tuple(panels)
+
+
+def _path(law: str) -> tuple[list[tuple[float, float, float]], str]:
+    if law == "F":
+        return friction_loop(SCANNING, _TURN), "(27)"
+    if law == "G":
+        quarter = 0.25 * SCANNING.period
+        turns = [(quarter, _TURN), (quarter, -_TURN), (3 * quarter, -_TURN), (3 * quarter, _TURN)]
+        return path_points(*turns), "(29)"
+    return groove_path(SCANNING), {"B": "(12)"}.get(law, "")
+
+
+def loop_energies() -> tuple[LoopEnergy, ...]:
+    """Return the paths of figure 3 and the energy along them, for the numbers of section V.B.
+
+    C and D, which the figure does not show, go along the path of A: they return what they took.
+    F is without texture, with the paper's h = 0.
+
+    Reference:
+        The paper's Fig. 3, (12), (27), (29).
+
+    Example:
+        >>> [f"{panel.law} {panel.energy * 1e3 + 0.0:.3f} mJ" for panel in loop_energies()][:2]
+        ['A 0.320 mJ', 'B 0.147 mJ']
+    """
+    return tuple(_loop_energy(law) for law in LAWS)
+
+
+def _loop_energy(law: str) -> LoopEnergy:
+    from asperity.analysis.loops import loop_work
+
+    x, height = _profile()
+    changes = {}
+    if law == "F":
+        # The law's m is 1/2 without texture; twice the friction makes that the paper's h = 0.
+        changes = {"modulation_depth": 0.0, "friction": 2.0 * SCANNING.friction}
+        height = np.zeros_like(height)
+    surface = SCANNING.surface(law, **changes)
+    turns, equation = _path(law)
+    corners = np.array(turns)
+    legs = zip(corners, np.roll(corners, -1, axis=0), strict=True)
+    share = np.linspace(0.0, 1.0, _STEPS, endpoint=False)[:, None]
+    path = np.concatenate([*(a + share * (b - a) for a, b in legs), corners[:1]])
+    step = np.diff(path, axis=0)
+    # By midpoints: corners of the path may lie where the force jumps.
+    dense = np.empty((2 * len(path) - 1, 3))
+    dense[::2], dense[1::2] = path, path[:-1] + 0.5 * step
+    work = np.sum(surface.trace(dense)[1::2] * step, axis=1)
+    return LoopEnergy(
+        law=law,
+        name=surface.law.name,
+        x=x,
+        height=height,
+        vertices=corners[:, [0, 2]],
+        way=np.concatenate([[0.0], np.cumsum(np.linalg.norm(step, axis=1))]),
+        work=np.concatenate([[0.0], np.cumsum(work)]),
+        energy=loop_work(surface, corners, 1e-10),
+        equation=equation,
+    )

@@ -1,0 +1,121 @@
+"""Every claim of the paper, in its order, and how to compute them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+
+from asperity.errors import ParameterError, nearest_names
+from asperity.paper import (
+    claims_appendix,
+    claims_conclusion,
+    claims_experiments,
+    claims_friction,
+    claims_god_object,
+    claims_laws,
+    claims_limits,
+    claims_number,
+    claims_passivity,
+    claims_simulated,
+    claims_tables,
+)
+from asperity.paper.claim import Claim, Result
+
+# What is called after each claim: its result, how many are done, of how many.
+Progress = Callable[[Result, int, int], None]
+
+_PARTS = (
+    claims_passivity.PASSIVE,
+    claims_limits.LIMITS,
+    claims_passivity.SECTION_III_A,
+    claims_number.SECTION_III_B,
+    claims_passivity.SECTION_III_C,
+    claims_tables.TABLE_I,
+    claims_tables.REMARKS,
+    claims_laws.LAW_A,
+    claims_laws.LAW_B,
+    claims_laws.LAW_C,
+    claims_god_object.LAW_D,
+    claims_god_object.LAW_E,
+    claims_friction.FRICTION,
+    claims_tables.CLAMP,
+    claims_laws.LAW_G,
+    claims_tables.FIGURE_3,
+    claims_tables.TABLE_II,
+    claims_experiments.SECTION_V,
+    claims_simulated.SECTION_V_A,
+    claims_experiments.SECTION_V_B,
+    claims_simulated.SECTION_V_B,
+    claims_experiments.SECTION_V_C,
+    claims_simulated.SECTION_V_C,
+    claims_conclusion.SECTION_VI,
+    claims_appendix.APPENDICES,
+)
+
+CLAIMS: dict[str, Claim] = {claim.id: claim for part in _PARTS for claim in part}
+
+
+def claim(name: str) -> Claim:
+    """Return a claim by its id.
+
+    Raises:
+        ParameterError: if there is none; the nearest are offered.
+
+    Example:
+        >>> claim("eq-12").equations
+        ('(12)',)
+    """
+    if not isinstance(name, str) or name not in CLAIMS:
+        raise ParameterError("claim", f"is unknown: {name!r}; {nearest_names(str(name), CLAIMS)}")
+    return CLAIMS[name]
+
+
+def reproduce_claims(
+    ids: Iterable[str] | None = None,
+    progress: Progress | None = None,
+    workers: int | None = None,
+) -> tuple[Result, ...]:
+    """Compute claims and return their results, in the order of the paper.
+
+    Args:
+        ids: which; all by default.
+        progress: called after each claim.
+        workers: processes to use; this one alone by default.
+
+    Raises:
+        ParameterError: for an unknown id, or a number of workers that is not positive.
+
+    Example:
+        >>> [result.verdict for result in reproduce_claims(["eq-10", "eq-12"])]
+        ['holds with correction', 'holds']
+    """
+    if workers is not None and (
+        isinstance(workers, bool) or workers != int(workers) or workers < 1
+    ):
+        raise ParameterError("workers", "must be a whole number, 1 or more", workers)
+    if isinstance(ids, str):
+        raise ParameterError("ids", "must be a sequence of ids, not one text", ids)
+    wanted = None if ids is None else {claim(given).id for given in ids}
+    names = [name for name in CLAIMS if wanted is None or name in wanted]
+    results = []
+    for result in _computed(names, 1 if workers is None else int(workers)):
+        results.append(result)
+        if progress is not None:
+            progress(result, len(results), len(names))
+    return tuple(results)
+
+
+def _run(name: str) -> Result:
+    return CLAIMS[name].run()
+
+
+def _computed(names: list[str], workers: int) -> Iterator[Result]:
+    """Yield results in order, computed here or by other processes."""
+    if workers == 1 or len(names) < 2:
+        yield from map(_run, names)
+        return
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    # A fresh process each: a fork would copy the threads of numerical libraries half.
+    with ProcessPoolExecutor(min(workers, len(names)), get_context("spawn")) as pool:
+        yield from pool.map(_run, names)

@@ -1,0 +1,129 @@
+"""A verdict follows from numbers, and its evidence can be written as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from asperity.errors import ParameterError
+from asperity.paper.claim import (
+    VERDICTS,
+    Check,
+    Claim,
+    Evidence,
+    Finding,
+    decide,
+    judge,
+    relative_error,
+    settle,
+)
+
+
+def test_what_agrees_holds_whatever_the_correction() -> None:
+    check = judge("x", printed=[1.0, 2.0], corrected=[5.0, 5.0], truth=[1.0, 2.0], correction="c")
+    assert check.verdict == "holds"
+    assert check.correction == ""
+
+
+def test_a_wrong_formula_with_a_right_correction() -> None:
+    check = judge("x", printed=[1.0, 2.1], corrected=[1.0, 2.0], truth=[1.0, 2.0], correction="c")
+    assert (check.verdict, check.correction) == ("holds with correction", "c")
+    assert check.numbers["x, error as printed"] == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("corrected", [None, [1.0, 2.2]])
+def test_a_wrong_formula_without_a_right_correction(corrected: list[float] | None) -> None:
+    check = judge("x", printed=[1.0, 2.1], corrected=corrected, truth=[1.0, 2.0], correction="c")
+    assert check.verdict == "does not hold"
+    # A correction that is wrong itself is not passed on as one.
+    assert check.correction == ("c" if corrected is None else "")
+
+
+def test_the_tolerance_is_the_border() -> None:
+    for off, verdict in ((0.9e-9, "holds"), (1.1e-9, "does not hold")):
+        assert judge("x", printed=[0.0, 2.0 * (1.0 + off)], truth=[0.0, 2.0]).verdict == verdict
+
+
+@pytest.mark.parametrize("truth", [math.nan, [1.0, math.nan], []])
+def test_without_truth_nothing_is_decided(truth: object) -> None:
+    assert judge("x", printed=truth, truth=truth).verdict == "undecided"  # type: ignore[arg-type] # any
+
+
+@pytest.mark.parametrize(
+    ("printed", "truth", "error"),
+    [
+        (math.inf, math.inf, 0.0),
+        (1.0, math.inf, math.inf),
+        (math.inf, 1.0, math.inf),
+        (math.nan, 1.0, math.inf),
+        (None, 1.0, math.inf),
+        ([1.0, 1.0], 1.0, math.inf),
+        (0.0, 0.0, 0.0),
+        (1e-300, 0.0, math.inf),
+        ([3.0, -4.0], [3.0, -5.0], 0.2),
+    ],
+)
+def test_errors_are_relative_to_the_largest_entry(
+    printed: object, truth: object, error: float
+) -> None:
+    assert relative_error(printed, truth) == pytest.approx(error)  # type: ignore[arg-type] # any
+
+
+def test_statements() -> None:
+    assert decide("s", printed=True).verdict == "holds"
+    assert decide("s", printed=np.bool_(False), corrected=True, correction="c").correction == "c"
+    assert decide("s", printed=False, corrected=False, correction="c").verdict == "does not hold"
+    assert decide("s", printed=False, corrected=False, correction="c").correction == ""
+    assert decide("s", printed=False, correction="c").correction == "c"
+    assert decide("s", printed=None).verdict == "undecided"
+    known = decide("s", printed=True, numbers={"a b": 1.0}, c_d=2.0).numbers
+    assert known == {"a b": 1.0, "c d": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("parts", "whole"),
+    [
+        (("holds", "holds"), "holds"),
+        (("holds", "holds with correction"), "holds with correction"),
+        (("undecided", "holds with correction"), "undecided"),
+        (("undecided", "does not hold", "holds"), "does not hold"),
+    ],
+)
+def test_a_claim_is_as_good_as_its_weakest_part(parts: tuple[str, ...], whole: str) -> None:
+    checks = [
+        Check(verdict, verdict[:1], {str(i): 1.0}, f"c{i}" if "cor" in verdict else "")  # type: ignore[arg-type] # text
+        for i, verdict in enumerate(parts)
+    ]
+    found = settle(*checks)
+    assert found.verdict == whole
+    assert len(found.evidence.numbers) == len(parts)
+
+
+def test_json_has_no_infinity() -> None:
+    evidence = Evidence("s", {"a": math.inf, "b": [1.0, -math.inf, math.nan], "c": "text"}, "")
+    result = Claim("x-1", ("(1)",), "I", "words", lambda: Finding("holds", evidence)).run()
+    back = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    assert list(back) == ["id", "equations", "statement", "verdict", "evidence"]
+    assert back["evidence"]["numbers"] == {"a": "inf", "b": [1.0, "-inf", "nan"], "c": "text"}
+    assert back["equations"] == ["(1)"]
+
+
+def test_what_the_package_refuses_is_undecided_and_a_fault_is_a_fault() -> None:
+    def refused() -> Finding:
+        raise ParameterError("depth", "must be positive [m]", -1.0)
+
+    def broken() -> Finding:
+        raise ZeroDivisionError
+
+    result = Claim("x", (), "I", "", refused).run()
+    assert result.verdict == "undecided"
+    assert "depth must be positive" in result.evidence.summary
+    with pytest.raises(ZeroDivisionError):
+        Claim("x", (), "I", "", broken).run()
+
+
+def test_there_are_four_verdicts() -> None:
+    assert VERDICTS == ("holds", "holds with correction", "does not hold", "undecided")
