@@ -135,6 +135,35 @@ class Surface:
         result.max_depth = positive("max_depth", max_depth, "m")
         return result
 
+    def to_stiffness(self, stiffness: float) -> Surface:
+        """Return the same surface with another stiffness [N/m].
+
+        Raises:
+            ParameterError: for a stiffness that is not positive.
+        """
+        result = copy(self)
+        result.__dict__.pop("law_arguments", None)
+        result.stiffness = positive("stiffness", stiffness, "N/m")
+        return result
+
+    def to_law(self, law: str | Law) -> Surface:
+        """Return the same texture with another law, everything else as it is.
+
+        Raises:
+            ParameterError: for an unknown law.
+        """
+        return Surface(
+            self.texture,
+            law,
+            self.stiffness,
+            self.max_depth,
+            friction=self.friction,
+            max_deflection=self.max_deflection,
+            modulation_depth=self.modulation_depth,
+            clamp=self.clamp,
+            continuity=self.continuity,
+        )
+
     @property
     def floor(self) -> float:
         """z_b [m], below which ``clamp="backed"`` adds its wall."""

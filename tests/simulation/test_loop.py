@@ -7,25 +7,31 @@ import pytest
 
 from asperity.checks import FloatArray
 from asperity.errors import ParameterError
+from asperity.simulation import (
+    Cartesian,
+    Run,
+    Servo,
+    SpringHand,
+    Still,
+    Strokes,
+    simulate,
+)
 from asperity.simulation.body import body
 from asperity.simulation.exact import exact_step
-from asperity.simulation.loop import Servo, Simulation
+from asperity.simulation.loop import Simulation
+from asperity.simulation.machine import Machine, machine
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
 WAVE = Sinusoid(amplitude=0.2e-3, period=2e-3, phase=0.3, direction=(2.0, 1.0))
 PERIOD = 1e-3
 MASS, DAMPING = 0.1, 0.8
-
-
-def pressed(count: int, depth: float) -> FloatArray:
-    """A hand that stays at a depth: never out of contact."""
-    return np.tile([0.0, 0.0, -depth], (count + 1, 1))
+PLANT = Cartesian(MASS, DAMPING)
 
 
 def spectral_radius(stiffness: float, delay: int) -> float:
     """Of one axis z of mass and damping with f = -k z of d samples ago, state (z, v, queue)."""
-    step = exact_step(body(MASS, DAMPING), PERIOD)
+    step = exact_step(body(PLANT.mass, PLANT.damping, SpringHand()), PERIOD)
     phi, gamma = step.motion[np.ix_([2, 5], [2, 5])], step.motion[[2, 5], 8]
     matrix = np.zeros((2 + delay, 2 + delay))
     matrix[:2, :2] = phi
@@ -62,9 +68,6 @@ def oscillates(stiffness: float, delay: int) -> float:
     next to no stiffness, balances the wall.
     """
     surface = Surface(WAVE, "W", stiffness)
-    simulation = Simulation(surface, body(MASS, DAMPING), Servo(PERIOD, delay), np.zeros(3))
-    one_sample = np.zeros((2, 3))
-    simulation.run(one_sample)  # compiled and begun
     matrix = np.zeros((2 + delay, 2 + delay))
     rest = np.array([0.0, 0.0, -1.0])
     for column in range(2 + delay):
@@ -76,65 +79,76 @@ def _response(surface: Surface, delay: int, rest: FloatArray, column: int) -> Fl
     """Change of (z, v, waiting forces) in one sample for a unit change of one of them."""
     results = []
     for size in (0.0, 1.0):
-        simulation = Simulation(surface, body(MASS, DAMPING), Servo(PERIOD, delay), rest)
+        servo = Servo(PERIOD, delay)
+        simulation = Simulation(surface, machine(PLANT, SpringHand(), servo), servo, rest)
         queue = np.zeros(delay)  # oldest last
         if column < 2:
-            simulation._state[(2, 5)[column]] += size
+            simulation.state[(2, 5)[column]] += size
         else:
             queue[column - 2] += size
         # The slot after the head is applied next, so the oldest force waits there.
         for i in range(delay):
-            simulation._queue[delay - i, 2] = queue[i]
+            simulation.queue[delay - i, 2] = queue[i]
         simulation.run(np.zeros((2, 3)))
-        waiting = [simulation._queue[(-i) % (delay + 1), 2] for i in range(delay)]
-        state = simulation._state
+        waiting = [simulation.queue[(-i) % (delay + 1), 2] for i in range(delay)]
+        state = simulation.state
         results.append(np.array([state[2], state[5], *waiting]))
     return np.asarray(results[1] - results[0])
 
 
+FULL = Servo(
+    1e-4, delay=1, position_resolution=5e-6, force_resolution=5e-3, max_force=3.0,
+    virtual_damping=0.2, velocity_share=0.3,
+)  # fmt: skip
+HAND = SpringHand([300.0, 200.0, 250.0], 2.0, mass=0.02, force=(0.1, -0.2, -0.3))
+WAY = Strokes((0.0, 0.0, -1e-3), (7e-3, 3e-3, -1e-3), speed=0.05, count=9)
+BODY = Cartesian((0.05, 0.04, 0.03), (0.5, 0.3, 0.4))
+
+
+def explored(letter: str, plant: Cartesian, duration: float = 0.3) -> Run:
+    surface = Surface(WAVE, letter, 800.0, max_depth=0.4e-3)
+    return simulate(surface, plant, HAND, FULL, WAY, duration, start=(0.0, 0.0, 1e-3))
+
+
 @pytest.mark.parametrize("letter", "WACDEFGH")
 def test_every_joule_is_accounted_for(letter: str) -> None:
-    surface = Surface(WAVE, letter, 800.0, max_depth=0.4e-3)
-    held = body(0.05, 0.5, hand_mass=0.02, hand_stiffness=300.0, hand_damping=2.0)
-    servo = Servo(
-        1e-4, delay=1, position_resolution=5e-6, force_resolution=5e-3, max_force=3.0,
-        virtual_damping=0.2, velocity_share=0.3, friction=0.02,
-    )  # fmt: skip
-    t = np.arange(5001) * 1e-4
-    way = np.stack([0.02 * t, 0.005 * np.sin(9 * t), -1e-3 + 0 * t], axis=-1)
-    run = Simulation(surface, held, servo, np.array([0.0, 0.0, 1e-3])).run(way)
+    run = explored(letter, BODY)
     assert abs(run.ledger.closure) < 1e-9 * run.ledger.exchanged
     assert run.ledger.exchanged > 1e-5
-    assert not run.diverged
+    assert not run.stopped
     assert np.abs(run.applied).max() <= 3.0 + 0.01
 
 
 def test_sampling_adds_half_k_times_the_squared_steps() -> None:
     """The sampling leak of a wall: ½ K Σ|Δp|²; the paper's sum turns it around."""
-    surface = Surface(WAVE, "W", 1000.0)
-    simulation = Simulation(surface, body(0.05, 0.0), Servo(1e-4), np.array([0.0, 0.0, -1e-3]))
-    run = simulation.run(np.zeros((51, 3)))
-    steps = np.diff(run.position[:, 2])
+    surface, rest = Surface(WAVE, "W", 1000.0), Still((0.0, 0.0, -1e-3))
+    run = simulate(surface, Cartesian(0.05), SpringHand(), Servo(1e-4), rest, 51e-4)
     assert run.position[:, 2].max() < 0.0
-    leak = 0.5 * 1000.0 * float((steps**2).sum())
+    leak = 0.5 * 1000.0 * float((np.diff(run.position[:, 2]) ** 2).sum())
+    first, last = run.position[[0, -1], 2]
+    # Up to the last sample, as the trace is.
+    energies = run.energies
+    assert energies["sampling"][-1] == pytest.approx(leak, rel=1e-9)
+    field = 0.5 * 1000.0 * (first**2 - last**2)
+    assert energies["supplied"][-1].sum() == pytest.approx(field + leak, rel=1e-9)
     assert run.ledger.sampling == pytest.approx(leak, rel=1e-9)
     # Same-sample sum: work of the field less the leak.
-    ends = 0.5 * 1000.0 * (run.position[0, 2] ** 2 - run.position[-1, 2] ** 2)
-    assert sum(run.ledger.same_sample) == pytest.approx(ends - leak, rel=1e-9)
+    assert sum(run.ledger.same_sample) == pytest.approx(field - leak, rel=1e-9)
 
 
 @pytest.mark.parametrize("letter", ["W", "C"])
 def test_undamped_energy_drifts_with_the_first_order_of_the_period(letter: str) -> None:
     """A conservative law without losses keeps its energy as T -> 0, with order 1."""
     surface = Surface(WAVE, letter, 1000.0, max_depth=0.4e-3)
+    begin = np.array([0.1e-3, 0.05e-3, -0.5e-3])
 
     def drift(period: float) -> float:
-        begin = np.array([0.1e-3, 0.05e-3, -0.5e-3])
-        simulation = Simulation(surface, body(0.05, 0.0), Servo(period), begin)
-        simulation.run(np.zeros((round(4e-3 / period) + 1, 3)))
-        state = simulation._state
-        kinetic = 0.5 * 0.05 * float(state[3:6] @ state[3:6])
-        return kinetic + _potential(surface, state[:3]) - _potential(surface, begin)
+        run = simulate(
+            surface, Cartesian(0.05), SpringHand(), Servo(period), Still((0.0, 0.0, 0.0)),
+            4e-3, start=begin, trace=False,
+        )  # fmt: skip
+        kinetic = 0.5 * 0.05 * float(run.state[3:6] @ run.state[3:6])
+        return kinetic + _potential(surface, run.state[:3]) - _potential(surface, begin)
 
     periods = [4e-5, 2e-5, 1e-5, 5e-6]
     errors = [abs(drift(period)) for period in periods]
@@ -147,29 +161,31 @@ def _potential(surface: Surface, p: FloatArray) -> float:
     return float(0.5 * surface.stiffness * max(depth, 0.0) ** 2)
 
 
-def test_a_run_goes_on_where_the_last_one_stopped() -> None:
-    surface = Surface(WAVE, "F", 500.0)
-    held = body(0.05, 0.5, hand_stiffness=300.0)
-    servo = Servo(1e-3, delay=2, position_resolution=1e-5, virtual_damping=0.1)
-    t = np.arange(201) * 1e-3
-    way = np.stack([0.05 * t, 0 * t, -1e-3 + 0 * t], axis=-1)
-    whole = Simulation(surface, held, servo, np.zeros(3)).run(way)
-    parts = Simulation(surface, held, servo, np.zeros(3))
-    first, second = parts.run(way[:91]), parts.run(way[90:])
-    np.testing.assert_array_equal(np.concatenate([first.position, second.position]), whole.position)
-    assert first.ledger.total + second.ledger.total == pytest.approx(whole.ledger.total, rel=1e-12)
-    assert second.time[0] == pytest.approx(0.09)
+@pytest.mark.parametrize("letter", "CF")
+def test_a_run_goes_on_where_the_last_one_stopped(letter: str) -> None:
+    """In two pieces or in one: state, waiting forces, filter and the law's anchor are carried."""
+    surface, servo = Surface(WAVE, letter, 500.0), Servo(1e-3, 2, 1e-5, virtual_damping=0.1)
+    moved: Machine = machine(BODY, HAND, servo)
+    way = WAY.at(np.arange(201) * 1e-3)
+    whole = Simulation(surface, moved, servo, np.zeros(3))
+    table = np.empty((200, 27))
+    whole.run(way, table)
+    parts, pieces = Simulation(surface, moved, servo, np.zeros(3)), np.empty((200, 27))
+    parts.run(way[:91], pieces[:90])
+    parts.run(way[90:], pieces[90:])
+    # Energies are summed in another order where a run is cut: not the trace up to the ledger.
+    np.testing.assert_array_equal(pieces, table)
+    assert parts.ledger() == whole.ledger()
 
 
 def test_divergence_is_reported_and_the_trace_kept() -> None:
-    surface = Surface(WAVE, "W", 1e9)
-    light = body(1e-3, 0.0, hand_stiffness=1e5)
-    run = Simulation(surface, light, Servo(1e-2, delay=3), np.array([0.0, 0.0, -1e-3])).run(
-        pressed(20_000, 1e-3)
+    surface, hand = Surface(WAVE, "W", 1e9), SpringHand(1e5)
+    run = simulate(
+        surface, Cartesian(1e-3), hand, Servo(1e-2, delay=3), Still((0.0, 0.0, -1e-3)), 200.0
     )
-    assert run.diverged
-    assert 10 < len(run.time) < 20_000
-    assert np.isfinite(run.position).all()
+    assert run.stopped == "diverged"
+    assert 10 < len(run.time) == run.samples < 20_000
+    assert np.isfinite(run.table).all()
 
 
 @pytest.mark.parametrize(
@@ -178,9 +194,12 @@ def test_divergence_is_reported_and_the_trace_kept() -> None:
         ({"period": 0.0}, "period"),
         ({"period": 1e-3, "delay": 1.5}, "delay"),
         ({"period": 1e-3, "delay": -1}, "delay"),
+        ({"period": 1e-3, "delay": np.nan}, "delay"),
         ({"period": 1e-3, "max_force": 0.0}, "max_force"),
+        ({"period": 1e-3, "max_force": np.nan}, "max_force"),
         ({"period": 1e-3, "velocity_share": 0.0}, "velocity_share"),
-        ({"period": 1e-3, "friction": -1.0}, "friction"),
+        ({"period": 1e-3, "force_resolution": -1.0}, "force_resolution"),
+        ({"period": 1e-3, "position_resolution": np.nan}, "position_resolution"),
     ],
 )
 def test_bad_servo_is_named(arguments: dict[str, float], named: str) -> None:

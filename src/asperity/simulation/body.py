@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.checks import FloatArray, array, positive, real
+from asperity.checks import FloatArray, positive, real
 from asperity.errors import ParameterError
+from asperity.simulation.hands import SpringHand
 
 
 @dataclass(frozen=True)
@@ -36,28 +37,38 @@ class Resonance:
         if not 0.0 < real("share", self.share) < 1.0:
             raise ParameterError("share", "must be between 0 and 1", self.share)
 
+    def to_dict(self) -> dict[str, float]:
+        """Return plain data, SI units."""
+        return {
+            "frequency": float(self.frequency), "damping_ratio": float(self.damping_ratio),
+            "share": float(self.share),
+        }  # fmt: skip
+
 
 @dataclass(frozen=True)
 class Body:
-    """A linear body: x' = A x + B f + C_a a + C_v v, with the energies as quadratic forms.
+    """A linear body: x' = A x + B f + C_a a + C_v v + G g, with the energies as quadratic forms.
 
-    f is the force on the handle [N], a and v position and velocity of the hand's anchor. With
-    z = (x, f, a, v) the stored energy is ½ zᵀ S z and the rate of loss zᵀ Q z; the anchor feeds
-    the power v · N z. All symmetric.
+    f is the force on the handle [N], a and v position and velocity of the hand's anchor, g the
+    constant force of the hand. With z = (x, f, a, v, g) the stored energy is ½ zᵀ S z and the rate
+    of loss zᵀ Q z; the anchor feeds the power v · N z. S and Q are symmetric.
 
     Attributes:
         dynamics: A, shape (n, n); the first three states are the handle's position [m], the next
-            three its velocity [m/s].
+            three its velocity [m/s]; then the same of the part that carries the hand, if it is
+            another one.
         force: B, shape (n, 3).
         anchor: C_a and C_v side by side, shape (n, 6).
-        storage: S, shape (n + 9, n + 9).
-        loss: Q, shape (n + 9, n + 9).
-        pull: N, the force of the anchor on the body, shape (3, n + 9).
+        press: G, shape (n, 3).
+        storage: S, shape (n + 12, n + 12).
+        loss: Q, shape (n + 12, n + 12).
+        pull: N, the force of the anchor on the body, shape (3, n + 12).
     """
 
     dynamics: FloatArray
     force: FloatArray
     anchor: FloatArray
+    press: FloatArray
     storage: FloatArray
     loss: FloatArray
     pull: FloatArray
@@ -69,71 +80,28 @@ class Body:
 
 
 def body(
-    mass: ArrayLike,
-    damping: ArrayLike,
-    *,
-    hand_mass: float = 0.0,
-    hand_stiffness: ArrayLike = 0.0,
-    hand_damping: ArrayLike = 0.0,
-    resonance: Resonance | None = None,
+    mass: ArrayLike, damping: ArrayLike, hand: SpringHand, resonance: Resonance | None = None
 ) -> Body:
     """Return the body of a device that a hand holds.
 
-    M p'' = f - B p' + K_h (a - p) + B_h (v - p'); with a resonance the share of the device's mass
-    and the hand hang on a spring from the part that motor and sensor see.
+    M p'' = f - B p' + K_h (a - p) + B_h (v - p') + g; with a resonance the share of the device's
+    mass and the hand hang on a spring from the part that motor and sensor see.
 
     Args:
-        mass: of the device as felt at the handle [kg], one number or one per axis.
-        damping: B [N s/m]: a number, one per axis, or a symmetric matrix (3, 3), positive
-            semidefinite.
-        hand_mass: mass of the hand that moves with the handle [kg].
-        hand_stiffness: K_h [N/m], a number or one per axis.
-        hand_damping: B_h [N s/m], a number or one per axis.
+        mass: of the device as felt at the handle [kg], one per axis.
+        damping: B [N s/m], symmetric, positive semidefinite, shape (3, 3).
+        hand: spring, damper, mass and constant force of the hand.
         resonance: first structural mode, alike along all axes.
 
-    Raises:
-        ParameterError: for a mass that is not positive, or a stiffness or damping that is negative.
-
     Example:
-        >>> body(0.05, 1.0, hand_stiffness=200.0).order
+        >>> body([0.05] * 3, np.eye(3), SpringHand(stiffness=200.0)).order
         6
     """
-    device = _diagonal("mass", mass, least=0.0, strictly=True)
-    friction = _symmetric("damping", damping)
-    held = real("hand_mass", hand_mass, "kg")
-    if held < 0.0:
-        raise ParameterError("hand_mass", "must not be negative [kg]", hand_mass)
-    spring = _diagonal("hand_stiffness", hand_stiffness, least=0.0)
-    damper = _diagonal("hand_damping", hand_damping, least=0.0)
+    device, friction = np.diag(np.asarray(mass, dtype=float)), np.asarray(damping, dtype=float)
+    spring, damper = np.diag(hand.stiffness), np.diag(hand.damping)
     if resonance is None:
-        return _assembled(device + held * np.eye(3), friction, spring, damper)
-    return _two_masses(device, friction, held, spring, damper, resonance)
-
-
-def _diagonal(name: str, value: ArrayLike, least: float, *, strictly: bool = False) -> FloatArray:
-    given = np.asarray(value, dtype=float)
-    unit = _UNITS[name]
-    axes = array(name, np.broadcast_to(given, (3,)) if given.ndim == 0 else given, (3,), unit)
-    if (axes <= least).any() if strictly else (axes < least).any():
-        rule = "must be positive" if strictly else "must not be negative"
-        raise ParameterError(name, f"{rule} [{unit}]", value)
-    return np.diag(axes)
-
-
-def _symmetric(name: str, value: ArrayLike) -> FloatArray:
-    given = np.asarray(value, dtype=float)
-    if given.ndim < 2:
-        return _diagonal(name, value, least=0.0)
-    matrix = array(name, given, (3, 3), _UNITS[name])
-    size = float(np.abs(matrix).max())
-    if np.abs(matrix - matrix.T).max() > 1e-12 * size:
-        raise ParameterError(name, "must be symmetric", value)
-    if np.linalg.eigvalsh(matrix)[0] < -1e-12 * size:
-        raise ParameterError(name, "must be positive semidefinite", value)
-    return np.asarray(0.5 * (matrix + matrix.T))
-
-
-_UNITS = {"mass": "kg", "damping": "N s/m", "hand_stiffness": "N/m", "hand_damping": "N s/m"}
+        return _assembled(device + hand.mass * np.eye(3), friction, spring, damper)
+    return _two_masses(device, friction, hand.mass, spring, damper, resonance)
 
 
 class _Blocks:
@@ -154,10 +122,10 @@ def _assembled(
     mass: FloatArray, friction: FloatArray, spring: FloatArray, damper: FloatArray
 ) -> Body:
     """One mass: x = (p, p')."""
-    z = _Blocks(("p", "dp", "f", "a", "v"))
+    z = _Blocks(("p", "dp", "f", "a", "v", "g"))
     stretch, rate, speed = z(a=1.0, p=-1.0), z(v=1.0, dp=-1.0), z(dp=1.0)
     pull = spring @ stretch + damper @ rate
-    rows = [speed, np.linalg.inv(mass) @ (z(f=1.0) - friction @ speed + pull)]
+    rows = [speed, np.linalg.inv(mass) @ (z(f=1.0, g=1.0) - friction @ speed + pull)]
     storage = _form(mass, speed) + _form(spring, stretch)
     loss = _form(friction, speed) + _form(damper, rate)
     return _body(rows, storage, loss, pull)
@@ -177,7 +145,7 @@ def _two_masses(
     reduced = near @ far @ np.linalg.inv(near + far)
     omega = 2.0 * np.pi * resonance.frequency
     inner, inner_damper = omega**2 * reduced, 2.0 * resonance.damping_ratio * omega * reduced
-    z = _Blocks(("p", "dp", "r", "dr", "f", "a", "v"))
+    z = _Blocks(("p", "dp", "r", "dr", "f", "a", "v", "g"))
     bend, bend_rate = z(r=1.0, p=-1.0), z(dr=1.0, dp=-1.0)
     stretch, rate = z(a=1.0, r=-1.0), z(v=1.0, dr=-1.0)
     pull = spring @ stretch + damper @ rate
@@ -186,7 +154,7 @@ def _two_masses(
         z(dp=1.0),
         np.linalg.inv(near) @ (z(f=1.0) - friction @ z(dp=1.0) + between),
         z(dr=1.0),
-        np.linalg.inv(far) @ (pull - between),
+        np.linalg.inv(far) @ (z(g=1.0) + pull - between),
     ]
     storage = _form(near, z(dp=1.0)) + _form(far, z(dr=1.0))
     storage += _form(inner, bend) + _form(spring, stretch)
@@ -201,4 +169,7 @@ def _form(matrix: FloatArray, rows: FloatArray) -> FloatArray:
 def _body(rows: list[FloatArray], storage: FloatArray, loss: FloatArray, pull: FloatArray) -> Body:
     every = np.vstack(rows)
     n = len(every)
-    return Body(every[:, :n], every[:, n : n + 3], every[:, n + 3 :], storage, loss, pull)
+    return Body(
+        every[:, :n], every[:, n : n + 3], every[:, n + 3 : n + 9], every[:, n + 9 :],
+        storage, loss, pull,
+    )  # fmt: skip

@@ -1,7 +1,7 @@
 """The servo loop around a law's kernel, as source that is compiled together with it.
 
 One sample: the position is read in steps of the encoder, the law answers, virtual damping is added,
-the force is rounded and limited, waits for the delay, and is held while the body moves exactly.
+the force is rounded and limited, waits for the delay, and is held while the body moves.
 """
 
 from __future__ import annotations
@@ -11,18 +11,20 @@ from asperity.laws import Law
 
 # What ``memory`` holds between calls: see ``servo_batch``.
 MEMORY = 15
-# Columns of the ledger: per axis x, y, z, then sums.
+# Sums of the ledger: work of the held force per axis (3), the paper's same-sample sum per axis
+# (3), loss, work of the hand, work of dry friction, what sampling adds, all without their signs.
 LEDGER = 11
-# Columns of the trace: position, velocity, commanded and applied force.
-TRACE = 12
-# Settings in order.
-SETTINGS = (
-    "position_resolution",
-    "force_resolution",
-    "max_force",
-    "virtual_damping",
-    "velocity_share",
-    "friction",
+# Columns of the trace with their units.
+COLUMNS = (
+    ("time", "s"),
+    *((name, "m") for name in ("x", "y", "z")),
+    *((f"v{axis}", "m/s") for axis in "xyz"),
+    *((f"commanded {axis}", "N") for axis in "xyz"),
+    *((f"applied {axis}", "N") for axis in "xyz"),
+    *((f"anchor {axis}", "m") for axis in "xyz"),
+    *((f"supplied {axis}", "J") for axis in "xyz"),
+    *((f"same sample {axis}", "J") for axis in "xyz"),
+    *((name, "J") for name in ("lost", "hand", "friction", "sampling", "stored")),
 )
 
 _STATELESS = """cx, cy, cz = probe_force(mx, my, mz, texture, law)
@@ -31,9 +33,9 @@ _STATELESS = """cx, cy, cz = probe_force(mx, my, mz, texture, law)
 _STATEFUL = """dx = 0.0
 dy = 0.0
 if mz < 0.0:
-    ax, ay, dx, dy = drag_anchor(mx, my, memory[9] > 0.0, memory[7], memory[8], max_deflection)
-    memory[7] = ax
-    memory[8] = ay
+    px, py, dx, dy = drag_anchor(mx, my, memory[9] > 0.0, memory[7], memory[8], max_deflection)
+    memory[7] = px
+    memory[8] = py
     memory[9] = 1.0
 else:
     memory[9] = 0.0
@@ -42,29 +44,30 @@ cx, cy, cz = probe_force(mx, my, mz, dx, dy, texture, law)
 
 
 def servo_source(law: Law) -> str:
-    """Return ``servo_batch`` for a law.
+    """Return ``servo_batch`` and ``stored_batch`` for a law; a body's kernel must come along.
 
-    ``servo_batch(x, z, queue, memory, ledger, anchor, motion, loss, anchor_work, mass, parts,
-    settings, texture, law, trace)`` runs one sample for each row of ``anchor`` but the last:
+    ``servo_batch(x, queue, memory, ledger, anchor, plant, settings, texture, law, trace, every)``
+    runs one sample for each row of ``anchor`` but the last and returns what stopped it: 0 nothing,
+    1 a state out of all bounds, 2 a body that would leave its workspace.
 
-    * x: state of the body (n,), changed;
-    * z: room for (x, f, a, v), (n + 9,): nothing is allocated;
+    * x: state of the body, changed: position, velocity, more;
     * queue: forces that wait (d + 1, 3), changed;
     * memory: whether begun, last measured position (3), filtered velocity (3), the law's anchor
       (2) and whether it is held, the head of the queue, samples done, last commanded force (3);
       changed;
-    * ledger: work of the held force per axis (3), the paper's same-sample sum per axis (3), loss,
-      work of the hand's anchor, work of dry friction, half of what the last two forces differ
-      times the measured step, and the sum of all exchanges without their signs [J]; added to;
+    * ledger: see ``LEDGER``; added to;
     * anchor: positions of the hand's anchor at the samples [m], (k + 1, 3);
-    * motion, loss, anchor_work: of a ``Step`` of T/parts;
-    * mass: what dry friction has to stop [kg];
-    * trace: (k, 12), or (0, 12) for none.
+    * plant: what the body is made of, see ``kernels``;
+    * trace: rows of ``COLUMNS`` for the samples that are multiples of ``every``; none are written
+      if it has no rows.
+
+    ``stored_batch(x, anchor, plant)`` returns the stored energy [J].
     """
     contact = _STATEFUL if law.stateful else _STATELESS
     unpack = ", ".join((*SHARED_PARAMETERS, *law.parameters))
     lines = "\n".join(" " * 8 + line for line in contact.splitlines())
-    return _SERVO.format(contact=lines, unpack=unpack)
+    inside = "mz < 0.0" if law.contact == "nominal" else "mz < height(mx, my, *texture)"
+    return _SERVO.format(contact=lines, unpack=unpack, inside=inside) + _TRACE
 
 
 _SERVO = '''def rounded(value, step):
@@ -74,95 +77,58 @@ _SERVO = '''def rounded(value, step):
     return value
 
 
-def move(x, z, motion, loss, anchor_work, mass, friction, ledger):
-    """Move the body by one part of a sample; z holds (x, f, a, v) with the force of the servo."""
-    n = x.shape[0]
-    size = z.shape[0]
-    gx = 0.0
-    gy = 0.0
-    gz = 0.0
-    if friction > 0.0:
-        speed = math.sqrt(x[3] * x[3] + x[4] * x[4] + x[5] * x[5])
-        if speed > 0.0:
-            share = min(friction, mass * speed) / speed
-            gx = -share * x[3]
-            gy = -share * x[4]
-            gz = -share * x[5]
-    for i in range(n):
-        z[i] = x[i]
-    fx = z[n]
-    fy = z[n + 1]
-    fz = z[n + 2]
-    z[n] += gx
-    z[n + 1] += gy
-    z[n + 2] += gz
-    lost = 0.0
-    for i in range(size):
-        row = 0.0
-        for j in range(i):
-            row += loss[i, j] * z[j]
-        lost += z[i] * (2.0 * row + loss[i, i] * z[i])
-    pulled = 0.0
-    for i in range(3):
-        row = 0.0
-        for j in range(size):
-            row += anchor_work[i, j] * z[j]
-        pulled += z[n + 6 + i] * row
-    for i in range(n):
-        row = 0.0
-        for j in range(size):
-            row += motion[i, j] * z[j]
-        x[i] = row
-    ledger[0] += fx * (x[0] - z[0])
-    ledger[1] += fy * (x[1] - z[1])
-    ledger[2] += fz * (x[2] - z[2])
-    ledger[6] += lost
-    ledger[7] += pulled
-    rubbed = gx * (x[0] - z[0]) + gy * (x[1] - z[1]) + gz * (x[2] - z[2])
-    ledger[8] += rubbed
-    fed = abs(fx * (x[0] - z[0])) + abs(fy * (x[1] - z[1])) + abs(fz * (x[2] - z[2]))
-    ledger[10] += fed + abs(lost) + abs(pulled) + abs(rubbed)
-    z[n] = fx
-    z[n + 1] = fy
-    z[n + 2] = fz
+def flush(values):
+    """Make nothing of what is next to nothing: subnormal numbers are a hundred times slower."""
+    for i in range(values.shape[0]):
+        if abs(values[i]) < 1e-60:
+            values[i] = 0.0
 
 
 def servo_batch(
-    x, z, queue, memory, ledger, anchor, motion, loss, anchor_work, mass, parts,
-    settings, texture, law, trace
+    x, queue, memory, ledger, anchor, plant, settings, texture, law, trace, every
 ):
-    """Run the servo loop; returns the samples done, fewer if the state leaves all bounds."""
+    """Run the servo loop; returns what stopped it, and the rows of the trace."""
     {unpack} = law
-    position_step, force_step, max_force, damper, velocity_share, friction, period = settings
-    n = x.shape[0]
+    position_step, force_step, max_force, damper, velocity_share, period = settings
     slots = queue.shape[0]
     head = int(memory[10])
+    done = int(memory[11])
     samples = anchor.shape[0] - 1
+    rate = 1.0 / period
+    rows = 0
+    wait = (every - done % every) % every
+    tracing = trace.shape[0] > 0
+    stop = 0
+    largest = max_force * max_force
+    if not memory[0] > 0.0:
+        memory[0] = 1.0
+        memory[1] = rounded(x[0], position_step)
+        memory[2] = rounded(x[1], position_step)
+        memory[3] = rounded(x[2], position_step)
     for sample in range(samples):
+        if sample & 255 == 0:
+            flush(x)
+            flush(memory)
         mx = rounded(x[0], position_step)
         my = rounded(x[1], position_step)
         mz = rounded(x[2], position_step)
-        if not memory[0] > 0.0:
-            memory[0] = 1.0
-            memory[1] = mx
-            memory[2] = my
-            memory[3] = mz
 {contact}
         stepx = mx - memory[1]
         stepy = my - memory[2]
         stepz = mz - memory[3]
         if damper != 0.0:
-            memory[4] += velocity_share * (stepx / period - memory[4])
-            memory[5] += velocity_share * (stepy / period - memory[5])
-            memory[6] += velocity_share * (stepz / period - memory[6])
+            memory[4] += velocity_share * (stepx * rate - memory[4])
+            memory[5] += velocity_share * (stepy * rate - memory[5])
+            memory[6] += velocity_share * (stepz * rate - memory[6])
             cx -= damper * memory[4]
             cy -= damper * memory[5]
             cz -= damper * memory[6]
-        size = math.sqrt(cx * cx + cy * cy + cz * cz)
-        if size > max_force:
-            cx *= max_force / size
-            cy *= max_force / size
-            cz *= max_force / size
+        square = cx * cx + cy * cy + cz * cz
+        if square > largest:
+            shorter = max_force / math.sqrt(square)
+            cx *= shorter
+            cy *= shorter
+            cz *= shorter
         cx = rounded(cx, force_step)
         cy = rounded(cy, force_step)
         cz = rounded(cz, force_step)
@@ -181,31 +147,67 @@ def servo_batch(
         queue[head, 0] = cx
         queue[head, 1] = cy
         queue[head, 2] = cz
-        head = (head + 1) % slots
-        for i in range(3):
-            z[n + i] = queue[head, i]
-            z[n + 3 + i] = anchor[sample, i]
-            z[n + 6 + i] = (anchor[sample + 1, i] - anchor[sample, i]) / period
-        if trace.shape[0] > 0:
-            for i in range(3):
-                trace[sample, i] = x[i]
-                trace[sample, 3 + i] = x[3 + i]
-                trace[sample, 9 + i] = z[n + i]
-            trace[sample, 6] = cx
-            trace[sample, 7] = cy
-            trace[sample, 8] = cz
-        for part in range(parts):
-            move(x, z, motion, loss, anchor_work, mass, friction, ledger)
-            for i in range(3):
-                z[n + 3 + i] += z[n + 6 + i] * period / parts
-        finite = True
-        for i in range(n):
-            finite = finite and abs(x[i]) < 1e6
-        if not finite:
-            memory[10] = head
-            memory[11] += sample + 1
-            return sample + 1
+        head += 1
+        if head == slots:
+            head = 0
+        fx = queue[head, 0]
+        fy = queue[head, 1]
+        fz = queue[head, 2]
+        ax = anchor[sample, 0]
+        ay = anchor[sample, 1]
+        az = anchor[sample, 2]
+        ux = (anchor[sample + 1, 0] - ax) * rate
+        uy = (anchor[sample + 1, 1] - ay) * rate
+        uz = (anchor[sample + 1, 2] - az) * rate
+        if tracing:
+            if wait == 0:
+                trace_row(
+                    trace, rows, (done + sample) * period, x, cx, cy, cz, fx, fy, fz,
+                    ax, ay, az, ledger, plant
+                )
+                rows += 1
+                wait = every
+            wait -= 1
+        stop = advance_body(
+            x, ledger, fx, fy, fz, ax, ay, az, ux, uy, uz, {inside}, plant
+        )
+        if stop != 0:
+            samples = sample
+            break
+        size = abs(x[0]) + abs(x[1]) + abs(x[2]) + abs(x[3]) + abs(x[4]) + abs(x[5])
+        if not size < 1e6:
+            stop = 1
+            samples = sample + 1
+            break
     memory[10] = head
-    memory[11] += samples
-    return samples
+    memory[11] = done + samples
+    return stop, rows
+
+
+'''
+
+_TRACE = '''def trace_row(
+    trace, row, time, x, cx, cy, cz, fx, fy, fz, ax, ay, az, ledger, plant
+):
+    """Write one row of the trace."""
+    trace[row, 0] = time
+    for i in range(6):
+        trace[row, 1 + i] = x[i]
+    trace[row, 7] = cx
+    trace[row, 8] = cy
+    trace[row, 9] = cz
+    trace[row, 10] = fx
+    trace[row, 11] = fy
+    trace[row, 12] = fz
+    trace[row, 13] = ax
+    trace[row, 14] = ay
+    trace[row, 15] = az
+    for i in range(10):
+        trace[row, 16 + i] = ledger[i]
+    trace[row, 26] = stored_energy(x, ax, ay, az, plant)
+
+
+def stored_batch(x, anchor, plant):
+    """Stored energy [J]."""
+    return stored_energy(x, anchor[0], anchor[1], anchor[2], plant)
 '''

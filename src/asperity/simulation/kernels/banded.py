@@ -1,0 +1,121 @@
+"""A mass in space on an elastic band, over one sample, by Runge-Kutta steps."""
+
+# ruff: noqa: ARG001 - one signature for every body
+
+from typing import Any
+
+from asperity.simulation.kernels.booking import book_energies
+from asperity.simulation.kernels.dense import friction_force
+from asperity.simulation.kernels.holding import band_turns, hand_energy, hand_force
+
+
+def banded_rates(
+    y: Any, k: Any, fx: float, fy: float, fz: float, ax: float, ay: float, az: float,
+    ux: float, uy: float, uz: float, mass: Any, damping: Any, hand: Any,
+) -> None:  # fmt: skip
+    """Let k become the rate of y = (p, p', loss, work of the hand)."""
+    hx, hy, hz, lost = hand_force(
+        ax - y[0], ay - y[1], az - y[2], ux - y[3], uy - y[4], uz - y[5], hand
+    )
+    k[6] = lost
+    k[7] = ux * hx + uy * hy + uz * hz
+    for i in range(3):
+        drag = damping[i, 0] * y[3] + damping[i, 1] * y[4] + damping[i, 2] * y[5]
+        push = fx + hx if i == 0 else fy + hy if i == 1 else fz + hz
+        k[i] = y[3 + i]
+        k[3 + i] = (push + hand[7 + i] - drag) / mass[i, i]
+        k[6] += drag * y[3 + i]
+        k[7] += hand[7 + i] * y[3 + i]
+
+
+def banded_part(
+    x: Any, fx: float, fy: float, fz: float, ax: float, ay: float, az: float,
+    ux: float, uy: float, uz: float, span: float, mass: Any, damping: Any, hand: Any,
+    change: Any, stage: Any, rate: Any,
+) -> None:  # fmt: skip
+    """One step of the classical Runge-Kutta method; ``change`` becomes that of (p, p', ...)."""
+    for i in range(8):
+        change[i] = 0.0
+        rate[i] = 0.0
+    for turn in range(4):
+        late = 0.0 if turn == 0 else 1.0 if turn == 3 else 0.5
+        weight = 1.0 / 6.0 if turn in (0, 3) else 1.0 / 3.0
+        for i in range(6):
+            stage[i] = x[i] + late * span * rate[i]
+        banded_rates(
+            stage, rate, fx, fy, fz,
+            ax + late * span * ux, ay + late * span * uy, az + late * span * uz,
+            ux, uy, uz, mass, damping, hand,
+        )  # fmt: skip
+        for i in range(8):
+            change[i] += weight * span * rate[i]
+    for i in range(6):
+        x[i] += change[i]
+
+
+def advance_body(
+    x: Any, ledger: Any,
+    fx: float, fy: float, fz: float,
+    ax: float, ay: float, az: float,
+    ux: float, uy: float, uz: float,
+    inside: bool, plant: Any,
+) -> int:  # fmt: skip
+    """Move the body over one sample; see ``kernels/__init__.py``.
+
+    plant: mass (3, 3), diagonal, damping, the hand, friction [N], parts, duration of a part [s],
+    and room for the changes, a stage and its rates (8 each).
+    """
+    mass, damping, hand, friction, parts, span, change, stage, rate = plant
+    gx = gy = gz = time = 0.0
+    part = fine = 0
+    h = span
+    while part < parts:
+        bx = ax + time * ux
+        by = ay + time * uy
+        bz = az + time * uz
+        if friction > 0.0:
+            banded_rates(x, rate, fx, fy, fz, bx, by, bz, ux, uy, uz, mass, damping, hand)
+            for i in range(3):
+                stage[i] = x[3 + i] + h * rate[3 + i]
+            gx, gy, gz = friction_force(stage[0], stage[1], stage[2], friction, mass, h)
+        banded_part(
+            x, fx + gx, fy + gy, fz + gz, bx, by, bz, ux, uy, uz, h, mass, damping, hand,
+            change, stage, rate,
+        )  # fmt: skip
+        if fine == 0 and banded_kink(x, change, bx, by, bz, h * ux, h * uy, h * uz, hand):
+            for i in range(6):
+                x[i] -= change[i]
+            fine = 256
+            h = span / 256.0
+            continue
+        time += h
+        rubbed = gx * change[0] + gy * change[1] + gz * change[2]
+        book_energies(
+            ledger, fx * change[0], fy * change[1], fz * change[2], change[6], change[7], rubbed
+        )
+        fine = max(fine - 1, 0)
+        if fine == 0:
+            part += 1
+            h = span
+    return 0
+
+
+def banded_kink(
+    x: Any, change: Any, ax: float, ay: float, az: float, dx: float, dy: float, dz: float, hand: Any
+) -> bool:
+    """Whether the band turned slack or taut in a step: its force then has a kink."""
+    ex = ax - x[0]
+    ey = ay - x[1]
+    ez = az - x[2]
+    return band_turns(
+        ex + change[0], ey + change[1], ez + change[2], ex + dx, ey + dy, ez + dz, hand
+    )
+
+
+def stored_energy(x: Any, ax: float, ay: float, az: float, plant: Any) -> float:
+    """½ m v² of every axis and the energy of the hand [J]."""
+    mass, hand = plant[0], plant[2]
+    total = hand_energy(ax - x[0], ay - x[1], az - x[2], hand)
+    for i in range(3):
+        total += 0.5 * mass[i, i] * x[3 + i] * x[3 + i]
+    return total

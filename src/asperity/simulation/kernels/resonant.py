@@ -1,0 +1,109 @@
+"""One sample of a body with a resonance, axis by axis, with dry friction at the handle.
+
+As in ``axes.py`` but for two masses: with e = p - a, w = p' - u and the same for the part r that
+hangs on a spring and carries the hand, (e, w, e_r, w_r) changes linearly in itself, F = f - b u and
+the hand's constant force g.
+"""
+
+# ruff: noqa: ARG001 - one signature for every body
+
+from typing import Any
+
+from asperity.simulation.kernels.booking import book_energies
+from asperity.simulation.kernels.dense import friction_force
+
+
+def resonant_state(
+    x: Any, i: int, f: float, a: float, u: float, table: Any, z: Any
+) -> float:  # fmt: skip
+    """Let z become (e, w, e_r, w_r, F, g) of one axis; returns p' at the end of the part [m/s]."""
+    z[0] = x[i] - a
+    z[1] = x[3 + i] - u
+    z[2] = x[6 + i] - a
+    z[3] = x[9 + i] - u
+    z[4] = f - table[i, 45] * u
+    z[5] = table[i, 50]
+    speed = x[3 + i]
+    for j in range(6):
+        speed += table[i, 6 + j] * z[j]
+    return speed  # type: ignore[no-any-return]  # arrays are untyped for Numba
+
+
+def advance_resonant(
+    x: Any, i: int, f: float, a: float, u: float, table: Any, z: Any
+) -> tuple[float, float, float]:
+    """Move along one axis; returns the displacement [m], loss and work of the hand [J].
+
+    Row i of the table: 0-23 the changes, 24-44 the loss, upper triangle by rows, 45 b, 46 and 47
+    the masses near and far, 48 the spring between, 49 K, 50 g, 51 T.
+    """
+    v = x[3 + i]
+    dw = resonant_state(x, i, f, a, u, table, z) - v
+    de = dr = ds = lost = 0.0
+    place = 24
+    for j in range(6):
+        de += table[i, j] * z[j]
+        dr += table[i, 12 + j] * z[j]
+        ds += table[i, 18 + j] * z[j]
+        row = 0.0
+        for k in range(j, 6):
+            row += table[i, place] * z[k]
+            place += 1
+        lost += z[j] * row
+    b = table[i, 45]
+    span = table[i, 51]
+    dp = de + u * span
+    lost += b * u * (de + dp)
+    impulse = table[i, 46] * dw + table[i, 47] * ds - (f + z[5]) * span + b * dp
+    hand = u * impulse + z[5] * (dr + u * span)
+    x[i] += dp
+    x[3 + i] = v + dw
+    x[6 + i] += dr + u * span
+    x[9 + i] += ds
+    return dp, lost, hand
+
+
+def advance_body(
+    x: Any, ledger: Any,
+    fx: float, fy: float, fz: float,
+    ax: float, ay: float, az: float,
+    ux: float, uy: float, uz: float,
+    inside: bool, plant: Any,
+) -> int:  # fmt: skip
+    """Move the body over one sample; see ``kernels/__init__.py``.
+
+    plant: the table for a part, friction [N], mass that friction stops [kg], parts, duration of a
+    part [s], room for z (6).
+    """
+    table, friction, mass, parts, span, z = plant
+    gx = gy = gz = 0.0
+    for part in range(parts):
+        bx = ax + part * span * ux
+        by = ay + part * span * uy
+        bz = az + part * span * uz
+        if friction > 0.0:
+            vx = resonant_state(x, 0, fx, bx, ux, table, z)
+            vy = resonant_state(x, 1, fy, by, uy, table, z)
+            vz = resonant_state(x, 2, fz, bz, uz, table, z)
+            gx, gy, gz = friction_force(vx, vy, vz, friction, mass, span)
+        dx, lost_x, hand_x = advance_resonant(x, 0, fx + gx, bx, ux, table, z)
+        dy, lost_y, hand_y = advance_resonant(x, 1, fy + gy, by, uy, table, z)
+        dz, lost_z, hand_z = advance_resonant(x, 2, fz + gz, bz, uz, table, z)
+        lost = lost_x + lost_y + lost_z
+        hand = hand_x + hand_y + hand_z
+        rubbed = gx * dx + gy * dy + gz * dz
+        book_energies(ledger, fx * dx, fy * dy, fz * dz, lost, hand, rubbed)
+    return 0
+
+
+def stored_energy(x: Any, ax: float, ay: float, az: float, plant: Any) -> float:
+    """Of both masses, the spring between them and that of the hand [J]."""
+    table = plant[0]
+    total = 0.0
+    for i in range(3):
+        anchor = ax if i == 0 else ay if i == 1 else az
+        stretch = anchor - x[6 + i]
+        bend = x[6 + i] - x[i]
+        total += 0.5 * table[i, 46] * x[3 + i] ** 2 + 0.5 * table[i, 47] * x[9 + i] ** 2
+        total += 0.5 * table[i, 48] * bend * bend + 0.5 * table[i, 49] * stretch * stretch
+    return total

@@ -1,0 +1,47 @@
+"""One sample of a body without coupling between its axes but for dry friction, in parts."""
+
+# ruff: noqa: ARG001 - one signature for every body
+
+from typing import Any
+
+from asperity.simulation.kernels.axes import advance_axis
+from asperity.simulation.kernels.booking import book_energies
+from asperity.simulation.kernels.dense import friction_force
+
+
+def final_speed(x: Any, i: int, f: float, a: float, u: float, table: Any) -> float:
+    """Velocity along one axis at the end of the part, without friction [m/s]."""
+    v = x[3 + i]
+    push = f + table[i, 15] - table[i, 12] * u
+    return v + table[i, 3] * (x[i] - a) + table[i, 4] * (v - u) + table[i, 5] * push  # type: ignore[no-any-return]  # arrays are untyped for Numba
+
+
+def advance_body(
+    x: Any, ledger: Any,
+    fx: float, fy: float, fz: float,
+    ax: float, ay: float, az: float,
+    ux: float, uy: float, uz: float,
+    inside: bool, plant: Any,
+) -> int:  # fmt: skip
+    """Move the body over one sample; see ``kernels/__init__.py``.
+
+    plant: the table of ``axes.py`` for a part, friction [N], mass that friction stops [kg], parts,
+    duration of a part [s].
+    """
+    table, friction, mass, parts, span = plant
+    for part in range(parts):
+        bx = ax + part * span * ux
+        by = ay + part * span * uy
+        bz = az + part * span * uz
+        gx, gy, gz = friction_force(
+            final_speed(x, 0, fx, bx, ux, table), final_speed(x, 1, fy, by, uy, table),
+            final_speed(x, 2, fz, bz, uz, table), friction, mass, span,
+        )  # fmt: skip
+        dx, lost_x, hand_x = advance_axis(x, 0, fx + gx, bx, ux, table)
+        dy, lost_y, hand_y = advance_axis(x, 1, fy + gy, by, uy, table)
+        dz, lost_z, hand_z = advance_axis(x, 2, fz + gz, bz, uz, table)
+        lost = lost_x + lost_y + lost_z
+        hand = hand_x + hand_y + hand_z
+        rubbed = gx * dx + gy * dy + gz * dz
+        book_energies(ledger, fx * dx, fy * dy, fz * dz, lost, hand, rubbed)
+    return 0

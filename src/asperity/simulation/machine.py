@@ -1,0 +1,160 @@
+"""Which compiled body moves for a plant and a hand, and the numbers that it is made of."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.errors import ParameterError
+from asperity.simulation.body import body
+from asperity.simulation.exact import axis_table, exact_step, resonant_table
+from asperity.simulation.hands import BandHand, Hand, MovedHand, SpringHand
+from asperity.simulation.plants import Cartesian, Pantograph, Plant
+from asperity.simulation.servo import Servo
+
+# Parts of a sample over which dry friction is held constant.
+FRICTION_PARTS = 4
+# Least sine of the angle at the elbows of a pantograph: nearer to stretched or folded it stops.
+LEAST_SINE = 0.05
+# Greatest part of a time constant that one Runge-Kutta step covers: energy then closes to 1e-10.
+_LARGEST_PART = 0.01
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A body as the compiled loop takes it.
+
+    Attributes:
+        modules: the functions that move it, see ``kernels``.
+        numbers: what it is made of, the argument ``plant`` of the loop.
+        order: number of states.
+    """
+
+    modules: tuple[ModuleType, ...]
+    numbers: tuple[Any, ...]
+    order: int
+
+    def state(self, position: FloatArray, velocity: FloatArray) -> FloatArray:
+        """Return the state of a body at a place [m], all of it at one velocity [m/s]."""
+        return np.concatenate([position, velocity] * (self.order // 6))
+
+
+def machine(plant: Plant, hand: Hand, servo: Servo) -> Machine:
+    """Return the body of a plant that a hand holds, sampled by a servo.
+
+    Raises:
+        ParameterError: for a resonance on an elastic band, which is not offered.
+    """
+    from asperity.simulation.kernels import booking, carried
+
+    if isinstance(hand, MovedHand):
+        return Machine((carried, booking), (float(servo.period),), 6)
+    if isinstance(plant, Pantograph):
+        return _pantograph(plant, hand, servo.period)
+    if isinstance(hand, BandHand):
+        return _banded(plant, hand, servo.period)
+    return _linear(plant, hand, servo.period)
+
+
+def _linear(plant: Cartesian, hand: SpringHand, period: float) -> Machine:
+    from asperity.simulation.kernels import axes, booking, dense, resonant, rough_axes
+
+    if np.abs(plant.damping - np.diag(np.diag(plant.damping))).max() > 0.0:
+        return dense_machine(plant, hand, period)
+    parts = FRICTION_PARTS if plant.friction > 0.0 else 1
+    span, friction, mode = float(period / parts), plant.friction, plant.resonance
+    if mode is not None:
+        table = np.array([resonant_table(plant, mode, hand, i, span) for i in range(3)])
+        stops = np.diag(span / table[:, 10])
+        return Machine(
+            (resonant, dense, booking), (table, friction, stops, parts, span, np.zeros(6)), 12
+        )
+    table = np.array([axis_table(plant, hand, i, span) for i in range(3)])
+    if friction == 0.0:
+        return Machine((axes, booking), (table,), 6)
+    stops = np.diag(span / table[:, 5])
+    return Machine((rough_axes, axes, dense, booking), (table, friction, stops, parts, span), 6)
+
+
+def dense_machine(plant: Cartesian, hand: SpringHand, period: float) -> Machine:
+    """Return a linear body moved by whole matrices, whatever its coupling."""
+    from asperity.simulation.kernels import booking, dense
+
+    parts = FRICTION_PARTS if plant.friction > 0.0 else 1
+    moved = body(plant.mass, plant.damping, hand, plant.resonance)
+    step = exact_step(moved, period / parts)
+    n = moved.order
+    stops = step.period * np.linalg.inv(step.motion[3:6, n : n + 3])
+    numbers = (
+        step.motion, step.loss, step.anchor_work, step.storage, np.zeros(n + 12),
+        np.array(hand.force), plant.friction, stops, parts, period / parts,
+    )  # fmt: skip
+    return Machine((dense, booking), numbers, n)
+
+
+def _holding(hand: SpringHand | BandHand) -> FloatArray:
+    """Return the numbers of ``kernels/holding.py``."""
+    if isinstance(hand, SpringHand):
+        return np.array([0.0, *hand.stiffness, *hand.damping, *hand.force, 0.0, 0.0])
+    stiffness, damping = [hand.stiffness] * 3, [hand.damping] * 3
+    return np.array([1.0, *stiffness, *damping, 0.0, 0.0, 0.0, hand.length, hand.rest_length])
+
+
+def _parts(friction: float, rate: float, period: float) -> int:
+    """Return into how many steps a sample is divided, for rates up to this one [1/s]."""
+    needed = math.ceil(rate * period / _LARGEST_PART)
+    return max(needed, FRICTION_PARTS if friction > 0.0 else 1)
+
+
+def _fastest(mass: float, damping: float, hand: SpringHand | BandHand) -> float:
+    """Return the fastest rate of a mass with damping on a hand [1/s]."""
+    stiffness = hand.stiffness if isinstance(hand, BandHand) else max(hand.stiffness)
+    held = hand.damping if isinstance(hand, BandHand) else max(hand.damping)
+    return max((damping + held) / mass, math.sqrt(stiffness / mass))
+
+
+def _banded(plant: Cartesian, hand: BandHand, period: float) -> Machine:
+    from asperity.simulation.kernels import banded, booking, dense, holding
+
+    if plant.resonance is not None:
+        raise ParameterError("resonance", "is not offered together with an elastic band")
+    damping = float(np.linalg.eigvalsh(plant.damping)[-1])
+    parts = _parts(plant.friction, _fastest(min(plant.mass), damping, hand), period)
+    numbers = (
+        np.diag(plant.mass), plant.damping, _holding(hand), plant.friction, parts, period / parts,
+        np.zeros(8), np.zeros(8), np.zeros(8),
+    )  # fmt: skip
+    return Machine((banded, holding, dense, booking), numbers, 6)
+
+
+def _pantograph(plant: Pantograph, hand: SpringHand | BandHand, period: float) -> Machine:
+    from asperity.simulation.kernels import booking, five_bar, holding
+
+    held = hand.mass if isinstance(hand, SpringHand) else 0.0
+    bar = bar_numbers(plant, held)
+    mxx, mxz, mzz, _cx, _cz, bxx, _bxz, bzz = five_bar.bar_body(0.0, 0.0, 0.0, 0.0, bar)
+    least = float(np.linalg.eigvalsh([[mxx, mxz], [mxz, mzz]])[0])
+    # Twice the damping here: elsewhere in the workspace it may be larger.
+    rate = _fastest(least, 2.0 * plant.joint_damping * (bxx + bzz), hand)
+    fewest = FRICTION_PARTS if plant.friction > 0.0 else 1
+    numbers = (
+        bar, _holding(hand), float(plant.friction), rate, fewest, float(period), _LARGEST_PART,
+        bool(plant.inside_only), LEAST_SINE,
+    )  # fmt: skip
+    return Machine((five_bar, holding, booking), numbers, 6)
+
+
+def bar_numbers(plant: Pantograph, held: float = 0.0) -> FloatArray:
+    """Return the numbers of ``kernels/five_bar.py``, with a mass [kg] held at the handle."""
+    bars, masses = plant.linkage, plant.masses
+    first = masses.rotor + masses.proximal * bars.proximal**2 / 3.0
+    inertia = first + masses.distal * bars.proximal**2 / 3.0
+    return np.array([
+        bars.proximal, bars.distal, bars.base, inertia, masses.distal, masses.handle + held,
+        *plant.centre, plant.joint_damping,
+    ])  # fmt: skip

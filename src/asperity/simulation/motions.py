@@ -1,0 +1,169 @@
+"""How the hand's anchor moves: nowhere, back and forth, or along given points."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from asperity.checks import FloatArray, array, positive
+from asperity.errors import ParameterError
+
+
+@runtime_checkable
+class Motion(Protocol):
+    """Anything that says where the hand's anchor is."""
+
+    def at(self, times: FloatArray) -> FloatArray:
+        """Return the positions [m], shape (n, 3), at the times [s], shape (n,)."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units."""
+
+
+def _point(name: str, value: ArrayLike) -> tuple[float, float, float]:
+    x, y, z = array(name, value, (3,), "m")
+    return float(x), float(y), float(z)
+
+
+@dataclass(frozen=True)
+class Still:
+    """An anchor that stays where it is.
+
+    Attributes:
+        point: [m], shape (3,).
+
+    Raises:
+        ParameterError: for another shape or a value that is not finite.
+
+    Example:
+        >>> Still((0.0, 0.0, -1e-3)).at([0.0, 1.0])
+        array([[ 0.   ,  0.   , -0.001],
+               [ 0.   ,  0.   , -0.001]])
+    """
+
+    point: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "point", _point("point", self.point))
+
+    def at(self, times: ArrayLike) -> FloatArray:
+        """Return the positions [m], shape (n, 3), at the times [s], shape (n,)."""
+        return np.tile(np.array(self.point), (len(array("times", times, (None,), "s")), 1))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units."""
+        return {"kind": "still", "point": list(self.point)}
+
+
+@dataclass(frozen=True)
+class Strokes:
+    """Back and forth between two points at constant speed, ending where the last stroke ends.
+
+    Attributes:
+        start: where the first stroke begins [m], shape (3,).
+        end: where it ends and the second begins [m], shape (3,).
+        speed: [m/s].
+        count: number of strokes.
+
+    Raises:
+        ParameterError: for points that coincide, a speed that is not positive, or a count that is
+            not a positive whole number.
+
+    Example:
+        >>> there = Strokes((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), speed=0.2, count=2)
+        >>> there.period, there.duration
+        (0.5, 1.0)
+        >>> there.at([0.25, 0.75, 2.0])[:, 0]
+        array([0.05, 0.05, 0.  ])
+    """
+
+    start: tuple[float, float, float]
+    end: tuple[float, float, float]
+    speed: float
+    count: int = 1
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", _point("start", self.start))
+        object.__setattr__(self, "end", _point("end", self.end))
+        positive("speed", self.speed, "m/s")
+        if self.start == self.end:
+            raise ParameterError("end", "must differ from start", self.end)
+        if positive("count", self.count) % 1 != 0:
+            raise ParameterError("count", "must be a whole number of strokes", self.count)
+        object.__setattr__(self, "count", int(self.count))
+
+    @property
+    def period(self) -> float:
+        """Duration of one stroke [s]."""
+        return math.dist(self.start, self.end) / self.speed
+
+    @property
+    def duration(self) -> float:
+        """Duration of all strokes [s]."""
+        return self.count * self.period
+
+    def at(self, times: ArrayLike) -> FloatArray:
+        """Return the positions [m], shape (n, 3), at the times [s], shape (n,)."""
+        strokes = array("times", times, (None,), "s") / self.period
+        strokes = np.clip(strokes, 0.0, self.count)
+        share = 1.0 - np.abs(1.0 - strokes % 2.0)
+        begin, way = np.array(self.start), np.subtract(self.end, self.start)
+        return np.asarray(begin + share[:, None] * way)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units."""
+        return {
+            "kind": "strokes", "start": list(self.start), "end": list(self.end),
+            "speed": float(self.speed), "count": self.count,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Through given points at given times, straight and at constant speed in between.
+
+    Before the first time and after the last one it rests there.
+
+    Attributes:
+        times: [s], increasing, shape (n,).
+        points: [m], shape (n, 3).
+
+    Raises:
+        ParameterError: for other shapes, values that are not finite, or times that do not increase.
+
+    Example:
+        >>> Path([0.0, 1.0], [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]).at([0.25, 3.0])[:, 2]
+        array([0.5, 2. ])
+    """
+
+    times: FloatArray
+    points: FloatArray
+
+    def __post_init__(self) -> None:
+        times = array("times", self.times, (None,), "s")
+        points = array("points", self.points, (None, 3), "m")
+        if len(times) < 1 or len(times) != len(points):
+            raise ParameterError("points", f"must be one for each of {len(times)} times")
+        if (np.diff(times) <= 0.0).any():
+            raise ParameterError("times", "must increase [s]")
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "points", points)
+
+    @property
+    def duration(self) -> float:
+        """The last time [s]."""
+        return float(self.times[-1])
+
+    def at(self, times: ArrayLike) -> FloatArray:
+        """Return the positions [m], shape (n, 3), at the times [s], shape (n,)."""
+        wanted = array("times", times, (None,), "s")
+        columns = [np.interp(wanted, self.times, self.points[:, i]) for i in range(3)]
+        return np.stack(columns, axis=-1)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units."""
+        return {"kind": "path", "times": self.times.tolist(), "points": self.points.tolist()}

@@ -1,0 +1,249 @@
+"""At which stiffness a closed loop begins to buzz: limit cycles by bisection over many starts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from asperity.checks import FloatArray, positive
+from asperity.errors import ParameterError
+from asperity.simulation.hands import Hand, MovedHand
+from asperity.simulation.motions import Motion
+from asperity.simulation.plants import Plant
+from asperity.simulation.run import Run
+from asperity.simulation.servo import Servo
+from asperity.simulation.simulate import simulate
+from asperity.surface import Surface
+
+# The paper does not say when an oscillation counts; here above this :func:`restlessness` [m/s].
+CYCLE_SPEED = 15e-3
+LOWEST, HIGHEST = 1.0, 1e6  # stiffness [N/m]
+# A run that is restless at its end is made so many times longer.
+PATIENCE = 4.0
+_COARSE = 2.0  # factor from one stiffness to the next while the onset is looked for
+
+
+@dataclass(frozen=True)
+class Onset:
+    """The stiffness at which limit cycles begin.
+
+    Attributes:
+        law: letter of the law.
+        delay: whole samples.
+        quiet: the greatest stiffness tried, below ``cycling``, at which no start ended in a limit
+            cycle [N/m]; 0 if even the lowest one cycled.
+        cycling: the least stiffness tried at which one did [N/m]; infinite if none up to the
+            highest did. The onset of these starts lies between the two, unless it is not monotone:
+            from the lowest on, stiffnesses were tried in steps of a factor of 2 first.
+        low: least position reached in the runs at ``cycling`` (at the highest stiffness if nothing
+            cycled), per axis [m].
+        high: greatest position reached there [m].
+        starts: how many starts were tried at each stiffness.
+        cycles: how many of them ended in a limit cycle at ``cycling``.
+    """
+
+    law: str
+    delay: int
+    quiet: float
+    cycling: float
+    starts: int
+    cycles: int
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+
+    @property
+    def value(self) -> float:
+        """Geometric mean of the bracket [N/m].
+
+        Its upper end if even the lowest stiffness cycled, infinite if nothing did.
+        """
+        if math.isinf(self.cycling):
+            return math.inf
+        return math.sqrt(self.quiet * self.cycling) if self.quiet else self.cycling
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units; an unbounded number is written as the string "inf"."""
+        cycling: float | str = "inf" if math.isinf(self.cycling) else self.cycling
+        return {
+            "law": self.law, "delay": self.delay, "quiet": self.quiet, "cycling": cycling,
+            "starts": self.starts, "cycles": self.cycles, "low": list(self.low),
+            "high": list(self.high),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Shifted:
+    """A motion that is carried along: the same way from another place.
+
+    Attributes:
+        motion: the motion.
+        offset: where to [m], shape (3,).
+    """
+
+    motion: Motion
+    offset: tuple[float, float, float]
+
+    def at(self, times: FloatArray) -> FloatArray:
+        """Return the positions [m], shape (n, 3), at the times [s], shape (n,)."""
+        return np.asarray(self.motion.at(times) + np.array(self.offset))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units."""
+        return {"kind": "shifted", "motion": self.motion.to_dict(), "offset": list(self.offset)}
+
+
+def restlessness(run: Run, quarter: int = 3) -> float:
+    """Return how much the velocity varies: its standard deviations, summed over the axes [m/s].
+
+    Args:
+        run: with at least four samples in its trace.
+        quarter: of the run, 0 to 3. For a cycle in place this is rms(vx) + rms(vy) + rms(vz);
+            sinking at constant speed does not count.
+    """
+    part = np.array_split(run.velocity, 4)[quarter]
+    return float(part.std(axis=0).sum())
+
+
+def cycles(run: Run, threshold: float = CYCLE_SPEED) -> bool:
+    """Return whether a run ended in a limit cycle: it diverged, or does not come to rest.
+
+    Args:
+        run: whose hand holds still during the second half.
+        threshold: of :func:`restlessness` [m/s].
+    """
+    return run.stopped.startswith("diverged") or restlessness(run) > threshold
+
+
+def calms_down(run: Run) -> bool:
+    """Return whether what is left of the motion is still getting less, by a tenth or more."""
+    return not run.stopped and restlessness(run) < 0.9 * restlessness(run, quarter=2)
+
+
+def ends_in_cycle(
+    run_for: Callable[[float], Run], duration: float, threshold: float = CYCLE_SPEED
+) -> tuple[bool, Run]:
+    """Return whether a loop ends in a limit cycle, and the longest run of it.
+
+    One that is restless at the end is run again, ``PATIENCE`` times as long: what has come to rest
+    by then, or is still calming down, was no cycle. A handle that leaves the workspace restless
+    counts as one.
+
+    Args:
+        run_for: runs the loop for a duration [s].
+        duration: of the first run [s].
+        threshold: of :func:`restlessness` [m/s].
+    """
+    run = run_for(duration)
+    if cycles(run, threshold) and not run.stopped:
+        run = run_for(PATIENCE * duration)
+        return cycles(run, threshold) and not calms_down(run), run
+    return cycles(run, threshold), run
+
+
+def offsets(surface: Surface, count: int) -> FloatArray:
+    """Return so many starting phases along the scan line [m], shape (count, 3).
+
+    They share out one period evenly; of a texture that does not repeat, its scan line.
+    """
+    line = surface.texture.scan_line()
+    along = np.append(line.direction, 0.0)
+    return np.asarray(np.arange(count)[:, None] / count * line.length * along)
+
+
+def find_onset(
+    surface: Surface,
+    plant: Plant,
+    hand: Hand,
+    servo: Servo,
+    motion: Motion,
+    *,
+    start: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    duration: float = 0.5,
+    starts: int = 24,
+    tolerance: float = 0.02,
+    threshold: float = CYCLE_SPEED,
+    lowest: float = LOWEST,
+    highest: float = HIGHEST,
+    progress: Callable[[], None] | None = None,
+) -> Onset:
+    """Return the stiffness at which limit cycles begin, by bisection over many starting phases.
+
+    Args:
+        surface: its stiffness does not count.
+        plant: what moves.
+        hand: what holds it.
+        servo: period, delay, resolutions.
+        motion: of the hand's anchor; it must be at rest in the second half of the run.
+        start: of the handle [m], shape (3,); default: where the motion begins.
+        velocity: of the handle at the start [m/s], shape (3,); default: none.
+        duration: of a run [s]; one that is restless at its end is run again, 4 times as long.
+        starts: phases of the texture at which the handle starts.
+        tolerance: the bracket's width over its lower end.
+        threshold: :func:`restlessness` that counts as a limit cycle [m/s].
+        lowest: stiffness from which the search goes up [N/m]; one that does not hold the hand's
+            force lets the handle sink to where the law's numbers no longer hold.
+        highest: stiffness to which the search goes [N/m].
+        progress: called after every stiffness.
+
+    Raises:
+        ParameterError: for a handle that is moved, a motion that does not come to rest, or a wrong
+            number.
+    """
+    _refuse(hand, motion, duration)
+    positive("tolerance", tolerance)
+    if starts < 1 or starts != int(starts):
+        raise ParameterError("starts", "must be a whole number, at least 1", starts)
+    shifts = offsets(surface, int(starts))
+    begin = motion.at(np.zeros(1))[0] if start is None else np.asarray(start, dtype=float)
+
+    def count(stiffness: float, enough: int) -> tuple[int, FloatArray]:
+        """Return how many starts cycle, at most so many, and the box (2, 3) that they reached."""
+        stiff, found, box = surface.to_stiffness(stiffness), 0, np.array([[np.inf], [-np.inf]])
+        for shift in shifts:
+            way = Shifted(motion, (shift[0], shift[1], shift[2]))
+
+            def run_for(span: float, way: Motion = way, shift: FloatArray = shift) -> Run:
+                return simulate(
+                    stiff, plant, hand, servo, way, span, start=begin + shift, velocity=velocity
+                )
+
+            ended, run = ends_in_cycle(run_for, duration, threshold)
+            found += ended
+            place = run.position
+            box = np.array([np.fmin(box[0], place.min(axis=0)), np.fmax(box[1], place.max(axis=0))])
+            if found >= enough:
+                break
+        if progress is not None:
+            progress()
+        return found, box
+
+    quiet, cycling = 0.0, positive("lowest", lowest, "N/m")
+    while cycling <= highest and not count(cycling, 1)[0]:
+        quiet, cycling = cycling, cycling * _COARSE
+    while cycling <= highest and quiet > 0.0 and cycling > quiet * (1.0 + tolerance):
+        middle = math.sqrt(quiet * cycling)
+        if count(middle, 1)[0]:
+            cycling = middle
+        else:
+            quiet = middle
+    ended = cycling > highest
+    every, box = count(quiet if ended else cycling, len(shifts))
+    low, high = ((float(row[0]), float(row[1]), float(row[2])) for row in box)
+    return Onset(
+        surface.law.letter, servo.delay, quiet, math.inf if ended else cycling, len(shifts), every,
+        low, high,
+    )  # fmt: skip
+
+
+def _refuse(hand: Hand, motion: Motion, duration: float) -> None:
+    if isinstance(hand, MovedHand):
+        raise ParameterError("hand", "must let the handle go: one that is moved never cycles")
+    times = np.linspace(0.5, 1.0, 33) * positive("duration", duration, "s")
+    if np.ptp(motion.at(times), axis=0).max() > 0.0:
+        raise ParameterError("motion", "must be at rest in the second half of the run")

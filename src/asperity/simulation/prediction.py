@@ -1,0 +1,159 @@
+"""What the criteria of the analysis say of the onset that a simulation finds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from asperity.analysis.characteristic import characteristic_number, one_sided_number
+from asperity.derive.facts import law_facts
+from asperity.devices.five_bar import handle_damping
+from asperity.simulation.hands import Hand, SpringHand
+from asperity.simulation.onset import Onset
+from asperity.simulation.plants import Pantograph, Plant
+from asperity.simulation.servo import Servo
+from asperity.simulation.simulate import left_workspace
+from asperity.surface import Surface
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Stiffnesses that criteria allow, beside the one at which cycles begin.
+
+    Attributes:
+        onset: of the simulation.
+        depth: to which the handle got where it cycles [m], below the highest crest, or below z = 0
+            for laws on the nominal contact; the numbers are those of this depth.
+        damping: σ₀ [N s/m], the least over where the handle got.
+        q: upper bound of the characteristic number, or the value where none is proved.
+        one_sided: the same of the one-sided number.
+        conservative: whether the law is; only then is the delay rule a proof.
+        paper: of the paper's (1), σ₀/(2 T q) [N/m].
+        delay_rule: σ₀/(T (q⁺/2 + d q)) [N/m].
+        wall_rule: the onset of the smooth wall at the same delay over q [N/m]; ``None`` if it was
+            not simulated.
+    """
+
+    onset: Onset
+    depth: float
+    damping: float
+    q: float
+    one_sided: float
+    conservative: bool
+    paper: float
+    delay_rule: float
+    wall_rule: float | None
+
+    @property
+    def missed(self) -> bool:
+        """Whether a loop cycled below what the delay rule allows a conservative law.
+
+        With exact positions it never may; the proof knows no steps of the encoder.
+        """
+        return self.conservative and self.onset.cycling <= self.delay_rule
+
+    @property
+    def wall_rule_missed(self) -> bool:
+        """Whether a loop cycled at a stiffness that K₀/q calls safe, K₀ being the wall's onset."""
+        return self.wall_rule is not None and self.onset.cycling < self.wall_rule
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units; an unbounded number is written as the string "inf"."""
+        numbers = {
+            "depth": self.depth,
+            "damping": self.damping,
+            "q": self.q,
+            "one_sided": self.one_sided,
+            "paper_1": self.paper,
+            "delay_rule": self.delay_rule,
+            "wall_rule": self.wall_rule,
+        }
+        return {
+            **self.onset.to_dict(),
+            **{name: "inf" if value == math.inf else value for name, value in numbers.items()},
+            "conservative": self.conservative,
+            "missed": self.missed,
+            "wall_rule_missed": self.wall_rule_missed,
+        }
+
+
+def least_damping(plant: Plant, low: ArrayLike, high: ArrayLike, hand: Hand | None = None) -> float:
+    """Return σ₀(B) [N s/m]: the least damping over the directions in which the handle moves.
+
+    Args:
+        plant: what moves; of a five-bar the brakes count as on.
+        low: least position that it gets to [m], shape (3,).
+        high: greatest position [m], shape (3,); of a five-bar 9 x 9 places in between are tried.
+        hand: whose damping counts too: of a spring, on a mass in space; of a band, everywhere.
+    """
+    if not isinstance(plant, Pantograph):
+        held = np.diag(hand.damping) if isinstance(hand, SpringHand) else np.zeros((3, 3))
+        return float(np.linalg.eigvalsh(plant.damping + held)[0])
+    if plant.joint_damping == 0.0:
+        return 0.0
+    (x0, _, z0), (x1, _, z1) = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+    grid = [
+        np.array([x, 0.0, z])
+        for x in np.linspace(x0, x1, 9)
+        for z in np.linspace(z0, min(z1, max(z0, 0.0)), 9)
+    ]
+    # Corners of the box that the arms do not reach are places where it was not.
+    places = [plant.centre + p[[0, 2]] for p in grid if not left_workspace(plant, p)]
+    return min(
+        float(np.linalg.eigvalsh(handle_damping(plant.linkage, plant.joint_damping, place))[0])
+        for place in places
+    )
+
+
+def predict(
+    surface: Surface,
+    plant: Plant,
+    hand: Hand,
+    servo: Servo,
+    onset: Onset,
+    wall: Onset | None = None,
+) -> Prediction:
+    """Return what the criteria allow beside what was found.
+
+    Args:
+        surface: texture and law; stiffness and max_depth do not count.
+        plant: of the simulation.
+        hand: of the simulation.
+        servo: with the delay of the simulation.
+        onset: what the simulation found.
+        wall: what it found for the smooth wall at the same delay.
+
+    Reference:
+        The paper's (1) and III.B; the delay rule is derived on the page "Passivity".
+    """
+    top = 0.0 if surface.law.contact == "nominal" else surface.texture.extremes[1]
+    depth = max(top - onset.low[2], 0.0)
+    damping = least_damping(plant, onset.low, onset.high, hand)
+    q = plus = 0.0
+    if depth > 0.0:
+        pressed = surface.to_depth(depth)
+        q, plus = characteristic_number(pressed).value, one_sided_number(pressed).value
+    budget = damping / servo.period
+    weight = 0.5 * plus + (servo.delay * q if servo.delay else 0.0)
+    return Prediction(
+        onset=onset,
+        depth=depth,
+        damping=damping,
+        q=q,
+        one_sided=plus,
+        conservative=law_facts(surface.law).conservative,
+        paper=0.5 * budget / q if q > 0.0 else math.inf,
+        delay_rule=budget / weight if weight > 0.0 else math.inf,
+        wall_rule=None if wall is None or q == 0.0 else wall.quiet / q,
+    )
+
+
+def with_wall(onsets: Sequence[Onset], delay: int) -> Onset | None:
+    """Return the onset of the smooth wall at a delay, if it is among these."""
+    found = [onset for onset in onsets if onset.law == "W" and onset.delay == delay]
+    return found[0] if found else None

@@ -1,0 +1,177 @@
+"""What a stroke along the surface gains or costs, against speed and depth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from asperity.checks import FloatArray, positive
+from asperity.errors import ParameterError
+from asperity.simulation.hands import Hand
+from asperity.simulation.motions import Strokes
+from asperity.simulation.plants import Plant
+from asperity.simulation.run import Run
+from asperity.simulation.servo import Servo
+from asperity.simulation.simulate import simulate
+from asperity.surface import Surface
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """Energy of a stroke at one speed and depth.
+
+    Attributes:
+        law: letter of the law.
+        speed: of the hand [m/s].
+        depth: of the hand below z = 0 [m].
+        energy: that the texture supplies per stroke, along x, y and z [J]: the mean over the
+            strokes after the first, which has the start in it (or over the only one).
+        field: of it what the law itself supplies per stroke [J]: the work of its force along the
+            true path, at every place at once. The rest is due to sampling, delay and the steps of
+            the encoder; of a conservative law all is.
+        error: of the field's work, by halving the steps of its quadrature [J].
+        spread: standard deviation of the field's work from stroke to stroke [J]; 0 for a single
+            stroke.
+        same_sample: the paper's sum, all axes, per stroke [J]: commanded force times the measured
+            displacement of the same sample.
+        lost_contact: how often per stroke the force ended.
+        closure: energy of the whole run that does not add up, over what was exchanged [1].
+        stopped: why the run ended early; empty if it did not.
+    """
+
+    law: str
+    speed: float
+    depth: float
+    energy: tuple[float, float, float]
+    field: float
+    error: float
+    spread: float
+    same_sample: float
+    lost_contact: float
+    closure: float
+    stopped: str
+
+    @property
+    def total(self) -> float:
+        """Energy per stroke, all axes [J]; > 0 feeds the hand."""
+        return float(sum(self.energy))
+
+    @property
+    def feeds(self) -> bool:
+        """Whether the law itself feeds the hand: by more than its spread and its error."""
+        return self.field > self.spread + self.error
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units; what is not known is ``None``."""
+        return {
+            "law": self.law, "speed": self.speed, "depth": self.depth,
+            "energy": [_plain(value) for value in self.energy], "energy_sum": _plain(self.total),
+            "field": _plain(self.field), "error": _plain(self.error),
+            "spread": _plain(self.spread),
+            "same_sample_sum": _plain(self.same_sample),
+            "lost_contact": _plain(self.lost_contact), "closure": _plain(self.closure),
+            "stopped": self.stopped,
+        }  # fmt: skip
+
+
+def _plain(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def scan_strokes(
+    surface: Surface,
+    plant: Plant,
+    hand: Hand,
+    servo: Servo,
+    motion: Strokes,
+    *,
+    speeds: Sequence[float],
+    depths: Sequence[float],
+    progress: Callable[[], None] | None = None,
+) -> tuple[Stroke, ...]:
+    """Return the energy per stroke for every speed and depth.
+
+    Args:
+        surface: texture, law and stiffness.
+        plant: what moves.
+        hand: what holds it.
+        servo: what the electronics do.
+        motion: the strokes; their speed and depth are replaced.
+        speeds: [m/s].
+        depths: of the hand below z = 0 [m].
+        progress: called after every run.
+
+    Raises:
+        ParameterError: for a motion that is not made of strokes, or a wrong number.
+    """
+    if not isinstance(motion, Strokes):
+        raise ParameterError("motion", "must be strokes to be scanned", type(motion).__name__)
+    result = []
+    for speed in speeds:
+        for depth in depths:
+            positive("speeds", speed, "m/s")
+            way = _at_depth(motion, speed, depth)
+            run = simulate(surface, plant, hand, servo, way, way.duration)
+            result.append(_stroke(surface, way, run, depth))
+            if progress is not None:
+                progress()
+    return tuple(result)
+
+
+def _at_depth(motion: Strokes, speed: float, depth: float) -> Strokes:
+    (x0, y0, _), (x1, y1, _) = motion.start, motion.end
+    return Strokes((x0, y0, -depth), (x1, y1, -depth), speed, motion.count)
+
+
+def _stroke(surface: Surface, way: Strokes, run: Run, depth: float) -> Stroke:
+    law, speed = surface.law.letter, float(way.speed)
+    contact = np.any(run.applied != 0.0, axis=1)
+    lost = float(np.count_nonzero(contact[:-1] & ~contact[1:]))
+    ledger = run.ledger
+    closure = abs(ledger.closure) / max(ledger.exchanged, 1e-300)
+    if run.stopped:
+        nan = math.nan
+        energy = (nan, nan, nan)
+        return Stroke(law, speed, depth, energy, nan, nan, nan, nan, nan, closure, run.stopped)
+    begins = np.searchsorted(run.time, way.period * np.arange(1, way.count) - 1e-9 * run.period)
+    first = 1 if way.count > 1 else 0
+
+    def each(name: str) -> FloatArray:
+        """Return a sum of the ledger stroke by stroke, from the first that counts on."""
+        at = [run.energies[name][begins], np.array([getattr(ledger, name)], dtype=float)]
+        summed = np.concatenate(at)
+        return np.asarray(np.diff(summed, axis=0, prepend=np.zeros_like(summed[:1]))[first:])
+
+    fine, coarse = field_work(surface, np.vstack([run.position, run.state[:3]]))
+    works = np.array([part.sum() for part in np.split(fine, begins)])[first:]
+    rough = np.array([part.sum() for part in np.split(coarse, begins)])[first:]
+    x, y, z = (float(value) for value in each("supplied").mean(axis=0))
+    return Stroke(
+        law, speed, depth, (x, y, z), float(works.mean()), float(np.abs(works - rough).mean()),
+        float(works.std()), float(each("same_sample").sum(axis=1).mean()), lost / way.count,
+        closure, "",
+    )  # fmt: skip
+
+
+def field_work(surface: Surface, path: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the work of a law's force along a path, straight from point to point.
+
+    Args:
+        surface: whose law, with its state if it has one, follows the path.
+        path: points [m], shape (n + 1, 3).
+
+    Returns:
+        Of each piece [J], shape (n,): by Simpson's rule, and by the trapezoidal rule.
+    """
+    middle = 0.5 * (path[1:] + path[:-1])
+    points = np.empty((2 * len(path) - 1, 3))
+    points[::2], points[1::2] = path, middle
+    force = surface.trace(points)
+    step = np.diff(path, axis=0)
+    ends = np.einsum("ij,ij->i", force[:-2:2] + force[2::2], step)
+    between = np.einsum("ij,ij->i", force[1::2], step)
+    return np.asarray((ends + 4.0 * between) / 6.0), np.asarray(0.5 * ends)

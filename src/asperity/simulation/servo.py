@@ -1,0 +1,81 @@
+"""What the device's electronics do between reading a position and holding a force."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from asperity.checks import positive, real
+from asperity.errors import ParameterError
+
+
+@dataclass(frozen=True)
+class Servo:
+    """What the device's electronics do to position and force.
+
+    Attributes:
+        period: T [s].
+        delay: whole samples between reading a position and applying its force.
+        position_resolution: of the encoder [m]; 0 for none.
+        force_resolution: smallest step of the force [N]; 0 for none.
+        max_force: the length to which a force is limited [N].
+        virtual_damping: b_v [N s/m], on the filtered velocity; a negative one feeds.
+        velocity_share: of the newest difference in the filtered velocity [1]; 1 for no filter.
+
+    Raises:
+        ParameterError: for a value out of its range; a delay that is not whole is refused.
+
+    Example:
+        >>> Servo(1e-4, delay=2).delay
+        2
+    """
+
+    period: float
+    delay: int = 0
+    position_resolution: float = 0.0
+    force_resolution: float = 0.0
+    max_force: float = math.inf
+    virtual_damping: float = 0.0
+    velocity_share: float = 1.0
+
+    def __post_init__(self) -> None:
+        positive("period", self.period, "s")
+        object.__setattr__(self, "delay", _samples(self.delay))
+        for name, unit in (("position_resolution", "m"), ("force_resolution", "N")):
+            if real(name, getattr(self, name), unit) < 0.0:
+                raise ParameterError(name, f"must not be negative [{unit}]", getattr(self, name))
+        if isinstance(self.max_force, bool) or not _number(self.max_force) > 0.0:
+            raise ParameterError("max_force", "must be positive [N]", self.max_force)
+        real("virtual_damping", self.virtual_damping, "N s/m")
+        if not 0.0 < real("velocity_share", self.velocity_share) <= 1.0:
+            raise ParameterError("velocity_share", "must be in (0, 1]", self.velocity_share)
+
+    @property
+    def settings(self) -> tuple[float, ...]:
+        """What the compiled loop receives, in its order."""
+        return (
+            float(self.position_resolution), float(self.force_resolution), float(self.max_force),
+            float(self.virtual_damping), float(self.velocity_share), float(self.period),
+        )  # fmt: skip
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units; no limit of the force is the string "inf"."""
+        values = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return {
+            name: "inf" if value == math.inf else float(value) if name != "delay" else value
+            for name, value in values.items()
+        }
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, (int, float, np.number)) else math.nan
+
+
+def _samples(delay: object) -> int:
+    number = _number(delay)
+    if isinstance(delay, bool) or not (math.isfinite(number) and number >= 0.0 and number % 1 == 0):
+        raise ParameterError("delay", "must be a whole number of samples, 0 or more", delay)
+    return int(number)

@@ -1,0 +1,228 @@
+"""Texture, device and hand in one loop: one run, or many at once."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from asperity.checks import FloatArray, array, positive
+from asperity.errors import ParameterError
+from asperity.simulation.hands import BandHand, Hand, MovedHand, SpringHand
+from asperity.simulation.loop import STOPS, Simulation
+from asperity.simulation.machine import LEAST_SINE, machine
+from asperity.simulation.motions import Motion
+from asperity.simulation.plants import Cartesian, Pantograph, Plant
+from asperity.simulation.run import Run
+from asperity.simulation.servo import Servo
+from asperity.simulation.trace import FileTrace, MemoryTrace, NoTrace, Trace
+from asperity.surface import Surface
+
+# Samples at a time: memory does not depend on the duration, progress is told in between.
+CHUNK = 16_384
+
+
+def simulate(
+    surface: Surface,
+    plant: Plant,
+    hand: Hand,
+    servo: Servo,
+    motion: Motion,
+    duration: float,
+    *,
+    start: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    trace: bool | str | os.PathLike[str] = True,
+    every: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Return what happens when a hand explores a surface on a device.
+
+    At every sample the servo reads the position, computes the force, delays it, and holds it while
+    plant and hand move on.
+
+    Args:
+        surface: the surface; its stiffness is what is rendered.
+        plant: the device.
+        hand: what holds it.
+        servo: its electronics.
+        motion: of the hand's anchor; between samples it moves at constant velocity.
+        duration: [s]; the nearest whole number of samples is done.
+        start: where the handle is at first [m], shape (3,); default: where the motion begins.
+        velocity: of the handle at first [m/s], shape (3,); default: at rest.
+        trace: whether to keep the trace in memory, or the path of a CSV file for it: rows are
+            written as they come, so memory does not depend on the duration.
+        every: samples per row of the trace.
+        progress: is told the part that is done, in [0, 1], now and then.
+
+    Returns:
+        The run; its ledger covers every sample, traced or not.
+
+    Raises:
+        ParameterError: for parts that do not fit together, or a trace file that cannot be written
+            (what was written stays, in whole lines).
+
+    Example:
+        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> from asperity.simulation import Cartesian, Servo, SpringHand, Still
+        >>> surface = Surface(Sinusoid(amplitude=0.4e-3, period=1e-3), "W", stiffness=500.0)
+        >>> hand = SpringHand(stiffness=200.0, damping=2.0)
+        >>> run = simulate(
+        ...     surface, Cartesian(0.05), hand, Servo(1e-4), Still((0.0, 0.0, -1e-3)), 2.0
+        ... )
+        >>> run.samples, run.stopped, round(1e3 * float(run.state[2]), 6)
+        (20000, '', -0.285714)
+    """
+    _check(surface, plant, hand, servo, motion)
+    samples = round(positive("duration", duration, "s") / servo.period)
+    if samples < 1:
+        raise ParameterError("duration", f"must be at least one period, {servo.period} s", duration)
+    if isinstance(every, bool) or not isinstance(every, (int, np.integer)) or every < 1:
+        raise ParameterError("every", "must be a whole number of samples, 1 or more", every)
+    simulation = _begin(surface, plant, hand, servo, motion, start, velocity)
+    way = _Way(motion, servo.period, samples, plant)
+    kept = _trace(trace, -(-samples // every))
+    try:
+        stop = _go(simulation, way, kept, every, progress)
+    finally:
+        kept.close()
+    return Run(
+        kept.table(), simulation.state, simulation.samples, float(servo.period),
+        simulation.ledger(), _words(stop, simulation.state, plant),
+        path=os.fspath(trace) if isinstance(kept, FileTrace) else "",  # type: ignore[arg-type]  # a path then
+        notes=plant.notes,
+    )  # fmt: skip
+
+
+def simulate_many(jobs: Sequence[Mapping[str, Any]], workers: int | None = None) -> list[Run]:
+    """Return many runs, computed at the same time.
+
+    Args:
+        jobs: the arguments of :func:`simulate`, by name, of each run.
+        workers: threads; default: as many as there are processors.
+
+    Returns:
+        The runs, in the order of the jobs.
+
+    Raises:
+        ParameterError: for a job that cannot be run, see :func:`simulate`.
+
+    Example:
+        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> from asperity.simulation import Cartesian, Servo, SpringHand, Still
+        >>> surface = Surface(Sinusoid(amplitude=0.4e-3, period=1e-3), "W", stiffness=500.0)
+        >>> job = dict(
+        ...     surface=surface, plant=Cartesian(0.05), hand=SpringHand(stiffness=200.0),
+        ...     servo=Servo(1e-4), motion=Still((0.0, 0.0, -1e-3)), duration=0.1, trace=False,
+        ... )
+        >>> [run.samples for run in simulate_many([job, job])]
+        [1000, 1000]
+    """
+    count = os.cpu_count() or 1 if workers is None else int(positive("workers", workers))
+    with ThreadPoolExecutor(max(count, 1)) as pool:
+        return list(pool.map(lambda job: simulate(**job), jobs))
+
+
+def _check(surface: Surface, plant: Plant, hand: Hand, servo: Servo, motion: Motion) -> None:
+    for name, value, kinds, words in (
+        ("surface", surface, Surface, "a Surface"),
+        ("plant", plant, (Cartesian, Pantograph), "a Cartesian or a Pantograph"),
+        ("hand", hand, (SpringHand, BandHand, MovedHand), "a SpringHand, BandHand or MovedHand"),
+        ("servo", servo, Servo, "a Servo"),
+        ("motion", motion, Motion, "a motion such as Still, Strokes or Path"),
+    ):
+        if not isinstance(value, kinds):
+            raise ParameterError(name, f"must be {words}", value)
+
+
+def _begin(
+    surface: Surface, plant: Plant, hand: Hand, servo: Servo, motion: Motion,
+    start: ArrayLike | None, velocity: ArrayLike | None,
+) -> Simulation:  # fmt: skip
+    origin = motion.at(np.zeros(1))[0]
+    place = origin if start is None else array("start", start, (3,), "m")
+    speed = np.zeros(3) if velocity is None else array("velocity", velocity, (3,), "m/s")
+    if isinstance(hand, MovedHand):
+        if (place != origin).any() or velocity is not None:
+            raise ParameterError("start", "is where the motion begins, if the hand is moved")
+        speed = (motion.at(np.array([servo.period]))[0] - origin) / servo.period
+    if isinstance(plant, Pantograph):
+        _check_plane("start", place)
+        _check_plane("velocity", speed)
+        reason = "" if isinstance(hand, MovedHand) else left_workspace(plant, place)
+        if reason:
+            raise ParameterError("start", f"must be in the workspace: {reason}", place.tolist())
+    return Simulation(surface, machine(plant, hand, servo), servo, place, speed)
+
+
+def _check_plane(name: str, values: FloatArray) -> None:
+    if (values[..., 1] != 0.0).any():
+        raise ParameterError(name, "must stay at y = 0: a pantograph moves in the x-z plane")
+
+
+class _Way:
+    """The anchor at the samples, chunk by chunk."""
+
+    def __init__(self, motion: Motion, period: float, samples: int, plant: Plant) -> None:
+        self.samples = samples
+        self._motion, self._period = motion, period
+        self._flat = isinstance(plant, Pantograph)
+
+    def chunk(self, first: int) -> FloatArray:
+        """Return the positions from a sample on, one more than the samples of the chunk."""
+        last = min(first + CHUNK, self.samples)
+        times = np.arange(first, last + 1, dtype=np.float64) * float(self._period)
+        points = array("motion", self._motion.at(times), (last + 1 - first, 3), "m")
+        if self._flat:
+            _check_plane("motion", points)
+        return points
+
+
+def _trace(wanted: bool | str | os.PathLike[str], rows: int) -> Trace:
+    if isinstance(wanted, bool):
+        return MemoryTrace(rows) if wanted else NoTrace()
+    if not isinstance(wanted, (str, os.PathLike)):
+        raise ParameterError("trace", "must be True, False or a path", wanted)
+    return FileTrace(wanted)
+
+
+def _go(
+    simulation: Simulation, way: _Way, kept: Trace, every: int,
+    progress: Callable[[float], None] | None,
+) -> str:  # fmt: skip
+    while simulation.samples < way.samples:
+        anchor = way.chunk(simulation.samples)
+        stop = simulation.run(anchor, kept.room(len(anchor) // every + 1), every)
+        kept.keep(simulation.rows)
+        if progress is not None:
+            progress(simulation.samples / way.samples)
+        if stop:
+            return stop
+    return ""
+
+
+def left_workspace(plant: Pantograph, place: FloatArray) -> str:
+    """Return why a place [m] is not in the workspace of a pantograph; empty if it is."""
+    x, z = plant.centre[0] + place[0], plant.centre[1] + place[2]
+    if z <= 0.0:
+        return f"the handle is behind the motors, at ({x:.4g}, {z:.4g}) m"
+    near, far = plant.linkage.proximal, plant.linkage.distal
+    for name, motor in (("right", 0.0), ("left", -plant.linkage.base)):
+        reach = float(np.hypot(x - motor, z))
+        cosine = (near**2 + far**2 - reach**2) / (2.0 * near * far)
+        if abs(cosine) >= np.sqrt(1.0 - LEAST_SINE**2):
+            state = "folded" if cosine > 0.0 else "stretched"
+            return f"the {name} arm is {state}, {reach:.4g} m from motor to handle"
+    return ""
+
+
+def _words(stop: str, state: FloatArray, plant: Plant) -> str:
+    if stop != STOPS[2] or not isinstance(plant, Pantograph):
+        return stop
+    x, z, vx, vz = state[0], state[2], state[3], state[5]
+    place, speed = f"({x:.4g}, 0, {z:.4g}) m", f"({vx:.3g}, 0, {vz:.3g}) m/s"
+    return f"{stop}: at {place} with {speed} an arm is almost stretched or folded"

@@ -1,0 +1,144 @@
+"""The trace of a run, in memory or in a file that other tools read."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.errors import ParameterError
+from asperity.simulation.servo_source import COLUMNS
+
+HEADER = ",".join(f"{name} [{unit}]" for name, unit in COLUMNS)
+_ROW = ",".join(["%.12g"] * len(COLUMNS)) + "\n"
+
+
+class Trace(Protocol):
+    """What takes the rows of a trace."""
+
+    def room(self, rows: int) -> FloatArray:
+        """Return a table with at least so many rows, to be written to."""
+
+    def keep(self, rows: int) -> None:
+        """Keep the first rows of the table that was given last."""
+
+    def table(self) -> FloatArray:
+        """Return what is in memory, shape (n, columns)."""
+
+    def close(self) -> None:
+        """Be done with it."""
+
+
+class NoTrace:
+    """Keeps nothing."""
+
+    def room(self, rows: int) -> FloatArray:  # noqa: ARG002 - asks for none
+        """Return a table without rows: nothing is written."""
+        return np.empty((0, len(COLUMNS)))
+
+    def keep(self, rows: int) -> None:
+        """Do nothing."""
+
+    def table(self) -> FloatArray:
+        """Return an empty table."""
+        return np.empty((0, len(COLUMNS)))
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
+class MemoryTrace:
+    """Keeps all rows in one table."""
+
+    def __init__(self, rows: int) -> None:
+        try:
+            self._table = np.empty((rows, len(COLUMNS)))
+        except MemoryError:
+            limit = f"needs memory for {rows} rows: give a path, or a larger 'every'"
+            raise ParameterError("trace", limit) from None
+        self._filled = 0
+
+    def room(self, rows: int) -> FloatArray:  # noqa: ARG002 - it has room for all
+        """Return the rest of the table."""
+        return self._table[self._filled :]
+
+    def keep(self, rows: int) -> None:
+        """Count the rows as filled."""
+        self._filled += rows
+
+    def table(self) -> FloatArray:
+        """Return the filled rows."""
+        return self._table[: self._filled]
+
+    def close(self) -> None:
+        """Do nothing: the table stays."""
+
+
+class FileTrace:
+    """Writes rows of a CSV file in chunks; what is written are whole lines.
+
+    The first line names the columns with their units, ``time [s],x [m],...``.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self._path = Path(path)
+        if self._path.suffix.lower() not in {".csv", ".txt"}:
+            raise ParameterError("trace", "must be the path of a .csv or .txt file", str(path))
+        self._buffer = np.empty((0, len(COLUMNS)))
+        self.rows = 0
+        try:
+            self._file = open(self._path, "wb", buffering=0)  # noqa: SIM115 - closed by close()
+        except OSError as error:
+            raise ParameterError("trace", f"cannot be written: {error}") from None
+        self._size = 0
+        self._write((HEADER + "\n").encode())
+
+    def room(self, rows: int) -> FloatArray:
+        """Return a buffer of so many rows."""
+        if len(self._buffer) < rows:
+            self._buffer = np.empty((rows, len(COLUMNS)))
+        return self._buffer
+
+    def keep(self, rows: int) -> None:
+        """Write the first rows of the buffer.
+
+        Raises:
+            ParameterError: if the file cannot grow; it then ends with a whole line.
+        """
+        values = self._buffer[:rows].ravel().tolist()
+        self._write((_ROW * rows % tuple(values)).encode())
+
+    def _write(self, text: bytes) -> None:
+        left = memoryview(text)
+        try:
+            while left:
+                left = left[self._file.write(left) or 0 :]
+        except OSError as error:
+            whole = self._cut(text[: len(text) - len(left)])
+            kept = f"{whole} rows are in {self._path}"
+            raise ParameterError(
+                "trace", f"cannot be written any further ({error.strerror}): {kept}"
+            ) from None
+        self._size += len(text)
+        self.rows += text.count(b"\n") - (self._size == len(text))
+
+    def _cut(self, written: bytes) -> int:
+        """Cut the file after its last whole line; returns the rows that it holds."""
+        whole = written.rfind(b"\n") + 1
+        with suppress(OSError):  # a device such as /dev/full has no length
+            self._file.truncate(self._size + whole)
+        header = self._size == 0 and whole > 0
+        self.close()
+        return self.rows + written.count(b"\n") - header
+
+    def table(self) -> FloatArray:
+        """Return an empty table: the rows are in the file."""
+        return np.empty((0, len(COLUMNS)))
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
