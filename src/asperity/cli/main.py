@@ -11,7 +11,10 @@ from asperity.cli.analyze import analyze_command
 from asperity.cli.compare import compare_command
 from asperity.cli.devices import devices_command
 from asperity.cli.limits import limits_command
+from asperity.cli.onset import onset_command
 from asperity.cli.prepare import prepare_command
+from asperity.cli.scan import scan_command
+from asperity.cli.simulate import simulate_command
 from asperity.cli.surfaces import surfaces_command
 from asperity.errors import AsperityError
 
@@ -31,7 +34,10 @@ cli.add_command(analyze_command)
 cli.add_command(compare_command)
 cli.add_command(devices_command)
 cli.add_command(limits_command)
+cli.add_command(onset_command)
 cli.add_command(prepare_command)
+cli.add_command(scan_command)
+cli.add_command(simulate_command)
 cli.add_command(surfaces_command)
 
 

@@ -1,0 +1,115 @@
+"""A simulated run in words: the answer, its facts and its ledger."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from asperity.scene.setup import Setup
+from asperity.simulation import Run
+from asperity.simulation.onset import CYCLE_SPEED, cycles, restlessness
+from asperity.units import engineering
+
+AXES = ("x", "y", "z")
+
+
+def energy(value: float) -> str:
+    """Return an energy with its sign, "+2.97 mJ"."""
+    if value == 0.0:
+        return "0 J"
+    text = engineering(abs(value), "J", digits=3)
+    return f"{'+' if value > 0.0 else '-'}{text}"
+
+
+def answer(setup: Setup, run: Run) -> str:
+    """Return what happened in one or two sentences."""
+    law = setup.surface.law.letter
+    total = run.ledger.total
+    verb = "feeds the hand" if total > 0.0 else "takes from the hand"
+    said = (
+        f"Law {law} at {engineering(setup.surface.stiffness, 'N/m')} {verb} "
+        f"{engineering(abs(total), 'J', digits=3)} in {engineering(run.duration, 's')}"
+    )
+    if run.stopped:
+        return f"{said}. The run stopped: it {run.stopped}."
+    return f"{said}. {unrest(setup, run)}."
+
+
+def at_rest(setup: Setup, duration: float) -> bool:
+    """Return whether the hand holds still in the second half of a run."""
+    times = np.linspace(0.5, 1.0, 33) * duration
+    return bool(np.ptp(setup.motion.at(times), axis=0).max() == 0.0)
+
+
+def unrest(setup: Setup, run: Run) -> str:
+    """Return whether the handle came to rest, in words."""
+    if not at_rest(setup, run.duration):
+        return "The hand was moving to the end"
+    if len(run.time) < 4:
+        return "Too few samples were traced to say whether it came to rest"
+    speed = restlessness(run)
+    kept = "keeps moving: a limit cycle" if cycles(run) else "comes to rest"
+    limit = engineering(CYCLE_SPEED, "m/s")
+    return (
+        f"The handle {kept} (velocity varies by {engineering(speed, 'm/s', digits=3)} in the last "
+        f"quarter; above {limit} counts as a cycle)"
+    )
+
+
+def facts_of_loop(setup: Setup) -> list[tuple[str, str]]:
+    """Return names and values of the device, its servo, the hand and the surface."""
+    servo = setup.servo
+    step = servo.position_resolution
+    return [
+        ("Surface", str(setup.surface.texture.describe()["kind"])),
+        ("Device", setup.device.name),
+        ("Update period", engineering(servo.period, "s")),
+        ("Position resolution", engineering(step, "m") if step else "not limited"),
+        ("Hand", str(setup.hand.to_dict()["kind"])),
+        ("Motion", str(setup.motion.to_dict()["kind"])),
+    ]
+
+
+def facts(setup: Setup, run: Run) -> list[tuple[str, str]]:
+    """Return names and values of what was simulated."""
+    surface = setup.surface
+    return [
+        ("Law", f"{surface.law.letter}, {surface.law.name.replace('-', ' ')}"),
+        ("Stiffness", engineering(surface.stiffness, "N/m")),
+        *facts_of_loop(setup),
+        ("Delay", f"{setup.servo.delay} samples"),
+        ("Simulated", f"{engineering(run.duration, 's')}, {run.samples} samples"),
+    ]
+
+
+def ledger_rows(run: Run) -> list[tuple[str, list[str]]]:
+    """Return name and cells (x, y, z, sum) of the energies."""
+    ledger = run.ledger
+
+    def axes(values: tuple[float, float, float]) -> list[str]:
+        return [*[energy(value) for value in values], energy(sum(values))]
+
+    def single(value: float) -> list[str]:
+        return ["", "", "", energy(value)]
+
+    return [
+        ("texture, exact", axes(ledger.supplied)),
+        ("texture, the paper's sum", axes(ledger.same_sample)),
+        ("sampling's part of it", single(ledger.sampling)),
+        ("the hand's anchor", single(ledger.hand)),
+        ("lost in damping of device and hand", single(-ledger.lost)),
+        ("dry friction", single(ledger.friction)),
+        ("stored, after less before", single(ledger.after - ledger.before)),
+        ("does not add up", single(ledger.closure)),
+    ]
+
+
+def closing_words(run: Run) -> str:
+    """Return how well the ledger closes."""
+    ledger = run.ledger
+    share = abs(ledger.closure) / ledger.exchanged if ledger.exchanged > 0.0 else 0.0
+    return (
+        "Positive feeds the hand. Exact: the held force on the true motion. The paper's sum: the "
+        "command and the measured step of one sample. Sampling's part: what holding the force "
+        f"adds, ½ Σ (f_k - f_k+1)·(p_k+1 - p_k). The ledger closes to {share:.1g} of the "
+        f"{engineering(ledger.exchanged, 'J', digits=3)} that were exchanged."
+    )

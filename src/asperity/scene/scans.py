@@ -1,0 +1,66 @@
+"""Energy per stroke of a scene, by law, speed and depth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+from asperity.errors import ParameterError
+from asperity.scene.setup import Setup
+from asperity.simulation.motions import Strokes
+from asperity.simulation.scan import Stroke, scan_strokes
+
+DEFAULT_SPEEDS = (0.02, 0.05, 0.1, 0.2)  # m/s
+DEFAULT_STROKES = 5
+WORKERS = 2
+
+
+def scans(
+    setup: Setup,
+    laws: Sequence[str],
+    *,
+    speeds: Sequence[float] = DEFAULT_SPEEDS,
+    depths: Sequence[float] | None = None,
+    strokes: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[Stroke, ...]:
+    """Return the energy per stroke for every law, speed and depth, laws first.
+
+    Args:
+        setup: the closed loop; its law does not count.
+        laws: letters.
+        speeds: of the hand [m/s].
+        depths: of the hand below z = 0 [m]; default: the motion's.
+        strokes: per run; default: the motion's, at least 5.
+        progress: is told the part that is done.
+
+    Raises:
+        ParameterError: for a motion that is not made of strokes.
+    """
+    motion = setup.motion
+    if not isinstance(motion, Strokes):
+        raise ParameterError("motion", 'must be kind = "strokes" to be scanned')
+    deepest = -min(motion.start[2], motion.end[2])
+    if depths is None:
+        if deepest <= 0.0:
+            raise ParameterError("depths", "are needed: the motion of the scene is not below z = 0")
+        depths = (deepest,)
+    count = max(motion.count, DEFAULT_STROKES) if strokes is None else strokes
+    way = replace(motion, count=count)
+    jobs = [(law, speed, depth) for law in laws for speed in speeds for depth in depths]
+    done = [0]
+
+    def one(job: tuple[str, float, float]) -> Stroke:
+        law, speed, depth = job
+        (found,) = scan_strokes(
+            setup.with_law(law).surface, setup.plant, setup.hand, setup.servo, way,
+            speeds=[speed], depths=[depth],
+        )  # fmt: skip
+        done[0] += 1
+        if progress is not None:
+            progress(done[0] / len(jobs))
+        return found
+
+    with ThreadPoolExecutor(WORKERS) as pool:
+        return tuple(pool.map(one, jobs))

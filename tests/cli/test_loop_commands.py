@@ -1,0 +1,223 @@
+"""simulate, onset and scan on the command line."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from asperity.cli.main import cli, main
+
+Call = Callable[..., tuple[int, str, str]]
+
+SCENE = """
+[texture]
+kind = "sinusoid"
+amplitude = "0.4 mm"
+period = "2 mm"
+[surface]
+law = "A"
+stiffness = "400 N/m"
+max_depth = "1 mm"
+[device]
+apparent_mass = "50 g"
+damping = "1 N*s/m"
+update_rate = "4 kHz"
+delay_samples = 1
+[hand]
+kind = "spring"
+stiffness = "300 N/m"
+damping = "3 N*s/m"
+"""
+STILL = '[motion]\nkind = "still"\npoint = ["0 mm", "0 mm", "-0.5 mm"]\n[run]\nduration = "0.2 s"\n'
+STROKES = """[motion]
+kind = "strokes"
+start = ["0 mm", "0 mm", "-0.5 mm"]
+end = ["8 mm", "0 mm", "-0.5 mm"]
+speed = "0.1 m/s"
+"""
+
+
+@pytest.fixture
+def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr("sys.argv", ["asperity", *arguments])
+        code = 0
+        try:
+            main()
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+@pytest.fixture
+def still(tmp_path: Path) -> str:
+    path = tmp_path / "still.toml"
+    path.write_text(SCENE + STILL)
+    return str(path)
+
+
+@pytest.fixture
+def strokes(tmp_path: Path) -> str:
+    path = tmp_path / "strokes.toml"
+    path.write_text(SCENE + STROKES)
+    return str(path)
+
+
+def test_simulate_prints_the_ledger(call: Call, still: str) -> None:
+    code, out, err = call("simulate", still)
+    assert (code, err) == (0, "")
+    assert "Law A at 400 N/m" in out
+    assert "comes to rest" in out
+    assert "texture, exact" in out
+    closes = re.search(r"closes to (\S+) of", " ".join(out.split()))
+    assert closes is not None
+    assert float(closes[1]) < 1e-9
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_simulate_writes_json_and_html(call: Call, strokes: str, tmp_path: Path) -> None:
+    code, out, _err = call(
+        "simulate", strokes, "--json", "-", "--law", "B", "--stiffness", "300N/m"
+    )
+    assert code == 0
+    data = json.loads(out)
+    assert data["scene"]["surface"]["law"] == "B"
+    assert data["scene"]["surface"]["stiffness"] == 300.0
+    ledger = data["run"]["ledger"]
+    assert sum(ledger["supplied"]) == pytest.approx(ledger["supplied_sum"])
+    assert abs(ledger["closure"]) < 1e-9 * ledger["exchanged"]
+    code, out, _err = call("simulate", strokes, "--html", str(tmp_path / "run.html"))
+    text = (tmp_path / "run.html").read_text(encoding="utf-8")
+    assert code == 0
+    assert text.count("data:image/svg+xml") == 1
+    assert "://" not in re.sub(r"data:[^\"]*", "", text)
+    assert "Where the energy went" in text
+
+
+def test_the_trace_has_columns_with_units(call: Call, still: str, tmp_path: Path) -> None:
+    path, page = str(tmp_path / "trace.csv"), str(tmp_path / "run.html")
+    code, out, _err = call("simulate", still, "--trace", path, "--every", "2", "--html", page)
+    assert code == 0
+    assert f"Trace: {path}" in out
+    with open(path, encoding="utf-8") as file:
+        names = file.readline().strip().split(",")
+    assert names[:4] == ["time [s]", "x [m]", "y [m]", "z [m]"]
+    table = np.loadtxt(path, delimiter=",", skiprows=1)
+    assert table.shape == (400, len(names))
+    assert table[1, 0] == pytest.approx(2 / 4000)
+    assert "data:image/svg+xml" in Path(page).read_text(encoding="utf-8")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_a_full_disk_is_said(call: Call, still: str, tmp_path: Path) -> None:
+    full = tmp_path / "full.csv"
+    os.symlink("/dev/full", full)
+    code, out, err = call("simulate", still, "--trace", str(full))
+    assert (code, out) == (2, "")
+    assert "cannot be written any further" in err
+    assert "Traceback" not in err
+
+
+def test_onset_finds_brackets(call: Call, still: str, tmp_path: Path) -> None:
+    options = ["--delays", "0; 2", "--starts", "2", "--tolerance", "0.2", "--laws", "WC"]
+    code, out, err = call("onset", still, *options, "--lowest", "100N/m")
+    assert (code, err) == (0, "")
+    rows = [line.split() for line in out.splitlines() if re.match(r"[WC] +[02] ", line)]
+    assert len(rows) == 4
+    assert max(map(len, out.splitlines())) <= 80
+    code, out, _err = call("onset", still, *options, "--lowest", "100N/m", "--json", "-")
+    onsets = json.loads(out)["onsets"]
+    assert [(one["law"], one["delay"]) for one in onsets] == [
+        ("W", 0),
+        ("W", 2),
+        ("C", 0),
+        ("C", 2),
+    ]
+    for one in onsets:
+        assert one["quiet"] < one["cycling"] <= 1.2 * one["quiet"] * (1 + 1e-9)
+        assert one["cycling"] > one["delay_rule"]
+    code, _out, _err = call("onset", still, *options, "--html", str(tmp_path / "o.html"))
+    assert "Onset against delay" in (tmp_path / "o.html").read_text(encoding="utf-8")
+
+
+def test_scan_tells_gain_from_loss(call: Call, strokes: str, tmp_path: Path) -> None:
+    options = ["--laws", "AF", "--speeds", "0.05m/s; 0.1m/s", "--strokes", "3"]
+    code, out, err = call("scan", strokes, *options)
+    assert (code, err) == (0, "")
+    assert "Feeds the hand at every speed and depth: A" in out
+    assert "never: F" in out
+    assert max(map(len, out.splitlines())) <= 80
+    code, out, _err = call("scan", strokes, *options, "--depths", "0.2mm;0.4mm", "--json", "-")
+    found = json.loads(out)["strokes"]
+    assert [(one["law"], one["speed"], one["depth"]) for one in found[:3]] == [
+        ("A", 0.05, 2e-4), ("A", 0.05, 4e-4), ("A", 0.1, 2e-4),
+    ]  # fmt: skip
+    assert len(found) == 8
+    code, _out, _err = call("scan", strokes, *options, "--html", str(tmp_path / "s.html"))
+    assert "Energy per stroke" in (tmp_path / "s.html").read_text(encoding="utf-8")
+
+
+BAD = [
+    (["simulate", "sinusoid:amplitude=1mm,period=1mm"], "must be a scene file"),
+    (["simulate", "{still}", "--duration", "0s"], "duration must be positive"),
+    (["simulate", "{still}", "--every", "1.5"], "every must be a whole number"),
+    (["simulate", "{still}", "--every", "0"], "every must be a whole number"),
+    (["simulate", "{still}", "--trace", "trace.xls"], "must be the path of a .csv"),
+    (["simulate", "{still}", "--trace", "no/trace.csv"], "folder that exists"),
+    (["simulate", "{still}", "--json", "-", "--html", "-"], "cannot both"),
+    (["simulate", "{still}", "--device", "omega.3"], "apparent_mass is not known"),
+    (["simulate", "{still}", "--law", "Z"], "law"),
+    (["onset", "{strokes}"], "must be at rest"),
+    (["onset", "{still}", "--delays", "1.5"], "delays must be a whole number"),
+    (["onset", "{still}", "--delays", "-1"], "delay must be a whole number"),
+    (["onset", "{still}", "--starts", "0"], "starts must be a whole number"),
+    (["onset", "{still}", "--laws", "WW"], "twice"),
+    (["scan", "{still}"], "motion must be"),
+    (["scan", "{strokes}", "--speeds", "fast"], "speeds must be a quantity"),
+    (["scan", "{strokes}", "--speeds", "0m/s"], "speeds must be positive"),
+    (["scan", "{strokes}", "--strokes", "0"], "count must be positive"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD, ids=[" ".join(a) for a, _m in BAD])
+def test_bad_input_is_one_line(
+    call: Call, still: str, strokes: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str], message: str,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.iterdir())
+    filled = [text.format(still=still, strokes=strokes) for text in arguments]
+    code, out, err = call(*filled)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize("command", ["simulate", "onset", "scan"])
+def test_help(command: str) -> None:
+    result = CliRunner().invoke(cli, [command, "--help"])
+    assert result.exit_code == 0
+    assert "SCENE" in result.output
+
+
+def test_a_plant_that_leaves_its_workspace_stops_there(call: Call, tmp_path: Path) -> None:
+    text = SCENE.replace('apparent_mass = "50 g"\n', "").replace(
+        '[device]\ndamping = "1 N*s/m"\nupdate_rate = "4 kHz"\ndelay_samples = 1\n',
+        '[device]\nid = "pantograph"\n',
+    )
+    far = STROKES.replace("8 mm", "200 mm").replace("0.1 m/s", "0.3 m/s")
+    (tmp_path / "far.toml").write_text(text + far)
+    code, out, err = call("simulate", str(tmp_path / "far.toml"))
+    assert (code, err) == (0, "")
+    assert "The run stopped: it left the workspace" in " ".join(out.split())

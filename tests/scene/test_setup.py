@@ -1,0 +1,164 @@
+"""Hand, motion and run of a scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity.errors import ParameterError
+from asperity.scene import load_scene
+from asperity.scene.setup import Setup, make_setup, working_point
+from asperity.simulation import BandHand, Cartesian, MovedHand, Pantograph, SpringHand, Strokes
+
+HEAD = """
+[texture]
+kind = "sinusoid"
+amplitude = "0.4 mm"
+period = "1.5 mm"
+[surface]
+law = "C"
+stiffness = "800 N/m"
+"""
+MASS = '[device]\napparent_mass = "45 g"\nupdate_rate = "2 kHz"\n'
+SPRING = '[hand]\nkind = "spring"\nstiffness = "300 N/m"\n'
+STILL = '[motion]\nkind = "still"\npoint = ["0 mm", "0 mm", "-1 mm"]\n'
+
+
+def scene(tmp_path: Path, *parts: str) -> Setup:
+    (tmp_path / "scene.toml").write_text(HEAD + "".join(parts), encoding="utf-8")
+    return make_setup(load_scene(str(tmp_path / "scene.toml")))
+
+
+def test_a_mass_in_space_on_a_spring(tmp_path: Path) -> None:
+    device = (
+        MASS + 'damping = "2 N*s/m"\nfriction = "0.1 N"\ndelay_samples = 2\nmax_force = "8 N"\n'
+    )
+    hand = SPRING + 'damping = ["1 N*s/m", "2 N*s/m", "3 N*s/m"]\nforce = "0 N; 0 N; -1 N"\n'
+    setup = scene(tmp_path, device, hand, STILL, '[run]\nduration = "0.2 s"\nevery = 4\n')
+    assert isinstance(setup.plant, Cartesian)
+    assert setup.plant.mass == (0.045, 0.045, 0.045)
+    np.testing.assert_array_equal(setup.plant.damping, 2.0 * np.eye(3))
+    assert setup.plant.friction == 0.1
+    assert setup.hand == SpringHand(300.0, (1.0, 2.0, 3.0), 0.0, (0.0, 0.0, -1.0))
+    assert (setup.servo.period, setup.servo.delay, setup.servo.max_force) == (5e-4, 2, 8.0)
+    assert (setup.duration, setup.every, setup.surface.stiffness) == (0.2, 4, 800.0)
+    assert setup.assumptions == ()
+    run = setup.simulate()
+    assert (run.samples, len(run.time)) == (400, 100)
+    assert working_point(setup).tolist() == [0.0, 0.0, -1e-3]
+
+
+def test_what_a_device_lacks_is_assumed_aloud(tmp_path: Path) -> None:
+    setup = scene(tmp_path, '[device]\nid = "touch"\n', SPRING, STILL)
+    said = " ".join(setup.assumptions)
+    for words in ("physical damping", "update rate", "1000 Hz", "delay", "Default duration 1 s"):
+        assert words in said
+    assert setup.servo.period == 1e-3
+    assert setup.plant.friction == 0.26
+
+
+def test_a_scene_changes_numbers_of_a_device_of_the_catalogue(tmp_path: Path) -> None:
+    device = '[device]\nid = "pantograph"\njoint_damping = "4 mN*m*s"\ndelay_samples = 5\n'
+    run = '[run]\ncentre = ["37.5 mm", "100 mm"]\nbrakes = "always"\nstart = "0 mm; 0 mm; 4 mm"\n'
+    band = '[hand]\nkind = "band"\ntension = "3 N"\nstiffness = "200 N/m"\nlength = "80 mm"\n'
+    setup = scene(tmp_path, device, band, STILL, run)
+    assert isinstance(setup.plant, Pantograph)
+    assert (setup.plant.joint_damping, setup.plant.centre) == (4e-3, (0.0375, 0.1))
+    assert not setup.plant.inside_only
+    assert setup.plant.linkage.proximal == 0.063
+    assert setup.servo.position_resolution == 15e-6
+    assert setup.servo.delay == 5
+    assert setup.hand == BandHand(200.0, 3.0, 0.08)
+    assert setup.start == (0.0, 0.0, 4e-3)
+    assert any("guess" in sentence for sentence in setup.assumptions)
+    assert setup.device.name.startswith("Pantograph")
+
+
+def test_a_moved_hand_needs_no_mass(tmp_path: Path) -> None:
+    strokes = (
+        '[motion]\nkind = "strokes"\nstart = ["0 mm", "0 mm", "-0.2 mm"]\n'
+        'end = ["3 mm", "0 mm", "-0.2 mm"]\nspeed = "30 mm/s"\ncount = 2\n'
+    )
+    setup = scene(tmp_path, '[device]\nid = "omega.3"\n', '[hand]\nkind = "moved"\n', strokes)
+    assert setup.hand == MovedHand()
+    assert isinstance(setup.motion, Strokes)
+    assert setup.duration == pytest.approx(0.2)
+    run = setup.simulate()
+    # Two strokes over whole periods of a conservative law: nothing but what sampling adds.
+    assert abs(run.ledger.total - run.ledger.sampling) < 1e-3 * abs(run.ledger.exchanged)
+
+
+def test_a_trace_is_a_path_for_another_scene(tmp_path: Path) -> None:
+    first = scene(tmp_path, MASS, SPRING, STILL, '[run]\nduration = "0.05 s"\n')
+    run = first.simulate(trace=str(tmp_path / "trace.csv"))
+    assert run.path
+    again = scene(tmp_path, MASS, '[hand]\nkind = "moved"\n[motion]\nkind = "path"\n'
+                  'file = "trace.csv"\n')  # fmt: skip
+    shown = first.simulate()
+    at = again.motion.at(shown.time)
+    np.testing.assert_allclose(at, shown.position, rtol=1e-9, atol=1e-15)
+
+
+def test_another_law_keeps_the_loop(tmp_path: Path) -> None:
+    setup = scene(tmp_path, MASS, SPRING, STILL)
+    other = setup.with_law("H", 500.0).with_delay(3)
+    assert (other.surface.law.letter, other.surface.stiffness, other.servo.delay) == ("H", 500.0, 3)
+    assert other.surface.texture is setup.surface.texture
+    assert other.plant == setup.plant
+    assert setup.surface.law.letter == "C"
+
+
+BAD = [
+    ((MASS, STILL), r"needs a section \[hand\]"),
+    ((MASS, SPRING), r"needs a section \[motion\]"),
+    ((MASS, '[hand]\nstiffnes = "3 N/m"\n', STILL), r"hand needs kind"),
+    ((MASS, '[hand]\nkind = "sprung"\n', STILL), r"did you mean 'spring'"),
+    ((MASS, SPRING.replace("stiffness", "stifness"), STILL), r"did you mean 'stiffness'"),
+    ((MASS, SPRING.replace("300 N/m", "300 N"), STILL), r"stiffness must be a quantity"),
+    ((MASS, SPRING.replace("300", "-300"), STILL), r"stiffness must not be negative"),
+    ((MASS, SPRING, '[motion]\nkind = "still"\n'), r"motion.point is missing"),
+    ((MASS, SPRING, STILL.replace('"0 mm", ', "", 1)), r"three quantities"),
+    ((MASS, SPRING, '[motion]\nkind = "path"\n'), r"needs a file"),
+    ((MASS, SPRING, '[motion]\nkind = "path"\nfile = "no.csv"\n'), r"cannot be read"),
+    ((MASS, SPRING, STILL, '[run]\nduraton = "1 s"\n'), r"did you mean 'duration'"),
+    ((MASS, SPRING, STILL, '[run]\nduration = "1 m"\n'), r"duration must be a quantity"),
+    ((MASS, SPRING, STILL, '[run]\nduration = "-1 s"\n'), r"duration must be positive"),
+    ((MASS, SPRING, STILL, '[run]\nbrakes = "off"\n'), r"must be 'inside' or 'always'"),
+    ((MASS, SPRING, STILL, '[run]\nbrakes = "always"\n'), r"needs a five-bar"),
+    ((MASS, SPRING, STILL, "[run]\nresonance = true\n"), r"needs the bandwidth"),
+    ((MASS + "delay_samples = 1.5\n", SPRING, STILL), r"must be a whole number"),
+    (('[device]\nid = "omega.3"\n', SPRING, STILL), r"apparent_mass is not known"),
+    (('[device]\nid = "pantagraph"\n', SPRING, STILL), r"did you mean 'pantograph'"),
+    (('[device]\nid = "pantograph"\njoint_dampng = "1 N*m*s"\n', SPRING, STILL), "joint_damping"),
+    ((MASS, SPRING, STILL, "[runs]\nevery = 1\n"), r"unknown section \[runs\]"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("parts", "message"), BAD, ids=[message for _parts, message in BAD])
+def test_wrong_scenes_say_what_is_wrong(
+    tmp_path: Path, parts: tuple[str, ...], message: str
+) -> None:
+    with pytest.raises(ParameterError, match=message):
+        scene(tmp_path, *parts)
+
+
+def test_no_law_is_no_loop(tmp_path: Path) -> None:
+    text = HEAD.replace('law = "C"\n', "") + MASS + SPRING + STILL
+    (tmp_path / "scene.toml").write_text(text)
+    with pytest.raises(ParameterError, match="law is missing"):
+        make_setup(load_scene(str(tmp_path / "scene.toml")))
+
+
+def test_paths_with_wrong_columns_are_refused(tmp_path: Path) -> None:
+    path = '[motion]\nkind = "path"\nfile = "way.csv"\n'
+    (tmp_path / "way.csv").write_text("time [s],x [m],y [m]\n0,0,0\n")
+    with pytest.raises(ParameterError, match=r"no column 'z \[m\]'"):
+        scene(tmp_path, MASS, SPRING, path)
+    (tmp_path / "way.csv").write_text("time [s],x [m],y [m],z [m]\n0,0,zero,0\n")
+    with pytest.raises(ParameterError, match="not a table of numbers"):
+        scene(tmp_path, MASS, SPRING, path)
+    (tmp_path / "way.csv").write_text("time [s],x [m],y [m],z [m]\n1,0,0,0\n0,0,0,0\n")
+    with pytest.raises(ParameterError, match="times must increase"):
+        scene(tmp_path, MASS, SPRING, path)
