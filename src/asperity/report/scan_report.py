@@ -25,11 +25,11 @@ HEADINGS = ("law", "speed", "depth", "x", "y", "z", "sum", "field", "±", "paper
 NUMBERS = tuple(range(1, 11))
 FIELD, Y = HEADINGS.index("field"), HEADINGS.index("y")
 NOTES = (
-    "Energies in mJ per stroke: work of the held force on the true motion, mean over the strokes "
-    "after the first; positive feeds the hand. Field: what the law itself gives along the true "
-    "path, without sampling, delay and steps of the encoder, which make up the rest; ±: from "
-    "stroke to stroke, and of its quadrature. Paper's: its sum of force and step of the same "
-    "sample. Lost: how often per stroke contact ended.",
+    "Energies in mJ per stroke: work of the held force on the true motion, mean over whole "
+    "turns, there and back, after the first stroke; positive feeds the hand. Field: what the law "
+    "itself gives along the true path, without sampling, delay and steps of the encoder, which "
+    "make up the rest; ±: from turn to turn, and of its quadrature. Paper's: its sum of force and "
+    "step of the same sample. Lost: how often per stroke contact ended.",
 )
 _DASHES = ("-", "--", ":", "-.")
 

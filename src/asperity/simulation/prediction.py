@@ -20,6 +20,9 @@ from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import left_workspace
 from asperity.surface import Surface
 
+# Relative gap of the characteristic numbers: far less than the bracket of an onset.
+TOLERANCE = 0.01
+
 
 @dataclass(frozen=True)
 class Prediction:
@@ -137,7 +140,8 @@ def predict(
     q = plus = 0.0
     if depth > 0.0:
         pressed = surface.to_depth(depth)
-        q, plus = characteristic_number(pressed).value, one_sided_number(pressed).value
+        q = characteristic_number(pressed, TOLERANCE).value
+        plus = one_sided_number(pressed, TOLERANCE).value
     budget = damping / servo.period
     weight = 0.5 * plus + (servo.delay * q if servo.delay else 0.0)
     return Prediction(

@@ -19,6 +19,9 @@ from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import simulate
 from asperity.surface import Surface
 
+# Of the work that goes to and fro, what counts as nothing.
+_NEGLIGIBLE = 1e-3
+
 
 @dataclass(frozen=True)
 class Stroke:
@@ -28,14 +31,14 @@ class Stroke:
         law: letter of the law.
         speed: of the hand [m/s].
         depth: of the hand below z = 0 [m].
-        energy: that the texture supplies per stroke, along x, y and z [J]: the mean over the
-            strokes after the first, which has the start in it (or over the only one).
+        energy: that the texture supplies per stroke, along x, y and z [J]: the mean over whole
+            turns, there and back, after the first stroke, which has the start in it.
         field: of it what the law itself supplies per stroke [J]: the work of its force along the
             true path, at every place at once. The rest is due to sampling, delay and the steps of
             the encoder; of a conservative law all is.
-        error: of the field's work, by halving the steps of its quadrature [J].
-        spread: standard deviation of the field's work from stroke to stroke [J]; 0 for a single
-            stroke.
+        error: of the field's work [J]: of its quadrature by halving the steps, and a thousandth
+            of all that goes there and back.
+        spread: standard deviation of the field's work from turn to turn [J]; 0 for a single one.
         same_sample: the paper's sum, all axes, per stroke [J]: commanded force times the measured
             displacement of the same sample.
         lost_contact: how often per stroke the force ended.
@@ -138,23 +141,40 @@ def _stroke(surface: Surface, way: Strokes, run: Run, depth: float) -> Stroke:
         energy = (nan, nan, nan)
         return Stroke(law, speed, depth, energy, nan, nan, nan, nan, nan, closure, run.stopped)
     begins = np.searchsorted(run.time, way.period * np.arange(1, way.count) - 1e-9 * run.period)
-    first = 1 if way.count > 1 else 0
 
     def each(name: str) -> FloatArray:
-        """Return a sum of the ledger stroke by stroke, from the first that counts on."""
+        """Return a sum of the ledger, stroke by stroke."""
         at = [run.energies[name][begins], np.array([getattr(ledger, name)], dtype=float)]
         summed = np.concatenate(at)
-        return np.asarray(np.diff(summed, axis=0, prepend=np.zeros_like(summed[:1]))[first:])
+        return np.asarray(np.diff(summed, axis=0, prepend=np.zeros_like(summed[:1])))
 
     fine, coarse = field_work(surface, np.vstack([run.position, run.state[:3]]))
-    works = np.array([part.sum() for part in np.split(fine, begins)])[first:]
-    rough = np.array([part.sum() for part in np.split(coarse, begins)])[first:]
-    x, y, z = (float(value) for value in each("supplied").mean(axis=0))
+
+    def summed(pieces: FloatArray) -> FloatArray:
+        return _kept(np.array([part.sum() for part in np.split(pieces, begins)]))
+
+    works = summed(fine)
+    error = np.abs(works - summed(coarse)).mean() + _NEGLIGIBLE * summed(np.abs(fine)).mean()
+    x, y, z = (float(value) for value in _kept(each("supplied")).mean(axis=0))
     return Stroke(
-        law, speed, depth, (x, y, z), float(works.mean()), float(np.abs(works - rough).mean()),
-        float(works.std()), float(each("same_sample").sum(axis=1).mean()), lost / way.count,
-        closure, "",
+        law, speed, depth, (x, y, z), float(works.mean()), float(error), _spread(works),
+        float(_kept(each("same_sample")).sum(axis=1).mean()), lost / way.count, closure, "",
     )  # fmt: skip
+
+
+def _kept(strokes: FloatArray) -> FloatArray:
+    """Return whole turns, there and back, without the first stroke where there are enough.
+
+    What a field stores on the way there it gives on the way back.
+    """
+    count = (len(strokes) - 1) // 2 * 2 or len(strokes)
+    return strokes[-count:]
+
+
+def _spread(works: FloatArray) -> float:
+    """Return the standard deviation of the mean from turn to turn."""
+    turns = works.reshape(-1, 2).mean(axis=1) if len(works) % 2 == 0 else works
+    return float(turns.std())
 
 
 def field_work(surface: Surface, path: FloatArray) -> tuple[FloatArray, FloatArray]:
