@@ -1,0 +1,140 @@
+"""What the paper could not do: predicted and simulated onsets for other devices and surfaces."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+from asperity.devices import device_names, load_device
+from asperity.errors import ParameterError
+from asperity.paper.experiments.settings import device_setup
+from asperity.simulation import Pantograph, SpringHand, find_onset
+from asperity.simulation.onset import Onset
+from asperity.simulation.prediction import Prediction, predict
+from asperity.surface import Surface
+from asperity.textures import named_surface
+from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.texture import Texture
+
+LAWS = "WACFH"
+STARTS = 4
+LOWEST = 400.0  # N/m: what holds the hand's 1 N at 2.5 mm
+TOLERANCE = 0.05
+WORKERS = 2
+HAND = SpringHand((300.0, 300.0, 0.0), 3.0, 0.0, (0.0, 0.0, -1.0))
+GUESSED = (
+    "The hand: 300 N/m sideways, 3 N·s/m, pressing with 1 N. Its damping is all that most of these "
+    "devices have: none of their physical damping is published",
+    "Where the update rate is not known 1 kHz was simulated, where the delay is not known none",
+)
+
+
+@dataclass(frozen=True)
+class DeviceOnset:
+    """One law on one device and surface.
+
+    Attributes:
+        device: its id.
+        surface: its name.
+        allowed: K₀/q with the K₀ of the catalogue [N/m], at the depth that was reached.
+        prediction: what was simulated, and what the criteria with the hand's damping allow.
+    """
+
+    device: str
+    surface: str
+    allowed: float
+    prediction: Prediction
+
+    @property
+    def missed(self) -> bool:
+        """Whether a limit cycle was found at a stiffness that K₀/q of the catalogue allows."""
+        return self.prediction.onset.cycling <= self.allowed
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units; an unbounded number is written as the string "inf"."""
+        return {
+            "device": self.device, "surface": self.surface,
+            "catalogue_rule": "inf" if math.isinf(self.allowed) else self.allowed,
+            "catalogue_rule_missed": self.missed, **self.prediction.to_dict(),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class BeyondExperiment:
+    """Other devices and surfaces.
+
+    Attributes:
+        onsets: by device, surface and law.
+        skipped: devices whose apparent mass (or K₀) is not known.
+        guessed: what was assumed.
+    """
+
+    onsets: tuple[DeviceOnset, ...]
+    skipped: tuple[str, ...]
+    guessed: tuple[str, ...] = GUESSED
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units."""
+        return {
+            "onsets": [one.to_dict() for one in self.onsets],
+            "skipped": list(self.skipped),
+            "guessed": list(self.guessed),
+        }
+
+
+def surfaces(measured: Texture | None = None) -> dict[str, Texture]:
+    """Return a gentle sinusoid, and a measured surface or a drawn one in its place."""
+    gentle = {"sinusoid A/l = 0.1": Sinusoid(0.1e-3, 1e-3)}
+    if measured is None:
+        return gentle | {"knurl": named_surface("knurl")}
+    return gentle | {"yours": measured}
+
+
+def usable_devices() -> tuple[list[str], list[str]]:
+    """Return the devices whose data suffice, and the others: they lack a mass or K₀."""
+    usable, skipped = [], []
+    for name in device_names():
+        try:
+            device_setup(name, Surface(Sinusoid(1e-4, 1e-3), "W"), HAND)
+        except ParameterError:
+            skipped.append(name)
+            continue
+        (skipped if load_device(name).value("max_stiffness") is None else usable).append(name)
+    return usable, skipped
+
+
+def device_onset(name: str, title: str, surface: Surface) -> DeviceOnset:
+    """Return onset and predictions of one law on one device and surface."""
+    setup = device_setup(name, surface, HAND)
+    found: Onset = find_onset(
+        setup.surface, setup.plant, setup.hand, setup.servo, setup.motion, start=setup.start,
+        duration=setup.duration, starts=STARTS, tolerance=TOLERANCE, lowest=LOWEST,
+    )  # fmt: skip
+    said = predict(surface, setup.plant, setup.hand, setup.servo, found)
+    stiffest = load_device(name).max_stiffness
+    return DeviceOnset(name, title, stiffest / said.q if said.q > 0.0 else math.inf, said)
+
+
+def beyond_experiment(measured: Texture | None = None, laws: str = LAWS) -> BeyondExperiment:
+    """Return predicted and simulated onsets for every device whose data suffice.
+
+    Args:
+        measured: a surface; without one a drawn knurl takes its place. Only devices that move in
+            space feel a surface that is no profile.
+        laws: letters.
+    """
+    usable, skipped = usable_devices()
+    jobs = []
+    for name in usable:
+        planar = isinstance(
+            device_setup(name, Surface(Sinusoid(1e-4, 1e-3), "W"), HAND).plant, Pantograph
+        )
+        for title, texture in surfaces(measured).items():
+            if planar and not texture.is_profile:
+                continue  # its handle stays in the x-z plane
+            jobs += [(name, title, Surface(texture, law, max_depth=1e-3)) for law in laws]
+    with ThreadPoolExecutor(WORKERS) as pool:
+        found = tuple(pool.map(lambda job: device_onset(*job), jobs))
+    return BeyondExperiment(found, tuple(skipped))

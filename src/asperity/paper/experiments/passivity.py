@@ -1,0 +1,136 @@
+"""Section V.A: who begins to cycle at 2000 N/m, and at which stiffness each law does."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.paper.experiments.settings import FITTED, LAG, LETTERS, band_setup
+from asperity.scene.onsets import onsets
+from asperity.simulation import Run, simulate
+from asperity.simulation.onset import Shifted, ends_in_cycle, offsets
+from asperity.simulation.prediction import Prediction
+
+STARTS = 24
+DELAYS = (0, 1, 2, 3, 4, 5, 6)
+# Law, and what its stiffness of 2000 N/m is divided by: the paper's figure 5.
+PANELS = (("W", 1.0), ("A", 1.0), ("F", 1.0), ("A", 5.1), ("F", 8.3))
+NEW = (("H", 1.0),)
+_STIFFNESS = 2000.0
+_EVERY = 10
+WORKERS = 2
+
+
+@dataclass(frozen=True)
+class Count:
+    """How many of the starts end in a limit cycle.
+
+    Attributes:
+        law: letter.
+        divisor: of the stiffness of 2000 N/m.
+        delay: in samples.
+        starts: how many there were.
+        cycles: how many were still moving after 2 s, and not calming down.
+        slow: how many were restless after 0.5 s, but at rest or calming down after 2 s.
+        time: of the first start's trace [s], shape (n,).
+        x: of the handle [m], shape (n,).
+        z: of the handle [m], shape (n,).
+    """
+
+    law: str
+    divisor: float
+    delay: int
+    starts: int
+    cycles: int
+    slow: int
+    time: FloatArray
+    x: FloatArray
+    z: FloatArray
+
+    @property
+    def stiffness(self) -> float:
+        """[N/m]."""
+        return _STIFFNESS / self.divisor
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data without the trace."""
+        return {
+            "law": self.law, "stiffness": self.stiffness, "delay": self.delay,
+            "starts": self.starts, "cycles": self.cycles, "slow": self.slow,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PassivityExperiment:
+    """Section V.A.
+
+    Attributes:
+        counts: at the fitted lag, in the order of figure 5, and law H.
+        onsets: of limit cycles by law and delay, beside the criteria.
+        fitted: what the paper does not state.
+    """
+
+    counts: tuple[Count, ...]
+    onsets: tuple[Prediction, ...]
+    fitted: tuple[str, ...] = FITTED
+
+    def count(self, law: str, divisor: float = 1.0) -> Count:
+        """Return the count of a law at 2000 N/m over a divisor."""
+        return next(one for one in self.counts if (one.law, one.divisor) == (law, divisor))
+
+    def onset(self, law: str, delay: int) -> Prediction:
+        """Return the onset of a law at a delay."""
+        return next(one for one in self.onsets if (one.onset.law, one.onset.delay) == (law, delay))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units."""
+        return {
+            "counts": [one.to_dict() for one in self.counts],
+            "onsets": [one.to_dict() for one in self.onsets],
+            "fitted": list(self.fitted),
+        }
+
+
+def count_cycles(law: str, divisor: float, delay: int = LAG, starts: int = STARTS) -> Count:
+    """Return how many starts end in a limit cycle at 2000 N/m over a divisor."""
+    setup = band_setup(law, _STIFFNESS / divisor, delay)
+    begin = np.array(setup.start)
+    found = slow = 0
+    kept: FloatArray | None = None
+    for shift in offsets(setup.surface, starts):
+        way = Shifted(setup.motion, (shift[0], shift[1], shift[2]))
+
+        def run_for(span: float, way: Shifted = way, shift: FloatArray = shift) -> Run:
+            return simulate(
+                setup.surface, setup.plant, setup.hand, setup.servo, way, span, start=begin + shift
+            )
+
+        ended, run = ends_in_cycle(run_for, setup.duration)
+        found += ended
+        slow += run.duration > setup.duration and not ended
+        if kept is None:
+            shown = slice(None, round(setup.duration / run.period), _EVERY)
+            kept = np.column_stack([run.time, run.position[:, 0], run.position[:, 2]])[shown]
+    assert kept is not None
+    time, x, z = kept.T
+    return Count(law, divisor, delay, starts, found, slow, time, x, z)
+
+
+def passivity_experiment(
+    laws: str = LETTERS, delays: tuple[int, ...] = DELAYS, starts: int = 12
+) -> PassivityExperiment:
+    """Return section V.A: counts at the fitted lag, and onsets against delay.
+
+    Args:
+        laws: of the onsets.
+        delays: of the onsets [samples].
+        starts: of the onsets; the counts have 24.
+    """
+    with ThreadPoolExecutor(WORKERS) as pool:
+        counts = tuple(pool.map(lambda job: count_cycles(*job), (*PANELS, *NEW)))
+    found = onsets(band_setup("W"), laws, delays, starts=starts, tolerance=0.05, lowest=50.0)
+    return PassivityExperiment(counts, found)
