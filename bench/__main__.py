@@ -7,13 +7,14 @@ from collections.abc import Callable, Sequence
 
 from rich.console import Console
 
-from bench import cache, certificates, kernels, nearest, split, startup
+from bench import cache, certificates, kernels, nearest, simulation, split, startup
 
 PARTS: dict[str, Callable[[Console], None]] = {
     "kernels": kernels.run,
     "cache": cache.run,
     "nearest": nearest.run,
     "split": split.run,
+    "simulation": simulation.run,
     "certificates": certificates.run,
     "startup": startup.run,
 }
