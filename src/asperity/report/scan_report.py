@@ -142,8 +142,7 @@ def print_scans(setup: Setup, found: Sequence[Stroke], console: Console) -> None
     """Print answer, table and assumptions."""
     console.print(answer(found), style="bold", markup=False)
     console.print()
-    planar = all(stroke.energy[1] == 0.0 for stroke in found if not stroke.stopped)
-    shown = [number for number in range(len(HEADINGS)) if number != Y or not planar]
+    shown = [number for number in range(len(HEADINGS)) if number != Y]
     table = Table(box=None, pad_edge=False)
     for number in shown:
         table.add_column(HEADINGS[number], justify="right" if number else "left", no_wrap=True)
@@ -152,7 +151,7 @@ def print_scans(setup: Setup, found: Sequence[Stroke], console: Console) -> None
         feeding = "red" if stroke.feeds else ""
         table.add_row(*[Text(texts[i], style=feeding if i == FIELD else "") for i in shown])
     console.print(table)
-    console.print(" ".join(NOTES), style="dim", markup=False)
+    console.print(f"{' '.join(NOTES)} The y axis: --html, --json.", style="dim", markup=False)
     stops = {stroke.stopped for stroke in found if stroke.stopped}
     for reason in sorted(stops):
         console.print(f"Stopped: it {reason}", style="dim", markup=False)

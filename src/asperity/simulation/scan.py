@@ -36,8 +36,8 @@ class Stroke:
         field: of it what the law itself supplies per stroke [J]: the work of its force along the
             true path, at every place at once. The rest is due to sampling, delay and the steps of
             the encoder; of a conservative law all is.
-        error: of the field's work [J]: of its quadrature by halving the steps, and a thousandth
-            of all that goes there and back.
+        error: of the field's work [J]: of its quadrature by halving the steps, a thousandth of
+            all that goes there and back, and what turns store that do not end where they began.
         spread: standard deviation of the field's work from turn to turn [J]; 0 for a single one.
         same_sample: the paper's sum, all axes, per stroke [J]: commanded force times the measured
             displacement of the same sample.
@@ -155,6 +155,7 @@ def _stroke(surface: Surface, way: Strokes, run: Run, depth: float) -> Stroke:
 
     works = summed(fine)
     error = np.abs(works - summed(coarse)).mean() + _NEGLIGIBLE * summed(np.abs(fine)).mean()
+    error += _not_closed(run, np.array([0, *begins]), len(works))
     x, y, z = (float(value) for value in _kept(each("supplied")).mean(axis=0))
     return Stroke(
         law, speed, depth, (x, y, z), float(works.mean()), float(error), _spread(works),
@@ -169,6 +170,18 @@ def _kept(strokes: FloatArray) -> FloatArray:
     """
     count = (len(strokes) - 1) // 2 * 2 or len(strokes)
     return strokes[-count:]
+
+
+def _not_closed(run: Run, begins: FloatArray, kept: int) -> float:
+    """Return what a field may have given or stored because turns do not end where they began [J].
+
+    Per stroke: the distance between both ends of a turn, times the force there.
+    """
+    first = [int(i) for i in begins[-kept::2]]
+    ends = np.vstack([run.position[first[1:]], run.state[:3]])
+    gaps = np.linalg.norm(ends - run.position[first], axis=1)
+    forces = np.linalg.norm(run.applied[first], axis=1)
+    return float((gaps * forces).mean() / 2.0) if kept % 2 == 0 else 0.0
 
 
 def _spread(works: FloatArray) -> float:
