@@ -13,6 +13,7 @@ from asperity.cli.devices import devices_command
 from asperity.cli.limits import limits_command
 from asperity.cli.onset import onset_command
 from asperity.cli.prepare import prepare_command
+from asperity.cli.reproduce import reproduce_command
 from asperity.cli.scan import scan_command
 from asperity.cli.simulate import simulate_command
 from asperity.cli.surfaces import surfaces_command
@@ -36,6 +37,7 @@ cli.add_command(devices_command)
 cli.add_command(limits_command)
 cli.add_command(onset_command)
 cli.add_command(prepare_command)
+cli.add_command(reproduce_command)
 cli.add_command(scan_command)
 cli.add_command(simulate_command)
 cli.add_command(surfaces_command)

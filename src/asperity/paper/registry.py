@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from difflib import get_close_matches
 
-from asperity.errors import ParameterError, nearest_names
+from asperity.errors import ParameterError
 from asperity.paper import (
     claims_appendix,
     claims_conclusion,
@@ -65,7 +66,12 @@ def claim(name: str) -> Claim:
         ('(12)',)
     """
     if not isinstance(name, str) or name not in CLAIMS:
-        raise ParameterError("claim", f"is unknown: {name!r}; {nearest_names(str(name), CLAIMS)}")
+        close = get_close_matches(str(name).lower(), [known.lower() for known in CLAIMS], n=3)
+        near = [known for known in CLAIMS if known.lower() in close]
+        hint = f"did you mean {' or '.join(map(repr, near))}? " if near else ""
+        raise ParameterError(
+            "claim", f"is unknown: {name!r}; {hint}there are {len(CLAIMS)}, all listed without it"
+        )
     return CLAIMS[name]
 
 

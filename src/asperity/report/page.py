@@ -34,10 +34,12 @@ class Row:
 
     Attributes:
         cells: texts.
-        kinds: of single cells, by column: "no" and "good" are coloured, "l" is bold, "open" faint.
+        kinds: of single cells, by column: "no", "good" and "part" are coloured, "l" is bold,
+            "open" is faint.
         id: for links to the row; may be empty.
         summary: of the details, which are folded away.
         details: names and values of what stands behind the row.
+        details_in: the column that they are folded into.
     """
 
     cells: Sequence[str]
@@ -45,6 +47,7 @@ class Row:
     id: str = ""
     summary: str = "Evidence"
     details: Sequence[tuple[str, str]] = ()
+    details_in: int = 0
 
 
 @dataclass(frozen=True)

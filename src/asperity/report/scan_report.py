@@ -125,7 +125,8 @@ def scan_html(setup: Setup, found: Sequence[Stroke]) -> str:
     )
     rows = [
         Row(cells(stroke), {0: "l", FIELD: "no" if stroke.feeds else ""},
-            details=[("stopped", stroke.stopped)] if stroke.stopped else (), summary="Why")
+            details=[("stopped", stroke.stopped)] if stroke.stopped else (), summary="Why",
+            details_in=6)
         for stroke in found
     ]  # fmt: skip
     parts: list[Picture | Grid] = [

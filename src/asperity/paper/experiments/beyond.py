@@ -94,7 +94,8 @@ def surfaces(measured: Texture | None = None) -> dict[str, Texture]:
 
 def usable_devices() -> tuple[list[str], list[str]]:
     """Return the devices whose data suffice, and the others: they lack a mass or K₀."""
-    usable, skipped = [], []
+    usable: list[str] = []
+    skipped: list[str] = []
     for name in device_names():
         try:
             device_setup(name, Surface(Sinusoid(1e-4, 1e-3), "W"), HAND)

@@ -1,0 +1,163 @@
+"""``asperity reproduce`` as its users see it."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from rich.cells import cell_len
+
+from asperity.cli.main import main
+from asperity.paper import CLAIMS, VERDICTS, claim
+
+Call = Callable[..., tuple[int, str, str]]
+FEW = ("eq-12", "eq-44", "table-1-A", "remark-3", "limit-4", "sentence-V.A-qF")
+
+
+@pytest.fixture
+def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["asperity", "reproduce", *arguments])
+        code = 0
+        try:
+            main()
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+def only(*names: str) -> list[str]:
+    return [text for name in names for text in ("--claim", name)]
+
+
+def test_one_claim_shows_its_evidence(call: Call) -> None:
+    code, out, err = call("--claim", "eq-12")
+    assert (code, err) == (0, "")
+    result = claim("eq-12").run()
+    text = " ".join(out.split())
+    assert " ".join(result.statement.split()) in text
+    assert result.verdict in text
+    assert " ".join(result.evidence.summary.split()) in text
+    for name in result.evidence.numbers:
+        assert name in text
+
+
+def test_json_has_the_schema(call: Call) -> None:
+    code, out, _err = call(*only(*FEW), "--json", "-")
+    assert code == 0
+    data = json.loads(out)
+    assert set(data) == {"schema", "claims", "experiments"}
+    assert data["experiments"] is None
+    assert {one["id"] for one in data["claims"]} == set(FEW)
+    for one in data["claims"]:
+        assert set(one) == {"id", "equations", "statement", "verdict", "evidence"}
+        assert one["verdict"] in VERDICTS
+        assert one["evidence"]["summary"]
+
+
+def test_a_claim_alone_is_what_it_is_among_others(call: Call) -> None:
+    _code, among, _err = call(*only(*FEW), "--json", "-")
+    _code, alone, _err = call("--claim", "limit-4", "--json", "-")
+    rows = {one["id"]: one for one in json.loads(among)["claims"]}
+    assert json.loads(alone)["claims"] == [rows["limit-4"]]
+
+
+def test_every_equation_has_a_claim() -> None:
+    covered = {number for one in CLAIMS.values() for number in one.equations}
+    wanted = {f"({n})" for n in range(1, 45)} | {"Table I", "Table II"}
+    wanted |= {f"Remark {n}" for n in range(1, 8)} | {f"Limit {n}" for n in range(1, 7)}
+    assert wanted <= covered
+
+
+class _Tags(HTMLParser):
+    """Checks that tags are closed in order."""
+
+    VOID = frozenset({"meta", "img", "br"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in self.VOID:
+            self.open.append(tag)
+        self.ids += [value for name, value in attrs if name == "id" and value]
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_the_page_needs_no_network_and_links_to_rows(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "claims.html"
+    code, _out, _err = call(*only(*FEW), "--html", str(path))
+    text = path.read_text(encoding="utf-8")
+    assert code == 0
+    tags = _Tags()
+    tags.feed(text)
+    assert tags.open == []
+    assert set(FEW) <= set(tags.ids)
+    assert len(set(tags.ids)) == len(tags.ids)
+    assert "://" not in re.sub(r"data:[^\"]*", "", text)
+    assert text.count("data:image/svg+xml") == 2  # figures 2 and 3
+    for name in FEW:
+        assert f"asperity reproduce --claim {name}" in text
+
+
+BAD = [
+    (["--claim", "eq-99"], "did you mean"),
+    (["--claim", ""], "claim is unknown"),
+    (["--json", "-", "--html", "-"], "cannot both"),
+    (["--json", "no/where.json"], "folder that exists"),
+    (["--surface", "sinusiod:amplitude=1mm,period=1mm"], "did you mean 'sinusoid'"),
+    (["--magnify", "20"], "applies to a measured surface"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD, ids=[" ".join(a) for a, _m in BAD])
+def test_bad_input_is_one_line(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = call(*arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert len(err.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_whole_table_fits_a_terminal(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its experiments are small stand-ins; the whole is run by hand and takes minutes."""
+    import asperity.paper.experiments as home
+    from asperity.paper.experiments import run as runner
+    from asperity.paper.experiments.beyond import BeyondExperiment
+    from asperity.paper.experiments.bump import bump_experiment
+    from asperity.paper.experiments.passivity import passivity_experiment
+    from asperity.paper.experiments.scanning import scanning_experiment
+
+    def small(measured: object = None, progress: object = None) -> runner.Experiments:
+        assert measured is None
+        assert progress is not None
+        return runner.Experiments(
+            passivity_experiment("W", (0,), starts=1),
+            scanning_experiment("A"),
+            bump_experiment("AD"),
+            BeyondExperiment((), ("falcon",)),
+        )
+
+    monkeypatch.setattr(home, "run_experiments", small)
+    code, out, err = call()
+    assert (code, err) == (0, "")
+    assert max(map(cell_len, out.splitlines())) <= 80
+    for name in CLAIMS:
+        assert name in out
+    assert f"Of {len(CLAIMS)} claims" in out
+    assert "V.C: A " in out
