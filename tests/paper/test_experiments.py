@@ -86,6 +86,18 @@ def test_a_wall_that_cycles_is_found_out(monkeypatch: pytest.MonkeyPatch) -> Non
     assert FINDINGS["sentence-V.A-cycles"]().verdict == "does not hold"
 
 
+def test_the_field_feeds_as_theory_says() -> None:
+    """A, B and E are not conservative and feed some hand; F takes; the others give nothing."""
+    found = scanning_experiment("WABCDEFH")
+    feeding = {law: sum(one.feeds for one in found.of(law)) for law in "WABCDEFH"}
+    every = len(settings.HANDS) * len(settings.SPEEDS)
+    assert feeding["A"] == feeding["E"] == every
+    assert feeding["B"] > 0
+    assert [feeding[law] for law in "WCDFH"] == [0, 0, 0, 0, 0]
+    assert all(one.closure < 1e-9 for law in "WABCDEFH" for one in found.of(law))
+    assert all(one.total < 0.0 for one in found.of("F"))
+
+
 # --- the experiments themselves -------------------------------------------------------------------
 
 
