@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -57,6 +58,9 @@ def onset_command(
     check_output("html", html_path)
     # The scene's law is one of many here; a scene without one is as good.
     setup = read_setup(scene, values | {"law": values["law"] or "W"}, duration)
+    # Nor is its delay assumed: --delays sets it.
+    said = tuple(sentence for sentence in setup.assumptions if "delay" not in sentence)
+    setup = replace(setup, assumptions=said)
     letters = read_laws(laws or values["law"] or "WABCDEFGH")
     waits = read_list("delays", delays or "0; 1; 2; 3; 4; 5", whole=True)
     chosen = {

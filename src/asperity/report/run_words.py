@@ -76,7 +76,7 @@ def facts(setup: Setup, run: Run) -> list[tuple[str, str]]:
         ("Law", f"{surface.law.letter}, {surface.law.name.replace('-', ' ')}"),
         ("Stiffness", engineering(surface.stiffness, "N/m")),
         *facts_of_loop(setup),
-        ("Delay", f"{setup.servo.delay} samples"),
+        ("Delay", f"{setup.servo.delay} sample{'' if setup.servo.delay == 1 else 's'}"),
         ("Simulated", f"{engineering(run.duration, 's')}, {run.samples} samples"),
     ]
 

@@ -92,7 +92,8 @@ def least_damping(plant: Plant, low: ArrayLike, high: ArrayLike, hand: Hand | No
         plant: what moves; of a five-bar the brakes count as on.
         low: least position that it gets to [m], shape (3,).
         high: greatest position [m], shape (3,); of a five-bar 9 x 9 places in between are tried.
-        hand: whose damping counts too: of a spring, on a mass in space; of a band, everywhere.
+        hand: whose damping counts too, of a spring on a mass in space; elsewhere it is left out,
+            which is on the safe side.
     """
     if not isinstance(plant, Pantograph):
         held = np.diag(hand.damping) if isinstance(hand, SpringHand) else np.zeros((3, 3))

@@ -104,7 +104,7 @@ class Experiments:
 def run_experiments(
     measured: Texture | None = None, progress: Callable[[str], None] | None = None
 ) -> Experiments:
-    """Return all experiments; about a minute on two processors.
+    """Return all experiments; one to three minutes on two processors.
 
     Args:
         measured: a surface for the last one; without it a drawn one takes its place.
