@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.checks import FloatArray, positive
+from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
 from asperity.simulation.hands import Hand, MovedHand
 from asperity.simulation.motions import Motion
@@ -23,8 +23,13 @@ from asperity.surface import Surface
 # The paper does not say when an oscillation counts; here above this :func:`restlessness` [m/s].
 CYCLE_SPEED = 15e-3
 LOWEST, HIGHEST = 1.0, 1e6  # stiffness [N/m]
-# A run that is restless at its end is made so many times longer.
-PATIENCE = 4.0
+_LEAST_TOLERANCE = 1e-9
+# A run that is restless at its end is made so many times longer, again and again up to the last.
+PATIENCE = (1.0, 4.0, 16.0)
+_LEAST_SAMPLES = 16
+# Part of the loss that the texture supplies at least: amplitudes beat, so not all of it always.
+_FED = 0.2
+_MOST_STARTS = 10_000
 _COARSE = 2.0  # factor from one stiffness to the next while the onset is looked for
 
 
@@ -110,13 +115,26 @@ def restlessness(run: Run, quarter: int = 3) -> float:
 
 
 def cycles(run: Run, threshold: float = CYCLE_SPEED) -> bool:
-    """Return whether a run ended in a limit cycle: it diverged, or does not come to rest.
+    """Return whether a run ends restless, and fed by the texture, or diverged.
+
+    Fed: in the last quarter the texture supplies at least a fifth of what damping and dry
+    friction take, on average all of it. A handle that swings or falls on its own is no limit cycle.
 
     Args:
         run: whose hand holds still during the second half.
         threshold: of :func:`restlessness` [m/s].
     """
-    return run.stopped.startswith("diverged") or restlessness(run) > threshold
+    if run.stopped.startswith("diverged"):
+        return True
+    return restlessness(run) > threshold and _fed(run)
+
+
+def _fed(run: Run) -> bool:
+    energies, first = run.energies, -max(len(run.time) // 4, 2)
+    supplied = energies["supplied"][-1].sum() - energies["supplied"][first].sum()
+    taken = energies["lost"][-1] - energies["lost"][first]
+    taken -= energies["friction"][-1] - energies["friction"][first]
+    return bool(supplied > _FED * taken)
 
 
 def calms_down(run: Run) -> bool:
@@ -129,20 +147,45 @@ def ends_in_cycle(
 ) -> tuple[bool, Run]:
     """Return whether a loop ends in a limit cycle, and the longest run of it.
 
-    One that is restless at the end is run again, ``PATIENCE`` times as long: what has come to rest
-    by then, or is still calming down, was no cycle. A handle that leaves the workspace restless
-    counts as one.
+    One that ends restless is run again, 4 and 16 times as long, until it is steady. It is a cycle
+    if the texture then feeds it, see :func:`cycles`. A handle that leaves the workspace while it
+    is fed counts as one.
 
     Args:
         run_for: runs the loop for a duration [s].
         duration: of the first run [s].
         threshold: of :func:`restlessness` [m/s].
     """
-    run = run_for(duration)
-    if cycles(run, threshold) and not run.stopped:
-        run = run_for(PATIENCE * duration)
-        return cycles(run, threshold) and not calms_down(run), run
+    for patience in PATIENCE:
+        run = run_for(patience * duration)
+        if run.stopped or restlessness(run) <= threshold:
+            return cycles(run, threshold), run
+        if patience > 1.0 and not calms_down(run):
+            break
     return cycles(run, threshold), run
+
+
+def holds_still(motion: Motion, duration: float) -> bool:
+    """Return whether a hand is at rest in the second half of a run [s]."""
+    times = np.linspace(0.5, 1.0, 33) * duration
+    return bool(np.ptp(motion.at(times), axis=0).max() == 0.0)
+
+
+def runner(
+    surface: Surface,
+    plant: Plant,
+    hand: Hand,
+    servo: Servo,
+    motion: Motion,
+    start: FloatArray,
+    velocity: ArrayLike | None,
+    shift: FloatArray,
+) -> Callable[[float], Run]:
+    """Return what runs a loop for a duration [s], all of it shifted by an offset [m]."""
+    way = Shifted(motion, (float(shift[0]), float(shift[1]), float(shift[2])))
+    return lambda span: simulate(
+        surface, plant, hand, servo, way, span, start=start + shift, velocity=velocity
+    )
 
 
 def offsets(surface: Surface, count: int) -> FloatArray:
@@ -182,7 +225,8 @@ def find_onset(
         motion: of the hand's anchor; it must be at rest in the second half of the run.
         start: of the handle [m], shape (3,); default: where the motion begins.
         velocity: of the handle at the start [m/s], shape (3,); default: none.
-        duration: of a run [s]; one that is restless at its end is run again, 4 times as long.
+        duration: of a run [s]; one that is restless at its end is run again, up to 16 times as
+            long.
         starts: phases of the texture at which the handle starts.
         tolerance: the bracket's width over its lower end.
         threshold: :func:`restlessness` that counts as a limit cycle [m/s].
@@ -195,25 +239,22 @@ def find_onset(
         ParameterError: for a handle that is moved, a motion that does not come to rest, or a wrong
             number.
     """
-    _refuse(hand, motion, duration)
-    positive("tolerance", tolerance)
-    if starts < 1 or starts != int(starts):
-        raise ParameterError("starts", "must be a whole number, at least 1", starts)
+    _refuse(hand, motion, servo, duration, starts)
+    width = positive("tolerance", tolerance)
+    if width < _LEAST_TOLERANCE:
+        raise ParameterError("tolerance", f"must be at least {_LEAST_TOLERANCE:g}", tolerance)
+    if not positive("lowest", lowest, "N/m") < positive("highest", highest, "N/m"):
+        raise ParameterError("lowest", f"must be below the highest, {highest:g} N/m", lowest)
+    limit = positive("threshold", threshold, "m/s")
     shifts = offsets(surface, int(starts))
-    begin = motion.at(np.zeros(1))[0] if start is None else np.asarray(start, dtype=float)
+    begin = motion.at(np.zeros(1))[0] if start is None else array("start", start, (3,), "m")
 
     def count(stiffness: float, enough: int) -> tuple[int, FloatArray]:
         """Return how many starts cycle, at most so many, and the box (2, 3) that they reached."""
         stiff, found, box = surface.to_stiffness(stiffness), 0, np.array([[np.inf], [-np.inf]])
         for shift in shifts:
-            way = Shifted(motion, (shift[0], shift[1], shift[2]))
-
-            def run_for(span: float, way: Motion = way, shift: FloatArray = shift) -> Run:
-                return simulate(
-                    stiff, plant, hand, servo, way, span, start=begin + shift, velocity=velocity
-                )
-
-            ended, run = ends_in_cycle(run_for, duration, threshold)
+            run_for = runner(stiff, plant, hand, servo, motion, begin, velocity, shift)
+            ended, run = ends_in_cycle(run_for, duration, limit)
             found += ended
             place = run.position
             box = np.array([np.fmin(box[0], place.min(axis=0)), np.fmax(box[1], place.max(axis=0))])
@@ -223,27 +264,41 @@ def find_onset(
             progress()
         return found, box
 
-    quiet, cycling = 0.0, positive("lowest", lowest, "N/m")
-    while cycling <= highest and not count(cycling, 1)[0]:
-        quiet, cycling = cycling, cycling * _COARSE
-    while cycling <= highest and quiet > 0.0 and cycling > quiet * (1.0 + tolerance):
+    quiet, cycling = _bracket(lambda k: count(k, 1)[0] > 0, lowest, highest, width)
+    every, box = count(quiet if math.isinf(cycling) else cycling, len(shifts))
+    low, high = ((float(row[0]), float(row[1]), float(row[2])) for row in box)
+    return Onset(surface.law.letter, servo.delay, quiet, cycling, len(shifts), every, low, high)
+
+
+def _bracket(
+    cycling_at: Callable[[float], bool], lowest: float, highest: float, width: float
+) -> tuple[float, float]:
+    """Return the greatest stiffness found quiet and the least found cycling [N/m].
+
+    Upwards from the lowest in steps of a factor of 2 until something cycles, then bisection.
+    """
+    quiet, cycling = 0.0, lowest
+    while not cycling_at(cycling):
+        if cycling >= highest:
+            return cycling, math.inf
+        quiet, cycling = cycling, min(cycling * _COARSE, highest)
+    while quiet > 0.0 and cycling > quiet * (1.0 + width):
         middle = math.sqrt(quiet * cycling)
-        if count(middle, 1)[0]:
+        if cycling_at(middle):
             cycling = middle
         else:
             quiet = middle
-    ended = cycling > highest
-    every, box = count(quiet if ended else cycling, len(shifts))
-    low, high = ((float(row[0]), float(row[1]), float(row[2])) for row in box)
-    return Onset(
-        surface.law.letter, servo.delay, quiet, math.inf if ended else cycling, len(shifts), every,
-        low, high,
-    )  # fmt: skip
+    return quiet, cycling
 
 
-def _refuse(hand: Hand, motion: Motion, duration: float) -> None:
+def _refuse(hand: Hand, motion: Motion, servo: Servo, duration: float, starts: int) -> None:
     if isinstance(hand, MovedHand):
         raise ParameterError("hand", "must let the handle go: one that is moved never cycles")
-    times = np.linspace(0.5, 1.0, 33) * positive("duration", duration, "s")
-    if np.ptp(motion.at(times), axis=0).max() > 0.0:
+    if positive("duration", duration, "s") < _LEAST_SAMPLES * servo.period:
+        least = f"must be at least {_LEAST_SAMPLES} samples, {_LEAST_SAMPLES * servo.period:g} s"
+        raise ParameterError("duration", least, duration)
+    if not holds_still(motion, duration):
         raise ParameterError("motion", "must be at rest in the second half of the run")
+    if isinstance(starts, bool) or not (1 <= starts <= _MOST_STARTS and starts == int(starts)):
+        limit = f"must be a whole number, 1 to {_MOST_STARTS}"
+        raise ParameterError("starts", limit, starts)

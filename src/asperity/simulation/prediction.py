@@ -58,7 +58,8 @@ class Prediction:
 
         With exact positions it never may; the proof knows no steps of the encoder.
         """
-        return self.conservative and self.onset.cycling <= self.delay_rule
+        cycling = self.onset.cycling
+        return self.conservative and math.isfinite(cycling) and cycling <= self.delay_rule
 
     @property
     def wall_rule_missed(self) -> bool:
@@ -85,7 +86,9 @@ class Prediction:
         }
 
 
-def least_damping(plant: Plant, low: ArrayLike, high: ArrayLike, hand: Hand | None = None) -> float:
+def least_damping(
+    plant: Plant, low: ArrayLike, high: ArrayLike, hand: Hand | None = None, top: float = 0.0
+) -> float:
     """Return σ₀(B) [N s/m]: the least damping over the directions in which the handle moves.
 
     Args:
@@ -94,9 +97,13 @@ def least_damping(plant: Plant, low: ArrayLike, high: ArrayLike, hand: Hand | No
         high: greatest position [m], shape (3,); of a five-bar 9 x 9 places in between are tried.
         hand: whose damping counts too, of a spring on a mass in space; elsewhere it is left out,
             which is on the safe side.
+        top: height up to which the brakes of a five-bar may be on [m].
     """
     if not isinstance(plant, Pantograph):
-        held = np.diag(hand.damping) if isinstance(hand, SpringHand) else np.zeros((3, 3))
+        # Behind a resonance the hand does not damp the handle.
+        held = np.zeros((3, 3))
+        if isinstance(hand, SpringHand) and plant.resonance is None:
+            held = np.diag(hand.damping)
         return float(np.linalg.eigvalsh(plant.damping + held)[0])
     if plant.joint_damping == 0.0:
         return 0.0
@@ -104,7 +111,7 @@ def least_damping(plant: Plant, low: ArrayLike, high: ArrayLike, hand: Hand | No
     grid = [
         np.array([x, 0.0, z])
         for x in np.linspace(x0, x1, 9)
-        for z in np.linspace(z0, min(z1, max(z0, 0.0)), 9)
+        for z in np.linspace(z0, min(z1, max(z0, top)), 9)
     ]
     # Corners of the box that the arms do not reach are places where it was not.
     places = [plant.centre + p[[0, 2]] for p in grid if not left_workspace(plant, p)]
@@ -137,7 +144,7 @@ def predict(
     """
     top = 0.0 if surface.law.contact == "nominal" else surface.texture.extremes[1]
     depth = max(top - onset.low[2], 0.0)
-    damping = least_damping(plant, onset.low, onset.high, hand)
+    damping = least_damping(plant, onset.low, onset.high, hand, top)
     q = plus = 0.0
     if depth > 0.0:
         pressed = surface.to_depth(depth)

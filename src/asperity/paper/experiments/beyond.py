@@ -50,7 +50,8 @@ class DeviceOnset:
     @property
     def missed(self) -> bool:
         """Whether a limit cycle was found at a stiffness that K₀/q of the catalogue allows."""
-        return self.prediction.onset.cycling <= self.allowed
+        cycling = self.prediction.onset.cycling
+        return math.isfinite(cycling) and cycling <= self.allowed
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units; an unbounded number is written as the string "inf"."""

@@ -11,8 +11,7 @@ import numpy as np
 from asperity.checks import FloatArray
 from asperity.paper.experiments.settings import FITTED, LAG, LETTERS, band_setup
 from asperity.scene.onsets import onsets
-from asperity.simulation import Run, simulate
-from asperity.simulation.onset import Shifted, ends_in_cycle, offsets
+from asperity.simulation.onset import ends_in_cycle, offsets, runner
 from asperity.simulation.prediction import Prediction
 
 STARTS = 24
@@ -34,8 +33,8 @@ class Count:
         divisor: of the stiffness of 2000 N/m.
         delay: in samples.
         starts: how many there were.
-        cycles: how many were still moving after 2 s, and not calming down.
-        slow: how many were restless after 0.5 s, but at rest or calming down after 2 s.
+        cycles: how many ended in a steady cycle, see ``ends_in_cycle``.
+        slow: how many were restless after 0.5 s, but came to rest by 2 or 8 s.
         time: of the first start's trace [s], shape (n,).
         x: of the handle [m], shape (n,).
         z: of the handle [m], shape (n,).
@@ -102,13 +101,9 @@ def count_cycles(law: str, divisor: float, delay: int = LAG, starts: int = START
     found = slow = 0
     kept: FloatArray | None = None
     for shift in offsets(setup.surface, starts):
-        way = Shifted(setup.motion, (shift[0], shift[1], shift[2]))
-
-        def run_for(span: float, way: Shifted = way, shift: FloatArray = shift) -> Run:
-            return simulate(
-                setup.surface, setup.plant, setup.hand, setup.servo, way, span, start=begin + shift
-            )
-
+        run_for = runner(
+            setup.surface, setup.plant, setup.hand, setup.servo, setup.motion, begin, None, shift
+        )
         ended, run = ends_in_cycle(run_for, setup.duration)
         found += ended
         slow += run.duration > setup.duration and not ended
