@@ -154,8 +154,9 @@ def test_scan_tells_gain_from_loss(call: Call, strokes: str, tmp_path: Path) -> 
     options = ["--laws", "AF", "--speeds", "0.05m/s; 0.1m/s", "--strokes", "3"]
     code, out, err = call("scan", strokes, *options)
     assert (code, err) == (0, "")
-    assert "Feeds the hand at every speed and depth: A" in out
-    assert "never: F" in out
+    said = " ".join(out.split())
+    assert "A stroke feeds the hand: A always, F never." in said
+    assert "The law's field itself feeds it: A always, F never." in said
     assert max(map(len, out.splitlines())) <= 80
     code, out, _err = call("scan", strokes, *options, "--depths", "0.2mm;0.4mm", "--json", "-")
     found = json.loads(out)["strokes"]
@@ -182,6 +183,12 @@ BAD = [
     (["onset", "{still}", "--delays", "-1"], "delay must be a whole number"),
     (["onset", "{still}", "--starts", "0"], "starts must be a whole number"),
     (["onset", "{still}", "--laws", "WW"], "twice"),
+    (["onset", "{still}", "--starts", "1;9"], "starts must be a single one"),
+    (["onset", "{still}", "--starts", "1e12"], "starts must be a whole number, 1 to"),
+    (["onset", "{still}", "--tolerance", "1e-18"], "tolerance must be at least"),
+    (["onset", "{still}", "--lowest", "1e7N/m"], "lowest must be below the highest"),
+    (["onset", "{still}", "--stiffness", "100N/m"], "stiffness is what onset looks for"),
+    (["onset", "{still}", "--duration", "0.5ms"], "duration must be at least 16 samples"),
     (["scan", "{still}"], "motion must be"),
     (["scan", "{strokes}", "--speeds", "fast"], "speeds must be a quantity"),
     (["scan", "{strokes}", "--speeds", "0m/s"], "speeds must be positive"),

@@ -101,6 +101,19 @@ def test_a_trace_is_a_path_for_another_scene(tmp_path: Path) -> None:
     np.testing.assert_allclose(at, shown.position, rtol=1e-9, atol=1e-15)
 
 
+def test_a_way_that_leaves_a_finite_surface_is_said(tmp_path: Path) -> None:
+    np.save(tmp_path / "map.npy", 1e-5 * np.random.default_rng(0).normal(size=(32, 64)))
+    text = (
+        '[texture]\nkind = "file"\npath = "map.npy"\npitch = "20 um"\n[surface]\nlaw = "A"\n'
+        '[hand]\nkind = "moved"\n[motion]\nkind = "strokes"\nstart = "0.1 mm; 0.2 mm; 0 mm"\n'
+        'end = "END; 0.4 mm; 0 mm"\nspeed = "10 mm/s"\n'
+    )
+    for end, leaves in (("1.2 mm", False), ("1.4 mm", True)):
+        (tmp_path / "map.toml").write_text(text.replace("END", end))
+        said = make_setup(load_scene(str(tmp_path / "map.toml"))).assumptions
+        assert any("leaves the surface" in sentence for sentence in said) == leaves
+
+
 def test_another_law_keeps_the_loop(tmp_path: Path) -> None:
     setup = scene(tmp_path, MASS, SPRING, STILL)
     other = setup.with_law("H", 500.0).with_delay(3)

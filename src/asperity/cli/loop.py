@@ -89,6 +89,18 @@ def read_list(name: str, text: str, unit: str = "", *, whole: bool = False) -> l
     return values
 
 
+def read_one(name: str, text: str, unit: str = "", *, whole: bool = False) -> float:
+    """Return a single quantity.
+
+    Raises:
+        ParameterError: for several, or one that is not a quantity (or number) of that unit.
+    """
+    values = read_list(name, text, unit, whole=whole)
+    if len(values) > 1:
+        raise ParameterError(name, "must be a single one", text)
+    return values[0]
+
+
 @contextmanager
 def progress_bar(words: str) -> Iterator[Callable[[float], None]]:
     """Show how much is done, in [0, 1], on standard error if it is a terminal."""

@@ -15,6 +15,7 @@ from asperity.cli.loop import (
     progress_bar,
     read_laws,
     read_list,
+    read_one,
     read_setup,
 )
 from asperity.cli.output import STANDARD_OUTPUT, check_output, write_output
@@ -56,6 +57,8 @@ def onset_command(
         raise ParameterError("json", "and html cannot both go to standard output")
     check_output("json", json_path)
     check_output("html", html_path)
+    if values["stiffness"] is not None:
+        raise ParameterError("stiffness", "is what onset looks for: leave it out")
     # The scene's law is one of many here; a scene without one is as good.
     setup = read_setup(scene, values | {"law": values["law"] or "W"}, duration)
     # Nor is its delay assumed: --delays sets it.
@@ -64,9 +67,9 @@ def onset_command(
     letters = read_laws(laws or values["law"] or "WABCDEFGH")
     waits = read_list("delays", delays or "0; 1; 2; 3; 4; 5", whole=True)
     chosen = {
-        "starts": int(read_list("starts", starts or "12", whole=True)[0]),
-        "tolerance": read_list("tolerance", tolerance or "0.05")[0],
-        "lowest": read_list("lowest", lowest or "1", "N/m")[0],
+        "starts": int(read_one("starts", starts or "12", whole=True)),
+        "tolerance": read_one("tolerance", tolerance or "0.05"),
+        "lowest": read_one("lowest", lowest or "1", "N/m"),
     }
     found = _onsets(setup, letters, [int(wait) for wait in waits], chosen)
     if json_path is not None:

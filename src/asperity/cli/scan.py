@@ -13,6 +13,7 @@ from asperity.cli.loop import (
     progress_bar,
     read_laws,
     read_list,
+    read_one,
     read_setup,
 )
 from asperity.cli.output import STANDARD_OUTPUT, check_output, write_output
@@ -58,7 +59,7 @@ def scan_command(
     if depths is not None:
         wanted["depths"] = read_list("depths", depths, "m")
     if strokes is not None:
-        wanted["strokes"] = int(read_list("strokes", strokes, whole=True)[0])
+        wanted["strokes"] = int(read_one("strokes", strokes, whole=True))
     with progress_bar("stroking") as told:
         found = scans(setup, letters, progress=told, **wanted)
     if json_path is not None:

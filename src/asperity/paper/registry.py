@@ -67,6 +67,8 @@ def claim(name: str) -> Claim:
     """
     if not isinstance(name, str) or name not in CLAIMS:
         close = get_close_matches(str(name).lower(), [known.lower() for known in CLAIMS], n=3)
+        text = str(name).strip("() ")
+        close += [f"eq-{text}"] if text.isdecimal() else []
         near = [known for known in CLAIMS if known.lower() in close]
         hint = f"did you mean {' or '.join(map(repr, near))}? " if near else ""
         raise ParameterError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -87,8 +87,9 @@ def answer(setup: Setup, found: Sequence[Prediction]) -> str:
         if step:
             said += f" It is proved for exact positions, not for steps of {engineering(step, 'm')}."
     else:
-        said = f"No limit cycle below the delay rule, in {proved} cases of conservative laws."
-    if any(one.wall_rule is not None for one in found):
+        cases = "case" if proved == 1 else "cases"
+        said = f"No limit cycle below the delay rule, in {proved} {cases} of conservative laws."
+    if any(one.wall_rule is not None and one.onset.law != "W" for one in found):
         names = ", ".join(f"{one.onset.law} at d = {one.onset.delay}" for one in walls)
         said += f" K₀/q was too much for: {names}." if walls else " K₀/q was safe in all of them."
     return said
@@ -162,7 +163,9 @@ def print_onsets(setup: Setup, found: Sequence[Prediction], console: Console) ->
     console.print()
     table = Table(box=None, pad_edge=False)
     for number, name in enumerate(HEADINGS):
-        table.add_column(name, justify="right" if number in NUMBERS else "left", no_wrap=True)
+        # A number that is too wide goes on in the next line: no digit is ever cut.
+        side: Literal["left", "right"] = "right" if number in NUMBERS else "left"
+        table.add_column(name, justify=side, overflow="fold")
     for one in found:
         marked = kinds(one)
         texts = [

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
-from asperity.simulation.onset import CYCLE_SPEED, cycles, restlessness
+from asperity.simulation.onset import CYCLE_SPEED, cycles, holds_still, restlessness
 from asperity.units import engineering
 
 AXES = ("x", "y", "z")
@@ -25,24 +23,17 @@ def answer(setup: Setup, run: Run) -> str:
     law = setup.surface.law.letter
     total = run.ledger.total
     verb = "feeds the hand" if total > 0.0 else "takes from the hand"
-    said = (
-        f"Law {law} at {engineering(setup.surface.stiffness, 'N/m')} {verb} "
-        f"{engineering(abs(total), 'J', digits=3)} in {engineering(run.duration, 's')}"
-    )
+    work = f"{verb} {engineering(abs(total), 'J', digits=3)}" if total else "does no work"
+    stiffness = engineering(setup.surface.stiffness, "N/m")
+    said = f"Law {law} at {stiffness} {work} in {engineering(run.duration, 's')}"
     if run.stopped:
         return f"{said}. The run stopped: it {run.stopped}."
     return f"{said}. {unrest(setup, run)}."
 
 
-def at_rest(setup: Setup, duration: float) -> bool:
-    """Return whether the hand holds still in the second half of a run."""
-    times = np.linspace(0.5, 1.0, 33) * duration
-    return bool(np.ptp(setup.motion.at(times), axis=0).max() == 0.0)
-
-
 def unrest(setup: Setup, run: Run) -> str:
     """Return whether the handle came to rest, in words."""
-    if not at_rest(setup, run.duration):
+    if not holds_still(setup.motion, run.duration):
         return "The hand was moving to the end"
     if len(run.time) < 4:
         return "Too few samples were traced to say whether it came to rest"

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
 
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -29,14 +29,16 @@ NOTES = (
     "turns, there and back, after the first stroke; positive feeds the hand. Field: what the law "
     "itself gives along the true path, without sampling, delay and steps of the encoder, which "
     "make up the rest; ±: from turn to turn, and of its quadrature. Paper's: its sum of force and "
-    "step of the same sample. Lost: how often per stroke contact ended.",
+    "step of the same sample. Depth: of the handle below z = 0, on average. Lost: how often per "
+    "stroke contact ended.",
 )
 _DASHES = ("-", "--", ":", "-.")
 
 
 def milli(value: float, *, sign: bool = True) -> str:
     """Return an energy [J] as text in mJ."""
-    digits = 2 if abs(value) >= 1e-4 else 4
+    size = abs(value)
+    digits = 0 if size >= 1.0 else 1 if size >= 0.1 else 2 if size >= 1e-4 else 4
     text = f"{1e3 * value:+.{digits}f}" if sign else f"{1e3 * value:.{digits}f}"
     return "0" if not text.strip("+-0.") else text
 
@@ -44,7 +46,7 @@ def milli(value: float, *, sign: bool = True) -> str:
 def cells(stroke: Stroke) -> list[str]:
     """Return the texts of a row."""
     place = [
-        stroke.law, engineering(stroke.speed, "m/s"), engineering(stroke.depth, "m", digits=3),
+        stroke.law, engineering(stroke.speed, "m/s"), engineering(stroke.reached, "m", digits=2),
     ]  # fmt: skip
     if stroke.stopped:
         return [*place, "", "", "", "stopped", "", "", "", ""]
@@ -55,24 +57,24 @@ def cells(stroke: Stroke) -> list[str]:
         milli(stroke.field),
         milli(stroke.spread + stroke.error, sign=False),
         milli(stroke.same_sample),
-        f"{stroke.lost_contact:.1f}",
+        f"{stroke.lost_contact:.3g}",
     ]
 
 
 def answer(found: Sequence[Stroke]) -> str:
-    """Return which laws gain energy, in a sentence or two."""
+    """Return which laws feed the hand, and which do so by their field, in two sentences."""
+    by_all = _grouped(found, lambda stroke: stroke.total > stroke.spread + stroke.error)
+    by_field = _grouped(found, lambda stroke: stroke.feeds)
+    return f"A stroke feeds the hand: {by_all}. The law's field itself feeds it: {by_field}."
+
+
+def _grouped(found: Sequence[Stroke], feeds: Callable[[Stroke], bool]) -> str:
     laws = list(dict.fromkeys(stroke.law for stroke in found))
-    groups: dict[str, list[str]] = {"always": [], "sometimes": [], "never": []}
+    groups: dict[str, list[str]] = {"always": [], "at times": [], "never": []}
     for law in laws:
-        gains = [stroke.feeds for stroke in found if stroke.law == law]
-        groups["always" if all(gains) else "sometimes" if any(gains) else "never"].append(law)
-    words = {
-        "always": "Feeds the hand at every speed and depth",
-        "sometimes": "at some",
-        "never": "never",
-    }
-    said = "; ".join(f"{words[key]}: {', '.join(groups[key])}" for key in words if groups[key])
-    return f"{said[0].upper()}{said[1:]}."
+        gains = [feeds(stroke) for stroke in found if stroke.law == law]
+        groups["always" if all(gains) else "at times" if any(gains) else "never"].append(law)
+    return ", ".join(f"{', '.join(laws)} {when}" for when, laws in groups.items() if laws)
 
 
 def scan_figure(found: Sequence[Stroke]) -> Figure:
@@ -146,7 +148,9 @@ def print_scans(setup: Setup, found: Sequence[Stroke], console: Console) -> None
     shown = [number for number in range(len(HEADINGS)) if number != Y]
     table = Table(box=None, pad_edge=False)
     for number in shown:
-        table.add_column(HEADINGS[number], justify="right" if number else "left", no_wrap=True)
+        # A number that is too wide goes on in the next line: no digit is ever cut.
+        side: Literal["left", "right"] = "right" if number else "left"
+        table.add_column(HEADINGS[number], justify=side, overflow="fold")
     for stroke in found:
         texts = cells(stroke)
         feeding = "red" if stroke.feeds else ""

@@ -46,7 +46,10 @@ def plant_of(
         return _five_bar(device, centre, resonance, brakes)
     for name, value in (("centre", centre), ("brakes", brakes)):
         if value is not None:
-            raise ParameterError(f"run.{name}", f"needs a five-bar, which {device.id} is not")
+            reason = f"needs a five-bar, which {device.id} is not"
+            if not dynamics:
+                reason = "means nothing for a handle that is moved"
+            raise ParameterError(f"run.{name}", reason)
     if not dynamics:
         return Cartesian(mass=1.0), []
     return _mass(device, resonance)

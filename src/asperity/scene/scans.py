@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from asperity.errors import ParameterError
 from asperity.scene.setup import Setup
+from asperity.simulation.hands import SpringHand
 from asperity.simulation.motions import Strokes
 from asperity.simulation.scan import Stroke, scan_strokes
 
@@ -36,7 +37,8 @@ def scans(
         progress: is told the part that is done.
 
     Raises:
-        ParameterError: for a motion that is not made of strokes.
+        ParameterError: for a motion that is not made of strokes, or depths for a hand that does
+            not hold a height.
     """
     motion = setup.motion
     if not isinstance(motion, Strokes):
@@ -46,6 +48,8 @@ def scans(
         if deepest <= 0.0:
             raise ParameterError("depths", "are needed: the motion of the scene is not below z = 0")
         depths = (deepest,)
+    elif isinstance(setup.hand, SpringHand) and setup.hand.stiffness[2] == 0.0:
+        raise ParameterError("depths", "mean nothing: the hand has no stiffness along z")
     count = max(motion.count, DEFAULT_STROKES) if strokes is None else strokes
     way = replace(motion, count=count)
     jobs = [(law, speed, depth) for law in laws for speed in speeds for depth in depths]
@@ -55,7 +59,7 @@ def scans(
         law, speed, depth = job
         (found,) = scan_strokes(
             setup.with_law(law).surface, setup.plant, setup.hand, setup.servo, way,
-            speeds=[speed], depths=[depth],
+            speeds=[speed], depths=[depth], start=setup.start, velocity=setup.velocity,
         )  # fmt: skip
         done[0] += 1
         if progress is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -34,6 +35,10 @@ from asperity.simulation import (
     Path as PathMotion,
 )
 from asperity.surface import Surface
+from asperity.textures.heightmap import HeightMap
+from asperity.textures.profile import Profile
+from asperity.textures.texture import Texture
+from asperity.units import engineering
 
 DEFAULT_DEVICE = "omega.3"
 DEFAULT_DURATION = 1.0
@@ -205,7 +210,7 @@ def make_setup(
     span, of_span = _duration(duration, run.pop("duration", None), motion)
     return Setup(
         Surface(scene.texture, **merged), chosen, plant, hand, servo, motion, span,
-        assumptions=(*assumed, *said, *of_span), **run,
+        assumptions=(*assumed, *said, *of_span, *_leaving(scene.texture, motion, span)), **run,
     )  # fmt: skip
 
 
@@ -217,6 +222,20 @@ def _duration(given: float | None, own: float | None, motion: Motion) -> tuple[f
     if ends > 0.0:
         return float(ends), []
     return DEFAULT_DURATION, [f"Default duration {DEFAULT_DURATION:g} s"]
+
+
+def _leaving(texture: Texture, motion: Motion, span: float) -> list[str]:
+    """Return a warning if the hand's way leaves a surface that ends."""
+    domain = texture.domain
+    if domain.periodic or not isinstance(texture, (HeightMap, Profile)):
+        return []
+    way = motion.at(np.linspace(0.0, span, 257))[:, :2] - domain.origin
+    sides = np.hypot(*domain.spans.T)
+    along = way @ (domain.spans / sides[:, None] ** 2).T
+    if (along >= 0.0).all() and (along <= 1.0).all():
+        return []
+    size = " x ".join(engineering(float(side), "m") for side in sides)
+    return [f"The hand's way leaves the surface, {size}: beyond it its mirror images are felt"]
 
 
 def _made(section: str, given: Mapping[str, Any], kinds: Kinds, folder: Path | None = None) -> Any:
@@ -251,7 +270,8 @@ def read_path(path: Path) -> PathMotion:
             that are not read; commas between. The traces of ``asperity simulate`` are such files.
 
     Raises:
-        ParameterError: for a file that cannot be read, lacks a column, or has a wrong number.
+        ParameterError: for a file that cannot be read, lacks a column, has no rows or a wrong
+            number.
     """
     try:
         with path.open(encoding="utf-8") as file:
@@ -259,12 +279,16 @@ def read_path(path: Path) -> PathMotion:
             columns = [
                 _column(names, name, path) for name in ("time [s]", "x [m]", "y [m]", "z [m]")
             ]
-            table = np.loadtxt(file, delimiter=",", usecols=columns, ndmin=2)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of no rows: see below
+                table = np.loadtxt(file, delimiter=",", usecols=columns, ndmin=2)
     except OSError as error:
         reason = error.strerror or str(error)
         raise ParameterError("motion.file", f"{path} cannot be read: {reason}") from None
     except ValueError as error:
         raise ParameterError("motion.file", f"{path} is not a table of numbers: {error}") from None
+    if not len(table):
+        raise ParameterError("motion.file", f"{path} has no rows")
     return PathMotion(table[:, 0], table[:, 1:])
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray, positive
 from asperity.errors import ParameterError
@@ -31,6 +32,7 @@ class Stroke:
         law: letter of the law.
         speed: of the hand [m/s].
         depth: of the hand below z = 0 [m].
+        reached: mean depth of the handle below z = 0 [m].
         energy: that the texture supplies per stroke, along x, y and z [J]: the mean over whole
             turns, there and back, after the first stroke, which has the start in it.
         field: of it what the law itself supplies per stroke [J]: the work of its force along the
@@ -49,6 +51,7 @@ class Stroke:
     law: str
     speed: float
     depth: float
+    reached: float
     energy: tuple[float, float, float]
     field: float
     error: float
@@ -71,7 +74,7 @@ class Stroke:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units; what is not known is ``None``."""
         return {
-            "law": self.law, "speed": self.speed, "depth": self.depth,
+            "law": self.law, "speed": self.speed, "depth": self.depth, "reached": self.reached,
             "energy": [_plain(value) for value in self.energy], "energy_sum": _plain(self.total),
             "field": _plain(self.field), "error": _plain(self.error),
             "spread": _plain(self.spread),
@@ -94,6 +97,8 @@ def scan_strokes(
     *,
     speeds: Sequence[float],
     depths: Sequence[float],
+    start: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
     progress: Callable[[], None] | None = None,
 ) -> tuple[Stroke, ...]:
     """Return the energy per stroke for every speed and depth.
@@ -106,6 +111,8 @@ def scan_strokes(
         motion: the strokes; their speed and depth are replaced.
         speeds: [m/s].
         depths: of the hand below z = 0 [m].
+        start: of the handle [m], shape (3,); default: where the motion begins.
+        velocity: of the handle at the start [m/s], shape (3,); default: none.
         progress: called after every run.
 
     Raises:
@@ -118,7 +125,9 @@ def scan_strokes(
         for depth in depths:
             positive("speeds", speed, "m/s")
             way = _at_depth(motion, speed, depth)
-            run = simulate(surface, plant, hand, servo, way, way.duration)
+            run = simulate(
+                surface, plant, hand, servo, way, way.duration, start=start, velocity=velocity
+            )
             result.append(_stroke(surface, way, run, depth))
             if progress is not None:
                 progress()
@@ -132,6 +141,7 @@ def _at_depth(motion: Strokes, speed: float, depth: float) -> Strokes:
 
 def _stroke(surface: Surface, way: Strokes, run: Run, depth: float) -> Stroke:
     law, speed = surface.law.letter, float(way.speed)
+    reached = -float(run.position[:, 2].mean())
     contact = np.any(run.applied != 0.0, axis=1)
     lost = float(np.count_nonzero(contact[:-1] & ~contact[1:]))
     ledger = run.ledger
@@ -139,7 +149,9 @@ def _stroke(surface: Surface, way: Strokes, run: Run, depth: float) -> Stroke:
     if run.stopped:
         nan = math.nan
         energy = (nan, nan, nan)
-        return Stroke(law, speed, depth, energy, nan, nan, nan, nan, nan, closure, run.stopped)
+        return Stroke(
+            law, speed, depth, reached, energy, nan, nan, nan, nan, nan, closure, run.stopped
+        )
     begins = np.searchsorted(run.time, way.period * np.arange(1, way.count) - 1e-9 * run.period)
 
     def each(name: str) -> FloatArray:
@@ -158,7 +170,7 @@ def _stroke(surface: Surface, way: Strokes, run: Run, depth: float) -> Stroke:
     error += _not_closed(run, np.array([0, *begins]), len(works))
     x, y, z = (float(value) for value in _kept(each("supplied")).mean(axis=0))
     return Stroke(
-        law, speed, depth, (x, y, z), float(works.mean()), float(error), _spread(works),
+        law, speed, depth, reached, (x, y, z), float(works.mean()), float(error), _spread(works),
         float(_kept(each("same_sample")).sum(axis=1).mean()), lost / way.count, closure, "",
     )  # fmt: skip
 

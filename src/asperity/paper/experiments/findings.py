@@ -175,7 +175,7 @@ def _law_d_is_balanced() -> Finding:
     )
     return settle(
         decide(
-            f"{says}: D is in balance, and never climbs the bump" if balanced else says,
+            f"{says} of 20",
             printed=balanced,
             numbers=_of_bumps(bumps),
         )

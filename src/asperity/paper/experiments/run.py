@@ -10,7 +10,9 @@ from asperity.paper.experiments.beyond import BeyondExperiment, beyond_experimen
 from asperity.paper.experiments.bump import BumpExperiment, bump_experiment
 from asperity.paper.experiments.passivity import PassivityExperiment, passivity_experiment
 from asperity.paper.experiments.scanning import ScanningExperiment, scanning_experiment
+from asperity.paper.experiments.settings import RESOLUTION
 from asperity.textures.texture import Texture
+from asperity.units import engineering
 
 STEPS = (
     "experiment V.A: who cycles",
@@ -75,8 +77,8 @@ class Experiments:
             return f"no limit cycle below the delay rule in {cases} cases of conservative laws"
         return (
             f"limit cycles below the delay rule in {len(missed)} of {cases} cases of conservative "
-            f"laws, all with steps of the encoder, which the proof does not know: "
-            f"{', '.join(missed)}"
+            f"laws, with steps of the encoder of {engineering(RESOLUTION, 'm')}; it is proved for "
+            f"exact positions: {', '.join(missed)}"
         )
 
     def _strokes(self) -> str:

@@ -19,7 +19,7 @@ from asperity.textures.sinusoid import Sinusoid
 PERIOD = 1e-4  # s, stated
 RESOLUTION = 15e-6  # m, stated: "better than"
 LETTERS = "WABCDEFGH"
-LAG = 6  # samples, fitted: the only lag at which W settles while A and F cycle for good
+LAG = 6  # samples, fitted: of 0 and 4 to 7 the one at which W settles while A and F cycle
 
 FITTED = (
     "Link masses (about 20 g at the handle): guessed, the paper gives none",
