@@ -21,7 +21,7 @@ from asperity.textures.texture import Texture
 LAWS = "WACFH"
 STARTS = 4
 LOWEST = 400.0  # N/m: what holds the hand's 1 N at 2.5 mm
-TOLERANCE = 0.05
+TOLERANCE = 0.1
 WORKERS = 2
 HAND = SpringHand((300.0, 300.0, 0.0), 3.0, 0.0, (0.0, 0.0, -1.0))
 GUESSED = (

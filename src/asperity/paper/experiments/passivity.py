@@ -116,7 +116,7 @@ def count_cycles(law: str, divisor: float, delay: int = LAG, starts: int = START
 
 
 def passivity_experiment(
-    laws: str = LETTERS, delays: tuple[int, ...] = DELAYS, starts: int = 12
+    laws: str = LETTERS, delays: tuple[int, ...] = DELAYS, starts: int = 8
 ) -> PassivityExperiment:
     """Return section V.A: counts at the fitted lag, and onsets against delay.
 

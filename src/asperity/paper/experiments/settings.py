@@ -117,7 +117,7 @@ def device_setup(name: str, surface: Surface, hand: SpringHand) -> Setup:
     servo, said = default_servo(device)
     still = Still((0.0, 0.0, 0.0))
     return Setup(
-        surface, device, plant, hand, servo, still, 0.5, start=(0.0, 0.0, 1e-3),
+        surface, device, plant, hand, servo, still, 0.25, start=(0.0, 0.0, 1e-3),
         assumptions=(*assumed, *said),
     )  # fmt: skip
 
