@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
 from asperity.simulation.onset import CYCLE_SPEED, cycles, holds_still, restlessness
@@ -14,6 +16,8 @@ def energy(value: float) -> str:
     """Return an energy with its sign, "+2.97 mJ"."""
     if value == 0.0:
         return "0 J"
+    if not math.isfinite(value):
+        return "not finite"
     text = engineering(abs(value), "J", digits=3)
     return f"{'+' if value > 0.0 else '-'}{text}"
 
@@ -24,10 +28,16 @@ def answer(setup: Setup, run: Run) -> str:
     total = run.ledger.total
     verb = "feeds the hand" if total > 0.0 else "takes from the hand"
     work = f"{verb} {engineering(abs(total), 'J', digits=3)}" if total else "does no work"
+    if not math.isfinite(total):
+        work = "feeds the hand beyond all numbers"
     stiffness = engineering(setup.surface.stiffness, "N/m")
     said = f"Law {law} at {stiffness} {work} in {engineering(run.duration, 's')}"
     if run.stopped:
-        return f"{said}. The run stopped: it {run.stopped}."
+        said = f"{said}. The run stopped: it {run.stopped}"
+    if not run.closes:
+        said = f"{said}. The energy does not add up: believe no number of this run"
+    if run.stopped:
+        return f"{said}."
     return f"{said}. {unrest(setup, run)}."
 
 
@@ -98,6 +108,8 @@ def closing_words(run: Run) -> str:
     """Return how well the ledger closes."""
     ledger = run.ledger
     share = abs(ledger.closure) / ledger.exchanged if ledger.exchanged > 0.0 else 0.0
+    if not math.isfinite(share):
+        return "The run diverged: its energies are beyond all numbers."
     return (
         "Positive feeds the hand. Exact: the held force on the true motion. The paper's sum: the "
         "command and the measured step of one sample. Sampling's part: what holding the force "

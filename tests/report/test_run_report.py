@@ -1,0 +1,70 @@
+"""A simulated run in words, table and page."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from asperity.report.run_html import run_html
+from asperity.report.run_table import print_run
+from asperity.report.run_words import answer, closing_words, energy, ledger_rows
+from asperity.scene import load_scene
+from asperity.scene.setup import Setup, make_setup
+from asperity.simulation import Run
+
+PRESS = Path(__file__).parents[2] / "examples" / "press.toml"
+
+
+@pytest.fixture(scope="module")
+def setup() -> Setup:
+    return make_setup(load_scene(str(PRESS)), surface={"law": "W"}, duration=0.3)
+
+
+@pytest.fixture(scope="module")
+def run(setup: Setup) -> Run:
+    return setup.simulate()
+
+
+def test_energies_have_signs() -> None:
+    assert energy(2.97e-3) == "+2.97 mJ"
+    assert energy(-4e-7) == "-400 nJ"
+    assert energy(0.0) == "0 J"
+    assert energy(math.nan) == "not finite"
+
+
+def test_rows_add_up(run: Run) -> None:
+    rows = dict(ledger_rows(run))
+    assert rows["texture, exact"][3] == energy(run.ledger.total)
+    assert rows["stored, after less before"][3] == energy(run.ledger.after - run.ledger.before)
+    assert run.closes
+
+
+def test_a_run_that_does_not_close_is_not_believed(setup: Setup, run: Run) -> None:
+    assert "believe no number" not in answer(setup, run)
+    wrong = replace(run, ledger=replace(run.ledger, lost=run.ledger.lost * (1.0 + 1e-6)))
+    assert "believe no number" in answer(setup, wrong)
+
+
+def test_numbers_beyond_all_bounds_are_words(setup: Setup, run: Run) -> None:
+    nan = (math.nan, 0.0, math.nan)
+    wrong = replace(run, ledger=replace(run.ledger, supplied=nan, exchanged=math.inf))
+    wrong = replace(wrong, stopped="diverged")
+    for text in (answer(setup, wrong), closing_words(wrong)):
+        assert "nan" not in text.lower()
+    assert "beyond all numbers" in answer(setup, wrong)
+    assert dict(ledger_rows(wrong))["texture, exact"][0] == "not finite"
+
+
+def test_table_and_page_say_the_same(setup: Setup, run: Run) -> None:
+    console = Console(width=80, record=True, quiet=True)
+    print_run(setup, run, console)
+    page = run_html(setup, run)
+    for name, cells in ledger_rows(run):
+        assert name.replace("'", "&#39;") in page
+        assert cells[3] in page
+    for sentence in setup.assumptions:
+        assert sentence.replace("'", "&#39;") in page
