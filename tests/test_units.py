@@ -33,7 +33,10 @@ def test_quantities(text: str | float, unit: str, value: float) -> None:
 @pytest.mark.parametrize(
     ("text", "unit"),
     [("5 N", "m"), ("abc", "m"), ("5 foo", "m"), ("nan", "m"), ("inf", "m"), ("", "m"),
-     ("5 mm", ""), (True, "m"), (None, "m"), ("5 m; import os", "m"), ("1e999", "m")],
+     ("5 mm", ""), (True, "m"), (None, "m"), ("5 m; import os", "m"), ("1e999", "m"),
+     pytest.param(10**400, "m", id="400 digits"), pytest.param(-(10**5000), "m", id="5000 digits"),
+     pytest.param("1" + "0" * 5000, "m", id="5000 digits as text"),
+     pytest.param("1e" + "9" * 5000 + " mm", "m", id="an exponent of 5000 digits")],
 )  # fmt: skip
 def test_bad_quantities_name_the_argument(text: object, unit: str) -> None:
     with pytest.raises(ParameterError) as caught:

@@ -22,6 +22,21 @@ static inline double rounded(double value, double step)
     return step > 0.0 ? step * floor(value / step + 0.5) : value;
 }
 
+/* Round to multiples of a step; towards zero where the length would exceed its limit. */
+static inline void limited(double c[3], double step, double largest)
+{
+    if (!(step > 0.0))
+        return;
+    double r[3], square = 0.0;
+    for (int i = 0; i < 3; i++) {
+        r[i] = rounded(c[i], step);
+        square += r[i] * r[i];
+    }
+    const int fits = square <= largest * (1.0 + 1e-12);
+    for (int i = 0; i < 3; i++)
+        c[i] = fits ? r[i] : copysign(step * floor(fabs(c[i]) / step), c[i]);
+}
+
 static inline void flush(double *values, int count)
 {
     for (int i = 0; i < count; i++)
@@ -49,9 +64,9 @@ static inline void command(struct loop *s, const struct servo *set, double *rest
         for (int i = 0; i < 3; i++)
             c[i] *= shorter;
     }
+    limited(c, set->force_step, set->max_force * set->max_force);
     double sampling = 0.0;
     for (int i = 0; i < 3; i++) {
-        c[i] = rounded(c[i], set->force_step);
         s->sums[3 + i] += c[i] * step[i];
         sampling += (s->commanded[i] - c[i]) * step[i];
         s->commanded[i] = c[i];

@@ -43,7 +43,8 @@ def quantity(name: str, text: str | float, unit: str) -> float:
     if number is None:
         number = _with_unit(name, str(text), unit)
     if not math.isfinite(number):
-        raise ParameterError(name, f"must be finite; {_wanted(unit)}", text)
+        shown = text if isinstance(text, str) else number  # an int may have too many digits
+        raise ParameterError(name, f"must be finite; {_wanted(unit)}", shown)
     return number
 
 
@@ -54,6 +55,8 @@ def _wanted(unit: str) -> str:
 def _bare_number(text: str | float) -> float | None:
     try:
         return float(text)
+    except OverflowError:  # an int beyond the largest float
+        return math.inf
     except ValueError:
         return None
 
@@ -83,7 +86,8 @@ def _scaled(number: str, factor: float) -> float:
     exponent = round(math.log10(factor)) if factor > 0.0 else 0
     if factor > 0.0 and abs(factor / 10.0**exponent - 1.0) < 1e-15:
         mantissa, _, power = number.lower().partition("e")
-        return float(f"{mantissa}e{int(power or 0) + exponent}")
+        if len(power) < 20:  # beyond that it is nothing or infinite, whatever the factor
+            return float(f"{mantissa}e{int(power or 0) + exponent}")
     return float(number) * factor
 
 

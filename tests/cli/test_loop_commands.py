@@ -176,6 +176,11 @@ BAD = [
     (["simulate", "{still}", "--trace", "trace.xls"], "must be the path of a .csv"),
     (["simulate", "{still}", "--trace", "no/trace.csv"], "folder that exists"),
     (["simulate", "{still}", "--json", "-", "--html", "-"], "cannot both"),
+    (["simulate", "{still}", "--trace", "a.csv", "--json", "a.csv"], "cannot both"),
+    (["simulate", "{still}", "--html", "a.html", "--json", "./a.html"], "cannot both"),
+    (["simulate", "{still}", "--duration", "1e300"], "duration must be at most"),
+    (["simulate", "{still}", "--stiffness", "1" + "0" * 400], "stiffness must be finite"),
+    (["onset", "{still}", "--delays", "1e20"], "delay must be at most"),
     (["simulate", "{still}", "--device", "omega.3"], "apparent_mass is not known"),
     (["simulate", "{still}", "--law", "Z"], "law"),
     (["onset", "{strokes}"], "must be at rest"),
@@ -196,7 +201,7 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("arguments", "message"), BAD, ids=[" ".join(a) for a, _m in BAD])
+@pytest.mark.parametrize(("arguments", "message"), BAD, ids=[" ".join(a)[:60] for a, _m in BAD])
 def test_bad_input_is_one_line(
     call: Call, still: str, strokes: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     arguments: list[str], message: str,
@@ -216,6 +221,25 @@ def test_help(command: str) -> None:
     result = CliRunner().invoke(cli, [command, "--help"])
     assert result.exit_code == 0
     assert "SCENE" in result.output
+
+
+def test_a_run_that_overflows_is_written_as_json(call: Call, still: str) -> None:
+    scene = Path(still)
+    scene.write_text(scene.read_text() + "velocity = [1e300, 0, 0]\n")
+    code, out, err = call("simulate", still, "--json", "-")
+    assert (code, err) == (0, "")
+    run = json.loads(out)["run"]
+    assert run["stopped"] == "diverged"
+    assert run["ledger"]["stored_before"] is None
+    assert run["state"][1] == 0.0
+
+
+def test_a_body_that_overflows_is_refused(call: Call, still: str) -> None:
+    scene = Path(still)
+    scene.write_text(scene.read_text().replace('"300 N/m"', "1e300"))
+    code, out, err = call("simulate", still, "--json", "-")
+    assert (code, out) == (2, "")
+    assert "stiffness makes the body too fast" in err
 
 
 def test_a_plant_that_leaves_its_workspace_stops_there(call: Call, tmp_path: Path) -> None:

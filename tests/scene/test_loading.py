@@ -87,6 +87,8 @@ def test_bad_specifications(source: str, argument: str, message: str) -> None:
          "did you mean 'touch'"),
         ("texture = 3\n", "must be a section"),
         ("[texture\n", "not valid TOML"),
+        ("[surface]\nstiffness = 1" + "0" * 5000, "not valid TOML"),
+        ("a = " + "[" * 3000, "nested too deeply"),
     ],
 )  # fmt: skip
 def test_bad_scenes(tmp_path: Path, content: str, message: str) -> None:

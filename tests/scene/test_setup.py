@@ -172,6 +172,10 @@ def test_paths_with_wrong_columns_are_refused(tmp_path: Path) -> None:
     (tmp_path / "way.csv").write_text("time [s],x [m],y [m],z [m]\n0,0,zero,0\n")
     with pytest.raises(ParameterError, match="not a table of numbers"):
         scene(tmp_path, MASS, SPRING, path)
+    for nothing in ("", "\n\n", "# 1,2,3,4\n"):
+        (tmp_path / "way.csv").write_text("time [s],x [m],y [m],z [m]\n" + nothing)
+        with pytest.raises(ParameterError, match="has no rows"):
+            scene(tmp_path, MASS, SPRING, path)
     (tmp_path / "way.csv").write_text("time [s],x [m],y [m],z [m]\n1,0,0,0\n0,0,0,0\n")
     with pytest.raises(ParameterError, match="times must increase"):
         scene(tmp_path, MASS, SPRING, path)

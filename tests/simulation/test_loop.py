@@ -9,6 +9,8 @@ from asperity.checks import FloatArray
 from asperity.errors import ParameterError
 from asperity.simulation import (
     Cartesian,
+    MovedHand,
+    Path,
     Run,
     Servo,
     SpringHand,
@@ -186,6 +188,46 @@ def test_divergence_is_reported_and_the_trace_kept() -> None:
     assert run.stopped == "diverged"
     assert 10 < len(run.time) == run.samples < 20_000
     assert np.isfinite(run.table).all()
+
+
+def commanded(force: tuple[float, float, float], step: float, limit: float) -> FloatArray:
+    """What the servo makes of a force: virtual damping of a handle that is moved at -force."""
+    start, period = np.array([0.0, 0.0, 1.0]), 0.25
+    end = start - period * np.array(force)
+    run = simulate(
+        Surface(WAVE, "W", 1.0), PLANT, MovedHand(),
+        Servo(period, force_resolution=step, max_force=limit, virtual_damping=1.0),
+        Path(np.array([0.0, period]), np.array([start, end])), 2.0 * period,
+    )  # fmt: skip
+    return np.asarray(run.commanded[1])
+
+
+@pytest.mark.parametrize(
+    ("force", "limit", "expected"),
+    [
+        ((0.0, 0.0, 2.0), 0.609375, (0.0, 0.0, 0.59375)),  # 19.5 steps: down, not to 20
+        ((0.0, 0.0, -2.0), 0.609375, (0.0, 0.0, -0.59375)),  # towards zero, not down
+        ((0.0, 0.0, 0.609375), 0.609375, (0.0, 0.0, 0.59375)),  # at its limit before rounding
+        ((3.0, 0.0, -4.0), 1.0, (0.59375, 0.0, -0.78125)),  # of (0.6, 0, -0.8): 19.2 and 25.6 steps
+        ((0.0, 0.0, 2.0), 0.625, (0.0, 0.0, 0.625)),  # 20 steps: none is lost
+        ((0.0, 0.0, 0.609375), 9.0, (0.0, 0.0, 0.625)),  # nowhere near a limit: the nearest
+        ((-0.609375, 0.0, 0.0), 9.0, (-0.59375, 0.0, 0.0)),
+    ],
+)
+def test_a_limited_force_is_rounded_towards_zero(
+    force: tuple[float, float, float], limit: float, expected: tuple[float, float, float]
+) -> None:
+    np.testing.assert_array_equal(commanded(force, 1.0 / 32.0, limit), expected)
+
+
+def test_the_force_never_exceeds_its_limit() -> None:
+    run = simulate(
+        Surface(Sinusoid(0.4e-3, 1e-3), "A", 900.0), Cartesian(0.05, 1.0),
+        SpringHand(200.0, 2.0, 0.0, (0.1, 0.0, -1.5)),
+        Servo(2.5e-4, force_resolution=0.02, max_force=0.61), Still((0.2e-3, 0.0, -0.5e-3)), 0.1,
+    )  # fmt: skip
+    lengths = np.linalg.norm(run.applied, axis=1)
+    assert 0.59 < lengths.max() <= 0.61 * (1.0 + 1e-12)
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ from asperity.simulation import (
     simulate,
     simulate_many,
 )
-from asperity.simulation.trace import HEADER
+from asperity.simulation.trace import HEADER, MemoryTrace
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
@@ -72,6 +72,9 @@ def test_every_thins_the_trace_and_nothing_else() -> None:
     np.testing.assert_array_equal(thin.table, whole.table[::7])
     assert none.table.shape == (0, 27)
     assert whole.ledger == thin.ledger == none.ledger
+    sparse = run_of(every=10**30)
+    np.testing.assert_array_equal(sparse.table, whole.table[:1])
+    assert sparse.ledger == whole.ledger
 
 
 def test_chunks_leave_no_seam(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -209,6 +212,27 @@ def test_at_rest_nothing_becomes_subnormal() -> None:
     assert not ((tiny > 0.0) & (tiny < 1e-150)).any()
 
 
+def test_a_ledger_that_does_not_close_is_said() -> None:
+    assert run_of().closes
+    # Friction holds the handle: all that is exchanged is the last bits of what a band stores.
+    held = run_of(
+        plant=Cartesian(0.05, 1.0, friction=5.0), hand=BandHand(),
+        motion=Still((0.0, 0.0, 0.01)), start=(0.0, 0.0, 1e-3),
+    )  # fmt: skip
+    assert abs(held.ledger.closure) > 1e-9 * held.ledger.exchanged
+    assert held.ledger.exchanged < 1e-15 * held.ledger.before
+    assert held.closes
+    stiff = run_of(hand=SpringHand(1e12))  # thousands of its radians to a sample
+    assert abs(stiff.ledger.closure) > 1e-9 * stiff.ledger.exchanged
+    assert not stiff.closes
+
+
+@pytest.mark.parametrize("rows", [10**15, 10**18])
+def test_a_trace_beyond_all_memory_is_refused(rows: int) -> None:
+    with pytest.raises(ParameterError, match=f"trace needs memory for {rows} rows"):
+        MemoryTrace(rows)
+
+
 BAD: list[tuple[dict[str, Any], str]] = [
     ({"surface": WAVE}, "surface must be a Surface"),
     ({"plant": 0.05}, "plant must be"),
@@ -217,6 +241,9 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"motion": (0, 0, 0)}, "motion must be"),
     ({"duration": 0.0}, "duration must be positive"),
     ({"duration": 1e-5}, "duration must be at least one period"),
+    ({"duration": 1e300}, "duration must be at most"),
+    ({"servo": Servo(1e-300)}, "duration must be at most"),
+    ({"servo": Servo(1e-3, delay=10**20)}, "delay must be at most"),
     ({"every": 0}, "every must be"),
     ({"every": 1.5}, "every must be"),
     ({"trace": 3}, "trace must be"),
@@ -260,6 +287,9 @@ WRONG: list[tuple[Any, tuple[Any, ...], dict[str, Any], str]] = [
     (Still, ((0.0, 0.0),), {}, "point"),
     (Strokes, ((0, 0, 0), (0, 0, 0), 1.0), {}, "end"),
     (Strokes, ((0, 0, 0), (1, 0, 0), 0.0), {}, "speed"),
+    (Strokes, ((-1e308, 0, 0), (1e308, 0, 0), 1.0), {}, "end must be at a finite distance"),
+    (Strokes, ((0, 0, 0), (1, 0, 0), 1e-320), {}, "speed must make"),
+    (Strokes, ((0, 0, 0), (1e-300, 0, 0), 1e300), {}, "speed must make"),
     (Strokes, ((0, 0, 0), (1, 0, 0), 1.0, 1.5), {}, "count"),
     (Path, ([0.0, 0.0], np.zeros((2, 3))), {}, "times"),
     (Path, ([0.0], np.zeros((2, 3))), {}, "points"),

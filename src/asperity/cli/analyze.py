@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import FILE_OPTIONS, LAW_OPTIONS, given, text_options
-from asperity.cli.output import STANDARD_OUTPUT, check_output, write_output
+from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
 from asperity.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -73,10 +73,7 @@ def analyze_command(
     SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
     or a scene file (TOML).
     """
-    if json_path == html_path == STANDARD_OUTPUT:
-        raise ParameterError("json", "and html cannot both go to standard output")
-    check_output("json", json_path)
-    check_output("html", html_path)
+    check_outputs(json=json_path, html=html_path)
     answer = _analyze(surface, law, device, values)
     if json_path is not None:
         data = answer.result.to_dict()

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import FILE_OPTIONS, LAW_OPTIONS, given, text_options
-from asperity.cli.output import STANDARD_OUTPUT, check_output, write_output
-from asperity.errors import ParameterError
+from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
 
 if TYPE_CHECKING:
     from asperity.analysis import Comparison
@@ -52,10 +51,7 @@ def compare_command(
     SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
     (X3P, NPY, text matrix, two-column profile) or a scene file (TOML).
     """
-    if json_path == html_path == STANDARD_OUTPUT:
-        raise ParameterError("json", "and html cannot both go to standard output")
-    check_output("json", json_path)
-    check_output("html", html_path)
+    check_outputs(json=json_path, html=html_path)
     result = _compare(surface, device, laws, values)
     if json_path is not None:
         text = json.dumps(result.to_dict(), indent=2, allow_nan=False, ensure_ascii=False)

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import FILE_OPTIONS, LAW_OPTIONS, given, text_options
-from asperity.cli.output import STANDARD_OUTPUT, check_output, write_output
-from asperity.errors import ParameterError
+from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
 
 if TYPE_CHECKING:
     from asperity.analysis.limit_result import Limits
@@ -63,10 +62,7 @@ def limits_command(
     SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
     or a scene file (TOML).
     """
-    if json_path == html_path == STANDARD_OUTPUT:
-        raise ParameterError("json", "and html cannot both go to standard output")
-    check_output("json", json_path)
-    check_output("html", html_path)
+    check_outputs(json=json_path, html=html_path)
     result = _limits(surface, device, speed, law, values)
     if json_path is not None:
         text = json.dumps(result.to_dict(), indent=2, allow_nan=False, ensure_ascii=False)

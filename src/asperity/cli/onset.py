@@ -18,7 +18,7 @@ from asperity.cli.loop import (
     read_one,
     read_setup,
 )
-from asperity.cli.output import STANDARD_OUTPUT, check_output, write_output
+from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
 from asperity.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -53,10 +53,7 @@ def onset_command(
 
     The hand of the scene must come to rest. Beside each onset stands what the criteria allow.
     """
-    if json_path == html_path == STANDARD_OUTPUT:
-        raise ParameterError("json", "and html cannot both go to standard output")
-    check_output("json", json_path)
-    check_output("html", html_path)
+    check_outputs(json=json_path, html=html_path)
     if values["stiffness"] is not None:
         raise ParameterError("stiffness", "is what onset looks for: leave it out")
     # The scene's law is one of many here; a scene without one is as good.

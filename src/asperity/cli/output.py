@@ -13,19 +13,48 @@ from asperity.errors import ParameterError
 STANDARD_OUTPUT = "-"
 
 
+def check_outputs(**paths: str | None) -> None:
+    """Refuse paths of which one cannot be written, or two are the same, before any work is done.
+
+    Args:
+        paths: by the names of their options; ``None`` for one that is not given.
+
+    Raises:
+        ParameterError: see :func:`check_output`.
+    """
+    taken: dict[str, str] = {}
+    for name, path in paths.items():
+        if path is None:
+            continue
+        target = path if path == STANDARD_OUTPUT else os.path.realpath(path)
+        if target in taken:
+            place = "go to standard output" if path == STANDARD_OUTPUT else f"be written to {path}"
+            raise ParameterError(taken[target], f"and {name} cannot both {place}")
+        taken[target] = name
+        check_output(name, path)
+
+
 def check_output(name: str, path: str | None) -> None:
     """Refuse a path that cannot be written, before any work is done.
 
     Raises:
-        ParameterError: if the folder does not exist or is not writable, or the path is a folder.
+        ParameterError: if the folder does not exist or is not writable, the path is a folder or a
+            link to itself, or a device or a pipe that cannot be written to.
     """
     if path is None or path == STANDARD_OUTPUT:
         return
-    folder = Path(path).absolute().parent
-    if not folder.is_dir():
-        raise ParameterError(name, f"must lie in a folder that exists, {folder} does not")
     if Path(path).is_dir():
         raise ParameterError(name, "must be a file, not a folder", path)
+    if _is_device(path):
+        if not os.access(path, os.W_OK):
+            raise ParameterError(name, "must be a file that can be written", path)
+        return
+    target = Path(os.path.realpath(path))
+    if target.is_symlink():
+        raise ParameterError(name, "must be a file, not a link to itself", path)
+    folder = target.parent
+    if not folder.is_dir():
+        raise ParameterError(name, f"must lie in a folder that exists, {folder} does not")
     if not os.access(folder, os.W_OK):
         raise ParameterError(name, f"must lie in a folder that can be written, not {folder}")
 
@@ -33,22 +62,35 @@ def check_output(name: str, path: str | None) -> None:
 def write_output(name: str, path: str, text: str) -> None:
     """Write a text to standard output or to a file, which is replaced only when all is written.
 
+    A link stays one: the file that it leads to is replaced. A device or a pipe is written to.
+
     Raises:
         ParameterError: if the file cannot be written.
     """
     if path == STANDARD_OUTPUT:
         click.echo(text, nl=not text.endswith("\n"))
         return
-    target = Path(path)
-    handle, temporary = tempfile.mkstemp(dir=target.absolute().parent, prefix=f".{target.name}.")
+    try:
+        if _is_device(path):
+            Path(path).write_text(text, encoding="utf-8")
+        else:
+            _replace(Path(os.path.realpath(path)), text)
+    except OSError as error:
+        raise ParameterError(name, f"cannot be written: {error.strerror}", path) from None
+
+
+def _is_device(path: str) -> bool:
+    """Return whether there is something that is not a regular file, and must not become one."""
+    return Path(path).exists() and not Path(path).is_file()
+
+
+def _replace(target: Path, text: str) -> None:
+    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     try:
         with os.fdopen(handle, "w", encoding="utf-8") as file:
             file.write(text)
         Path(temporary).chmod(0o666 & ~_umask())
         Path(temporary).replace(target)
-    except OSError as error:
-        Path(temporary).unlink(missing_ok=True)
-        raise ParameterError(name, f"cannot be written: {error.strerror}", path) from None
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise

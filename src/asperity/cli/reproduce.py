@@ -10,7 +10,7 @@ import click
 
 from asperity.cli.loop import print_report, progress_bar
 from asperity.cli.options import FILE_OPTIONS, given, text_options
-from asperity.cli.output import STANDARD_OUTPUT, check_output, write_output
+from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
 from asperity.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -47,10 +47,7 @@ def reproduce_command(
 
     Each claim is code that computes its evidence; the verdict follows from the numbers.
     """
-    if json_path == html_path == STANDARD_OUTPUT:
-        raise ParameterError("json", "and html cannot both go to standard output")
-    check_output("json", json_path)
-    check_output("html", html_path)
+    check_outputs(json=json_path, html=html_path)
     from asperity.paper import claim
 
     for name in names:

@@ -16,8 +16,7 @@ from asperity.cli.loop import (
     read_one,
     read_setup,
 )
-from asperity.cli.output import STANDARD_OUTPUT, check_output, write_output
-from asperity.errors import ParameterError
+from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
 
 
 @click.command("scan", short_help="Energy per stroke, against speed and depth.")
@@ -45,10 +44,7 @@ def scan_command(
 
     The motion of the scene must be strokes; their speed and depth are replaced.
     """
-    if json_path == html_path == STANDARD_OUTPUT:
-        raise ParameterError("json", "and html cannot both go to standard output")
-    check_output("json", json_path)
-    check_output("html", html_path)
+    check_outputs(json=json_path, html=html_path)
     from asperity.scene.scans import scans
 
     setup = read_setup(scene, values | {"law": values["law"] or "W"})

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from asperity.cli.loop import loop_options, print_report, progress_bar, read_setup
-from asperity.cli.output import STANDARD_OUTPUT, check_output, write_output
-from asperity.errors import ParameterError
+from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
 
 if TYPE_CHECKING:
     from asperity.scene.setup import Setup
@@ -42,10 +42,7 @@ def simulate_command(
     A scene has the sections [texture], [surface], [device], [hand], [motion] and [run]. The trace
     is a table whose columns have units: positions, velocities, forces, energies.
     """
-    if json_path == html_path == STANDARD_OUTPUT:
-        raise ParameterError("json", "and html cannot both go to standard output")
-    for name, path in (("json", json_path), ("html", html_path), ("trace", trace_path)):
-        check_output(name, path)
+    check_outputs(json=json_path, html=html_path, trace=trace_path)
     setup = read_setup(scene, values, duration, every)
     with progress_bar("simulating") as told:
         run = setup.simulate(trace=True if trace_path is None else trace_path, progress=told)
@@ -64,6 +61,15 @@ def simulate_command(
 
 
 def as_json(setup: Setup, run: Run) -> str:
-    """Return scene and result as JSON text."""
-    data = {"schema": 1, "scene": setup.to_dict(), "run": run.to_dict()}
+    """Return scene and result as JSON text; null for what is not finite, if the run diverged."""
+    data = {"schema": 1, "scene": setup.to_dict(), "run": _finite(run.to_dict())}
     return json.dumps(data, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def _finite(data: Any) -> Any:
+    """Return plain data with None in the place of numbers that are not finite."""
+    if isinstance(data, dict):
+        return {name: _finite(value) for name, value in data.items()}
+    if isinstance(data, list):
+        return [_finite(value) for value in data]
+    return None if isinstance(data, float) and not math.isfinite(data) else data

@@ -204,5 +204,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
     except OSError as error:
         reason = error.strerror or str(error)
         raise ParameterError("scene", f"{path} cannot be read: {reason}") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except RecursionError:
+        raise ParameterError("scene", f"{path} is nested too deeply") from None
+    except ValueError as error:  # of TOML, of the encoding, of an impossible path or number
         raise ParameterError("scene", f"{path} is not valid TOML: {error}") from None

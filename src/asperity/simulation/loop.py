@@ -10,6 +10,7 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.derive.driver import ClampName
+from asperity.errors import ParameterError
 from asperity.laws import Law
 from asperity.simulation.ledger import Ledger
 from asperity.simulation.machine import Machine
@@ -19,6 +20,8 @@ from asperity.surface import Surface
 
 # Why the compiled loop stops, by its answer.
 STOPS = ("", "diverged", "left the workspace")
+# Forces that may wait: a second at a megahertz.
+MOST_DELAY = 1_000_000
 _LOCK = Lock()
 
 
@@ -42,6 +45,9 @@ class Simulation:
         servo: the servo.
         start: position [m], shape (3,).
         velocity: [m/s], shape (3,).
+
+    Raises:
+        ParameterError: for a delay of more than ``MOST_DELAY`` samples.
     """
 
     def __init__(
@@ -52,6 +58,8 @@ class Simulation:
         start: FloatArray,
         velocity: FloatArray | None = None,
     ) -> None:
+        if servo.delay > MOST_DELAY:
+            raise ParameterError("delay", f"must be at most {MOST_DELAY} samples", servo.delay)
         self._surface, self._moved, self._servo = surface, moved, servo
         self.state = moved.state(start, np.zeros(3) if velocity is None else velocity)
         self.queue = np.zeros((servo.delay + 1, 3))

@@ -23,6 +23,13 @@ FRICTION_PARTS = 4
 LEAST_SINE = 0.05
 # Greatest part of a time constant that one Runge-Kutta step covers: energy then closes to 1e-10.
 _LARGEST_PART = 0.01
+# Parts of a sample at most: a body that needs more is too fast for its period.
+_MOST_PARTS = 10_000
+# What is usual: of a body that cannot be computed, what is furthest from it is named.
+_USUAL = {
+    "mass": 0.1, "handle": 0.1, "stiffness": 1e3, "damping": 1.0, "joint_damping": 1e-2,
+    "frequency": 100.0, "damping_ratio": 0.1, "period": 1e-3,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -48,17 +55,51 @@ def machine(plant: Plant, hand: Hand, servo: Servo) -> Machine:
     """Return the body of a plant that a hand holds, sampled by a servo.
 
     Raises:
-        ParameterError: for a resonance on an elastic band, which is not offered.
+        ParameterError: for a resonance on an elastic band, which is not offered; for a body that is
+            too fast for the period, or whose numbers overflow.
     """
     from asperity.simulation.kernels import booking, carried
 
     if isinstance(hand, MovedHand):
         return Machine((carried, booking), (float(servo.period),), 6)
+    try:
+        with np.errstate(all="ignore"):  # what overflows is refused here
+            made = _held(plant, hand, servo.period)
+    except (ArithmeticError, np.linalg.LinAlgError):
+        raise _too_fast(plant, hand, servo.period) from None
+    if not all(np.isfinite(part).all() for part in made.numbers):
+        raise _too_fast(plant, hand, servo.period)
+    return made
+
+
+def _held(plant: Plant, hand: SpringHand | BandHand, period: float) -> Machine:
     if isinstance(plant, Pantograph):
-        return _pantograph(plant, hand, servo.period)
+        return _pantograph(plant, hand, period)
     if isinstance(hand, BandHand):
-        return _banded(plant, hand, servo.period)
-    return _linear(plant, hand, servo.period)
+        return _banded(plant, hand, period)
+    return _linear(plant, hand, period)
+
+
+def _too_fast(plant: Plant, hand: SpringHand | BandHand, period: float) -> ParameterError:
+    """Return the error that names what is furthest from the usual."""
+    given = [("stiffness", np.max(hand.stiffness)), ("damping", np.max(hand.damping))]
+    given += [("period", period)]
+    if isinstance(plant, Pantograph):
+        given += [("handle", plant.masses.handle + plant.masses.distal)]
+        given += [("joint_damping", plant.joint_damping)]
+    else:
+        given += [("mass", min(plant.mass)), ("damping", np.abs(plant.damping).max())]
+        mode = plant.resonance
+        given += [] if mode is None else [("frequency", mode.frequency)]
+        given += [] if mode is None else [("damping_ratio", mode.damping_ratio)]
+    if isinstance(hand, SpringHand):
+        given += [("mass", hand.mass)]
+    name, value = max(
+        (one for one in given if one[1] > 0.0),
+        key=lambda one: abs(math.log(one[1] / _USUAL[one[0]])),
+    )
+    words = f"makes the body too fast to be computed in samples of {period:g} s"
+    return ParameterError(name, words, float(value))
 
 
 def _linear(plant: Cartesian, hand: SpringHand, period: float) -> Machine:
@@ -106,7 +147,13 @@ def _holding(hand: SpringHand | BandHand) -> FloatArray:
 
 
 def _parts(friction: float, rate: float, period: float) -> int:
-    """Return into how many steps a sample is divided, for rates up to this one [1/s]."""
+    """Return into how many steps a sample is divided, for rates up to this one [1/s].
+
+    Raises:
+        OverflowError: for more than ``_MOST_PARTS``.
+    """
+    if not rate * period / _LARGEST_PART <= _MOST_PARTS:
+        raise OverflowError
     needed = math.ceil(rate * period / _LARGEST_PART)
     return max(needed, FRICTION_PARTS if friction > 0.0 else 1)
 
@@ -141,6 +188,7 @@ def _pantograph(plant: Pantograph, hand: SpringHand | BandHand, period: float) -
     least = float(np.linalg.eigvalsh([[mxx, mxz], [mxz, mzz]])[0])
     # Twice the damping here: elsewhere in the workspace it may be larger.
     rate = _fastest(least, 2.0 * plant.joint_damping * (bxx + bzz), hand)
+    _parts(plant.friction, rate, period)  # refuses too many; how many there are depends on speed
     fewest = FRICTION_PARTS if plant.friction > 0.0 else 1
     numbers = (
         bar, _holding(hand), float(plant.friction), rate, fewest, float(period), _LARGEST_PART,

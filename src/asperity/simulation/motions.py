@@ -70,8 +70,8 @@ class Strokes:
         count: number of strokes.
 
     Raises:
-        ParameterError: for points that coincide, a speed that is not positive, or a count that is
-            not a positive whole number.
+        ParameterError: for points that coincide or are infinitely far apart, a speed that is not
+            positive or gives no finite duration, or a count that is not a positive whole number.
 
     Example:
         >>> there = Strokes((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), speed=0.2, count=2)
@@ -95,6 +95,11 @@ class Strokes:
         if positive("count", self.count) % 1 != 0:
             raise ParameterError("count", "must be a whole number of strokes", self.count)
         object.__setattr__(self, "count", int(self.count))
+        if not math.isfinite(math.dist(self.start, self.end)):
+            raise ParameterError("end", "must be at a finite distance from start [m]", self.end)
+        if not (self.period > 0.0 and math.isfinite(self.duration)):
+            limit = "must make a stroke last, and all of them a finite time [m/s]"
+            raise ParameterError("speed", limit, self.speed)
 
     @property
     def period(self) -> float:

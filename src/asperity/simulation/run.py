@@ -45,6 +45,17 @@ class Run:
         return self.samples * self.period
 
     @property
+    def closes(self) -> bool:
+        """Whether the ledger adds up, to 1e-9 of all that was exchanged.
+
+        If not, the body is too stiff for its period, and no energy of the run is to be believed.
+        """
+        ledger = self.ledger
+        # Where nothing moves, the last bits of what is stored are all there is.
+        bits = 1e-15 * max(ledger.before, ledger.after)
+        return abs(ledger.closure) <= 1e-9 * ledger.exchanged + bits
+
+    @property
     def time(self) -> FloatArray:
         """Of the traced samples [s], shape (k,)."""
         return self.table[:, 0]

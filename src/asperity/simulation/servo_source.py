@@ -1,7 +1,7 @@
 """The servo loop around a law's kernel, as source that is compiled together with it.
 
 One sample: the position is read in steps of the encoder, the law answers, virtual damping is added,
-the force is rounded and limited, waits for the delay, and is held while the body moves.
+the force is limited and rounded, waits for the delay, and is held while the body moves.
 """
 
 from __future__ import annotations
@@ -77,6 +77,21 @@ _SERVO = '''def rounded(value, step):
     return value
 
 
+def limited(x, y, z, step, largest):
+    """Round a force to multiples of a step; towards zero if it would get too long (squared)."""
+    if step > 0.0:
+        rx = rounded(x, step)
+        ry = rounded(y, step)
+        rz = rounded(z, step)
+        # What is a multiple, but for the last bits, loses no step.
+        if rx * rx + ry * ry + rz * rz <= largest * (1.0 + 1e-12):
+            return rx, ry, rz
+        x = math.copysign(step * math.floor(abs(x) / step), x)
+        y = math.copysign(step * math.floor(abs(y) / step), y)
+        z = math.copysign(step * math.floor(abs(z) / step), z)
+    return x, y, z
+
+
 def flush(values):
     """Make nothing of what is next to nothing: subnormal numbers are a hundred times slower."""
     for i in range(values.shape[0]):
@@ -129,9 +144,7 @@ def servo_batch(
             cx *= shorter
             cy *= shorter
             cz *= shorter
-        cx = rounded(cx, force_step)
-        cy = rounded(cy, force_step)
-        cz = rounded(cz, force_step)
+        cx, cy, cz = limited(cx, cy, cz, force_step, largest)
         ledger[3] += cx * stepx
         ledger[4] += cy * stepy
         ledger[5] += cz * stepz

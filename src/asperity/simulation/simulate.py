@@ -24,6 +24,8 @@ from asperity.surface import Surface
 
 # Samples at a time: memory does not depend on the duration, progress is told in between.
 CHUNK = 16_384
+# Samples of a run: a day and more of computing.
+MOST_SAMPLES = 10**12
 
 
 def simulate(
@@ -78,11 +80,10 @@ def simulate(
         (20000, '', -0.285714)
     """
     _check(surface, plant, hand, servo, motion)
-    samples = round(positive("duration", duration, "s") / servo.period)
-    if samples < 1:
-        raise ParameterError("duration", f"must be at least one period, {servo.period} s", duration)
+    samples = _samples(positive("duration", duration, "s"), servo.period)
     if isinstance(every, bool) or not isinstance(every, (int, np.integer)) or every < 1:
         raise ParameterError("every", "must be a whole number of samples, 1 or more", every)
+    every = min(int(every), samples)
     simulation = _begin(surface, plant, hand, servo, motion, start, velocity)
     way = _Way(motion, servo.period, samples, plant)
     kept = _trace(trace, -(-samples // every))
@@ -137,6 +138,16 @@ def _check(surface: Surface, plant: Plant, hand: Hand, servo: Servo, motion: Mot
     ):
         if not isinstance(value, kinds):
             raise ParameterError(name, f"must be {words}", value)
+
+
+def _samples(duration: float, period: float) -> int:
+    if not duration / period <= MOST_SAMPLES:
+        limit = f"must be at most {MOST_SAMPLES:g} samples of {period:g} s"
+        raise ParameterError("duration", limit, duration)
+    samples = round(duration / period)
+    if samples < 1:
+        raise ParameterError("duration", f"must be at least one period, {period} s", duration)
+    return samples
 
 
 def _begin(

@@ -57,7 +57,7 @@ class MemoryTrace:
     def __init__(self, rows: int) -> None:
         try:
             self._table = np.empty((rows, len(COLUMNS)))
-        except MemoryError:
+        except (MemoryError, ValueError):  # more than there are addresses
             limit = f"needs memory for {rows} rows: give a path, or a larger 'every'"
             raise ParameterError("trace", limit) from None
         self._filled = 0

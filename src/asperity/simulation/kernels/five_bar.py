@@ -167,7 +167,9 @@ def bar_reached(x: float, z: float, least: float, bar: Any) -> bool:
 
 def bar_parts(vx: float, vz: float, rate: float, span: float, bar: Any) -> int:
     """Steps for a sample: one for each ``share`` of a time constant, shorter ones at speed."""
-    return 1 + int((rate + 4.0 * math.sqrt(vx * vx + vz * vz) / bar[0]) * span)
+    parts = (rate + 4.0 * math.sqrt(vx * vx + vz * vz) / bar[0]) * span
+    # At such speeds the handle leaves the workspace with the first of them.
+    return 1 + int(parts) if parts < 1e6 else 1000000
 
 
 def bar_kink(

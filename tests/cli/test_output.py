@@ -1,0 +1,85 @@
+"""Where results go: files, links, pipes, and what cannot be written."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from asperity.cli.output import check_output, check_outputs, write_output
+from asperity.errors import ParameterError
+
+
+def test_a_file_is_replaced_and_nothing_else_is_left(tmp_path: Path) -> None:
+    target = tmp_path / "real.html"
+    target.write_text("old")
+    check_output("html", str(target))
+    write_output("html", str(target), "new")
+    assert target.read_text() == "new"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+@pytest.mark.parametrize("linked", [False, True], ids=["pipe", "link to a pipe"])
+def test_what_is_no_file_is_written_to_and_not_replaced(tmp_path: Path, linked: bool) -> None:
+    """As root, a file was put in the place of a device."""
+    pipe = path = tmp_path / "pipe.html"
+    os.mkfifo(pipe)
+    if linked:
+        path = tmp_path / "link.html"
+        path.symlink_to(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        check_output("html", str(path))
+        write_output("html", str(path), "text")
+        assert os.read(reader, 100) == b"text"
+    finally:
+        os.close(reader)
+    assert pipe.is_fifo()
+    assert path.is_symlink() == linked
+
+
+@pytest.mark.parametrize("exists", [True, False])
+def test_a_link_is_followed(tmp_path: Path, exists: bool) -> None:
+    (tmp_path / "far").mkdir()
+    real, link = tmp_path / "far" / "real.html", tmp_path / "link.html"
+    if exists:
+        real.write_text("old")
+    link.symlink_to(real)
+    check_output("html", str(link))
+    write_output("html", str(link), "new")
+    assert link.is_symlink()
+    assert real.read_text() == "new"
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "far", link]
+
+
+def test_the_folder_is_that_of_the_linked_file(tmp_path: Path) -> None:
+    link = tmp_path / "link.html"
+    link.symlink_to(tmp_path / "none" / "real.html")
+    with pytest.raises(ParameterError, match=r"folder that exists, .*none does not"):
+        check_output("html", str(link))
+    with pytest.raises(ParameterError, match="html cannot be written: No such file"):
+        write_output("html", str(link), "new")
+
+
+def test_links_to_themselves_and_folders_are_refused(tmp_path: Path) -> None:
+    loop = tmp_path / "loop.html"
+    loop.symlink_to(loop)
+    with pytest.raises(ParameterError, match="html must be a file, not a link to itself"):
+        check_output("html", str(loop))
+    with pytest.raises(ParameterError, match="html must be a file, not a folder"):
+        check_output("html", str(tmp_path))
+
+
+def test_two_outputs_cannot_be_one_file(tmp_path: Path) -> None:
+    file, link = tmp_path / "a.csv", tmp_path / "link"
+    link.symlink_to(tmp_path)
+    check_outputs(json=str(file), html=str(tmp_path / "b.html"), trace=None)
+    for same in (str(file), str(tmp_path / "." / "a.csv"), str(link / "a.csv")):
+        with pytest.raises(ParameterError, match="trace and json cannot both be written to"):
+            check_outputs(trace=str(file), html=None, json=same)
+    with pytest.raises(ParameterError, match="json and html cannot both go to standard output"):
+        check_outputs(json="-", html="-")
+    with pytest.raises(ParameterError, match="html must lie in a folder that exists"):
+        check_outputs(json="-", html=str(tmp_path / "none" / "b.html"))

@@ -1,0 +1,83 @@
+"""Bodies that are too fast for their period are refused, and what makes them so is named."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from asperity.errors import ParameterError
+from asperity.simulation import (
+    BandHand,
+    Cartesian,
+    Hand,
+    LinkMasses,
+    Pantograph,
+    Plant,
+    Resonance,
+    Servo,
+    SpringHand,
+    Still,
+    simulate,
+)
+from asperity.simulation.kernels import five_bar
+from asperity.simulation.machine import machine
+from asperity.surface import Surface
+from asperity.textures.sinusoid import Sinusoid
+
+MILLISECOND = Servo(1e-3)
+LIGHT = LinkMasses(1e-30, 1e-30, 1e-30)
+COUPLED = np.array([[1.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.0]])
+
+TOO_FAST: list[tuple[Plant, Hand, Servo, str]] = [
+    (Cartesian(0.05), BandHand(stiffness=1e40), MILLISECOND, "stiffness"),
+    (Cartesian(1e-30), BandHand(), MILLISECOND, "mass"),
+    (Cartesian(0.05, 1e40), BandHand(), MILLISECOND, "damping"),
+    (Cartesian(0.05), BandHand(), Servo(1e30), "period"),
+    (Pantograph(), SpringHand(1e40), MILLISECOND, "stiffness"),
+    (Pantograph(), BandHand(stiffness=1e40), MILLISECOND, "stiffness"),
+    (Pantograph(joint_damping=1e300), SpringHand(100.0), MILLISECOND, "joint_damping"),
+    (Pantograph(masses=LIGHT), SpringHand(100.0), MILLISECOND, "handle"),
+    (Cartesian(0.05), SpringHand(1e300), MILLISECOND, "stiffness"),
+    (Cartesian(0.05), SpringHand(1.0, 1e300), MILLISECOND, "damping"),
+    (Cartesian(1e-300, 1.0), SpringHand(1.0), MILLISECOND, "mass"),
+    (Cartesian(1e-300, COUPLED), SpringHand(1.0), MILLISECOND, "mass"),
+    (Cartesian(0.05, COUPLED), SpringHand(1e300), MILLISECOND, "stiffness"),
+    (Cartesian(0.05, 1.0), SpringHand(1.0), Servo(1e300), "period"),
+    (Cartesian(0.05, 0.0, Resonance(1e200)), SpringHand(1.0), MILLISECOND, "frequency"),
+    (Cartesian(0.05, 0.0, Resonance(200.0)), SpringHand(1e300), MILLISECOND, "stiffness"),
+    (Cartesian(5e-324, 0.0, Resonance(200.0)), SpringHand(1.0), MILLISECOND, "mass"),
+]
+
+
+@pytest.mark.parametrize(("plant", "hand", "servo", "name"), TOO_FAST)
+def test_what_is_too_fast_is_refused(plant: Plant, hand: Hand, servo: Servo, name: str) -> None:
+    with pytest.raises(ParameterError, match="too fast") as caught:
+        machine(plant, hand, servo)
+    assert caught.value.argument == name
+
+
+def rate_on_a_band(damping: float) -> float:
+    return float(machine(Pantograph(), BandHand(damping=damping), MILLISECOND).numbers[3])
+
+
+def test_ten_thousand_parts_are_the_most() -> None:
+    """A hundred parts to a time constant: so a rate of 1e5 1/s at 1 ms, damping over mass."""
+    slope = (rate_on_a_band(200.0) - rate_on_a_band(100.0)) / 100.0
+    for plant, limit in (
+        (Cartesian(0.1), 1e5 * 0.1),
+        (Pantograph(), 200.0 + (1e5 - rate_on_a_band(200.0)) / slope),
+    ):
+        machine(plant, BandHand(damping=0.999 * limit), MILLISECOND)
+        with pytest.raises(ParameterError, match="damping makes the body too fast"):
+            machine(plant, BandHand(damping=1.001 * limit), MILLISECOND)
+
+
+@pytest.mark.parametrize("speed", [1e9, 1e300])
+def test_a_pantograph_at_any_speed_comes_to_an_end(speed: float) -> None:
+    run = simulate(
+        Surface(Sinusoid(0.4e-3, 1e-3), "W", 800.0), Pantograph(), SpringHand(100.0), MILLISECOND,
+        Still((0.0, 0.0, 0.0)), 0.1, velocity=(speed, 0.0, 0.0),
+    )  # fmt: skip
+    assert run.stopped.startswith("left the workspace")
+    assert run.samples == 0
+    assert five_bar.bar_parts(speed, 0.0, 1.0, 1.0, [0.06]) == 1_000_000
