@@ -21,10 +21,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from asperity.analysis.bound import Bound
-from asperity.analysis.certificate import Search, certified
-from asperity.analysis.characteristic import characteristic_number
-from asperity.analysis.measures import NORM
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.bounds.measures import NORM
+from asperity.analysis.gain.certificate import Search, certified
+from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Sinusoid
@@ -69,10 +69,10 @@ def objective(surface: Surface) -> tuple[Objective, Any]:
     period = float(texture.domain.spans[0, 0])
 
     def probe(x: float, level: float) -> list[float]:
-        if surface.law.contact == "nominal":
+        if surface.law.contact.name == "nominal":
             return [x, 0.0, -level]
         h, slope = texture.derivatives([[x, 0.0]])[0, :2]
-        if surface.law.contact == "vertical":
+        if surface.law.contact.name == "vertical":
             return [x, 0.0, h - level]
         below = level / math.hypot(1.0, slope)
         return [x + below * slope, 0.0, h - below]

@@ -73,7 +73,7 @@ def _damage(data: bytearray, at: int, rng: random.Random) -> None:
 def outcomes(reader: str, count: int, folder: Path) -> Iterator[tuple[str, str]]:
     """Read mutated files in this process: ("read" | "refused" | "other", what) for each."""
     from asperity.errors import AsperityError
-    from asperity.textures.reading import read_surface
+    from asperity.measured.reading import read_surface
 
     seed = fuzz_seeds.SEEDS[reader](folder)
     options = fuzz_seeds.OPTIONS.get(reader, {})

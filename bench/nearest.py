@@ -221,7 +221,7 @@ def _as_many_as_fit(texture: Texture, points: FloatArray) -> FloatArray:
 
 
 def _peers(texture: Texture) -> ModuleType:
-    from asperity.derive.fuse import fuse_sampler
+    from asperity.kernels.fuse import fuse_sampler
 
     return fuse_sampler((*texture.sampler, peers))
 

@@ -13,16 +13,16 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from asperity.analysis.bound import Bound
-from asperity.analysis.characteristic import (
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.bounds.measures import curl, precise_norm, precise_one_sided
+from asperity.analysis.gain.characteristic import (
     characteristic_number,
     curl_number,
     one_sided_number,
 )
-from asperity.analysis.measures import curl, precise_norm, precise_one_sided
 from asperity.checks import FloatArray
+from asperity.contacts.symbols import ContactSymbols
 from asperity.laws import Law
-from asperity.laws.symbols import ContactSymbols
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid
 from asperity.textures.texture import Texture
@@ -254,7 +254,7 @@ def random_contacts(
         near = reach * 10.0 ** rng.uniform(-8.0, -1.0, (count, 1)) * rng.normal(size=(count, 2))
         xy = np.where(rng.random((count, 1)) < 0.5, np.asarray(around) + near, xy)
     # Just below the surface rounding of a far position decides what the split god-object sees.
-    least = 1e-3 if surface.law.contact == "split" else 1e-6
+    least = 1e-3 if surface.law.contact.name == "split" else 1e-6
     depth = surface.max_depth * rng.choice([1.0 - 1e-12, least, rng.random()], count)
     points = _probes(surface, xy, depth)
     if not surface.law.stateful:
@@ -280,7 +280,7 @@ def _places(rng: Generator, texture: Texture, count: int) -> FloatArray:
 
 
 def _probes(surface: Surface, xy: FloatArray, depth: FloatArray) -> FloatArray:
-    texture, contact = surface.texture, surface.law.contact
+    texture, contact = surface.texture, surface.law.contact.name
     if contact == "nominal":
         return np.column_stack([xy, -depth])
     height = texture.height(xy)

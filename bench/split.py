@@ -19,8 +19,8 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from asperity.analysis.split import split_state
-from asperity.analysis.split_table import tabulate
+from asperity.analysis.split.potential_table import tabulate
+from asperity.analysis.split.state import split_state
 from asperity.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Profile, Sinusoid, load_texture

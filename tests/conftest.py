@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.derive import fuse
+from asperity.kernels import fuse
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 

@@ -79,7 +79,7 @@ def test_every_name_that_a_page_refers_to_exists(page: Path) -> None:
 
 def test_a_name_that_does_not_exist_is_noticed() -> None:
     with pytest.raises(AttributeError):
-        _resolve("asperity.analysis.merit.nothing_of_the_kind")
+        _resolve("asperity.analysis.energy.merit.nothing_of_the_kind")
 
 
 def _run_block(kind: str, body: str, names: dict[str, Any]) -> None:

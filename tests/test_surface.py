@@ -12,10 +12,10 @@ import sympy as sp
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from asperity.contacts.symbols import ContactSymbols
 from asperity.definition import exact_force
 from asperity.errors import LawError, ParameterError
 from asperity.laws import LAWS, Law
-from asperity.laws.symbols import ContactSymbols
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 
@@ -74,7 +74,9 @@ def test_a_nominal_law_does_not_feel_the_height(letter: str, wave: Sinusoid):
 def contact(surface: Surface, p: np.ndarray) -> dict[str, Any]:
     """Return what the formulas by hand need of the contact of one probe in the body."""
     texture = surface.texture
-    xy = texture.nearest(p[None, :])[:, :2] if surface.law.contact == "nearest" else p[None, :2]
+    xy = (
+        texture.nearest(p[None, :])[:, :2] if surface.law.contact.name == "nearest" else p[None, :2]
+    )
     h, hx, hy, hxx, hxy, hyy = texture.derivatives(xy)[0]
     low, high = texture.extremes
     half = (high - low) / 2
@@ -82,7 +84,7 @@ def contact(surface: Surface, p: np.ndarray) -> dict[str, Any]:
         "nominal": -p[2],
         "vertical": h - p[2],
         "nearest": float(np.linalg.norm([*(xy[0] - p[:2]), h - p[2]])),
-    }[surface.law.contact]
+    }[surface.law.contact.name]
     return {
         "k": surface.stiffness, "depth": depth, "g": (hx, hy),
         "hessian": np.array([[hxx, hxy], [hxy, hyy]]),

@@ -25,7 +25,7 @@ figure, panels = plt.subplots(4, 2, figsize=(10.0, 8.0), sharex=True, sharey=Tru
 figure.set_layout_engine("constrained")
 for axes, law in zip(panels.ravel(), find_laws("WABCDEFG"), strict=True):
     surface = asp.Surface(texture, law, stiffness=1000.0, max_depth=depth)
-    top = 0.0 if law.contact == "nominal" else texture.extremes[1]
+    top = 0.0 if law.contact.name == "nominal" else texture.extremes[1]
     path = np.column_stack([x, np.zeros_like(x), np.full_like(x, top - depth)])
     force = surface.trace(path)  # carries the state of law F from point to point
     axes.plot(x * 1e3, force[:, 2], color="#d55e00", label="normal")

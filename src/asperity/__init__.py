@@ -23,12 +23,12 @@ if TYPE_CHECKING:
         one_sided_number,
         worst_loop,
     )
-    from asperity.analysis.inspection import Analysis, analyze
-    from asperity.analysis.limit_result import Limits
-    from asperity.analysis.limits import limits
-    from asperity.analysis.passivity import passivity
-    from asperity.analysis.split import PopThrough, SplitState, pop_through, split_state
-    from asperity.analysis.split_table import TabulatedSurface, tabulate
+    from asperity.analysis.analyze import Analysis, analyze
+    from asperity.analysis.limits.device_limits import limits
+    from asperity.analysis.limits.limit_result import Limits
+    from asperity.analysis.passivity.judgement import passivity
+    from asperity.analysis.split.potential_table import TabulatedSurface, tabulate
+    from asperity.analysis.split.state import PopThrough, SplitState, pop_through, split_state
     from asperity.devices import Device, load_device
     from asperity.laws import Law
     from asperity.surface import Surface
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Analysis": "asperity.analysis.inspection",
+    "Analysis": "asperity.analysis.analyze",
     "Bound": "asperity.analysis",
     "Comparison": "asperity.analysis",
     "Device": "asperity.devices",
@@ -57,31 +57,31 @@ _HOMES = {
     "HeightMap": "asperity.textures",
     "Law": "asperity.laws",
     "Leak": "asperity.analysis",
-    "Limits": "asperity.analysis.limit_result",
+    "Limits": "asperity.analysis.limits.limit_result",
     "Noise": "asperity.textures",
     "NoiseProfile": "asperity.textures",
     "Passivity": "asperity.analysis",
-    "PopThrough": "asperity.analysis.split",
+    "PopThrough": "asperity.analysis.split.state",
     "Profile": "asperity.textures",
     "Sinusoid": "asperity.textures",
-    "SplitState": "asperity.analysis.split",
+    "SplitState": "asperity.analysis.split.state",
     "Surface": "asperity.surface",
-    "TabulatedSurface": "asperity.analysis.split_table",
-    "analyze": "asperity.analysis.inspection",
+    "TabulatedSurface": "asperity.analysis.split.potential_table",
+    "analyze": "asperity.analysis.analyze",
     "characteristic_number": "asperity.analysis",
     "compare": "asperity.analysis",
     "curl_number": "asperity.analysis",
-    "limits": "asperity.analysis.limits",
+    "limits": "asperity.analysis.limits.device_limits",
     "load_device": "asperity.devices",
     "load_texture": "asperity.textures",
     "loop_work": "asperity.analysis",
     "named_surface": "asperity.textures",
     "one_sided_number": "asperity.analysis",
-    "passivity": "asperity.analysis.passivity",
-    "pop_through": "asperity.analysis.split",
-    "split_state": "asperity.analysis.split",
+    "passivity": "asperity.analysis.passivity.judgement",
+    "pop_through": "asperity.analysis.split.state",
+    "split_state": "asperity.analysis.split.state",
     "surface_names": "asperity.textures",
-    "tabulate": "asperity.analysis.split_table",
+    "tabulate": "asperity.analysis.split.potential_table",
     "worst_loop": "asperity.analysis",
 }
 

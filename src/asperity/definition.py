@@ -13,9 +13,9 @@ from typing import Any
 import mpmath
 import sympy as sp
 
+from asperity.contacts.symbols import DEPTH, DX, DY, H_HALF, H_MID, HX, HY, POSITION, H, K
 from asperity.derive.jacobian import symbolic_force
 from asperity.errors import ParameterError
-from asperity.laws.symbols import DEPTH, DX, DY, H_HALF, H_MID, HX, HY, POSITION, H, K
 from asperity.surface import Surface
 from asperity.textures.fourier import Fourier
 from asperity.textures.heightmap import HeightMap
@@ -158,17 +158,17 @@ def exact_jacobian(
 
 def _force(surface: Surface, p: list[Any], d: list[Any]) -> Any:
     law, h = surface.law, exact_height(surface.texture)
-    if law.contact == "split":
+    if law.contact.name == "split":
         # Its definition is a supremum over space: the theorems on it are tested instead.
         raise ParameterError("surface", f"with law {law} has no definition in many digits")
     x, y, z = p
-    if law.contact == "nominal":
+    if law.contact.name == "nominal":
         depth, foot = -z, (x, y)
     else:
         depth, foot = h(x, y, 0, 0) - z, (x, y)
     if depth <= 0:
         return mpmath.matrix([0, 0, 0])
-    if law.contact == "nearest":
+    if law.contact.name == "nearest":
         foot = _exact_foot(surface.texture, h, p)
         away = [foot[0] - x, foot[1] - y, h(*foot, 0, 0) - z]
         depth = mpmath.sqrt(sum(part**2 for part in away))

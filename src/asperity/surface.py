@@ -3,36 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from copy import copy
 from functools import cached_property
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.checks import FloatArray, array, fraction, positive, real
-from asperity.derive.driver import CLAMPS, ClampName
+from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError, nearest_names
-from asperity.laws import Law, find_law
+from asperity.kernels.driver import CLAMPS, ClampName
+from asperity.laws import LAW_ARGUMENTS, LAWS, Law, find_law
 from asperity.textures.texture import Texture
 
 DEFAULT_STIFFNESS = 1000.0
-# Parameters of laws that are arguments of the surface, unless the law has its own defaults.
-DEFAULT_PARAMETERS = {
-    "friction": 0.8,
-    "max_deflection": 1e-3,
-    "modulation_depth": 0.8,
-    "continuity": 1.0,
-}
 # max_depth unless given: the peak-to-valley height of the texture, at most this [m].
 LARGEST_DEFAULT_DEPTH = 1e-3
+
+DEFAULT_PARAMETERS = {
+    name: default for law in LAWS.values() for name, default in law.parameters.items()
+}
+"""The defaults of the shipped laws' parameters."""
 
 
 def default_max_depth(texture: Texture) -> float:
     """Return the peak-to-valley height of the texture, at most 1 mm [m]."""
     height = texture.peak_to_valley
     return min(height, LARGEST_DEFAULT_DEPTH) if height > 0.0 else LARGEST_DEFAULT_DEPTH
+
+
+def _merged(law: Law, given: dict[str, float], own: dict[str, float]) -> dict[str, float]:
+    """Return the values that were given for parameters of laws, each from one place only."""
+    for name, value in own.items():
+        if name not in law.arguments:
+            hint = nearest_names(name, law.arguments) if law.arguments else "it has none"
+            raise ParameterError("law_parameters", f"names {name!r}; law {law}: {hint}")
+        if name in given:
+            raise ParameterError(name, "is given twice, by keyword and in law_parameters", value)
+        given[name] = law.arguments[name].checked(value)
+    return given
 
 
 class Surface:
@@ -53,7 +62,11 @@ class Surface:
             with a backing wall k (z_b - z) e_z below z_b = min h - max_depth, or -max_depth for
             laws on the nominal contact). Laws W, D, E and H are never clamped.
         continuity: c of law H, positive: its characteristic number is max(1, c); default 1.
-        law_parameters: values for the further parameters of a law of your own.
+        law_parameters: values for the parameters that the law declares, a law of your own
+            included; the four keywords above are a convenience for those of the shipped laws.
+
+    A surface is frozen. ``law_parameters`` of the result are the parameters of its law, complete
+    with their defaults: kernels and certificates read them there and nowhere else.
 
     Raises:
         ParameterError: for a value that cannot be used; it names the argument.
@@ -65,6 +78,14 @@ class Surface:
         array([[0. , 0. , 0.4],
                [0. , 0. , 0. ]])
     """
+
+    texture: Texture
+    law: Law
+    stiffness: float
+    max_depth: float
+    clamp: ClampName
+    law_parameters: Mapping[str, float]
+    _given: Mapping[str, float]
 
     def __init__(
         self,
@@ -81,41 +102,59 @@ class Surface:
     ) -> None:
         if not isinstance(texture, Texture):
             raise ParameterError("texture", "must be a texture such as Sinusoid", texture)
-        self.texture = texture
-        self.law = find_law(law)
-        self.stiffness = positive("stiffness", stiffness, "N/m")
-        self.max_depth = (
+        own = find_law(law)
+        keywords = {
+            "friction": friction,
+            "max_deflection": max_deflection,
+            "modulation_depth": modulation_depth,
+            "continuity": continuity,
+        }
+        given = {
+            name: LAW_ARGUMENTS[name].checked(value)
+            for name, value in keywords.items()
+            if value is not None
+        }
+        if clamp not in CLAMPS:
+            raise ParameterError("clamp", f"must be one of {', '.join(CLAMPS)}", clamp)
+        depth = (
             default_max_depth(texture)
             if max_depth is None
             else positive("max_depth", max_depth, "m")
         )
-        own = {**DEFAULT_PARAMETERS, **self.law.parameters}
-        self.friction = real("friction", own["friction"] if friction is None else friction)
-        if self.friction < 0.0:
-            raise ParameterError("friction", "must not be negative", friction)
-        longest = own["max_deflection"] if max_deflection is None else max_deflection
-        self.max_deflection = positive("max_deflection", longest, "m")
-        swing = own["modulation_depth"] if modulation_depth is None else modulation_depth
-        self.modulation_depth = fraction("modulation_depth", swing)
-        if clamp not in CLAMPS:
-            raise ParameterError("clamp", f"must be one of {', '.join(CLAMPS)}", clamp)
-        self.clamp: ClampName = clamp
-        self.continuity = positive(
-            "continuity", own["continuity"] if continuity is None else continuity
+        self._set(
+            texture=texture,
+            law=own,
+            stiffness=positive("stiffness", stiffness, "N/m"),
+            max_depth=depth,
+            clamp=clamp,
+            _given=_merged(own, given, dict(law_parameters or {})),
         )
-        self.law_parameters = self._own_parameters(dict(law_parameters or {}))
 
-    def _own_parameters(self, given: dict[str, float]) -> dict[str, float]:
-        values = {name: float(default) for name, default in self.law.parameters.items()}
-        values |= {
-            name: float(getattr(self, name)) for name in DEFAULT_PARAMETERS if name in values
+    def _set(self, **values: Any) -> None:
+        """Fill a new surface, the parameters of its law completed with the law's defaults."""
+        law, given = values["law"], values["_given"]
+        parameters = {
+            name: argument.checked(given[name]) if name in given else float(law.parameters[name])
+            for name, argument in law.arguments.items()
         }
-        for name, value in given.items():
-            if name not in values:
-                hint = nearest_names(name, values) if values else "it has none"
-                raise ParameterError("law_parameters", f"names {name!r}; law {self.law}: {hint}")
-            values[name] = real(name, value)
-        return values
+        if law.stateful:
+            positive("max_deflection", parameters["max_deflection"], "m")
+        self.__dict__.update(values, law_parameters=MappingProxyType(parameters))
+
+    def _changed(self, **values: Any) -> Surface:
+        """Return a surface that differs in these values only; nothing derived is taken along."""
+        names = ("texture", "law", "stiffness", "max_depth", "clamp", "_given")
+        result = object.__new__(type(self))
+        result._set(**{name: getattr(self, name) for name in names} | values)
+        return result
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(
+            f"a surface is not changed: {name} belongs to a new one, "
+            "by to_law, to_stiffness, to_depth or Surface(...)"
+        )
+
+    __delattr__ = None  # type: ignore[assignment]  # nothing of a surface is taken away
 
     def __repr__(self) -> str:
         return (
@@ -129,11 +168,7 @@ class Surface:
         Raises:
             ParameterError: for a depth that is not positive.
         """
-        result = copy(self)
-        for cached in ("law_arguments", "_loops"):
-            result.__dict__.pop(cached, None)
-        result.max_depth = positive("max_depth", max_depth, "m")
-        return result
+        return self._changed(max_depth=positive("max_depth", max_depth, "m"))
 
     def to_stiffness(self, stiffness: float) -> Surface:
         """Return the same surface with another stiffness [N/m].
@@ -141,40 +176,64 @@ class Surface:
         Raises:
             ParameterError: for a stiffness that is not positive.
         """
-        result = copy(self)
-        result.__dict__.pop("law_arguments", None)
-        result.stiffness = positive("stiffness", stiffness, "N/m")
-        return result
+        return self._changed(stiffness=positive("stiffness", stiffness, "N/m"))
 
     def to_law(self, law: str | Law) -> Surface:
         """Return the same texture with another law, everything else as it is.
 
+        Values that were given for parameters go along, also those that only the other law has.
+
         Raises:
             ParameterError: for an unknown law.
         """
-        return Surface(
-            self.texture,
-            law,
-            self.stiffness,
-            self.max_depth,
-            friction=self.friction,
-            max_deflection=self.max_deflection,
-            modulation_depth=self.modulation_depth,
-            clamp=self.clamp,
-            continuity=self.continuity,
-        )
+        return self._changed(law=find_law(law))
+
+    def parameter(self, name: str) -> float:
+        """Return the value in effect of a parameter of the law.
+
+        Raises:
+            ParameterError: for a name that the law does not declare.
+        """
+        if name not in self.law_parameters:
+            hint = nearest_names(name, self.law_parameters) if self.law_parameters else "none"
+            raise ParameterError("name", f"is no parameter of law {self.law}: {name!r}; {hint}")
+        return self.law_parameters[name]
+
+    def _in_effect(self, name: str) -> float:
+        """Return a shipped law's parameter: the law's own, else as given for other laws."""
+        if name in self.law_parameters:
+            return self.law_parameters[name]
+        return self._given.get(name, DEFAULT_PARAMETERS[name])
+
+    @property
+    def friction(self) -> float:
+        """μ [1] of law F: this surface's own, else the one that :meth:`to_law` hands on."""
+        return self._in_effect("friction")
+
+    @property
+    def max_deflection(self) -> float:
+        """d_max [m] of law F; see :attr:`friction`."""
+        return self._in_effect("max_deflection")
+
+    @property
+    def modulation_depth(self) -> float:
+        """a_m [1] of law F; see :attr:`friction`."""
+        return self._in_effect("modulation_depth")
+
+    @property
+    def continuity(self) -> float:
+        """C [1] of law H; see :attr:`friction`."""
+        return self._in_effect("continuity")
 
     @property
     def floor(self) -> float:
         """z_b [m], below which ``clamp="backed"`` adds its wall."""
-        if self.law.contact == "nominal":
-            return -self.max_depth
-        return self.texture.extremes[0] - self.max_depth
+        return self.law.contact.extremes(self.texture)[0] - self.max_depth
 
     @cached_property
     def law_arguments(self) -> tuple[float, ...]:
-        """What the kernels receive of the law: see ``asperity.derive.driver``."""
-        from asperity.derive.fuse import kernel_source
+        """What the kernels receive of the law: see ``asperity.kernels.driver``."""
+        from asperity.kernels.fuse import kernel_source
 
         # The extremes of a map cost time: only for a law that looks at the relative height.
         relative = "h_mid" in kernel_source(self.law)
@@ -193,8 +252,11 @@ class Surface:
     def sampler(self) -> tuple[ModuleType, ...]:
         """The modules that are compiled together with the law: the texture's and the contact's."""
         sampler = self.texture.sampler
-        if self.law.contact == "split":
-            from asperity.textures.samplers import sinusoid, split, split_conditions, split_sinusoid
+        if self.law.contact.name == "split":
+            from asperity.contacts.split import conditions as split_conditions
+            from asperity.contacts.split import solver as split
+            from asperity.textures.samplers import sinusoid
+            from asperity.textures.samplers import sinusoid_split as split_sinusoid
 
             known = sampler[0] is sinusoid
             sampler = (*sampler, *((split_sinusoid,) if known else (split, split_conditions)))
@@ -202,7 +264,7 @@ class Surface:
 
     @cached_property
     def _loops(self) -> ModuleType:
-        from asperity.derive.fuse import fuse_surface
+        from asperity.kernels.fuse import fuse_surface
 
         clamp: ClampName = self.clamp if self.law.clampable else "none"
         return fuse_surface(self.law, self.sampler, clamp)

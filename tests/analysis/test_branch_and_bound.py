@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.branch_and_bound import Problem, Supremum, supremum
-from asperity.analysis.cells import Cells, cells_of
-from asperity.analysis.friction import largest_singular_value, largest_symmetric_eigenvalue
-from asperity.analysis.measures import (
+from asperity.analysis.bounds.branch_and_bound import Problem, Supremum, supremum
+from asperity.analysis.bounds.measures import (
     CURL,
     NORM,
     ONE_SIDED,
@@ -22,11 +20,18 @@ from asperity.analysis.measures import (
     precise_norm,
     precise_one_sided,
 )
-from asperity.analysis.problems import CrestProblem, FrictionProblem, SlopeProblem, normal_problem
-from asperity.analysis.ridges import crest_curvature
+from asperity.analysis.bounds.problems import (
+    CrestProblem,
+    FrictionProblem,
+    SlopeProblem,
+    normal_problem,
+)
+from asperity.analysis.gain.friction import largest_singular_value, largest_symmetric_eigenvalue
+from asperity.analysis.gain.medial_axis import crest_curvature
 from asperity.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Sinusoid, Texture
+from asperity.textures.cells import Cells, cells_of
 
 NUMBERS = [NORM, ONE_SIDED, CURL]
 EXACT = {"norm": precise_norm, "one-sided": precise_one_sided, "curl": curl}

@@ -11,15 +11,15 @@ import mpmath
 import numpy as np
 import pytest
 
-from asperity.analysis.branch_and_bound import _parts, _split
-from asperity.analysis.cells import NAMES, Cells, WaveCells, cells_of
-from asperity.analysis.cells.base import ORDERS, spread
-from asperity.analysis.cells.products import ProductCells, anchor_models, with_deflection
-from asperity.analysis.cells.splines import MapCells
-from asperity.analysis.cells.waves import nearest_phases
-from asperity.analysis.taylor import Taylor
+from asperity.analysis.bounds.branch_and_bound import _parts, _split
 from asperity.definition import exact_height
+from asperity.enclosures.cells import ORDERS, spread
+from asperity.enclosures.products import ProductCells, anchor_models, with_deflection
+from asperity.enclosures.taylor import Taylor
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
+from asperity.textures.cells import NAMES, Cells, WaveCells, cells_of
+from asperity.textures.cells.splines import MapCells
+from asperity.textures.cells.waves import nearest_phases
 
 RNG = np.random.default_rng(20260611)
 ROUGH = RNG.normal(size=(7, 9))

@@ -19,13 +19,21 @@ import sympy as sp
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from asperity.analysis import characteristic_number, closed_forms, one_sided_number
-from asperity.analysis.bound import Bound
-from asperity.analysis.certificate import Search, certified, safe_bound
-from asperity.analysis.characteristic import curl_number
-from asperity.analysis.friction import largest_singular_value
-from asperity.analysis.measures import CURL, NORM, ONE_SIDED, curl, precise_norm, precise_one_sided
-from asperity.analysis.ridges import sharpest_crest
+from asperity.analysis import characteristic_number, one_sided_number
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.bounds.measures import (
+    CURL,
+    NORM,
+    ONE_SIDED,
+    curl,
+    precise_norm,
+    precise_one_sided,
+)
+from asperity.analysis.gain import closed_forms
+from asperity.analysis.gain.certificate import Search, certified, safe_bound
+from asperity.analysis.gain.characteristic import curl_number
+from asperity.analysis.gain.friction import largest_singular_value
+from asperity.analysis.gain.medial_axis import sharpest_crest
 from asperity.definition import exact_jacobian
 from asperity.errors import ParameterError
 from asperity.laws import Law

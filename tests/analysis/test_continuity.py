@@ -12,9 +12,9 @@ import pytest
 from scipy.optimize import brentq
 
 from asperity.analysis import characteristic_number
-from asperity.analysis import continuity as module
-from asperity.analysis.bound import Bound
-from asperity.analysis.continuity import Continuity, continuity, jumps
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy import continuity as module
+from asperity.analysis.energy.continuity import Continuity, continuity, jumps
 from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures.heightmap import HeightMap

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis import keeping
-from asperity.analysis.bound import Bound
-from asperity.analysis.certificate import Search
-from asperity.analysis.characteristic import characteristic_number, one_sided_number
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.gain import kept as keeping
+from asperity.analysis.gain.certificate import Search
+from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Sinusoid, Texture
@@ -225,7 +225,8 @@ NUMBERS = {"q": characteristic_number, "q+": one_sided_number}
 _SECOND = """
 import sys, numpy as np
 from asperity import HeightMap, Surface, characteristic_number
-from asperity.analysis import branch_and_bound, certificate
+from asperity.analysis.bounds import branch_and_bound
+from asperity.analysis.gain import certificate
 def refuse(*_arguments):
     raise SystemExit("computed again")
 certificate.supremum = refuse

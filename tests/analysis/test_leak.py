@@ -9,9 +9,9 @@ import pytest
 from scipy.integrate import dblquad
 
 from asperity.analysis import loop_work
-from asperity.analysis.columns import curl_integral, sampled_sides
-from asperity.analysis.leak import worst_loop
-from asperity.analysis.state_loops import in_plane_loop
+from asperity.analysis.energy.columns import curl_integral, sampled_sides
+from asperity.analysis.energy.leak import worst_loop
+from asperity.analysis.energy.state_loops import in_plane_loop
 from asperity.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.fourier import Fourier

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from asperity.analysis import limits as module
-from asperity.analysis.bound import Bound
-from asperity.analysis.comparison import compare
-from asperity.analysis.limit_result import Limits
-from asperity.analysis.limits import limits
-from asperity.analysis.merit import merit
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.compare import compare
+from asperity.analysis.energy.merit import merit
+from asperity.analysis.limits.device_limits import device_limits as module
+from asperity.analysis.limits.device_limits import limits
+from asperity.analysis.limits.limit_result import Limits
 from asperity.devices import Device, parse_device
 from asperity.errors import ParameterError
 from asperity.surface import Surface

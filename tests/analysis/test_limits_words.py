@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.limit_result import Limits
-from asperity.analysis.limits import limits
+from asperity.analysis.limits.device_limits import limits
+from asperity.analysis.limits.limit_result import Limits
 from asperity.devices import Device, parse_device
 from asperity.textures import Fourier, HeightMap, Sinusoid, Texture
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 from asperity.analysis import loop_work
-from asperity.analysis.anchor import anchored_stretches
+from asperity.analysis.energy.anchor import anchored_stretches
 from asperity.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.heightmap import HeightMap

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from asperity.analysis.merit import merit
+from asperity.analysis.energy.merit import merit
 from asperity.surface import Surface
 from asperity.textures.heightmap import HeightMap
 from asperity.textures.sinusoid import Sinusoid

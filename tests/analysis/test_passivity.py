@@ -13,10 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
-from asperity.analysis.bound import Bound
-from asperity.analysis.criteria import Criterion
-from asperity.analysis.leak import Leak, worst_loop
-from asperity.analysis.passivity import Passivity, passivity
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.leak import Leak, worst_loop
+from asperity.analysis.passivity.criteria import Criterion
+from asperity.analysis.passivity.judgement import Passivity, passivity
 from asperity.derive.facts import law_facts
 from asperity.devices import Datum, Device, parse_device
 from asperity.errors import ParameterError

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
-from asperity.analysis.bound import Bound
-from asperity.analysis.leak import worst_loop
-from asperity.analysis.passivity import Passivity, passivity
-from asperity.analysis.split import split_state
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.leak import worst_loop
+from asperity.analysis.passivity.judgement import Passivity, passivity
+from asperity.analysis.split.state import split_state
 from asperity.devices import parse_device
 from asperity.surface import Surface
 from asperity.textures.fourier import Fourier

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from asperity.analysis import characteristic_number
-from asperity.analysis.continuity import continuity
-from asperity.analysis.ridges import crest_curvature, sharpest_crest
+from asperity.analysis.energy.continuity import continuity
+from asperity.analysis.gain.medial_axis import crest_curvature, sharpest_crest
 from asperity.surface import Surface
 from asperity.textures.fourier import Fourier
 from asperity.textures.heightmap import HeightMap

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from asperity.analysis import spectrum as module
-from asperity.analysis.spectrum import Spectrum, banded, grid, samples, spectrum
+from asperity.analysis.limits.device_limits import spectrum as module
+from asperity.analysis.limits.spectrum import Spectrum, banded, grid, samples, spectrum
 from asperity.textures import Fourier, Grating, HeightMap, Noise, NoiseProfile, Profile, Sinusoid
 
 

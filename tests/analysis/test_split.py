@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
-from asperity.analysis.split import split_state
+from asperity.analysis.split.state import split_state
 from asperity.errors import ParameterError
 from asperity.laws import Law
 from asperity.surface import Surface

@@ -8,11 +8,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from asperity.analysis.split import split_state
+from asperity.analysis.split.state import split_state
 from asperity.checks import FloatArray
-from asperity.derive.fuse import fuse_surface
+from asperity.contacts.split import conditions as split_conditions
+from asperity.contacts.split import solver as split
+from asperity.kernels.fuse import fuse_surface
 from asperity.surface import Surface
-from asperity.textures.samplers import split, split_conditions
 from asperity.textures.sinusoid import Sinusoid
 
 PERIOD = 1e-3

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from asperity.analysis.split import pop_through, split_state
+from asperity.analysis.split.state import pop_through, split_state
 from asperity.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.profile import Profile

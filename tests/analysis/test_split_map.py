@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.analysis.split import split_state
+from asperity.analysis.split.state import split_state
 from asperity.surface import Surface
 from asperity.textures.heightmap import HeightMap
 from asperity.textures.texture import Texture

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from asperity.analysis import loop_work
-from asperity.analysis.split import split_state
-from asperity.analysis.split_table import TabulatedSurface, tabulate
+from asperity.analysis.split.potential_table import TabulatedSurface, tabulate
+from asperity.analysis.split.state import split_state
 from asperity.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.fourier import Fourier

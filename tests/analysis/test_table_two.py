@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from asperity.analysis.bound import Bound
-from asperity.analysis.table_two import TableTwo, table_two
+from asperity.analysis.bounds.bound import Bound
+from asperity.paper.table_two import TableTwo, table_two
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 

@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.cells import NAMES, cells_of
-from asperity.analysis.cells.products import with_depth
-from asperity.analysis.measures import NORM
-from asperity.analysis.problems import _stacked, law_constants, law_kernel
-from asperity.analysis.taylor import Taylor, TaylorMath, reciprocal
+from asperity.analysis.bounds.measures import NORM
+from asperity.analysis.bounds.problems import _stacked, law_constants, law_kernel
 from asperity.definition import exact_jacobian
-from asperity.derive.fuse import kernel_source
+from asperity.enclosures.products import with_depth
+from asperity.enclosures.taylor import Taylor, TaylorMath, reciprocal
+from asperity.kernels.fuse import kernel_source
 from asperity.laws import Law, find_law
 from asperity.surface import Surface
 from asperity.textures import Fourier
+from asperity.textures.cells import NAMES, cells_of
 
 SAMPLES = 64
 WIDE = np.longdouble

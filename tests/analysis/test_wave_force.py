@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from asperity.analysis import wave_force as module
-from asperity.analysis.merit import scan_height
-from asperity.analysis.spectrum import spectrum
-from asperity.analysis.wave_force import scan_forces, wave_forces
+from asperity.analysis.energy.merit import scan_height
+from asperity.analysis.limits.device_limits import wave_force as module
+from asperity.analysis.limits.spectrum import spectrum
+from asperity.analysis.limits.wave_force import scan_forces, wave_forces
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from asperity.contacts.symbols import ContactSymbols
 from asperity.derive.curl import curl_verdict
 from asperity.laws import LAWS, Law
-from asperity.laws.symbols import ContactSymbols
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 

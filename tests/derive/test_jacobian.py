@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from asperity.contacts.symbols import DEPTH, POSITION, K
 from asperity.derive.jacobian import derive, explicit
 from asperity.laws import LAWS, Law
-from asperity.laws.symbols import DEPTH, POSITION, K
 
 LETTERS = "WABCDEFG"
 STIFFNESS, FRICTION, MAX_DEFLECTION, MODULATION = 700.0, 0.7, 0.8e-3, 0.9
@@ -91,7 +91,7 @@ def modulation(h: float) -> float:
 
 def depth_of(patch: Patch, letter: str) -> float:
     """Return a depth well inside: for D and E 60 % of the way to the nearest focal point."""
-    if LAWS[letter].contact != "nearest":
+    if LAWS[letter].contact.name != "nearest":
         return 0.7e-3
     s = np.sqrt(1.0 + patch.g @ patch.g)
     first = np.eye(2) + np.outer(patch.g, patch.g)
@@ -133,13 +133,13 @@ def force_on_patch(
     """Return the force as a function of the probe, (n, 3) -> (n, 3)."""
 
     def one(p: np.ndarray) -> np.ndarray:
-        u = patch.foot(p) if LAWS[letter].contact == "nearest" else p[:2]
+        u = patch.foot(p) if LAWS[letter].contact.name == "nearest" else p[:2]
         h, g, _ = patch.derivatives(u)
         depth = {
             "nominal": -p[2],
             "vertical": h - p[2],
             "nearest": float(np.sqrt((u - p[:2]) @ (u - p[:2]) + (h - p[2]) ** 2)),
-        }[LAWS[letter].contact]
+        }[LAWS[letter].contact.name]
         d = p[:2] - anchor
         if sliding:
             d = d * np.hypot(*DEFLECTION) / np.hypot(*d)
@@ -157,7 +157,7 @@ def probe_of(patch: Patch, letter: str, depth: float) -> np.ndarray:
         "nominal": np.array([0.0, 0.0, -depth]),
         "vertical": np.array([0.0, 0.0, patch.h0 - depth]),
         "nearest": np.array([0.0, 0.0, patch.h0]) - depth * n,
-    }[LAWS[letter].contact]
+    }[LAWS[letter].contact.name]
 
 
 @pytest.mark.parametrize(("letter", "sliding"), CASES, ids=IDS)
@@ -191,7 +191,7 @@ def test_the_saturated_jacobian_is_the_jacobian_without_the_depth(letter: str):
         "nominal": sp.Matrix([[0, 0, -1]]),
         "vertical": w,
         "nearest": w / sp.sqrt(w.dot(w)),
-    }[derivation.law.contact]
+    }[derivation.law.contact.name]
     by_depth = derivation.force.diff(DEPTH) * gradient
     rest = derivation.jacobian - derivation.jacobian_saturated - by_depth
     assert rest.applyfunc(sp.simplify) == sp.zeros(3, 3)

@@ -11,11 +11,11 @@ import pytest
 import sympy as sp
 
 from asperity.analysis import characteristic_number
+from asperity.contacts.symbols import HXX, ContactSymbols
 from asperity.derive.jacobian import derive, symbolic_force
 from asperity.derive.python_source import law_source
 from asperity.errors import LawError
 from asperity.laws import Law
-from asperity.laws.symbols import HXX, ContactSymbols
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from asperity.contacts.symbols import ARGUMENT_ORDER
 from asperity.derive.jacobian import derive, explicit
 from asperity.derive.python_source import law_source
 from asperity.laws import LAWS, Law
-from asperity.laws.symbols import ARGUMENT_ORDER
 
 VALUES = {
     "x": 1e-3, "y": -2e-3, "z": -0.4e-3, "depth": 0.4e-3, "h": 0.25e-3, "hx": 0.6, "hy": -1.1,

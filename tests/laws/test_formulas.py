@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
+from asperity.contacts.symbols import ContactSymbols
 from asperity.derive.jacobian import symbolic_force
 from asperity.laws import LAWS
-from asperity.laws.symbols import ContactSymbols
 
 # Nothing here is round or symmetric, so that no exchanged term goes unnoticed.
 VALUES = {

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from asperity.contacts.symbols import ContactSymbols
 from asperity.errors import LawError
 from asperity.laws import LAWS, Law
-from asperity.laws.symbols import ContactSymbols
 
 
 def wall(c: ContactSymbols) -> Any:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-import asperity.analysis.characteristic
-import asperity.analysis.loops
+import asperity.analysis.energy.loops
+import asperity.analysis.gain.characteristic
 import asperity.definition
 from asperity.laws import find_law
 from asperity.paper import (
@@ -43,12 +43,12 @@ def test_another_law_flips_the_verdict(name: str, monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.parametrize("name", ["eq-12", "sentence-IV.A-energy", "eq-27"])
 def test_another_work_flips_the_verdict(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    original = asperity.analysis.loops.loop_work
+    original = asperity.analysis.energy.loops.loop_work
 
     def changed(*arguments: Any) -> float:
         return _CHANGED * original(*arguments)
 
-    monkeypatch.setattr(asperity.analysis.loops, "loop_work", changed)
+    monkeypatch.setattr(asperity.analysis.energy.loops, "loop_work", changed)
     assert claim(name).run().verdict == "does not hold"
 
 
@@ -60,7 +60,7 @@ def test_another_work_flips_the_verdict(name: str, monkeypatch: pytest.MonkeyPat
 def test_another_number_flips_the_verdict(
     name: str, factor: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    original = asperity.analysis.characteristic.characteristic_number
+    original = asperity.analysis.gain.characteristic.characteristic_number
 
     def changed(surface: Any) -> Any:
         found = original(surface)
@@ -69,7 +69,7 @@ def test_another_number_flips_the_verdict(
             times = 10.0 if surface.texture.period > 1.5e-3 else 1.0
         return replace(found, lower=times * found.lower, upper=times * found.upper)
 
-    monkeypatch.setattr(asperity.analysis.characteristic, "characteristic_number", changed)
+    monkeypatch.setattr(asperity.analysis.gain.characteristic, "characteristic_number", changed)
     assert claim(name).run().verdict == "does not hold"
 
 

@@ -13,8 +13,8 @@ import pytest
 from matplotlib.collections import QuadMesh
 from rich.console import Console
 
-from asperity.analysis.bound import Bound
-from asperity.analysis.inspection import Analysis, analyze
+from asperity.analysis.analyze import Analysis, analyze
+from asperity.analysis.bounds.bound import Bound
 from asperity.devices import Device, parse_device
 from asperity.errors import ParameterError
 from asperity.report import html_text, plot, print_analysis

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from asperity.analysis.limit_result import Limits
-from asperity.analysis.limits import limits
+from asperity.analysis.limits.device_limits import limits
+from asperity.analysis.limits.limit_result import Limits
 from asperity.devices import parse_device
 from asperity.report.limits_html import limits_html
 from asperity.report.limits_picture import limits_figure, shortest

@@ -11,7 +11,8 @@ import itertools
 import numpy as np
 import pytest
 
-from asperity.textures.samplers import line, search
+from asperity.contacts.nearest import line_search as line
+from asperity.contacts.nearest import plane_search as search
 
 Cubic = np.ndarray  # coefficients of x^i y^j, i + j <= 3, shape (4, 4)
 LEVEL = (0.0, 0.0, 0.0)  # a probe below the origin

@@ -1,17 +1,17 @@
 """A surface (and a device) in, a frozen result out."""
 
-from asperity.analysis.bound import Bound
-from asperity.analysis.characteristic import (
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.compare import Comparison, compare
+from asperity.analysis.energy.continuity import Continuity, Jump
+from asperity.analysis.energy.leak import Leak, worst_loop
+from asperity.analysis.energy.loops import loop_work
+from asperity.analysis.gain.characteristic import (
     characteristic_number,
     curl_number,
     one_sided_number,
 )
-from asperity.analysis.comparison import Comparison, compare
-from asperity.analysis.continuity import Continuity, Jump
-from asperity.analysis.criteria import Criterion
-from asperity.analysis.leak import Leak, worst_loop
-from asperity.analysis.loops import loop_work
-from asperity.analysis.passivity import Passivity
+from asperity.analysis.passivity.criteria import Criterion
+from asperity.analysis.passivity.judgement import Passivity
 from asperity.analysis.row import LawRow
 
 __all__ = [

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from asperity.analysis.bound import Bound
-from asperity.analysis.leak import Leak
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.leak import Leak
 from asperity.laws import Law
 from asperity.surface import Surface
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from asperity.analysis.row import LawRow
 from asperity.devices import Device
-from asperity.surface import DEFAULT_PARAMETERS, Surface
+from asperity.surface import Surface
 from asperity.units import engineering, rounded_down
 
 # A texture force below this is taken as not felt where the device's resolution is unknown [N].
@@ -29,7 +29,7 @@ def verdict(row: LawRow) -> str:
         parts.append("no texture")
     if not parts:
         parts.append(f"sound at {k:g} N/m: below its limit, conservative, continuous")
-    if row.contact_lost > 0.0 and surface.law.contact != "nominal":
+    if row.contact_lost > 0.0 and surface.law.contact.begins_on_texture:
         parts.append(f"no contact on {100.0 * row.contact_lost:.0f} % of the scan")
     return "; ".join(parts)
 
@@ -74,7 +74,7 @@ def _soundest(sound: Sequence[LawRow]) -> LawRow:
     """Return the strongest law; of nearly equal ones one whose force cannot jump at any depth."""
     strongest = max(row.texture_force for row in sound)
     equal = [row for row in sound if row.texture_force >= 0.98 * strongest]
-    return min(equal, key=lambda row: row.surface.law.contact == "nearest")
+    return min(equal, key=lambda row: not row.surface.law.contact.single_valued)
 
 
 def felt_force(device: Device) -> tuple[float, str]:
@@ -207,9 +207,9 @@ def _defaulted(rows: Sequence[LawRow], defaults: Mapping[str, bool], given: set[
         result.append(f"Default max depth {depth}: the peak-to-valley height, at most 1 mm")
     for row in rows:
         for name in row.law.parameters:
-            if name not in given and name in DEFAULT_PARAMETERS:
-                value = getattr(row.surface, name)
-                text = engineering(value, "m") if name == "max_deflection" else f"{value:g}"
+            if name not in given:
+                value = row.surface.law_parameters[name]
+                text = row.law.arguments[name].readable(value)
                 spoken = name.replace("_", " ")
                 result.append(f"Default {spoken} {text} for law {row.law.letter}")
     return result

@@ -16,7 +16,7 @@ from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
 from asperity.errors import ParameterError
 
 if TYPE_CHECKING:
-    from asperity.analysis.inspection import Analysis
+    from asperity.analysis.analyze import Analysis
     from asperity.textures import Texture
 
 _SEARCH_OPTIONS = (
@@ -89,8 +89,8 @@ def analyze_command(
 
 def _analyze(surface: str, law: str | None, device: str | None, values: dict[str, Any]) -> Answer:
     """Return the analysis that the arguments ask for."""
-    from asperity.analysis.comparison import DEFAULT_DEVICE
-    from asperity.analysis.inspection import STEPS, analyze
+    from asperity.analysis.analyze import STEPS, analyze
+    from asperity.analysis.compare import DEFAULT_DEVICE
     from asperity.devices import load_device
     from asperity.laws import find_law
     from asperity.scene import FILE_ARGUMENTS, SURFACE_ARGUMENTS, load_scene

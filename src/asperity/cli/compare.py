@@ -68,7 +68,7 @@ def _compare(
     surface: str, device: str | None, laws: str | None, values: dict[str, Any]
 ) -> Comparison:
     """Return the comparison that the arguments ask for."""
-    from asperity.analysis.comparison import ALL_LAWS, DEFAULT_DEVICE, compare
+    from asperity.analysis.compare import ALL_LAWS, DEFAULT_DEVICE, compare
     from asperity.devices import load_device
     from asperity.laws import find_laws
     from asperity.scene import FILE_ARGUMENTS, SURFACE_ARGUMENTS, load_scene

@@ -11,7 +11,7 @@ from asperity.cli.options import FILE_OPTIONS, LAW_OPTIONS, given, text_options
 from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
 
 if TYPE_CHECKING:
-    from asperity.analysis.limit_result import Limits
+    from asperity.analysis.limits.limit_result import Limits
 
 _STIFFNESS = (
     "--stiffness",
@@ -83,7 +83,7 @@ def _limits(
     values: dict[str, Any],
 ) -> Limits:
     """Return the limits that the arguments ask for."""
-    from asperity.analysis.limits import DEFAULT_DEVICE, limits
+    from asperity.analysis.limits.device_limits import DEFAULT_DEVICE, limits
     from asperity.devices import load_device
     from asperity.laws import find_law
     from asperity.scene import FILE_ARGUMENTS, SURFACE_ARGUMENTS, load_scene

@@ -13,7 +13,7 @@ import click
 from asperity.cli.options import FILE_OPTIONS, given, text_options
 
 if TYPE_CHECKING:
-    from asperity.textures.prepared import Prepared
+    from asperity.measured.prepared import Prepared
 
 _WORDS = {
     "read": "reading the surface",
@@ -41,9 +41,9 @@ def prepare_command(file: str, output: str, **values: Any) -> None:
     the result in place of the measured file. Lengths are in the surface's own metres, before
     magnification.
     """
+    from asperity.measured.prepared import check_target, save_prepared
     from asperity.scene import FILE_ARGUMENTS
     from asperity.textures.loading import prepare_file
-    from asperity.textures.prepared import check_target, save_prepared
 
     check_target(Path(output), Path(file))
     arguments = {
@@ -98,13 +98,13 @@ def summary(prepared: Prepared) -> str:
 
     Example:
         >>> import numpy as np
-        >>> from asperity.textures.prepared import Prepared
+        >>> from asperity.measured.prepared import Prepared
         >>> summary(Prepared(np.array([0.0, 1e-6, 0.0, 1e-6]), (1e-5,), ()))
         '4 points, pitch 10 µm, peak to valley 1 µm, RMS 500 nm'
     """
     import numpy as np
 
-    from asperity.textures.lengths import by_text, lengths_text
+    from asperity.measured.length_words import by_text, lengths_text
     from asperity.units import engineering
 
     heights = prepared.heights

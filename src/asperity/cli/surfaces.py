@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from asperity.textures.arguments import Argument, Kind
+    from asperity.arguments import Argument
+    from asperity.textures.kinds import Kind
     from asperity.textures.texture import Texture
 
 SCHEMA = 1

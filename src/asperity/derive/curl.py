@@ -8,10 +8,9 @@ from typing import Any
 
 import sympy as sp
 
+from asperity.contacts.symbols import DEPTH, HX, HY, TOWARD
 from asperity.derive.jacobian import derive, explicit
-from asperity.laws.contacts import contact_derivatives
 from asperity.laws.law import Law
-from asperity.laws.symbols import DEPTH, HX, HY, TOWARD
 
 # s = |w| = √(1 + h_x² + h_y²), as a symbol of its own so that the curl becomes rational.
 _S = sp.Symbol("s", positive=True)
@@ -69,7 +68,7 @@ def curl_verdict(law: Law) -> CurlVerdict:
         return CurlVerdict(False, curl, "not proved: the formula is in pieces")
     if not _starts_along_the_normal(law, derivation.force):
         return CurlVerdict(False, curl, "where contact begins the force has a tangential part")
-    if contact_derivatives(law.contact).single_valued:
+    if law.contact.single_valued:
         return CurlVerdict(True, curl, "the curl is zero identically")
     return CurlVerdict(True, curl, "the curl is zero identically, its potential does not jump")
 
@@ -82,9 +81,9 @@ def begins_at_zero(force: Any) -> bool:
 
 def _starts_along_the_normal(law: Law, force: Any) -> bool:
     start = force.subs(dict.fromkeys([DEPTH, *TOWARD], 0))
-    if law.contact == "split":
+    if not law.contact.given_by_depth:
         return begins_at_zero(force)
-    across = start.cross(contact_derivatives(law.contact).depth_gradient.T)
+    across = start.cross(law.contact.derivatives().depth_gradient.T)
     return bool(across.applyfunc(_reduce) == sp.zeros(3, 1))
 
 

@@ -59,9 +59,9 @@ def derive_facts(law: Law) -> LawFacts:
     Raises:
         LawError: see :func:`asperity.derive.jacobian.derive`.
     """
+    from asperity.contacts.symbols import HX, HY, POSITION, H
     from asperity.derive.curl import begins_at_zero, curl_verdict
     from asperity.derive.jacobian import derive, explicit
-    from asperity.laws.symbols import HX, HY, POSITION, H
 
     verdict = curl_verdict(law)
     derivation = derive(law)
@@ -80,8 +80,8 @@ def derive_facts(law: Law) -> LawFacts:
 
 def _is_affine(jacobian: Any) -> bool:
     """Return whether the second derivative by the depth vanishes identically."""
+    from asperity.contacts.symbols import DEPTH
     from asperity.derive.curl import is_zero
-    from asperity.laws.symbols import DEPTH
 
     bend = jacobian.diff(DEPTH, 2)
     # A point where it is not zero settles it at once; a proof is only tried where there is none.

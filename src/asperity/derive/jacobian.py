@@ -10,10 +10,7 @@ from typing import Any
 
 import sympy as sp
 
-from asperity.errors import LawError
-from asperity.laws.contacts import contact_derivatives
-from asperity.laws.law import Law
-from asperity.laws.symbols import (
+from asperity.contacts.symbols import (
     ARGUMENT_ORDER,
     DEPTH,
     DX,
@@ -27,11 +24,11 @@ from asperity.laws.symbols import (
     SXX,
     SXY,
     SYY,
-    TOWARD,
-    TOWARD_DERIVATIVE,
     ContactSymbols,
     H,
 )
+from asperity.errors import LawError
+from asperity.laws.law import Law
 
 # Names that the kernels use themselves: symbols, intermediate values, loops and libraries.
 _RESERVED = re.compile(
@@ -82,7 +79,7 @@ def derive(law: Law) -> Derivation:
         [hx*k, hy*k, -k]])
     """
     force = symbolic_force(law)
-    contact = contact_derivatives(law.contact)
+    contact = law.contact.derivatives()
     by_height = force.jacobian([H, HX, HY])
     height_by_point = sp.Matrix([[HX, HY], [HXX, HXY], [HXY, HYY]])
     saturated = by_height * height_by_point * contact.point_derivative
@@ -90,8 +87,7 @@ def derive(law: Law) -> Derivation:
     if law.stateful:
         # ∂d/∂p is handed in: the identity while sticking, I - u uᵀ while sliding.
         saturated += force.jacobian([DX, DY]) * sp.Matrix([[SXX, SXY, 0], [SXY, SYY, 0]])
-    if law.contact == "split":
-        saturated += force.jacobian(list(TOWARD)) * TOWARD_DERIVATIVE
+    saturated += law.contact.jacobian_part(force)
     full = saturated + force.diff(DEPTH) * contact.depth_gradient
     return Derivation(law, force, _tidy(full), _tidy(saturated), contact.definitions)
 
@@ -109,7 +105,7 @@ def symbolic_force(law: Law) -> Any:
     Raises:
         LawError: see :func:`derive`.
     """
-    symbols = ContactSymbols(tuple(law.parameters), law.contact)
+    symbols = ContactSymbols(tuple(law.parameters), law.contact.toward())
     for name in law.parameters:
         if not name.isidentifier() or keyword.iskeyword(name) or _RESERVED.fullmatch(name):
             raise LawError(f"law {law.letter}: {name!r} cannot be the name of a parameter")
@@ -134,8 +130,9 @@ def symbolic_force(law: Law) -> Any:
 
 
 def _check_symbols(law: Law, force: Any) -> None:
-    here = TOWARD if law.contact == "split" else (DEPTH, H, HX, HY)
-    allowed = {*POSITION, *here} | {sp.Symbol(n, real=True) for n in law.parameters}
+    allowed = {*POSITION, *law.contact.formula_symbols()} | {
+        sp.Symbol(n, real=True) for n in law.parameters
+    }
     allowed |= set(ARGUMENT_ORDER[-3:])  # k, h_mid, h_half
     if law.stateful:
         allowed |= {DX, DY}

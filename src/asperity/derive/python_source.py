@@ -8,10 +8,10 @@ from typing import Any
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
+from asperity.contacts.symbols import ARGUMENT_ORDER, HX, HY
 from asperity.derive.jacobian import Derivation, derive
 from asperity.errors import LawError
 from asperity.laws.law import Law
-from asperity.laws.symbols import ARGUMENT_ORDER, HX, HY
 
 _S = sp.Symbol("s", positive=True)
 _S_SQUARED = 1 + HX**2 + HY**2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from asperity.arguments import Argument
 from asperity.errors import ParameterError, nearest_names
 from asperity.laws import (
     a_groove_wall_normal,
@@ -14,9 +15,9 @@ from asperity.laws import (
     h_split_god_object,
     w_smooth_wall,
 )
-from asperity.laws.law import ContactName, Law
+from asperity.laws.law import Law
 
-__all__ = ["LAWS", "ContactName", "Law", "find_law", "find_laws"]
+__all__ = ["LAWS", "LAW_ARGUMENTS", "Law", "find_law", "find_laws"]
 
 # In the order of the paper's tables, the smooth wall first.
 LAWS: dict[str, Law] = {
@@ -33,6 +34,11 @@ LAWS: dict[str, Law] = {
         h_split_god_object,
     )
 }
+
+LAW_ARGUMENTS: dict[str, Argument] = {
+    name: argument for law in LAWS.values() for name, argument in law.arguments.items()
+}
+"""The parameters of the shipped laws, by name."""
 
 
 def find_law(law: str | Law) -> Law:

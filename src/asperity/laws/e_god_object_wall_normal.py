@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from asperity.laws.law import Law
 
 if TYPE_CHECKING:
-    from asperity.laws.symbols import ContactSymbols
+    from asperity.contacts.symbols import ContactSymbols
 
 
 def force(c: ContactSymbols) -> Any:

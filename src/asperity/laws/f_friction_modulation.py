@@ -14,10 +14,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from asperity.arguments import Argument
 from asperity.laws.law import Law
 
 if TYPE_CHECKING:
-    from asperity.laws.symbols import ContactSymbols
+    from asperity.contacts.symbols import ContactSymbols
 
 
 def force(c: ContactSymbols) -> Any:
@@ -35,5 +36,17 @@ LAW = Law(
     summary="smooth wall with friction that the height modulates",
     clampable=True,
     stateful=True,
-    parameters={"friction": 0.8, "max_deflection": 1e-3, "modulation_depth": 0.8},
+    parameters={
+        "friction": Argument("friction", "coefficient of friction μ of law F", default=0.8),
+        "max_deflection": Argument(
+            "max_deflection",
+            "d_max of law F, the greatest deflection of its anchor",
+            "m",
+            1e-3,
+            positive=True,
+        ),
+        "modulation_depth": Argument(
+            "modulation_depth", "a_m of law F, 0 to 1", default=0.8, high=1.0
+        ),
+    },
 )

@@ -15,10 +15,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from asperity.arguments import Argument
 from asperity.laws.law import Law
 
 if TYPE_CHECKING:
-    from asperity.laws.symbols import ContactSymbols
+    from asperity.contacts.symbols import ContactSymbols
 
 
 def force(c: ContactSymbols) -> Any:
@@ -32,5 +33,9 @@ LAW = Law(
     contact="split",
     force=force,
     summary="spring to the mean of a god-object that splits",
-    parameters={"continuity": 1.0},
+    parameters={
+        "continuity": Argument(
+            "continuity", "c of law H, whose q is max(1, c)", default=1.0, positive=True
+        )
+    },
 )

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any
 
-from asperity.errors import LawError
+from asperity.arguments import Argument
+from asperity.contacts import CONTACTS, Contact
+from asperity.errors import LawError, nearest_names
 
 if TYPE_CHECKING:
-    from asperity.laws.symbols import ContactSymbols
+    from asperity.contacts.symbols import ContactSymbols
 
-ContactName = Literal["nominal", "vertical", "nearest", "split"]
 ForceFormula = Callable[["ContactSymbols"], Any]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Law:
     """A texture law: the force on the probe, as mathematics.
 
-    ``force`` receives a :class:`~asperity.laws.symbols.ContactSymbols` and returns the three
+    ``force`` receives a :class:`~asperity.contacts.symbols.ContactSymbols` and returns the three
     components of the force on the probe [N] while the probe is in contact, as a SymPy
     expression. Everything else (Jacobian, curl, kernel) is derived from it.
 
@@ -29,14 +31,16 @@ class Law:
         name: the name in words, joined with hyphens.
         contact: the point where the surface is felt: ``"nominal"`` (the smooth wall below the
             probe), ``"vertical"`` (the textured surface above or below the probe),
-            ``"nearest"`` (the god-object) or ``"split"`` (the split god-object).
+            ``"nearest"`` (the god-object) or ``"split"`` (the split god-object); or a
+            :class:`~asperity.contacts.Contact` of your own.
         force: the formula.
         summary: one line for tables.
         clampable: whether a depth clamp changes this law (W, D, E and H are never clamped); on
-            the nominal and the vertical contact only.
+            a contact that can be clamped (nominal, vertical).
         stateful: whether the force depends on the tangential deflection of a dragged anchor; on
-            the nominal contact only, where the anchor is held while z < 0.
-        parameters: names of the further parameters of the formula, with their defaults [SI].
+            a contact that holds one (nominal: the anchor is held while z < 0).
+        parameters: names of the further parameters of the formula, with their defaults [SI], or
+            with an :class:`~asperity.arguments.Argument` that has unit, bounds and words too.
 
     Example:
         >>> from asperity.laws import Law
@@ -46,28 +50,77 @@ class Law:
 
     letter: str
     name: str
-    contact: ContactName
+    contact: Contact
     force: ForceFormula
     summary: str = ""
     clampable: bool = False
     stateful: bool = False
     parameters: Mapping[str, float] = field(default_factory=dict)
+    arguments: Mapping[str, Argument] = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        letter: str,
+        name: str,
+        contact: str | Contact,
+        force: ForceFormula,
+        summary: str = "",
+        clampable: bool = False,
+        stateful: bool = False,
+        parameters: Mapping[str, float | Argument] | None = None,
+    ) -> None:
+        declared = {
+            key: value if isinstance(value, Argument) else _plain_argument(letter, key, value)
+            for key, value in (parameters or {}).items()
+        }
+        values: dict[str, Any] = {
+            "letter": letter,
+            "name": name,
+            "contact": _find_contact(letter, contact),
+            "force": force,
+            "summary": summary,
+            "clampable": clampable,
+            "stateful": stateful,
+            "parameters": MappingProxyType({key: _default(a) for key, a in declared.items()}),
+            "arguments": MappingProxyType(declared),
+        }
+        for key, value in values.items():
+            object.__setattr__(self, key, value)
+        self._check()
+
+    def _check(self) -> None:
         if not self.letter.isidentifier():
             raise LawError(f"law letter must be a letter or a word, got {self.letter!r}")
-        if self.contact not in get_args(ContactName):
-            choice = ", ".join(get_args(ContactName))
-            raise LawError(
-                f"law {self.letter}: contact must be one of {choice}, got {self.contact!r}"
-            )
-        if self.clampable and self.contact in {"nearest", "split"}:
+        if self.clampable and not self.contact.clampable:
             raise LawError(f"law {self.letter}: a law on the {self.contact} contact is not clamped")
-        if self.stateful and self.contact != "nominal":
-            raise LawError(f"law {self.letter}: a law with state must be on the nominal contact")
+        if self.stateful and not self.contact.holds_anchor:
+            holding = ", ".join(c.name for c in CONTACTS.values() if c.holds_anchor)
+            raise LawError(f"law {self.letter}: a law with state must be on the {holding} contact")
         if not callable(self.force):
             raise LawError(f"law {self.letter}: force must be a function of the contact symbols")
-        object.__setattr__(self, "parameters", MappingProxyType(dict(self.parameters)))
 
     def __str__(self) -> str:
         return f"{self.letter} ({self.name})"
+
+
+def _find_contact(letter: str, contact: str | Contact) -> Contact:
+    if isinstance(contact, Contact):
+        return contact
+    if not isinstance(contact, str) or contact not in CONTACTS:
+        hint = nearest_names(str(contact), CONTACTS)
+        raise LawError(
+            f"law {letter}: contact must be one of {', '.join(CONTACTS)} or a Contact of your "
+            f"own, got {contact!r}; {hint}"
+        )
+    return CONTACTS[contact]
+
+
+def _plain_argument(letter: str, name: str, default: float) -> Argument:
+    words = f"parameter of law {letter}"
+    return Argument(name, words, default=float(default), low=-math.inf)
+
+
+def _default(argument: Argument) -> float:
+    if not isinstance(argument.default, (int, float)):
+        raise LawError(f"the parameter {argument.name!r} needs a number as its default")
+    return float(argument.default)

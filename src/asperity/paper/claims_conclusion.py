@@ -53,7 +53,7 @@ def mostly_proportional() -> Finding:
 
 def always_passive() -> Finding:
     """Passivity can always be had by less gain, more samples or more damping."""
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
 
     length = 2.0 * (0.25 * SCANNING.period + SCANNING.amplitude)
     speeds = {}
@@ -80,8 +80,8 @@ def always_passive() -> Finding:
 
 
 def _continuous(law: str, case: Setting = SCANNING) -> bool:
-    from asperity.analysis.characteristic import characteristic_number
-    from asperity.analysis.continuity import continuity
+    from asperity.analysis.energy.continuity import continuity
+    from asperity.analysis.gain.characteristic import characteristic_number
 
     surface = case.surface(law)
     return continuity(surface, characteristic_number(surface)).continuous
@@ -100,7 +100,7 @@ def best_of_c() -> Finding:
 
 def summary_of_d() -> Finding:
     """D is conservative, keeps the stiffness, and jumps."""
-    from asperity.analysis.characteristic import characteristic_number, one_sided_number
+    from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 
     surface = SCANNING.surface("D")
     q, plus = characteristic_number(surface).value, one_sided_number(surface).value
@@ -126,7 +126,7 @@ def summary_of_e() -> Finding:
 
 def summary_of_f() -> Finding:
     """F has no small number, but a stroke forth and back loses energy."""
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
 
     numbers = {law: q_of(SCANNING, law) for law in "AEFG"}
     bound = norm_of(*stick_entries(Rub(0.8, 1e-3, 0.8, SCANNING.period, 1e-3)))

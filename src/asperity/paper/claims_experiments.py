@@ -132,7 +132,7 @@ def rule() -> Finding:
 
 def ensured() -> Finding:
     """Divided by their numbers, A and F still gain on a slow loop."""
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
 
     damping = _damping(PASSIVITY.joint_damping, 0.0375)
     speeds = {}
@@ -222,7 +222,7 @@ def growth(values: list[float], by: list[float]) -> float:
 
 def scaling() -> Finding:
     """q_A grows as A/l, the energy of A as A²."""
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
 
     exponents = {}
     amplitudes, periods = [BUMP.amplitude, 1.01 * BUMP.amplitude], [BUMP.period, 1.01 * BUMP.period]
@@ -253,7 +253,7 @@ def scaling() -> Finding:
 
 def perpendicular() -> Finding:
     """A gives nothing to a probe that moves at right angles to the surface."""
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
 
     most = 0.0
     for case in [PASSIVITY, *random_settings()]:
@@ -272,7 +272,7 @@ def perpendicular() -> Finding:
 
 def leaks() -> dict[str, float]:
     """Return what the worst loop gains in V.C's setting, pressed 1 mm deep [J]."""
-    from asperity.analysis.leak import worst_loop
+    from asperity.analysis.energy.leak import worst_loop
 
     return {law: worst_loop(BUMP.surface(law)).energy for law in "ABD"}
 

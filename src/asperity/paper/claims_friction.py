@@ -248,7 +248,7 @@ def friction_loop(case: Setting, light: float) -> list[tuple[float, float, float
 
 def energy_f() -> Finding:
     """(27): the law without texture; twice the friction makes its m = 1/2 the paper's h = 0."""
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
 
     cases, share = [SCANNING, *random_settings(4)], 0.2
     printed, corrected, truth, limit = [], [], [], 0.0
@@ -278,7 +278,7 @@ def energy_f() -> Finding:
 
 def compliant() -> Finding:
     """The energy grows with d_max."""
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
 
     found = []
     for reach in (1e-3, 1e-2):

@@ -69,7 +69,7 @@ def potential_d() -> Finding:
 
 def field_d() -> Finding:
     """(17), and that it is conservative also across the ridges where it jumps."""
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
 
     worst = 0.0
     for case in [SCANNING, *random_settings()]:
@@ -108,7 +108,7 @@ def singular_d() -> Finding:
 
 def number_d() -> Finding:
     """‖J_D‖ = κ₀ and q_D = 1."""
-    from asperity.analysis.characteristic import characteristic_number, one_sided_number
+    from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 
     norms = [float(np.linalg.norm(s.jacobian(), 2)) / s.k for s in spots("D", 12)]
     surface = PASSIVITY.surface("D")
@@ -136,8 +136,8 @@ def _onset(amplitude: float, period: float) -> float:
 
 def remark_6() -> Finding:
     """D jumps below the maxima; its potential does not, but has a kink."""
-    from asperity.analysis.characteristic import characteristic_number
-    from asperity.analysis.continuity import continuity
+    from asperity.analysis.energy.continuity import continuity
+    from asperity.analysis.gain.characteristic import characteristic_number
 
     checks = []
     for name, case in (("V.A", PASSIVITY), ("V.B", SCANNING), ("V.C", BUMP)):
@@ -208,7 +208,7 @@ def jacobian_e() -> Finding:
 
 def norm_e() -> Finding:
     """(21), q_E = 1."""
-    from asperity.analysis.characteristic import characteristic_number
+    from asperity.analysis.gain.characteristic import characteristic_number
 
     places = list(spots("E", 6))
     norms = judge(
@@ -241,7 +241,7 @@ def _steepness_e() -> Any:
 
 def energy_e() -> Finding:
     """The loop of Fig. 3: only one leg works, and it gains."""
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
 
     least, other = math.inf, 0.0
     for case in [SCANNING, *random_settings()]:
@@ -263,8 +263,8 @@ def energy_e() -> Finding:
 
 def remark_7() -> Finding:
     """E is not conservative, but continuous."""
-    from asperity.analysis.characteristic import characteristic_number
-    from asperity.analysis.continuity import continuity
+    from asperity.analysis.energy.continuity import continuity
+    from asperity.analysis.gain.characteristic import characteristic_number
 
     surface = PASSIVITY.surface("E")
     found = continuity(surface, characteristic_number(surface))

@@ -172,7 +172,7 @@ def remark_4() -> Finding:
 
 def closed_forms() -> Finding:
     """The paper finds no closed form for B, C and G: do ours give what a search finds?"""
-    from asperity.analysis.closed_forms import Q
+    from asperity.analysis.gain.closed_forms import Q
 
     cases = [PASSIVITY, SCANNING, *random_settings(6)]
     checks = []
@@ -253,7 +253,7 @@ def curvature_c() -> Finding:
 
 def conservative_c() -> Finding:
     """Conservative by construction: curl and loops."""
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
 
     energies = [
         loop_work(case.surface("C"), groove_path(case)) / (case.stiffness * case.amplitude**2)
@@ -311,7 +311,7 @@ def field_g() -> Finding:
 
 def energy_g() -> Finding:
     """(29)."""
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
 
     worst, least = 0.0, math.inf
     for case in [SCANNING, *random_settings()]:

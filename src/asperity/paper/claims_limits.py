@@ -157,7 +157,7 @@ def limit_4() -> Finding:
 
 def limit_5() -> Finding:
     """Gain: what the greatest slope of the force of every law is."""
-    from asperity.analysis.characteristic import characteristic_number
+    from asperity.analysis.gain.characteristic import characteristic_number
 
     draw, case = np.random.default_rng(8), SCANNING
     worst, best = 0.0, math.inf

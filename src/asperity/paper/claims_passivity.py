@@ -47,7 +47,7 @@ def sampled_loop(vertices: FloatArray, step: float) -> FloatArray:
 
 def _alive(law: str) -> tuple[float, float, FloatArray, Surface]:
     """Return the net gain of a slow loop where (1) holds with equality, and what made it."""
-    from asperity.analysis.characteristic import characteristic_number
+    from asperity.analysis.gain.characteristic import characteristic_number
 
     surface = SCANNING.surface(law)
     q = characteristic_number(surface).value
@@ -62,7 +62,7 @@ def _quiet(delay: int, seed: int, part: float = 1.0) -> float:
     Beyond what was stored at the beginning, relative to k times the square of the depth. Also
     shakes where q is attained. ``part`` is of the damping that (1) asks for.
     """
-    from asperity.analysis.characteristic import characteristic_number
+    from asperity.analysis.gain.characteristic import characteristic_number
 
     draw, worst = np.random.default_rng(seed), -math.inf
     for case in [SCANNING, *random_settings(2, seed)]:
@@ -89,7 +89,7 @@ def _quiet(delay: int, seed: int, part: float = 1.0) -> float:
 
 def shake(surface: Surface, size: float, angle: float = math.pi) -> FloatArray:
     """Return a to and fro along the stiffest direction where q is attained, just inside."""
-    from asperity.analysis.characteristic import characteristic_number
+    from asperity.analysis.gain.characteristic import characteristic_number
 
     at = characteristic_number(surface).at
     if at is None:
@@ -196,7 +196,7 @@ def step_bound() -> Finding:
 
 def zero_curl() -> Finding:
     """Zero curl makes a field conservative: a field that begins with a jump says when."""
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
     from asperity.derive.curl import curl_verdict
     from asperity.laws import Law, find_law
 

@@ -9,9 +9,8 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from asperity.analysis.table_two import TableTwo, TableTwoRow
 from asperity.checks import FloatArray
-from asperity.derive.driver import ClampName
+from asperity.kernels.driver import ClampName
 from asperity.paper.claim import (
     Check,
     Claim,
@@ -25,6 +24,7 @@ from asperity.paper.claims_appendix import true_number
 from asperity.paper.claims_friction import PAPER, norm_of, stick_entries
 from asperity.paper.comparisons import field_check, groove_path
 from asperity.paper.plane import SCANNING, Setting, Spot, generic_profile, spots
+from asperity.paper.table_two import TableTwo, TableTwoRow
 from asperity.surface import Surface
 from asperity.textures.fourier import Fourier
 from asperity.textures.sinusoid import Sinusoid
@@ -107,7 +107,7 @@ def row_f() -> Finding:
 
 @lru_cache(maxsize=1)
 def _table() -> TableTwo:
-    from asperity.analysis.table_two import table_two
+    from asperity.paper.table_two import table_two
 
     return table_two()
 
@@ -185,9 +185,9 @@ def _conservative_cell(row: TableTwoRow) -> Check:
 
 def _continuity_cell(row: TableTwoRow) -> Check:
     """Judge the condition on h: a force that uses h' jumps where h' does."""
+    from asperity.contacts.symbols import HX
     from asperity.derive.jacobian import symbolic_force
     from asperity.laws import find_law
-    from asperity.laws.symbols import HX
 
     uses = HX in symbolic_force(find_law(row.law)).free_symbols
     needs = "h'" in row.printed.continuous
@@ -217,7 +217,7 @@ def _finer(case: Setting, times: float) -> Setting:
 
 def remark_2() -> Finding:
     """A Lipschitz bound M takes the place of 2πA/l: the same M, other curvatures."""
-    from asperity.analysis.characteristic import characteristic_number
+    from asperity.analysis.gain.characteristic import characteristic_number
 
     base, numbers = Setting(1000.0, 2e-3, 0.2e-3, depth=0.02e-3), {}
     for law in "ABCDEG":
@@ -248,7 +248,7 @@ def remark_2() -> Finding:
 
 def _safe_bounds() -> float:
     """Return the least ratio of the bounds by M and K to q, on sums of waves."""
-    from asperity.analysis.characteristic import characteristic_number
+    from asperity.analysis.gain.characteristic import characteristic_number
 
     least = math.inf
     for seed, bent in ((5, 0.45), (6, 0.45), (5, 6.0)):
@@ -266,7 +266,7 @@ def _safe_bounds() -> float:
 
 def remark_3() -> Finding:
     """The numbers of B, C, F, G grow with depth; holding the depth for the lateral force bounds."""
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
 
     growth = {law: _deep(law, "none", 50.0) / _deep(law, "none", 1.0) for law in "BCFG"}
     lateral = {law: _deep(law, "lateral", 50.0) / _deep(law, "none", 1.0) for law in "BCFG"}

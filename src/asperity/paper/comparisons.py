@@ -72,7 +72,7 @@ def groove_path(case: Setting) -> list[tuple[float, float, float]]:
 
 def loop_check(law: str, printed: Callable[[Setting], float]) -> Check:
     """Compare a printed energy of the path of Fig. 3 with quadrature of the force."""
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
 
     cases = [SCANNING, *random_settings()]
     return judge(
@@ -95,7 +95,7 @@ def gradient_of(potential: Callable[[Any, Any], Any], spot: Spot) -> list[float]
 
 def energy_sign_check(law: str, places: list[Spot], halves: list[float]) -> Check:
     """Compare a printed energy -κ₀ · half with the work that pressing straight in takes."""
-    from asperity.analysis.loops import integrate
+    from asperity.analysis.energy.loops import integrate
 
     taken = []
     for spot in places:
@@ -120,8 +120,8 @@ def energy_sign_check(law: str, places: list[Spot], halves: list[float]) -> Chec
 
 def greatest_norm(surface: Surface) -> float:
     """Return the greatest ‖J‖/κ₀ at full depth, by a search over compiled Jacobians."""
-    from asperity.analysis.measures import spectral_norm
-    from asperity.analysis.search import greatest
+    from asperity.analysis.bounds.dense_search import greatest
+    from asperity.analysis.bounds.measures import spectral_norm
 
     def depths(heights: FloatArray) -> FloatArray:
         return np.full(len(heights), surface.max_depth)
@@ -131,7 +131,7 @@ def greatest_norm(surface: Surface) -> float:
 
 def leg_work(surface: Surface, start: FloatArray, end: FloatArray) -> float:
     """Return the work of the force on a straight way [J]."""
-    from asperity.analysis.loops import integrate
+    from asperity.analysis.energy.loops import integrate
 
     along = end - start
 
@@ -143,6 +143,6 @@ def leg_work(surface: Surface, start: FloatArray, end: FloatArray) -> float:
 
 def q_of(case: Setting, law: str) -> float:
     """Return the characteristic number of a law in a setting of the paper."""
-    from asperity.analysis.characteristic import characteristic_number
+    from asperity.analysis.gain.characteristic import characteristic_number
 
     return characteristic_number(case.surface(law)).value

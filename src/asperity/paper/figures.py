@@ -121,7 +121,7 @@ def force_fields() -> tuple[ForceField, ...]:
     for law in LAWS:
         surface = SCANNING.surface(law)
         forces = _plane_force(surface, points.reshape(-1, 2)).reshape(points.shape)
-        start = "wall" if surface.law.contact == "nominal" else "texture"
+        start = "texture" if surface.law.contact.begins_on_texture else "wall"
         panels.append(
             ForceField(law, surface.law.name, start, x, height, points, forces, handles,
                        _plane_force(surface, handles))
@@ -156,7 +156,7 @@ def loop_energies() -> tuple[LoopEnergy, ...]:
 
 
 def _loop_energy(law: str) -> LoopEnergy:
-    from asperity.analysis.loops import loop_work
+    from asperity.analysis.energy.loops import loop_work
 
     x, height = _profile()
     changes = {}

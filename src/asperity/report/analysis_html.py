@@ -8,8 +8,8 @@ from typing import Any
 import jinja2
 
 import asperity
-from asperity.analysis.criteria import Criterion
-from asperity.analysis.inspection import Analysis
+from asperity.analysis.analyze import Analysis
+from asperity.analysis.passivity.criteria import Criterion
 from asperity.devices import FIELD_TABLE
 from asperity.report import style
 from asperity.report.analysis_pictures import analysis_figure, pictures_of

@@ -14,7 +14,7 @@ from matplotlib.patheffects import Stroke, withStroke
 from matplotlib.quiver import Quiver
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator, SymmetricalLogLocator
 
-from asperity.analysis.inspection import Analysis
+from asperity.analysis.analyze import Analysis
 from asperity.checks import FloatArray
 from asperity.report import style
 from asperity.report.analysis_region import (
@@ -294,7 +294,7 @@ def draw_depth(figure: Part, analysis: Analysis) -> None:
     axes.set_ylim(-0.03 * highest if top <= 30.0 else -0.1, highest)
     axes.set_xlim(0.0, analysis.surface.max_depth * unit.scale)
     along = "along the normal" if abs(column.below[2]) < 1.0 else "below the surface"
-    if analysis.surface.law.contact == "nominal":
+    if analysis.surface.law.contact.name == "nominal":
         along = "below the smooth wall"
     style.label(axes, f"depth {along} [{unit.name}]", "singular values of J/k [1]")
     style.entitle(axes, analysis.surface.law.letter, "down to the witness", _gain_words(analysis))

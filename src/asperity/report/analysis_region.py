@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.analysis.bound import Bound
-from asperity.analysis.highest import highest_point
-from asperity.analysis.inspection import Analysis
-from asperity.analysis.measures import spectral_norm
+from asperity.analysis.analyze import Analysis
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.bounds.highest import highest_point
+from asperity.analysis.bounds.measures import spectral_norm
 from asperity.checks import FloatArray
 from asperity.report.field_picture import Window
 from asperity.report.section import Stretch, feature_length, stretch_of
@@ -29,15 +29,7 @@ TOP_LEVELS = (_INSIDE, 0.25, 0.5, 0.75, 1.0)
 
 def working_depth(surface: Surface, points: FloatArray) -> FloatArray:
     """Return the depth (n,) [m] of points (n, 3) by which the working region is bounded."""
-    contact = surface.law.contact
-    if contact == "nominal":
-        return -points[:, 2]
-    if contact == "vertical":
-        return surface.texture.height(points[:, :2]) - points[:, 2]
-    feet = surface.texture.nearest(points)
-    below = points[:, 2] < surface.texture.height(points[:, :2])
-    side = np.where(below, 1.0, -1.0)
-    return np.asarray(side * np.linalg.norm(feet - points, axis=1))
+    return surface.law.contact.depth(surface.texture, points)
 
 
 def witness(analysis: Analysis) -> FloatArray:
@@ -49,7 +41,7 @@ def witness(analysis: Analysis) -> FloatArray:
         return np.array(analysis.q.at)
     surface = analysis.surface
     xy = highest_point(surface.texture)
-    top = surface.texture.height(xy[None])[0] if surface.law.contact != "nominal" else 0.0
+    top = surface.texture.height(xy[None])[0] if surface.law.contact.name != "nominal" else 0.0
     return np.array([*xy, top - surface.max_depth])
 
 
@@ -136,7 +128,7 @@ def _features(surface: Surface) -> float:
 def _window(surface: Surface, stretch: Stretch, show: FloatArray) -> Window:
     """Return the window that holds surface and working region, and heights that must be seen."""
     heights = surface.texture.height(stretch.xy(stretch.steps(1000)))
-    nominal = surface.law.contact == "nominal"
+    nominal = surface.law.contact.name == "nominal"
     low = -surface.max_depth if nominal else float(heights.min()) - surface.max_depth
     low = min(low, float(heights.min()), float(show.min()))
     high = max(float(heights.max()), float(show.max()), 0.0 if nominal else -math.inf)
@@ -178,9 +170,9 @@ def witness_column(analysis: Analysis) -> Column:
 
 def _column_axis(surface: Surface, at: FloatArray) -> tuple[FloatArray, FloatArray]:
     down = np.array([0.0, 0.0, -1.0])
-    if surface.law.contact == "nominal":
+    if surface.law.contact.name == "nominal":
         return np.array([at[0], at[1], 0.0]), down
-    if surface.law.contact == "vertical":
+    if surface.law.contact.name == "vertical":
         return np.array([at[0], at[1], surface.texture.height(at[None, :2])[0]]), down
     foot = surface.texture.nearest(at[None])[0]
     p, q = surface.texture.gradient(foot[None, :2])[0]
@@ -217,12 +209,12 @@ def top_view(analysis: Analysis) -> TopView:
     """Return the greatest ‖J‖/k at five depths below every point of a grid, of a map."""
     surface = analysis.surface
     low, size = _rectangle(surface.texture)
-    step = float(size.max()) / _TOP_CELLS[surface.law.contact]
+    step = float(size.max()) / _TOP_CELLS[surface.law.contact.name]
     columns, rows = (max(2, round(float(side) / step)) for side in size)
     x = low[0] + (np.arange(columns) + 0.5) * size[0] / columns
     y = low[1] + (np.arange(rows) + 0.5) * size[1] / rows
     xy = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    nominal = surface.law.contact == "nominal"
+    nominal = surface.law.contact.name == "nominal"
     tops = np.zeros(len(xy)) if nominal else surface.texture.height(xy)
     best = np.zeros(len(xy))
     for part in TOP_LEVELS:

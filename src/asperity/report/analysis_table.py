@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from asperity.analysis.inspection import Analysis
+from asperity.analysis.analyze import Analysis
 from asperity.report.analysis_words import (
     down_text,
     holds_text,

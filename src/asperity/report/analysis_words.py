@@ -7,12 +7,12 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 import numpy as np
 
-from asperity.analysis.bound import Bound
-from asperity.analysis.criteria import Criterion
-from asperity.analysis.inspection import Analysis
-from asperity.laws import LAWS
+from asperity.analysis.analyze import Analysis
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.passivity.criteria import Criterion
+from asperity.laws import LAW_ARGUMENTS, LAWS
 from asperity.report.wording import INFINITE, SAMPLED, merit_text
-from asperity.surface import DEFAULT_PARAMETERS, Surface
+from asperity.surface import Surface
 from asperity.units import engineering, rounded_down
 
 _PREFIXES = {"": 1.0, "m": 1e3, "µ": 1e6, "n": 1e9, "p": 1e12, "k": 1e-3, "M": 1e-6}
@@ -314,8 +314,8 @@ def _arguments(surface: Surface) -> str:
     parts = [repr(law.letter) if shipped else "law"]
     parts += [f"stiffness={surface.stiffness!r}", f"max_depth={surface.max_depth!r}"]
     own = {name: v for name, v in surface.law_parameters.items() if v != law.parameters[name]}
-    parts += [f"{name}={v!r}" for name, v in own.items() if name in DEFAULT_PARAMETERS]
-    rest = {name: v for name, v in own.items() if name not in DEFAULT_PARAMETERS}
+    parts += [f"{name}={v!r}" for name, v in own.items() if name in LAW_ARGUMENTS]
+    rest = {name: v for name, v in own.items() if name not in LAW_ARGUMENTS}
     if rest:
         parts.append(f"law_parameters={rest!r}")
     if surface.clamp != "none":

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from asperity.analysis.merit import scan_height
+from asperity.analysis.energy.merit import scan_height
 from asperity.report import style
 from asperity.report.section import (
     ArrowField,
@@ -204,7 +204,7 @@ def _draw_outline(axes: Axes, surface: Surface, scene: _Scene) -> None:
     along = scene.stretch.steps(600)
     x = along * scene.wide.scale
     heights = surface.texture.height(scene.stretch.xy(along)) * scene.high.scale
-    nominal = surface.law.contact == "nominal"
+    nominal = surface.law.contact.name == "nominal"
     axes.plot(x, heights, color=style.INK, linewidth=1.3, linestyle=":" if nominal else "-")
     if nominal:
         axes.axhline(0.0, color=style.INK, linewidth=1.3)

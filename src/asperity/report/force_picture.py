@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from asperity.analysis.merit import scan_height
+from asperity.analysis.energy.merit import scan_height
 from asperity.report import style
 from asperity.report.section import (
     ScanForces,

@@ -10,7 +10,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
-from asperity.analysis.comparison import Comparison
+from asperity.analysis.compare import Comparison
 from asperity.report import style
 from asperity.report.field_picture import field_stretch
 from asperity.report.section import CurlField, curl_field, field_range

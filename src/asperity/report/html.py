@@ -9,8 +9,8 @@ from typing import Any
 import jinja2
 
 import asperity
-from asperity.analysis.comparison import Comparison
-from asperity.analysis.inspection import Analysis
+from asperity.analysis.analyze import Analysis
+from asperity.analysis.compare import Comparison
 from asperity.analysis.row import LawRow
 from asperity.report import style
 from asperity.report.analysis_html import analysis_html

@@ -8,9 +8,9 @@ from typing import Any
 import jinja2
 
 import asperity
-from asperity.analysis.limit_result import Limits, RenderedWave
-from asperity.analysis.limit_rules import Limit
-from asperity.analysis.limit_words import percent, speed_text, speeds_text, stiffness_text
+from asperity.analysis.limits.limit_result import Limits, RenderedWave
+from asperity.analysis.limits.limit_rules import Limit
+from asperity.analysis.limits.limit_words import percent, speed_text, speeds_text, stiffness_text
 from asperity.devices import FIELD_TABLE
 from asperity.report import style
 from asperity.report.limits_picture import limits_figure

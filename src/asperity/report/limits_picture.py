@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from asperity.analysis.limit_result import Limits
-from asperity.analysis.limit_words import speed_text, stiffness_text
+from asperity.analysis.limits.limit_result import Limits
+from asperity.analysis.limits.limit_words import speed_text, stiffness_text
 from asperity.report import style
 from asperity.units import engineering
 

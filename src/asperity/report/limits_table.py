@@ -7,9 +7,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from asperity.analysis.limit_result import Limits, RenderedWave
-from asperity.analysis.limit_rules import RULES, Limit
-from asperity.analysis.limit_words import percent, speed_text, speeds_text, stiffness_text
+from asperity.analysis.limits.limit_result import Limits, RenderedWave
+from asperity.analysis.limits.limit_rules import RULES, Limit
+from asperity.analysis.limits.limit_words import percent, speed_text, speeds_text, stiffness_text
 from asperity.units import engineering
 
 MOST_WAVES = 16

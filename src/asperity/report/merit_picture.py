@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
-from asperity.analysis.comparison import Comparison
+from asperity.analysis.compare import Comparison
 from asperity.report import style
 from asperity.report.wording import strength_has_unit
 

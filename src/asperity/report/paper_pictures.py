@@ -149,7 +149,7 @@ def _draw_path(axes: Axes, panel: LoopEnergy) -> None:
     x, height = panel.x * _MILLI, panel.height * _MILLI
     closed = np.concatenate([panel.vertices, panel.vertices[:1]]) * _MILLI
     low = min(float(closed[:, 1].min()), float(height.min())) - 0.2
-    flat = find_law(panel.law).contact == "nominal"
+    flat = not find_law(panel.law).contact.begins_on_texture
     axes.fill_between(x, 0.0 * height if flat else height, low, color=style.BODY, lw=0.0, alpha=0.6)
     axes.plot(x, height, color=style.INK, lw=0.9, ls=":" if flat else "-")
     if flat:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.analysis.measures import spectral_norm
-from asperity.analysis.merit import scan_height
+from asperity.analysis.bounds.measures import spectral_norm
+from asperity.analysis.energy.merit import scan_height
 from asperity.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine, Texture
@@ -115,7 +115,7 @@ class ScanForces:
 
 def scan_forces(surface: Surface, stretch: Stretch, count: int = 900) -> ScanForces:
     """Return the forces along the stretch at the height of the scan."""
-    if surface.law.contact == "split":
+    if surface.law.contact.name == "split":
         count = min(count, 300)
     along = stretch.steps(count)
     points = np.column_stack([stretch.xy(along), np.full(count, scan_height(surface))])
@@ -170,7 +170,7 @@ def curl_field(
         columns: number of cells along the scan.
         rows: number of cells upwards.
     """
-    if surface.law.contact == "split":
+    if surface.law.contact.name == "split":
         # The costliest contact has no curl to resolve finely.
         columns, rows = max(columns // 4, 1), max(rows // 4, 1)
     edges = stretch.steps(columns + 1)
@@ -192,7 +192,7 @@ def curl_field(
 
 def _contact_top(surface: Surface, xy: FloatArray) -> FloatArray:
     """Return the height below which the law acts [m]."""
-    if surface.law.contact == "nominal":
+    if surface.law.contact.name == "nominal":
         return np.zeros(len(xy))
     return surface.texture.height(xy)
 

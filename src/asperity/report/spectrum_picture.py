@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from asperity.analysis.merit import parallel_lines
+from asperity.analysis.energy.merit import parallel_lines
 from asperity.checks import FloatArray
 from asperity.devices import Device
 from asperity.report import style

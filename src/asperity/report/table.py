@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from asperity.analysis.comparison import Comparison
+from asperity.analysis.compare import Comparison
 from asperity.analysis.row import LawRow
 from asperity.report.wording import (
     any_sampled,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from asperity.analysis.bound import Bound
-from asperity.analysis.comparison import Comparison
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.compare import Comparison
 from asperity.analysis.row import LawRow
 from asperity.units import engineering, rounded_down
 

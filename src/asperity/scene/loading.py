@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from asperity.arguments import Argument, Form
 from asperity.devices import Device, load_device, parse_device
 from asperity.errors import ParameterError, nearest_names
 from asperity.scene import readers
 from asperity.scene.readers import Reader, read_arguments
 from asperity.textures import Texture, load_texture
-from asperity.textures.arguments import Argument, Form
 from asperity.textures.catalogue import CATALOGUE
 
 LOOP_SECTIONS = ("hand", "motion", "run")

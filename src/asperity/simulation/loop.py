@@ -9,8 +9,8 @@ from types import ModuleType
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.derive.driver import ClampName
 from asperity.errors import ParameterError
+from asperity.kernels.driver import ClampName
 from asperity.laws import Law
 from asperity.simulation.ledger import Ledger
 from asperity.simulation.machine import Machine
@@ -29,7 +29,7 @@ _LOCK = Lock()
 def _fused(
     law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName, body: tuple[ModuleType, ...]
 ) -> ModuleType:
-    from asperity.derive.fuse import fuse_surface, sampler_source
+    from asperity.kernels.fuse import fuse_surface, sampler_source
     from asperity.simulation.servo_source import servo_source
 
     further = "\n\n\n".join([sampler_source(body), servo_source(law)])

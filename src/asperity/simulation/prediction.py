@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.analysis.characteristic import characteristic_number, one_sided_number
+from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.derive.facts import law_facts
 from asperity.devices.five_bar import handle_damping
 from asperity.simulation.hands import Hand, SpringHand
@@ -142,7 +142,7 @@ def predict(
     Reference:
         The paper's (1) and III.B; the delay rule is derived on the page "Passivity".
     """
-    top = 0.0 if surface.law.contact == "nominal" else surface.texture.extremes[1]
+    top = surface.law.contact.extremes(surface.texture)[1]
     depth = max(top - onset.low[2], 0.0)
     damping = least_damping(plant, onset.low, onset.high, hand, top)
     q = plus = 0.0

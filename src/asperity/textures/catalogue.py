@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from asperity.textures.arguments import Argument, Kind
+from asperity.arguments import Argument
 from asperity.textures.fourier import Fourier
 from asperity.textures.grating import GRATING
+from asperity.textures.kinds import Kind
 from asperity.textures.library.registry import LIBRARY
 from asperity.textures.noise import NOISE, NOISE_PROFILE
 from asperity.textures.sinusoid import Sinusoid

@@ -67,7 +67,9 @@ class Fourier(Texture):
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
-        from asperity.textures.samplers import fourier, fourier_line, line, search
+        from asperity.contacts.nearest import line_search as line
+        from asperity.contacts.nearest import plane_search as search
+        from asperity.textures.samplers import fourier, fourier_line
 
         return (fourier_line, fourier, line) if self._parallel else (fourier, search)
 

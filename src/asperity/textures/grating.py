@@ -8,9 +8,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from asperity.arguments import Argument
 from asperity.checks import FloatArray, positive, real
 from asperity.errors import ParameterError
-from asperity.textures.arguments import Argument, Kind
+from asperity.textures.kinds import Kind
 from asperity.textures.profile import Profile
 
 # Nodes per edge: the spline then meets the closed form to 2e-5 of the height (tested).

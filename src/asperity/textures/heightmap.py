@@ -77,7 +77,8 @@ class HeightMap(Texture):
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
-        from asperity.textures.samplers import heightmap, search, spline
+        from asperity.contacts.nearest import plane_search as search
+        from asperity.textures.samplers import heightmap, spline
 
         return heightmap, spline, search
 

@@ -11,7 +11,7 @@ from asperity.textures.heightmap import HeightMap
 from asperity.textures.profile import Profile
 
 if TYPE_CHECKING:
-    from asperity.textures.prepared import Prepared
+    from asperity.measured.prepared import Prepared
 
 
 def load_texture(
@@ -106,9 +106,9 @@ def prepare_file(
         ParameterError: for an argument that cannot be used, or one that would prepare a second
             time.
     """
-    from asperity.textures.preparation import magnified, prepare
-    from asperity.textures.prepared import is_prepared, load_prepared
-    from asperity.textures.reading import read_surface
+    from asperity.measured.preparation import magnified, prepare
+    from asperity.measured.prepared import is_prepared, load_prepared
+    from asperity.measured.reading import read_surface
 
     given = {k: v for k, v in arguments.items() if v is not None and v is not False}
     begin = progress or (lambda _stage: None)

@@ -68,7 +68,8 @@ class Profile(Texture):
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
-        from asperity.textures.samplers import line, profile, spline
+        from asperity.contacts.nearest import line_search as line
+        from asperity.textures.samplers import profile, spline
 
         return profile, spline, line
 

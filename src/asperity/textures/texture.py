@@ -101,7 +101,7 @@ class Texture(ABC):
 
     @cached_property
     def _loops(self) -> ModuleType:
-        from asperity.derive.fuse import fuse_sampler
+        from asperity.kernels.fuse import fuse_sampler
 
         return fuse_sampler(self.sampler)
 

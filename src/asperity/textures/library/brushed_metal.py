@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from asperity.arguments import SEED, Argument
 from asperity.checks import FloatArray
-from asperity.textures.arguments import SEED, Argument
 from asperity.textures.library.named import Drawing, around
 from asperity.textures.waves import low_pass
 

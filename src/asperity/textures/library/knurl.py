@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from asperity.textures.arguments import Argument
+from asperity.arguments import Argument
 from asperity.textures.library.named import Drawing
 
 SUMMARY = "diamond knurl with raised points, like a tool handle"

@@ -7,7 +7,7 @@ from types import ModuleType
 from typing import Any
 
 from asperity.errors import ParameterError, nearest_names
-from asperity.textures.arguments import Kind
+from asperity.textures.kinds import Kind
 from asperity.textures.library import brushed_metal, cloth, knurl, sandpaper, tile, wood
 from asperity.textures.library.named import NamedSurface
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from asperity.arguments import SEED, Argument
 from asperity.checks import FloatArray
-from asperity.textures.arguments import SEED, Argument
 from asperity.textures.library.named import Drawing, around
 
 SUMMARY = "abrasive paper, grains by P grade"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from asperity.arguments import SEED, Argument
 from asperity.checks import FloatArray
 from asperity.errors import ParameterError
-from asperity.textures.arguments import SEED, Argument
 from asperity.textures.library.named import Drawing
 from asperity.textures.waves import Band, random_field, with_rms
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.textures.samplers.search import descend, judge, next_box
+from asperity.contacts.nearest.plane_search import descend, judge, next_box
 
 FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 

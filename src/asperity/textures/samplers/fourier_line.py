@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.textures.samplers.line import descend, judge, next_part
+from asperity.contacts.nearest.line_search import descend, judge, next_part
 
 FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.textures.samplers.search import Point, descend, judge, next_box
+from asperity.contacts.nearest.plane_search import Point, descend, judge, next_box
 from asperity.textures.samplers.spline import (
     box_bounds,
     cell_of,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.textures.samplers.line import Point, descend, judge, next_part
+from asperity.contacts.nearest.line_search import Point, descend, judge, next_part
 from asperity.textures.samplers.spline import (
     box_bounds,
     cell_of,

@@ -1,0 +1,214 @@
+"""Certified suprema: halve the cells that may hold the greatest value until none is left.
+
+A cell is dropped when a proved upper bound on it is not above what is already attained, but for
+the tolerance. The greatest bound of all cells dropped, or left over at the work limit, is the
+certificate.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.textures.cells import Cells
+
+DEFAULT_WORK_LIMIT = 20_000_000
+# Cells of each chunk at which the value itself is computed: the most promising ones.
+_TRIED = 4
+# Fewer cells than this cost no more than one.
+_SMALL = 128
+_POLISH_STEPS = 50
+# Steps that are tried at once, and the change of a step below which nothing is gained.
+_SCALES = 4.0 ** -np.arange(5.0)
+_FINEST = 1e-10
+_LEAST_HALF = 1e-12
+# So many cells cost next to nothing.
+_FEW = 4096
+
+
+class Problem(ABC):
+    """A function on cells whose supremum is wanted.
+
+    Attributes:
+        cells: where it lives.
+        floor: a value that is attained, or that does not matter below.
+    """
+
+    cells: Cells
+    floor: float = 0.0
+
+    @abstractmethod
+    def at_most(self, centres: FloatArray, half: FloatArray, above: float) -> FloatArray:
+        """Return proved upper bounds on cells, shape (n,); rough ones where below ``above``."""
+
+    @abstractmethod
+    def values(self, coordinates: FloatArray) -> FloatArray:
+        """Return the value at coordinates (n, d), shape (n,)."""
+
+    def enough(self, best: float, tolerance: float) -> float:
+        """Return the bound at which a cell can be dropped."""
+        return best * (1.0 + tolerance)
+
+
+@dataclass(frozen=True)
+class Supremum:
+    """What branch and bound found.
+
+    Attributes:
+        lower: the greatest value attained, or the floor of the problem.
+        upper: a proved bound.
+        at: coordinates where ``lower`` is attained; ``None`` for the floor.
+        cells: how many cells were looked at.
+        reached: whether the tolerance was reached within the work limit.
+    """
+
+    lower: float
+    upper: float
+    at: FloatArray | None
+    cells: int
+    reached: bool
+
+
+def supremum(
+    problem: Problem,
+    tolerance: float,
+    work_limit: int = DEFAULT_WORK_LIMIT,
+    wished: float | None = None,
+) -> Supremum:
+    """Return proved bounds of the supremum of a problem.
+
+    Errors shrink with the square of the cells, so a much smaller gap often costs little more.
+
+    Args:
+        problem: the function on its cells.
+        tolerance: relative gap at which to stop.
+        work_limit: greatest number of cells to look at; the bounds reached by then are returned.
+        wished: a smaller gap, to be reached as long as few cells are left.
+    """
+    goal = tolerance if wished is None else min(wished, tolerance)
+    chunks, half = problem.cells.start()
+    best, at = _first(problem)
+    dropped, looked = problem.floor, 0
+    while True:
+        kept, bounds = [], []
+        for centres in chunks:
+            looked += len(centres)
+            upper = problem.at_most(centres, half, problem.enough(best, goal))
+            upper = np.where(np.isnan(upper), np.inf, upper)
+            best, at = _try(problem, centres, half, upper, best, at)
+            keep = upper > problem.enough(best, goal)
+            dropped = max(dropped, float(upper[~keep].max(initial=0.0)))
+            kept.append(centres[keep])
+            bounds.append(upper[keep])
+        centres, upper = np.concatenate(kept), np.concatenate(bounds)
+        keep = upper > problem.enough(best, goal)
+        dropped = max(dropped, float(upper[~keep].max(initial=0.0)))
+        centres, upper = centres[keep], upper[keep]
+        left = float(upper.max(initial=0.0))
+        parts = _parts(len(centres), problem.cells.dimensions)
+        children = len(centres) * parts**problem.cells.dimensions
+        good = left <= problem.enough(best, tolerance)
+        done = len(centres) == 0 or (good and children > _FEW)
+        if done or looked + children > work_limit or float(half.max()) < _LEAST_HALF:
+            break
+        half = half / parts
+        chunks = _split(centres, half, parts, problem.cells.chunk())
+    if at is not None:
+        best, at = polish(problem, at, half, best)
+    return Supremum(best, max(best, dropped, left), at, looked, good)
+
+
+def _first(problem: Problem) -> tuple[float, FloatArray | None]:
+    """Return the greatest of a few samples, so that most cells are dropped at first sight."""
+    points = problem.cells.samples()
+    values = problem.values(points)
+    first = _greatest(values)
+    if values[first] > problem.floor:
+        return float(values[first]), points[first]
+    return problem.floor, None
+
+
+def _try(
+    problem: Problem,
+    centres: FloatArray,
+    half: FloatArray,
+    upper: FloatArray,
+    best: float,
+    at: FloatArray | None,
+) -> tuple[float, FloatArray | None]:
+    """Return the best value and where it is, after a look at the most promising cells."""
+    top = np.argpartition(-upper, min(_TRIED, len(upper) - 1))[:_TRIED]
+    top = top[upper[top] > best]
+    if len(top) == 0:
+        return best, at
+    points = problem.cells.inside(
+        (centres[top, None] + _star(len(half)) * half).reshape(-1, len(half))
+    )
+    values = problem.values(points)
+    first = _greatest(values)
+    if values[first] > best:
+        return float(values[first]), points[first]
+    return best, at
+
+
+def _greatest(values: FloatArray) -> int:
+    """Return the index of the greatest value; what is no number is smaller than any."""
+    first = int(values.argmax())
+    if np.isnan(values[first]):
+        first = int(np.where(np.isnan(values), -np.inf, values).argmax())
+    return first
+
+
+@lru_cache(maxsize=8)
+def _star(dimensions: int) -> FloatArray:
+    """Return the centre and the corners of a cell in units of its half widths."""
+    corners = np.stack(np.meshgrid(*[(-1.0, 1.0)] * dimensions, indexing="ij"), axis=-1)
+    return np.concatenate([np.zeros((1, dimensions)), corners.reshape(-1, dimensions)])
+
+
+def _parts(cells: int, dimensions: int) -> int:
+    """Return into how many parts to cut along every coordinate: more than halves of few cells."""
+    parts = 2
+    while max(cells, 1) * (2 * parts) ** dimensions <= _SMALL:
+        parts *= 2
+    return parts
+
+
+def _split(centres: FloatArray, half: FloatArray, parts: int, chunk: int) -> Iterator[FloatArray]:
+    """Return the parts, of half widths ``half``, of cells, chunk by chunk."""
+    ticks = 2.0 * np.arange(parts) + 1.0 - parts
+    grid = np.stack(np.meshgrid(*[ticks] * len(half), indexing="ij"), axis=-1)
+    offsets = grid.reshape(-1, len(half)) * half
+    step = max(1, chunk // len(offsets))
+    pieces: Iterable[FloatArray] = (
+        (centres[first : first + step, None] + offsets).reshape(-1, len(half))
+        for first in range(0, len(centres), step)
+    )
+    return iter(pieces)
+
+
+def polish(
+    problem: Problem, at: FloatArray, half: FloatArray, best: float
+) -> tuple[float, FloatArray]:
+    """Climb to the top near a point, by steps of several sizes at once."""
+    size = len(half)
+    offsets = np.concatenate([_star(size)[1:], np.eye(size), -np.eye(size)])
+    offsets = (_SCALES[:, None, None] * offsets).reshape(-1, size)
+    scale, step = np.repeat(_SCALES, len(offsets) // len(_SCALES)), 2.0
+    for _ in range(_POLISH_STEPS):
+        points = problem.cells.inside(at + offsets * (step * half))
+        values = problem.values(points)
+        first = _greatest(values)
+        if values[first] > best:
+            best, at = float(values[first]), points[first]
+            step *= min(2.0 * float(scale[first]), 1.0)
+        else:
+            step *= 0.5 * float(_SCALES[-1])
+        if step < _FINEST:
+            break
+    return best, at

@@ -1,0 +1,272 @@
+"""Dense sampling with zooming: the greatest value of a number of the Jacobian over contacts.
+
+A contact is (X, Y, depth, deflection, sliding). The law's ``contact_batch`` gives the Jacobian
+there without a texture, so depth zero, the limit from inside, is a sample like any other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.analysis.bounds.measures import (
+    Measure,
+    precise_norm,
+    precise_one_sided,
+    spectral_norm,
+)
+from asperity.checks import FloatArray
+from asperity.derive.facts import law_facts
+from asperity.errors import ParameterError
+from asperity.kernels.fuse import fuse_contact
+from asperity.surface import Surface
+from asperity.textures.fourier import Fourier
+from asperity.textures.heightmap import HeightMap
+from asperity.textures.profile import Profile
+from asperity.textures.texture import Texture
+
+# Points on the contact's plane: at most this many, at least this many per profile.
+_MOST_POINTS = 1_200_000
+_PROFILE_POINTS = 4096
+_CANDIDATES = 12
+_ZOOM_STEPS = 44
+DEPTH_FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+DepthLimit = Callable[[FloatArray], FloatArray]
+
+
+@dataclass(frozen=True)
+class Found:
+    """The greatest value found and the contact that attains it.
+
+    Attributes:
+        value: of the measure, in units of the stiffness [1].
+        xy: contact point [m].
+        depth: [m].
+        deflection: of the anchor [m].
+        probe: probe position [m].
+        samples: how many contacts were looked at.
+    """
+
+    value: float
+    xy: tuple[float, float]
+    depth: float
+    deflection: tuple[float, float]
+    probe: tuple[float, float, float]
+    samples: int
+
+
+class ContactField:
+    """The Jacobian of a surface as a function of the contact, in units of the stiffness."""
+
+    def __init__(self, surface: Surface) -> None:
+        self.surface = surface
+        self.texture = surface.texture
+        self._loops = fuse_contact(surface.law)
+        self._law = (1.0, *surface.law_arguments[1:])
+
+    def jacobians(
+        self,
+        xy: FloatArray,
+        depth: FloatArray,
+        derivatives: FloatArray,
+        deflection: FloatArray,
+        *,
+        sliding: bool = False,
+    ) -> FloatArray:
+        """Return J/k at contacts, shape (n, 3, 3)."""
+        n = len(xy)
+        force, jacobian = np.empty((n, 3)), np.empty((n, 3, 3))
+        slides = np.full(n, sliding)
+        self._loops.contact_batch(
+            xy, depth, derivatives, deflection, slides, force, jacobian, self._law
+        )
+        return jacobian
+
+    def worst_deflection(self, derivatives: FloatArray) -> FloatArray:
+        """Return the deflection that maximises every norm of law F, shape (n, 2).
+
+        ‖J‖ and λ_max are convex in d, hence greatest for |d| = d_max, and there for d against
+        the slope of the height: the friction then falls along d fastest (MATH section 3).
+        """
+        slope = derivatives[:, 1:3]
+        length = np.hypot(*slope.T)
+        unit = np.where(
+            length[:, None] > 0.0, slope / np.where(length, length, 1.0)[:, None], [1, 0]
+        )
+        return np.ascontiguousarray(-self.surface.max_deflection * unit)
+
+    def probe(self, xy: FloatArray, depth: float, derivatives: FloatArray) -> FloatArray:
+        """Return the probe position of one contact [m]."""
+        contact = self.surface.law.contact
+        return np.asarray(contact.probe(xy[None], np.array([depth]), derivatives[None])[0])
+
+
+def need_depths(surface: Surface) -> None:
+    """Refuse a law whose contacts are not given by a point and a depth: there are no samples.
+
+    Raises:
+        ParameterError: for such a law; its numbers need a theorem.
+    """
+    contact = surface.law.contact
+    if not contact.given_by_depth:
+        raise ParameterError(
+            "law", f"{surface.law} is on the {contact} contact, which has no samples"
+        )
+
+
+def sample_fractions(texture: Texture) -> tuple[FloatArray, FloatArray]:
+    """Return sample points as fractions of the domain's spans (n, d), and their spacing (d,)."""
+    counts = _sample_counts(texture)
+    axes = [(np.arange(count) + _offset(texture)) / count for count in counts]
+    if not texture.domain.periodic:
+        axes = [np.linspace(0.0, 1.0, count + 1) for count in counts]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(counts))
+    return grid, 1.0 / np.array(counts, dtype=float)
+
+
+def _offset(texture: Texture) -> float:
+    """Nodes of a measured surface are where its second derivatives are extreme."""
+    return 0.0 if isinstance(texture, (HeightMap, Profile)) else 0.5
+
+
+def _sample_counts(texture: Texture) -> list[int]:
+    if isinstance(texture, Profile):
+        cells = len(texture.heights) - (0 if texture.periodic else 1)
+        return [cells * max(1, -(-_PROFILE_POINTS // cells))]
+    if isinstance(texture, HeightMap):
+        extra = 0 if texture.periodic else 1
+        counts = [n - extra for n in texture.heights.shape[::-1]]
+        while counts[0] * counts[1] * 4 <= _MOST_POINTS // 4:
+            counts = [2 * n for n in counts]
+        while counts[0] * counts[1] > _MOST_POINTS:
+            counts = [-(-n // 2) for n in counts]
+        return counts
+    if texture.is_profile:
+        return [_PROFILE_POINTS]
+    assert isinstance(texture, Fourier)
+    shortest = 2.0 * np.pi / np.hypot(*texture.wavevectors.T).max()
+    lengths = np.hypot(*texture.domain.spans.T)
+    return [int(min(max(24 * length / shortest, 64), 1000)) for length in lengths]
+
+
+def greatest(surface: Surface, measure: Measure, depth_limit: DepthLimit) -> Found:
+    """Return the greatest value of a measure of J/k over the contacts of a surface.
+
+    Dense samples of the domain at five depths (at both ends of the depth range where the Jacobian
+    is affine in the depth), then the best dozen are zoomed in on until the
+    step is below 1e-12 of the sample spacing. Nothing is certified: a lower bound that is
+    attained at the contact returned.
+
+    Args:
+        surface: the surface; its clamp is not looked at.
+        measure: :func:`~asperity.analysis.bounds.measures.spectral_norm` or ``one_sided``.
+        depth_limit: greatest depth [m] of each contact from its height derivatives (n, 6).
+
+    Raises:
+        ParameterError: for a law of your own on the split contact.
+    """
+    need_depths(surface)
+    field = ContactField(surface)
+    fractions, spacing = sample_fractions(surface.texture)
+    levels = (0.0, 1.0) if law_facts(surface.law).affine_in_depth else DEPTH_FRACTIONS
+    values = _sampled_values(field, measure, depth_limit, fractions, levels)
+    samples = values.size
+    point = _best_of_blocks(values.max(axis=1))
+    level = np.argmax(values[point], axis=1)
+    centres = np.column_stack([fractions[point], np.array(levels)[level]])
+    centres, zoomed = _zoom(field, measure, depth_limit, centres, np.append(spacing, 0.25))
+    scores = _values(field, measure, depth_limit, centres)
+    best = centres[int(np.argmax(scores))]
+    return _found(field, measure, depth_limit, best, samples + zoomed)
+
+
+def _best_of_blocks(values: FloatArray) -> NDArray[np.intp]:
+    """Return the indices of the best samples of the best blocks: neighbours are one candidate."""
+    starts = np.arange(0, len(values), max(len(values) // 256, 1))
+    blocks = np.split(np.arange(len(values)), starts[1:])
+    best = np.array([block[np.argmax(values[block])] for block in blocks])
+    return best[np.argsort(values[best], kind="stable")[-_CANDIDATES:]]
+
+
+def _zoom(
+    field: ContactField,
+    measure: Measure,
+    depth_limit: DepthLimit,
+    centres: FloatArray,
+    step: FloatArray,
+) -> tuple[FloatArray, int]:
+    """Return the candidates after halving the step around the best neighbour, and the cost."""
+    width = len(step)
+    offsets = np.stack(np.meshgrid(*[(-1.0, -0.5, 0.0, 0.5, 1.0)] * width), axis=-1)
+    offsets = offsets.reshape(-1, width)
+    # The centre first: of equal values the first one is kept.
+    offsets = offsets[np.argsort(np.abs(offsets).sum(axis=1), kind="stable")]
+    bounded = slice(None) if not field.texture.domain.periodic else slice(width - 1, None)
+    for _ in range(_ZOOM_STEPS):
+        trial = centres[:, None, :] + offsets * step
+        trial[..., bounded] = np.clip(trial[..., bounded], 0.0, 1.0)
+        scores = _values(field, measure, depth_limit, trial.reshape(-1, width))
+        scores = scores.reshape(trial.shape[:2])
+        centres = trial[np.arange(len(trial)), np.argmax(scores, axis=1)]
+        step = step * 0.5
+    return centres, _ZOOM_STEPS * len(centres) * len(offsets)
+
+
+def _sampled_values(
+    field: ContactField,
+    measure: Measure,
+    depth_limit: DepthLimit,
+    fractions: FloatArray,
+    levels: tuple[float, ...],
+) -> FloatArray:
+    """Return the measure at every sample and depth, shape (n, levels)."""
+    values = np.empty((len(fractions), len(levels)))
+    for level, part in enumerate(levels):
+        for first in range(0, len(fractions), 100_000):
+            block = fractions[first : first + 100_000]
+            rows = np.column_stack([block, np.full(len(block), part)])
+            values[first : first + len(block), level] = _values(field, measure, depth_limit, rows)
+    return values
+
+
+def _contacts(
+    field: ContactField, depth_limit: DepthLimit, rows: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return contact points, depths, derivatives, deflections of rows (fractions, depth part)."""
+    xy = field.texture.domain.points(rows[:, :-1])
+    derivatives = field.texture.derivatives(xy)
+    depth = np.ascontiguousarray(rows[:, -1] * np.maximum(depth_limit(derivatives), 0.0))
+    deflection = (
+        field.worst_deflection(derivatives)
+        if field.surface.law.stateful
+        else np.zeros((len(xy), 2))
+    )
+    return xy, depth, derivatives, deflection
+
+
+def _values(
+    field: ContactField, measure: Measure, depth_limit: DepthLimit, rows: FloatArray
+) -> FloatArray:
+    return measure(field.jacobians(*_contacts(field, depth_limit, rows)))
+
+
+def _found(
+    field: ContactField, measure: Measure, depth_limit: DepthLimit, row: FloatArray, samples: int
+) -> Found:
+    xy, depth, derivatives, deflection = _contacts(field, depth_limit, row[None, :])
+    matrix = field.jacobians(xy, depth, derivatives, deflection)[0]
+    careful = precise_norm if measure is spectral_norm else precise_one_sided
+    value = float(careful(matrix[None])[0])
+    x, y, z = (float(c) for c in field.probe(xy[0], float(depth[0]), derivatives[0]))
+    return Found(
+        value=value,
+        xy=(float(xy[0, 0]), float(xy[0, 1])),
+        depth=float(depth[0]),
+        deflection=(float(deflection[0, 0]), float(deflection[0, 1])),
+        probe=(x, y, z),
+        samples=samples,
+    )

@@ -1,0 +1,382 @@
+"""What is maximised over cells for each law: mostly ‖J‖ itself, for some an equivalent number.
+
+A law's own generated kernel, run on Taylor models, gives J on whole cells. Where a law's number
+is a function of something simpler, that is maximised instead: the slope for A and E, the change
+of the normal for G, the crest curvature for D, two entries for F.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from asperity.analysis.bounds.branch_and_bound import Problem, Supremum
+from asperity.analysis.bounds.dense_search import ContactField
+from asperity.analysis.bounds.measures import NORM, ONE_SIDED
+from asperity.analysis.bounds.measures import Number as MatrixNumber
+from asperity.checks import FloatArray
+from asperity.derive.facts import law_facts
+from asperity.enclosures.products import (
+    ANGLE,
+    DEPTH,
+    LENGTH,
+    ProductCells,
+    anchor_models,
+    with_deflection,
+    with_depth,
+)
+from asperity.enclosures.taylor import Number, Taylor, TaylorMath
+from asperity.laws import Law
+from asperity.surface import Surface
+from asperity.textures.cells import NAMES, Cells
+from asperity.textures.sinusoid import Sinusoid
+
+Entries = Sequence[Sequence[Number]]
+# Numbers of J/k below this are not resolved; a flat surface would have no relative gap.
+_LEAST = 1e-9
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Depths [m], (n,), and deflections [m], (n, 2), of an anchor that sticks or is dragged."""
+
+    depth: FloatArray
+    deflection: FloatArray
+    sliding: bool
+
+
+class MatrixProblem(Problem):
+    """The greatest measure of matrices that are functions of the height derivatives.
+
+    Args:
+        cells: of the texture.
+        names: the derivatives that are needed.
+        matrices: 3 × 3 entries from the derivatives' models; several, of which the greatest counts.
+        exact: the same matrices from numbers: (n, d) coordinates to several (n, 3, 3).
+        number: the measure.
+        floor: see :class:`Problem`.
+    """
+
+    def __init__(
+        self,
+        cells: Cells,
+        names: Sequence[str],
+        matrices: Callable[[dict[str, Number]], list[Entries]],
+        exact: Callable[[FloatArray], list[FloatArray]],
+        number: MatrixNumber,
+        floor: float = 0.0,
+    ) -> None:
+        self.cells, self.floor = cells, floor
+        self._names, self._matrices, self._exact, self._number = names, matrices, exact, number
+
+    def at_most(self, centres: FloatArray, half: FloatArray, above: float) -> FloatArray:
+        """See :class:`Problem`."""
+        n, d = len(centres), len(half)
+        best = np.full(n, -np.inf)
+        with np.errstate(all="ignore"):
+            models = self.cells.models(centres, half, self._names)
+            for entries in self._matrices(models):
+                c, g, e = _stacked(entries, n, d)
+                best = np.maximum(best, self._number.at_most(c, g, e, above))
+        return best
+
+    def values(self, coordinates: FloatArray) -> FloatArray:
+        """See :class:`Problem`."""
+        return np.asarray(self.levels(coordinates).max(axis=0))
+
+    def levels(self, coordinates: FloatArray) -> FloatArray:
+        """Return the measure of each of the matrices, shape (matrices, n)."""
+        with np.errstate(all="ignore"):
+            return np.stack([self._number.careful(m) for m in self._exact(coordinates)])
+
+
+def _stacked(entries: Entries, n: int, d: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    c, g, e = np.zeros((n, 3, 3)), np.zeros((d, n, 3, 3)), np.zeros((n, 3, 3))
+    for i, row in enumerate(entries):
+        for j, entry in enumerate(row):
+            if isinstance(entry, Taylor):
+                c[:, i, j], g[:, :, i, j], e[:, i, j] = entry.c, entry.g, entry.e
+            else:
+                c[:, i, j] = entry
+    return c, g, e
+
+
+def law_kernel(law: Law) -> tuple[Callable[..., Any], tuple[str, ...]]:
+    """Return a law's generated kernel ``law_jacobian`` for Taylor models, and its arguments.
+
+    Raises:
+        TypeError: when called, if the kernel decides by comparing, as pieces and max() do.
+    """
+    from asperity.kernels.fuse import kernel_source
+
+    source = kernel_source(law)
+    space: dict[str, Any] = {"math": TaylorMath}
+    exec(compile(source, f"<law {law.letter}>", "exec"), space)
+    kernel = space["law_jacobian"]
+    return kernel, kernel.__code__.co_varnames[: kernel.__code__.co_argcount]
+
+
+def law_constants(surface: Surface) -> dict[str, float]:
+    """Return the arguments of a kernel that do not change over the surface; k is 1."""
+    _k, middle, half = surface.law_arguments[:3]
+    return {"k": 1.0, "h_mid": middle, "h_half": half, **surface.law_parameters}
+
+
+class LawProblem(MatrixProblem):
+    """A measure of J/k itself, over contacts, depths in [0, D] and states of an anchor.
+
+    At a fixed contact most Jacobians are affine in the depth, and a convex measure is then
+    greatest at an end; else the depth is one more coordinate.
+    """
+
+    def __init__(self, surface: Surface, cells: Cells, number: MatrixNumber) -> None:
+        self._surface, self._field = surface, ContactField(surface)
+        self._kernel, arguments = law_kernel(surface.law)
+        self._constants = {n: v for n, v in law_constants(surface).items() if n in arguments}
+        self._taken = arguments
+        depth = surface.max_depth
+        self._ends = (0.0, depth) if law_facts(surface.law).affine_in_depth else (None,)
+        if surface.law.stateful:
+            level = None if self._ends[0] is not None else depth
+            cells = with_deflection(cells, surface.max_deflection, level)
+        elif self._ends[0] is None:
+            cells = with_depth(cells, depth)
+        self._slides = (False, True) if surface.law.stateful else (False,)
+        names = [name for name in NAMES if name in arguments]
+        super().__init__(cells, names, self._models, self._jacobians, number, _LEAST)
+
+    def _models(self, models: dict[str, Number]) -> list[Entries]:
+        result = []
+        for sliding in self._slides:
+            state = {}
+            if self._surface.law.stateful:
+                state = anchor_models(models, self._surface.max_deflection, sliding=sliding)
+            for end in self._ends:
+                known = {**models, **state, **({} if end is None else {DEPTH: end})}
+                taken = {name: known[name] for name in self._taken if name in known}
+                if len(taken) + len(self._constants) < len(self._taken):
+                    raise TypeError("the force depends on the position itself")
+                result.append(_rows(self._kernel(**taken, **self._constants)[3:]))
+        return result
+
+    def contacts(self, coordinates: FloatArray) -> list[Contacts]:
+        """Return every depth and state that is looked at for given coordinates."""
+        n, longest = len(coordinates), self._surface.max_deflection
+        further: dict[str, FloatArray] = {}
+        if isinstance(self.cells, ProductCells):
+            further = self.cells.further(coordinates)
+        result = []
+        for sliding in self._slides:
+            deflection = np.zeros((n, 2))
+            if self._surface.law.stateful:
+                length = np.full(n, longest) if sliding else further[LENGTH]
+                unit = np.stack([np.cos(further[ANGLE]), np.sin(further[ANGLE])], axis=-1)
+                deflection = length[:, None] * unit
+            for end in self._ends:
+                depth = further[DEPTH] if end is None else np.full(n, end)
+                result.append(Contacts(depth, deflection, sliding))
+        return result
+
+    def _jacobians(self, coordinates: FloatArray) -> list[FloatArray]:
+        derivatives = self.cells.derivatives(coordinates)
+        nowhere = np.zeros((len(coordinates), 2))
+        return [
+            self._field.jacobians(nowhere, at.depth, derivatives, at.deflection, sliding=at.sliding)
+            for at in self.contacts(coordinates)
+        ]
+
+
+def _rows(entries: Sequence[Number]) -> Entries:
+    return [entries[0:3], entries[3:6], entries[6:9]]
+
+
+class SlopeProblem(MatrixProblem):
+    """The greatest slope |∇h|.
+
+    Args:
+        cells: of the texture.
+        beside: the 1 in √(1 + |∇h|²), whose gap is what counts; 0 for the slope alone.
+    """
+
+    def __init__(self, cells: Cells, beside: float) -> None:
+        def matrices(models: dict[str, Number]) -> list[Entries]:
+            return [[[models["hx"]], [models["hy"]]]]
+
+        def exact(coordinates: FloatArray) -> list[FloatArray]:
+            result = np.zeros((len(coordinates), 3, 3))
+            result[:, :2, 0] = cells.derivatives(coordinates)[:, 1:3]
+            return [result]
+
+        self._beside = beside
+        super().__init__(cells, ("hx", "hy"), matrices, exact, NORM, _LEAST)
+
+    def enough(self, best: float, tolerance: float) -> float:
+        """See :class:`Problem`."""
+        whole = math.hypot(self._beside, best) * (1.0 + tolerance)
+        return math.sqrt((whole - self._beside) * (whole + self._beside))
+
+
+def _normal_change(derivatives: Sequence[Any], root: Any) -> list[list[Any]]:
+    """∂n/∂x and ∂n/∂y as columns: (∂w - n (n · ∂w))/s with w = (-h_x, -h_y, 1)."""
+    hx, hy, hxx, hxy, hyy = derivatives
+    s = root(1.0 + hx * hx + hy * hy)
+    square = 1.0 / (s * s)
+    columns = []
+    for a, b in ((hxx, hxy), (hxy, hyy)):
+        along = (hx * a + hy * b) * square
+        columns.append([(hx * along - a) / s, (hy * along - b) / s, -along / s])
+    return [[column[row] for column in columns] for row in range(3)]
+
+
+def normal_problem(cells: Cells, floor: float) -> MatrixProblem:
+    """Return the problem of ‖∂n/∂(x, y)‖, of which law G's number is max(1, depth times it)."""
+
+    def matrices(models: dict[str, Number]) -> list[Entries]:
+        return [_normal_change([models[name] for name in NAMES[1:]], TaylorMath.sqrt)]
+
+    def exact(coordinates: FloatArray) -> list[FloatArray]:
+        derivatives = cells.derivatives(coordinates).T[1:]
+        result = np.zeros((len(coordinates), 3, 3))
+        result[:, :, :2] = np.array(_normal_change(list(derivatives), np.sqrt)).transpose(2, 0, 1)
+        return [result]
+
+    return MatrixProblem(cells, NAMES[1:], matrices, exact, NORM, floor)
+
+
+def _shape_operator(derivatives: Sequence[Any], root: Any) -> list[list[Any]]:
+    """G^(-1/2) H G^(-1/2)/s, whose eigenvalues are the principal curvatures; G = I + g gᵀ.
+
+    G^(-1/2) = I - g gᵀ/(s (1 + s)).
+    """
+    hx, hy, hxx, hxy, hyy = derivatives
+    square = 1.0 + hx * hx + hy * hy
+    s = root(square)
+    share = 1.0 / (square + s)
+    a, b, c = 1.0 - hx * hx * share, -(hx * hy * share), 1.0 - hy * hy * share
+    # Columns of H G^(-1/2), then G^(-1/2) from the left.
+    p, q = hxx * a + hxy * b, hxx * b + hxy * c
+    r, t = hxy * a + hyy * b, hxy * b + hyy * c
+    return [[(a * p + b * r) / s, (a * q + b * t) / s], [(b * p + c * r) / s, (b * q + c * t) / s]]
+
+
+class CrestProblem(MatrixProblem):
+    """The greatest downward curvature of the surface [1/m].
+
+    Args:
+        cells: of the texture.
+        depth: where only law D's number down to a depth [m] is wanted; then curvatures up to
+            1/(2 depth), and differences that do not change the number, do not matter.
+    """
+
+    def __init__(self, cells: Cells, depth: float | None = None) -> None:
+        def matrices(models: dict[str, Number]) -> list[Entries]:
+            return [_shape_operator([models[name] for name in NAMES[1:]], TaylorMath.sqrt)]
+
+        def exact(coordinates: FloatArray) -> list[FloatArray]:
+            derivatives = cells.derivatives(coordinates).T[1:]
+            result = np.zeros((len(coordinates), 3, 3))
+            two: FloatArray = np.array(_shape_operator(list(derivatives), np.sqrt)).transpose(
+                2, 0, 1
+            )
+            # No third curvature: the entry is small enough never to be the greatest of a crest.
+            result[:, :2, :2] = two
+            return [result]
+
+        self._depth = depth
+        floor = _LEAST if depth is None else 0.5 / depth
+        super().__init__(cells, NAMES[1:], matrices, exact, ONE_SIDED, floor)
+
+    def enough(self, best: float, tolerance: float) -> float:
+        """See :class:`Problem`: y/(1 - y) within the tolerance, y = depth times curvature."""
+        if self._depth is None:
+            return super().enough(best, tolerance)
+        y = self._depth * best
+        if y >= 1.0:
+            return math.inf
+        number = max(y / (1.0 - y), 1.0) * (1.0 + tolerance)
+        return number / (1.0 + number) / self._depth
+
+
+class FrictionProblem(Problem):
+    """Law F's number, which is that of [[a, b], [0, 1]].
+
+    The deflection that is worst is against the slope and as long as it can be (see
+    ``friction.py``); a = μ D ((1 - m)/d_max + |∇m|), b = μ (1 - m). Both numbers of the matrix
+    grow with a and b and are convex in them, and a and b are convex in (m, ∇m).
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        cells: Cells,
+        number: Callable[[FloatArray, FloatArray], FloatArray],
+    ) -> None:
+        self.cells, self._number = cells, number
+        _k, middle, half = surface.law_arguments[:3]
+        swing = surface.modulation_depth
+        self._offset, self._share = 0.5 * (1.0 + swing * middle / half), 0.5 * swing / half
+        self._friction = surface.friction
+        self._depth, self._longest = surface.max_depth, surface.max_deflection
+
+    def _entries(self, h: FloatArray, slope: FloatArray) -> FloatArray:
+        still = np.maximum(self._offset - self._share * h, 0.0)
+        a = self._friction * self._depth * (still / self._longest + self._share * slope)
+        return self._number(a, self._friction * still)
+
+    def at_most(
+        self,
+        centres: FloatArray,
+        half: FloatArray,
+        above: float,  # noqa: ARG002 - the one bound there is costs little
+    ) -> FloatArray:
+        """See :class:`Problem`."""
+        models = self.cells.models(centres, half, ("h", "hx", "hy"))
+        n, d = len(centres), len(half)
+        zero = Taylor(np.zeros(n), np.zeros((d, n)), np.zeros(n))
+        h, x, y = (m if isinstance(m, Taylor) else zero for m in models.values())
+        rest = np.hypot(x.e, y.e) * (1.0 + 1e-12)
+        best = np.zeros(n)
+        for corner in range(2**d):
+            signs = np.array([1.0 if corner >> axis & 1 else -1.0 for axis in range(d)])
+            slope = np.hypot(x.c + signs @ x.g, y.c + signs @ y.g) + rest
+            best = np.maximum(best, self._entries(h.c + signs @ h.g - h.e, slope))
+        return np.asarray(best * (1.0 + 1e-13))
+
+    def values(self, coordinates: FloatArray) -> FloatArray:
+        """See :class:`Problem`."""
+        derivatives = self.cells.derivatives(coordinates)
+        return self._entries(derivatives[:, 0], np.hypot(derivatives[:, 1], derivatives[:, 2]))
+
+    def around(self, texture: Sinusoid) -> Supremum:
+        """Return bounds on a sinusoid at once, without cells.
+
+        There (h, |∇h|) runs along half an ellipse, which a polygon of tangents encloses; a convex
+        number that grows with |∇h| is greatest at its corners, or where they touch.
+        """
+        touch, corner, radius = _half_circle()
+        height, slope = texture.amplitude, texture.bounds[0]
+        values = self._entries(height * np.sin(touch), slope * np.cos(touch))
+        beyond = self._entries(height * radius * np.sin(corner), slope * radius * np.cos(corner))
+        upper = max(float(values.max()), float(beyond.max())) * (1.0 + 1e-13)
+        index = min(max(int(values.argmax()), 1), len(values) - 2)
+        before, here, after = values[index - 1 : index + 2]
+        bend = before - 2.0 * here + after
+        shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+        step = float(touch[1] - touch[0])
+        tries = touch[index] + step * np.array([-1.0, 0.0, 1.0, min(max(shift, -1.0), 1.0)])
+        found = self._entries(height * np.sin(tries), slope * np.cos(tries))
+        best = int(found.argmax())
+        at = np.array([tries[best] - texture.phase])
+        return Supremum(float(found[best]), upper, at, len(corner), reached=True)
+
+
+@lru_cache(maxsize=1)
+def _half_circle(count: int = 1024) -> tuple[FloatArray, FloatArray, float]:
+    """Return the angles where tangents touch half a circle and where they meet, and how far out."""
+    touch = np.linspace(-0.5 * math.pi, 0.5 * math.pi, count + 1)
+    return touch, 0.5 * (touch[1:] + touch[:-1]), 1.0 / math.cos(0.5 * math.pi / count)

@@ -1,0 +1,45 @@
+"""The fallback where nothing is proved: many samples, the best of which are climbed from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from asperity.analysis.bounds.branch_and_bound import Problem, Supremum, polish
+from asperity.textures.cells import Cells, WaveCells, cells_of
+from asperity.textures.fourier import Fourier
+from asperity.textures.texture import Texture
+
+_CANDIDATES = 12
+_SAMPLES = 65_536
+
+
+def sampling_cells(texture: Texture) -> Cells:
+    """Return the cells of a texture; of an endless sum those of a rectangle of the plane."""
+    cells = cells_of(texture)
+    if cells is not None:
+        return cells
+    assert isinstance(texture, Fourier)
+    width, depth = (float(side) for side in np.abs(texture.domain.spans).sum(axis=0))
+    return WaveCells(texture, (width, depth))
+
+
+def sampled(problem: Problem) -> Supremum:
+    """Return the greatest value found, without an upper bound."""
+    points = problem.cells.samples(_SAMPLES)
+    values = np.concatenate([problem.values(part) for part in np.array_split(points, 16)])
+    _chunks, half = problem.cells.start()
+    best, at = problem.floor, None
+    for index in np.argsort(-values)[:_CANDIDATES]:
+        top, where = polish(problem, points[index], half, float(values[index]))
+        if top > best:
+            best, at = top, where
+    return Supremum(best, math.inf, at, len(points), reached=False)
+
+
+def sampled_supremum(texture: Texture, build: Callable[[Cells], Problem]) -> tuple[Cells, Supremum]:
+    """Return the cells that were sampled and the greatest value found of a problem on them."""
+    cells = sampling_cells(texture)
+    return cells, sampled(build(cells))

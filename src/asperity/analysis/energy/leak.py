@@ -1,0 +1,226 @@
+"""How much energy the worst simple loop gains, and how fast one has to be to lose it again."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from asperity.analysis.energy.columns import column_loop, curl_integral, sampled_sides
+from asperity.analysis.energy.loops import loop_work
+from asperity.analysis.energy.nearest_loop import nearest_outlines
+from asperity.analysis.energy.state_loops import in_plane_loop, light_then_deep_loop
+from asperity.analysis.energy.thrust import mean_thrust
+from asperity.checks import FloatArray, array, positive
+from asperity.derive.facts import law_facts
+from asperity.errors import ParameterError
+from asperity.surface import Surface
+from asperity.textures.texture import ScanLine
+
+_LINES = 33
+_NEAREST_LINES = 4
+# Relative error of the work where each force is a search for the nearest point.
+_COSTLY = 1e-4
+
+
+@dataclass(frozen=True)
+class Leak:
+    """The worst simple loop, turned once, in a vertical plane along a scan line.
+
+    Its energy is the larger of ∬curl⁺ and ∬curl⁻ over the length of the line and the depth range,
+    curl = ∂f_t/∂z - ∂f_z/∂t, t along the line. For a law with state also loops in a plane of
+    constant depth are looked at.
+
+    Attributes:
+        energy: work of the field on the probe around ``vertices`` [J]; 0 for a conservative law.
+        upper: proved bound for every simple loop in that plane [J]; infinite if none is proved.
+        line: the scan line of the plane.
+        method: ``"theorem"`` (zero by proof), ``"certified"`` or ``"sampled"``.
+        description: the loop in words.
+        vertices: the loop as a closed polygon (n, 3) [m], empty if no loop gains anything;
+            ``loop_work(surface, vertices)`` is ``energy``.
+        thrust: mean tangential force on a straight scan along the line at the scan height [N],
+            > 0 along it; ``None`` for a law with state, whose friction resists anyway, and for a
+            conservative law on a line that does not repeat.
+    """
+
+    energy: float
+    upper: float
+    line: ScanLine
+    method: str
+    description: str
+    vertices: FloatArray
+    thrust: float | None
+
+    @property
+    def worst(self) -> float:
+        """``upper`` where one is proved, else ``energy`` [J]."""
+        return self.upper if math.isfinite(self.upper) else self.energy
+
+    @property
+    def length(self) -> float:
+        """Length of the loop [m]."""
+        edges = self.vertices - np.roll(self.vertices, 1, axis=0)
+        return float(np.linalg.norm(edges, axis=1).sum())
+
+    @property
+    def per_length(self) -> float:
+        """Energy over the length of the line [J/m]: a mean thrust [N]."""
+        return self.energy / self.line.length
+
+    def speed(self, damping: float) -> float:
+        """Return v* = W/(σ₀ · length), the speed below which damping does not absorb the loop.
+
+        Args:
+            damping: σ₀(B), the least damping of the device [N s/m].
+
+        Raises:
+            ParameterError: for a damping that is not positive.
+        """
+        sigma = positive("damping", damping, "N s/m")
+        return self.energy / (sigma * self.length) if self.energy > 0.0 else 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data; an unbounded number is written as the string "inf"."""
+        return {
+            "energy": self.energy,
+            "upper": self.upper if math.isfinite(self.upper) else "inf",
+            "per_length": self.per_length,
+            "length": self.length,
+            "thrust": self.thrust,
+            "line": {
+                "start": self.line.start.tolist(),
+                "direction": self.line.direction.tolist(),
+                "length": self.line.length,
+                "periodic": self.line.periodic,
+            },
+            "method": self.method,
+            "description": self.description,
+            "vertices": self.vertices.tolist(),
+        }
+
+
+def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -> Leak:
+    """Return the worst simple loop over the working region.
+
+    For a law on the nominal or the vertical contact the depth is measured from its own boundary
+    and the energy is certified; for the nearest contact the region is where the distance to the
+    surface is at most max_depth. On maps the worst of several parallel lines is taken. For a law
+    with state, whose force is no field of position, loops are traced from many starting points.
+
+    Args:
+        surface: the surface.
+        direction: of the vertical plane, (x, y); the texture's scan line by default.
+
+    Raises:
+        ParameterError: for a direction without length.
+
+    Reference:
+        The paper's section III.C and (27); MATH section 4.
+
+    Example:
+        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> surface = Surface(Sinusoid(amplitude=0.8e-3, period=2e-3), "A", max_depth=0.8e-3)
+        >>> leak = worst_loop(surface)  # k D 2A, down one flank and up the other
+        >>> round(leak.energy * 1e3, 3), round(leak.upper * 1e3, 3)
+        (1.28, 1.28)
+    """
+    line = surface.texture.scan_line() if direction is None else scan_line(surface, direction)
+    nothing = np.zeros((0, 3))
+    if surface.law.stateful:
+        return _state_leak(surface, line)
+    facts = law_facts(surface.law)
+    if facts.conservative:
+        text = "every closed loop: zero by the symbolic curl"
+        thrust = 0.0 if line.periodic else None
+        return Leak(0.0, 0.0, line, "theorem", text, nothing, thrust)
+    lines = parallel_lines(surface, line)
+    if surface.law.contact.above_probe:
+        leak = _column_leak(surface, lines)
+    else:
+        leak = _nearest_leak(surface, lines)
+    if len(lines) > 1:
+        return replace(leak, description=f"{leak.description}, the worst of {len(lines)} lines")
+    return leak
+
+
+def scan_line(surface: Surface, direction: tuple[float, float]) -> ScanLine:
+    """Return the line in a direction through the start of the texture's own, as long as that."""
+    vector = array("direction", direction, (2,), "1")
+    size = math.hypot(*vector)
+    if size == 0.0:
+        raise ParameterError("direction", "must have a length", direction)
+    own = surface.texture.scan_line()
+    unit = vector / size
+    if abs(float(unit @ own.direction)) > 1.0 - 1e-12:
+        return own
+    domain = surface.texture.domain
+    reach = float(np.abs(domain.spans @ unit).max())
+    return ScanLine(domain.origin, unit, reach if reach > 0.0 else own.length, periodic=False)
+
+
+def parallel_lines(surface: Surface, line: ScanLine) -> list[ScanLine]:
+    """Return lines parallel to a line, spread over a map; on a profile the line alone."""
+    domain = surface.texture.domain
+    if surface.texture.is_profile:
+        return [line]
+    across = np.array([-line.direction[1], line.direction[0]])
+    reach = domain.spans @ across
+    low, high = float(np.minimum(reach, 0.0).sum()), float(np.maximum(reach, 0.0).sum())
+    count = _LINES if surface.law.contact.above_probe else _NEAREST_LINES
+    first = float((domain.origin - line.start) @ across) + low
+    shifts = first + (high - low) * (np.arange(count) + 0.5) / count
+    return [
+        ScanLine(line.start + shift * across, line.direction, line.length, line.periodic)
+        for shift in shifts
+    ]
+
+
+def _column_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
+    """Return the loop around the curl of one sign, certified in the plane of the worst line."""
+    sides = [sampled_sides(surface, line) for line in lines]
+    worst = int(np.argmax([max(side) for side in sides]))
+    line = lines[worst]
+    sign = 1.0 if sides[worst][0] >= sides[worst][1] else -1.0
+    vertices, energy = gaining(surface, column_loop(surface, line, sign))
+    bounds = curl_integral(surface, line)
+    upper = math.inf if bounds is None else max(high for _low, high in bounds)
+    method = "sampled" if bounds is None else "certified"
+    text = f"around the region of one sign of the curl, depth to {surface.max_depth * 1e3:g} mm"
+    thrust = mean_thrust(surface, line)
+    return Leak(energy, max(upper, energy), line, method, text, vertices, thrust)
+
+
+def gaining(
+    surface: Surface, vertices: FloatArray, tolerance: float = 1e-12
+) -> tuple[FloatArray, float]:
+    """Return a polygon in the sense in which it gains energy, and its work [J]."""
+    if len(vertices) < 2:
+        return np.zeros((0, 3)), 0.0
+    work = loop_work(surface, vertices, tolerance)
+    return (vertices, work) if work >= 0.0 else (np.ascontiguousarray(vertices[::-1]), -work)
+
+
+def _nearest_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
+    """Return the loop around the curl of one sign where the surface is near enough."""
+    outlines = [outline for line in lines for outline in nearest_outlines(surface, line)]
+    worst = max(outlines, key=lambda outline: outline.promise)
+    vertices, energy = gaining(surface, worst.vertices, _COSTLY)
+    text = (
+        "around the region of one sign of the curl where the surface is nearer than "
+        f"{surface.max_depth * 1e3:g} mm"
+    )
+    thrust = mean_thrust(surface, worst.line)
+    return Leak(energy, math.inf, worst.line, "sampled", text, vertices, thrust)
+
+
+def _state_leak(surface: Surface, line: ScanLine) -> Leak:
+    """Return the worst of the paper's path of (27) and of loops at constant depth."""
+    found = [light_then_deep_loop(surface, line), in_plane_loop(surface, line)]
+    worst = max(found, key=lambda loop: loop.energy)
+    if worst.energy <= 0.0:
+        text = "no loop that was tried gains energy"
+        return Leak(0.0, math.inf, line, "sampled", text, np.zeros((0, 3)), None)
+    return Leak(worst.energy, math.inf, line, "sampled", worst.description, worst.vertices, None)

@@ -1,0 +1,135 @@
+"""How much texture, and how much support, a law gives for the loop gain that it costs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity.analysis.bounds.dense_search import greatest
+from asperity.analysis.bounds.measures import spectral_norm
+from asperity.analysis.gain.medial_axis import sharpest_crest
+from asperity.checks import FloatArray
+from asperity.surface import Surface
+from asperity.textures.texture import ScanLine, Texture
+
+_POINTS = 2048
+_LINES = 16
+_NEAREST_POINTS = {True: 2048, False: 128}
+
+
+@dataclass(frozen=True)
+class Merit:
+    """Strength and support of a law on a straight scan at constant height.
+
+    Attributes:
+        strength: T, RMS of the oscillating force / (sup‖J‖ · l) [1]; without a period, times a
+            length: RMS / sup‖J‖ [m].
+        support: S, d⟨f_z⟩/d depth / sup‖J‖ [1].
+        ripple: RMS of the oscillating force over the stiffness, RMS/k [m].
+        gain: sup‖J‖/k over the body above the scan height [1].
+        height: z of the scan [m].
+        contact_lost: fraction of the scan without contact.
+    """
+
+    strength: float
+    support: float
+    ripple: float
+    gain: float
+    height: float
+    contact_lost: float
+
+
+def merit(surface: Surface) -> Merit:
+    """Return strength and support (MATH section 6), sampled.
+
+    The scan runs at z = max h - max_depth (vertical and nearest contact) or z = -max_depth
+    (nominal contact), along the texture's scan line; on a map along parallel lines, each with
+    its own mean. A law with state slides: its anchor trails the probe at full deflection.
+    """
+    line = surface.texture.scan_line()
+    height = scan_height(surface)
+    forces, slopes, lost = _scan(surface, line, height)
+    variance = float(np.mean(np.var(forces, axis=1).sum(axis=1)))
+    size = float(np.mean(np.square(forces).sum(axis=2)))
+    # What is left of a constant force is rounding.
+    ripple = math.sqrt(variance) if variance > 1e-24 * size else 0.0
+    gain = _gain_above(surface, height)
+    unit = line.length if line.periodic else 1.0
+    if math.isinf(gain):
+        strength = support = 0.0
+    else:
+        strength, support = ripple / (gain * unit), float(slopes.mean()) / gain
+    return Merit(strength, support, ripple, gain, height, lost)
+
+
+def scan_height(surface: Surface) -> float:
+    """Return z [m] of the scan at which laws are compared."""
+    return surface.law.contact.extremes(surface.texture)[1] - surface.max_depth
+
+
+def scan_points(surface: Surface, line: ScanLine, height: float) -> FloatArray:
+    """Return the probe points of the scan, shape (lines, points, 3) [m]."""
+    costly = surface.law.contact.costly
+    count = _NEAREST_POINTS[surface.texture.is_profile] if costly else _POINTS
+    xy = parallel_lines(surface.texture, line, count)
+    return np.concatenate([xy, np.full((*xy.shape[:2], 1), height)], axis=2)
+
+
+def parallel_lines(texture: Texture, line: ScanLine, count: int) -> FloatArray:
+    """Return points (lines, count, 2) [m] of the scan line of a profile, or 16 lines of a map.
+
+    The lines of a map are parallel to its scan line and spread evenly over the domain.
+    """
+    xy = line.points(count)
+    if texture.is_profile:
+        return xy[None]
+    spans = texture.domain.spans
+    parts = (np.arange(_LINES) + 0.5) / _LINES
+    across = spans[np.argmin(np.abs(spans @ line.direction) / np.hypot(*spans.T))]
+    first = line.start if line.periodic else texture.domain.origin
+    shifts = parts[:, None] * across + (first - line.start)
+    return np.asarray(xy + shifts[:, None, :])
+
+
+def _scan(surface: Surface, line: ScanLine, height: float) -> tuple[FloatArray, FloatArray, float]:
+    """Return f/k and -J_zz/k on the scan, and the fraction without contact."""
+    points = scan_points(surface, line, height)
+    flat = points.reshape(-1, 3)
+    if surface.law.stateful:
+        trailing = np.tile(surface.max_deflection * line.direction, (len(flat), 1))
+        sliding = np.ones(len(flat), dtype=bool)
+        forces, jacobians = surface.force_and_jacobian(flat, trailing, sliding)
+    else:
+        forces, jacobians = surface.force_and_jacobian(flat)
+    lost = float(np.mean(~jacobians.any(axis=(1, 2))))
+    shape = points.shape[:2]
+    slopes = -jacobians[:, 2, 2].reshape(shape) / surface.stiffness
+    return forces.reshape(*shape, 3) / surface.stiffness, slopes, lost
+
+
+def _gain_above(surface: Surface, height: float) -> float:
+    """Return sup‖J‖/k over the body above a height."""
+    contact, letter = surface.law.contact, surface.law.letter
+    if letter in {"W", "E"}:
+        return 1.0
+    if letter == "H":
+        return max(1.0, surface.continuity)
+    if letter == "D":
+        return _god_object_gain(surface, height)
+
+    def limit(derivatives: FloatArray) -> FloatArray:
+        return contact.greatest_depth(height, derivatives)
+
+    return greatest(surface, spectral_norm, limit).value
+
+
+def _god_object_gain(surface: Surface, height: float) -> float:
+    """y/(1 - y) at the sharpest crest, infinite if its centre of curvature is above the height."""
+    crest = sharpest_crest(surface.texture)
+    if crest is None:
+        return 1.0
+    fall = crest.foot[2] - crest.centre[2]
+    y = (crest.foot[2] - height) / fall
+    return math.inf if y >= 1.0 else max(1.0, y / (1.0 - y))

@@ -1,0 +1,112 @@
+"""Loops that feed the hand although the law is friction: made with the state of the anchor."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity.analysis.energy.loops import loop_work
+from asperity.checks import FloatArray
+from asperity.surface import Surface
+from asperity.textures.texture import ScanLine
+
+_STARTS = 64
+_COLUMNS = 128
+# Loops in a plane whose work is computed, of those that promise most.
+_TRIED = 4
+_INSIDE = 1.0 - 1e-9
+
+
+@dataclass(frozen=True)
+class StateLoop:
+    """A closed polygon that begins where contact, and with it the anchor, begins.
+
+    Attributes:
+        energy: work of the force on the probe [J].
+        vertices: (n, 3) [m].
+        description: in words.
+    """
+
+    energy: float
+    vertices: FloatArray
+    description: str
+
+
+def friction_path(surface: Surface, start: FloatArray, along: FloatArray) -> FloatArray:
+    """Return the paper's path of (27) from a point of the plane, vertices (5, 3) [m].
+
+    Down to light contact, along by max_deflection, down to max_depth, back, and up.
+    """
+    depth, light = surface.max_depth, 1e-6 * surface.max_depth
+    end = start + surface.max_deflection * along
+    above = 0.1 * depth
+    return np.array(
+        [
+            [*start, above],
+            [*start, -light],
+            [*end, -light],
+            [*end, -depth],
+            [*start, -depth],
+        ]
+    )
+
+
+def light_then_deep_loop(surface: Surface, line: ScanLine) -> StateLoop:
+    """Return the best of the paper's path of (27), both ways, from points all along the line."""
+    paths = [
+        friction_path(surface, start, sign * line.direction)
+        for start in line.points(_STARTS)
+        for sign in (1.0, -1.0)
+    ]
+    energies = [loop_work(surface, path) for path in paths]
+    best = int(np.argmax(energies))
+    text = (
+        f"the paper's path of (27), worst of {len(paths)} starts: "
+        f"{surface.max_deflection * 1e3:g} mm along in light contact, "
+        f"back at {surface.max_depth * 1e3:g} mm"
+    )
+    return StateLoop(float(energies[best]), paths[best], text)
+
+
+def in_plane_loop(surface: Surface, line: ScanLine) -> StateLoop:
+    """Return the best loop at constant depth about an anchor that sticks.
+
+    There f = -k D μ (1 - m) d/d_max is a field of the deflection d, whose curl k D μ ∇m × d/d_max
+    has one sign on either side of the scan line wherever m rises, and the other where it falls.
+    The polygon encloses one sign of it within the circle |d| < d_max.
+    """
+    outlines = []
+    for start in line.points(_STARTS):
+        for sign in (1.0, -1.0):
+            promise, vertices = _outline(surface, line, start, sign)
+            outlines.append((promise, vertices))
+    outlines.sort(key=lambda outline: -outline[0])
+    best = StateLoop(-math.inf, np.zeros((0, 3)), "")
+    text = f"in the plane at {surface.max_depth * 1e3:g} mm about an anchor that sticks"
+    for _promise, vertices in outlines[:_TRIED]:
+        energy = loop_work(surface, vertices)
+        if energy > best.energy:
+            best = StateLoop(energy, vertices, text)
+    return best
+
+
+def _outline(
+    surface: Surface, line: ScanLine, anchor: FloatArray, sign: float
+) -> tuple[float, FloatArray]:
+    """Return ∬|∇m × d| within the outline, but for a factor, and the polygon."""
+    t = np.linspace(-1.0, 1.0, _COLUMNS + 1) * surface.max_deflection * _INSIDE
+    along, across = line.direction, np.array([-line.direction[1], line.direction[0]])
+    xy = anchor + t[:, None] * along
+    slope = surface.texture.gradient(xy) @ along
+    width = np.sqrt(np.maximum((_INSIDE * surface.max_deflection) ** 2 - t * t, 0.0))
+    promise = float((np.abs(slope) * width * width).sum())
+    side = sign * np.where(slope >= 0.0, width, -width)
+    low, high = np.minimum(side, 0.0), np.maximum(side, 0.0)
+    forth = xy + low[:, None] * across
+    back = (xy + high[:, None] * across)[::-1]
+    plane = np.concatenate([anchor[None], forth, back, anchor[None]])
+    depth = np.full((len(plane), 1), -surface.max_depth)
+    above = np.array([[*anchor, 0.1 * surface.max_depth]])
+    return promise, np.concatenate([above, np.hstack([plane, depth])])

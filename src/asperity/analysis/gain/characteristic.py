@@ -1,0 +1,173 @@
+"""How much a law raises the loop gain: the characteristic number q and the one-sided number q⁺.
+
+q = sup ‖J‖₂/k is the paper's (5); q⁺ = sup λ_max(-sym J)/k decides for conservative laws (MATH
+section 4). Both are taken over the working region: depths up to the surface's max_depth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
+from asperity.analysis.bounds.highest import highest_point
+from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED, Number
+from asperity.analysis.bounds.witness import attained, lower_of
+from asperity.analysis.gain import closed_forms
+from asperity.analysis.gain.certificate import Search, certified, is_shipped, sinusoid_number
+from asperity.analysis.gain.god_object import crest_number, split_number
+from asperity.analysis.gain.kept import kept
+from asperity.checks import positive
+from asperity.derive.facts import law_facts
+from asperity.errors import ParameterError
+from asperity.surface import Surface
+from asperity.textures.sinusoid import Sinusoid
+
+
+def characteristic_number(
+    surface: Surface,
+    tolerance: float | None = None,
+    work_limit: int = DEFAULT_WORK_LIMIT,
+    extent: tuple[float, float] | None = None,
+) -> Bound:
+    """Return q = sup ‖J‖₂/k over the working region, between proved bounds.
+
+    Theorem for W, E and H; closed form for A, B, C, D and G on a sinusoid; else certified by
+    branch and bound with enclosures of the height's derivatives. What cannot be certified is
+    sampled and says so.
+
+    Args:
+        surface: the surface.
+        tolerance: relative gap (upper - lower)/lower at which to stop; by default 1e-6 on
+            profiles and periodic sums, 1e-4 on sums of three independent waves, 1e-3 on maps.
+        work_limit: greatest number of cells to look at; if it is reached the bounds found by then
+            are returned, and the note says so.
+        extent: width and depth [m] of the part of the plane that counts, from the origin, for
+            sums of waves; the whole plane by default. For laws that feel the nearest point it is
+            widened by the depth on every side.
+
+    Returns:
+        A :class:`Bound`; infinite for D where the depth reaches the medial axis, ``at`` then
+        being the onset, the least depth of the medial axis.
+
+    Raises:
+        ParameterError: for a tolerance, a limit or an extent that is not positive, or a law of
+            your own on the split contact.
+
+    Reference:
+        The paper's (5), (10) and Table II; MATH section 4 for the rest.
+
+    Example:
+        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> paper = Sinusoid(amplitude=0.8e-3, period=1e-3)
+        >>> round(characteristic_number(Surface(paper, "A")).value, 4)
+        5.1251
+    """
+    search = _search(surface, tolerance, work_limit, extent)
+    letter = surface.law.letter if is_shipped(surface) else ""
+    if letter in {"W", "E"}:
+        return _constant(surface, NORM, 1.0, "‖J‖ is exactly k everywhere")
+    if letter == "D":
+        return kept(surface, "q", search, lambda: crest_number(surface, search))
+    if letter == "H":
+        return kept(surface, "q", search, lambda: split_number(surface, search))
+    return _number(surface, NORM, search, closed_forms.Q)
+
+
+def one_sided_number(
+    surface: Surface,
+    tolerance: float | None = None,
+    work_limit: int = DEFAULT_WORK_LIMIT,
+    extent: tuple[float, float] | None = None,
+) -> Bound:
+    """Return q⁺ = sup λ_max(-sym J)/k over the working region; see :func:`characteristic_number`.
+
+    1 by theorem for W, D, E and H; closed form for A and C on a sinusoid.
+
+    Example:
+        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> paper = Sinusoid(amplitude=0.8e-3, period=1e-3)
+        >>> one_sided_number(Surface(paper, "D")).value
+        1.0
+    """
+    search = _search(surface, tolerance, work_limit, extent)
+    reasons = {
+        "W": "-J = k e_z e_zᵀ",
+        "D": "the potential is half a squared distance, whose Hessian is at most the identity",
+        "E": "λ_max of the symmetric part of e_z nᵀ is (1 + n_z)/2, 1 where the surface is level",
+        "H": "the potential is an infimum of functions whose Hessian is the identity",
+    }
+    letter = surface.law.letter if is_shipped(surface) else ""
+    if letter in reasons:
+        return _constant(surface, ONE_SIDED, 1.0, reasons[letter])
+    return _number(surface, ONE_SIDED, search, closed_forms.ONE_SIDED)
+
+
+def curl_number(
+    surface: Surface,
+    tolerance: float | None = None,
+    work_limit: int = DEFAULT_WORK_LIMIT,
+    extent: tuple[float, float] | None = None,
+) -> Bound:
+    """Return sup |curl f|/k over the working region: the greatest work per area of a small loop.
+
+    Zero by theorem for a conservative law; see :func:`characteristic_number` for the rest.
+
+    Raises:
+        ParameterError: for a law with state, whose force is no field of position.
+
+    Example:
+        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> paper = Sinusoid(amplitude=0.8e-3, period=1e-3)
+        >>> round(curl_number(Surface(paper, "A")).value, 4)  # the greatest slope, 2πA/l
+        5.0265
+    """
+    search = _search(surface, tolerance, work_limit, extent)
+    if surface.law.stateful:
+        raise ParameterError("law", f"{surface.law} has state: its force is no field with a curl")
+    facts = law_facts(surface.law)
+    if facts.conservative:
+        return Bound(0.0, 0.0, "theorem", None, facts.reason)
+    return _number(surface, CURL, search, closed_forms.CURL)
+
+
+def _search(
+    surface: Surface,
+    tolerance: float | None,
+    work_limit: int,
+    extent: tuple[float, float] | None,
+) -> Search:
+    if not isinstance(surface, Surface):
+        raise ParameterError("surface", "must be a Surface", surface)
+    gap = None if tolerance is None else positive("tolerance", tolerance)
+    limit = int(positive("work_limit", work_limit))
+    if extent is not None:
+        if not isinstance(extent, Sequence) or isinstance(extent, str) or len(extent) != 2:
+            raise ParameterError("extent", "must be (width, depth) [m]", extent)
+        width, depth = (positive("extent", side, "m") for side in extent)
+        extent = (width, depth)
+    return Search(gap, limit, extent)
+
+
+def _number(
+    surface: Surface,
+    number: Number,
+    search: Search,
+    formulas: dict[str, closed_forms.ClosedForm],
+) -> Bound:
+    texture, letter = surface.texture, surface.law.letter
+    whole = isinstance(texture, Sinusoid) and search.extent is None
+    if is_shipped(surface) and isinstance(texture, Sinusoid) and whole and letter in formulas:
+        value = formulas[letter](texture, surface.max_depth)
+        phase = closed_forms.PHASES[letter](texture, surface.max_depth)
+        return sinusoid_number(surface, number, value, phase)
+    return kept(surface, number.name, search, lambda: certified(surface, number, search))
+
+
+def _constant(surface: Surface, number: Number, value: float, reason: str) -> Bound:
+    """Return a number that a theorem gives for every surface, attained where it is level.
+
+    Just inside the highest point the normal is e_z.
+    """
+    witness = attained(surface, number, highest_point(surface.texture), 0.0)
+    return Bound(lower_of(value, witness), value, "theorem", witness.at, reason)

@@ -1,0 +1,113 @@
+"""Where the god-object jumps: the medial axis below the crests.
+
+Below a crest of curvature radius R the nearest surface point splits at depth R, the centre of
+curvature; above it law D's tangential stiffness is k δκ/(1 - δκ) with κ = 1/R, unbounded towards R.
+The least depth of the whole medial axis is the radius of the sharpest crest. For along the axis
+the depth is least either at a centre of curvature or half-way between two surface points
+whose normals are opposite (Aamari et al., Electron. J. Statist. 13 (2019) 1359, theorem 3.4), and
+the normals of a height function all point upwards.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT, Supremum, supremum
+from asperity.analysis.bounds.problems import CrestProblem
+from asperity.analysis.bounds.sampling import sampled_supremum
+from asperity.checks import FloatArray
+from asperity.textures.cells import Cells, cells_of
+from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.texture import Texture
+
+_TOLERANCE = 1e-4
+
+
+@dataclass(frozen=True)
+class Crest:
+    """The sharpest crest.
+
+    Attributes:
+        foot: the surface point [m].
+        radius: radius of curvature [m], the depth at which the medial axis begins below it.
+        centre: the centre of curvature [m].
+        least_radius: proved lower bound of every crest's radius [m]; zero if none is proved.
+    """
+
+    foot: tuple[float, float, float]
+    radius: float
+    centre: tuple[float, float, float]
+    least_radius: float
+
+
+def crest_curvature(derivatives: FloatArray) -> FloatArray:
+    """Return the greatest downward curvature -κ [1/m] of the surface, shape (n,).
+
+    κ are the principal curvatures of the graph: eigenvalues of S = G⁻¹ H / s with G = I + g gᵀ.
+
+    Args:
+        derivatives: h, h_x, h_y, h_xx, h_xy, h_yy, shape (n, 6).
+    """
+    _h, p, q, r, s, t = derivatives.T
+    w = 1.0 + p * p + q * q
+    mean = ((1.0 + q * q) * r - 2.0 * p * q * s + (1.0 + p * p) * t) / (2.0 * w**1.5)
+    gauss = (r * t - s * s) / (w * w)
+    result: FloatArray = np.sqrt(np.maximum(mean * mean - gauss, 0.0)) - mean
+    return result
+
+
+@lru_cache(maxsize=16)
+def sharpest_crest(
+    texture: Texture,
+    tolerance: float = _TOLERANCE,
+    work_limit: int = DEFAULT_WORK_LIMIT,
+    extent: tuple[float, float] | None = None,
+    margin: float = 0.0,
+) -> Crest | None:
+    """Return the crest of least radius, certified; nothing for a surface without crests.
+
+    Exact for a sinusoid; else by branch and bound to a relative tolerance of the curvature. A sum
+    of more than three independent waves is sampled unless an extent is given, which is then
+    looked at with a margin on every side.
+    """
+    if isinstance(texture, Sinusoid) and extent is None:
+        return _sinusoid_crest(texture)
+    cells = cells_of(texture, extent, margin)
+    found: Supremum
+    if cells is None:
+        cells, found = sampled_supremum(texture, CrestProblem)
+    else:
+        found = supremum(CrestProblem(cells), tolerance, work_limit, cells.wish)
+    if found.at is None:
+        return None
+    return _crest(texture, _plane(cells, found.at), found.upper)
+
+
+def _plane(cells: Cells, at: FloatArray) -> FloatArray:
+    return np.asarray(cells.plane(at[None])[0])
+
+
+def _sinusoid_crest(texture: Sinusoid) -> Crest:
+    along = texture.period * (0.25 - texture.phase / (2.0 * math.pi))
+    curvature = (2.0 * math.pi / texture.period) ** 2 * texture.amplitude
+    crest = _crest(texture, along * np.array(texture.direction), curvature)
+    assert crest is not None
+    return crest
+
+
+def _crest(texture: Texture, xy: FloatArray, greatest: float) -> Crest | None:
+    derivatives = texture.derivatives(xy[None, :])
+    curvature = float(crest_curvature(derivatives)[0])
+    if curvature <= 0.0:
+        return None
+    radius = 1.0 / curvature
+    h, hx, hy = derivatives[0, :3]
+    below = radius / math.sqrt(1.0 + hx * hx + hy * hy)
+    foot = (float(xy[0]), float(xy[1]), float(h))
+    centre = (foot[0] + below * float(hx), foot[1] + below * float(hy), foot[2] - below)
+    least = 1.0 / greatest if math.isfinite(greatest) else 0.0
+    return Crest(foot, radius, centre, min(least, radius))

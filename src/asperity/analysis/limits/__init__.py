@@ -1,0 +1,1 @@
+"""What a device sets as limits to a texture."""

@@ -1,0 +1,203 @@
+"""What is known of the six limits for one surface, device and speed."""
+
+from __future__ import annotations
+
+import html
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.limits.limit_rules import Limit, plain
+from asperity.analysis.limits.spectrum import Spectrum
+from asperity.devices import Device
+from asperity.surface import Surface
+from asperity.textures.texture import Texture
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class RenderedWave:
+    """One wave of the texture on the device.
+
+    Attributes:
+        wavelength: l [m].
+        amplitude: a [m].
+        share: of the variance of the heights.
+        frequency: v/l [Hz].
+        force: A_F [N], amplitude of the force at this wavelength.
+        holds: whether each limit holds, by its number; those that cannot be decided, and the gain
+            limit, which is not on waves, are missing.
+        top_speed: speed [m/s] below which all of these hold; 0 if one holds at no speed.
+    """
+
+    wavelength: float
+    amplitude: float
+    share: float
+    frequency: float
+    force: float
+    holds: dict[int, bool]
+    top_speed: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data; an unbounded number is written as the string "inf"."""
+        return {
+            "wavelength": self.wavelength,
+            "amplitude": self.amplitude,
+            "share": self.share,
+            "frequency": self.frequency,
+            "force": self.force,
+            "holds": {str(number): holds for number, holds in self.holds.items()},
+            "top_speed": plain(self.top_speed),
+        }
+
+
+@dataclass(frozen=True)
+class TextureForce:
+    """The texture's force against what the device can show.
+
+    Attributes:
+        rms: RMS of the oscillating force on a scan at constant height [N].
+        in_band: share of its variance at frequencies below the device's bandwidth; ``None`` if
+            that is not known.
+        in_band_rms: RMS of that part [N]; of all where the bandwidth is not known.
+        above_resolution: whether that is more than the device's smallest step of force.
+        above_friction: whether its amplitude, √2 RMS, is more than the device's dry friction,
+            which hides less.
+        needs: what is missing to decide these.
+    """
+
+    rms: float
+    in_band: float | None
+    in_band_rms: float
+    above_resolution: bool | None
+    above_friction: bool | None
+    needs: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units."""
+        return {
+            "rms": self.rms,
+            "in_band": self.in_band,
+            "in_band_rms": self.in_band_rms,
+            "above_resolution": self.above_resolution,
+            "above_friction": self.above_friction,
+            "needs": list(self.needs),
+        }
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The six limits for one surface on one device at one scanning speed.
+
+    Attributes:
+        surface: texture, law and the stiffness k of the force.
+        device: the device.
+        speed: v [m/s].
+        time_samples: α, updates in a wave.
+        position_samples: β, position steps in a wave.
+        force_steps: γ, steps of force in an amplitude.
+        gain: q, or q⁺ for a conservative law: what limit 5 multiplies the stiffness by.
+        gain_symbol: "q" or "q⁺".
+        safe_stiffness: K₀ over that [N/m]; ``None`` if K₀ is not known.
+        limits: the six, in the paper's order.
+        waves: what the texture is made of, the longest first.
+        spectrum: all waves, with those that were too small to count.
+        force: the texture's force against resolution, friction and bandwidth.
+        speeds: speeds [m/s] at which all limits hold that could be decided, from the first up to
+            but without the second.
+        answer: in words.
+        assumptions: what was assumed, in sentences.
+    """
+
+    surface: Surface
+    device: Device
+    speed: float
+    time_samples: float
+    position_samples: float
+    force_steps: float
+    gain: Bound
+    gain_symbol: str
+    safe_stiffness: float | None
+    limits: tuple[Limit, ...]
+    waves: tuple[RenderedWave, ...]
+    spectrum: Spectrum
+    force: TextureForce
+    speeds: tuple[float, float]
+    answer: str
+    assumptions: tuple[str, ...]
+
+    @property
+    def texture(self) -> Texture:
+        """The texture."""
+        return self.surface.texture
+
+    @property
+    def share(self) -> float:
+        """Share of the height variance in waves that meet every limit on waves that is decided."""
+        total = sum(wave.share for wave in self.waves)
+        met = sum(wave.share for wave in self.waves if all(wave.holds.values()))
+        return met / total if total > 0.0 else 0.0
+
+    def limit(self, number: int) -> Limit:
+        """Return a limit by the paper's number.
+
+        Raises:
+            KeyError: for a number other than 1 to 6.
+        """
+        for limit in self.limits:
+            if limit.number == number:
+                return limit
+        raise KeyError(number)
+
+    def _repr_html_(self) -> str:
+        """Return the answer and a table for a notebook."""
+        head = ["limit", "", "left", "right", "holds", "speeds up to [m/s]", "needs"]
+        titles = "".join(f"<th>{name}</th>" for name in head)
+        rows = "".join(
+            f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in _cells(limit))}</tr>"
+            for limit in self.limits
+        )
+        return f"<p>{html.escape(self.answer)}</p><table><tr>{titles}</tr>{rows}</table>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units, with a schema number."""
+        return {
+            "schema": SCHEMA,
+            "texture": self.texture.describe(),
+            "law": self.surface.law.letter,
+            "device": self.device.to_dict(),
+            "speed": self.speed,
+            "stiffness": self.surface.stiffness,
+            "max_depth": self.surface.max_depth,
+            "time_samples": self.time_samples,
+            "position_samples": self.position_samples,
+            "force_steps": self.force_steps,
+            "gain": {"symbol": self.gain_symbol, **self.gain.to_dict()},
+            "safe_stiffness": self.safe_stiffness,
+            "limits": [limit.to_dict() for limit in self.limits],
+            "waves": [wave.to_dict() for wave in self.waves],
+            "spectrum": self.spectrum.to_dict(),
+            "force": self.force.to_dict(),
+            "share": self.share,
+            "speeds": [plain(end) for end in self.speeds],
+            "answer": self.answer,
+            "assumptions": list(self.assumptions),
+        }
+
+
+def _cells(limit: Limit) -> list[str]:
+    if limit.left is None or limit.right is None or limit.speeds is None:
+        return [str(limit.number), limit.inequality, "", "", "", "", ", ".join(limit.needs)]
+    verdict = "yes" if limit.holds else "no"
+    sides = [f"{side:.3g} {limit.unit}" for side in (limit.left, limit.right)]
+    top = "all" if math.isinf(limit.speeds[1]) else f"{limit.speeds[1]:.3g}"
+    return [
+        str(limit.number),
+        limit.inequality,
+        *sides,
+        verdict,
+        top if limit.speeds[1] else "none",
+        "",
+    ]

@@ -1,0 +1,212 @@
+"""From the six limits to words: the answer, and what was assumed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from asperity.analysis.limits.limit_result import Limits
+from asperity.analysis.limits.limit_rules import Limit
+from asperity.units import engineering, rounded_down
+
+
+def answer(result: Limits) -> str:
+    """Return whether the texture is felt as it is, in a few sentences."""
+    if not result.waves:
+        return "The surface is flat: there is no texture to feel."
+    failing = [limit for limit in result.limits if limit.holds is False]
+    open_ones = [limit for limit in result.limits if limit.holds is None]
+    if failing:
+        text = f"{_part(result, failing)} at {_speed(result)}: "
+        text += f"{'; '.join(_failure(limit) for limit in failing)}.{_slower(result, failing)}"
+    elif len(open_ones) == len(result.limits):
+        text = "Nothing can be decided."
+    elif open_ones:
+        text = f"As far as can be decided: {_listed(result.limits, True)} at {_speed(result)}."
+    else:
+        text = f"Yes: all six limits hold at {_speed(result)}."
+    if open_ones:
+        missing = dict.fromkeys(need for limit in open_ones for need in limit.needs)
+        text += f" Not decidable: {_numbers(open_ones)}, for want of {_joined(list(missing))}."
+    return f"{text} {force_words(result)}"
+
+
+def speeds_text(speeds: tuple[float, float] | None) -> str:
+    """Return an interval of speeds for reading, its end rounded down.
+
+    Example:
+        >>> speeds_text((0.0, 0.4)), speeds_text((0.0, math.inf)), speeds_text((0.0, 0.0))
+        ('below 0.4 m/s', 'all', 'none')
+    """
+    if speeds is None:
+        return "–"
+    if math.isinf(speeds[1]):
+        return "all"
+    if speeds[1] == 0.0:
+        return "none"
+    return f"below {speed_text(rounded_down(speeds[1]))}"
+
+
+def speed_text(speed: float) -> str:
+    """Return a speed for reading.
+
+    Example:
+        >>> speed_text(0.1), speed_text(0.00034)
+        ('0.1 m/s', '0.34 mm/s')
+    """
+    return f"{speed:.3g} m/s" if speed >= 0.01 else f"{1e3 * speed:.3g} mm/s"
+
+
+def _speed(result: Limits) -> str:
+    return speed_text(result.speed)
+
+
+def _part(result: Limits, failing: Sequence[Limit]) -> str:
+    """Return how much of the texture meets the limits that can be decided."""
+    if any(limit.share is None for limit in failing) or result.share == 0.0:
+        return "Not as it is"
+    return f"Not all of it, only waves with {percent(result.share)} of the height variance,"
+
+
+def _failure(limit: Limit) -> str:
+    """Return what a limit that fails says, with the wave that breaks it most."""
+    left, right = (
+        engineering(side, limit.unit) if side is not None else "–"
+        for side in (limit.left, limit.right)
+    )
+    return f"limit {limit.number} ({limit.name}) fails, {left} against {right}"
+
+
+def _slower(result: Limits, failing: Sequence[Limit]) -> str:
+    """Return at which speed all would hold, if a slower scan mends it."""
+    top = result.speeds[1]
+    if top == 0.0:
+        at_none = [
+            limit for limit in failing if limit.speeds is not None and limit.speeds[1] == 0.0
+        ]
+        return f" No speed mends {_numbers(at_none)}."
+    return f" {speeds_text(result.speeds).capitalize()} they hold."
+
+
+def force_words(result: Limits) -> str:
+    """Return how strong the texture's force is, against what the device can show."""
+    force, device = result.force, result.device
+    k = stiffness_text(result)
+    text = f"At {k} law {result.surface.law.letter} pushes with {_newton(force.rms)} RMS of texture"
+    if force.in_band is not None and force.in_band < 0.995:
+        text += f", {percent(force.in_band)} of its power within the bandwidth"
+    against = []
+    if force.above_resolution is not None:
+        word = "above" if force.above_resolution else "not above"
+        against.append(
+            f"{word} the force resolution of {_newton(device.data['force_resolution'].value)}"
+        )
+    if force.above_friction is not None:
+        word = "above" if force.above_friction else "not above"
+        against.append(
+            f"its amplitude {word} the dry friction of {_newton(device.data['friction'].value)}"
+        )
+    return f"{text}{': ' if against else ''}{', '.join(against)}."
+
+
+def stiffness_text(result: Limits) -> str:
+    """Return the stiffness of the force for reading, rounded down: a limit stays one."""
+    return engineering(rounded_down(result.surface.stiffness), "N/m")
+
+
+def percent(share: float) -> str:
+    """Return a share for reading; what is nearly none or nearly all is not rounded to that.
+
+    Example:
+        >>> percent(0.5), percent(1e-5), percent(0.9999), percent(1.0)
+        ('50 %', '< 0.1 %', '> 99.9 %', '100 %')
+    """
+    if 0.0 < share < 1e-3:
+        return "< 0.1 %"
+    if 0.999 < share < 1.0 - 1e-12:
+        return "> 99.9 %"
+    return f"{100.0 * share:.3g} %"
+
+
+def _newton(force: float) -> str:
+    return engineering(force, "N", digits=2)
+
+
+def _listed(six: Sequence[Limit], holds: bool) -> str:
+    return f"{_numbers([limit for limit in six if limit.holds is holds])} hold"
+
+
+def _numbers(some: Sequence[Limit]) -> str:
+    word = "limit" if len(some) == 1 else "limits"
+    return f"{word} {_joined([str(limit.number) for limit in some])}"
+
+
+def _joined(words: Sequence[str]) -> str:
+    return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]])) if words else "none"
+
+
+def assumptions(
+    result: Limits, defaults: Mapping[str, bool], contact_lost: float
+) -> tuple[str, ...]:
+    """Return what was assumed, in sentences.
+
+    Args:
+        result: the limits.
+        defaults: whether speed, stiffness, max_depth and samples are defaults.
+        contact_lost: fraction of the scan without contact.
+    """
+    surface = result.surface
+    said = [*getattr(surface.texture, "preparation", ()), *_defaulted(result, defaults)]
+    said.append(f"Waves: {result.spectrum.description}")
+    left_out = len(result.spectrum.waves) - len(result.waves)
+    if left_out:
+        said.append(
+            f"{left_out} bands with less than 0.1 % of the variance of height and of force are "
+            "left out of the limits"
+        )
+    depth = engineering(surface.max_depth, "m")
+    said.append(f"Forces are those of a scan at constant height, pressed to {depth}")
+    if contact_lost > 0.0:
+        said.append(f"No contact on {percent(contact_lost)} of that scan")
+    if result.gain.method == "sampled":
+        said.append(f"{result.gain_symbol} = {result.gain.value:.4g} is sampled, not proved")
+    said += _of_the_device(result)
+    said.append(
+        "The limits are necessary, not sufficient; they say nothing of perception: no test with "
+        "people stands behind them"
+    )
+    return tuple(said)
+
+
+def _defaulted(result: Limits, defaults: Mapping[str, bool]) -> list[str]:
+    said = []
+    if defaults["speed"]:
+        said.append(f"Default speed {_speed(result)}")
+    if defaults["samples"]:
+        counts = (result.time_samples, result.position_samples, result.force_steps)
+        shown = ", ".join(f"{name} = {n:g}" for name, n in zip("αβγ", counts, strict=True))
+        said.append(f"Samples in a wave: {shown}; the paper says 5 to 10")
+    if defaults["stiffness"]:
+        k, symbol = stiffness_text(result), result.gain_symbol
+        known = result.safe_stiffness is not None and result.safe_stiffness > 0.0
+        why = f"what the device renders, K₀/{symbol}" if known else "a default, K₀ being unknown"
+        if result.safe_stiffness == 0.0:
+            why = f"a default: {symbol} is unbounded, so no stiffness is safe"
+        said.append(f"Stiffness {k}: {why}")
+    if defaults["max_depth"]:
+        depth = engineering(result.surface.max_depth, "m")
+        said.append(f"Default max depth {depth}: the peak-to-valley height, at most 1 mm")
+    return said
+
+
+def _of_the_device(result: Limits) -> list[str]:
+    """Return which of the device's numbers were used without being verified, and its notes."""
+    device = result.device
+    used = [*dict.fromkeys(limit.uses for limit in result.limits), "friction"]
+    unverified = [
+        f"{field.replace('_', ' ')} {device.data[field].text}"
+        for field in used
+        if field in device.data and not device.data[field].verified
+    ]
+    said = [f"Not verified for the {device.name}: {', '.join(unverified)}"] if unverified else []
+    return [*said, *device.notes]

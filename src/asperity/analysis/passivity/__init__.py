@@ -1,0 +1,1 @@
+"""What each criterion says of a law on a device."""

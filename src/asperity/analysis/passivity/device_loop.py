@@ -1,0 +1,173 @@
+"""A surface on a device, as the criteria of passivity see it: exact numbers and what is known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.continuity import continuity
+from asperity.analysis.energy.leak import Leak
+from asperity.derive.facts import law_facts
+from asperity.devices import Device
+from asperity.errors import ParameterError
+from asperity.laws import LAWS
+from asperity.surface import Surface
+
+HALF = Fraction(1, 2)
+Number = Fraction | float  # a fraction, or infinity
+# A leak below this part of k · depth · length of the line is rounding, not a leak.
+_ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A surface on a device; numbers of the device as exact fractions, ``None`` if not known.
+
+    Attributes:
+        surface: the surface.
+        device: the device.
+        q: characteristic number.
+        one_sided: one-sided number q⁺.
+        leak: the worst loop.
+        conservative: whether the law is.
+        obstacle: why the rules for conservative laws do not apply; empty if they do.
+        rate: update rate 1/T [Hz].
+        damping: σ₀ [N s/m].
+        virtual: b_v [N s/m].
+        delay: d, whole samples.
+        wall: K₀ [N/m].
+    """
+
+    surface: Surface
+    device: Device
+    q: Bound
+    one_sided: Bound
+    leak: Leak
+    conservative: bool
+    obstacle: str
+    rate: Fraction | None
+    damping: Fraction | None
+    virtual: Fraction | None
+    delay: int | None
+    wall: Fraction | None
+
+    @property
+    def stiffness(self) -> Fraction:
+        """The surface's k [N/m]."""
+        return Fraction(self.surface.stiffness)
+
+    @property
+    def loss(self) -> Fraction | None:
+        """σ₀/T [N/m]."""
+        return None if self.damping is None or self.rate is None else self.damping * self.rate
+
+    @property
+    def damper(self) -> Fraction:
+        """b_v/T [N/m]; 0 if no virtual damping is known of, which every criterion then says."""
+        return (self.virtual or Fraction(0)) * (self.rate or Fraction(0))
+
+    @property
+    def samples(self) -> Fraction:
+        """d, taken as 0 where it is not known: only for criteria that say so."""
+        return Fraction(self.delay or 0)
+
+    def number(self, plus: Fraction, full: Fraction, side: str) -> Number:
+        """Return plus · q⁺ + full · q at its lower or upper end; a weight of 0 hides infinity."""
+        total = Fraction(0)
+        for weight, bound in ((plus, self.one_sided), (full, self.q)):
+            value = float(getattr(bound, side))
+            if weight and math.isinf(value):
+                return math.inf
+            total += weight * Fraction(value) if weight else 0
+        return total
+
+
+def make_loop(surface: Surface, device: Device, q: Bound, one_sided: Bound, leak: Leak) -> Loop:
+    """Return what the criteria are about.
+
+    Raises:
+        ParameterError: for a number of the device that is out of its range.
+    """
+    conservative, obstacle = _obstacle(surface, q)
+    delay = _fraction(device, "delay_samples", "must not be negative")
+    if delay is not None and delay.denominator != 1:
+        raise ParameterError("device.delay_samples", "must be a whole number", float(delay))
+    return Loop(
+        surface=surface,
+        device=device,
+        q=q,
+        one_sided=one_sided,
+        leak=leak,
+        conservative=conservative,
+        obstacle=obstacle,
+        rate=_fraction(device, "update_rate", "must be positive"),
+        damping=_fraction(device, "damping", "must not be negative"),
+        virtual=_fraction(device, "virtual_damping", "must be finite"),
+        delay=None if delay is None else int(delay),
+        wall=_fraction(device, "max_stiffness", "must be positive"),
+    )
+
+
+def _fraction(device: Device, field: str, rule: str) -> Fraction | None:
+    """Return a number of the device, exactly; checked, since a device may be built by hand."""
+    value = device.value(field)
+    if value is None:
+        return None
+    wrong = (rule == "must be positive" and value <= 0.0) or (
+        rule == "must not be negative" and value < 0.0
+    )
+    if wrong or not math.isfinite(value):
+        unit = device.data[field].unit
+        raise ParameterError(f"device.{field}", f"{rule}, and finite [{unit}]", value)
+    return Fraction(value)
+
+
+def _obstacle(surface: Surface, q: Bound) -> tuple[bool, str]:
+    """Return whether the law is conservative, and why its potential gives no bound if so.
+
+    The rules need U(p + Δ) <= U(p) + ∇U · Δ + q⁺|Δ|²/2. The Jacobian proves that where the force
+    is continuous. A jump can break it; law D's do not, for its potential is an infimum.
+    """
+    law, facts = surface.law, law_facts(surface.law)
+    if not facts.conservative:
+        return False, f"the law is not conservative ({facts.reason})"
+    if surface.clamp == "lateral" and law.clampable:
+        return False, "the lateral clamp makes the law leak below max_depth"
+    if LAWS.get("D") is law:
+        return True, ""
+    smooth = continuity(surface, q)
+    return True, "" if smooth.continuous else f"the force is not continuous: {smooth.reason}"
+
+
+def greatest_delay(loop: Loop) -> int | None:
+    """Return the greatest d for which the delay rule is proved at this stiffness.
+
+    ``None`` if not even d = 0 is, if it cannot be decided, or if q is 0 and any d will do.
+    """
+    if loop.loss is None or loop.obstacle:
+        return None
+    rest = (loop.loss - abs(loop.damper)) / loop.stiffness
+    half = loop.number(HALF, Fraction(0), "upper")
+    if half == math.inf or rest < half:
+        return None
+    q = loop.number(Fraction(0), Fraction(1), "upper")
+    if q == math.inf:
+        return 0
+    return math.floor((rest - Fraction(half)) / Fraction(q)) if q > 0 else None
+
+
+def leaks(loop: Loop) -> bool:
+    """Return whether a loop that gains energy is known."""
+    size = loop.surface.stiffness * loop.surface.max_depth * loop.leak.line.length
+    return not loop.conservative and loop.leak.energy > _ROUNDING * size
+
+
+def critical_speed(loop: Loop) -> float | None:
+    """Return v* = W/(σ₀ length) [m/s], 0 for a conservative law, ``None`` if unknown."""
+    if loop.conservative:
+        return 0.0
+    if loop.damping is None or not leaks(loop):
+        return None
+    return loop.leak.speed(float(loop.damping)) if loop.damping > 0 else math.inf

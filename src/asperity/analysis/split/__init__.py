@@ -1,0 +1,1 @@
+"""Law H beyond its force: its state, and its potential as a table."""

@@ -1,0 +1,207 @@
+"""The nodes of a tabulated law H: where they are, the exact potential there, and what follows."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.analysis.bounds.bound import Bound
+from asperity.checks import FloatArray
+from asperity.surface import Surface
+
+Progress = Callable[[float], None]
+
+_LEAST_NODES = 4
+_NODES_AT_ONCE = 20_000
+# Rounding of a second difference of coefficients, in units of their size, counted generously.
+_ROUNDING = 32.0 * float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Where the nodes of a table are.
+
+    Attributes:
+        steps: from node to node along each axis of the texture [m], shape (d, 2).
+        cells: number of steps along each of them.
+        start: the first node [m], shape (2,).
+        levels: number of nodes along z, the last two of them above the highest point.
+        rise: distance of the levels [m].
+        floor: z halfway between the two lowest levels [m], where the cells of the spline begin.
+        periodic: whether the table repeats; else it is mirrored at its border.
+    """
+
+    steps: FloatArray
+    cells: tuple[int, ...]
+    start: FloatArray
+    levels: int
+    rise: float
+    floor: float
+    periodic: bool
+
+    @staticmethod
+    def fit(surface: Surface, resolution: float) -> Grid:
+        """Return the coarsest grid whose nodes are nowhere farther apart than the resolution."""
+        domain, (low, high) = surface.texture.domain, surface.texture.extremes
+        lengths = np.hypot(*domain.spans.T)
+        cells = [max(math.ceil(length / resolution), _LEAST_NODES) for length in lengths]
+        floor = low - surface.max_depth
+        inside = max(math.ceil((high - floor) / resolution), _LEAST_NODES)
+        return Grid(
+            steps=domain.spans / np.array(cells)[:, None],
+            cells=tuple(cells),
+            start=domain.origin,
+            levels=inside + 3,
+            rise=(high - floor) / inside,
+            floor=floor,
+            periodic=domain.periodic,
+        )
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of stored nodes along each axis, z last."""
+        return (*(count + 3 for count in self.cells), self.levels)
+
+    @property
+    def spacing(self) -> tuple[float, ...]:
+        """Distance of the nodes along each axis [m], z last."""
+        return (*(float(length) for length in np.hypot(*self.steps.T)), self.rise)
+
+    @property
+    def bytes(self) -> int:
+        """Size of the coefficients."""
+        return 8 * math.prod(self.shape)
+
+    def height(self, level: Any) -> Any:
+        """Return z of a level [m]."""
+        return self.floor + (level - 0.5) * self.rise
+
+    def nodes(self, axis: int) -> NDArray[np.intp]:
+        """Return the indices of the stored nodes along an axis, each the one that it repeats."""
+        count = self.cells[axis]
+        index = np.arange(-1, count + 2)
+        if self.periodic:
+            return np.asarray(index % count, dtype=np.intp)
+        return np.asarray(count - np.abs(count - np.abs(index)), dtype=np.intp)
+
+    def arguments(self, coefficients: FloatArray) -> tuple[Any, ...]:
+        """Return what the kernels receive: see ``asperity.contacts.split.spline``."""
+        x0, y0 = (float(value) for value in self.start)
+        rates = np.zeros((2, 2))
+        # Rows of the pseudo-inverse's transpose: nodes per metre along each axis.
+        rates[: len(self.cells)] = np.linalg.pinv(self.steps).T
+        (m00, m01), (m10, m11) = rates.tolist()
+        z0 = float(self.height(0))
+        return coefficients, x0, y0, z0, m00, m01, m10, m11, 1.0 / self.rise, not self.periodic
+
+    def error_bounds(self, gain: float) -> tuple[float, float]:
+        """Return proved bounds of |∇U_T - ∇U| [m] and of |U_T - U| [m²].
+
+        A derivative of U_T along a step is the mean of that derivative of U over places around the
+        probe, its potential the mean of U over others. Both have the probe as their mean; along
+        each axis the variance is 1/4 of a squared step, in the first case at most 1/3 along the
+        step itself (a linear B-spline, at most 1/4, and the step's own 1/12).
+
+        Args:
+            gain: Lipschitz constant of ∇U [1].
+        """
+        square = np.square(self.spacing)
+        spread = 0.25 * square.sum()
+        components = gain * np.sqrt(spread + square / 12.0)
+        rates = np.linalg.pinv(self.steps).T * np.hypot(*self.steps.T)[:, None]
+        # Derivatives along steps that are not at right angles enlarge an error of the gradient.
+        skew = max(1.0, float(np.linalg.norm(rates, 2)))
+        return skew * float(np.linalg.norm(components)), 0.5 * gain * float(spread)
+
+
+def potentials(surface: Surface, grid: Grid, progress: Progress | None) -> FloatArray:
+    """Return U [m²] at the nodes as the kernels receive it, borders repeated or mirrored."""
+    axes = [np.unique(grid.nodes(axis)) for axis in range(len(grid.cells))]
+    flat = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+    columns = np.zeros((len(flat), grid.levels))
+    at_once = max(_NODES_AT_ONCE // grid.levels, 1)
+    parts = [slice(first, first + at_once) for first in range(0, len(flat), at_once)]
+
+    def fill(part: slice) -> None:
+        columns[part] = _column_potentials(surface, grid, flat[part])
+
+    if parts:
+        fill(parts[0])  # compiled once, before there are threads
+    _in_threads(fill, parts[1:], progress)
+    stored = columns.reshape(*(len(axis) for axis in axes), grid.levels)
+    for axis in range(len(axes)):
+        stored = np.take(stored, grid.nodes(axis), axis=axis)
+    # By second axis, first axis, z; a profile has no second axis.
+    stored = stored[None] if len(axes) == 1 else np.swapaxes(stored, 0, 1)
+    return np.ascontiguousarray(stored)
+
+
+def _column_potentials(surface: Surface, grid: Grid, index: NDArray[np.intp]) -> FloatArray:
+    """Return U [m²] at all levels above nodes of the plane, shape (n, levels)."""
+    xy = grid.start + index @ grid.steps
+    z = grid.height(np.arange(grid.levels))
+    points = np.empty((len(xy), grid.levels, 3))
+    points[:, :, :2] = xy[:, None]
+    points[:, :, 2] = z
+    out = np.empty((points[..., 0].size, 3))
+    surface._loops.split_batch(
+        points.reshape(-1, 3), out, surface.texture.arguments, surface.law_arguments
+    )
+    return np.ascontiguousarray(out[:, 0].reshape(len(xy), grid.levels))
+
+
+def _in_threads(
+    work: Callable[[Any], None], parts: Sequence[Any], progress: Progress | None
+) -> None:
+    """Do the parts in threads; the compiled loops let go of the interpreter."""
+    with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
+        for done, future in enumerate(as_completed(pool.submit(work, part) for part in parts)):
+            future.result()
+            if progress is not None:
+                progress((done + 1) / len(parts))
+    if progress is not None and not parts:
+        progress(1.0)
+
+
+def curvatures(grid: Grid, arguments: tuple[Any, ...]) -> tuple[Bound, Bound]:
+    """Return certified bounds of sup ‖Hess U_T‖ and of its greatest eigenvalue.
+
+    ``upper`` comes from the hull of the second differences of the coefficients, ``lower`` is
+    attained from inside a corner of a cell of the spline.
+    """
+    from asperity.contacts.split import hull as split_table_hull
+    from asperity.kernels.fuse import fuse_module
+
+    loops = fuse_module(split_table_hull, inline=False)
+    coefficients, rates = arguments[0], arguments[4:9]
+    width = grid.cells[0] + (0 if grid.periodic else 1)
+    parts = [(first, min(first + 16, width)) for first in range(0, width, 16)]
+    found = np.zeros((len(parts), 2, 5))
+
+    def search(part: int) -> None:
+        loops.hull_batch(*parts[part], found[part], coefficients, *rates)
+
+    search(0)
+    _in_threads(search, range(1, len(parts)), None)
+    rounding = _ROUNDING * float(coefficients.max()) / min(grid.spacing) ** 2
+    best = found[np.argmax(found[:, :, 1], axis=0), [0, 1]]
+    upper = found[:, :, 0].max(axis=0) + rounding
+    positive, negative = (_bound(grid, float(upper[i]), best[i]) for i in range(2))
+    larger = positive if positive.lower >= negative.lower else negative
+    norm = Bound(larger.lower, float(upper.max()), "certified", larger.at, larger.note)
+    return norm, positive
+
+
+def _bound(grid: Grid, upper: float, found: FloatArray) -> Bound:
+    u, v, w = (float(value) for value in found[2:])
+    xy = grid.start + np.array([u, v])[: len(grid.cells)] @ grid.steps
+    at = (float(xy[0]), float(xy[1]), float(grid.height(w)))
+    note = "hull of the second differences of the table; attained on one side of a knot"
+    return Bound(float(found[1]), upper, "certified", at, note)

@@ -1,0 +1,148 @@
+"""What a contact is: the point where a surface is felt, and what follows from it.
+
+A contact has a depth and a point (X, Y, h(X, Y)) of the surface. A law is a formula in both; what
+depends on the contact alone is asked of the contact, here and nowhere else.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+
+from asperity.checks import FloatArray
+
+
+class HeightField(Protocol):
+    """What a contact asks of a texture: heights, their derivatives and extremes."""
+
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """Least and greatest height [m]."""
+
+    def height(self, xy: FloatArray) -> FloatArray:
+        """Heights [m], shape (n,), at points (n, 2) [m]."""
+
+    def gradient(self, xy: FloatArray) -> FloatArray:
+        """Slopes [1], shape (n, 2), at points (n, 2) [m]."""
+
+    def nearest(self, points: FloatArray) -> FloatArray:
+        """Nearest surface points [m], shape (n, 3), of probes (n, 3) [m]."""
+
+
+@dataclass(frozen=True)
+class ContactDerivatives:
+    """Derivatives of a contact by the probe position.
+
+    Attributes:
+        depth_gradient: ∇depth, shape (1, 3).
+        point_derivative: ∂(X, Y)/∂p, shape (2, 3).
+        definitions: names for parts of the above with their values, each in terms of the
+            contact symbols and of the names before it; kept apart, because expanding the
+            determinant of Q cancels digits near the medial axis.
+    """
+
+    depth_gradient: Any
+    point_derivative: Any
+    definitions: tuple[tuple[Any, Any], ...] = ()
+
+
+class Contact(ABC):
+    """The point where a surface is felt.
+
+    What is a class variable says what a law on this contact may do, and what an analysis may rely
+    on; the defaults are those of a contact that promises nothing.
+
+    Attributes:
+        name: one word.
+        single_valued: whether the contact point depends continuously on the probe.
+        above_probe: whether the contact point is straight above or below the probe, so that the
+            probe at a given point and depth lies on a vertical line.
+        begins_on_texture: whether contact begins at the textured surface.
+        given_by_depth: whether point and depth determine the probe; not where the probe is pulled
+            to the mean of several points.
+        costly: whether finding the point takes a search.
+        clampable: whether a law on this contact may have its depth clamped.
+        holds_anchor: whether a law on this contact may have state, an anchor that is held while
+            there is contact.
+    """
+
+    name: ClassVar[str]
+    single_valued: ClassVar[bool] = False
+    above_probe: ClassVar[bool] = False
+    begins_on_texture: ClassVar[bool] = True
+    given_by_depth: ClassVar[bool] = True
+    costly: ClassVar[bool] = True
+    clampable: ClassVar[bool] = False
+    holds_anchor: ClassVar[bool] = False
+
+    def __str__(self) -> str:
+        return self.name
+
+    @abstractmethod
+    def derivatives(self) -> ContactDerivatives:
+        """Return how depth and contact point move with the probe, as SymPy matrices."""
+
+    def formula_symbols(self) -> tuple[Any, ...]:
+        """Return the symbols of the contact that a law's force may use."""
+        from asperity.contacts.symbols import DEPTH, HX, HY, H
+
+        return (DEPTH, H, HX, HY)
+
+    def toward(self) -> Any:
+        """Return the vector from the probe to the contact point in the contact symbols [m]."""
+        from asperity.contacts.symbols import DEPTH, unit_normal
+
+        return DEPTH * unit_normal()
+
+    def jacobian_part(self, force: Any) -> Any:
+        """Return what the Jacobian gets from symbols that only this contact has, (3, 3)."""
+        import sympy as sp
+
+        return sp.zeros(force.shape[0], 3)
+
+    @abstractmethod
+    def begin(self, texture: HeightField, xy: FloatArray) -> FloatArray:
+        """Return the height z [m], (n,), below which there is contact at points (n, 2) [m]."""
+
+    def extremes(self, texture: HeightField) -> tuple[float, float]:
+        """Return the least and the greatest height at which contact begins [m]."""
+        return texture.extremes
+
+    @abstractmethod
+    def depth(self, texture: HeightField, points: FloatArray) -> FloatArray:
+        """Return the depths [m], (n,), of probes (n, 3) [m]; negative out of contact."""
+
+    @abstractmethod
+    def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
+        """Return the probe positions of contacts.
+
+        Args:
+            xy: contact points [m], shape (n, 2).
+            depth: [m], shape (n,).
+            derivatives: h, h_x, h_y, ... there in SI units, shape (n, 3) or more.
+
+        Returns:
+            Positions [m], shape (n, 3).
+        """
+
+    @abstractmethod
+    def greatest_depth(self, height: float, derivatives: FloatArray) -> FloatArray:
+        """Return the depths [m], (n,), at which probes of given contact points reach a height."""
+
+    def margin(self, max_depth: float) -> float:
+        """Return how far beside its probe a contact point may lie [m]."""
+        return max_depth
+
+    def coordinate_size(self, xy: FloatArray, height: float) -> float:
+        """Return the size of the coordinates that the depth is a difference of [m]."""
+        return float(abs(height) + np.abs(xy).max())
+
+
+def along_normal(xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
+    """Return the points (n, 3) [m] at a depth below surface points, along their normals."""
+    h, hx, hy = derivatives[:, :3].T
+    below = depth / np.sqrt(1.0 + hx * hx + hy * hy)
+    return np.column_stack([xy[:, 0] + below * hx, xy[:, 1] + below * hy, h - below])

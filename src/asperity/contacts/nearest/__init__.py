@@ -1,0 +1,1 @@
+"""The god-object: the globally nearest point of the surface."""

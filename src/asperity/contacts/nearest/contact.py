@@ -1,0 +1,61 @@
+"""The nearest contact: the god-object, the globally nearest point of the textured surface."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.contacts.contact import Contact, ContactDerivatives, HeightField, along_normal
+
+
+class Nearest(Contact):
+    """Depth |p - p_h|, contact point p_h; two points tie on the medial axis, where it jumps."""
+
+    name = "nearest"
+
+    def derivatives(self) -> ContactDerivatives:
+        """Return ∇depth = -n and, by the implicit function theorem, ∂(X, Y)/∂p = Q⁻¹ [I g].
+
+        Q = I + g gᵀ + (h - z) H, where h - z = depth / s because the foot lies along the normal
+        (MATH section 3).
+        """
+        import sympy as sp
+
+        from asperity.contacts.symbols import DEPTH, HX, HXX, HXY, HY, HYY
+
+        root = sp.sqrt(1 + HX**2 + HY**2)
+        q11, q12, q22, r = sp.symbols("q11 q12 q22 r", real=True)
+        definitions = (
+            (q11, 1 + HX**2 + DEPTH / root * HXX),
+            (q12, HX * HY + DEPTH / root * HXY),
+            (q22, 1 + HY**2 + DEPTH / root * HYY),
+            (r, 1 / (q11 * q22 - q12**2)),
+        )
+        inverse = r * sp.Matrix([[q22, -q12], [-q12, q11]])
+        return ContactDerivatives(
+            depth_gradient=sp.Matrix([[HX, HY, -1]]) / root,
+            point_derivative=inverse * sp.Matrix([[1, 0, HX], [0, 1, HY]]),
+            definitions=definitions,
+        )
+
+    def begin(self, texture: HeightField, xy: FloatArray) -> FloatArray:
+        """At the textured surface."""
+        return texture.height(xy)
+
+    def depth(self, texture: HeightField, points: FloatArray) -> FloatArray:
+        """Distance to the surface, negative outside of the body."""
+        feet = texture.nearest(points)
+        below = points[:, 2] < texture.height(np.ascontiguousarray(points[:, :2]))
+        return np.asarray(np.where(below, 1.0, -1.0) * np.linalg.norm(feet - points, axis=1))
+
+    def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
+        """Below the foot along its normal."""
+        return along_normal(xy, depth, derivatives)
+
+    def greatest_depth(self, height: float, derivatives: FloatArray) -> FloatArray:
+        """Where the foot's normal line sinks below the height."""
+        above = derivatives[:, 0] - height
+        return np.asarray(above * np.sqrt(1.0 + derivatives[:, 1] ** 2 + derivatives[:, 2] ** 2))
+
+
+NEAREST = Nearest()

@@ -1,0 +1,63 @@
+"""The nominal contact: the smooth wall z < 0; texture changes the force, not where it begins."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.contacts.contact import Contact, ContactDerivatives, HeightField
+
+
+class Nominal(Contact):
+    """Depth -z, contact point (x, y)."""
+
+    name = "nominal"
+    single_valued = True
+    above_probe = True
+    begins_on_texture = False
+    costly = False
+    clampable = True
+    holds_anchor = True
+
+    def derivatives(self) -> ContactDerivatives:
+        """Depth -z: ∇depth = (0, 0, -1), (X, Y) = (x, y)."""
+        import sympy as sp
+
+        return ContactDerivatives(sp.Matrix([[0, 0, -1]]), sp.Matrix([[1, 0, 0], [0, 1, 0]]))
+
+    def begin(self, texture: HeightField, xy: FloatArray) -> FloatArray:
+        """Everywhere at 0."""
+        del texture
+        return np.zeros(len(xy))
+
+    def extremes(self, texture: HeightField) -> tuple[float, float]:
+        """0 and 0."""
+        del texture
+        return 0.0, 0.0
+
+    def depth(self, texture: HeightField, points: FloatArray) -> FloatArray:
+        """-z."""
+        del texture
+        return np.asarray(-points[:, 2])
+
+    def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
+        """(X, Y, -depth)."""
+        del derivatives
+        return np.column_stack([xy, -depth])
+
+    def greatest_depth(self, height: float, derivatives: FloatArray) -> FloatArray:
+        """-height."""
+        return np.full(len(derivatives), -height)
+
+    def margin(self, max_depth: float) -> float:
+        """0: the point is the probe's own."""
+        del max_depth
+        return 0.0
+
+    def coordinate_size(self, xy: FloatArray, height: float) -> float:
+        """0: the depth is no difference."""
+        del xy, height
+        return 0.0
+
+
+NOMINAL = Nominal()

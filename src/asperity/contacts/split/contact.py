@@ -1,0 +1,49 @@
+"""The split contact: the mean z̄ of a god-object that has split into several surface points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from asperity.contacts.contact import ContactDerivatives
+from asperity.contacts.nearest.contact import Nearest
+
+
+class Split(Nearest):
+    """The vector to the mean is all that a law gets; its derivative comes with it.
+
+    Down to the fraction c/(1 + c) of the way to the medial axis the mean is the nearest point, so
+    what holds for a foot holds there (MATH section 6, item 3).
+    """
+
+    name = "split"
+    single_valued = True
+    given_by_depth = False
+
+    def derivatives(self) -> ContactDerivatives:
+        """Nothing by depth or point: see :meth:`jacobian_part`."""
+        import sympy as sp
+
+        return ContactDerivatives(sp.zeros(1, 3), sp.zeros(2, 3))
+
+    def formula_symbols(self) -> tuple[Any, ...]:
+        """The components of the vector from the probe to the mean."""
+        from asperity.contacts.symbols import TOWARD
+
+        return tuple(TOWARD)
+
+    def toward(self) -> Any:
+        """z̄ - p [m]."""
+        import sympy as sp
+
+        from asperity.contacts.symbols import TOWARD
+
+        return sp.Matrix(TOWARD)
+
+    def jacobian_part(self, force: Any) -> Any:
+        """∂f/∂(z̄ - p) ∂(z̄ - p)/∂p."""
+        from asperity.contacts.symbols import TOWARD, TOWARD_DERIVATIVE
+
+        return force.jacobian(list(TOWARD)) * TOWARD_DERIVATIVE
+
+
+SPLIT = Split()

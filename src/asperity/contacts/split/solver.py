@@ -1,0 +1,349 @@
+"""The split god-object: the point between several nearest points to which law H pulls.
+
+With F the free set (outside of the body), c > 0 and μ = 1/(1 + c), law H's potential is
+
+    U(p) = min over weights m on F of ½ [|p - z̄|² + (1 - μ) Σ λ_i |w_i - z̄|²],  z̄ = Σ λ_i w_i
+
+and its force is k (z̄ - p) (MATH section 6, item 2). At the optimum every atom w_i is a nearest
+point of y = p - (z̄ - p)/c, the maximiser of the dual
+U(p) = (1 - μ) max_y [dist²(y)/2 - |p - y|²/(2μ)].
+
+Fully-corrective Frank-Wolfe: ask for the nearest point of y, add it to the atoms, solve for the
+weights exactly, drop what has no weight, and let Newton's method on the conditions of optimality
+move the feet along with y. The last query certifies the gap between primal and dual.
+
+Rows of ``atoms`` are x, y, z [m] and weight.
+``nearest`` and ``height`` are the sampler's own; the fused module binds them.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from asperity.contacts.split.conditions import (
+    split_copy,
+    split_farther,
+    split_follow,
+    split_moving,
+    split_projection,
+    split_solve,
+    split_system,
+    split_value,
+)
+
+
+def nearest(x: float, y: float, z: float, *texture: Any) -> tuple[float, float]:
+    """Stand in for the sampler's own function, which replaces this one."""
+    raise AssertionError
+
+
+def height(x: float, y: float, *texture: Any) -> float:
+    """Stand in for the sampler's own function, which replaces this one."""
+    raise AssertionError
+
+
+# Compiled, these are arrays on the stack: see stack_memory.
+local_array = np.empty
+
+# fused from here
+
+FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+
+
+def split_query(y: FloatArray, atoms: FloatArray, row: int, texture: Any) -> None:
+    """Write the point of the free set nearest to y into a row of the atoms."""
+    fx = y[0]
+    fy = y[1]
+    fz = y[2]
+    if height(fx, fy, *texture) > fz:
+        fx, fy = nearest(fx, fy, fz, *texture)
+        fz = height(fx, fy, *texture)
+    atoms[row, 0] = fx
+    atoms[row, 1] = fy
+    atoms[row, 2] = fz
+    atoms[row, 3] = 0.0
+
+
+def split_subset(
+    atoms: FloatArray, count: int, mask: int, p: FloatArray, mu: float, a: FloatArray,
+    trial: FloatArray, y: FloatArray,
+) -> int:  # fmt: skip
+    """Write the best weights on the last atom and a subset of the others, and y.
+
+    Returns:
+        How many atoms; 0 if a weight is not positive.
+    """
+    # No literals: Numba compiles a function again for each literal that it is called with.
+    n: Any = np.int64(0)
+    for i in range(count):
+        if i == count - 1 or mask >> i & 1:
+            for d in range(3):
+                trial[n, d] = atoms[i, d]
+            trial[n, 3] = 0.0
+            n += 1
+    for d in range(3):
+        y[d] = p[d]
+    split_system(trial, n, p, y, mu, a)
+    if not split_solve(a, 3 + n, 4 + n):
+        return 0
+    for i in range(n):
+        trial[i, 3] = a[3 + i, 3 + n]
+        if not trial[i, 3] > 0.0:
+            return 0
+    for d in range(3):
+        y[d] += a[d, 3 + n]
+    return int(n)
+
+
+def split_weights(atoms: FloatArray, count: int, p: FloatArray, mu: float, a: FloatArray) -> int:
+    """Write the optimal weights, drop the atoms without weight, return how many are left.
+
+    The last atom is new and nearer to y than the others, so it has weight; every subset of the
+    others is tried, the largest first, until one satisfies all conditions of optimality. If
+    rounding lets none do so, the one that comes nearest is taken; 0 if there is none.
+    """
+    trial = local_array((4, 4))
+    best = local_array((4, 4))
+    y = local_array((3,))
+    left: Any = np.int64(0)
+    least = np.inf
+    for mask in range((1 << (count - 1)) - 1, -1, -1):
+        # In space at most four atoms are needed (Carathéodory).
+        n = split_subset(atoms, count, mask, p, mu, a, trial, y) if mask != 15 else 0
+        if n == 0:
+            continue
+        violation = 0.0
+        for i in range(count):
+            violation = max(violation, split_farther(atoms, count - 1, i, y))
+        if violation < least:
+            least = violation
+            left = n
+            split_copy(trial, best, n)
+        if violation == 0.0:
+            break
+    split_copy(best, atoms, left)
+    return int(left)
+
+
+def split_advance(atoms: FloatArray, count: int, y: FloatArray, a: FloatArray) -> tuple[int, float]:
+    """Take the step that the solved system holds, and drop atoms without weight.
+
+    Returns:
+        How many atoms are left, and the square of the step of y [m²].
+    """
+    n = 3 + count
+    size = 0.0
+    for d in range(3):
+        y[d] += a[d, n]
+        size += a[d, n] * a[d, n]
+    left = 0
+    for i in range(count):
+        weight = atoms[i, 3] + a[3 + i, n]
+        if weight > 0.0:
+            for d in range(3):
+                atoms[left, d] = atoms[i, d]
+            atoms[left, 3] = weight
+            left += 1
+    return left, size
+
+
+def split_polish(
+    atoms: FloatArray, count: int, p: FloatArray, y: FloatArray, mu: float, a: FloatArray,
+    texture: Any,
+) -> int:  # fmt: skip
+    """Make atoms, weights and y satisfy the conditions of optimality, by Newton's method.
+
+    Returns:
+        How many atoms are left; 0 for failure.
+    """
+    scale = 0.0
+    for d in range(3):
+        scale += p[d] * p[d] + y[d] * y[d]
+    last = np.inf
+    stalled = 0
+    for _ in range(20):
+        for i in range(count):
+            if not split_follow(y, atoms, i, texture):
+                return 0
+        split_system(atoms, count, p, y, mu, a)
+        moving = split_moving(atoms, count, y, mu, a, texture)
+        if not (moving and split_solve(a, 3 + count, 4 + count)):
+            return 0
+        left, size = split_advance(atoms, count, y, a)
+        stalled += size >= 0.25 * last
+        last = size
+        if left == count and (stalled > 2 or size <= 1e-28 * scale):
+            return count
+        count = left
+    return 0
+
+
+def split_try_polish(
+    atoms: FloatArray, count: int, p: FloatArray, y: FloatArray, mu: float, a: FloatArray,
+    texture: Any,
+) -> int:  # fmt: skip
+    """Polish; take everything back and return 0 if that does not lower the energy."""
+    pull = local_array((3,))
+    before = local_array((5, 4))
+    split_copy(atoms, before, count)
+    for d in range(3):
+        before[4, d] = y[d]
+    value = split_value(atoms, count, p, mu, pull)
+    left = split_polish(atoms, count, p, y, mu, a, texture)
+    # Equal energies are the rule where the atoms have almost settled.
+    if left > 0 and split_value(atoms, left, p, mu, pull) <= value * (1.0 + 1e-14):
+        return left
+    split_copy(before, atoms, count)
+    for d in range(3):
+        y[d] = before[4, d]
+    return 0
+
+
+def split_single(atoms: FloatArray, y: FloatArray, texture: Any) -> bool:
+    """Return whether the only atom is a local minimum of the distance, as seen from y.
+
+    Where a god-object begins to split, its atoms are so close that their distances differ by less
+    than rounding; but then the point between them is none.
+    """
+    projection = local_array((3, 3))
+    first: Any = np.int64(0)
+    return split_projection(y, atoms, first, projection, texture)
+
+
+def split_gap(
+    atoms: FloatArray, count: int, y: FloatArray, mu: float, scale: float
+) -> tuple[float, float]:
+    """Return the gap between primal and dual [m²], and how large rounding can make it.
+
+    The atom in row ``count`` is the nearest to y.
+    """
+    gap = 0.0
+    distance = 0.0
+    for i in range(count):
+        gap += atoms[i, 3] * split_farther(atoms, i, count, y)
+    for d in range(3):
+        distance += abs(atoms[count, d] - y[d])
+    rounding = 4e-16 * (1.0 - mu) * distance * (distance + scale)
+    return max((1.0 - mu) * gap, 0.0), rounding
+
+
+def split_atoms(
+    p: FloatArray, continuity: float, atoms: FloatArray, pull: FloatArray, texture: Any
+) -> tuple[int, float]:
+    """Write the atoms of law H, ``atoms`` (5, 4), and z̄ - p, ``pull`` (3,), at a probe inside.
+
+    Returns:
+        How many atoms, and the gap between primal and dual [m²]: the force is exact to
+        k √(2 (1 + c) gap).
+    """
+    mu = 1.0 / (1.0 + continuity)
+    a = local_array((7, 10))
+    y = local_array((3,))
+    scale = abs(p[0]) + abs(p[1]) + abs(p[2])
+    first: Any = np.int64(0)
+    count: Any = np.int64(1)
+    split_query(p, atoms, first, texture)
+    atoms[0, 3] = 1.0
+    gap = np.inf
+    doubts = 0
+    for _ in range(60):
+        split_value(atoms, count, p, mu, pull)
+        for d in range(3):
+            y[d] = p[d] - pull[d] / continuity
+        polished = split_try_polish(atoms, count, p, y, mu, a, texture) if count > 1 else 0
+        if polished > 0:
+            count = polished
+            # From y, not from the weights: they are ill-conditioned where atoms meet.
+            for d in range(3):
+                pull[d] = continuity * (p[d] - y[d])
+        split_query(y, atoms, count, texture)
+        gap, rounding = split_gap(atoms, count, y, mu, scale)
+        if gap <= rounding:
+            doubts += 1
+            if polished > 0 or doubts > 6 or (count == 1 and split_single(atoms, y, texture)):
+                break
+        left = split_weights(atoms, count + 1, p, mu, a)
+        if left == 0:
+            break  # rounding: no better weights are known than these
+        count = left
+    return count, gap
+
+
+def split_contact(
+    x: float, y: float, z: float, continuity: float, texture: Any
+) -> tuple[float, float, float]:
+    """Return z̄ - p, from the probe to the mean of the split god-object [m]."""
+    atoms = local_array((5, 4))
+    p = local_array((3,))
+    pull = local_array((3,))
+    p[0] = x
+    p[1] = y
+    p[2] = z
+    split_atoms(p, continuity, atoms, pull, texture)
+    return pull[0], pull[1], pull[2]
+
+
+def split_energy(
+    x: float, y: float, z: float, continuity: float, texture: Any
+) -> tuple[float, int, float]:
+    """Return U [m²], the number of atoms, and the gap between primal and dual [m²]."""
+    atoms = local_array((5, 4))
+    p = local_array((3,))
+    pull = local_array((3,))
+    p[0] = x
+    p[1] = y
+    p[2] = z
+    count, gap = split_atoms(p, continuity, atoms, pull, texture)
+    return split_value(atoms, count, p, 1.0 / (1.0 + continuity), pull), count, gap
+
+
+def split_response(
+    p: FloatArray, continuity: float, atoms: FloatArray, count: int, pull: FloatArray,
+    m: FloatArray, texture: Any,
+) -> None:  # fmt: skip
+    """Write M = ∂(z̄ - p)/∂p, (3, 3).
+
+    One atom: P - I with P the derivative of the foot. Several: z̄ = (p - (1 - μ) y)/μ with
+    ∂y/∂p from the conditions of optimality, so M = c (I - ∂y/∂p).
+    """
+    a = local_array((7, 10))
+    y = local_array((3,))
+    mu = 1.0 / (1.0 + continuity)
+    n = 3 + count
+    for r in range(3):
+        y[r] = p[r] - pull[r] / continuity
+        for s in range(3):
+            m[r, s] = 0.0
+    if count == 1:
+        if split_projection(p, atoms, count - 1, m, texture):
+            for d in range(3):
+                m[d, d] -= 1.0
+        return
+    split_system(atoms, count, p, y, mu, a)
+    for r in range(n):
+        for s in range(3):
+            a[r, n + s] = 1.0 if r == s else 0.0
+    if split_moving(atoms, count, y, mu, a, texture) and split_solve(a, n, n + 3):
+        for r in range(3):
+            for s in range(3):
+                m[r, s] = -continuity * a[r, n + s]
+            m[r, r] += continuity
+
+
+def split_derivative(
+    x: float, y: float, z: float, continuity: float, texture: Any
+) -> tuple[float, float, float, float, float, float, float, float, float]:
+    """Return z̄ - p [m] and M = ∂(z̄ - p)/∂p as m_xx, m_xy, m_xz, m_yy, m_yz, m_zz."""
+    atoms = local_array((5, 4))
+    p = local_array((3,))
+    pull = local_array((3,))
+    m = local_array((3, 3))
+    p[0] = x
+    p[1] = y
+    p[2] = z
+    count, _gap = split_atoms(p, continuity, atoms, pull, texture)
+    split_response(p, continuity, atoms, count, pull, m, texture)
+    return (
+        pull[0], pull[1], pull[2], m[0, 0], 0.5 * (m[0, 1] + m[1, 0]), 0.5 * (m[0, 2] + m[2, 0]),
+        m[1, 1], 0.5 * (m[1, 2] + m[2, 1]), m[2, 2],
+    )  # fmt: skip

@@ -1,0 +1,55 @@
+"""The vertical contact: the textured surface straight above or below the probe."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.contacts.contact import Contact, ContactDerivatives, HeightField
+
+
+class Vertical(Contact):
+    """Depth h(x, y) - z, contact point (x, y)."""
+
+    name = "vertical"
+    single_valued = True
+    above_probe = True
+    costly = False
+    clampable = True
+
+    def derivatives(self) -> ContactDerivatives:
+        """Depth h - z: ∇depth = (h_x, h_y, -1), (X, Y) = (x, y)."""
+        import sympy as sp
+
+        from asperity.contacts.symbols import HX, HY
+
+        return ContactDerivatives(sp.Matrix([[HX, HY, -1]]), sp.Matrix([[1, 0, 0], [0, 1, 0]]))
+
+    def begin(self, texture: HeightField, xy: FloatArray) -> FloatArray:
+        """At the textured surface."""
+        return texture.height(xy)
+
+    def depth(self, texture: HeightField, points: FloatArray) -> FloatArray:
+        """H - z."""
+        return np.asarray(texture.height(np.ascontiguousarray(points[:, :2])) - points[:, 2])
+
+    def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
+        """(X, Y, h - depth)."""
+        return np.column_stack([xy, derivatives[:, 0] - depth])
+
+    def greatest_depth(self, height: float, derivatives: FloatArray) -> FloatArray:
+        """H less the height."""
+        return np.asarray(derivatives[:, 0] - height)
+
+    def margin(self, max_depth: float) -> float:
+        """0: the point is straight above the probe."""
+        del max_depth
+        return 0.0
+
+    def coordinate_size(self, xy: FloatArray, height: float) -> float:
+        """|h|."""
+        del xy
+        return abs(height)
+
+
+VERTICAL = Vertical()

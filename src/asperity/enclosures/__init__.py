@@ -1,0 +1,1 @@
+"""Rigorous enclosures: arithmetic on boxes, and the cells that a texture is cut into."""

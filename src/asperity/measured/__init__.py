@@ -1,0 +1,1 @@
+"""From a file to prepared heights; no textures are known here."""

@@ -1,0 +1,206 @@
+"""Read the files of instruments through SurfaceTopography (the extra ``asperity[formats]``)."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import ParameterError, SurfaceFileError
+from asperity.measured.reading.length_units import metres_of
+from asperity.measured.reading.raw import MAX_POINTS, RawSurface
+
+# asperity reads these itself, or refuses them for a reason; HGT takes any file of a square size.
+_OURS = frozenset(("sdf", "xyz", "asc", "npy", "npz", "x3p", "hgt"))
+_INFLATION = 1032  # deflate, which all compressed formats use, packs at most so many bytes into one
+_HEAD = 512
+
+
+def read_instrument(
+    path: Path,
+    name: str,
+    *,
+    channel: str | int | None = None,
+    metres: float | None = None,
+    sure: bool = False,
+) -> RawSurface | None:
+    """Read a file that one of SurfaceTopography's readers recognises.
+
+    Args:
+        path: the file.
+        name: its name, for messages.
+        channel: name or number (from 0) of the height channel.
+        metres: length of the unit [m] where the file has none.
+        sure: ask only the readers that know the file by its first bytes.
+
+    Returns:
+        Heights [m]; None where no reader recognises the file.
+
+    Raises:
+        ModuleNotFoundError: the extra is not installed.
+        SurfaceFileError: recognised, but it cannot be read.
+        ParameterError: the channel or the unit must be given, or must not.
+    """
+    library = _library()
+    with _quiet(), _Bounded(io.FileIO(path)) as stream:
+        reader = _recognised(library, stream, name, sure=sure)
+        if reader is None:
+            return None
+        with contextlib.closing(reader):
+            what = f"{name}: {reader.name()}"
+            try:
+                return _surface(reader, path, name, channel, metres)
+            except (SurfaceFileError, ParameterError, MemoryError):
+                raise
+            except Exception as error:  # a damaged file can raise anything in there
+                raise SurfaceFileError(f"{what} file, damaged ({_reason(error)})") from error
+
+
+class _Bounded(io.BufferedReader):
+    """A file that is never asked for more than it has.
+
+    Python reserves the memory that a read asks for, and a damaged header may ask for terabytes.
+    """
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        left = max(os.fstat(self.fileno()).st_size - self.tell(), 0)
+        return super().read(left if size is None or size < 0 else min(size, left))
+
+
+def has_library() -> bool:
+    """Tell whether the extra is installed."""
+    try:
+        _library()
+    except ModuleNotFoundError:
+        return False
+    return True
+
+
+def _library() -> Any:
+    """Import SurfaceTopography.IO, which takes seconds."""
+    with _quiet():
+        try:
+            from importlib import import_module
+
+            return import_module("SurfaceTopography.IO")
+        except ModuleNotFoundError:
+            raise
+        except Exception as error:  # a broken installation counts as none
+            raise ModuleNotFoundError(str(error)) from error
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep what the readers print and warn away from the user: the result says what matters."""
+    with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()):
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _recognised(library: Any, stream: _Bounded, name: str, *, sure: bool) -> Any | None:
+    head = stream.read(_HEAD)
+    for kind in library.readers:
+        if kind.format() in _OURS:
+            continue
+        match = kind.can_read(head).value
+        if match == "no" or (sure and match != "yes"):
+            continue
+        stream.seek(0)
+        try:
+            return kind(stream)
+        except Exception as error:  # each reader says "not mine" in its own way
+            if match == "yes":
+                raise SurfaceFileError(
+                    f"{name}: {kind.name()} file, damaged ({_reason(error)})"
+                ) from error
+    return None
+
+
+def _reason(error: Exception) -> str:
+    text = " ".join(str(error).split())
+    return text if 0 < len(text) <= 120 else f"{text[:117]}..." if text else type(error).__name__
+
+
+def _surface(
+    reader: Any, path: Path, name: str, channel: str | int | None, metres: float | None
+) -> RawSurface:
+    chosen = _chosen(reader, name, channel)
+    size = chosen.nb_grid_pts
+    points = int(np.prod([int(n) for n in size])) if size is not None else 0
+    if points > MAX_POINTS or points > _INFLATION * path.stat().st_size:
+        raise SurfaceFileError(f"{name}: {points} points, more than are read or the file can hold")
+    if chosen.is_uniform is False:
+        raise SurfaceFileError(f"{name}: sampling is not uniform; resample the profile")
+    unit = _unit(chosen, name, metres)
+    heights, pitch = _data(chosen)
+    notes = [f"{reader.name()} file, read by SurfaceTopography"]
+    if len(reader.channels) > 1:
+        notes.append(f"channel {chosen.name!r} of {len(reader.channels)}")
+    if metres is not None:
+        notes.append(f"no unit in the file: {metres:g} m as given")
+    with np.errstate(over="ignore"):
+        scaled = heights * unit
+    lateral = None if pitch is None else tuple(float(p) * unit for p in pitch)
+    if lateral is not None and not all(np.isfinite(lateral) & (np.array(lateral) > 0)):
+        raise SurfaceFileError(f"{name}: the file's pitch {lateral} is not positive")
+    return RawSurface(scaled, lateral, name, tuple(notes))
+
+
+def _chosen(reader: Any, name: str, channel: str | int | None) -> Any:
+    """Return the only height channel, or the one that is named."""
+    heights = [c for c in reader.channels if c.data_kind.value == "height" and c.dim in (1, 2)]
+    if not heights:
+        kinds = ", ".join(f"{c.name!r} ({c.data_kind.value})" for c in reader.channels) or "none"
+        raise SurfaceFileError(f"{name}: no height channel; the file has: {kinds}")
+    if channel is None and len(heights) == 1:
+        return heights[0]
+    names = ", ".join(f"{c.index}: {c.name!r}" for c in heights)
+    if channel is None:
+        raise ParameterError(
+            "channel", f"must be given: {name} has {len(heights)} height channels: {names}"
+        )
+    matching = [c for c in heights if c.name == channel]
+    if not matching and str(channel).isdecimal():
+        matching = [c for c in heights if c.index == int(channel)]
+    if len(matching) != 1:
+        raise ParameterError("channel", f"must be one of the height channels {names}", channel)
+    return matching[0]
+
+
+def _unit(chosen: Any, name: str, metres: float | None) -> float:
+    if chosen.unit is None:
+        if metres is None:
+            raise ParameterError(
+                "unit", f"is required: {name} has no unit; say what it is in, such as 'um'"
+            )
+        return metres
+    if metres is not None:
+        raise ParameterError("unit", f"must not be given: {name} is in {chosen.unit}")
+    return metres_of(str(chosen.unit))
+
+
+def _data(chosen: Any) -> tuple[NDArray[np.float64], tuple[float, ...] | None]:
+    """Return heights with x along the last axis, and the pitch; both in the file's unit."""
+    options: dict[str, Any] = {}
+    if chosen.physical_sizes is None:  # it must be told something; the pitch is dropped again
+        options["physical_sizes"] = tuple(1.0 for _ in chosen.nb_grid_pts)
+    if chosen.unit is None:
+        options["unit"] = "m"
+    topography = chosen.topography(**options)
+    if not topography.is_uniform:
+        raise SurfaceFileError("sampling is not uniform; resample the profile")
+    stored = np.ma.masked_array(topography.heights(), dtype=np.float64)
+    heights = np.ascontiguousarray(stored.filled(np.nan).T)
+    if heights.ndim not in (1, 2) or heights.size == 0:
+        raise SurfaceFileError(f"heights of shape {heights.shape}")
+    if chosen.physical_sizes is None:
+        return heights, None
+    sizes = np.atleast_1d(np.asarray(chosen.physical_sizes, dtype=np.float64))
+    return heights, tuple(sizes / np.array(heights.shape[::-1]))

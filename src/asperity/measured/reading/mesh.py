@@ -1,0 +1,192 @@
+"""Read STL and OBJ meshes as a height field over their best plane."""
+
+from __future__ import annotations
+
+import io
+import re
+import struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import ParameterError, SurfaceFileError
+from asperity.measured.reading.mesh_plane import Plane, best_plane
+from asperity.measured.reading.mesh_raster import Grid, rasterise
+from asperity.measured.reading.quiet import quiet_log
+from asperity.measured.reading.raw import RawSurface
+
+_STL_HEADER, _STL_RECORD = 84, 50
+_STL_TEXT = re.compile(rb"\s*solid\b[^\n]*\n\s*(facet\s+normal\b|endsolid\b)", re.IGNORECASE)
+_OBJ_LINE = re.compile(rb"(#|v |vn |vt |vp |f |o |g |s |l |mtllib |usemtl |o$|g$)")
+_OBJ_VERTEX = re.compile(rb"^v[ \t]+[-+.0-9]", re.MULTILINE)
+_OBJ_FACE = re.compile(rb"^f[ \t]+-?[0-9]", re.MULTILINE)
+_LONGEST = 1.0  # [m]; a texture that one touches is rather smaller
+_OBJ_FACE_LINE = re.compile(rb"^f[ \t]+([^\r\n]*)", re.MULTILINE)
+_OBJ_ZERO = re.compile(rb"[+-]?0+(/|$)")  # corners are counted from 1, or from -1 backwards
+_CLOSED = 0.25  # share of overhanging area from which a mesh looks like a whole body
+
+
+def mesh_kind(content: bytes) -> str | None:
+    r"""Return "STL" or "OBJ" where the content is one, else None.
+
+    Args:
+        content: the bytes of the file.
+
+    Example:
+        >>> mesh_kind(b"solid x\nfacet normal 0 0 1\n"), mesh_kind(b"v 1 2 3\nf 1 1 1\n")
+        ('STL', 'OBJ')
+        >>> mesh_kind(b"1 2 3\n")
+    """
+    if _STL_TEXT.match(content[:4096]) or _is_binary_stl(content):
+        return "STL"
+    lines = (line.strip() for line in content[:65536].splitlines())
+    first = next((line for line in lines if line and not line.startswith(b"#")), b"")
+    if _OBJ_LINE.match(first) and _OBJ_VERTEX.search(content) and _OBJ_FACE.search(content):
+        return "OBJ"
+    return None
+
+
+def _is_binary_stl(content: bytes) -> bool:
+    """A binary STL has no magic: its number of triangles gives its size."""
+    if len(content) < _STL_HEADER + _STL_RECORD:
+        return False
+    (count,) = struct.unpack_from("<I", content, 80)
+    return bool(len(content) == _STL_HEADER + _STL_RECORD * count)
+
+
+def read_mesh(content: bytes, kind: str, name: str, metres: float | None) -> RawSurface:
+    """Read a mesh patch as heights over its least-squares plane.
+
+    Args:
+        content: the bytes of the file.
+        kind: "STL" or "OBJ".
+        name: name of the file.
+        metres: length of one unit of the coordinates [m], None if not given.
+
+    Returns:
+        Heights [m] on a grid whose pitch is about the median edge; NaN at holes.
+
+    Raises:
+        ParameterError: no unit, which neither format has.
+        SurfaceFileError: damaged, overhanging or folded.
+    """
+    if metres is None:
+        raise ParameterError(
+            "unit",
+            f"is required: {name} is {_an(kind)} file, which has no unit; say what its"
+            " coordinates are in, such as 'mm'",
+        )
+    try:
+        corners = _corners(content, kind) * metres
+        return _surface(corners, name)
+    except SurfaceFileError as error:
+        raise SurfaceFileError(f"{name}: {error}") from error
+
+
+def _an(kind: str) -> str:
+    return "an " + kind
+
+
+def _corners(content: bytes, kind: str) -> NDArray[np.float64]:
+    """Return the corners of the triangles, shape (n, 3, 3); the normals in the file are ignored."""
+    if kind == "STL" and _is_binary_stl(content):
+        record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+        triangles = np.frombuffer(content, record, offset=_STL_HEADER)["corners"]
+    else:
+        triangles = _parsed(content, kind)
+    with np.errstate(invalid="ignore"):  # what is no number is refused below
+        corners = triangles.astype(np.float64)
+    if not np.isfinite(corners).all():
+        raise SurfaceFileError("has corners that are not finite numbers")
+    return corners
+
+
+def _parsed(content: bytes, kind: str) -> NDArray[np.float64]:
+    import trimesh
+
+    options: dict[str, Any] = {"skip_materials": True} if kind == "OBJ" else {}
+    try:
+        with quiet_log("trimesh"):
+            loaded: Any = trimesh.load(
+                io.BytesIO(content), file_type=kind.lower(), process=False, **options
+            )
+        meshes = [loaded] if isinstance(loaded, trimesh.Trimesh) else loaded.dump()
+        parts = [np.asarray(part.triangles, dtype=np.float64) for part in meshes]
+        triangles = np.concatenate(parts) if parts else np.empty((0, 3, 3))
+    except MemoryError:
+        raise
+    except Exception as error:  # trimesh names no closed list of what a damaged file raises
+        reason = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
+        raise SurfaceFileError(f"damaged {kind} mesh ({reason})") from error
+    if triangles.ndim != 3 or triangles.shape[1:] != (3, 3):
+        raise SurfaceFileError(f"damaged {kind} mesh (its faces are no triangles)")
+    expected = _faces_of_obj(content) if kind == "OBJ" else content.lower().count(b"facet normal")
+    if len(triangles) != expected:  # trimesh leaves out what it does not understand
+        raise SurfaceFileError(
+            f"damaged or truncated {kind} mesh ({len(triangles)} of {expected} triangles are sound)"
+        )
+    return triangles
+
+
+def _faces_of_obj(content: bytes) -> int:
+    """Count the triangles that the faces of an OBJ ask for."""
+    count = 0
+    for match in _OBJ_FACE_LINE.finditer(content.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")):
+        corners = match.group(1).partition(b"#")[0].split()
+        if len(corners) < 3 or any(_OBJ_ZERO.match(corner) for corner in corners):
+            raise SurfaceFileError(
+                f"damaged OBJ mesh (the face {match.group().decode('latin-1')[:40]!r})"
+            )
+        count += len(corners) - 2
+    return count
+
+
+def _surface(corners: NDArray[np.float64], name: str) -> RawSurface:
+    notes: list[str] = []
+    with np.errstate(over="ignore", invalid="ignore"):
+        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        areas = 0.5 * np.linalg.norm(cross, axis=1)
+    if not np.isfinite(areas).all():
+        raise SurfaceFileError("has triangles too large for floating-point numbers")
+    kept = areas > 0.0
+    if not kept.all():
+        notes.append(f"{int((~kept).sum())} triangles without area ignored")
+        corners, cross, areas = corners[kept], cross[kept], areas[kept]
+    if len(corners) < 2:
+        raise SurfaceFileError(f"a mesh of {len(corners)} triangles is no surface")
+    plane = best_plane(corners, cross, areas)
+    _check_overhangs(cross, areas, plane)
+    grid = rasterise(plane.local(corners))
+    notes.extend(plane.notes)
+    notes.extend(grid.notes)
+    _check_folds(grid)
+    longest = max(n * p for n, p in zip(grid.heights.shape[::-1], grid.pitch, strict=True))
+    if longest > _LONGEST:
+        notes.append(f"the patch is {longest:.3g} m long: check the unit")
+    return RawSurface(grid.heights, grid.pitch, name, tuple(notes))
+
+
+def _check_overhangs(cross: NDArray[np.float64], areas: NDArray[np.float64], plane: Plane) -> None:
+    away = cross @ plane.normal < 0.0
+    if not away.any():
+        return
+    area, total = float(areas[away].sum()), float(areas.sum())
+    advice = (
+        "it looks like a whole body: cut off the textured side"
+        if area > _CLOSED * total
+        else "a height field has one height at each place: cut them off"
+    )
+    raise SurfaceFileError(
+        f"{int(away.sum())} triangles overhang, {1e6 * area:.4g} mm² or {area / total:.2%} of the"
+        f" surface; {advice}"
+    )
+
+
+def _check_folds(grid: Grid) -> None:
+    if grid.folded:
+        area = grid.folded * grid.pitch[0] * grid.pitch[1]
+        raise SurfaceFileError(
+            f"the mesh lies above itself at {grid.folded} grid points, about {1e6 * area:.4g} mm²;"
+            " a height field has one height at each place"
+        )

@@ -1,0 +1,140 @@
+"""Read TIFF images of heights, integer and float."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import SurfaceFileError
+from asperity.measured.reading.image import Pixels, check_size
+from asperity.measured.reading.quiet import quiet_log
+
+TIFF_MAGIC = (b"II*\x00", b"MM\x00*", b"II+\x00", b"MM\x00+")
+_INFLATION = 2000  # no compression that is read packs more bytes into one
+_MINISWHITE, _RGB, _PALETTE = 0, 2, 3
+_GREY = (0, 1)
+_REDUCED, _MASK = 1, 4
+_NODATA = 42113  # GDAL's tag for the value of a missing point
+
+
+def read_tiff(content: bytes) -> Pixels:
+    """Read the one page of a grey or colour TIFF.
+
+    Args:
+        content: the bytes of the file.
+
+    Returns:
+        The pixels as stored; the missing value that GDAL's tag names becomes NaN.
+
+    Raises:
+        SurfaceFileError: several pages, a palette, an unknown compression, damage.
+
+    Reference:
+        TIFF Revision 6.0, Adobe, 1992.
+    """
+    import tifffile
+
+    try:
+        with warnings.catch_warnings(), quiet_log("tifffile"):
+            warnings.simplefilter("ignore")
+            with tifffile.TiffFile(io.BytesIO(content)) as file:
+                page = _one_page(file)
+                _check_page(page, len(content))
+                return _pixels(page, _decoded(page, content))
+    except (SurfaceFileError, MemoryError):
+        raise
+    except Exception as error:  # tifffile names no closed list of what a damaged file raises
+        reason = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
+        raise SurfaceFileError(f"damaged TIFF image ({reason})") from error
+
+
+def _one_page(file: Any) -> Any:
+    """Return the page that is no thumbnail and no mask; there must be one."""
+    pages = [page for page in list(file.pages) if not int(page.subfiletype) & (_REDUCED | _MASK)]
+    stack = int((file.imagej_metadata or {}).get("images", 1)) if file.is_imagej else 1
+    count = max(len(pages), stack)
+    if count != 1:
+        raise SurfaceFileError(f"has {count} pages; one is expected: save the one with heights")
+    return pages[0]
+
+
+def _check_page(page: Any, size: int) -> None:
+    check_size(int(page.imagelength), int(page.imagewidth))
+    if int(page.photometric) == _PALETTE:
+        raise SurfaceFileError("has a palette, whose colours are no heights; save a grey image")
+    if int(page.imagedepth) != 1:
+        raise SurfaceFileError(f"has {page.imagedepth} layers; one is expected")
+    if int(page.photometric) not in (*_GREY, _RGB):
+        kind = getattr(page.photometric, "name", page.photometric)
+        raise SurfaceFileError(f"stores its pixels as {kind}; grey or RGB is expected")
+    if page.dtype is None or page.dtype.kind not in "iuf":
+        raise SurfaceFileError(f"has pixels of type {page.dtype}; integers or floats are expected")
+    if int(page.bitspersample) not in (8, 16, 32, 64):
+        raise SurfaceFileError(f"has {page.bitspersample} bit per pixel; 8, 16 and float are read")
+    channels = int(page.samplesperpixel)
+    if channels > 4:
+        raise SurfaceFileError(f"has {channels} channels; one channel of heights is expected")
+    bytes_needed = page.imagelength * page.imagewidth * channels * page.dtype.itemsize
+    packed = min(sum(int(n) for n in page.databytecounts), size)
+    if bytes_needed > packed * (1 if int(page.compression) == 1 else _INFLATION):
+        raise SurfaceFileError(
+            f"truncated: {packed} bytes cannot hold {page.imagewidth} x {page.imagelength} pixels"
+        )
+
+
+def _decoded(page: Any, content: bytes) -> NDArray[Any]:
+    try:
+        return np.asarray(page.asarray())
+    except (ValueError, KeyError) as error:
+        if "imagecodecs" not in str(error):
+            raise
+    # The codec is an extra of tifffile; Pillow has the common ones for what it can hold.
+    from PIL import Image
+
+    name = getattr(page.compression, "name", str(page.compression))
+    try:
+        with Image.open(io.BytesIO(content), formats=("TIFF",)) as image:
+            values = np.asarray(image)
+    except Exception as error:  # Pillow names no closed list either
+        raise SurfaceFileError(f"cannot be unpacked ({name}); save it uncompressed") from error
+    kind = (values.dtype.kind, values.dtype.itemsize)
+    if values.size != np.prod(page.shape) or kind != (page.dtype.kind, page.dtype.itemsize):
+        raise SurfaceFileError(f"cannot be unpacked in full ({name}); save it uncompressed")
+    if int(page.photometric) == _MINISWHITE and kind[1] == 1:  # Pillow has done this for 8 bit
+        values = np.iinfo(values.dtype).max - values
+    return values.reshape(page.shape)
+
+
+def _pixels(page: Any, values: NDArray[Any]) -> Pixels:
+    channels = int(page.samplesperpixel)
+    if channels > 1 and int(page.planarconfig) == 2:
+        values = np.moveaxis(values, 0, -1)
+    values = values.reshape(int(page.imagelength), int(page.imagewidth), channels)
+    notes = []
+    if int(page.photometric) == _MINISWHITE and values.dtype.kind == "u":
+        values = np.iinfo(values.dtype).max - values
+        notes.append("the file stores white as 0: inverted, so that white is high")
+    tag = page.tags.get(_NODATA)
+    if tag is not None and channels == 1:
+        values, note = _without(values, str(tag.value))
+        notes.extend(note)
+    colours = 3 if int(page.photometric) == _RGB else 1
+    if channels not in (colours, colours + 1):
+        raise SurfaceFileError(f"has {channels} channels; one channel of heights is expected")
+    return Pixels(values, channels == colours + 1, tuple(notes))
+
+
+def _without(values: NDArray[Any], text: str) -> tuple[NDArray[Any], list[str]]:
+    try:
+        code = float(text.strip().rstrip("\x00"))
+    except ValueError:
+        return values, ["the tag of the missing value is not a number: ignored"]
+    missing = values.astype(np.float64) == code
+    if not missing.any():
+        return values, []
+    note = f"{int(missing.sum())} points hold {code:g}, which marks a missing point"
+    return np.where(missing, np.nan, values), [note]

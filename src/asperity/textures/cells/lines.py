@@ -1,0 +1,98 @@
+"""A straight line over a texture cut into pieces, with the same enclosures as its cells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.enclosures.cells import Cells
+from asperity.enclosures.taylor import Number, Taylor
+from asperity.textures.cells.splines import MapCells, ProfileCells
+from asperity.textures.cells.waves import WaveCells
+from asperity.textures.fourier import Fourier
+from asperity.textures.heightmap import HeightMap
+from asperity.textures.profile import Profile
+from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.texture import ScanLine, Texture
+
+_ALONG_AN_AXIS = 1e-12
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Pieces of a line, all equally long.
+
+    Attributes:
+        centres: in the coordinates of the cells, shape (n, d).
+        half: half of a piece in these coordinates, shape (d,).
+        length: of a piece [m].
+    """
+
+    cells: Cells
+    centres: FloatArray
+    half: FloatArray
+    length: float
+
+    def models(self, names: Sequence[str]) -> dict[str, Number]:
+        """Return enclosures of height derivatives, with one coordinate: along the line."""
+        found = self.cells.models(self.centres, self.half, names)
+        return {name: _along(model) for name, model in found.items()}
+
+
+def _along(model: Number) -> Number:
+    if not isinstance(model, Taylor):
+        return model
+    return Taylor(model.c, model.g.sum(axis=0, keepdims=True), model.e)
+
+
+def line_pieces(texture: Texture, line: ScanLine, least: int) -> Pieces | None:
+    """Return at least so many pieces of a line; nothing for a line across the cells of a map."""
+    if isinstance(texture, (Sinusoid, Fourier)):
+        half = 0.5 * line.length / least
+        centres: FloatArray = half * (2.0 * np.arange(least, dtype=float)[:, None] + 1.0)
+        return Pieces(_LineOfWaves(texture, line), centres, np.full(1, half), 2.0 * half)
+    if isinstance(texture, Profile):
+        along_x = abs(abs(line.direction[0]) - 1.0) < _ALONG_AN_AXIS
+        return _spline_pieces(ProfileCells(texture), 0, line, least) if along_x else None
+    if isinstance(texture, HeightMap):
+        for axis in (0, 1):
+            if abs(abs(line.direction[axis]) - 1.0) < _ALONG_AN_AXIS:
+                return _spline_pieces(MapCells(texture), axis, line, least)
+    return None
+
+
+def _spline_pieces(
+    cells: MapCells | ProfileCells, axis: int, line: ScanLine, least: int
+) -> Pieces | None:
+    """Cut the line at the nodes and between them; it must begin and end at nodes."""
+    ends = cells.coordinates(np.stack([line.start, line.start + line.length * line.direction]))
+    low, high = np.sort(ends[:, axis])
+    nodes = round(high - low)
+    if abs(low - round(low)) > 1e-6 or abs(high - low - nodes) > 1e-6 or round(low) < 0:
+        return None
+    parts = max(1, -(-least // nodes))
+    half = np.zeros(cells.dimensions)
+    half[axis] = 0.5 / parts
+    centres = np.tile(ends[0], (nodes * parts, 1))
+    centres[:, axis] = round(low) + half[axis] * (2.0 * np.arange(nodes * parts) + 1.0)
+    if line.direction[axis] < 0.0:
+        centres, half = centres[::-1].copy(), -half
+    return Pieces(cells, centres, np.abs(half), line.length / (nodes * parts))
+
+
+class _LineOfWaves(WaveCells):
+    """The waves as they are met along a line; the coordinate is the distance [m]."""
+
+    def __init__(self, texture: Sinusoid | Fourier, line: ScanLine) -> None:
+        super().__init__(texture, (line.length, line.length))
+        self._phases = self._phases + self._waves @ line.start
+        self._multiples = self._waves @ line.direction[:, None]
+        self._line = line
+        self.dimensions, self._extent = 1, (line.length,)
+
+    def plane(self, coordinates: FloatArray) -> FloatArray:
+        """See :class:`Cells`."""
+        return np.ascontiguousarray(self._line.start + coordinates * self._line.direction)

@@ -1,0 +1,204 @@
+"""Sums of waves, cut on the torus of their independent phases.
+
+The plane of a sum that never repeats is dense on the torus, so the supremum is the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.enclosures.cells import (
+    CHUNK,
+    EPS,
+    GAPS,
+    NAMES,
+    ORDERS,
+    SAMPLES,
+    WISHES,
+    Cells,
+    spread,
+)
+from asperity.enclosures.taylor import Number, Taylor
+from asperity.textures.fourier import Fourier
+from asperity.textures.sinusoid import Sinusoid
+
+# Sines per chunk.
+_SINES = 2_000_000
+# First samples of each wave of a profile.
+_PER_WAVE = 64
+_ODD = [i for i, name in enumerate(NAMES) if sum(ORDERS[name]) == 1]
+_EVEN = [i for i in range(len(NAMES)) if i not in _ODD]
+
+
+class WaveCells(Cells):
+    """Cells on the torus of independent phases of a sum of waves, or on a rectangle.
+
+    Args:
+        texture: a sinusoid or a sum.
+        extent: width and depth [m] of the rectangle from the origin; the whole plane by default.
+        margin: how far the rectangle reaches beyond that on every side [m].
+    """
+
+    def __init__(
+        self,
+        texture: Sinusoid | Fourier,
+        extent: tuple[float, ...] | None = None,
+        margin: float = 0.0,
+    ) -> None:
+        self._extent = None if extent is None else tuple(side + 2.0 * margin for side in extent)
+        self._margin, self._miss = margin, 0.0
+        if isinstance(texture, Sinusoid):
+            amplitude, kx, ky, phase = texture.arguments
+            self._amplitudes, self._phases = np.array([amplitude]), np.array([phase])
+            self._waves = np.array([[kx, ky]])
+            self._basis, self._multiples = self._waves, np.ones((1, 1))
+        else:
+            self._amplitudes, self._phases = texture.amplitudes, texture.phases
+            self._waves = texture.wavevectors
+            if extent is None:
+                self._basis, self._multiples = texture.lattice
+                self._miss = _missed(texture)
+        if extent is not None:
+            self._basis, self._multiples = np.eye(2), self._waves
+            self._phases = self._phases - self._waves.sum(axis=1) * margin
+        self._weights = {name: self._weight(*ORDERS[name]) for name in NAMES}
+        every = np.stack(list(self._weights.values()), axis=-1)
+        self._even, self._odd = every[:, _EVEN], every[:, _ODD]
+        self.dimensions = self._multiples.shape[1]
+        self.gap, self.wish = GAPS.get(self.dimensions, 1e-3), WISHES.get(self.dimensions)
+
+    def start(self) -> tuple[Iterator[FloatArray], FloatArray]:
+        """See :class:`Cells`."""
+        sizes = np.full(self.dimensions, 2.0 * math.pi) if self._extent is None else self._extent
+        # Cells on which the fastest wave turns by about a third of a radian, but not fewer than
+        # cost as much as one.
+        least = 64 if self.dimensions == 1 else 16
+        turns = np.abs(self._multiples).max(axis=0) * np.asarray(sizes)
+        limit = 4_000_000 ** (1.0 / self.dimensions)
+        counts = [int(min(max(math.ceil(turn / 0.7), least), limit)) for turn in turns]
+        half = 0.5 * np.asarray(sizes) / counts
+        total = math.prod(counts)
+
+        def chunks() -> Iterator[FloatArray]:
+            for first in range(0, total, self.chunk()):
+                flat = np.arange(first, min(first + self.chunk(), total))
+                index = np.stack(np.unravel_index(flat, counts), axis=-1)
+                yield half * (2.0 * index + 1.0)
+
+        return chunks(), half
+
+    def samples(self, count: int = SAMPLES) -> FloatArray:
+        """See :class:`Cells`."""
+        sizes = np.full(self.dimensions, 2.0 * math.pi) if self._extent is None else self._extent
+        count = min(count, max(64, _SINES // len(self._amplitudes)))
+        if self.dimensions == 1 and self._extent is None:
+            count = min(count, _PER_WAVE * (1 + int(np.abs(self._multiples).max())))
+        return np.asarray(spread(count, self.dimensions) * np.asarray(sizes))
+
+    def chunk(self) -> int:
+        """See :class:`Cells`."""
+        return max(256, min(CHUNK, _SINES // len(self._amplitudes)))
+
+    def models(
+        self, centres: FloatArray, half: FloatArray, names: Sequence[str]
+    ) -> dict[str, Number]:
+        """See :class:`Cells`; a wave's sine differs from its tangent by at most ρ²/2 |sin|.
+
+        ρ is the greatest change of the wave's phase on the cell.
+        """
+        angles = centres @ self._multiples.T + self._phases
+        sine, cosine = np.sin(angles), np.cos(angles)
+        reach = np.abs(self._multiples) @ half
+        bend = 0.5 * reach * reach
+        rest = [bend * np.minimum(1.0, np.abs(part) + reach) for part in (sine, cosine)]
+        # What the rounding of the phases costs.
+        most = np.abs(centres).max(axis=0, initial=0.0) @ np.abs(self._multiples).T
+        largest = float((most + np.abs(self._phases)).max())
+        slack = 16.0 * EPS * (1.0 + largest + len(sine[0])) + self._miss
+        result: dict[str, Number] = {}
+        for name in names:
+            weight, odd = self._weights[name], sum(ORDERS[name]) % 2
+            values, slopes = (cosine, -sine) if odd else (sine, cosine)
+            if not weight.any():
+                result[name] = 0.0
+                continue
+            g = half[:, None] * (self._multiples.T @ (slopes * weight).T)
+            size = np.abs(weight)
+            e = (rest[odd] @ size) * (1.0 + 16.0 * EPS) + slack * float(size.sum())
+            result[name] = Taylor(values @ weight, g, e)
+        return result
+
+    def _weight(self, nx: int, ny: int) -> FloatArray:
+        """Return the weights of a derivative's waves: cosines for a slope, else sines."""
+        weight = self._amplitudes * self._waves[:, 0] ** nx * self._waves[:, 1] ** ny
+        return np.asarray(-weight if nx + ny == 2 else weight)
+
+    def derivatives(self, coordinates: FloatArray) -> FloatArray:
+        """See :class:`Cells`."""
+        angles = coordinates @ self._multiples.T + self._phases
+        result = np.empty((len(coordinates), len(NAMES)))
+        result[:, _EVEN], result[:, _ODD] = np.sin(angles) @ self._even, np.cos(angles) @ self._odd
+        return result
+
+    def plane(self, coordinates: FloatArray) -> FloatArray:
+        """See :class:`Cells`; the nearest phases among many points for more than two phases."""
+        if self._extent is not None:
+            return np.ascontiguousarray(coordinates - self._margin)
+        if self.dimensions == 1:
+            wave = self._basis[0]
+            return np.ascontiguousarray(coordinates * (wave / (wave @ wave)))
+        if self.dimensions <= np.linalg.matrix_rank(self._basis):
+            inverse = np.linalg.pinv(self._basis)
+            return np.ascontiguousarray(coordinates @ inverse.T)
+        return np.array([nearest_phases(self._basis, row) for row in coordinates])
+
+    def inside(self, coordinates: FloatArray) -> FloatArray:
+        """See :class:`Cells`."""
+        if self._extent is None:
+            return coordinates
+        return np.clip(coordinates, 0.0, self._extent)
+
+
+def _missed(texture: Fourier) -> float:
+    """Return how far phases are from those on the torus, within the domain of a texture.
+
+    Ratios of waves count as rational up to a relative error: see ``integer_lattice``.
+    """
+    basis, multiples = texture.lattice
+    off = np.hypot(*(texture.wavevectors - multiples @ basis).T)
+    reach = float(np.hypot(*texture.domain.spans.T).sum())
+    # What rounding alone leaves is within the slack anyway.
+    rounding = 16.0 * EPS * np.abs(multiples) @ np.hypot(*basis.T)
+    return float(np.where(off > rounding, off, 0.0).max() * reach)
+
+
+def nearest_phases(basis: FloatArray, wanted: FloatArray, reach: int = 400) -> FloatArray:
+    """Return a point of the plane whose phases basis @ p are near the wanted ones, modulo 2π.
+
+    The wanted phases of the independent waves are met exactly at the points of a lattice; of many
+    such points the one is taken where the other phases are nearest.
+    """
+    rank = int(np.linalg.matrix_rank(basis))
+    rows = _independent_rows(basis, rank)
+    others = [row for row in range(len(basis)) if row not in rows]
+    span = np.arange(-reach, reach + 1) if rank == 2 else np.arange(-(reach**2), reach**2 + 1)
+    turns = np.stack(np.meshgrid(*[span] * rank, indexing="ij"), axis=-1).reshape(-1, rank)
+    phases = wanted[rows] + 2.0 * math.pi * turns
+    points = phases @ np.linalg.pinv(basis[rows]).T
+    miss = points @ basis[others].T - wanted[others]
+    miss = np.abs(miss - 2.0 * math.pi * np.round(miss / (2.0 * math.pi))).max(axis=1)
+    return np.asarray(points[int(np.argmin(miss))])
+
+
+def _independent_rows(basis: FloatArray, rank: int) -> list[int]:
+    rows: list[int] = []
+    for row in range(len(basis)):
+        if np.linalg.matrix_rank(basis[[*rows, row]]) > len(rows):
+            rows.append(row)
+        if len(rows) == rank:
+            break
+    return rows

@@ -1,8 +1,0 @@
-"""Reading surfaces: X3P, SDF, NPY, text, images, meshes, and instruments' files by an extra."""
-
-from __future__ import annotations
-
-from .raw import RawSurface
-from .read import read_surface
-
-__all__ = ["RawSurface", "read_surface"]

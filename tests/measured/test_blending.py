@@ -1,0 +1,141 @@
+"""Blended borders: the map repeats, and the stated changes are those of a slow loop."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.errors import ParameterError
+from asperity.measured.blending import blend_borders
+from asperity.measured.preparation import prepare
+from asperity.measured.reading import RawSurface
+from asperity.textures import load_texture
+
+PITCH = (2e-6, 3e-6)
+
+
+def bumpy(ny: int = 60, nx: int = 50) -> Any:
+    y, x = np.mgrid[:ny, :nx]
+    return 1e-6 * (np.sin(x / 4.0 + 0.3) + np.cos(y / 5.0) + 0.05 * x - 0.02 * y)
+
+
+def smooth_step(s: float) -> float:
+    return 6 * s**5 - 15 * s**4 + 10 * s**3
+
+
+@pytest.mark.parametrize("band", [4, 7, 12])
+@pytest.mark.parametrize("seed", range(8))
+def test_profile_against_a_slow_loop(band: int, seed: int) -> None:
+    n, step = 40, 2e-6
+    heights = np.random.default_rng(seed).standard_normal(n)
+    got, seam = blend_borders(heights, (band,), (step,))
+    expected, changes, pieces = heights[: n - band].copy(), [], []
+    for i in range(band):
+        t = smooth_step((i + 1) / (band + 1))
+        expected[i] = t * heights[i] + (1 - t) * heights[n - band + i]
+        pieces.append("end" if i < band // 2 else "start")
+        changes.append(expected[i] - heights[n - band + i if pieces[-1] == "end" else i])
+    np.testing.assert_allclose(got, expected, atol=1e-14)
+    assert seam.rms == pytest.approx(np.sqrt(np.mean(np.square(changes))), rel=1e-12)
+    assert seam.jump == pytest.approx(abs(heights[0] - heights[-1]))
+    slopes = []
+    for i in range(-1, band):  # the step from i to i + 1, against that of the piece(s) it is in
+        after = expected[(i + 1) % (n - band)] - expected[i % (n - band)]
+        if i < band // 2:
+            slopes.append(after - (heights[n - band + i + 1] - heights[n - band + i]))
+        if i >= band // 2:
+            slopes.append(after - (heights[i + 1] - heights[i]))
+    assert seam.slope == pytest.approx(np.abs(slopes).max() / step, rel=1e-12)
+
+
+def test_a_surface_that_repeats_already_is_only_shortened() -> None:
+    y, x = np.mgrid[:48, :66]
+    repeats = np.sin(2 * np.pi * x / 60) + np.cos(2 * np.pi * y / 20)
+    got, seam = blend_borders(repeats, (6, 8), (1.0, 1.0))
+    np.testing.assert_allclose(got, repeats[:40, :60], atol=1e-14)
+    assert seam.rms < 1e-14
+    assert seam.slope < 1e-14
+
+
+def test_the_seam_is_as_smooth_as_the_surface() -> None:
+    heights = bumpy()
+    got, seam = blend_borders(heights, (10, 12), (1.0, 1.0))
+    assert got.shape == (48, 40)
+    steps_inside = np.abs(np.diff(heights, axis=1)).max()
+    across = np.abs(got[:, 0] - got[:, -1]).max()
+    assert across < steps_inside + seam.slope
+    assert np.abs(heights[:, 0] - heights[:, 39]).max() > 3 * steps_inside  # cutting alone is not
+    assert got.min() >= heights.min()
+    assert got.max() <= heights.max()
+
+
+def test_untouched_beyond_the_bands() -> None:
+    heights = bumpy()
+    got, _ = blend_borders(heights, (10, 12), (1.0, 1.0))
+    np.testing.assert_array_equal(got[12:, 10:], heights[12:48, 10:40])
+
+
+def test_prepared_surface_is_periodic_and_says_so(tmp_path: Any) -> None:
+    raw = RawSurface(bumpy(), PITCH, "test", ())
+    prepared = prepare(raw, periodic=True)
+    assert prepared.periodic
+    assert prepared.heights.shape == (54, 45)
+    assert "opposite borders blended over 10 µm x 18 µm (a tenth of each side)" in prepared.steps[3]
+    assert "which leaves 45 x 54 points" in prepared.steps[3]
+    given = prepare(raw, periodic=True, blend=30e-6)
+    assert given.heights.shape == (50, 35)
+    assert "blended over 30 µm, which" in given.steps[3]
+    np.save(tmp_path / "map.npy", bumpy())
+    texture = load_texture(tmp_path / "map.npy", pitch=PITCH, periodic=True)
+    assert texture.periodic
+    xy = np.random.default_rng(1).uniform(0, 1e-4, (20, 2))
+    moved = xy + np.array([45 * PITCH[0], -54 * PITCH[1]])
+    np.testing.assert_allclose(texture.height(xy), texture.height(moved), atol=1e-15)
+    assert not load_texture(tmp_path / "map.npy", pitch=PITCH).periodic
+
+
+def test_mask_follows() -> None:
+    heights = bumpy()
+    holes = [(1, 30), (50, 20), (59, 49), (30, 47)]
+    for index in holes:
+        heights[index] = np.nan
+    prepared = prepare(RawSurface(heights, PITCH, "test", ()), periodic=True)
+    assert prepared.filled is not None
+    # Rows from 54 and columns from 45 are blended into rows and columns from 0.
+    expected = {(1, 30), (50, 20), (5, 4), (30, 2)}
+    assert set(map(tuple, np.argwhere(prepared.filled).tolist())) == expected
+
+
+def test_small_profile_and_map() -> None:
+    assert len(prepare(RawSurface(bumpy()[0, :8], (1e-6,), "t", ()), periodic=True).heights) == 4
+    for small in (bumpy()[0, :7], bumpy()[:7, :20]):
+        raw = RawSurface(small, PITCH[: small.ndim], "test", ())
+        with pytest.raises(ParameterError, match="periodic needs at least 8 points along each"):
+            prepare(raw, periodic=True)
+
+
+@pytest.mark.parametrize(
+    ("blend", "match"),
+    [
+        (0.0, "must be positive"),
+        (-1e-6, "must be positive"),
+        (np.nan, "must be positive and finite"),
+        (9e-6, "must be at least 4 samples, 12 µm"),
+        (60e-6, "must be at most half of the shorter side, 50 µm"),
+        (1.0, "must be at most half of the shorter side"),
+    ],
+)
+def test_widths_that_are_refused(blend: float, match: str) -> None:
+    with pytest.raises(ParameterError, match=f"blend {match}") as caught:
+        prepare(RawSurface(bumpy(), PITCH, "test", ()), periodic=True, blend=blend)
+    assert caught.value.argument == "blend"
+
+
+def test_width_without_periodic_and_periodic_that_is_no_answer() -> None:
+    raw = RawSurface(bumpy(), PITCH, "test", ())
+    with pytest.raises(ParameterError, match=r"blend is the width .* needs periodic"):
+        prepare(raw, blend=20e-6)
+    with pytest.raises(ParameterError, match="periodic must be true or false"):
+        prepare(raw, periodic="no")  # type: ignore[arg-type]  # the mistake under test

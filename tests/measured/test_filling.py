@@ -1,0 +1,134 @@
+"""Holes are filled by the harmonic function of their surroundings, whatever their size."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from asperity.measured import filling, multigrid
+from asperity.measured.filling import fill_harmonic
+
+P = 1e-6
+
+
+def plane(ny: int, nx: int) -> NDArray[np.float64]:
+    y, x = np.mgrid[:ny, :nx] * 1.0
+    return 3e-6 + 0.02 * P * x - 0.005 * 2 * P * y
+
+
+def bumpy(ny: int = 40, nx: int = 50) -> NDArray[np.float64]:
+    rng = np.random.default_rng(7)
+    return np.asarray(1e-6 * rng.standard_normal((ny, nx)) + plane(ny, nx))
+
+
+def holed(heights: NDArray[np.float64]) -> NDArray[np.float64]:
+    ny, nx = heights.shape
+    with_holes = heights.copy()
+    with_holes[ny // 4 : 5 * ny // 8, nx // 5 : 4 * nx // 5] = np.nan
+    with_holes[2, 3] = np.nan
+    return with_holes
+
+
+@pytest.fixture(params=["direct", "multigrid"])
+def solver(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Send every hole to one of the two solvers, with many levels of multigrid."""
+    if request.param == "multigrid":
+        monkeypatch.setattr(filling, "_DIRECT", 0)
+        monkeypatch.setattr(multigrid, "_COARSEST", 4)
+
+
+@pytest.mark.usefixtures("solver")
+@pytest.mark.parametrize("ratio", [0.05, 1.0, 2.0, 20.0])
+def test_filling_continues_a_plane(ratio: float) -> None:
+    exact = plane(61, 80)
+    filled = fill_harmonic(holed(exact), (P, ratio * P))
+    assert np.max(np.abs(filled - exact)) < 1e-8 * np.ptp(exact)
+
+
+@pytest.mark.usefixtures("solver")
+def test_filling_is_harmonic_and_keeps_valid_points() -> None:
+    heights = holed(bumpy())
+    heights[0, :5] = heights[-3:, -1] = np.nan  # holes at the outer border, too
+    missing = np.isnan(heights)
+    filled = fill_harmonic(heights, (P, 2 * P))
+    np.testing.assert_array_equal(filled[~missing], heights[~missing])
+    mirrored = np.pad(filled, 1, mode="edge")  # no slope across the border
+    centre = mirrored[1:-1, 1:-1]
+    laplacian = (mirrored[1:-1, 2:] - 2 * centre + mirrored[1:-1, :-2]) / 1.0
+    laplacian += (mirrored[2:, 1:-1] - 2 * centre + mirrored[:-2, 1:-1]) / 4.0
+    assert np.max(np.abs(laplacian[missing])) < 1e-7 * np.ptp(filled)
+    assert np.max(np.abs(laplacian[~missing])) > 0.1 * np.ptp(filled)  # the check can fail
+    assert filled[missing].max() < np.nanmax(heights)
+    assert filled[missing].min() > np.nanmin(heights)
+
+
+def test_filling_of_a_profile_is_linear() -> None:
+    n = np.nan
+    filled = fill_harmonic(np.array([n, 1.0, n, n, 4.0, 0.0, n]))
+    np.testing.assert_allclose(filled, [1, 1, 2, 3, 4, 0, 0])
+
+
+def test_filling_of_a_quarter_of_a_million_points() -> None:
+    y, x = np.mgrid[:1000, :1000] / 100.0
+    exact = x**2 - y**2 + 3 * x  # harmonic, also for the five-point equation
+    heights = exact.copy()
+    heights[100:599, 300:800] = np.nan
+    assert np.isnan(heights).mean() > 0.249
+    assert np.max(np.abs(fill_harmonic(heights) - exact)) < 1e-7 * np.ptp(exact)
+
+
+def test_multigrid_needs_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The preconditioner works: without it conjugate gradients take hundreds of steps."""
+    import scipy.sparse.linalg
+
+    counts: list[int] = []
+    solve = scipy.sparse.linalg.cg
+
+    def counting(matrix: Any, right: Any, **options: Any) -> Any:
+        counts.append(0)
+
+        def count(_x: Any) -> None:
+            counts[-1] += 1
+
+        return solve(matrix, right, callback=count, **options)
+
+    monkeypatch.setattr(scipy.sparse.linalg, "cg", counting)
+    monkeypatch.setattr(filling, "_DIRECT", 0)
+    heights = np.random.default_rng(5).standard_normal((300, 301))
+    ragged = np.hypot(*np.meshgrid(np.arange(301) - 120, np.arange(300) - 170)) < 90
+    ragged[0:120, 150] = ragged[230:300, 10:200] = True  # a slit, and a bay at the outer border
+    heights[ragged & (np.random.default_rng(6).random(ragged.shape) < 0.97)] = np.nan
+    for ratio in (0.05, 1.0, 20.0):
+        counts.clear()
+        filled = fill_harmonic(heights, (1.0, ratio))
+        assert np.isfinite(filled).all()
+        assert 2 < max(counts) < 20
+
+
+def test_interpolation_keeps_a_constant() -> None:
+    """Where everything is unknown, as at the outer border, of even and odd counts."""
+    for shape in ((9, 12), (8, 7), (5, 5)):
+        where = tuple(index.ravel().astype(np.int64) for index in np.indices(shape))
+        for halve in ((True, True), (True, False), (False, True)):
+            matrix, coarse = multigrid._interpolation((where[0], where[1]), shape, halve)
+            np.testing.assert_allclose(matrix @ np.ones(len(coarse[0])), 1.0)
+
+
+def test_groups_are_whole_holes_and_all_of_them() -> None:
+    missing = np.random.default_rng(8).random((200, 210)) < 0.4
+    groups = list(filling._groups(missing))
+    np.testing.assert_array_equal(np.sort(np.concatenate(groups)), np.flatnonzero(missing))
+
+
+def test_holes_are_independent_of_their_grouping(monkeypatch: pytest.MonkeyPatch) -> None:
+    heights = bumpy(60, 70)
+    heights[np.random.default_rng(9).random(heights.shape) < 0.2] = np.nan
+    together = fill_harmonic(heights, (P, 2 * P))
+    monkeypatch.setattr(filling, "_DIRECT", 40)
+    groups = list(filling._groups(np.isnan(heights)))
+    assert len(groups) > 10
+    apart = fill_harmonic(heights, (P, 2 * P))
+    np.testing.assert_allclose(apart, together, atol=1e-12 * np.ptp(together))

@@ -1,0 +1,128 @@
+"""S- and L-filter against the transmission that the standard defines: 2^-(λc/λ)²."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.errors import ParameterError
+from asperity.measured import filters
+from asperity.measured.filters import ALPHA, gaussian_filter
+from asperity.measured.preparation import prepare
+from asperity.measured.reading import RawSurface
+
+P = 1e-6
+N = 401
+# Waves that end in a crest or trough at both borders: an even number of quarter turns.
+WAVES = [2, 5, 16, 40, 81, 150]
+
+
+def passed(wavelength: float, cutoff: float) -> float:
+    """Return the transmission of the Gaussian low-pass: one half at the cut-off."""
+    return float(2.0 ** -((cutoff / wavelength) ** 2))
+
+
+def wave(waves: int, n: int = N) -> Any:
+    return 1e-6 * np.cos(np.pi * waves * np.arange(n) / (n - 1))
+
+
+def run(heights: Any, **arguments: Any) -> Any:
+    """Filter only: the mean stays with form 0, and cosines of whole waves have nearly none."""
+    raw = RawSurface(heights, (P,) * heights.ndim, "test", ())
+    return prepare(raw, form=0, **arguments)
+
+
+def test_the_constant_of_the_standard() -> None:
+    assert pytest.approx(0.4697186393498257, rel=1e-15) == ALPHA
+    assert np.exp(-np.pi * ALPHA**2) == pytest.approx(0.5, rel=1e-15)
+
+
+@pytest.mark.parametrize("waves", WAVES)
+@pytest.mark.parametrize("cutoff", [4e-6, 2.5e-5])
+def test_s_filter_of_a_profile(waves: int, cutoff: float) -> None:
+    before = wave(waves)
+    length = 2 * (N - 1) * P / waves
+    got = run(before, cutoff=cutoff).heights
+    mean = before.mean()  # form 0 subtracts it, and the filter keeps a constant
+    expected = passed(length, cutoff) * before - mean
+    assert np.max(np.abs(got - expected)) < 1e-12 * 1e-6
+
+
+@pytest.mark.parametrize("waves", WAVES)
+def test_s_and_l_filter_of_a_profile(waves: int) -> None:
+    short, long = 4e-6, 5e-5
+    before = wave(waves)
+    length = 2 * (N - 1) * P / waves
+    got = run(before, cutoff=short, l_cutoff=long).heights
+    expected = passed(length, short) * (1 - passed(length, long)) * before
+    assert np.max(np.abs(got - expected)) < 1e-12 * 1e-6
+    wrong = passed(length, short) * (1 - passed(length, 1.001 * long)) * before
+    if 0.01 < passed(length, long) < 0.99:  # the check can fail
+        assert np.max(np.abs(got - wrong)) > 1e-6 * 1e-6
+
+
+def test_l_filter_of_a_map_with_unequal_pitch() -> None:
+    ny, nx, px, py, short, long = 81, 121, 1e-6, 2e-6, 8e-6, 3e-5
+    y, x = np.mgrid[:ny, :nx]
+    kx, ky = 7 / (2 * (nx - 1) * px), 9 / (2 * (ny - 1) * py)  # waves per metre
+    before = 1e-6 * np.cos(2 * np.pi * kx * px * x) * np.cos(2 * np.pi * ky * py * y)
+    raw = RawSurface(before, (px, py), "test", ())
+    got = prepare(raw, form=0, cutoff=short, l_cutoff=long).heights
+    square = kx**2 + ky**2
+    expected = 2.0 ** -(short**2 * square) * (1 - 2.0 ** -(long**2 * square)) * before
+    assert np.max(np.abs(got - expected)) < 1e-12 * 1e-6
+
+
+def test_half_passes_both_filters_at_their_cutoffs() -> None:
+    at = wave(20)  # wavelength 40 µm
+    np.testing.assert_allclose(gaussian_filter(at, (P,), 4e-5), at / 2, atol=1e-18)
+    rough = at.copy()
+    filters.roughen_in_place(rough, (P,), 4e-5)
+    np.testing.assert_allclose(rough, at / 2, atol=1e-18)
+
+
+@pytest.mark.parametrize("block", [1, 100, 700])
+def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch, block: int) -> None:
+    heights = np.random.default_rng(2).standard_normal((31, 23))
+    whole = gaussian_filter(heights, (1.0, 2.0), 7.0)
+    monkeypatch.setattr(filters, "_BLOCK", block)
+    np.testing.assert_allclose(gaussian_filter(heights, (1.0, 2.0), 7.0), whole, atol=1e-14)
+
+
+def test_the_input_is_kept() -> None:
+    heights = np.random.default_rng(2).standard_normal((9, 8))
+    before = heights.copy()
+    gaussian_filter(heights, (1.0, 1.0), 3.0)
+    np.testing.assert_array_equal(heights, before)
+
+
+def test_steps_say_both() -> None:
+    steps = run(wave(5), cutoff=4e-6, l_cutoff=8e-5).steps
+    assert steps[2] == "filtered: Gaussian ISO 16610-21, cut-off 4 µm"
+    assert steps[3] == "waviness removed: Gaussian L-filter ISO 16610-21, cut-off 80 µm"
+
+
+@pytest.mark.parametrize(
+    ("l_cutoff", "match"),
+    [
+        (4e-6, "must be longer than cutoff, 4 µm"),
+        (1e-6, "must be longer than cutoff"),
+        (1e-3, "must be at most the surface's length, 400 µm"),
+        (0.0, "must be positive"),
+        (-1e-5, "must be positive"),
+        (np.nan, "must be positive and finite"),
+        (np.inf, "must be positive and finite"),
+        ("1e-4", "must be positive and finite"),
+    ],
+)
+def test_l_cutoffs_that_are_refused(l_cutoff: Any, match: str) -> None:
+    with pytest.raises(ParameterError, match=match) as caught:
+        run(wave(5), cutoff=4e-6, l_cutoff=l_cutoff)
+    assert caught.value.argument == "l_cutoff"
+
+
+def test_l_cutoff_is_compared_with_the_default_cutoff_too() -> None:
+    with pytest.raises(ParameterError, match="l_cutoff must be longer than cutoff, 4 µm"):
+        run(wave(5), l_cutoff=3e-6)

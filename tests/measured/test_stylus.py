@@ -1,0 +1,157 @@
+"""The ball against closed forms, a slow loop, and the rules of morphology."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.errors import ParameterError
+from asperity.measured import stylus
+from asperity.measured.preparation import prepare
+from asperity.measured.reading import RawSurface
+from asperity.measured.stylus import close_envelope, dilate, erode
+
+PITCH = (1e-6, 1.5e-6)
+
+
+def rough(shape: tuple[int, ...] = (24, 31)) -> Any:
+    return 1e-6 * np.random.default_rng(2).standard_normal(shape)
+
+
+def slow_dilation(heights: Any, pitch: tuple[float, ...], radius: float) -> Any:
+    """Every point of the mirrored surface against every other."""
+    shape = heights.shape
+    wide = np.pad(heights, [(n - 1, n - 1) for n in shape], mode="reflect")
+    places = np.stack(np.indices(wide.shape), -1).reshape(-1, len(shape)) * pitch[::-1]
+    result = np.empty(shape)
+    for index in np.ndindex(shape):
+        here = (np.array(index) + np.array(shape) - 1) * pitch[::-1]
+        squares = ((places - here) ** 2).sum(axis=1)
+        inside = squares <= radius**2
+        ball = np.sqrt(radius**2 - squares[inside]) - radius
+        result[index] = (wide.ravel()[inside] + ball).max()
+    return result
+
+
+@pytest.mark.parametrize("radius", [2.1e-6, 7.2e-6, 3e-5])
+@pytest.mark.parametrize("tile", [256, 7])
+def test_map_against_a_slow_loop(monkeypatch: pytest.MonkeyPatch, radius: float, tile: int) -> None:
+    monkeypatch.setattr(stylus, "_TILE", tile)
+    heights = rough()
+    expected = slow_dilation(heights, PITCH, radius)
+    np.testing.assert_allclose(dilate(heights, PITCH, radius), expected, atol=1e-18)
+
+
+@pytest.mark.parametrize("radius", [2.1e-6, 7.2e-6, 3e-5])
+def test_profile_against_a_slow_loop(radius: float) -> None:
+    heights = rough((60,))
+    expected = slow_dilation(heights, (1e-6,), radius)
+    np.testing.assert_allclose(dilate(heights, (1e-6,), radius), expected, atol=1e-18)
+
+
+def test_a_spike_becomes_a_cap() -> None:
+    radius, high = 9e-6, 5e-6
+    spike = np.zeros((41, 45))
+    spike[20, 22] = high
+    y, x = np.mgrid[:41, :45]
+    squares = ((x - 22) * PITCH[0]) ** 2 + ((y - 20) * PITCH[1]) ** 2
+    cap = high - radius + np.sqrt(np.maximum(radius**2 - squares, 0.0))
+    expected = np.where(squares <= radius**2, np.maximum(cap, 0.0), 0.0)
+    np.testing.assert_allclose(dilate(spike, PITCH, radius), expected, atol=1e-19)
+    other = np.where(squares <= radius**2, np.maximum(cap + 1e-9, 0.0), 0.0)
+    assert np.max(np.abs(other - expected)) > 1e-10
+
+
+@pytest.mark.parametrize("height", [0.0, 3e-6])
+def test_flat_stays_flat(height: float) -> None:
+    flat = np.full((12, 15), height)
+    np.testing.assert_array_equal(dilate(flat, PITCH, 5e-6), flat)
+    np.testing.assert_array_equal(close_envelope(flat, PITCH, 5e-6), flat)
+
+
+def test_round_ridge_gets_rounder_by_the_radius() -> None:
+    """The centre runs on the parallel curve of a circle: a circle of the sum of the radii."""
+    own, tip, n = 50e-6, 20e-6, 2001
+    pitch = 60e-6 / (n - 1)
+    x = (np.arange(n) - n // 2) * pitch
+    ridge = np.sqrt(own**2 - x**2) - own
+    felt = dilate(ridge, (pitch,), tip)
+    parallel = np.sqrt((own + tip) ** 2 - x**2) - own - tip
+    # The point of contact must lie on the profile, not on its mirror image: |x| < 30·(70/50) µm.
+    inner = np.abs(x) < 0.9 * 30e-6
+    assert np.max(np.abs(felt - parallel)[inner]) < 2 * pitch**2 / tip
+    assert np.max(np.abs(felt - ridge)[inner]) > 1e-6
+
+
+def test_groove_that_is_too_narrow_is_bridged() -> None:
+    """A slot of width 2 a in a plane: the ball sinks by R - √(R² - a²) and no more."""
+    radius, half = 40e-6, 10
+    slot = np.zeros(201)
+    slot[100 - half + 1 : 100 + half] = -1e-4
+    felt = dilate(slot, (1e-6,), radius)
+    a = half * 1e-6
+    assert felt.min() == pytest.approx(-(radius - np.sqrt(radius**2 - a**2)), rel=1e-9)
+    closed = close_envelope(slot, (1e-6,), radius)
+    u = (np.arange(201) - 100) * 1e-6
+    inside = np.abs(u) < a
+    arc = np.sqrt(radius**2 - a**2) - np.sqrt(radius**2 - u[inside] ** 2)
+    np.testing.assert_allclose(closed[inside], arc, atol=1e-15)
+    np.testing.assert_allclose(closed[~inside], 0.0, atol=1e-19)
+
+
+@pytest.mark.parametrize("shape", [(24, 31), (70,)])
+def test_closing_is_idempotent_and_only_raises(shape: tuple[int, ...]) -> None:
+    heights, pitch = rough(shape), PITCH[: len(shape)]
+    once = close_envelope(heights, pitch, 6e-6)
+    twice = close_envelope(once, pitch, 6e-6)
+    np.testing.assert_allclose(twice, once, atol=1e-18)
+    assert (once >= heights - 1e-18).all()
+    assert np.max(np.abs(once - heights)) > 1e-7  # it is not nothing
+    assert np.max(np.abs(dilate(once, pitch, 6e-6) - once)) > 1e-7  # dilation is not idempotent
+
+
+def test_erosion_is_the_dilation_of_the_underside() -> None:
+    heights = rough()
+    np.testing.assert_array_equal(erode(heights, PITCH, 5e-6), -dilate(-heights, PITCH, 5e-6))
+    assert (erode(heights, PITCH, 5e-6) <= heights).all()
+
+
+def test_a_tip_below_the_pitch_feels_the_points() -> None:
+    np.testing.assert_array_equal(dilate(rough(), PITCH, 0.9e-6), rough())
+
+
+def test_preparation_says_what_the_tip_did() -> None:
+    raw = RawSurface(rough(), PITCH, "test", ())
+    plain = prepare(raw)
+    felt = prepare(raw, tip_radius=4e-6, magnify=2.0)
+    np.testing.assert_allclose(felt.heights, 2 * dilate(plain.heights, PITCH, 4e-6), rtol=1e-12)
+    change = dilate(plain.heights, PITCH, 4e-6) - plain.heights
+    assert felt.steps[3] == (
+        "felt with a tip of radius 4 µm: dilation by a ball (as in ISO 16610-41) lowered by the"
+        f" radius, heights raised at {np.mean(change > 0):.3g} of the points, by"
+        f" {np.sqrt(np.mean(change**2)) * 1e9:.4g} nm RMS and at most {change.max() * 1e9:.4g} nm"
+    )
+
+
+@pytest.mark.parametrize(
+    ("radius", "match"),
+    [
+        (0.0, "must be positive"),
+        (-1e-6, "must be positive"),
+        (np.nan, "must be positive and finite"),
+        (np.inf, "must be positive and finite"),
+        (4e-5, "must be at most the surface's shorter side, 30 µm"),
+    ],
+)
+def test_radii_that_are_refused(radius: float, match: str) -> None:
+    with pytest.raises(ParameterError, match=f"tip_radius {match}") as caught:
+        prepare(RawSurface(rough(), PITCH, "test", ()), tip_radius=radius)
+    assert caught.value.argument == "tip_radius"
+
+
+def test_too_much_work_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stylus, "_MOST_COMPARISONS", 1e4)
+    with pytest.raises(ParameterError, match=r"tip_radius needs .* comparisons at each of 744"):
+        dilate(rough(), PITCH, 1e-5)
