@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 ROOT = Path(__file__).parent.parent
-_WRITERS = ROOT / "tests" / "textures"
+_WRITERS = ROOT / "tests" / "measured"
 _DATA = ROOT.parent / "shared" / "data"
 _PNG_HEAD = 8
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from asperity.analysis.limits.device_limits import spectrum as module
+from asperity.analysis.limits import spectrum as module
 from asperity.analysis.limits.spectrum import Spectrum, banded, grid, samples, spectrum
 from asperity.textures import Fourier, Grating, HeightMap, Noise, NoiseProfile, Profile, Sinusoid
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 from asperity.analysis.energy.merit import scan_height
-from asperity.analysis.limits.device_limits import wave_force as module
+from asperity.analysis.limits import wave_force as module
 from asperity.analysis.limits.spectrum import spectrum
 from asperity.analysis.limits.wave_force import scan_forces, wave_forces
 from asperity.surface import Surface
