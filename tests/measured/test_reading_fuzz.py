@@ -78,7 +78,7 @@ def test_the_worker_sees_faults(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
     import numpy as np
 
     from asperity.errors import SurfaceFileError
-    from asperity.textures import reading
+    from asperity.measured import reading
 
     def raising(*_: object, **__: object) -> None:
         raise IndexError("oops")
