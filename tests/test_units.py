@@ -21,6 +21,11 @@ from asperity.units import engineering, quantity
         ("1e-3 m", "m", 1e-3),
         ("2 rad/mm", "rad/m", 2000.0),
         ("90 deg", "rad", 1.5707963267948966),
+        ("5 1/mm", "1/m", 5000.0),
+        ("2 N*s/m", "N*s/m", 2.0),
+        ("2 N s m^-1", "N*s/m", 2.0),
+        ("2 kg*s**-2", "N/m", 2.0),
+        ("3 mm²", "m**2", 3e-6),
         ("3", "N/m", 3.0),
         (3, "N/m", 3.0),
         ("20", "", 20.0),
@@ -36,7 +41,11 @@ def test_quantities(text: str | float, unit: str, value: float) -> None:
      ("5 mm", ""), (True, "m"), (None, "m"), ("5 m; import os", "m"), ("1e999", "m"),
      pytest.param(10**400, "m", id="400 digits"), pytest.param(-(10**5000), "m", id="5000 digits"),
      pytest.param("1" + "0" * 5000, "m", id="5000 digits as text"),
-     pytest.param("1e" + "9" * 5000 + " mm", "m", id="an exponent of 5000 digits")],
+     pytest.param("1e" + "9" * 5000 + " mm", "m", id="an exponent of 5000 digits"),
+     ("1 m*9**9**9", "m"), ("1 m**99999", "m"), ("1 m^(2)", "m"), ("1 2 m", "m"), ("1 m*9", "m"),
+     ("1 m.__class__", "m"), ("1 m[0]", "m"), ("1 m*", "m"), ("1 *m", "m"),
+     pytest.param("1 " + "m*" * 40 + "m", "m", id="a long unit"),
+     pytest.param("1 " + "m " * 50_000 + "!", "m", id="100 kB of units")],
 )  # fmt: skip
 def test_bad_quantities_name_the_argument(text: object, unit: str) -> None:
     with pytest.raises(ParameterError) as caught:

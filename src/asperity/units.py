@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     import pint
 
 _BARE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+# A unit is words with small whole powers, between them *, / or a blank; nothing is evaluated.
+_FACTOR = r"[^\W\d_]+(?:\s*(?:\^|\*\*)\s*[+-]?[1-9]|⁻?[¹²³])?|[°%]"
+_UNIT = re.compile(rf"(?:1\s*/\s*)?(?:{_FACTOR})(?:\s*[*/·\s]\s*(?:{_FACTOR}))*")
+_LONGEST_UNIT = 64
 
 
 @lru_cache(maxsize=1)
@@ -65,11 +69,14 @@ def _with_unit(name: str, text: str, unit: str) -> float:
     match = _BARE.match(text.strip())
     if match is None or not unit:
         raise ParameterError(name, _wanted(unit), text)
+    words = text.strip()[match.end() :].strip()
+    if len(words) > _LONGEST_UNIT or _UNIT.fullmatch(words) is None:
+        raise ParameterError(name, f"{_wanted(unit)}; the unit is not understood", text)
     import pint
 
     registry = _registry()
     try:
-        given = registry.Quantity(1.0, text.strip()[match.end() :].strip())
+        given = registry.Quantity(1.0, words)
         # The number is converted as text would be: 0.8 mm is 0.0008, not 0.8 * 0.001.
         factor = given.to(unit).magnitude
     except pint.DimensionalityError:
