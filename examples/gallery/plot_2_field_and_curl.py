@@ -6,11 +6,11 @@ one colour feeds energy to the hand or drains it, each time it is turned.
 """  # noqa: D205, D415 - the first line is a reStructuredText title
 
 import asperity as asp
-from asperity.report.plots import field_figure
+from asperity.report import plot
 
 texture = asp.Sinusoid(amplitude=0.2e-3, period=2e-3)
 result = asp.compare(texture, laws="ACD", stiffness=1000.0, max_depth=0.5e-3)
-figure = field_figure(result)
+figure = plot(result, picture="field")
 
 # %%
 # A has curl wherever the surface slopes: its worst loop gains this much per turn.

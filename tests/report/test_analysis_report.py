@@ -19,8 +19,8 @@ from asperity.devices import Device, parse_device
 from asperity.errors import ParameterError
 from asperity.report import html_text, plot, print_analysis
 from asperity.report.analysis_html import analysis_html
-from asperity.report.analysis_pictures import analysis_figure, pictures_of
-from asperity.report.analysis_region import (
+from asperity.report.pictures.analysis_pictures import analysis_figure, pictures_of
+from asperity.report.pictures.analysis_region import (
     gain_window,
     in_window,
     loop_window,
@@ -28,7 +28,7 @@ from asperity.report.analysis_region import (
     witness_column,
     working_depth,
 )
-from asperity.report.analysis_words import down_text, interval_text, span_text, up_text
+from asperity.report.words.analysis_words import down_text, interval_text, span_text, up_text
 from asperity.surface import Surface
 from asperity.textures import Fourier, Sinusoid, Texture
 

@@ -9,8 +9,12 @@ from asperity.paper.experiments.bump import bump_experiment
 from asperity.paper.experiments.passivity import passivity_experiment
 from asperity.paper.experiments.run import Experiments
 from asperity.paper.experiments.scanning import scanning_experiment
-from asperity.report.experiment_pictures import cycles_figure, devices_figure, experiment_parts
 from asperity.report.page import Grid, Page, Picture, page_html
+from asperity.report.pictures.experiment_pictures import (
+    cycles_figure,
+    devices_figure,
+    experiment_parts,
+)
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 

@@ -13,8 +13,8 @@ from asperity.analysis.limits.device_limits import limits
 from asperity.analysis.limits.limit_result import Limits
 from asperity.devices import parse_device
 from asperity.report.limits_html import limits_html
-from asperity.report.limits_picture import limits_figure, shortest
 from asperity.report.limits_table import MOST_WAVES, print_limits, shown_waves
+from asperity.report.pictures.limits_picture import limits_figure, shortest
 from asperity.textures import Fourier, HeightMap, Sinusoid
 
 BENCH = {

@@ -15,10 +15,10 @@ import asperity as asp
 from asperity.devices import parse_device
 from asperity.errors import ParameterError
 from asperity.report import comparison_table, html_text, plot, print_comparison
-from asperity.report.gain_picture import gain_figure
-from asperity.report.merit_picture import merit_figure
-from asperity.report.section import curl_field, stretch_of
-from asperity.report.spectrum_picture import device_limits, line_spectrum, spectrum_figure
+from asperity.report.pictures.gain_picture import gain_figure
+from asperity.report.pictures.merit_picture import merit_figure
+from asperity.report.pictures.spectrum_picture import device_limits, line_spectrum, spectrum_figure
+from asperity.report.pictures.vertical_cut import curl_field, stretch_of
 from asperity.surface import Surface
 
 TEXTURE = asp.Sinusoid(amplitude=0.2e-3, period=2e-3)

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from asperity.report.run_html import run_html
 from asperity.report.run_table import print_run
-from asperity.report.run_words import answer, closing_words, energy, ledger_rows
+from asperity.report.words.run_words import answer, closing_words, energy, ledger_rows
 from asperity.scene import load_scene
 from asperity.scene.setup import Setup, make_setup
 from asperity.simulation import Run

@@ -110,7 +110,7 @@ def _quoted(specification: str) -> str:
 
 def picture(texture: Texture) -> str:
     """Return a picture of a texture as a data URI: its map lit from the side, and a section."""
-    from asperity.report import style
+    from asperity.report.pictures import style
 
     figure = style.new_figure(4.4, 2.0 if texture.is_profile else 5.0)
     if texture.is_profile:
@@ -129,7 +129,7 @@ def picture(texture: Texture) -> str:
 def _draw_map(axes: Axes, texture: Texture) -> None:
     from matplotlib.colors import LightSource, LinearSegmentedColormap
 
-    from asperity.report import style
+    from asperity.report.pictures import style
 
     size, heights = _map(texture)
     step = size / np.array(heights.shape[::-1])
@@ -176,7 +176,7 @@ def _map(texture: Texture) -> tuple[FloatArray, FloatArray]:
 
 
 def _draw_section(axes: Any, texture: Texture) -> None:
-    from asperity.report import style
+    from asperity.report.pictures import style
 
     line = texture.scan_line()
     periods = 3.0 if texture.is_profile and texture.peak_to_valley > 0.05 * line.length else 1.0

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from asperity.report.analysis_table import print_analysis
     from asperity.report.html import html_text
-    from asperity.report.plots import plot
+    from asperity.report.pictures.plots import plot
     from asperity.report.table import comparison_table, print_comparison
 
 _HOMES = {
     "comparison_table": "asperity.report.table",
     "html_text": "asperity.report.html",
-    "plot": "asperity.report.plots",
+    "plot": "asperity.report.pictures.plots",
     "print_analysis": "asperity.report.analysis_table",
     "print_comparison": "asperity.report.table",
 }

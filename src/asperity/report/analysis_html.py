@@ -11,9 +11,9 @@ import asperity
 from asperity.analysis.analyze import Analysis
 from asperity.analysis.passivity.criteria import Criterion
 from asperity.devices import FIELD_TABLE
-from asperity.report import style
-from asperity.report.analysis_pictures import analysis_figure, pictures_of
-from asperity.report.analysis_words import (
+from asperity.report.pictures import style
+from asperity.report.pictures.analysis_pictures import analysis_figure, pictures_of
+from asperity.report.words.analysis_words import (
     down_text,
     holds_text,
     interval_text,
@@ -28,7 +28,7 @@ from asperity.report.analysis_words import (
     up_text,
     witness_text,
 )
-from asperity.report.wording import law_title
+from asperity.report.words.number_words import law_title
 from asperity.units import engineering
 
 _PICTURES = {
@@ -74,7 +74,7 @@ def analysis_html(analysis: Analysis, texture: str = "") -> str:
     Args:
         analysis: the result.
         texture: an expression of Python that makes the texture; see
-            :func:`asperity.report.analysis_words.reproduction`.
+            :func:`asperity.report.words.analysis_words.reproduction`.
     """
     law = analysis.surface.law
     return _template().render(

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from asperity.analysis.analyze import Analysis
-from asperity.report.analysis_words import (
+from asperity.report.words.analysis_words import (
     down_text,
     holds_text,
     jump_rows,
@@ -25,7 +25,7 @@ from asperity.report.analysis_words import (
     up_text,
     witness_text,
 )
-from asperity.report.wording import law_title
+from asperity.report.words.number_words import law_title
 
 
 def numbers_table(analysis: Analysis) -> Table:
@@ -79,7 +79,7 @@ def print_analysis(analysis: Analysis, console: Console, texture: str = "") -> N
         analysis: the result.
         console: where to.
         texture: an expression of Python that makes the texture; see
-            :func:`asperity.report.analysis_words.reproduction`.
+            :func:`asperity.report.words.analysis_words.reproduction`.
     """
     law = analysis.surface.law
     console.print(Text(analysis.answer, style="bold"))

@@ -12,13 +12,13 @@ import asperity
 from asperity.analysis.analyze import Analysis
 from asperity.analysis.compare import Comparison
 from asperity.analysis.row import LawRow
-from asperity.report import style
 from asperity.report.analysis_html import analysis_html
-from asperity.report.gain_picture import gain_figure
-from asperity.report.merit_picture import merit_figure
-from asperity.report.plots import field_figure, force_figure, surface_figure
-from asperity.report.spectrum_picture import spectrum_figure
-from asperity.report.wording import (
+from asperity.report.pictures import style
+from asperity.report.pictures.gain_picture import gain_figure
+from asperity.report.pictures.merit_picture import merit_figure
+from asperity.report.pictures.plots import field_figure, force_figure, surface_figure
+from asperity.report.pictures.spectrum_picture import spectrum_figure
+from asperity.report.words.number_words import (
     SAMPLED_NOTE,
     any_sampled,
     bound_text,

@@ -12,8 +12,6 @@ from asperity.analysis.limits.limit_result import Limits, RenderedWave
 from asperity.analysis.limits.limit_rules import Limit
 from asperity.analysis.limits.limit_words import percent, speed_text, speeds_text, stiffness_text
 from asperity.devices import FIELD_TABLE
-from asperity.report import style
-from asperity.report.limits_picture import limits_figure
 from asperity.report.limits_table import (
     MOST_WAVES,
     ON_WAVES,
@@ -24,6 +22,8 @@ from asperity.report.limits_table import (
     shown_waves,
     side_text,
 )
+from asperity.report.pictures import style
+from asperity.report.pictures.limits_picture import limits_figure
 from asperity.units import engineering
 
 

@@ -13,11 +13,11 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from asperity.report import style
 from asperity.report.page import Grid, Page, Picture, Row, page_html
+from asperity.report.pictures import style
 from asperity.report.run_html import FOOTER
 from asperity.report.run_table import print_assumptions
-from asperity.report.run_words import facts_of_loop
+from asperity.report.words.run_words import facts_of_loop
 from asperity.scene.setup import Setup
 from asperity.simulation.onset import CYCLE_SPEED
 from asperity.simulation.prediction import Prediction

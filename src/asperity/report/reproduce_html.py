@@ -7,9 +7,9 @@ from itertools import groupby
 
 from asperity.paper import Result
 from asperity.paper.experiments import Experiments
-from asperity.report.experiment_pictures import experiment_parts
 from asperity.report.page import Grid, Page, Picture, Row, page_html
-from asperity.report.paper_pictures import paper_pictures
+from asperity.report.pictures.experiment_pictures import experiment_parts
+from asperity.report.pictures.paper_pictures import paper_pictures
 from asperity.report.reproduce_table import counts_text, number_text
 
 KINDS = {

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from asperity.report import style
 from asperity.report.page import Grid, Page, Picture, Row, page_html
-from asperity.report.run_picture import run_figure
-from asperity.report.run_words import answer, closing_words, facts, ledger_rows
+from asperity.report.pictures import style
+from asperity.report.pictures.run_picture import run_figure
+from asperity.report.words.run_words import answer, closing_words, facts, ledger_rows
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
 

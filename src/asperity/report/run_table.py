@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from asperity.report.run_words import answer, closing_words, facts, ledger_rows
+from asperity.report.words.run_words import answer, closing_words, facts, ledger_rows
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
 

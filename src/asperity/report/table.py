@@ -13,7 +13,7 @@ from rich.text import Text
 
 from asperity.analysis.compare import Comparison
 from asperity.analysis.row import LawRow
-from asperity.report.wording import (
+from asperity.report.words.number_words import (
     any_sampled,
     bound_text,
     force_text,

@@ -12,8 +12,8 @@ from matplotlib.colors import LightSource, Normalize
 from matplotlib.figure import Figure, SubFigure
 
 from asperity.checks import FloatArray
-from asperity.report import style
-from asperity.report.section import Stretch, feature_length, stretch_of
+from asperity.report.pictures import style
+from asperity.report.pictures.vertical_cut import Stretch, feature_length, stretch_of
 from asperity.textures.texture import Texture
 
 _MAP_POINTS = 320

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from asperity.analysis.energy.merit import parallel_lines
 from asperity.checks import FloatArray
 from asperity.devices import Device
-from asperity.report import style
+from asperity.report.pictures import style
 from asperity.textures.texture import Texture
 from asperity.units import engineering
 

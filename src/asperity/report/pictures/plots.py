@@ -12,15 +12,15 @@ from asperity.analysis.analyze import Analysis
 from asperity.analysis.compare import Comparison
 from asperity.analysis.row import LawRow
 from asperity.errors import ParameterError
-from asperity.report import style
-from asperity.report.analysis_pictures import analysis_figure, picture_size, pictures_of
-from asperity.report.field_picture import draw_fields, field_size
-from asperity.report.force_picture import draw_forces, force_size
-from asperity.report.gain_picture import gain_figure
-from asperity.report.merit_picture import merit_figure
-from asperity.report.spectrum_picture import spectrum_figure
-from asperity.report.surface_picture import draw_surface, surface_size
-from asperity.report.wording import leak_text
+from asperity.report.pictures import style
+from asperity.report.pictures.analysis_pictures import analysis_figure, picture_size, pictures_of
+from asperity.report.pictures.field_picture import draw_fields, field_size
+from asperity.report.pictures.force_picture import draw_forces, force_size
+from asperity.report.pictures.gain_picture import gain_figure
+from asperity.report.pictures.merit_picture import merit_figure
+from asperity.report.pictures.spectrum_picture import spectrum_figure
+from asperity.report.pictures.surface_picture import draw_surface, surface_size
+from asperity.report.words.number_words import leak_text
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 

@@ -11,15 +11,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from asperity.analysis.energy.merit import scan_height
-from asperity.report import style
-from asperity.report.section import (
+from asperity.report.pictures import style
+from asperity.report.pictures.vertical_cut import (
     ScanForces,
     Stretch,
     feature_length,
     scan_forces,
     stretch_of,
 )
-from asperity.report.wording import law_title
+from asperity.report.words.number_words import law_title
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 from asperity.units import engineering

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from asperity.laws import find_law
 from asperity.paper.figures import ForceField, LoopEnergy, force_fields, loop_energies
-from asperity.report import style
 from asperity.report.page import Picture
-from asperity.report.wording import law_title
+from asperity.report.pictures import style
+from asperity.report.words.number_words import law_title
 
 _COLUMNS = 4
 _MILLI, _MICRO = 1e3, 1e6

@@ -16,8 +16,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator, Symmetrica
 
 from asperity.analysis.analyze import Analysis
 from asperity.checks import FloatArray
-from asperity.report import style
-from asperity.report.analysis_region import (
+from asperity.report.pictures import style
+from asperity.report.pictures.analysis_region import (
     gain_window,
     in_window,
     loop_window,
@@ -26,10 +26,10 @@ from asperity.report.analysis_region import (
     witness_column,
     working_depth,
 )
-from asperity.report.analysis_words import interval_text, span_text
-from asperity.report.field_picture import Window, draw_fields
-from asperity.report.section import CurlField, curl_field
-from asperity.report.wording import law_title, number_text
+from asperity.report.pictures.field_picture import Window, draw_fields
+from asperity.report.pictures.vertical_cut import CurlField, curl_field
+from asperity.report.words.analysis_words import interval_text, span_text
+from asperity.report.words.number_words import law_title, number_text
 from asperity.units import engineering
 
 Part = Figure | SubFigure

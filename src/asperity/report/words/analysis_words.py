@@ -11,7 +11,7 @@ from asperity.analysis.analyze import Analysis
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.passivity.criteria import Criterion
 from asperity.laws import LAW_ARGUMENTS, LAWS
-from asperity.report.wording import INFINITE, SAMPLED, merit_text
+from asperity.report.words.number_words import INFINITE, SAMPLED, merit_text
 from asperity.surface import Surface
 from asperity.units import engineering, rounded_down
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from asperity.report import style
+from asperity.report.pictures import style
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
 

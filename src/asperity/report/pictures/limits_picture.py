@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter
 
 from asperity.analysis.limits.limit_result import Limits
 from asperity.analysis.limits.limit_words import speed_text, stiffness_text
-from asperity.report import style
+from asperity.report.pictures import style
 from asperity.units import engineering
 
 # Behind words, so that lines do not run through them.

@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from asperity.analysis.energy.merit import scan_height
-from asperity.report import style
-from asperity.report.section import (
+from asperity.report.pictures import style
+from asperity.report.pictures.vertical_cut import (
     ArrowField,
     CurlField,
     Stretch,
@@ -23,7 +23,7 @@ from asperity.report.section import (
     field_range,
     stretch_of,
 )
-from asperity.report.wording import law_title
+from asperity.report.words.number_words import law_title
 from asperity.surface import Surface
 
 _WIDTH = 10.0
@@ -110,8 +110,8 @@ def draw_fields(
         window: what to show; see :func:`field_window` for what is shown by default.
 
     Returns:
-        The panels, one per law; lengths on their axes are in the units of
-        :func:`asperity.report.style.length_unit` for the width and the height of the window.
+        The panels, one per law; lengths on their axes are in the units that
+        :func:`asperity.report.pictures.style.length_unit` gives for width and height of the window.
     """
     window = window or field_window(surfaces)
     stretch, bottom, top = window.stretch, window.bottom, window.top

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 
 from asperity.analysis.compare import Comparison
-from asperity.report import style
-from asperity.report.field_picture import field_stretch
-from asperity.report.section import CurlField, curl_field, field_range
-from asperity.report.wording import bound_text, law_title
+from asperity.report.pictures import style
+from asperity.report.pictures.field_picture import field_stretch
+from asperity.report.pictures.vertical_cut import CurlField, curl_field, field_range
+from asperity.report.words.number_words import bound_text, law_title
 
 _COLUMNS = 3
 _CELLS = (120, 60)

@@ -17,7 +17,6 @@ from asperity.paper.experiments.bump import BumpExperiment
 from asperity.paper.experiments.passivity import Count, PassivityExperiment
 from asperity.paper.experiments.scanning import ScanningExperiment
 from asperity.paper.experiments.settings import bump_setup
-from asperity.report import style
 from asperity.report.onset_report import (
     HEADINGS,
     NOTES,
@@ -28,6 +27,7 @@ from asperity.report.onset_report import (
     onset_figure,
 )
 from asperity.report.page import Grid, Picture, Row
+from asperity.report.pictures import style
 from asperity.report.scan_report import milli
 from asperity.units import engineering
 
