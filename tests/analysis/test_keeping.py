@@ -202,7 +202,7 @@ def test_a_full_disk_leaves_nothing_behind(kept: Path, monkeypatch: pytest.Monke
     def full(*_arguments: Any) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(json, "dump", full)
+    monkeypatch.setattr(Path, "replace", full)
     assert Maker().asked(surface()) == BOUND
     assert list(kept.iterdir()) == []
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -14,6 +13,7 @@ import click
 from asperity.cli.options import FILE_OPTIONS, LAW_OPTIONS, given, text_options
 from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
 from asperity.errors import ParameterError
+from asperity.files import json_text
 
 if TYPE_CHECKING:
     from asperity.analysis.analyze import Analysis
@@ -76,9 +76,7 @@ def analyze_command(
     check_outputs(json=json_path, html=html_path)
     answer = _analyze(surface, law, device, values)
     if json_path is not None:
-        data = answer.result.to_dict()
-        text = json.dumps(data, indent=2, allow_nan=False, ensure_ascii=False)
-        write_output("json", json_path, text + "\n")
+        write_output("json", json_path, json_text(answer.result))
     if html_path is not None:
         from asperity.report.analysis_html import analysis_html
 

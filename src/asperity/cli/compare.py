@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,6 +11,7 @@ import click
 
 from asperity.cli.options import FILE_OPTIONS, LAW_OPTIONS, given, text_options
 from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
+from asperity.files import json_text
 
 if TYPE_CHECKING:
     from asperity.analysis import Comparison
@@ -54,8 +54,7 @@ def compare_command(
     check_outputs(json=json_path, html=html_path)
     result = _compare(surface, device, laws, values)
     if json_path is not None:
-        text = json.dumps(result.to_dict(), indent=2, allow_nan=False, ensure_ascii=False)
-        write_output("json", json_path, text + "\n")
+        write_output("json", json_path, json_text(result))
     if html_path is not None:
         from asperity.report import html_text
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import click
 
 from asperity.cli.output import STANDARD_OUTPUT, check_output, write_output
+from asperity.files import json_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,9 +33,8 @@ def devices_command(names: tuple[str, ...], json_path: str | None) -> None:
     check_output("json", json_path)
     devices = [load_device(name) for name in names or device_names()]
     if json_path is not None:
-        content = {"schema": SCHEMA, "devices": [device.to_dict() for device in devices]}
-        text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
-        write_output("json", json_path, text + "\n")
+        content = {"schema": SCHEMA, "devices": devices}
+        write_output("json", json_path, json_text(content))
     if json_path != STANDARD_OUTPUT:
         _print(devices, bool(names))
 

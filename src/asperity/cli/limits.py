@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from asperity.cli.options import FILE_OPTIONS, LAW_OPTIONS, given, text_options
 from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
+from asperity.files import json_text
 
 if TYPE_CHECKING:
     from asperity.analysis.limits.limit_result import Limits
@@ -65,8 +65,7 @@ def limits_command(
     check_outputs(json=json_path, html=html_path)
     result = _limits(surface, device, speed, law, values)
     if json_path is not None:
-        text = json.dumps(result.to_dict(), indent=2, allow_nan=False, ensure_ascii=False)
-        write_output("json", json_path, text + "\n")
+        write_output("json", json_path, json_text(result))
     if html_path is not None:
         from asperity.report.limits_html import limits_html
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -20,6 +19,7 @@ from asperity.cli.loop import (
 )
 from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
 from asperity.errors import ParameterError
+from asperity.files import json_text
 
 if TYPE_CHECKING:
     from asperity.scene.setup import Setup
@@ -72,11 +72,10 @@ def onset_command(
     if json_path is not None:
         data = {
             "schema": 1,
-            "scene": setup.to_dict(),
-            "onsets": [prediction.to_dict() for prediction in found],
+            "scene": setup,
+            "onsets": found,
         }
-        text = json.dumps(data, indent=2, allow_nan=False, ensure_ascii=False)
-        write_output("json", json_path, text + "\n")
+        write_output("json", json_path, json_text(data))
     if html_path is not None:
         from asperity.report.onset_report import onset_html
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from pathlib import Path
 
 import click
 
 from asperity.errors import ParameterError
+from asperity.files import is_device, write_text
 
 STANDARD_OUTPUT = "-"
 
@@ -45,7 +45,7 @@ def check_output(name: str, path: str | None) -> None:
         return
     if Path(path).is_dir():
         raise ParameterError(name, "must be a file, not a folder", path)
-    if _is_device(path):
+    if is_device(path):
         if not os.access(path, os.W_OK):
             raise ParameterError(name, "must be a file that can be written", path)
         return
@@ -60,9 +60,7 @@ def check_output(name: str, path: str | None) -> None:
 
 
 def write_output(name: str, path: str, text: str) -> None:
-    """Write a text to standard output or to a file, which is replaced only when all is written.
-
-    A link stays one: the file that it leads to is replaced. A device or a pipe is written to.
+    """Write a text to standard output or to a file; see :func:`asperity.files.whole_file`.
 
     Raises:
         ParameterError: if the file cannot be written.
@@ -71,32 +69,6 @@ def write_output(name: str, path: str, text: str) -> None:
         click.echo(text, nl=not text.endswith("\n"))
         return
     try:
-        if _is_device(path):
-            Path(path).write_text(text, encoding="utf-8")
-        else:
-            _replace(Path(os.path.realpath(path)), text)
+        write_text(path, text)
     except OSError as error:
         raise ParameterError(name, f"cannot be written: {error.strerror}", path) from None
-
-
-def _is_device(path: str) -> bool:
-    """Return whether there is something that is not a regular file, and must not become one."""
-    return Path(path).exists() and not Path(path).is_file()
-
-
-def _replace(target: Path, text: str) -> None:
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-        Path(temporary).chmod(0o666 & ~_umask())
-        Path(temporary).replace(target)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-
-
-def _umask() -> int:
-    current = os.umask(0)
-    os.umask(current)
-    return current

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ from asperity.cli.loop import print_report, progress_bar
 from asperity.cli.options import FILE_OPTIONS, given, text_options
 from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
 from asperity.errors import ParameterError
+from asperity.files import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -109,9 +109,4 @@ def _reproduced(
 
 def as_json(results: Sequence[Result], experiments: Experiments | None) -> str:
     """Return claims and experiments as JSON text."""
-    data = {
-        "schema": 1,
-        "claims": [result.to_dict() for result in results],
-        "experiments": None if experiments is None else experiments.to_dict(),
-    }
-    return json.dumps(data, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    return json_text({"schema": 1, "claims": list(results), "experiments": experiments})

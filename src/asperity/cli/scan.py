@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import click
@@ -17,6 +16,7 @@ from asperity.cli.loop import (
     read_setup,
 )
 from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
+from asperity.files import json_text
 
 
 @click.command("scan", short_help="Energy per stroke, against speed and depth.")
@@ -61,11 +61,10 @@ def scan_command(
     if json_path is not None:
         data = {
             "schema": 1,
-            "scene": setup.to_dict(),
-            "strokes": [stroke.to_dict() for stroke in found],
+            "scene": setup,
+            "strokes": found,
         }
-        text = json.dumps(data, indent=2, allow_nan=False, ensure_ascii=False)
-        write_output("json", json_path, text + "\n")
+        write_output("json", json_path, json_text(data))
     if html_path is not None:
         from asperity.report.scan_report import scan_html
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import math
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from asperity.cli.loop import loop_options, print_report, progress_bar, read_setup
 from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
+from asperity.files import json_text
 
 if TYPE_CHECKING:
     from asperity.scene.setup import Setup
@@ -62,14 +61,4 @@ def simulate_command(
 
 def as_json(setup: Setup, run: Run) -> str:
     """Return scene and result as JSON text; null for what is not finite, if the run diverged."""
-    data = {"schema": 1, "scene": setup.to_dict(), "run": _finite(run.to_dict())}
-    return json.dumps(data, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
-
-
-def _finite(data: Any) -> Any:
-    """Return plain data with None in the place of numbers that are not finite."""
-    if isinstance(data, dict):
-        return {name: _finite(value) for name, value in data.items()}
-    if isinstance(data, list):
-        return [_finite(value) for value in data]
-    return None if isinstance(data, float) and not math.isfinite(data) else data
+    return json_text({"schema": 1, "scene": setup, "run": run})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import click
 
 from asperity.cli.output import STANDARD_OUTPUT, check_output, write_output
 from asperity.errors import ParameterError, nearest_names
+from asperity.files import json_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -103,9 +103,8 @@ def surfaces_command(names: tuple[str, ...], json_path: str | None, html_path: s
     check_output("html", html_path)
     listed = listed_surfaces(names)
     if json_path is not None:
-        content = {"schema": SCHEMA, "surfaces": [one.to_dict() for one in listed]}
-        text = json.dumps(content, indent=2, allow_nan=False, ensure_ascii=False)
-        write_output("json", json_path, text + "\n")
+        content = {"schema": SCHEMA, "surfaces": listed}
+        write_output("json", json_path, json_text(content))
     if html_path is not None:
         from asperity.cli.gallery import gallery_text
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from asperity.files import write_text
 from asperity.laws import LAWS, Law
 
 GENERATED = Path(__file__).parent / "generated"
@@ -39,7 +40,7 @@ def main(arguments: list[str]) -> int:
             continue
         stale.append(path.name)
         if "--check" not in arguments:
-            path.write_text(text, encoding="utf-8")
+            write_text(path, text)
     if "--check" in arguments and stale:
         sys.stderr.write(f"out of date, run `make kernels`: {', '.join(stale)}\n")
         return 1

@@ -19,6 +19,7 @@ from types import ModuleType
 
 from asperity.derive.generate import generated_path
 from asperity.errors import ParameterError
+from asperity.files import write_text
 from asperity.kernels.driver import ClampName, DriverPlan, contact_source, driver_source
 from asperity.laws import LAWS, Law
 
@@ -263,12 +264,7 @@ def load_fused(source: str) -> ModuleType:
     name = f"asperity_fused_{digest}"
     path = cache_directory() / f"{name}.py"
     if not path.exists() or path.read_text(encoding="utf-8") != source:
-        # Written beside and renamed: another process never imports half a file.
-        with tempfile.NamedTemporaryFile(
-            "w", dir=path.parent, suffix=".tmp", delete=False, encoding="utf-8"
-        ) as file:
-            file.write(source)
-        Path(file.name).replace(path)
+        write_text(path, source)
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None

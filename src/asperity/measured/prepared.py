@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tempfile
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from asperity.checks import FloatArray
 from asperity.errors import ParameterError, SurfaceFileError
+from asperity.files import whole_file
 
 SCHEMA = 1
 """Version of the file's layout."""
@@ -52,8 +52,7 @@ def save_prepared(
 ) -> None:
     """Save a prepared surface as NPZ: heights, pitch, mask, steps, and where it came from.
 
-    The file appears whole or not at all: it is written beside its place under another name and
-    moved there at the end.
+    The file appears whole or not at all; see :func:`asperity.files.whole_file`.
 
     Args:
         path: the file to write; an existing one is replaced.
@@ -76,25 +75,13 @@ def save_prepared(
         "source": np.array(Path(source).name),
         "sha256": np.array(_sha256(Path(source))),
     }
-    temporary = ""
     try:
-        handle, temporary = tempfile.mkstemp(
-            dir=target.absolute().parent, prefix=f".{target.name}."
-        )
-        with os.fdopen(handle, "wb") as file:
+        with whole_file(target, durable=True) as file:
             np.savez(file, **members)  # type: ignore[arg-type]  # typed as if one might be a flag
-            file.flush()
-            os.fsync(file.fileno())
-        Path(temporary).chmod(0o666 & ~_umask())
-        Path(temporary).replace(target)
     except OSError as error:
-        _remove(temporary)
         raise ParameterError(
             "output", f"cannot be written: {error.strerror or error}", str(path)
         ) from None
-    except BaseException:
-        _remove(temporary)
-        raise
 
 
 def check_target(target: Path, source: Path) -> None:
@@ -201,14 +188,3 @@ def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
 def _sha256(path: Path) -> str:
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def _remove(temporary: str) -> None:
-    if temporary:
-        Path(temporary).unlink(missing_ok=True)
-
-
-def _umask() -> int:
-    current = os.umask(0)
-    os.umask(current)
-    return current

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.checks import FloatArray
+from asperity.files import plain
 
 
 @dataclass(frozen=True)
@@ -59,12 +60,12 @@ class Ledger:
         return change - (self.total + self.hand + self.friction - self.lost)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data."""
-        return {
-            "supplied": list(self.supplied),
+        """Return plain data [J], the sums over the axes as well; None for what overflowed."""
+        data = {
+            "supplied": self.supplied,
             "supplied_sum": self.total,
-            "same_sample": list(self.same_sample),
-            "same_sample_sum": float(sum(self.same_sample)),
+            "same_sample": self.same_sample,
+            "same_sample_sum": sum(self.same_sample),
             "sampling": self.sampling,
             "lost": self.lost,
             "hand": self.hand,
@@ -74,3 +75,4 @@ class Ledger:
             "closure": self.closure,
             "exchanged": self.exchanged,
         }
+        return dict(plain(data, infinity=None))

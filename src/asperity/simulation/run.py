@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.checks import FloatArray
+from asperity.files import record
 from asperity.simulation.ledger import Ledger
 from asperity.simulation.servo_source import COLUMNS
 
@@ -96,14 +97,7 @@ class Run:
         return {"supplied": self.table[:, 16:19], "same_sample": self.table[:, 19:22], **single}
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data without the trace, SI units."""
-        return {
-            "duration": self.duration,
-            "samples": self.samples,
-            "period": self.period,
-            "stopped": self.stopped,
-            "state": self.state.tolist(),
-            "ledger": self.ledger.to_dict(),
-            "trace": self.path or None,
-            "notes": list(self.notes),
-        }
+        """Return plain data without the trace, SI units; None for what overflowed."""
+        names = ("duration", "samples", "period", "stopped", "state", "ledger")
+        own = record(self, *names, infinity=None)
+        return own | {"trace": self.path or None, "notes": list(self.notes)}

@@ -10,8 +10,8 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import astuple
 from functools import lru_cache
 from pathlib import Path
@@ -21,6 +21,7 @@ import numpy as np
 
 from asperity.analysis.bounds.bound import Bound, Method
 from asperity.analysis.gain.certificate import Search
+from asperity.files import json_text, write_text
 from asperity.kernels.fuse import cache_directory, kernel_source
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
@@ -102,16 +103,6 @@ def _number(text: float | str) -> float:
 
 
 def _write(path: Path, bound: Bound) -> None:
-    beside = None
-    try:
+    with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        # Written beside and renamed: another process never reads half a file.
-        with tempfile.NamedTemporaryFile(
-            "w", dir=path.parent, suffix=".tmp", delete=False, encoding="utf-8"
-        ) as file:
-            beside = Path(file.name)
-            json.dump(bound.to_dict(), file)
-        beside.replace(path)
-    except OSError:
-        if beside is not None:
-            beside.unlink(missing_ok=True)
+        write_text(path, json_text(bound))

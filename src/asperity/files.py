@@ -1,0 +1,135 @@
+"""What leaves the program: files that are whole or not there, and values as plain data for JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import secrets
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from pathlib import Path
+from typing import IO, Any
+
+
+def is_device(path: str | os.PathLike[str]) -> bool:
+    """Return whether there is something that is no regular file (a pipe, a device, a folder)."""
+    return Path(path).exists() and not Path(path).is_file()
+
+
+@contextmanager
+def whole_file(path: str | os.PathLike[str], *, durable: bool = False) -> Iterator[IO[bytes]]:
+    """Open a file for writing that replaces an existing one only when all is written.
+
+    It is written beside its place under another name and moved there at the end, so that nobody
+    ever reads half a file, and an error leaves what was there. A link stays one: the file that it
+    leads to is replaced. A device or a pipe is written to, never replaced.
+
+    Args:
+        path: the file to write.
+        durable: wait until the content is on the disk, so that it survives a loss of power.
+
+    Yields:
+        The stream to write to.
+
+    Raises:
+        OSError: if the file cannot be written.
+    """
+    if is_device(path):
+        with Path(path).open("wb") as stream:
+            yield stream
+        return
+    target = Path(os.path.realpath(path))
+    beside = target.with_name(f".{secrets.token_hex(8)}.tmp")
+    try:
+        with beside.open("xb") as stream:
+            yield stream
+            if durable:
+                stream.flush()
+                os.fsync(stream.fileno())
+        beside.replace(target)
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write a text as UTF-8; see :func:`whole_file`."""
+    with whole_file(path) as stream:
+        stream.write(text.encode())
+
+
+def json_text(value: Any) -> str:
+    """Return a value as JSON text with a line feed at its end; see :func:`plain`.
+
+    Example:
+        >>> print(json_text({"reach": math.inf}), end="")
+        {
+          "reach": "inf"
+        }
+    """
+    return json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def plain(value: Any, infinity: str | None = "inf") -> Any:
+    """Return a value as JSON has it: dictionaries, lists, texts, numbers, truth values and None.
+
+    A number that is not known (NaN) is None. Enumerations are their values, dataclasses their
+    fields by name; what has a method ``to_dict`` says itself what it is.
+
+    Args:
+        value: the value.
+        infinity: what an unbounded number becomes, with a minus sign if it is negative; None where
+            infinity is no answer but an overflow.
+
+    Raises:
+        TypeError: for a kind of value that has no plain form.
+
+    Example:
+        >>> plain((1.5, -math.inf, math.nan)), plain(math.inf, infinity=None)
+        ([1.5, '-inf', None], None)
+    """
+    if isinstance(value, Enum):
+        value = value.value
+    elif hasattr(value, "tolist"):  # arrays and scalars of NumPy, which is not imported for this
+        value = value.tolist()
+    if value is None or isinstance(value, (str, int)):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else _not_finite(value, infinity)
+    if isinstance(value, Mapping):
+        return {str(name): plain(item, infinity) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item, infinity) for item in value]
+    return value.to_dict() if hasattr(value, "to_dict") else record(value, infinity=infinity)
+
+
+def _not_finite(value: float, infinity: str | None) -> str | None:
+    if infinity is None or math.isnan(value):
+        return None
+    return infinity if value > 0.0 else f"-{infinity}"
+
+
+def record(value: Any, *names: str, infinity: str | None = "inf") -> dict[str, Any]:
+    """Return attributes of an object as plain data; see :func:`plain`.
+
+    Args:
+        value: the object.
+        names: of its attributes, in order; by default all fields of a dataclass.
+        infinity: what an unbounded number becomes.
+    """
+    if not names:
+        if not is_dataclass(value):
+            raise TypeError(f"no plain data: {type(value).__name__}")
+        names = tuple(field.name for field in fields(value))
+    return {name: plain(getattr(value, name), infinity) for name in names}
+
+
+class Record:
+    """A dataclass that is written field by field."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units: infinity is the string "inf", what is not known None."""
+        return record(self)
