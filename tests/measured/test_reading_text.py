@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import time
 from pathlib import Path
 
 import numpy as np
@@ -291,3 +292,106 @@ def test_mutated_files_fail_only_as_surface_files(tmp_path: Path) -> None:
         assert not np.isinf(raw.heights).any()
         assert raw.pitch is None or min(raw.pitch) > 0
     assert min(outcomes.values()) > 30, outcomes
+
+
+# --- headers of maps ------------------------------------------------------------------------------
+
+MAP = "1 -2 3 4\n5 6 7 8\n9 10 11 12\n"
+
+
+def test_a_conversion_factor_of_the_header_is_applied(tmp_path: Path) -> None:
+    head = "h=3 w=4\npixel size=3.69862e-007 m\ndata unit=rad\n"
+    raw = read(tmp_path, head + "height conversion factor (-> m)=6.3e-008\n" + MAP)
+    assert raw.heights[2, 3] == 12 * 6.3e-8
+    assert raw.pitch == (3.69862e-7, 3.69862e-7)
+    assert raw.has_units
+    assert raw.notes == ("heights multiplied by the header's factor, 6.3e-08 m",)
+
+
+@pytest.mark.parametrize(
+    ("header", "match"),
+    [
+        ("data unit=rad", "no unit of length"),
+        ("data unit=V\npixel size=1e-6 m", "no unit of length|unit 'V'"),
+        ("height conversion factor=6.3e-8", "a number and a unit of length"),
+        ("z factor (-> m)=many", "a number and a unit of length"),
+        ("h=30 w=4", "the header says 30 rows of 4 heights, there are 3 rows of 4"),
+    ],
+)
+def test_a_header_that_cannot_be_applied_is_refused(
+    tmp_path: Path, header: str, match: str
+) -> None:
+    fails(tmp_path, f"{header}\n{MAP}", match)
+
+
+def test_a_unit_of_the_values_anywhere_in_the_header(tmp_path: Path) -> None:
+    raw = read(tmp_path, "# Value units: nm\n# Width: 8 um\n# Height: 3 um\n# made today\n" + MAP)
+    assert raw.heights[0, 1] == -2e-9
+    assert raw.pitch == pytest.approx((2e-6, 1e-6), rel=1e-15)
+
+
+@pytest.mark.parametrize("names", [("Width", "Height"), ("Breite", "Höhe")])
+def test_a_map_of_three_columns_as_gwyddion_exports_it(
+    tmp_path: Path, names: tuple[str, str]
+) -> None:
+    head = f"# Channel: Z\n# {names[0]}: 12 µm\n# {names[1]}: 8 µm\n# Value units: m\n"
+    raw = read(tmp_path, head + "1 1.5 3\n-2 -3 -6\n0 0 0\n9 9 9\n")
+    assert raw.heights.shape == (4, 3)
+    assert raw.pitch == pytest.approx((4e-6, 2e-6), rel=1e-15)
+
+
+# --- lists of points ------------------------------------------------------------------------------
+
+
+def points(order: list[int] | None = None, left_out: tuple[int, ...] = ()) -> list[str]:
+    rows = [(0.5 * i, 2.0 + j, 10.0 * i + j) for j in range(4) for i in range(5)]
+    chosen = [rows[k] for k in order or range(20) if k not in left_out]
+    return [f"{x} {y} {z}" for x, y, z in chosen]
+
+
+@pytest.mark.parametrize("seed", [None, 1, 2])
+def test_points_of_a_grid_in_any_order_are_a_map(tmp_path: Path, seed: int | None) -> None:
+    order = list(range(20))
+    if seed is not None:
+        random.Random(seed).shuffle(order)
+    raw = read(tmp_path, "x [um] y [um] z [nm]\n" + "\n".join(points(order)))
+    assert raw.pitch == pytest.approx((0.5e-6, 1e-6), rel=1e-12)
+    expected = [[(10.0 * i + j) * 1e-9 for i in range(5)] for j in range(4)]
+    np.testing.assert_allclose(raw.heights, expected, rtol=1e-15)
+    assert raw.has_units
+
+
+def test_a_point_that_a_grid_lacks_is_missing(tmp_path: Path) -> None:
+    raw = read(tmp_path, "\n".join(points(left_out=(7,))))
+    assert np.argwhere(np.isnan(raw.heights)).tolist() == [[1, 2]]
+    assert raw.notes == ("no unit in the file: taken as metres",)
+
+
+def test_points_on_one_line_are_a_profile(tmp_path: Path) -> None:
+    raw = read(tmp_path, "0 3 1\n0 1 2\n0 2 5\n0 4 7\n")
+    assert raw.heights.tolist() == [2.0, 5.0, 1.0, 7.0]
+    assert raw.pitch == (1.0,)
+
+
+@pytest.mark.parametrize(
+    ("rows", "match"),
+    [
+        (["0 0 1", "1 0.3 2", "2 0.7 3", "3.5 0.9 4", "4 1 5"], "no regular grid"),
+        ([*points(), "0.5 2 77"], "same position"),
+        ([*points(), "2.7 2 1", "2.7 3 1", "2.7 4 1", "2.7 5 1"], "positions are not uniform"),
+        (["nan 0 1", *points()], "position is missing"),
+    ],
+)
+def test_points_that_are_no_grid_are_refused(tmp_path: Path, rows: list[str], match: str) -> None:
+    fails(tmp_path, "\n".join(rows) + "\n", match)
+
+
+@pytest.mark.parametrize(
+    "header", ["[(" * 16_000, " " * 50_000, "no data" + " " * 50_000, "um (" * 12_000, "=" * 50_000]
+)
+def test_a_long_header_is_read_in_no_time(tmp_path: Path, header: str) -> None:
+    """Quadratic searches took 17 s and more than 100 s; this has room for a busy machine."""
+    before = time.process_time()
+    raw = read(tmp_path, f"x{header}x\n{MAP}")
+    assert time.process_time() - before < 5.0
+    assert raw.heights.shape == (3, 4)

@@ -13,19 +13,23 @@ from asperity.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading.numbers import parse_number
 from asperity.measured.reading.raw import MAX_POINTS, RawSurface
 from asperity.measured.reading.spacing import spacing
+from asperity.measured.reading.text_header import MapHeader, map_header
+from asperity.measured.reading.text_points import grid_of, refuse_missing_positions
 from asperity.measured.reading.text_table import Table, find_table
-from asperity.measured.reading.text_units import one_unit, two_units
+from asperity.measured.reading.text_units import one_unit, two_units, units_of
 
 _LEAST_POINTS = 4
+_LONGEST_HEADER = 1000
 _LONGEST = 10.0  # [m]; a longer measurement is rather one whose unit is not the metre
 
 
 def read_text(content: bytes, name: str, metres: float | None = None) -> RawSurface:
-    """Read a text matrix, a two-column profile (position, height) or a column of heights.
+    """Read a matrix, a profile (position, height), a list of x, y, z, or a column of heights.
 
     Cells are separated by tabs, semicolons, commas or white space. Empty cells and "nan"
     are missing points. A decimal comma is accepted where the separator is no comma. Two
-    columns are a profile where the first increases (or decreases) throughout.
+    columns are a profile where the first increases (or decreases) throughout; three are points
+    of a regular grid, in any order, unless the header is a map's.
 
     Args:
         content: the bytes of the file.
@@ -42,9 +46,13 @@ def read_text(content: bytes, name: str, metres: float | None = None) -> RawSurf
     try:
         table = find_table(_decode(content))
         _check_table(table)
-        if table.values.shape[1] == 2 and _is_monotonic(table):
+        header = map_header(table.header)
+        rows, columns = table.values.shape
+        if columns == 2 and not header.describes_map and _is_monotonic(table):
             return _profile(table, name, metres)
-        return _matrix(table, name, metres)
+        if columns == 3 and rows > 3 and not header.describes_map:
+            return _points(table, name, metres)
+        return _matrix(table, header, name, metres)
     except SurfaceFileError as error:
         raise SurfaceFileError(f"{name}: {error}") from error
 
@@ -66,11 +74,6 @@ def _check_table(table: Table) -> None:
     if table.values.size < _LEAST_POINTS or (columns <= 2 and rows < _LEAST_POINTS):
         raise SurfaceFileError(
             f"{rows} rows of {columns} numbers; at least {_LEAST_POINTS} points are expected"
-        )
-    if columns == 3 and rows > 3:
-        raise SurfaceFileError(
-            "three columns: a list of x, y, z points or of several heights has no grid;"
-            " a matrix of heights or two columns (position, height) are expected"
         )
     infinite = np.argwhere(np.isinf(table.values))
     if len(infinite):
@@ -94,9 +97,11 @@ def _is_monotonic(table: Table) -> bool:
 
 
 def _profile(table: Table, name: str, metres: float | None) -> RawSurface:
-    units = _units(table, name, metres, two_columns=True)
-    notes = _notes(table, units, metres)
-    unit_x, unit_z = units or (1.0, 1.0)
+    named = _near_two(table)
+    _refuse_second(named, name, metres)
+    known = named is not None or metres is not None
+    notes = _notes(table, known=known, metres=metres)
+    unit_x, unit_z = named or (metres or 1.0, metres or 1.0)
     positions, heights = table.values[:, 0], table.values[:, 1] * unit_z
     resolution = _resolution(table)
     lines = table.lines
@@ -112,31 +117,59 @@ def _profile(table: Table, name: str, metres: float | None) -> RawSurface:
             " resample the profile"
         )
     pitch = result.step * unit_x
-    if units is None and pitch * (len(heights) - 1) > _LONGEST:
+    _refuse_long(pitch * (len(heights) - 1), known=known)
+    return RawSurface(np.ascontiguousarray(heights), (pitch,), name, notes, has_units=known)
+
+
+def _refuse_long(length: float, *, known: bool) -> None:
+    if not known and length > _LONGEST:
         raise SurfaceFileError(
-            f"positions span {pitch * (len(heights) - 1):.4g} and look not to be in metres;"
-            " name the units in the column header, such as 'x [um], z [nm]', or give unit='mm'"
+            f"positions span {length:.4g} and look not to be in metres; name the units in the"
+            " column header, such as 'x [um], z [nm]', or give unit='mm'"
         )
-    return RawSurface(
-        np.ascontiguousarray(heights), (pitch,), name, notes, has_units=units is not None
-    )
 
 
-def _matrix(table: Table, name: str, metres: float | None) -> RawSurface:
+def _points(table: Table, name: str, metres: float | None) -> RawSurface:
+    """Return the map, or the profile along one axis, that a list of points is."""
+    named = _near_three(table)
+    _refuse_second(named, name, metres)
+    known = named is not None or metres is not None
+    unit_x, unit_y, unit_z = named or (metres or 1.0,) * 3
+    refuse_missing_positions(table.values)
+    grid = grid_of(table.values, (_resolution(table, 0), _resolution(table, 1)))
+    pitch = (grid.pitch[0] * unit_x, grid.pitch[1] * unit_y)
+    rows, columns = grid.heights.shape
+    _refuse_long(max(pitch[0] * (columns - 1), pitch[1] * (rows - 1)), known=known)
+    notes = _notes(table, known=known, metres=metres)
+    heights = np.ascontiguousarray(grid.heights * unit_z)
+    if 1 in heights.shape:
+        axis = 0 if rows == 1 else 1
+        return RawSurface(heights.ravel(), (pitch[axis],), name, notes, has_units=known)
+    return RawSurface(heights, pitch, name, notes, has_units=known)
+
+
+def _matrix(table: Table, header: MapHeader, name: str, metres: float | None) -> RawSurface:
     values = table.values
+    if header.shape is not None and header.shape != values.shape:
+        said, found = (
+            f"{rows} rows of {columns}" for rows, columns in (header.shape, values.shape)
+        )
+        raise SurfaceFileError(f"the header says {said} heights, there are {found}")
     _refuse_numbering(values)
-    notes = []
+    notes = list(header.notes)
     code = _code_of_missing(table.header)
     if code is not None:
         values = np.where(values == code, np.nan, values)
         notes.append(f"the header says that {code:g} is a missing point")
-    units = _units(table, name, metres, two_columns=False)
-    notes.extend(_notes(table, units, metres))
-    heights = np.ascontiguousarray(values * (units[1] if units else 1.0))
+    own = header.unit if header.unit is not None else one_unit(_last_header(table))
+    _refuse_second(own, name, metres)
+    unit = own if own is not None else metres
+    notes.extend(_notes(table, known=unit is not None, metres=metres))
+    heights = np.ascontiguousarray(values * (1.0 if unit is None else unit))
+    pitch: tuple[float, ...] | None = header.pitch_of(*values.shape)
     if heights.shape[1] == 1:
-        heights = heights[:, 0]
-    pitch = _pitch_of_size(table) if heights.ndim == 2 else None
-    return RawSurface(heights, pitch, name, tuple(notes), has_units=units is not None)
+        heights, pitch = heights[:, 0], None if pitch is None else pitch[1:]
+    return RawSurface(heights, pitch, name, tuple(notes), has_units=unit is not None)
 
 
 def _refuse_numbering(values: NDArray[np.float64]) -> None:
@@ -155,55 +188,39 @@ def _refuse_numbering(values: NDArray[np.float64]) -> None:
 def _code_of_missing(header: list[str]) -> float | None:
     """Return the number that stands for a missing point where the header declares one."""
     for line in header:
-        match = re.fullmatch(r"\s*no_?data(?:_?value)?\s*[:=,;\s]\s*(\S+)\s*", line, re.IGNORECASE)
-        if match:
-            return parse_number(match.group(1), "the header's value for missing points")
+        words = re.split(r"[:=,;\s]+", line[:_LONGEST_HEADER].strip())
+        if len(words) == 2 and words[0].lower().replace("_", "") in {"nodata", "nodatavalue"}:
+            return parse_number(words[1], "the header's value for missing points")
     return None
 
 
-def _pitch_of_size(table: Table) -> tuple[float, float] | None:
-    """Return the pitch from "Width: 5 µm" and "Height: 5 µm", as Gwyddion exports them."""
-    sizes = {}
-    for line in table.header:
-        match = re.fullmatch(
-            r"\s*(width|height)\s*:\s*([0-9.eE+-]+)\s*(\S+)\s*", line, re.IGNORECASE
-        )
-        unit = one_unit(match.group(3)) if match else None
-        if match and unit is not None:
-            sizes[match.group(1).lower()] = unit * parse_number(match.group(2), match.group(1))
-    if sizes.keys() != {"width", "height"} or min(sizes.values()) <= 0:
-        return None
-    rows, columns = table.values.shape
-    return sizes["width"] / columns, sizes["height"] / rows
-
-
-def _units(
-    table: Table, name: str, metres: float | None, *, two_columns: bool
-) -> tuple[float, float] | None:
-    """Return the units that the header names, else the one that was given, else None."""
-    units = _near(table, two_columns=two_columns)
-    if metres is None:
-        return units
-    if units is not None:
+def _refuse_second(named: object, name: str, metres: float | None) -> None:
+    """Refuse a unit for a file that names its own."""
+    if named is not None and metres is not None:
         raise ParameterError("unit", f"must not be given: {name} names its units")
-    return metres, metres
 
 
-def _near(table: Table, *, two_columns: bool) -> tuple[float, float] | None:
-    """Return the units that the last header line names, right before the numbers."""
+def _last_header(table: Table) -> str:
+    """Return the last header line, right before the numbers."""
     line = next((line for line in reversed(table.header) if line.strip(" \t,;")), "")
-    if two_columns:
-        cells = table.dialect.cells(line) if table.dialect.separator else []
-        return two_units(cells, line)
-    unit = one_unit(line)
-    return None if unit is None else (unit, unit)
+    return line if len(line) <= _LONGEST_HEADER else ""
 
 
-def _notes(
-    table: Table, units: tuple[float, float] | None, metres: float | None
-) -> tuple[str, ...]:
+def _near_two(table: Table) -> tuple[float, float] | None:
+    line = _last_header(table)
+    return two_units(table.dialect.cells(line) if table.dialect.separator else [], line)
+
+
+def _near_three(table: Table) -> tuple[float, float, float] | None:
+    found = units_of(_last_header(table))
+    if len(found) not in {0, 1, 3}:
+        raise SurfaceFileError("the header must name the unit of all three columns or of none")
+    return None if not found else (found[0], found[len(found) // 2], found[-1])
+
+
+def _notes(table: Table, *, known: bool, metres: float | None) -> tuple[str, ...]:
     notes = []
-    if units is None:
+    if not known:
         notes.append("no unit in the file: taken as metres")
     elif metres is not None:
         notes.append(f"no unit in the file: {metres:g} m as given")
@@ -214,13 +231,13 @@ def _notes(
     return tuple(notes)
 
 
-def _resolution(table: Table) -> NDArray[np.float64]:
-    """Return the value of the last printed digit of each position.
+def _resolution(table: Table, column: int = 0) -> NDArray[np.float64]:
+    """Return the value of the last printed digit of each number of a column.
 
     Fixed notation prints the same number of decimals, "%g" the same number of digits and
     drops zeros at the end; the coarser of both bounds the rounding in either case.
     """
-    cells = [_first_cell(table, text) for text in table.texts]
+    cells = [_cell(table, text, column) for text in table.texts]
     decimals = {len(cell.partition(".")[2]) for cell in cells}
     if len(decimals) == 1 and not any("e" in cell.lower() for cell in cells):
         return np.full(len(cells), 10.0 ** -min(decimals.pop(), 300))
@@ -238,8 +255,8 @@ def _decimal(text: str) -> Decimal:
         return Decimal(0)
 
 
-def _first_cell(table: Table, text: str) -> str:
+def _cell(table: Table, text: str, column: int) -> str:
     if table.dialect.decimal == ",":
         text = text.replace(",", ".")
-    cell = table.dialect.cells(text)[0]
+    cell = table.dialect.cells(text)[column]
     return re.sub(r"\s", "", cell)

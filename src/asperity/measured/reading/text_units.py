@@ -10,7 +10,7 @@ from asperity.measured.reading.length_units import METRES
 # Units of other things or of other systems: never to be mistaken for metres.
 _REFUSED = {"in", "inch", "inche", "mil", "thou", "ft", "feet", "volt", "px", "pixel", "mv", "kå"}
 _WORD = re.compile(r"[^\W\d_]+")
-_BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
+_BRACKET = re.compile(r"[\[(]([^\[\]()]*)[\])]")
 
 
 def units_of(text: str) -> list[float]:
@@ -103,7 +103,8 @@ def _in_brackets(text: str, match: re.Match[str]) -> bool:
 
 def _refuse_brackets(text: str) -> None:
     """Refuse "[V]" and the like: a bracket that stands where a unit stands."""
-    for content in _BRACKET.findall(text):
+    for bracket in _BRACKET.findall(text):
+        content = bracket.strip()
         if content and (len(content) <= 3 or _key(content) in _REFUSED):
             raise _unknown(content)
 

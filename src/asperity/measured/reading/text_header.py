@@ -1,0 +1,136 @@
+"""What the header of a text matrix says of its heights: unit, factor, size of a pixel."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from asperity.errors import SurfaceFileError
+from asperity.measured.reading.numbers import parse_number
+from asperity.measured.reading.text_units import one_unit, units_of
+
+# A longer line is no header but data that went astray.
+_LONGEST_LINE = 1000
+_BRACKETED = re.compile(r"[\[(]([^\[\]()]*)[\])]")
+_QUANTITY = re.compile(r"([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S*)")
+_COUNTS = re.compile(r"\b([hw])=([0-9]+)\b")
+# Gwyddion writes its header in the language of its user.
+_WIDTH = ("width", "breite", "largeur", "larghezza", "ancho", "šířka", "largura")
+_HEIGHT = ("height", "höhe", "hauteur", "altezza", "alto", "výška", "altura")
+_PIXEL = ("pixel size", "pixel width", "pixel pitch", "pixel spacing", "point spacing")
+_UNIT = ("data unit", "data units", "value unit", "value units", "z unit", "z units", "height unit")
+
+
+@dataclass(frozen=True)
+class MapHeader:
+    """What the header of a matrix says.
+
+    Attributes:
+        unit: metres per number, None where the header does not say.
+        pitch: distance of the points [m], None where it does not say.
+        size: (width, height) [m], None where it does not say.
+        shape: rows and columns, None where it does not say.
+        notes: what was applied, one sentence each.
+    """
+
+    unit: float | None = None
+    pitch: float | None = None
+    size: tuple[float, float] | None = None
+    shape: tuple[int, int] | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def describes_map(self) -> bool:
+        """Whether the header is that of a map, whatever the number of its columns."""
+        return not (self.pitch is None and self.size is None and self.shape is None)
+
+    def pitch_of(self, rows: int, columns: int) -> tuple[float, float] | None:
+        """Return the pitch of a matrix of so many rows and columns [m]."""
+        if self.pitch is not None:
+            return self.pitch, self.pitch
+        if self.size is None:
+            return None
+        return self.size[0] / columns, self.size[1] / rows
+
+
+def map_header(lines: Sequence[str]) -> MapHeader:
+    """Return what a header says of the heights below it.
+
+    Raises:
+        SurfaceFileError: for a factor or a unit of the heights that cannot be applied: heights
+            that are wrong by it would pass unnoticed.
+
+    Example:
+        >>> header = map_header(["pixel size=3.7e-007 m", "height conversion factor (-> m)=6e-8"])
+        >>> header.unit, header.pitch
+        (6e-08, 3.7e-07)
+    """
+    entries = dict(_entry(line) for line in lines if len(line) <= _LONGEST_LINE)
+    factor = _factor(entries)
+    unit = factor if factor is not None else _unit(entries)
+    notes = () if factor is None else (f"heights multiplied by the header's factor, {factor:g} m",)
+    sides = [_length(entries, names) for names in (_WIDTH, _HEIGHT)]
+    size = None if sides[0] is None or sides[1] is None else (sides[0], sides[1])
+    return MapHeader(unit, _length(entries, _PIXEL), size, _shape(lines), notes)
+
+
+def _entry(line: str) -> tuple[str, str]:
+    """Return key and value of "key=value" or "key: value"."""
+    sign = min((s for s in "=:" if s in line), key=line.index, default="=")
+    key, _, value = line.partition(sign)
+    return " ".join(key.lower().split()), value.strip()
+
+
+def _length(entries: dict[str, str], names: Sequence[str]) -> float | None:
+    """Return the positive length [m] that one of the keys names."""
+    for name in names:
+        match = _QUANTITY.fullmatch(entries.get(name, ""))
+        if match is None:
+            continue
+        metres = one_unit(match.group(2)) if match.group(2) else None
+        number = parse_number(match.group(1), name)
+        if metres is not None and number > 0.0:
+            return number * metres
+    return None
+
+
+def _factor(entries: dict[str, str]) -> float | None:
+    """Return the metres per number that a conversion factor of the heights says."""
+    for key, value in entries.items():
+        words = set(_BRACKETED.sub(" ", key).split())
+        if "factor" not in words or not words & {"height", "z", "data", "value", "conversion"}:
+            continue
+        match = _QUANTITY.fullmatch(value)
+        target = units_of(f"{' '.join(_BRACKETED.findall(key))} {match.group(2) if match else ''}")
+        if match is None or len(set(target)) != 1:
+            raise SurfaceFileError(
+                f"the header's {key!r} is {value[:40]!r}; a number and a unit of length, such as "
+                "'(-> m)=6.3e-8', are expected: without them the heights are not known"
+            )
+        return parse_number(match.group(1), key) * target[0]
+    return None
+
+
+def _unit(entries: dict[str, str]) -> float | None:
+    """Return the metres per number that the unit of the heights says."""
+    for name in _UNIT:
+        if name not in entries:
+            continue
+        metres = one_unit(entries[name])
+        if metres is None:
+            raise SurfaceFileError(
+                f"the header's {name!r} is {entries[name][:40]!r}, no unit of length, and there is "
+                "no conversion factor: the heights are not known"
+            )
+        return metres
+    return None
+
+
+def _shape(lines: Sequence[str]) -> tuple[int, int] | None:
+    """Return rows and columns from "h=650 w=650"."""
+    for line in lines:
+        found = dict(_COUNTS.findall(line[:_LONGEST_LINE]))
+        if len(found) == 2:
+            return int(found["h"][:12]), int(found["w"][:12])
+    return None
