@@ -243,7 +243,7 @@ def test_garbage_is_not_claimed(tmp_path: Path, size: int) -> None:
 @needs_library
 def test_text_stays_ours(tmp_path: Path) -> None:
     path = tmp_path / "points.txt"
-    path.write_text("".join(f"{x} {y} {x * y}\n" for x in range(5) for y in range(5)))
+    path.write_text("".join(f"{x + y / 100} {y} {x * y}\n" for x in range(5) for y in range(5)))
     with pytest.raises(SurfaceFileError, match="three columns"):
         read_surface(path)
 
