@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
-from asperity.definition import exact_force, exact_height, exact_jacobian
-from asperity.errors import ParameterError
+from asperity.definition import exact_force, exact_jacobian
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Profile, Sinusoid, Texture
 
@@ -23,7 +22,7 @@ ORDERS = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
 
 
 def exact_derivatives(texture: Texture, xy: np.ndarray) -> np.ndarray:
-    h = exact_height(texture)
+    h = texture.exact_height()
     with mpmath.workdps(30):
         return np.array(
             [[float(h(mpmath.mpf(x), mpmath.mpf(y), *order)) for order in ORDERS] for x, y in xy]
@@ -52,7 +51,7 @@ def test_splines_are_scipy_s(texture: HeightMap | Profile, scatter: Check):
 
 @pytest.mark.parametrize("order", ORDERS[1:])
 def test_derivatives_are_those_of_the_height(texture: Texture, order: tuple[int, int]):
-    h = exact_height(texture)
+    h = texture.exact_height()
     point = (mpmath.mpf("1.3137e-4"), mpmath.mpf("2.7193e-4"))
     with mpmath.workdps(40):
         numeric = mpmath.diff(lambda x, y: h(x, y, 0, 0), point, order, h=mpmath.mpf("1e-15"))
@@ -60,9 +59,19 @@ def test_derivatives_are_those_of_the_height(texture: Texture, order: tuple[int,
         assert abs(h(*point, *order) - numeric) < 1e-8 * bound
 
 
-def test_a_texture_of_ones_own_has_no_definition():
-    with pytest.raises(ParameterError, match="no exact definition"):
-        exact_height(object())  # type: ignore[arg-type]
+def test_a_kind_without_a_formula_is_continued_between_doubles(texture: Texture):
+    """Values and slopes are consistent: a difference over 1e-25 m is the slope."""
+    h, formula = Texture.exact_height(texture), texture.exact_height()
+    scale = (texture.peak_to_valley, *texture.bounds)
+    with mpmath.workdps(60):
+        x, y, step = mpmath.mpf("1.3137e-4"), mpmath.mpf("2.7193e-4"), mpmath.mpf("1e-25")
+        for m, n in ORDERS:
+            assert abs(h(x, y, m, n) - formula(x, y, m, n)) < 1e-12 * scale[m + n]
+        for m, n in ORDERS[:3]:
+            rate = (h(x + step, y, m, n) - h(x - step, y, m, n)) / (2 * step)
+            assert abs(rate - h(x, y, m + 1, n)) < 1e-12 * scale[m + n + 1]
+            rate = (h(x, y + step, m, n) - h(x, y - step, m, n)) / (2 * step)
+            assert abs(rate - h(x, y, m, n + 1)) < 1e-12 * scale[m + n + 1]
 
 
 def sampled_wave(count: int, rows: int) -> tuple[Texture, Sinusoid]:

@@ -7,7 +7,7 @@ solving its condition, the Jacobian from differences of the force in doubled pre
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import mpmath
@@ -17,90 +17,8 @@ from asperity.contacts.symbols import DEPTH, DX, DY, H_HALF, H_MID, HX, HY, POSI
 from asperity.derive.jacobian import symbolic_force
 from asperity.errors import ParameterError
 from asperity.surface import Surface
-from asperity.textures.fourier import Fourier
-from asperity.textures.heightmap import HeightMap
-from asperity.textures.profile import Profile
-from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.exact import ExactHeight
 from asperity.textures.texture import Texture
-
-ExactHeight = Callable[[Any, Any, int, int], Any]
-
-
-def exact_height(texture: Texture) -> ExactHeight:
-    """Return h(x, y, m, n): the derivative of order (m, n) of the height, m + n <= 2, in mpmath.
-
-    Raises:
-        ParameterError: for a texture kind without a definition here.
-    """
-    if isinstance(texture, Sinusoid):
-        k = 2 * mpmath.pi / mpmath.mpf(texture.period)
-        # The direction as the sampler receives it: a unit vector to double precision.
-        waves = [
-            (texture.amplitude, k * texture.direction[0], k * texture.direction[1], texture.phase)
-        ]
-        return lambda x, y, m, n: _wave_sum(waves, x, y, m, n)
-    if isinstance(texture, Fourier):
-        waves = list(zip(texture.amplitudes, *texture.wavevectors.T, texture.phases, strict=True))
-        return lambda x, y, m, n: _wave_sum(waves, x, y, m, n)
-    if isinstance(texture, HeightMap):
-        return lambda x, y, m, n: _spline_surface(texture, x, y, m, n)
-    if isinstance(texture, Profile):
-        return lambda x, _y, m, n: _spline_profile(texture, x, m, n)
-    raise ParameterError("texture", "has no exact definition", texture)
-
-
-def _wave_sum(waves: Sequence[Any], x: Any, y: Any, m: int, n: int) -> Any:
-    total = mpmath.mpf(0)
-    for a, kx, ky, phase in waves:
-        u, v = mpmath.mpf(kx), mpmath.mpf(ky)
-        angle = u * x + v * y + mpmath.mpf(phase)
-        total += mpmath.mpf(a) * u**m * v**n * mpmath.sin(angle + (m + n) * mpmath.pi / 2)
-    return total
-
-
-def _basis(u: Any, order: int) -> Any:
-    """Cardinal cubic B-spline β(u), support (-2, 2), or its derivative: truncated powers."""
-    total = mpmath.mpf(0)
-    for j, weight in enumerate((1, -4, 6, -4, 1)):
-        t = u + 2 - j
-        if t > 0:
-            total += weight * t ** (3 - order) / mpmath.factorial(3 - order)
-    return total
-
-
-def _weights(u: Any, count: int, periodic: bool, order: int) -> dict[int, Any]:
-    """Return the weight of each node at u [nodes], the border folded node by node."""
-    weights: dict[int, Any] = {}
-    first = int(mpmath.floor(u)) - 1
-    for j in range(first, first + 4):
-        node = j % count if periodic else j % (2 * (count - 1))
-        node = node if node < count else 2 * (count - 1) - node
-        weights[node] = weights.get(node, 0) + _basis(u - j, order)
-    return weights
-
-
-def _spline_surface(texture: HeightMap, x: Any, y: Any, m: int, n: int) -> Any:
-    u = (x - mpmath.mpf(texture.origin[0])) / mpmath.mpf(texture.pitch[0])
-    v = (y - mpmath.mpf(texture.origin[1])) / mpmath.mpf(texture.pitch[1])
-    ny, nx = texture.heights.shape
-    columns = _weights(u, nx, texture.periodic, m)
-    rows = _weights(v, ny, texture.periodic, n)
-    inner = texture.coefficients[1:, 1:]  # without the row and column before the first cell
-    total = sum(
-        wr * wc * mpmath.mpf(float(inner[i, j]))
-        for i, wr in rows.items()
-        for j, wc in columns.items()
-    )
-    return total / mpmath.mpf(texture.pitch[0]) ** m / mpmath.mpf(texture.pitch[1]) ** n
-
-
-def _spline_profile(texture: Profile, x: Any, m: int, n: int) -> Any:
-    if n > 0:
-        return mpmath.mpf(0)
-    u = (x - mpmath.mpf(texture.origin)) / mpmath.mpf(texture.pitch)
-    columns = _weights(u, len(texture.heights), texture.periodic, m)
-    total = sum(w * mpmath.mpf(float(texture.coefficients[j + 1])) for j, w in columns.items())
-    return total / mpmath.mpf(texture.pitch) ** m
 
 
 def exact_force(
@@ -157,7 +75,7 @@ def exact_jacobian(
 
 
 def _force(surface: Surface, p: list[Any], d: list[Any]) -> Any:
-    law, h = surface.law, exact_height(surface.texture)
+    law, h = surface.law, surface.texture.exact_height()
     if law.contact.name == "split":
         # Its definition is a supremum over space: the theorems on it are tested instead.
         raise ParameterError("surface", f"with law {law} has no definition in many digits")

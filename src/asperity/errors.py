@@ -55,6 +55,13 @@ class LawError(ParameterError):
         return self.requirement
 
 
+class InternalError(AsperityError, RuntimeError):
+    """What was proved and what was evaluated contradict each other: no result can be trusted.
+
+    A mistake in the code, or in the bounds that a texture kind of your own claims.
+    """
+
+
 def nearest_names(name: str, known: Iterable[str]) -> str:
     """Return a hint such as ``did you mean 'omega.3'?`` and the full choice.
 

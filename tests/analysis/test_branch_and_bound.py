@@ -29,9 +29,9 @@ from asperity.analysis.bounds.problems import (
 from asperity.analysis.gain.friction import largest_singular_value, largest_symmetric_eigenvalue
 from asperity.analysis.gain.medial_axis import crest_curvature
 from asperity.checks import FloatArray
+from asperity.enclosures.cells import Cells
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Sinusoid, Texture
-from asperity.textures.cells import Cells, cells_of
 
 NUMBERS = [NORM, ONE_SIDED, CURL]
 EXACT = {"norm": precise_norm, "one-sided": precise_one_sided, "curl": curl}
@@ -278,7 +278,7 @@ SINE = Sinusoid(0.4e-3, 1.5e-3, 0.7, (2.0, 1.0))
 
 
 def problems(texture: Texture) -> list[Problem]:
-    cells = cells_of(texture)
+    cells = texture.cells()
     assert cells is not None
     surface = Surface(texture, "F", max_depth=0.5e-3)
     return [
@@ -313,7 +313,7 @@ def test_no_value_in_a_cell_exceeds_its_bound(texture: Texture, level: int) -> N
 
 
 def test_the_slope_is_the_length_of_the_gradient() -> None:
-    cells = cells_of(WAVES)
+    cells = WAVES.cells()
     assert cells is not None
     at = cells.samples(20)
     slope = np.hypot(*WAVES.gradient(cells.plane(at)).T)
@@ -323,7 +323,7 @@ def test_the_slope_is_the_length_of_the_gradient() -> None:
 
 
 def test_crests_are_as_sharp_as_their_principal_curvature() -> None:
-    cells = cells_of(MAP)
+    cells = MAP.cells()
     assert cells is not None
     at = cells.samples(200)
     expected = np.maximum(crest_curvature(MAP.derivatives(cells.plane(at))), 0.0)
@@ -331,7 +331,7 @@ def test_crests_are_as_sharp_as_their_principal_curvature() -> None:
 
 
 def test_a_crest_at_the_centre_of_curvature_needs_no_further_search() -> None:
-    cells = cells_of(MAP)
+    cells = MAP.cells()
     assert cells is not None
     problem = CrestProblem(cells, 1e-3)
     assert problem.enough(2e3, 1e-6) == math.inf
@@ -340,7 +340,7 @@ def test_a_crest_at_the_centre_of_curvature_needs_no_further_search() -> None:
 
 
 def test_the_normal_turns_as_fast_as_differences_say() -> None:
-    cells = cells_of(WAVES)
+    cells = WAVES.cells()
     assert cells is not None
     at = cells.samples(10)
     xy, step = cells.plane(at), 1e-8

@@ -12,13 +12,10 @@ import numpy as np
 import pytest
 
 from asperity.analysis.bounds.branch_and_bound import _parts, _split
-from asperity.definition import exact_height
-from asperity.enclosures.cells import ORDERS, spread
+from asperity.enclosures.cells import NAMES, ORDERS, Cells, spread
 from asperity.enclosures.products import ProductCells, anchor_models, with_deflection
 from asperity.enclosures.taylor import Taylor
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
-from asperity.textures.cells import NAMES, Cells, WaveCells, cells_of
-from asperity.textures.cells.splines import MapCells
 from asperity.textures.cells.waves import nearest_phases
 
 RNG = np.random.default_rng(20260611)
@@ -75,7 +72,7 @@ TEXTURES: dict[str, Build] = {
 def cells(name: str, margin: float = 0.0) -> tuple[Texture, Any]:
     build, extent = TEXTURES[name]
     texture = build()
-    found = cells_of(texture, extent, margin)
+    found = texture.cells(extent, margin)
     assert found is not None
     return texture, found
 
@@ -105,7 +102,7 @@ def exactly(texture: Texture, margin: float, extent: Any, coordinates: np.ndarra
         where = [mpmath.mpf(texture.origin) + c[0] * mpmath.mpf(texture.pitch), mpmath.mpf(0)]
     else:
         where = [value - mpmath.mpf(margin) for value in c]
-    h = exact_height(texture)
+    h = texture.exact_height()
     return [h(*where, *ORDERS[name]) for name in NAMES]
 
 
@@ -114,7 +111,7 @@ def _on_torus(texture: Sinusoid | Fourier, c: list[Any]) -> list[Any]:
         a, kx, ky, phase = texture.arguments
         waves = [(a, kx, ky, phase, [1])]
     else:
-        _basis, multiples = texture.lattice
+        _basis, multiples = texture.waves.lattice
         rows = zip(texture.amplitudes, texture.wavevectors, texture.phases, multiples, strict=True)
         waves = [(a, *k, phase, n.tolist()) for a, k, phase, n in rows]
     totals = [mpmath.mpf(0)] * 6
@@ -265,7 +262,7 @@ def test_the_error_shrinks_with_the_square_of_the_cell(name: str) -> None:
 def test_blocks_of_a_tilted_plane_are_exact() -> None:
     """A linear height is its own linear part: next to nothing is left, also of its slopes."""
     y, x = np.mgrid[0:16.0, 0:16.0]
-    found = MapCells(HeightMap(1e-4 * x - 3e-4 * y, (3e-4, 7e-4)))
+    found = HeightMap(1e-4 * x - 3e-4 * y, (3e-4, 7e-4)).cells()
     centres, half = np.array([[8.0, 8.0]]), np.array([2.0, 2.0])
     models = found.models(centres, half, ["h", "hx", "hy"])
     # The border is mirrored, which reaches a little into the middle.
@@ -283,7 +280,7 @@ def test_blocks_of_a_tilted_plane_are_exact() -> None:
 def test_blocks_of_ridges_touch_their_bounds() -> None:
     """Second derivatives along a ridged map are linear between nodes: its hull is attained."""
     texture = HeightMap(1e-4 * np.tile(ROUGH[0], (9, 1)), 3e-4)
-    found = MapCells(texture)
+    found = texture.cells()
     chunks, half = found.start()
     centres = np.concatenate(list(chunks))
     assert half.tolist() == [2.0, 2.0]
@@ -308,16 +305,10 @@ def test_a_margin_widens_the_extent_on_every_side() -> None:
     assert (np.abs(found.derivatives(coordinates) - texture.derivatives(xy)) < 1e-12 * scale).all()
 
 
-def test_four_phases_need_an_extent_and_an_own_kind_has_no_cells() -> None:
+def test_four_phases_need_an_extent() -> None:
     four = Fourier(np.ones(4), np.random.default_rng(1).normal(size=(4, 2)))
-    assert cells_of(four) is None
-    assert cells_of(four, (1.0, 2.0)) is not None
-
-    class Own(Texture):
-        kind = "own"
-
-    Own.__abstractmethods__ = frozenset()
-    assert cells_of(Own()) is None
+    assert four.cells() is None
+    assert four.cells((1.0, 2.0)) is not None
 
 
 # --- waves that nearly repeat ---------------------------------------------------------------------
@@ -330,7 +321,7 @@ def almost() -> Fourier:
 
 def test_waves_that_repeat_but_for_rounding_are_enclosed_within_their_domain() -> None:
     texture = almost()
-    found = WaveCells(texture)
+    found = texture.cells()
     assert found.dimensions == 1
     assert 1e-10 < found._miss < 1e-8
     xy = texture.domain.points(np.array([[0.9], [0.5], [0.77]]))
@@ -352,7 +343,7 @@ def test_waves_that_repeat_but_for_rounding_are_enclosed_within_their_domain() -
 def test_phases_that_cancel_are_charged_by_their_size() -> None:
     """7·1000 - 7·1000 turns and a phase: the angles are small, their rounding is not."""
     waves = np.array([[1.0, 0.0], [0.0, 1.0], [997.0, -991.0]])
-    found = WaveCells(Fourier([1.0, 1.0, 1.0], waves))
+    found = Fourier([1.0, 1.0, 1.0], waves).cells()
     centres = np.array([[6.0, 6.0]])
     model = found.models(centres, np.zeros(2), ["h"])["h"]
     assert isinstance(model, Taylor)

@@ -14,13 +14,13 @@ import pytest
 from asperity.analysis.bounds.measures import NORM
 from asperity.analysis.bounds.problems import _stacked, law_constants, law_kernel
 from asperity.definition import exact_jacobian
+from asperity.enclosures.cells import NAMES
 from asperity.enclosures.products import with_depth
 from asperity.enclosures.taylor import Taylor, TaylorMath, reciprocal
 from asperity.kernels.fuse import kernel_source
 from asperity.laws import Law, find_law
 from asperity.surface import Surface
 from asperity.textures import Fourier
-from asperity.textures.cells import NAMES, cells_of
 
 SAMPLES = 64
 WIDE = np.longdouble
@@ -268,7 +268,7 @@ def plain_kernel(law: Law) -> Callable[..., Any]:
 def test_law_kernels_enclose_their_own_numbers(law: str | Law, level: int) -> None:
     """On cells of the torus times a range of depths, at random points of each."""
     surface = Surface(TEXTURE, law, max_depth=DEPTH)
-    texture_cells = cells_of(TEXTURE)
+    texture_cells = TEXTURE.cells()
     assert texture_cells is not None
     cells = with_depth(texture_cells, DEPTH)
     rng = np.random.default_rng(level)
@@ -309,7 +309,7 @@ def _encloses(model: Any, xi: np.ndarray, cell: int, value: float) -> bool:
 def test_law_kernels_enclose_the_definition(letter: str) -> None:
     """The Jacobian in 30 digits, which shares nothing but the symbolic force."""
     surface = Surface(TEXTURE, letter, stiffness=1.0, max_depth=DEPTH)
-    texture_cells = cells_of(TEXTURE)
+    texture_cells = TEXTURE.cells()
     assert texture_cells is not None
     half, rng = np.array([0.02, 0.02]), np.random.default_rng(3)
     centres = rng.uniform(0.0, 6.0, (3, 2))

@@ -32,8 +32,6 @@ from asperity.surface import (
     Surface,
     default_max_depth,
 )
-from asperity.textures.heightmap import HeightMap
-from asperity.textures.profile import Profile
 from asperity.textures.texture import Texture
 from asperity.units import engineering, rounded_down
 
@@ -254,7 +252,7 @@ def _refuse_beyond(surface: Surface) -> None:
 
 def _width(texture: Texture) -> float:
     """Return how wide a finite surface is, the shorter way [m]; infinite where it goes on."""
-    if texture.domain.periodic or not isinstance(texture, (HeightMap, Profile)):
+    if not texture.ends:
         return math.inf
     return float(np.hypot(*texture.domain.spans.T).min())
 
@@ -298,7 +296,7 @@ def _capital(words: str) -> str:
 def _assumptions(result: Analysis, extent: tuple[float, float] | None) -> tuple[str, ...]:
     surface, leak = result.surface, result.leak
     texture, depth = surface.texture, engineering(surface.max_depth, "m")
-    said = [*getattr(texture, "preparation", ()), *_defaults(surface)]
+    said = [*texture.preparation, *_defaults(surface)]
     region = texture.domain.description
     if extent is not None:
         region = " x ".join(engineering(side, "m") for side in extent) + " from the origin"

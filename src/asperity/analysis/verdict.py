@@ -166,7 +166,7 @@ def assumptions(
         given: names of the arguments of the surface that the user gave.
     """
     first = rows[0].surface
-    result = [*getattr(first.texture, "preparation", ())]
+    result = [*first.texture.preparation]
     result += _defaulted(rows, defaults, given)
     datum = device.data["max_stiffness"]
     mark = "" if datum.verified else " (not verified)"

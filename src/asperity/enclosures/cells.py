@@ -28,11 +28,13 @@ class Cells(ABC):
         dimensions: how many coordinates they have.
         gap: the relative gap that is reached in reasonable time.
         wish: a smaller one that is worth a try.
+        most: cells beyond which halving them tells little more; as many as asked for by default.
     """
 
     dimensions: int
     gap: float
     wish: float | None = None
+    most: int | None = None
 
     @abstractmethod
     def start(self) -> tuple[Iterator[FloatArray], FloatArray]:

@@ -22,6 +22,7 @@ class ProductCells(Cells):
 
     def __init__(self, flat: Cells, further: dict[str, float]) -> None:
         self._flat, self._further = flat, further
+        self.most = flat.most
         self._tops = np.array(list(further.values()))
         self.dimensions = flat.dimensions + len(further)
         self.gap = max(flat.gap, GAPS.get(self.dimensions, 1e-3))

@@ -173,9 +173,7 @@ def spots(law: str, count: int = 4, seed: int = 5) -> Iterator[Spot]:
 
 
 def _profile(surface: Surface) -> Callable[[Any, int], Any]:
-    from asperity.definition import exact_height
-
-    height = exact_height(surface.texture)
+    height = surface.texture.exact_height()
     return lambda x, order: height(x, _ACROSS, order, 0)
 
 

@@ -35,8 +35,6 @@ from asperity.simulation import (
     Path as PathMotion,
 )
 from asperity.surface import Surface
-from asperity.textures.heightmap import HeightMap
-from asperity.textures.profile import Profile
 from asperity.textures.texture import Texture
 from asperity.units import engineering
 
@@ -227,7 +225,7 @@ def _duration(given: float | None, own: float | None, motion: Motion) -> tuple[f
 def _leaving(texture: Texture, motion: Motion, span: float) -> list[str]:
     """Return a warning if the hand's way leaves a surface that ends."""
     domain = texture.domain
-    if domain.periodic or not isinstance(texture, (HeightMap, Profile)):
+    if not texture.ends:
         return []
     way = motion.at(np.linspace(0.0, span, 257))[:, :2] - domain.origin
     sides = np.hypot(*domain.spans.T)

@@ -5,15 +5,22 @@ from __future__ import annotations
 import math
 from functools import cached_property
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray, array
+from asperity.enclosures.cells import Cells
 from asperity.errors import ParameterError
-from asperity.textures.lattice import integer_lattice
-from asperity.textures.texture import Domain, ScanLine, Texture
+from asperity.textures.cells.lines import Pieces, wave_pieces
+from asperity.textures.cells.waves import WaveCells
+from asperity.textures.domain import Domain, ScanLine
+from asperity.textures.plane_waves import PlaneWaves
+from asperity.textures.texture import Texture
+
+if TYPE_CHECKING:
+    from asperity.textures.exact import ExactHeight
 
 # How many of the longest waves stand for a sum that never repeats.
 _WAVES_OF_AN_ENDLESS_SUM = 16
@@ -96,9 +103,31 @@ class Fourier(Texture):
         return bool(np.abs(cross).max() < 1e-14)
 
     @cached_property
-    def lattice(self) -> tuple[FloatArray, FloatArray]:
-        """Independent wave vectors B [rad/m], (r, 2), and integers N with wavevectors = N @ B."""
-        return integer_lattice(self.wavevectors)
+    def waves(self) -> PlaneWaves:
+        """The waves of the sum."""
+        return PlaneWaves(self.amplitudes, self.wavevectors, self.phases)
+
+    def exact_height(self) -> ExactHeight:
+        """See :class:`Texture`."""
+        from asperity.textures.exact import exact_waves
+
+        columns = (self.amplitudes, *self.wavevectors.T, self.phases)
+        return exact_waves(list(zip(*columns, strict=True)))
+
+    def cells(self, extent: tuple[float, float] | None = None, margin: float = 0.0) -> Cells | None:
+        """See :class:`Texture`; more than three independent phases need an extent."""
+        reach = float(np.hypot(*self.domain.spans.T).sum())
+        cells = WaveCells(self.waves, extent, margin, reach)
+        return cells if cells.dimensions <= _LARGEST_TORUS else None
+
+    def sampling_cells(self) -> Cells:
+        """See :class:`Texture`; of an endless sum those of a rectangle of the plane."""
+        width, depth = (float(side) for side in np.abs(self.domain.spans).sum(axis=0))
+        return self.cells() or WaveCells(self.waves, (width, depth))
+
+    def line_pieces(self, line: ScanLine, least: int) -> Pieces:
+        """See :class:`Texture`."""
+        return wave_pieces(self.waves, line, least)
 
     @cached_property
     def extremes(self) -> tuple[float, float]:
@@ -116,7 +145,7 @@ class Fourier(Texture):
     @cached_property
     def _periods(self) -> FloatArray | None:
         """Edge vectors of one period [m], or nothing for a sum that never repeats."""
-        basis, _multiples = self.lattice
+        basis, _multiples = self.waves.lattice
         if len(basis) == 1:
             periods: FloatArray = 2.0 * math.pi * basis / np.sum(basis**2)
             return periods
@@ -173,7 +202,7 @@ class Fourier(Texture):
     def _supremum(self, amplitudes: FloatArray) -> float:
         """Return sup Σ a_i sin(θ_i + phase_i) by branch and bound on the torus of phases."""
         total = float(np.abs(amplitudes).sum())
-        _basis, multiples = self.lattice
+        _basis, multiples = self.waves.lattice
         rank = multiples.shape[1]
         if rank == len(amplitudes) or rank > _LARGEST_TORUS:
             return total  # every phase is free, or more are than can be searched: a safe bound

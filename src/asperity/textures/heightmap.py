@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from types import ModuleType
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,10 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
 from asperity.textures.bernstein import greatest_height
+from asperity.textures.cells.lines import Pieces, spline_pieces
+from asperity.textures.cells.splines import MapCells
+from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.pyramid import plane_pyramid
-from asperity.textures.texture import Domain, ScanLine, Texture
+from asperity.textures.texture import Texture
+
+if TYPE_CHECKING:
+    from asperity.textures.exact import ExactHeight
 
 LEAST_NODES = 4
+# Samples of a dense search: parts of the cells are looked at as long as there are no more.
+_MOST_SAMPLES = 1_200_000
 
 
 class HeightMap(Texture):
@@ -45,6 +53,7 @@ class HeightMap(Texture):
     """
 
     kind: ClassVar[str] = "heightmap"
+    sample_offset: ClassVar[float] = 0.0
 
     def __init__(
         self,
@@ -126,6 +135,48 @@ class HeightMap(Texture):
         text = "one period" if self.periodic else "the extent of the map"
         spans = np.diag(self._extent)
         return Domain(self.origin, spans, periodic=self.periodic, description=text)
+
+    @property
+    def ends(self) -> bool:
+        """See :class:`Texture`."""
+        return not self.periodic
+
+    def exact_height(self) -> ExactHeight:
+        """See :class:`Texture`."""
+        from asperity.textures.exact import exact_map
+
+        ny, nx = self.heights.shape
+        inner = self.coefficients[1 : ny + 1, 1 : nx + 1]
+        return exact_map(inner, self.pitch, self.origin, self.periodic)
+
+    def cells(
+        self,
+        extent: tuple[float, float] | None = None,  # noqa: ARG002 - all of it, always
+        margin: float = 0.0,  # noqa: ARG002 - likewise
+    ) -> MapCells:
+        """See :class:`Texture`; the cells of the spline, all of them."""
+        return MapCells(self.coefficients, self.pitch, self.origin, self.derivatives)
+
+    def line_pieces(self, line: ScanLine, least: int) -> Pieces | None:
+        """See :class:`Texture`; a line along an axis, from node to node."""
+        return spline_pieces(self.cells(), line, least)
+
+    def sample_counts(self) -> list[int]:
+        """See :class:`Texture`; whole parts of the cells."""
+        counts = [n - self.ends for n in self.heights.shape[::-1]]
+        while counts[0] * counts[1] * 4 <= _MOST_SAMPLES // 4:
+            counts = [2 * n for n in counts]
+        while counts[0] * counts[1] > _MOST_SAMPLES:
+            counts = [-(-n // 2) for n in counts]
+        return counts
+
+    def grid_counts(self) -> list[int]:
+        """See :class:`Texture`; the nodes."""
+        return list(self.heights.shape[::-1])
+
+    def samples(self) -> tuple[FloatArray, tuple[float, float], bool]:
+        """See :class:`Texture`; the nodes."""
+        return self.heights, self.pitch, self.periodic
 
     def scan_line(self) -> ScanLine:
         """Along x through the middle of the map."""

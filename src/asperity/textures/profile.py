@@ -5,16 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray, array, positive, real
 from asperity.errors import ParameterError
+from asperity.textures.cells.lines import Pieces, spline_pieces
+from asperity.textures.cells.splines import ProfileCells
+from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.heightmap import LEAST_NODES, mask, padded_coefficients
 from asperity.textures.pyramid import line_pyramid
-from asperity.textures.texture import Domain, ScanLine, Texture
+from asperity.textures.texture import Texture
+
+if TYPE_CHECKING:
+    from asperity.textures.exact import ExactHeight
+
+# Samples of a dense search, at least.
+_LEAST_SAMPLES = 4096
 
 
 class Profile(Texture):
@@ -41,6 +50,7 @@ class Profile(Texture):
     """
 
     kind: ClassVar[str] = "profile"
+    sample_offset: ClassVar[float] = 0.0
 
     def __init__(
         self,
@@ -118,6 +128,43 @@ class Profile(Texture):
         corner: FloatArray = np.array([self.origin, 0.0])
         spans = np.array([[self._extent, 0.0]])
         return Domain(corner, spans, periodic=self.periodic, description=text)
+
+    @property
+    def ends(self) -> bool:
+        """See :class:`Texture`."""
+        return not self.periodic
+
+    def exact_height(self) -> ExactHeight:
+        """See :class:`Texture`."""
+        from asperity.textures.exact import exact_profile
+
+        inner = self.coefficients[1 : len(self.heights) + 1]
+        return exact_profile(inner, self.pitch, self.origin, self.periodic)
+
+    def cells(
+        self,
+        extent: tuple[float, float] | None = None,  # noqa: ARG002 - all of it, always
+        margin: float = 0.0,  # noqa: ARG002 - likewise
+    ) -> ProfileCells:
+        """See :class:`Texture`; the cells of the spline, all of them."""
+        return ProfileCells(self.coefficients, self.pitch, self.origin, self.derivatives)
+
+    def line_pieces(self, line: ScanLine, least: int) -> Pieces | None:
+        """See :class:`Texture`; a line along x, from node to node."""
+        return spline_pieces(self.cells(), line, least)
+
+    def sample_counts(self) -> list[int]:
+        """See :class:`Texture`; whole parts of the cells."""
+        cells = len(self.heights) - self.ends
+        return [cells * max(1, -(-_LEAST_SAMPLES // cells))]
+
+    def grid_counts(self) -> list[int]:
+        """See :class:`Texture`; the nodes."""
+        return [len(self.heights)]
+
+    def samples(self) -> tuple[FloatArray, tuple[float, float], bool]:
+        """See :class:`Texture`; the nodes."""
+        return self.heights[None], (self.pitch, self.pitch), self.periodic
 
     def scan_line(self) -> ScanLine:
         """Along x over the whole profile."""

@@ -6,13 +6,21 @@ import math
 from collections.abc import Sequence
 from functools import cached_property
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from asperity.checks import array, positive, real
+from asperity.enclosures.cells import Cells
 from asperity.errors import ParameterError
-from asperity.textures.texture import Domain, ScanLine, Texture
+from asperity.textures.cells.lines import Pieces, wave_pieces
+from asperity.textures.cells.waves import WaveCells
+from asperity.textures.domain import Domain, ScanLine
+from asperity.textures.plane_waves import PlaneWaves, SingleWave
+from asperity.textures.texture import Texture
+
+if TYPE_CHECKING:
+    from asperity.textures.exact import ExactHeight
 
 
 class Sinusoid(Texture):
@@ -90,6 +98,38 @@ class Sinusoid(Texture):
         """One period along the direction."""
         span = self.period * np.array([self.direction])
         return Domain(np.zeros(2), span, periodic=True, description="one period")
+
+    @cached_property
+    def waves(self) -> PlaneWaves:
+        """The one wave."""
+        amplitude, kx, ky, phase = self.arguments
+        return PlaneWaves(np.array([amplitude]), np.array([[kx, ky]]), np.array([phase]))
+
+    @property
+    def single_wave(self) -> SingleWave:
+        """This wave."""
+        return self
+
+    def exact_height(self) -> ExactHeight:
+        """See :class:`Texture`; the direction as the sampler receives it, of rounded length."""
+        import mpmath
+
+        from asperity.textures.exact import exact_waves
+
+        def height(x: Any, y: Any, m: int, n: int) -> Any:
+            k = 2 * mpmath.pi / mpmath.mpf(self.period)
+            kx, ky = (k * part for part in self.direction)
+            return exact_waves([(self.amplitude, kx, ky, self.phase)])(x, y, m, n)
+
+        return height
+
+    def cells(self, extent: tuple[float, float] | None = None, margin: float = 0.0) -> Cells:
+        """See :class:`Texture`; over one turn of the phase."""
+        return WaveCells(self.waves, extent, margin)
+
+    def line_pieces(self, line: ScanLine, least: int) -> Pieces:
+        """See :class:`Texture`."""
+        return wave_pieces(self.waves, line, least)
 
     def scan_line(self) -> ScanLine:
         """One period along the direction, through the origin."""

@@ -2,69 +2,55 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 from functools import cached_property
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from asperity.checks import FloatArray, array
+from asperity.enclosures.cells import Cells
+from asperity.textures.cells.bounded import BoundedCells, DerivativeBounds
+from asperity.textures.cells.lines import Pieces, equal_pieces
+from asperity.textures.domain import Domain, ScanLine
+from asperity.textures.plane_waves import PlaneWaves, SingleWave
 
+if TYPE_CHECKING:
+    from asperity.textures.exact import ExactHeight
 
-@dataclass(frozen=True)
-class Domain:
-    """The region of the plane that stands for the whole texture.
+__all__ = ["Domain", "ScanLine", "Texture"]
 
-    Attributes:
-        origin: one corner [m], shape (2,).
-        spans: edge vectors [m], shape (1, 2) for a profile, (2, 2) for a map.
-        periodic: whether the texture repeats along every span.
-        description: in words, for tables.
-    """
-
-    origin: FloatArray
-    spans: FloatArray
-    periodic: bool
-    description: str
-
-    def points(self, fractions: FloatArray) -> FloatArray:
-        """Return the points (n, 2) [m] at fractions (n, d) of the spans."""
-        return np.ascontiguousarray(self.origin + fractions @ self.spans)
-
-
-@dataclass(frozen=True)
-class ScanLine:
-    """A straight line over the texture.
-
-    Attributes:
-        start: first point [m], shape (2,).
-        direction: unit vector, shape (2,).
-        length: one period, or the extent [m].
-        periodic: whether the texture repeats after the length.
-    """
-
-    start: FloatArray
-    direction: FloatArray
-    length: float
-    periodic: bool
-
-    def points(self, count: int) -> FloatArray:
-        """Return points (count, 2) [m], in the middle of equal steps."""
-        steps = (np.arange(count) + 0.5) * (self.length / count)
-        return np.ascontiguousarray(self.start + steps[:, None] * self.direction)
+# Points of a grid that shows a texture whose waves are not known: along a profile, along each
+# side of a map; fewer where the shortest wave is long.
+_LINE_POINTS, _SIDE_POINTS, _POINTS_PER_WAVE = 2**15, 1024, 8.0
+# Samples along a profile, along each side of a map, and where the shortest wave is known.
+_PROFILE_SAMPLES, _SIDE_SAMPLES, _SAMPLES_PER_WAVE = 4096, 512, 24
+_LEAST_SAMPLES, _MOST_SAMPLES = 64, 1000
 
 
 class Texture(ABC):
     """A height function h(x, y) [m], twice continuously differentiable.
 
     A texture kind names its sampler (scalar functions that are compiled together with a law) and
-    the arguments that it takes, and knows its certified extremes and bounds.
+    the arguments that it takes, and knows its certified extremes and bounds. That is all a kind
+    of your own must give: what the methods from :meth:`exact_height` on answer follows, right if
+    slow, and a kind that can do better overrides them.
+
+    Attributes:
+        kind: its name.
+        sample_offset: where in its cell a sample lies: 0 at the nodes of a spline, where second
+            derivatives are extreme.
+        preparation: what was done to measured heights, in words, for reports.
+        filled: where heights were missing and have been interpolated; ``None`` for nowhere.
     """
 
     kind: ClassVar[str]
+    sample_offset: ClassVar[float] = 0.5
+    preparation: tuple[str, ...] = ()
+    filled: NDArray[np.bool_] | None = None
 
     @property
     @abstractmethod
@@ -98,6 +84,101 @@ class Texture(ABC):
     @abstractmethod
     def describe(self) -> dict[str, Any]:
         """The texture in words and numbers, SI units, for reports."""
+
+    # --- what a kind may know better --------------------------------------------------------------
+
+    @property
+    def twist(self) -> float:
+        """A proved bound T >= ‖D³h‖ [1/m²], the rate of change of the Hessian; infinite if none.
+
+        With it numbers that depend on second derivatives are certified as closely as others.
+        """
+        return math.inf
+
+    @property
+    def waves(self) -> PlaneWaves | None:
+        """The plane waves whose sum the height is; nothing for other heights."""
+        return None
+
+    @property
+    def single_wave(self) -> SingleWave | None:
+        """The one wave that the height is, where closed forms of it hold."""
+        return None
+
+    @property
+    def ends(self) -> bool:
+        """Whether the texture stops at the border of its domain and is mirrored there."""
+        return False
+
+    def exact_height(self) -> ExactHeight:
+        """Return h(x, y, m, n), the derivative of order (m, n), m + n <= 2, in mpmath.
+
+        Kernels are tested against it. Unless the kind has a formula it is good to double
+        precision only: the sampler's own values, continued by Taylor's formula between doubles.
+        """
+        from asperity.textures.exact import exact_continuation
+
+        return exact_continuation(self.derivatives)
+
+    def cells(self, extent: tuple[float, float] | None = None, margin: float = 0.0) -> Cells | None:
+        """Return the cells over which suprema are certified; by default from the bounds alone.
+
+        Args:
+            extent: width and depth [m] of the part of the plane to look at, from the origin; the
+                domain, or the whole plane, by default.
+            margin: how far beyond to look on every side [m].
+
+        Returns:
+            The cells; nothing for a kind that needs an extent and got none.
+        """
+        region = self.domain
+        if extent is not None:
+            region = Domain(np.zeros(2), np.diag(extent), periodic=False, description="extent")
+        return self._bounded(region if region.periodic else region.widened(margin))
+
+    def sampling_cells(self) -> Cells:
+        """Return the cells over which suprema are sampled where none are certified."""
+        return self.cells() or self._bounded(self.domain)
+
+    def line_pieces(self, line: ScanLine, least: int) -> Pieces | None:
+        """Return at least so many pieces of a line; nothing where a kind cannot cut along it."""
+        span = line.length * line.direction[None]
+        region = Domain(line.start, span, periodic=False, description="line")
+        return equal_pieces(self._bounded(region), line, least, 1.0)
+
+    def _bounded(self, region: Domain) -> BoundedCells:
+        bounds = DerivativeBounds(*self.extremes, *self.bounds, self.twist)
+        return BoundedCells(region, self.derivatives, bounds)
+
+    def sample_counts(self) -> list[int]:
+        """Return how many samples along each span of the domain a dense search begins with."""
+        if self.is_profile:
+            return [_PROFILE_SAMPLES]
+        if self.waves is None:
+            return [_SIDE_SAMPLES] * 2
+        wanted = _SAMPLES_PER_WAVE * np.hypot(*self.domain.spans.T) / self.waves.shortest
+        return [int(min(max(count, _LEAST_SAMPLES), _MOST_SAMPLES)) for count in wanted]
+
+    def grid_counts(self) -> list[int]:
+        """Return how many points along each span of the domain show every wave."""
+        sides = np.hypot(*self.domain.upright()[0].T)
+        most = _LINE_POINTS if self.is_profile else _SIDE_POINTS
+        if self.waves is None:
+            return [most] * len(sides)
+        wanted = np.ceil(_POINTS_PER_WAVE * sides / self.waves.shortest)
+        return [int(count) for count in np.clip(wanted, 16, most)]
+
+    def samples(self) -> tuple[FloatArray, tuple[float, float], bool]:
+        """Return heights on a grid of the domain, the nodes of a measured texture.
+
+        Returns:
+            Heights [m], shape (ny, nx), (1, nx) for a profile; spacing (x, y) [m]; whether they
+            repeat, so that no window is needed.
+        """
+        points, spacing, repeats = self.domain.grid(self.grid_counts())
+        return self.height(points.reshape(-1, 2)).reshape(points.shape[:2]), spacing, repeats
+
+    # --- values -----------------------------------------------------------------------------------
 
     @cached_property
     def _loops(self) -> ModuleType:

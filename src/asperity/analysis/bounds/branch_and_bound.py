@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.textures.cells import Cells
+from asperity.enclosures.cells import Cells
 
 DEFAULT_WORK_LIMIT = 20_000_000
 # Cells of each chunk at which the value itself is computed: the most promising ones.
@@ -91,6 +91,7 @@ def supremum(
         wished: a smaller gap, to be reached as long as few cells are left.
     """
     goal = tolerance if wished is None else min(wished, tolerance)
+    limit = min(work_limit, problem.cells.most or work_limit)
     chunks, half = problem.cells.start()
     best, at = _first(problem)
     dropped, looked = problem.floor, 0
@@ -114,7 +115,7 @@ def supremum(
         children = len(centres) * parts**problem.cells.dimensions
         good = left <= problem.enough(best, tolerance)
         done = len(centres) == 0 or (good and children > _FEW)
-        if done or looked + children > work_limit or float(half.max()) < _LEAST_HALF:
+        if done or looked + children > limit or float(half.max()) < _LEAST_HALF:
             break
         half = half / parts
         chunks = _split(centres, half, parts, problem.cells.chunk())

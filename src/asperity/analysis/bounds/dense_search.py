@@ -23,14 +23,8 @@ from asperity.derive.facts import law_facts
 from asperity.errors import ParameterError
 from asperity.kernels.fuse import fuse_contact
 from asperity.surface import Surface
-from asperity.textures.fourier import Fourier
-from asperity.textures.heightmap import HeightMap
-from asperity.textures.profile import Profile
 from asperity.textures.texture import Texture
 
-# Points on the contact's plane: at most this many, at least this many per profile.
-_MOST_POINTS = 1_200_000
-_PROFILE_POINTS = 4096
 _CANDIDATES = 12
 _ZOOM_STEPS = 44
 DEPTH_FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -120,37 +114,12 @@ def need_depths(surface: Surface) -> None:
 
 def sample_fractions(texture: Texture) -> tuple[FloatArray, FloatArray]:
     """Return sample points as fractions of the domain's spans (n, d), and their spacing (d,)."""
-    counts = _sample_counts(texture)
-    axes = [(np.arange(count) + _offset(texture)) / count for count in counts]
+    counts = texture.sample_counts()
+    axes = [(np.arange(count) + texture.sample_offset) / count for count in counts]
     if not texture.domain.periodic:
         axes = [np.linspace(0.0, 1.0, count + 1) for count in counts]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(counts))
     return grid, 1.0 / np.array(counts, dtype=float)
-
-
-def _offset(texture: Texture) -> float:
-    """Nodes of a measured surface are where its second derivatives are extreme."""
-    return 0.0 if isinstance(texture, (HeightMap, Profile)) else 0.5
-
-
-def _sample_counts(texture: Texture) -> list[int]:
-    if isinstance(texture, Profile):
-        cells = len(texture.heights) - (0 if texture.periodic else 1)
-        return [cells * max(1, -(-_PROFILE_POINTS // cells))]
-    if isinstance(texture, HeightMap):
-        extra = 0 if texture.periodic else 1
-        counts = [n - extra for n in texture.heights.shape[::-1]]
-        while counts[0] * counts[1] * 4 <= _MOST_POINTS // 4:
-            counts = [2 * n for n in counts]
-        while counts[0] * counts[1] > _MOST_POINTS:
-            counts = [-(-n // 2) for n in counts]
-        return counts
-    if texture.is_profile:
-        return [_PROFILE_POINTS]
-    assert isinstance(texture, Fourier)
-    shortest = 2.0 * np.pi / np.hypot(*texture.wavevectors.T).max()
-    lengths = np.hypot(*texture.domain.spans.T)
-    return [int(min(max(24 * length / shortest, 64), 1000)) for length in lengths]
 
 
 def greatest(surface: Surface, measure: Measure, depth_limit: DepthLimit) -> Found:

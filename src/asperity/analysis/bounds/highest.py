@@ -9,7 +9,7 @@ import numpy as np
 from asperity.analysis.bounds.branch_and_bound import Problem
 from asperity.analysis.bounds.sampling import sampled_supremum
 from asperity.checks import FloatArray
-from asperity.textures.cells import Cells
+from asperity.enclosures.cells import Cells
 from asperity.textures.texture import Texture
 
 

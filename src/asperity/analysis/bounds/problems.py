@@ -21,6 +21,7 @@ from asperity.analysis.bounds.measures import NORM, ONE_SIDED
 from asperity.analysis.bounds.measures import Number as MatrixNumber
 from asperity.checks import FloatArray
 from asperity.derive.facts import law_facts
+from asperity.enclosures.cells import NAMES, Cells
 from asperity.enclosures.products import (
     ANGLE,
     DEPTH,
@@ -33,8 +34,7 @@ from asperity.enclosures.products import (
 from asperity.enclosures.taylor import Number, Taylor, TaylorMath
 from asperity.laws import Law
 from asperity.surface import Surface
-from asperity.textures.cells import NAMES, Cells
-from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.plane_waves import SingleWave
 
 Entries = Sequence[Sequence[Number]]
 # Numbers of J/k below this are not resolved; a flat surface would have no relative gap.
@@ -352,14 +352,14 @@ class FrictionProblem(Problem):
         derivatives = self.cells.derivatives(coordinates)
         return self._entries(derivatives[:, 0], np.hypot(derivatives[:, 1], derivatives[:, 2]))
 
-    def around(self, texture: Sinusoid) -> Supremum:
-        """Return bounds on a sinusoid at once, without cells.
+    def around(self, wave: SingleWave, slope: float) -> Supremum:
+        """Return bounds on one wave of a greatest slope at once, without cells.
 
         There (h, |∇h|) runs along half an ellipse, which a polygon of tangents encloses; a convex
         number that grows with |∇h| is greatest at its corners, or where they touch.
         """
         touch, corner, radius = _half_circle()
-        height, slope = texture.amplitude, texture.bounds[0]
+        height = wave.amplitude
         values = self._entries(height * np.sin(touch), slope * np.cos(touch))
         beyond = self._entries(height * radius * np.sin(corner), slope * radius * np.cos(corner))
         upper = max(float(values.max()), float(beyond.max())) * (1.0 + 1e-13)
@@ -371,7 +371,7 @@ class FrictionProblem(Problem):
         tries = touch[index] + step * np.array([-1.0, 0.0, 1.0, min(max(shift, -1.0), 1.0)])
         found = self._entries(height * np.sin(tries), slope * np.cos(tries))
         best = int(found.argmax())
-        at = np.array([tries[best] - texture.phase])
+        at = np.array([tries[best] - wave.phase])
         return Supremum(float(found[best]), upper, at, len(corner), reached=True)
 
 

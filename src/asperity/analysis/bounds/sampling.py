@@ -8,22 +8,11 @@ from collections.abc import Callable
 import numpy as np
 
 from asperity.analysis.bounds.branch_and_bound import Problem, Supremum, polish
-from asperity.textures.cells import Cells, WaveCells, cells_of
-from asperity.textures.fourier import Fourier
+from asperity.enclosures.cells import Cells
 from asperity.textures.texture import Texture
 
 _CANDIDATES = 12
 _SAMPLES = 65_536
-
-
-def sampling_cells(texture: Texture) -> Cells:
-    """Return the cells of a texture; of an endless sum those of a rectangle of the plane."""
-    cells = cells_of(texture)
-    if cells is not None:
-        return cells
-    assert isinstance(texture, Fourier)
-    width, depth = (float(side) for side in np.abs(texture.domain.spans).sum(axis=0))
-    return WaveCells(texture, (width, depth))
 
 
 def sampled(problem: Problem) -> Supremum:
@@ -41,5 +30,5 @@ def sampled(problem: Problem) -> Supremum:
 
 def sampled_supremum(texture: Texture, build: Callable[[Cells], Problem]) -> tuple[Cells, Supremum]:
     """Return the cells that were sampled and the greatest value found of a problem on them."""
-    cells = sampling_cells(texture)
+    cells = texture.sampling_cells()
     return cells, sampled(build(cells))

@@ -18,10 +18,10 @@ from asperity.analysis.bounds.dense_search import ContactField
 from asperity.analysis.bounds.problems import law_constants, law_kernel
 from asperity.checks import FloatArray
 from asperity.derive.facts import law_facts
+from asperity.enclosures.cells import NAMES
 from asperity.enclosures.taylor import Number, Taylor
 from asperity.surface import Surface
-from asperity.textures.cells import NAMES
-from asperity.textures.cells.lines import Pieces, line_pieces
+from asperity.textures.cells.lines import Pieces
 from asperity.textures.texture import ScanLine, Texture
 
 _LEAST_PIECES, _MOST_PIECES = 512, 65_536
@@ -41,7 +41,7 @@ def curl_integral(
     """
     count = _LEAST_PIECES
     while True:
-        pieces = line_pieces(surface.texture, line, count)
+        pieces = surface.texture.line_pieces(line, count)
         if pieces is None:
             return None
         try:
@@ -181,7 +181,7 @@ def column_loop(surface: Surface, line: ScanLine, sign: float) -> FloatArray:
 
 
 def _node_count(texture: Texture, line: ScanLine) -> int:
-    pieces = line_pieces(texture, line, 1)
+    pieces = texture.line_pieces(line, 1)
     cells = 0 if pieces is None else len(pieces.centres)
     return int(np.clip(_NODES_PER_CELL * cells, _NODES, _MOST_NODES))
 

@@ -23,15 +23,15 @@ from asperity.analysis.bounds.problems import (
     SlopeProblem,
     normal_problem,
 )
-from asperity.analysis.bounds.sampling import sampled, sampling_cells
+from asperity.analysis.bounds.sampling import sampled
 from asperity.analysis.bounds.witness import Witness, attained, lower_of
 from asperity.analysis.gain.friction import largest_singular_value, largest_symmetric_eigenvalue
 from asperity.analysis.gain.medial_axis import sharpest_crest
 from asperity.checks import FloatArray
+from asperity.enclosures.cells import Cells
 from asperity.laws import LAWS
 from asperity.surface import Surface
-from asperity.textures.cells import Cells, cells_of
-from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.plane_waves import SingleWave
 
 # Rounding of the few operations between a problem's bound and the number.
 _INFLATE = 1.0 + 1e-14
@@ -87,9 +87,9 @@ def certified(surface: Surface, number: Number, search: Search) -> Bound:
         ParameterError: for a law of your own on the split contact.
     """
     need_depths(surface)
-    cells = cells_of(surface.texture, search.extent, search.margin(surface))
+    cells = surface.texture.cells(search.extent, search.margin(surface))
     if cells is None:
-        problem, step = _problem(surface, sampling_cells(surface.texture), number)
+        problem, step = _problem(surface, surface.texture.sampling_cells(), number)
         found = sampled(problem)
         text = "more than three independent waves: certified numbers need an extent"
         return _bound(surface, number, problem, found, safe_bound(surface, number), text)
@@ -124,11 +124,10 @@ def certified(surface: Surface, number: Number, search: Search) -> Bound:
 def _at_once(surface: Surface, problem: Problem, search: Search) -> Supremum | None:
     """Return bounds that need no search, if they are as near as was asked for."""
     texture, gap = surface.texture, search.wish(problem.cells) or search.gap(problem.cells)
-    if not isinstance(problem, FrictionProblem) or not isinstance(texture, Sinusoid):
+    wave = texture.single_wave
+    if not isinstance(problem, FrictionProblem) or wave is None or search.extent is not None:
         return None
-    if search.extent is not None:
-        return None
-    found = problem.around(texture)
+    found = problem.around(wave, texture.bounds[0])
     return found if found.upper <= found.lower * (1.0 + gap) else None
 
 
@@ -245,14 +244,14 @@ def safe_bound(surface: Surface, number: Number) -> float:
     return 2.0 * norm if number is CURL else norm
 
 
-def sinusoid_number(surface: Surface, number: Number, value: float, phase: float) -> Bound:
+def wave_number(
+    surface: Surface, wave: SingleWave, number: Number, value: float, phase: float
+) -> Bound:
     """Return a number that a closed form gives, with its witness at a phase.
 
     At full depth; law E's is attained at every depth at which the foot is the nearest point.
     """
-    texture = surface.texture
-    assert isinstance(texture, Sinusoid)
-    along = (phase - texture.phase) * texture.period / (2.0 * math.pi)
+    along = (phase - wave.phase) * wave.period / (2.0 * math.pi)
     depth = surface.max_depth if surface.law.contact.single_valued else 0.0
-    witness = attained(surface, number, along * np.array(texture.direction), depth)
+    witness = attained(surface, number, along * np.array(wave.direction), depth)
     return Bound(lower_of(value, witness), value, "closed form", witness.at, "MATH section 4")

@@ -14,14 +14,13 @@ from asperity.analysis.bounds.highest import highest_point
 from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED, Number
 from asperity.analysis.bounds.witness import attained, lower_of
 from asperity.analysis.gain import closed_forms
-from asperity.analysis.gain.certificate import Search, certified, is_shipped, sinusoid_number
+from asperity.analysis.gain.certificate import Search, certified, is_shipped, wave_number
 from asperity.analysis.gain.god_object import crest_number, split_number
 from asperity.analysis.gain.kept import kept
 from asperity.checks import positive
 from asperity.derive.facts import law_facts
 from asperity.errors import ParameterError
 from asperity.surface import Surface
-from asperity.textures.sinusoid import Sinusoid
 
 
 def characteristic_number(
@@ -155,12 +154,12 @@ def _number(
     search: Search,
     formulas: dict[str, closed_forms.ClosedForm],
 ) -> Bound:
-    texture, letter = surface.texture, surface.law.letter
-    whole = isinstance(texture, Sinusoid) and search.extent is None
-    if is_shipped(surface) and isinstance(texture, Sinusoid) and whole and letter in formulas:
-        value = formulas[letter](texture, surface.max_depth)
-        phase = closed_forms.PHASES[letter](texture, surface.max_depth)
-        return sinusoid_number(surface, number, value, phase)
+    letter, wave = surface.law.letter, surface.texture.single_wave
+    known = is_shipped(surface) and letter in formulas and search.extent is None
+    if wave is not None and known:
+        value = formulas[letter](wave, surface.max_depth)
+        phase = closed_forms.PHASES[letter](wave, surface.max_depth)
+        return wave_number(surface, wave, number, value, phase)
     return kept(surface, number.name, search, lambda: certified(surface, number, search))
 
 

@@ -10,41 +10,41 @@ import math
 from collections.abc import Callable
 from itertools import pairwise
 
-from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.plane_waves import SingleWave
 
-ClosedForm = Callable[[Sinusoid, float], float]
-
-
-def _slope(texture: Sinusoid) -> float:
-    return 2.0 * math.pi * texture.amplitude / texture.period
+ClosedForm = Callable[[SingleWave, float], float]
 
 
-def _bend(texture: Sinusoid, depth: float) -> float:
-    return 4.0 * math.pi**2 * texture.amplitude * depth / texture.period**2
+def _slope(wave: SingleWave) -> float:
+    return 2.0 * math.pi * wave.amplitude / wave.period
 
 
-def q_a(texture: Sinusoid, depth: float) -> float:  # noqa: ARG001 - one signature for all
+def _bend(wave: SingleWave, depth: float) -> float:
+    return 4.0 * math.pi**2 * wave.amplitude * depth / wave.period**2
+
+
+def q_a(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one signature for all
     """q_A = √(1 + G₁²); the paper's (10)."""
-    return math.hypot(1.0, _slope(texture))
+    return math.hypot(1.0, _slope(wave))
 
 
-def q_b(texture: Sinusoid, depth: float) -> float:
+def q_b(wave: SingleWave, depth: float) -> float:
     """q_B = max(√(1 + G₁²), y)."""
-    return max(math.hypot(1.0, _slope(texture)), _bend(texture, depth))
+    return max(math.hypot(1.0, _slope(wave)), _bend(wave, depth))
 
 
-def q_c(texture: Sinusoid, depth: float) -> float:
+def q_c(wave: SingleWave, depth: float) -> float:
     """q_C = max{1, y, feasible roots λ of the cubic}.
 
     λ³ - (1 + G₁² + E²/4) λ² + (E²/2) λ - E²/4 = 0 with E = 2πD/l; a root is feasible if λ > 1 and
     E (λ - 1) <= 2 G₁ λ. At depth 0 the norm is 1 + G₁².
     """
-    return max(1.0, _bend(texture, depth), *_feasible_roots(texture, depth))
+    return max(1.0, _bend(wave, depth), *_feasible_roots(wave, depth))
 
 
-def _feasible_roots(texture: Sinusoid, depth: float) -> list[float]:
+def _feasible_roots(wave: SingleWave, depth: float) -> list[float]:
     """Return the feasible roots by t = 1/λ: (E²/4) t (1 - t)² + (1 + G₁²) t = 1, 0 < t < 1."""
-    g, e = _slope(texture), 2.0 * math.pi * depth / texture.period
+    g, e = _slope(wave), 2.0 * math.pi * depth / wave.period
     bend, rate = e * e / 4.0, 1.0 + g * g
     # Between these the left side is monotone: 3t² - 4t + 1 + rate/bend = 0.
     inner = 4.0 - 3.0 * (1.0 + rate / bend) if rate < bend else -1.0
@@ -77,44 +77,44 @@ def _root(bend: float, rate: float, low: float, high: float) -> float | None:
     return t
 
 
-def q_d(texture: Sinusoid, depth: float) -> float:
+def q_d(wave: SingleWave, depth: float) -> float:
     """q_D = 1 if y <= 1/2, y/(1 - y) if y < 1, infinite from y = 1 on."""
-    y = _bend(texture, depth)
+    y = _bend(wave, depth)
     if y >= 1.0:
         return math.inf
     return max(1.0, y / (1.0 - y))
 
 
-def q_g(texture: Sinusoid, depth: float) -> float:
+def q_g(wave: SingleWave, depth: float) -> float:
     """q_G = max(1, y)."""
-    return max(1.0, _bend(texture, depth))
+    return max(1.0, _bend(wave, depth))
 
 
-def one_sided_a(texture: Sinusoid, depth: float) -> float:  # noqa: ARG001 - one signature for all
+def one_sided_a(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one signature for all
     """q⁺_A = (1 + √(1 + G₁²))/2: the symmetric part of e_z wᵀ has that eigenvalue."""
-    return 0.5 * (1.0 + math.hypot(1.0, _slope(texture)))
+    return 0.5 * (1.0 + math.hypot(1.0, _slope(wave)))
 
 
-def _steepest(texture: Sinusoid, depth: float) -> float:  # noqa: ARG001 - one signature for all
+def _steepest(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one signature for all
     return 0.0
 
 
-def _trough(texture: Sinusoid, depth: float) -> float:  # noqa: ARG001 - one signature for all
+def _trough(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one signature for all
     return -0.5 * math.pi
 
 
-def _phase_b(texture: Sinusoid, depth: float) -> float:
-    steep = math.hypot(1.0, _slope(texture)) >= _bend(texture, depth)
-    return _steepest(texture, depth) if steep else _trough(texture, depth)
+def _phase_b(wave: SingleWave, depth: float) -> float:
+    steep = math.hypot(1.0, _slope(wave)) >= _bend(wave, depth)
+    return _steepest(wave, depth) if steep else _trough(wave, depth)
 
 
-def _phase_c(texture: Sinusoid, depth: float) -> float:
+def _phase_c(wave: SingleWave, depth: float) -> float:
     """sin(phase) = -E (λ - 1)/(2 G₁ λ): there λ is stationary along the profile."""
-    root = max(_feasible_roots(texture, depth), default=0.0)
-    if root < max(1.0, _bend(texture, depth)):
-        return _trough(texture, depth)
-    e = 2.0 * math.pi * depth / texture.period
-    return math.asin(max(-1.0, -0.5 * e * (root - 1.0) / (root * _slope(texture))))
+    root = max(_feasible_roots(wave, depth), default=0.0)
+    if root < max(1.0, _bend(wave, depth)):
+        return _trough(wave, depth)
+    e = 2.0 * math.pi * depth / wave.period
+    return math.asin(max(-1.0, -0.5 * e * (root - 1.0) / (root * _slope(wave))))
 
 
 # The phase of the sinusoid at which the number is attained, at full depth.
@@ -129,14 +129,14 @@ PHASES: dict[str, ClosedForm] = {
 Q: dict[str, ClosedForm] = {"A": q_a, "B": q_b, "C": q_c, "D": q_d, "G": q_g}
 
 
-def curl_a(texture: Sinusoid, depth: float) -> float:  # noqa: ARG001 - one signature for all
+def curl_a(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one signature for all
     """Sup |curl f_A|/k = G₁: the curl of k δ e_z has the length of k ∇h."""
-    return _slope(texture)
+    return _slope(wave)
 
 
-def curl_e(texture: Sinusoid, depth: float) -> float:  # noqa: ARG001 - one signature for all
+def curl_e(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one signature for all
     """Sup |curl f_E|/k = G₁/√(1 + G₁²): the curl of k δₙ e_z has the length of k (n_x, n_y)."""
-    return _slope(texture) / math.hypot(1.0, _slope(texture))
+    return _slope(wave) / math.hypot(1.0, _slope(wave))
 
 
 ONE_SIDED: dict[str, ClosedForm] = {"A": one_sided_a, "C": q_c}

@@ -16,8 +16,7 @@ from asperity.analysis.gain import closed_forms
 from asperity.analysis.gain.certificate import Search
 from asperity.analysis.gain.medial_axis import Crest, sharpest_crest
 from asperity.surface import Surface
-from asperity.textures.cells import cells_of
-from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.plane_waves import SingleWave
 
 _ROUNDING = 1e-14
 _ONSET = "the depth reaches the medial axis, where the force jumps; its onset is given"
@@ -31,8 +30,8 @@ def crest_number(surface: Surface, search: Search) -> Bound:
     the nearest point down to the least radius of all crests (see ``ridges.py``).
     """
     texture, depth = surface.texture, surface.max_depth
-    if isinstance(texture, Sinusoid) and search.extent is None:
-        return _sinusoid_number(surface, texture)
+    if texture.single_wave is not None and search.extent is None:
+        return _wave_number(surface, texture.single_wave)
     if depth * texture.bounds[1] <= 0.5:
         witness = attained(surface, NORM, highest_point(texture), depth)
         note = "depth times the bound of the second derivatives is at most 1/2"
@@ -46,7 +45,7 @@ def crest_number(surface: Surface, search: Search) -> Bound:
     if depth >= crest.radius:
         return Bound(math.inf, math.inf, _method(crest), crest.centre, _ONSET)
     foot, least = np.array(crest.foot[:2]), crest.least_radius
-    cells = cells_of(texture, search.extent, margin)
+    cells = texture.cells(search.extent, margin)
     if cells is not None:
         found = supremum(
             CrestProblem(cells, depth), search.gap(cells), search.work_limit, search.wish(cells)
@@ -64,8 +63,8 @@ def crest_number(surface: Surface, search: Search) -> Bound:
     return Bound(witness.value, max(upper, witness.value), proof, witness.at, note)
 
 
-def _sinusoid_number(surface: Surface, texture: Sinusoid) -> Bound:
-    value, crest = closed_forms.q_d(texture, surface.max_depth), sharpest_crest(texture)
+def _wave_number(surface: Surface, wave: SingleWave) -> Bound:
+    value, crest = closed_forms.q_d(wave, surface.max_depth), sharpest_crest(surface.texture)
     assert crest is not None
     if math.isinf(value):
         return Bound(math.inf, math.inf, "closed form", crest.centre, _ONSET)

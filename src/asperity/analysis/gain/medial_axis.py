@@ -20,8 +20,8 @@ from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT, Suprem
 from asperity.analysis.bounds.problems import CrestProblem
 from asperity.analysis.bounds.sampling import sampled_supremum
 from asperity.checks import FloatArray
-from asperity.textures.cells import Cells, cells_of
-from asperity.textures.sinusoid import Sinusoid
+from asperity.enclosures.cells import Cells
+from asperity.textures.plane_waves import SingleWave
 from asperity.textures.texture import Texture
 
 _TOLERANCE = 1e-4
@@ -74,9 +74,9 @@ def sharpest_crest(
     of more than three independent waves is sampled unless an extent is given, which is then
     looked at with a margin on every side.
     """
-    if isinstance(texture, Sinusoid) and extent is None:
-        return _sinusoid_crest(texture)
-    cells = cells_of(texture, extent, margin)
+    if texture.single_wave is not None and extent is None:
+        return _wave_crest(texture, texture.single_wave)
+    cells = texture.cells(extent, margin)
     found: Supremum
     if cells is None:
         cells, found = sampled_supremum(texture, CrestProblem)
@@ -91,10 +91,10 @@ def _plane(cells: Cells, at: FloatArray) -> FloatArray:
     return np.asarray(cells.plane(at[None])[0])
 
 
-def _sinusoid_crest(texture: Sinusoid) -> Crest:
-    along = texture.period * (0.25 - texture.phase / (2.0 * math.pi))
-    curvature = (2.0 * math.pi / texture.period) ** 2 * texture.amplitude
-    crest = _crest(texture, along * np.array(texture.direction), curvature)
+def _wave_crest(texture: Texture, wave: SingleWave) -> Crest:
+    along = wave.period * (0.25 - wave.phase / (2.0 * math.pi))
+    curvature = (2.0 * math.pi / wave.period) ** 2 * wave.amplitude
+    crest = _crest(texture, along * np.array(wave.direction), curvature)
     assert crest is not None
     return crest
 

@@ -156,7 +156,7 @@ def assumptions(
         contact_lost: fraction of the scan without contact.
     """
     surface = result.surface
-    said = [*getattr(surface.texture, "preparation", ()), *_defaulted(result, defaults)]
+    said = [*surface.texture.preparation, *_defaulted(result, defaults)]
     said.append(f"Waves: {result.spectrum.description}")
     left_out = len(result.spectrum.waves) - len(result.waves)
     if left_out:

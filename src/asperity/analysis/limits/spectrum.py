@@ -12,13 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.checks import FloatArray
-from asperity.textures.fourier import Fourier
-from asperity.textures.heightmap import HeightMap
-from asperity.textures.profile import Profile
-from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.plane_waves import PlaneWaves
 from asperity.textures.texture import Texture
 
 BANDS_PER_OCTAVE = 3
@@ -27,9 +23,6 @@ LEAST_SHARE = 1e-3
 
 # A sum of more waves than this is taken by bands.
 _MOST_WAVES = 64
-# Points of a texture that has no nodes of its own: along a profile, along each side of a map.
-_LINE_POINTS, _SIDE_POINTS = 2**15, 1024
-_POINTS_PER_WAVE = 8.0
 # What is less than this of the variance is the rounding of the transform.
 _ROUNDING = 1e-18
 # Rows of a map that are counted at once: what bounds the memory.
@@ -118,7 +111,7 @@ def spectrum(texture: Texture) -> Spectrum:
     waves = _plane_waves(texture)
     if waves is not None and len(waves) <= _MOST_WAVES:
         return Spectrum(waves, True, "the waves of the sum")
-    heights, spacing, repeats = samples(texture)
+    heights, spacing, repeats = texture.samples()
     found = banded(heights[None], spacing, repeats)
     total = float(found.variance.sum())
     # What is left of a constant height is rounding.
@@ -139,17 +132,20 @@ def spectrum(texture: Texture) -> Spectrum:
 
 
 def _plane_waves(texture: Texture) -> tuple[Wave, ...] | None:
-    """Return the waves of a sinusoid or a sum, those along one wave vector taken together."""
-    if isinstance(texture, Sinusoid):
-        k = 2.0 * math.pi / texture.period
-        vector = (k * texture.direction[0], k * texture.direction[1])
-        return (Wave(texture.period, texture.amplitude, 1.0, vector, texture.phase),)
-    if not isinstance(texture, Fourier):
-        return None
+    """Return the waves of a texture that is one wave or a sum of them."""
+    wave = texture.single_wave
+    if wave is not None:
+        k = 2.0 * math.pi / wave.period
+        vector = (k * wave.direction[0], k * wave.direction[1])
+        return (Wave(wave.period, wave.amplitude, 1.0, vector, wave.phase),)
+    return None if texture.waves is None else _taken_together(texture.waves)
+
+
+def _taken_together(given: PlaneWaves) -> tuple[Wave, ...]:
+    """Return the waves of a sum, those along one wave vector as one."""
     summed: dict[tuple[float, float], complex] = {}
     for amplitude, (kx, ky), phase in zip(
-        texture.amplitudes.tolist(), texture.wavevectors.tolist(), texture.phases.tolist(),
-        strict=True,
+        given.amplitudes.tolist(), given.wavevectors.tolist(), given.phases.tolist(), strict=True,
     ):  # fmt: skip
         # a sin(-k·x + φ) is a sin(k·x + π - φ).
         turned = (kx, ky) < (0.0, 0.0)
@@ -157,7 +153,7 @@ def _plane_waves(texture: Texture) -> tuple[Wave, ...] | None:
         angle = math.pi - phase if turned else phase
         phasor = amplitude * complex(math.cos(angle), math.sin(angle))
         summed[vector] = summed.get(vector, 0.0) + phasor
-    least = 1e-12 * float(np.abs(texture.amplitudes).max())
+    least = 1e-12 * float(np.abs(given.amplitudes).max())
     kept = {vector: phasor for vector, phasor in summed.items() if abs(phasor) > least}
     total = sum(abs(phasor) ** 2 for phasor in kept.values())
     waves = [
@@ -171,77 +167,6 @@ def _plane_waves(texture: Texture) -> tuple[Wave, ...] | None:
         for vector, phasor in kept.items()
     ]
     return tuple(sorted(waves, key=lambda wave: -wave.wavelength))
-
-
-def samples(texture: Texture) -> tuple[FloatArray, tuple[float, float], bool]:
-    """Return heights on a grid of the texture's domain.
-
-    The nodes of a profile or a map; for other kinds a grid of eight points per shortest wave.
-
-    Returns:
-        Heights [m], shape (ny, nx), (1, nx) for a profile; spacing (x, y) [m]; whether they
-        repeat, so that no window is needed.
-    """
-    if isinstance(texture, HeightMap):
-        return texture.heights, texture.pitch, texture.periodic
-    if isinstance(texture, Profile):
-        return texture.heights[None], (texture.pitch, texture.pitch), texture.periodic
-    points, spacing, repeats = grid(texture)
-    return texture.height(points.reshape(-1, 2)).reshape(points.shape[:2]), spacing, repeats
-
-
-def grid(texture: Texture, most: int | None = None) -> tuple[FloatArray, tuple[float, float], bool]:
-    """Return the points of :func:`samples`.
-
-    Args:
-        texture: any kind.
-        most: points along each side; from the middle of a larger texture. All by default.
-
-    Returns:
-        Points [m], shape (ny, nx, 2), (1, nx, 2) for a profile; spacing (x, y) [m]; whether they
-        are a whole period.
-    """
-    spans, repeats = _rectangle(texture)
-    sides = np.hypot(*spans.T)
-    counts = _counts(texture, sides)
-    # A finite map has a node at both ends, a periodic one does not repeat its first.
-    steps = sides / (counts if texture.domain.periodic else counts - 1)
-    first = np.zeros_like(counts)
-    if most is not None and counts.max() > most:
-        repeats = False
-        first = np.maximum((counts - most) // 2, 0)
-        counts = np.minimum(counts, most)
-    ticks = [
-        (begin + np.arange(count)) * step / side
-        for begin, count, step, side in zip(first, counts, steps, sides, strict=True)
-    ]
-    points = texture.domain.origin + np.stack(np.meshgrid(*ticks), axis=-1) @ spans
-    points = points[None] if len(ticks) == 1 else points
-    return points, (float(steps[0]), float(steps[-1])), repeats
-
-
-def _rectangle(texture: Texture) -> tuple[FloatArray, bool]:
-    """Return spans at right angles, and whether the texture repeats along them."""
-    spans, periodic = texture.domain.spans, texture.domain.periodic
-    if len(spans) == 1:
-        return spans, periodic
-    along = spans[0] / np.hypot(*spans[0])
-    across = spans[1] - float(spans[1] @ along) * along
-    skew = float(np.hypot(*(spans[1] - across)))
-    square = skew < 1e-9 * float(np.hypot(*across))
-    return np.array([spans[0], across]), periodic and square
-
-
-def _counts(texture: Texture, sides: FloatArray) -> NDArray[np.intp]:
-    """Return the number of points along each side."""
-    if isinstance(texture, HeightMap | Profile):
-        return np.array(texture.heights.shape[::-1], dtype=np.intp)
-    most = _LINE_POINTS if len(sides) == 1 else _SIDE_POINTS
-    if not isinstance(texture, Fourier):
-        return np.full(len(sides), most, dtype=np.intp)
-    shortest = 2.0 * math.pi / float(np.hypot(*texture.wavevectors.T).max())
-    wanted = np.ceil(_POINTS_PER_WAVE * sides / shortest)
-    return np.clip(wanted, 16, most).astype(np.intp)
 
 
 def banded(values: FloatArray, spacing: tuple[float, float], repeats: bool) -> Bands:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from asperity.analysis.energy.merit import scan_height
-from asperity.analysis.limits.spectrum import BANDS_PER_OCTAVE, Spectrum, banded, grid
+from asperity.analysis.limits.spectrum import BANDS_PER_OCTAVE, Spectrum, banded
 from asperity.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
@@ -91,7 +91,7 @@ def _by_bands(surface: Surface, spectrum: Spectrum) -> FloatArray:
     """Return the amplitude of each band, from the ratio of force to height on a patch."""
     texture, costly = surface.texture, _costly(surface)
     most = (_LINE_POINTS if texture.is_profile else _SIDE_POINTS)[costly]
-    points, spacing, repeats = grid(texture, most)
+    points, spacing, repeats = texture.domain.grid(texture.grid_counts(), most)
     flat = points.reshape(-1, 2)
     shape = points.shape[:2]
     heights = banded(texture.height(flat).reshape(1, *shape), spacing, repeats)

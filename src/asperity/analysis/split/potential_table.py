@@ -17,8 +17,6 @@ from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
 from asperity.laws import LAWS
 from asperity.surface import Surface
-from asperity.textures.heightmap import HeightMap
-from asperity.textures.profile import Profile
 
 DEFAULT_MAX_BYTES = 2**28
 # Unless told otherwise, a table has about this many nodes, but no finer ones than there is use for.
@@ -156,7 +154,7 @@ def tabulate(
     if surface.law is not LAWS["H"]:
         raise ParameterError("surface", f"must have law H to be tabulated, not {surface.law}")
     texture = surface.texture
-    if not (texture.domain.periodic or isinstance(texture, HeightMap | Profile)):
+    if not (texture.domain.periodic or texture.ends):
         raise ParameterError("surface", "has a texture that never repeats: no table holds it")
     limit = int(positive("max_bytes", max_bytes, "byte"))
     if resolution is None:

@@ -115,7 +115,7 @@ def _draw_map(figure: Figure | SubFigure, axes: Axes, texture: Texture) -> None:
 
 def _greyed(shaded: FloatArray, texture: Texture) -> FloatArray:
     """Return the picture with the places greyed where heights were missing and are filled in."""
-    filled = getattr(texture, "filled", None)
+    filled = texture.filled
     if filled is None or not filled.any():
         return shaded
     rows, columns = (

@@ -12,11 +12,8 @@ from asperity.enclosures.cells import Cells
 from asperity.enclosures.taylor import Number, Taylor
 from asperity.textures.cells.splines import MapCells, ProfileCells
 from asperity.textures.cells.waves import WaveCells
-from asperity.textures.fourier import Fourier
-from asperity.textures.heightmap import HeightMap
-from asperity.textures.profile import Profile
-from asperity.textures.sinusoid import Sinusoid
-from asperity.textures.texture import ScanLine, Texture
+from asperity.textures.domain import ScanLine
+from asperity.textures.plane_waves import PlaneWaves
 
 _ALONG_AN_AXIS = 1e-12
 
@@ -48,26 +45,32 @@ def _along(model: Number) -> Number:
     return Taylor(model.c, model.g.sum(axis=0, keepdims=True), model.e)
 
 
-def line_pieces(texture: Texture, line: ScanLine, least: int) -> Pieces | None:
-    """Return at least so many pieces of a line; nothing for a line across the cells of a map."""
-    if isinstance(texture, (Sinusoid, Fourier)):
-        half = 0.5 * line.length / least
-        centres: FloatArray = half * (2.0 * np.arange(least, dtype=float)[:, None] + 1.0)
-        return Pieces(_LineOfWaves(texture, line), centres, np.full(1, half), 2.0 * half)
-    if isinstance(texture, Profile):
-        along_x = abs(abs(line.direction[0]) - 1.0) < _ALONG_AN_AXIS
-        return _spline_pieces(ProfileCells(texture), 0, line, least) if along_x else None
-    if isinstance(texture, HeightMap):
-        for axis in (0, 1):
-            if abs(abs(line.direction[axis]) - 1.0) < _ALONG_AN_AXIS:
-                return _spline_pieces(MapCells(texture), axis, line, least)
+def equal_pieces(cells: Cells, line: ScanLine, least: int, length: float) -> Pieces:
+    """Return so many pieces of a line whose cells have one coordinate, 0 to ``length``."""
+    half = 0.5 * length / least
+    centres: FloatArray = half * (2.0 * np.arange(least, dtype=float)[:, None] + 1.0)
+    return Pieces(cells, centres, np.full(1, half), line.length / least)
+
+
+def wave_pieces(waves: PlaneWaves, line: ScanLine, least: int) -> Pieces:
+    """Return so many pieces of a line over a sum of waves."""
+    return equal_pieces(_LineOfWaves(waves, line), line, least, line.length)
+
+
+def spline_pieces(cells: MapCells | ProfileCells, line: ScanLine, least: int) -> Pieces | None:
+    """Cut a line at the nodes of a spline and between them; at least so many pieces.
+
+    It must begin and end at nodes, and not run across the cells: else there are none.
+    """
+    for axis in range(cells.dimensions):
+        if abs(abs(line.direction[axis]) - 1.0) < _ALONG_AN_AXIS:
+            return _pieces_along(cells, axis, line, least)
     return None
 
 
-def _spline_pieces(
+def _pieces_along(
     cells: MapCells | ProfileCells, axis: int, line: ScanLine, least: int
 ) -> Pieces | None:
-    """Cut the line at the nodes and between them; it must begin and end at nodes."""
     ends = cells.coordinates(np.stack([line.start, line.start + line.length * line.direction]))
     low, high = np.sort(ends[:, axis])
     nodes = round(high - low)
@@ -86,8 +89,8 @@ def _spline_pieces(
 class _LineOfWaves(WaveCells):
     """The waves as they are met along a line; the coordinate is the distance [m]."""
 
-    def __init__(self, texture: Sinusoid | Fourier, line: ScanLine) -> None:
-        super().__init__(texture, (line.length, line.length))
+    def __init__(self, waves: PlaneWaves, line: ScanLine) -> None:
+        super().__init__(waves, (line.length, line.length))
         self._phases = self._phases + self._waves @ line.start
         self._multiples = self._waves @ line.direction[:, None]
         self._line = line

@@ -6,15 +6,15 @@ several cells of a map its B-spline coefficients do.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.enclosures.cells import CHUNK, EPS, ORDERS, SAMPLES, Cells, spread
 from asperity.enclosures.taylor import Number, Taylor
-from asperity.textures.heightmap import HeightMap
-from asperity.textures.profile import Profile
+
+Evaluate = Callable[[FloatArray], FloatArray]
 
 # From uniform B-spline to Bernstein coefficients on one cell, by degree.
 _TO_BERNSTEIN = {
@@ -33,15 +33,27 @@ _BLOCK = 4
 
 
 class MapCells(Cells):
-    """The cells of a bicubic spline, in units of its nodes, and at first blocks of them."""
+    """The cells of a bicubic spline, in units of its nodes, and at first blocks of them.
+
+    Args:
+        coefficients: of the B-spline [m], one row and column before the first cell, two after.
+        pitch: distance of the nodes (p_x, p_y) [m].
+        origin: the first node [m], shape (2,).
+        derivatives: h, h_x, h_y, h_xx, h_xy, h_yy, (n, 6), at points (n, 2) [m].
+    """
 
     dimensions, gap, wish = 2, 1e-3, 1e-6
 
-    def __init__(self, texture: HeightMap) -> None:
-        self._texture = texture
-        c, ix, iy, x0, y0 = texture.arguments[:5]
-        self._c, self._per, self._origin = c, np.array([ix, iy]), np.array([x0, y0])
-        self._counts = np.array([c.shape[1] - 3, c.shape[0] - 3])
+    def __init__(
+        self,
+        coefficients: FloatArray,
+        pitch: tuple[float, float],
+        origin: FloatArray,
+        derivatives: Evaluate,
+    ) -> None:
+        self._c, self._per, self._origin = coefficients, 1.0 / np.array(pitch), origin
+        self._counts = np.array([coefficients.shape[1] - 3, coefficients.shape[0] - 3])
+        self._evaluate = derivatives
 
     def start(self) -> tuple[Iterator[FloatArray], FloatArray]:
         """See :class:`Cells`."""
@@ -89,7 +101,7 @@ class MapCells(Cells):
 
     def derivatives(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""
-        return self._texture.derivatives(self.plane(coordinates))
+        return self._evaluate(self.plane(coordinates))
 
     def plane(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""
@@ -105,14 +117,16 @@ class MapCells(Cells):
 
 
 class ProfileCells(Cells):
-    """The cells of a cubic spline along x, in units of its nodes."""
+    """The cells of a cubic spline along x, in units of its nodes; see :class:`MapCells`."""
 
     dimensions, gap, wish = 1, 1e-6, 1e-9
 
-    def __init__(self, texture: Profile) -> None:
-        self._texture = texture
-        self._c, self._per, self._origin, _periodic = texture.arguments[:4]
-        self._count = len(self._c) - 3
+    def __init__(
+        self, coefficients: FloatArray, pitch: float, origin: float, derivatives: Evaluate
+    ) -> None:
+        self._c, self._per, self._origin = coefficients, 1.0 / pitch, origin
+        self._count = len(coefficients) - 3
+        self._evaluate = derivatives
 
     def start(self) -> tuple[Iterator[FloatArray], FloatArray]:
         """See :class:`Cells`."""
@@ -149,7 +163,7 @@ class ProfileCells(Cells):
 
     def derivatives(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""
-        return self._texture.derivatives(self.plane(coordinates))
+        return self._evaluate(self.plane(coordinates))
 
     def plane(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""

@@ -23,8 +23,7 @@ from asperity.enclosures.cells import (
     spread,
 )
 from asperity.enclosures.taylor import Number, Taylor
-from asperity.textures.fourier import Fourier
-from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.plane_waves import PlaneWaves
 
 # Sines per chunk.
 _SINES = 2_000_000
@@ -38,31 +37,27 @@ class WaveCells(Cells):
     """Cells on the torus of independent phases of a sum of waves, or on a rectangle.
 
     Args:
-        texture: a sinusoid or a sum.
+        waves: of the texture.
         extent: width and depth [m] of the rectangle from the origin; the whole plane by default.
         margin: how far the rectangle reaches beyond that on every side [m].
+        reach: how far from the origin [m] phases must be near those on the torus.
     """
 
     def __init__(
         self,
-        texture: Sinusoid | Fourier,
+        waves: PlaneWaves,
         extent: tuple[float, ...] | None = None,
         margin: float = 0.0,
+        reach: float = 0.0,
     ) -> None:
         self._extent = None if extent is None else tuple(side + 2.0 * margin for side in extent)
         self._margin, self._miss = margin, 0.0
-        if isinstance(texture, Sinusoid):
-            amplitude, kx, ky, phase = texture.arguments
-            self._amplitudes, self._phases = np.array([amplitude]), np.array([phase])
-            self._waves = np.array([[kx, ky]])
-            self._basis, self._multiples = self._waves, np.ones((1, 1))
+        self._amplitudes, self._phases = waves.amplitudes, waves.phases
+        self._waves = waves.wavevectors
+        if extent is None:
+            self._basis, self._multiples = waves.lattice
+            self._miss = _missed(waves, reach)
         else:
-            self._amplitudes, self._phases = texture.amplitudes, texture.phases
-            self._waves = texture.wavevectors
-            if extent is None:
-                self._basis, self._multiples = texture.lattice
-                self._miss = _missed(texture)
-        if extent is not None:
             self._basis, self._multiples = np.eye(2), self._waves
             self._phases = self._phases - self._waves.sum(axis=1) * margin
         self._weights = {name: self._weight(*ORDERS[name]) for name in NAMES}
@@ -163,14 +158,13 @@ class WaveCells(Cells):
         return np.clip(coordinates, 0.0, self._extent)
 
 
-def _missed(texture: Fourier) -> float:
-    """Return how far phases are from those on the torus, within the domain of a texture.
+def _missed(waves: PlaneWaves, reach: float) -> float:
+    """Return how far phases are from those on the torus, within a distance of the origin [m].
 
     Ratios of waves count as rational up to a relative error: see ``integer_lattice``.
     """
-    basis, multiples = texture.lattice
-    off = np.hypot(*(texture.wavevectors - multiples @ basis).T)
-    reach = float(np.hypot(*texture.domain.spans.T).sum())
+    basis, multiples = waves.lattice
+    off = np.hypot(*(waves.wavevectors - multiples @ basis).T)
     # What rounding alone leaves is within the slack anyway.
     rounding = 16.0 * EPS * np.abs(multiples) @ np.hypot(*basis.T)
     return float(np.where(off > rounding, off, 0.0).max() * reach)

@@ -1,0 +1,99 @@
+"""Where a texture lives: the region that stands for all of it, and the line that is scanned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from asperity.checks import FloatArray
+
+
+@dataclass(frozen=True)
+class Domain:
+    """The region of the plane that stands for the whole texture.
+
+    Attributes:
+        origin: one corner [m], shape (2,).
+        spans: edge vectors [m], shape (1, 2) for a profile, (2, 2) for a map.
+        periodic: whether the texture repeats along every span.
+        description: in words, for tables.
+    """
+
+    origin: FloatArray
+    spans: FloatArray
+    periodic: bool
+    description: str
+
+    def points(self, fractions: FloatArray) -> FloatArray:
+        """Return the points (n, 2) [m] at fractions (n, d) of the spans."""
+        return np.ascontiguousarray(self.origin + fractions @ self.spans)
+
+    def widened(self, margin: float) -> Domain:
+        """Return the region that reaches so far beyond this one on every side [m]."""
+        unit = self.spans / np.hypot(*self.spans.T)[:, None]
+        spans = self.spans + 2.0 * margin * unit
+        return replace(self, origin=self.origin - margin * unit.sum(axis=0), spans=spans)
+
+    def upright(self) -> tuple[FloatArray, bool]:
+        """Return spans at right angles [m], and whether the texture repeats along them."""
+        if len(self.spans) == 1:
+            return self.spans, self.periodic
+        along = self.spans[0] / np.hypot(*self.spans[0])
+        across = self.spans[1] - float(self.spans[1] @ along) * along
+        skew = float(np.hypot(*(self.spans[1] - across)))
+        square = skew < 1e-9 * float(np.hypot(*across))
+        return np.array([self.spans[0], across]), self.periodic and square
+
+    def grid(
+        self, counts: Sequence[int], most: int | None = None
+    ) -> tuple[FloatArray, tuple[float, float], bool]:
+        """Return points at equal distances along spans at right angles.
+
+        Args:
+            counts: points along each span.
+            most: points along each side; from the middle of a larger grid. All by default.
+
+        Returns:
+            Points [m], shape (ny, nx, 2), (1, nx, 2) for a profile; spacing (x, y) [m]; whether
+            they are a whole period.
+        """
+        spans, repeats = self.upright()
+        sides, number = np.hypot(*spans.T), np.array(counts, dtype=np.intp)
+        # A finite map has a node at both ends, a periodic one does not repeat its first.
+        steps = sides / (number if self.periodic else number - 1)
+        first = np.zeros_like(number)
+        if most is not None and number.max() > most:
+            repeats = False
+            first = np.maximum((number - most) // 2, 0)
+            number = np.minimum(number, most)
+        ticks = [
+            (begin + np.arange(count)) * step / side
+            for begin, count, step, side in zip(first, number, steps, sides, strict=True)
+        ]
+        points = self.origin + np.stack(np.meshgrid(*ticks), axis=-1) @ spans
+        points = points[None] if len(ticks) == 1 else points
+        return points, (float(steps[0]), float(steps[-1])), repeats
+
+
+@dataclass(frozen=True)
+class ScanLine:
+    """A straight line over the texture.
+
+    Attributes:
+        start: first point [m], shape (2,).
+        direction: unit vector, shape (2,).
+        length: one period, or the extent [m].
+        periodic: whether the texture repeats after the length.
+    """
+
+    start: FloatArray
+    direction: FloatArray
+    length: float
+    periodic: bool
+
+    def points(self, count: int) -> FloatArray:
+        """Return points (count, 2) [m], in the middle of equal steps."""
+        steps = (np.arange(count) + 0.5) * (self.length / count)
+        return np.ascontiguousarray(self.start + steps[:, None] * self.direction)

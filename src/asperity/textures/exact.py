@@ -1,0 +1,102 @@
+"""The defining formulas of the texture kinds in many digits, slowly, in mpmath.
+
+Each is a function h(x, y, m, n): the derivative of order (m, n) of the height, m + n <= 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mpmath
+
+from asperity.checks import FloatArray
+
+ExactHeight = Callable[[Any, Any, int, int], Any]
+
+
+def exact_waves(waves: list[tuple[Any, Any, Any, Any]]) -> ExactHeight:
+    """Return Σ a sin(k_x x + k_y y + phase) of waves (a, k_x, k_y, phase)."""
+
+    def height(x: Any, y: Any, m: int, n: int) -> Any:
+        total = mpmath.mpf(0)
+        for a, kx, ky, phase in waves:
+            u, v = mpmath.mpf(kx), mpmath.mpf(ky)
+            angle = u * x + v * y + mpmath.mpf(phase)
+            total += mpmath.mpf(a) * u**m * v**n * mpmath.sin(angle + (m + n) * mpmath.pi / 2)
+        return total
+
+    return height
+
+
+def exact_continuation(derivatives: Callable[[FloatArray], FloatArray]) -> ExactHeight:
+    """Return what double precision tells: values there, continued by Taylor's formula."""
+
+    def height(x: Any, y: Any, m: int, n: int) -> Any:
+        near = [float(x), float(y)]
+        h, hx, hy, hxx, hxy, hyy = (mpmath.mpf(float(v)) for v in derivatives([near])[0])  # type: ignore[arg-type]  # a list will do
+        dx, dy = x - mpmath.mpf(near[0]), y - mpmath.mpf(near[1])
+        if m + n == 2:
+            return (hyy, hxy, hxx)[m]
+        if m + n == 1:
+            return hx + hxx * dx + hxy * dy if m else hy + hxy * dx + hyy * dy
+        return h + dx * (hx + hxx * dx / 2 + hxy * dy) + dy * (hy + hyy * dy / 2)
+
+    return height
+
+
+def exact_map(
+    coefficients: FloatArray, pitch: tuple[float, float], origin: FloatArray, periodic: bool
+) -> ExactHeight:
+    """Return the bicubic B-spline of coefficients at nodes, (ny, nx), mirrored or periodic."""
+    ny, nx = coefficients.shape
+
+    def height(x: Any, y: Any, m: int, n: int) -> Any:
+        u = (x - mpmath.mpf(float(origin[0]))) / mpmath.mpf(pitch[0])
+        v = (y - mpmath.mpf(float(origin[1]))) / mpmath.mpf(pitch[1])
+        columns, rows = _weights(u, nx, periodic, m), _weights(v, ny, periodic, n)
+        total = sum(
+            wr * wc * mpmath.mpf(float(coefficients[i, j]))
+            for i, wr in rows.items()
+            for j, wc in columns.items()
+        )
+        return total / mpmath.mpf(pitch[0]) ** m / mpmath.mpf(pitch[1]) ** n
+
+    return height
+
+
+def exact_profile(
+    coefficients: FloatArray, pitch: float, origin: float, periodic: bool
+) -> ExactHeight:
+    """Return the cubic B-spline along x of coefficients at nodes, mirrored or periodic."""
+
+    def height(x: Any, _y: Any, m: int, n: int) -> Any:
+        if n > 0:
+            return mpmath.mpf(0)
+        u = (x - mpmath.mpf(origin)) / mpmath.mpf(pitch)
+        columns = _weights(u, len(coefficients), periodic, m)
+        total = sum(w * mpmath.mpf(float(coefficients[j])) for j, w in columns.items())
+        return total / mpmath.mpf(pitch) ** m
+
+    return height
+
+
+def _weights(u: Any, count: int, periodic: bool, order: int) -> dict[int, Any]:
+    """Return the weight of each node at u [nodes], the border folded node by node."""
+    weights: dict[int, Any] = {}
+    first = int(mpmath.floor(u)) - 1
+    for j in range(first, first + 4):
+        node = j % count if periodic else j % (2 * (count - 1))
+        node = node if node < count else 2 * (count - 1) - node
+        weights[node] = weights.get(node, 0) + _basis(u - j, order)
+    return weights
+
+
+def _basis(u: Any, order: int) -> Any:
+    """Cardinal cubic B-spline β(u), support (-2, 2), or its derivative: truncated powers."""
+    total = mpmath.mpf(0)
+    for j, weight in enumerate((1, -4, 6, -4, 1)):
+        t = u + 2 - j
+        if t > 0:
+            total += weight * t ** (3 - order) / mpmath.factorial(3 - order)
+    return total
