@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from asperity.checks import positive, real
 from asperity.errors import ParameterError, nearest_names
+from asperity.files import record
 from asperity.units import engineering
 
 Form = Literal["quantity", "pair", "vector", "items", "vectors", "integer", "text"]
@@ -96,16 +97,7 @@ class Argument:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {
-            "name": self.name,
-            "words": self.words,
-            "unit": self.unit,
-            "default": self.default,
-            "default_words": self.default_words,
-            "form": self.form,
-            "required": self.required,
-            "choices": list(self.choices),
-        }
+        return record(self, without=("low", "high", "positive"))
 
 
 def whole(name: str, value: Any) -> int:

@@ -6,12 +6,12 @@ import json
 import math
 import os
 import secrets
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, overload
 
 
 def is_device(path: str | os.PathLike[str]) -> bool:
@@ -73,6 +73,10 @@ def json_text(value: Any) -> str:
     return json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
+@overload
+def plain(value: Mapping[str, Any], infinity: str | None = "inf") -> dict[str, Any]: ...
+@overload
+def plain(value: Any, infinity: str | None = "inf") -> Any: ...
 def plain(value: Any, infinity: str | None = "inf") -> Any:
     """Return a value as JSON has it: dictionaries, lists, texts, numbers, truth values and None.
 
@@ -112,18 +116,21 @@ def _not_finite(value: float, infinity: str | None) -> str | None:
     return infinity if value > 0.0 else f"-{infinity}"
 
 
-def record(value: Any, *names: str, infinity: str | None = "inf") -> dict[str, Any]:
+def record(
+    value: Any, *names: str, without: Sequence[str] = (), infinity: str | None = "inf"
+) -> dict[str, Any]:
     """Return attributes of an object as plain data; see :func:`plain`.
 
     Args:
         value: the object.
         names: of its attributes, in order; by default all fields of a dataclass.
+        without: names of fields that are left out.
         infinity: what an unbounded number becomes.
     """
     if not names:
         if not is_dataclass(value):
             raise TypeError(f"no plain data: {type(value).__name__}")
-        names = tuple(field.name for field in fields(value))
+        names = tuple(field.name for field in fields(value) if field.name not in without)
     return {name: plain(getattr(value, name), infinity) for name in names}
 
 

@@ -6,7 +6,7 @@ import html
 import math
 import os
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,11 +22,12 @@ from asperity.analysis.gain.characteristic import (
     curl_number,
     one_sided_number,
 )
-from asperity.analysis.passivity.criteria import LEAK, plain
+from asperity.analysis.passivity.criteria import LEAK
 from asperity.analysis.passivity.judgement import Passivity, passivity
 from asperity.derive.facts import law_facts
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
+from asperity.files import plain
 from asperity.surface import (
     DEFAULT_STIFFNESS,
     Surface,
@@ -98,31 +99,33 @@ class Analysis:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number; infinity is the string "inf"."""
-        surface, density = self.surface, self.curl_density
-        return {
-            "schema": SCHEMA,
-            "answer": self.answer,
-            "texture": surface.texture.describe(),
-            "law": surface.law.letter,
-            "law_name": surface.law.name,
-            "law_parameters": dict(surface.law_parameters),
-            "clamp": surface.clamp,
-            "stiffness": surface.stiffness,
-            "max_depth": surface.max_depth,
-            "device": self.device.to_dict(),
-            "q": self.q.to_dict(),
-            "one_sided": self.one_sided.to_dict(),
-            "curl": None if self.curl is None else self.curl.to_dict(),
-            "curl_density": None if density is None else density.to_dict(),
-            "conservative": self.conservative,
-            "conservative_reason": self.conservative_reason,
-            "leak": self.leak.to_dict(),
-            "v_star": plain(self.v_star),
-            "continuity": self.continuity.to_dict(),
-            "passivity": self.passivity.to_dict(),
-            "merit": {name: plain(value) for name, value in asdict(self.merit).items()},
-            "assumptions": list(self.assumptions),
-        }
+        surface = self.surface
+        return plain(
+            {
+                "schema": SCHEMA,
+                "answer": self.answer,
+                "texture": surface.texture.describe(),
+                "law": surface.law.letter,
+                "law_name": surface.law.name,
+                "law_parameters": surface.law_parameters,
+                "clamp": surface.clamp,
+                "stiffness": surface.stiffness,
+                "max_depth": surface.max_depth,
+                "device": self.device,
+                "q": self.q,
+                "one_sided": self.one_sided,
+                "curl": self.curl,
+                "curl_density": self.curl_density,
+                "conservative": self.conservative,
+                "conservative_reason": self.conservative_reason,
+                "leak": self.leak,
+                "v_star": self.v_star,
+                "continuity": self.continuity,
+                "passivity": self.passivity,
+                "merit": self.merit,
+                "assumptions": self.assumptions,
+            }
+        )
 
     def _repr_html_(self) -> str:
         """Return the answer, the numbers and the criteria for a notebook."""

@@ -17,6 +17,7 @@ from asperity.analysis.verdict import assumptions, recommend, verdict
 from asperity.checks import positive
 from asperity.derive.facts import law_facts
 from asperity.devices import Device, load_device
+from asperity.files import plain, record
 from asperity.laws import LAWS, Law, find_laws
 from asperity.surface import DEFAULT_STIFFNESS, Surface
 from asperity.textures.texture import Texture
@@ -90,13 +91,9 @@ class Comparison:
         return {
             "schema": SCHEMA,
             "texture": self.texture.describe(),
-            "device": self.device.to_dict(),
-            "stiffness": self.stiffness,
-            "max_depth": self.max_depth,
-            "laws": [row.to_dict() for row in self.rows],
-            "recommended": self.recommended,
-            "recommendation": self.recommendation,
-            "assumptions": list(self.assumptions),
+            **record(self, "device", "stiffness", "max_depth"),
+            "laws": plain(self.rows),
+            **record(self, "recommended", "recommendation", "assumptions"),
         }
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import Leak
+from asperity.files import record
 from asperity.laws import Law
 from asperity.surface import Surface
 
@@ -57,21 +58,5 @@ class LawRow:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {
-            "law": self.law.letter,
-            "name": self.law.name,
-            "q": self.q.to_dict(),
-            "one_sided": self.one_sided.to_dict(),
-            "safe_stiffness": self.safe_stiffness,
-            "rule": self.rule,
-            "conservative": self.conservative,
-            "conservative_reason": self.conservative_reason,
-            "leak": self.leak.to_dict(),
-            "continuous": self.continuous,
-            "continuous_reason": self.continuous_reason,
-            "strength": self.strength,
-            "support": self.support,
-            "contact_lost": self.contact_lost,
-            "texture_force": self.texture_force,
-            "verdict": self.verdict,
-        }
+        law = {"law": self.law.letter, "name": self.law.name}
+        return law | record(self, without=("surface",))

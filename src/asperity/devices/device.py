@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.errors import ParameterError
+from asperity.files import Record, record
 from asperity.units import engineering
 
 
 @dataclass(frozen=True)
-class Datum:
+class Datum(Record):
     """One number of a device.
 
     Attributes:
@@ -41,16 +42,6 @@ class Datum:
         if self.unit == "kg" and self.value < 1.0:
             return engineering(1e3 * self.value, "g")
         return engineering(self.value, self.unit).replace("*", "·")
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data."""
-        return {
-            "value": self.value,
-            "unit": self.unit,
-            "source": self.source,
-            "verified": self.verified,
-            "also": [other.to_dict() for other in self.also],
-        }
 
 
 @dataclass(frozen=True)
@@ -97,10 +88,4 @@ class Device:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data."""
-        return {
-            "id": self.id,
-            "name": self.name,
-            "axes": self.axes,
-            "notes": list(self.notes),
-            "data": {field: datum.to_dict() for field, datum in self.data.items()},
-        }
+        return record(self, "id", "name", "axes", "notes", "data")

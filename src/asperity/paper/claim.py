@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray
 from asperity.errors import AsperityError
+from asperity.files import record
 
 Verdict = Literal["holds", "holds with correction", "does not hold", "undecided"]
 VERDICTS: tuple[Verdict, ...] = ("holds", "holds with correction", "does not hold", "undecided")
@@ -99,13 +100,7 @@ class Result:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {
-            "id": self.id,
-            "equations": list(self.equations),
-            "statement": self.statement,
-            "verdict": self.verdict,
-            "evidence": self.evidence.to_dict(),
-        }
+        return record(self, without=("section",))
 
 
 @dataclass(frozen=True)

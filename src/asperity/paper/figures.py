@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from asperity.checks import FloatArray
+from asperity.files import Record
 from asperity.paper.claims_friction import friction_loop
 from asperity.paper.comparisons import groove_path
 from asperity.paper.plane import LAWS, SCANNING, path_points
@@ -20,7 +20,7 @@ _STEPS = 400  # on each leg of a path of figure 3
 
 
 @dataclass(frozen=True)
-class ForceField:
+class ForceField(Record):
     """One panel of figure 2: a law's force in the x-z plane.
 
     Attributes:
@@ -45,13 +45,9 @@ class ForceField:
     handles: FloatArray
     handle_forces: FloatArray
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return {name: _listed(value) for name, value in vars(self).items()}
-
 
 @dataclass(frozen=True)
-class LoopEnergy:
+class LoopEnergy(Record):
     """One panel of figure 3: a closed path and the energy that a law gives along it.
 
     Attributes:
@@ -75,14 +71,6 @@ class LoopEnergy:
     work: FloatArray
     energy: float
     equation: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return {name: _listed(value) for name, value in vars(self).items()}
-
-
-def _listed(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def _profile() -> tuple[FloatArray, FloatArray]:

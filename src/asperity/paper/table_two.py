@@ -16,6 +16,7 @@ from asperity.analysis.energy.loops import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.gain.friction import largest_singular_value
 from asperity.derive.facts import law_facts
+from asperity.files import record
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
@@ -119,19 +120,9 @@ class TableTwoRow:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
         return {
-            "law": self.law,
-            "printed": vars(self.printed),
-            "q": self.q.to_dict(),
-            "one_sided": self.one_sided.to_dict(),
-            "formula": self.formula,
-            "conservative": self.conservative,
-            "continuous": self.continuous,
-            "energy": self.energy,
-            "number_agrees": self.number_agrees,
-            "conservativity_agrees": self.conservativity_agrees,
-            "continuity_agrees": self.continuity_agrees,
-            "energy_agrees": self.energy_agrees,
-            "change": self.change,
+            **record(self, without=("change",)),
+            **record(self, "number_agrees", "conservativity_agrees"),
+            **record(self, "continuity_agrees", "energy_agrees", "change"),
         }
 
 
@@ -165,7 +156,7 @@ class TableTwo:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {"parameters": self.parameters, "rows": [row.to_dict() for row in self.rows]}
+        return record(self, "parameters", "rows")
 
     def _repr_html_(self) -> str:
         """Return the table for a notebook."""

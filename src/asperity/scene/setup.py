@@ -13,6 +13,7 @@ import numpy as np
 from asperity.checks import FloatArray, positive
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError, nearest_names
+from asperity.files import plain, record
 from asperity.laws import Law
 from asperity.scene import readers
 from asperity.scene.loading import Scene
@@ -146,24 +147,16 @@ class Setup:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
+        surface = self.surface
         return {
             "surface": {
-                "texture": self.surface.texture.describe(),
-                "law": self.surface.law.letter,
-                "stiffness": self.surface.stiffness,
-                "max_depth": self.surface.max_depth,
-                "parameters": dict(self.surface.law_parameters),
+                "texture": surface.texture.describe(),
+                "law": surface.law.letter,
+                **record(surface, "stiffness", "max_depth"),
+                "parameters": plain(surface.law_parameters),
             },
             "device": self.device.id,
-            "plant": self.plant.to_dict(),
-            "hand": self.hand.to_dict(),
-            "servo": self.servo.to_dict(),
-            "motion": self.motion.to_dict(),
-            "duration": self.duration,
-            "start": None if self.start is None else list(self.start),
-            "velocity": None if self.velocity is None else list(self.velocity),
-            "every": self.every,
-            "assumptions": list(self.assumptions),
+            **record(self, without=("surface", "device")),
         }
 
 

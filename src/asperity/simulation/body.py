@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray, positive, real
 from asperity.errors import ParameterError
+from asperity.files import Record
 from asperity.simulation.hands import SpringHand
 
 
 @dataclass(frozen=True)
-class Resonance:
+class Resonance(Record):
     """The first structural mode: part of the mass hangs on a spring, away from motor and sensor.
 
     Attributes:
@@ -36,13 +37,6 @@ class Resonance:
             raise ParameterError("damping_ratio", "must not be negative", self.damping_ratio)
         if not 0.0 < real("share", self.share) < 1.0:
             raise ParameterError("share", "must be between 0 and 1", self.share)
-
-    def to_dict(self) -> dict[str, float]:
-        """Return plain data, SI units."""
-        return {
-            "frequency": float(self.frequency), "damping_ratio": float(self.damping_ratio),
-            "share": float(self.share),
-        }  # fmt: skip
 
 
 @dataclass(frozen=True)

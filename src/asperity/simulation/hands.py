@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from asperity.checks import array, positive, real
 from asperity.errors import ParameterError
+from asperity.files import record
 
 Triple = tuple[float, float, float]
 
@@ -69,10 +70,7 @@ class SpringHand:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {
-            "kind": "spring", "stiffness": list(self.stiffness), "damping": list(self.damping),
-            "mass": self.mass, "force": list(self.force),
-        }  # fmt: skip
+        return {"kind": "spring"} | record(self)
 
 
 @dataclass(frozen=True)
@@ -125,10 +123,7 @@ class BandHand:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {
-            "kind": "band", "stiffness": float(self.stiffness), "tension": float(self.tension),
-            "length": float(self.length), "damping": float(self.damping),
-        }  # fmt: skip
+        return {"kind": "band"} | record(self)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
+from asperity.files import record
 
 
 @runtime_checkable
@@ -56,7 +57,7 @@ class Still:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {"kind": "still", "point": list(self.point)}
+        return {"kind": "still"} | record(self)
 
 
 @dataclass(frozen=True)
@@ -121,10 +122,7 @@ class Strokes:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {
-            "kind": "strokes", "start": list(self.start), "end": list(self.end),
-            "speed": float(self.speed), "count": self.count,
-        }  # fmt: skip
+        return {"kind": "strokes"} | record(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,4 +169,4 @@ class Path:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {"kind": "path", "times": self.times.tolist(), "points": self.points.tolist()}
+        return {"kind": "path"} | record(self)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
+from asperity.files import Record, record
 from asperity.simulation.hands import Hand, MovedHand
 from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Plant
@@ -34,7 +35,7 @@ _COARSE = 2.0  # factor from one stiffness to the next while the onset is looked
 
 
 @dataclass(frozen=True)
-class Onset:
+class Onset(Record):
     """The stiffness at which limit cycles begin.
 
     Attributes:
@@ -71,15 +72,6 @@ class Onset:
             return math.inf
         return math.sqrt(self.quiet * self.cycling) if self.quiet else self.cycling
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units; an unbounded number is written as the string "inf"."""
-        cycling: float | str = "inf" if math.isinf(self.cycling) else self.cycling
-        return {
-            "law": self.law, "delay": self.delay, "quiet": self.quiet, "cycling": cycling,
-            "starts": self.starts, "cycles": self.cycles, "low": list(self.low),
-            "high": list(self.high),
-        }  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Shifted:
@@ -99,7 +91,7 @@ class Shifted:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {"kind": "shifted", "motion": self.motion.to_dict(), "offset": list(self.offset)}
+        return {"kind": "shifted"} | record(self)
 
 
 def restlessness(run: Run, quarter: int = 3) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from asperity.checks import FloatArray, array, real
 from asperity.devices.five_bar import FiveBar, joint_angles
 from asperity.errors import ParameterError
+from asperity.files import record
 from asperity.simulation.body import Resonance
 from asperity.simulation.hands import Triple, triple
 
@@ -96,11 +97,7 @@ class Cartesian:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        mode = self.resonance
-        return {
-            "kind": "cartesian", "mass": list(self.mass), "damping": self.damping.tolist(),
-            "resonance": None if mode is None else mode.to_dict(), "friction": self.friction,
-        }  # fmt: skip
+        return {"kind": "cartesian"} | record(self)
 
 
 @dataclass(frozen=True)
@@ -194,16 +191,7 @@ class Pantograph:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        bars, masses = self.linkage, self.masses
-        return {
-            "kind": "pantograph",
-            "linkage": {"proximal": bars.proximal, "distal": bars.distal, "base": bars.base},
-            "masses": {name: getattr(masses, name) for name in masses.__dataclass_fields__},
-            "joint_damping": self.joint_damping,
-            "centre": list(self.centre),
-            "inside_only": self.inside_only,
-            "friction": self.friction,
-        }
+        return {"kind": "pantograph"} | record(self)
 
 
 Plant = Cartesian | Pantograph

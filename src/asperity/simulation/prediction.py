@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.derive.facts import law_facts
 from asperity.devices.five_bar import handle_damping
+from asperity.files import plain, record
 from asperity.simulation.hands import Hand, SpringHand
 from asperity.simulation.onset import Onset
 from asperity.simulation.plants import Pantograph, Plant
@@ -67,22 +68,13 @@ class Prediction:
         return self.wall_rule is not None and self.onset.cycling < self.wall_rule
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units; an unbounded number is written as the string "inf"."""
-        numbers = {
-            "depth": self.depth,
-            "damping": self.damping,
-            "q": self.q,
-            "one_sided": self.one_sided,
-            "paper_1": self.paper,
-            "delay_rule": self.delay_rule,
-            "wall_rule": self.wall_rule,
-        }
+        """Return plain data, SI units."""
         return {
             **self.onset.to_dict(),
-            **{name: "inf" if value == math.inf else value for name, value in numbers.items()},
-            "conservative": self.conservative,
-            "missed": self.missed,
-            "wall_rule_missed": self.wall_rule_missed,
+            **record(self, "depth", "damping", "q", "one_sided"),
+            "paper_1": plain(self.paper),  # equation (1) of the paper
+            **record(self, "delay_rule", "wall_rule", "conservative"),
+            **record(self, "missed", "wall_rule_missed"),
         }
 
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray, positive
 from asperity.errors import ParameterError
+from asperity.files import plain, record
 from asperity.simulation.hands import Hand
 from asperity.simulation.motions import Strokes
 from asperity.simulation.plants import Plant
@@ -72,20 +73,14 @@ class Stroke:
         return self.field > self.spread + self.error
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units; what is not known is ``None``."""
+        """Return plain data, SI units; what is not known, or overflowed, is ``None``."""
         return {
-            "law": self.law, "speed": self.speed, "depth": self.depth, "reached": self.reached,
-            "energy": [_plain(value) for value in self.energy], "energy_sum": _plain(self.total),
-            "field": _plain(self.field), "error": _plain(self.error),
-            "spread": _plain(self.spread),
-            "same_sample_sum": _plain(self.same_sample),
-            "lost_contact": _plain(self.lost_contact), "closure": _plain(self.closure),
-            "stopped": self.stopped,
-        }  # fmt: skip
-
-
-def _plain(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+            **record(self, "law", "speed", "depth", "reached", "energy", infinity=None),
+            "energy_sum": plain(self.total, infinity=None),
+            **record(self, "field", "error", "spread", infinity=None),
+            "same_sample_sum": plain(self.same_sample, infinity=None),
+            **record(self, "lost_contact", "closure", "stopped", infinity=None),
+        }
 
 
 def scan_strokes(

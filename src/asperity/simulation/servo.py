@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from asperity.checks import positive, real
 from asperity.errors import ParameterError
+from asperity.files import Record
 
 
 @dataclass(frozen=True)
-class Servo:
+class Servo(Record):
     """What the device's electronics do to position and force.
 
     Attributes:
@@ -60,14 +60,6 @@ class Servo:
             float(self.position_resolution), float(self.force_resolution), float(self.max_force),
             float(self.virtual_damping), float(self.velocity_share), float(self.period),
         )  # fmt: skip
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units; no limit of the force is the string "inf"."""
-        values = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return {
-            name: "inf" if value == math.inf else float(value) if name != "delay" else value
-            for name, value in values.items()
-        }
 
 
 def _number(value: object) -> float:

@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from asperity.files import record
+
 Method = Literal["theorem", "closed form", "certified", "sampled"]
 
 
@@ -51,17 +53,6 @@ class Bound:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data; an unbounded number is written as the string "inf"."""
-        return {
-            "value": _plain(self.value),
-            "lower": _plain(self.lower),
-            "upper": _plain(self.upper),
-            "method": self.method,
-            "at": None if self.at is None else list(self.at),
-            "note": self.note,
-            "deflection": None if self.deflection is None else list(self.deflection),
-            "sliding": self.sliding,
-        }
-
-
-def _plain(number: float) -> float | str:
-    return number if math.isfinite(number) else "inf"
+        return record(
+            self, "value", "lower", "upper", "method", "at", "note", "deflection", "sliding"
+        )

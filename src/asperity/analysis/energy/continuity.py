@@ -14,6 +14,7 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.gain.medial_axis import Crest, sharpest_crest
 from asperity.checks import FloatArray
 from asperity.derive.facts import law_facts
+from asperity.files import Record, record
 from asperity.laws import LAWS
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
@@ -36,7 +37,7 @@ _STARTS = 256
 
 
 @dataclass(frozen=True)
-class Jump:
+class Jump(Record):
     """A place where the force jumps, with two witnesses on either side of it.
 
     Attributes:
@@ -50,15 +51,6 @@ class Jump:
     size: float
     before: Point
     after: Point
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return {
-            "depth": self.depth,
-            "size": self.size,
-            "before": list(self.before),
-            "after": list(self.after),
-        }
 
 
 @dataclass(frozen=True)
@@ -87,12 +79,7 @@ class Continuity:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {
-            "continuous": self.continuous,
-            "reason": self.reason,
-            "lipschitz": None if self.lipschitz is None else self.lipschitz.to_dict(),
-            "jumps": [jump.to_dict() for jump in self.jumps],
-        }
+        return record(self, "continuous", "reason", "lipschitz", "jumps")
 
 
 def continuity(surface: Surface, q: Bound) -> Continuity:

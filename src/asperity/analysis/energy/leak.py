@@ -16,6 +16,7 @@ from asperity.analysis.energy.thrust import mean_thrust
 from asperity.checks import FloatArray, array, positive
 from asperity.derive.facts import law_facts
 from asperity.errors import ParameterError
+from asperity.files import record
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine
 
@@ -84,22 +85,8 @@ class Leak:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data; an unbounded number is written as the string "inf"."""
-        return {
-            "energy": self.energy,
-            "upper": self.upper if math.isfinite(self.upper) else "inf",
-            "per_length": self.per_length,
-            "length": self.length,
-            "thrust": self.thrust,
-            "line": {
-                "start": self.line.start.tolist(),
-                "direction": self.line.direction.tolist(),
-                "length": self.line.length,
-                "periodic": self.line.periodic,
-            },
-            "method": self.method,
-            "description": self.description,
-            "vertices": self.vertices.tolist(),
-        }
+        numbers = record(self, "energy", "upper", "per_length", "length", "thrust")
+        return numbers | record(self, "line", "method", "description", "vertices")
 
 
 def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -> Leak:

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.limits.limit_rules import Limit, plain
+from asperity.analysis.limits.limit_rules import Limit
 from asperity.analysis.limits.spectrum import Spectrum
 from asperity.devices import Device
+from asperity.files import Record, record
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -18,7 +19,7 @@ SCHEMA = 1
 
 
 @dataclass(frozen=True)
-class RenderedWave:
+class RenderedWave(Record):
     """One wave of the texture on the device.
 
     Attributes:
@@ -40,21 +41,9 @@ class RenderedWave:
     holds: dict[int, bool]
     top_speed: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data; an unbounded number is written as the string "inf"."""
-        return {
-            "wavelength": self.wavelength,
-            "amplitude": self.amplitude,
-            "share": self.share,
-            "frequency": self.frequency,
-            "force": self.force,
-            "holds": {str(number): holds for number, holds in self.holds.items()},
-            "top_speed": plain(self.top_speed),
-        }
-
 
 @dataclass(frozen=True)
-class TextureForce:
+class TextureForce(Record):
     """The texture's force against what the device can show.
 
     Attributes:
@@ -74,17 +63,6 @@ class TextureForce:
     above_resolution: bool | None
     above_friction: bool | None
     needs: tuple[str, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return {
-            "rms": self.rms,
-            "in_band": self.in_band,
-            "in_band_rms": self.in_band_rms,
-            "above_resolution": self.above_resolution,
-            "above_friction": self.above_friction,
-            "needs": list(self.needs),
-        }
 
 
 @dataclass(frozen=True)
@@ -163,27 +141,17 @@ class Limits:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""
+        surface = self.surface
         return {
             "schema": SCHEMA,
-            "texture": self.texture.describe(),
-            "law": self.surface.law.letter,
-            "device": self.device.to_dict(),
-            "speed": self.speed,
-            "stiffness": self.surface.stiffness,
-            "max_depth": self.surface.max_depth,
-            "time_samples": self.time_samples,
-            "position_samples": self.position_samples,
-            "force_steps": self.force_steps,
-            "gain": {"symbol": self.gain_symbol, **self.gain.to_dict()},
-            "safe_stiffness": self.safe_stiffness,
-            "limits": [limit.to_dict() for limit in self.limits],
-            "waves": [wave.to_dict() for wave in self.waves],
-            "spectrum": self.spectrum.to_dict(),
-            "force": self.force.to_dict(),
-            "share": self.share,
-            "speeds": [plain(end) for end in self.speeds],
-            "answer": self.answer,
-            "assumptions": list(self.assumptions),
+            "texture": surface.texture.describe(),
+            "law": surface.law.letter,
+            **record(self, "device", "speed"),
+            **record(surface, "stiffness", "max_depth"),
+            **record(self, "time_samples", "position_samples", "force_steps"),
+            "gain": {"symbol": self.gain_symbol} | self.gain.to_dict(),
+            **record(self, "safe_stiffness", "limits", "waves", "spectrum", "force", "share"),
+            **record(self, "speeds", "answer", "assumptions"),
         }
 
 

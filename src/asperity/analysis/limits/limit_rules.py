@@ -15,12 +15,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.checks import FloatArray
+from asperity.files import Record
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Case:
 
 
 @dataclass(frozen=True)
-class Limit:
+class Limit(Record):
     """One of the six limits, decided for all waves at once.
 
     Attributes:
@@ -114,28 +114,6 @@ class Limit:
     speeds: tuple[float, float] | None
     uses: str
     needs: tuple[str, ...]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data; an unbounded number is written as the string "inf"."""
-        return {
-            "number": self.number,
-            "name": self.name,
-            "inequality": self.inequality,
-            "unit": self.unit,
-            "left": plain(self.left),
-            "right": plain(self.right),
-            "wavelength": self.wavelength,
-            "holds": self.holds,
-            "share": self.share,
-            "speeds": None if self.speeds is None else [plain(end) for end in self.speeds],
-            "uses": self.uses,
-            "needs": list(self.needs),
-        }
-
-
-def plain(number: float | None) -> float | str | None:
-    """Return a number for JSON, which has no infinity."""
-    return "inf" if number is not None and math.isinf(number) else number
 
 
 @dataclass(frozen=True)

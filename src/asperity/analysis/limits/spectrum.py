@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from asperity.checks import FloatArray
+from asperity.files import record
 from asperity.textures.plane_waves import PlaneWaves
 from asperity.textures.texture import Texture
 
@@ -74,12 +75,7 @@ class Spectrum:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {
-            "exact": self.exact,
-            "description": self.description,
-            "wavelengths": self.wavelengths.tolist(),
-            "amplitudes": self.amplitudes.tolist(),
-        }
+        return record(self, "exact", "description", "wavelengths", "amplitudes")
 
 
 @dataclass(frozen=True)

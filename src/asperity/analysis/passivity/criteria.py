@@ -12,7 +12,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from asperity.analysis.passivity.device_loop import (
     HALF,
@@ -22,6 +21,7 @@ from asperity.analysis.passivity.device_loop import (
     greatest_delay,
     leaks,
 )
+from asperity.files import Record
 from asperity.units import engineering, rounded_down
 
 PAPER = "paper (1)"
@@ -34,7 +34,7 @@ LEAK = "leak"
 
 
 @dataclass(frozen=True)
-class Criterion:
+class Criterion(Record):
     """One criterion of passivity.
 
     Attributes:
@@ -56,24 +56,6 @@ class Criterion:
     assumptions: str
     missing: tuple[str, ...]
     says: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units; an unbounded number is written as the string "inf"."""
-        return {
-            "name": self.name,
-            "formula": self.formula,
-            "holds": self.holds,
-            "limit": plain(self.limit),
-            "margin": plain(self.margin),
-            "assumptions": self.assumptions,
-            "missing": list(self.missing),
-            "says": self.says,
-        }
-
-
-def plain(number: float | None) -> float | str | None:
-    """Return a number for JSON: infinity as the string "inf"."""
-    return "inf" if number == math.inf else number
 
 
 # --- rules of the form k (w⁺ q⁺ + w q) <= budget --------------------------------------------------

@@ -21,7 +21,6 @@ from asperity.analysis.passivity.criteria import (
     WALL_ONE_SIDED,
     Criterion,
     criteria,
-    plain,
 )
 from asperity.analysis.passivity.device_loop import (
     HALF,
@@ -32,6 +31,7 @@ from asperity.analysis.passivity.device_loop import (
 )
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
+from asperity.files import record
 from asperity.surface import Surface
 
 Verdict = Literal["passive", "not passive", "undecided"]
@@ -78,16 +78,10 @@ class Passivity:
         raise KeyError(name)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units; an unbounded number is written as the string "inf"."""
+        """Return plain data, SI units."""
         return {
-            "verdict": self.verdict,
-            "decided_by": self.decided_by,
-            "reason": self.reason,
-            "stiffness": self.stiffness,
-            "safe_stiffness": plain(self.safe_stiffness),
-            "critical_speed": plain(self.critical_speed),
-            "greatest_delay": self.greatest_delay,
-            "criteria": [criterion.to_dict() for criterion in self.criteria],
+            **record(self, "verdict", "decided_by", "reason", "stiffness", "safe_stiffness"),
+            **record(self, "critical_speed", "greatest_delay", "criteria"),
         }
 
     def _repr_html_(self) -> str:

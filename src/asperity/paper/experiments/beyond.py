@@ -9,6 +9,7 @@ from typing import Any
 
 from asperity.devices import device_names, load_device
 from asperity.errors import ParameterError
+from asperity.files import Record, plain
 from asperity.paper.experiments.settings import device_setup
 from asperity.simulation import Pantograph, SpringHand, find_onset
 from asperity.simulation.onset import Onset
@@ -54,16 +55,18 @@ class DeviceOnset:
         return math.isfinite(cycling) and cycling <= self.allowed
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units; an unbounded number is written as the string "inf"."""
-        return {
-            "device": self.device, "surface": self.surface,
-            "catalogue_rule": "inf" if math.isinf(self.allowed) else self.allowed,
-            "catalogue_rule_missed": self.missed, **self.prediction.to_dict(),
-        }  # fmt: skip
+        """Return plain data, SI units."""
+        own = {
+            "device": self.device,
+            "surface": self.surface,
+            "catalogue_rule": self.allowed,
+            "catalogue_rule_missed": self.missed,
+        }
+        return plain(own) | self.prediction.to_dict()
 
 
 @dataclass(frozen=True)
-class BeyondExperiment:
+class BeyondExperiment(Record):
     """Other devices and surfaces.
 
     Attributes:
@@ -75,14 +78,6 @@ class BeyondExperiment:
     onsets: tuple[DeviceOnset, ...]
     skipped: tuple[str, ...]
     guessed: tuple[str, ...] = GUESSED
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return {
-            "onsets": [one.to_dict() for one in self.onsets],
-            "skipped": list(self.skipped),
-            "guessed": list(self.guessed),
-        }
 
 
 def surfaces(measured: Texture | None = None) -> dict[str, Texture]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from asperity.checks import FloatArray
+from asperity.files import Record, record
 from asperity.paper.experiments.settings import BUMP_GUESSED, ENTRIES, bump_setup
 
 LAWS = "ABDEH"
@@ -56,14 +57,11 @@ class Bump:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, without the traces."""
-        return {
-            "law": self.law, "entry": self.entry, "energy": list(self.energy), "lost": self.lost,
-            "jump": self.jump, "top": self.top, "closure": self.closure, "stopped": self.stopped,
-        }  # fmt: skip
+        return record(self, without=("time", "x", "z", "supplied"))
 
 
 @dataclass(frozen=True)
-class BumpExperiment:
+class BumpExperiment(Record):
     """Section V.C.
 
     Attributes:
@@ -77,10 +75,6 @@ class BumpExperiment:
     def of(self, law: str) -> tuple[Bump, ...]:
         """Return a law's runs, all entries."""
         return tuple(one for one in self.bumps if one.law == law)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units, without the traces."""
-        return {"bumps": [one.to_dict() for one in self.bumps], "guessed": list(self.guessed)}
 
 
 def over_bump(law: str, entry: str) -> Bump:

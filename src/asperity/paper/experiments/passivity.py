@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from asperity.checks import FloatArray
+from asperity.files import Record, record
 from asperity.paper.experiments.settings import FITTED, LAG, LETTERS, band_setup
 from asperity.scene.onsets import onsets
 from asperity.simulation.onset import ends_in_cycle, offsets, runner
@@ -57,14 +58,11 @@ class Count:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data without the trace."""
-        return {
-            "law": self.law, "stiffness": self.stiffness, "delay": self.delay,
-            "starts": self.starts, "cycles": self.cycles, "slow": self.slow,
-        }  # fmt: skip
+        return record(self, "law", "stiffness", "delay", "starts", "cycles", "slow")
 
 
 @dataclass(frozen=True)
-class PassivityExperiment:
+class PassivityExperiment(Record):
     """Section V.A.
 
     Attributes:
@@ -84,14 +82,6 @@ class PassivityExperiment:
     def onset(self, law: str, delay: int) -> Prediction:
         """Return the onset of a law at a delay."""
         return next(one for one in self.onsets if (one.onset.law, one.onset.delay) == (law, delay))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return {
-            "counts": [one.to_dict() for one in self.counts],
-            "onsets": [one.to_dict() for one in self.onsets],
-            "fitted": list(self.fitted),
-        }
 
 
 def count_cycles(law: str, divisor: float, delay: int = LAG, starts: int = STARTS) -> Count:

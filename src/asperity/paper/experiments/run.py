@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from asperity.files import plain
 from asperity.paper.experiments.beyond import BeyondExperiment, beyond_experiment
 from asperity.paper.experiments.bump import BumpExperiment, bump_experiment
 from asperity.paper.experiments.passivity import PassivityExperiment, passivity_experiment
@@ -40,12 +41,14 @@ class Experiments:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {
-            "V.A": self.passivity.to_dict(),
-            "V.B": self.scanning.to_dict(),
-            "V.C": self.bump.to_dict(),
-            "beyond": self.beyond.to_dict(),
-        }
+        return plain(
+            {
+                "V.A": self.passivity,
+                "V.B": self.scanning,
+                "V.C": self.bump,
+                "beyond": self.beyond,
+            }
+        )
 
     @property
     def lines(self) -> tuple[tuple[str, str], ...]:

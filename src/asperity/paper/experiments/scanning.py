@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.checks import FloatArray
+from asperity.files import record
 from asperity.paper.experiments.settings import (
     HANDS,
     HANDS_GUESSED,
@@ -37,7 +38,7 @@ class HandStroke:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {"hand": self.hand, **self.stroke.to_dict()}
+        return {"hand": self.hand} | self.stroke.to_dict()
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class ScanningExperiment:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, without the traces."""
-        return {"strokes": [one.to_dict() for one in self.strokes], "guessed": list(self.guessed)}
+        return record(self, "strokes", "guessed")
 
 
 def _stroke(law: str, named: NamedHand, speed: float) -> HandStroke:
