@@ -54,23 +54,25 @@ def array(name: str, value: ArrayLike, shape: tuple[int | None, ...], unit: str)
         >>> array("points", [[0, 0, 1]], (None, 3), "m").shape
         (1, 3)
     """
-    described = f"({', '.join('n' if length is None else str(length) for length in shape)})"
     try:
         given = np.asarray(value)
     except (TypeError, ValueError):  # rows of different length
         given = np.array(None)
     if given.dtype.kind not in "fiu" and given.size:
-        raise ParameterError(name, f"must be numbers of shape {described} [{unit}]")
+        raise ParameterError(name, f"must be numbers of shape {_described(shape)} [{unit}]")
     result: FloatArray = np.ascontiguousarray(given, dtype=np.float64)
-    fits = result.ndim == len(shape) and all(
-        wanted is None or wanted == length
-        for wanted, length in zip(shape, result.shape, strict=True)
-    )
+    fits = result.ndim == len(shape)
+    for wanted, length in zip(shape, result.shape, strict=False):
+        fits = fits and wanted in (None, length)
     if not fits:
-        raise ParameterError(name, f"must have shape {described} [{unit}]", result.shape)
+        raise ParameterError(name, f"must have shape {_described(shape)} [{unit}]", result.shape)
     if not np.isfinite(result).all():
         raise ParameterError(name, f"must be finite [{unit}]; {_first_bad(result)}")
     return result
+
+
+def _described(shape: tuple[int | None, ...]) -> str:
+    return f"({', '.join('n' if length is None else str(length) for length in shape)})"
 
 
 def _first_bad(values: FloatArray) -> str:

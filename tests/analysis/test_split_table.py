@@ -186,7 +186,7 @@ def test_the_default_resolution_fits() -> None:
     wave = 2.0 * math.pi * table.surface.texture.bounds[0] / table.surface.texture.bounds[1]
     assert table.bytes <= 8.1e6
     assert 0.9 * wave / 64 <= table.resolution <= wave / 64 * (1 + 1e-9)
-    assert table.bytes == table._arguments[0].nbytes
+    assert table.bytes == table._table.c.nbytes
 
 
 def test_a_table_that_is_too_large_is_refused_with_what_fits() -> None:

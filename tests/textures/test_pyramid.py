@@ -14,7 +14,7 @@ Boxes = list[tuple[np.ndarray, slice, slice]]
 
 def boxes_of_map(texture: HeightMap) -> Boxes:
     """Return the four numbers of every box, with the rows and columns of its cells."""
-    values, levels = texture.arguments[6:]
+    values, levels = texture.arguments.nodes, texture.arguments.levels
     boxes = []
     for level, (start, rows, columns) in enumerate(levels):
         side = 2 << level
@@ -95,7 +95,7 @@ def test_the_bounds_of_a_map_are_not_wide(name: str):
 
 def finest(texture: HeightMap) -> np.ndarray:
     """Return the numbers of the finest boxes, shape (rows, columns, 4)."""
-    values, levels = texture.arguments[6:]
+    values, levels = texture.arguments.nodes, texture.arguments.levels
     _start, rows, columns = levels[0]
     return np.asarray(values[: rows * columns].reshape(rows, columns, 4), dtype=np.float64)
 
@@ -142,7 +142,7 @@ def test_tiles_make_no_difference(monkeypatch: pytest.MonkeyPatch):
 @pytest.mark.parametrize("count", [4, 9, 37])
 def test_a_profile_stays_in_its_boxes(count: int, periodic: bool):
     texture = Profile(1e-4 * RNG.normal(size=count), 2e-4, periodic=periodic, origin=3e-4)
-    values, levels = texture.arguments[4:]
+    values, levels = texture.arguments.nodes, texture.arguments.levels
     cells = texture.coefficients.size - 3
     ticks = np.linspace(0.0, 1.0, 33)
     x = texture.origin + texture.pitch * (np.arange(cells)[:, None] + ticks)

@@ -218,7 +218,7 @@ def test_a_box_is_closed_only_when_its_minima_are_known(monkeypatch: pytest.Monk
         wide = rng.choice([1.0, 4.0]) * rng.uniform(-1.0, 1.0, 2)
         probe = below(c, *(np.array([a, b]) * wide), rng.exponential())
         best = (9.0, 9.0, 1e9, 0.0, 0.0, 0.0)
-        after, open_ = search.judge(*probe, 0.0, 0.0, a, b, *bounds(c, a, b), best, (c,))
+        after, open_ = search.judge(*probe, 0.0, 0.0, a, b, *bounds(c, a, b), best, c)
         if open_:
             continue
         closed += 1
@@ -235,14 +235,13 @@ def test_a_box_is_closed_only_when_its_minima_are_known(monkeypatch: pytest.Monk
     assert found > 20
 
 
-def profile(x: float, *texture: tuple[np.ndarray, ...]) -> tuple[float, ...]:
+def profile(x: float, c: np.ndarray) -> tuple[float, ...]:
     """Return what a profile's sampler would of a polynomial."""
-    ((c,),) = texture
     return tuple(float(np.polynomial.Polynomial(c).deriv(n)(x)) for n in range(3))
 
 
 def profile_as_map(x: float, _y: float, c: np.ndarray) -> tuple[float, ...]:
-    h, h1, h2 = profile(x, (c,))
+    h, h1, h2 = profile(x, c)
     return h, h1, 0.0, h2, 0.0, 0.0
 
 
@@ -261,10 +260,10 @@ def test_an_interval_is_closed_only_when_its_minima_are_known(
         bend, twist = max(abs(2 * c[2] + 6 * c[3] * r), abs(2 * c[2] - 6 * c[3] * r)), 6 * abs(c[3])
         if as_map:
             start = (9.0, 9.0, 1e9, 0.0, 0.0, 0.0)
-            after, open_ = search.judge(x, 0.0, z, 0.0, 0.0, r, 1e-3, bend, twist, start, (c,))
+            after, open_ = search.judge(x, 0.0, z, 0.0, 0.0, r, 1e-3, bend, twist, start, c)
             value = after[2]
         else:
-            answer, open_ = line.judge(x, z, 0.0, r, bend, twist, (9.0, 1e9, 0.0, 0.0), (c,))
+            answer, open_ = line.judge(x, z, 0.0, r, bend, twist, (9.0, 1e9, 0.0, 0.0), c)
             value = answer[1]
         if open_:
             continue
@@ -285,7 +284,7 @@ def test_a_box_stays_open_when_the_minimum_lies_outside(monkeypatch: pytest.Monk
     """Newton's method was expected to end in the box and did not: its parts decide."""
     monkeypatch.setattr(search, "curvature", profile_as_map)
     monkeypatch.setattr(line, "along", profile)
-    flat, at = (np.zeros(4),), 0.3
+    flat, at = np.zeros(4), 0.3
     monkeypatch.setattr(search, "descend", lambda *_: (at, 0.0, 0.5, 0.0, 0.0, 0.0))
     monkeypatch.setattr(line, "descend", lambda *_: (at, 0.5, 0.0, 0.0))
     for at, outside in ((0.3, True), (0.05, False)):
@@ -305,7 +304,7 @@ def test_a_profile_interval_is_kept_if_it_can_be_level(monkeypatch: pytest.Monke
     limit = r + 0.5 * twist * gap * r * r
     for share, dropped in ((0.99, False), (1.04, True)):
         start = (9.0, 1e9, 0.0, 0.0)
-        best, open_ = line.judge(-share * limit, -gap, 0.0, r, twist * r, twist, start, (c,))
+        best, open_ = line.judge(-share * limit, -gap, 0.0, r, twist * r, twist, start, c)
         assert (best == start and not open_) == dropped
 
 

@@ -101,12 +101,12 @@ def _probe(plan: DriverPlan, what: Literal["force", "jacobian"]) -> str:
 def _enter_contact(plan: DriverPlan, what: str) -> list[str]:
     """Return the lines that find the contact; the next line leaves if there is none."""
     sampled = {
-        "force": "h, hx, hy = slope({}, *texture)"
+        "force": "h, hx, hy = slope({}, texture)"
         if plan.needs_slope
-        else "h = height({}, *texture)",
-        "jacobian": "h, hx, hy, hxx, hxy, hyy = curvature({}, *texture)"
+        else "h = height({}, texture)",
+        "jacobian": "h, hx, hy, hxx, hxy, hyy = curvature({}, texture)"
         if plan.needs_curvature
-        else "h, hx, hy = slope({}, *texture)",
+        else "h, hx, hy = slope({}, texture)",
     }[what]
     here = sampled.format("x, y")
     contact = plan.law.contact.name
@@ -115,7 +115,7 @@ def _enter_contact(plan: DriverPlan, what: str) -> list[str]:
         return ["depth = -z", "if not depth > 0.0:"]
     if contact == "vertical":
         return [here, "depth = h - z", "if not depth > 0.0:"]
-    return ["if not height(x, y, *texture) - z > 0.0:"]  # nearest and split
+    return ["if not height(x, y, texture) - z > 0.0:"]  # nearest and split
 
 
 def _after_contact(plan: DriverPlan, what: str) -> list[str]:
@@ -133,12 +133,12 @@ def _after_contact(plan: DriverPlan, what: str) -> list[str]:
         return [f"{derivative} = split_derivative(x, y, z, continuity, texture)"]
     if plan.law.contact.name == "nearest":
         return [
-            "foot_x, foot_y, h, hx, hy = foot(x, y, z, *texture)",
-            *([f"{names} = curvature(foot_x, foot_y, *texture)"] if width == "curvature" else []),
+            "foot_x, foot_y, h, hx, hy = foot(x, y, z, texture)",
+            *([f"{names} = curvature(foot_x, foot_y, texture)"] if width == "curvature" else []),
             "depth = math.sqrt((x - foot_x)**2 + (y - foot_y)**2 + (z - h)**2)",
         ]
     if plan.law.contact.name == "nominal" and plan.needs_texture:
-        return [f"{names} = {width}(x, y, *texture)"]
+        return [f"{names} = {width}(x, y, texture)"]
     return []
 
 
@@ -275,7 +275,7 @@ _SPLIT_BATCH = '''def split_batch(points, out, texture, law):
         value = 0.0
         count = 0
         gap = 0.0
-        if height(x, y, *texture) > z:
+        if height(x, y, texture) > z:
             value, count, gap = split_energy(x, y, z, continuity, texture)
         out[i, 0] = value
         out[i, 1] = count

@@ -117,10 +117,10 @@ def fuse_contact(law: Law) -> ModuleType:
 
 
 @lru_cache(maxsize=16)
-def fuse_module(module: ModuleType, *, inline: bool = True) -> ModuleType:
-    """Return a module of plain functions compiled; those named ``..._batch`` are for Python."""
-    title = f"{module.__name__.rpartition('.')[2]}."
-    source = sampler_source((module,))
+def fuse_module(*modules: ModuleType, inline: bool = True) -> ModuleType:
+    """Return modules of plain functions compiled; those named ``..._batch`` are for Python."""
+    title = f"{modules[0].__name__.rpartition('.')[2]}."
+    source = sampler_source(modules)
     return load_fused(_HEADER.format(title=title) + decorate(source, inline=inline))
 
 
@@ -139,19 +139,19 @@ def fuse_sampler(sampler: tuple[ModuleType, ...]) -> ModuleType:
 _SAMPLER_LOOPS = '''def height_batch(points, out, texture):
     """Heights [m]."""
     for i in range(points.shape[0]):
-        out[i, 0] = height(points[i, 0], points[i, 1], *texture)
+        out[i, 0] = height(points[i, 0], points[i, 1], texture)
 
 
 def slope_batch(points, out, texture):
     """Heights [m] and slopes."""
     for i in range(points.shape[0]):
-        out[i, 0], out[i, 1], out[i, 2] = slope(points[i, 0], points[i, 1], *texture)
+        out[i, 0], out[i, 1], out[i, 2] = slope(points[i, 0], points[i, 1], texture)
 
 
 def curvature_batch(points, out, texture):
     """Heights [m], slopes and second derivatives [1/m]."""
     for i in range(points.shape[0]):
-        h, hx, hy, hxx, hxy, hyy = curvature(points[i, 0], points[i, 1], *texture)
+        h, hx, hy, hxx, hxy, hyy = curvature(points[i, 0], points[i, 1], texture)
         out[i, 0] = h
         out[i, 1] = hx
         out[i, 2] = hy
@@ -163,7 +163,7 @@ def curvature_batch(points, out, texture):
 def nearest_batch(points, out, texture):
     """Nearest surface points [m]."""
     for i in range(points.shape[0]):
-        out[i, 0], out[i, 1] = nearest(points[i, 0], points[i, 1], points[i, 2], *texture)
+        out[i, 0], out[i, 1] = nearest(points[i, 0], points[i, 1], points[i, 2], texture)
 '''
 
 

@@ -66,7 +66,7 @@ def servo_source(law: Law) -> str:
     contact = _STATEFUL if law.stateful else _STATELESS
     unpack = ", ".join((*SHARED_PARAMETERS, *law.parameters))
     lines = "\n".join(" " * 8 + line for line in contact.splitlines())
-    inside = "mz < 0.0" if law.contact.name == "nominal" else "mz < height(mx, my, *texture)"
+    inside = "mz < 0.0" if law.contact.name == "nominal" else "mz < height(mx, my, texture)"
     return _SERVO.format(contact=lines, unpack=unpack, inside=inside) + _TRACE
 
 

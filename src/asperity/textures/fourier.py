@@ -17,6 +17,7 @@ from asperity.textures.cells.lines import Pieces, wave_pieces
 from asperity.textures.cells.waves import WaveCells
 from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.plane_waves import PlaneWaves
+from asperity.textures.samplers.fourier import FourierArguments
 from asperity.textures.texture import Texture
 
 if TYPE_CHECKING:
@@ -81,15 +82,19 @@ class Fourier(Texture):
         return (fourier_line, fourier, line) if self._parallel else (fourier, search)
 
     @cached_property
-    def arguments(self) -> tuple[Any, ...]:
-        """Amplitudes, k_x, k_y, phases, and the description of the search (see the sampler)."""
+    def arguments(self) -> FourierArguments:
+        """See :class:`Texture`."""
         length = np.hypot(*self.wavevectors.T)
         inflate = 1.0 + 1e-14 * len(length)
         twist = inflate * float(np.abs(self.amplitudes) @ length**3)
         shortest = float(length.max())
-        search = np.array([self.bounds[1], twist, *self.extremes, shortest, *self._directions[0]])
         kx, ky = (np.ascontiguousarray(column) for column in self.wavevectors.T)
-        return self.amplitudes, kx, ky, self.phases, search
+        low, high = self.extremes
+        ux, uy = self._directions[0].tolist()
+        return FourierArguments(
+            self.amplitudes, kx, ky, self.phases,
+            self.bounds[1], twist, low, high, shortest, ux, uy,
+        )  # fmt: skip
 
     @cached_property
     def _directions(self) -> FloatArray:

@@ -17,6 +17,7 @@ from asperity.textures.cells.lines import Pieces, spline_pieces
 from asperity.textures.cells.splines import MapCells
 from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.pyramid import plane_pyramid
+from asperity.textures.samplers.heightmap import HeightMapArguments
 from asperity.textures.texture import Texture
 
 if TYPE_CHECKING:
@@ -97,11 +98,12 @@ class HeightMap(Texture):
         return padded_coefficients(self.heights, self.periodic)
 
     @cached_property
-    def arguments(self) -> tuple[Any, ...]:
-        """Coefficients, nodes per metre along x and y, origin, periodic, pyramid of bounds."""
+    def arguments(self) -> HeightMapArguments:
+        """See :class:`Texture`."""
         x0, y0 = (float(value) for value in self.origin)
         c, (px, py) = self.coefficients, self.pitch
-        return c, 1.0 / px, 1.0 / py, x0, y0, self.periodic, *plane_pyramid(c, self.pitch)
+        pyramid = plane_pyramid(c, self.pitch)
+        return HeightMapArguments(c, 1.0 / px, 1.0 / py, x0, y0, self.periodic, *pyramid)
 
     @cached_property
     def extremes(self) -> tuple[float, float]:

@@ -17,6 +17,7 @@ from asperity.textures.cells.splines import ProfileCells
 from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.heightmap import LEAST_NODES, mask, padded_coefficients
 from asperity.textures.pyramid import line_pyramid
+from asperity.textures.samplers.profile import ProfileArguments
 from asperity.textures.texture import Texture
 
 if TYPE_CHECKING:
@@ -89,10 +90,11 @@ class Profile(Texture):
         return padded_coefficients(self.heights, self.periodic)
 
     @cached_property
-    def arguments(self) -> tuple[Any, ...]:
-        """Coefficients, nodes per metre, origin, periodic, pyramid of bounds."""
+    def arguments(self) -> ProfileArguments:
+        """See :class:`Texture`."""
         c = self.coefficients
-        return c, 1.0 / self.pitch, self.origin, self.periodic, *line_pyramid(c, self.pitch)
+        pyramid = line_pyramid(c, self.pitch)
+        return ProfileArguments(c, 1.0 / self.pitch, self.origin, self.periodic, *pyramid)
 
     @cached_property
     def extremes(self) -> tuple[float, float]:

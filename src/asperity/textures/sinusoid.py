@@ -17,6 +17,7 @@ from asperity.textures.cells.lines import Pieces, wave_pieces
 from asperity.textures.cells.waves import WaveCells
 from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.plane_waves import PlaneWaves, SingleWave
+from asperity.textures.samplers.sinusoid import SinusoidArguments
 from asperity.textures.texture import Texture
 
 if TYPE_CHECKING:
@@ -76,11 +77,12 @@ class Sinusoid(Texture):
 
         return (sinusoid,)
 
-    @property
-    def arguments(self) -> tuple[Any, ...]:
-        """Amplitude [m], k_x, k_y [rad/m], phase [rad]."""
+    @cached_property
+    def arguments(self) -> SinusoidArguments:
+        """See :class:`Texture`."""
         k = 2.0 * math.pi / self.period
-        return (self.amplitude, k * self.direction[0], k * self.direction[1], self.phase)
+        kx, ky = k * self.direction[0], k * self.direction[1]
+        return SinusoidArguments(self.amplitude, kx, ky, self.phase)
 
     @cached_property
     def extremes(self) -> tuple[float, float]:

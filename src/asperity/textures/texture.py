@@ -60,7 +60,7 @@ class Texture(ABC):
     @property
     @abstractmethod
     def arguments(self) -> tuple[Any, ...]:
-        """The arguments that the sampler's functions take after the position."""
+        """What the sampler's functions receive after the position, as one record (NamedTuple)."""
 
     @cached_property
     @abstractmethod

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.checks import FloatArray
+from asperity.contacts.split.spline import PotentialTable
 from asperity.surface import Surface
 
 Progress = Callable[[float], None]
@@ -91,15 +92,17 @@ class Grid:
             return np.asarray(index % count, dtype=np.intp)
         return np.asarray(count - np.abs(count - np.abs(index)), dtype=np.intp)
 
-    def arguments(self, coefficients: FloatArray) -> tuple[Any, ...]:
-        """Return what the kernels receive: see ``asperity.contacts.split.spline``."""
+    def table(self, coefficients: FloatArray) -> PotentialTable:
+        """Return what the kernels receive of the potential at the nodes."""
         x0, y0 = (float(value) for value in self.start)
         rates = np.zeros((2, 2))
         # Rows of the pseudo-inverse's transpose: nodes per metre along each axis.
         rates[: len(self.cells)] = np.linalg.pinv(self.steps).T
         (m00, m01), (m10, m11) = rates.tolist()
         z0 = float(self.height(0))
-        return coefficients, x0, y0, z0, m00, m01, m10, m11, 1.0 / self.rise, not self.periodic
+        return PotentialTable(
+            coefficients, x0, y0, z0, m00, m01, m10, m11, 1.0 / self.rise, not self.periodic
+        )
 
     def error_bounds(self, gain: float) -> tuple[float, float]:
         """Return proved bounds of |∇U_T - ∇U| [m] and of |U_T - U| [m²].
@@ -170,27 +173,26 @@ def _in_threads(
         progress(1.0)
 
 
-def curvatures(grid: Grid, arguments: tuple[Any, ...]) -> tuple[Bound, Bound]:
+def curvatures(grid: Grid, table: PotentialTable) -> tuple[Bound, Bound]:
     """Return certified bounds of sup ‖Hess U_T‖ and of its greatest eigenvalue.
 
     ``upper`` comes from the hull of the second differences of the coefficients, ``lower`` is
     attained from inside a corner of a cell of the spline.
     """
-    from asperity.contacts.split import hull as split_table_hull
+    from asperity.contacts.split import hull, spline
     from asperity.kernels.fuse import fuse_module
 
-    loops = fuse_module(split_table_hull, inline=False)
-    coefficients, rates = arguments[0], arguments[4:9]
+    loops = fuse_module(hull, spline, inline=False)
     width = grid.cells[0] + (0 if grid.periodic else 1)
     parts = [(first, min(first + 16, width)) for first in range(0, width, 16)]
     found = np.zeros((len(parts), 2, 5))
 
     def search(part: int) -> None:
-        loops.hull_batch(*parts[part], found[part], coefficients, *rates)
+        loops.hull_batch(*parts[part], found[part], table)
 
     search(0)
     _in_threads(search, range(1, len(parts)), None)
-    rounding = _ROUNDING * float(coefficients.max()) / min(grid.spacing) ** 2
+    rounding = _ROUNDING * float(table.c.max()) / min(grid.spacing) ** 2
     best = found[np.argmax(found[:, :, 1], axis=0), [0, 1]]
     upper = found[:, :, 0].max(axis=0) + rounding
     positive, negative = (_bound(grid, float(upper[i]), best[i]) for i in range(2))

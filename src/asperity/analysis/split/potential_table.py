@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.split.potential_grid import Grid, Progress, curvatures, potentials
 from asperity.checks import FloatArray, array, positive
+from asperity.contacts.split.spline import PotentialTable
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
 from asperity.laws import LAWS
@@ -56,7 +57,7 @@ class TabulatedSurface:
     error: float
     error_bound: float
     potential_error_bound: float
-    _arguments: tuple[Any, ...] = field(repr=False, compare=False)
+    _table: PotentialTable = field(repr=False, compare=False)
 
     @property
     def resolution(self) -> float:
@@ -79,7 +80,7 @@ class TabulatedSurface:
         """
         probes = array("points", points, (None, 3), "m")
         out = np.empty((len(probes), 3))
-        self._force_loop(probes, out, self.surface.stiffness, self._arguments)
+        self._force_loop(probes, out, self.surface.stiffness, self._table)
         return out
 
     def potential(self, points: ArrayLike) -> FloatArray:
@@ -117,7 +118,7 @@ class TabulatedSurface:
 
         probes = array("points", points, (None, 3), "m")
         out = np.empty((len(probes), 7))
-        fuse_module(split_table).expansion_batch(probes, out, self._arguments)
+        fuse_module(split_table).expansion_batch(probes, out, self._table)
         return out
 
 
@@ -211,8 +212,8 @@ def _rounded_up(value: float) -> float:
 
 
 def _tabulated(surface: Surface, grid: Grid, coefficients: FloatArray) -> TabulatedSurface:
-    arguments = grid.arguments(coefficients)
-    lipschitz, one_sided = curvatures(grid, arguments)
+    entries = grid.table(coefficients)
+    lipschitz, one_sided = curvatures(grid, entries)
     force, energy = grid.error_bounds(max(1.0, surface.continuity))
     table = TabulatedSurface(
         surface=surface,
@@ -224,7 +225,7 @@ def _tabulated(surface: Surface, grid: Grid, coefficients: FloatArray) -> Tabula
         error=math.nan,
         error_bound=surface.stiffness * force,
         potential_error_bound=surface.stiffness * energy,
-        _arguments=arguments,
+        _table=entries,
     )
     points = _probes(surface, grid)
     difference = table.force(points) - surface.force(points)

@@ -7,12 +7,10 @@ value at the centre, L = 3 K max|h'| + T max|h - z|.
 ``along`` is the sampler's own; the fused module binds it.
 """
 
-from typing import Any
-
 import numpy as np
 
 
-def along(x: float, texture: Any) -> tuple[float, float, float]:
+def along(x: float, texture: object) -> tuple[float, float, float]:
     """Stand in for the sampler's own h, h', h'', which replaces this one."""
     raise AssertionError
 
@@ -23,7 +21,7 @@ def along(x: float, texture: Any) -> tuple[float, float, float]:
 Point = tuple[float, float, float, float]
 
 
-def descend(x: float, z: float, start: float, texture: Any) -> Point:
+def descend(x: float, z: float, start: float, texture: object) -> Point:
     """Return a local minimum of φ downhill from a start, to rounding."""
     best = (start, np.inf, 0.0, 0.0)
     at = start
@@ -58,7 +56,7 @@ def descend(x: float, z: float, start: float, texture: Any) -> Point:
 
 def judge(
     x: float, z: float, centre: float, r: float, bend: float, twist: float,
-    best: Point, texture: Any,
+    best: Point, texture: object,
 ) -> tuple[Point, bool]:  # fmt: skip
     """Return the best point after a look at one interval, and whether its halves need a look."""
     h, h1, h2 = along(centre, texture)

@@ -11,12 +11,11 @@ the next one follows from the numbers of the last.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
 
-def curvature(x: float, y: float, *texture: Any) -> tuple[float, ...]:
+def curvature(x: float, y: float, texture: object) -> tuple[float, ...]:
     """Stand in for the sampler's own function, which replaces this one."""
     raise AssertionError
 
@@ -50,13 +49,13 @@ def newton_step(
     return (qxy * py - qyy * px) / det, (qxy * px - qxx * py) / det, convex
 
 
-def descend(x: float, y: float, z: float, fx: float, fy: float, texture: Any) -> Point:
+def descend(x: float, y: float, z: float, fx: float, fy: float, texture: object) -> Point:
     """Return a local minimum of φ downhill from a start, to rounding."""
     best = (fx, fy, np.inf, 0.0, 0.0, 0.0)
     sx = sy = last = 0.0
     close = False
     for _ in range(200):
-        h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, *texture)
+        h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, texture)
         gap = h - z
         dx = fx - x
         dy = fy - y
@@ -145,13 +144,13 @@ def hopeless(
 
 def judge(
     x: float, y: float, z: float, cx: float, cy: float, a: float, b: float,
-    bend: float, twist: float, best: Point, texture: Any,
+    bend: float, twist: float, best: Point, texture: object,
 ) -> tuple[Point, bool]:  # fmt: skip
     """Return the best point after a look at one box, and whether its parts need a look.
 
     The box is (cx, cy) ± (a, b) [m], with K = bend [1/m] and T = twist [1/m²].
     """
-    h, hx, hy, hxx, hxy, hyy = curvature(cx, cy, *texture)
+    h, hx, hy, hxx, hxy, hyy = curvature(cx, cy, texture)
     gap = h - z
     away = (cx - x, cy - y, gap)
     q = (1.0 + hx * hx + gap * hxx, hx * hy + gap * hxy, 1.0 + hy * hy + gap * hyy)

@@ -4,17 +4,15 @@ Rows of ``atoms`` are x, y, z [m] and weight. Differences of squared distances a
 sums and differences: near a crest the atoms are so close together that squares would cancel.
 """
 
-from typing import Any
-
 import numpy as np
 
 
-def height(x: float, y: float, *texture: Any) -> float:
+def height(x: float, y: float, texture: object) -> float:
     """Stand in for the sampler's own function, which replaces this one."""
     raise AssertionError
 
 
-def curvature(x: float, y: float, *texture: Any) -> tuple[float, ...]:
+def curvature(x: float, y: float, texture: object) -> tuple[float, ...]:
     """Stand in for the sampler's own function, which replaces this one."""
     raise AssertionError
 
@@ -107,10 +105,10 @@ def split_system(
 
 
 def split_projection(
-    y: FloatArray, atoms: FloatArray, row: int, out: FloatArray, texture: Any
+    y: FloatArray, atoms: FloatArray, row: int, out: FloatArray, texture: object
 ) -> bool:
     """Write ∂w/∂y, (3, 3), of a foot w on the surface; return whether it is a minimum."""
-    _h, hx, hy, hxx, hxy, hyy = curvature(atoms[row, 0], atoms[row, 1], *texture)
+    _h, hx, hy, hxx, hxy, hyy = curvature(atoms[row, 0], atoms[row, 1], texture)
     gap = atoms[row, 2] - y[2]
     q11 = 1.0 + hx * hx + gap * hxx
     q12 = hx * hy + gap * hxy
@@ -131,7 +129,7 @@ def split_projection(
 
 
 def split_moving(
-    atoms: FloatArray, count: int, y: FloatArray, mu: float, a: FloatArray, texture: Any
+    atoms: FloatArray, count: int, y: FloatArray, mu: float, a: FloatArray, texture: object
 ) -> bool:
     """Let the atoms of the system move with y, as feet do; return whether all are minima."""
     projection = local_array((3, 3))
@@ -144,14 +142,14 @@ def split_moving(
     return True
 
 
-def split_follow(y: FloatArray, atoms: FloatArray, row: int, texture: Any) -> bool:
+def split_follow(y: FloatArray, atoms: FloatArray, row: int, texture: object) -> bool:
     """Move a foot to the stationary point near it that belongs to y; return success."""
     fx = atoms[row, 0]
     fy = atoms[row, 1]
     last = np.inf
     stalled = 0
     for _ in range(25):
-        h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, *texture)
+        h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, texture)
         gap = h - y[2]
         px = fx - y[0] + gap * hx
         py = fy - y[1] + gap * hy
@@ -173,5 +171,5 @@ def split_follow(y: FloatArray, atoms: FloatArray, row: int, texture: Any) -> bo
             break
     atoms[row, 0] = fx
     atoms[row, 1] = fy
-    atoms[row, 2] = height(fx, fy, *texture)
+    atoms[row, 2] = height(fx, fy, texture)
     return True

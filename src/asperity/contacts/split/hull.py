@@ -1,10 +1,9 @@
-"""Certified bounds of the second derivatives of a tabulated potential (``split_table.py``)."""
+"""Certified bounds of the second derivatives of a tabulated potential (``spline.py``)."""
 
 import math
 
-import numpy as np
-
-FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+from asperity.checks import FloatArray
+from asperity.contacts.split.spline import PotentialTable, table_hessian
 
 
 def bernstein(c0: float, c1: float, c2: float, order: int, index: int) -> float:
@@ -72,24 +71,17 @@ def hull_entry(
 
 
 def hull_matrix(
-    c: FloatArray, i: int, j: int, m: int, e: int, f: int, g: int,
-    m00: float, m01: float, m10: float, m11: float, iz: float,
-) -> tuple[float, float, float, float, float, float]:  # fmt: skip
+    i: int, j: int, m: int, e: int, f: int, g: int, table: PotentialTable
+) -> tuple[float, float, float, float, float, float]:
     """Return one matrix of the Bernstein hull of Hess U on a cell: xx, xy, xz, yy, yz, zz."""
+    c = table.c
     vv = hull_entry(c, i, j, m, (2, 0, 0), e, f, g)
     uv = hull_entry(c, i, j, m, (1, 1, 0), e, f, g)
     vw = hull_entry(c, i, j, m, (1, 0, 1), e, f, g)
     uu = hull_entry(c, i, j, m, (0, 2, 0), e, f, g)
     uw = hull_entry(c, i, j, m, (0, 1, 1), e, f, g)
     ww = hull_entry(c, i, j, m, (0, 0, 2), e, f, g)
-    return (
-        m00 * m00 * uu + 2.0 * m00 * m10 * uv + m10 * m10 * vv,
-        m00 * m01 * uu + (m00 * m11 + m01 * m10) * uv + m10 * m11 * vv,
-        iz * (m00 * uw + m10 * vw),
-        m01 * m01 * uu + 2.0 * m01 * m11 * uv + m11 * m11 * vv,
-        iz * (m01 * uw + m11 * vw),
-        iz * iz * ww,
-    )
+    return table_hessian(uu, uv, uw, vv, vw, ww, table)
 
 
 def raise_bound(
@@ -110,25 +102,19 @@ def raise_bound(
             bound[2 + d] = place[d]
 
 
-def hull_cell(
-    c: FloatArray, i: int, j: int, m: int, out: FloatArray,
-    m00: float, m01: float, m10: float, m11: float, iz: float,
-) -> None:  # fmt: skip
+def hull_cell(i: int, j: int, m: int, out: FloatArray, table: PotentialTable) -> None:
     """Raise the bounds of the eigenvalues of Hess U by one cell; see ``hull_batch``."""
-    rows = 1 if c.shape[0] == 1 else 3
+    rows = 1 if table.c.shape[0] == 1 else 3
     for n in range(9 * rows):
         e, f, g = n // 9, n // 3 % 3, n % 3
-        xx, xy, xz, yy, yz, zz = hull_matrix(c, i, j, m, e, f, g, m00, m01, m10, m11, iz)
+        xx, xy, xz, yy, yz, zz = hull_matrix(i, j, m, e, f, g, table)
         corner = (rows == 1 or e != 1) and f != 1 and g != 1
         place = (j + 0.5 * f - 0.5, i + (0.5 * e - 0.5 if rows > 1 else 0.0), m + 0.5 * g - 0.5)
         raise_bound(out[0], corner, (xx, xy, xz, yy, yz, zz), place)
         raise_bound(out[1], corner, (-xx, -xy, -xz, -yy, -yz, -zz), place)
 
 
-def hull_batch(
-    first: int, last: int, out: FloatArray, c: FloatArray,
-    m00: float, m01: float, m10: float, m11: float, iz: float,
-) -> None:  # fmt: skip
+def hull_batch(first: int, last: int, out: FloatArray, table: PotentialTable) -> None:
     """Write bounds of the eigenvalues of Hess U over the cells of nodes first to last along x.
 
     A polynomial lies in the hull of its Bernstein coefficients, and so does a matrix of them; the
@@ -140,13 +126,9 @@ def hull_batch(
         last: node after the last.
         out: (2, 5), for Hess U and for its negative: an upper bound of the greatest eigenvalue,
             the greatest one attained in a corner of a cell, and that corner in nodes along x, y, z.
-        c: coefficients.
-        m00: see the module, as are the others.
-        m01: likewise.
-        m10: likewise.
-        m11: likewise.
-        iz: likewise.
+        table: the table.
     """
+    c = table.c
     rows = 1 if c.shape[0] == 1 else 3
     out[:, :2] = 0.0
     for i in range(c.shape[0] - rows + 1):
@@ -158,4 +140,4 @@ def hull_batch(
                     for b in range(3):
                         inside = max(inside, c[i + a, j + b, m - 1])
                 if inside > 0.0:
-                    hull_cell(c, i, j, m, out, m00, m01, m10, m11, iz)
+                    hull_cell(i, j, m, out, table)

@@ -32,12 +32,12 @@ from asperity.contacts.split.conditions import (
 )
 
 
-def nearest(x: float, y: float, z: float, *texture: Any) -> tuple[float, float]:
+def nearest(x: float, y: float, z: float, texture: object) -> tuple[float, float]:
     """Stand in for the sampler's own function, which replaces this one."""
     raise AssertionError
 
 
-def height(x: float, y: float, *texture: Any) -> float:
+def height(x: float, y: float, texture: object) -> float:
     """Stand in for the sampler's own function, which replaces this one."""
     raise AssertionError
 
@@ -50,14 +50,14 @@ local_array = np.empty
 FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
 
-def split_query(y: FloatArray, atoms: FloatArray, row: int, texture: Any) -> None:
+def split_query(y: FloatArray, atoms: FloatArray, row: int, texture: object) -> None:
     """Write the point of the free set nearest to y into a row of the atoms."""
     fx = y[0]
     fy = y[1]
     fz = y[2]
-    if height(fx, fy, *texture) > fz:
-        fx, fy = nearest(fx, fy, fz, *texture)
-        fz = height(fx, fy, *texture)
+    if height(fx, fy, texture) > fz:
+        fx, fy = nearest(fx, fy, fz, texture)
+        fz = height(fx, fy, texture)
     atoms[row, 0] = fx
     atoms[row, 1] = fy
     atoms[row, 2] = fz
@@ -149,7 +149,7 @@ def split_advance(atoms: FloatArray, count: int, y: FloatArray, a: FloatArray) -
 
 def split_polish(
     atoms: FloatArray, count: int, p: FloatArray, y: FloatArray, mu: float, a: FloatArray,
-    texture: Any,
+    texture: object,
 ) -> int:  # fmt: skip
     """Make atoms, weights and y satisfy the conditions of optimality, by Newton's method.
 
@@ -180,7 +180,7 @@ def split_polish(
 
 def split_try_polish(
     atoms: FloatArray, count: int, p: FloatArray, y: FloatArray, mu: float, a: FloatArray,
-    texture: Any,
+    texture: object,
 ) -> int:  # fmt: skip
     """Polish; take everything back and return 0 if that does not lower the energy."""
     pull = local_array((3,))
@@ -199,7 +199,7 @@ def split_try_polish(
     return 0
 
 
-def split_single(atoms: FloatArray, y: FloatArray, texture: Any) -> bool:
+def split_single(atoms: FloatArray, y: FloatArray, texture: object) -> bool:
     """Return whether the only atom is a local minimum of the distance, as seen from y.
 
     Where a god-object begins to split, its atoms are so close that their distances differ by less
@@ -228,7 +228,7 @@ def split_gap(
 
 
 def split_atoms(
-    p: FloatArray, continuity: float, atoms: FloatArray, pull: FloatArray, texture: Any
+    p: FloatArray, continuity: float, atoms: FloatArray, pull: FloatArray, texture: object
 ) -> tuple[int, float]:
     """Write the atoms of law H, ``atoms`` (5, 4), and z̄ - p, ``pull`` (3,), at a probe inside.
 
@@ -270,7 +270,7 @@ def split_atoms(
 
 
 def split_contact(
-    x: float, y: float, z: float, continuity: float, texture: Any
+    x: float, y: float, z: float, continuity: float, texture: object
 ) -> tuple[float, float, float]:
     """Return z̄ - p, from the probe to the mean of the split god-object [m]."""
     atoms = local_array((5, 4))
@@ -284,7 +284,7 @@ def split_contact(
 
 
 def split_energy(
-    x: float, y: float, z: float, continuity: float, texture: Any
+    x: float, y: float, z: float, continuity: float, texture: object
 ) -> tuple[float, int, float]:
     """Return U [m²], the number of atoms, and the gap between primal and dual [m²]."""
     atoms = local_array((5, 4))
@@ -299,7 +299,7 @@ def split_energy(
 
 def split_response(
     p: FloatArray, continuity: float, atoms: FloatArray, count: int, pull: FloatArray,
-    m: FloatArray, texture: Any,
+    m: FloatArray, texture: object,
 ) -> None:  # fmt: skip
     """Write M = ∂(z̄ - p)/∂p, (3, 3).
 
@@ -331,7 +331,7 @@ def split_response(
 
 
 def split_derivative(
-    x: float, y: float, z: float, continuity: float, texture: Any
+    x: float, y: float, z: float, continuity: float, texture: object
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
     """Return z̄ - p [m] and M = ∂(z̄ - p)/∂p as m_xx, m_xy, m_xz, m_yy, m_yz, m_zz."""
     atoms = local_array((5, 4))

@@ -1,23 +1,45 @@
 """Law H from a table: a quadratic B-spline whose coefficients are the exact potential at nodes.
 
-Arguments, after the probe: ``c``, coefficients [m²] by second axis, first axis and z, with one
-node before the first and one or two after the last along both axes (a profile has no second one);
-``x0``, ``y0``, ``z0``, the first node [m]; ``m00``, ``m01``, ``m10``, ``m11``, nodes per metre
-along the two axes of the texture; ``iz``, nodes per metre along z; ``mirrored`` at the border, else
-periodic.
-
 Below the floor, halfway between the two lowest nodes, the table goes on with its value and slope
 there and the curvature of the flat wall: there the force stays the gradient of a potential, and
 continuous.
 """
 
 import math
-from typing import Any
+from typing import NamedTuple
 
-import numpy as np
+from asperity.checks import FloatArray
 
-FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 Weights = tuple[float, float, float]
+
+
+class PotentialTable(NamedTuple):
+    """What the functions below receive of a table.
+
+    Attributes:
+        c: coefficients [m²] by second axis, first axis and z, with one node before the first and
+            one or two after the last along both axes; a profile has no second one.
+        x0: the first node [m].
+        y0: likewise.
+        z0: likewise.
+        m00: nodes per metre along the first axis of the texture: x.
+        m01: y.
+        m10: along the second: x.
+        m11: y.
+        iz: nodes per metre along z.
+        mirrored: whether the table is mirrored at its border; else it is periodic.
+    """
+
+    c: FloatArray
+    x0: float
+    y0: float
+    z0: float
+    m00: float
+    m01: float
+    m10: float
+    m11: float
+    iz: float
+    mirrored: bool
 
 
 def table_fold(u: float, cells: int, mirrored: bool) -> tuple[float, float]:
@@ -30,6 +52,35 @@ def table_fold(u: float, cells: int, mirrored: bool) -> tuple[float, float]:
     if u > cells:
         return max(2.0 * cells - u, 0.0), -1.0
     return u, 1.0
+
+
+def table_first(x: float, y: float, table: PotentialTable) -> float:
+    """Return the coordinate along the first axis of the texture, in nodes."""
+    return (x - table.x0) * table.m00 + (y - table.y0) * table.m01
+
+
+def table_second(x: float, y: float, table: PotentialTable) -> float:
+    """Return the coordinate along the second axis of the texture, in nodes."""
+    return (x - table.x0) * table.m10 + (y - table.y0) * table.m11
+
+
+def table_hessian(
+    uu: float, uv: float, uw: float, vv: float, vw: float, ww: float, table: PotentialTable
+) -> tuple[float, float, float, float, float, float]:
+    """Return xx, xy, xz, yy, yz, zz of a Hessian along the axes of the table, in nodes."""
+    m00 = table.m00
+    m01 = table.m01
+    m10 = table.m10
+    m11 = table.m11
+    iz = table.iz
+    return (
+        m00 * m00 * uu + 2.0 * m00 * m10 * uv + m10 * m10 * vv,
+        m00 * m01 * uu + (m00 * m11 + m01 * m10) * uv + m10 * m11 * vv,
+        iz * (m00 * uw + m10 * vw),
+        m01 * m01 * uu + 2.0 * m01 * m11 * uv + m11 * m11 * vv,
+        iz * (m01 * uw + m11 * vw),
+        iz * iz * ww,
+    )
 
 
 def table_weights(t: float) -> tuple[float, float, float]:
@@ -60,14 +111,14 @@ def table_dot(c: FloatArray, i: int, j: int, m: int, w: Weights) -> float:
 
 
 def profile_gradient(
-    x: float, y: float, z: float, c: FloatArray, x0: float, y0: float, z0: float,
-    m00: float, m01: float, m10: float, m11: float, iz: float, mirrored: bool,
-) -> tuple[float, float, float]:  # fmt: skip
+    x: float, y: float, z: float, table: PotentialTable
+) -> tuple[float, float, float]:
     """Return ∇U [m]."""
-    w = (z - z0) * iz
+    c = table.c
+    w = (z - table.z0) * table.iz
     if w >= c.shape[2] - 1.5:
         return 0.0, 0.0, 0.0
-    u, sign = table_fold((x - x0) * m00 + (y - y0) * m01, c.shape[1] - 3, mirrored)
+    u, sign = table_fold(table_first(x, y, table), c.shape[1] - 3, table.mirrored)
     j = int(u + 0.5)
     u0, u1, u2 = table_weights(u - j)
     d0, d1, d2 = table_slopes(u - j)
@@ -79,19 +130,17 @@ def profile_gradient(
     gw += u1 * table_dot(c, 0, j + 1, m, slopes)
     gw += u2 * table_dot(c, 0, j + 2, m, slopes)
     gu *= sign
-    return m00 * gu, m01 * gu, iz * gw + below / iz
+    return table.m00 * gu, table.m01 * gu, table.iz * gw + below / table.iz
 
 
-def map_gradient(
-    x: float, y: float, z: float, c: FloatArray, x0: float, y0: float, z0: float,
-    m00: float, m01: float, m10: float, m11: float, iz: float, mirrored: bool,
-) -> tuple[float, float, float]:  # fmt: skip
+def map_gradient(x: float, y: float, z: float, table: PotentialTable) -> tuple[float, float, float]:
     """Return ∇U [m]."""
-    w = (z - z0) * iz
+    c = table.c
+    w = (z - table.z0) * table.iz
     if w >= c.shape[2] - 1.5:
         return 0.0, 0.0, 0.0
-    u, u_sign = table_fold((x - x0) * m00 + (y - y0) * m01, c.shape[1] - 3, mirrored)
-    v, v_sign = table_fold((x - x0) * m10 + (y - y0) * m11, c.shape[0] - 3, mirrored)
+    u, u_sign = table_fold(table_first(x, y, table), c.shape[1] - 3, table.mirrored)
+    v, v_sign = table_fold(table_second(x, y, table), c.shape[0] - 3, table.mirrored)
     j = int(u + 0.5)
     i = int(v + 0.5)
     u0, u1, u2 = table_weights(u - j)
@@ -122,7 +171,11 @@ def map_gradient(
         gw += (v0, v1, v2)[k] * along
     gu *= u_sign
     gv *= v_sign
-    return m00 * gu + m10 * gv, m01 * gu + m11 * gv, iz * gw + below / iz
+    return (
+        table.m00 * gu + table.m10 * gv,
+        table.m01 * gu + table.m11 * gv,
+        table.iz * gw + below / table.iz,
+    )
 
 
 def table_sums(
@@ -154,55 +207,51 @@ def table_sums(
 
 
 def table_expansion(
-    x: float, y: float, z: float, c: FloatArray, x0: float, y0: float, z0: float,
-    m00: float, m01: float, m10: float, m11: float, iz: float, mirrored: bool,
-) -> tuple[float, float, float, float, float, float, float]:  # fmt: skip
+    x: float, y: float, z: float, table: PotentialTable
+) -> tuple[float, float, float, float, float, float, float]:
     """Return U [m²] and its second derivatives xx, xy, xz, yy, yz, zz [1], of profile or map."""
-    w = (z - z0) * iz
+    c = table.c
+    w = (z - table.z0) * table.iz
     if w >= c.shape[2] - 1.5:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    u, u_sign = table_fold((x - x0) * m00 + (y - y0) * m01, c.shape[1] - 3, mirrored)
+    u, u_sign = table_fold(table_first(x, y, table), c.shape[1] - 3, table.mirrored)
     v = 0.0
     v_sign = 1.0
     if c.shape[0] > 1:
-        v, v_sign = table_fold((x - x0) * m10 + (y - y0) * m11, c.shape[0] - 3, mirrored)
+        v, v_sign = table_fold(table_second(x, y, table), c.shape[0] - 3, table.mirrored)
     value, uu, uv, uw, vv, vw, ww = table_sums(c, u, v, w)
     uv *= u_sign * v_sign
     uw *= u_sign
     vw *= v_sign
-    drop = min(w - 0.5, 0.0) / iz
-    return (
-        value + 0.5 * drop * drop,
-        m00 * m00 * uu + 2.0 * m00 * m10 * uv + m10 * m10 * vv,
-        m00 * m01 * uu + (m00 * m11 + m01 * m10) * uv + m10 * m11 * vv,
-        iz * (m00 * uw + m10 * vw),
-        m01 * m01 * uu + 2.0 * m01 * m11 * uv + m11 * m11 * vv,
-        iz * (m01 * uw + m11 * vw),
-        iz * iz * ww + (1.0 if drop < 0.0 else 0.0),
-    )
+    drop = min(w - 0.5, 0.0) / table.iz
+    xx, xy, xz, yy, yz, zz = table_hessian(uu, uv, uw, vv, vw, ww, table)
+    zz += 1.0 if drop < 0.0 else 0.0
+    return value + 0.5 * drop * drop, xx, xy, xz, yy, yz, zz
 
 
-def profile_force_batch(points: FloatArray, out: FloatArray, k: float, table: Any) -> None:
+def profile_force_batch(
+    points: FloatArray, out: FloatArray, k: float, table: PotentialTable
+) -> None:
     """Forces [N] at the points [m]."""
     for i in range(points.shape[0]):
-        gx, gy, gz = profile_gradient(points[i, 0], points[i, 1], points[i, 2], *table)
+        gx, gy, gz = profile_gradient(points[i, 0], points[i, 1], points[i, 2], table)
         out[i, 0] = -k * gx
         out[i, 1] = -k * gy
         out[i, 2] = -k * gz
 
 
-def map_force_batch(points: FloatArray, out: FloatArray, k: float, table: Any) -> None:
+def map_force_batch(points: FloatArray, out: FloatArray, k: float, table: PotentialTable) -> None:
     """Forces [N] at the points [m]."""
     for i in range(points.shape[0]):
-        gx, gy, gz = map_gradient(points[i, 0], points[i, 1], points[i, 2], *table)
+        gx, gy, gz = map_gradient(points[i, 0], points[i, 1], points[i, 2], table)
         out[i, 0] = -k * gx
         out[i, 1] = -k * gy
         out[i, 2] = -k * gz
 
 
-def expansion_batch(points: FloatArray, out: FloatArray, table: Any) -> None:
+def expansion_batch(points: FloatArray, out: FloatArray, table: PotentialTable) -> None:
     """U [m²] and its second derivatives [1] at the points [m]."""
     for i in range(points.shape[0]):
-        values = table_expansion(points[i, 0], points[i, 1], points[i, 2], *table)
+        values = table_expansion(points[i, 0], points[i, 1], points[i, 2], table)
         for d in range(7):
             out[i, d] = values[d]

@@ -1,83 +1,97 @@
-"""h = Σ a_i sin(k_i · (x, y) + phase_i).
-
-Arguments: ``a`` [m], ``kx``, ``ky`` [rad/m], ``phase`` [rad], and ``bounds`` for the search of
-nearest points: of second and third derivatives [1/m, 1/m²], least and greatest height [m], the
-greatest wave number [rad/m], and the direction of the first wave.
-"""
+"""h = Σ a_i sin(k_i · (x, y) + phase_i)."""
 
 import math
-from typing import Any
+from typing import NamedTuple
 
-import numpy as np
-
+from asperity.checks import FloatArray
 from asperity.contacts.nearest.plane_search import descend, judge, next_box
 
-FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+
+class FourierArguments(NamedTuple):
+    """What the functions below receive of a sum of waves.
+
+    Attributes:
+        amplitudes: a_i [m].
+        kx: wave vectors [rad/m].
+        ky: likewise.
+        phases: [rad].
+        bend: bound of the second derivatives [1/m].
+        twist: bound of the third derivatives [1/m²].
+        low: least height [m].
+        high: greatest height [m].
+        wave_number: the greatest [rad/m].
+        ux: direction of the first wave.
+        uy: likewise.
+    """
+
+    amplitudes: FloatArray
+    kx: FloatArray
+    ky: FloatArray
+    phases: FloatArray
+    bend: float
+    twist: float
+    low: float
+    high: float
+    wave_number: float
+    ux: float
+    uy: float
 
 
-def height(
-    x: float, y: float, a: FloatArray, kx: FloatArray, ky: FloatArray, phase: FloatArray,
-    bounds: FloatArray,
-) -> float:  # fmt: skip
+def height(x: float, y: float, texture: FourierArguments) -> float:
     """Return h [m]."""
     h = 0.0
-    for i in range(a.size):
-        h += a[i] * math.sin(kx[i] * x + ky[i] * y + phase[i])
+    for i in range(texture.amplitudes.size):
+        angle = texture.kx[i] * x + texture.ky[i] * y + texture.phases[i]
+        h += texture.amplitudes[i] * math.sin(angle)
     return h
 
 
-def slope(
-    x: float, y: float, a: FloatArray, kx: FloatArray, ky: FloatArray, phase: FloatArray,
-    bounds: FloatArray,
-) -> tuple[float, float, float]:  # fmt: skip
+def slope(x: float, y: float, texture: FourierArguments) -> tuple[float, float, float]:
     """Return h [m], h_x, h_y [1]."""
     h = hx = hy = 0.0
-    for i in range(a.size):
-        angle = kx[i] * x + ky[i] * y + phase[i]
-        c = a[i] * math.cos(angle)
-        h += a[i] * math.sin(angle)
-        hx += kx[i] * c
-        hy += ky[i] * c
+    for i in range(texture.amplitudes.size):
+        angle = texture.kx[i] * x + texture.ky[i] * y + texture.phases[i]
+        c = texture.amplitudes[i] * math.cos(angle)
+        h += texture.amplitudes[i] * math.sin(angle)
+        hx += texture.kx[i] * c
+        hy += texture.ky[i] * c
     return h, hx, hy
 
 
 def curvature(
-    x: float, y: float, a: FloatArray, kx: FloatArray, ky: FloatArray, phase: FloatArray,
-    bounds: FloatArray,
-) -> tuple[float, float, float, float, float, float]:  # fmt: skip
+    x: float, y: float, texture: FourierArguments
+) -> tuple[float, float, float, float, float, float]:
     """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
     h = hx = hy = hxx = hxy = hyy = 0.0
-    for i in range(a.size):
-        angle = kx[i] * x + ky[i] * y + phase[i]
-        s = a[i] * math.sin(angle)
-        c = a[i] * math.cos(angle)
+    for i in range(texture.amplitudes.size):
+        angle = texture.kx[i] * x + texture.ky[i] * y + texture.phases[i]
+        s = texture.amplitudes[i] * math.sin(angle)
+        c = texture.amplitudes[i] * math.cos(angle)
         h += s
-        hx += kx[i] * c
-        hy += ky[i] * c
-        hxx -= kx[i] * kx[i] * s
-        hxy -= kx[i] * ky[i] * s
-        hyy -= ky[i] * ky[i] * s
+        hx += texture.kx[i] * c
+        hy += texture.ky[i] * c
+        hxx -= texture.kx[i] * texture.kx[i] * s
+        hxy -= texture.kx[i] * texture.ky[i] * s
+        hyy -= texture.ky[i] * texture.ky[i] * s
     return h, hx, hy, hxx, hxy, hyy
 
 
-def nearest(x: float, y: float, z: float, *texture: Any) -> tuple[float, float]:
+def nearest(x: float, y: float, z: float, texture: FourierArguments) -> tuple[float, float]:
     """Return X, Y of the globally nearest surface point."""
-    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, *texture)
+    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, texture)
     return foot_x, foot_y
 
 
 def foot(
-    x: float, y: float, z: float, a: FloatArray, kx: FloatArray, ky: FloatArray,
-    phase: FloatArray, bounds: FloatArray,
-) -> tuple[float, float, float, float, float]:  # fmt: skip
+    x: float, y: float, z: float, texture: FourierArguments
+) -> tuple[float, float, float, float, float]:
     """Return X, Y of the globally nearest surface point, and h, h_x, h_y there.
 
     Downhill from the probe, a distance; only a square of that half-width, less what the heights
     leave over, can hold a nearer point. It is quartered from the whole down.
     """
-    texture = (a, kx, ky, phase, bounds)
     best = descend(x, y, z, x, y, texture)
-    gap = max(bounds[2] - z, z - bounds[3], 0.0)
+    gap = max(texture.low - z, z - texture.high, 0.0)
     reach = math.sqrt(max(best[2] - gap * gap, 0.0))
     u = 0.5 + 0.5 * (best[0] - x) / max(reach, 1e-300)
     v = 0.5 + 0.5 * (best[1] - y) / max(reach, 1e-300)
@@ -92,9 +106,9 @@ def foot(
         near_y = max(abs(cy) - half, 0.0)
         deeper = near_x * near_x + near_y * near_y + gap * gap < best[2] * (1.0 - 1e-13)
         # In a box of several waves Taylor's formula says nothing.
-        if deeper and half * bounds[4] < 1.5:
+        if deeper and half * texture.wave_number < 1.5:
             best, deeper = judge(
-                x, y, z, x + cx, y + cy, half, half, bounds[0], bounds[1],
+                x, y, z, x + cx, y + cy, half, half, texture.bend, texture.twist,
                 best, texture,
             )  # fmt: skip
             deeper = deeper and level > -48

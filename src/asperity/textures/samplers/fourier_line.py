@@ -4,42 +4,35 @@ It replaces ``foot`` of ``fourier``, whose arguments these are.
 """
 
 import math
-from typing import Any
-
-import numpy as np
 
 from asperity.contacts.nearest.line_search import descend, judge, next_part
+from asperity.textures.samplers.fourier import FourierArguments
 
-FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
-
-def along(t: float, texture: Any) -> tuple[float, float, float]:
+def along(t: float, texture: FourierArguments) -> tuple[float, float, float]:
     """Return h [m], h' [1], h'' [1/m] at the distance t along the direction [m]."""
-    a, kx, ky, phase, bounds = texture
     h = h1 = h2 = 0.0
-    for i in range(a.size):
-        k = kx[i] * bounds[5] + ky[i] * bounds[6]
-        angle = k * t + phase[i]
-        s = a[i] * math.sin(angle)
+    for i in range(texture.amplitudes.size):
+        k = texture.kx[i] * texture.ux + texture.ky[i] * texture.uy
+        angle = k * t + texture.phases[i]
+        s = texture.amplitudes[i] * math.sin(angle)
         h += s
-        h1 += k * a[i] * math.cos(angle)
+        h1 += k * texture.amplitudes[i] * math.cos(angle)
         h2 -= k * k * s
     return h, h1, h2
 
 
 def foot(
-    x: float, y: float, z: float, a: FloatArray, kx: FloatArray, ky: FloatArray,
-    phase: FloatArray, bounds: FloatArray,
-) -> tuple[float, float, float, float, float]:  # fmt: skip
+    x: float, y: float, z: float, texture: FourierArguments
+) -> tuple[float, float, float, float, float]:
     """Return X, Y of the globally nearest surface point, and h, h_x, h_y there.
 
     Downhill from the probe, a distance; only an interval of that half-width, less what the
     heights leave over, can hold a nearer point. It is halved from the whole down.
     """
-    texture = (a, kx, ky, phase, bounds)
-    t = x * bounds[5] + y * bounds[6]
+    t = x * texture.ux + y * texture.uy
     best = descend(t, z, t, texture)
-    gap = max(bounds[2] - z, z - bounds[3], 0.0)
+    gap = max(texture.low - z, z - texture.high, 0.0)
     reach = math.sqrt(max(best[1] - gap * gap, 0.0))
     u = 0.5 + 0.5 * (best[0] - t) / max(reach, 1e-300)
     level = 0 if reach > 0.0 else 1
@@ -51,8 +44,8 @@ def foot(
         near = max(abs(centre) - half, 0.0)
         deeper = near * near + gap * gap < best[1] * (1.0 - 1e-13)
         # In an interval of several waves Taylor's formula says nothing.
-        if deeper and half * bounds[4] < 1.5:
-            best, deeper = judge(t, z, t + centre, half, bounds[0], bounds[1], best, texture)
+        if deeper and half * texture.wave_number < 1.5:
+            best, deeper = judge(t, z, t + centre, half, texture.bend, texture.twist, best, texture)
             deeper = deeper and level > -48
         if deeper:
             level -= 1
@@ -60,6 +53,6 @@ def foot(
             i = 2 * i + (1 if u >= (2 * i + 1) * side else 0)
         else:
             level, side, i = next_part(level, side, i, 0, u)
-    x += (best[0] - t) * bounds[5]
-    y += (best[0] - t) * bounds[6]
-    return x, y, best[2], best[3] * bounds[5], best[3] * bounds[6]
+    x += (best[0] - t) * texture.ux
+    y += (best[0] - t) * texture.uy
+    return x, y, best[2], best[3] * texture.ux, best[3] * texture.uy

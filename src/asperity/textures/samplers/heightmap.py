@@ -1,15 +1,12 @@
-"""h = Σ c_ij β(x/p_x - j) β(y/p_y - i), a bicubic B-spline.
-
-Arguments: ``c``, coefficients with one extra row and column before the first cell and two after the
-last; ``ix``, ``iy``, nodes per metre; ``x0``, ``y0``, the first node [m]; ``periodic``; ``nodes``
-and ``levels``, the pyramid of bounds (see ``asperity.textures.pyramid``).
-"""
+"""h = Σ c_ij β(x/p_x - j) β(y/p_y - i), a bicubic B-spline."""
 
 import math
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from asperity.checks import FloatArray
 from asperity.contacts.nearest.plane_search import Point, descend, judge, next_box
 from asperity.textures.samplers.spline import (
     box_bounds,
@@ -24,7 +21,30 @@ from asperity.textures.samplers.spline import (
     weights_second,
 )
 
-FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+
+class HeightMapArguments(NamedTuple):
+    """What the functions below receive of a map.
+
+    Attributes:
+        c: coefficients [m], with one extra row and column before the first cell and two after the
+            last.
+        ix: nodes per metre along x.
+        iy: along y.
+        x0: the first node [m].
+        y0: likewise.
+        periodic: whether the map repeats.
+        nodes: bounds of the boxes of the pyramid, see :mod:`asperity.textures.pyramid`.
+        levels: where its levels begin in them.
+    """
+
+    c: FloatArray
+    ix: float
+    iy: float
+    x0: float
+    y0: float
+    periodic: bool
+    nodes: NDArray[np.float32]
+    levels: NDArray[np.int64]
 
 
 def dot4(c: FloatArray, i: int, j: int, w0: float, w1: float, w2: float, w3: float) -> float:
@@ -37,63 +57,56 @@ def cells_of(c: FloatArray) -> tuple[int, int]:
     return c.shape[1] - 3, c.shape[0] - 3
 
 
-def height(
-    x: float, y: float, c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool,
-    nodes: FloatArray, levels: FloatArray,
-) -> float:  # fmt: skip
+def height(x: float, y: float, texture: HeightMapArguments) -> float:
     """Return h [m]."""
-    nx, ny = cells_of(c)
-    u, _su = fold((x - x0) * ix, nx, periodic)
-    v, _sv = fold((y - y0) * iy, ny, periodic)
+    nx, ny = cells_of(texture.c)
+    u, _su = fold((x - texture.x0) * texture.ix, nx, texture.periodic)
+    v, _sv = fold((y - texture.y0) * texture.iy, ny, texture.periodic)
     j, t = cell_of(u, nx)
     i, r = cell_of(v, ny)
     w0, w1, w2, w3 = weights(t)
     v0, v1, v2, v3 = weights(r)
     return (
-        v0 * dot4(c, i, j, w0, w1, w2, w3)
-        + v1 * dot4(c, i + 1, j, w0, w1, w2, w3)
-        + v2 * dot4(c, i + 2, j, w0, w1, w2, w3)
-        + v3 * dot4(c, i + 3, j, w0, w1, w2, w3)
+        v0 * dot4(texture.c, i, j, w0, w1, w2, w3)
+        + v1 * dot4(texture.c, i + 1, j, w0, w1, w2, w3)
+        + v2 * dot4(texture.c, i + 2, j, w0, w1, w2, w3)
+        + v3 * dot4(texture.c, i + 3, j, w0, w1, w2, w3)
     )
 
 
-def slope(
-    x: float, y: float, c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool,
-    nodes: FloatArray, levels: FloatArray,
-) -> tuple[float, float, float]:  # fmt: skip
+def slope(x: float, y: float, texture: HeightMapArguments) -> tuple[float, float, float]:
     """Return h [m], h_x, h_y [1]."""
-    nx, ny = cells_of(c)
-    u, su = fold((x - x0) * ix, nx, periodic)
-    v, sv = fold((y - y0) * iy, ny, periodic)
+    nx, ny = cells_of(texture.c)
+    u, su = fold((x - texture.x0) * texture.ix, nx, texture.periodic)
+    v, sv = fold((y - texture.y0) * texture.iy, ny, texture.periodic)
     j, t = cell_of(u, nx)
     i, r = cell_of(v, ny)
     w0, w1, w2, w3 = weights(t)
     d0, d1, d2, d3 = weights_first(t)
     v0, v1, v2, v3 = weights(r)
     e0, e1, e2, e3 = weights_first(r)
-    a0 = dot4(c, i, j, w0, w1, w2, w3)
-    a1 = dot4(c, i + 1, j, w0, w1, w2, w3)
-    a2 = dot4(c, i + 2, j, w0, w1, w2, w3)
-    a3 = dot4(c, i + 3, j, w0, w1, w2, w3)
-    b0 = dot4(c, i, j, d0, d1, d2, d3)
-    b1 = dot4(c, i + 1, j, d0, d1, d2, d3)
-    b2 = dot4(c, i + 2, j, d0, d1, d2, d3)
-    b3 = dot4(c, i + 3, j, d0, d1, d2, d3)
+    a0 = dot4(texture.c, i, j, w0, w1, w2, w3)
+    a1 = dot4(texture.c, i + 1, j, w0, w1, w2, w3)
+    a2 = dot4(texture.c, i + 2, j, w0, w1, w2, w3)
+    a3 = dot4(texture.c, i + 3, j, w0, w1, w2, w3)
+    b0 = dot4(texture.c, i, j, d0, d1, d2, d3)
+    b1 = dot4(texture.c, i + 1, j, d0, d1, d2, d3)
+    b2 = dot4(texture.c, i + 2, j, d0, d1, d2, d3)
+    b3 = dot4(texture.c, i + 3, j, d0, d1, d2, d3)
     return (
         v0 * a0 + v1 * a1 + v2 * a2 + v3 * a3,
-        su * ix * (v0 * b0 + v1 * b1 + v2 * b2 + v3 * b3),
-        sv * iy * (e0 * a0 + e1 * a1 + e2 * a2 + e3 * a3),
+        su * texture.ix * (v0 * b0 + v1 * b1 + v2 * b2 + v3 * b3),
+        sv * texture.iy * (e0 * a0 + e1 * a1 + e2 * a2 + e3 * a3),
     )
 
 
 def curvature(
-    x: float, y: float, c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool,
-    nodes: FloatArray, levels: FloatArray,
-) -> tuple[float, float, float, float, float, float]:  # fmt: skip
+    x: float, y: float, texture: HeightMapArguments
+) -> tuple[float, float, float, float, float, float]:
     """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
-    nx, ny = cells_of(c)
-    u, su = fold((x - x0) * ix, nx, periodic)
-    v, sv = fold((y - y0) * iy, ny, periodic)
+    nx, ny = cells_of(texture.c)
+    u, su = fold((x - texture.x0) * texture.ix, nx, texture.periodic)
+    v, sv = fold((y - texture.y0) * texture.iy, ny, texture.periodic)
     j, t = cell_of(u, nx)
     i, r = cell_of(v, ny)
     w0, w1, w2, w3 = weights(t)
@@ -102,61 +115,58 @@ def curvature(
     v0, v1, v2, v3 = weights(r)
     e0, e1, e2, e3 = weights_first(r)
     g0, g1, g2, g3 = weights_second(r)
-    a0 = dot4(c, i, j, w0, w1, w2, w3)
-    a1 = dot4(c, i + 1, j, w0, w1, w2, w3)
-    a2 = dot4(c, i + 2, j, w0, w1, w2, w3)
-    a3 = dot4(c, i + 3, j, w0, w1, w2, w3)
-    b0 = dot4(c, i, j, d0, d1, d2, d3)
-    b1 = dot4(c, i + 1, j, d0, d1, d2, d3)
-    b2 = dot4(c, i + 2, j, d0, d1, d2, d3)
-    b3 = dot4(c, i + 3, j, d0, d1, d2, d3)
+    a0 = dot4(texture.c, i, j, w0, w1, w2, w3)
+    a1 = dot4(texture.c, i + 1, j, w0, w1, w2, w3)
+    a2 = dot4(texture.c, i + 2, j, w0, w1, w2, w3)
+    a3 = dot4(texture.c, i + 3, j, w0, w1, w2, w3)
+    b0 = dot4(texture.c, i, j, d0, d1, d2, d3)
+    b1 = dot4(texture.c, i + 1, j, d0, d1, d2, d3)
+    b2 = dot4(texture.c, i + 2, j, d0, d1, d2, d3)
+    b3 = dot4(texture.c, i + 3, j, d0, d1, d2, d3)
     hxx = (
-        v0 * dot4(c, i, j, f0, f1, f2, f3)
-        + v1 * dot4(c, i + 1, j, f0, f1, f2, f3)
-        + v2 * dot4(c, i + 2, j, f0, f1, f2, f3)
-        + v3 * dot4(c, i + 3, j, f0, f1, f2, f3)
+        v0 * dot4(texture.c, i, j, f0, f1, f2, f3)
+        + v1 * dot4(texture.c, i + 1, j, f0, f1, f2, f3)
+        + v2 * dot4(texture.c, i + 2, j, f0, f1, f2, f3)
+        + v3 * dot4(texture.c, i + 3, j, f0, f1, f2, f3)
     )
     return (
         v0 * a0 + v1 * a1 + v2 * a2 + v3 * a3,
-        su * ix * (v0 * b0 + v1 * b1 + v2 * b2 + v3 * b3),
-        sv * iy * (e0 * a0 + e1 * a1 + e2 * a2 + e3 * a3),
-        ix * ix * hxx,
-        su * sv * ix * iy * (e0 * b0 + e1 * b1 + e2 * b2 + e3 * b3),
-        iy * iy * (g0 * a0 + g1 * a1 + g2 * a2 + g3 * a3),
+        su * texture.ix * (v0 * b0 + v1 * b1 + v2 * b2 + v3 * b3),
+        sv * texture.iy * (e0 * a0 + e1 * a1 + e2 * a2 + e3 * a3),
+        texture.ix * texture.ix * hxx,
+        su * sv * texture.ix * texture.iy * (e0 * b0 + e1 * b1 + e2 * b2 + e3 * b3),
+        texture.iy * texture.iy * (g0 * a0 + g1 * a1 + g2 * a2 + g3 * a3),
     )
 
 
-def nearest(x: float, y: float, z: float, *texture: Any) -> tuple[float, float]:
+def nearest(x: float, y: float, z: float, texture: HeightMapArguments) -> tuple[float, float]:
     """Return X, Y of the globally nearest surface point."""
-    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, *texture)
+    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, texture)
     return foot_x, foot_y
 
 
 def foot(
-    x: float, y: float, z: float,
-    c: FloatArray, ix: float, iy: float, x0: float, y0: float, periodic: bool,
-    nodes: FloatArray, levels: FloatArray,
-) -> tuple[float, float, float, float, float]:  # fmt: skip
+    x: float, y: float, z: float, texture: HeightMapArguments
+) -> tuple[float, float, float, float, float]:
     """Return X, Y of the globally nearest surface point, and h, h_x, h_y there.
 
     Downhill from the probe, a distance; only points within it can be nearer. The plane is tiled
     by copies of the map, every other one mirrored if it is finite; each is searched from the
     coarsest boxes of the pyramid down.
     """
-    texture = (c, ix, iy, x0, y0, periodic, nodes, levels)
     best = descend(x, y, z, x, y, texture)
-    nx, ny = cells_of(c)
-    tile_i = math.floor((y - y0) * iy / ny)
-    tile_j = math.floor((x - x0) * ix / nx)
+    nx, ny = cells_of(texture.c)
+    tile_i = math.floor((y - texture.y0) * texture.iy / ny)
+    tile_j = math.floor((x - texture.x0) * texture.ix / nx)
     best = search_tile(x, y, z, tile_i, tile_j, best, texture)
-    reach = reach_of(z, best[2], nodes)
+    reach = reach_of(z, best[2], texture.nodes)
     # Of the copies of a point only the nearest counts.
-    reach_x = min(reach, nearest_copy(nx / ix, periodic))
-    reach_y = min(reach, nearest_copy(ny / iy, periodic))
-    i_first = math.floor((y - reach_y - y0) * iy / ny)
-    i_last = math.floor((y + reach_y - y0) * iy / ny)
-    j_first = math.floor((x - reach_x - x0) * ix / nx)
-    j_last = math.floor((x + reach_x - x0) * ix / nx)
+    reach_x = min(reach, nearest_copy(nx / texture.ix, texture.periodic))
+    reach_y = min(reach, nearest_copy(ny / texture.iy, texture.periodic))
+    i_first = math.floor((y - reach_y - texture.y0) * texture.iy / ny)
+    i_last = math.floor((y + reach_y - texture.y0) * texture.iy / ny)
+    j_first = math.floor((x - reach_x - texture.x0) * texture.ix / nx)
+    j_last = math.floor((x + reach_x - texture.x0) * texture.ix / nx)
     for i in range(i_first, i_last + 1):
         for j in range(j_first, j_last + 1):
             if i != tile_i or j != tile_j:
@@ -165,17 +175,16 @@ def foot(
 
 
 def search_tile(
-    x: float, y: float, z: float, tile_i: int, tile_j: int, best: Point, texture: Any
+    x: float, y: float, z: float, tile_i: int, tile_j: int, best: Point, texture: HeightMapArguments
 ) -> Point:
     """Return the best point after a search of one copy of the map.
 
     Probe and best point are moved to where they are seen from the map itself.
     """
-    c, ix, iy, x0, y0, periodic, nodes, levels = texture
-    nx, ny = cells_of(c)
-    reach = reach_of(z, best[2], nodes)
-    turn_x, shift_x = tile_frame(tile_j, nx, ix, x0, periodic)
-    turn_y, shift_y = tile_frame(tile_i, ny, iy, y0, periodic)
+    nx, ny = cells_of(texture.c)
+    reach = reach_of(z, best[2], texture.nodes)
+    turn_x, shift_x = tile_frame(tile_j, nx, texture.ix, texture.x0, texture.periodic)
+    turn_y, shift_y = tile_frame(tile_i, ny, texture.iy, texture.y0, texture.periodic)
     x = turn_x * x + shift_x
     y = turn_y * y + shift_y
     found = (
@@ -183,12 +192,12 @@ def search_tile(
         best[3], turn_x * best[4], turn_y * best[5],
     )  # fmt: skip
     # Boxes of two by two cells that are within reach.
-    j_low = max(math.floor((x - reach - x0) * ix), 0) >> 1
-    j_high = min(math.floor((x + reach - x0) * ix), nx - 1) >> 1
-    i_low = max(math.floor((y - reach - y0) * iy), 0) >> 1
-    i_high = min(math.floor((y + reach - y0) * iy), ny - 1) >> 1
+    j_low = max(math.floor((x - reach - texture.x0) * texture.ix), 0) >> 1
+    j_high = min(math.floor((x + reach - texture.x0) * texture.ix), nx - 1) >> 1
+    i_low = max(math.floor((y - reach - texture.y0) * texture.iy), 0) >> 1
+    i_high = min(math.floor((y + reach - texture.y0) * texture.iy), ny - 1) >> 1
     top = 1
-    while top < levels.shape[0] and ((i_high - i_low) | (j_high - j_low)) >> (top - 1) > 0:
+    while top < texture.levels.shape[0] and ((i_high - i_low) | (j_high - j_low)) >> (top - 1) > 0:
         top += 1
     for i in range(i_low >> (top - 1), (i_high >> (top - 1)) + 1):
         for j in range(j_low >> (top - 1), (j_high >> (top - 1)) + 1):
@@ -202,25 +211,27 @@ def search_tile(
 
 
 def search_tree(
-    x: float, y: float, z: float, top: int, i: int, j: int, best: Point, texture: Any
+    x: float, y: float, z: float, top: int, i: int, j: int, best: Point, texture: HeightMapArguments
 ) -> Point:
     """Return the best point after a search of box (i, j) of level top, its sides 2^top cells."""
-    c, ix, iy, x0, y0, _periodic, nodes, levels = texture
+    ix = texture.ix
+    x0 = texture.x0
+    y0 = texture.y0
     px = 1.0 / ix
-    py = 1.0 / iy
+    py = 1.0 / texture.iy
     u = (x - x0) * ix
-    v = (y - y0) * iy
+    v = (y - y0) * texture.iy
     level = top
     side = 2.0**top
     low = high = bend = twist = 0.0
     while level <= top:
-        i_end = min((i + 1) * side, c.shape[0] - 3.0)
-        j_end = min((j + 1) * side, c.shape[1] - 3.0)
+        i_end = min((i + 1) * side, texture.c.shape[0] - 3.0)
+        j_end = min((j + 1) * side, texture.c.shape[1] - 3.0)
         deeper = i * side < i_end and j * side < j_end
         if deeper:
             if level > 0:
-                k = levels[level - 1, 0] + i * levels[level - 1, 2] + j
-                low, high, bend, twist = box_bounds(nodes, k)
+                k = texture.levels[level - 1, 0] + i * texture.levels[level - 1, 2] + j
+                low, high, bend, twist = box_bounds(texture.nodes, k)
             near_x = max(j * side - u, u - j_end, 0.0) * px
             near_y = max(i * side - v, v - i_end, 0.0) * py
             gap = max(low - z, z - high, 0.0)

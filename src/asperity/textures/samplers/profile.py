@@ -1,15 +1,12 @@
-"""h = Σ c_j β(x/p - j), a cubic B-spline profile; constant along y.
-
-Arguments: ``c``, coefficients with one extra before the first cell and two after the last; ``ix``,
-nodes per metre; ``x0``, the first node [m]; ``periodic``; ``nodes`` and ``levels``, the pyramid of
-bounds (see ``asperity.textures.pyramid``).
-"""
+"""h = Σ c_j β(x/p_x - j), a cubic B-spline profile; constant along y."""
 
 import math
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from asperity.checks import FloatArray
 from asperity.contacts.nearest.line_search import Point, descend, judge, next_part
 from asperity.textures.samplers.spline import (
     box_bounds,
@@ -24,7 +21,25 @@ from asperity.textures.samplers.spline import (
     weights_second,
 )
 
-FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+
+class ProfileArguments(NamedTuple):
+    """What the functions below receive of a profile.
+
+    Attributes:
+        c: coefficients [m], with one extra before the first cell and two after the last.
+        ix: nodes per metre.
+        x0: the first node [m].
+        periodic: whether the profile repeats.
+        nodes: bounds of the boxes of the pyramid, see :mod:`asperity.textures.pyramid`.
+        levels: where its levels begin in them.
+    """
+
+    c: FloatArray
+    ix: float
+    x0: float
+    periodic: bool
+    nodes: NDArray[np.float32]
+    levels: NDArray[np.int64]
 
 
 def dot4(c: FloatArray, j: int, w0: float, w1: float, w2: float, w3: float) -> float:
@@ -32,117 +47,92 @@ def dot4(c: FloatArray, j: int, w0: float, w1: float, w2: float, w3: float) -> f
     return float(w0 * c[j] + w1 * c[j + 1] + w2 * c[j + 2] + w3 * c[j + 3])
 
 
-def height(
-    x: float,
-    y: float,
-    c: FloatArray,
-    ix: float,
-    x0: float,
-    periodic: bool,
-    nodes: FloatArray,
-    levels: FloatArray,
-) -> float:
+def height(x: float, y: float, texture: ProfileArguments) -> float:
     """Return h [m]."""
-    cells = c.size - 3
-    u, _sign = fold((x - x0) * ix, cells, periodic)
+    cells = texture.c.size - 3
+    u, _sign = fold((x - texture.x0) * texture.ix, cells, texture.periodic)
     j, t = cell_of(u, cells)
     w0, w1, w2, w3 = weights(t)
-    return dot4(c, j, w0, w1, w2, w3)
+    return dot4(texture.c, j, w0, w1, w2, w3)
 
 
-def slope(
-    x: float,
-    y: float,
-    c: FloatArray,
-    ix: float,
-    x0: float,
-    periodic: bool,
-    nodes: FloatArray,
-    levels: FloatArray,
-) -> tuple[float, float, float]:
+def slope(x: float, y: float, texture: ProfileArguments) -> tuple[float, float, float]:
     """Return h [m], h_x, h_y [1]."""
-    cells = c.size - 3
-    u, sign = fold((x - x0) * ix, cells, periodic)
+    cells = texture.c.size - 3
+    u, sign = fold((x - texture.x0) * texture.ix, cells, texture.periodic)
     j, t = cell_of(u, cells)
     w0, w1, w2, w3 = weights(t)
     d0, d1, d2, d3 = weights_first(t)
-    return dot4(c, j, w0, w1, w2, w3), sign * ix * dot4(c, j, d0, d1, d2, d3), 0.0
+    h = dot4(texture.c, j, w0, w1, w2, w3)
+    return h, sign * texture.ix * dot4(texture.c, j, d0, d1, d2, d3), 0.0
 
 
 def curvature(
-    x: float,
-    y: float,
-    c: FloatArray,
-    ix: float,
-    x0: float,
-    periodic: bool,
-    nodes: FloatArray,
-    levels: FloatArray,
+    x: float, y: float, texture: ProfileArguments
 ) -> tuple[float, float, float, float, float, float]:
     """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
-    cells = c.size - 3
-    u, sign = fold((x - x0) * ix, cells, periodic)
+    cells = texture.c.size - 3
+    u, sign = fold((x - texture.x0) * texture.ix, cells, texture.periodic)
     j, t = cell_of(u, cells)
     w0, w1, w2, w3 = weights(t)
     d0, d1, d2, d3 = weights_first(t)
     f0, f1, f2, f3 = weights_second(t)
-    h = dot4(c, j, w0, w1, w2, w3)
-    hx = sign * ix * dot4(c, j, d0, d1, d2, d3)
-    return h, hx, 0.0, ix * ix * dot4(c, j, f0, f1, f2, f3), 0.0, 0.0
+    h = dot4(texture.c, j, w0, w1, w2, w3)
+    hx = sign * texture.ix * dot4(texture.c, j, d0, d1, d2, d3)
+    return h, hx, 0.0, texture.ix * texture.ix * dot4(texture.c, j, f0, f1, f2, f3), 0.0, 0.0
 
 
-def along(x: float, texture: Any) -> tuple[float, float, float]:
+def along(x: float, texture: ProfileArguments) -> tuple[float, float, float]:
     """Return h [m], h' [1], h'' [1/m]."""
-    h, h1, _hy, h2, _hxy, _hyy = curvature(x, 0.0, *texture)
+    h, h1, _hy, h2, _hxy, _hyy = curvature(x, 0.0, texture)
     return h, h1, h2
 
 
-def nearest(x: float, y: float, z: float, *texture: Any) -> tuple[float, float]:
+def nearest(x: float, y: float, z: float, texture: ProfileArguments) -> tuple[float, float]:
     """Return X, Y of the globally nearest surface point; Y = y."""
-    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, *texture)
+    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, texture)
     return foot_x, foot_y
 
 
 def foot(
-    x: float, y: float, z: float, c: FloatArray, ix: float, x0: float, periodic: bool,
-    nodes: FloatArray, levels: FloatArray,
-) -> tuple[float, float, float, float, float]:  # fmt: skip
+    x: float, y: float, z: float, texture: ProfileArguments
+) -> tuple[float, float, float, float, float]:
     """Return X, Y of the globally nearest surface point, and h, h_x, h_y there; Y = y.
 
     Downhill from the probe, a distance; only points within it can be nearer. The line is tiled by
     copies of the profile, every other one mirrored if it is finite; each is searched from the
     coarsest intervals of the pyramid down.
     """
-    texture = (c, ix, x0, periodic, nodes, levels)
     best = descend(x, z, x, texture)
-    cells = c.size - 3
-    middle = math.floor((x - x0) * ix / cells)
+    cells = texture.c.size - 3
+    middle = math.floor((x - texture.x0) * texture.ix / cells)
     best = search_tile(x, z, middle, best, texture)
     # Of the copies of a point only the nearest counts.
-    reach = min(reach_of(z, best[1], nodes), nearest_copy(cells / ix, periodic))
-    first = math.floor((x - reach - x0) * ix / cells)
-    last = math.floor((x + reach - x0) * ix / cells)
+    reach = min(
+        reach_of(z, best[1], texture.nodes), nearest_copy(cells / texture.ix, texture.periodic)
+    )
+    first = math.floor((x - reach - texture.x0) * texture.ix / cells)
+    last = math.floor((x + reach - texture.x0) * texture.ix / cells)
     for tile in range(first, last + 1):
         if tile != middle:
             best = search_tile(x, z, tile, best, texture)
     return best[0], y, best[2], best[3], 0.0
 
 
-def search_tile(x: float, z: float, tile: int, best: Point, texture: Any) -> Point:
+def search_tile(x: float, z: float, tile: int, best: Point, texture: ProfileArguments) -> Point:
     """Return the best point after a search of one copy of the profile.
 
     Probe and best point are moved to where they are seen from the profile itself.
     """
-    c, ix, x0, periodic, nodes, levels = texture
-    cells = c.size - 3
-    reach = reach_of(z, best[1], nodes)
-    turn, shift = tile_frame(tile, cells, ix, x0, periodic)
+    cells = texture.c.size - 3
+    reach = reach_of(z, best[1], texture.nodes)
+    turn, shift = tile_frame(tile, cells, texture.ix, texture.x0, texture.periodic)
     x = turn * x + shift
     found = (turn * best[0] + shift, best[1], best[2], turn * best[3])
-    low = max(math.floor((x - reach - x0) * ix), 0)
-    high = min(math.floor((x + reach - x0) * ix), cells - 1)
+    low = max(math.floor((x - reach - texture.x0) * texture.ix), 0)
+    high = min(math.floor((x + reach - texture.x0) * texture.ix), cells - 1)
     top = 0
-    while top < levels.shape[0] - 1 and (high - low) >> top > 0:
+    while top < texture.levels.shape[0] - 1 and (high - low) >> top > 0:
         top += 1
     for i in range(low >> top, (high >> top) + 1):
         found = search_tree(x, z, top, i, found, texture)
@@ -151,10 +141,13 @@ def search_tile(x: float, z: float, tile: int, best: Point, texture: Any) -> Poi
     return best
 
 
-def search_tree(x: float, z: float, top: int, i: int, best: Point, texture: Any) -> Point:
+def search_tree(
+    x: float, z: float, top: int, i: int, best: Point, texture: ProfileArguments
+) -> Point:
     """Return the best point after a search of interval i of level top, 2^top cells long."""
-    c, ix, x0, _periodic, nodes, levels = texture
-    cells = float(c.size - 3)
+    ix = texture.ix
+    x0 = texture.x0
+    cells = float(texture.c.size - 3)
     pitch = 1.0 / ix
     u = (x - x0) * ix
     level = top
@@ -166,7 +159,7 @@ def search_tree(x: float, z: float, top: int, i: int, best: Point, texture: Any)
         deeper = start < end
         if deeper:
             if level >= 0:
-                low, high, bend, twist = box_bounds(nodes, levels[level, 0] + i)
+                low, high, bend, twist = box_bounds(texture.nodes, texture.levels[level, 0] + i)
             near = max(start - u, u - end, 0.0) * pitch
             gap = max(low - z, z - high, 0.0)
             deeper = near * near + gap * gap < best[1] * (1.0 - 1e-13)

@@ -1,41 +1,57 @@
 """h = A sin(k_x x + k_y y + phase)."""
 
 import math
-from typing import Any
+from typing import NamedTuple
 
 
-def height(x: float, y: float, a: float, kx: float, ky: float, phase: float) -> float:
+class SinusoidArguments(NamedTuple):
+    """What the functions below receive of a sinusoid.
+
+    Attributes:
+        amplitude: A [m].
+        kx: wave vector [rad/m].
+        ky: likewise.
+        phase: [rad].
+    """
+
+    amplitude: float
+    kx: float
+    ky: float
+    phase: float
+
+
+def height(x: float, y: float, texture: SinusoidArguments) -> float:
     """Return h [m]."""
-    return a * math.sin(kx * x + ky * y + phase)
+    return texture.amplitude * math.sin(texture.kx * x + texture.ky * y + texture.phase)
 
 
-def slope(
-    x: float, y: float, a: float, kx: float, ky: float, phase: float
-) -> tuple[float, float, float]:
+def slope(x: float, y: float, texture: SinusoidArguments) -> tuple[float, float, float]:
     """Return h [m], h_x, h_y [1]."""
-    angle = kx * x + ky * y + phase
-    c = a * math.cos(angle)
-    return a * math.sin(angle), kx * c, ky * c
+    angle = texture.kx * x + texture.ky * y + texture.phase
+    c = texture.amplitude * math.cos(angle)
+    return texture.amplitude * math.sin(angle), texture.kx * c, texture.ky * c
 
 
 def curvature(
-    x: float, y: float, a: float, kx: float, ky: float, phase: float
+    x: float, y: float, texture: SinusoidArguments
 ) -> tuple[float, float, float, float, float, float]:
     """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
-    angle = kx * x + ky * y + phase
-    h = a * math.sin(angle)
-    c = a * math.cos(angle)
+    angle = texture.kx * x + texture.ky * y + texture.phase
+    h = texture.amplitude * math.sin(angle)
+    c = texture.amplitude * math.cos(angle)
+    kx = texture.kx
+    ky = texture.ky
     return h, kx * c, ky * c, -kx * kx * h, -kx * ky * h, -ky * ky * h
 
 
-def nearest(x: float, y: float, z: float, *texture: Any) -> tuple[float, float]:
+def nearest(x: float, y: float, z: float, texture: SinusoidArguments) -> tuple[float, float]:
     """Return X, Y of the globally nearest surface point."""
-    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, *texture)
+    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, texture)
     return foot_x, foot_y
 
 
 def foot(
-    x: float, y: float, z: float, a: float, kx: float, ky: float, phase: float
+    x: float, y: float, z: float, texture: SinusoidArguments
 ) -> tuple[float, float, float, float, float]:
     """Return X, Y of the globally nearest surface point, and h, h_x, h_y there.
 
@@ -49,12 +65,14 @@ def foot(
     changes sign exactly once: it is convex from u to the inflection π/2 with F(u) <= 0, and
     increasing from there on while the surface is above the probe.
     """
-    amplitude = abs(a)
+    amplitude = abs(texture.amplitude)
     if amplitude == 0.0:
         return x, y, 0.0, 0.0, 0.0
+    kx = texture.kx
+    ky = texture.ky
     k2 = kx * kx + ky * ky
-    angle = kx * x + ky * y + phase
-    if a < 0.0:
+    angle = kx * x + ky * y + texture.phase
+    if texture.amplitude < 0.0:
         angle += math.pi
     over = 1.0
     if z > amplitude * math.sin(angle):

@@ -14,10 +14,10 @@ is then k (c u/κ, A cos ψ - z), else law D's.
 
 import math
 
+from asperity.textures.samplers.sinusoid import SinusoidArguments
 
-def nearest(
-    x: float, y: float, z: float, a: float, kx: float, ky: float, phase: float
-) -> tuple[float, float]:
+
+def nearest(x: float, y: float, z: float, texture: SinusoidArguments) -> tuple[float, float]:
     """Stand in for the sampler's own function, which replaces this one."""
     raise AssertionError
 
@@ -66,10 +66,10 @@ def split_root(share: float, u: float, z: float, amplitude: float, bend: float) 
     return psi
 
 
-def split_phase(x: float, y: float, a: float, kx: float, ky: float, phase: float) -> float:
+def split_phase(x: float, y: float, texture: SinusoidArguments) -> float:
     """Return the phase from the nearest crest, in [-π, π]."""
-    angle = kx * x + ky * y + phase
-    turns = angle / (2.0 * math.pi) - (0.25 if a >= 0.0 else 0.75)
+    angle = texture.kx * x + texture.ky * y + texture.phase
+    turns = angle / (2.0 * math.pi) - (0.25 if texture.amplitude >= 0.0 else 0.75)
     return 2.0 * math.pi * (turns - math.floor(turns + 0.5))
 
 
@@ -88,26 +88,25 @@ def split_foot(
 
 
 def split_contact(
-    x: float, y: float, z: float, continuity: float, texture: tuple[float, float, float, float]
+    x: float, y: float, z: float, continuity: float, texture: SinusoidArguments
 ) -> tuple[float, float, float]:
     """Return z̄ - p, from the probe to the mean of the split god-object [m]."""
-    a, kx, ky, phase = texture
-    k2 = kx * kx + ky * ky
-    u = split_phase(x, y, a, kx, ky, phase)
-    split, psi = split_foot(abs(u), z, continuity, abs(a), k2 * abs(a))
+    amplitude = abs(texture.amplitude)
+    k2 = texture.kx * texture.kx + texture.ky * texture.ky
+    u = split_phase(x, y, texture)
+    split, psi = split_foot(abs(u), z, continuity, amplitude, k2 * amplitude)
     shift = continuity * u if split else math.copysign(psi - abs(u), u)
-    return kx * shift / k2, ky * shift / k2, abs(a) * math.cos(psi) - z
+    return texture.kx * shift / k2, texture.ky * shift / k2, amplitude * math.cos(psi) - z
 
 
 def split_derivative(
-    x: float, y: float, z: float, continuity: float, texture: tuple[float, float, float, float]
+    x: float, y: float, z: float, continuity: float, texture: SinusoidArguments
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
     """Return z̄ - p [m] and its derivative by p as m_xx, m_xy, m_xz, m_yy, m_yz, m_zz."""
-    a, kx, ky, phase = texture
-    amplitude = abs(a)
-    k2 = kx * kx + ky * ky
+    amplitude = abs(texture.amplitude)
+    k2 = texture.kx * texture.kx + texture.ky * texture.ky
     wave = math.sqrt(k2)
-    u = split_phase(x, y, a, kx, ky, phase)
+    u = split_phase(x, y, texture)
     split, psi = split_foot(abs(u), z, continuity, amplitude, k2 * amplitude)
     s = math.sin(psi)
     c = math.cos(psi)
@@ -128,40 +127,40 @@ def split_derivative(
         along = 1.0 / q - 1.0
         mixed = slope / q
         upward = slope * slope / q - 1.0
-    ex = kx / wave
-    ey = ky / wave
+    ex = texture.kx / wave
+    ey = texture.ky / wave
     return (
-        kx * shift / k2, ky * shift / k2, gap,
+        texture.kx * shift / k2, texture.ky * shift / k2, gap,
         ex * ex * along, ex * ey * along, ex * mixed, ey * ey * along, ey * mixed, upward,
     )  # fmt: skip
 
 
 def split_energy(
-    x: float, y: float, z: float, continuity: float, texture: tuple[float, float, float, float]
+    x: float, y: float, z: float, continuity: float, texture: SinusoidArguments
 ) -> tuple[float, int, float]:
     """Return U [m²], the number of atoms, and the gap between U and the dual's lower bound [m²].
 
     The lower bound takes the globally nearest point of y from the sampler's own search.
     """
-    a, kx, ky, phase = texture
-    k2 = kx * kx + ky * ky
+    amplitude = abs(texture.amplitude)
+    k2 = texture.kx * texture.kx + texture.ky * texture.ky
     share = continuity / (1.0 + continuity)
-    u = split_phase(x, y, a, kx, ky, phase)
-    split, psi = split_foot(abs(u), z, continuity, abs(a), k2 * abs(a))
+    u = split_phase(x, y, texture)
+    split, psi = split_foot(abs(u), z, continuity, amplitude, k2 * amplitude)
     foot = psi if split else math.copysign(psi, u)
     shift = continuity * u if split else foot - u
-    h = abs(a) * math.cos(psi)
+    h = amplitude * math.cos(psi)
     # Variance of the atoms ±ψ around their mean (1 + c) u.
     mean = (1.0 + continuity) * u
     spread = (psi - mean) * (psi + mean) / k2 if split else 0.0
     value = 0.5 * (shift * shift / k2 + (h - z) * (h - z) + share * spread)
     far = u - shift / continuity
-    far_x = x - kx * (shift / continuity) / k2
-    far_y = y - ky * (shift / continuity) / k2
+    far_x = x - texture.kx * (shift / continuity) / k2
+    far_y = y - texture.ky * (shift / continuity) / k2
     far_z = z - (h - z) / continuity
-    near_x, near_y = nearest(far_x, far_y, far_z, a, kx, ky, phase)
-    near = far + kx * (near_x - far_x) + ky * (near_y - far_y)
-    near_h = a * math.sin(kx * near_x + ky * near_y + phase)
+    near_x, near_y = nearest(far_x, far_y, far_z, texture)
+    near = far + texture.kx * (near_x - far_x) + texture.ky * (near_y - far_y)
+    near_h = texture.amplitude * math.sin(texture.kx * near_x + texture.ky * near_y + texture.phase)
     # Products of sums and differences: squares would cancel.
     gap = (foot - near) * (foot + near - 2.0 * far) / k2 + (h - near_h) * (h + near_h - 2.0 * far_z)
     return value, 2 if split else 1, max(0.5 * share * gap, 0.0)

@@ -3,10 +3,7 @@
 import math
 
 import numpy as np
-
-FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
-
-# fused from here
+from numpy.typing import NDArray
 
 
 def fold(u: float, cells: int, periodic: bool) -> tuple[float, float]:
@@ -68,12 +65,12 @@ def tile_frame(
     return -1.0, 2.0 * start + (tile + 1) * length
 
 
-def box_bounds(nodes: FloatArray, k: int) -> tuple[float, float, float, float]:
+def box_bounds(nodes: NDArray[np.float32], k: int) -> tuple[float, float, float, float]:
     """Return the least and greatest height and the bounds K and T of box k of the pyramid."""
     return float(nodes[k, 0]), float(nodes[k, 1]), float(nodes[k, 2]), float(nodes[k, 3])
 
 
-def reach_of(z: float, best: float, nodes: FloatArray) -> float:
+def reach_of(z: float, best: float, nodes: NDArray[np.float32]) -> float:
     """Return the lateral distance beyond which no surface point is nearer than the best [m].
 
     From the least and greatest height of all, which the last box knows.
