@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Sequence
+
 from asperity.arguments import Argument
-from asperity.errors import ParameterError, nearest_names
+from asperity.errors import LawError, ParameterError, nearest_names
 from asperity.laws import (
     a_groove_wall_normal,
     b_groove_texture_normal,
@@ -17,7 +19,17 @@ from asperity.laws import (
 )
 from asperity.laws.law import Law
 
-__all__ = ["LAWS", "LAW_ARGUMENTS", "Law", "find_law", "find_laws"]
+__all__ = [
+    "KNOWN_LAWS",
+    "LAWS",
+    "LAW_ARGUMENTS",
+    "Law",
+    "find_law",
+    "find_laws",
+    "known_arguments",
+    "register",
+    "shared_out",
+]
 
 # In the order of the paper's tables, the smooth wall first.
 LAWS: dict[str, Law] = {
@@ -40,6 +52,72 @@ LAW_ARGUMENTS: dict[str, Argument] = {
 }
 """The parameters of the shipped laws, by name."""
 
+KNOWN_LAWS: dict[str, Law] = dict(LAWS)
+"""The laws that are found by letter or name: the shipped ones and those that were registered."""
+
+
+def register(law: Law) -> Law:
+    """Make a law of your own known by its letter and its name, in scenes and commands too.
+
+    Raises:
+        LawError: for a letter or a name that is taken, or a parameter that has another unit in
+            a law that is known.
+
+    Example:
+        >>> register(Law("C", "mine", "vertical", lambda c: c.k * c.depth * c.w))
+        Traceback (most recent call last):
+        ...
+        asperity.errors.LawError: law C (mine): 'C' is taken by law C (change-of-height)
+    """
+    for name in (law.letter, law.name):
+        known = _known(name)
+        if known is not None:
+            raise LawError(f"law {law}: {name!r} is taken by law {known}")
+    units = {name: argument.unit for name, argument in known_arguments().items()}
+    for name, argument in law.arguments.items():
+        if units.get(name, argument.unit) != argument.unit:
+            raise LawError(
+                f"law {law}: its parameter {name!r} is in [{argument.unit or '1'}], that of "
+                f"another law in [{units[name] or '1'}]; declare it as an Argument with that unit"
+            )
+    KNOWN_LAWS[law.letter] = law
+    return law
+
+
+def known_arguments(laws: Iterable[Law] | None = None) -> dict[str, Argument]:
+    """Return the parameters of laws by name, of all that are known unless told otherwise."""
+    chosen = KNOWN_LAWS.values() if laws is None else laws
+    return {name: argument for law in chosen for name, argument in law.arguments.items()}
+
+
+def shared_out(values: Mapping[str, float], laws: Sequence[Law]) -> list[dict[str, float]]:
+    """Return for each law those of the parameters that it declares.
+
+    Raises:
+        ParameterError: for a parameter that none of the laws declares; the nearest are offered.
+    """
+    declared = known_arguments(laws)
+    for name in values:
+        if name not in declared:
+            hint = nearest_names(name, declared) if declared else "they have none"
+            letters = ", ".join(law.letter for law in laws)
+            raise ParameterError(
+                "law_parameters", f"names {name!r}, which no law of {letters} has; {hint}"
+            )
+    return [{name: values[name] for name in law.arguments if name in values} for law in laws]
+
+
+def _known(name: str) -> Law | None:
+    wanted = _spelling(name)
+    for law in KNOWN_LAWS.values():
+        if wanted in {_spelling(law.letter), _spelling(law.name)}:
+            return law
+    return None
+
+
+def _spelling(name: str) -> str:
+    return name.strip().lower().replace("_", "-").replace(" ", "-")
+
 
 def find_law(law: str | Law) -> Law:
     """Return a law by letter or by name; a :class:`Law` is returned as it is.
@@ -55,11 +133,10 @@ def find_law(law: str | Law) -> Law:
         return law
     if not isinstance(law, str):
         raise ParameterError("law", "must be a letter, a name or a Law", law)
-    wanted = law.strip().lower().replace("_", "-").replace(" ", "-")
-    for known in LAWS.values():
-        if wanted in (known.letter.lower(), known.name):
-            return known
-    names = [name for known in LAWS.values() for name in (known.letter, known.name)]
+    known = _known(law)
+    if known is not None:
+        return known
+    names = [name for one in KNOWN_LAWS.values() for name in (one.letter, one.name)]
     raise ParameterError("law", f"is unknown: {law!r}; {nearest_names(law, names)}")
 
 
@@ -78,7 +155,7 @@ def find_laws(laws: str | list[str | Law] | tuple[str | Law, ...]) -> tuple[Law,
     """
     if isinstance(laws, str):
         parts: list[str | Law] = [part.strip() for part in laws.split(",") if part.strip()]
-        if len(parts) == 1 and "-" not in laws:
+        if len(parts) == 1 and "-" not in laws and _known(laws) is None:
             parts = list(laws.strip())
     else:
         parts = list(laws)
