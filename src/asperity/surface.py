@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from asperity.arguments import Argument
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError, nearest_names
 from asperity.kernels.driver import CLAMPS, ClampName
@@ -19,6 +20,31 @@ from asperity.textures.texture import Texture
 DEFAULT_STIFFNESS = 1000.0
 # max_depth unless given: the peak-to-valley height of the texture, at most this [m].
 LARGEST_DEFAULT_DEPTH = 1e-3
+
+LAW = Argument("law", "letter or name of the law", default="C", form="text")
+STIFFNESS = Argument(
+    "stiffness",
+    "stiffness that you want",
+    "N/m",
+    DEFAULT_STIFFNESS,
+    positive=True,
+    example="500N/m",
+)
+MAX_DEPTH = Argument(
+    "max_depth",
+    "depth to press to",
+    "m",
+    default_words="peak-to-valley height, at most 1 mm",
+    positive=True,
+    example="0.5mm",
+)
+CLAMP = Argument(
+    "clamp",
+    "what holds the depth at max_depth",
+    default="none",
+    form="text",
+    choices=CLAMPS,
+)
 
 DEFAULT_PARAMETERS = {
     name: default for law in LAWS.values() for name, default in law.parameters.items()
@@ -116,15 +142,11 @@ class Surface:
         }
         if clamp not in CLAMPS:
             raise ParameterError("clamp", f"must be one of {', '.join(CLAMPS)}", clamp)
-        depth = (
-            default_max_depth(texture)
-            if max_depth is None
-            else positive("max_depth", max_depth, "m")
-        )
+        depth = default_max_depth(texture) if max_depth is None else MAX_DEPTH.checked(max_depth)
         self._set(
             texture=texture,
             law=own,
-            stiffness=positive("stiffness", stiffness, "N/m"),
+            stiffness=STIFFNESS.checked(stiffness),
             max_depth=depth,
             clamp=clamp,
             _given=_merged(own, given, dict(law_parameters or {})),
@@ -168,7 +190,7 @@ class Surface:
         Raises:
             ParameterError: for a depth that is not positive.
         """
-        return self._changed(max_depth=positive("max_depth", max_depth, "m"))
+        return self._changed(max_depth=MAX_DEPTH.checked(max_depth))
 
     def to_stiffness(self, stiffness: float) -> Surface:
         """Return the same surface with another stiffness [N/m].
@@ -176,17 +198,23 @@ class Surface:
         Raises:
             ParameterError: for a stiffness that is not positive.
         """
-        return self._changed(stiffness=positive("stiffness", stiffness, "N/m"))
+        return self._changed(stiffness=STIFFNESS.checked(stiffness))
 
-    def to_law(self, law: str | Law) -> Surface:
+    def to_law(self, law: str | Law, law_parameters: Mapping[str, float] | None = None) -> Surface:
         """Return the same texture with another law, everything else as it is.
 
         Values that were given for parameters go along, also those that only the other law has.
 
+        Args:
+            law: the other law.
+            law_parameters: further values for the parameters that it declares.
+
         Raises:
-            ParameterError: for an unknown law.
+            ParameterError: for an unknown law, or a value that cannot be used.
         """
-        return self._changed(law=find_law(law))
+        other = find_law(law)
+        given = _merged(other, {}, dict(law_parameters or {}))
+        return self._changed(law=other, _given={**self._given, **given})
 
     def parameter(self, name: str) -> float:
         """Return the value in effect of a parameter of the law.

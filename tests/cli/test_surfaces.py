@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 from PIL import Image
 
 from asperity.cli.gallery import gallery_text, picture
-from asperity.cli.surfaces import listed_surfaces, surfaces_command
+from asperity.cli.surfaces import command, listed_surfaces
 from asperity.errors import ParameterError
 from asperity.scene import KINDS, load_scene
 from asperity.textures import Sinusoid
@@ -23,7 +23,7 @@ from asperity.units import quantity
 
 
 def call(*arguments: str) -> Result:
-    return CliRunner().invoke(surfaces_command, arguments, env={"COLUMNS": "80"})
+    return CliRunner().invoke(command, arguments, env={"COLUMNS": "80"})
 
 
 def content_of(*arguments: str) -> dict[str, dict]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +18,7 @@ from asperity.checks import positive
 from asperity.derive.facts import law_facts
 from asperity.devices import Device, load_device
 from asperity.files import plain, record
-from asperity.laws import LAWS, Law, find_laws
+from asperity.laws import LAWS, Law, find_laws, shared_out
 from asperity.surface import DEFAULT_STIFFNESS, Surface
 from asperity.textures.texture import Texture
 
@@ -105,6 +105,7 @@ def compare(
     max_depth: float | None = None,
     *,
     progress: Progress | None = None,
+    law_parameters: Mapping[str, float] | None = None,
     **surface_arguments: Any,
 ) -> Comparison:
     """Return which laws render a surface on a device, at which stiffness, and what goes wrong.
@@ -121,10 +122,12 @@ def compare(
         max_depth: the depth to which the surface is pressed [m]; by default its peak-to-valley
             height, at most 1 mm.
         progress: called with the letter of each law before it is analysed.
+        law_parameters: values of laws' parameters by name; each goes to the laws that declare it.
         **surface_arguments: further arguments of :class:`~asperity.surface.Surface`.
 
     Raises:
-        ParameterError: for a value that cannot be used; it names the argument.
+        ParameterError: for a value that cannot be used, or a parameter that none of the laws
+            declares; it names the argument.
 
     Example:
         >>> from asperity.textures.sinusoid import Sinusoid
@@ -136,7 +139,11 @@ def compare(
     known_device = load_device(device)
     asked = DEFAULT_STIFFNESS if stiffness is None else positive("stiffness", stiffness, "N/m")
     limit = known_device.max_stiffness
-    surfaces = [Surface(texture, law, asked, max_depth, **surface_arguments) for law in chosen]
+    given = dict(law_parameters or {})
+    surfaces = [
+        Surface(texture, law, asked, max_depth, law_parameters=own, **surface_arguments)
+        for law, own in zip(chosen, shared_out(given, chosen), strict=True)
+    ]
     rows = []
     for surface in surfaces:
         if progress is not None:
@@ -152,7 +159,7 @@ def compare(
         rows=tuple(rows),
         recommended=letter,
         recommendation=words,
-        assumptions=assumptions(rows, known_device, defaults, set(surface_arguments)),
+        assumptions=assumptions(rows, known_device, defaults, {*surface_arguments, *given}),
     )
 
 

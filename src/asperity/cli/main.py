@@ -2,45 +2,61 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 
 import click
 
 import asperity
-from asperity.cli.analyze import analyze_command
-from asperity.cli.compare import compare_command
-from asperity.cli.devices import devices_command
-from asperity.cli.limits import limits_command
-from asperity.cli.onset import onset_command
-from asperity.cli.prepare import prepare_command
-from asperity.cli.reproduce import reproduce_command
-from asperity.cli.scan import scan_command
-from asperity.cli.simulate import simulate_command
-from asperity.cli.surfaces import surfaces_command
 from asperity.errors import AsperityError
 
 BAD_INPUT = 2
 
+COMMANDS = {
+    "analyze": "Say all that is known of one law on a surface and a device.",
+    "compare": "Compare the laws on a surface and a device.",
+    "devices": "List devices, and the source of every number.",
+    "limits": "Say whether a texture can be felt on a device.",
+    "onset": "Find the stiffness at which limit cycles begin.",
+    "prepare": "Prepare a measured surface and save it.",
+    "reproduce": "Redo the paper and judge each of its statements.",
+    "scan": "Energy per stroke, against speed and depth.",
+    "simulate": "Run texture, device and hand in one loop.",
+    "surfaces": "List the surfaces that can be asked for by name.",
+}
+"""The commands with what each does; each is ``command`` in the module of its name."""
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+
+class Commands(click.Group):
+    """Commands that are imported when they are asked for, so that the program starts at once."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
+        """Return the names of the commands."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - as above
+        """Return a command by its name."""
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = importlib.import_module(f"asperity.cli.{cmd_name}").command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - as above
+        """Write what the commands do."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(
+    cls=Commands,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
 @click.version_option(asperity.__version__, prog_name="asperity")
 def cli() -> None:
     """Haptic textures that neither buzz nor feel alive, on the device you have.
 
     Start with: asperity compare sinusoid:amplitude=0.8mm,period=1mm --device omega.3
     """
-
-
-cli.add_command(analyze_command)
-cli.add_command(compare_command)
-cli.add_command(devices_command)
-cli.add_command(limits_command)
-cli.add_command(onset_command)
-cli.add_command(prepare_command)
-cli.add_command(reproduce_command)
-cli.add_command(scan_command)
-cli.add_command(simulate_command)
-cli.add_command(surfaces_command)
 
 
 def main() -> None:

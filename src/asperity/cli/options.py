@@ -1,66 +1,165 @@
-"""Options that several commands share."""
+"""Options that several commands share, made from the arguments' declarations."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar
 
 import click
 
+from asperity.arguments import Argument
+from asperity.devices import Device, load_device
+from asperity.errors import ParameterError, nearest_names
+from asperity.laws import LAW_ARGUMENTS, find_law, find_laws, known_arguments
+from asperity.measured.arguments import FILE_ARGUMENTS
+from asperity.surface import MAX_DEPTH, STIFFNESS
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-# Of the surface, read from a measured file.
-FILE_OPTIONS = (
-    ("--channel", "Which data channel of a file that has several, by name or number."),
-    ("--unit", "Unit of the heights where the file names none, 'um'."),
-    ("--integrate-normals", "Make heights of a normal map."),
-    ("--pitch", "Distance of the points, '5um' or '5um; 8um' for x and y."),
-    ("--height-range", "Peak-to-valley height that the heights are scaled to, '0.2mm'."),
-    ("--outliers", "Replace spikes beyond so many robust standard deviations, '6'."),
-    ("--max-missing", "Share of the points that may be missing.  [default: 0.25]"),
-    ("--form", "Degree of the polynomial that is subtracted.  [default: 1, levelling]"),
-    (
-        "--cutoff",
-        "Cut-off wavelength of the Gaussian S-filter, before magnification, '10um'."
-        "  [default: 4 samples]",
-    ),
-    ("--l-cutoff", "Cut-off wavelength of the L-filter, which removes longer waves, '0.8mm'."),
-    ("--tip-radius", "Radius of the ball that feels the surface, before magnification, '5um'."),
-    ("--periodic", "Blend opposite borders so that the surface repeats."),
-    ("--blend", "Width of the blended band, '0.1mm'.  [default: a tenth of each side]"),
-    ("--magnify", "Factor of the size, and of the height unless told otherwise."),
-    ("--magnify-height", "Factor of the height."),
-)
-
-# Options that are given without a value.
-SWITCHES = frozenset({"--integrate-normals", "--periodic"})
-
-# Of the law.
-LAW_OPTIONS = (
-    ("--stiffness", "Stiffness that you want, '500N/m'.  [default: 1000 N/m]"),
-    ("--max-depth", "Depth to press to, '0.5mm'.  [default: peak-to-valley height, at most 1 mm]"),
-    ("--friction", "Friction coefficient of law F.  [default: 0.8]"),
-    ("--max-deflection", "Greatest deflection of law F's anchor.  [default: 1 mm]"),
-    ("--modulation-depth", "Modulation depth of law F, 0 to 1.  [default: 0.8]"),
-    ("--continuity", "c of law H, whose q is max(1, c).  [default: 1]"),
-)
+LAW_OPTIONS = (STIFFNESS, MAX_DEPTH, *LAW_ARGUMENTS.values())
 
 
-def text_options(options: tuple[tuple[str, str], ...]) -> Callable[[Command], Command]:
-    """Return a decorator that adds options whose values are read as quantities later."""
+Read = Callable[[str], Any]
+"""Returns what the text of an option stands for."""
+
+
+def as_read(read: Read) -> Callable[[click.Context, click.Parameter, str | None], Any]:
+    """Return a callback that reads the text of an option that is given."""
+    return lambda _ctx, _option, text: None if text is None else read(text)
+
+
+def help_of(argument: Argument) -> str:
+    """Return the help of an argument's option.
+
+    Example:
+        >>> help_of(Argument("length", "of the scan", "m", 0.1, example="5mm"))
+        "Of the scan, '5mm'.  [default: 100 mm]"
+    """
+    first, rest = argument.words[:1], argument.words[1:]
+    # A symbol stays as it is written: "c of law H".
+    words = f"{first.upper()}{rest}" if rest[:1].isalpha() else f"{first}{rest}"
+    example = f", '{argument.example}'" if argument.example else ""
+    default = f"  [default: {argument.default_text}]" if argument.default_text else ""
+    return f"{words}{example}.{default}"
+
+
+def options(
+    arguments: Iterable[Argument], read: Callable[[Argument], Read] | None = None
+) -> Callable[[Command], Command]:
+    """Return a decorator that adds an option for each argument.
+
+    Args:
+        arguments: their declarations.
+        read: returns how the text of one is read; by default as it is declared.
+    """
 
     def decorate(command: Command) -> Command:
-        for name, words in reversed(options):
-            if name in SWITCHES:
-                command = click.option(name, is_flag=True, default=None, help=words)(command)
-            else:
-                command = click.option(name, metavar="TEXT", help=words)(command)
+        for argument in reversed(list(arguments)):
+            flag, words = f"--{argument.name.replace('_', '-')}", help_of(argument)
+            if argument.form == "switch":
+                command = click.option(flag, is_flag=True, default=None, help=words)(command)
+                continue
+            value = as_read(argument.read if read is None else read(argument))
+            shown = "LIST" if read is several else "N" if argument.form == "integer" else "TEXT"
+            command = click.option(flag, metavar=shown, callback=value, help=words)(command)
         return command
 
     return decorate
 
 
-def given(values: dict[str, Any], options: tuple[tuple[str, str], ...]) -> dict[str, Any]:
+def one(argument: Argument) -> Read:
+    """Read a single value, and say so where a list is given."""
+
+    def read(text: str) -> Any:
+        values = several(argument)(text)
+        if len(values) > 1:
+            raise ParameterError(argument.name, "must be a single one", text)
+        return values[0]
+
+    return read
+
+
+def several(argument: Argument) -> Read:
+    """Read "a; b; c"."""
+
+    def read(text: str) -> list[Any]:
+        parts = [part for part in text.replace(",", ";").split(";") if part.strip()]
+        if not parts:
+            raise ParameterError(argument.name, "must be one or several, 'a; b'", text)
+        return [argument.read(part) for part in parts]
+
+    return read
+
+
+def given(values: Mapping[str, Any], arguments: Iterable[Argument]) -> dict[str, Any]:
     """Return the values of the options that the user gave, by argument name."""
-    names = [name.removeprefix("--").replace("-", "_") for name, _words in options]
+    names = [argument.name for argument in arguments]
     return {name: values[name] for name in names if values[name] is not None}
+
+
+def device_option(
+    words: str = "Device of the catalogue, or a TOML file.  [default: omega.3]",
+) -> Callable[[Command], Command]:
+    """Return a decorator that adds ``--device``."""
+    return click.option("--device", metavar="ID|FILE", callback=as_read(load_device), help=words)
+
+
+def law_option(words: str) -> Callable[[Command], Command]:
+    """Return a decorator that adds ``--law``."""
+    return click.option("--law", metavar="LETTER", callback=as_read(find_law), help=words)
+
+
+def laws_option(words: str) -> Callable[[Command], Command]:
+    """Return a decorator that adds ``--laws``."""
+    return click.option("--laws", metavar="LETTERS", callback=as_read(find_laws), help=words)
+
+
+def law_options(arguments: Iterable[Argument] = LAW_OPTIONS) -> Callable[[Command], Command]:
+    """Return a decorator that adds the options of surface and law."""
+
+    def decorate(command: Command) -> Command:
+        words = "Parameter of a law, also of your own, 'gain=2.5'; more by repeating it."
+        command = click.option(
+            "--set", "parameters", metavar="NAME=VALUE", multiple=True, help=words
+        )(command)
+        return options(arguments)(command)
+
+    return decorate
+
+
+file_options = options(FILE_ARGUMENTS)
+
+
+def file_values(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the options say of a measured file."""
+    return given(values, FILE_ARGUMENTS)
+
+
+def surface_values(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the options say of the surface and of the parameters of laws.
+
+    Raises:
+        ParameterError: for a parameter that is unknown (the nearest are offered) or given twice,
+            or a value that is none.
+    """
+    result = given(values, LAW_OPTIONS)
+    if values.get("law") is not None:
+        result["law"] = values["law"]
+    known = known_arguments()
+    for text in values["parameters"]:
+        name, equals, value = text.partition("=")
+        name = name.strip().replace("-", "_")
+        if not equals:
+            raise ParameterError("set", "must be NAME=VALUE", text)
+        if name not in known:
+            words = f"names {name!r}, which is a parameter of no law; {nearest_names(name, known)}"
+            raise ParameterError("set", words)
+        if name in result:
+            raise ParameterError(name, "is given twice")
+        result[name] = known[name].read(value)
+    return result
+
+
+def first_device(*devices: Device | None, default: str) -> Device:
+    """Return the first device that is one, else that of the catalogue."""
+    return next((device for device in devices if device is not None), None) or load_device(default)

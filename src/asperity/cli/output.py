@@ -2,15 +2,93 @@
 
 from __future__ import annotations
 
+import functools
 import os
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from asperity.errors import ParameterError
-from asperity.files import is_device, write_text
+from asperity.files import is_device, json_text, write_text
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 STANDARD_OUTPUT = "-"
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Where a command writes its result.
+
+    Attributes:
+        json: path of the result as JSON, "-" for standard output, ``None`` for nowhere.
+        html: path of the report, likewise.
+        trace: path of the samples of a run, of the commands that have some.
+    """
+
+    json: str | None = None
+    html: str | None = None
+    trace: str | None = None
+
+    def write(
+        self,
+        data: Any,
+        say: Callable[[Console], None],
+        page: Callable[[], str] | None = None,
+        page_words: str = "Report",
+    ) -> None:
+        """Write a result where it was asked for, else say it on standard output.
+
+        Args:
+            data: the result for JSON, see :func:`asperity.files.plain`.
+            say: prints the result for reading.
+            page: returns the report, of a command that has one.
+            page_words: what the report is called.
+        """
+        if self.json is not None:
+            write_output("json", self.json, json_text(data))
+        if self.html is not None and page is not None:
+            write_output("html", self.html, page())
+        if STANDARD_OUTPUT in {self.json, self.html}:
+            return
+        from rich.console import Console
+
+        console = Console(highlight=False)
+        say(console)
+        for words, path in ((page_words, self.html), ("Trace", self.trace)):
+            if path is not None:
+                console.print(f"{words}: {path}", soft_wrap=True, markup=False)
+
+
+def output_options(
+    html: str | None, json: str = "Write the result as JSON; - is standard output."
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator that adds ``--json`` and ``--html``.
+
+    The command receives :class:`Outputs` as ``outputs``, checked before any work is done; a
+    ``--trace`` of its own goes there too.
+
+    Args:
+        html: help of ``--html``; ``None`` for a command without a report.
+        json: help of ``--json``.
+    """
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        @functools.wraps(command)
+        def run(**values: Any) -> None:
+            paths = {name: values.pop(f"{name}_path", None) for name in ("json", "html", "trace")}
+            check_outputs(**paths)
+            command(outputs=Outputs(**paths), **values)
+
+        if html is not None:
+            run = click.option("--html", "html_path", metavar="PATH", help=html)(run)
+        return click.option("--json", "json_path", metavar="PATH", help=json)(run)
+
+    return decorate
 
 
 def check_outputs(**paths: str | None) -> None:

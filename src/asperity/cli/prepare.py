@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import FILE_OPTIONS, given, text_options
+from asperity.cli.options import file_options, file_values
+from asperity.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from asperity.measured.prepared import Prepared
@@ -28,13 +26,13 @@ _WORDS = {
 }
 
 
-@click.command("prepare", short_help="Prepare a measured surface and save it.")
+@click.command("prepare")
 @click.argument("file")
 @click.option(
     "-o", "--output", metavar="PATH", required=True, help="The file to write, surface.npz."
 )
-@text_options(FILE_OPTIONS)
-def prepare_command(file: str, output: str, **values: Any) -> None:
+@file_options
+def command(file: str, output: str, **values: Any) -> None:
     """Prepare the measured surface FILE as told, and save it with everything that was done.
 
     In this order: read, outliers, fill, form, filter, tip, blend, magnify. Every command takes
@@ -42,38 +40,19 @@ def prepare_command(file: str, output: str, **values: Any) -> None:
     magnification.
     """
     from asperity.measured.prepared import check_target, save_prepared
-    from asperity.scene import FILE_ARGUMENTS
     from asperity.textures.loading import prepare_file
 
     check_target(Path(output), Path(file))
-    arguments = {
-        name: FILE_ARGUMENTS[name](name, text) for name, text in given(values, FILE_OPTIONS).items()
-    }
-    with _progress() as begin:
-        prepared = prepare_file(file, progress=begin, **arguments)
+    stages = list(_WORDS)
+    with progress_bar(_WORDS["read"]) as told:
+
+        def begin(stage: str) -> None:
+            told(stages.index(stage) / len(stages), _WORDS[stage])
+
+        prepared = prepare_file(file, progress=begin, **file_values(values))
         begin("write")
         save_prepared(output, prepared, file)
     _print(prepared, output)
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str], None]]:
-    """Show a progress bar on standard error if it is a terminal."""
-    if not sys.stderr.isatty():
-        yield lambda _stage: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (TextColumn("{task.description:<24}"), BarColumn(), TimeElapsedColumn())
-    stages = list(_WORDS)
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(_WORDS["read"], total=len(stages))
-
-        def begin(stage: str) -> None:
-            bar.update(task, description=_WORDS[stage], completed=stages.index(stage))
-
-        yield begin
 
 
 def _print(prepared: Prepared, output: str) -> None:

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.loop import print_report, progress_bar
-from asperity.cli.options import FILE_OPTIONS, given, text_options
-from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
+from asperity.cli.options import file_options, file_values
+from asperity.cli.output import Outputs, output_options
+from asperity.cli.progress import progress_bar
 from asperity.errors import ParameterError
-from asperity.files import json_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 _CLAIMS = 0.35
 
 
-@click.command("reproduce", short_help="Redo the paper and judge each of its statements.")
+@click.command("reproduce")
 @click.option(
     "--claim", "names", metavar="ID", multiple=True, help="Only this claim, with its evidence."
 )
@@ -32,22 +31,19 @@ _CLAIMS = 0.35
 @click.option(
     "--surface", metavar="SURFACE", help="Of the last experiment, instead of a drawn knurl."
 )
-@text_options(FILE_OPTIONS)
-@click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON; - is stdout.")
-@click.option("--html", "html_path", metavar="PATH", help="Write a report; - is standard output.")
-def reproduce_command(
+@file_options
+@output_options("Write a report; - is standard output.")
+def command(
     names: tuple[str, ...],
     skip_experiments: bool,
     surface: str | None,
-    json_path: str | None,
-    html_path: str | None,
+    outputs: Outputs,
     **values: Any,
 ) -> None:
     """Compute every claim of the paper and say whether it holds, and redo its experiments.
 
     Each claim is code that computes its evidence; the verdict follows from the numbers.
     """
-    check_outputs(json=json_path, html=html_path)
     from asperity.paper import claim
 
     for name in names:
@@ -55,35 +51,33 @@ def reproduce_command(
     measured = _texture(surface, values)
     alone = bool(names) or skip_experiments
     results, experiments = _reproduced(names or None, measured, with_experiments=not alone)
-    if json_path is not None:
-        write_output("json", json_path, as_json(results, experiments))
-    if html_path is not None:
+
+    def page() -> str:
         from asperity.report.reproduce_html import reproduce_html
 
-        write_output("html", html_path, reproduce_html(results, experiments))
-    if STANDARD_OUTPUT in {json_path, html_path}:
-        return
-    from asperity.report.reproduce_table import print_evidence, print_results
+        return reproduce_html(results, experiments)
 
     def say(console: Console) -> None:
+        from asperity.report.reproduce_table import print_evidence, print_results
+
         if not names:
             print_results(results, experiments, console)
         for result in results if names else ():
             print_evidence(result, console)
 
-    print_report(say, html_path)
+    data = {"schema": 1, "claims": results, "experiments": experiments}
+    outputs.write(data, say, page)
 
 
 def _texture(surface: str | None, values: dict[str, Any]) -> Texture | None:
-    from asperity.scene import FILE_ARGUMENTS, load_scene
+    from asperity.scene import load_scene
 
-    options = given(values, FILE_OPTIONS)
-    if surface is None:
-        for name in options:
-            raise ParameterError(name, "applies to a measured surface: give --surface")
-        return None
-    for_file = {name: FILE_ARGUMENTS[name](name, text) for name, text in options.items()}
-    return load_scene(surface, for_file).texture
+    for_file = file_values(values)
+    if surface is not None:
+        return load_scene(surface, for_file).texture
+    for name in for_file:
+        raise ParameterError(name, "applies to a measured surface: give --surface")
+    return None
 
 
 def _reproduced(
@@ -105,8 +99,3 @@ def _reproduced(
             told(share + (1.0 - share) * STEPS.index(name) / len(STEPS))
 
         return results, run_experiments(measured, progress=step)
-
-
-def as_json(results: Sequence[Result], experiments: Experiments | None) -> str:
-    """Return claims and experiments as JSON text."""
-    return json_text({"schema": 1, "claims": list(results), "experiments": experiments})

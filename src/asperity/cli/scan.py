@@ -2,74 +2,59 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.loop import (
-    loop_options,
-    print_report,
-    progress_bar,
-    read_laws,
-    read_list,
-    read_one,
-    read_setup,
+from asperity.arguments import Argument
+from asperity.cli.loop import chosen_laws, loop_options, read_setup
+from asperity.cli.options import given, laws_option, one, options, several
+from asperity.cli.output import Outputs, output_options
+from asperity.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from asperity.laws import Law
+
+_LISTS = (
+    Argument(
+        "speeds",
+        "of the hand",
+        "m/s",
+        default_words="0.02 to 0.2 m/s",
+        example="0.05m/s; 0.1m/s",
+    ),
+    Argument("depths", "of the hand below z = 0", "m", default_words="the scene's"),
 )
-from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
-from asperity.files import json_text
+_STROKES = Argument(
+    "strokes", "strokes per run", default_words="the scene's, at least 5", form="integer"
+)
 
 
-@click.command("scan", short_help="Energy per stroke, against speed and depth.")
-@click.argument("scene")
+@click.command("scan")
 @loop_options
-@click.option("--laws", metavar="LETTERS", help="Laws to try.  [default: WABCDEFGH]")
-@click.option(
-    "--speeds", metavar="LIST", help="Of the hand, '0.05m/s; 0.1m/s'.  [default: 0.02 to 0.2 m/s]"
-)
-@click.option("--depths", metavar="LIST", help="Of the hand below z = 0.  [default: the scene's]")
-@click.option("--strokes", metavar="N", help="Strokes per run.  [default: the scene's, at least 5]")
-@click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON; - is stdout.")
-@click.option("--html", "html_path", metavar="PATH", help="Write a report; - is standard output.")
-def scan_command(
-    scene: str,
-    laws: str | None,
-    speeds: str | None,
-    depths: str | None,
-    strokes: str | None,
-    json_path: str | None,
-    html_path: str | None,
-    **values: Any,
-) -> None:
+@laws_option("Laws to try.  [default: all]")
+@options(_LISTS, several)
+@options([_STROKES], one)
+@output_options("Write a report; - is standard output.")
+def command(scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **values: Any) -> None:
     """Stroke the surface of SCENE and say what each stroke gains or costs, by law.
 
     The motion of the scene must be strokes; their speed and depth are replaced.
     """
-    check_outputs(json=json_path, html=html_path)
     from asperity.scene.scans import scans
 
-    setup = read_setup(scene, values | {"law": values["law"] or "W"})
-    letters = read_laws(laws or values["law"] or "WABCDEFGH")
-    wanted: dict[str, Any] = {}
-    if speeds is not None:
-        wanted["speeds"] = read_list("speeds", speeds, "m/s")
-    if depths is not None:
-        wanted["depths"] = read_list("depths", depths, "m")
-    if strokes is not None:
-        wanted["strokes"] = int(read_one("strokes", strokes, whole=True))
+    chosen = chosen_laws(laws, values["law"])
+    setup = read_setup(scene, values, laws=chosen)
+    letters = [law.letter for law in chosen]
     with progress_bar("stroking") as told:
-        found = scans(setup, letters, progress=told, **wanted)
-    if json_path is not None:
-        data = {
-            "schema": 1,
-            "scene": setup,
-            "strokes": found,
-        }
-        write_output("json", json_path, json_text(data))
-    if html_path is not None:
+        found = scans(setup, letters, progress=told, **given(values, (*_LISTS, _STROKES)))
+
+    def page() -> str:
         from asperity.report.scan_report import scan_html
 
-        write_output("html", html_path, scan_html(setup, found))
-    if STANDARD_OUTPUT not in {json_path, html_path}:
-        from asperity.report.scan_report import print_scans
+        return scan_html(setup, found)
 
-        print_report(lambda console: print_scans(setup, found, console), html_path)
+    from asperity.report.scan_report import print_scans
+
+    data = {"schema": 1, "scene": setup, "strokes": found}
+    outputs.write(data, lambda console: print_scans(setup, found, console), page)

@@ -2,63 +2,55 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import Any
 
 import click
 
-from asperity.cli.loop import loop_options, print_report, progress_bar, read_setup
-from asperity.cli.output import STANDARD_OUTPUT, check_outputs, write_output
-from asperity.files import json_text
+from asperity.arguments import Argument
+from asperity.cli.loop import loop_options, read_setup
+from asperity.cli.options import options
+from asperity.cli.output import Outputs, output_options
+from asperity.cli.progress import progress_bar
 
-if TYPE_CHECKING:
-    from asperity.scene.setup import Setup
-    from asperity.simulation import Run
+_RUN = (
+    Argument("duration", "of the run", "s", default_words="the scene's", example="2s"),
+    Argument(
+        "every",
+        "samples per row of trace and pictures",
+        default_words="the scene's, 1",
+        form="integer",
+    ),
+)
 
 
-@click.command("simulate", short_help="Run texture, device and hand in one loop.")
-@click.argument("scene")
+@click.command("simulate")
 @loop_options
-@click.option("--duration", metavar="TEXT", help="Of the run, '2s'.  [default: the scene's]")
+@options(_RUN)
 @click.option(
     "--trace", "trace_path", metavar="PATH", help="Write every sample to a .csv file as it comes."
 )
-@click.option(
-    "--every", metavar="N", help="Samples per row of trace and pictures.  [default: the scene's, 1]"
-)
-@click.option("--json", "json_path", metavar="PATH", help="Write the result as JSON; - is stdout.")
-@click.option("--html", "html_path", metavar="PATH", help="Write a report; - is standard output.")
-def simulate_command(
-    scene: str,
-    duration: str | None,
-    trace_path: str | None,
-    every: str | None,
-    json_path: str | None,
-    html_path: str | None,
-    **values: Any,
+@output_options("Write a report; - is standard output.")
+def command(
+    scene: str, outputs: Outputs, duration: float | None, every: int | None, **values: Any
 ) -> None:
     """Run the closed loop of SCENE (TOML) and say where the energy went.
 
     A scene has the sections [texture], [surface], [device], [hand], [motion] and [run]. The trace
     is a table whose columns have units: positions, velocities, forces, energies.
     """
-    check_outputs(json=json_path, html=html_path, trace=trace_path)
-    setup = read_setup(scene, values, duration, every)
+    setup = read_setup(scene, values, duration)
+    setup = setup if every is None else replace(setup, every=every)
     with progress_bar("simulating") as told:
-        run = setup.simulate(trace=True if trace_path is None else trace_path, progress=told)
-    if json_path is not None:
-        write_output("json", json_path, as_json(setup, run))
-    if html_path is not None:
+        run = setup.simulate(trace=outputs.trace or True, progress=told)
+
+    def page() -> str:
         from asperity.report.run_html import run_html
         from asperity.simulation.rereading import reread
 
-        shown = run if trace_path is None else reread(run)
-        write_output("html", html_path, run_html(setup, shown))
-    if STANDARD_OUTPUT not in {json_path, html_path}:
-        from asperity.report.run_table import print_run
+        return run_html(setup, run if outputs.trace is None else reread(run))
 
-        print_report(lambda console: print_run(setup, run, console), html_path, trace_path)
+    from asperity.report.run_table import print_run
 
-
-def as_json(setup: Setup, run: Run) -> str:
-    """Return scene and result as JSON text; null for what is not finite, if the run diverged."""
-    return json_text({"schema": 1, "scene": setup, "run": run})
+    data = {"schema": 1, "scene": setup, "run": run}
+    outputs.write(data, lambda console: print_run(setup, run, console), page)

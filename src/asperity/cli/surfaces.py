@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.output import STANDARD_OUTPUT, check_output, write_output
+from asperity.cli.output import Outputs, output_options
 from asperity.errors import ParameterError, nearest_names
-from asperity.files import json_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rich.console import Console
     from rich.table import Table
 
     from asperity.arguments import Argument
@@ -80,37 +80,27 @@ class Listed:
         }
 
 
-@click.command("surfaces", short_help="List the surfaces that can be asked for by name.")
+@click.command("surfaces")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
-@click.option(
-    "--json", "json_path", metavar="PATH", help="Write the list as JSON; - is standard output."
+@output_options(
+    "Write a page with a picture of each; - is standard output.",
+    "Write the list as JSON; - is standard output.",
 )
-@click.option(
-    "--html",
-    "html_path",
-    metavar="PATH",
-    help="Write a page with a picture of each; - is standard output.",
-)
-def surfaces_command(names: tuple[str, ...], json_path: str | None, html_path: str | None) -> None:
+def command(names: tuple[str, ...], outputs: Outputs) -> None:
     """List kinds of textures and named surfaces: arguments, units, defaults, size and height.
 
     Given NAMEs, says more about those. Use them as SURFACE in other commands, with arguments or
     without: cloth: or sandpaper:grit=P60 or noise:rms=20um,size=10mm
     """
-    if json_path == html_path == STANDARD_OUTPUT:
-        raise ParameterError("json", "and html cannot both go to standard output")
-    check_output("json", json_path)
-    check_output("html", html_path)
     listed = listed_surfaces(names)
-    if json_path is not None:
-        content = {"schema": SCHEMA, "surfaces": listed}
-        write_output("json", json_path, json_text(content))
-    if html_path is not None:
+
+    def page() -> str:
         from asperity.cli.gallery import gallery_text
 
-        write_output("html", html_path, gallery_text(listed))
-    if STANDARD_OUTPUT not in {json_path, html_path}:
-        _print(listed, bool(names), html_path)
+        return gallery_text(listed)
+
+    data = {"schema": SCHEMA, "surfaces": listed}
+    outputs.write(data, lambda console: _print(listed, bool(names), console), page, "Pictures")
 
 
 def listed_surfaces(names: Sequence[str] = ()) -> list[Listed]:
@@ -147,24 +137,18 @@ def _plain(argument: Argument, value: Any) -> str:
     return argument.readable(value).replace("µ", "u").replace(" ", "")
 
 
-def _print(listed: Sequence[Listed], in_detail: bool, html_path: str | None) -> None:
-    from rich.console import Console
-
-    console = Console()
+def _print(listed: Sequence[Listed], in_detail: bool, console: Console) -> None:
     console.print(_table(listed))
-    if in_detail:
-        for one in listed:
-            console.print(_detail(one))
-            if one.kind.source:
-                console.print(f"Sizes: {one.kind.source}.", markup=False, highlight=False)
-    else:
+    if not in_detail:
         console.print(
             "Size and height are those of the defaults, of the example for a kind that needs "
-            "arguments. More about one: asperity surfaces NAME",
-            highlight=False,
+            "arguments. More about one: asperity surfaces NAME"
         )
-    if html_path is not None:
-        console.print(f"Pictures: {html_path}", soft_wrap=True, markup=False, highlight=False)
+        return
+    for one in listed:
+        console.print(_detail(one))
+        if one.kind.source:
+            console.print(f"Sizes: {one.kind.source}.", markup=False)
 
 
 def _table(listed: Sequence[Listed]) -> Table:

@@ -37,16 +37,16 @@ LAW = Law(
     clampable=True,
     stateful=True,
     parameters={
-        "friction": Argument("friction", "coefficient of friction μ of law F", default=0.8),
+        "friction": Argument("friction", "friction coefficient μ of law F", default=0.8),
         "max_deflection": Argument(
             "max_deflection",
-            "d_max of law F, the greatest deflection of its anchor",
+            "greatest deflection d_max of law F's anchor",
             "m",
             1e-3,
             positive=True,
         ),
         "modulation_depth": Argument(
-            "modulation_depth", "a_m of law F, 0 to 1", default=0.8, high=1.0
+            "modulation_depth", "modulation depth a_m of law F, 0 to 1", default=0.8, high=1.0
         ),
     },
 )

@@ -9,8 +9,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.arguments import described
 from asperity.checks import FloatArray
 from asperity.errors import ParameterError
+from asperity.measured.arguments import PREPARING
 from asperity.measured.blending import check_width, make_periodic
 from asperity.measured.filling import fill_in_place
 from asperity.measured.filters import ALPHA, apply_filters, find_cutoffs, gaussian_filter
@@ -33,7 +35,8 @@ MAX_MISSING = 0.25
 _LONGEST = 10.0  # [m]; heights beyond are rather heights whose unit is not the metre
 
 
-def prepare(
+@described(PREPARING)
+def prepare(  # noqa: D417 - the others are described where they are declared
     raw: RawSurface,
     *,
     pitch: float | Sequence[float] | None = None,
@@ -60,23 +63,7 @@ def prepare(
 
     Args:
         raw: the surface as read.
-        pitch: distance of neighbouring points [m], one number or (px, py); needed where the
-            file has none, replaces the file's where it has one.
-        height_range: peak-to-valley height [m] that the measured heights, without outliers, are
-            scaled to.
-        outliers: spikes beyond so many robust standard deviations become missing points; None
-            for none.
-        max_missing: share of the points, outliers included, that may be missing.
-        form: degree of the polynomial that is fitted to the valid points and subtracted: 0 the
-            mean, 1 a plane (levelling), 2 a bow, up to 10.
-        cutoff: cut-off wavelength of the Gaussian S-filter [m]; by default four times the larger
-            pitch.
-        l_cutoff: cut-off wavelength of the Gaussian L-filter [m], which removes longer waves.
-        tip_radius: radius of the ball that feels the surface [m]; None for a point.
-        periodic: whether opposite borders are blended so that the surface repeats.
-        blend: width of the blended band [m]; by default a tenth of each side.
-        magnify: lateral magnification, and of the heights unless magnify_height is given.
-        magnify_height: magnification of the heights.
+        {arguments}
         progress: called with the name of each stage before it begins.
 
     Returns:

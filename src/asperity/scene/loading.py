@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from asperity.arguments import Argument, Form
+from asperity.arguments import Argument, read_arguments
 from asperity.devices import Device, load_device, parse_device
 from asperity.errors import ParameterError, nearest_names
-from asperity.scene import readers
-from asperity.scene.readers import Reader, read_arguments
+from asperity.scene.sections import KINDS, surface_arguments
 from asperity.textures import Texture, load_texture
-from asperity.textures.catalogue import CATALOGUE
 
+_ID = Argument("device.id", "device of the catalogue", form="text")
 LOOP_SECTIONS = ("hand", "motion", "run")
 SECTIONS = ("texture", "surface", "device", *LOOP_SECTIONS)
 
@@ -39,61 +38,6 @@ class Scene:
     device: Device | None = None
     loop: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     folder: Path = Path()
-
-
-FILE_ARGUMENTS: dict[str, Reader] = {
-    "channel": readers.channel,
-    "unit": readers.text,
-    "integrate_normals": readers.switch,
-    "pitch": readers.pair("m"),
-    "height_range": readers.in_unit("m"),
-    "outliers": readers.in_unit(""),
-    "max_missing": readers.in_unit(""),
-    "form": readers.whole,
-    "cutoff": readers.in_unit("m"),
-    "l_cutoff": readers.in_unit("m"),
-    "tip_radius": readers.in_unit("m"),
-    "periodic": readers.switch,
-    "blend": readers.in_unit("m"),
-    "magnify": readers.in_unit(""),
-    "magnify_height": readers.in_unit(""),
-}
-
-
-def _reader(argument: Argument) -> Reader:
-    unit = argument.unit
-    by_form: dict[Form, Reader] = {
-        "quantity": readers.in_unit(unit),
-        "pair": readers.pair(unit),
-        "vector": readers.vector(unit),
-        "items": readers.items(unit),
-        "vectors": readers.vectors(unit),
-        "integer": readers.whole,
-        "text": readers.text,
-    }
-    return by_form[argument.form]
-
-
-# Texture kinds: what makes one, its required and its optional arguments.
-KINDS: dict[str, tuple[Callable[..., Texture], dict[str, Reader], dict[str, Reader]]] = {
-    kind.name: (
-        kind.make,
-        {argument.name: _reader(argument) for argument in kind.required},
-        {argument.name: _reader(argument) for argument in kind.optional},
-    )
-    for kind in CATALOGUE.values()
-} | {"file": (load_texture, {"path": readers.text}, FILE_ARGUMENTS)}
-
-SURFACE_ARGUMENTS: dict[str, Reader] = {
-    "law": readers.text,
-    "stiffness": readers.in_unit("N/m"),
-    "max_depth": readers.in_unit("m"),
-    "friction": readers.in_unit(""),
-    "max_deflection": readers.in_unit("m"),
-    "modulation_depth": readers.in_unit(""),
-    "clamp": readers.text,
-    "continuity": readers.in_unit(""),
-}
 
 
 def load_scene(source: str, file_arguments: Mapping[str, Any] | None = None) -> Scene:
@@ -142,24 +86,31 @@ def _parse_arguments(text: str) -> dict[str, str]:
     return arguments
 
 
-def build_texture(kind: str, arguments: Mapping[str, Any]) -> Texture:
+def build_texture(kind: str, arguments: Mapping[str, Any], folder: Path | None = None) -> Texture:
     """Return a texture from its kind and its arguments as text, numbers or lists.
+
+    Args:
+        kind: of the catalogue, or "file".
+        arguments: by name.
+        folder: to which a file is relative.
 
     Raises:
         ParameterError: for an unknown kind or argument, one that is missing, or a wrong value.
     """
     if kind not in KINDS:
         raise ParameterError("surface", f"kind is unknown: {kind!r}; {nearest_names(kind, KINDS)}")
-    make, required, optional = KINDS[kind]
-    values = read_arguments(kind, arguments, required | optional)
-    missing = [name for name in required if name not in values]
-    if missing:
-        raise ParameterError(missing[0], f"is missing: a {kind} needs {', '.join(required)}")
-    return make(**values)
+    known = KINDS[kind]
+    values = read_arguments(kind, arguments, known.arguments, folder)
+    required = [argument.name for argument in known.required]
+    for name in required:
+        if name not in values:
+            raise ParameterError(name, f"is missing: a {kind} needs {', '.join(required)}")
+    return known.make(**values)
 
 
 def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
     content = _read_toml(path)
+    _refuse_code(content)
     for name in content:
         if name not in SECTIONS:
             hint = nearest_names(name, SECTIONS)
@@ -173,14 +124,21 @@ def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
         raise ParameterError("scene", f"{path.name} needs [texture] with kind = {_kinds()}", kind)
     if kind == "file":
         texture |= extra
-        if isinstance(texture.get("path"), str):
-            texture["path"] = str(path.parent / texture["path"])
     else:
         _refuse_file_arguments(extra)
-    surface = read_arguments("surface", content.get("surface", {}), SURFACE_ARGUMENTS)
+    surface = read_arguments("surface", content.get("surface", {}), surface_arguments())
     device = _scene_device(content["device"]) if "device" in content else None
     loop = {name: content[name] for name in LOOP_SECTIONS if name in content}
-    return Scene(build_texture(kind, texture), surface, device, loop, path.parent)
+    return Scene(build_texture(kind, texture, path.parent), surface, device, loop, path.parent)
+
+
+def _refuse_code(content: Mapping[str, Any]) -> None:
+    """Refuse a scene that names code: only who runs a command may do that."""
+    sections = [section for section in content.values() if isinstance(section, dict)]
+    for name in (name for section in (content, *sections) for name in section):
+        if name.replace("-", "_").lower() in {"law_module", "law_modules"}:
+            words = "a scene never runs code; name the file on the command line, --law-module FILE"
+            raise ParameterError(name, f"is refused: {words}")
 
 
 def _kinds() -> str:
@@ -192,7 +150,7 @@ def _scene_device(section: Mapping[str, Any]) -> Device:
     own = {name: value for name, value in section.items() if name != "id"}
     if "id" not in section:
         return parse_device(own, "the scene's device")
-    known = load_device(readers.text("device.id", section["id"]))
+    known = load_device(_ID.read(section["id"]))
     changed = parse_device(own, known.id)
     words = {name: getattr(changed, name) for name in ("name", "axes", "notes") if name in own}
     return replace(known, data={**known.data, **changed.data}, **words)

@@ -6,7 +6,9 @@ import os
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from asperity.arguments import described
 from asperity.errors import ParameterError
+from asperity.measured.arguments import FILE_ARGUMENTS, READING
 from asperity.textures.heightmap import HeightMap
 from asperity.textures.profile import Profile
 
@@ -14,7 +16,8 @@ if TYPE_CHECKING:
     from asperity.measured.prepared import Prepared
 
 
-def load_texture(
+@described(FILE_ARGUMENTS)
+def load_texture(  # noqa: D417 - the others are described where they are declared
     path: str | os.PathLike[str],
     *,
     channel: str | int | None = None,
@@ -41,47 +44,13 @@ def load_texture(
 
     Args:
         path: the file; its kind is told by its content.
-        channel: which one of several data channels, by name or number.
-        unit: of the heights, where the file names none.
-        integrate_normals: whether the image is a normal map, to be integrated.
-        pitch: distance of the points [m], one number or (p_x, p_y); required where the file has
-            none, else it overrides the file's.
-        height_range: peak-to-valley height [m] that the heights are scaled to.
-        outliers: spikes beyond so many robust standard deviations become missing points.
-        max_missing: share of the points that may be missing; a quarter if not given.
-        form: degree of the polynomial that is subtracted; 1, which levels, if not given.
-        cutoff: cut-off wavelength of the Gaussian S-filter [m], in the surface's own metres
-            before magnification, as all lengths here; chosen from the sampling if not given.
-        l_cutoff: cut-off wavelength of the Gaussian L-filter [m], which removes longer waves.
-        tip_radius: radius of the ball that feels the surface [m].
-        periodic: whether opposite borders are blended so that the surface repeats.
-        blend: width of the blended band [m]; a tenth of each side if not given.
-        magnify: factor of the lateral size, and of the height unless told otherwise.
-        magnify_height: factor of the height.
+        {arguments}
 
     Raises:
         SurfaceFileError: for a file that cannot be read, with the reason.
         ParameterError: for an argument that cannot be used.
     """
-    prepared = prepare_file(
-        path,
-        channel=channel,
-        unit=unit,
-        integrate_normals=integrate_normals,
-        pitch=pitch,
-        height_range=height_range,
-        outliers=outliers,
-        max_missing=max_missing,
-        form=form,
-        cutoff=cutoff,
-        l_cutoff=l_cutoff,
-        tip_radius=tip_radius,
-        periodic=periodic,
-        blend=blend,
-        magnify=magnify,
-        magnify_height=magnify_height,
-    )
-    return texture_of(prepared)
+    return texture_of(prepare_file(**locals()))  # every argument under its own name
 
 
 def prepare_file(
@@ -117,7 +86,7 @@ def prepare_file(
         for name in given:
             raise ParameterError(name, f"cannot be applied: {os.fspath(path)} was prepared already")
         return magnified(load_prepared(path), magnify, magnify_height)
-    reading = {k: given.pop(k) for k in ("channel", "unit", "integrate_normals") if k in given}
+    reading = {a.name: given.pop(a.name) for a in READING if a.name in given}
     return prepare(
         read_surface(path, **reading),
         magnify=magnify,

@@ -1,0 +1,114 @@
+"""An argument is declared once: what is read, checked and shown follows from the declaration."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+import pytest
+
+from asperity.arguments import Argument, Form, read_arguments
+from asperity.errors import ParameterError
+from asperity.measured.arguments import FILE_ARGUMENTS, PREPARING
+from asperity.measured.preparation import prepare
+from asperity.surface import CLAMP, LAW, MAX_DEPTH, STIFFNESS, Surface
+from asperity.textures import load_texture
+
+READ = [
+    ("quantity", "1.5 mm", 1.5e-3),
+    ("quantity", 2, 2.0),
+    ("pair", "5 µm; 8 µm", [5e-6, 8e-6]),
+    ("pair", "5 µm", 5e-6),
+    ("vector", "1 0.4", [1.0, 0.4]),
+    ("items", ["1 mm", 2e-3], [1e-3, 2e-3]),
+    ("vectors", "3 1; -1 4", [[3.0, 1.0], [-1.0, 4.0]]),
+    ("vectors", "3; 4", [3.0, 4.0]),
+    ("space", "1mm; 0; -2mm", (1e-3, 0.0, -2e-3)),
+    ("plane", ["37.5 mm", 0.1], (37.5e-3, 0.1)),
+    ("axes", "3", 3.0),
+    ("axes", [1, 2, 3], (1.0, 2.0, 3.0)),
+    ("direction", "Y", (0.0, 1.0)),
+    ("direction", "1,0.5", (1.0, 0.5)),
+    ("integer", "3", 3),
+    ("switch", "Yes", True),
+    ("switch", False, False),
+    ("channel", "2", 2),
+    ("channel", "height", "height"),
+    ("text", "um", "um"),
+]
+
+
+@pytest.mark.parametrize(("form", "given", "value"), READ)
+def test_each_form_reads_text_numbers_and_lists(form: Form, given: Any, value: Any) -> None:
+    unit = "" if form in {"integer"} else "m"
+    read = Argument("length", "of something", unit, form=form).read(given)
+    assert read == value
+    assert type(read) is type(value)
+
+
+WRONG = [
+    ("quantity", "3 N", "dimension"),
+    ("pair", "1;2;3", "one quantity, or two"),
+    ("space", "1;2", "three quantities"),
+    ("plane", "1;2;3", "two quantities"),
+    ("axes", "1;2", "three quantities"),
+    ("direction", "0,0", "must have a length"),
+    ("direction", "up", "must be x, y"),
+    ("integer", "2.5", "whole number"),
+    ("switch", "perhaps", "true or false"),
+    ("channel", True, "name or a whole number"),
+    ("text", 3, "must be text"),
+]
+
+
+@pytest.mark.parametrize(("form", "given", "message"), WRONG)
+def test_each_form_refuses_what_it_is_not(form: Form, given: Any, message: str) -> None:
+    with pytest.raises(ParameterError, match=message) as caught:
+        Argument("length", "of something", "m", form=form).read(given)
+    assert caught.value.argument == "length"
+
+
+def test_bounds_are_those_of_every_part() -> None:
+    sides = Argument("extent", "of the part", "m", form="pair", positive=True)
+    assert sides.checked([1e-3, 2e-3]) == [1e-3, 2e-3]
+    with pytest.raises(ParameterError, match=r"extent must be positive \[m\], got -0.002"):
+        sides.checked([1e-3, -2e-3])
+    share = Argument("share", "of all", high=1.0)
+    with pytest.raises(ParameterError, match="share must be 0 to 1"):
+        share.checked(1.5)
+    count = Argument("count", "of steps", form="integer", low=1)
+    with pytest.raises(ParameterError, match="count must be a whole number, 1 or more"):
+        count.checked(0)
+
+
+def test_the_nearest_key_is_offered() -> None:
+    known = (Argument("gain", "of the spring"), Argument("phase", "at the origin", "rad"))
+    assert read_arguments("surface", {"gain": "2.5"}, known) == {"gain": 2.5}
+    with pytest.raises(ParameterError, match=r"surface\.gian is unknown; did you mean 'gain'"):
+        read_arguments("surface", {"gian": "2.5"}, known)
+
+
+def _keywords(function: Any, *others: str) -> dict[str, inspect.Parameter]:
+    parameters = inspect.signature(function).parameters
+    return {name: one for name, one in parameters.items() if name not in others}
+
+
+def test_signatures_are_the_declarations() -> None:
+    """Python users have explicit keywords: in name and order those that are declared."""
+    names = [argument.name for argument in FILE_ARGUMENTS]
+    assert list(_keywords(load_texture, "path")) == names
+    ready = _keywords(prepare, "raw", "progress")
+    assert list(ready) == [argument.name for argument in PREPARING]
+    for argument in PREPARING:
+        if argument.form != "switch":
+            assert ready[argument.name].default == argument.default, argument.name
+    own = _keywords(Surface, "texture", "law_parameters")
+    for argument in (LAW, STIFFNESS, MAX_DEPTH, CLAMP):
+        assert own[argument.name].default == argument.default
+
+
+def test_docstrings_list_what_is_declared() -> None:
+    for function, arguments in ((load_texture, FILE_ARGUMENTS), (prepare, PREPARING)):
+        text = inspect.getdoc(function) or ""
+        for argument in arguments:
+            assert f"\n    {argument.name}: {argument.words}" in text
