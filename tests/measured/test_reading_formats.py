@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from asperity.errors import ParameterError, SurfaceFileError
-from asperity.measured.reading import RawSurface, formats, read_surface
+from asperity.measured.reading import RawSurface, instruments, read_surface
 
 sys.path.insert(0, str(Path(__file__).parent))
 from image_writer import write_tiff
@@ -22,7 +22,7 @@ from image_writer import write_tiff
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="real surfaces (../shared/data) missing")
 needs_library = pytest.mark.skipif(
-    not formats.has_library(), reason="the extra asperity[formats] is not installed"
+    not instruments.has_library(), reason="the extra asperity[formats] is not installed"
 )
 
 
@@ -97,7 +97,7 @@ def file(tmp_path: Path) -> Path:
 def read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *channels: Channel, **options: Any
 ) -> RawSurface:
-    monkeypatch.setattr(formats, "_library", lambda: Library(*channels))
+    monkeypatch.setattr(instruments, "_library", lambda: Library(*channels))
     return read_surface(file(tmp_path), **options)
 
 
@@ -201,7 +201,7 @@ def test_what_cannot_be_a_surface(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_a_reader_that_fails_is_reported_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: Exception
 ) -> None:
-    monkeypatch.setattr(formats, "_library", lambda: Library(fault=fault))
+    monkeypatch.setattr(instruments, "_library", lambda: Library(fault=fault))
     with pytest.raises(SurfaceFileError, match=r"scan\.bin: Made-up scanner file, damaged") as got:
         read_surface(file(tmp_path))
     assert "\n" not in str(got.value)

@@ -1,8 +1,17 @@
-"""Reading surfaces: X3P, SDF, NPY, text, images, meshes, and instruments' files by an extra."""
+"""Reading surfaces: X3P, SDF, NPY, text, images, meshes, instruments' files, and what you add."""
 
 from __future__ import annotations
 
 from asperity.measured.reading.raw import RawSurface
 from asperity.measured.reading.read import read_surface
+from asperity.measured.reading.reader import Reader, ReadingOptions, SurfaceFile
+from asperity.measured.reading.registry import register
 
-__all__ = ["RawSurface", "read_surface"]
+__all__ = [
+    "RawSurface",
+    "Reader",
+    "ReadingOptions",
+    "SurfaceFile",
+    "read_surface",
+    "register",
+]

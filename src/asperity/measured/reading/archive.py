@@ -7,6 +7,7 @@ from pathlib import Path
 
 from asperity.errors import SurfaceFileError
 
+ZIP_MAGIC = (b"PK\x03\x04", b"PK\x05\x06")  # the second begins an empty archive
 _MOST = 2 * 10**9
 _DAMAGE = (zipfile.BadZipFile, ValueError, NotImplementedError, EOFError, KeyError)
 

@@ -19,7 +19,6 @@ from asperity.measured.reading.raw import RawSurface
 from asperity.measured.reading.spacing import spacing
 from asperity.measured.reading.x3p_document import Axis, Document, Link, parse_document
 
-ZIP_MAGIC = (b"PK\x03\x04", b"PK\x05\x06")  # the second begins an empty archive
 _MAX_XML = 64 * 2**20
 _SMALL = 64 * 2**20
 _BOMB = 500  # heights of an instrument, even with many points missing, pack far less

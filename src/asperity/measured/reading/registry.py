@@ -1,0 +1,112 @@
+"""The readers of surface files, in the order in which they are asked.
+
+First those that know a file by its own mark. Then a user's own: registered ones in the order of
+registration, then the entry points of the group ``asperity.readers`` by name, which are loaded only
+when a file comes that far. Last those that take what is left: text, and the files of instruments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from importlib.metadata import EntryPoint, entry_points
+
+import numpy as np
+
+from asperity.errors import AsperityError, ParameterError, SurfaceFileError
+from asperity.measured.reading.raw import RawSurface
+from asperity.measured.reading.reader import Reader, ReadingOptions, SurfaceFile
+from asperity.measured.reading.shipped import LAST, MARKED
+
+ENTRY_POINTS = "asperity.readers"
+"""Group of the entry points by which an installed package brings a :class:`Reader`."""
+
+_PASSED = (AsperityError, OSError, MemoryError)  # what a reader may raise
+_own: dict[str, Reader] = {}
+
+
+def register(reader: Reader) -> None:
+    """Let a reader of your own be asked, after the shipped ones that know a file by its mark.
+
+    Args:
+        reader: the reader.
+
+    Raises:
+        ParameterError: its name is taken.
+    """
+    if reader.name in {known.name for known in (*MARKED, *_own.values(), *LAST)}:
+        raise ParameterError("reader", "must have a name that no other reader has", reader.name)
+    _own[reader.name] = reader
+
+
+def readers(faults: list[str]) -> Iterator[Reader]:
+    """Yield all readers in the order in which they are asked.
+
+    Args:
+        faults: receives a sentence for each reader of the user's that cannot be used.
+    """
+    yield from MARKED
+    for reader in _own.values():
+        yield _guarded(reader, faults)
+    for point in sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name):
+        loaded = _loaded(point, faults)
+        if loaded is not None:
+            yield _guarded(loaded, faults)
+    yield from LAST
+
+
+def _loaded(point: EntryPoint, faults: list[str]) -> Reader | None:
+    try:
+        reader = point.load()
+        if not isinstance(reader, Reader):
+            raise TypeError(f"{point.value} is no Reader")
+    except Exception as error:  # a package of somebody else's may raise anything
+        faults.append(f"the reader {point.name!r} cannot be used ({_reason(error)})")
+        return None
+    return reader
+
+
+def _guarded(reader: Reader, faults: list[str]) -> Reader:
+    """Return a user's reader whose own mistakes do not stop the others."""
+
+    def recognises(file: SurfaceFile) -> bool:
+        try:
+            return bool(reader.recognises(file))
+        except _PASSED:
+            raise
+        except Exception as error:
+            faults.append(f"the reader of {reader.name} cannot be used ({_reason(error)})")
+            return False
+
+    def read(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
+        try:
+            return _checked(reader.read(file, options))
+        except _PASSED:
+            raise
+        except Exception as error:
+            message = f"{file.name}: the reader of {reader.name} failed ({_reason(error)})"
+            raise SurfaceFileError(message) from error
+
+    return replace(reader, recognises=recognises, read=read)
+
+
+def _checked(raw: RawSurface | None) -> RawSurface | None:
+    """Return a surface as the others are made, or refuse what is none."""
+    if raw is None:
+        return None
+    if not isinstance(raw, RawSurface):
+        raise TypeError(f"{type(raw).__name__} instead of a RawSurface")
+    heights = np.ascontiguousarray(raw.heights, dtype=np.float64)
+    if heights.ndim not in (1, 2) or heights.size == 0:
+        raise ValueError(f"heights of shape {heights.shape}")
+    pitch = None if raw.pitch is None else tuple(float(p) for p in raw.pitch)
+    if pitch is not None and not (
+        len(pitch) == heights.ndim and all(np.isfinite(p) and p > 0.0 for p in pitch)
+    ):
+        raise ValueError(f"pitch {pitch} for heights of shape {heights.shape}")
+    return replace(raw, heights=heights, pitch=pitch)
+
+
+def _reason(error: Exception) -> str:
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text[:120]}" if text else type(error).__name__
