@@ -23,8 +23,9 @@ from rich.table import Table
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.bounds.measures import NORM
-from asperity.analysis.gain.certificate import Search, certified
+from asperity.analysis.gain.certificate import certified
 from asperity.analysis.gain.characteristic import characteristic_number
+from asperity.analysis.gain.search import Search
 from asperity.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Sinusoid

@@ -9,7 +9,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import asperity as asp
-from asperity.analysis.gain.closed_forms import Q
+from asperity.analysis.gain.closed_forms import q_b, q_c, q_g
 
 texture = asp.Sinusoid(amplitude=0.1e-3, period=1e-3)
 depths = np.linspace(0.0, 0.8e-3, 200)[1:]
@@ -36,10 +36,10 @@ def greatest_norm(law: str, depth: float) -> float:
 
 figure, axes = plt.subplots(figsize=(9.0, 4.6), layout="constrained")
 worst = 0.0
-for law, colour in (("B", "#0072b2"), ("C", "#d55e00"), ("G", "#009e73")):
-    closed = np.array([Q[law](texture, depth) for depth in depths])
+for law, q, colour in (("B", q_b, "#0072b2"), ("C", q_c, "#d55e00"), ("G", q_g, "#009e73")):
+    closed = np.array([q(texture, depth) for depth in depths])
     dots = np.array([greatest_norm(law, depth) for depth in sampled])
-    exact = np.array([Q[law](texture, depth) for depth in sampled])
+    exact = np.array([q(texture, depth) for depth in sampled])
     worst = max(worst, float(np.abs(dots / exact - 1.0).max()))
     axes.plot(depths * 1e3, closed, color=colour, label=f"law {law}, closed form")
     axes.plot(sampled * 1e3, dots, "o", color=colour, label=f"law {law}, samples")

@@ -22,11 +22,14 @@ from asperity.analysis.bounds.measures import (
 )
 from asperity.analysis.bounds.problems import (
     CrestProblem,
-    FrictionProblem,
     SlopeProblem,
     normal_problem,
 )
-from asperity.analysis.gain.friction import largest_singular_value, largest_symmetric_eigenvalue
+from asperity.analysis.gain.friction import (
+    FrictionProblem,
+    largest_singular_value,
+    largest_symmetric_eigenvalue,
+)
 from asperity.analysis.gain.medial_axis import crest_curvature
 from asperity.checks import FloatArray
 from asperity.enclosures.cells import Cells

@@ -30,10 +30,12 @@ from asperity.analysis.bounds.measures import (
     precise_one_sided,
 )
 from asperity.analysis.gain import closed_forms
-from asperity.analysis.gain.certificate import Search, certified, safe_bound
+from asperity.analysis.gain.certificate import certified
 from asperity.analysis.gain.characteristic import curl_number
 from asperity.analysis.gain.friction import largest_singular_value
 from asperity.analysis.gain.medial_axis import sharpest_crest
+from asperity.analysis.gain.search import Search
+from asperity.analysis.gain.theorems import safe_bound
 from asperity.definition import exact_jacobian
 from asperity.errors import ParameterError
 from asperity.laws import Law

@@ -15,8 +15,8 @@ import pytest
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.gain import kept as keeping
-from asperity.analysis.gain.certificate import Search
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
+from asperity.analysis.gain.search import Search
 from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Sinusoid, Texture

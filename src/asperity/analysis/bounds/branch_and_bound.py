@@ -31,6 +31,15 @@ _LEAST_HALF = 1e-12
 _FEW = 4096
 
 
+@dataclass(frozen=True)
+class Contacts:
+    """Depths [m], (n,), and deflections [m], (n, 2), of an anchor that sticks or is dragged."""
+
+    depth: FloatArray
+    deflection: FloatArray
+    sliding: bool
+
+
 class Problem(ABC):
     """A function on cells whose supremum is wanted.
 
@@ -53,6 +62,17 @@ class Problem(ABC):
     def enough(self, best: float, tolerance: float) -> float:
         """Return the bound at which a cell can be dropped."""
         return best * (1.0 + tolerance)
+
+    def contacts(self, coordinates: FloatArray) -> list[Contacts]:  # noqa: ARG002 - of a default
+        """Return the contacts that may attain the value at coordinates (n, d).
+
+        None where the value is one of the surface alone: then either end of the depth may.
+        """
+        return []
+
+    def at_once(self) -> Supremum | None:
+        """Return bounds over the whole plane that need no search, where there are some."""
+        return None
 
 
 @dataclass(frozen=True)

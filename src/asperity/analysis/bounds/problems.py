@@ -1,21 +1,18 @@
-"""What is maximised over cells for each law: mostly ‖J‖ itself, for some an equivalent number.
+"""What is maximised over cells: ‖J‖ itself, or something simpler of which a number is a function.
 
-A law's own generated kernel, run on Taylor models, gives J on whole cells. Where a law's number
-is a function of something simpler, that is maximised instead: the slope for A and E, the change
-of the normal for G, the crest curvature for D, two entries for F.
+A law's own generated kernel, run on Taylor models, gives J on whole cells. Of the surface alone
+there are the slope, the change of the normal and the crest curvature.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from asperity.analysis.bounds.branch_and_bound import Problem, Supremum
+from asperity.analysis.bounds.branch_and_bound import Contacts, Problem
 from asperity.analysis.bounds.dense_search import ContactField
 from asperity.analysis.bounds.measures import NORM, ONE_SIDED
 from asperity.analysis.bounds.measures import Number as MatrixNumber
@@ -34,20 +31,10 @@ from asperity.enclosures.products import (
 from asperity.enclosures.taylor import Number, Taylor, TaylorMath
 from asperity.laws import Law
 from asperity.surface import Surface
-from asperity.textures.plane_waves import SingleWave
 
 Entries = Sequence[Sequence[Number]]
 # Numbers of J/k below this are not resolved; a flat surface would have no relative gap.
 _LEAST = 1e-9
-
-
-@dataclass(frozen=True)
-class Contacts:
-    """Depths [m], (n,), and deflections [m], (n, 2), of an anchor that sticks or is dragged."""
-
-    depth: FloatArray
-    deflection: FloatArray
-    sliding: bool
 
 
 class MatrixProblem(Problem):
@@ -234,7 +221,7 @@ def _normal_change(derivatives: Sequence[Any], root: Any) -> list[list[Any]]:
 
 
 def normal_problem(cells: Cells, floor: float) -> MatrixProblem:
-    """Return the problem of ‖∂n/∂(x, y)‖, of which law G's number is max(1, depth times it)."""
+    """Return the problem of ‖∂n/∂(x, y)‖, the change of the surface normal [1/m]."""
 
     def matrices(models: dict[str, Number]) -> list[Entries]:
         return [_normal_change([models[name] for name in NAMES[1:]], TaylorMath.sqrt)]
@@ -300,83 +287,3 @@ class CrestProblem(MatrixProblem):
             return math.inf
         number = max(y / (1.0 - y), 1.0) * (1.0 + tolerance)
         return number / (1.0 + number) / self._depth
-
-
-class FrictionProblem(Problem):
-    """Law F's number, which is that of [[a, b], [0, 1]].
-
-    The deflection that is worst is against the slope and as long as it can be (see
-    ``friction.py``); a = μ D ((1 - m)/d_max + |∇m|), b = μ (1 - m). Both numbers of the matrix
-    grow with a and b and are convex in them, and a and b are convex in (m, ∇m).
-    """
-
-    def __init__(
-        self,
-        surface: Surface,
-        cells: Cells,
-        number: Callable[[FloatArray, FloatArray], FloatArray],
-    ) -> None:
-        self.cells, self._number = cells, number
-        _k, middle, half = surface.law_arguments[:3]
-        swing = surface.modulation_depth
-        self._offset, self._share = 0.5 * (1.0 + swing * middle / half), 0.5 * swing / half
-        self._friction = surface.friction
-        self._depth, self._longest = surface.max_depth, surface.max_deflection
-
-    def _entries(self, h: FloatArray, slope: FloatArray) -> FloatArray:
-        still = np.maximum(self._offset - self._share * h, 0.0)
-        a = self._friction * self._depth * (still / self._longest + self._share * slope)
-        return self._number(a, self._friction * still)
-
-    def at_most(
-        self,
-        centres: FloatArray,
-        half: FloatArray,
-        above: float,  # noqa: ARG002 - the one bound there is costs little
-    ) -> FloatArray:
-        """See :class:`Problem`."""
-        models = self.cells.models(centres, half, ("h", "hx", "hy"))
-        n, d = len(centres), len(half)
-        zero = Taylor(np.zeros(n), np.zeros((d, n)), np.zeros(n))
-        h, x, y = (m if isinstance(m, Taylor) else zero for m in models.values())
-        rest = np.hypot(x.e, y.e) * (1.0 + 1e-12)
-        best = np.zeros(n)
-        for corner in range(2**d):
-            signs = np.array([1.0 if corner >> axis & 1 else -1.0 for axis in range(d)])
-            slope = np.hypot(x.c + signs @ x.g, y.c + signs @ y.g) + rest
-            best = np.maximum(best, self._entries(h.c + signs @ h.g - h.e, slope))
-        return np.asarray(best * (1.0 + 1e-13))
-
-    def values(self, coordinates: FloatArray) -> FloatArray:
-        """See :class:`Problem`."""
-        derivatives = self.cells.derivatives(coordinates)
-        return self._entries(derivatives[:, 0], np.hypot(derivatives[:, 1], derivatives[:, 2]))
-
-    def around(self, wave: SingleWave, slope: float) -> Supremum:
-        """Return bounds on one wave of a greatest slope at once, without cells.
-
-        There (h, |∇h|) runs along half an ellipse, which a polygon of tangents encloses; a convex
-        number that grows with |∇h| is greatest at its corners, or where they touch.
-        """
-        touch, corner, radius = _half_circle()
-        height = wave.amplitude
-        values = self._entries(height * np.sin(touch), slope * np.cos(touch))
-        beyond = self._entries(height * radius * np.sin(corner), slope * radius * np.cos(corner))
-        upper = max(float(values.max()), float(beyond.max())) * (1.0 + 1e-13)
-        index = min(max(int(values.argmax()), 1), len(values) - 2)
-        before, here, after = values[index - 1 : index + 2]
-        bend = before - 2.0 * here + after
-        shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
-        step = float(touch[1] - touch[0])
-        tries = touch[index] + step * np.array([-1.0, 0.0, 1.0, min(max(shift, -1.0), 1.0)])
-        found = self._entries(height * np.sin(tries), slope * np.cos(tries))
-        best = int(found.argmax())
-        at = np.array([tries[best] - wave.phase])
-        return Supremum(float(found[best]), upper, at, len(corner), reached=True)
-
-
-@lru_cache(maxsize=1)
-def _half_circle(count: int = 1024) -> tuple[FloatArray, FloatArray, float]:
-    """Return the angles where tangents touch half a circle and where they meet, and how far out."""
-    touch = np.linspace(-0.5 * math.pi, 0.5 * math.pi, count + 1)
-    return touch, 0.5 * (touch[1:] + touch[:-1]), 1.0 / math.cos(0.5 * math.pi / count)

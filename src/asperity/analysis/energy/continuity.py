@@ -12,10 +12,10 @@ import numpy as np
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.gain.medial_axis import Crest, sharpest_crest
+from asperity.analysis.gain.theorems import theorem_of
 from asperity.checks import FloatArray
 from asperity.derive.facts import law_facts
 from asperity.files import Record, record
-from asperity.laws import LAWS
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 from asperity.units import engineering, rounded_down
@@ -117,12 +117,12 @@ def continuity(surface: Surface, q: Bound) -> Continuity:
 def _nearest(surface: Surface, q: Bound) -> Continuity:
     """Return whether the medial axis, on which the nearest point jumps, is deeper than max_depth.
 
-    q of law D knows; that of a law of your own may not.
+    q knows for a law with that theorem; else the sharpest crest does.
     """
     depth = surface.max_depth
     if depth * surface.texture.bounds[1] < 1.0:
         return _smooth(surface, q, "the nearest point is unique down to 1/K, K >= ‖Hess h‖")
-    if LAWS.get("D") is surface.law:
+    if theorem_of(surface.law).knows_medial_axis:
         onset = math.inf
         if math.isinf(q.lower) and q.at is not None:
             onset = min(_distance(surface, q.at), depth)

@@ -9,7 +9,7 @@ import numpy as np
 
 from asperity.analysis.bounds.dense_search import greatest
 from asperity.analysis.bounds.measures import spectral_norm
-from asperity.analysis.gain.medial_axis import sharpest_crest
+from asperity.analysis.gain.theorems import theorem_of
 from asperity.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine, Texture
@@ -110,26 +110,12 @@ def _scan(surface: Surface, line: ScanLine, height: float) -> tuple[FloatArray, 
 
 
 def _gain_above(surface: Surface, height: float) -> float:
-    """Return sup‖J‖/k over the body above a height."""
-    contact, letter = surface.law.contact, surface.law.letter
-    if letter in {"W", "E"}:
-        return 1.0
-    if letter == "H":
-        return max(1.0, surface.continuity)
-    if letter == "D":
-        return _god_object_gain(surface, height)
+    """Return sup‖J‖/k over the body above a height: by theorem, else sampled."""
+    proved = theorem_of(surface.law).gain_above
+    if proved is not None:
+        return proved(surface, height)
 
     def limit(derivatives: FloatArray) -> FloatArray:
-        return contact.greatest_depth(height, derivatives)
+        return surface.law.contact.greatest_depth(height, derivatives)
 
     return greatest(surface, spectral_norm, limit).value
-
-
-def _god_object_gain(surface: Surface, height: float) -> float:
-    """y/(1 - y) at the sharpest crest, infinite if its centre of curvature is above the height."""
-    crest = sharpest_crest(surface.texture)
-    if crest is None:
-        return 1.0
-    fall = crest.foot[2] - crest.centre[2]
-    y = (crest.foot[2] - height) / fall
-    return math.inf if y >= 1.0 else max(1.0, y / (1.0 - y))

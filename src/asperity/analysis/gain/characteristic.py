@@ -13,10 +13,10 @@ from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
 from asperity.analysis.bounds.highest import highest_point
 from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED, Number
 from asperity.analysis.bounds.witness import attained, lower_of
-from asperity.analysis.gain import closed_forms
-from asperity.analysis.gain.certificate import Search, certified, is_shipped, wave_number
-from asperity.analysis.gain.god_object import crest_number, split_number
+from asperity.analysis.gain.certificate import certified, wave_number
 from asperity.analysis.gain.kept import kept
+from asperity.analysis.gain.search import Search
+from asperity.analysis.gain.theorems import Constant, theorem_of
 from asperity.checks import positive
 from asperity.derive.facts import law_facts
 from asperity.errors import ParameterError
@@ -62,15 +62,7 @@ def characteristic_number(
         >>> round(characteristic_number(Surface(paper, "A")).value, 4)
         5.1251
     """
-    search = _search(surface, tolerance, work_limit, extent)
-    letter = surface.law.letter if is_shipped(surface) else ""
-    if letter in {"W", "E"}:
-        return _constant(surface, NORM, 1.0, "‖J‖ is exactly k everywhere")
-    if letter == "D":
-        return kept(surface, "q", search, lambda: crest_number(surface, search))
-    if letter == "H":
-        return kept(surface, "q", search, lambda: split_number(surface, search))
-    return _number(surface, NORM, search, closed_forms.Q)
+    return _number(surface, NORM, _search(surface, tolerance, work_limit, extent))
 
 
 def one_sided_number(
@@ -89,17 +81,7 @@ def one_sided_number(
         >>> one_sided_number(Surface(paper, "D")).value
         1.0
     """
-    search = _search(surface, tolerance, work_limit, extent)
-    reasons = {
-        "W": "-J = k e_z e_zᵀ",
-        "D": "the potential is half a squared distance, whose Hessian is at most the identity",
-        "E": "λ_max of the symmetric part of e_z nᵀ is (1 + n_z)/2, 1 where the surface is level",
-        "H": "the potential is an infimum of functions whose Hessian is the identity",
-    }
-    letter = surface.law.letter if is_shipped(surface) else ""
-    if letter in reasons:
-        return _constant(surface, ONE_SIDED, 1.0, reasons[letter])
-    return _number(surface, ONE_SIDED, search, closed_forms.ONE_SIDED)
+    return _number(surface, ONE_SIDED, _search(surface, tolerance, work_limit, extent))
 
 
 def curl_number(
@@ -127,7 +109,7 @@ def curl_number(
     facts = law_facts(surface.law)
     if facts.conservative:
         return Bound(0.0, 0.0, "theorem", None, facts.reason)
-    return _number(surface, CURL, search, closed_forms.CURL)
+    return _number(surface, CURL, search)
 
 
 def _search(
@@ -148,25 +130,23 @@ def _search(
     return Search(gap, limit, extent)
 
 
-def _number(
-    surface: Surface,
-    number: Number,
-    search: Search,
-    formulas: dict[str, closed_forms.ClosedForm],
-) -> Bound:
-    letter, wave = surface.law.letter, surface.texture.single_wave
-    known = is_shipped(surface) and letter in formulas and search.extent is None
-    if wave is not None and known:
-        value = formulas[letter](wave, surface.max_depth)
-        phase = closed_forms.PHASES[letter](wave, surface.max_depth)
-        return wave_number(surface, wave, number, value, phase)
+def _number(surface: Surface, number: Number, search: Search) -> Bound:
+    theorem, wave = theorem_of(surface.law), surface.texture.single_wave
+    if number in theorem.constants:
+        return _constant(surface, number, theorem.constants[number])
+    own_way = theorem.own_way.get(number)
+    if own_way is not None:
+        return kept(surface, f"{number.name}, proved", search, lambda: own_way(surface, search))
+    if wave is not None and search.extent is None and number in theorem.on_a_wave:
+        return wave_number(surface, number, wave, theorem.on_a_wave[number])
     return kept(surface, number.name, search, lambda: certified(surface, number, search))
 
 
-def _constant(surface: Surface, number: Number, value: float, reason: str) -> Bound:
+def _constant(surface: Surface, number: Number, known: Constant) -> Bound:
     """Return a number that a theorem gives for every surface, attained where it is level.
 
     Just inside the highest point the normal is e_z.
     """
     witness = attained(surface, number, highest_point(surface.texture), 0.0)
-    return Bound(lower_of(value, witness), value, "theorem", witness.at, reason)
+    lower = lower_of(known.value, witness)
+    return Bound(lower, known.value, "theorem", witness.at, known.reason)

@@ -95,38 +95,29 @@ def one_sided_a(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one 
     return 0.5 * (1.0 + math.hypot(1.0, _slope(wave)))
 
 
-def _steepest(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one signature for all
+def steepest(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one signature for all
+    """Return the phase where the flank is steepest."""
     return 0.0
 
 
-def _trough(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one signature for all
+def trough(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one signature for all
+    """Return the phase of the trough."""
     return -0.5 * math.pi
 
 
-def _phase_b(wave: SingleWave, depth: float) -> float:
+def phase_b(wave: SingleWave, depth: float) -> float:
+    """Return the phase at which q_B is attained: on the flank or in the trough."""
     steep = math.hypot(1.0, _slope(wave)) >= _bend(wave, depth)
-    return _steepest(wave, depth) if steep else _trough(wave, depth)
+    return steepest(wave, depth) if steep else trough(wave, depth)
 
 
-def _phase_c(wave: SingleWave, depth: float) -> float:
+def phase_c(wave: SingleWave, depth: float) -> float:
     """sin(phase) = -E (λ - 1)/(2 G₁ λ): there λ is stationary along the profile."""
     root = max(_feasible_roots(wave, depth), default=0.0)
     if root < max(1.0, _bend(wave, depth)):
-        return _trough(wave, depth)
+        return trough(wave, depth)
     e = 2.0 * math.pi * depth / wave.period
     return math.asin(max(-1.0, -0.5 * e * (root - 1.0) / (root * _slope(wave))))
-
-
-# The phase of the sinusoid at which the number is attained, at full depth.
-PHASES: dict[str, ClosedForm] = {
-    "A": _steepest,
-    "B": _phase_b,
-    "C": _phase_c,
-    "E": _steepest,
-    "G": _trough,
-}
-
-Q: dict[str, ClosedForm] = {"A": q_a, "B": q_b, "C": q_c, "D": q_d, "G": q_g}
 
 
 def curl_a(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one signature for all
@@ -137,7 +128,3 @@ def curl_a(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one signa
 def curl_e(wave: SingleWave, depth: float) -> float:  # noqa: ARG001 - one signature for all
     """Sup |curl f_E|/k = G₁/√(1 + G₁²): the curl of k δₙ e_z has the length of k (n_x, n_y)."""
     return _slope(wave) / math.hypot(1.0, _slope(wave))
-
-
-ONE_SIDED: dict[str, ClosedForm] = {"A": one_sided_a, "C": q_c}
-CURL: dict[str, ClosedForm] = {"A": curl_a, "E": curl_e}

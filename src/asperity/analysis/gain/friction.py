@@ -10,9 +10,19 @@ same holds for the symmetric part. In the depth all entries grow.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from functools import lru_cache
+
 import numpy as np
 
+from asperity.analysis.bounds.branch_and_bound import Contacts, Problem, Supremum
 from asperity.checks import FloatArray
+from asperity.enclosures.cells import Cells
+from asperity.enclosures.taylor import Taylor
+from asperity.surface import Surface
+
+Entries = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 def largest_singular_value(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -28,3 +38,94 @@ def largest_symmetric_eigenvalue(a: FloatArray, b: FloatArray) -> FloatArray:
     """λ_max of the symmetric part of [[a, b], [0, 1]]."""
     result: FloatArray = 0.5 * (1.0 + a + np.hypot(1.0 - a, b))
     return result
+
+
+class FrictionProblem(Problem):
+    """Law F's number, which is that of [[a, b], [0, 1]].
+
+    The deflection that is worst is against the slope and as long as it can be;
+    a = μ D ((1 - m)/d_max + |∇m|), b = μ (1 - m). Both numbers of the matrix grow with a and b
+    and are convex in them, and a and b are convex in (m, ∇m).
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        cells: Cells,
+        number: Entries,
+    ) -> None:
+        self.cells, self._number, self._texture = cells, number, surface.texture
+        _k, middle, half = surface.law_arguments[:3]
+        swing = surface.parameter("modulation_depth")
+        self._offset, self._share = 0.5 * (1.0 + swing * middle / half), 0.5 * swing / half
+        self._friction, self._depth = surface.parameter("friction"), surface.max_depth
+        self._longest = surface.parameter("max_deflection")
+
+    def _entries(self, h: FloatArray, slope: FloatArray) -> FloatArray:
+        still = np.maximum(self._offset - self._share * h, 0.0)
+        a = self._friction * self._depth * (still / self._longest + self._share * slope)
+        return self._number(a, self._friction * still)
+
+    def at_most(
+        self,
+        centres: FloatArray,
+        half: FloatArray,
+        above: float,  # noqa: ARG002 - the one bound there is costs little
+    ) -> FloatArray:
+        """See :class:`Problem`."""
+        models = self.cells.models(centres, half, ("h", "hx", "hy"))
+        n, d = len(centres), len(half)
+        zero = Taylor(np.zeros(n), np.zeros((d, n)), np.zeros(n))
+        h, x, y = (m if isinstance(m, Taylor) else zero for m in models.values())
+        rest = np.hypot(x.e, y.e) * (1.0 + 1e-12)
+        best = np.zeros(n)
+        for corner in range(2**d):
+            signs = np.array([1.0 if corner >> axis & 1 else -1.0 for axis in range(d)])
+            slope = np.hypot(x.c + signs @ x.g, y.c + signs @ y.g) + rest
+            best = np.maximum(best, self._entries(h.c + signs @ h.g - h.e, slope))
+        return np.asarray(best * (1.0 + 1e-13))
+
+    def values(self, coordinates: FloatArray) -> FloatArray:
+        """See :class:`Problem`."""
+        derivatives = self.cells.derivatives(coordinates)
+        return self._entries(derivatives[:, 0], np.hypot(derivatives[:, 1], derivatives[:, 2]))
+
+    def contacts(self, coordinates: FloatArray) -> list[Contacts]:
+        """See :class:`Problem`: at full depth, the deflection against the slope."""
+        slope = self._texture.gradient(self.cells.plane(coordinates))
+        length = np.hypot(slope[:, 0], slope[:, 1])[:, None]
+        unit = np.where(length > 0.0, slope / np.where(length > 0.0, length, 1.0), [1.0, 0.0])
+        depth = np.full(len(coordinates), self._depth)
+        return [Contacts(depth, -self._longest * unit, sliding=False)]
+
+    def at_once(self) -> Supremum | None:
+        """See :class:`Problem`: on a single wave.
+
+        There (h, |∇h|) runs along half an ellipse, which a polygon of tangents encloses; a convex
+        number that grows with |∇h| is greatest at its corners, or where they touch.
+        """
+        wave = self._texture.single_wave
+        if wave is None:
+            return None
+        touch, corner, radius = _half_circle()
+        height, slope = wave.amplitude, self._texture.bounds[0]
+        values = self._entries(height * np.sin(touch), slope * np.cos(touch))
+        beyond = self._entries(height * radius * np.sin(corner), slope * radius * np.cos(corner))
+        upper = max(float(values.max()), float(beyond.max())) * (1.0 + 1e-13)
+        index = min(max(int(values.argmax()), 1), len(values) - 2)
+        before, here, after = values[index - 1 : index + 2]
+        bend = before - 2.0 * here + after
+        shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+        step = float(touch[1] - touch[0])
+        tries = touch[index] + step * np.array([-1.0, 0.0, 1.0, min(max(shift, -1.0), 1.0)])
+        found = self._entries(height * np.sin(tries), slope * np.cos(tries))
+        best = int(found.argmax())
+        at = np.array([tries[best] - wave.phase])
+        return Supremum(float(found[best]), upper, at, len(corner), reached=True)
+
+
+@lru_cache(maxsize=1)
+def _half_circle(count: int = 1024) -> tuple[FloatArray, FloatArray, float]:
+    """Return the angles where tangents touch half a circle and where they meet, and how far out."""
+    touch = np.linspace(-0.5 * math.pi, 0.5 * math.pi, count + 1)
+    return touch, 0.5 * (touch[1:] + touch[:-1]), 1.0 / math.cos(0.5 * math.pi / count)

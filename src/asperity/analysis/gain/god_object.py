@@ -1,4 +1,4 @@
-"""The characteristic number of law D, from the curvature of the sharpest crest."""
+"""The characteristic numbers of laws D and H, from the curvature of the sharpest crest."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from asperity.analysis.bounds.measures import NORM
 from asperity.analysis.bounds.problems import CrestProblem
 from asperity.analysis.bounds.witness import attained, lower_of
 from asperity.analysis.gain import closed_forms
-from asperity.analysis.gain.certificate import Search
 from asperity.analysis.gain.medial_axis import Crest, sharpest_crest
+from asperity.analysis.gain.search import Search
 from asperity.surface import Surface
 from asperity.textures.plane_waves import SingleWave
 
@@ -27,7 +27,7 @@ def crest_number(surface: Surface, search: Search) -> Bound:
     """Return q_D: 1, y/(1 - y) with y = depth times crest curvature, or infinity from y = 1 on.
 
     ‖J‖/k at depth δ above a foot of crest curvature κ is max(1, δκ/(1 - δκ)), and every foot stays
-    the nearest point down to the least radius of all crests (see ``ridges.py``).
+    the nearest point down to the least radius of all crests (see ``medial_axis.py``).
     """
     texture, depth = surface.texture, surface.max_depth
     if texture.single_wave is not None and search.extent is None:
@@ -73,12 +73,23 @@ def _wave_number(surface: Surface, wave: SingleWave) -> Bound:
     return Bound(lower, value, "closed form", witness.at, "MATH section 4")
 
 
+def gain_above_crest(surface: Surface, height: float) -> float:
+    """Return sup‖J‖/k of law D over the body above a height [m].
+
+    y/(1 - y) at the sharpest crest, infinite if its centre of curvature is above the height.
+    """
+    crest = sharpest_crest(surface.texture)
+    if crest is None:
+        return 1.0
+    return _number((crest.foot[2] - height) / (crest.foot[2] - crest.centre[2]))
+
+
 def split_number(surface: Surface, search: Search) -> Bound:
     """Return q_H: max(1, c) by theorem, less only where nothing is deep enough to split.
 
     Down to the fraction c/(1 + c) of the crest's radius H is law D, whose number grows to c there.
     """
-    c = surface.continuity
+    c = surface.parameter("continuity")
     reason = "-c <= Hess U <= 1 for any surface: q = max(1, c)"
     crest = None
     if c > 1.0:

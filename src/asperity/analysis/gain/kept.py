@@ -20,7 +20,7 @@ from typing import get_args
 import numpy as np
 
 from asperity.analysis.bounds.bound import Bound, Method
-from asperity.analysis.gain.certificate import Search
+from asperity.analysis.gain.search import Search
 from asperity.files import json_text, write_text
 from asperity.kernels.fuse import cache_directory, kernel_source
 from asperity.surface import Surface

@@ -9,10 +9,10 @@ from fractions import Fraction
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import Leak
+from asperity.analysis.gain.theorems import theorem_of
 from asperity.derive.facts import law_facts
 from asperity.devices import Device
 from asperity.errors import ParameterError
-from asperity.laws import LAWS
 from asperity.surface import Surface
 
 HALF = Fraction(1, 2)
@@ -128,14 +128,14 @@ def _obstacle(surface: Surface, q: Bound) -> tuple[bool, str]:
     """Return whether the law is conservative, and why its potential gives no bound if so.
 
     The rules need U(p + Δ) <= U(p) + ∇U · Δ + q⁺|Δ|²/2. The Jacobian proves that where the force
-    is continuous. A jump can break it; law D's do not, for its potential is an infimum.
+    is continuous. A jump can break it, but not where a theorem says that U is an infimum.
     """
     law, facts = surface.law, law_facts(surface.law)
     if not facts.conservative:
         return False, f"the law is not conservative ({facts.reason})"
     if surface.clamp == "lateral" and law.clampable:
         return False, "the lateral clamp makes the law leak below max_depth"
-    if LAWS.get("D") is law:
+    if theorem_of(law).infimum:
         return True, ""
     smooth = continuity(surface, q)
     return True, "" if smooth.continuous else f"the force is not continuous: {smooth.reason}"

@@ -1,0 +1,40 @@
+"""How far to search for a certified number."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
+from asperity.enclosures.cells import Cells
+from asperity.surface import Surface
+
+
+@dataclass(frozen=True)
+class Search:
+    """How far to search.
+
+    Attributes:
+        tolerance: relative gap; ``None`` for 1e-6 on profiles and periodic sums, 1e-4 on sums of
+            three independent waves, 1e-3 on maps and wherever a depth or an anchor's state has
+            to be searched as well.
+        work_limit: greatest number of cells.
+        extent: width and depth [m] of the part of the plane that counts, for sums of waves.
+    """
+
+    tolerance: float | None = None
+    work_limit: int = DEFAULT_WORK_LIMIT
+    extent: tuple[float, float] | None = None
+
+    def margin(self, surface: Surface) -> float:
+        """Return how far beyond the extent the surface is felt [m]: feet are not below probes."""
+        return surface.law.contact.margin(surface.max_depth)
+
+    def wish(self, cells: Cells) -> float | None:
+        """Return the gap to try for where it costs little."""
+        return cells.wish if self.tolerance is None else None
+
+    def gap(self, cells: Cells) -> float:
+        """Return the relative gap to reach."""
+        if self.tolerance is not None:
+            return self.tolerance
+        return cells.gap
