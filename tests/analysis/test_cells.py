@@ -35,6 +35,20 @@ def many_waves() -> Fourier:
     return Fourier(1e-6 * rng.normal(size=500), multiples @ SKEW, rng.uniform(0, 7, 500))
 
 
+class ByBounds(Fourier):
+    """A sum that is looked at as a kind of one's own is, through its bounds alone."""
+
+    cells = Texture.cells
+
+
+class ByThirdBounds(ByBounds):
+    @property
+    def twist(self) -> float:
+        return float(np.abs(self.amplitudes) @ np.hypot(*self.wavevectors.T) ** 3)
+
+
+SUM = ([4e-4, 3e-4, 1e-4], np.vstack([SKEW, SKEW[0] - 2 * SKEW[1]]), [0.4, 1, 2])
+
 Build = tuple[Callable[[], Texture], tuple[float, float] | None]
 TEXTURES: dict[str, Build] = {
     "sinusoid": (lambda: Sinusoid(0.4e-3, 1.5e-3, 0.7, (2.0, 1.0)), None),
@@ -55,6 +69,10 @@ TEXTURES: dict[str, Build] = {
         lambda: Fourier(1e-4 * RNG.normal(size=5), 2e3 * RNG.normal(size=(5, 2))),
         (5e-3, 2e-3),
     ),
+    "bounds": (lambda: ByBounds(*SUM), None),
+    "third bounds": (lambda: ByThirdBounds(*SUM), None),
+    "third bounds, extent": (lambda: ByThirdBounds(*SUM), (3e-3, 2e-3)),
+    "bounds of a profile": (lambda: ByThirdBounds([2e-4, 1e-4], [1200.0, 2800.0]), None),
     "500 waves": (many_waves, None),
     "no height": (lambda: flat_sum(2), None),
     "map": (lambda: HeightMap(1e-4 * ROUGH, (3e-4, 7e-4), origin=(-1.3e-3, 0.7e-3)), None),
@@ -91,9 +109,13 @@ def random_cells(of: Cells, level: int, count: int, seed: int) -> tuple[np.ndarr
 def exactly(texture: Texture, margin: float, extent: Any, coordinates: np.ndarray) -> list[Any]:
     """Return the six derivatives at coordinates, in 40 digits."""
     c = [mpmath.mpf(float(value)) for value in coordinates]
-    if isinstance(texture, (Sinusoid, Fourier)) and extent is None:
+    if isinstance(texture, ByBounds):
+        spans = texture.domain.spans if extent is None else np.diag(extent)
+        rows = [[mpmath.mpf(float(value)) for value in row] for row in spans]
+        where = [sum(u * row[i] for u, row in zip(c, rows, strict=True)) for i in (0, 1)]
+    elif isinstance(texture, (Sinusoid, Fourier)) and extent is None:
         return _on_torus(texture, c)
-    if isinstance(texture, HeightMap):
+    elif isinstance(texture, HeightMap):
         where = [
             mpmath.mpf(float(o)) + u * mpmath.mpf(p)
             for o, u, p in zip(texture.origin, c, texture.pitch, strict=True)
@@ -191,7 +213,9 @@ def test_every_point_of_the_plane_has_coordinates(name: str) -> None:
     """What a random point sees is what the torus, or the cell of a spline, says there."""
     texture, found = cells(name)
     xy = texture.domain.points(np.random.default_rng(2).random((20, len(texture.domain.spans))))
-    if isinstance(texture, (Sinusoid, Fourier)):
+    if isinstance(texture, ByBounds):
+        coordinates = xy @ np.linalg.pinv(texture.domain.spans)
+    elif isinstance(texture, (Sinusoid, Fourier)):
         coordinates = xy @ found._basis.T
     else:
         coordinates = found.coordinates(xy)

@@ -109,7 +109,8 @@ def listed_surfaces(names: Sequence[str] = ()) -> list[Listed]:
     Raises:
         ParameterError: for an unknown name; the nearest are offered.
     """
-    from asperity.textures.catalogue import CATALOGUE, TEXTURE_KINDS
+    from asperity.textures.catalogue import CATALOGUE
+    from asperity.textures.library import LIBRARY
 
     wanted = [name.lower().rstrip(":") for name in names]
     for name in wanted:
@@ -117,7 +118,7 @@ def listed_surfaces(names: Sequence[str] = ()) -> list[Listed]:
             hint = nearest_names(name, CATALOGUE)
             raise ParameterError("surface", f"is unknown: {name!r}; {hint}")
     return [
-        Listed(kind, kind.make(**kind.example), name not in TEXTURE_KINDS)
+        Listed(kind, kind.make(**kind.example), name in LIBRARY)
         for name, kind in CATALOGUE.items()
         if not wanted or name in wanted
     ]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
 
 from asperity.arguments import Argument
+from asperity.errors import ParameterError
 from asperity.textures.fourier import Fourier
 from asperity.textures.grating import GRATING
 from asperity.textures.kinds import Kind
@@ -36,10 +38,32 @@ _FOURIER = Kind(
     example={"amplitudes": [2e-4, 1e-4], "wavevectors": [[3000.0, 0.0], [0.0, 6000.0]]},
 )
 
-TEXTURE_KINDS: dict[str, Kind] = {
+CATALOGUE: dict[str, Kind] = {
     kind.name: kind for kind in (_SINUSOID, _FOURIER, GRATING, NOISE, NOISE_PROFILE)
-}
-"""The kinds that are given by a formula or a spectrum."""
+} | LIBRARY
+"""All kinds and all named surfaces; what :func:`register` has added too."""
 
-CATALOGUE: dict[str, Kind] = {**TEXTURE_KINDS, **LIBRARY}
-"""All kinds and all named surfaces."""
+# What else the command line and scenes take where a kind stands.
+_RESERVED = ("file",)
+
+
+def register(kind: Kind) -> Kind:
+    """Make a kind of your own known by its name, on the command line and in scenes too.
+
+    Raises:
+        ParameterError: for a name that is taken, or is not lower-case letters, digits and hyphens.
+
+    Example:
+        >>> register(Kind("sinusoid", "mine", Sinusoid, ()))
+        Traceback (most recent call last):
+        ...
+        asperity.errors.ParameterError: kind 'sinusoid' is taken: one sinusoid, the classic of haptic texture
+    """  # noqa: E501  # doctest compares the whole message
+    if not re.fullmatch(r"[a-z][a-z0-9-]+", kind.name):
+        requirement = "must have a name of lower-case letters, digits and hyphens"
+        raise ParameterError("kind", requirement, kind.name)
+    if kind.name in CATALOGUE or kind.name in _RESERVED:
+        owner = CATALOGUE[kind.name].summary if kind.name in CATALOGUE else "a measured surface"
+        raise ParameterError("kind", f"{kind.name!r} is taken: {owner}")
+    CATALOGUE[kind.name] = kind
+    return kind

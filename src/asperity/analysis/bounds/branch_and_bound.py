@@ -16,6 +16,7 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.enclosures.cells import Cells
+from asperity.errors import InternalError
 
 DEFAULT_WORK_LIMIT = 20_000_000
 # Cells of each chunk at which the value itself is computed: the most promising ones.
@@ -27,6 +28,8 @@ _POLISH_STEPS = 50
 _SCALES = 4.0 ** -np.arange(5.0)
 _FINEST = 1e-10
 _LEAST_HALF = 1e-12
+# By how much what is attained may be above the bound: both are computed in double precision.
+_ROUNDING = 1e-9
 # So many cells cost next to nothing.
 _FEW = 4096
 
@@ -109,6 +112,9 @@ def supremum(
         tolerance: relative gap at which to stop.
         work_limit: greatest number of cells to look at; the bounds reached by then are returned.
         wished: a smaller gap, to be reached as long as few cells are left.
+
+    Raises:
+        InternalError: if a value is above the proved bound, so that nothing is proved.
     """
     goal = tolerance if wished is None else min(wished, tolerance)
     limit = min(work_limit, problem.cells.most or work_limit)
@@ -141,7 +147,11 @@ def supremum(
         chunks = _split(centres, half, parts, problem.cells.chunk())
     if at is not None:
         best, at = polish(problem, at, half, best)
-    return Supremum(best, max(best, dropped, left), at, looked, good)
+    proved = max(dropped, left)
+    if best > proved + _ROUNDING * abs(proved):
+        words = "the enclosures, or the bounds that the texture claims, are wrong"
+        raise InternalError(f"{best:g} is attained, above the proved bound {proved:g}: {words}")
+    return Supremum(best, max(best, proved), at, looked, good)
 
 
 def _first(problem: Problem) -> tuple[float, FloatArray | None]:

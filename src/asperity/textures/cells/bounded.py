@@ -129,21 +129,23 @@ class BoundedCells(Cells):
         """
         points = self.plane(coordinates)
         values = self._evaluate(points)
-        h, hx, hy, hxx, hxy, hyy = values.T
-        mean, half = 0.5 * (hxx + hyy), 0.5 * (hxx - hyy)
-        bend = np.abs(mean) + np.sqrt(half * half + hxy * hxy)
-        b, slack = self._bounds, self._slack
-        centre, reach = 0.5 * (b.low + b.high), 0.5 * (b.high - b.low)
-        for words, found, limit, order in (
-            ("its extremes", np.abs(h - centre), reach, 0),
-            ("its bound of the slope", np.hypot(hx, hy), b.slope, 1),
-            ("its bound of the second derivatives", bend, b.bend, 2),
-        ):
-            bad = ~(found <= limit * _ABOVE + slack[order])
-            if bad.any():
-                x, y = points[int(np.argmax(bad))]
-                raise InternalError(f"the texture exceeds {words} at ({x:g}, {y:g}) m")
+        b = self._bounds
+        middle, most = 0.5 * (b.low + b.high), 0.5 * (b.high - b.low)
+        # From one point to the next the Hessian changes by no more than T times the distance.
+        far = b.twist * np.hypot(*np.diff(points, axis=0).T)
+        self._check("the extremes", 0, points, np.abs(values[:, 0] - middle), most)
+        self._check("the slope bound", 1, points, np.hypot(values[:, 1], values[:, 2]), b.slope)
+        self._check("the bend bound", 2, points, _spectral(values[:, 3:]), b.bend)
+        self._check("the twist bound", 2, points, _spectral(np.diff(values[:, 3:], axis=0)), far)
         return values
+
+    def _check(
+        self, name: str, order: int, points: FloatArray, found: FloatArray, most: float | FloatArray
+    ) -> None:
+        above = ~(found <= most * _ABOVE + 2.0 * self._slack[order])
+        if above.any():
+            x, y = points[int(np.argmax(above))]
+            raise InternalError(f"the texture exceeds {name} that it claims at ({x:g}, {y:g}) m")
 
     def plane(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""
@@ -152,3 +154,9 @@ class BoundedCells(Cells):
     def inside(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""
         return coordinates if self._region.periodic else np.clip(coordinates, 0.0, 1.0)
+
+
+def _spectral(second: FloatArray) -> FloatArray:
+    """Return ‖H‖₂, shape (n,), of Hessians given as h_xx, h_xy, h_yy, (n, 3)."""
+    xx, xy, yy = second.T
+    return np.asarray(0.5 * np.abs(xx + yy) + np.hypot(0.5 * (xx - yy), xy))

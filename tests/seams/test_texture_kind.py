@@ -1,0 +1,326 @@
+"""A texture kind of a user's own, with a sampler of its own, gets everything; nothing is added.
+
+The kind is the example's, as a file outside of the package.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import shutil
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+
+import asperity as asp
+from asperity.analysis import one_sided_number
+from asperity.cli.main import main
+from asperity.definition import exact_force, exact_jacobian
+from asperity.enclosures.cells import NAMES
+from asperity.errors import InternalError, ParameterError
+from asperity.report.html import html_text
+from asperity.textures import Texture, catalogue
+from asperity.textures.kinds import Kind
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "own_texture.py"
+A, PERIOD = 0.1e-3, 2e-3
+WAVE = 2.0 * math.pi / PERIOD
+DEPTH = 0.2e-3
+Call = Callable[..., tuple[int, str]]
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
+    """The user's module, imported from a directory of the user's."""
+    folder = tmp_path_factory.mktemp("own")
+    shutil.copy(EXAMPLE, folder / "my_eggs.py")
+    sys.path.insert(0, str(folder))
+    try:
+        yield importlib.import_module("my_eggs")
+    finally:
+        sys.path.remove(str(folder))
+        del sys.modules["my_eggs"]
+
+
+@pytest.fixture
+def texture(own: ModuleType) -> Any:
+    return own.EggBox(amplitude=A, period=PERIOD)
+
+
+@pytest.fixture
+def plain(own: ModuleType) -> Any:
+    """The same without what a kind need not give."""
+
+    class Plain(own.EggBox):
+        twist = Texture.twist
+
+    return Plain(A, PERIOD)
+
+
+@pytest.fixture
+def registered(own: ModuleType, monkeypatch: pytest.MonkeyPatch) -> Kind:
+    # The catalogue itself, so that those who hold it see the kind come and go.
+    monkeypatch.setitem(catalogue.CATALOGUE, "egg-box", own.EGG_BOX)
+    monkeypatch.delitem(catalogue.CATALOGUE, "egg-box")
+    return catalogue.register(own.EGG_BOX)
+
+
+@pytest.fixture
+def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+    def run(*arguments: str) -> tuple[int, str]:
+        monkeypatch.setattr(sys, "argv", ["asperity", *arguments])
+        code = 0
+        try:
+            main()
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        captured = capsys.readouterr()
+        assert "Traceback" not in captured.err
+        return code, captured.out
+
+    return run
+
+
+# --- its values, by formulas of the test's own ----------------------------------------------------
+
+
+def grid(count: int) -> np.ndarray:
+    ticks = (np.arange(count) + 0.3) / count * PERIOD
+    return np.stack(np.meshgrid(ticks, ticks), axis=-1).reshape(-1, 2)
+
+
+def formulas(xy: np.ndarray) -> np.ndarray:
+    """Return h, h_x, h_y, h_xx, h_xy, h_yy by the sum of two waves along the diagonals."""
+    total = np.zeros((len(xy), 6))
+    for sign in (1.0, -1.0):
+        k = WAVE * np.array([1.0, sign])
+        s, c = 0.5 * A * np.sin(xy @ k), 0.5 * A * np.cos(xy @ k)
+        total += np.stack(
+            [c, *(-k[i] * s for i in (0, 1)), *(-k[i] * k[j] * c for i, j in PAIRS)]
+        ).T
+    return total
+
+
+PAIRS = ((0, 0), (0, 1), (1, 1))
+
+
+def dense_numbers(law: str, count: int = 401) -> tuple[float, float]:
+    """Return the greatest ‖J‖/k and λ_max(-sym J)/k of law A or C on a dense grid."""
+    _h, hx, hy, hxx, hxy, hyy = formulas(grid(count)).T
+    down = np.stack([hx, hy, np.full_like(hx, -1.0)], axis=-1)
+    norms, sides = [], []
+    for depth in (0.0, DEPTH):
+        if law == "C":  # the gradient of the energy k δ²/2
+            second = np.zeros((len(hx), 3, 3))
+            second[:, 0, 0], second[:, 0, 1], second[:, 1, 1] = hxx, hxy, hyy
+            second[:, 1, 0] = hxy
+            jacobian = -(down[:, :, None] * down[:, None, :] + depth * second)
+        else:  # A pushes along e_z with k δ
+            jacobian = np.zeros((len(hx), 3, 3))
+            jacobian[:, 2] = down
+        norms.append(np.linalg.norm(jacobian, 2, axis=(1, 2)).max())
+        symmetric = -0.5 * (jacobian + jacobian.transpose(0, 2, 1))
+        sides.append(np.linalg.eigvalsh(symmetric).max())
+    return float(max(norms)), float(max(sides))
+
+
+def test_its_sampler_is_what_it_says(texture: Any) -> None:
+    xy = grid(7)
+    scale = np.array([A, *[A * WAVE] * 2, *[A * WAVE**2] * 3])
+    assert (np.abs(texture.derivatives(xy) - formulas(xy)) < 1e-13 * scale).all()
+    points = np.column_stack([xy, np.full(len(xy), -0.3e-3)])
+    feet = texture.nearest(points)
+    near = grid(201)
+    around = near[None] + PERIOD * np.array([[[i, j]] for i in (-1, 0, 1) for j in (-1, 0, 1)])
+    surface = np.column_stack([around.reshape(-1, 2), np.tile(formulas(near)[:, 0], 9)])
+    for point, foot in zip(points, feet, strict=True):
+        best = np.linalg.norm(surface - point, axis=1).min()
+        assert np.linalg.norm(foot - point) <= best * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("law", ["A", "C"])
+@pytest.mark.parametrize("kind", ["texture", "plain"])
+def test_numbers_are_within_their_bounds(
+    law: str, kind: str, request: pytest.FixtureRequest
+) -> None:
+    """What a dense evaluation finds is below the proof; what is attained is above the grid's."""
+    surface = asp.Surface(request.getfixturevalue(kind), law, max_depth=DEPTH)
+    found = (asp.characteristic_number(surface), one_sided_number(surface))
+    for bound, dense in zip(found, dense_numbers(law), strict=True):
+        assert bound.method == "certified"
+        assert dense * (1.0 - 1e-9) <= bound.upper
+        assert bound.lower >= dense * (1.0 - 1e-4)
+        # Second derivatives that are not enclosed: each entry may be as large as their bound.
+        loose = 2.0 * DEPTH * (A * WAVE**2) if law == "C" and kind == "plain" else 0.0
+        assert bound.upper <= (dense + loose) * (1.01 if loose else 1.0011)
+
+
+def test_every_shipped_law_has_an_honest_number(plain: Any) -> None:
+    for law in "WABCDEFG":
+        surface = asp.Surface(plain, law, max_depth=DEPTH)
+        bound = asp.characteristic_number(surface)
+        assert bound.lower <= bound.upper
+        rng = np.random.default_rng(3)
+        points = np.column_stack(
+            [rng.uniform(-1, 1, (2000, 2)) * PERIOD, -rng.uniform(0, 1e-4, 2000)]
+        )
+        jacobians = surface.jacobian(points) / surface.stiffness
+        assert np.linalg.norm(jacobians, 2, axis=(1, 2)).max() <= bound.upper * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("law", ["A", "C", "D"])
+def test_the_definition_in_many_digits_follows(texture: Any, law: str) -> None:
+    surface = asp.Surface(texture, law, max_depth=DEPTH)
+    point = [0.31e-3, -0.17e-3, -0.05e-3]
+    force = np.array(exact_force(surface, point).tolist(), dtype=float)[:, 0]
+    np.testing.assert_allclose(surface.force([point])[0], force, atol=1e-12 * 1000.0 * DEPTH)
+    jacobian = np.array(exact_jacobian(surface, point).tolist(), dtype=float)
+    np.testing.assert_allclose(surface.jacobian([point])[0], jacobian, atol=1e-11 * 1000.0)
+
+
+def test_a_line_is_cut_into_pieces_that_enclose(texture: Any) -> None:
+    line = texture.scan_line()
+    pieces = texture.line_pieces(line, 64)
+    models = pieces.models(NAMES)
+    for xi in (-1.0, 0.3, 1.0):
+        along = (np.arange(64) + 0.5 + 0.5 * xi) * pieces.length
+        exact = formulas(line.start + along[:, None] * line.direction)
+        for i, name in enumerate(NAMES):
+            model = models[name]
+            assert (np.abs(exact[:, i] - model.c - xi * model.g[0]) <= model.e).all()
+    assert models["h"].e.max() < 2e-3 * A  # and tell something
+
+
+# --- what is wrong is not passed over -------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", ["A", "C", "G"])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("extremes", (-0.9 * A, 0.9 * A)),
+        ("bounds", (0.9 * A * WAVE, A * WAVE**2)),
+        ("bounds", (A * WAVE, 0.9 * A * WAVE**2)),
+    ],
+)
+def test_bounds_that_are_too_small_are_no_proof(
+    own: ModuleType, law: str, name: str, value: tuple[float, float]
+) -> None:
+    wrong = type("Wrong", (own.EggBox,), {name: value})(A, PERIOD)
+    with pytest.raises(InternalError):
+        asp.characteristic_number(asp.Surface(wrong, law, max_depth=DEPTH))
+
+
+def test_a_bound_of_third_derivatives_that_is_too_small_is_no_proof(own: ModuleType) -> None:
+    wrong = type("Wrong", (own.EggBox,), {"twist": A * WAVE**3})(A, PERIOD)
+    with pytest.raises(InternalError):
+        asp.characteristic_number(asp.Surface(wrong, "C", max_depth=DEPTH))
+
+
+# --- everything else follows ----------------------------------------------------------------------
+
+
+def test_python_has_everything(texture: Any) -> None:
+    result = asp.compare(texture, device="omega.3", laws="WABCDEFG", max_depth=DEPTH)
+    assert [row.law.letter for row in result.rows] == list("WABCDEFG")
+    data = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    assert data["texture"]["kind"] == "egg-box"
+    assert "egg-box" in html_text(result)
+    surface = asp.Surface(texture, "A", max_depth=DEPTH)
+    found = asp.analyze(surface, device="omega.3")
+    json.dumps(found.to_dict(), allow_nan=False)
+    assert "<svg" in html_text(found) or "<img" in html_text(found)
+    json.dumps(asp.limits(texture, device="omega.3").to_dict(), allow_nan=False)
+
+
+def test_a_loop_gains_what_it_says(plain: Any) -> None:
+    surface = asp.Surface(plain, "A", max_depth=DEPTH)
+    worst = asp.worst_loop(surface)
+    assert asp.loop_work(surface, worst.vertices) == pytest.approx(worst.energy, rel=1e-3)
+    assert worst.energy <= worst.upper
+
+
+def test_its_spectrum_is_sampled(texture: Any) -> None:
+    """Two waves along the diagonals: all the variance at l/√2, of a²/2 with a = A/√2."""
+    from asperity.analysis.limits.spectrum import spectrum
+
+    found = spectrum(texture)
+    assert not found.exact
+    strongest = max(found.waves, key=lambda wave: wave.share)
+    assert strongest.share > 0.99
+    assert strongest.wavelength == pytest.approx(PERIOD / math.sqrt(2.0), rel=1e-3)
+    assert strongest.amplitude == pytest.approx(A / math.sqrt(2.0), rel=1e-2)
+
+
+# --- by its name ----------------------------------------------------------------------------------
+
+
+def test_a_name_is_taken_once(registered: Kind) -> None:
+    with pytest.raises(ParameterError, match="'egg-box' is taken: bumps and dimples"):
+        catalogue.register(registered)
+
+
+@pytest.mark.parametrize("name", ["sinusoid", "cloth", "file", "Egg", "egg box", "", "e"])
+def test_names_that_cannot_be_taken(name: str, own: ModuleType) -> None:
+    before = dict(catalogue.CATALOGUE)
+    with pytest.raises(ParameterError, match="kind"):
+        catalogue.register(Kind(name, "mine", own.EggBox, ()))
+    assert before == catalogue.CATALOGUE
+
+
+@pytest.mark.usefixtures("registered")
+def test_the_command_line_has_everything(call: Call, tmp_path: Path) -> None:
+    specification = "egg-box:amplitude=0.1mm,period=2mm"
+    page = tmp_path / "report.html"
+    code, out = call("compare", specification, "--laws", "AC", "--json", "-", "--html", str(page))
+    assert code == 0
+    assert json.loads(out)["texture"]["kind"] == "egg-box"
+    assert "egg-box" in page.read_text(encoding="utf-8")
+    code, out = call("surfaces", "egg-box", "--json", "-")
+    assert code == 0
+    assert json.loads(out)["surfaces"][0]["specification"] == "egg-box:amplitude=100um,period=2mm"
+    assert call("compare", "egg-box:amplitude=0.1mm")[0] == 2
+    assert call("analyze", specification, "--law", "C", "--json", "-")[0] == 0
+    assert call("limits", specification, "--json", "-")[0] == 0
+
+
+@pytest.mark.usefixtures("registered")
+def test_a_scene_has_everything(call: Call, tmp_path: Path) -> None:
+    scene = tmp_path / "eggs.toml"
+    scene.write_text(
+        '[texture]\nkind = "egg-box"\namplitude = "0.1 mm"\nperiod = "2 mm"\n'
+        '[surface]\nlaw = "C"\nmax_depth = "0.2 mm"\n'
+        '[device]\nid = "omega.3"\napparent_mass = "250 g"\n'
+        '[hand]\nkind = "spring"\nstiffness = "500 N/m"\n'
+        '[motion]\nkind = "strokes"\nstart = "0mm; 0mm; -0.05mm"\n'
+        'end = "1mm; 0.2mm; -0.05mm"\nspeed = "50 mm/s"\n'
+        '[run]\nduration = "20 ms"\n',
+        encoding="utf-8",
+    )
+    code, out = call("analyze", str(scene), "--json", "-")
+    assert code == 0
+    assert json.loads(out)["texture"]["kind"] == "egg-box"
+    assert call("simulate", str(scene), "--json", "-")[0] == 0
+
+
+def test_the_example_runs(own: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    monkeypatch.setattr(catalogue, "CATALOGUE", dict(catalogue.CATALOGUE))
+    own.main()
+    assert "C: q = 1.1006 (certified)" in capsys.readouterr().out
+
+
+def test_digits_are_those_of_doubles(texture: Any) -> None:
+    """What the definition is told of a kind without a formula, and how good that is."""
+    h = texture.exact_height()
+    with mpmath.workdps(40):
+        k, x, y = mpmath.mpf(WAVE), mpmath.mpf("0.123e-3"), mpmath.mpf("0.321e-3")
+        exact = mpmath.mpf(A) * mpmath.cos(k * x) * mpmath.cos(k * y)
+        off = abs(h(x, y, 0, 0) - exact)
+    assert off < 1e-15 * A
