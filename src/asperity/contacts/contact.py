@@ -63,7 +63,7 @@ class Contact(ABC):
         begins_on_texture: whether contact begins at the textured surface.
         given_by_depth: whether point and depth determine the probe; not where the probe is pulled
             to the mean of several points.
-        costly: whether finding the point takes a search.
+        cost: how many heights of a map are found in the time that one contact point takes.
         clampable: whether a law on this contact may have its depth clamped.
         holds_anchor: whether a law on this contact may have state, an anchor that is held while
             there is contact.
@@ -74,12 +74,17 @@ class Contact(ABC):
     above_probe: ClassVar[bool] = False
     begins_on_texture: ClassVar[bool] = True
     given_by_depth: ClassVar[bool] = True
-    costly: ClassVar[bool] = True
+    cost: ClassVar[float] = 1000.0
     clampable: ClassVar[bool] = False
     holds_anchor: ClassVar[bool] = False
 
     def __str__(self) -> str:
         return self.name
+
+    @property
+    def costly(self) -> bool:
+        """Whether finding the point takes a search."""
+        return self.cost > 1.0
 
     @abstractmethod
     def derivatives(self) -> ContactDerivatives:
@@ -114,6 +119,19 @@ class Contact(ABC):
     @abstractmethod
     def depth(self, texture: HeightField, points: FloatArray) -> FloatArray:
         """Return the depths [m], (n,), of probes (n, 3) [m]; negative out of contact."""
+
+    def column(self, texture: HeightField, point: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the line through a probe along which depth grows.
+
+        Args:
+            texture: the surface.
+            point: a probe in contact [m], shape (3,).
+
+        Returns:
+            Where the line begins, at depth 0 [m], shape (3,), and its unit vector, shape (3,).
+        """
+        top = self.begin(texture, np.ascontiguousarray(point[None, :2]))[0]
+        return np.array([point[0], point[1], top]), np.array([0.0, 0.0, -1.0])
 
     @abstractmethod
     def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ class Nominal(Contact):
     single_valued = True
     above_probe = True
     begins_on_texture = False
-    costly = False
+    cost = 1.0
     clampable = True
     holds_anchor = True
 

@@ -14,7 +14,7 @@ class Vertical(Contact):
     name = "vertical"
     single_valued = True
     above_probe = True
-    costly = False
+    cost = 1.0
     clampable = True
 
     def derivatives(self) -> ContactDerivatives:

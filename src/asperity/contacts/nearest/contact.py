@@ -12,6 +12,7 @@ class Nearest(Contact):
     """Depth |p - p_h|, contact point p_h; two points tie on the medial axis, where it jumps."""
 
     name = "nearest"
+    cost = 100.0
 
     def derivatives(self) -> ContactDerivatives:
         """Return ∇depth = -n and, by the implicit function theorem, ∂(X, Y)/∂p = Q⁻¹ [I g].
@@ -47,6 +48,13 @@ class Nearest(Contact):
         feet = texture.nearest(points)
         below = points[:, 2] < texture.height(np.ascontiguousarray(points[:, :2]))
         return np.asarray(np.where(below, 1.0, -1.0) * np.linalg.norm(feet - points, axis=1))
+
+    def column(self, texture: HeightField, point: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Along the normal at the foot, into the body."""
+        foot = texture.nearest(point[None])[0]
+        hx, hy = texture.gradient(foot[None, :2])[0]
+        inward = np.array([hx, hy, -1.0])
+        return foot, inward / np.linalg.norm(inward)
 
     def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
         """Below the foot along its normal."""

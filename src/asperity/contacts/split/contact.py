@@ -16,6 +16,7 @@ class Split(Nearest):
     """
 
     name = "split"
+    cost = 1000.0
     single_valued = True
     given_by_depth = False
 
