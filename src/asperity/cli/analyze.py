@@ -107,11 +107,12 @@ def command(surface: str, device: Device | None, outputs: Outputs, **values: Any
     code = _texture_code(surface, for_file, scene.texture)
 
     def page() -> str:
-        from asperity.report.analysis_html import analysis_html
+        from asperity.report.analysis import analysis_page
+        from asperity.report.page import page_html
 
-        return analysis_html(result, code)
+        return page_html(analysis_page(result, code))
 
-    from asperity.report.analysis_table import print_analysis
+    from asperity.report.analysis import print_analysis
 
     outputs.write(result, lambda console: print_analysis(result, console, code), page)
 

@@ -35,7 +35,7 @@ def command(names: tuple[str, ...], outputs: Outputs) -> None:
 
 
 def _print(devices: Sequence[Device], in_detail: bool, console: Console) -> None:
-    from asperity.report.device_table import print_device, print_devices
+    from asperity.report.devices import print_device, print_devices
 
     if not in_detail:
         print_devices(devices, console)

@@ -69,10 +69,11 @@ def command(surface: str, device: Device | None, outputs: Outputs, **values: Any
     )
 
     def page() -> str:
-        from asperity.report.limits_html import limits_html
+        from asperity.report.limits import limits_page
+        from asperity.report.page import page_html
 
-        return limits_html(result)
+        return page_html(limits_page(result))
 
-    from asperity.report.limits_table import print_limits
+    from asperity.report.limits import print_limits
 
     outputs.write(result, lambda console: print_limits(result, console), page)

@@ -61,11 +61,12 @@ def command(
     found = _onsets(setup, chosen, delays or list(range(6)), given(values, _SEARCH))
 
     def page() -> str:
-        from asperity.report.onset_report import onset_html
+        from asperity.report.onset import onset_page
+        from asperity.report.page import page_html
 
-        return onset_html(setup, found)
+        return page_html(onset_page(setup, found))
 
-    from asperity.report.onset_report import print_onsets
+    from asperity.report.onset import print_onsets
 
     data = {"schema": 1, "scene": setup, "onsets": found}
     outputs.write(data, lambda console: print_onsets(setup, found, console), page)

@@ -53,12 +53,13 @@ def command(
     results, experiments = _reproduced(names or None, measured, with_experiments=not alone)
 
     def page() -> str:
-        from asperity.report.reproduce_html import reproduce_html
+        from asperity.report.page import page_html
+        from asperity.report.reproduce import reproduce_page
 
-        return reproduce_html(results, experiments)
+        return page_html(reproduce_page(results, experiments))
 
     def say(console: Console) -> None:
-        from asperity.report.reproduce_table import print_evidence, print_results
+        from asperity.report.reproduce import print_evidence, print_results
 
         if not names:
             print_results(results, experiments, console)

@@ -50,11 +50,12 @@ def command(scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **values
         found = scans(setup, letters, progress=told, **given(values, (*_LISTS, _STROKES)))
 
     def page() -> str:
-        from asperity.report.scan_report import scan_html
+        from asperity.report.page import page_html
+        from asperity.report.scan import scan_page
 
-        return scan_html(setup, found)
+        return page_html(scan_page(setup, found))
 
-    from asperity.report.scan_report import print_scans
+    from asperity.report.scan import print_scans
 
     data = {"schema": 1, "scene": setup, "strokes": found}
     outputs.write(data, lambda console: print_scans(setup, found, console), page)

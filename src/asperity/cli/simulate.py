@@ -45,12 +45,13 @@ def command(
         run = setup.simulate(trace=outputs.trace or True, progress=told)
 
     def page() -> str:
-        from asperity.report.run_html import run_html
+        from asperity.report.page import page_html
+        from asperity.report.run import run_page
         from asperity.simulation.rereading import reread
 
-        return run_html(setup, run if outputs.trace is None else reread(run))
+        return page_html(run_page(setup, run if outputs.trace is None else reread(run)))
 
-    from asperity.report.run_table import print_run
+    from asperity.report.run import print_run
 
     data = {"schema": 1, "scene": setup, "run": run}
     outputs.write(data, lambda console: print_run(setup, run, console), page)

@@ -8,20 +8,23 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from asperity.report.analysis_table import print_analysis
+    from asperity.report.analysis import print_analysis
+    from asperity.report.comparison import comparison_table, print_comparison
     from asperity.report.html import html_text
+    from asperity.report.page import add_section
     from asperity.report.pictures.plots import plot
-    from asperity.report.table import comparison_table, print_comparison
 
 _HOMES = {
-    "comparison_table": "asperity.report.table",
+    "add_section": "asperity.report.page",
+    "comparison_table": "asperity.report.comparison",
     "html_text": "asperity.report.html",
     "plot": "asperity.report.pictures.plots",
-    "print_analysis": "asperity.report.analysis_table",
-    "print_comparison": "asperity.report.table",
+    "print_analysis": "asperity.report.analysis",
+    "print_comparison": "asperity.report.comparison",
 }
 
 __all__ = [
+    "add_section",
     "comparison_table",
     "html_text",
     "plot",

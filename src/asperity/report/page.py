@@ -1,31 +1,90 @@
-"""A report of pictures and tables as one HTML file that needs no network."""
+"""A report is values: a page of sections, a section of blocks. One template writes it as HTML."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
-
-import jinja2
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import asperity
+from asperity.report.words.number_words import holds_text
+
+if TYPE_CHECKING:
+    import jinja2
+    from matplotlib.figure import Figure
+
+PAPER = "after Campion and Hayward, “On the Synthesis of Haptic Textures”"
+UNFELT = "No perceptual test stands behind these numbers."
+
+
+@dataclass(frozen=True)
+class Words:
+    """A paragraph.
+
+    Attributes:
+        text: plain text.
+        kind: "note" is faint, "mono" is one line of code; "code" keeps its line breaks.
+    """
+
+    form: ClassVar[str] = "words"
+    text: str
+    kind: str = ""
+
+
+@dataclass(frozen=True)
+class Items:
+    """A list of sentences."""
+
+    form: ClassVar[str] = "items"
+    sentences: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Definitions:
+    """Terms, and what each means."""
+
+    form: ClassVar[str] = "definitions"
+    pairs: Sequence[tuple[str, str]]
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture with its words.
+    """A picture.
 
     Attributes:
-        title: heading.
-        caption: what is to be seen.
         source: data URI.
-        notes: paragraphs below it.
+        alt: what it shows, for who does not see it; by default the title of its section.
     """
 
-    title: str
-    caption: str
+    form: ClassVar[str] = "picture"
     source: str
-    notes: Sequence[str] = ()
+    alt: str = ""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A cell of a table; a plain string is one too.
+
+    Attributes:
+        text: what it says.
+        kind: "no", "good" and "part" are coloured, "l" is bold, "open" is faint, "mono" is code,
+            "line" is not broken.
+        note: shown when pointed at.
+        below: a faint line below the text.
+        summary: of the details.
+        details: names and values of what stands behind it, folded away.
+    """
+
+    text: str
+    kind: str = ""
+    note: str = ""
+    below: str = ""
+    summary: str = "Evidence"
+    details: Sequence[tuple[str, str]] = ()
+
+
+Cells = list[str | Cell]
 
 
 @dataclass(frozen=True)
@@ -33,42 +92,64 @@ class Row:
     """A row of a table.
 
     Attributes:
-        cells: texts.
-        kinds: of single cells, by column: "no", "good" and "part" are coloured, "l" is bold,
-            "open" is faint.
+        cells: as many as the table has columns.
+        kind: "best" is tinted.
         id: for links to the row; may be empty.
-        summary: of the details, which are folded away.
-        details: names and values of what stands behind the row.
-        details_in: the column that they are folded into.
     """
 
-    cells: Sequence[str]
-    kinds: Mapping[int, str] = field(default_factory=dict)
+    cells: Sequence[str | Cell]
+    kind: str = ""
     id: str = ""
-    summary: str = "Evidence"
-    details: Sequence[tuple[str, str]] = ()
-    details_in: int = 0
 
 
 @dataclass(frozen=True)
-class Grid:
-    """A table with its words.
+class Table:
+    """A table.
 
     Attributes:
-        title: heading.
-        caption: what it says.
-        headings: of the columns.
+        headings: of the columns; none for a list of pairs.
         rows: its rows.
         numbers: which columns are numbers, from 0.
-        notes: paragraphs below it.
     """
 
-    title: str
-    caption: str
+    form: ClassVar[str] = "table"
     headings: Sequence[str]
     rows: Sequence[Row]
     numbers: Sequence[int] = ()
+
+
+@dataclass(frozen=True)
+class Cards:
+    """Sections side by side."""
+
+    form: ClassVar[str] = "cards"
+    sections: Sequence[Section]
+
+
+Block = Words | Items | Definitions | Picture | Table | Cards
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and what stands below it.
+
+    Attributes:
+        title: heading; may be empty.
+        blocks: in order.
+        caption: what is to be seen, above the blocks.
+        notes: paragraphs below them.
+        level: 2, or 3 for a part of the section before it.
+        kind: "assumed" stands in a box.
+        id: for links to the section; may be empty.
+    """
+
+    title: str
+    blocks: Sequence[Block]
+    caption: str = ""
     notes: Sequence[str] = ()
+    level: int = 2
+    kind: str = ""
+    id: str = ""
 
 
 @dataclass(frozen=True)
@@ -79,17 +160,68 @@ class Page:
         title: of the page.
         answer: one or two sentences.
         facts: names and values of what was asked.
-        parts: pictures and tables in order.
-        assumptions: sentences.
+        sections: in order.
         footer: where it comes from.
     """
 
     title: str
     answer: str
     facts: Sequence[tuple[str, str]]
-    parts: Sequence[Picture | Grid]
-    assumptions: Sequence[str] = ()
+    sections: Sequence[Section]
     footer: str = ""
+
+
+def pairs(rows: Sequence[tuple[str, str]]) -> Table:
+    """Return a table without headings: bold words, and what is said of each."""
+    return Table((), [Row([Cell(word, "l"), words]) for word, words in rows])
+
+
+def pictured(
+    title: str, figure: Figure, caption: str, notes: Sequence[str] = (), level: int = 2
+) -> Section:
+    """Return a section that shows a figure."""
+    from asperity.report.pictures.style import data_uri
+
+    return Section(title, [Picture(data_uri(figure))], caption, notes, level)
+
+
+def holds_cell(holds: bool | None) -> Cell:
+    """Return yes, no, or ? for what cannot be decided."""
+    return Cell(holds_text(holds), "open" if holds is None else "" if holds else "no")
+
+
+def assumed(sentences: Sequence[str], *blocks: Block) -> list[Section]:
+    """Return the section that says what was assumed; none where nothing was."""
+    if not sentences:
+        return []
+    return [Section("What was assumed", [Items(sentences), *blocks], kind="assumed")]
+
+
+# --- sections of one's own ------------------------------------------------------------------------
+
+_ADDED: dict[type, list[Callable[..., Section | None]]] = {}
+
+
+def add_section(result: type, section: Callable[..., Section | None]) -> None:
+    """Add a section to the page of every result of a type, before what was assumed.
+
+    Args:
+        result: the type, such as :class:`~asperity.analysis.compare.Comparison`.
+        section: called with what the page is made of: a comparison, an analysis, limits; of a run
+            its setup and the run. It returns a :class:`Section`, or ``None`` for none.
+    """
+    added = _ADDED.setdefault(result, [])
+    if section not in added:
+        added.append(section)
+
+
+def added_sections(result: type, *arguments: Any) -> list[Section]:
+    """Return the sections that were added to the pages of a type of result."""
+    made = [section(*arguments) for section in _ADDED.get(result, ())]
+    return [section for section in made if section is not None]
+
+
+# --- HTML -----------------------------------------------------------------------------------------
 
 
 def page_html(page: Page) -> str:
@@ -99,6 +231,8 @@ def page_html(page: Page) -> str:
 
 @lru_cache(maxsize=1)
 def _template() -> jinja2.Template:
+    import jinja2
+
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("asperity.report"),
         autoescape=True,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,7 +11,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.patheffects import Stroke, withStroke
 from matplotlib.quiver import Quiver
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator, SymmetricalLogLocator
+from matplotlib.ticker import FuncFormatter, SymmetricalLogLocator
 
 from asperity.analysis.analyze import Analysis
 from asperity.checks import FloatArray
@@ -27,9 +26,9 @@ from asperity.report.pictures.analysis_region import (
     working_depth,
 )
 from asperity.report.pictures.field_picture import Window, draw_fields
+from asperity.report.pictures.gain_picture import draw_gain_field, gain_bar
 from asperity.report.pictures.vertical_cut import CurlField, curl_field
-from asperity.report.words.analysis_words import interval_text, span_text
-from asperity.report.words.number_words import law_title, number_text
+from asperity.report.words.number_words import interval_text, law_title, span_text
 from asperity.units import engineering
 
 Part = Figure | SubFigure
@@ -178,16 +177,7 @@ def draw_gain(figure: Part, analysis: Analysis) -> None:
     scale = _gain_scale(analysis, field.gain)
     axes: Axes = figure.subplots()
     style.dress(axes)
-    axes.set_facecolor(style.FREE)
-    mesh = axes.pcolormesh(
-        field.along * wide.scale,
-        field.z * high.scale,
-        np.maximum(field.gain, scale.vmin or 0.0),
-        norm=scale,
-        cmap="magma_r",
-        shading="flat",
-        rasterized=True,
-    )
+    mesh = draw_gain_field(axes, field, scale, (wide, high))
     _pale(axes, analysis, window, field)
     at = in_window(window, witness(analysis)) if analysis.q.at is not None else None
     if at is not None:
@@ -197,7 +187,7 @@ def draw_gain(figure: Part, analysis: Analysis) -> None:
     axes.set_aspect("equal" if wide == high and _is_true(window) else "auto")
     style.label(axes, f"{_along_text(window)} [{wide.name}]", f"z [{high.name}]")
     style.entitle(axes, surface.law.letter, law_title(surface.law.name), _gain_remark(analysis))
-    _gain_bar(figure, mesh, axes)
+    gain_bar(figure, mesh, axes, "‖J‖ / k [1]")
 
 
 def _gain_remark(analysis: Analysis) -> str:
@@ -205,16 +195,6 @@ def _gain_remark(analysis: Analysis) -> str:
         return "q = ∞; the cross is where it first becomes so"
     cross = "; the cross attains the lower end" if analysis.q.at is not None else ""
     return f"q = {interval_text(analysis.q)} ({analysis.q.method}){cross}"
-
-
-def _gain_bar(figure: Part, mesh: Any, axes: Axes) -> None:
-    ticks = LogLocator(subs=(1.0, 2.0, 5.0))
-    bar = figure.colorbar(
-        mesh, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.02, extend="both",
-        ticks=ticks, format=FuncFormatter(lambda value, _place: number_text(value)),
-    )  # fmt: skip
-    bar.ax.xaxis.set_minor_locator(NullLocator())
-    style.dress_bar(bar, "‖J‖ / k [1]")
 
 
 def _mark(axes: Axes, x: float, y: float) -> None:
@@ -252,7 +232,7 @@ def draw_top(figure: Part, analysis: Analysis) -> None:
     style.label(axes, f"x [{unit.name}]", f"y [{unit.name}]")
     remark = "greatest of five depths, sampled; dotted: the vertical plane of the other picture"
     style.entitle(axes, surface.law.letter, "seen from above", remark)
-    _gain_bar(figure, mesh, axes)
+    gain_bar(figure, mesh, axes, "‖J‖ / k [1]")
 
 
 def _into(at: FloatArray, low: FloatArray, size: FloatArray, *, periodic: bool) -> FloatArray:
@@ -294,7 +274,7 @@ def draw_depth(figure: Part, analysis: Analysis) -> None:
     axes.set_ylim(-0.03 * highest if top <= 30.0 else -0.1, highest)
     axes.set_xlim(0.0, analysis.surface.max_depth * unit.scale)
     along = "along the normal" if abs(column.below[2]) < 1.0 else "below the surface"
-    if analysis.surface.law.contact.name == "nominal":
+    if not analysis.surface.law.contact.begins_on_texture:
         along = "below the smooth wall"
     style.label(axes, f"depth {along} [{unit.name}]", "singular values of J/k [1]")
     style.entitle(axes, analysis.surface.law.letter, "down to the witness", _gain_words(analysis))
@@ -304,18 +284,8 @@ def draw_depth(figure: Part, analysis: Analysis) -> None:
 def _beside(axes: Axes, part: float, words: str) -> None:
     """Write words beside a vertical line at a part of the width, on the side with more room."""
     left = part > 0.5
-    axes.annotate(
-        words,
-        (min(part, 1.0), 0.5),
-        (-4 if left else 4, 0),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        ha="right" if left else "left",
-        va="center",
-        fontsize=style.TICK,
-        color=style.SOFT,
-        bbox={"facecolor": style.CARD, "edgecolor": "none", "pad": 1.0, "alpha": 0.85},
-    )
+    side, away = ("right", -4) if left else ("left", 4)
+    style.note(axes, words, (min(part, 1.0), 0.5), xytext=(away, 0), ha=side, va="center")
 
 
 def _gain_words(analysis: Analysis) -> str:

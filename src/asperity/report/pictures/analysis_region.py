@@ -13,15 +13,17 @@ from asperity.analysis.bounds.highest import highest_point
 from asperity.analysis.bounds.measures import spectral_norm
 from asperity.checks import FloatArray
 from asperity.report.pictures.field_picture import Window
+from asperity.report.pictures.map_grid import map_grid
 from asperity.report.pictures.vertical_cut import Stretch, feature_length, stretch_of
 from asperity.surface import Surface
-from asperity.textures.texture import ScanLine, Texture
+from asperity.textures.texture import ScanLine
 
 # A picture shows the whole loop or the whole line if that is no longer than so many features.
 _MOST_FEATURES = 4.0
 _MARGIN = 0.05
 _COLUMN_POINTS = 600
-_TOP_CELLS = {"nominal": 260, "vertical": 260, "nearest": 180, "split": 60}
+# Cells of a map along its longer side, and what the map may cost, in heights found in that time.
+_TOP_CELLS, _TOP_BUDGET = 260, 1.7e7
 # Just inside the surface, where the Jacobian is its limit.
 _INSIDE = 1e-6
 TOP_LEVELS = (_INSIDE, 0.25, 0.5, 0.75, 1.0)
@@ -41,7 +43,7 @@ def witness(analysis: Analysis) -> FloatArray:
         return np.array(analysis.q.at)
     surface = analysis.surface
     xy = highest_point(surface.texture)
-    top = surface.texture.height(xy[None])[0] if surface.law.contact.name != "nominal" else 0.0
+    top = surface.law.contact.begin(surface.texture, xy[None])[0]
     return np.array([*xy, top - surface.max_depth])
 
 
@@ -127,11 +129,11 @@ def _features(surface: Surface) -> float:
 
 def _window(surface: Surface, stretch: Stretch, show: FloatArray) -> Window:
     """Return the window that holds surface and working region, and heights that must be seen."""
-    heights = surface.texture.height(stretch.xy(stretch.steps(1000)))
-    nominal = surface.law.contact.name == "nominal"
-    low = -surface.max_depth if nominal else float(heights.min()) - surface.max_depth
-    low = min(low, float(heights.min()), float(show.min()))
-    high = max(float(heights.max()), float(show.max()), 0.0 if nominal else -math.inf)
+    xy = stretch.xy(stretch.steps(1000))
+    heights = surface.texture.height(xy)
+    tops = surface.law.contact.begin(surface.texture, xy)
+    low = float(min(tops.min() - surface.max_depth, heights.min(), show.min()))
+    high = float(max(tops.max(), heights.max(), show.max()))
     margin = _MARGIN * (high - low)
     return Window(stretch, low - margin, high + margin)
 
@@ -159,25 +161,13 @@ def witness_column(analysis: Analysis) -> Column:
     """Return the column through the witness: vertical, or along the normal of the nearest point."""
     surface, bound = analysis.surface, analysis.q
     at = witness(analysis)
-    place, below = _column_axis(surface, at)
+    place, below = surface.law.contact.column(surface.texture, at)
     reach = surface.max_depth * np.linspace(0.0, 1.0, _COLUMN_POINTS)
     reach[0] = _INSIDE * surface.max_depth
     points = place + reach[:, None] * below
     jacobians = surface.jacobian(points, **_state(surface, bound, len(points)))
     values = np.asarray(np.linalg.svd(jacobians / surface.stiffness, compute_uv=False))
     return Column(reach, values, place, below, float((at - place) @ below))
-
-
-def _column_axis(surface: Surface, at: FloatArray) -> tuple[FloatArray, FloatArray]:
-    down = np.array([0.0, 0.0, -1.0])
-    if surface.law.contact.name == "nominal":
-        return np.array([at[0], at[1], 0.0]), down
-    if surface.law.contact.name == "vertical":
-        return np.array([at[0], at[1], surface.texture.height(at[None, :2])[0]]), down
-    foot = surface.texture.nearest(at[None])[0]
-    p, q = surface.texture.gradient(foot[None, :2])[0]
-    inward = np.array([p, q, -1.0])
-    return foot, inward / np.linalg.norm(inward)
 
 
 def _state(surface: Surface, bound: Bound, count: int) -> dict[str, FloatArray]:
@@ -208,24 +198,12 @@ class TopView:
 def top_view(analysis: Analysis) -> TopView:
     """Return the greatest ‖J‖/k at five depths below every point of a grid, of a map."""
     surface = analysis.surface
-    low, size = _rectangle(surface.texture)
-    step = float(size.max()) / _TOP_CELLS[surface.law.contact.name]
-    columns, rows = (max(2, round(float(side) / step)) for side in size)
-    x = low[0] + (np.arange(columns) + 0.5) * size[0] / columns
-    y = low[1] + (np.arange(rows) + 0.5) * size[1] / rows
-    xy = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    nominal = surface.law.contact.name == "nominal"
-    tops = np.zeros(len(xy)) if nominal else surface.texture.height(xy)
-    best = np.zeros(len(xy))
+    affordable = math.isqrt(int(_TOP_BUDGET / (len(TOP_LEVELS) * surface.law.contact.cost)))
+    grid = map_grid(surface.texture, min(_TOP_CELLS, affordable))
+    tops = surface.law.contact.begin(surface.texture, grid.xy)
+    best = np.zeros(len(grid.xy))
     for part in TOP_LEVELS:
-        points = np.column_stack([xy, tops - part * surface.max_depth])
+        points = np.column_stack([grid.xy, tops - part * surface.max_depth])
         jacobians = surface.jacobian(points, **_state(surface, analysis.q, len(points)))
         best = np.maximum(best, spectral_norm(jacobians) / surface.stiffness)
-    return TopView(low, size, best.reshape(rows, columns))
-
-
-def _rectangle(texture: Texture) -> tuple[FloatArray, FloatArray]:
-    """Return origin and size [m] of the rectangle about the domain."""
-    corners = texture.domain.points(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]))
-    low = corners.min(axis=0)
-    return low, corners.max(axis=0) - low
+    return TopView(grid.low, grid.size, best.reshape(grid.shape))

@@ -118,21 +118,18 @@ def draw_fields(
     curls = [curl_field(surface, stretch, bottom) for surface in surfaces]
     arrows = [arrow_field(surface, stretch, bottom, top) for surface in surfaces]
     scene = _scene(surfaces, window, curls, arrows)
-    columns = _columns(len(surfaces))
-    rows = math.ceil(len(surfaces) / columns)
-    grid: Any = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    panels = list(grid.ravel())
+    x, y = f"along the scan line [{scene.wide.name}]", f"z [{scene.high.name}]"
+    panels = style.panels(figure, len(surfaces), _columns(len(surfaces)), x=x, y=y)
     mesh: Any = None
     quiver: Any = None
-    for index, surface in enumerate(surfaces):
-        axes = panels[index]
+    for index, (axes, surface) in enumerate(zip(panels, surfaces, strict=True)):
         mesh = _draw_curl(axes, curls[index], scene)
         quiver = _draw_arrows(axes, arrows[index], scene)
         _draw_outline(axes, surface, scene)
         remark = remarks[index] if index < len(remarks) else ""
         style.entitle(axes, surface.law.letter, law_title(surface.law.name), remark)
-    _finish(figure, panels, len(surfaces), scene, (mesh, quiver))
-    return panels[: len(surfaces)]
+    _finish(figure, panels, scene, (mesh, quiver))
+    return panels
 
 
 def _scene(
@@ -200,52 +197,42 @@ def _draw_arrows(axes: Axes, field: ArrowField, scene: _Scene) -> Any:
 
 
 def _draw_outline(axes: Axes, surface: Surface, scene: _Scene) -> None:
-    """Draw the textured body, the nominal surface where the law acts below it, and the scan."""
+    """Draw the textured body, the surface where contact begins if another, and the scan."""
     along = scene.stretch.steps(600)
     x = along * scene.wide.scale
-    heights = surface.texture.height(scene.stretch.xy(along)) * scene.high.scale
-    nominal = surface.law.contact.name == "nominal"
-    axes.plot(x, heights, color=style.INK, linewidth=1.3, linestyle=":" if nominal else "-")
-    if nominal:
-        axes.axhline(0.0, color=style.INK, linewidth=1.3)
+    xy = scene.stretch.xy(along)
+    heights = surface.texture.height(xy) * scene.high.scale
+    contact = surface.law.contact
+    felt = contact.begins_on_texture
+    axes.plot(x, heights, color=style.INK, linewidth=1.3, linestyle="-" if felt else ":")
+    if not felt:
+        tops = contact.begin(surface.texture, xy) * scene.high.scale
+        axes.plot(x, tops, color=style.INK, linewidth=1.3)
     axes.axhline(
         scan_height(surface) * scene.high.scale, color=style.GREEN, linewidth=1.0, linestyle="--"
     )
 
 
-def _finish(
-    figure: Figure | SubFigure, panels: list[Axes], count: int, scene: _Scene, drawn: Any
-) -> None:
+def _finish(figure: Figure | SubFigure, panels: list[Axes], scene: _Scene, drawn: Any) -> None:
     mesh, quiver = drawn
-    columns = _columns(count)
-    for axes in panels[count:]:
-        axes.set_visible(False)
-    for index, axes in enumerate(panels[:count]):
-        style.dress(axes)
-        lowest = index + columns >= count
-        axes.tick_params(labelbottom=lowest)
-        style.label(
-            axes,
-            f"along the scan line [{scene.wide.name}]" if lowest else "",
-            f"z [{scene.high.name}]" if index % columns == 0 else "",
-        )
+    for axes in panels:
         axes.set_xlim(0.0, scene.stretch.length * scene.wide.scale)
         axes.set_ylim(scene.bottom * scene.high.scale, scene.top * scene.high.scale)
         if scene.true_to_scale and scene.wide == scene.high:
             axes.set_aspect("equal")
     bar = figure.colorbar(
-        mesh, ax=panels[:count], location="bottom", shrink=0.5, aspect=40, extend="both", pad=0.02
+        mesh, ax=panels, location="bottom", shrink=0.5, aspect=40, extend="both", pad=0.02
     )
     style.dress_bar(bar, "curl [N/m]: white is conservative")
     force = style.nice_length(0.35 * scene.per_inch)
     unit = style.force_unit(force)
     quiver.axes.quiverkey(
         quiver,
-        0.9,
+        0.92,
         1.04,
         force,
         f"{force * unit.scale:g} {unit.name}",
-        labelpos="E",
+        labelpos="W",
         fontproperties={"size": style.TICK},
         labelcolor=style.INK,
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -44,28 +43,16 @@ def draw_forces(figure: Figure | SubFigure, surfaces: Sequence[Surface]) -> None
     """Draw tangential and normal force along the scan for every law, on shared axes."""
     stretch = force_stretch(surfaces[0].texture)
     forces = [scan_forces(surface, stretch) for surface in surfaces]
-    columns = min(_COLUMNS, len(surfaces))
-    rows = math.ceil(len(surfaces) / columns)
-    grid: Any = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     limits = _shared_limits(forces)
     unit = style.force_unit(max(map(abs, limits)))
     wide = style.length_unit(stretch.length)
-    panels = list(grid.ravel())
-    for axes, surface, force in zip(panels, surfaces, forces, strict=False):
+    x, y = f"along the scan line [{wide.name}]", f"force [{unit.name}]"
+    panels = style.panels(figure, len(surfaces), _COLUMNS, x=x, y=y)
+    for axes, surface, force in zip(panels, surfaces, forces, strict=True):
         _draw_panel(axes, surface, force, (wide, unit))
         _mark_cut(axes, force, limits, unit)
     panels[0].set_ylim(limits[0] * unit.scale, limits[1] * unit.scale)
     panels[0].set_xlim(0.0, stretch.length * wide.scale)
-    for axes in panels[len(surfaces) :]:
-        axes.set_visible(False)
-    for index, axes in enumerate(panels[: len(surfaces)]):
-        lowest = index + columns >= len(surfaces)
-        axes.tick_params(labelbottom=lowest)
-        style.label(
-            axes,
-            f"along the scan line [{wide.name}]" if lowest else "",
-            f"force [{unit.name}]" if index % columns == 0 else "",
-        )
     _draw_key(figure, panels[0])
 
 
@@ -89,7 +76,6 @@ def _draw_panel(
     axes.axhline(0.0, color=style.FAINT, linewidth=0.8)
     axes.plot(x, force.normal * unit.scale, color=style.ORANGE, linewidth=1.3, label="normal")
     axes.plot(x, force.tangential * unit.scale, color=style.BLUE, linewidth=1.3, label="tangential")
-    style.dress(axes)
     style.entitle(axes, surface.law.letter, law_title(surface.law.name))
     axes.set_title(
         f"z = {engineering(scan_height(surface), 'm', digits=2)}",
@@ -109,17 +95,8 @@ def _mark_cut(axes: Axes, force: ScanForces, limits: tuple[float, float], unit: 
     if low < limits[0]:
         words.append(f"down to {low * unit.scale:.2g} {unit.name}")
     if words:
-        axes.text(
-            0.99,
-            0.95,
-            "leaves the picture: " + ", ".join(words),
-            transform=axes.transAxes,
-            ha="right",
-            va="top",
-            fontsize=style.TICK,
-            color=style.INK,
-            bbox={"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.5},
-        )
+        left = f"leaves the picture: {', '.join(words)}"
+        style.note(axes, left, (0.99, 0.95), ha="right", va="top", color=style.INK)
 
 
 def _draw_key(figure: Figure | SubFigure, axes: Axes) -> None:

@@ -6,15 +6,17 @@ import math
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from asperity.analysis.compare import Comparison
+from asperity.analysis.row import LawRow
 from asperity.report.pictures import style
 from asperity.report.pictures.field_picture import field_stretch
-from asperity.report.pictures.vertical_cut import CurlField, curl_field, field_range
-from asperity.report.words.number_words import bound_text, law_title
+from asperity.report.pictures.vertical_cut import CurlField, Stretch, curl_field, field_range
+from asperity.report.words.number_words import bound_text, law_title, number_text
 
 _COLUMNS = 3
 _CELLS = (120, 60)
@@ -33,58 +35,50 @@ def gain_figure(comparison: Comparison) -> Figure:
     highest = max(float(np.quantile(values[np.isfinite(values)], 0.995)), 2.0)
     scale = LogNorm(min(0.5, float(np.quantile(values[values > 0.0], 0.02))), highest)
     wide, high = style.length_unit(stretch.length), style.length_unit(top - bottom)
-    columns = min(_COLUMNS, len(surfaces))
-    rows = math.ceil(len(surfaces) / columns)
-    figure = style.new_figure(10.0, 2.2 * rows + 0.9)
-    grid: Any = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    panels = list(grid.ravel())
-    mesh: Any = None
-    for index, (row, field) in enumerate(zip(comparison.rows, fields, strict=True)):
-        axes = panels[index]
-        mesh = _draw(axes, field, scale, wide.scale, high.scale)
+    figure = style.new_figure(10.0, 2.2 * math.ceil(len(surfaces) / _COLUMNS) + 0.9)
+    x, y = f"along the scan line [{wide.name}]", f"z [{high.name}]"
+    panels = style.panels(figure, len(surfaces), _COLUMNS, x=x, y=y)
+    for axes, row, field in zip(panels, comparison.rows, fields, strict=True):
+        mesh = draw_gain_field(axes, field, scale, (wide, high))
         style.entitle(axes, row.law.letter, law_title(row.law.name), f"q = {bound_text(row.q)}")
-        if row.q.at is not None:
-            offset = np.array(row.q.at[:2]) - stretch.xy(np.zeros(1))[0]
-            along = float(offset @ stretch.line.direction)
-            aside = float(np.linalg.norm(offset - along * stretch.line.direction))
-            if 0.0 <= along <= stretch.length and aside < 0.01 * stretch.length:
-                x, y = along * wide.scale, row.q.at[2] * high.scale
-                axes.plot(x, y, "x", color=style.BLUE, ms=7, mew=2, zorder=5)
-        lowest = index + columns >= len(surfaces)
-        axes.tick_params(labelbottom=lowest)
-        style.label(
-            axes,
-            f"along the scan line [{wide.name}]" if lowest else "",
-            f"z [{high.name}]" if index % columns == 0 else "",
-        )
+        _draw_witness(axes, row, stretch, (wide, high))
         axes.set_ylim(bottom * high.scale, top * high.scale)
-    for axes in panels[len(surfaces) :]:
-        axes.set_visible(False)
-    bar = figure.colorbar(
-        mesh,
-        ax=panels[: len(surfaces)],
-        location="bottom",
-        shrink=0.5,
-        aspect=40,
-        extend="both",
-        ticks=LogLocator(subs=(1.0, 2.0, 5.0)),
-        format="%g",
-    )
-    bar.ax.xaxis.set_minor_locator(NullLocator())
-    style.dress_bar(bar, "‖J‖ / k: loop gain over that of the smooth wall [1]")
+    gain_bar(figure, mesh, panels, "‖J‖ / k: loop gain over that of the smooth wall [1]")
     return figure
 
 
-def _draw(axes: Any, field: CurlField, scale: LogNorm, wide: float, high: float) -> Any:
-    style.dress(axes)
+def _draw_witness(
+    axes: Axes, row: LawRow, stretch: Stretch, units: tuple[style.Unit, style.Unit]
+) -> None:
+    """Draw a cross at the witness of q if it lies in the part of the plane that is shown."""
+    if row.q.at is None:
+        return
+    offset = np.array(row.q.at[:2]) - stretch.xy(np.zeros(1))[0]
+    along = float(offset @ stretch.line.direction)
+    aside = float(np.linalg.norm(offset - along * stretch.line.direction))
+    if 0.0 <= along <= stretch.length and aside < 0.01 * stretch.length:
+        x, y = along * units[0].scale, row.q.at[2] * units[1].scale
+        axes.plot(x, y, "x", color=style.BLUE, ms=7, mew=2, zorder=5)
+
+
+def draw_gain_field(
+    axes: Axes, field: CurlField, scale: LogNorm, units: tuple[style.Unit, style.Unit]
+) -> Any:
+    """Draw ‖J‖/k of the cells of a vertical plane; return what a colour bar needs."""
     axes.set_facecolor(style.FREE)
-    shown = np.maximum(field.gain, scale.vmin if scale.vmin is not None else 1e-3)
     return axes.pcolormesh(
-        field.along * wide,
-        field.z * high,
-        shown,
-        norm=scale,
-        cmap="magma_r",
-        shading="flat",
-        rasterized=True,
-    )
+        field.along * units[0].scale, field.z * units[1].scale,
+        np.maximum(field.gain, scale.vmin or 0.0),
+        norm=scale, cmap="magma_r", shading="flat", rasterized=True,
+    )  # fmt: skip
+
+
+def gain_bar(figure: Figure | SubFigure, mesh: Any, axes: Axes | list[Axes], words: str) -> None:
+    """Draw the colour bar of ‖J‖/k."""
+    bar = figure.colorbar(
+        mesh, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.02, extend="both",
+        ticks=LogLocator(subs=(1.0, 2.0, 5.0)),
+        format=FuncFormatter(lambda value, _place: number_text(value)),
+    )  # fmt: skip
+    bar.ax.xaxis.set_minor_locator(NullLocator())
+    style.dress_bar(bar, words)

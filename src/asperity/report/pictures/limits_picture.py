@@ -15,8 +15,6 @@ from asperity.analysis.limits.limit_words import speed_text, stiffness_text
 from asperity.report.pictures import style
 from asperity.units import engineering
 
-# Behind words, so that lines do not run through them.
-_PLATE = {"facecolor": style.CARD, "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
 _MILLI = 1e3  # wavelengths are drawn in mm, whatever their size: the axis is logarithmic
 
 
@@ -114,17 +112,11 @@ def _draw_shortest(result: Limits, both: Sequence[Axes]) -> list[float]:
     for level, (least, number, words) in enumerate(found):
         for axes in both:
             axes.axvline(least * _MILLI, color=style.ORANGE, lw=1.0, ls="--", zorder=1.0)
-        both[0].annotate(
-            f"{number}: {words}, {engineering(least, 'm')}",
-            (least * _MILLI, 0.97 - 0.11 * level),
-            (4, 0),
-            xycoords=("data", "axes fraction"),
-            textcoords="offset points",
-            fontsize=style.TICK,
-            color=style.ORANGE,
-            va="top",
-            bbox=_PLATE,
-        )
+        style.note(
+            both[0], f"{number}: {words}, {engineering(least, 'm')}",
+            (least * _MILLI, 0.97 - 0.11 * level), xycoords=("data", "axes fraction"),
+            xytext=(4, 0), va="top", color=style.ORANGE,
+        )  # fmt: skip
     if found:
         for axes in both:
             axes.axvspan(1e-12, found[-1][0] * _MILLI, color=style.ORANGE, alpha=0.06, lw=0.0)
@@ -143,28 +135,14 @@ def _draw_weakest(result: Limits, axes: Axes, scale: float) -> None:
         lines.append((friction, "dry friction of the device", style.GREEN))
     for force, words, colour in lines:
         axes.axhline(force * scale, color=colour, lw=1.0, ls="--", zorder=1.0)
-        axes.annotate(
-            f"{words}, {engineering(force, 'N')}",
-            (0.005, force * scale),
-            (0, 4),
-            xycoords=("axes fraction", "data"),
-            textcoords="offset points",
-            fontsize=style.TICK,
-            color=colour,
-            bbox=_PLATE,
-        )
+        style.note(
+            axes, f"{words}, {engineering(force, 'N')}", (0.005, force * scale),
+            xycoords=("axes fraction", "data"), xytext=(0, 4), color=colour,
+        )  # fmt: skip
     low, high = axes.get_ylim()
     values = [force * scale for force, _words, _colour in lines]
     if values:
         axes.set_ylim(min(low, min(values) / 3.0), max(high, max(values) * 4.0))
     if not lines and math.isfinite(low):
-        axes.annotate(
-            "force steps and friction of the device are not known",
-            (0.995, 0.94),
-            xycoords="axes fraction",
-            fontsize=style.TICK,
-            color=style.SOFT,
-            ha="right",
-            va="top",
-            bbox=_PLATE,
-        )
+        words = "force steps and friction of the device are not known"
+        style.note(axes, words, (0.995, 0.94), ha="right", va="top")

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from asperity.analysis.compare import Comparison
 from asperity.report.pictures import style
-from asperity.report.words.number_words import strength_has_unit
+from asperity.report.words.comparison_words import strength_has_unit
 
 
 def merit_figure(comparison: Comparison) -> Figure:

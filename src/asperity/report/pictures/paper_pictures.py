@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from asperity.laws import find_law
 from asperity.paper.figures import ForceField, LoopEnergy, force_fields, loop_energies
-from asperity.report.page import Picture
 from asperity.report.pictures import style
 from asperity.report.words.number_words import law_title
 
@@ -181,21 +180,3 @@ def energy_words(panel: LoopEnergy) -> str:
     gain = round(panel.energy * _MICRO, 1)
     source = f", as {panel.equation}" if panel.equation else ""
     return f"gains {gain:.1f} µJ{source}" if gain > 0.0 else f"returns all{source}"
-
-
-def paper_pictures() -> list[Picture]:
-    """Return figures 2 and 3 of the paper with their words."""
-    fields = (
-        "The texture of section V.B, 0.8 mm sin(2πx/2 mm), with κ₀ = 1000 N/m. The two handles are "
-        "as deep on one flank of the crest as on the other, 0.6 mm below z = 0: laws differ in the "
-        "direction of the force and in how deep they take a handle to be."
-    )
-    loops = (
-        "Closed paths, and the energy that a law has given to a probe that went along them once. A "
-        "law that ends above zero can be turned again and again: it feeds the hand. C and D, which "
-        "the paper does not show, go the way of A."
-    )
-    return [
-        Picture("Figure 2: forces", fields, style.data_uri(figure_two())),
-        Picture("Figure 3: energy around closed paths", loops, style.data_uri(figure_three())),
-    ]

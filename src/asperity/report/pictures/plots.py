@@ -20,7 +20,7 @@ from asperity.report.pictures.gain_picture import gain_figure
 from asperity.report.pictures.merit_picture import merit_figure
 from asperity.report.pictures.spectrum_picture import spectrum_figure
 from asperity.report.pictures.surface_picture import draw_surface, surface_size
-from asperity.report.words.number_words import leak_text
+from asperity.report.words.comparison_words import leak_text
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 

@@ -48,10 +48,6 @@ def _scan_axis(run: Run) -> int:
     return int(np.argmax(np.ptp(run.position[:, :2], axis=0)))
 
 
-def _legend(axes: Axes) -> None:
-    axes.legend(fontsize=style.TICK, frameon=False, loc="best", labelcolor=style.SOFT)
-
-
 def _draw_motion(axes: Axes, setup: Setup, run: Run, shown: slice) -> None:
     time, place, anchor = run.time[shown], run.position[shown], run.anchor[shown]
     height = setup.surface.texture.height(place[:, :2])
@@ -62,7 +58,7 @@ def _draw_motion(axes: Axes, setup: Setup, run: Run, shown: slice) -> None:
     inside = np.abs(anchor[:, 2]).max() < 4.0 * max(np.abs(place[:, 2]).max(), 1e-9)
     if inside:
         axes.plot(time, anchor[:, 2] * unit.scale, color=style.SOFT, lw=0.8, ls="--", label="hand")
-    _legend(axes)
+    style.legend(axes)
     style.label(axes, "", f"z [{unit.name}]")
     style.entitle(axes, "Motion", "height of the handle over the surface below it")
 
@@ -79,7 +75,7 @@ def _draw_force(axes: Axes, run: Run, shown: slice) -> None:
         axes.plot(
             run.time[shown], applied[:, i] * unit.scale, color=_COLOURS[i], lw=0.8, label=_AXES[i]
         )
-    _legend(axes)
+    style.legend(axes)
     style.label(axes, "", f"force [{unit.name}]")
     style.entitle(axes, "Force", "applied to the handle")
 
@@ -92,7 +88,7 @@ def _draw_energy(axes: Axes, run: Run, shown: slice) -> None:
     axes.plot(run.time[shown], supplied.sum(axis=1), color=style.INK, lw=1.4, label="sum, exact")
     axes.plot(run.time[shown], paper, color=style.SOFT, lw=0.9, ls="--", label="the paper's sum")
     axes.axhline(0.0, color=style.FAINT, lw=0.8, zorder=0.0)
-    _legend(axes)
+    style.legend(axes)
     style.label(axes, "time [s]", "energy [mJ]")
     style.entitle(axes, "Energy", "that the texture has supplied; up feeds the hand")
 

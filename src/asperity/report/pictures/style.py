@@ -12,7 +12,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 
 CARD = "#ffffff"
 """Background of every picture, light in both themes."""
@@ -90,6 +90,52 @@ def dress(axes: Axes) -> None:
         spine.set_linewidth(0.8)
 
 
+def panels(
+    figure: Figure | SubFigure,
+    count: int,
+    columns: int,
+    *,
+    x: str = "",
+    y: str = "",
+    sharey: bool = True,
+) -> list[Axes]:
+    """Return axes side by side, dressed, in rows; only the outer ones carry words and numbers.
+
+    Args:
+        figure: where to.
+        count: of axes.
+        columns: greatest number of axes in a row.
+        x: what all have along, written below the lowest.
+        y: what all have upwards, written beside the first of each row.
+        sharey: whether all have one vertical scale, too.
+    """
+    columns = min(columns, count)
+    rows = -(-count // columns)
+    grid: Any = figure.subplots(rows, columns, sharex=True, sharey=sharey, squeeze=False)
+    for index, axes in enumerate(grid.ravel()):
+        axes.set_visible(index < count)
+        lowest = index + columns >= count
+        dress(axes)
+        axes.tick_params(labelbottom=lowest)
+        label(axes, x if lowest else "", y if index % columns == 0 else "")
+    return list(grid.ravel()[:count])
+
+
+def legend(axes: Axes, **options: Any) -> None:
+    """Name the lines, without a frame."""
+    axes.legend(**{"fontsize": TICK, "frameon": False, "labelcolor": SOFT, **options})
+
+
+def note(axes: Axes, words: str, place: tuple[float, float], **options: Any) -> None:
+    """Write small words on a plate, so that lines do not run through them."""
+    plate = {"facecolor": CARD, "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
+    defaults: dict[str, Any] = {
+        "xycoords": "axes fraction", "xytext": (0, 0), "textcoords": "offset points",
+        "fontsize": TICK, "color": SOFT, "bbox": plate,
+    }  # fmt: skip
+    axes.annotate(words, place, **{**defaults, **options})
+
+
 def entitle(axes: Axes, letter: str, name: str, remark: str = "") -> None:
     """Write a title: the letter bold, the name after it, and a remark below them."""
     above = TICK + 6.0 if remark else 0.0
@@ -121,6 +167,8 @@ def svg_text(figure: Figure) -> str:
     options: dict[str, Any] = {"facecolor": CARD, "metadata": {"Date": None, "Creator": None}}
     figure.savefig(buffer, format="svg", dpi=160, **options)
     text = buffer.getvalue().decode("utf-8")
+    # A page needs neither the prologue nor the words about the file.
+    text = re.sub(r"\s*<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     # Matplotlib draws its identifiers at random; numbered in order, the text is reproducible.
     found = dict.fromkeys(re.findall(r'id="((?:image|[a-zA-Z])[0-9a-f]{10})"', text))
     for number, identifier in enumerate(found):

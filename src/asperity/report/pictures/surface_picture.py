@@ -13,6 +13,7 @@ from matplotlib.figure import Figure, SubFigure
 
 from asperity.checks import FloatArray
 from asperity.report.pictures import style
+from asperity.report.pictures.map_grid import map_grid
 from asperity.report.pictures.vertical_cut import Stretch, feature_length, stretch_of
 from asperity.textures.texture import Texture
 
@@ -62,27 +63,10 @@ def draw_section(axes: Axes, texture: Texture, stretch: Stretch) -> None:
     )
 
 
-def _rectangle(texture: Texture) -> tuple[FloatArray, FloatArray]:
-    """Return origin and size [m] of the rectangle about the domain."""
-    domain = texture.domain
-    corners = domain.points(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]))
-    low = corners.min(axis=0)
-    return low, corners.max(axis=0) - low
-
-
-def _map_grid(texture: Texture) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return origin, size [m] and heights (rows, columns) [m] of the map."""
-    low, size = _rectangle(texture)
-    step = float(size.max()) / _MAP_POINTS
-    columns, rows = (max(2, round(float(side) / step)) for side in size)
-    x = low[0] + (np.arange(columns) + 0.5) * size[0] / columns
-    y = low[1] + (np.arange(rows) + 0.5) * size[1] / rows
-    grid = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    return low, size, texture.height(grid).reshape(rows, columns)
-
-
 def _draw_map(figure: Figure | SubFigure, axes: Axes, texture: Texture) -> None:
-    low, size, heights = _map_grid(texture)
+    grid = map_grid(texture, _MAP_POINTS)
+    low, size = grid.low, grid.size
+    heights = texture.height(grid.xy).reshape(grid.shape)
     wide = style.length_unit(float(size.max()))
     high = style.length_unit(texture.peak_to_valley)
     norm = Normalize(float(heights.min()) * high.scale, float(heights.max()) * high.scale)

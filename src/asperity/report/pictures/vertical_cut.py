@@ -17,6 +17,8 @@ from asperity.textures.texture import ScanLine, Texture
 _SURVEY_POINTS = 4096
 _CURL_COLUMNS, _CURL_ROWS = 160, 90
 _ARROW_COLUMNS, _ARROW_ROWS = 20, 12
+# What a field may cost, in heights of a map that are found in the same time; else it is coarser.
+_BUDGET = 2.2e6
 
 
 @dataclass(frozen=True)
@@ -115,8 +117,6 @@ class ScanForces:
 
 def scan_forces(surface: Surface, stretch: Stretch, count: int = 900) -> ScanForces:
     """Return the forces along the stretch at the height of the scan."""
-    if surface.law.contact.name == "split":
-        count = min(count, 300)
     along = stretch.steps(count)
     points = np.column_stack([stretch.xy(along), np.full(count, scan_height(surface))])
     forces = surface.force(points, **sliding_state(surface, count))
@@ -167,16 +167,16 @@ def curl_field(
         surface: a law with state is taken sliding along the line, fully deflected.
         stretch: the part of the scan line.
         bottom: of the region [m], below the surface everywhere.
-        columns: number of cells along the scan.
-        rows: number of cells upwards.
+        columns: number of cells along the scan; fewer where the contact is costly.
+        rows: number of cells upwards; likewise.
     """
-    if surface.law.contact.name == "split":
-        # The costliest contact has no curl to resolve finely.
-        columns, rows = max(columns // 4, 1), max(rows // 4, 1)
+    coarser = math.sqrt(min(1.0, _BUDGET / (surface.law.contact.cost * columns * rows)))
+    columns, rows = (max(1, round(coarser * count)) for count in (columns, rows))
     edges = stretch.steps(columns + 1)
     middles = 0.5 * (edges[1:] + edges[:-1])
     xy = stretch.xy(middles)
-    tops, corner_tops = _contact_top(surface, xy), _contact_top(surface, stretch.xy(edges))
+    begin, texture = surface.law.contact.begin, surface.texture
+    tops, corner_tops = begin(texture, xy), begin(texture, stretch.xy(edges))
     fractions = (np.arange(rows) + 0.5) / rows
     z = bottom + (tops - bottom)[:, None] * fractions
     points = np.column_stack([np.repeat(xy, rows, axis=0), z.ravel()])
@@ -188,13 +188,6 @@ def curl_field(
     norm = float(np.linalg.norm(J, axis=(1, 2)).max(initial=0.0))
     gain = spectral_norm(J).reshape(columns, rows) / surface.stiffness
     return CurlField(corner_t, corner_z, curl.reshape(columns, rows), gain, norm)
-
-
-def _contact_top(surface: Surface, xy: FloatArray) -> FloatArray:
-    """Return the height below which the law acts [m]."""
-    if surface.law.contact.name == "nominal":
-        return np.zeros(len(xy))
-    return surface.texture.height(xy)
 
 
 @dataclass(frozen=True)
@@ -227,7 +220,7 @@ def arrow_field(
     levels = bottom + (np.arange(rows) + 0.5) * ((top - bottom) / rows)
     along, z = (grid.ravel() for grid in np.meshgrid(steps, levels, indexing="ij"))
     xy = stretch.xy(along)
-    inside = z < _contact_top(surface, xy)
+    inside = z < surface.law.contact.begin(surface.texture, xy)
     points = np.column_stack([xy, z])[inside]
     forces = surface.force(points, **sliding_state(surface, len(points)))
     return ArrowField(

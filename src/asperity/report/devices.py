@@ -1,15 +1,16 @@
-"""Devices in a terminal: the catalogue, and one device with the source of every number."""
+"""Devices: the catalogue and one device in a terminal, the numbers of a device on a page."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-from rich import box
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from asperity.devices import FIELD_TABLE, Datum, Device
+from asperity.report import page
+from asperity.report.terminal import Column, say, table
+from asperity.report.words.number_words import NONE, law_title
 
 UNVERIFIED = "?"
 NOT_VERIFIED_NOTE = (
@@ -38,7 +39,7 @@ def datum_text(datum: Datum | None) -> str:
         ('55 µm ?', '–')
     """
     if datum is None:
-        return "–"
+        return NONE
     return datum.text if datum.verified else f"{datum.text} {UNVERIFIED}"
 
 
@@ -49,39 +50,54 @@ def devices_table(devices: Sequence[Device], width: int = 100) -> Table:
         devices: what to list.
         width: of the console in characters; full names are left out on a narrow one.
     """
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, pad_edge=False)
-    table.add_column("id", no_wrap=True, style="bold")
     named = width >= _NAMES_FROM
-    if named:
-        table.add_column("device")
-    for heading in _COLUMNS:
-        table.add_column(heading, justify="right", no_wrap=True)
-    for device in devices:
-        numbers = [datum_text(device.data.get(field)) for field in _COLUMNS.values()]
-        cells = [device.id, *([device.name] if named else []), *numbers]
-        table.add_row(*[Text(cell) for cell in cells])
-    return table
+    columns = [Column("id", style="bold"), *([Column("device", wraps=True)] if named else [])]
+    columns += [Column(heading, right=True) for heading in _COLUMNS]
+    rows = [
+        [
+            device.id,
+            *([device.name] if named else []),
+            *[datum_text(device.data.get(field)) for field in _COLUMNS.values()],
+        ]
+        for device in devices
+    ]
+    return table(columns, [(cells, "") for cells in rows])
 
 
 def device_table(device: Device) -> Table:
     """Return every number of a device with its source; other values of it in the rows below."""
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, pad_edge=False)
-    table.add_column("what", no_wrap=True)
-    table.add_column("value", justify="right", no_wrap=True)
-    table.add_column("verified", no_wrap=True)
-    table.add_column("source")
+    columns = (
+        Column("what"), Column("value", right=True), Column("verified"),
+        Column("source", wraps=True),
+    )  # fmt: skip
+    return table(columns, _rows(device))
+
+
+def _rows(device: Device) -> Iterator[tuple[list[str], str]]:
     for field, datum in device.data.items():
-        _add(table, field.replace("_", " "), datum)
-        for other in datum.also:
-            _add(table, "  also", other)
-    return table
+        named = [(law_title(field), datum), *(("  also", other) for other in datum.also)]
+        for what, one in named:
+            verified, style = ("yes", "") if one.verified else ("no", "yellow")
+            yield [what, one.text, verified, one.source], style
 
 
-def _add(table: Table, what: str, datum: Datum) -> None:
-    verified = "yes" if datum.verified else "no"
-    style = "" if datum.verified else "yellow"
-    cells = [Text(cell) for cell in (what, datum.text, verified, datum.source)]
-    table.add_row(*cells, style=style)
+def numbers_table(device: Device, fields: Sequence[str]) -> page.Table:
+    """Return the numbers of a device for a page, with what is asked for and not known.
+
+    Args:
+        device: the device.
+        fields: what is asked for.
+    """
+    rows = []
+    for field in fields:
+        datum = device.data.get(field)
+        if datum is None:
+            unknown = page.Cell("not known", "open")
+            rows.append(page.Row([law_title(field), "", unknown, FIELD_TABLE[field].words]))
+        else:
+            verified = page.holds_cell(datum.verified)
+            rows.append(page.Row([law_title(field), datum.text, verified, datum.source]))
+    return page.Table((device.name, "value", "verified", "source"), rows, numbers=(1,))
 
 
 def unknown_fields(device: Device) -> list[str]:
@@ -106,25 +122,25 @@ def print_devices(devices: Sequence[Device], console: Console) -> None:
     console.print(devices_table(devices, console.width))
     console.print()
     if any(not datum.verified for device in devices for datum in device.data.values()):
-        console.print(Text(NOT_VERIFIED_NOTE, style="dim"))
-    console.print(Text("Sources and other values: asperity devices NAME", style="dim"))
+        say(console, NOT_VERIFIED_NOTE, "dim")
+    say(console, "Sources and other values: asperity devices NAME", "dim")
 
 
 def print_device(device: Device, console: Console) -> None:
     """Print everything that is known of a device, and what is not."""
     title = device.name if device.name == device.id else f"{device.name} ({device.id})"
-    console.print(Text(title, style="bold"))
+    say(console, title, "bold")
     console.print()
     console.print(device_table(device))
     if device.axes:
         console.print()
-        console.print(Text(f"Axes: {device.axes}"))
+        say(console, f"Axes: {device.axes}")
     for note in device.notes:
         console.print()
-        console.print(Text(note))
+        say(console, note)
     missing = unknown_fields(device)
     if missing:
         console.print()
-        console.print(Text("Not known, so what needs it is not decided:"))
+        say(console, "Not known, so what needs it is not decided:")
         for words in missing:
-            console.print(Text(f"  {words}"))
+            say(console, f"  {words}")

@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from rich.console import Console
+from tests.report.pages import terminal
 
-from asperity.report.run_html import run_html
-from asperity.report.run_table import print_run
+from asperity.report.page import page_html
+from asperity.report.run import print_run, run_page
 from asperity.report.words.run_words import answer, closing_words, energy, ledger_rows
 from asperity.scene import load_scene
 from asperity.scene.setup import Setup, make_setup
@@ -60,11 +60,12 @@ def test_numbers_beyond_all_bounds_are_words(setup: Setup, run: Run) -> None:
 
 
 def test_table_and_page_say_the_same(setup: Setup, run: Run) -> None:
-    console = Console(width=80, record=True, quiet=True)
-    print_run(setup, run, console)
-    page = run_html(setup, run)
+    shown = terminal(print_run, setup, run, width=80)
+    page = page_html(run_page(setup, run))
     for name, cells in ledger_rows(run):
         assert name.replace("'", "&#39;") in page
         assert cells[3] in page
+        assert cells[3] in shown
     for sentence in setup.assumptions:
         assert sentence.replace("'", "&#39;") in page
+        assert sentence in " ".join(shown.split())

@@ -9,12 +9,9 @@ from asperity.paper.experiments.bump import bump_experiment
 from asperity.paper.experiments.passivity import passivity_experiment
 from asperity.paper.experiments.run import Experiments
 from asperity.paper.experiments.scanning import scanning_experiment
-from asperity.report.page import Grid, Page, Picture, page_html
-from asperity.report.pictures.experiment_pictures import (
-    cycles_figure,
-    devices_figure,
-    experiment_parts,
-)
+from asperity.report.experiments import experiment_sections
+from asperity.report.page import Page, Picture, Table, page_html
+from asperity.report.pictures.experiment_pictures import cycles_figure, devices_figure
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
@@ -30,25 +27,31 @@ def found() -> Experiments:
     )
 
 
-def test_parts_in_order(found: Experiments) -> None:
-    parts = experiment_parts(found)
-    assert [part.title.split(",")[0] for part in parts] == [
+def test_sections_in_order(found: Experiments) -> None:
+    sections = experiment_sections(found)
+    assert [section.title.split(",")[0] for section in sections] == [
         "V.A", "V.A", "V.A", "V.B", "V.B", "V.C", "Predicted and simulated", "Devices in numbers",
     ]  # fmt: skip
-    pictures = [part for part in parts if isinstance(part, Picture)]
-    assert all(part.source.startswith("data:image/svg+xml") for part in pictures)
-    assert "Not stated by the paper" in pictures[0].notes[0]
-    assert "falcon" in pictures[-1].notes[1]
-    html = page_html(Page("title", "answer", [], parts))
-    assert html.count("<figure>") == len(pictures) == 5
+    drawn = [section for section in sections if isinstance(section.blocks[0], Picture)]
+    for section in drawn:
+        assert isinstance(section.blocks[0], Picture)
+        assert section.blocks[0].source.startswith("data:image/svg+xml")
+    assert "Not stated by the paper" in drawn[0].notes[0]
+    assert "falcon" in drawn[-1].notes[1]
+    html = page_html(Page("title", "answer", [], sections))
+    assert html.count("<figure>") == len(drawn) == 5
 
 
 def test_tables_have_as_many_cells_as_headings(found: Experiments) -> None:
-    for part in experiment_parts(found):
-        if isinstance(part, Grid):
-            assert part.rows
-            for row in part.rows:
-                assert len(row.cells) == len(part.headings)
+    tables = [
+        block for section in experiment_sections(found) for block in section.blocks
+        if isinstance(block, Table)
+    ]  # fmt: skip
+    assert len(tables) == 3
+    for table in tables:
+        assert table.rows
+        for row in table.rows:
+            assert len(row.cells) == len(table.headings)
 
 
 def test_figures_show_what_was_found(found: Experiments) -> None:

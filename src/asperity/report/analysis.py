@@ -1,0 +1,260 @@
+"""The analysis of one law: in a terminal, and as a page."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.table import Table
+
+from asperity.analysis.analyze import Analysis
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.passivity.criteria import Criterion
+from asperity.report import page, terminal
+from asperity.report.devices import numbers_table
+from asperity.report.page import (
+    PAPER,
+    UNFELT,
+    Cell,
+    Cells,
+    Definitions,
+    Page,
+    Row,
+    Section,
+    Words,
+    added_sections,
+    assumed,
+    holds_cell,
+    pairs,
+    pictured,
+)
+from asperity.report.terminal import Column, head, say
+from asperity.report.words import glossary
+from asperity.report.words.analysis_words import (
+    jump_rows,
+    leak_facts,
+    merit_facts,
+    notes,
+    numbers,
+    open_criteria,
+)
+from asperity.report.words.number_words import (
+    NONE,
+    down_text,
+    holds_text,
+    interval_text,
+    law_title,
+    limit_text,
+    up_text,
+    witness_text,
+)
+from asperity.report.words.reproduction_words import reproduction
+from asperity.units import engineering
+
+_NUMBERS = ("number", "lower", "upper", "method")
+_CRITERIA = ("criterion", "condition", "holds", "limit", "margin")
+_JUMPS = ("at depth", "jumps by")
+# What the criteria of passivity use of the device.
+_USED = ("max_stiffness", "update_rate", "damping", "virtual_damping", "delay_samples")
+
+
+def _number_cells(name: str, bound: Bound) -> list[str]:
+    ends = [down_text(bound.lower), up_text(bound.upper)]
+    return [name, *ends, bound.method, witness_text(bound)]
+
+
+def _criterion_cells(criterion: Criterion) -> list[str]:
+    margin = NONE if criterion.margin is None else down_text(criterion.margin, 3)
+    said = [criterion.name, criterion.formula, holds_text(criterion.holds)]
+    return [*said, limit_text(criterion.limit), margin]
+
+
+# --- in a terminal --------------------------------------------------------------------------------
+
+
+def _numbers_table(analysis: Analysis) -> Table:
+    """Return one row per number: lower, upper, method and the point that attains lower."""
+    columns = [Column(name, right=i in {1, 2}) for i, name in enumerate(_NUMBERS)]
+    rows = [(_number_cells(name, bound), "") for name, bound in numbers(analysis)]
+    return terminal.table([*columns, Column("attained at", wraps=True)], rows)
+
+
+def _criteria_table(analysis: Analysis) -> Table:
+    """Return one row per criterion of passivity; the one that decides carries an arrow."""
+    columns = [Column(name, right=i > 2) for i, name in enumerate(_CRITERIA)]
+    columns[0] = Column("criterion", wraps=True, most=18)
+    rows = []
+    for criterion in analysis.passivity.criteria:
+        decides = criterion.name == analysis.passivity.decided_by
+        style = "bold" if decides else "dim" if criterion.holds is None else ""
+        rows.append((["→" if decides else "", *_criterion_cells(criterion)], style))
+    return terminal.table([Column(""), *columns], rows)
+
+
+def _jumps_table(analysis: Analysis) -> Table:
+    """Return one row per depth at which a jump was located."""
+    near = Column("near (both witnesses are in the JSON)", wraps=True)
+    columns = [*(Column(name, right=True) for name in _JUMPS), near]
+    return terminal.table(columns, [(row, "") for row in jump_rows(analysis)])
+
+
+def print_analysis(analysis: Analysis, console: Console, texture: str = "") -> None:
+    """Print the verdict, the numbers, the criteria, the worst loop, the jumps, and three lines.
+
+    Args:
+        analysis: the result.
+        console: where to.
+        texture: an expression of Python that makes the texture; see
+            :func:`asperity.report.words.reproduction_words.reproduction`.
+    """
+    law = analysis.surface.law
+    say(console, analysis.answer, "bold")
+    head(console, f"Law {law.letter}, {law_title(law.name)}: suprema over the working region")
+    console.print(_numbers_table(analysis))
+    for line in notes(analysis):
+        say(console, line, "dim")
+    head(console, f"Passive on the {analysis.device.name}? {analysis.passivity.verdict}")
+    console.print(_criteria_table(analysis))
+    console.print(terminal.pairs(open_criteria(analysis), "dim", most=26))
+    head(console, "Worst loop")
+    console.print(terminal.pairs(leak_facts(analysis), most=26))
+    head(console, "Continuity")
+    say(console, analysis.continuity.reason)
+    if analysis.continuity.jumps:
+        console.print(_jumps_table(analysis))
+    head(console, "On a straight scan")
+    console.print(terminal.pairs(merit_facts(analysis), most=26))
+    head(console, "Reproduce q")
+    for line in reproduction(analysis, texture):
+        console.print(line, soft_wrap=True, markup=False, highlight=False)
+    terminal.print_assumptions(console, analysis.assumptions)
+
+
+# --- as a page ------------------------------------------------------------------------------------
+
+
+def analysis_page(analysis: Analysis, texture: str = "") -> Page:
+    """Return the report: verdict, numbers, criteria, pictures and assumptions.
+
+    Args:
+        analysis: the result.
+        texture: an expression of Python that makes the texture; see
+            :func:`asperity.report.words.reproduction_words.reproduction`.
+    """
+    law, code = analysis.surface.law, "\n".join(reproduction(analysis, texture))
+    return Page(
+        title=f"Law {law.letter} on the {analysis.device.name}",
+        answer=analysis.answer,
+        facts=_facts(analysis),
+        sections=[
+            _numbers(analysis),
+            Section("Three lines that reproduce q", [Words(code, "code")]),
+            *_pictures(analysis, "gain", "top", "depth"),
+            _criteria(analysis),
+            Section("The worst loop", [pairs(leak_facts(analysis))]),
+            *_pictures(analysis, "field"),
+            _continuity(analysis),
+            *_pictures(analysis, "jumps"),
+            Section("On a straight scan", [pairs(merit_facts(analysis))]),
+            *added_sections(Analysis, analysis),
+            *assumed(analysis.assumptions, numbers_table(analysis.device, _USED)),
+            Section("How to read it", [Definitions(glossary.ANALYSIS)]),
+        ],
+        footer=f"{PAPER}. {UNFELT}",
+    )
+
+
+def _facts(analysis: Analysis) -> list[tuple[str, str]]:
+    surface = analysis.surface
+    decisive = analysis.passivity.criterion(analysis.passivity.decided_by)
+    return [
+        ("Surface", str(surface.texture.describe()["kind"])),
+        ("Peak to valley", engineering(surface.texture.peak_to_valley, "m")),
+        ("Law", f"{surface.law.letter}, {law_title(surface.law.name)}"),
+        ("Device", analysis.device.name),
+        ("Stiffness", f"{surface.stiffness:g} N/m"),
+        ("Pressed to", engineering(surface.max_depth, "m")),
+        ("Characteristic number q", interval_text(analysis.q)),
+        (f"Greatest stiffness by {decisive.name}", limit_text(decisive.limit)),
+    ]
+
+
+def _numbers(analysis: Analysis) -> Section:
+    rows = [_number_cells(name, bound) for name, bound in numbers(analysis)]
+    table = page.Table(
+        (*_NUMBERS, "lower is attained at"),
+        [Row([Cell(name, "l"), *cells]) for name, *cells in rows],
+        numbers=(1, 2),
+    )
+    return Section("The numbers", [table], notes=notes(analysis))
+
+
+def _criteria(analysis: Analysis) -> Section:
+    judged = analysis.passivity
+    rows = []
+    for criterion in judged.criteria:
+        name, formula, _holds, limit, margin = _criterion_cells(criterion)
+        said = Cell(criterion.says, below=criterion.assumptions)
+        holds = holds_cell(criterion.holds)
+        cells: Cells = [Cell(name, "l"), Cell(formula, "line"), holds, limit, margin, said]
+        rows.append(Row(cells, "best" if name == judged.decided_by else ""))
+    headings = (*_CRITERIA, "what it says, and rests on")
+    return Section(
+        f"Passive on the {analysis.device.name}?",
+        [page.Table(headings, rows, numbers=(3, 4))],
+        caption=(
+            f"Verdict: {judged.verdict}. It rests on: {judged.decided_by}. T is the period of an "
+            "update, σ₀ the least damping of the device, b_v virtual damping, d the whole samples "
+            "of delay, K₀ the stiffest smooth wall that it renders."
+        ),
+    )
+
+
+def _continuity(analysis: Analysis) -> Section:
+    blocks: list[page.Block] = [Words(analysis.continuity.reason)]
+    rows = [Row(cells) for cells in jump_rows(analysis)]
+    if rows:
+        blocks.append(page.Table((*_JUMPS, "near"), rows, numbers=(0, 1)))
+    return Section("Continuity", blocks)
+
+
+def _pictures(analysis: Analysis, *names: str) -> list[Section]:
+    """Return the pictures of these names that the analysis has."""
+    from asperity.report.pictures.analysis_pictures import analysis_figure, pictures_of
+
+    return [
+        pictured(title, analysis_figure(analysis, name), caption, level=3)
+        for name, (title, caption) in ((name, _CAPTIONS[name]) for name in names)
+        if name in pictures_of(analysis)
+    ]
+
+
+_CAPTIONS = {
+    "field": (
+        "The field and the worst loop",
+        "Arrows: force on the probe. Colour: curl; the probe gains energy on a loop around one "
+        "colour. White everywhere: conservative. Blue: the worst loop, turned as its arrows say, "
+        "projected on the plane. The dashed line is the scan; what lies deeper than the working "
+        "region is paled. A law with state is drawn sliding, its anchor trailing at full "
+        "deflection; its worst loop may lie in a horizontal plane and is then seen from the side.",
+    ),
+    "gain": (
+        "Where the loop gain is",
+        "‖J‖/k in the vertical plane through the witness of q: by how much the law multiplies the "
+        "stiffness of the smooth wall at each place. Computed on a grid, which meets thin ridges "
+        "of the medial axis only here and there.",
+    ),
+    "top": (
+        "The loop gain from above",
+        "The greatest ‖J‖/k of five depths below each point, sampled on a grid: greater values "
+        "may lie between. The bounds of q above are not sampled.",
+    ),
+    "depth": (
+        "Singular values over depth",
+        "Those of J/k on the way down to the witness of q; ‖J‖/k is the greatest. The lines are "
+        "the bounds of q.",
+    ),
+    "jumps": (
+        "How far the force jumps",
+        "At each depth the difference of the force at two points on either side of the medial "
+        "axis, closer together than 1e-9 of the texture.",
+    ),
+}

@@ -1,0 +1,82 @@
+"""The picture of the six limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from asperity.analysis.limits.device_limits import limits
+from asperity.analysis.limits.limit_result import Limits
+from asperity.devices import parse_device
+from asperity.report.pictures.limits_picture import limits_figure, shortest
+from asperity.textures import Fourier, HeightMap, Sinusoid
+
+BENCH = {
+    "max_stiffness": 2000.0, "position_resolution": 15e-6, "force_resolution": 2e-3,
+    "bandwidth": 400.0, "update_rate": 1e4, "friction": 0.03,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def result() -> Limits:
+    texture = Fourier([5e-5, 2e-5], [2 * np.pi / 1e-3, 2 * np.pi / 0.2e-3])
+    return limits(texture, parse_device(BENCH, "bench"), law="A")
+
+
+def test_the_shortest_waves_by_hand(result: Limits) -> None:
+    """α v T, β δ and v/F₀; α δ is drawn only where it differs."""
+    assert [(number, round(least, 9)) for least, number, _words in shortest(result)] == [
+        (1, 50e-6), (2, 75e-6), (6, 250e-6),
+    ]  # fmt: skip
+    other = limits(Sinusoid(5e-5, 1e-3), result.device, law="A", time_samples=8.0)
+    assert [(number, round(least, 9)) for least, number, _words in shortest(other)] == [
+        (2, 75e-6), (1, 80e-6), (3, 120e-6), (6, 250e-6),
+    ]  # fmt: skip
+
+
+def test_the_picture_shows_waves_forces_and_limits(result: Limits) -> None:
+    upper, lower = limits_figure(result).axes
+    assert lower.get_xlabel() == "wavelength [mm]"
+    assert upper.get_ylabel() == "amplitude [µm]"
+    assert lower.get_ylabel() in {"force [N]", "force [mN]"}
+    for axes, values in ((upper, [50.0, 20.0]), (lower, [wave.force for wave in result.waves])):
+        scale = 1e3 if axes.get_ylabel() == "force [mN]" else 1.0
+        drawn = {
+            (round(float(x), 9), round(float(y), 9))
+            for line in axes.lines if line.get_marker() == "o"
+            for x, y in zip(*line.get_data(), strict=True)
+        }  # fmt: skip
+        expected = zip([1.0, 0.2], values, strict=True)
+        assert drawn == {(x, round(y * scale, 9)) for x, y in expected}
+    dashed = {
+        round(float(line.get_xdata()[0]), 9) for line in upper.lines if line.get_linestyle() == "--"
+    }
+    assert dashed == {0.05, 0.075, 0.25}
+    words = " ".join(text.get_text() for text in lower.texts)
+    assert "4: 5 steps of force, 10 mN" in words
+    assert "dry friction of the device, 30 mN" in words
+
+
+def test_waves_that_meet_every_limit_are_filled(result: Limits) -> None:
+    marks = [line for line in limits_figure(result).axes[0].lines if line.get_marker() == "o"]
+    filled = [line for line in marks if line.get_markerfacecolor() == line.get_markeredgecolor()]
+    empty = [line for line in marks if line not in filled]
+    assert [list(line.get_xdata()) for line in filled] == [[1.0]]
+    assert [list(np.round(line.get_xdata(), 9)) for line in empty] == [[0.2]]
+
+
+def test_pictures_of_what_is_not_known_and_of_what_is_flat() -> None:
+    unknown = limits(Sinusoid(5e-5, 1e-3), parse_device({}, "none"), law="A")
+    words = " ".join(text.get_text() for text in limits_figure(unknown).axes[1].texts)
+    assert "not known" in words
+    flat = limits(HeightMap(np.full((6, 6), 1e-3), 1e-4), parse_device(BENCH, "bench"), law="A")
+    assert "flat" in " ".join(text.get_text() for text in limits_figure(flat).axes[0].texts)
+
+
+@pytest.mark.parametrize("law", ["W", "D", "G"])
+def test_pictures_of_other_laws_can_be_drawn(law: str) -> None:
+    """W pushes with nothing, which a logarithmic axis must bear."""
+    figure = limits_figure(limits(Sinusoid(5e-5, 1e-3), parse_device(BENCH, "bench"), law=law))
+    figure.canvas.draw()
+    low, high = figure.axes[1].get_ylim()
+    assert 0.0 < low < high

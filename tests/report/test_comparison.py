@@ -1,0 +1,76 @@
+"""The comparison in a terminal, as a page, and in a notebook."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from tests.report.pages import Reader, check_alone, terminal
+
+import asperity as asp
+from asperity.devices import parse_device
+from asperity.report import comparison_table, html_text, print_comparison
+
+TEXTURE = asp.Sinusoid(amplitude=0.2e-3, period=2e-3)
+
+
+@pytest.fixture(scope="module")
+def result() -> asp.Comparison:
+    return asp.compare(TEXTURE, device="omega.3", laws="WACD", max_depth=0.3e-3)
+
+
+@pytest.fixture(scope="module")
+def page(result: asp.Comparison) -> str:
+    return html_text(result)
+
+
+@pytest.mark.parametrize("width", [80, 100, 120])
+def test_the_answer_fits_the_terminal(result: asp.Comparison, width: int) -> None:
+    text = terminal(print_comparison, result, width=width)
+    assert max(len(line) for line in text.splitlines()) <= width
+    for row in result.rows:
+        found = [line for line in text.splitlines() if re.match(rf"{row.law.letter} +\S", line)]
+        assert len(found) >= 2  # the table's row and the verdict
+    assert "…" not in text
+    assert "K₀" in text
+
+
+def test_sampled_numbers_carry_a_mark() -> None:
+    found = asp.compare(asp.Sinusoid(amplitude=0.1e-3, period=2e-3), laws="ACF")
+    leaks = [str(cell) for cell in comparison_table(found, 120).columns[7].cells]
+    assert leaks[0][0].isdigit()  # A's leak is certified
+    assert leaks[1] == "0"  # C's is zero by theorem
+    assert leaks[2].startswith("~")  # F's is the worst loop that was tried
+
+
+def test_page_has_a_row_per_law_with_the_letter_alone(page: str) -> None:
+    rows = re.findall(r'<tr[^>]*><td class="l">([^<]*)</td>', page)
+    assert rows[:4] == ["W", "A", "C", "D"]
+
+
+def test_page_loads_nothing(page: str) -> None:
+    reader = check_alone(page)
+    assert len(reader.loaded) == 6
+
+
+def test_page_says_what_was_assumed(result: asp.Comparison, page: str) -> None:
+    assert "What was assumed" in page
+    for sentence in result.assumptions:
+        assert sentence.split(":")[0][:40].replace("'", "&#39;") in page
+    assert "not verified" in page.lower() or ">no<" in page
+
+
+def test_hostile_names_are_escaped() -> None:
+    hostile = "<script>alert(1)</script>"
+    device = parse_device({"name": hostile, "max_stiffness": 1000.0}, "mine")
+    text = html_text(asp.compare(TEXTURE, device=device, laws="WA"))
+    assert hostile not in text
+    assert "script" not in Reader(text).tags
+    assert "&lt;script&gt;" in text
+
+
+def test_notebook_table_has_a_row_per_law(result: asp.Comparison) -> None:
+    text = result._repr_html_()
+    assert text.count("<tr>") == 1 + len(result.rows)
+    assert "<td>∞" not in text
+    assert result.recommendation[:20] in text

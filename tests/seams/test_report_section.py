@@ -1,0 +1,53 @@
+"""A section of one's own on the page of a result, through public means only."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import asperity as asp
+from asperity.cli.main import main
+from asperity.report import add_section, html_text, page
+from asperity.report.page import Cell, Row, Section, Table
+
+
+def paint(comparison: asp.Comparison) -> Section | None:
+    """Say how much paint the surface takes; nothing of one that is almost flat."""
+    height = comparison.texture.peak_to_valley
+    if height < 1e-5:
+        return None
+    rows = [Row([Cell(row.law.letter, "l"), f"{1e3 * height:.3g} mm"]) for row in comparison.rows]
+    return Section("Paint", [Table(("law", "thickness"), rows)], caption="One coat.")
+
+
+@pytest.fixture(autouse=True)
+def _added(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(page, "_ADDED", {})
+    add_section(asp.Comparison, paint)
+
+
+def test_it_is_on_the_page_that_the_command_line_writes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "report.html"
+    arguments = ["compare", "sinusoid:amplitude=0.1mm,period=1mm", "--laws", "WC"]
+    monkeypatch.setattr("sys.argv", ["asperity", *arguments, "--html", str(path)])
+    main()
+    text = path.read_text("utf-8")
+    assert text.count("<h2>Paint</h2>") == 1
+    assert text.count("<td>0.2 mm</td>") == 2
+    assert text.index("Strength and support") < text.index("Paint") < text.index("What was assumed")
+
+
+def test_it_may_have_nothing_to_say() -> None:
+    text = html_text(asp.compare(asp.Sinusoid(1e-6, 1e-3), laws="W"))
+    assert "Paint" not in text
+
+
+def test_it_is_added_once_and_to_its_result_only() -> None:
+    add_section(asp.Comparison, paint)
+    text = html_text(asp.compare(asp.Sinusoid(1e-4, 1e-3), laws="W"))
+    assert text.count("<h2>Paint</h2>") == 1
+    other = html_text(asp.analyze(asp.Surface(asp.Sinusoid(1e-4, 1e-3), "W")))
+    assert "Paint" not in other
