@@ -17,6 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bench.damage import mutated
+
 ROOT = Path(__file__).parent.parent
 _WRITERS = ROOT / "tests" / "measured"
 _DATA = ROOT.parent / "shared" / "data"
@@ -222,8 +224,6 @@ def _checked_png(content: bytes) -> bytes:
 
 def _rezipped(content: bytes, rng: random.Random) -> bytes:
     """Damage a member inside a sound archive."""
-    from bench.fuzz import mutated
-
     stream = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(stream, "w") as new:
         victim = "main.xml" if rng.random() < 0.8 else rng.choice(old.namelist())

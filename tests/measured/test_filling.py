@@ -9,9 +9,17 @@ import pytest
 from numpy.typing import NDArray
 
 from asperity.measured import filling, multigrid
-from asperity.measured.filling import fill_harmonic
+from asperity.measured.filling import fill_in_place
 
 P = 1e-6
+
+
+def fill_harmonic(
+    heights: NDArray[np.float64], pitch: tuple[float, ...] = (1.0, 1.0)
+) -> NDArray[np.float64]:
+    filled = heights.copy()
+    fill_in_place(filled, pitch)
+    return filled
 
 
 def plane(ny: int, nx: int) -> NDArray[np.float64]:

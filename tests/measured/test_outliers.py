@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from asperity.checks import FloatArray
 from asperity.errors import ParameterError
 from asperity.measured import outliers
-from asperity.measured.outliers import local_median, remove_outliers
+from asperity.measured.outliers import _continued, _local_median, _reach, remove_outliers
 from asperity.measured.preparation import prepare
 from asperity.measured.reading import RawSurface
 
@@ -30,6 +31,10 @@ def continued(line: Any, reach: int) -> Any:
     before = [2 * middle(line[:3]) - line[2 + i] for i in range(reach, 0, -1)]
     after = [2 * middle(line[-3:]) - line[-3 - i] for i in range(1, reach + 1)]
     return np.concatenate([before, line, after])
+
+
+def local_median(heights: FloatArray) -> FloatArray:
+    return _local_median(_continued(heights, _reach(heights.shape)), heights.shape)
 
 
 @pytest.mark.parametrize("shape", [(14, 17), (40,)])

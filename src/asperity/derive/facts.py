@@ -8,6 +8,7 @@ from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
+from asperity.derive.shipped import generated_path
 from asperity.laws import LAWS, Law
 
 
@@ -44,8 +45,6 @@ def law_facts(law: Law) -> LawFacts:
     """
     if LAWS.get(law.letter) is not law:
         return derive_facts(law)
-    from asperity.derive.generate import generated_path
-
     tree = ast.parse(generated_path(law).read_text(encoding="utf-8"))
     for node in tree.body:
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "FACTS":

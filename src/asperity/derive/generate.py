@@ -6,17 +6,10 @@ Run as ``python -m asperity.derive.generate [--check]``; ``make kernels`` and ``
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
+from asperity.derive.shipped import generated_path
 from asperity.files import write_text
 from asperity.laws import LAWS, Law
-
-GENERATED = Path(__file__).parent / "generated"
-
-
-def generated_path(law: Law) -> Path:
-    """Return where the kernels of a shipped law lie."""
-    return GENERATED / f"law_{law.letter.lower()}.py"
 
 
 def generated_text(law: Law) -> str:

@@ -17,7 +17,7 @@ from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 
-from asperity.derive.generate import generated_path
+from asperity.derive.shipped import generated_path
 from asperity.errors import ParameterError
 from asperity.files import write_text
 from asperity.kernels.driver import ClampName, DriverPlan, contact_source, driver_source

@@ -20,7 +20,7 @@ _DIRECT = 100_000
 _TOLERANCE = 1e-10
 
 
-def fill_harmonic(heights: FloatArray, pitch: tuple[float, ...] = (1.0, 1.0)) -> FloatArray:
+def fill_in_place(heights: FloatArray, pitch: tuple[float, ...]) -> None:
     """Replace NaN by the harmonic function that the valid neighbours determine.
 
     The five-point Laplace equation h_xx + h_yy = 0 holds at each missing point, the valid
@@ -32,23 +32,15 @@ def fill_harmonic(heights: FloatArray, pitch: tuple[float, ...] = (1.0, 1.0)) ->
     conjugate gradients with a multigrid preconditioner.
 
     Args:
-        heights: [m], shape (ny, nx) or (n,), with at least one valid point.
+        heights: [m], shape (ny, nx) or (n,), with at least one valid point; they are changed.
         pitch: (px, py) [m]; only the ratio matters.
 
-    Returns:
-        The heights without NaN [m], same shape.
-
     Example:
-        >>> fill_harmonic(np.array([0.0, np.nan, 2.0, np.nan]))
+        >>> heights = np.array([0.0, np.nan, 2.0, np.nan])
+        >>> fill_in_place(heights, (1.0,))
+        >>> heights
         array([0., 1., 2., 2.])
     """
-    filled = np.array(heights, dtype=np.float64)
-    fill_in_place(filled, pitch)
-    return filled
-
-
-def fill_in_place(heights: FloatArray, pitch: tuple[float, ...]) -> None:
-    """Fill the heights where they are; see :func:`fill_harmonic`."""
     missing = np.isnan(heights)
     if not missing.any():
         return

@@ -74,26 +74,12 @@ def remove_outliers(heights: FloatArray, threshold: float) -> str:
     )
 
 
-def local_median(heights: FloatArray) -> FloatArray:
-    """Return the median of the valid points of each neighbourhood.
-
-    Beyond the border the surface is continued by point reflection, which keeps its slope: a
-    tilted surface has no residuals there.
-
-    Args:
-        heights: [m], shape (ny, nx) or (n,), NaN where missing.
-
-    Returns:
-        Medians [m], same shape; NaN at missing points.
-    """
-    return _local_median(_continued(heights, _reach(heights.shape)), heights.shape)
-
-
 def _reach(shape: tuple[int, ...]) -> int:
     return min(WINDOW[len(shape)] // 2, min(shape) - 3)
 
 
 def _local_median(padded: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """Return the median of the valid points of each neighbourhood; NaN at missing points."""
     from scipy.ndimage import binary_dilation, median_filter
 
     reach = _reach(shape)
@@ -122,7 +108,10 @@ def _windows_at(
 
 
 def _continued(heights: FloatArray, reach: int) -> FloatArray:
-    """Reflect each end through the median of its last three points, which no spike moves."""
+    """Reflect each end through the median of its last three points, which no spike moves.
+
+    That keeps the slope: a tilted surface has no residuals at its border.
+    """
     for axis in range(heights.ndim):
         lines = np.moveaxis(heights, axis, 0)
         with warnings.catch_warnings():

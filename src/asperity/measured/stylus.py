@@ -63,26 +63,6 @@ def dilate(heights: FloatArray, pitch: tuple[float, ...], radius: float) -> Floa
     return result
 
 
-def erode(heights: FloatArray, pitch: tuple[float, ...], radius: float) -> FloatArray:
-    """Return the path of the highest point of a ball that is dragged along the underside.
-
-    e(x) = min over |u| < R of h(x + u) - √(R² - |u|²) + R; see :func:`dilate`.
-    """
-    return -dilate(-heights, pitch, radius)
-
-
-def close_envelope(heights: FloatArray, pitch: tuple[float, ...], radius: float) -> FloatArray:
-    """Return the surface as far as a ball from above can touch it: dilation, then erosion.
-
-    Closing leaves what the ball reaches and bridges the rest by pieces of the ball; closing
-    twice changes nothing more.
-
-    Reference:
-        ISO 16610-41, closing by a disk; for a map the same with a ball.
-    """
-    return erode(dilate(heights, pitch, radius), pitch, radius)
-
-
 def check_radius(shape: tuple[int, ...], pitch: tuple[float, ...], radius: float) -> None:
     """Refuse a tip that is no ball, or larger than the surface.
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from asperity.arguments import read_arguments
-from asperity.checks import FloatArray
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
 from asperity.files import plain, record
@@ -175,10 +174,3 @@ def _leaving(texture: Texture, motion: Motion, span: float) -> list[str]:
         return []
     size = " x ".join(engineering(float(side), "m") for side in sides)
     return [f"The hand's way leaves the surface, {size}: beyond it its mirror images are felt"]
-
-
-def working_point(setup: Setup) -> FloatArray:
-    """Return where the handle starts [m], shape (3,)."""
-    if setup.start is not None:
-        return np.array(setup.start, dtype=float)
-    return np.asarray(setup.motion.at(np.zeros(1))[0])

@@ -34,8 +34,3 @@ class Kind:
     def required(self) -> tuple[Argument, ...]:
         """The arguments that have no default."""
         return tuple(argument for argument in self.arguments if argument.required)
-
-    @property
-    def optional(self) -> tuple[Argument, ...]:
-        """The arguments that have a default."""
-        return tuple(argument for argument in self.arguments if not argument.required)

@@ -9,8 +9,6 @@ from asperity.simulation import Run
 from asperity.simulation.onset import CYCLE_SPEED, cycles, holds_still, restlessness
 from asperity.units import engineering
 
-AXES = ("x", "y", "z")
-
 
 def energy(value: float) -> str:
     """Return an energy with its sign, "+2.97 mJ"."""
