@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from asperity.analysis.limits import spectrum as module
-from asperity.analysis.limits.spectrum import Spectrum, banded, grid, samples, spectrum
+from asperity.analysis.limits.spectrum import Spectrum, banded, spectrum
 from asperity.textures import Fourier, Grating, HeightMap, Noise, NoiseProfile, Profile, Sinusoid
 
 
@@ -185,18 +185,18 @@ def test_components_are_added() -> None:
 def test_nodes_of_a_map_are_its_samples(periodic: bool) -> None:
     heights = np.random.default_rng(2).normal(size=(9, 12)) * 1e-5
     texture = HeightMap(heights, (1e-5, 3e-5), periodic=periodic, origin=(1e-3, -2e-3))
-    points, spacing, repeats = grid(texture)
+    points, spacing, repeats = texture.domain.grid(texture.grid_counts())
     assert (points.shape, repeats) == ((9, 12, 2), periodic)
     assert spacing == pytest.approx((1e-5, 3e-5), rel=1e-12)
     np.testing.assert_allclose(
         texture.height(points.reshape(-1, 2)).reshape(9, 12), heights, atol=1e-15
     )
-    np.testing.assert_array_equal(samples(texture)[0], heights)
+    np.testing.assert_array_equal(texture.samples()[0], heights)
 
 
 def test_a_patch_is_the_middle_of_the_map() -> None:
     texture = HeightMap(np.random.default_rng(2).normal(size=(20, 31)), 1e-5, periodic=True)
-    points, spacing, repeats = grid(texture, most=8)
+    points, spacing, repeats = texture.domain.grid(texture.grid_counts(), most=8)
     assert (points.shape, repeats) == ((8, 8, 2), False)
     assert spacing == pytest.approx((1e-5, 1e-5))
     heights = texture.height(points.reshape(-1, 2)).reshape(8, 8)
@@ -205,7 +205,7 @@ def test_a_patch_is_the_middle_of_the_map() -> None:
 
 def test_a_skew_period_is_covered_by_a_rectangle() -> None:
     texture = Fourier([1e-4, 1e-4], [[2e3, 0.0], [1.1e3, 1.5e3]])
-    points, spacing, repeats = grid(texture)
+    points, spacing, repeats = texture.domain.grid(texture.grid_counts())
     assert not repeats
     along, across = points[0, 1] - points[0, 0], points[1, 0] - points[0, 0]
     assert float(along @ across) == pytest.approx(0.0, abs=1e-15)
