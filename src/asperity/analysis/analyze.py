@@ -327,12 +327,7 @@ def _defaults(surface: Surface) -> list[str]:
     if surface.max_depth > _width(surface.texture):
         width = engineering(_width(surface.texture), "m")
         said.append(f"Below {width}, the surface's width, only its mirror images are felt")
-    for name, default in surface.law.parameters.items():
-        value = surface.law_parameters[name]
-        if value == default:
-            text = surface.law.arguments[name].readable(value)
-            said.append(f"Default {name.replace('_', ' ')} {text}")
-    return said
+    return said + surface.parameters_said()
 
 
 def _of_the_device(device: Device) -> list[str]:

@@ -139,10 +139,10 @@ def compare(
     known_device = load_device(device)
     asked = DEFAULT_STIFFNESS if stiffness is None else positive("stiffness", stiffness, "N/m")
     limit = known_device.max_stiffness
-    given = dict(law_parameters or {})
+    shares = shared_out(law_parameters or {}, chosen)
     surfaces = [
         Surface(texture, law, asked, max_depth, law_parameters=own, **surface_arguments)
-        for law, own in zip(chosen, shared_out(given, chosen), strict=True)
+        for law, own in zip(chosen, shares, strict=True)
     ]
     rows = []
     for surface in surfaces:
@@ -159,7 +159,7 @@ def compare(
         rows=tuple(rows),
         recommended=letter,
         recommendation=words,
-        assumptions=assumptions(rows, known_device, defaults, {*surface_arguments, *given}),
+        assumptions=assumptions(rows, known_device, defaults),
     )
 
 

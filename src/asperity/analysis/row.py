@@ -59,4 +59,5 @@ class LawRow:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
         law = {"law": self.law.letter, "name": self.law.name}
+        law |= record(self.surface, "law_parameters")
         return law | record(self, without=("surface",))

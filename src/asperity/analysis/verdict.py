@@ -155,7 +155,7 @@ def _saturation(best: LawRow, device: Device) -> str:
 
 
 def assumptions(
-    rows: Sequence[LawRow], device: Device, defaults: Mapping[str, bool], given: set[str]
+    rows: Sequence[LawRow], device: Device, defaults: Mapping[str, bool]
 ) -> tuple[str, ...]:
     """Return what was assumed, in sentences.
 
@@ -163,11 +163,10 @@ def assumptions(
         rows: the laws compared.
         device: the device.
         defaults: whether stiffness and max_depth are defaults.
-        given: names of the arguments of the surface that the user gave.
     """
     first = rows[0].surface
     result = [*first.texture.preparation]
-    result += _defaulted(rows, defaults, given)
+    result += _defaulted(rows, defaults)
     datum = device.data["max_stiffness"]
     mark = "" if datum.verified else " (not verified)"
     result.append(f"K₀ = {datum.value:g} N/m for the {device.name}{mark}: {datum.source}")
@@ -197,7 +196,7 @@ def assumptions(
     return tuple(result)
 
 
-def _defaulted(rows: Sequence[LawRow], defaults: Mapping[str, bool], given: set[str]) -> list[str]:
+def _defaulted(rows: Sequence[LawRow], defaults: Mapping[str, bool]) -> list[str]:
     first: Surface = rows[0].surface
     result = []
     if defaults["stiffness"]:
@@ -206,10 +205,6 @@ def _defaulted(rows: Sequence[LawRow], defaults: Mapping[str, bool], given: set[
         depth = engineering(first.max_depth, "m")
         result.append(f"Default max depth {depth}: the peak-to-valley height, at most 1 mm")
     for row in rows:
-        for name in row.law.parameters:
-            if name not in given:
-                value = row.surface.law_parameters[name]
-                text = row.law.arguments[name].readable(value)
-                spoken = name.replace("_", " ")
-                result.append(f"Default {spoken} {text} for law {row.law.letter}")
+        said = row.surface.parameters_said()
+        result += [f"{parameter} for law {row.law.letter}" for parameter in said]
     return result

@@ -36,6 +36,8 @@ def read_setup(
     values: dict[str, Any],
     duration: float | None = None,
     laws: Sequence[Law] = (),
+    *,
+    keeps_delay: bool = True,
 ) -> Setup:
     """Return the closed loop that a scene file and the options name.
 
@@ -44,6 +46,7 @@ def read_setup(
         values: of the options, by name.
         duration: of the run [s]; comes before the scene's.
         laws: those that the loop will be changed to; the scene's own does not count then.
+        keeps_delay: whether the device's delay counts.
 
     Raises:
         ParameterError: for what is missing, unknown or wrong.
@@ -57,8 +60,14 @@ def read_setup(
     surface = surface_values(values)
     if laws:
         surface.setdefault("law", find_law("W"))
-    scene = load_scene(source, file_values(values))
-    return make_setup(scene, surface=surface, device=values["device"], duration=duration, laws=laws)
+    return make_setup(
+        load_scene(source, file_values(values)),
+        surface=surface,
+        device=values["device"],
+        duration=duration,
+        laws=laws,
+        keeps_delay=keeps_delay,
+    )
 
 
 def chosen_laws(laws: tuple[Law, ...] | None, law: Law | None) -> tuple[Law, ...]:

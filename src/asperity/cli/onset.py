@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
@@ -54,10 +53,7 @@ def command(
     if values["stiffness"] is not None:
         raise ParameterError("stiffness", "is what onset looks for: leave it out")
     chosen = chosen_laws(laws, values["law"])
-    setup = read_setup(scene, values, duration, chosen)
-    # The scene's delay is not assumed: --delays sets it.
-    said = tuple(sentence for sentence in setup.assumptions if "delay" not in sentence)
-    setup = replace(setup, assumptions=said)
+    setup = read_setup(scene, values, duration, chosen, keeps_delay=False)
     found = _onsets(setup, chosen, delays or list(range(6)), given(values, _SEARCH))
 
     def page() -> str:

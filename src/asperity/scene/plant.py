@@ -93,8 +93,13 @@ def _mass(device: Device, resonance: bool) -> tuple[Plant, list[str]]:
     return Cartesian(mass, values["damping"], mode, values["friction"]), said
 
 
-def default_servo(device: Device) -> tuple[Servo, list[str]]:
-    """Return the servo of a device, and what was assumed of it."""
+def default_servo(device: Device, *, keeps_delay: bool = True) -> tuple[Servo, list[str]]:
+    """Return the servo of a device, and what was assumed of it.
+
+    Args:
+        device: whose numbers are used.
+        keeps_delay: whether the delay is the one that counts; else nothing is said of it.
+    """
     rate, said = device.value("update_rate"), []
     if rate is None:
         rate = DEFAULT_RATE
@@ -106,7 +111,7 @@ def default_servo(device: Device) -> tuple[Servo, list[str]]:
         "virtual_damping": device.value("virtual_damping"),
     }
     delay = device.value("delay_samples")
-    if delay is None:
+    if delay is None and keeps_delay:
         said.append(f"The delay of {device.name} is not known; none is simulated")
     known = {name: value for name, value in values.items() if value is not None}
     return Servo(1.0 / rate, delay=int(delay or 0), **known), said

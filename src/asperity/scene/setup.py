@@ -99,6 +99,7 @@ def make_setup(
     device: Device | None = None,
     duration: float | None = None,
     laws: Sequence[Law] = (),
+    keeps_delay: bool = True,
 ) -> Setup:
     """Return the closed loop of a scene.
 
@@ -109,6 +110,7 @@ def make_setup(
         device: comes before the scene's; omega.3 if there is none.
         duration: of the run [s]; comes before the scene's.
         laws: those that the loop will be changed to, which have parameters too.
+        keeps_delay: whether the device's delay counts; not where the loop gets another one.
 
     Raises:
         ParameterError: for a section or a number that is missing, an unknown key (the nearest is
@@ -130,12 +132,17 @@ def make_setup(
         chosen, centre=run.pop("centre", None), resonance=run.pop("resonance", False),
         brakes=brakes, dynamics=needs_plant,
     )  # fmt: skip
-    servo, said = default_servo(chosen)
+    servo, said = default_servo(chosen, keeps_delay=keeps_delay)
     if share is not None:
         servo = replace(servo, velocity_share=share)
     span, of_span = _duration(duration, run.pop("duration", None), motion)
+    whole = _surface(scene.texture, merged, laws)
+    for law in laws:
+        parameters = whole.to_law(law).parameters_said()
+        said += [f"{parameter} for law {law.letter}" for parameter in parameters]
+    said += [] if laws else whole.parameters_said()
     return Setup(
-        _surface(scene.texture, merged, laws), chosen, plant, hand, servo, motion, span,
+        whole, chosen, plant, hand, servo, motion, span,
         assumptions=(*assumed, *said, *of_span, *_leaving(scene.texture, motion, span)), **run,
     )  # fmt: skip
 

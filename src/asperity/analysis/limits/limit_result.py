@@ -147,7 +147,7 @@ class Limits:
             "texture": surface.texture.describe(),
             "law": surface.law.letter,
             **record(self, "device", "speed"),
-            **record(surface, "stiffness", "max_depth"),
+            **record(surface, "law_parameters", "stiffness", "max_depth"),
             **record(self, "time_samples", "position_samples", "force_steps"),
             "gain": {"symbol": self.gain_symbol} | self.gain.to_dict(),
             **record(self, "safe_stiffness", "limits", "waves", "spectrum", "force", "share"),

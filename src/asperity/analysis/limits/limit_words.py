@@ -196,7 +196,7 @@ def _defaulted(result: Limits, defaults: Mapping[str, bool]) -> list[str]:
     if defaults["max_depth"]:
         depth = engineering(result.surface.max_depth, "m")
         said.append(f"Default max depth {depth}: the peak-to-valley height, at most 1 mm")
-    return said
+    return said + result.surface.parameters_said()
 
 
 def _of_the_device(result: Limits) -> list[str]:
