@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 import click
 
 from asperity.arguments import Argument
+from asperity.cli.own_code import load_own_code
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError, nearest_names
 from asperity.laws import LAW_ARGUMENTS, find_law, find_laws, known_arguments
@@ -114,11 +115,23 @@ def laws_option(words: str) -> Callable[[Command], Command]:
     return click.option("--laws", metavar="LETTERS", callback=as_read(find_laws), help=words)
 
 
+own_code_option = click.option(
+    "--law-module",
+    metavar="FILE",
+    multiple=True,
+    is_eager=True,  # what it defines can be named in the other options
+    expose_value=False,
+    callback=load_own_code,
+    help="Python file of your own, which is run: laws, claims; more than one by repeating it.",
+)
+
+
 def law_options(arguments: Iterable[Argument] = LAW_OPTIONS) -> Callable[[Command], Command]:
     """Return a decorator that adds the options of surface and law."""
 
     def decorate(command: Command) -> Command:
         words = "Parameter of a law, also of your own, 'gain=2.5'; more by repeating it."
+        command = own_code_option(command)
         command = click.option(
             "--set", "parameters", metavar="NAME=VALUE", multiple=True, help=words
         )(command)

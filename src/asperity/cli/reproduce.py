@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import file_options, file_values
+from asperity.cli.options import file_options, file_values, own_code_option
 from asperity.cli.output import Outputs, output_options
 from asperity.cli.progress import progress_bar
 from asperity.errors import ParameterError
@@ -31,6 +31,7 @@ _CLAIMS = 0.35
 @click.option(
     "--surface", metavar="SURFACE", help="Of the last experiment, instead of a drawn knurl."
 )
+@own_code_option
 @file_options
 @output_options("Write a report; - is standard output.")
 def command(

@@ -1,0 +1,155 @@
+"""``--law-module``: laws, textures and claims that the user's own Python file defines.
+
+Only the command line names such a file: whoever types the command runs the code. What it defines
+is known until the command ends.
+"""
+
+from __future__ import annotations
+
+import ast
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import click
+
+from asperity.errors import AsperityError, ParameterError
+
+OPTION = "law_module"
+
+
+@dataclass(frozen=True)
+class Registry:
+    """Where things of a kind are known by name.
+
+    Attributes:
+        kind: of the things.
+        register: adds one, and refuses a name that is taken.
+        known: the things by name.
+    """
+
+    kind: type
+    register: Callable[[Any], Any]
+    known: dict[str, Any]
+
+
+def registries() -> tuple[Registry, ...]:
+    """Return where what a file defines becomes known."""
+    from asperity import laws
+    from asperity.paper import registry
+    from asperity.paper.claim import Claim
+    from asperity.textures import catalogue
+    from asperity.textures.kinds import Kind
+
+    return (
+        Registry(laws.Law, laws.register, laws.KNOWN_LAWS),
+        Registry(Kind, catalogue.register, catalogue.CATALOGUE),
+        Registry(Claim, registry.register, registry.CLAIMS),
+    )
+
+
+def load_own_code(ctx: click.Context, _option: click.Parameter, files: tuple[str, ...]) -> None:
+    """Run the files and register what they define, until the command ends.
+
+    Raises:
+        ParameterError: for a file that cannot be read or run, with line and reason, one that
+            defines nothing, or a name that is taken.
+    """
+    if not files:
+        return
+    places = registries()
+    for place in places:
+        ctx.find_root().call_on_close(_restoring(place.known))
+    for file in files:
+        _load(file, places)
+
+
+def _restoring(table: dict[str, Any]) -> Callable[[], None]:
+    before = dict(table)
+
+    def restore() -> None:
+        table.clear()
+        table.update(before)
+
+    return restore
+
+
+def _load(file: str, places: tuple[Registry, ...]) -> None:
+    before = sum(len(place.known) for place in places)
+    source = _source(file)
+    with _refusing(file):
+        tree = ast.parse(source, file)
+        module = _run(file, source)
+    for name, value in vars(module).items():
+        for place in places:
+            new = isinstance(value, place.kind) and not _among(value, place.known)
+            if new:
+                with _refusing(file, _line(tree, name)):
+                    place.register(value)
+    if sum(len(place.known) for place in places) == before:
+        kinds = ", ".join(place.kind.__name__ for place in places)
+        raise ParameterError(OPTION, f"{file} defines none of these at its top level: {kinds}")
+
+
+def _source(file: str) -> bytes:
+    try:
+        return Path(file).read_bytes()
+    except (OSError, ValueError) as error:  # ValueError: of an impossible path
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ParameterError(OPTION, f"{file} cannot be read: {reason}") from None
+
+
+def _run(file: str, source: bytes) -> ModuleType:
+    """Run a file as a module that can import its neighbours, as ``python FILE`` would."""
+    path = Path(file).resolve()
+    module = ModuleType(f"own_{path.stem}")
+    module.__file__ = str(path)
+    sys.modules[module.__name__] = module
+    sys.path.insert(0, str(path.parent))
+    try:
+        exec(compile(source, file, "exec"), vars(module))
+    finally:
+        sys.path.remove(str(path.parent))
+    return module
+
+
+@contextmanager
+def _refusing(file: str, line: int | None = None) -> Iterator[None]:
+    """Turn whatever the user's code raises into one line: file, line and reason."""
+    try:
+        yield
+    except (Exception, SystemExit) as error:
+        at = _line_of(error, file) if line is None else line
+        reason = str(error) if isinstance(error, AsperityError) else _reason(error)
+        words = f"{file}, line {at}: {' '.join(reason.split())}"
+        raise ParameterError(OPTION, words) from error
+
+
+def _reason(error: BaseException) -> str:
+    said = error.msg if isinstance(error, SyntaxError) else str(error)
+    return f"{type(error).__name__}: {said}"
+
+
+def _line_of(error: BaseException, file: str) -> int:
+    if isinstance(error, SyntaxError) and error.filename == file:
+        return error.lineno or 1
+    frames = traceback.extract_tb(error.__traceback__)
+    return next((f.lineno or 1 for f in reversed(frames) if f.filename == file), 1)
+
+
+def _line(tree: ast.Module, name: str) -> int:
+    """Return the line at which a name is assigned."""
+    for node in tree.body:
+        targets = getattr(node, "targets", [getattr(node, "target", None)])
+        if any(isinstance(target, ast.Name) and target.id == name for target in targets):
+            return node.lineno
+    return 1
+
+
+def _among(value: Any, known: dict[str, Any]) -> bool:
+    return any(value is one for one in known.values())

@@ -1,0 +1,42 @@
+"""What the seam tests share: the command as its users call it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from asperity.cli.main import main
+
+Call = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+    """``call("compare", ...)``: exit code, standard output and standard error."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr("sys.argv", ["asperity", *arguments])
+        code = 0
+        try:
+            main()
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+@pytest.fixture
+def answer(call: Call) -> Callable[..., Any]:
+    """``answer("compare", ...)``: what the command writes as JSON."""
+
+    def run(*arguments: str) -> Any:
+        code, out, err = call(*arguments, "--json", "-")
+        assert (code, err) == (0, "")
+        return json.loads(out)
+
+    return run
