@@ -223,7 +223,7 @@ def _as_many_as_fit(texture: Texture, points: FloatArray) -> FloatArray:
 def _peers(texture: Texture) -> ModuleType:
     from asperity.kernels.fuse import fuse_sampler
 
-    return fuse_sampler((*texture.sampler, peers))
+    return fuse_sampler(texture.sampler, peers)
 
 
 def _last_proxies(texture: Texture, points: FloatArray, pitch: float) -> FloatArray:

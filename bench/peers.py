@@ -1,35 +1,28 @@
 """Other ways to a nearest point, compiled like asperity's own samplers: plain scalar functions.
 
-``curvature`` and ``height`` are the sampler's; fusing binds them. A polish from a start that
-something else found, and the downhill simplex of HAPI's depth-map surfaces (its class
-HAPIVariableDepthSurface): at most 35 steps, started from the last proxy, the probe's x, y and a
-third point beside the two, ended when the squared distances of the corners agree to 1e-4.
+A polish from a start that something else found, and the downhill simplex of HAPI's depth-map
+surfaces (its class HAPIVariableDepthSurface): at most 35 steps, started from the last proxy, the
+probe's x, y and a third point beside the two, ended when the squared distances of the corners
+agree to 1e-4.
 """
 
-from typing import Any
+from asperity.checks import FloatArray
+from asperity.compiled import Kernels
+from asperity.contacts.sampler import curvature, height
 
-import numpy as np
+KERNELS = Kernels(
+    requires=("curvature", "height"), loops=("peer_polish_batch", "peer_simplex_batch")
+)
 
-FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 Corner = tuple[float, float, float]
 
 
-def height(_x: float, _y: float, *_texture: Any) -> float:
-    """Stand in for the sampler's own function, which replaces this one."""
-    raise AssertionError
-
-
-def curvature(_x: float, _y: float, *_texture: Any) -> tuple[float, ...]:
-    """Stand in for the sampler's own function, which replaces this one."""
-    raise AssertionError
-
-
 def peer_polish(
-    x: float, y: float, z: float, fx: float, fy: float, texture: Any
+    x: float, y: float, z: float, fx: float, fy: float, texture: object
 ) -> tuple[float, float]:
     """Return where Newton's method leads from a start near a minimum of the distance."""
     for _ in range(30):
-        h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, *texture)
+        h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, texture)
         px = fx - x + (h - z) * hx
         py = fy - y + (h - z) * hy
         qxx = 1.0 + hx * hx + (h - z) * hxx
@@ -48,7 +41,7 @@ def peer_polish(
 
 
 def peer_polish_batch(
-    points: FloatArray, starts: FloatArray, out: FloatArray, texture: Any
+    points: FloatArray, starts: FloatArray, out: FloatArray, texture: object
 ) -> None:
     """Write the polished feet (n, 2) of the probes (n, 3)."""
     for i in range(points.shape[0]):
@@ -57,14 +50,14 @@ def peer_polish_batch(
         )
 
 
-def peer_corner(x: float, y: float, z: float, fx: float, fy: float, texture: Any) -> Corner:
+def peer_corner(x: float, y: float, z: float, fx: float, fy: float, texture: object) -> Corner:
     """Return a corner of the simplex: a point and its squared distance from the probe."""
-    gap = height(fx, fy, *texture) - z
+    gap = height(fx, fy, texture) - z
     return fx, fy, (fx - x) * (fx - x) + (fy - y) * (fy - y) + gap * gap
 
 
 def peer_simplex(
-    x: float, y: float, z: float, last_x: float, last_y: float, texture: Any
+    x: float, y: float, z: float, last_x: float, last_y: float, texture: object
 ) -> tuple[float, float]:
     """Return the lowest corner after at most 35 steps of Nelder and Mead's method."""
     half_x = 0.5 * (x - last_x)
@@ -107,7 +100,9 @@ def peer_simplex(
     return low[0], low[1]
 
 
-def peer_simplex_batch(points: FloatArray, last: FloatArray, out: FloatArray, texture: Any) -> None:
+def peer_simplex_batch(
+    points: FloatArray, last: FloatArray, out: FloatArray, texture: object
+) -> None:
     """Write the feet (n, 2) of the probes (n, 3), from the last proxies (n, 2)."""
     for i in range(points.shape[0]):
         out[i, 0], out[i, 1] = peer_simplex(

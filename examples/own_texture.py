@@ -14,6 +14,7 @@ import numpy as np
 
 import asperity as asp
 from asperity.arguments import Argument
+from asperity.compiled import Kernels
 from asperity.contacts.nearest import plane_search
 from asperity.contacts.nearest.plane_search import descend
 from asperity.textures import Domain, ScanLine, Texture
@@ -21,6 +22,8 @@ from asperity.textures.catalogue import register
 from asperity.textures.kinds import Kind
 
 # --- the sampler: plain Python that Numba compiles ------------------------------------------------
+
+KERNELS = Kernels(provides=("height", "slope", "curvature", "foot"), requires=("descend",))
 
 
 class Egg(NamedTuple):
@@ -59,12 +62,6 @@ def foot(x: float, y: float, z: float, egg: Egg) -> tuple[float, float, float, f
             if found[2] < best[2]:
                 best = found
     return best[0], best[1], best[3], best[4], best[5]
-
-
-def nearest(x: float, y: float, z: float, egg: Egg) -> tuple[float, float]:
-    """Return X, Y of the nearest surface point."""
-    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, egg)
-    return foot_x, foot_y
 
 
 # --- the kind: what is proved ---------------------------------------------------------------------

@@ -294,16 +294,7 @@ class Surface:
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """The modules that are compiled together with the law: the texture's and the contact's."""
-        sampler = self.texture.sampler
-        if self.law.contact.name == "split":
-            from asperity.contacts.split import conditions as split_conditions
-            from asperity.contacts.split import solver as split
-            from asperity.textures.samplers import sinusoid
-            from asperity.textures.samplers import sinusoid_split as split_sinusoid
-
-            known = sampler[0] is sinusoid
-            sampler = (*sampler, *((split_sinusoid,) if known else (split, split_conditions)))
-        return sampler
+        return (*self.texture.sampler, *self.law.contact.kernels())
 
     @cached_property
     def _loops(self) -> ModuleType:

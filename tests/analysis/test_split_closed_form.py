@@ -10,10 +10,10 @@ import pytest
 
 from asperity.analysis.split.state import split_state
 from asperity.checks import FloatArray
-from asperity.contacts.split import conditions as split_conditions
-from asperity.contacts.split import solver as split
+from asperity.contacts.split import conditions, solver
 from asperity.kernels.fuse import fuse_surface
 from asperity.surface import Surface
+from asperity.textures.samplers import sinusoid
 from asperity.textures.sinusoid import Sinusoid
 
 PERIOD = 1e-3
@@ -27,7 +27,7 @@ def _surface(part: float, c: float) -> Surface:
 
 def _general(surface: Surface) -> ModuleType:
     """Return the loops that know nothing of sinusoids but their nearest points."""
-    return fuse_surface(surface.law, (*surface.texture.sampler, split, split_conditions), "none")
+    return fuse_surface(surface.law, (sinusoid, solver, conditions), "none")
 
 
 def _probes(surface: Surface, count: int) -> FloatArray:

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.errors import ParameterError
 from asperity.kernels import fuse
-from asperity.kernels.driver import CLAMPS, DriverPlan, driver_source
+from asperity.kernels.driver import CLAMPS
 from asperity.laws import LAWS, Law
 from asperity.textures import Texture
 
@@ -80,15 +79,12 @@ def test_every_function_is_compiled_and_named_once(texture: Texture, interpreted
     functions = [node for node in body if isinstance(node, ast.FunctionDef)]
     names = [function.name for function in functions]
     assert len(names) == len(set(names))
-    assert {"height", "slope", "curvature", "nearest", "law_force", "trace_batch"} <= set(names)
+    assert {"slope", "law_force", "trace_batch"} <= set(names)
+    assert {"curvature", "foot"}.isdisjoint(names)  # only what is needed is taken
     for function in functions:
         decorator = function.decorator_list[0]
         assert isinstance(decorator, ast.Name)
         assert (decorator.id == "loop") == function.name.endswith("_batch")
-
-
-def test_the_stand_in_of_the_search_is_replaced(texture: Texture, interpreted: Check):
-    assert "raise" not in interpreted(lambda: fuse.fuse_sampler(texture.sampler)).fused_source
 
 
 def test_a_law_of_ones_own_never_uses_a_shipped_file():
@@ -136,24 +132,3 @@ def test_forces_and_jacobians_at_given_contacts(
         hessian = np.array([[hxx, hxy], [hxy, hyy]])
         expected = jacobian_by_hand(letter, g=(hx, hy), hessian=hessian, **here, **state)
         assert np.abs(jacobian[i] - expected).max() <= 1e-11 * np.linalg.norm(expected, 2)
-
-
-def test_a_texture_without_second_derivatives_serves_the_laws_that_need_none():
-    """A and E need slopes; B needs curvature, and says so."""
-    from asperity.textures.samplers import sinusoid
-
-    text = Path(sinusoid.__file__ or "").read_text(encoding="utf-8")
-    tree = ast.parse(text)
-    tree.body = [node for node in tree.body if getattr(node, "name", "") != "curvature"]
-    kept = ast.unparse(tree)
-    assert "def slope(" in kept
-    fuse._require(LAWS["A"], kept, driver_source(_plan("A")))
-    fuse._require(LAWS["E"], kept, driver_source(_plan("E")))
-    with pytest.raises(ParameterError, match=r"texture must offer second derivatives.*law B"):
-        fuse._require(LAWS["B"], kept, driver_source(_plan("B")))
-    with pytest.raises(ParameterError, match="nearest points"):
-        fuse._require(LAWS["D"], "", "foot_x, foot_y = nearest(x)")
-
-
-def _plan(letter: str) -> DriverPlan:
-    return DriverPlan(LAWS[letter], fuse.kernel_source(LAWS[letter]), "none")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -107,6 +108,13 @@ class Contact(ABC):
         import sympy as sp
 
         return sp.zeros(force.shape[0], 3)
+
+    def kernels(self) -> tuple[ModuleType, ...]:
+        """Return the compiled modules that the contact brings: what no texture kind need offer.
+
+        What a texture kind offers itself comes first.
+        """
+        return ()
 
     @abstractmethod
     def begin(self, texture: HeightField, xy: FloatArray) -> FloatArray:

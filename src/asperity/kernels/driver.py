@@ -69,7 +69,7 @@ class DriverPlan:
 
 
 def driver_source(plan: DriverPlan) -> str:
-    """Return the loops over probe points on a texture, as source."""
+    """Return the functions of a probe point on a texture and the loops over them, as source."""
     parts = [_probe(plan, "force"), _probe(plan, "jacobian")]
     parts += [_force_batch(plan), _jacobian_batch(plan)]
     if plan.law.stateful:
@@ -77,6 +77,13 @@ def driver_source(plan: DriverPlan) -> str:
     if plan.law.contact.name == "split":
         parts.append(_SPLIT_BATCH.format(unpack=_unpack(plan.law)))
     return "\n\n".join(parts)
+
+
+def driver_loops(plan: DriverPlan) -> tuple[str, ...]:
+    """Return the names of the loops in the source."""
+    trace = ("trace_batch",) if plan.law.stateful else ()
+    split = ("split_batch",) if plan.law.contact.name == "split" else ()
+    return ("force_batch", "jacobian_batch", *trace, *split)
 
 
 def _unpack(law: Law) -> str:

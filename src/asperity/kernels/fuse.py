@@ -6,21 +6,35 @@ its content, and Numba keeps the machine code beside it: a second process compil
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import importlib.util
-import inspect
 import os
 import sys
 import tempfile
-from functools import lru_cache
+from collections.abc import Sequence
+from functools import lru_cache, partial
 from pathlib import Path
 from types import ModuleType
 
+from asperity.contacts.sampler import OFFERED
 from asperity.derive.shipped import generated_path
 from asperity.errors import ParameterError
 from asperity.files import write_text
-from asperity.kernels.driver import ClampName, DriverPlan, contact_source, driver_source
+from asperity.kernels.driver import (
+    ClampName,
+    DriverPlan,
+    contact_source,
+    driver_loops,
+    driver_source,
+)
+from asperity.kernels.link import (
+    MissingFunctionError,
+    Unit,
+    link,
+    loops_of,
+    module_unit,
+    written_unit,
+)
 from asperity.laws import LAWS, Law
 
 _HEADER = '''"""{title}
@@ -42,199 +56,136 @@ plain = dict(error_model="numpy", _nrt=False)
 internal = dict(**plain, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 scalar = njit(**internal)
 inlined = njit(**internal, forceinline=True)
+merged = njit(error_model="numpy", inline="always")
 loop = njit(**plain, cache=True, nogil=True)
 
 
 '''
 
 
-# Law H iterates on small arrays; on the stack they cost no allocation.
-_SPLIT_HEADER = """from asperity.kernels.stack_memory import local_array
-
-merged = njit(error_model="numpy", inline="always")
-
-
-"""
-
-
 @lru_cache(maxsize=256)
 def kernel_source(law: Law) -> str:
     """Return the kernels of a law: the shipped file, or derived now for a user's own law."""
     if LAWS.get(law.letter) is law:
-        return _functions(generated_path(law).read_text(encoding="utf-8"))
+        text = generated_path(law).read_text(encoding="utf-8")
+        return text[text.index("def ") :]
     from asperity.derive.python_source import law_source
 
     return law_source(law)
 
 
 @lru_cache(maxsize=256)
-def fuse_surface(
-    law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName, further: str = ""
-) -> ModuleType:
+def law_units(law: Law, clamp: ClampName) -> tuple[Unit, Unit]:
+    """Return a law's own functions, and those that call them at a probe point on a texture."""
+    plan = DriverPlan(law, kernel_source(law), clamp)
+    own = written_unit(f"law {law}", plan.source, merged=("law_force", "law_jacobian"))
+    merged = ("probe_force", "probe_jacobian")
+    loops = driver_loops(plan)
+    return own, written_unit(
+        f"law {law} on a texture", driver_source(plan), loops=loops, merged=merged
+    )
+
+
+@lru_cache(maxsize=256)
+def fuse_surface(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) -> ModuleType:
     """Return the compiled loops of a law on a texture kind.
 
     Args:
         law: the law.
         sampler: the modules whose functions make up the sampler.
         clamp: the depth clamp.
-        further: source of more functions, which may call those of the law.
 
     Returns:
         A module with ``force_batch``, ``jacobian_batch``, ``trace_batch`` if the law has state.
+
+    Raises:
+        ParameterError: for a texture that lacks what the law looks at.
     """
-    plan = DriverPlan(law, kernel_source(law), clamp)
-    title = f"Law {law.letter} on {sampler[0].__name__.rpartition('.')[2]}, clamp {clamp}."
-    driver = driver_source(plan)
-    _require(law, sampler_source(sampler), driver)
-    source = "\n\n".join([sampler_source(sampler), plan.source, driver, further])
-    iterative = any(module.__name__.endswith(".solver") for module in sampler)
-    header = _HEADER.format(title=title) + (_SPLIT_HEADER if iterative else "")
-    return load_fused(header + decorate(source, inline=not iterative))
+    own, probe = law_units(law, clamp)
+    return fuse_on_texture(law, sampler, loops_of(probe), (own, probe))
 
 
-_OFFERED = {
-    "height": "heights",
-    "slope": "slopes",
-    "curvature": "second derivatives",
-    "nearest": "nearest points",
-}
+def fuse_on_texture(
+    law: Law,
+    sampler: tuple[ModuleType, ...],
+    loops: Sequence[tuple[str, Unit]],
+    further: Sequence[Unit],
+) -> ModuleType:
+    """Return loops compiled that ask a sampler, a law's functions and further units.
+
+    Raises:
+        ParameterError: for a texture that lacks what is asked of it.
+    """
+    modules = tuple(module_unit(module) for module in sampler)
+    try:
+        source = link(loops, (*modules, *further))
+    except MissingFunctionError as missing:
+        raise _lacking(missing, modules, f"which law {law} needs") from None
+    return load_fused(_head(f"Law {law} on {sampler[0].__name__}.", source) + source)
 
 
-def _require(law: Law, sampler: str, driver: str) -> None:
-    """Refuse a texture that lacks what a law looks at."""
-    for name, words in _OFFERED.items():
-        if f" {name}(" in driver and f"def {name}(" not in sampler:
-            need = f"must offer {words} (a sampler function {name!r}), which law {law} needs"
-            raise ParameterError("texture", need)
+def _lacking(missing: MissingFunctionError, modules: Sequence[Unit], who: str) -> ParameterError:
+    """Return the error of a texture that lacks a function; it says which, and who needs it."""
+    if missing.name not in OFFERED:
+        return missing
+    offered = sorted({name for unit in modules for name in unit.kernels.provides} & OFFERED.keys())
+    what = f"must offer {OFFERED[missing.name]} (a sampler function {missing.name!r})"
+    there = f"{modules[0].name} offers {', '.join(offered) or 'nothing'}"
+    return ParameterError("texture", f"{what}, {who}; {there}")
 
 
 @lru_cache(maxsize=256)
 def fuse_contact(law: Law) -> ModuleType:
     """Return the compiled loop of a law over given contacts: ``contact_batch``."""
     plan = DriverPlan(law, kernel_source(law), "none")
-    source = "\n\n".join([plan.source, contact_source(plan)])
-    return load_fused(_HEADER.format(title=f"Law {law.letter} at contacts.") + decorate(source))
+    own, _probe = law_units(law, "none")
+    unit = written_unit(f"law {law}", contact_source(plan), loops=("contact_batch",))
+    source = link(loops_of(unit), (own, unit))
+    return load_fused(_head(f"Law {law} at contacts.", source) + source)
 
 
 @lru_cache(maxsize=16)
-def fuse_module(*modules: ModuleType, inline: bool = True) -> ModuleType:
-    """Return modules of plain functions compiled; those named ``..._batch`` are for Python."""
-    title = f"{modules[0].__name__.rpartition('.')[2]}."
-    source = sampler_source(modules)
-    return load_fused(_HEADER.format(title=title) + decorate(source, inline=inline))
+def fuse_module(module: ModuleType, *helpers: ModuleType) -> ModuleType:
+    """Return a module whose loops are compiled, with what they call in it and in others."""
+    unit = module_unit(module)
+    source = link(loops_of(unit), (unit, *map(module_unit, helpers)))
+    return load_fused(_head(f"{module.__name__}.", source) + source)
 
 
 @lru_cache(maxsize=64)
-def fuse_sampler(sampler: tuple[ModuleType, ...]) -> ModuleType:
+def fuse_sampler(sampler: tuple[ModuleType, ...], *further: ModuleType) -> ModuleType:
     """Return the compiled loops of a texture kind.
 
     Functions ``height_batch``, ``slope_batch``, ``curvature_batch`` (points (n, 2), result array)
-    and ``nearest_batch`` (points (n, 3), result (n, 2)).
+    and ``nearest_batch`` (points (n, 3), result (n, 2)), and the loops of further modules. A loop
+    that asks what the sampler does not offer raises a ParameterError when it is called.
     """
-    title = f"Texture {sampler[0].__name__.rpartition('.')[2]}."
-    source = "\n\n".join([sampler_source(sampler), _SAMPLER_LOOPS])
-    return load_fused(_HEADER.format(title=title) + decorate(source))
+    from asperity.kernels import sampler_loops
+
+    modules = tuple(module_unit(module) for module in sampler)
+    asking = [module_unit(module) for module in (sampler_loops, *further)]
+    at_hand = (*modules, *asking)
+    served, refused = [], {}
+    for loop in loops_of(*asking):
+        try:
+            link([loop], at_hand)
+            served.append(loop)
+        except MissingFunctionError as missing:
+            refused[loop[0]] = _lacking(missing, modules, "which is asked of it")
+    source = link(served, at_hand)
+    module = load_fused(_head(f"Texture {sampler[0].__name__}.", source) + source)
+    for name, error in refused.items():
+        setattr(module, name, partial(_refuse, error))
+    return module
 
 
-_SAMPLER_LOOPS = '''def height_batch(points, out, texture):
-    """Heights [m]."""
-    for i in range(points.shape[0]):
-        out[i, 0] = height(points[i, 0], points[i, 1], texture)
+def _refuse(error: ParameterError, *_arguments: object) -> None:
+    raise error
 
 
-def slope_batch(points, out, texture):
-    """Heights [m] and slopes."""
-    for i in range(points.shape[0]):
-        out[i, 0], out[i, 1], out[i, 2] = slope(points[i, 0], points[i, 1], texture)
-
-
-def curvature_batch(points, out, texture):
-    """Heights [m], slopes and second derivatives [1/m]."""
-    for i in range(points.shape[0]):
-        h, hx, hy, hxx, hxy, hyy = curvature(points[i, 0], points[i, 1], texture)
-        out[i, 0] = h
-        out[i, 1] = hx
-        out[i, 2] = hy
-        out[i, 3] = hxx
-        out[i, 4] = hxy
-        out[i, 5] = hyy
-
-
-def nearest_batch(points, out, texture):
-    """Nearest surface points [m]."""
-    for i in range(points.shape[0]):
-        out[i, 0], out[i, 1] = nearest(points[i, 0], points[i, 1], points[i, 2], texture)
-'''
-
-
-@lru_cache(maxsize=64)
-def sampler_source(modules: tuple[ModuleType, ...]) -> str:
-    """Return the functions of the modules as one text; of equal names the first one counts."""
-    seen: set[str] = set()
-    parts = []
-    for module in modules:
-        text = inspect.getsource(module)
-        for node in ast.parse(text).body:
-            if isinstance(node, ast.FunctionDef) and node.name not in seen:
-                seen.add(node.name)
-                parts.append(ast.get_source_segment(text, node) or "")
-    return "\n\n\n".join(parts)
-
-
-def _functions(text: str) -> str:
-    """Return a generated file from its first function on."""
-    return text[text.index("def ") :]
-
-
-def decorate(source: str, *, inline: bool = True) -> str:
-    """Return the source with every top-level function compiled by Numba.
-
-    Args:
-        source: plain functions.
-        inline: whether small functions are copied into their callers. LLVM leaves calls of
-            mid-sized ones, 20 to 40 ns each; long iterations would only compile more slowly.
-    """
-    lines = []
-    for line in source.splitlines():
-        if line.startswith("def "):
-            name = line[4 : line.index("(")]
-            lines.append(_decorator(name, inline))
-        lines.append(line)
-    return "\n".join(lines) + "\n"
-
-
-# Too large to be copied to every place that calls them.
-_CALLED = {
-    "foot",
-    "search_tile",
-    "search_tree",
-    "judge",
-    "descend",
-    "newton_step",
-}
-
-
-# LLVM optimises everything again at each level of calls: a chain of single calls is made one
-# function before it compiles, which nearly halves the time.
-_MERGED = {
-    "probe_force",
-    "probe_jacobian",
-    "law_force",
-    "law_jacobian",
-    "split_contact",
-    "split_derivative",
-    "split_energy",
-    "split_polish",
-    "split_try_polish",
-}
-
-
-def _decorator(name: str, inline: bool) -> str:
-    if name.endswith("_batch"):
-        return "@loop"
-    if name in _MERGED and not inline:
-        return "@merged"
-    return "@scalar" if name in _CALLED or not inline else "@inlined"
+def _head(title: str, source: str) -> str:
+    local = "from asperity.kernels.stack_memory import local_array\n\n"
+    return _HEADER.format(title=title) + (local if "local_array(" in source else "")
 
 
 @lru_cache(maxsize=1)

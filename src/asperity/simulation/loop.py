@@ -29,11 +29,13 @@ _LOCK = Lock()
 def _fused(
     law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName, body: tuple[ModuleType, ...]
 ) -> ModuleType:
-    from asperity.kernels.fuse import fuse_surface, sampler_source
+    from asperity.kernels.fuse import fuse_on_texture, law_units
+    from asperity.kernels.link import loops_of, module_unit, written_unit
     from asperity.simulation.servo_source import servo_source
 
-    further = "\n\n\n".join([sampler_source(body), servo_source(law)])
-    return fuse_surface(law, sampler, clamp, further)
+    servo = written_unit("the servo", servo_source(law), loops=("servo_batch", "stored_batch"))
+    further = (*law_units(law, clamp), servo, *map(module_unit, body))
+    return fuse_on_texture(law, sampler, loops_of(servo), further)
 
 
 class Simulation:

@@ -73,9 +73,9 @@ class Sinusoid(Texture):
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
-        from asperity.textures.samplers import sinusoid
+        from asperity.textures.samplers import sinusoid, sinusoid_split
 
-        return (sinusoid,)
+        return sinusoid, sinusoid_split
 
     @cached_property
     def arguments(self) -> SinusoidArguments:

@@ -182,7 +182,7 @@ def curvatures(grid: Grid, table: PotentialTable) -> tuple[Bound, Bound]:
     from asperity.contacts.split import hull, spline
     from asperity.kernels.fuse import fuse_module
 
-    loops = fuse_module(hull, spline, inline=False)
+    loops = fuse_module(hull, spline)
     width = grid.cells[0] + (0 if grid.periodic else 1)
     parts = [(first, min(first + 16, width)) for first in range(0, width, 16)]
     found = np.zeros((len(parts), 2, 5))

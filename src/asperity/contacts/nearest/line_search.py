@@ -1,21 +1,20 @@
-"""Certified search for the nearest point of a profile, shared by its samplers; see ``search``.
+"""Certified search for the nearest point of a profile; see ``plane_search``.
 
 In one dimension: φ(X) = (X - x)² + (h(X) - z)², p = φ'/2, Q = φ''/2 = 1 + h'² + (h - z) h''. Over
 an interval of half-width r in which |h''| <= K and |h'''| <= T, Q changes by at most L r from its
 value at the centre, L = 3 K max|h'| + T max|h - z|.
-
-``along`` is the sampler's own; the fused module binds it.
 """
 
 import numpy as np
 
+from asperity.compiled import Kernels
+from asperity.contacts.sampler import along
 
-def along(x: float, texture: object) -> tuple[float, float, float]:
-    """Stand in for the sampler's own h, h', h'', which replaces this one."""
-    raise AssertionError
-
-
-# fused from here
+KERNELS = Kernels(
+    provides=("descend", "judge", "next_part"),
+    requires=("along",),
+    called=("descend", "judge"),
+)
 
 # A point of the profile: X, φ, h, h'.
 Point = tuple[float, float, float, float]

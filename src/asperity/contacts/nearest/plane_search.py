@@ -6,21 +6,21 @@ no negative eigenvalue of Q. Over a box of half-diagonal r in which ‖Hess h‖
 Q differs from its value at the centre by at most L r, L = 3 K max|∇h| + T max|h - z|: Taylor's
 formula at the centre decides most boxes at once.
 
-``curvature`` is the sampler's own; the fused module binds it. Boxes are quartered without a stack:
-the next one follows from the numbers of the last.
+Boxes are quartered without a stack: the next one follows from the numbers of the last.
 """
 
 import math
 
 import numpy as np
 
+from asperity.compiled import Kernels
+from asperity.contacts.sampler import curvature
 
-def curvature(x: float, y: float, texture: object) -> tuple[float, ...]:
-    """Stand in for the sampler's own function, which replaces this one."""
-    raise AssertionError
-
-
-# fused from here
+KERNELS = Kernels(
+    provides=("descend", "judge", "next_box"),
+    requires=("curvature",),
+    called=("descend", "judge", "newton_step"),
+)
 
 # A point of the surface: X, Y, φ, h, h_x, h_y.
 Point = tuple[float, float, float, float, float, float]

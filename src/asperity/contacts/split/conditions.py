@@ -1,4 +1,4 @@
-"""Energy and conditions of optimality of law H for given atoms (``split.py``).
+"""Energy and conditions of optimality of law H for given atoms (``solver.py``).
 
 Rows of ``atoms`` are x, y, z [m] and weight. Differences of squared distances are products of
 sums and differences: near a crest the atoms are so close together that squares would cancel.
@@ -6,23 +6,18 @@ sums and differences: near a crest the atoms are so close together that squares 
 
 import numpy as np
 
+from asperity.checks import FloatArray
+from asperity.compiled import Kernels, local_array
+from asperity.contacts.sampler import curvature, height
 
-def height(x: float, y: float, texture: object) -> float:
-    """Stand in for the sampler's own function, which replaces this one."""
-    raise AssertionError
-
-
-def curvature(x: float, y: float, texture: object) -> tuple[float, ...]:
-    """Stand in for the sampler's own function, which replaces this one."""
-    raise AssertionError
-
-
-# Compiled, these are arrays on the stack: see stack_memory.
-local_array = np.empty
-
-# fused from here
-
-FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+KERNELS = Kernels(
+    provides=(
+        "split_copy", "split_farther", "split_follow", "split_moving", "split_projection",
+        "split_solve", "split_system", "split_value",
+    ),
+    requires=("curvature", "height"),
+    iterates=True,
+)  # fmt: skip
 
 
 def split_farther(atoms: FloatArray, i: int, j: int, y: FloatArray) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import ModuleType
 from typing import Any
 
 from asperity.contacts.contact import ContactDerivatives
@@ -19,6 +20,12 @@ class Split(Nearest):
     cost = 1000.0
     single_valued = True
     given_by_depth = False
+
+    def kernels(self) -> tuple[ModuleType, ...]:
+        """The general solver; a texture kind may offer ``split_contact`` and the like itself."""
+        from asperity.contacts.split import conditions, solver
+
+        return solver, conditions
 
     def derivatives(self) -> ContactDerivatives:
         """Nothing by depth or point: see :meth:`jacobian_part`."""

@@ -3,7 +3,10 @@
 import math
 
 from asperity.checks import FloatArray
+from asperity.compiled import Kernels
 from asperity.contacts.split.spline import PotentialTable, table_hessian
+
+KERNELS = Kernels(requires=("table_hessian",), loops=("hull_batch",), iterates=True)
 
 
 def bernstein(c0: float, c1: float, c2: float, order: int, index: int) -> float:

@@ -13,13 +13,15 @@ weights exactly, drop what has no weight, and let Newton's method on the conditi
 move the feet along with y. The last query certifies the gap between primal and dual.
 
 Rows of ``atoms`` are x, y, z [m] and weight.
-``nearest`` and ``height`` are the sampler's own; the fused module binds them.
 """
 
 from typing import Any
 
 import numpy as np
 
+from asperity.checks import FloatArray
+from asperity.compiled import Kernels, local_array
+from asperity.contacts.sampler import foot, height
 from asperity.contacts.split.conditions import (
     split_copy,
     split_farther,
@@ -31,23 +33,17 @@ from asperity.contacts.split.conditions import (
     split_value,
 )
 
-
-def nearest(x: float, y: float, z: float, texture: object) -> tuple[float, float]:
-    """Stand in for the sampler's own function, which replaces this one."""
-    raise AssertionError
-
-
-def height(x: float, y: float, texture: object) -> float:
-    """Stand in for the sampler's own function, which replaces this one."""
-    raise AssertionError
-
-
-# Compiled, these are arrays on the stack: see stack_memory.
-local_array = np.empty
-
-# fused from here
-
-FloatArray = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+KERNELS = Kernels(
+    provides=("split_contact", "split_derivative", "split_energy"),
+    requires=(
+        "foot", "height", "split_copy", "split_farther", "split_follow", "split_moving",
+        "split_projection", "split_solve", "split_system", "split_value",
+    ),
+    merged=(
+        "split_contact", "split_derivative", "split_energy", "split_polish", "split_try_polish",
+    ),
+    iterates=True,
+)  # fmt: skip
 
 
 def split_query(y: FloatArray, atoms: FloatArray, row: int, texture: object) -> None:
@@ -56,7 +52,7 @@ def split_query(y: FloatArray, atoms: FloatArray, row: int, texture: object) -> 
     fy = y[1]
     fz = y[2]
     if height(fx, fy, texture) > fz:
-        fx, fy = nearest(fx, fy, fz, texture)
+        fx, fy, _h, _hx, _hy = foot(fx, fy, fz, texture)
         fz = height(fx, fy, texture)
     atoms[row, 0] = fx
     atoms[row, 1] = fy

@@ -9,6 +9,12 @@ import math
 from typing import NamedTuple
 
 from asperity.checks import FloatArray
+from asperity.compiled import Kernels
+
+KERNELS = Kernels(
+    provides=("table_hessian",),
+    loops=("expansion_batch", "map_force_batch", "profile_force_batch"),
+)
 
 Weights = tuple[float, float, float]
 

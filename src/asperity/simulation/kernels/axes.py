@@ -13,7 +13,12 @@ damper is m Δp' - (f + g) T + b Δp.
 
 from typing import Any
 
+from asperity.compiled import Kernels
 from asperity.simulation.kernels.booking import book_energies
+
+KERNELS = Kernels(
+    provides=("advance_axis", "advance_body", "stored_energy"), requires=("book_energies",)
+)
 
 
 def advance_axis(

@@ -4,9 +4,15 @@
 
 from typing import Any
 
+from asperity.compiled import Kernels
 from asperity.simulation.kernels.booking import book_energies
 from asperity.simulation.kernels.dense import friction_force
 from asperity.simulation.kernels.holding import band_turns, hand_energy, hand_force
+
+KERNELS = Kernels(
+    provides=("advance_body", "stored_energy"),
+    requires=("band_turns", "book_energies", "friction_force", "hand_energy", "hand_force"),
+)
 
 
 def banded_rates(

@@ -2,6 +2,10 @@
 
 from typing import Any
 
+from asperity.compiled import Kernels
+
+KERNELS = Kernels(provides=("book_energies",))
+
 
 def book_energies(
     ledger: Any, wx: float, wy: float, wz: float, lost: float, hand: float, rubbed: float

@@ -4,7 +4,10 @@
 
 from typing import Any
 
+from asperity.compiled import Kernels
 from asperity.simulation.kernels.booking import book_energies
+
+KERNELS = Kernels(provides=("advance_body", "stored_energy"), requires=("book_energies",))
 
 
 def advance_body(

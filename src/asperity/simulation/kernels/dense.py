@@ -5,7 +5,12 @@
 import math
 from typing import Any
 
+from asperity.compiled import Kernels
 from asperity.simulation.kernels.booking import book_energies
+
+KERNELS = Kernels(
+    provides=("advance_body", "friction_force", "stored_energy"), requires=("book_energies",)
+)
 
 
 def advance_body(

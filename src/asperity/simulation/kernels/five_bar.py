@@ -14,8 +14,14 @@ and c(p, p') is what the masses need to stay on their way while p'' = 0.
 import math
 from typing import Any
 
+from asperity.compiled import Kernels
 from asperity.simulation.kernels.booking import book_energies
 from asperity.simulation.kernels.holding import band_turns, hand_energy, hand_force
+
+KERNELS = Kernels(
+    provides=("advance_body", "stored_energy"),
+    requires=("band_turns", "book_energies", "hand_energy", "hand_force"),
+)
 
 
 def bar_arm(

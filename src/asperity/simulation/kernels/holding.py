@@ -3,6 +3,10 @@
 import math
 from typing import Any
 
+from asperity.compiled import Kernels
+
+KERNELS = Kernels(provides=("band_turns", "hand_energy", "hand_force"))
+
 
 def hand_force(
     sx: float, sy: float, sz: float,

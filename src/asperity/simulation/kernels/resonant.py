@@ -9,8 +9,13 @@ the hand's constant force g.
 
 from typing import Any
 
+from asperity.compiled import Kernels
 from asperity.simulation.kernels.booking import book_energies
 from asperity.simulation.kernels.dense import friction_force
+
+KERNELS = Kernels(
+    provides=("advance_body", "stored_energy"), requires=("book_energies", "friction_force")
+)
 
 
 def resonant_state(

@@ -4,9 +4,14 @@
 
 from typing import Any
 
+from asperity.compiled import Kernels
 from asperity.simulation.kernels.axes import advance_axis
 from asperity.simulation.kernels.booking import book_energies
 from asperity.simulation.kernels.dense import friction_force
+
+KERNELS = Kernels(
+    provides=("advance_body",), requires=("advance_axis", "book_energies", "friction_force")
+)
 
 
 def final_speed(x: Any, i: int, f: float, a: float, u: float, table: Any) -> float:

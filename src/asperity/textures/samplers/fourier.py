@@ -4,7 +4,14 @@ import math
 from typing import NamedTuple
 
 from asperity.checks import FloatArray
+from asperity.compiled import Kernels
 from asperity.contacts.nearest.plane_search import descend, judge, next_box
+
+KERNELS = Kernels(
+    provides=("curvature", "foot", "height", "slope"),
+    requires=("descend", "judge", "next_box"),
+    called=("foot",),
+)
 
 
 class FourierArguments(NamedTuple):
@@ -74,12 +81,6 @@ def curvature(
         hxy -= texture.kx[i] * texture.ky[i] * s
         hyy -= texture.ky[i] * texture.ky[i] * s
     return h, hx, hy, hxx, hxy, hyy
-
-
-def nearest(x: float, y: float, z: float, texture: FourierArguments) -> tuple[float, float]:
-    """Return X, Y of the globally nearest surface point."""
-    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, texture)
-    return foot_x, foot_y
 
 
 def foot(

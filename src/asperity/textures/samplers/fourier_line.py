@@ -5,8 +5,15 @@ It replaces ``foot`` of ``fourier``, whose arguments these are.
 
 import math
 
+from asperity.compiled import Kernels
 from asperity.contacts.nearest.line_search import descend, judge, next_part
 from asperity.textures.samplers.fourier import FourierArguments
+
+KERNELS = Kernels(
+    provides=("along", "foot"),
+    requires=("descend", "judge", "next_part"),
+    called=("foot",),
+)
 
 
 def along(t: float, texture: FourierArguments) -> tuple[float, float, float]:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.checks import FloatArray
+from asperity.compiled import Kernels
 from asperity.contacts.nearest.plane_search import Point, descend, judge, next_box
 from asperity.textures.samplers.spline import (
     box_bounds,
@@ -20,6 +21,16 @@ from asperity.textures.samplers.spline import (
     weights_first,
     weights_second,
 )
+
+KERNELS = Kernels(
+    provides=("curvature", "foot", "height", "slope"),
+    requires=(
+        "descend", "judge", "next_box",
+        "box_bounds", "cell_of", "fold", "foreseeable", "nearest_copy", "reach_of", "tile_frame",
+        "weights", "weights_first", "weights_second",
+    ),
+    called=("foot", "search_tile", "search_tree"),
+)  # fmt: skip
 
 
 class HeightMapArguments(NamedTuple):
@@ -137,12 +148,6 @@ def curvature(
         su * sv * texture.ix * texture.iy * (e0 * b0 + e1 * b1 + e2 * b2 + e3 * b3),
         texture.iy * texture.iy * (g0 * a0 + g1 * a1 + g2 * a2 + g3 * a3),
     )
-
-
-def nearest(x: float, y: float, z: float, texture: HeightMapArguments) -> tuple[float, float]:
-    """Return X, Y of the globally nearest surface point."""
-    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, texture)
-    return foot_x, foot_y
 
 
 def foot(

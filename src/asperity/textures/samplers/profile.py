@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.checks import FloatArray
+from asperity.compiled import Kernels
 from asperity.contacts.nearest.line_search import Point, descend, judge, next_part
 from asperity.textures.samplers.spline import (
     box_bounds,
@@ -20,6 +21,16 @@ from asperity.textures.samplers.spline import (
     weights_first,
     weights_second,
 )
+
+KERNELS = Kernels(
+    provides=("along", "curvature", "foot", "height", "slope"),
+    requires=(
+        "descend", "judge", "next_part",
+        "box_bounds", "cell_of", "fold", "foreseeable", "nearest_copy", "reach_of", "tile_frame",
+        "weights", "weights_first", "weights_second",
+    ),
+    called=("foot", "search_tile", "search_tree"),
+)  # fmt: skip
 
 
 class ProfileArguments(NamedTuple):
@@ -86,12 +97,6 @@ def along(x: float, texture: ProfileArguments) -> tuple[float, float, float]:
     """Return h [m], h' [1], h'' [1/m]."""
     h, h1, _hy, h2, _hxy, _hyy = curvature(x, 0.0, texture)
     return h, h1, h2
-
-
-def nearest(x: float, y: float, z: float, texture: ProfileArguments) -> tuple[float, float]:
-    """Return X, Y of the globally nearest surface point; Y = y."""
-    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, texture)
-    return foot_x, foot_y
 
 
 def foot(

@@ -3,6 +3,10 @@
 import math
 from typing import NamedTuple
 
+from asperity.compiled import Kernels
+
+KERNELS = Kernels(provides=("curvature", "foot", "height", "slope"), called=("foot",))
+
 
 class SinusoidArguments(NamedTuple):
     """What the functions below receive of a sinusoid.
@@ -42,12 +46,6 @@ def curvature(
     kx = texture.kx
     ky = texture.ky
     return h, kx * c, ky * c, -kx * kx * h, -kx * ky * h, -ky * ky * h
-
-
-def nearest(x: float, y: float, z: float, texture: SinusoidArguments) -> tuple[float, float]:
-    """Return X, Y of the globally nearest surface point."""
-    foot_x, foot_y, _h, _hx, _hy = foot(x, y, z, texture)
-    return foot_x, foot_y
 
 
 def foot(

@@ -2,7 +2,7 @@
 
 Let u be the phase of the probe from the nearest crest, ψ that of a foot, κ the wave number and
 R = 1/(κ² A) the radius of the crest. Every point that has two nearest points lies straight below
-a crest. Where the god-object is split, y (``split.py``) is such a point and its feet are ±ψ, so
+a crest. Where the god-object is split, y (``solver.py``) is such a point and its feet are ±ψ, so
 p = (1 - μ) y + μ z̄ leaves one equation that does not know u,
 
     (1 - μ) ψ - κ² A sin ψ (A cos ψ - z) = 0,
@@ -14,15 +14,12 @@ is then k (c u/κ, A cos ψ - z), else law D's.
 
 import math
 
-from asperity.textures.samplers.sinusoid import SinusoidArguments
+from asperity.compiled import Kernels
+from asperity.textures.samplers.sinusoid import SinusoidArguments, foot
 
-
-def nearest(x: float, y: float, z: float, texture: SinusoidArguments) -> tuple[float, float]:
-    """Stand in for the sampler's own function, which replaces this one."""
-    raise AssertionError
-
-
-# fused from here
+KERNELS = Kernels(
+    provides=("split_contact", "split_derivative", "split_energy"), requires=("foot",)
+)
 
 
 def split_root(share: float, u: float, z: float, amplitude: float, bend: float) -> float:
@@ -147,8 +144,8 @@ def split_energy(
     share = continuity / (1.0 + continuity)
     u = split_phase(x, y, texture)
     split, psi = split_foot(abs(u), z, continuity, amplitude, k2 * amplitude)
-    foot = psi if split else math.copysign(psi, u)
-    shift = continuity * u if split else foot - u
+    angle = psi if split else math.copysign(psi, u)
+    shift = continuity * u if split else angle - u
     h = amplitude * math.cos(psi)
     # Variance of the atoms ±ψ around their mean (1 + c) u.
     mean = (1.0 + continuity) * u
@@ -158,9 +155,11 @@ def split_energy(
     far_x = x - texture.kx * (shift / continuity) / k2
     far_y = y - texture.ky * (shift / continuity) / k2
     far_z = z - (h - z) / continuity
-    near_x, near_y = nearest(far_x, far_y, far_z, texture)
+    near_x, near_y, _h, _hx, _hy = foot(far_x, far_y, far_z, texture)
     near = far + texture.kx * (near_x - far_x) + texture.ky * (near_y - far_y)
     near_h = texture.amplitude * math.sin(texture.kx * near_x + texture.ky * near_y + texture.phase)
     # Products of sums and differences: squares would cancel.
-    gap = (foot - near) * (foot + near - 2.0 * far) / k2 + (h - near_h) * (h + near_h - 2.0 * far_z)
+    gap = (angle - near) * (angle + near - 2.0 * far) / k2 + (h - near_h) * (
+        h + near_h - 2.0 * far_z
+    )
     return value, 2 if split else 1, max(0.5 * share * gap, 0.0)

@@ -5,6 +5,15 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.compiled import Kernels
+
+KERNELS = Kernels(
+    provides=(
+        "box_bounds", "cell_of", "fold", "foreseeable", "nearest_copy", "reach_of", "tile_frame",
+        "weights", "weights_first", "weights_second",
+    )
+)  # fmt: skip
+
 
 def fold(u: float, cells: int, periodic: bool) -> tuple[float, float]:
     """Return the coordinate inside [0, cells] and the sign of its derivative.

@@ -1,0 +1,48 @@
+"""What a module of compiled functions says of itself, and what such functions may use.
+
+A compiled module is plain Python whose top-level functions Numba compiles: scalars, whole
+contiguous arrays and records of both in; scalars, tuples and records out; no closures, no
+slices, no stars. It declares itself in a constant ``KERNELS``; :mod:`asperity.kernels.link` puts
+modules together by what they declare.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity.checks import FloatArray
+
+
+@dataclass(frozen=True)
+class Kernels:
+    """What a compiled module provides and requires, and hints for the compiler.
+
+    Attributes:
+        provides: functions for other modules; of several modules at hand the first that provides a
+            name is taken.
+        requires: functions that it calls and does not define.
+        loops: functions for Python.
+        called: functions that are too large to be copied to every place that calls them.
+        merged: functions that are made one with their caller before they compile, where something
+            iterates: the compiler optimises everything again at each level of a chain of calls.
+        iterates: whether iterations run in it that are so long that copies of functions only
+            compile more slowly.
+    """
+
+    provides: tuple[str, ...] = ()
+    requires: tuple[str, ...] = ()
+    loops: tuple[str, ...] = ()
+    called: tuple[str, ...] = ()
+    merged: tuple[str, ...] = ()
+    iterates: bool = False
+
+
+def local_array(shape: tuple[int, ...]) -> FloatArray:
+    """Return an uninitialised float64 array of a constant shape such as ``(5, 4)``.
+
+    Compiled it lies on the stack and lives until the function that asks for it returns: see
+    :mod:`asperity.kernels.stack_memory`. Hand it down, never up.
+    """
+    return np.empty(shape)

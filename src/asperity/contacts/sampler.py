@@ -1,0 +1,41 @@
+"""What compiled code asks of a texture: the functions of its sampler.
+
+These are the interface alone. A texture kind defines the functions in its sampler and provides
+them; the linker binds the calls of contacts and searches to them. ``texture`` is the record
+(NamedTuple) that the kind declares: whatever it holds, it is passed on whole.
+"""
+
+OFFERED = {
+    "height": "heights",
+    "slope": "slopes",
+    "curvature": "second derivatives",
+    "foot": "nearest points",
+}
+"""What each function offers, in words."""
+
+
+def height(x: float, y: float, texture: object) -> float:
+    """Return h [m]."""
+    raise NotImplementedError
+
+
+def slope(x: float, y: float, texture: object) -> tuple[float, float, float]:
+    """Return h [m], h_x, h_y [1]."""
+    raise NotImplementedError
+
+
+def curvature(
+    x: float, y: float, texture: object
+) -> tuple[float, float, float, float, float, float]:
+    """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
+    raise NotImplementedError
+
+
+def foot(x: float, y: float, z: float, texture: object) -> tuple[float, float, float, float, float]:
+    """Return X, Y of the globally nearest surface point [m], and h [m], h_x, h_y [1] there."""
+    raise NotImplementedError
+
+
+def along(x: float, texture: object) -> tuple[float, float, float]:
+    """Return h [m], h' [1], h'' [1/m] along a line: of kinds whose heights vary along it only."""
+    raise NotImplementedError

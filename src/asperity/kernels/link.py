@@ -1,0 +1,151 @@
+"""Compiled modules put together: every function that is needed, and its provider.
+
+The linker knows no module and no function by name: it goes by what modules declare, see
+:class:`asperity.compiled.Kernels`.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import inspect
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from types import ModuleType
+
+from asperity.compiled import Kernels
+from asperity.errors import ParameterError
+
+# Anyone may call these; ``local_array`` is in the head of every linked text that does.
+_COMMON = frozenset([*dir(builtins), "local_array"])
+
+
+class MissingFunctionError(ParameterError):
+    """A function that is required and that no module at hand provides.
+
+    Attributes:
+        name: of the function.
+    """
+
+    def __init__(self, name: str, caller: str) -> None:
+        super().__init__("sampler", f"must provide {name!r}, which {caller} requires")
+        self.name = name
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The functions of a module as text, and what the module says of itself.
+
+    Attributes:
+        name: of the module.
+        kernels: its declaration.
+        texts: source of each top-level function.
+        calls: the functions that each of them calls, but for those that anyone may call.
+    """
+
+    name: str
+    kernels: Kernels
+    texts: dict[str, str]
+    calls: dict[str, tuple[str, ...]]
+
+    def owner(self, name: str, at_hand: Sequence[Unit]) -> Unit:
+        """Return the unit whose function of a name one of this unit's functions calls.
+
+        Raises:
+            MissingFunctionError: if there is none.
+            ParameterError: for a function that is neither defined nor declared as required.
+        """
+        if name in self.texts and name not in self.kernels.provides:
+            return self
+        if name not in self.texts and name not in self.kernels.requires:
+            words = f"{self.name} calls {name!r}, which it neither defines nor requires in KERNELS"
+            raise ParameterError("sampler", words)
+        for unit in at_hand:
+            if name in unit.kernels.provides:
+                return unit
+        raise MissingFunctionError(name, self.name)
+
+    def decorator(self, name: str, iterates: bool) -> str:
+        """Return how one of its functions is compiled, in words of the head of a fused module."""
+        kernels = self.kernels
+        if name in kernels.loops:
+            return "@loop"
+        if iterates:
+            return "@merged" if name in kernels.merged else "@scalar"
+        return "@scalar" if name in kernels.called else "@inlined"
+
+
+def text_unit(name: str, source: str, kernels: Kernels) -> Unit:
+    """Return the unit of a source text."""
+    texts, calls = {}, {}
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.FunctionDef):
+            texts[node.name] = ast.get_source_segment(source, node) or ""
+            calls[node.name] = _calls(node)
+    return Unit(name, kernels, texts, calls)
+
+
+def written_unit(
+    name: str, source: str, *, loops: tuple[str, ...] = (), merged: tuple[str, ...] = ()
+) -> Unit:
+    """Return the unit of a text that code has written: it provides and requires all it can."""
+    unit = text_unit(name, source, Kernels())
+    called = {called for names in unit.calls.values() for called in names}
+    provides = tuple(unit.texts)
+    requires = tuple(sorted(called.difference(provides)))
+    return replace(unit, kernels=Kernels(provides, requires, loops, merged=merged))
+
+
+@lru_cache(maxsize=64)
+def module_unit(module: ModuleType) -> Unit:
+    """Return the unit of a compiled module.
+
+    Raises:
+        ParameterError: for a module that does not declare itself.
+    """
+    kernels = getattr(module, "KERNELS", None)
+    if not isinstance(kernels, Kernels):
+        raise ParameterError("sampler", f"{module.__name__} must declare KERNELS = Kernels(...)")
+    return text_unit(module.__name__, inspect.getsource(module), kernels)
+
+
+def _calls(function: ast.FunctionDef) -> tuple[str, ...]:
+    names = {
+        node.func.id
+        for node in ast.walk(function)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
+    }
+    return tuple(sorted(names - _COMMON))
+
+
+def loops_of(*units: Unit) -> list[tuple[str, Unit]]:
+    """Return all loops of units, as :func:`link` takes them."""
+    return [(name, unit) for unit in units for name in unit.kernels.loops]
+
+
+def link(loops: Sequence[tuple[str, Unit]], at_hand: Sequence[Unit]) -> str:
+    """Return loops, each named with its unit, and all that they call, with their decorators.
+
+    Raises:
+        MissingFunctionError: for a function that is required and not provided.
+        ParameterError: for two functions of one name that are both needed.
+    """
+    taken: dict[str, Unit] = {}
+    waiting = list(loops)
+    while waiting:
+        name, unit = waiting.pop()
+        known = taken.setdefault(name, unit)
+        if known is not unit:
+            words = f"has two functions {name!r}, of {known.name} and of {unit.name}"
+            raise ParameterError("sampler", words)
+        called = [(callee, unit.owner(callee, at_hand)) for callee in unit.calls[name]]
+        waiting += [(callee, owner) for callee, owner in called if taken.get(callee) is not owner]
+    iterates = any(unit.kernels.iterates for unit in taken.values())
+    parts = [
+        f"{unit.decorator(name, iterates)}\n{text}"
+        for unit in at_hand
+        for name, text in unit.texts.items()
+        if taken.get(name) is unit
+    ]
+    return "\n\n\n".join(parts) + "\n"
