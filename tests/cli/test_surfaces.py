@@ -13,9 +13,12 @@ import pytest
 from click.testing import CliRunner, Result
 from PIL import Image
 
-from asperity.cli.gallery import gallery_text, picture
-from asperity.cli.surfaces import command, listed_surfaces
+from asperity.cli.surfaces import command
 from asperity.errors import ParameterError
+from asperity.report.page import page_html
+from asperity.report.pictures.gallery_picture import gallery_figure
+from asperity.report.pictures.style import png_uri
+from asperity.report.surfaces import listed_surfaces, surfaces_page
 from asperity.scene import KINDS, load_scene
 from asperity.textures import Sinusoid
 from asperity.textures.catalogue import CATALOGUE
@@ -123,9 +126,9 @@ def test_the_page_is_whole_and_needs_no_network(tmp_path: Path):
     assert page.rstrip().endswith("</html>")
     assert path.stat().st_size < 3_000_000
     assert not re.search(r"https?://|<script|<link|url\(", page)
-    pictures = re.findall(r'<img src="data:image/png;base64,([^"]+)" alt="([^"]+)"', page)
+    pictures = re.findall(r'<img alt="([^"]+)" src="data:image/png;base64,([^"]+)"', page)
     assert page.count("<img") == len(pictures) == len(CATALOGUE)
-    for encoded, words in pictures:
+    for words, encoded in pictures:
         image = np.asarray(Image.open(io.BytesIO(base64.b64decode(encoded))).convert("L"))
         assert image.shape[1] > 400, words
         assert image.std() > 20.0, words  # something is drawn
@@ -137,13 +140,13 @@ def test_the_page_is_whole_and_needs_no_network(tmp_path: Path):
 
 
 def test_pictures_of_different_surfaces_differ_and_of_the_same_do_not():
-    one, again, other = (picture(Sinusoid(a, 1e-3)) for a in (1e-4, 1e-4, 4e-4))
+    one, again, other = (png_uri(gallery_figure(Sinusoid(a, 1e-3))) for a in (1e-4, 1e-4, 4e-4))
     assert one == again
     assert one != other
 
 
 def test_a_page_of_few():
-    page = gallery_text(listed_surfaces(["knurl"]))
+    page = page_html(surfaces_page(listed_surfaces(["knurl"])))
     assert page.count("<img") == 1
     assert "Kinds of textures" not in page
 

@@ -106,15 +106,13 @@ def command(surface: str, device: Device | None, outputs: Outputs, **values: Any
         result = analyze(whole, known, progress=step, **given(values, _SEARCH))
     code = _texture_code(surface, for_file, scene.texture)
 
-    def page() -> str:
-        from asperity.report.analysis import analysis_page
-        from asperity.report.page import page_html
+    from asperity.report.analysis import analysis_page, print_analysis
 
-        return page_html(analysis_page(result, code))
-
-    from asperity.report.analysis import print_analysis
-
-    outputs.write(result, lambda console: print_analysis(result, console, code), page)
+    outputs.write(
+        result,
+        lambda console: print_analysis(result, console, code),
+        lambda: analysis_page(result, code),
+    )
 
 
 def _texture_code(source: str, for_file: Mapping[str, Any], texture: Texture) -> str:

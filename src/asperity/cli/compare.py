@@ -57,6 +57,6 @@ def command(
         result = compare(
             scene.texture, known, chosen, progress=lambda law: step(f"law {law}"), **arguments
         )
-    from asperity.report import html_text, print_comparison
+    from asperity.report.comparison import comparison_page, print_comparison
 
-    outputs.write(result, lambda to: print_comparison(result, to), lambda: html_text(result))
+    outputs.write(result, lambda to: print_comparison(result, to), lambda: comparison_page(result))

@@ -68,12 +68,8 @@ def command(surface: str, device: Device | None, outputs: Outputs, **values: Any
         **surface_keywords(merged, find_law(merged["law"])),
     )
 
-    def page() -> str:
-        from asperity.report.limits import limits_page
-        from asperity.report.page import page_html
+    from asperity.report.limits import limits_page, print_limits
 
-        return page_html(limits_page(result))
-
-    from asperity.report.limits import print_limits
-
-    outputs.write(result, lambda console: print_limits(result, console), page)
+    outputs.write(
+        result, lambda console: print_limits(result, console), lambda: limits_page(result)
+    )

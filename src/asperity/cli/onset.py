@@ -56,16 +56,12 @@ def command(
     setup = read_setup(scene, values, duration, chosen, keeps_delay=False)
     found = _onsets(setup, chosen, delays or list(range(6)), given(values, _SEARCH))
 
-    def page() -> str:
-        from asperity.report.onset import onset_page
-        from asperity.report.page import page_html
-
-        return page_html(onset_page(setup, found))
-
-    from asperity.report.onset import print_onsets
+    from asperity.report.onset import onset_page, print_onsets
 
     data = {"schema": 1, "scene": setup, "onsets": found}
-    outputs.write(data, lambda console: print_onsets(setup, found, console), page)
+    outputs.write(
+        data, lambda console: print_onsets(setup, found, console), lambda: onset_page(setup, found)
+    )
 
 
 def _onsets(

@@ -17,6 +17,8 @@ from asperity.files import is_device, json_text, write_text
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from asperity.report.page import Page
+
 STANDARD_OUTPUT = "-"
 
 
@@ -38,7 +40,7 @@ class Outputs:
         self,
         data: Any,
         say: Callable[[Console], None],
-        page: Callable[[], str] | None = None,
+        page: Callable[[], Page] | None = None,
         page_words: str = "Report",
     ) -> None:
         """Write a result where it was asked for, else say it on standard output.
@@ -52,7 +54,9 @@ class Outputs:
         if self.json is not None:
             write_output("json", self.json, json_text(data))
         if self.html is not None and page is not None:
-            write_output("html", self.html, page())
+            from asperity.report.page import page_html
+
+            write_output("html", self.html, page_html(page()))
         if STANDARD_OUTPUT in {self.json, self.html}:
             return
         from rich.console import Console

@@ -52,23 +52,16 @@ def command(
     measured = _texture(surface, values)
     alone = bool(names) or skip_experiments
     results, experiments = _reproduced(names or None, measured, with_experiments=not alone)
-
-    def page() -> str:
-        from asperity.report.page import page_html
-        from asperity.report.reproduce import reproduce_page
-
-        return page_html(reproduce_page(results, experiments))
+    from asperity.report.reproduce import print_evidence, print_results, reproduce_page
 
     def say(console: Console) -> None:
-        from asperity.report.reproduce import print_evidence, print_results
-
         if not names:
             print_results(results, experiments, console)
         for result in results if names else ():
             print_evidence(result, console)
 
     data = {"schema": 1, "claims": results, "experiments": experiments}
-    outputs.write(data, say, page)
+    outputs.write(data, say, lambda: reproduce_page(results, experiments))
 
 
 def _texture(surface: str | None, values: dict[str, Any]) -> Texture | None:

@@ -49,13 +49,9 @@ def command(scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **values
     with progress_bar("stroking") as told:
         found = scans(setup, letters, progress=told, **given(values, (*_LISTS, _STROKES)))
 
-    def page() -> str:
-        from asperity.report.page import page_html
-        from asperity.report.scan import scan_page
-
-        return page_html(scan_page(setup, found))
-
-    from asperity.report.scan import print_scans
+    from asperity.report.scan import print_scans, scan_page
 
     data = {"schema": 1, "scene": setup, "strokes": found}
-    outputs.write(data, lambda console: print_scans(setup, found, console), page)
+    outputs.write(
+        data, lambda console: print_scans(setup, found, console), lambda: scan_page(setup, found)
+    )

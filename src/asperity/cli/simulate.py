@@ -43,15 +43,11 @@ def command(
     setup = setup if every is None else replace(setup, every=every)
     with progress_bar("simulating") as told:
         run = setup.simulate(trace=outputs.trace or True, progress=told)
+    from asperity.report.run import print_run, run_page
+    from asperity.simulation.rereading import reread
 
-    def page() -> str:
-        from asperity.report.page import page_html
-        from asperity.report.run import run_page
-        from asperity.simulation.rereading import reread
-
-        return page_html(run_page(setup, run if outputs.trace is None else reread(run)))
-
-    from asperity.report.run import print_run
-
-    data = {"schema": 1, "scene": setup, "run": run}
-    outputs.write(data, lambda console: print_run(setup, run, console), page)
+    outputs.write(
+        {"schema": 1, "scene": setup, "run": run},
+        lambda console: print_run(setup, run, console),
+        lambda: run_page(setup, run if outputs.trace is None else reread(run)),
+    )

@@ -182,6 +182,13 @@ def data_uri(figure: Figure) -> str:
     return f"data:image/svg+xml;base64,{encoded}"
 
 
+def png_uri(figure: Figure) -> str:
+    """Return the figure as a data URI of its pixels, which many small pictures share well."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=110, facecolor=CARD, metadata={"Software": None})
+    return f"data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode('ascii')}"
+
+
 def label(axes: Axes, x: str = "", y: str = "") -> None:
     """Name the axes, unit included."""
     axes.set_xlabel(x, fontsize=LABEL, color=SOFT)
