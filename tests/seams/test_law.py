@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import asperity as asp
@@ -255,6 +256,23 @@ def test_the_file_may_define_a_texture_kind_too(call: Call, answer: Answer, tmp_
     assert data["texture"]["amplitude"] == 5e-5
     code, _out, err = call("compare", "my-wave:height=0.1mm", "--laws", "A")
     assert (code, "'my-wave'" in err) == (2, True)
+
+
+def test_the_file_may_define_a_reader_too(call: Call, answer: Answer, tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(
+        "import numpy as np\n"
+        "from asperity.measured.reading import RawSurface, Reader\n"
+        "def read(file, options):\n"
+        "    heights = np.frombuffer(file.content, '<f8', offset=8)\n"
+        "    return RawSurface(heights, (1e-5,), file.name, ())\n"
+        "MINE = Reader('a WAFFLE file', lambda file: file.head.startswith(b'WAFFLE__'), read)\n"
+    )
+    heights = 1e-5 * np.sin(np.arange(64.0))
+    (tmp_path / "land.waffle").write_bytes(b"WAFFLE__" + heights.tobytes())
+    asked = ["limits", str(tmp_path / "land.waffle"), "--law", "A"]
+    data = answer(*asked, "--law-module", str(tmp_path / "mine.py"))
+    assert data["texture"]["pitch"] == pytest.approx(1e-5)
+    assert call(*asked)[0] == 2
 
 
 @pytest.mark.parametrize(

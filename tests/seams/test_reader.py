@@ -134,7 +134,7 @@ def test_a_broken_package_is_named_and_stops_nobody(
 
 @pytest.fixture
 def empty(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "_own", {})
+    monkeypatch.setattr(registry, "OWN", {})
 
 
 def groove(result: object) -> Reader:

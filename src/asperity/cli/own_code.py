@@ -1,4 +1,4 @@
-"""``--law-module``: laws, textures and claims that the user's own Python file defines.
+"""``--law-module``: what the user's own Python file defines: laws, textures, readers, claims.
 
 Only the command line names such a file: whoever types the command runs the code. What it defines
 is known until the command ends.
@@ -41,6 +41,8 @@ class Registry:
 def registries() -> tuple[Registry, ...]:
     """Return where what a file defines becomes known."""
     from asperity import laws
+    from asperity.measured.reading import Reader
+    from asperity.measured.reading import registry as readers
     from asperity.paper import registry
     from asperity.paper.claim import Claim
     from asperity.textures import catalogue
@@ -49,6 +51,7 @@ def registries() -> tuple[Registry, ...]:
     return (
         Registry(laws.Law, laws.register, laws.KNOWN_LAWS),
         Registry(Kind, catalogue.register, catalogue.CATALOGUE),
+        Registry(Reader, readers.register, readers.OWN),
         Registry(Claim, registry.register, registry.CLAIMS),
     )
 

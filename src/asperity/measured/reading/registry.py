@@ -22,7 +22,7 @@ ENTRY_POINTS = "asperity.readers"
 """Group of the entry points by which an installed package brings a :class:`Reader`."""
 
 _PASSED = (AsperityError, OSError, MemoryError)  # what a reader may raise
-_own: dict[str, Reader] = {}
+OWN: dict[str, Reader] = {}
 
 
 def register(reader: Reader) -> None:
@@ -34,9 +34,9 @@ def register(reader: Reader) -> None:
     Raises:
         ParameterError: its name is taken.
     """
-    if reader.name in {known.name for known in (*MARKED, *_own.values(), *LAST)}:
+    if reader.name in {known.name for known in (*MARKED, *OWN.values(), *LAST)}:
         raise ParameterError("reader", "must have a name that no other reader has", reader.name)
-    _own[reader.name] = reader
+    OWN[reader.name] = reader
 
 
 def readers(faults: list[str]) -> Iterator[Reader]:
@@ -46,7 +46,7 @@ def readers(faults: list[str]) -> Iterator[Reader]:
         faults: receives a sentence for each reader of the user's that cannot be used.
     """
     yield from MARKED
-    for reader in _own.values():
+    for reader in OWN.values():
         yield _guarded(reader, faults)
     for point in sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name):
         loaded = _loaded(point, faults)
