@@ -107,7 +107,7 @@ def test_json_has_no_infinity() -> None:
     result = Claim("x-1", ("(1)",), "I", "words", lambda: Finding("holds", evidence)).run()
     back = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert list(back) == ["id", "equations", "statement", "verdict", "evidence"]
-    assert back["evidence"]["numbers"] == {"a": "inf", "b": [1.0, "-inf", "nan"], "c": "text"}
+    assert back["evidence"]["numbers"] == {"a": "inf", "b": [1.0, "-inf", None], "c": "text"}
     assert back["equations"] == ["(1)"]
 
 

@@ -15,6 +15,7 @@ from asperity.paper.experiments.bump import over_bump
 from asperity.paper.experiments.passivity import count_cycles, passivity_experiment
 from asperity.paper.experiments.run import Experiments
 from asperity.paper.experiments.scanning import energy_trace, scanning_experiment
+from asperity.paper.plane import SAMPLING_PERIOD
 from asperity.simulation import simulate
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
@@ -153,14 +154,10 @@ def test_a_trace_is_the_ledger_of_its_stroke() -> None:
     setup = settings.stroke_setup("A")
     run = simulate(
         setup.surface, setup.plant, setup.hand, setup.servo, setup.motion,
-        float(trace.time[-1]) + run_period(),
+        float(trace.time[-1]) + SAMPLING_PERIOD,
     )  # fmt: skip
     before = run.energies["supplied"][-1]
     np.testing.assert_allclose(trace.exact[-1], before[[0, 2]], rtol=1e-12, atol=1e-18)
-
-
-def run_period() -> float:
-    return settings.PERIOD
 
 
 def test_a_count_keeps_its_trace() -> None:

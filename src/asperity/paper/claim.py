@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray
 from asperity.errors import AsperityError
-from asperity.files import record
+from asperity.files import plain, record
 
 Verdict = Literal["holds", "holds with correction", "does not hold", "undecided"]
 VERDICTS: tuple[Verdict, ...] = ("holds", "holds with correction", "does not hold", "undecided")
@@ -44,12 +44,12 @@ class Evidence:
     correction: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data; a number that is not finite is written as text."""
-        return {
-            "summary": self.summary,
-            "numbers": {name: _plain(value) for name, value in self.numbers.items()},
-            "correction": self.correction,
+        """Return plain data, every number a float: counts and truth values among them too."""
+        numbers = {
+            name: value if isinstance(value, str) else plain(np.asarray(value, dtype=float))
+            for name, value in self.numbers.items()
         }
+        return {**record(self, "summary"), "numbers": numbers, **record(self, "correction")}
 
 
 @dataclass(frozen=True)
@@ -260,13 +260,3 @@ def relative_error(value: ArrayLike | None, target: ArrayLike) -> float:
 
 def _off(error: float) -> str:
     return f"off by {error:.2g}" if math.isfinite(error) else "not a value to compare"
-
-
-def _plain(value: Number) -> Any:
-    """Return a value for JSON, which has neither infinity nor NaN."""
-    if isinstance(value, str):
-        return value
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    number = float(value)
-    return number if math.isfinite(number) else str(number)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from asperity.paper.claim import Check, Claim, Finding, decide, settle
 from asperity.paper.claims_experiments import SETTINGS, growth
 from asperity.paper.claims_friction import Rub, norm_of, stick_entries
-from asperity.paper.comparisons import curl_check, groove_path, q_of
+from asperity.paper.comparisons import curl_check, q_of
+from asperity.paper.paths import groove_path
 from asperity.paper.plane import LAWS, SCANNING, Setting, random_settings
 
 

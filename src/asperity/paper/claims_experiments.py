@@ -12,11 +12,11 @@ from asperity.paper.claims_appendix import true_number
 from asperity.paper.claims_friction import (
     PAPER,
     Rub,
-    friction_loop,
     norm_of,
     stick_entries,
 )
-from asperity.paper.comparisons import groove_path, outside_check, q_of
+from asperity.paper.comparisons import outside_check, q_of
+from asperity.paper.paths import friction_path, groove_path
 from asperity.paper.plane import (
     BUMP,
     PASSIVITY,
@@ -138,7 +138,7 @@ def ensured() -> Finding:
     speeds = {}
     for law, number in (("A", 5.1), ("F", 8.3)):
         surface = PASSIVITY.surface(law, stiffness=PASSIVITY.stiffness / number)
-        loop = np.array(groove_path(PASSIVITY) if law == "A" else friction_loop(PASSIVITY, 1e-5))
+        loop = np.array(groove_path(PASSIVITY) if law == "A" else friction_path(PASSIVITY, 1e-5))
         length = float(np.linalg.norm(loop - np.roll(loop, 1, axis=0), axis=1).sum())
         speeds[law] = loop_work(surface, loop) / (damping * length)
     said = ", ".join(f"{law} {speed * 1e3:.1f} mm/s" for law, speed in speeds.items())

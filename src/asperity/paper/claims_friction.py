@@ -15,7 +15,8 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.paper.claim import Check, Claim, Finding, decide, judge, settle
-from asperity.paper.plane import SCANNING, Setting, path_points, random_settings, spots
+from asperity.paper.paths import friction_path
+from asperity.paper.plane import SCANNING, random_settings, spots
 
 _TURN = 2.0 * math.pi
 
@@ -240,12 +241,6 @@ def stick_bound() -> Finding:
 # --- energy ---------------------------------------------------------------------------------------
 
 
-def friction_loop(case: Setting, light: float) -> list[tuple[float, float, float]]:
-    """Return the path of (27): out at the small depth a, back at the greater."""
-    x, deep = case.deflection, -case.depth
-    return path_points((0.0, 1e-3), (0.0, -light), (x, -light), (x, deep), (0.0, deep))
-
-
 def energy_f() -> Finding:
     """(27): the law without texture; twice the friction makes its m = 1/2 the paper's h = 0."""
     from asperity.analysis.energy.loops import loop_work
@@ -257,8 +252,8 @@ def energy_f() -> Finding:
         whole = 0.5 * case.stiffness * case.friction * case.depth * case.deflection
         printed.append(whole)
         corrected.append(whole * (1.0 - share))
-        truth.append(loop_work(surface, friction_loop(case, share * case.depth)))
-        lightest = loop_work(surface, friction_loop(case, 1e-7 * case.depth))
+        truth.append(loop_work(surface, friction_path(case, share * case.depth)))
+        lightest = loop_work(surface, friction_path(case, 1e-7 * case.depth))
         limit = max(limit, abs(lightest / whole - 1.0))
     return settle(
         judge(
@@ -284,7 +279,7 @@ def compliant() -> Finding:
     for reach in (1e-3, 1e-2):
         case = replace(SCANNING, deflection=reach)
         surface = case.surface("F", modulation_depth=0.0, friction=2.0 * case.friction)
-        found.append(loop_work(surface, friction_loop(case, 1e-7 * case.depth)))
+        found.append(loop_work(surface, friction_path(case, 1e-7 * case.depth)))
     ratio = found[1] / found[0]
     return settle(
         decide(

@@ -14,10 +14,10 @@ from asperity.paper.comparisons import (
     energy_sign_check,
     field_check,
     gradient_of,
-    groove_path,
     jacobian_check,
     leg_work,
 )
+from asperity.paper.paths import groove_path
 from asperity.paper.plane import (
     BUMP,
     PASSIVITY,

@@ -16,20 +16,19 @@ from asperity.paper.comparisons import (
     field_check,
     gradient_of,
     greatest_norm,
-    groove_path,
     jacobian_check,
     leg_work,
     loop_check,
     outside_check,
     q_of,
 )
+from asperity.paper.paths import crossing_path, groove_path
 from asperity.paper.plane import (
     BUMP,
     PASSIVITY,
     SCANNING,
     Setting,
     Spot,
-    path_points,
     random_settings,
     spots,
 )
@@ -315,10 +314,8 @@ def energy_g() -> Finding:
 
     worst, least = 0.0, math.inf
     for case in [SCANNING, *random_settings()]:
-        a, quarter = 0.5 * case.depth, 0.25 * case.period
-        surface = case.surface("G")
-        turns = [(quarter, a), (quarter, -a), (3 * quarter, -a), (3 * quarter, a)]
-        points = np.array(path_points(*turns))
+        a, surface = 0.5 * case.depth, case.surface("G")
+        points = np.array(crossing_path(case, a))
         scale = case.stiffness * a**2
         ends = np.roll(points, -1, axis=0)
         legs = [leg_work(surface, *leg) for leg in zip(points, ends, strict=True)]

@@ -8,7 +8,8 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.paper.claim import Check, Claim, Finding, decide, judge, settle
-from asperity.paper.comparisons import groove_path, q_of
+from asperity.paper.comparisons import q_of
+from asperity.paper.paths import groove_path
 from asperity.paper.plane import (
     SAMPLING_PERIOD,
     SCANNING,

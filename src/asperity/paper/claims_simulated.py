@@ -1,33 +1,17 @@
-"""The sentences of section V that need the closed loop.
-
-Each is computed by ``asperity.paper.experiments``, whose ``FINDINGS`` maps the id of a claim to a
-function that returns its :class:`~asperity.paper.claim.Finding`.
-"""
+"""The sentences of section V that need the closed loop."""
 
 from __future__ import annotations
 
-import importlib
 from functools import partial
 
-from asperity.paper.claim import Claim, Finding, decide, settle
-
-_HOME = "asperity.paper.experiments"
+from asperity.paper.claim import Claim, Finding
 
 
 def simulated(name: str) -> Finding:
-    """Return the finding of a simulated experiment; undecided where there is none."""
-    try:
-        known = importlib.import_module(_HOME).FINDINGS
-    except ModuleNotFoundError as error:
-        if error.name != _HOME:
-            raise
-        known = {}
-    if name not in known:
-        return settle(decide("needs the closed loop, and is not simulated here", printed=None))
-    found = known[name]()
-    if not isinstance(found, Finding):
-        raise TypeError(f"the experiment of {name} must return a Finding, got {found!r}")
-    return found
+    """Return what the simulated experiment of a claim finds."""
+    from asperity.paper.experiments.findings import FINDINGS  # and with it the simulation
+
+    return FINDINGS[name]()
 
 
 def _claim(name: str, section: str, statement: str) -> Claim:

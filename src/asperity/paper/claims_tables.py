@@ -22,7 +22,8 @@ from asperity.paper.claim import (
 )
 from asperity.paper.claims_appendix import true_number
 from asperity.paper.claims_friction import PAPER, norm_of, stick_entries
-from asperity.paper.comparisons import field_check, groove_path
+from asperity.paper.comparisons import field_check
+from asperity.paper.paths import groove_path
 from asperity.paper.plane import SCANNING, Setting, Spot, generic_profile, spots
 from asperity.paper.table_two import TableTwo, TableTwoRow
 from asperity.surface import Surface

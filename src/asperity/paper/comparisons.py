@@ -9,7 +9,8 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.paper.claim import Check, decide, judge
-from asperity.paper.plane import SCANNING, Setting, Spot, path_points, random_settings, spots
+from asperity.paper.paths import groove_path
+from asperity.paper.plane import SCANNING, Setting, Spot, random_settings, spots
 from asperity.surface import Surface
 
 Formula = Callable[[Spot], FloatArray]
@@ -62,12 +63,6 @@ def curl_check(law: str, *, conservative: bool) -> Check:
         printed=verdict.conservative is conservative,
         numbers={f"curl of {law}": ", ".join(str(entry) for entry in verdict.curl)},
     )
-
-
-def groove_path(case: Setting) -> list[tuple[float, float, float]]:
-    """Return the path of Fig. 3 for A, B and E."""
-    quarter, top = 0.25 * case.period, case.amplitude
-    return path_points((0.0, 0.0), (quarter, 0.0), (quarter, top), (0.0, top))
 
 
 def loop_check(law: str, printed: Callable[[Setting], float]) -> Check:

@@ -8,15 +8,14 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.files import Record
-from asperity.paper.claims_friction import friction_loop
-from asperity.paper.comparisons import groove_path
-from asperity.paper.plane import LAWS, SCANNING, path_points
+from asperity.paper.paths import path_of
+from asperity.paper.plane import LAWS, SCANNING
 from asperity.surface import Surface
 
 _COLUMNS, _ROWS, _PROFILE = 33, 13, 401
 _DEPTH = 0.6e-3  # of the handles in figure 2 [m]
-_TURN = 0.1e-3  # a in the paths of (27) and (29) [m]
 _STEPS = 400  # on each leg of a path of figure 3
+_EQUATIONS = {"B": "(12)", "F": "(27)", "G": "(29)"}  # that give the energies of figure 3
 
 
 @dataclass(frozen=True)
@@ -117,16 +116,6 @@ def force_fields() -> tuple[ForceField, ...]:
     return tuple(panels)
 
 
-def _path(law: str) -> tuple[list[tuple[float, float, float]], str]:
-    if law == "F":
-        return friction_loop(SCANNING, _TURN), "(27)"
-    if law == "G":
-        quarter = 0.25 * SCANNING.period
-        turns = [(quarter, _TURN), (quarter, -_TURN), (3 * quarter, -_TURN), (3 * quarter, _TURN)]
-        return path_points(*turns), "(29)"
-    return groove_path(SCANNING), {"B": "(12)"}.get(law, "")
-
-
 def loop_energies() -> tuple[LoopEnergy, ...]:
     """Return the paths of figure 3 and the energy along them, for the numbers of section V.B.
 
@@ -153,8 +142,7 @@ def _loop_energy(law: str) -> LoopEnergy:
         changes = {"modulation_depth": 0.0, "friction": 2.0 * SCANNING.friction}
         height = np.zeros_like(height)
     surface = SCANNING.surface(law, **changes)
-    turns, equation = _path(law)
-    corners = np.array(turns)
+    corners = np.array(path_of(law, SCANNING))
     legs = zip(corners, np.roll(corners, -1, axis=0), strict=True)
     share = np.linspace(0.0, 1.0, _STEPS, endpoint=False)[:, None]
     path = np.concatenate([*(a + share * (b - a) for a, b in legs), corners[:1]])
@@ -172,5 +160,5 @@ def _loop_energy(law: str) -> LoopEnergy:
         way=np.concatenate([[0.0], np.cumsum(np.linalg.norm(step, axis=1))]),
         work=np.concatenate([[0.0], np.cumsum(work)]),
         energy=loop_work(surface, corners, 1e-10),
-        equation=equation,
+        equation=_EQUATIONS.get(law, ""),
     )

@@ -4,32 +4,21 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.loops import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
-from asperity.analysis.gain.friction import largest_singular_value
 from asperity.derive.facts import law_facts
 from asperity.files import record
-from asperity.surface import Surface
-from asperity.textures.sinusoid import Sinusoid
+from asperity.paper.claims_friction import PAPER, norm_of, stick_entries
+from asperity.paper.paths import TURN, path_of
+from asperity.paper.plane import LAWS, PASSIVITY, SCANNING
 
-# Section V.A, where the paper uses its numbers.
-_STIFFNESS, _AMPLITUDE, _PERIOD, _DEPTH = 2000.0, 0.8e-3, 1e-3, 1e-3
-_FRICTION, _DEFLECTION = 0.8, 1e-3
-# Section V.B, where it measures energies.
-_LOOP_STIFFNESS, _LOOP_PERIOD = 1000.0, 2e-3
-# Where the loops of (27) and (29) turn; the paper leaves a open.
-_A = 0.1e-3
 # Relative to k A²: loops that do not agree differ by more.
 _SAME_ENERGY = 1e-9
-_ORDER = "ABCDEFG"
 
 
 @dataclass(frozen=True)
@@ -98,7 +87,7 @@ class TableTwoRow:
     @property
     def energy_agrees(self) -> bool:
         """Whether the paper's loop gains what its formula says, or has the sign that it says."""
-        scale = _LOOP_STIFFNESS * _AMPLITUDE**2
+        scale = SCANNING.stiffness * SCANNING.amplitude**2
         if self.printed.energy is None:
             return self.energy > _SAME_ENERGY * scale
         return abs(self.energy - self.printed.energy) <= _SAME_ENERGY * scale
@@ -189,31 +178,22 @@ def table_two() -> TableTwo:
         (5.85, 2.4863)
     """
     parameters = (
-        f"q: A = {_mm(_AMPLITUDE)}, l = {_mm(_PERIOD)}, depth and d_max {_mm(_DEPTH)}, "
-        f"μ = {_FRICTION}; loops: k = {_LOOP_STIFFNESS:g} N/m, l = {_mm(_LOOP_PERIOD)}, "
-        f"a = {_mm(_A)}"
+        f"q: A = {_mm(PASSIVITY.amplitude)}, l = {_mm(PASSIVITY.period)}, "
+        f"depth and d_max {_mm(PASSIVITY.depth)}, μ = {PASSIVITY.friction}; "
+        f"loops: k = {SCANNING.stiffness:g} N/m, l = {_mm(SCANNING.period)}, a = {_mm(TURN)}"
     )
-    return TableTwo(tuple(_row(letter) for letter in _ORDER), parameters)
+    return TableTwo(tuple(_row(letter) for letter in LAWS), parameters)
 
 
 def _mm(length: float) -> str:
     return f"{length * 1e3:g} mm"
 
 
-def _surface(letter: str) -> Surface:
-    """Return the surface of section V.A."""
-    return Surface(
-        Sinusoid(_AMPLITUDE, _PERIOD),
-        letter,
-        stiffness=_STIFFNESS,
-        max_depth=_DEPTH,
-        friction=_FRICTION,
-        max_deflection=_DEFLECTION,
-    )
-
-
 def _row(letter: str) -> TableTwoRow:
-    surface = _surface(letter)
+    surface = PASSIVITY.surface(letter)
+    # Law F without texture, as in (27).
+    changes = {"modulation_depth": 0.0} if letter == "F" else {}
+    looped = SCANNING.surface(letter, **changes)
     q, printed = characteristic_number(surface), _printed()[letter]
     return TableTwoRow(
         law=letter,
@@ -223,7 +203,7 @@ def _row(letter: str) -> TableTwoRow:
         formula=_FORMULAS[letter],
         conservative=law_facts(surface.law).conservative,
         continuous=continuity(surface, q).continuous,
-        energy=loop_work(_loop_surface(letter), _path(letter)),
+        energy=loop_work(looped, path_of(letter, SCANNING)),
         change=_change(letter, printed, q),
     )
 
@@ -241,12 +221,13 @@ _FORMULAS = {
 
 def _printed() -> dict[str, Printed]:
     """Return the table as printed, its formulas put in numbers."""
-    slope = 2.0 * math.pi * _AMPLITUDE / _PERIOD
-    k, root = _LOOP_STIFFNESS, math.hypot(1.0, 2.0 * math.pi * _AMPLITUDE / _LOOP_PERIOD)
-    half = 0.5 * k * _AMPLITUDE**2
-    b_energy = half + k * _LOOP_PERIOD**2 / (4.0 * math.pi**2) * (1.0 - root)
+    slope = 2.0 * math.pi * PASSIVITY.amplitude / PASSIVITY.period
+    case, k = SCANNING, SCANNING.stiffness
+    root = math.hypot(1.0, 2.0 * math.pi * case.amplitude / case.period)
+    half = 0.5 * k * case.amplitude**2
+    b_energy = half + k * case.period**2 / (4.0 * math.pi**2) * (1.0 - root)
     # (27) with the modulation m = 1/2 of a law without texture, where the paper has m = 0.
-    f_energy = 0.5 * k * _FRICTION * 0.5 * _DEFLECTION * (_DEPTH - _A)
+    f_energy = 0.5 * k * case.friction * 0.5 * case.deflection * (case.depth - TURN)
     if_height, if_slope = "If h continuous", "If h' continuous"
     return {
         "A": Printed("√(1 + [2πA/l]²)", math.hypot(1.0, slope), "No", if_height, half),
@@ -254,47 +235,16 @@ def _printed() -> dict[str, Printed]:
         "C": Printed("No closed-form", None, "Yes", if_slope, 0.0),
         "D": Printed("1", 1.0, "Yes", "No. Even if h continuous", 0.0),
         "E": Printed("1", 1.0, "No", if_height, None),
-        "F": Printed("Appendix I", _appendix_one(), "Almost", if_height, f_energy),
+        "F": Printed("Appendix I", norm_of(*stick_entries(PAPER)), "Almost", if_height, f_energy),
         "G": Printed("No closed-form", None, "No", if_slope, None),
     }
 
 
-def _appendix_one() -> float:
-    """The norm of the paper's (26), which its (31) writes out; its h has no dimension."""
-    a = 2.0 * _FRICTION * (_DEPTH / _DEFLECTION + math.pi * _AMPLITUDE / _PERIOD)
-    return float(largest_singular_value(np.array([a]), np.array([2.0 * _FRICTION]))[0])
-
-
-def _loop_surface(letter: str) -> Surface:
-    """Return the surface of section V.B; law F without texture, as in (27)."""
-    return Surface(
-        Sinusoid(_AMPLITUDE, _LOOP_PERIOD),
-        letter,
-        stiffness=_LOOP_STIFFNESS,
-        max_depth=_DEPTH,
-        friction=_FRICTION,
-        max_deflection=_DEFLECTION,
-        modulation_depth=0.0,
-    )
-
-
-def _path(letter: str) -> Sequence[Sequence[float]]:
-    """Return the path of Fig. 3 on which the paper looks at a law's energy, vertices [m]."""
-    quarter = 0.25 * _LOOP_PERIOD
-    if letter == "F":
-        x, z = _DEFLECTION, -_DEPTH
-        turns = [(0.0, 1e-3), (0.0, -_A), (x, -_A), (x, z), (0.0, z)]
-    elif letter == "G":
-        turns = [(quarter, _A), (quarter, -_A), (3.0 * quarter, -_A), (3.0 * quarter, _A)]
-    else:
-        turns = [(0.0, 0.0), (quarter, 0.0), (quarter, _AMPLITUDE), (0.0, _AMPLITUDE)]
-    return [(x, 0.0, z) for x, z in turns]
-
-
 def _change(letter: str, printed: Printed, q: Bound) -> str:
     """Return what changed and why, with its numbers."""
-    y = 4.0 * math.pi**2 * _AMPLITUDE * _DEPTH / _PERIOD**2
-    radius = _mm(_DEPTH / y)
+    case = PASSIVITY
+    y = 4.0 * math.pi**2 * case.amplitude * case.depth / case.period**2
+    radius = _mm(case.depth / y)
     closed = f"There is a closed form, and it grows with the depth: y = {y:.2f} here."
     if letter == "F":
         own = printed.value or 0.0

@@ -9,14 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from asperity.devices import load_device
+from asperity.paper.plane import BUMP, PASSIVITY, SAMPLING_PERIOD, SCANNING
 from asperity.scene.plant import plant_of
 from asperity.scene.setup import Setup
 from asperity.simulation import BandHand, Motion, Pantograph, Servo, SpringHand, Still, Strokes
 from asperity.simulation.hands import Hand
 from asperity.surface import Surface
-from asperity.textures.sinusoid import Sinusoid
 
-PERIOD = 1e-4  # s, stated
 RESOLUTION = 15e-6  # m, stated: "better than"
 LETTERS = "WABCDEFGH"
 LAG = 6  # samples, fitted: of 0 and 4 to 7 the one at which W settles while A and F cycle
@@ -43,14 +42,12 @@ BUMP_GUESSED = (
 """What section V.C needs and does not state."""
 
 
-def band_setup(law: str = "A", stiffness: float = 2000.0, delay: int = LAG) -> Setup:
+def band_setup(law: str = "A", stiffness: float = PASSIVITY.stiffness, delay: int = LAG) -> Setup:
     """Return the loop of section V.A: an elastic band pulls the handle into the wall."""
-    surface = Surface(
-        Sinusoid(0.8e-3, 1e-3), law, stiffness, max_depth=1e-3, friction=0.8, max_deflection=1e-3
-    )
+    plant = Pantograph(joint_damping=PASSIVITY.joint_damping, centre=(0.0375, 0.1))
     return _setup(
-        surface, Pantograph(joint_damping=4.7e-3, centre=(0.0375, 0.1)), BandHand(),
-        Servo(PERIOD, delay, RESOLUTION), Still((0.0, 0.0, 0.0)), 0.5, start=(0.0, 0.0, 4e-3),
+        PASSIVITY.surface(law, stiffness=stiffness), plant, BandHand(),
+        _servo(delay), Still((0.0, 0.0, 0.0)), 0.5, start=(0.0, 0.0, 4e-3),
     )  # fmt: skip
 
 
@@ -77,12 +74,9 @@ SPEEDS = (0.05, 0.1, 0.15)  # m/s
 
 def stroke_setup(law: str = "A", hand: SpringHand = HANDS[0].hand, speed: float = 0.1) -> Setup:
     """Return the loop of section V.B: strokes of 80 mm along the wall, there and back."""
-    surface = Surface(
-        Sinusoid(0.8e-3, 2e-3), law, 1000.0, max_depth=1e-3, friction=0.8, max_deflection=1e-3
-    )
     way = Strokes((-0.04, 0.0, -1e-3), (0.04, 0.0, -1e-3), speed, count=5)
-    plant = Pantograph(joint_damping=4.0e-3)
-    return _setup(surface, plant, hand, Servo(PERIOD, 0, RESOLUTION), way, way.duration)
+    plant, servo = Pantograph(joint_damping=SCANNING.joint_damping), _servo(0)
+    return _setup(SCANNING.surface(law), plant, hand, servo, way, way.duration)
 
 
 ENTRIES = {
@@ -95,11 +89,10 @@ ENTRIES = {
 def bump_setup(law: str = "A", entry: str = "mid-height") -> Setup:
     """Return the loop of section V.C: once over a bump of 20 mm and back."""
     hand, height, speed, first = ENTRIES[entry]
-    surface = Surface(Sinusoid(0.02, 0.02), law, 1000.0, max_depth=0.02)
     way = Strokes((-0.01, 0.0, height), (0.01, 0.0, height), speed, count=2)
-    plant = Pantograph(joint_damping=4.0e-3)
+    plant, servo = Pantograph(joint_damping=BUMP.joint_damping), _servo(0)
     return _setup(
-        surface, plant, hand, Servo(PERIOD, 0, RESOLUTION), way, way.duration,
+        BUMP.surface(law, max_depth=0.02), plant, hand, servo, way, way.duration,
         start=(-0.01, 0.0, first),
     )  # fmt: skip
 
@@ -120,6 +113,10 @@ def device_setup(name: str, surface: Surface, hand: SpringHand) -> Setup:
         surface, device, plant, hand, servo, still, 0.25, start=(0.0, 0.0, 1e-3),
         assumptions=(*assumed, *said),
     )  # fmt: skip
+
+
+def _servo(delay: int) -> Servo:
+    return Servo(SAMPLING_PERIOD, delay, RESOLUTION)
 
 
 def _setup(
