@@ -15,6 +15,7 @@ from asperity.report.words.run_words import answer, closing_words, energy, ledge
 from asperity.scene import load_scene
 from asperity.scene.setup import Setup, make_setup
 from asperity.simulation import Run
+from asperity.simulation.run import Stop
 
 PRESS = Path(__file__).parents[2] / "examples" / "press.toml"
 
@@ -52,7 +53,7 @@ def test_a_run_that_does_not_close_is_not_believed(setup: Setup, run: Run) -> No
 def test_numbers_beyond_all_bounds_are_words(setup: Setup, run: Run) -> None:
     nan = (math.nan, 0.0, math.nan)
     wrong = replace(run, ledger=replace(run.ledger, supplied=nan, exchanged=math.inf))
-    wrong = replace(wrong, stopped="diverged")
+    wrong = replace(wrong, stop=Stop.DIVERGED)
     for text in (answer(setup, wrong), closing_words(wrong)):
         assert "nan" not in text.lower()
     assert "beyond all numbers" in answer(setup, wrong)

@@ -14,12 +14,13 @@ from asperity.kernels.driver import ClampName
 from asperity.laws import Law
 from asperity.simulation.ledger import Ledger
 from asperity.simulation.machine import Machine
+from asperity.simulation.run import Stop
 from asperity.simulation.servo import Servo
 from asperity.simulation.servo_source import COLUMNS, LEDGER, MEMORY
 from asperity.surface import Surface
 
 # Why the compiled loop stops, by its answer.
-STOPS = ("", "diverged", "left the workspace")
+STOPS = tuple(Stop)
 # Forces that may wait: a second at a megahertz.
 MOST_DELAY = 1_000_000
 _LOCK = Lock()
@@ -81,7 +82,7 @@ class Simulation:
         """Return the stored energy [J] with the hand's anchor at a place [m]."""
         return float(self._loops.stored_batch(self.state, anchor, self._moved.numbers))
 
-    def run(self, anchor: FloatArray, trace: FloatArray | None = None, every: int = 1) -> str:
+    def run(self, anchor: FloatArray, trace: FloatArray | None = None, every: int = 1) -> Stop:
         """Run one sample for each row of the anchor's way but the last.
 
         Args:
@@ -91,7 +92,7 @@ class Simulation:
             every: samples per row.
 
         Returns:
-            What stopped it before the end, one of ``STOPS``; empty for nothing.
+            What stopped it before the end.
         """
         if self.samples == 0:
             self._before = self.stored(anchor[0])
@@ -102,7 +103,7 @@ class Simulation:
             self._servo.settings, *self._arguments, table, every,
         )  # fmt: skip
         self._anchor = anchor[self.samples - first].copy()
-        return STOPS[stop]
+        return STOPS[int(stop)]
 
     @property
     def sums(self) -> FloatArray:

@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
-from asperity.files import Record, record
+from asperity.files import record
+from asperity.laws.w_smooth_wall import LAW as SMOOTH_WALL
 from asperity.simulation.hands import Hand, MovedHand
 from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Plant
-from asperity.simulation.run import Run
+from asperity.simulation.run import Run, Stop
 from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import simulate
 from asperity.surface import Surface
@@ -35,7 +36,7 @@ _COARSE = 2.0  # factor from one stiffness to the next while the onset is looked
 
 
 @dataclass(frozen=True)
-class Onset(Record):
+class Onset:
     """The stiffness at which limit cycles begin.
 
     Attributes:
@@ -49,6 +50,7 @@ class Onset(Record):
         low: least position reached in the runs at ``cycling`` (at the highest stiffness if nothing
             cycled), per axis [m].
         high: greatest position reached there [m].
+        wall: whether the law is the smooth wall.
         starts: how many starts were tried at each stiffness.
         cycles: how many of them ended in a limit cycle at ``cycling``.
     """
@@ -61,6 +63,11 @@ class Onset(Record):
     cycles: int
     low: tuple[float, float, float]
     high: tuple[float, float, float]
+    wall: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units; infinity is the string "inf"."""
+        return record(self, without=("wall",))
 
     @property
     def value(self) -> float:
@@ -116,7 +123,7 @@ def cycles(run: Run, threshold: float = CYCLE_SPEED) -> bool:
         run: whose hand holds still during the second half.
         threshold: of :func:`restlessness` [m/s].
     """
-    if run.stopped.startswith("diverged"):
+    if run.stop is Stop.DIVERGED:
         return True
     return restlessness(run) > threshold and _fed(run)
 
@@ -131,7 +138,7 @@ def _fed(run: Run) -> bool:
 
 def calms_down(run: Run) -> bool:
     """Return whether what is left of the motion is still getting less, by a tenth or more."""
-    return not run.stopped and restlessness(run) < 0.9 * restlessness(run, quarter=2)
+    return not run.stop and restlessness(run) < 0.9 * restlessness(run, quarter=2)
 
 
 def ends_in_cycle(
@@ -150,7 +157,7 @@ def ends_in_cycle(
     """
     for patience in PATIENCE:
         run = run_for(patience * duration)
-        if run.stopped or restlessness(run) <= threshold:
+        if run.stop or restlessness(run) <= threshold:
             return cycles(run, threshold), run
         if patience > 1.0 and not calms_down(run):
             break
@@ -259,7 +266,8 @@ def find_onset(
     quiet, cycling = _bracket(lambda k: count(k, 1)[0] > 0, lowest, highest, width)
     every, box = count(quiet if math.isinf(cycling) else cycling, len(shifts))
     low, high = ((float(row[0]), float(row[1]), float(row[2])) for row in box)
-    return Onset(surface.law.letter, servo.delay, quiet, cycling, len(shifts), every, low, high)
+    return Onset(surface.law.letter, servo.delay, quiet, cycling, len(shifts), every, low, high,
+                 wall=surface.law is SMOOTH_WALL)  # fmt: skip
 
 
 def _bracket(

@@ -159,5 +159,5 @@ def predict(
 
 def with_wall(onsets: Sequence[Onset], delay: int) -> Onset | None:
     """Return the onset of the smooth wall at a delay, if it is among these."""
-    found = [onset for onset in onsets if onset.law == "W" and onset.delay == delay]
+    found = [onset for onset in onsets if onset.wall and onset.delay == delay]
     return found[0] if found else None

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 from asperity.checks import FloatArray
 from asperity.files import record
 from asperity.simulation.ledger import Ledger
 from asperity.simulation.servo_source import COLUMNS
+
+
+class Stop(StrEnum):
+    """What ends a run before its time."""
+
+    NOTHING = ""
+    DIVERGED = "diverged"
+    """The state left all bounds, 1e6 in SI units."""
+    LEFT = "left the workspace"
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,9 +34,9 @@ class Run:
         samples: that were done.
         period: T [s].
         ledger: the energies of the whole run.
-        stopped: empty, ``"diverged"`` (the state left all bounds, 1e6 in SI units) or ``"left the
-            workspace: ..."``; then trace and ledger end there (in the second case with the sample
-            that the body could not follow).
+        stop: what ended it early; then trace and ledger end there (where it left the workspace,
+            with the sample that the body could not follow).
+        place: where it left the workspace, in words.
         path: of the trace file, or empty.
         notes: what about the plant is guessed.
     """
@@ -36,9 +46,15 @@ class Run:
     samples: int
     period: float
     ledger: Ledger
-    stopped: str = ""
+    stop: Stop = Stop.NOTHING
+    place: str = ""
     path: str = ""
     notes: tuple[str, ...] = ()
+
+    @property
+    def stopped(self) -> str:
+        """What ended it early, in words; empty if nothing did."""
+        return f"{self.stop}: {self.place}" if self.place else str(self.stop)
 
     @property
     def duration(self) -> float:

@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
 from asperity.simulation.hands import BandHand, Hand, MovedHand, SpringHand
-from asperity.simulation.loop import STOPS, Simulation
+from asperity.simulation.loop import Simulation
 from asperity.simulation.machine import LEAST_SINE, machine
 from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Cartesian, Pantograph, Plant
-from asperity.simulation.run import Run
+from asperity.simulation.run import Run, Stop
 from asperity.simulation.servo import Servo
 from asperity.simulation.trace import FileTrace, MemoryTrace, NoTrace, Trace
 from asperity.surface import Surface
@@ -93,7 +93,7 @@ def simulate(
         kept.close()
     return Run(
         kept.table(), simulation.state, simulation.samples, float(servo.period),
-        simulation.ledger(), _words(stop, simulation.state, plant),
+        simulation.ledger(), stop, _place(stop, simulation.state, plant),
         path=os.fspath(trace) if isinstance(kept, FileTrace) else "",  # type: ignore[arg-type]  # a path then
         notes=plant.notes,
     )  # fmt: skip
@@ -204,7 +204,7 @@ def _trace(wanted: bool | str | os.PathLike[str], rows: int) -> Trace:
 def _go(
     simulation: Simulation, way: _Way, kept: Trace, every: int,
     progress: Callable[[float], None] | None,
-) -> str:  # fmt: skip
+) -> Stop:  # fmt: skip
     while simulation.samples < way.samples:
         anchor = way.chunk(simulation.samples)
         stop = simulation.run(anchor, kept.room(len(anchor) // every + 1), every)
@@ -213,7 +213,7 @@ def _go(
             progress(simulation.samples / way.samples)
         if stop:
             return stop
-    return ""
+    return Stop.NOTHING
 
 
 def left_workspace(plant: Pantograph, place: FloatArray) -> str:
@@ -231,9 +231,10 @@ def left_workspace(plant: Pantograph, place: FloatArray) -> str:
     return ""
 
 
-def _words(stop: str, state: FloatArray, plant: Plant) -> str:
-    if stop != STOPS[2] or not isinstance(plant, Pantograph):
-        return stop
+def _place(stop: Stop, state: FloatArray, plant: Plant) -> str:
+    """Return where the handle of a pantograph left the workspace."""
+    if stop is not Stop.LEFT or not isinstance(plant, Pantograph):
+        return ""
     x, z, vx, vz = state[0], state[2], state[3], state[5]
     place, speed = f"({x:.4g}, 0, {z:.4g}) m", f"({vx:.3g}, 0, {vz:.3g}) m/s"
-    return f"{stop}: at {place} with {speed} an arm is almost stretched or folded"
+    return f"at {place} with {speed} an arm is almost stretched or folded"
