@@ -23,10 +23,11 @@ if TYPE_CHECKING:
         one_sided_number,
         worst_loop,
     )
-    from asperity.analysis.analyze import Analysis, analyze
-    from asperity.analysis.limits.device_limits import limits
+    from asperity.analysis.analysis_result import Analysis
+    from asperity.analysis.analyze import analyze
+    from asperity.analysis.check_limits import limits
+    from asperity.analysis.judge_passivity import passivity
     from asperity.analysis.limits.limit_result import Limits
-    from asperity.analysis.passivity.judgement import passivity
     from asperity.analysis.split.potential_table import TabulatedSurface, tabulate
     from asperity.analysis.split.state import PopThrough, SplitState, pop_through, split_state
     from asperity.devices import Device, load_device
@@ -48,7 +49,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
-    "Analysis": "asperity.analysis.analyze",
+    "Analysis": "asperity.analysis.analysis_result",
     "Bound": "asperity.analysis",
     "Comparison": "asperity.analysis",
     "Device": "asperity.devices",
@@ -71,13 +72,13 @@ _HOMES = {
     "characteristic_number": "asperity.analysis",
     "compare": "asperity.analysis",
     "curl_number": "asperity.analysis",
-    "limits": "asperity.analysis.limits.device_limits",
+    "limits": "asperity.analysis.check_limits",
     "load_device": "asperity.devices",
     "load_texture": "asperity.textures",
     "loop_work": "asperity.analysis",
     "named_surface": "asperity.textures",
     "one_sided_number": "asperity.analysis",
-    "passivity": "asperity.analysis.passivity.judgement",
+    "passivity": "asperity.analysis.judge_passivity",
     "pop_through": "asperity.analysis.split.state",
     "split_state": "asperity.analysis.split.state",
     "surface_names": "asperity.textures",

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.analysis.verdict import limit_text
+from asperity.analysis.words.comparison import limit_text
 from asperity.devices import parse_device
 from asperity.errors import ParameterError
 from asperity.laws import Law

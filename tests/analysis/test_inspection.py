@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.analysis.analyze import STEPS, Analysis, analyze
+from asperity.analysis.analysis_result import Analysis
+from asperity.analysis.analyze import STEPS, analyze
 from asperity.devices import Device, parse_device
 from asperity.devices.device import Datum
 from asperity.errors import ParameterError

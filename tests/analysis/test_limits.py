@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from asperity.analysis import check_limits as module
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.check_limits import limits
 from asperity.analysis.compare import compare
 from asperity.analysis.energy.merit import merit
-from asperity.analysis.limits import device_limits as module
-from asperity.analysis.limits.device_limits import limits
 from asperity.analysis.limits.limit_result import Limits
 from asperity.devices import Device, parse_device
 from asperity.errors import ParameterError

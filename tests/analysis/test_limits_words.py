@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.limits.device_limits import limits
+from asperity.analysis.check_limits import limits
 from asperity.analysis.limits.limit_result import Limits
 from asperity.devices import Device, parse_device
 from asperity.textures import Fourier, HeightMap, Sinusoid, Texture

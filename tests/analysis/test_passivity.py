@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import Leak, worst_loop
+from asperity.analysis.judge_passivity import passivity
 from asperity.analysis.passivity.criteria import Criterion
-from asperity.analysis.passivity.judgement import Passivity, passivity
+from asperity.analysis.passivity.judgement import Passivity
 from asperity.derive.facts import law_facts
 from asperity.devices import Datum, Device, parse_device
 from asperity.errors import ParameterError

@@ -16,7 +16,8 @@ from scipy.linalg import expm
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.passivity.judgement import Passivity, passivity
+from asperity.analysis.judge_passivity import passivity
+from asperity.analysis.passivity.judgement import Passivity
 from asperity.analysis.split.state import split_state
 from asperity.devices import parse_device
 from asperity.surface import Surface

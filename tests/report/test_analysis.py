@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from tests.report.pages import Reader, check_alone, terminal
 
-from asperity.analysis.analyze import Analysis, analyze
+from asperity.analysis.analysis_result import Analysis
+from asperity.analysis.analyze import analyze
 from asperity.devices import parse_device
 from asperity.report import html_text, print_analysis
 from asperity.report.analysis import analysis_page

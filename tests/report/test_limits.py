@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.report.pages import Reader, check_alone, terminal
 
-from asperity.analysis.limits.device_limits import limits
+from asperity.analysis.check_limits import limits
 from asperity.analysis.limits.limit_result import Limits
 from asperity.devices import parse_device
 from asperity.report import html_text

@@ -12,8 +12,9 @@ from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import merit
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
+from asperity.analysis.recommendation import recommend
 from asperity.analysis.row import LawRow
-from asperity.analysis.verdict import assumptions, recommend, verdict
+from asperity.analysis.words.comparison import assumptions, recommendation, verdict
 from asperity.checks import positive
 from asperity.derive.facts import law_facts
 from asperity.devices import Device, load_device
@@ -39,7 +40,7 @@ class Comparison:
         stiffness: the stiffness that was asked for [N/m].
         max_depth: the depth to which the surface is pressed [m].
         rows: one per law, in the order asked for.
-        recommended: letter of the recommended law; empty if none can be recommended.
+        recommended_row: of the recommended law; ``None`` if none can be recommended.
         recommendation: the recommendation with its reason, in words.
         assumptions: what was assumed, in sentences: defaults, unverified device data, the steps
             of preparing the surface, regions and resolutions of sampling.
@@ -50,9 +51,14 @@ class Comparison:
     stiffness: float
     max_depth: float
     rows: tuple[LawRow, ...]
-    recommended: str
+    recommended_row: LawRow | None
     recommendation: str
     assumptions: tuple[str, ...]
+
+    @property
+    def recommended(self) -> str:
+        """Letter of the recommended law; empty if none can be recommended."""
+        return "" if self.recommended_row is None else self.recommended_row.law.letter
 
     def row(self, letter: str) -> LawRow:
         """Return the row of a law by its letter.
@@ -149,7 +155,7 @@ def compare(
         if progress is not None:
             progress(surface.law.letter)
         rows.append(_row(surface, limit))
-    letter, words = recommend(rows, known_device)
+    chosen_one = recommend(rows, known_device)
     defaults = {"stiffness": stiffness is None, "max_depth": max_depth is None}
     return Comparison(
         texture=texture,
@@ -157,8 +163,8 @@ def compare(
         stiffness=asked,
         max_depth=surfaces[0].max_depth,
         rows=tuple(rows),
-        recommended=letter,
-        recommendation=words,
+        recommended_row=chosen_one.row,
+        recommendation=recommendation(chosen_one, known_device),
         assumptions=assumptions(rows, known_device, defaults),
     )
 
@@ -166,16 +172,14 @@ def compare(
 def _row(surface: Surface, limit: float) -> LawRow:
     facts = law_facts(surface.law)
     q, one_sided = characteristic_number(surface), one_sided_number(surface)
-    number, rule = (one_sided, "K₀/q⁺") if facts.conservative else (q, "K₀/q")
     scan = merit(surface)
     smooth = continuity(surface, q)
-    safe = limit / number.value
+    safe = limit / (one_sided if facts.conservative else q).value
     row = LawRow(
         surface=surface,
         q=q,
         one_sided=one_sided,
         safe_stiffness=safe,
-        rule=rule,
         conservative=facts.conservative,
         conservative_reason=facts.reason,
         leak=worst_loop(surface),

@@ -21,7 +21,6 @@ class LawRow:
         q: characteristic number.
         one_sided: one-sided number q⁺.
         safe_stiffness: the stiffness that the device can still render [N/m]; 0 for q = ∞.
-        rule: the rule that gave it, "K₀/q" or "K₀/q⁺".
         conservative: whether the work around every closed path is zero.
         conservative_reason: one sentence.
         leak: the worst simple loop at the stiffness that was asked for.
@@ -39,7 +38,6 @@ class LawRow:
     q: Bound
     one_sided: Bound
     safe_stiffness: float
-    rule: str
     conservative: bool
     conservative_reason: str
     leak: Leak
@@ -56,8 +54,54 @@ class LawRow:
         """The law of this row."""
         return self.surface.law
 
+    @property
+    def limiting(self) -> Bound:
+        """The number on which the safe stiffness rests: q⁺ for a conservative law, else q."""
+        return self.one_sided if self.conservative else self.q
+
+    @property
+    def rule(self) -> str:
+        """The rule that gave the safe stiffness, "K₀/q" or "K₀/q⁺"."""
+        return "K₀/q⁺" if self.conservative else "K₀/q"
+
+    @property
+    def buzzes(self) -> bool:
+        """Whether the law may buzz: the stiffness that was asked for is above its limit."""
+        return self.safe_stiffness < self.surface.stiffness
+
+    @property
+    def leaks(self) -> bool:
+        """Whether the law feels alive: it is not conservative."""
+        return not self.conservative
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the force jumps, which clicks."""
+        return not self.continuous
+
+    @property
+    def textureless(self) -> bool:
+        """Whether the law renders no texture."""
+        return self.texture_force == 0.0
+
+    @property
+    def loses_contact(self) -> bool:
+        """Whether contact is lost on a part of the scan."""
+        return self.contact_lost > 0.0 and self.law.contact.begins_on_texture
+
+    @property
+    def safe_leak(self) -> float:
+        """What the worst loop gains at the law's own safe stiffness [J]."""
+        return self.leak.worst * self.safe_stiffness / self.surface.stiffness
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        law = {"law": self.law.letter, "name": self.law.name}
-        law |= record(self.surface, "law_parameters")
-        return law | record(self, without=("surface",))
+        return {
+            "law": self.law.letter,
+            "name": self.law.name,
+            **record(self.surface, "law_parameters"),
+            **record(self, "q", "one_sided", "safe_stiffness", "rule"),
+            **record(self, "conservative", "conservative_reason", "leak"),
+            **record(self, "continuous", "continuous_reason", "strength", "support"),
+            **record(self, "contact_lost", "texture_force", "verdict"),
+        }

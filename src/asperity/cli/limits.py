@@ -54,7 +54,7 @@ def command(surface: str, device: Device | None, outputs: Outputs, **values: Any
     SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
     or a scene file (TOML).
     """
-    from asperity.analysis.limits.device_limits import DEFAULT_DEVICE, DEFAULT_LAW, limits
+    from asperity.analysis.check_limits import DEFAULT_DEVICE, DEFAULT_LAW, limits
     from asperity.scene import load_scene
     from asperity.scene.sections import surface_keywords
 

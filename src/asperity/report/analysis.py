@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.console import Console
 from rich.table import Table
 
-from asperity.analysis.analyze import Analysis
+from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.passivity.criteria import Criterion
 from asperity.report import page, terminal

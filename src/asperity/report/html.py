@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from asperity.analysis.analyze import Analysis
+from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.compare import Comparison
 from asperity.analysis.limits.limit_result import Limits
 from asperity.report.analysis import analysis_page

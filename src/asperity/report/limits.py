@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Table
 
 from asperity.analysis.limits.limit_result import Limits
-from asperity.analysis.limits.limit_words import speed_text, speeds_text, stiffness_text
+from asperity.analysis.words.limits import speed_text, speeds_text, stiffness_text
 from asperity.report import page, terminal
 from asperity.report.devices import numbers_table
 from asperity.report.page import (

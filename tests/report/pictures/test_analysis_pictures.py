@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
 
-from asperity.analysis.analyze import Analysis, analyze
+from asperity.analysis.analysis_result import Analysis
+from asperity.analysis.analyze import analyze
 from asperity.devices import parse_device
 from asperity.errors import ParameterError
 from asperity.report import plot

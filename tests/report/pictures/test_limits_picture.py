@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from asperity.analysis.limits.device_limits import limits
+from asperity.analysis.check_limits import limits
 from asperity.analysis.limits.limit_result import Limits
 from asperity.devices import parse_device
 from asperity.report.pictures.limits_picture import limits_figure, shortest

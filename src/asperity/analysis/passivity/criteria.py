@@ -2,27 +2,22 @@
 
 The force of sample i - d is held over the step p_i -> p_{i+1} of duration T; the damping takes at
 least σ₀|Δp|²/T of it. Proofs are on the page "Passivity" of the documentation. Limits are computed
-in exact rational arithmetic from the numbers given, and rounded down.
+in exact rational arithmetic from the numbers given, and rounded down. A criterion of one's own is
+added with :func:`register`.
 """
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Any
 
-from asperity.analysis.passivity.device_loop import (
-    HALF,
-    Loop,
-    Number,
-    critical_speed,
-    greatest_delay,
-    leaks,
-)
-from asperity.files import Record
-from asperity.units import engineering, rounded_down
+from asperity.analysis.passivity.device_loop import HALF, Loop, Number, Obstacle, leaks
+from asperity.errors import ParameterError
+from asperity.files import record
 
 PAPER = "paper (1)"
 ONE_SIDED = "one-sided"
@@ -34,7 +29,7 @@ LEAK = "leak"
 
 
 @dataclass(frozen=True)
-class Criterion(Record):
+class Criterion:
     """One criterion of passivity.
 
     Attributes:
@@ -45,24 +40,34 @@ class Criterion(Record):
         margin: limit over the surface's stiffness [1]; ``None`` if the limit is unknown.
         assumptions: what it rests on, in one line, with the device's numbers that it used.
         missing: fields of the device that are needed and not known.
-        says: the answer in words.
+        says: the answer in words; made from the other fields where it is empty.
+        at_most: a stiffness above which it surely does not hold [N/m]; ``None`` if unknown.
+        obstacle: why it does not apply to the law; ``None`` if it does.
+        uses: fields of the device that it looked at.
     """
 
     name: str
     formula: str
-    holds: bool | None
-    limit: float | None
-    margin: float | None
-    assumptions: str
-    missing: tuple[str, ...]
-    says: str
+    holds: bool | None = None
+    limit: float | None = None
+    margin: float | None = None
+    assumptions: str = ""
+    missing: tuple[str, ...] = ()
+    says: str = ""
+    at_most: float | None = None
+    obstacle: Obstacle | None = None
+    uses: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units; an unbounded number is written as the string "inf"."""
+        return record(self, without=("at_most", "obstacle", "uses"))
 
 
 # --- rules of the form k (w⁺ q⁺ + w q) <= budget --------------------------------------------------
 
 
 @dataclass(frozen=True)
-class _Rule:
+class Rule:
     """k (plus · q⁺ + full · q) <= budget [N/m], with the fields of the device that it needs."""
 
     name: str
@@ -72,38 +77,34 @@ class _Rule:
     budget: Fraction | None
     needs: tuple[str, ...]
     assumptions: str
-    obstacle: str = ""
+    obstacle: Obstacle | None = None
     uses: tuple[str, ...] = ()
 
 
-def criteria(loop: Loop) -> tuple[Criterion, ...]:
-    """Return every criterion, judged."""
-    rules = (_paper(loop), _one_sided(loop), _delay(loop), _virtual(loop), *_walls(loop))
-    return (*(_judge(loop, rule) for rule in rules), _leak(loop))
-
-
-def _judge(loop: Loop, rule: _Rule) -> Criterion:
-    assumptions = _one_line(loop, rule.assumptions, (*rule.needs, *rule.uses))
+def judge(loop: Loop, rule: Rule) -> Criterion:
+    """Return what a rule says of a surface on a device."""
     missing = tuple(field for field in rule.needs if loop.device.value(field) is None)
-    if rule.obstacle or missing or rule.budget is None:
-        says = f"not applicable: {rule.obstacle}" if rule.obstacle else _needs(loop, missing)
-        left = () if rule.obstacle else missing
-        return Criterion(rule.name, rule.formula, None, None, None, assumptions, left, says)
+    said: dict[str, Any] = {
+        "name": rule.name,
+        "formula": rule.formula,
+        "assumptions": rule.assumptions,
+        "uses": (*rule.needs, *rule.uses),
+    }
+    if rule.obstacle is not None:
+        return Criterion(**said, obstacle=rule.obstacle)
+    if missing or rule.budget is None:
+        return Criterion(**said, missing=missing)
     upper = loop.number(rule.plus, rule.full, "upper")
     proved = _greatest(rule.budget, upper)
     possible = _greatest(rule.budget, loop.number(rule.plus, rule.full, "lower"))
-    holds = True if loop.stiffness <= proved else False if loop.stiffness > possible else None
     # Infinity over a finite lower end: the number was only sampled, so no limit is proved.
     known = upper != math.inf or possible == 0
     return Criterion(
-        name=rule.name,
-        formula=rule.formula,
-        holds=holds,
+        **said,
+        holds=True if loop.stiffness <= proved else False if loop.stiffness > possible else None,
         limit=_down(proved) if known else None,
         margin=_down(proved / loop.stiffness) if known else None,
-        assumptions=assumptions,
-        missing=(),
-        says=_says(holds, proved, possible, known),
+        at_most=_down(possible),
     )
 
 
@@ -122,68 +123,32 @@ def _down(value: Number) -> float:
     return near if Fraction(near) <= value else math.nextafter(near, -math.inf)
 
 
-def _says(holds: bool | None, proved: Number, possible: Number, known: bool) -> str:
-    answer = {True: "holds", False: "does not hold", None: "not decidable"}[holds]
-    if not known:
-        return f"{answer}: the number was only sampled; the limit is at most {_newtons(possible)}"
-    if holds is None:
-        return f"{answer}: the limit is between {_newtons(proved)} and {_newtons(possible)}"
-    return f"{answer}: the limit is {_newtons(proved)}"
-
-
-def _newtons(stiffness: Number) -> str:
-    if stiffness == math.inf:
-        return "infinite"
-    return f"{rounded_down(_down(stiffness)):.10g} N/m"
-
-
-def _needs(loop: Loop, missing: Sequence[str]) -> str:
-    text = f"not decidable: needs {', '.join(missing)}"
-    if tuple(missing) != ("delay_samples",):
-        return text
-    most = greatest_delay(loop)
-    if most is None:
-        return f"{text}; at this stiffness not even d = 0 is proved"
-    return f"{text}; at this stiffness d <= {most} is proved"
-
-
-def _one_line(loop: Loop, assumptions: str, fields: Sequence[str]) -> str:
-    """Return the assumptions with the region and the numbers used, the unverified ones marked."""
-    depth = f"no deeper than {engineering(loop.surface.max_depth, 'm')}"
-    used = [(field, loop.device.data[field]) for field in fields if field in loop.device.data]
-    numbers = [
-        f"{field} {datum.text}{'' if datum.verified else ' (not verified)'}"
-        for field, datum in used
-    ]
-    return "; ".join([assumptions, depth, *([", ".join(numbers)] if numbers else [])])
-
-
 _SIMPLE = "conservative law, zero-order hold, symmetric damping >= σ₀ wherever the force acts"
 
 
-def _paper(loop: Loop) -> _Rule:
+def _paper(loop: Loop) -> Rule:
     budget = None if loop.loss is None else loop.loss / 2
     note = "zero-order hold; no certificate for a field with curl, nor from 2 samples of delay on"
     needs = ("update_rate", "damping")
-    return _Rule(PAPER, "k q <= σ₀/(2T)", Fraction(0), Fraction(1), budget, needs, note)
+    return Rule(PAPER, "k q <= σ₀/(2T)", Fraction(0), Fraction(1), budget, needs, note)
 
 
-def _one_sided(loop: Loop) -> _Rule:
+def _one_sided(loop: Loop) -> Rule:
     budget = None if loop.loss is None else 2 * loop.loss
     note = f"{_SIMPLE}, no delay, no virtual damping"
     needs = ("update_rate", "damping")
     one, none = Fraction(1), Fraction(0)
-    return _Rule(ONE_SIDED, "k q⁺ <= 2σ₀/T", one, none, budget, needs, note, loop.obstacle)
+    return Rule(ONE_SIDED, "k q⁺ <= 2σ₀/T", one, none, budget, needs, note, loop.obstacle)
 
 
-def _delay(loop: Loop) -> _Rule:
+def _delay(loop: Loop) -> Rule:
     note = f"{_SIMPLE}, d whole samples of delay, no virtual damping, no quantisation"
     needs = ("update_rate", "damping", "delay_samples")
     formula = "k (q⁺/2 + d q) <= σ₀/T"
-    return _Rule(DELAY, formula, HALF, loop.samples, loop.loss, needs, note, loop.obstacle)
+    return Rule(DELAY, formula, HALF, loop.samples, loop.loss, needs, note, loop.obstacle)
 
 
-def _virtual(loop: Loop) -> _Rule:
+def _virtual(loop: Loop) -> Rule:
     """Colgate and Schenkel's b > K T/2 + |b_v| is the case of a plain wall without delay."""
     budget = None if loop.loss is None else loop.loss - abs(loop.damper)
     delay = "no delay" if loop.delay is None else "d whole samples of delay"
@@ -191,12 +156,12 @@ def _virtual(loop: Loop) -> _Rule:
     needs = ("update_rate", "damping", "virtual_damping")
     formula = "k q⁺ T/2 + |b_v| <= σ₀" if not loop.delay else "k (q⁺/2 + d q) T + |b_v| <= σ₀"
     uses = ("delay_samples",)
-    return _Rule(
+    return Rule(
         VIRTUAL, formula, HALF, loop.samples, budget, needs, note, loop.obstacle, uses
     )  # fmt: skip
 
 
-def _walls(loop: Loop) -> tuple[_Rule, _Rule]:
+def _walls(loop: Loop) -> tuple[Rule, Rule]:
     """What a smooth wall K₀ that is passive on the device says of the texture.
 
     It shows σ₀/T >= K₀ (1/2 + d), whatever d is; q⁺ <= q does the rest.
@@ -210,8 +175,8 @@ def _walls(loop: Loop) -> tuple[_Rule, _Rule]:
     formula = "k q⁺ <= K₀" if not loop.delay else "k (q⁺/2 + d q) <= K₀ (1/2 + d)"
     uses = ("delay_samples",)
     return (
-        _Rule(WALL, "k q <= K₀", Fraction(0), Fraction(1), budget, needs, both),
-        _Rule(WALL_ONE_SIDED, formula, HALF, loop.samples, wide, needs, own, loop.obstacle, uses),
+        Rule(WALL, "k q <= K₀", Fraction(0), Fraction(1), budget, needs, both),
+        Rule(WALL_ONE_SIDED, formula, HALF, loop.samples, wide, needs, own, loop.obstacle, uses),
     )
 
 
@@ -223,18 +188,50 @@ def _leak(loop: Loop) -> Criterion:
     formula = "W <= 0 for every loop"
     if loop.conservative:
         note = "the law's curl is zero identically; nothing is asked of the device"
-        return Criterion(LEAK, formula, True, math.inf, math.inf, note, (), "holds: no loop gains")
-    missing = () if loop.damping is not None else ("damping",)
+        return Criterion(LEAK, formula, True, math.inf, math.inf, note)
     note = f"one slow turn of the loop ({loop.leak.method}); dry friction is not counted"
-    assumptions = _one_line(loop, note, ("damping",))
     if not leaks(loop):
-        says = "not decidable: no loop found that gains energy, and no proof that none does"
-        return Criterion(LEAK, formula, None, None, None, assumptions, (), says)
-    gain = f"does not hold: a loop gains {engineering(loop.leak.energy, 'J')}, in proportion to k"
-    speed = critical_speed(loop)
-    tail = (
-        "; the speed below which damping does not absorb it is not decidable: needs damping"
-        if speed is None
-        else f"; damping absorbs it only above {engineering(speed, 'm/s')}"
-    )
-    return Criterion(LEAK, formula, False, 0.0, 0.0, assumptions, missing, gain + tail)
+        return Criterion(LEAK, formula, assumptions=note, uses=("damping",))
+    missing = () if loop.damping is not None else ("damping",)
+    return Criterion(LEAK, formula, False, 0.0, 0.0, note, missing, uses=("damping",))
+
+
+# --- all of them ----------------------------------------------------------------------------------
+
+Judge = Callable[[Loop], Criterion]
+CRITERIA: dict[str, Judge] = {
+    PAPER: lambda loop: judge(loop, _paper(loop)),
+    ONE_SIDED: lambda loop: judge(loop, _one_sided(loop)),
+    DELAY: lambda loop: judge(loop, _delay(loop)),
+    VIRTUAL: lambda loop: judge(loop, _virtual(loop)),
+    WALL: lambda loop: judge(loop, _walls(loop)[0]),
+    WALL_ONE_SIDED: lambda loop: judge(loop, _walls(loop)[1]),
+    LEAK: _leak,
+}
+"""What judges a surface on a device, by the name of the criterion, in the order of the tables."""
+
+
+def register(name: str, judge_loop: Judge) -> None:
+    """Add a criterion of one's own: it stands in every analysis, but decides nothing.
+
+    Args:
+        name: what it is called.
+        judge_loop: what it says of a :class:`~asperity.analysis.passivity.device_loop.Loop`; the
+            sentence, the region and the device's numbers are put into words after it.
+
+    Raises:
+        ParameterError: for a name that is taken.
+
+    Example:
+        >>> from asperity.analysis.passivity.criteria import CRITERIA, Criterion, register
+        >>> register("soft", lambda loop: Criterion("soft", "k <= 100 N/m", loop.stiffness <= 100))
+        >>> del CRITERIA["soft"]
+    """
+    if name in CRITERIA:
+        raise ParameterError("name", "is the name of another criterion", name)
+    CRITERIA[name] = judge_loop
+
+
+def criteria(loop: Loop) -> tuple[Criterion, ...]:
+    """Return every criterion, judged."""
+    return tuple(replace(judge_loop(loop), name=name) for name, judge_loop in CRITERIA.items())

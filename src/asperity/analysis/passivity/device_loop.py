@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import Enum, auto
 from fractions import Fraction
 
 from asperity.analysis.bounds.bound import Bound
@@ -21,6 +22,14 @@ Number = Fraction | float  # a fraction, or infinity
 _ROUNDING = 1e-12
 
 
+class Obstacle(Enum):
+    """Why the rules for conservative laws do not apply."""
+
+    CURL = auto()
+    LATERAL_CLAMP = auto()
+    JUMPS = auto()
+
+
 @dataclass(frozen=True)
 class Loop:
     """A surface on a device; numbers of the device as exact fractions, ``None`` if not known.
@@ -32,7 +41,8 @@ class Loop:
         one_sided: one-sided number q⁺.
         leak: the worst loop.
         conservative: whether the law is.
-        obstacle: why the rules for conservative laws do not apply; empty if they do.
+        obstacle: why the rules for conservative laws do not apply; ``None`` if they do.
+        reason: what the curl, or the continuity of the force, says of the obstacle.
         rate: update rate 1/T [Hz].
         damping: σ₀ [N s/m].
         virtual: b_v [N s/m].
@@ -46,7 +56,8 @@ class Loop:
     one_sided: Bound
     leak: Leak
     conservative: bool
-    obstacle: str
+    obstacle: Obstacle | None
+    reason: str
     rate: Fraction | None
     damping: Fraction | None
     virtual: Fraction | None
@@ -90,8 +101,8 @@ def make_loop(surface: Surface, device: Device, q: Bound, one_sided: Bound, leak
     Raises:
         ParameterError: for a number of the device that is out of its range.
     """
-    conservative, obstacle = _obstacle(surface, q)
-    delay = _fraction(device, "delay_samples", "must not be negative")
+    obstacle, reason = _obstacle(surface, q)
+    delay = _fraction(device, "delay_samples", _NOT_NEGATIVE)
     if delay is not None and delay.denominator != 1:
         raise ParameterError("device.delay_samples", "must be a whole number", float(delay))
     return Loop(
@@ -100,45 +111,49 @@ def make_loop(surface: Surface, device: Device, q: Bound, one_sided: Bound, leak
         q=q,
         one_sided=one_sided,
         leak=leak,
-        conservative=conservative,
+        conservative=obstacle not in {Obstacle.CURL, Obstacle.LATERAL_CLAMP},
         obstacle=obstacle,
-        rate=_fraction(device, "update_rate", "must be positive"),
-        damping=_fraction(device, "damping", "must not be negative"),
-        virtual=_fraction(device, "virtual_damping", "must be finite"),
+        reason=reason,
+        rate=_fraction(device, "update_rate", _POSITIVE),
+        damping=_fraction(device, "damping", _NOT_NEGATIVE),
+        virtual=_fraction(device, "virtual_damping", _FINITE),
         delay=None if delay is None else int(delay),
-        wall=_fraction(device, "max_stiffness", "must be positive"),
+        wall=_fraction(device, "max_stiffness", _POSITIVE),
     )
 
 
-def _fraction(device: Device, field: str, rule: str) -> Fraction | None:
+_POSITIVE = ("must be positive", 5e-324)
+_NOT_NEGATIVE = ("must not be negative", 0.0)
+_FINITE = ("must be finite", -math.inf)
+
+
+def _fraction(device: Device, field: str, rule: tuple[str, float]) -> Fraction | None:
     """Return a number of the device, exactly; checked, since a device may be built by hand."""
     value = device.value(field)
     if value is None:
         return None
-    wrong = (rule == "must be positive" and value <= 0.0) or (
-        rule == "must not be negative" and value < 0.0
-    )
-    if wrong or not math.isfinite(value):
+    words, least = rule
+    if value < least or not math.isfinite(value):
         unit = device.data[field].unit
-        raise ParameterError(f"device.{field}", f"{rule}, and finite [{unit}]", value)
+        raise ParameterError(f"device.{field}", f"{words}, and finite [{unit}]", value)
     return Fraction(value)
 
 
-def _obstacle(surface: Surface, q: Bound) -> tuple[bool, str]:
-    """Return whether the law is conservative, and why its potential gives no bound if so.
+def _obstacle(surface: Surface, q: Bound) -> tuple[Obstacle | None, str]:
+    """Return why the law's potential gives no bound, if so, and what is said of that.
 
     The rules need U(p + Δ) <= U(p) + ∇U · Δ + q⁺|Δ|²/2. The Jacobian proves that where the force
     is continuous. A jump can break it, but not where a theorem says that U is an infimum.
     """
     law, facts = surface.law, law_facts(surface.law)
     if not facts.conservative:
-        return False, f"the law is not conservative ({facts.reason})"
+        return Obstacle.CURL, facts.reason
     if surface.clamp == "lateral" and law.clampable:
-        return False, "the lateral clamp makes the law leak below max_depth"
+        return Obstacle.LATERAL_CLAMP, ""
     if theorem_of(law).infimum:
-        return True, ""
+        return None, ""
     smooth = continuity(surface, q)
-    return True, "" if smooth.continuous else f"the force is not continuous: {smooth.reason}"
+    return (None, "") if smooth.continuous else (Obstacle.JUMPS, smooth.reason)
 
 
 def greatest_delay(loop: Loop) -> int | None:

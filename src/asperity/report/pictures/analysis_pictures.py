@@ -13,7 +13,7 @@ from matplotlib.patheffects import Stroke, withStroke
 from matplotlib.quiver import Quiver
 from matplotlib.ticker import FuncFormatter, SymmetricalLogLocator
 
-from asperity.analysis.analyze import Analysis
+from asperity.analysis.analysis_result import Analysis
 from asperity.checks import FloatArray
 from asperity.report.pictures import style
 from asperity.report.pictures.analysis_region import (

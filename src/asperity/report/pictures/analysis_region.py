@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.analysis.analyze import Analysis
+from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.bounds.highest import highest_point
 from asperity.analysis.bounds.measures import spectral_norm

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from asperity.analysis.limits.limit_result import Limits
-from asperity.analysis.limits.limit_words import speed_text, stiffness_text
+from asperity.analysis.words.limits import speed_text, stiffness_text
 from asperity.report.pictures import style
 from asperity.units import engineering
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from asperity.analysis.analyze import Analysis
+from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.compare import Comparison
 from asperity.analysis.row import LawRow
 from asperity.errors import ParameterError
@@ -32,7 +32,7 @@ def plot(result: Any, picture: str | None = None) -> Figure:
     Args:
         result: a :class:`~asperity.analysis.compare.Comparison` (the surface, the forces and
             the fields of all laws), a :class:`~asperity.surface.Surface` (forces and field of its
-            law), a texture (the surface) or an :class:`~asperity.analysis.analyze.Analysis`
+            law), a texture (the surface) or an :class:`~asperity.analysis.analysis_result.Analysis`
             (the field with the worst loop, the loop gain, the singular values).
         picture: one picture of the report alone; of a comparison "surface", "spectrum", "force",
             "field", "gain" or "merit", of an analysis "field", "gain", "depth", for a map also

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from asperity.analysis.analyze import Analysis
+from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.bounds.bound import Bound
 from asperity.report.words.number_words import (
     in_one_unit,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from asperity.analysis.limits.limit_result import Limits, RenderedWave
 from asperity.analysis.limits.limit_rules import RULES, Limit
-from asperity.analysis.limits.limit_words import percent, speed_text, speeds_text, stiffness_text
+from asperity.analysis.words.limits import percent, speed_text, speeds_text, stiffness_text
 from asperity.report.words.number_words import INFINITE, NONE, holds_text
 from asperity.units import engineering
 

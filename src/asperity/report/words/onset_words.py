@@ -66,7 +66,7 @@ def answer(setup: Setup, found: Sequence[Prediction]) -> str:
     else:
         cases = "case" if proved == 1 else "cases"
         said = f"No limit cycle below the delay rule, in {proved} {cases} of conservative laws."
-    if any(one.wall_rule is not None and one.onset.law != "W" for one in found):
+    if any(one.wall_rule is not None and not one.onset.wall for one in found):
         names = ", ".join(f"{one.onset.law} at d = {one.onset.delay}" for one in walls)
         said += f" K₀/q was too much for: {names}." if walls else " K₀/q was safe in all of them."
     return said

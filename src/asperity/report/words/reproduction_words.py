@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from asperity.analysis.analyze import Analysis
+from asperity.analysis.analysis_result import Analysis
 from asperity.laws import LAW_ARGUMENTS, LAWS
 from asperity.report.words.number_words import interval_text
 from asperity.surface import Surface

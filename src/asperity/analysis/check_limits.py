@@ -16,9 +16,9 @@ from asperity.analysis.energy.merit import merit
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.limits.limit_result import Limits, RenderedWave, TextureForce
 from asperity.analysis.limits.limit_rules import RULES, Case, Decision, Limit, decide
-from asperity.analysis.limits.limit_words import answer, assumptions
 from asperity.analysis.limits.spectrum import LEAST_SHARE, Spectrum, spectrum
 from asperity.analysis.limits.wave_force import wave_forces
+from asperity.analysis.words.limits import answer, assumptions
 from asperity.checks import FloatArray, positive, real
 from asperity.derive.facts import law_facts
 from asperity.devices import Device, load_device

@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 
+from asperity.analysis.recommendation import Recommendation, felt_force
 from asperity.analysis.row import LawRow
 from asperity.devices import Device
 from asperity.surface import Surface
 from asperity.units import engineering, rounded_down
 
-# A texture force below this is taken as not felt where the device's resolution is unknown [N].
-DEFAULT_FELT_FORCE = 0.01
-
 
 def verdict(row: LawRow) -> str:
     """Return what will go wrong with a law, in one line."""
-    surface, k = row.surface, row.surface.stiffness
-    parts = []
-    if row.safe_stiffness < k:
+    k, parts = row.surface.stiffness, []
+    if row.buzzes:
         parts.append(f"may buzz: {k:g} N/m is above its {limit_text(row.safe_stiffness)}")
-    if not row.conservative:
+    if row.leaks:
         gain = engineering(row.leak.worst, "J")
         parts.append(f"feels alive: a loop gains up to {gain}")
-    if not row.continuous:
+    if row.jumps:
         parts.append("clicks: " + row.continuous_reason)
-    if row.texture_force == 0.0:
+    if row.textureless:
         parts.append("no texture")
     if not parts:
         parts.append(f"sound at {k:g} N/m: below its limit, conservative, continuous")
-    if row.contact_lost > 0.0 and surface.law.contact.begins_on_texture:
+    if row.loses_contact:
         parts.append(f"no contact on {100.0 * row.contact_lost:.0f} % of the scan")
     return "; ".join(parts)
 
@@ -44,45 +40,18 @@ def limit_text(stiffness: float) -> str:
     return f"{rounded_down(stiffness):.10g} N/m"
 
 
-def recommend(rows: Sequence[LawRow], device: Device) -> tuple[str, str]:
-    """Return the letter of the recommended law and the reason, in words.
-
-    A law that is conservative and continuous cannot feel alive and does not click; of those the
-    one with the strongest texture at its own safe stiffness is recommended, if it can be felt.
-    Else, of the continuous laws that can be felt, the one that leaks least for its texture force.
-    """
-    textured = [row for row in rows if row.texture_force > 0.0]
-    if not textured:
-        return "", "None of the laws compared renders a texture on this surface."
-    threshold, _source = felt_force(device)
-    felt = [row for row in textured if row.texture_force >= threshold] or textured
-    sound = [row for row in felt if row.conservative and row.continuous]
-    if sound:
-        best = _soundest(sound)
-    else:
-        best = min([row for row in felt if row.continuous] or felt, key=_aliveness)
+def recommendation(found: Recommendation, device: Device) -> str:
+    """Return which law to use, and why."""
+    best = found.row
+    if best is None:
+        return "None of the laws compared renders a texture on this surface."
     head = (
         f"Use law {best.law.letter} ({_spoken(best)}) at up to {limit_text(best.safe_stiffness)} "
         f"on the {device.name}"
     )
-    why = _sound_reason(best) if sound else _least_leak_reason(best, textured, threshold)
-    tail = _price(best, felt) + _saturation(best, device)
-    return best.law.letter, f"{head}: {why}.{tail}"
-
-
-def _soundest(sound: Sequence[LawRow]) -> LawRow:
-    """Return the strongest law; of nearly equal ones one whose force cannot jump at any depth."""
-    strongest = max(row.texture_force for row in sound)
-    equal = [row for row in sound if row.texture_force >= 0.98 * strongest]
-    return min(equal, key=lambda row: not row.surface.law.contact.single_valued)
-
-
-def felt_force(device: Device) -> tuple[float, str]:
-    """Return the texture force below which nothing is felt [N], and where that comes from."""
-    known = device.value("force_resolution")
-    if known is not None:
-        return known, f"the force resolution of the {device.name}"
-    return DEFAULT_FELT_FORCE, "a default, the device's force resolution being unknown"
+    why = _sound_reason(best) if found.sound else _least_leak_reason(best, found)
+    tail = _price(best, found.felt) + _saturation(best, device)
+    return f"{head}: {why}.{tail}"
 
 
 def _sound_reason(best: LawRow) -> str:
@@ -93,16 +62,16 @@ def _sound_reason(best: LawRow) -> str:
     )
 
 
-def _least_leak_reason(best: LawRow, textured: Sequence[LawRow], threshold: float) -> str:
+def _least_leak_reason(best: LawRow, found: Recommendation) -> str:
     force = engineering(best.texture_force, "N")
-    gain = engineering(best.leak.worst * best.safe_stiffness / best.surface.stiffness, "J")
-    faint = [row for row in textured if row.conservative and row.continuous]
+    gain = engineering(best.safe_leak, "J")
+    faint = [row for row in found.textured if not (row.leaks or row.jumps)]
     if faint:
         weak = max(faint, key=lambda row: row.texture_force)
         why_not = (
             f"law {weak.law.letter}, conservative and continuous, gives only "
             f"{engineering(weak.texture_force, 'N')} RMS at its {limit_text(weak.safe_stiffness)}, "
-            f"below the {engineering(threshold, 'N')} that can be felt"
+            f"below the {engineering(found.threshold, 'N')} that can be felt"
         )
     else:
         why_not = "none of the laws compared is conservative and continuous"
@@ -116,14 +85,6 @@ def _spoken(row: LawRow) -> str:
     return row.law.name.replace("-", " ")
 
 
-def _aliveness(row: LawRow) -> float:
-    """Leak at the law's own safe stiffness over texture force times length of the scan [1]."""
-    if row.safe_stiffness == 0.0:
-        return math.inf
-    gained = row.leak.worst * row.safe_stiffness / row.surface.stiffness
-    return gained / (row.texture_force * row.leak.line.length)
-
-
 def _price(best: LawRow, textured: Sequence[LawRow]) -> str:
     """Return what the recommended law gives up against the others."""
     stiffer = [row for row in textured if row.safe_stiffness > 1.5 * best.safe_stiffness]
@@ -131,10 +92,9 @@ def _price(best: LawRow, textured: Sequence[LawRow]) -> str:
         return ""
     rival = max(stiffer, key=lambda row: row.safe_stiffness)
     trouble = []
-    if not rival.conservative:
-        gained = rival.leak.worst * rival.safe_stiffness / rival.surface.stiffness
-        trouble.append(f"gains up to {engineering(gained, 'J')} per loop there")
-    if not rival.continuous:
+    if rival.leaks:
+        trouble.append(f"gains up to {engineering(rival.safe_leak, 'J')} per loop there")
+    if rival.jumps:
         trouble.append("its force jumps")
     return (
         f" The price is stiffness: law {rival.law.letter} can be rendered at "
@@ -170,7 +130,7 @@ def assumptions(
     datum = device.data["max_stiffness"]
     mark = "" if datum.verified else " (not verified)"
     result.append(f"K₀ = {datum.value:g} N/m for the {device.name}{mark}: {datum.source}")
-    if any("⁺" in row.rule for row in rows):
+    if any(row.conservative for row in rows):
         result.append(
             "K₀/q⁺ is proved for a loop without delay beyond the hold; K₀/q for every delay, if "
             "the law is conservative"
@@ -181,8 +141,14 @@ def assumptions(
     ]  # fmt: skip
     if unverified:
         result.append(f"Not verified for the {device.name}: {', '.join(unverified)}")
-    force, source = felt_force(device)
-    result.append(f"Texture below {engineering(force, 'N')} RMS counts as not felt: {source}")
+    known = device.value("force_resolution") is not None
+    source = (
+        f"the force resolution of the {device.name}"
+        if known
+        else "a default, the device's force resolution being unknown"
+    )
+    force = engineering(felt_force(device), "N")
+    result.append(f"Texture below {force} RMS counts as not felt: {source}")
     if any(row.q.method == "sampled" or row.one_sided.method == "sampled" for row in rows):
         region = first.texture.domain.description
         result.append(

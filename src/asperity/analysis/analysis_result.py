@@ -1,0 +1,126 @@
+"""What is known of one law on one surface and one device."""
+
+from __future__ import annotations
+
+import html
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.continuity import Continuity
+from asperity.analysis.energy.leak import Leak
+from asperity.analysis.energy.merit import Merit
+from asperity.analysis.passivity.judgement import Passivity
+from asperity.devices import Device
+from asperity.files import plain
+from asperity.surface import Surface
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What is known of one law on one surface and one device.
+
+    Attributes:
+        surface: the surface, with its law, stiffness and depth.
+        device: the device.
+        q: characteristic number [1].
+        one_sided: one-sided number q⁺ [1].
+        curl: sup |curl f|/k [1]; ``None`` for a law with state, whose force is no field.
+        conservative: whether the work around every closed path is zero.
+        conservative_reason: one sentence.
+        leak: the worst simple loop, in a vertical plane.
+        continuity: whether the force jumps inside the working region, and where.
+        passivity: what each criterion says of the device, and which one decides.
+        merit: strength and support on a straight scan.
+        answer: the verdict in one sentence.
+        assumptions: defaults that were used, device data that are not verified, the steps of
+            preparing the surface, in sentences.
+    """
+
+    surface: Surface
+    device: Device
+    q: Bound
+    one_sided: Bound
+    curl: Bound | None
+    conservative: bool
+    conservative_reason: str
+    leak: Leak
+    continuity: Continuity
+    passivity: Passivity
+    merit: Merit
+    answer: str
+    assumptions: tuple[str, ...]
+
+    @property
+    def curl_density(self) -> Bound | None:
+        """Sup |curl f| [N/m]: the greatest work of a small loop per area [J/m²]."""
+        if self.curl is None:
+            return None
+        k, upper = self.surface.stiffness, self.curl.upper
+        # One unit in the last place covers the rounding of the product.
+        top = math.nextafter(k * upper, math.inf) if upper > 0.0 else 0.0
+        return replace(self.curl, lower=k * self.curl.lower, upper=top)
+
+    @property
+    def v_star(self) -> float | None:
+        """v* [m/s], the speed below which damping does not absorb the worst loop.
+
+        0 for a conservative law; ``None`` where the device's damping is not known.
+        """
+        return self.passivity.critical_speed
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units, with a schema number; infinity is the string "inf"."""
+        surface = self.surface
+        return plain(
+            {
+                "schema": SCHEMA,
+                "answer": self.answer,
+                "texture": surface.texture.describe(),
+                "law": surface.law.letter,
+                "law_name": surface.law.name,
+                "law_parameters": surface.law_parameters,
+                "clamp": surface.clamp,
+                "stiffness": surface.stiffness,
+                "max_depth": surface.max_depth,
+                "device": self.device,
+                "q": self.q,
+                "one_sided": self.one_sided,
+                "curl": self.curl,
+                "curl_density": self.curl_density,
+                "conservative": self.conservative,
+                "conservative_reason": self.conservative_reason,
+                "leak": self.leak,
+                "v_star": self.v_star,
+                "continuity": self.continuity,
+                "passivity": self.passivity,
+                "merit": self.merit,
+                "assumptions": self.assumptions,
+            }
+        )
+
+    def _repr_html_(self) -> str:
+        """Return the answer, the numbers and the criteria for a notebook."""
+        bounds = (("q", self.q), ("q⁺", self.one_sided), ("sup |curl|/k", self.curl))
+        numbers = [
+            [name, f"{bound.lower:.6g}", f"{bound.upper:.6g}", bound.method, str(bound.at or "")]
+            for name, bound in bounds
+            if bound is not None
+        ]
+        rules = [[c.name, c.formula, c.says] for c in self.passivity.criteria]
+        return (
+            f"<p>{html.escape(self.answer)}</p>"
+            + _table(["number", "lower", "upper", "method", "at [m]"], numbers)
+            + _table(["criterion", "condition", "says"], rules)
+        )
+
+
+def _table(head: list[str], rows: list[list[str]]) -> str:
+    titles = "".join(f"<th>{html.escape(title)}</th>" for title in head)
+    body = "".join(
+        f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows
+    )
+    return f"<table><tr>{titles}</tr>{body}</table>"

@@ -1,0 +1,81 @@
+"""A surface on a device in, every criterion of passivity and the verdict out."""
+
+from __future__ import annotations
+
+import os
+
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.leak import Leak
+from asperity.analysis.passivity.criteria import criteria
+from asperity.analysis.passivity.device_loop import critical_speed, greatest_delay, make_loop
+from asperity.analysis.passivity.judgement import Passivity, decide
+from asperity.analysis.words.passivity import reason, worded
+from asperity.devices import Device, load_device
+from asperity.errors import ParameterError
+from asperity.surface import Surface
+
+
+def passivity(
+    surface: Surface,
+    device: str | os.PathLike[str] | Device,
+    q: Bound,
+    one_sided: Bound,
+    leak: Leak,
+) -> Passivity:
+    """Return whether the loop of hand, device and texture is passive, and what decides it.
+
+    With T the period of the update rate, σ₀ the device's damping, b_v its virtual damping, d its
+    whole samples of delay and K₀ the stiffest smooth wall that it renders, the criteria are:
+
+    * paper (1): k q <= σ₀/(2T), as printed;
+    * one-sided: k q⁺ <= 2σ₀/T, for a conservative law without delay;
+    * delay: k (q⁺/2 + d q) <= σ₀/T, for a conservative law;
+    * virtual damping: k (q⁺/2 + d q) T + |b_v| <= σ₀, for a conservative law;
+    * smooth-wall rule: k q <= K₀; one-sided: k (q⁺/2 + d q) <= K₀ (1/2 + d), conservative law;
+    * leak: no loop of the field gains energy.
+
+    Args:
+        surface: the surface.
+        device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`.
+        q: its characteristic number.
+        one_sided: its one-sided number.
+        leak: its worst loop.
+
+    Raises:
+        ParameterError: for another type, or a number of the device that is out of its range.
+
+    Reference:
+        The paper's (1) and III.B; Colgate and Schenkel (the paper's [25]); MATH section 4.
+
+    Example:
+        >>> from asperity.analysis import characteristic_number, one_sided_number
+        >>> from asperity.analysis.energy.leak import worst_loop
+        >>> from asperity.devices import parse_device
+        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> rig = {"damping": "2 N*s/m", "update_rate": "4 kHz", "delay_samples": 1}
+        >>> surface = Surface(Sinusoid(amplitude=0.1e-3, period=1e-3), "H")
+        >>> numbers = characteristic_number(surface), one_sided_number(surface)
+        >>> leak = worst_loop(surface)
+        >>> answer = passivity(surface, parse_device(rig, "mine"), *numbers, leak)
+        >>> answer.verdict, answer.decided_by, round(answer.safe_stiffness, 3)
+        ('passive', 'delay', 5333.333)
+    """
+    given = (("surface", surface, Surface), ("q", q, Bound), ("one_sided", one_sided, Bound))
+    for name, value, kind in (*given, ("leak", leak, Leak)):
+        if not isinstance(value, kind):
+            raise ParameterError(name, f"must be a {kind.__name__}", value)
+    loop = make_loop(surface, load_device(device), q, one_sided, leak)
+    judged = tuple(worded(loop, criterion) for criterion in criteria(loop))
+    by_name = {criterion.name: criterion for criterion in judged}
+    verdict, decisive, ground = decide(loop, by_name)
+    return Passivity(
+        criteria=judged,
+        decided_by=decisive,
+        verdict=verdict,
+        ground=ground,
+        reason=reason(loop, by_name[decisive], ground),
+        stiffness=surface.stiffness,
+        safe_stiffness=by_name[decisive].limit,
+        critical_speed=critical_speed(loop),
+        greatest_delay=greatest_delay(loop),
+    )

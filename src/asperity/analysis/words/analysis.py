@@ -1,0 +1,111 @@
+"""The verdict on one law in one sentence, and what was assumed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from asperity.analysis.analysis_result import Analysis
+from asperity.analysis.passivity.criteria import LEAK
+from asperity.analysis.words.passivity import gained
+from asperity.devices import Device
+from asperity.surface import DEFAULT_STIFFNESS, Surface, default_max_depth
+from asperity.textures.texture import Texture
+from asperity.units import engineering, rounded_down
+
+# What the criteria of passivity look at.
+_USED = ("max_stiffness", "update_rate", "damping", "delay_samples", "virtual_damping")
+
+
+def surface_width(texture: Texture) -> float:
+    """Return how wide a finite surface is, the shorter way [m]; infinite where it goes on."""
+    if not texture.ends:
+        return math.inf
+    return float(np.hypot(*texture.domain.spans.T).min())
+
+
+def answer(result: Analysis) -> str:
+    """Return the verdict in one sentence."""
+    surface, judged = result.surface, result.passivity
+    depth = engineering(surface.max_depth, "m")
+    subject = (
+        f"law {surface.law.letter} at {surface.stiffness:g} N/m, pressed to {depth}, "
+        f"on the {result.device.name}"
+    )
+    rule = judged.criterion(judged.decided_by)
+    if judged.verdict == "passive":
+        limit = "infinite" if rule.limit == math.inf else f"{rounded_down(rule.limit or 0.0):.10g}"
+        said = f"{_capital(subject)} is passive by {rule.formula}, whose limit is {limit} N/m"
+    elif judged.verdict == "not passive":
+        gain = gained(result.leak.energy, judged.critical_speed)
+        reason = gain if rule.name == LEAK else judged.reason
+        said = f"{_capital(subject)} is not passive: {reason}"
+    else:
+        said = f"Whether {subject} is passive is undecided: {judged.reason}"
+    return f"{said}; {_of_jumps(result)}."
+
+
+def _of_jumps(result: Analysis) -> str:
+    smooth = result.continuity
+    if smooth.continuous:
+        return "its force is continuous"
+    if not smooth.jumps:
+        return f"its force is not continuous ({smooth.reason})"
+    largest = engineering(max(jump.size for jump in smooth.jumps), "N")
+    return f"its force jumps, by up to {largest} where that was located"
+
+
+def _capital(words: str) -> str:
+    return words[:1].upper() + words[1:]
+
+
+def assumptions(result: Analysis, extent: tuple[float, float] | None) -> tuple[str, ...]:
+    """Return what was assumed, in sentences.
+
+    Args:
+        result: the analysis.
+        extent: the part of the plane that counted [m], if one was given.
+    """
+    surface, leak = result.surface, result.leak
+    texture, depth = surface.texture, engineering(surface.max_depth, "m")
+    said = [*texture.preparation, *_defaults(surface)]
+    region = texture.domain.description
+    if extent is not None:
+        region = " x ".join(engineering(side, "m") for side in extent) + " from the origin"
+    said.append(f"The numbers are suprema over {region} and depths to {depth}")
+    x, y = (float(part) for part in leak.line.direction)
+    said.append(f"Loops in the vertical plane along ({x:g}, {y:g}) are compared")
+    bounds = (result.q, result.one_sided, result.curl)
+    if any(bound is not None and math.isinf(bound.upper - bound.lower) for bound in bounds):
+        said.append("A number without an upper bound is the greatest one found, not a proof")
+    if not result.continuity.continuous:
+        said.append("Jumps are located where contact begins and below the sharpest crest only")
+    said += _of_the_device(result.device)
+    said.append("Dry friction and quantisation of the device are in none of the criteria")
+    return tuple(said)
+
+
+def _defaults(surface: Surface) -> list[str]:
+    """Return which numbers are the ones taken unless told otherwise."""
+    said = []
+    if surface.stiffness == DEFAULT_STIFFNESS:
+        said.append(f"Default stiffness {surface.stiffness:g} N/m")
+    if surface.max_depth == default_max_depth(surface.texture):
+        depth = engineering(surface.max_depth, "m")
+        said.append(f"Default max depth {depth}: the peak-to-valley height, at most 1 mm")
+    if surface.max_depth > surface_width(surface.texture):
+        width = engineering(surface_width(surface.texture), "m")
+        said.append(f"Below {width}, the surface's width, only its mirror images are felt")
+    return said + surface.parameters_said()
+
+
+def _of_the_device(device: Device) -> list[str]:
+    """Return what the criteria use of the device without its being verified, and its notes."""
+    unverified = [
+        f"{field.replace('_', ' ')} {device.data[field].text}"
+        for field in _USED
+        if field in device.data and not device.data[field].verified
+    ]
+    said = [f"Not verified for the {device.name}: {', '.join(unverified)}"] if unverified else []
+    return [*said, *device.notes]
