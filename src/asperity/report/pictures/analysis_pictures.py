@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,6 +15,7 @@ from matplotlib.quiver import Quiver
 from matplotlib.ticker import FuncFormatter, SymmetricalLogLocator
 
 from asperity.analysis.analysis_result import Analysis
+from asperity.analysis.bounds.bound import Bound
 from asperity.checks import FloatArray
 from asperity.report.pictures import style
 from asperity.report.pictures.analysis_region import (
@@ -32,7 +34,7 @@ from asperity.report.words.number_words import interval_text, law_title, span_te
 from asperity.units import engineering
 
 Part = Figure | SubFigure
-Draw = Callable[[Part, Analysis], None]
+Drawing = tuple[Callable[[Part, Analysis], None], Callable[[Analysis], float]]
 
 _WIDTH = 10.0
 # Width and height of a panel [inch]; flatter ones are not drawn true to scale.
@@ -40,6 +42,7 @@ _BROAD, _TALL, _LOW = 9.0, 4.6, 2.4
 _FLATTEST = 2.4
 # Titles, labels and the colour bar below a panel [inch].
 _AROUND = 1.9
+_GRAPH = 3.6  # height of a graph [inch]
 _CELLS = (200, 110)
 _HALO = [withStroke(linewidth=4.0, foreground="white")]
 # Where the numbers of a picture grow without bound it is cut off here.
@@ -47,33 +50,39 @@ _HIGHEST = 1e3
 _ARROWS = 5
 
 
-def pictures_of(analysis: Analysis) -> dict[str, Draw]:
-    """Return the pictures that an analysis has, by name."""
-    found: dict[str, Draw] = {"field": draw_field, "gain": draw_gain}
+def pictures_of(analysis: Analysis) -> dict[str, Drawing]:
+    """Return the pictures that an analysis has by name: what draws each, its height [inch]."""
+    found: dict[str, Drawing] = {
+        "field": (draw_field, lambda result: _plane_height(loop_window(result))),
+        "gain": (draw_gain, lambda result: _plane_height(gain_window(result))),
+    }
     if not analysis.surface.texture.is_profile:
-        found["top"] = draw_top
-    found["depth"] = draw_depth
+        found["top"] = (draw_top, _map_height)
+    found["depth"] = (draw_depth, lambda _result: _GRAPH)
     if analysis.continuity.jumps:
-        found["jumps"] = draw_jumps
+        found["jumps"] = (draw_jumps, lambda _result: _GRAPH)
     return found
+
+
+def _plane_height(window: Window) -> float:
+    ratio = (window.top - window.bottom) / window.stretch.length
+    return min(max(_BROAD * ratio, _LOW), _TALL) + _AROUND
+
+
+def _map_height(analysis: Analysis) -> float:
+    spans = np.abs(analysis.surface.texture.domain.spans).sum(axis=0)
+    return min(_BROAD * float(spans[1] / spans[0]), 6.5) + _AROUND
 
 
 def picture_size(analysis: Analysis, name: str) -> tuple[float, float]:
     """Return width and height of a picture [inch]."""
-    if name == "top":
-        spans = np.abs(analysis.surface.texture.domain.spans).sum(axis=0)
-        return _WIDTH, min(_BROAD * float(spans[1] / spans[0]), 6.5) + _AROUND
-    if name not in {"field", "gain"}:
-        return _WIDTH, 3.6
-    window = loop_window(analysis) if name == "field" else gain_window(analysis)
-    ratio = (window.top - window.bottom) / window.stretch.length
-    return _WIDTH, min(max(_BROAD * ratio, _LOW), _TALL) + _AROUND
+    return _WIDTH, pictures_of(analysis)[name][1](analysis)
 
 
 def analysis_figure(analysis: Analysis, name: str) -> Figure:
     """Return one picture of an analysis."""
     figure = style.new_figure(*picture_size(analysis, name))
-    pictures_of(analysis)[name](figure, analysis)
+    pictures_of(analysis)[name][0](figure, analysis)
     return figure
 
 
@@ -246,39 +255,49 @@ def _into(at: FloatArray, low: FloatArray, size: FloatArray, *, periodic: bool) 
 
 def draw_depth(figure: Part, analysis: Analysis) -> None:
     """Draw the singular values of J/k against depth at the witness column, with q's bounds."""
-    column, q = witness_column(analysis), analysis.q
-    unit = style.length_unit(analysis.surface.max_depth)
+    column, surface = witness_column(analysis), analysis.surface
+    unit = style.length_unit(surface.max_depth)
     axes: Axes = figure.subplots()
     style.dress(axes)
-    colours = (style.BLUE, style.GREEN, style.SOFT)
-    for index, colour in enumerate(colours):
-        name = f"σ{'₁₂₃'[index]}"
+    for index, colour in enumerate((style.BLUE, style.GREEN, style.SOFT)):
         values = np.minimum(column.values[:, index], 2.0 * _HIGHEST)
-        width = 2.2 - 0.5 * index
-        axes.plot(column.depth * unit.scale, values, color=colour, lw=width, label=name)
-    top = float(np.quantile(column.values[:, 0], 0.98))
-    if math.isfinite(q.lower):
-        top = max(top, q.lower)
-        axes.axhline(q.lower, color=style.ORANGE, lw=1.1, label="q, lower")
-        if math.isfinite(q.upper):
-            axes.axhline(q.upper, color=style.INK, lw=1.1, ls=(0, (6, 6)), label="q, upper")
-    if q.at is not None:
-        words = "witness" if math.isfinite(q.lower) else "onset: from here down the force jumps"
+        look: dict[str, Any] = {"color": colour, "lw": 2.2 - 0.5 * index}
+        axes.plot(column.depth * unit.scale, values, label=f"σ{'₁₂₃'[index]}", **look)
+    _draw_bounds(axes, analysis.q)
+    if analysis.q.at is not None:
+        infinite = math.isinf(analysis.q.lower)
+        words = "onset: from here down the force jumps" if infinite else "witness"
         axes.axvline(column.witness * unit.scale, color=style.FAINT, lw=1.2, zorder=0)
-        _beside(axes, column.witness / analysis.surface.max_depth, words)
-    if top > 30.0:
+        _beside(axes, column.witness / surface.max_depth, words)
+    top = float(np.quantile(column.values[:, 0], 0.98))
+    _scale_values(axes, max(top, analysis.q.lower) if math.isfinite(analysis.q.lower) else top)
+    axes.set_xlim(0.0, surface.max_depth * unit.scale)
+    along = "along the normal" if abs(column.below[2]) < 1.0 else "below the surface"
+    if not surface.law.contact.begins_on_texture:
+        along = "below the smooth wall"
+    style.label(axes, f"depth {along} [{unit.name}]", "singular values of J/k [1]")
+    remark = f"q = {interval_text(analysis.q)} ({analysis.q.method})"
+    style.entitle(axes, surface.law.letter, "down to the witness", remark)
+    axes.legend(frameon=False, fontsize=style.TICK, loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _draw_bounds(axes: Axes, q: Bound) -> None:
+    """Draw the ends of q that are finite."""
+    if math.isfinite(q.lower):
+        axes.axhline(q.lower, color=style.ORANGE, lw=1.1, label="q, lower")
+    if math.isfinite(q.upper):
+        axes.axhline(q.upper, color=style.INK, lw=1.1, ls=(0, (6, 6)), label="q, upper")
+
+
+def _scale_values(axes: Axes, top: float) -> None:
+    """Scale the vertical axis up to a value; logarithmically above 1 where that is great."""
+    great = top > 30.0
+    if great:
         axes.set_yscale("symlog", linthresh=1.0)
         axes.yaxis.set_major_locator(SymmetricalLogLocator(base=10, linthresh=1, subs=[1, 2, 5]))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
     highest = 1.12 * min(top, _HIGHEST)
-    axes.set_ylim(-0.03 * highest if top <= 30.0 else -0.1, highest)
-    axes.set_xlim(0.0, analysis.surface.max_depth * unit.scale)
-    along = "along the normal" if abs(column.below[2]) < 1.0 else "below the surface"
-    if not analysis.surface.law.contact.begins_on_texture:
-        along = "below the smooth wall"
-    style.label(axes, f"depth {along} [{unit.name}]", "singular values of J/k [1]")
-    style.entitle(axes, analysis.surface.law.letter, "down to the witness", _gain_words(analysis))
-    axes.legend(frameon=False, fontsize=style.TICK, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    axes.set_ylim(-0.1 if great else -0.03 * highest, highest)
 
 
 def _beside(axes: Axes, part: float, words: str) -> None:
@@ -286,10 +305,6 @@ def _beside(axes: Axes, part: float, words: str) -> None:
     left = part > 0.5
     side, away = ("right", -4) if left else ("left", 4)
     style.note(axes, words, (min(part, 1.0), 0.5), xytext=(away, 0), ha=side, va="center")
-
-
-def _gain_words(analysis: Analysis) -> str:
-    return f"q = {interval_text(analysis.q)} ({analysis.q.method})"
 
 
 def draw_jumps(figure: Part, analysis: Analysis) -> None:

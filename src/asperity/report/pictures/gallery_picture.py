@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LightSource, LinearSegmentedColormap
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from asperity.report.pictures import style
 from asperity.report.pictures.map_grid import map_grid
+from asperity.report.pictures.surface_picture import draw_scale_bar, relief
 from asperity.textures.texture import Texture
 
 _MAP_POINTS = 420
@@ -32,36 +33,11 @@ def gallery_figure(texture: Texture) -> Figure:
 def _draw_map(axes: Axes, texture: Texture) -> None:
     grid = map_grid(texture, _MAP_POINTS)
     size, heights = grid.size, texture.height(grid.xy).reshape(grid.shape)
-    step = size / np.array(heights.shape[::-1])
-    slopes = np.hypot(*np.gradient(heights, step[1], step[0]))
-    # The steepest tenth is shown at 35 degrees, whatever the true slopes are.
-    steep = 0.7 / max(float(np.quantile(slopes, 0.9)), 1e-300)
-    shaded = LightSource(azdeg=315, altdeg=45).shade(
-        heights,
-        cmap=LinearSegmentedColormap.from_list("material", _MATERIAL),
-        blend_mode="soft",
-        vert_exag=steep,
-        dx=float(step[0]),
-        dy=float(step[1]),
-    )
+    colours = LinearSegmentedColormap.from_list("material", _MATERIAL)
+    shaded = relief(heights, size, colours, steepest=0.7, altitude=45.0)
     axes.imshow(shaded, origin="lower", extent=(0.0, size[0], 0.0, size[1]))
     axes.set_axis_off()
-    length = style.nice_length(0.3 * float(size[0]))
-    unit = style.length_unit(float(size[0]))
-    x0, y0 = 0.05 * size[0], 0.05 * size[1]
-    for colour, thickness in (("white", 7.0), (style.INK, 3.5)):
-        axes.plot([x0, x0 + length], [y0, y0], color=colour, linewidth=thickness,
-                  solid_capstyle="butt")  # fmt: skip
-    axes.annotate(
-        f"{length * unit.scale:g} {unit.name}",
-        (x0 + 0.5 * length, y0),
-        (0, 6),
-        textcoords="offset points",
-        ha="center",
-        fontsize=style.LABEL,
-        color=style.INK,
-        bbox={"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.5},
-    )
+    draw_scale_bar(axes, float(size[0]))
 
 
 def _draw_section(axes: Axes, texture: Texture) -> None:

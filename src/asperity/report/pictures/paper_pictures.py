@@ -39,7 +39,7 @@ def figure_two(panels: Sequence[ForceField] | None = None) -> Figure:
         style.dress(axes)
         _draw_body(axes, panel)
         _draw_forces(axes, panel)
-        start = "texture" if panel.measured_from == "texture" else "flat wall"
+        start = "flat wall" if _is_flat(panel.law) else "texture"
         style.entitle(axes, panel.law, law_title(panel.name), f"depth below the {start}")
         style.label(
             axes,
@@ -56,11 +56,16 @@ def figure_two(panels: Sequence[ForceField] | None = None) -> Figure:
     return figure
 
 
+def _is_flat(law: str) -> bool:
+    """Return whether depth is counted from the smooth wall."""
+    return not find_law(law).contact.begins_on_texture
+
+
 def _draw_body(axes: Axes, panel: ForceField) -> None:
     """Draw what is solid, the texture, and the wall where depth is counted from it."""
     x, height = panel.x * _MILLI, panel.height * _MILLI
     low, high = panel.points[..., 1].min() * _MILLI, panel.points[..., 1].max() * _MILLI
-    flat = panel.measured_from == "wall"
+    flat = _is_flat(panel.law)
     axes.fill_between(x, 0.0 * height if flat else height, low, color=style.BODY, lw=0.0, alpha=0.6)
     axes.plot(x, height, color=style.INK, lw=1.2, ls=":" if flat else "-")
     if flat:
@@ -148,7 +153,7 @@ def _draw_path(axes: Axes, panel: LoopEnergy) -> None:
     x, height = panel.x * _MILLI, panel.height * _MILLI
     closed = np.concatenate([panel.vertices, panel.vertices[:1]]) * _MILLI
     low = min(float(closed[:, 1].min()), float(height.min())) - 0.2
-    flat = not find_law(panel.law).contact.begins_on_texture
+    flat = _is_flat(panel.law)
     axes.fill_between(x, 0.0 * height if flat else height, low, color=style.BODY, lw=0.0, alpha=0.6)
     axes.plot(x, height, color=style.INK, lw=0.9, ls=":" if flat else "-")
     if flat:

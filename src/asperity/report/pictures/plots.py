@@ -91,7 +91,7 @@ def _analysis(result: Analysis, picture: str | None = None) -> Figure:
     if picture is not None:
         return analysis_figure(result, picture)
     figure, parts = _stacked([picture_size(result, name) for name in drawings])
-    for draw, part in zip(drawings.values(), parts, strict=True):
+    for (draw, _height), part in zip(drawings.values(), parts, strict=True):
         draw(part, result)
     return figure
 

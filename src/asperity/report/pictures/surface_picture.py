@@ -8,7 +8,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LightSource, Normalize
+from matplotlib.colors import Colormap, LightSource, Normalize
 from matplotlib.figure import Figure, SubFigure
 
 from asperity.checks import FloatArray
@@ -71,20 +71,7 @@ def _draw_map(figure: Figure | SubFigure, axes: Axes, texture: Texture) -> None:
     high = style.length_unit(texture.peak_to_valley)
     norm = Normalize(float(heights.min()) * high.scale, float(heights.max()) * high.scale)
     colours = matplotlib.colormaps[style.HEIGHTS]
-    step = size[0] / heights.shape[1]
-    # Steep enough to shade, whatever the magnification: the steepest tenth is at 45 degrees.
-    slopes = np.hypot(*np.gradient(heights, step))
-    steepness = 1.0 / max(float(np.quantile(slopes, 0.9)), 1e-300)
-    shaded = LightSource(azdeg=315, altdeg=50).shade(
-        heights * high.scale,
-        cmap=colours,
-        norm=norm,
-        blend_mode="soft",
-        vert_exag=steepness / high.scale,
-        dx=step,
-        dy=step,
-    )
-    shaded = _greyed(shaded, texture)
+    shaded = _greyed(relief(heights, size, colours, steepest=1.0, altitude=50.0), texture)
     x0, y0 = low * wide.scale
     x1, y1 = (low + size) * wide.scale
     axes.imshow(shaded, origin="lower", extent=(x0, x1, y0, y1), interpolation="bilinear")
@@ -92,9 +79,29 @@ def _draw_map(figure: Figure | SubFigure, axes: Axes, texture: Texture) -> None:
     style.dress(axes)
     style.label(axes, f"x [{wide.name}]", f"y [{wide.name}]")
     _draw_scan_line(axes, texture, wide)
-    _draw_scale_bar(axes, float(size[0]), wide)
+    draw_scale_bar(axes, float(size[0]))
     bar: Any = figure.colorbar(ScalarMappable(norm, colours), ax=axes, pad=0.02, aspect=18)
     style.dress_bar(bar, f"height [{high.name}]")
+
+
+def relief(
+    heights: FloatArray, size: FloatArray, colours: Colormap, steepest: float, altitude: float
+) -> FloatArray:
+    """Return a map lit from the upper left as colours (rows, columns, 4).
+
+    Args:
+        heights: [m], shape (rows, columns).
+        size: width and depth [m], shape (2,).
+        colours: of the heights.
+        steepest: the slope that the steepest tenth is shown with, whatever the true slopes are.
+        altitude: of the light above the horizon [degrees].
+    """
+    dx, dy = (float(step) for step in size / np.array(heights.shape[::-1]))
+    slopes = np.hypot(*np.gradient(heights, dy, dx))
+    exaggeration = steepest / max(float(np.quantile(slopes, 0.9)), 1e-300)
+    return LightSource(azdeg=315, altdeg=altitude).shade(
+        heights, cmap=colours, blend_mode="soft", vert_exag=exaggeration, dx=dx, dy=dy
+    )
 
 
 def _greyed(shaded: FloatArray, texture: Texture) -> FloatArray:
@@ -117,39 +124,18 @@ def _draw_scan_line(axes: Axes, texture: Texture, unit: style.Unit) -> None:
     ends = np.stack([line.start, line.start + line.length * line.direction]) * unit.scale
     axes.plot(*ends.T, color="white", linewidth=2.6, solid_capstyle="butt")
     axes.plot(*ends.T, color=style.ORANGE, linewidth=1.4, solid_capstyle="butt")
-    axes.annotate(
-        "scan line",
-        tuple(ends[0]),
-        (6, 5),
-        textcoords="offset points",
-        fontsize=style.TICK,
-        color=style.INK,
-        bbox={"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.5},
-    )
+    start = (float(ends[0, 0]), float(ends[0, 1]))
+    style.note(axes, "scan line", start, xycoords="data", xytext=(6, 5), color=style.INK)
 
 
-def _draw_scale_bar(axes: Axes, width: float, unit: style.Unit) -> None:
-    """Draw a bar of a round length in the lower right corner."""
-    length = style.nice_length(0.22 * width)
+def draw_scale_bar(axes: Axes, width: float) -> None:
+    """Draw a bar of a round length in the lower right corner of a map of that width [m]."""
+    unit, length = style.length_unit(width), style.nice_length(0.22 * width)
     right, span = 0.97, length / width
-    box = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 2.5}
-    axes.text(
-        right - 0.5 * span,
-        0.085,
-        f"{length * unit.scale:g} {unit.name}",
-        transform=axes.transAxes,
-        ha="center",
-        va="bottom",
-        fontsize=style.TICK,
-        color=style.INK,
-        bbox=box,
-    )
     for colour, thickness in (("white", 6.0), (style.INK, 3.0)):
         axes.plot(
-            [right - span, right],
-            [0.06, 0.06],
-            transform=axes.transAxes,
-            color=colour,
-            linewidth=thickness,
-            solid_capstyle="butt",
-        )
+            [right - span, right], [0.06, 0.06], transform=axes.transAxes, color=colour,
+            linewidth=thickness, solid_capstyle="butt",
+        )  # fmt: skip
+    words, middle = f"{length * unit.scale:g} {unit.name}", right - 0.5 * span
+    style.note(axes, words, (middle, 0.085), ha="center", va="bottom", color=style.INK)
