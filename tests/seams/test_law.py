@@ -204,6 +204,11 @@ FILES = {
         "line 2: law X (x): its parameter 'max_deflection' is in [1], that of another law in [m]",
     "from asperity.laws import LAWS, find_law\nC = find_law('C')": "defines none of these",
     "\x00": "line 1: ",
+    "from asperity.laws import Law\n\ndef force(c):\n    return c.k * nothing\n\n"
+    "L = Law('X', 'x', 'vertical', force)": "line 4: law X: its force is not a symbolic formula "
+    "(name 'nothing' is not defined)",
+    "from asperity.laws import Law\nL = Law('X', 'x', 'vertical', lambda c: [c.k, 0])":
+        "line 2: law X: force must have 3 components",
 }  # fmt: skip
 
 
@@ -218,6 +223,17 @@ def test_errors_of_the_file_have_a_line_and_a_reason(
     assert f"law_module {path}" in err
     assert FILES[source] in err
     assert len(err.strip().splitlines()) == 1
+
+
+def test_what_fails_only_when_it_is_used(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "late.py"
+    path.write_text(
+        "from asperity.textures.kinds import Kind\n\n\n"
+        "def make():\n    raise ValueError('not\\ntoday')\n\n\nLATE = Kind('late', 'x', make, ())\n"
+    )
+    code, out, err = call("compare", "late:", "--law-module", str(path))
+    assert (code, out) == (2, "")
+    assert err == f"asperity: {path}, line 5: ValueError: not today\n"
 
 
 def test_a_file_that_is_not_there(call: Call) -> None:

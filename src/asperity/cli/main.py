@@ -8,6 +8,7 @@ import sys
 import click
 
 import asperity
+from asperity.cli.own_code import own_fault
 from asperity.errors import AsperityError
 
 BAD_INPUT = 2
@@ -76,4 +77,10 @@ def main() -> None:
         sys.exit(BAD_INPUT)
     except MemoryError:
         click.echo("asperity: the surface is too large for this machine's memory", err=True)
+        sys.exit(BAD_INPUT)
+    except Exception as error:
+        said = own_fault(error)
+        if said is None:
+            raise  # a fault of asperity's own
+        click.echo(f"asperity: {said}", err=True)
         sys.exit(BAD_INPUT)

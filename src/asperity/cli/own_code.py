@@ -21,6 +21,7 @@ import click
 from asperity.errors import AsperityError, ParameterError
 
 OPTION = "law_module"
+_FILES: list[str] = []  # that were run
 
 
 @dataclass(frozen=True)
@@ -31,16 +32,19 @@ class Registry:
         kind: of the things.
         register: adds one, and refuses a name that is taken.
         known: the things by name.
+        check: refuses one that cannot be used.
     """
 
     kind: type
     register: Callable[[Any], Any]
     known: dict[str, Any]
+    check: Callable[[Any], Any] = lambda _thing: None
 
 
 def registries() -> tuple[Registry, ...]:
     """Return where what a file defines becomes known."""
     from asperity import laws
+    from asperity.derive.jacobian import symbolic_force
     from asperity.measured.reading import Reader
     from asperity.measured.reading import registry as readers
     from asperity.paper import registry
@@ -49,7 +53,7 @@ def registries() -> tuple[Registry, ...]:
     from asperity.textures.kinds import Kind
 
     return (
-        Registry(laws.Law, laws.register, laws.KNOWN_LAWS),
+        Registry(laws.Law, laws.register, laws.KNOWN_LAWS, symbolic_force),
         Registry(Kind, catalogue.register, catalogue.CATALOGUE),
         Registry(Reader, readers.register, readers.OWN),
         Registry(Claim, registry.register, registry.CLAIMS),
@@ -94,6 +98,7 @@ def _load(file: str, places: tuple[Registry, ...]) -> None:
             if new:
                 with _refusing(file, _line(tree, name)):
                     place.register(value)
+                    place.check(value)
     if sum(len(place.known) for place in places) == before:
         kinds = ", ".join(place.kind.__name__ for place in places)
         raise ParameterError(OPTION, f"{file} defines none of these at its top level: {kinds}")
@@ -109,6 +114,7 @@ def _source(file: str) -> bytes:
 
 def _run(file: str, source: bytes) -> ModuleType:
     """Run a file as a module that can import its neighbours, as ``python FILE`` would."""
+    _FILES.append(file)
     path = Path(file).resolve()
     module = ModuleType(f"own_{path.stem}")
     module.__file__ = str(path)
@@ -122,27 +128,37 @@ def _run(file: str, source: bytes) -> ModuleType:
 
 
 @contextmanager
-def _refusing(file: str, line: int | None = None) -> Iterator[None]:
+def _refusing(file: str, line: int = 1) -> Iterator[None]:
     """Turn whatever the user's code raises into one line: file, line and reason."""
     try:
         yield
     except (Exception, SystemExit) as error:
-        at = _line_of(error, file) if line is None else line
-        reason = str(error) if isinstance(error, AsperityError) else _reason(error)
-        words = f"{file}, line {at}: {' '.join(reason.split())}"
-        raise ParameterError(OPTION, words) from error
+        at = _line_of(error, file) or line
+        raise ParameterError(OPTION, f"{file}, line {at}: {_reason(error)}") from error
+
+
+def own_fault(error: BaseException) -> str | None:
+    """Return what to say of an error that the user's own code has raised; None if it has not."""
+    lines = {file: _line_of(error, file) for file in _FILES}
+    said = [f"{file}, line {line}: {_reason(error)}" for file, line in lines.items() if line]
+    return said[0] if said else None
 
 
 def _reason(error: BaseException) -> str:
     said = error.msg if isinstance(error, SyntaxError) else str(error)
-    return f"{type(error).__name__}: {said}"
+    kind = "" if isinstance(error, AsperityError) else f"{type(error).__name__}: "
+    return " ".join(f"{kind}{said}".split())
 
 
-def _line_of(error: BaseException, file: str) -> int:
+def _line_of(error: BaseException | None, file: str) -> int | None:
+    """Return the line of the file at which an error, or what caused it, was raised."""
+    if error is None:
+        return None
     if isinstance(error, SyntaxError) and error.filename == file:
-        return error.lineno or 1
+        return error.lineno
     frames = traceback.extract_tb(error.__traceback__)
-    return next((f.lineno or 1 for f in reversed(frames) if f.filename == file), 1)
+    here = (frame.lineno for frame in reversed(frames) if frame.filename == file)
+    return next(here, None) or _line_of(error.__cause__, file)
 
 
 def _line(tree: ast.Module, name: str) -> int:
