@@ -1,8 +1,11 @@
 """A texture kind with a sampler of its own, and everything that follows from it.
 
-Run it: ``python examples/own_texture.py``, or name it on the command line. The egg-box
-h = A cos(2πx/l) cos(2πy/l) below is one file: scalar functions that Numba compiles together with
-a law, a class that says what is proved of them, and a name with arguments.
+Run it: ``python examples/own_texture.py``, or name it on the command line,
+
+    asperity compare egg-box:amplitude=0.1mm,period=2mm --law-module examples/own_texture.py
+
+The egg-box h = A cos(2πx/l) cos(2πy/l) below is one file: scalar functions that Numba compiles
+together with a law, a class that says what is proved of them, and a name with arguments.
 """
 
 import math

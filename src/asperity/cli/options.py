@@ -122,7 +122,7 @@ own_code_option = click.option(
     is_eager=True,  # what it defines can be named in the other options
     expose_value=False,
     callback=load_own_code,
-    help="Python file of your own, which is run: laws, claims; more than one by repeating it.",
+    help="Python file of your own, which is run: laws, textures, claims; more by repeating it.",
 )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from asperity.cli.options import own_code_option
 from asperity.cli.output import Outputs, output_options
 
 SCHEMA = 1
@@ -11,6 +12,7 @@ SCHEMA = 1
 
 @click.command("surfaces")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
+@own_code_option
 @output_options(
     "Write a page with a picture of each; - is standard output.",
     "Write the list as JSON; - is standard output.",

@@ -83,7 +83,7 @@ class Texture(ABC):
 
     @abstractmethod
     def describe(self) -> dict[str, Any]:
-        """The texture in words and numbers, SI units, for reports."""
+        """The texture in words and numbers, SI units, for reports; ``kind`` among them."""
 
     # --- what a kind may know better --------------------------------------------------------------
 

@@ -1,8 +1,8 @@
 """Certificates are kept on disk by the content of what they certify, so none is made twice.
 
-The key is a digest of the texture's arguments, the law's kernel, all parameters, the search, and
-the source of this package: whatever changes, the certificate is made anew. A file that cannot be
-read or written, or that says what no certificate says, only costs time.
+The key is a digest of the texture's arguments and kind, the law's kernel, all parameters, the
+search, and the source of this package: whatever changes, the certificate is made anew. A file that
+cannot be read or written, or that says what no certificate says, only costs time.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import astuple
@@ -22,7 +23,7 @@ import numpy as np
 from asperity.analysis.bounds.bound import Bound, Method
 from asperity.analysis.gain.search import Search
 from asperity.files import json_text, write_text
-from asperity.kernels.fuse import cache_directory, kernel_source
+from asperity.kernels.fuse import cache_directory, fuse_sampler, kernel_source
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -58,8 +59,16 @@ def _key(surface: Surface, name: str, search: Search) -> str:
 
 @lru_cache(maxsize=32)
 def texture_digest(texture: Texture) -> str:
-    """Return a digest of everything that the texture's sampler is given."""
-    digest = hashlib.sha256(type(texture).__name__.encode())
+    """Return a digest of the texture's sampler, of all that it is given, and of what is claimed.
+
+    A compiled sampler is named by its content. A kind of one's own is no part of this package:
+    what its files say counts too.
+    """
+    name = type(texture).__name__ + fuse_sampler(texture.sampler).__name__
+    digest = hashlib.sha256(name.encode())
+    for kind in type(texture).__mro__:
+        file = Path(getattr(sys.modules[kind.__module__], "__file__", None) or "")
+        digest.update(file.read_bytes() if file.is_file() else b"")
     for argument in texture.arguments:
         values = np.ascontiguousarray(argument)
         digest.update(f"{values.dtype}{values.shape}".encode())
