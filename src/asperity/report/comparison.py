@@ -81,7 +81,7 @@ def _cells(row: LawRow, comparison: Comparison) -> list[Cell]:
 
 
 def _is_best(row: LawRow, comparison: Comparison) -> bool:
-    return row.law.letter == comparison.recommended
+    return row is comparison.recommended_row
 
 
 # --- in a terminal --------------------------------------------------------------------------------

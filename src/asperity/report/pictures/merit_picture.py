@@ -31,7 +31,7 @@ def merit_figure(comparison: Comparison) -> Figure:
             ha="center",
             fontsize=style.TITLE,
             color=style.INK,
-            fontweight="bold" if row.law.letter == comparison.recommended else "normal",
+            fontweight="bold" if row is comparison.recommended_row else "normal",
         )
     axes.set_xlim(0.0, 1.15 * widest)
     axes.set_ylim(0.0, 1.15)

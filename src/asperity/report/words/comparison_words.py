@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.compare import Comparison
 from asperity.analysis.row import LawRow
 from asperity.report.words.number_words import SAMPLED, in_one_unit, is_sampled
@@ -22,13 +21,8 @@ def stiffness_text(row: LawRow) -> str:
     """Return the stiffness up to which the device renders the law: "995 N/m", or "none"."""
     if row.safe_stiffness <= 0.0:
         return "none"
-    mark = SAMPLED if is_sampled(limiting_number(row)) else ""
+    mark = SAMPLED if is_sampled(row.limiting) else ""
     return f"{mark}{engineering(rounded_down(row.safe_stiffness), 'N/m')}"
-
-
-def limiting_number(row: LawRow) -> Bound:
-    """Return the number, q or q⁺, on which the safe stiffness rests."""
-    return row.one_sided if "⁺" in row.rule or "+" in row.rule else row.q
 
 
 def leak_text(row: LawRow, comparison: Comparison) -> str:
