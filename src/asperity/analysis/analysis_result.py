@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,6 +13,7 @@ from asperity.analysis.energy.merit import Merit
 from asperity.analysis.passivity.judgement import Passivity
 from asperity.devices import Device
 from asperity.files import plain
+from asperity.notebook import as_html
 from asperity.surface import Surface
 
 SCHEMA = 1
@@ -111,16 +111,8 @@ class Analysis:
             if bound is not None
         ]
         rules = [[c.name, c.formula, c.says] for c in self.passivity.criteria]
-        return (
-            f"<p>{html.escape(self.answer)}</p>"
-            + _table(["number", "lower", "upper", "method", "at [m]"], numbers)
-            + _table(["criterion", "condition", "says"], rules)
+        return as_html(
+            self.answer,
+            (["number", "lower", "upper", "method", "at [m]"], numbers),
+            (["criterion", "condition", "says"], rules),
         )
-
-
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    titles = "".join(f"<th>{html.escape(title)}</th>" for title in head)
-    body = "".join(
-        f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows
-    )
-    return f"<table><tr>{titles}</tr>{body}</table>"

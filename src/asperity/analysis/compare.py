@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,6 +19,7 @@ from asperity.derive.facts import law_facts
 from asperity.devices import Device, load_device
 from asperity.files import plain, record
 from asperity.laws import LAWS, Law, find_laws, shared_out
+from asperity.notebook import as_html
 from asperity.surface import DEFAULT_STIFFNESS, Surface
 from asperity.textures.texture import Texture
 
@@ -86,11 +86,7 @@ class Comparison:
             ]
             for row in self.rows
         ]
-        cells = "".join(
-            f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows
-        )
-        titles = "".join(f"<th>{name}</th>" for name in head)
-        return f"<p>{html.escape(self.recommendation)}</p><table><tr>{titles}</tr>{cells}</table>"
+        return as_html(self.recommendation, (head, rows))
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +12,7 @@ from asperity.analysis.energy.loops import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.derive.facts import law_facts
 from asperity.files import record
+from asperity.notebook import as_html
 from asperity.paper.claims_friction import PAPER, norm_of, stick_entries
 from asperity.paper.paths import TURN, path_of
 from asperity.paper.plane import LAWS, PASSIVITY, SCANNING
@@ -149,12 +149,8 @@ class TableTwo:
 
     def _repr_html_(self) -> str:
         """Return the table for a notebook."""
-        head, *rows = (
-            [f"<{tag}>{html.escape(cell)}</{tag}>" for cell in row]
-            for row, tag in zip(self.cells(), ["th"] + ["td"] * len(self.rows), strict=True)
-        )
-        body = "".join(f"<tr>{''.join(row)}</tr>" for row in [head, *rows])
-        return f"<p>{html.escape(self.parameters)}</p><table>{body}</table>"
+        head, *rows = self.cells()
+        return as_html(self.parameters, (head, rows))
 
 
 def table_two() -> TableTwo:

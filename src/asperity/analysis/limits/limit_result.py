@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +11,7 @@ from asperity.analysis.limits.limit_rules import Limit
 from asperity.analysis.limits.spectrum import Spectrum
 from asperity.devices import Device
 from asperity.files import Record, record
+from asperity.notebook import as_html
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -132,12 +132,7 @@ class Limits:
     def _repr_html_(self) -> str:
         """Return the answer and a table for a notebook."""
         head = ["limit", "", "left", "right", "holds", "speeds up to [m/s]", "needs"]
-        titles = "".join(f"<th>{name}</th>" for name in head)
-        rows = "".join(
-            f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in _cells(limit))}</tr>"
-            for limit in self.limits
-        )
-        return f"<p>{html.escape(self.answer)}</p><table><tr>{titles}</tr>{rows}</table>"
+        return as_html(self.answer, (head, [_cells(limit) for limit in self.limits]))
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""

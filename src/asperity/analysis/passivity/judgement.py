@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from asperity.analysis.passivity.criteria import (
 )
 from asperity.analysis.passivity.device_loop import HALF, Loop
 from asperity.files import record
+from asperity.notebook import as_html
 
 Verdict = Literal["passive", "not passive", "undecided"]
 
@@ -92,12 +92,8 @@ class Passivity:
     def _repr_html_(self) -> str:
         """Return the verdict and a table for a notebook."""
         rows = [[c.name, c.formula, c.says, c.assumptions] for c in self.criteria]
-        head = "".join(f"<th>{title}</th>" for title in ("criterion", "formula", "says", "assumes"))
-        body = "".join(
-            f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows
-        )
         answer = f"{self.verdict}, decided by {self.decided_by}: {self.reason}"
-        return f"<p>{html.escape(answer)}</p><table><tr>{head}</tr>{body}</table>"
+        return as_html(answer, (["criterion", "formula", "says", "assumes"], rows))
 
 
 def decide(loop: Loop, by_name: Mapping[str, Criterion]) -> tuple[Verdict, str, Ground]:
