@@ -227,21 +227,6 @@ class Surface:
             raise ParameterError("name", f"is no parameter of law {self.law}: {name!r}; {hint}")
         return self.law_parameters[name]
 
-    def parameters_said(self) -> list[str]:
-        """Return the parameters of the law in words.
-
-        Example:
-            >>> from asperity.textures.sinusoid import Sinusoid
-            >>> Surface(Sinusoid(1e-4, 1e-3), "F", friction=0.3).parameters_said()[:2]
-            ['Given friction 0.3', 'Default max deflection 1 mm']
-        """
-        said = []
-        for name, argument in self.law.arguments.items():
-            value = self.law_parameters[name]
-            kind = "Default" if value == argument.default else "Given"
-            said.append(f"{kind} {name.replace('_', ' ')} {argument.readable(value)}")
-        return said
-
     def _in_effect(self, name: str) -> float:
         """Return a shipped law's parameter: the law's own, else as given for other laws."""
         if name in self.law_parameters:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from asperity.analysis.words.surface import law_parameters
 from asperity.arguments import read_arguments
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
@@ -137,10 +138,10 @@ def make_setup(
         servo = replace(servo, velocity_share=share)
     span, of_span = _duration(duration, run.pop("duration", None), motion)
     whole = _surface(scene.texture, merged, laws)
+    said += [] if laws else law_parameters(whole)
     for law in laws:
-        parameters = whole.to_law(law).parameters_said()
+        parameters = law_parameters(whole.to_law(law))
         said += [f"{parameter} for law {law.letter}" for parameter in parameters]
-    said += [] if laws else whole.parameters_said()
     return Setup(
         whole, chosen, plant, hand, servo, motion, span,
         assumptions=(*assumed, *said, *of_span, *_leaving(scene.texture, motion, span)), **run,

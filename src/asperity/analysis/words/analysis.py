@@ -9,6 +9,7 @@ import numpy as np
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.passivity.criteria import LEAK
 from asperity.analysis.words.passivity import gained
+from asperity.analysis.words.surface import law_parameters
 from asperity.devices import Device
 from asperity.surface import DEFAULT_STIFFNESS, Surface, default_max_depth
 from asperity.textures.texture import Texture
@@ -97,7 +98,7 @@ def _defaults(surface: Surface) -> list[str]:
     if surface.max_depth > surface_width(surface.texture):
         width = engineering(surface_width(surface.texture), "m")
         said.append(f"Below {width}, the surface's width, only its mirror images are felt")
-    return said + surface.parameters_said()
+    return said + law_parameters(surface)
 
 
 def _of_the_device(device: Device) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from asperity.analysis.recommendation import Recommendation, felt_force
 from asperity.analysis.row import LawRow
+from asperity.analysis.words.surface import law_parameters
 from asperity.devices import Device
 from asperity.surface import Surface
 from asperity.units import engineering, rounded_down
@@ -171,6 +172,6 @@ def _defaulted(rows: Sequence[LawRow], defaults: Mapping[str, bool]) -> list[str
         depth = engineering(first.max_depth, "m")
         result.append(f"Default max depth {depth}: the peak-to-valley height, at most 1 mm")
     for row in rows:
-        said = row.surface.parameters_said()
+        said = law_parameters(row.surface)
         result += [f"{parameter} for law {row.law.letter}" for parameter in said]
     return result

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from asperity.analysis.limits.limit_result import Limits
 from asperity.analysis.limits.limit_rules import Limit
+from asperity.analysis.words.surface import law_parameters
 from asperity.units import engineering, rounded_down
 
 
@@ -196,7 +197,7 @@ def _defaulted(result: Limits, defaults: Mapping[str, bool]) -> list[str]:
     if defaults["max_depth"]:
         depth = engineering(result.surface.max_depth, "m")
         said.append(f"Default max depth {depth}: the peak-to-valley height, at most 1 mm")
-    return said + result.surface.parameters_said()
+    return said + law_parameters(result.surface)
 
 
 def _of_the_device(result: Limits) -> list[str]:
