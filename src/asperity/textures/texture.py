@@ -36,7 +36,7 @@ class Texture(ABC):
 
     A texture kind names its sampler (scalar functions that are compiled together with a law) and
     the arguments that it takes, and knows its certified extremes and bounds. That is all a kind
-    of your own must give: what the methods from :meth:`exact_height` on answer follows, right if
+    of your own must give: what :attr:`twist` and the methods after it answer follows, right if
     slow, and a kind that can do better overrides them.
 
     Attributes:
