@@ -1,0 +1,80 @@
+"""Options follow from declarations, commands are imported when they are asked for."""
+
+from __future__ import annotations
+
+import io
+import os
+import subprocess
+import sys
+
+import pytest
+from click.testing import CliRunner
+
+from asperity.cli.main import COMMANDS, cli
+from asperity.cli.options import LAW_OPTIONS, help_of
+from asperity.cli.progress import progress_bar, step_bar
+from asperity.laws import LAWS
+from asperity.measured.arguments import FILE_ARGUMENTS
+
+READ_A_SURFACE = ["analyze", "compare", "limits", "onset", "scan", "simulate"]
+
+
+@pytest.mark.parametrize("command", READ_A_SURFACE)
+def test_every_declared_argument_is_an_option_with_its_help(command: str) -> None:
+    result = CliRunner().invoke(cli, [command, "--help"], env={"COLUMNS": "100"})
+    assert result.exit_code == 0
+    said = " ".join(result.output.split())
+    for argument in (*LAW_OPTIONS[1:], *FILE_ARGUMENTS):
+        assert f"--{argument.name.replace('_', '-')} " in said
+        assert " ".join(help_of(argument).split()) in said
+    for option in ("--stiffness", "--set", "--law-module", "--device"):
+        assert f"{option} " in said
+
+
+def test_every_parameter_of_a_shipped_law_is_an_option() -> None:
+    declared = {name for law in LAWS.values() for name in law.arguments}
+    assert {argument.name for argument in LAW_OPTIONS} == declared | {"stiffness", "max_depth"}
+
+
+def test_help_loads_nothing_heavy() -> None:
+    code = (
+        "import sys\n"
+        "from click.testing import CliRunner\n"
+        "from asperity.cli.main import COMMANDS, cli\n"
+        "for name in COMMANDS:\n"
+        "    said = CliRunner().invoke(cli, [name, '--help'])\n"
+        "    assert said.exit_code == 0 and said.output.startswith(f'Usage: cli {name}'), name\n"
+        "heavy = {'scipy', 'sympy', 'numba', 'matplotlib', 'pint', 'rich', 'jinja2'}\n"
+        "sys.exit(str(sorted(heavy & set(sys.modules))) if heavy & set(sys.modules) else 0)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, env=os.environ
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_list_of_commands_says_what_each_does() -> None:
+    said = CliRunner().invoke(cli, ["--help"], env={"COLUMNS": "100"}).output
+    for name, words in COMMANDS.items():
+        assert f"  {name} " in said
+        assert words in said
+    wrong = CliRunner().invoke(cli, ["campare"])
+    assert (wrong.exit_code, "No such command 'campare'" in wrong.output) == (2, True)
+
+
+class _Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_progress_is_shown_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    for stream, shown in ((_Terminal(), True), (io.StringIO(), False)):
+        monkeypatch.setattr(sys, "stderr", stream)
+        with step_bar("reading", 2) as step:
+            step("first part")
+            step("second part")
+        with progress_bar("stroking") as told:
+            told(0.5)
+            told(1.0, "writing")
+        assert ("stroking" in stream.getvalue()) == shown
+        assert ("second part" in stream.getvalue()) == shown
