@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import io
 import os
 import subprocess
@@ -10,11 +11,16 @@ import sys
 import pytest
 from click.testing import CliRunner
 
+import asperity as asp
+from asperity.analysis.check_limits import DEFAULT_SAMPLES, DEFAULT_SPEED
+from asperity.arguments import Argument
+from asperity.cli import analyze, limits, onset
 from asperity.cli.main import COMMANDS, cli
 from asperity.cli.options import LAW_OPTIONS, help_of
 from asperity.cli.progress import progress_bar, step_bar
 from asperity.laws import LAWS
 from asperity.measured.arguments import FILE_ARGUMENTS
+from asperity.scene.onsets import onsets
 
 READ_A_SURFACE = ["analyze", "compare", "limits", "onset", "scan", "simulate"]
 
@@ -34,6 +40,20 @@ def test_every_declared_argument_is_an_option_with_its_help(command: str) -> Non
 def test_every_parameter_of_a_shipped_law_is_an_option() -> None:
     declared = {name for law in LAWS.values() for name in law.arguments}
     assert {argument.name for argument in LAW_OPTIONS} == declared | {"stiffness", "max_depth"}
+
+
+def test_defaults_in_the_help_are_those_of_the_functions() -> None:
+    for command, function in ((limits, asp.limits), (onset, onsets), (analyze, asp.analyze)):
+        known = inspect.signature(function).parameters
+        options = [one for one in vars(command).values() if isinstance(one, tuple) and one]
+        arguments = [one for group in options for one in group if isinstance(one, Argument)]
+        assert arguments
+        for argument in arguments:
+            default = known[argument.name].default if argument.name in known else None
+            if argument.default is not None and default is not None:
+                assert argument.default == default, argument.name
+    assert {one.default for one in limits._SAMPLES} == {DEFAULT_SAMPLES}
+    assert limits._SPEED.default_words == f"{DEFAULT_SPEED:g} m/s"
 
 
 def test_help_loads_nothing_heavy() -> None:

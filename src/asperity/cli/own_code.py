@@ -29,16 +29,21 @@ class Registry:
     """Where things of a kind are known by name.
 
     Attributes:
-        kind: of the things.
+        kind: of the things; ``None`` where a file must call ``register`` itself.
         register: adds one, and refuses a name that is taken.
         known: the things by name.
         check: refuses one that cannot be used.
     """
 
-    kind: type
+    kind: type | None
     register: Callable[[Any], Any]
     known: dict[str, Any]
     check: Callable[[Any], Any] = lambda _thing: None
+
+    def takes(self, value: Any) -> bool:
+        """Return whether a value of the file is to be registered here."""
+        ours = self.kind is not None and isinstance(value, self.kind)
+        return ours and all(value is not known for known in self.known.values())
 
 
 def registries() -> tuple[Registry, ...]:
@@ -94,13 +99,12 @@ def _load(file: str, places: tuple[Registry, ...]) -> None:
         module = _run(file, source)
     for name, value in vars(module).items():
         for place in places:
-            new = isinstance(value, place.kind) and not _among(value, place.known)
-            if new:
+            if place.takes(value):
                 with _refusing(file, _line(tree, name)):
                     place.register(value)
                     place.check(value)
     if sum(len(place.known) for place in places) == before:
-        kinds = ", ".join(place.kind.__name__ for place in places)
+        kinds = ", ".join(place.kind.__name__ for place in places if place.kind is not None)
         raise ParameterError(OPTION, f"{file} defines none of these at its top level: {kinds}")
 
 
@@ -168,7 +172,3 @@ def _line(tree: ast.Module, name: str) -> int:
         if any(isinstance(target, ast.Name) and target.id == name for target in targets):
             return node.lineno
     return 1
-
-
-def _among(value: Any, known: dict[str, Any]) -> bool:
-    return any(value is one for one in known.values())
