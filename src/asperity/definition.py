@@ -17,8 +17,6 @@ from asperity.contacts.symbols import DEPTH, DX, DY, H_HALF, H_MID, HX, HY, POSI
 from asperity.derive.jacobian import symbolic_force
 from asperity.errors import ParameterError
 from asperity.surface import Surface
-from asperity.textures.exact import ExactHeight
-from asperity.textures.texture import Texture
 
 
 def exact_force(
@@ -76,20 +74,12 @@ def exact_jacobian(
 
 def _force(surface: Surface, p: list[Any], d: list[Any]) -> Any:
     law, h = surface.law, surface.texture.exact_height()
-    if law.contact.name == "split":
-        # Its definition is a supremum over space: the theorems on it are tested instead.
+    contact = law.contact.exact_point(surface.texture, h, p)
+    if contact is None:
         raise ParameterError("surface", f"with law {law} has no definition in many digits")
-    x, y, z = p
-    if law.contact.name == "nominal":
-        depth, foot = -z, (x, y)
-    else:
-        depth, foot = h(x, y, 0, 0) - z, (x, y)
+    depth, foot = contact[0], contact[1:]
     if depth <= 0:
         return mpmath.matrix([0, 0, 0])
-    if law.contact.name == "nearest":
-        foot = _exact_foot(surface.texture, h, p)
-        away = [foot[0] - x, foot[1] - y, h(*foot, 0, 0) - z]
-        depth = mpmath.sqrt(sum(part**2 for part in away))
     names = [*POSITION, DEPTH, H, HX, HY, DX, DY, K, H_MID, H_HALF]
     stiffness, middle, half = surface.law_arguments[:3]
     values = [*p, depth, h(*foot, 0, 0), h(*foot, 1, 0), h(*foot, 0, 1), *d]
@@ -98,20 +88,3 @@ def _force(surface: Surface, p: list[Any], d: list[Any]) -> Any:
         names.append(sp.Symbol(name, real=True))
         values.append(mpmath.mpf(value))
     return sp.lambdify(names, symbolic_force(law), "mpmath")(*values)
-
-
-def _exact_foot(texture: Texture, h: ExactHeight, p: list[Any]) -> tuple[Any, Any]:
-    """Solve (X - x) + (h - z) h_x = 0, (Y - y) + (h - z) h_y = 0 from the double-precision foot."""
-    start = texture.nearest([[float(c) for c in p]])[0]
-    fx, fy = mpmath.mpf(start[0]), mpmath.mpf(start[1])
-    for _ in range(60):
-        gap, hx, hy = h(fx, fy, 0, 0) - p[2], h(fx, fy, 1, 0), h(fx, fy, 0, 1)
-        hxx, hxy, hyy = h(fx, fy, 2, 0), h(fx, fy, 1, 1), h(fx, fy, 0, 2)
-        a, b = fx - p[0] + gap * hx, fy - p[1] + gap * hy
-        qxx, qxy, qyy = 1 + hx * hx + gap * hxx, hx * hy + gap * hxy, 1 + hy * hy + gap * hyy
-        det = qxx * qyy - qxy * qxy
-        sx, sy = (qxy * b - qyy * a) / det, (qxy * a - qxx * b) / det
-        fx, fy = fx + sx, fy + sy
-        if abs(sx) + abs(sy) <= mpmath.eps * (abs(fx) + abs(fy) + abs(gap)):
-            break
-    return fx, fy

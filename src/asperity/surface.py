@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from asperity.arguments import Argument
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError, nearest_names
-from asperity.kernels.driver import CLAMPS, ClampName
+from asperity.kernels.probe import CLAMPS, ClampName
 from asperity.laws import LAW_ARGUMENTS, LAWS, Law, find_law
 from asperity.textures.texture import Texture
 
@@ -260,7 +260,7 @@ class Surface:
 
     @cached_property
     def law_arguments(self) -> tuple[float, ...]:
-        """What the kernels receive of the law: see ``asperity.kernels.driver``."""
+        """What the kernels receive of the law: see ``asperity.kernels.probe``."""
         from asperity.kernels.fuse import kernel_source
 
         # The extremes of a map cost time: only for a law that looks at the relative height.
@@ -276,17 +276,12 @@ class Surface:
             *self.law_parameters.values(),
         )
 
-    @property
-    def sampler(self) -> tuple[ModuleType, ...]:
-        """The modules that are compiled together with the law: the texture's and the contact's."""
-        return (*self.texture.sampler, *self.law.contact.kernels())
-
     @cached_property
     def _loops(self) -> ModuleType:
         from asperity.kernels.fuse import fuse_surface
 
         clamp: ClampName = self.clamp if self.law.clampable else "none"
-        return fuse_surface(self.law, self.sampler, clamp)
+        return fuse_surface(self.law, self.texture.sampler, clamp)
 
     def force(self, points: ArrayLike, deflection: ArrayLike | None = None) -> FloatArray:
         """Return the force on the probe (what the device applies to the hand).

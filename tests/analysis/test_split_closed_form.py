@@ -10,7 +10,6 @@ import pytest
 
 from asperity.analysis.split.state import split_state
 from asperity.checks import FloatArray
-from asperity.contacts.split import conditions, solver
 from asperity.kernels.fuse import fuse_surface
 from asperity.surface import Surface
 from asperity.textures.samplers import sinusoid
@@ -27,7 +26,7 @@ def _surface(part: float, c: float) -> Surface:
 
 def _general(surface: Surface) -> ModuleType:
     """Return the loops that know nothing of sinusoids but their nearest points."""
-    return fuse_surface(surface.law, (sinusoid, solver, conditions), "none")
+    return fuse_surface(surface.law, (sinusoid,), "none")
 
 
 def _probes(surface: Surface, count: int) -> FloatArray:
@@ -70,7 +69,7 @@ def test_energy_atoms_and_gap_agree_with_the_general_method(part: float, c: floa
     surface = _surface(part, c)
     points = _probes(surface, 2000)
     out = np.empty((len(points), 3))
-    _general(surface).split_batch(points, out, surface.texture.arguments, surface.law_arguments)
+    _general(surface).split_batch(points, out, c, surface.texture.arguments)
     state = split_state(surface, points)
     rounding = 4e-15 * (PERIOD + surface.texture.extremes[1]) * np.sqrt(2.0 * state.potential)
     assert (np.abs(out[:, 0] - state.potential) <= rounding).all()

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from asperity.kernels import fuse
-from asperity.kernels.driver import CLAMPS
+from asperity.kernels.probe import CLAMPS
 from asperity.laws import LAWS, Law
 from asperity.textures import Texture
 
@@ -115,7 +115,7 @@ def test_forces_and_jacobians_at_given_contacts(
     shared = (700.0, 1e-4, 5e-4, 1.0, 0.0)
     own = (0.7, 0.8e-3, 0.9) if letter == "F" else ()
     module.contact_batch(
-        rng.normal(size=(7, 2)), depths, derivatives, deflection, sliding, force, jacobian,
+        rng.normal(size=(7, 3)), depths, derivatives, deflection, sliding, force, jacobian,
         shared + own,
     )  # fmt: skip
     for i in range(7):

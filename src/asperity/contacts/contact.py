@@ -7,13 +7,16 @@ depends on the contact alone is asked of the contact, here and nowhere else.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray
+from asperity.contacts.sampler import sampled
 
 
 class HeightField(Protocol):
@@ -29,8 +32,12 @@ class HeightField(Protocol):
     def gradient(self, xy: FloatArray) -> FloatArray:
         """Slopes [1], shape (n, 2), at points (n, 2) [m]."""
 
-    def nearest(self, points: FloatArray) -> FloatArray:
+    def nearest(self, points: ArrayLike) -> FloatArray:
         """Nearest surface points [m], shape (n, 3), of probes (n, 3) [m]."""
+
+
+# h(x, y, m, n), the derivative of the height of order (m, n), in mpmath.
+ExactHeight = Callable[[Any, Any, int, int], Any]
 
 
 @dataclass(frozen=True)
@@ -68,6 +75,7 @@ class Contact(ABC):
         clampable: whether a law on this contact may have its depth clamped.
         holds_anchor: whether a law on this contact may have state, an anchor that is held while
             there is contact.
+        parameters: names that a law on this contact must have among its own.
     """
 
     name: ClassVar[str]
@@ -78,6 +86,7 @@ class Contact(ABC):
     cost: ClassVar[float] = 1000.0
     clampable: ClassVar[bool] = False
     holds_anchor: ClassVar[bool] = False
+    parameters: ClassVar[tuple[str, ...]] = ()
 
     def __str__(self) -> str:
         return self.name
@@ -110,11 +119,35 @@ class Contact(ABC):
         return sp.zeros(force.shape[0], 3)
 
     def kernels(self) -> tuple[ModuleType, ...]:
-        """Return the compiled modules that the contact brings: what no texture kind need offer.
+        """Return the compiled modules that the contact brings; their loops go along.
 
-        What a texture kind offers itself comes first.
+        A texture kind may offer something better under the same name: it is asked first. Unless
+        :meth:`begin_code` says otherwise one of them provides ``contact_point(x, y, z, texture)``,
+        which returns depth, X and Y of a probe [m], the depth negative out of contact.
         """
         return ()
+
+    def begin_code(self, wanted: frozenset[str]) -> tuple[list[str], str]:
+        """Return how a compiled function finds whether its probe ``x, y, z`` is in contact.
+
+        Args:
+            wanted: names that must be known in contact, see :meth:`sample_code`.
+
+        Returns:
+            Lines of Python, and the condition that holds in contact.
+        """
+        del wanted
+        return ["depth, contact_x, contact_y = contact_point(x, y, z, texture)"], "depth > 0.0"
+
+    def sample_code(self, wanted: frozenset[str]) -> list[str]:
+        """Return the lines of a compiled function after :meth:`begin_code`, in contact.
+
+        Args:
+            wanted: names that must be known after them: of the height and its derivatives at the
+                contact point, ``h``, ``hx``, ..., ``hyy``, of the depth, ``depth``, and of other
+                symbols that laws on this contact use.
+        """
+        return sampled(wanted, "contact_x, contact_y")
 
     @abstractmethod
     def begin(self, texture: HeightField, xy: FloatArray) -> FloatArray:
@@ -140,6 +173,16 @@ class Contact(ABC):
         """
         top = self.begin(texture, np.ascontiguousarray(point[None, :2]))[0]
         return np.array([point[0], point[1], top]), np.array([0.0, 0.0, -1.0])
+
+    def exact_point(
+        self, texture: HeightField, h: ExactHeight, p: list[Any]
+    ) -> tuple[Any, Any, Any] | None:
+        """Return depth, X and Y [m] of a probe p in mpmath, from h(x, y, m, n), ∂ᵐ⁺ⁿh/∂xᵐ∂yⁿ.
+
+        Nothing where the contact has no definition in many digits to test kernels against.
+        """
+        del texture, h, p
+        return None
 
     @abstractmethod
     def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:

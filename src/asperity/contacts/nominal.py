@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.contacts.contact import Contact, ContactDerivatives, HeightField
+from asperity.contacts.contact import Contact, ContactDerivatives, ExactHeight, HeightField
+from asperity.contacts.sampler import sampled
 
 
 class Nominal(Contact):
@@ -25,6 +28,15 @@ class Nominal(Contact):
 
         return ContactDerivatives(sp.Matrix([[0, 0, -1]]), sp.Matrix([[1, 0, 0], [0, 1, 0]]))
 
+    def begin_code(self, wanted: frozenset[str]) -> tuple[list[str], str]:
+        """Below the wall, whatever the texture."""
+        del wanted
+        return ["depth = -z"], "depth > 0.0"
+
+    def sample_code(self, wanted: frozenset[str]) -> list[str]:
+        """At the probe."""
+        return sampled(wanted, "x, y")
+
     def begin(self, texture: HeightField, xy: FloatArray) -> FloatArray:
         """Everywhere at 0."""
         del texture
@@ -39,6 +51,13 @@ class Nominal(Contact):
         """-z."""
         del texture
         return np.asarray(-points[:, 2])
+
+    def exact_point(
+        self, texture: HeightField, h: ExactHeight, p: list[Any]
+    ) -> tuple[Any, Any, Any] | None:
+        """-z, x, y."""
+        del texture, h
+        return -p[2], p[0], p[1]
 
     def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
         """(X, Y, -depth)."""

@@ -1,9 +1,22 @@
 """What compiled code asks of a texture: the functions of its sampler.
 
-These are the interface alone. A texture kind defines the functions in its sampler and provides
+The functions are the interface alone. A texture kind defines them in its sampler and provides
 them; the linker binds the calls of contacts and searches to them. ``texture`` is the record
 (NamedTuple) that the kind declares: whatever it holds, it is passed on whole.
 """
+
+_SECOND = frozenset(("hxx", "hxy", "hyy"))
+_FIRST = frozenset(("hx", "hy"))
+
+
+def sampled(wanted: frozenset[str], place: str) -> list[str]:
+    """Return the line of code that samples what is wanted of h, hx, ..., hyy at a place."""
+    if wanted & _SECOND:
+        return [f"h, hx, hy, hxx, hxy, hyy = curvature({place}, texture)"]
+    if wanted & _FIRST:
+        return [f"h, hx, hy = slope({place}, texture)"]
+    return [f"h = height({place}, texture)"] if "h" in wanted else []
+
 
 OFFERED = {
     "height": "heights",

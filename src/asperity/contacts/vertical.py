@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.contacts.contact import Contact, ContactDerivatives, HeightField
+from asperity.contacts.contact import Contact, ContactDerivatives, ExactHeight, HeightField
+from asperity.contacts.sampler import sampled
 
 
 class Vertical(Contact):
@@ -25,6 +28,15 @@ class Vertical(Contact):
 
         return ContactDerivatives(sp.Matrix([[HX, HY, -1]]), sp.Matrix([[1, 0, 0], [0, 1, 0]]))
 
+    def begin_code(self, wanted: frozenset[str]) -> tuple[list[str], str]:
+        """Below the height at the probe; what is wanted besides is sampled with it."""
+        return [*sampled(wanted | {"h"}, "x, y"), "depth = h - z"], "depth > 0.0"
+
+    def sample_code(self, wanted: frozenset[str]) -> list[str]:
+        """All is known."""
+        del wanted
+        return []
+
     def begin(self, texture: HeightField, xy: FloatArray) -> FloatArray:
         """At the textured surface."""
         return texture.height(xy)
@@ -32,6 +44,13 @@ class Vertical(Contact):
     def depth(self, texture: HeightField, points: FloatArray) -> FloatArray:
         """H - z."""
         return np.asarray(texture.height(np.ascontiguousarray(points[:, :2])) - points[:, 2])
+
+    def exact_point(
+        self, texture: HeightField, h: ExactHeight, p: list[Any]
+    ) -> tuple[Any, Any, Any] | None:
+        """H - z, x, y."""
+        del texture
+        return h(p[0], p[1], 0, 0) - p[2], p[0], p[1]
 
     def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
         """(X, Y, h - depth)."""

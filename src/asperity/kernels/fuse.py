@@ -20,13 +20,6 @@ from asperity.contacts.sampler import OFFERED
 from asperity.derive.shipped import generated_path
 from asperity.errors import ParameterError
 from asperity.files import write_text
-from asperity.kernels.driver import (
-    ClampName,
-    DriverPlan,
-    contact_source,
-    driver_loops,
-    driver_source,
-)
 from asperity.kernels.link import (
     MissingFunctionError,
     Unit,
@@ -35,6 +28,7 @@ from asperity.kernels.link import (
     module_unit,
     written_unit,
 )
+from asperity.kernels.probe import ClampName, ProbePlan, contact_source, probe_source
 from asperity.laws import LAWS, Law
 
 _HEADER = '''"""{title}
@@ -75,14 +69,18 @@ def kernel_source(law: Law) -> str:
 
 
 @lru_cache(maxsize=256)
-def law_units(law: Law, clamp: ClampName) -> tuple[Unit, Unit]:
-    """Return a law's own functions, and those that call them at a probe point on a texture."""
-    plan = DriverPlan(law, kernel_source(law), clamp)
-    own = written_unit(f"law {law}", plan.source, merged=("law_force", "law_jacobian"))
-    merged = ("probe_force", "probe_jacobian")
-    loops = driver_loops(plan)
-    return own, written_unit(
-        f"law {law} on a texture", driver_source(plan), loops=loops, merged=merged
+def law_units(law: Law, clamp: ClampName) -> tuple[Unit, ...]:
+    """Return the functions of a law, those of a probe point, and those that its loops may call."""
+    from asperity.kernels import anchor, storing
+
+    plan = ProbePlan(law, kernel_source(law), clamp)
+    return (
+        written_unit(f"law {law}", plan.source, merged=("law_force", "law_jacobian")),
+        written_unit(
+            f"law {law} at a probe", probe_source(plan), merged=("probe_force", "probe_jacobian")
+        ),
+        module_unit(anchor),
+        module_unit(storing),
     )
 
 
@@ -96,40 +94,46 @@ def fuse_surface(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) ->
         clamp: the depth clamp.
 
     Returns:
-        A module with ``force_batch``, ``jacobian_batch``, ``trace_batch`` if the law has state.
+        A module with ``force_batch``, ``jacobian_batch``, ``trace_batch`` if the law has state, and
+        the loops that its contact brings.
 
     Raises:
         ParameterError: for a texture that lacks what the law looks at.
     """
-    own, probe = law_units(law, clamp)
-    return fuse_on_texture(law, sampler, loops_of(probe), (own, probe))
+    from asperity.kernels import anchored_loops, probe_loops
+
+    loops = anchored_loops if law.stateful else probe_loops
+    asking = [module_unit(module) for module in (loops, *law.contact.kernels())]
+    return fuse_on_texture(law, sampler, clamp, asking)
 
 
 def fuse_on_texture(
     law: Law,
     sampler: tuple[ModuleType, ...],
-    loops: Sequence[tuple[str, Unit]],
-    further: Sequence[Unit],
+    clamp: ClampName,
+    asking: Sequence[Unit],
+    further: Sequence[Unit] = (),
 ) -> ModuleType:
-    """Return loops compiled that ask a sampler, a law's functions and further units.
+    """Return the loops of units compiled that ask a sampler, a law and further units.
 
     Raises:
         ParameterError: for a texture that lacks what is asked of it.
     """
     modules = tuple(module_unit(module) for module in sampler)
+    brought = map(module_unit, law.contact.kernels())
+    at_hand = dict.fromkeys((*modules, *law_units(law, clamp), *asking, *brought, *further))
     try:
-        source = link(loops, (*modules, *further))
+        source = link(loops_of(*asking), tuple(at_hand))
     except MissingFunctionError as missing:
-        raise _lacking(missing, modules, f"which law {law} needs") from None
+        who = f"which law {law} on the {law.contact} contact needs"
+        raise _lacking(missing, modules, who) from None
     return load_fused(_head(f"Law {law} on {sampler[0].__name__}.", source) + source)
 
 
 def _lacking(missing: MissingFunctionError, modules: Sequence[Unit], who: str) -> ParameterError:
     """Return the error of a texture that lacks a function; it says which, and who needs it."""
-    if missing.name not in OFFERED:
-        return missing
     offered = sorted({name for unit in modules for name in unit.kernels.provides} & OFFERED.keys())
-    what = f"must offer {OFFERED[missing.name]} (a sampler function {missing.name!r})"
+    what = f"must offer {OFFERED.get(missing.name, 'more')} (a sampler function {missing.name!r})"
     there = f"{modules[0].name} offers {', '.join(offered) or 'nothing'}"
     return ParameterError("texture", f"{what}, {who}; {there}")
 
@@ -137,11 +141,20 @@ def _lacking(missing: MissingFunctionError, modules: Sequence[Unit], who: str) -
 @lru_cache(maxsize=256)
 def fuse_contact(law: Law) -> ModuleType:
     """Return the compiled loop of a law over given contacts: ``contact_batch``."""
-    plan = DriverPlan(law, kernel_source(law), "none")
-    own, _probe = law_units(law, "none")
-    unit = written_unit(f"law {law}", contact_source(plan), loops=("contact_batch",))
-    source = link(loops_of(unit), (own, unit))
+    from asperity.kernels import contact_loop
+
+    plan = ProbePlan(law, kernel_source(law), "none")
+    loop = module_unit(contact_loop)
+    given = written_unit(f"law {law} at a contact", contact_source(plan))
+    source = link(loops_of(loop), (loop, given, *law_units(law, "none")))
     return load_fused(_head(f"Law {law} at contacts.", source) + source)
+
+
+@lru_cache(maxsize=256)
+def reads_position(law: Law) -> bool:
+    """Return whether the Jacobian of a law looks at the position of the probe."""
+    wanted = ProbePlan(law, kernel_source(law), "none").wanted("law_jacobian")
+    return not wanted.isdisjoint(("x", "y", "z"))
 
 
 @lru_cache(maxsize=16)

@@ -33,7 +33,7 @@ class MissingFunctionError(ParameterError):
         self.name = name
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Unit:
     """The functions of a module as text, and what the module says of itself.
 

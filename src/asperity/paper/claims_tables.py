@@ -10,7 +10,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.kernels.driver import ClampName
+from asperity.kernels.probe import ClampName
 from asperity.paper.claim import (
     Check,
     Claim,

@@ -10,7 +10,7 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.errors import ParameterError
-from asperity.kernels.driver import ClampName
+from asperity.kernels.probe import ClampName
 from asperity.laws import Law
 from asperity.simulation.ledger import Ledger
 from asperity.simulation.machine import Machine
@@ -30,13 +30,12 @@ _LOCK = Lock()
 def _fused(
     law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName, body: tuple[ModuleType, ...]
 ) -> ModuleType:
-    from asperity.kernels.fuse import fuse_on_texture, law_units
-    from asperity.kernels.link import loops_of, module_unit, written_unit
+    from asperity.kernels.fuse import fuse_on_texture
+    from asperity.kernels.link import module_unit, written_unit
     from asperity.simulation.servo_source import servo_source
 
-    servo = written_unit("the servo", servo_source(law), loops=("servo_batch", "stored_batch"))
-    further = (*law_units(law, clamp), servo, *map(module_unit, body))
-    return fuse_on_texture(law, sampler, loops_of(servo), further)
+    servo = written_unit("the servo", servo_source(), loops=("servo_batch", "stored_batch"))
+    return fuse_on_texture(law, sampler, clamp, (servo,), [module_unit(part) for part in body])
 
 
 class Simulation:
@@ -70,7 +69,7 @@ class Simulation:
         self._before = 0.0
         clamp: ClampName = surface.clamp if surface.law.clampable else "none"
         with _LOCK:
-            self._loops = _fused(surface.law, surface.sampler, clamp, moved.modules)
+            self._loops = _fused(surface.law, surface.texture.sampler, clamp, moved.modules)
         self._arguments = surface.texture.arguments, surface.law_arguments
 
     @property

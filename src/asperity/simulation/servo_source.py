@@ -6,9 +6,6 @@ the force is limited and rounded, waits for the delay, and is held while the bod
 
 from __future__ import annotations
 
-from asperity.kernels.driver import SHARED_PARAMETERS
-from asperity.laws import Law
-
 # What ``memory`` holds between calls: see ``servo_batch``.
 MEMORY = 15
 # Sums of the ledger: work of the held force per axis (3), the paper's same-sample sum per axis
@@ -27,24 +24,9 @@ COLUMNS = (
     *((name, "J") for name in ("lost", "hand", "friction", "sampling", "stored")),
 )
 
-_STATELESS = """cx, cy, cz = probe_force(mx, my, mz, texture, law)
-"""
 
-_STATEFUL = """dx = 0.0
-dy = 0.0
-if mz < 0.0:
-    px, py, dx, dy = drag_anchor(mx, my, memory[9] > 0.0, memory[7], memory[8], max_deflection)
-    memory[7] = px
-    memory[8] = py
-    memory[9] = 1.0
-else:
-    memory[9] = 0.0
-cx, cy, cz = probe_force(mx, my, mz, dx, dy, texture, law)
-"""
-
-
-def servo_source(law: Law) -> str:
-    """Return ``servo_batch`` and ``stored_batch`` for a law; a body's kernel must come along.
+def servo_source() -> str:
+    """Return ``servo_batch`` and ``stored_batch``, which call a law's functions and a body's.
 
     ``servo_batch(x, queue, memory, ledger, anchor, plant, settings, texture, law, trace, every)``
     runs one sample for each row of ``anchor`` but the last and returns what stopped it: 0 nothing,
@@ -63,11 +45,7 @@ def servo_source(law: Law) -> str:
 
     ``stored_batch(x, anchor, plant)`` returns the stored energy [J].
     """
-    contact = _STATEFUL if law.stateful else _STATELESS
-    unpack = ", ".join((*SHARED_PARAMETERS, *law.parameters))
-    lines = "\n".join(" " * 8 + line for line in contact.splitlines())
-    inside = "mz < 0.0" if law.contact.name == "nominal" else "mz < height(mx, my, texture)"
-    return _SERVO.format(contact=lines, unpack=unpack, inside=inside) + _TRACE
+    return _SERVO + _TRACE
 
 
 _SERVO = '''def rounded(value, step):
@@ -103,7 +81,6 @@ def servo_batch(
     x, queue, memory, ledger, anchor, plant, settings, texture, law, trace, every
 ):
     """Run the servo loop; returns what stopped it, and the rows of the trace."""
-    {unpack} = law
     position_step, force_step, max_force, damper, velocity_share, period = settings
     slots = queue.shape[0]
     head = int(memory[10])
@@ -127,7 +104,10 @@ def servo_batch(
         mx = rounded(x[0], position_step)
         my = rounded(x[1], position_step)
         mz = rounded(x[2], position_step)
-{contact}
+        cx, cy, cz, memory[7], memory[8], held = probe_held(
+            mx, my, mz, memory[7], memory[8], memory[9] > 0.0, texture, law
+        )
+        memory[9] = 1.0 if held else 0.0
         stepx = mx - memory[1]
         stepy = my - memory[2]
         stepz = mz - memory[3]
@@ -181,8 +161,9 @@ def servo_batch(
                 rows += 1
                 wait = every
             wait -= 1
+        inside = probe_inside(mx, my, mz, texture)
         stop = advance_body(
-            x, ledger, fx, fy, fz, ax, ay, az, ux, uy, uz, {inside}, plant
+            x, ledger, fx, fy, fz, ax, ay, az, ux, uy, uz, inside, plant
         )
         if stop != 0:
             samples = sample

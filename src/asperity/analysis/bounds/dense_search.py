@@ -21,7 +21,7 @@ from asperity.analysis.bounds.measures import (
 from asperity.checks import FloatArray
 from asperity.derive.facts import law_facts
 from asperity.errors import ParameterError
-from asperity.kernels.fuse import fuse_contact
+from asperity.kernels.fuse import fuse_contact, reads_position
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -60,6 +60,7 @@ class ContactField:
         self.surface = surface
         self.texture = surface.texture
         self._loops = fuse_contact(surface.law)
+        self._placed = reads_position(surface.law)
         self._law = (1.0, *surface.law_arguments[1:])
 
     def jacobians(
@@ -75,8 +76,10 @@ class ContactField:
         n = len(xy)
         force, jacobian = np.empty((n, 3)), np.empty((n, 3, 3))
         slides = np.full(n, sliding)
+        contact = self.surface.law.contact
+        points = contact.probe(xy, depth, derivatives) if self._placed else np.zeros((n, 3))
         self._loops.contact_batch(
-            xy, depth, derivatives, deflection, slides, force, jacobian, self._law
+            points, depth, derivatives, deflection, slides, force, jacobian, self._law
         )
         return jacobian
 

@@ -155,7 +155,7 @@ def _column_potentials(surface: Surface, grid: Grid, index: NDArray[np.intp]) ->
     points[:, :, 2] = z
     out = np.empty((points[..., 0].size, 3))
     surface._loops.split_batch(
-        points.reshape(-1, 3), out, surface.texture.arguments, surface.law_arguments
+        points.reshape(-1, 3), out, surface.continuity, surface.texture.arguments
     )
     return np.ascontiguousarray(out[:, 0].reshape(len(xy), grid.levels))
 

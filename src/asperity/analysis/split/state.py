@@ -53,7 +53,7 @@ def split_state(surface: Surface, points: ArrayLike) -> SplitState:
     _need_split(surface)
     probes = array("points", points, (None, 3), "m")
     out = np.empty((len(probes), 3))
-    surface._loops.split_batch(probes, out, surface.texture.arguments, surface.law_arguments)
+    surface._loops.split_batch(probes, out, surface.continuity, surface.texture.arguments)
     potential, atoms, gap = out.T
     k = surface.stiffness
     return SplitState(k * potential, atoms.astype(np.intp), k * gap)

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.contacts.contact import Contact, ContactDerivatives, HeightField, along_normal
+from asperity.contacts.contact import (
+    Contact,
+    ContactDerivatives,
+    ExactHeight,
+    HeightField,
+    along_normal,
+)
+from asperity.contacts.sampler import sampled
 
 
 class Nearest(Contact):
@@ -39,6 +48,19 @@ class Nearest(Contact):
             definitions=definitions,
         )
 
+    def begin_code(self, wanted: frozenset[str]) -> tuple[list[str], str]:
+        """Below the height at the probe: no search out of contact."""
+        del wanted
+        return [], "height(x, y, texture) - z > 0.0"
+
+    def sample_code(self, wanted: frozenset[str]) -> list[str]:
+        """The search knows the slopes at the foot."""
+        return [
+            "foot_x, foot_y, h, hx, hy = foot(x, y, z, texture)",
+            *sampled(wanted & {"hxx", "hxy", "hyy"}, "foot_x, foot_y"),
+            "depth = math.sqrt((x - foot_x)**2 + (y - foot_y)**2 + (z - h)**2)",
+        ]
+
     def begin(self, texture: HeightField, xy: FloatArray) -> FloatArray:
         """At the textured surface."""
         return texture.height(xy)
@@ -55,6 +77,14 @@ class Nearest(Contact):
         hx, hy = texture.gradient(foot[None, :2])[0]
         inward = np.array([hx, hy, -1.0])
         return foot, inward / np.linalg.norm(inward)
+
+    def exact_point(
+        self, texture: HeightField, h: ExactHeight, p: list[Any]
+    ) -> tuple[Any, Any, Any] | None:
+        """The foot, by Newton's method from the kernels' own."""
+        from asperity.contacts.nearest.exact import exact_nearest
+
+        return exact_nearest(texture, h, p)
 
     def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
         """Below the foot along its normal."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import ModuleType
 from typing import Any
 
-from asperity.contacts.contact import ContactDerivatives
+from asperity.contacts.contact import ContactDerivatives, ExactHeight, HeightField
 from asperity.contacts.nearest.contact import Nearest
 
 
@@ -20,12 +20,27 @@ class Split(Nearest):
     cost = 1000.0
     single_valued = True
     given_by_depth = False
+    parameters = ("continuity",)
 
     def kernels(self) -> tuple[ModuleType, ...]:
         """The general solver; a texture kind may offer ``split_contact`` and the like itself."""
-        from asperity.contacts.split import conditions, solver
+        from asperity.contacts.split import conditions, energy_loop, solver
 
-        return solver, conditions
+        return solver, conditions, energy_loop
+
+    def exact_point(
+        self, texture: HeightField, h: ExactHeight, p: list[Any]
+    ) -> tuple[Any, Any, Any] | None:
+        """None: its definition is a supremum over space; the theorems on it are tested instead."""
+        del texture, h, p
+        return None
+
+    def sample_code(self, wanted: frozenset[str]) -> list[str]:
+        """The vector to the mean, with its derivative where that is wanted."""
+        if "mxx" in wanted:
+            derivative = "tx, ty, tz, mxx, mxy, mxz, myy, myz, mzz"
+            return [f"{derivative} = split_derivative(x, y, z, continuity, texture)"]
+        return ["tx, ty, tz = split_contact(x, y, z, continuity, texture)"]
 
     def derivatives(self) -> ContactDerivatives:
         """Nothing by depth or point: see :meth:`jacobian_part`."""

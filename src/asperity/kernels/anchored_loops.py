@@ -1,0 +1,57 @@
+"""Loops over probe points, of laws with state: the deflection of an anchor."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.checks import FloatArray
+from asperity.compiled import Kernels
+from asperity.kernels.anchor import sliding_derivative
+from asperity.kernels.law_functions import probe_force, probe_held, probe_jacobian
+from asperity.kernels.storing import store_force, store_jacobian
+
+KERNELS = Kernels(
+    requires=(
+        "probe_force", "probe_held", "probe_jacobian", "sliding_derivative", "store_force",
+        "store_jacobian",
+    ),
+    loops=("force_batch", "jacobian_batch", "trace_batch"),
+)  # fmt: skip
+
+
+def force_batch(
+    points: FloatArray, deflection: FloatArray, out: FloatArray, texture: object, law: object
+) -> None:
+    """Write the forces (n, 3) [N] at points (n, 3) with deflections (n, 2) [m]."""
+    for i in range(points.shape[0]):
+        fx, fy, fz = probe_force(
+            points[i, 0], points[i, 1], points[i, 2], deflection[i, 0], deflection[i, 1],
+            texture, law,
+        )  # fmt: skip
+        store_force(out, i, fx, fy, fz)
+
+
+def jacobian_batch(
+    points: FloatArray, deflection: FloatArray, sliding: NDArray[np.bool_], force: FloatArray,
+    jacobian: FloatArray, texture: object, law: object,
+) -> None:  # fmt: skip
+    """Write forces (n, 3) [N] and Jacobians (n, 3, 3) [N/m], anchors dragged where sliding."""
+    for i in range(points.shape[0]):
+        dx = deflection[i, 0]
+        dy = deflection[i, 1]
+        sxx, sxy, syy = sliding_derivative(dx, dy, sliding[i])
+        fx, fy, fz, j00, j01, j02, j10, j11, j12, j20, j21, j22 = probe_jacobian(
+            points[i, 0], points[i, 1], points[i, 2], dx, dy, sxx, sxy, syy, texture, law
+        )
+        store_force(force, i, fx, fy, fz)
+        store_jacobian(jacobian, i, j00, j01, j02, j10, j11, j12, j20, j21, j22)
+
+
+def trace_batch(points: FloatArray, out: FloatArray, texture: object, law: object) -> None:
+    """Write the forces (n, 3) [N] along a path (n, 3) [m], the anchor released at the start."""
+    ax = ay = 0.0
+    held = False
+    for i in range(points.shape[0]):
+        fx, fy, fz, ax, ay, held = probe_held(
+            points[i, 0], points[i, 1], points[i, 2], ax, ay, held, texture, law
+        )
+        store_force(out, i, fx, fy, fz)

@@ -1,0 +1,30 @@
+"""Loops over probe points, of laws without state."""
+
+from asperity.checks import FloatArray
+from asperity.compiled import Kernels
+from asperity.kernels.law_functions import probe_force, probe_jacobian
+from asperity.kernels.storing import store_force, store_jacobian
+
+KERNELS = Kernels(
+    requires=("probe_force", "probe_jacobian", "store_force", "store_jacobian"),
+    loops=("force_batch", "jacobian_batch"),
+)
+
+
+def force_batch(points: FloatArray, out: FloatArray, texture: object, law: object) -> None:
+    """Write the forces (n, 3) [N] at points (n, 3) [m]."""
+    for i in range(points.shape[0]):
+        fx, fy, fz = probe_force(points[i, 0], points[i, 1], points[i, 2], 0.0, 0.0, texture, law)
+        store_force(out, i, fx, fy, fz)
+
+
+def jacobian_batch(
+    points: FloatArray, force: FloatArray, jacobian: FloatArray, texture: object, law: object
+) -> None:
+    """Write forces (n, 3) [N] and Jacobians (n, 3, 3) [N/m] at points (n, 3) [m]."""
+    for i in range(points.shape[0]):
+        fx, fy, fz, j00, j01, j02, j10, j11, j12, j20, j21, j22 = probe_jacobian(
+            points[i, 0], points[i, 1], points[i, 2], 0.0, 0.0, 1.0, 0.0, 1.0, texture, law
+        )
+        store_force(force, i, fx, fy, fz)
+        store_jacobian(jacobian, i, j00, j01, j02, j10, j11, j12, j20, j21, j22)
