@@ -16,7 +16,7 @@ from asperity.checks import FloatArray, array, positive
 from asperity.contacts.split.spline import PotentialTable
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
-from asperity.laws import LAWS
+from asperity.laws.h_split_god_object import LAW as SPLIT_GOD_OBJECT
 from asperity.surface import Surface
 
 DEFAULT_MAX_BYTES = 2**28
@@ -152,7 +152,7 @@ def tabulate(
         >>> table.shape, round(table.lipschitz.value, 2)
         ((103, 133), 1.07)
     """
-    if surface.law is not LAWS["H"]:
+    if surface.law is not SPLIT_GOD_OBJECT:
         raise ParameterError("surface", f"must have law H to be tabulated, not {surface.law}")
     texture = surface.texture
     if not (texture.domain.periodic or texture.ends):
