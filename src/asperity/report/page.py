@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -226,18 +227,21 @@ def added_sections(result: type, *arguments: Any) -> list[Section]:
 
 def page_html(page: Page) -> str:
     """Return the page as HTML; nothing is loaded from elsewhere; light, dark and print."""
-    return _template().render(page=page, version=asperity.__version__)
+    environment = _environment()
+    # Blanks that mean nothing make no page larger.
+    style = re.sub(r"\s*([{};])\s*", r"\1", environment.get_template("style.css").render())
+    template = environment.get_template("page.html.j2")
+    return template.render(page=page, style=style, version=asperity.__version__)
 
 
 @lru_cache(maxsize=1)
-def _template() -> jinja2.Template:
+def _environment() -> jinja2.Environment:
     import jinja2
 
-    environment = jinja2.Environment(
+    return jinja2.Environment(
         loader=jinja2.PackageLoader("asperity.report"),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template("page.html.j2")

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from asperity.analysis.limits.limit_result import Limits
 from asperity.analysis.words.limits import speed_text, stiffness_text
@@ -47,8 +47,10 @@ def limits_figure(result: Limits) -> Figure:
     # The words of the last line need a third of the width.
     room = span**0.45 if least and least[-1] > 0.5 * max(edges) else 1.6
     lower.set_xlim(min(edges) * _MILLI / 1.6, max(edges) * _MILLI * room)
+    plain = FuncFormatter(lambda value, _place: f"{value:g}")
     for axis in (lower.xaxis, upper.yaxis, lower.yaxis):
-        axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
+        axis.set_major_formatter(plain)
+    lower.xaxis.set_minor_formatter(plain if span < 8.0 else NullFormatter())
     style.label(upper, "", f"amplitude [{unit.name}]")
     style.label(lower, "wavelength [mm]", f"force [{push.name}]")
     k = stiffness_text(result)

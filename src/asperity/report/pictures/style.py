@@ -83,7 +83,7 @@ def new_figure(width: float, height: float) -> Figure:
 
 def dress(axes: Axes) -> None:
     """Give axes the common look."""
-    axes.tick_params(labelsize=TICK, colors=SOFT, length=3, width=0.6)
+    axes.tick_params(which="both", labelsize=TICK, colors=SOFT, length=3, width=0.6)
     for side, spine in axes.spines.items():
         spine.set_visible(side in {"left", "bottom"})
         spine.set_color(FAINT)
@@ -167,8 +167,9 @@ def svg_text(figure: Figure) -> str:
     options: dict[str, Any] = {"facecolor": CARD, "metadata": {"Date": None, "Creator": None}}
     figure.savefig(buffer, format="svg", dpi=160, **options)
     text = buffer.getvalue().decode("utf-8")
-    # A page needs neither the prologue nor the words about the file.
+    # A page needs no prologue, no words about the file and no indentation.
     text = re.sub(r"\s*<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
+    text = re.sub(r"\n +", "\n", text)
     # Matplotlib draws its identifiers at random; numbered in order, the text is reproducible.
     found = dict.fromkeys(re.findall(r'id="((?:image|[a-zA-Z])[0-9a-f]{10})"', text))
     for number, identifier in enumerate(found):
@@ -185,7 +186,8 @@ def data_uri(figure: Figure) -> str:
 def png_uri(figure: Figure) -> str:
     """Return the figure as a data URI of its pixels, which many small pictures share well."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110, facecolor=CARD, metadata={"Software": None})
+    options: dict[str, Any] = {"metadata": {"Software": None}, "pil_kwargs": {"optimize": True}}
+    figure.savefig(buffer, format="png", dpi=110, facecolor=CARD, **options)
     return f"data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode('ascii')}"
 
 
