@@ -1,4 +1,4 @@
-"""``--law-module``: what the user's own Python file defines: laws, textures, readers, claims.
+"""``--law-module``: what the user's own Python file defines: laws, textures, criteria, claims.
 
 Only the command line names such a file: whoever types the command runs the code. What it defines
 is known until the command ends.
@@ -36,7 +36,7 @@ class Registry:
     """
 
     kind: type | None
-    register: Callable[[Any], Any]
+    register: Callable[..., Any]
     known: dict[str, Any]
     check: Callable[[Any], Any] = lambda _thing: None
 
@@ -49,6 +49,7 @@ class Registry:
 def registries() -> tuple[Registry, ...]:
     """Return where what a file defines becomes known."""
     from asperity import laws
+    from asperity.analysis.passivity import criteria
     from asperity.derive.jacobian import symbolic_force
     from asperity.measured.reading import Reader
     from asperity.measured.reading import registry as readers
@@ -62,6 +63,8 @@ def registries() -> tuple[Registry, ...]:
         Registry(Kind, catalogue.register, catalogue.CATALOGUE),
         Registry(Reader, readers.register, readers.OWN),
         Registry(Claim, registry.register, registry.CLAIMS),
+        # A criterion is a function: the file gives it its name by calling register.
+        Registry(None, criteria.register, criteria.CRITERIA),
     )
 
 
