@@ -1,0 +1,41 @@
+"""The line through a probe along which depth grows, and what a contact costs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from asperity.contacts import CONTACTS
+from asperity.textures import Fourier
+
+# Generic: no axis, no crest and no trough at the probes.
+HILLS = Fourier([4e-5, 3e-5], [[6e3, 1e3], [-2e3, 5e3]], phases=[0.3, 1.1])
+PROBES = np.array([[0.11e-3, 0.23e-3, -0.12e-3], [0.71e-3, -0.34e-3, -0.09e-3]])
+
+
+@pytest.mark.parametrize("name", ["nominal", "vertical", "nearest", "split"])
+@pytest.mark.parametrize("probe", PROBES)
+def test_depth_grows_along_it_by_the_way_gone(name: str, probe: np.ndarray) -> None:
+    contact = CONTACTS[name]
+    place, below = contact.column(HILLS, probe)
+    depth = contact.depth(HILLS, probe[None])[0]
+    assert depth > 0.0
+    assert np.linalg.norm(below) == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_allclose(place + depth * below, probe, atol=1e-12)
+    ways = np.array([0.0, 0.3, 0.8]) * depth
+    np.testing.assert_allclose(
+        contact.depth(HILLS, place + ways[:, None] * below), ways, atol=1e-10
+    )
+
+
+def test_the_columns_of_contacts_are_told_apart() -> None:
+    below = {name: contact.column(HILLS, PROBES[0])[1] for name, contact in CONTACTS.items()}
+    assert below["vertical"][2] == -1.0
+    assert abs(below["nearest"][2]) < 0.999
+
+
+def test_what_takes_a_search_costs_more_than_a_height() -> None:
+    costs = {name: CONTACTS[name].cost for name in ("nominal", "vertical", "nearest", "split")}
+    assert costs["nominal"] == costs["vertical"] == 1.0
+    assert costs["vertical"] < costs["nearest"] < costs["split"]
+    assert [CONTACTS[name].costly for name in costs] == [False, False, True, True]
