@@ -6,14 +6,23 @@ from typing import Any
 
 from asperity.analysis.compare import Comparison
 from asperity.analysis.row import LawRow
-from asperity.report.words.number_words import SAMPLED, in_one_unit, is_sampled
+from asperity.arguments import Argument
+from asperity.report.words.number_words import (
+    SAMPLED,
+    holds_text,
+    in_one_unit,
+    is_sampled,
+    law_title,
+)
+from asperity.textures.catalogue import CATALOGUE
 from asperity.units import engineering, rounded_down
 
 SAMPLED_NOTE = (
     "~ found by sampling, not proved: the true q, q⁺ and leak may be larger, "
     "the true safe stiffness smaller."
 )
-_LENGTHS = {"amplitude", "period", "pitch", "rms", "height", "size", "cutoff", "rolloff", "edge"}
+# Of maps and profiles, which are no arguments of a kind.
+_LENGTHS = {"pitch", "cutoff"}
 _UNSAID = {"kind", "preparation", "phase", "direction", "phases", "wavevectors"}
 
 
@@ -52,7 +61,14 @@ def any_sampled(comparison: Comparison) -> bool:
 
 
 def described(description: dict[str, Any]) -> str:
-    """Return the kind of a texture and its plain arguments in words."""
+    """Return the kind of a texture and its plain arguments in words.
+
+    Example:
+        >>> described({"kind": "sinusoid", "amplitude": 8e-4, "period": 1e-3, "phase": 0.0})
+        'sinusoid: amplitude 800 µm, period 1 mm'
+    """
+    kind = CATALOGUE.get(description["kind"])
+    declared = {} if kind is None else {argument.name: argument for argument in kind.arguments}
     parts = []
     for name, value in description.items():
         if name in _UNSAID:
@@ -61,9 +77,14 @@ def described(description: dict[str, Any]) -> str:
         if len(values) > 4:
             parts.append(f"{len(values)} {name}")
             continue
-        shown = [
-            engineering(v, "m") if name in _LENGTHS and isinstance(v, float) else f"{v}"
-            for v in values
-        ]
-        parts.append(f"{name.replace('_', ' ')} {' × '.join(shown)}")
+        shown = [_value_text(name, one, declared.get(name)) for one in values]
+        parts.append(f"{law_title(name)} {' × '.join(shown)}")
     return f"{description['kind']}: {', '.join(parts)}"
+
+
+def _value_text(name: str, value: Any, argument: Argument | None) -> str:
+    if isinstance(value, bool):
+        return holds_text(value)
+    if argument is not None:
+        return argument.readable(value)
+    return engineering(value, "m") if name in _LENGTHS and isinstance(value, float) else f"{value}"

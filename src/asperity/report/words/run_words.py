@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from asperity.report.words.number_words import law_title
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
 from asperity.simulation.onset import CYCLE_SPEED, cycles, holds_still, restlessness
@@ -72,7 +73,7 @@ def facts(setup: Setup, run: Run) -> list[tuple[str, str]]:
     """Return names and values of what was simulated."""
     surface = setup.surface
     return [
-        ("Law", f"{surface.law.letter}, {surface.law.name.replace('-', ' ')}"),
+        ("Law", f"{surface.law.letter}, {law_title(surface.law.name)}"),
         ("Stiffness", engineering(surface.stiffness, "N/m")),
         *facts_of_loop(setup),
         ("Delay", f"{setup.servo.delay} sample{'' if setup.servo.delay == 1 else 's'}"),
