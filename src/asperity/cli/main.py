@@ -9,9 +9,10 @@ import click
 
 import asperity
 from asperity.cli.own_code import own_fault
-from asperity.errors import AsperityError
+from asperity.errors import AsperityError, InternalError
 
 BAD_INPUT = 2
+INTERNAL_ERROR = 70  # as sysexits.h has it
 
 COMMANDS = {
     "analyze": "Say all that is known of one law on a surface and a device.",
@@ -72,6 +73,9 @@ def main() -> None:
     except click.ClickException as error:
         error.show()
         sys.exit(BAD_INPUT)
+    except InternalError as error:
+        click.echo(f"asperity: {error}", err=True)
+        sys.exit(INTERNAL_ERROR)
     except AsperityError as error:
         click.echo(f"asperity: {error}", err=True)
         sys.exit(BAD_INPUT)

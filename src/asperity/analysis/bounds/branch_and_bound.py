@@ -28,8 +28,11 @@ _POLISH_STEPS = 50
 _SCALES = 4.0 ** -np.arange(5.0)
 _FINEST = 1e-10
 _LEAST_HALF = 1e-12
-# By how much what is attained may be above the bound: both are computed in double precision.
-_ROUNDING = 1e-9
+# What rounding may put an attained value above its bound by: a kernel and an eigenvalue are a few
+# hundred operations, 2⁸ units of the round-off; a second derivative is a difference of heights of
+# neighbouring nodes, which costs (n/2π)² more at n nodes a wave, 2¹⁶ at 1600 of them.
+OPERATIONS = 2.0**8 * float(np.finfo(np.float64).eps)
+DIFFERENCES = 2.0**16
 # So many cells cost next to nothing.
 _FEW = 4096
 
@@ -148,7 +151,7 @@ def supremum(
     if at is not None:
         best, at = polish(problem, at, half, best)
     proved = max(dropped, left)
-    if best > proved + _ROUNDING * abs(proved):
+    if best > proved + OPERATIONS * DIFFERENCES * abs(proved):
         words = "the enclosures, or the bounds that the texture claims, are wrong"
         raise InternalError(f"{best:g} is attained, above the proved bound {proved:g}: {words}")
     return Supremum(best, max(best, proved), at, looked, good)

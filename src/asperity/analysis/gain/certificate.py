@@ -15,7 +15,7 @@ from asperity.analysis.bounds.dense_search import need_depths
 from asperity.analysis.bounds.measures import Number
 from asperity.analysis.bounds.problems import LawProblem
 from asperity.analysis.bounds.sampling import sampled
-from asperity.analysis.bounds.witness import Witness, attained, lower_of
+from asperity.analysis.bounds.witness import Witness, attained, lower_of, upper_of
 from asperity.analysis.gain.medial_axis import sharpest_crest
 from asperity.analysis.gain.search import Search
 from asperity.analysis.gain.theorems import ClosedForm, safe_bound, theorem_of
@@ -114,10 +114,8 @@ def _bound(
         # Nothing is above the floor, which every point attains.
         where = problem.cells.samples(1)[0]
     witness = _witness(surface, number, problem, where)
-    top = max(upper, witness.value)
+    top = upper_of(surface, number, upper, witness)
     method: Method = "certified" if math.isfinite(upper) else "sampled"
-    if method == "sampled":
-        top = math.inf
     return Bound(witness.value, top, method, witness.at, note, witness.deflection, witness.sliding)
 
 
@@ -151,4 +149,10 @@ def wave_number(surface: Surface, number: Number, wave: SingleWave, form: Closed
     along = (phase - wave.phase) * wave.period / (2.0 * math.pi)
     depth = surface.max_depth if surface.law.contact.single_valued else 0.0
     witness = attained(surface, number, along * np.array(wave.direction), depth)
-    return Bound(lower_of(value, witness), value, "closed form", witness.at, "MATH section 4")
+    return Bound(
+        lower_of(surface, number, value, witness),
+        value,
+        "closed form",
+        witness.at,
+        "MATH section 4",
+    )

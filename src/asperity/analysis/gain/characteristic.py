@@ -148,5 +148,5 @@ def _constant(surface: Surface, number: Number, known: Constant) -> Bound:
     Just inside the highest point the normal is e_z.
     """
     witness = attained(surface, number, highest_point(surface.texture), 0.0)
-    lower = lower_of(known.value, witness)
+    lower = lower_of(surface, number, known.value, witness)
     return Bound(lower, known.value, "theorem", witness.at, known.reason)

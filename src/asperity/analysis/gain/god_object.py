@@ -11,7 +11,7 @@ from asperity.analysis.bounds.branch_and_bound import supremum
 from asperity.analysis.bounds.highest import highest_point
 from asperity.analysis.bounds.measures import NORM
 from asperity.analysis.bounds.problems import CrestProblem
-from asperity.analysis.bounds.witness import attained, lower_of
+from asperity.analysis.bounds.witness import attained, lower_of, upper_of
 from asperity.analysis.gain import closed_forms
 from asperity.analysis.gain.medial_axis import Crest, sharpest_crest
 from asperity.analysis.gain.search import Search
@@ -35,13 +35,13 @@ def crest_number(surface: Surface, search: Search) -> Bound:
     if depth * texture.bounds[1] <= 0.5:
         witness = attained(surface, NORM, highest_point(texture), depth)
         note = "depth times the bound of the second derivatives is at most 1/2"
-        return Bound(lower_of(1.0, witness), 1.0, "theorem", witness.at, note)
+        return Bound(lower_of(surface, NORM, 1.0, witness), 1.0, "theorem", witness.at, note)
     margin = search.margin(surface)
     crest = sharpest_crest(texture, extent=search.extent, margin=margin)
     if crest is None:
         witness = attained(surface, NORM, highest_point(texture), 0.0)
         note = "the surface has no crest"
-        return Bound(lower_of(1.0, witness), 1.0, "certified", witness.at, note)
+        return Bound(lower_of(surface, NORM, 1.0, witness), 1.0, "certified", witness.at, note)
     if depth >= crest.radius:
         return Bound(math.inf, math.inf, _method(crest), crest.centre, _ONSET)
     foot, least = np.array(crest.foot[:2]), crest.least_radius
@@ -60,7 +60,8 @@ def crest_number(surface: Surface, search: Search) -> Bound:
     upper = _number(depth / least * (1.0 + _ROUNDING)) * (1.0 + _ROUNDING)
     proof: Method = "certified" if math.isfinite(upper) else "sampled"
     note = "crest curvature" if proof == "certified" else _UNDECIDED
-    return Bound(witness.value, max(upper, witness.value), proof, witness.at, note)
+    top = upper_of(surface, NORM, upper, witness)
+    return Bound(witness.value, top, proof, witness.at, note)
 
 
 def _wave_number(surface: Surface, wave: SingleWave) -> Bound:
@@ -69,7 +70,7 @@ def _wave_number(surface: Surface, wave: SingleWave) -> Bound:
     if math.isinf(value):
         return Bound(math.inf, math.inf, "closed form", crest.centre, _ONSET)
     witness = attained(surface, NORM, np.array(crest.foot[:2]), surface.max_depth)
-    lower = lower_of(value, witness)
+    lower = lower_of(surface, NORM, value, witness)
     return Bound(lower, value, "closed form", witness.at, "MATH section 4")
 
 
@@ -97,7 +98,7 @@ def split_number(surface: Surface, search: Search) -> Bound:
         crest = sharpest_crest(surface.texture, extent=search.extent, margin=margin)
     if crest is None:
         witness = attained(surface, NORM, highest_point(surface.texture), 0.0)
-        return Bound(lower_of(1.0, witness), 1.0, "theorem", witness.at, reason)
+        return Bound(lower_of(surface, NORM, 1.0, witness), 1.0, "theorem", witness.at, reason)
     share = c / (1.0 + c) * crest.radius
     foot = np.array(crest.foot[:2])
     # The very depth at which the foot splits has two derivatives.
@@ -109,7 +110,7 @@ def split_number(surface: Surface, search: Search) -> Bound:
     upper = min(c, alone * (1.0 + _ROUNDING) if alone > 1.0 else 1.0)
     if upper < c:
         reason = "law D's number: the depth is too small for the god-object to split"
-    return Bound(lower_of(upper, witness), upper, "theorem", witness.at, reason)
+    return Bound(lower_of(surface, NORM, upper, witness), upper, "theorem", witness.at, reason)
 
 
 def _number(y: float) -> float:

@@ -1,0 +1,148 @@
+"""A witness above a proved bound is an internal error, loudly; rounding is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.analysis.bounds.measures import NORM
+from asperity.analysis.bounds.witness import Witness, lower_of, upper_of
+from asperity.analysis.energy import leak as leaks
+from asperity.analysis.energy.leak import worst_loop
+from asperity.analysis.gain import god_object
+from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
+from asperity.analysis.gain.theorems import ClosedForm, Constant, Theorem, register_theorem
+from asperity.errors import AsperityError, InternalError
+from asperity.laws import LAWS, Law
+from asperity.surface import Surface
+from asperity.textures import Fourier, HeightMap, Profile, Sinusoid
+
+WAVE = Sinusoid(amplitude=0.1e-3, period=1e-3)
+WAVES = Fourier([1e-4, 5e-5], [[3000.0, 0.0], [6000.0, 0.0]], [0.3, 1.0])
+HEIGHTS = 5e-5 * np.random.default_rng(3).normal(size=(7, 7))
+
+
+class Flatterer(Fourier):
+    """Four waves whose slopes and second derivatives are said to be half of what they are."""
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        slope, bend = super().bounds
+        return 0.5 * slope, 0.5 * bend
+
+
+def copy_of(letter: str) -> Law:
+    law = LAWS[letter]
+    return Law("copy", "copy", law.contact, law.force)
+
+
+def test_a_texture_whose_bounds_lie_is_found_out() -> None:
+    waves = [1e-4, 5e-5, 4e-5, 3e-5]
+    vectors = [[3000.0, 0.0], [0.0, 5000.0], [1234.0, 777.0], [-500.0, 2222.0]]
+    honest, liar = Fourier(waves, vectors), Flatterer(waves, vectors)
+    assert characteristic_number(Surface(honest, "A")).upper > 1.0
+    with pytest.raises(InternalError) as caught:
+        characteristic_number(Surface(liar, "A"))
+    said = str(caught.value)
+    for part in ("norm", "law='A'", "proved to be at most", "is attained at (", "report"):
+        assert part in said
+    assert isinstance(caught.value, AsperityError)
+
+
+def test_a_broken_kernel_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its Jacobians are one in a million too large: branch and bound knows better."""
+    surface = Surface(WAVES, "B")
+    assert characteristic_number(surface).method == "certified"
+    intact = Surface.jacobian
+
+    def broken(self: Surface, *arguments: Any) -> Any:
+        return (1.0 + 1e-6) * intact(self, *arguments)
+
+    monkeypatch.setattr(Surface, "jacobian", broken)
+    with pytest.raises(InternalError, match="norm"):
+        characteristic_number(surface)
+    with pytest.raises(InternalError, match="one-sided"):
+        one_sided_number(Surface(WAVE, "D"))
+
+
+def test_a_wrong_theorem_is_found_out() -> None:
+    constant, closed = copy_of("W"), copy_of("A")
+    register_theorem(constant, Theorem({NORM: Constant(0.999, "wrong")}))
+    form = ClosedForm(lambda _wave, _depth: 1.1, lambda _wave, _depth: 0.0)
+    register_theorem(closed, Theorem(on_a_wave={NORM: form}))
+    for law in (constant, closed):
+        with pytest.raises(InternalError):
+            characteristic_number(Surface(WAVE, law))
+
+
+def test_a_wrong_crest_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    surface = Surface(WAVES, "D", max_depth=3e-4)
+    assert characteristic_number(surface).upper > 1.0
+    intact = god_object.supremum
+
+    def flatter(*arguments: Any) -> Any:
+        found = intact(*arguments)
+        return replace(found, upper=0.999 * found.upper)
+
+    monkeypatch.setattr(god_object, "supremum", flatter)
+    with pytest.raises(InternalError, match="norm"):
+        characteristic_number(surface)
+
+
+LEAKING = {
+    "wave, A": (WAVE, "A"),
+    "waves, G": (WAVES, "G"),
+    "profile, B": (Profile(HEIGHTS[0], 3e-4, periodic=False), "B"),
+    "map, A": (HeightMap(HEIGHTS, 3e-4), "A"),
+}
+
+
+@pytest.mark.parametrize("case", LEAKING.values(), ids=list(LEAKING))
+def test_a_loop_that_gains_more_than_is_proved_is_found_out(
+    case: tuple[Any, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    surface = Surface(*case)
+    honest = worst_loop(surface)
+    assert 0.9 * honest.upper < honest.energy <= honest.upper
+    intact, share = leaks.curl_integral, [0.8]
+
+    def flatter(*arguments: Any) -> Any:
+        found = intact(*arguments)
+        assert found is not None
+        return [(share[0] * low, share[0] * high) for low, high in found]
+
+    monkeypatch.setattr(leaks, "curl_integral", flatter)
+    with pytest.raises(InternalError, match="gains"):
+        worst_loop(surface)
+    share[0] = honest.energy / honest.upper * (1.0 - 1e-12)  # that much is rounding
+    assert worst_loop(surface).upper == honest.energy
+
+
+def test_rounding_is_no_contradiction() -> None:
+    surface = Surface(WAVE, "A")
+    for excess in (-1e-3, 0.0, 1e-15, 1e-12):
+        witness = Witness(2.0 * (1.0 + excess), 2.0, (0.0, 0.0, -1e-5))
+        assert upper_of(surface, NORM, 2.0, witness) == max(2.0, witness.value)
+    witness = Witness(2.0 * (1.0 + 1e-7), 2.0, (0.0, 0.0, -1e-5))
+    with pytest.raises(InternalError):
+        upper_of(surface, NORM, 2.0, witness)
+    with pytest.raises(InternalError):
+        lower_of(surface, NORM, 2.0, witness)
+
+
+def test_the_command_line_says_so_with_its_own_exit_code(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from asperity.cli import main as commands
+
+    def contradict(**_options: Any) -> None:
+        raise InternalError("proved to be at most 1, but 2 is attained")
+
+    monkeypatch.setattr(commands, "cli", contradict)
+    with pytest.raises(SystemExit) as stop:
+        commands.main()
+    assert stop.value.code == commands.INTERNAL_ERROR
+    assert "at most 1, but 2" in capsys.readouterr().err
