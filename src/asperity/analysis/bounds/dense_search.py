@@ -94,7 +94,7 @@ class ContactField:
         unit = np.where(
             length[:, None] > 0.0, slope / np.where(length, length, 1.0)[:, None], [1, 0]
         )
-        return np.ascontiguousarray(-self.surface.max_deflection * unit)
+        return np.ascontiguousarray(-self.surface.parameter("max_deflection") * unit)
 
     def probe(self, xy: FloatArray, depth: float, derivatives: FloatArray) -> FloatArray:
         """Return the probe position of one contact [m]."""

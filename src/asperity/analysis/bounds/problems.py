@@ -130,7 +130,8 @@ class LawProblem(MatrixProblem):
         self._ends = (0.0, depth) if law_facts(surface.law).affine_in_depth else (None,)
         if surface.law.stateful:
             level = None if self._ends[0] is not None else depth
-            cells = with_deflection(cells, surface.max_deflection, level)
+            self._longest = surface.parameter("max_deflection")
+            cells = with_deflection(cells, self._longest, level)
         elif self._ends[0] is None:
             cells = with_depth(cells, depth)
         self._slides = (False, True) if surface.law.stateful else (False,)
@@ -142,7 +143,7 @@ class LawProblem(MatrixProblem):
         for sliding in self._slides:
             state = {}
             if self._surface.law.stateful:
-                state = anchor_models(models, self._surface.max_deflection, sliding=sliding)
+                state = anchor_models(models, self._longest, sliding=sliding)
             for end in self._ends:
                 known = {**models, **state, **({} if end is None else {DEPTH: end})}
                 taken = {name: known[name] for name in self._taken if name in known}
@@ -153,7 +154,7 @@ class LawProblem(MatrixProblem):
 
     def contacts(self, coordinates: FloatArray) -> list[Contacts]:
         """Return every depth and state that is looked at for given coordinates."""
-        n, longest = len(coordinates), self._surface.max_deflection
+        n = len(coordinates)
         further: dict[str, FloatArray] = {}
         if isinstance(self.cells, ProductCells):
             further = self.cells.further(coordinates)
@@ -161,7 +162,7 @@ class LawProblem(MatrixProblem):
         for sliding in self._slides:
             deflection = np.zeros((n, 2))
             if self._surface.law.stateful:
-                length = np.full(n, longest) if sliding else further[LENGTH]
+                length = np.full(n, self._longest) if sliding else further[LENGTH]
                 unit = np.stack([np.cos(further[ANGLE]), np.sin(further[ANGLE])], axis=-1)
                 deflection = length[:, None] * unit
             for end in self._ends:

@@ -98,7 +98,7 @@ def _scan(surface: Surface, line: ScanLine, height: float) -> tuple[FloatArray, 
     points = scan_points(surface, line, height)
     flat = points.reshape(-1, 3)
     if surface.law.stateful:
-        trailing = np.tile(surface.max_deflection * line.direction, (len(flat), 1))
+        trailing = np.tile(surface.parameter("max_deflection") * line.direction, (len(flat), 1))
         sliding = np.ones(len(flat), dtype=bool)
         forces, jacobians = surface.force_and_jacobian(flat, trailing, sliding)
     else:

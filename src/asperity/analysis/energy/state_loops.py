@@ -40,7 +40,7 @@ def friction_path(surface: Surface, start: FloatArray, along: FloatArray) -> Flo
     Down to light contact, along by max_deflection, down to max_depth, back, and up.
     """
     depth, light = surface.max_depth, 1e-6 * surface.max_depth
-    end = start + surface.max_deflection * along
+    end = start + surface.parameter("max_deflection") * along
     above = 0.1 * depth
     return np.array(
         [
@@ -64,7 +64,7 @@ def light_then_deep_loop(surface: Surface, line: ScanLine) -> StateLoop:
     best = int(np.argmax(energies))
     text = (
         f"the paper's path of (27), worst of {len(paths)} starts: "
-        f"{surface.max_deflection * 1e3:g} mm along in light contact, "
+        f"{surface.parameter('max_deflection') * 1e3:g} mm along in light contact, "
         f"back at {surface.max_depth * 1e3:g} mm"
     )
     return StateLoop(float(energies[best]), paths[best], text)
@@ -96,11 +96,12 @@ def _outline(
     surface: Surface, line: ScanLine, anchor: FloatArray, sign: float
 ) -> tuple[float, FloatArray]:
     """Return ∬|∇m × d| within the outline, but for a factor, and the polygon."""
-    t = np.linspace(-1.0, 1.0, _COLUMNS + 1) * surface.max_deflection * _INSIDE
+    longest = surface.parameter("max_deflection")
+    t = np.linspace(-1.0, 1.0, _COLUMNS + 1) * longest * _INSIDE
     along, across = line.direction, np.array([-line.direction[1], line.direction[0]])
     xy = anchor + t[:, None] * along
     slope = surface.texture.gradient(xy) @ along
-    width = np.sqrt(np.maximum((_INSIDE * surface.max_deflection) ** 2 - t * t, 0.0))
+    width = np.sqrt(np.maximum((_INSIDE * longest) ** 2 - t * t, 0.0))
     promise = float((np.abs(slope) * width * width).sum())
     side = sign * np.where(slope >= 0.0, width, -width)
     low, high = np.minimum(side, 0.0), np.maximum(side, 0.0)

@@ -61,7 +61,9 @@ def scan_forces(surface: Surface, xy: FloatArray) -> FloatArray:
     if not surface.law.stateful:
         return surface.force(probes)
     direction = surface.texture.scan_line().direction
-    return surface.force(probes, np.tile(surface.max_deflection * direction, (len(xy), 1)))
+    return surface.force(
+        probes, np.tile(surface.parameter("max_deflection") * direction, (len(xy), 1))
+    )
 
 
 def _fitted(surface: Surface, spectrum: Spectrum) -> FloatArray:

@@ -214,7 +214,7 @@ def _rounded_up(value: float) -> float:
 def _tabulated(surface: Surface, grid: Grid, coefficients: FloatArray) -> TabulatedSurface:
     entries = grid.table(coefficients)
     lipschitz, one_sided = curvatures(grid, entries)
-    force, energy = grid.error_bounds(max(1.0, surface.continuity))
+    force, energy = grid.error_bounds(max(1.0, surface.parameter("continuity")))
     table = TabulatedSurface(
         surface=surface,
         spacing=grid.spacing,

@@ -122,7 +122,8 @@ def pop_through(surface: Surface, thickness: float) -> PopThrough:
     if not least > 0.0:
         limit = f"must be more than the peak-to-valley height, {high - low:.4g} m"
         raise ParameterError("thickness", limit, thickness)
-    share = surface.continuity / (1.0 + surface.continuity)
+    c = surface.parameter("continuity")
+    share = c / (1.0 + c)
     energy = surface.stiffness * least**2 / 8.0
     return PopThrough(high - total, 0.5 * share * total, share * energy, energy, high)
 
