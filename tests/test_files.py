@@ -102,6 +102,16 @@ def test_a_record_is_its_fields_or_the_attributes_that_are_named() -> None:
     assert list(record(outer, "size", "name").items()) == [("size", 1), ("name", "o")]
 
 
+def test_a_class_says_what_is_written_of_it() -> None:
+    class Short(Outer):
+        written = "size name"
+
+    assert list(Short("o", Inner(1.0, (2.0, 3.0))).to_dict().items()) == [
+        ("size", 0),
+        ("name", "o"),
+    ]
+
+
 def test_json_is_readable_and_strict() -> None:
     text = json_text({"Länge": np.inf, "n": [1]})
     assert text == '{\n  "Länge": "inf",\n  "n": [\n    1\n  ]\n}\n'

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
-from typing import IO, Any, overload
+from typing import IO, Any, ClassVar, overload
 
 
 def is_device(path: str | os.PathLike[str]) -> bool:
@@ -135,8 +135,15 @@ def record(
 
 
 class Record:
-    """A dataclass that is written field by field."""
+    """A dataclass that is written as plain data: field by field, or as its class says.
+
+    Attributes:
+        written: names of the attributes that are written, in order, apart by blanks; all fields if
+            there are none.
+    """
+
+    written: ClassVar[str] = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units: infinity is the string "inf", what is not known None."""
-        return record(self)
+        return record(self, *self.written.split())

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from asperity.errors import ParameterError
-from asperity.files import Record, record
+from asperity.files import Record
 from asperity.units import engineering
 
 
@@ -45,7 +44,7 @@ class Datum(Record):
 
 
 @dataclass(frozen=True)
-class Device:
+class Device(Record):
     """A force-feedback device.
 
     Attributes:
@@ -63,6 +62,8 @@ class Device:
         >>> [(other.text, other.verified) for other in device.data["max_stiffness"].also]
         [('14500 N/m', False)]
     """
+
+    written = "id name axes notes data"
 
     id: str
     name: str
@@ -85,7 +86,3 @@ class Device:
         if value is None:
             raise ParameterError("device", f"{self.id} needs max_stiffness to compare laws [N/m]")
         return value
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data."""
-        return record(self, "id", "name", "axes", "notes", "data")

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray
 from asperity.errors import AsperityError
-from asperity.files import plain, record
+from asperity.files import Record, plain, record
 
 Verdict = Literal["holds", "holds with correction", "does not hold", "undecided"]
 VERDICTS: tuple[Verdict, ...] = ("holds", "holds with correction", "does not hold", "undecided")
@@ -78,7 +78,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Result:
+class Result(Record):
     """A claim with its verdict.
 
     Attributes:
@@ -91,16 +91,14 @@ class Result:
         evidence: what the verdict follows from.
     """
 
+    written = "id equations statement verdict evidence"
+
     id: str
     equations: tuple[str, ...]
     section: str
     statement: str
     verdict: Verdict
     evidence: Evidence
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return record(self, without=("section",))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.loops import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.derive.facts import law_facts
-from asperity.files import record
+from asperity.files import Record, record
 from asperity.notebook import as_html
 from asperity.paper.claims_friction import PAPER, norm_of, stick_entries
 from asperity.paper.paths import TURN, path_of
@@ -116,13 +116,15 @@ class TableTwoRow:
 
 
 @dataclass(frozen=True)
-class TableTwo:
+class TableTwo(Record):
     """The paper's Table II, printed and computed.
 
     Attributes:
         rows: laws A to G.
         parameters: of the numbers and of the loops, in words.
     """
+
+    written = "parameters rows"
 
     rows: tuple[TableTwoRow, ...]
     parameters: str
@@ -142,10 +144,6 @@ class TableTwo:
         """Return the table as text, its first row the head."""
         head = ["law", "q printed", "q", "q⁺", "conservative", "continuous", "loop", "stands"]
         return [head, *(_cells(row) for row in self.rows)]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return record(self, "parameters", "rows")
 
     def _repr_html_(self) -> str:
         """Return the table for a notebook."""

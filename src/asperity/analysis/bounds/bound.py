@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
-from asperity.files import record
+from asperity.files import Record
 
 Method = Literal["theorem", "closed form", "certified", "sampled"]
 
 
 @dataclass(frozen=True)
-class Bound:
+class Bound(Record):
     """A supremum, with what is known of it.
 
     Attributes:
@@ -30,6 +30,8 @@ class Bound:
         >>> Bound(2.0, math.inf, "sampled", (0.0, 0.0, -1e-3)).value
         2.0
     """
+
+    written = "value lower upper method at note deflection sliding"
 
     lower: float
     upper: float
@@ -50,9 +52,3 @@ class Bound:
         if math.isinf(self.lower):
             return 0.0
         return (self.upper - self.lower) / self.lower if self.lower > 0.0 else math.inf
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data; an unbounded number is written as the string "inf"."""
-        return record(
-            self, "value", "lower", "upper", "method", "at", "note", "deflection", "sliding"
-        )

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from asperity.analysis.gain.medial_axis import Crest, sharpest_crest
 from asperity.analysis.gain.theorems import theorem_of
 from asperity.checks import FloatArray
 from asperity.derive.facts import law_facts
-from asperity.files import Record, record
+from asperity.files import Record
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 from asperity.units import engineering, rounded_down
@@ -54,7 +53,7 @@ class Jump(Record):
 
 
 @dataclass(frozen=True)
-class Continuity:
+class Continuity(Record):
     """Whether the force jumps inside the working region.
 
     Attributes:
@@ -64,6 +63,8 @@ class Continuity:
             along straight paths inside the working region; ``None`` if the force jumps.
         surface: the surface.
     """
+
+    written = "continuous reason lipschitz jumps"
 
     continuous: bool
     reason: str
@@ -76,10 +77,6 @@ class Continuity:
         if self.continuous or self.surface is None:
             return ()
         return jumps(self.surface)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return record(self, "continuous", "reason", "lipschitz", "jumps")
 
 
 def continuity(surface: Surface, q: Bound) -> Continuity:

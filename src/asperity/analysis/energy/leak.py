@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from asperity.analysis.energy.thrust import mean_thrust
 from asperity.checks import FloatArray, array, positive
 from asperity.derive.facts import law_facts
 from asperity.errors import InternalError, ParameterError
-from asperity.files import record
+from asperity.files import Record
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine
 
@@ -30,7 +29,7 @@ _COSTLY = 1e-4
 
 
 @dataclass(frozen=True)
-class Leak:
+class Leak(Record):
     """The worst simple loop, turned once, in a vertical plane along a scan line.
 
     Its energy is the larger of ∬curl⁺ and ∬curl⁻ over the length of the line and the depth range,
@@ -49,6 +48,8 @@ class Leak:
             > 0 along it; ``None`` for a law with state, whose friction resists anyway, and for a
             conservative law on a line that does not repeat.
     """
+
+    written = "energy upper per_length length thrust line method description vertices"
 
     energy: float
     upper: float
@@ -85,11 +86,6 @@ class Leak:
         """
         sigma = positive("damping", damping, "N s/m")
         return self.energy / (sigma * self.length) if self.energy > 0.0 else 0.0
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data; an unbounded number is written as the string "inf"."""
-        numbers = record(self, "energy", "upper", "per_length", "length", "thrust")
-        return numbers | record(self, "line", "method", "description", "vertices")
 
 
 def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -> Leak:

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.files import record
+from asperity.files import Record
 from asperity.textures.plane_waves import PlaneWaves
 from asperity.textures.texture import Texture
 
@@ -50,7 +49,7 @@ class Wave:
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class Spectrum(Record):
     """The waves of a texture, the longest first.
 
     Attributes:
@@ -58,6 +57,8 @@ class Spectrum:
         exact: whether they are the waves of a sum, not bands of a periodogram.
         description: how they were found, in words.
     """
+
+    written = "exact description wavelengths amplitudes"
 
     waves: tuple[Wave, ...]
     exact: bool
@@ -72,10 +73,6 @@ class Spectrum:
     def amplitudes(self) -> FloatArray:
         """Amplitudes a [m], shape (n,)."""
         return np.array([wave.amplitude for wave in self.waves])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return record(self, "exact", "description", "wavelengths", "amplitudes")
 
 
 @dataclass(frozen=True)

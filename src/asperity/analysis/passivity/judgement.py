@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Literal
 
 from asperity.analysis.passivity.criteria import (
     DELAY,
@@ -19,7 +19,7 @@ from asperity.analysis.passivity.criteria import (
     Criterion,
 )
 from asperity.analysis.passivity.device_loop import HALF, Loop
-from asperity.files import record
+from asperity.files import Record
 from asperity.notebook import as_html
 
 Verdict = Literal["passive", "not passive", "undecided"]
@@ -41,7 +41,7 @@ class Ground(Enum):
 
 
 @dataclass(frozen=True)
-class Passivity:
+class Passivity(Record):
     """Whether a surface on a device can be made to give energy to the hand without end.
 
     Attributes:
@@ -60,6 +60,10 @@ class Passivity:
         greatest_delay: the most whole samples of delay for which the delay rule is proved at this
             stiffness; ``None`` if not even none is, or if it is unknown.
     """
+
+    written = (
+        "verdict decided_by reason stiffness safe_stiffness critical_speed greatest_delay criteria"
+    )
 
     criteria: tuple[Criterion, ...]
     decided_by: str
@@ -81,13 +85,6 @@ class Passivity:
             if criterion.name == name:
                 return criterion
         raise KeyError(name)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return {
-            **record(self, "verdict", "decided_by", "reason", "stiffness", "safe_stiffness"),
-            **record(self, "critical_speed", "greatest_delay", "criteria"),
-        }
 
     def _repr_html_(self) -> str:
         """Return the verdict and a table for a notebook."""

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.files import Record, record
+from asperity.files import Record
 from asperity.paper.experiments.settings import BUMP_GUESSED, ENTRIES, bump_setup
 
 LAWS = "ABDEH"
@@ -19,7 +18,7 @@ WORKERS = 2
 
 
 @dataclass(frozen=True)
-class Bump:
+class Bump(Record):
     """Once over the bump and back.
 
     Attributes:
@@ -36,6 +35,8 @@ class Bump:
         supplied: energy up to then, all axes [J], shape (n,).
         stopped: why the run ended early; empty if it did not.
     """
+
+    written = "law entry energy lost jump top closure stopped"
 
     law: str
     entry: str
@@ -54,10 +55,6 @@ class Bump:
     def total(self) -> float:
         """Energy supplied [J]."""
         return float(sum(self.energy))
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units, without the traces."""
-        return record(self, without=("time", "x", "z", "supplied"))
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.files import Record, record
+from asperity.files import Record
 from asperity.paper.experiments.settings import FITTED, LAG, LETTERS, band_setup
 from asperity.scene.onsets import onsets
 from asperity.simulation.onset import ends_in_cycle, offsets, runner
@@ -26,7 +25,7 @@ WORKERS = 2
 
 
 @dataclass(frozen=True)
-class Count:
+class Count(Record):
     """How many of the starts end in a limit cycle.
 
     Attributes:
@@ -40,6 +39,8 @@ class Count:
         x: of the handle [m], shape (n,).
         z: of the handle [m], shape (n,).
     """
+
+    written = "law stiffness delay starts cycles slow"
 
     law: str
     divisor: float
@@ -55,10 +56,6 @@ class Count:
     def stiffness(self) -> float:
         """[N/m]."""
         return _STIFFNESS / self.divisor
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data without the trace."""
-        return record(self, "law", "stiffness", "delay", "starts", "cycles", "slow")
 
 
 @dataclass(frozen=True)

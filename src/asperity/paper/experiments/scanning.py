@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.checks import FloatArray
-from asperity.files import record
+from asperity.files import Record
 from asperity.paper.experiments.settings import (
     HANDS,
     HANDS_GUESSED,
@@ -59,7 +59,7 @@ class EnergyTrace:
 
 
 @dataclass(frozen=True)
-class ScanningExperiment:
+class ScanningExperiment(Record):
     """Section V.B.
 
     Attributes:
@@ -68,6 +68,8 @@ class ScanningExperiment:
         guessed: what the paper does not state.
     """
 
+    written = "strokes guessed"
+
     strokes: tuple[HandStroke, ...]
     traces: tuple[EnergyTrace, ...]
     guessed: tuple[str, ...] = HANDS_GUESSED
@@ -75,10 +77,6 @@ class ScanningExperiment:
     def of(self, law: str) -> tuple[Stroke, ...]:
         """Return a law's strokes, all hands and speeds."""
         return tuple(one.stroke for one in self.strokes if one.stroke.law == law)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units, without the traces."""
-        return record(self, "strokes", "guessed")
 
 
 def _stroke(law: str, named: NamedHand, speed: float) -> HandStroke:
