@@ -571,6 +571,12 @@ def test_a_law_in_pieces_has_a_kernel(wave: Sinusoid, plain: Check):
     np.testing.assert_allclose(forces[:, 2], [500.0 * D, 1000.0 * D])
 
 
+def test_a_law_with_state_needs_a_greatest_deflection(wave: Sinusoid):
+    law = own_law("nominal", lambda c: c.k * c.depth * c.e_z, stateful=True)
+    with pytest.raises(LawError, match="needs the parameter max_deflection"):
+        Surface(wave, law).force([[0.0, 0.0, -1e-3]])
+
+
 # --- arguments ------------------------------------------------------------------------------------
 
 

@@ -159,7 +159,7 @@ class Surface:
             name: argument.checked(given[name]) if name in given else float(law.parameters[name])
             for name, argument in law.arguments.items()
         }
-        if law.stateful:
+        if law.stateful and "max_deflection" in parameters:  # the derivation asks for it
             positive("max_deflection", parameters["max_deflection"], "m")
         self.__dict__.update(values, law_parameters=MappingProxyType(parameters))
 

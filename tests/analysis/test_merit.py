@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from asperity.analysis.energy.merit import merit
+from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures.heightmap import HeightMap
 from asperity.textures.sinusoid import Sinusoid
@@ -87,3 +88,9 @@ def test_a_map_has_strength_in_metres() -> None:
     found = merit(Surface(HeightMap(heights, 1e-4), "A", max_depth=4e-4))
     assert found.ripple == pytest.approx(1e-4 / math.sqrt(2), rel=1e-3)
     assert found.strength == pytest.approx(found.ripple / found.gain, rel=1e-12)
+
+
+def test_a_force_that_nowhere_varies_has_neither_strength_nor_support():
+    law = Law("K", "constant", "vertical", lambda c: c.k * 1e-3 * c.e_z)
+    found = merit(Surface(Sinusoid(0.2e-3, 1e-3), law))
+    assert (found.gain, found.strength, found.support) == (0.0, 0.0, 0.0)

@@ -57,7 +57,7 @@ def merit(surface: Surface) -> Merit:
     ripple = math.sqrt(variance) if variance > 1e-24 * size else 0.0
     gain = _gain_above(surface, height)
     unit = line.length if line.periodic else 1.0
-    if math.isinf(gain):
+    if math.isinf(gain) or gain == 0.0:  # a force that nowhere varies has neither
         strength = support = 0.0
     else:
         strength, support = ripple / (gain * unit), float(slopes.mean()) / gain
