@@ -13,7 +13,6 @@ from asperity.units import engineering
 HEADINGS = (
     "law", "d", "quiet to", "cycles", "starts", "depth", "q", "paper (1)", "delay rule", "K₀/q",
 )  # fmt: skip
-NUMBERS = tuple(range(1, 10))
 NOTES = (
     "Stiffnesses in N/m, d the delay in samples. Quiet to, cycles: the bracket of the onset over "
     "all starts. Starts: how many of them end in a limit cycle where it begins. Depth: how deep "
