@@ -65,7 +65,7 @@ def described(description: dict[str, Any]) -> str:
 
     Example:
         >>> described({"kind": "sinusoid", "amplitude": 8e-4, "period": 1e-3, "phase": 0.0})
-        'sinusoid: amplitude 800 µm, period 1 mm'
+        'sinusoid: amplitude 0.8 mm, period 1 mm'
     """
     kind = CATALOGUE.get(description["kind"])
     declared = {} if kind is None else {argument.name: argument for argument in kind.arguments}
