@@ -110,8 +110,9 @@ class _InC:
         numbers = machine(self.plant, _HAND, _SERVO).numbers
         if isinstance(self.plant, Pantograph):
             bar, hand, _friction, rate, fewest, period, share, inside, least = numbers
-            tail = [rate, period, share, least, 0.0, 0.0]
-            self._numbers: Any = np.concatenate([bar, hand, tail])
+            held = [hand.band, *hand.stiffness, *hand.damping, *hand.force]
+            tail = [hand.length, hand.rest_length, rate, period, share, least, 0.0, 0.0]
+            self._numbers: Any = np.array([*bar, *held, *tail], dtype=np.float64)
             self._numbers[-2:].view(np.int64)[:] = fewest, inside
         else:
             self._numbers = numbers[0]

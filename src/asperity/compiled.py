@@ -2,7 +2,8 @@
 
 A compiled module is plain Python whose top-level functions Numba compiles: scalars, whole
 contiguous arrays and records of both in; scalars, tuples and records out; no closures, no
-slices, no stars. It declares itself in a constant ``KERNELS``; :mod:`asperity.kernels.link` puts
+slices, no stars; it may use records and numbers of its
+module. It declares itself in a constant ``KERNELS``; :mod:`asperity.kernels.link` puts
 modules together by what they declare.
 """
 

@@ -8,6 +8,7 @@ import inspect
 import pkgutil
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -46,8 +47,9 @@ def written(module: ModuleType) -> tuple[set[str], set[str], set[str]]:
         for node in ast.walk(tree)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
     }
-    known = {"Kernels", "local_array", *dir(__builtins__), *__builtins__}  # type: ignore[misc]  # a dict or a module
-    return defined, called & defined, called - defined - known
+    known = {"local_array", *dir(__builtins__), *__builtins__}  # type: ignore[misc]  # a dict or a module
+    records = {name for name, value in vars(module).items() if isinstance(value, type)}
+    return defined, called & defined, called - defined - known - records
 
 
 def disagreements(module: ModuleType) -> list[str]:
@@ -214,3 +216,34 @@ def test_the_closed_form_of_a_sinusoid_comes_before_the_general_split() -> None:
     text = Path(split.__file__ or "").read_text(encoding="utf-8")
     assert "def split_root" in text
     assert "def split_polish" not in text
+
+
+# --- records and numbers --------------------------------------------------------------------------
+
+RECORD = """
+from typing import NamedTuple
+KERNELS = Kernels(loops=("run_batch",))
+LIMIT = 2.5
+class Pair(NamedTuple):
+    a: float
+    b: float
+def run_batch(x):
+    return Pair(min(x, LIMIT), x)
+"""
+
+
+def test_records_and_numbers_of_a_module_come_along(user: Make) -> None:
+    module = user(RECORD)
+    loops = fuse.fuse_module(module)
+    assert loops.run_batch(3.0) == module.Pair(2.5, 3.0)
+    assert isinstance(loops.run_batch(3.0), module.Pair)
+
+
+def test_a_number_of_two_values_is_an_error(user: Make) -> None:
+    one = module_unit(
+        user("LIMIT = 1\nKERNELS = Kernels(('one',))\ndef one(x): return LIMIT + two(x)")
+    )
+    two = module_unit(user("LIMIT = 2\nKERNELS = Kernels(('two',))\ndef two(x): return LIMIT"))
+    one = replace(one, kernels=Kernels(("one",), ("two",), ("one",)))
+    with pytest.raises(ParameterError, match=r"defines 'LIMIT' in two ways: 'LIMIT = [12]' and"):
+        link(loops_of(one), (one, two))

@@ -20,7 +20,7 @@ from asperity.simulation import (
     simulate,
 )
 from asperity.simulation.kernels import five_bar
-from asperity.simulation.machine import machine
+from asperity.simulation.machine import bar_record, machine
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
@@ -80,4 +80,4 @@ def test_a_pantograph_at_any_speed_comes_to_an_end(speed: float) -> None:
     )  # fmt: skip
     assert run.stopped.startswith("left the workspace")
     assert run.samples == 0
-    assert five_bar.bar_parts(speed, 0.0, 1.0, 1.0, [0.06]) == 1_000_000
+    assert five_bar.bar_parts(speed, 0.0, 1.0, 1.0, bar_record(Pantograph())) == 1_000_000

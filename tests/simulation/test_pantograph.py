@@ -30,7 +30,7 @@ from asperity.simulation import (
     simulate,
 )
 from asperity.simulation.kernels.five_bar import bar_body
-from asperity.simulation.machine import bar_numbers
+from asperity.simulation.machine import bar_record
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
@@ -81,7 +81,7 @@ def lagrangian() -> tuple[Any, Any]:
 
 def inertia(x: float, z: float, dx: float, dz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Mass matrix, c and JᵀJ of the code under test."""
-    mxx, mxz, mzz, cx, cz, bxx, bxz, bzz = bar_body(x, z, dx, dz, bar_numbers(HEAVY))
+    mxx, mxz, mzz, cx, cz, bxx, bxz, bzz = bar_body(x, z, dx, dz, bar_record(HEAVY))
     return (
         np.array([[mxx, mxz], [mxz, mzz]]),
         np.array([cx, cz]),
@@ -119,7 +119,7 @@ def test_rates_are_the_derivative_of_the_angles(place: tuple[float, float]) -> N
 
 def test_the_guess_is_about_twenty_grams_and_is_labelled() -> None:
     plant = Pantograph()
-    numbers = bar_body(0.0, 0.0, 0.0, 0.0, bar_numbers(plant))
+    numbers = bar_body(0.0, 0.0, 0.0, 0.0, bar_record(plant))
     assert numbers[0] == pytest.approx(0.020, abs=1.5e-3)
     assert numbers[2] == pytest.approx(0.020, abs=1.5e-3)
     assert "guess" in plant.notes[0]
@@ -185,6 +185,8 @@ def test_a_slack_band_needs_the_kink(tmp_path: FilePath, monkeypatch: pytest.Mon
     assert abs(run.ledger.closure) < 1e-9 * run.ledger.exchanged
 
     source = "def band_turns(sx, sy, sz, tx, ty, tz, hand):\n    return False\n"
+    declared = 'KERNELS = Kernels(provides=("band_turns",))'
+    source = f"from asperity.compiled import Kernels\n{declared}\n{source}"
     (tmp_path / "blind_band.py").write_text(source)
     monkeypatch.syspath_prepend(tmp_path)
     blind, build = importlib.import_module("blind_band"), machine._pantograph

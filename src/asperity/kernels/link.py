@@ -9,10 +9,10 @@ from __future__ import annotations
 import ast
 import builtins
 import inspect
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 
 from asperity.compiled import Kernels
 from asperity.errors import ParameterError
@@ -42,12 +42,14 @@ class Unit:
         kernels: its declaration.
         texts: source of each top-level function.
         calls: the functions that each of them calls, but for those that anyone may call.
+        lines: the lines that define the records and numbers of the module that each of them uses.
     """
 
     name: str
     kernels: Kernels
     texts: dict[str, str]
     calls: dict[str, tuple[str, ...]]
+    lines: dict[str, dict[str, str]]
 
     def owner(self, name: str, at_hand: Sequence[Unit]) -> Unit:
         """Return the unit whose function of a name one of this unit's functions calls.
@@ -76,14 +78,38 @@ class Unit:
         return "@scalar" if name in kernels.called else "@inlined"
 
 
-def text_unit(name: str, source: str, kernels: Kernels) -> Unit:
-    """Return the unit of a source text."""
-    texts, calls = {}, {}
+def text_unit(
+    name: str, source: str, kernels: Kernels, space: Mapping[str, object] = MappingProxyType({})
+) -> Unit:
+    """Return the unit of a source text, whose records and numbers are in a name space."""
+    unit = Unit(name, kernels, {}, {}, {})
     for node in ast.parse(source).body:
         if isinstance(node, ast.FunctionDef):
-            texts[node.name] = ast.get_source_segment(source, node) or ""
-            calls[node.name] = _calls(node)
-    return Unit(name, kernels, texts, calls)
+            lines = _lines(node, space)
+            unit.texts[node.name] = ast.get_source_segment(source, node) or ""
+            unit.lines[node.name] = lines
+            unit.calls[node.name] = tuple(sorted(_calls(node) - lines.keys()))
+    return unit
+
+
+def _calls(function: ast.FunctionDef) -> frozenset[str]:
+    nodes = ast.walk(function)
+    calls = [node.func for node in nodes if isinstance(node, ast.Call)]
+    return frozenset(call.id for call in calls if isinstance(call, ast.Name)) - _COMMON
+
+
+def _lines(function: ast.FunctionDef, space: Mapping[str, object]) -> dict[str, str]:
+    """Return the lines that define the records and numbers that a function's body uses."""
+    body = (node for part in function.body for node in ast.walk(part))
+    names = {node.id for node in body if isinstance(node, ast.Name)}
+    lines = {}
+    for name in sorted(names & space.keys()):
+        value = space[name]
+        if isinstance(value, type) and issubclass(value, tuple):
+            lines[name] = f"from {value.__module__} import {name}"
+        elif isinstance(value, (int, float)):
+            lines[name] = f"{name} = {value!r}"
+    return lines
 
 
 def written_unit(
@@ -107,16 +133,7 @@ def module_unit(module: ModuleType) -> Unit:
     kernels = getattr(module, "KERNELS", None)
     if not isinstance(kernels, Kernels):
         raise ParameterError("sampler", f"{module.__name__} must declare KERNELS = Kernels(...)")
-    return text_unit(module.__name__, inspect.getsource(module), kernels)
-
-
-def _calls(function: ast.FunctionDef) -> tuple[str, ...]:
-    names = {
-        node.func.id
-        for node in ast.walk(function)
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
-    }
-    return tuple(sorted(names - _COMMON))
+    return text_unit(module.__name__, inspect.getsource(module), kernels, vars(module))
 
 
 def loops_of(*units: Unit) -> list[tuple[str, Unit]]:
@@ -148,4 +165,15 @@ def link(loops: Sequence[tuple[str, Unit]], at_hand: Sequence[Unit]) -> str:
         for name, text in unit.texts.items()
         if taken.get(name) is unit
     ]
-    return "\n\n\n".join(parts) + "\n"
+    return "\n\n\n".join([_shared_lines(taken), *parts]) + "\n"
+
+
+def _shared_lines(taken: Mapping[str, Unit]) -> str:
+    """Return the lines that define records and numbers, each once."""
+    lines: dict[str, str] = {}
+    for name, unit in taken.items():
+        for used, line in unit.lines[name].items():
+            if lines.setdefault(used, line) != line:
+                words = f"defines {used!r} in two ways: {line!r} and {lines[used]!r}"
+                raise ParameterError("sampler", words)
+    return "\n".join(sorted(lines.values()))

@@ -41,7 +41,7 @@ class Ledger:
 
     @classmethod
     def of(cls, sums: FloatArray, before: float, after: float) -> Ledger:
-        """Return the ledger of the sums of a run; see ``servo_source``."""
+        """Return the ledger of the sums of a run; see ``kernels/booking.py``."""
         values = [float(value) for value in sums]
         x, y, z, px, py, pz, lost, hand, friction, sampling, exchanged = values
         return cls(

@@ -12,11 +12,14 @@ from asperity.checks import FloatArray
 from asperity.errors import ParameterError
 from asperity.kernels.probe import ClampName
 from asperity.laws import Law
+from asperity.simulation.kernels import servo_loop
+from asperity.simulation.kernels.booking import SUMS
+from asperity.simulation.kernels.servo_loop import LoopState
 from asperity.simulation.ledger import Ledger
 from asperity.simulation.machine import Machine
 from asperity.simulation.run import Stop
 from asperity.simulation.servo import Servo
-from asperity.simulation.servo_source import COLUMNS, LEDGER, MEMORY
+from asperity.simulation.trace import COLUMNS
 from asperity.surface import Surface
 
 # Why the compiled loop stops, by its answer.
@@ -30,12 +33,12 @@ _LOCK = Lock()
 def _fused(
     law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName, body: tuple[ModuleType, ...]
 ) -> ModuleType:
+    from asperity.kernels import tick
     from asperity.kernels.fuse import fuse_on_texture
-    from asperity.kernels.link import module_unit, written_unit
-    from asperity.simulation.servo_source import servo_source
+    from asperity.kernels.link import module_unit
 
-    servo = written_unit("the servo", servo_source(), loops=("servo_batch", "stored_batch"))
-    return fuse_on_texture(law, sampler, clamp, (servo,), [module_unit(part) for part in body])
+    servo, *further = (module_unit(module) for module in (servo_loop, tick, *body))
+    return fuse_on_texture(law, sampler, clamp, (servo,), further)
 
 
 class Simulation:
@@ -65,7 +68,7 @@ class Simulation:
         self._surface, self._moved, self._servo = surface, moved, servo
         self.state = moved.state(start, np.zeros(3) if velocity is None else velocity)
         self.queue = np.zeros((servo.delay + 1, 3))
-        self._memory, self._ledger = np.zeros(MEMORY), np.zeros(LEDGER)
+        self._loop, self._ledger = LoopState(), np.zeros(SUMS)
         self._before = 0.0
         clamp: ClampName = surface.clamp if surface.law.clampable else "none"
         with _LOCK:
@@ -75,7 +78,7 @@ class Simulation:
     @property
     def samples(self) -> int:
         """Samples done."""
-        return int(self._memory[11])
+        return self._loop.samples
 
     def stored(self, anchor: FloatArray) -> float:
         """Return the stored energy [J] with the hand's anchor at a place [m]."""
@@ -97,8 +100,8 @@ class Simulation:
             self._before = self.stored(anchor[0])
         table = np.empty((0, len(COLUMNS))) if trace is None else trace
         first = self.samples
-        stop, self.rows = self._loops.servo_batch(
-            self.state, self.queue, self._memory, self._ledger, anchor, self._moved.numbers,
+        stop, self.rows, self._loop = self._loops.servo_batch(
+            self.state, self.queue, self._loop, self._ledger, anchor, self._moved.numbers,
             self._servo.settings, *self._arguments, table, every,
         )  # fmt: skip
         self._anchor = anchor[self.samples - first].copy()
@@ -106,7 +109,7 @@ class Simulation:
 
     @property
     def sums(self) -> FloatArray:
-        """Sums of the ledger since the beginning, see ``servo_source.LEDGER``."""
+        """Sums of the ledger since the beginning, see ``kernels/booking.py``."""
         return self._ledger
 
     def ledger(self) -> Ledger:

@@ -14,6 +14,18 @@ from asperity.errors import ParameterError
 from asperity.simulation.body import body
 from asperity.simulation.exact import axis_table, exact_step, resonant_table
 from asperity.simulation.hands import BandHand, Hand, MovedHand, SpringHand
+from asperity.simulation.kernels import (
+    axes,
+    axes_friction,
+    banded,
+    booking,
+    dense,
+    five_bar,
+    holding,
+    prescribed,
+    resonant,
+)
+from asperity.simulation.kernels.holding import HandRecord
 from asperity.simulation.plants import Cartesian, Pantograph, Plant
 from asperity.simulation.servo import Servo
 
@@ -38,7 +50,7 @@ class Machine:
 
     Attributes:
         modules: the functions that move it, see ``kernels``.
-        numbers: what it is made of, the argument ``plant`` of the loop.
+        numbers: what it is made of, the record ``plant`` of the loop.
         order: number of states.
     """
 
@@ -58,18 +70,24 @@ def machine(plant: Plant, hand: Hand, servo: Servo) -> Machine:
         ParameterError: for a resonance on an elastic band, which is not offered; for a body that is
             too fast for the period, or whose numbers overflow.
     """
-    from asperity.simulation.kernels import booking, carried
-
     if isinstance(hand, MovedHand):
-        return Machine((carried, booking), (float(servo.period),), 6)
+        record = prescribed.PrescribedPlant(float(servo.period))
+        return Machine((prescribed, booking), record, 6)
     try:
         with np.errstate(all="ignore"):  # what overflows is refused here
             made = _held(plant, hand, servo.period)
     except (ArithmeticError, np.linalg.LinAlgError):
         raise _too_fast(plant, hand, servo.period) from None
-    if not all(np.isfinite(part).all() for part in made.numbers):
+    if not _finite(made.numbers):
         raise _too_fast(plant, hand, servo.period)
     return made
+
+
+def _finite(record: object) -> bool:
+    """Return whether all numbers of a record are finite, those of records in it too."""
+    if isinstance(record, tuple):
+        return all(_finite(part) for part in record)
+    return bool(np.isfinite(np.asarray(record, dtype=np.float64)).all())
 
 
 def _held(plant: Plant, hand: SpringHand | BandHand, period: float) -> Machine:
@@ -103,8 +121,6 @@ def _too_fast(plant: Plant, hand: SpringHand | BandHand, period: float) -> Param
 
 
 def _linear(plant: Cartesian, hand: SpringHand, period: float) -> Machine:
-    from asperity.simulation.kernels import axes, booking, dense, resonant, rough_axes
-
     if np.abs(plant.damping - np.diag(np.diag(plant.damping))).max() > 0.0:
         return dense_machine(plant, hand, period)
     parts = FRICTION_PARTS if plant.friction > 0.0 else 1
@@ -112,38 +128,36 @@ def _linear(plant: Cartesian, hand: SpringHand, period: float) -> Machine:
     if mode is not None:
         table = np.array([resonant_table(plant, mode, hand, i, span) for i in range(3)])
         stops = np.diag(span / table[:, 10])
-        return Machine(
-            (resonant, dense, booking), (table, friction, stops, parts, span, np.zeros(6)), 12
-        )
+        slow = resonant.ResonantPlant(table, friction, stops, parts, span)
+        return Machine((resonant, dense, booking), slow, 12)
     table = np.array([axis_table(plant, hand, i, span) for i in range(3)])
     if friction == 0.0:
-        return Machine((axes, booking), (table,), 6)
+        return Machine((axes, booking), axes.AxesPlant(table), 6)
     stops = np.diag(span / table[:, 5])
-    return Machine((rough_axes, axes, dense, booking), (table, friction, stops, parts, span), 6)
+    rough = axes_friction.FrictionAxesPlant(table, friction, stops, parts, span)
+    return Machine((axes_friction, axes, dense, booking), rough, 6)
 
 
 def dense_machine(plant: Cartesian, hand: SpringHand, period: float) -> Machine:
     """Return a linear body moved by whole matrices, whatever its coupling."""
-    from asperity.simulation.kernels import booking, dense
-
     parts = FRICTION_PARTS if plant.friction > 0.0 else 1
     moved = body(plant.mass, plant.damping, hand, plant.resonance)
     step = exact_step(moved, period / parts)
     n = moved.order
-    stops = step.period * np.linalg.inv(step.motion[3:6, n : n + 3])
-    numbers = (
+    stops = np.asarray(step.period * np.linalg.inv(step.motion[3:6, n : n + 3]), dtype=np.float64)
+    record = dense.DensePlant(
         step.motion, step.loss, step.anchor_work, step.storage, np.zeros(n + 12),
         np.array(hand.force), plant.friction, stops, parts, period / parts,
     )  # fmt: skip
-    return Machine((dense, booking), numbers, n)
+    return Machine((dense, booking), record, n)
 
 
-def _holding(hand: SpringHand | BandHand) -> FloatArray:
-    """Return the numbers of ``kernels/holding.py``."""
+def _hand_record(hand: SpringHand | BandHand) -> HandRecord:
     if isinstance(hand, SpringHand):
-        return np.array([0.0, *hand.stiffness, *hand.damping, *hand.force, 0.0, 0.0])
-    stiffness, damping = [hand.stiffness] * 3, [hand.damping] * 3
-    return np.array([1.0, *stiffness, *damping, 0.0, 0.0, 0.0, hand.length, hand.rest_length])
+        return HandRecord(False, hand.stiffness, hand.damping, hand.force, 0.0, 0.0)
+    k, b = float(hand.stiffness), float(hand.damping)
+    none = (0.0, 0.0, 0.0)
+    return HandRecord(True, (k, k, k), (b, b, b), none, float(hand.length), float(hand.rest_length))
 
 
 def _parts(friction: float, rate: float, period: float) -> int:
@@ -166,43 +180,40 @@ def _fastest(mass: float, damping: float, hand: SpringHand | BandHand) -> float:
 
 
 def _banded(plant: Cartesian, hand: BandHand, period: float) -> Machine:
-    from asperity.simulation.kernels import banded, booking, dense, holding
-
     if plant.resonance is not None:
         raise ParameterError("resonance", "is not offered together with an elastic band")
     damping = float(np.linalg.eigvalsh(plant.damping)[-1])
     parts = _parts(plant.friction, _fastest(min(plant.mass), damping, hand), period)
-    numbers = (
-        np.diag(plant.mass), plant.damping, _holding(hand), plant.friction, parts, period / parts,
-        np.zeros(8), np.zeros(8), np.zeros(8),
+    record = banded.BandedPlant(
+        np.diag(plant.mass), plant.damping, _hand_record(hand), plant.friction, parts,
+        period / parts,
     )  # fmt: skip
-    return Machine((banded, holding, dense, booking), numbers, 6)
+    return Machine((banded, holding, dense, booking), record, 6)
 
 
 def _pantograph(plant: Pantograph, hand: SpringHand | BandHand, period: float) -> Machine:
-    from asperity.simulation.kernels import booking, five_bar, holding
-
     held = hand.mass if isinstance(hand, SpringHand) else 0.0
-    bar = bar_numbers(plant, held)
+    bar = bar_record(plant, held)
     mxx, mxz, mzz, _cx, _cz, bxx, _bxz, bzz = five_bar.bar_body(0.0, 0.0, 0.0, 0.0, bar)
     least = float(np.linalg.eigvalsh([[mxx, mxz], [mxz, mzz]])[0])
     # Twice the damping here: elsewhere in the workspace it may be larger.
     rate = _fastest(least, 2.0 * plant.joint_damping * (bxx + bzz), hand)
     _parts(plant.friction, rate, period)  # refuses too many; how many there are depends on speed
     fewest = FRICTION_PARTS if plant.friction > 0.0 else 1
-    numbers = (
-        bar, _holding(hand), float(plant.friction), rate, fewest, float(period), _LARGEST_PART,
+    record = five_bar.PantographPlant(
+        bar, _hand_record(hand), float(plant.friction), rate, fewest, float(period), _LARGEST_PART,
         bool(plant.inside_only), LEAST_SINE,
     )  # fmt: skip
-    return Machine((five_bar, holding, booking), numbers, 6)
+    return Machine((five_bar, holding, booking), record, 6)
 
 
-def bar_numbers(plant: Pantograph, held: float = 0.0) -> FloatArray:
-    """Return the numbers of ``kernels/five_bar.py``, with a mass [kg] held at the handle."""
+def bar_record(plant: Pantograph, held: float = 0.0) -> five_bar.Bar:
+    """Return the linkage of a pantograph, with a mass [kg] held at the handle."""
     bars, masses = plant.linkage, plant.masses
     first = masses.rotor + masses.proximal * bars.proximal**2 / 3.0
     inertia = first + masses.distal * bars.proximal**2 / 3.0
-    return np.array([
+    numbers = (
         bars.proximal, bars.distal, bars.base, inertia, masses.distal, masses.handle + held,
         *plant.centre, plant.joint_damping,
-    ])  # fmt: skip
+    )  # fmt: skip
+    return five_bar.Bar(*map(float, numbers))

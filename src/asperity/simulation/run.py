@@ -9,7 +9,7 @@ from typing import Any
 from asperity.checks import FloatArray
 from asperity.files import record
 from asperity.simulation.ledger import Ledger
-from asperity.simulation.servo_source import COLUMNS
+from asperity.simulation.trace import COLUMNS
 
 
 class Stop(StrEnum):
@@ -27,7 +27,7 @@ class Run:
 
     Attributes:
         table: the trace, one row for each traced sample with the columns of
-            :data:`~asperity.simulation.servo_source.COLUMNS`; no rows if it went to a file or
+            :data:`~asperity.simulation.trace.COLUMNS`; no rows if it went to a file or
             nowhere.
         state: of the body at the end: position [m], velocity [m/s], then the same of the part that
             carries the hand, if it is another one.

@@ -10,6 +10,7 @@ import numpy as np
 from asperity.checks import positive, real
 from asperity.errors import ParameterError
 from asperity.files import Record
+from asperity.kernels.tick import ServoSettings
 
 
 @dataclass(frozen=True)
@@ -54,9 +55,9 @@ class Servo(Record):
             raise ParameterError("velocity_share", "must be in (0, 1]", self.velocity_share)
 
     @property
-    def settings(self) -> tuple[float, ...]:
-        """What the compiled loop receives, in its order."""
-        return (
+    def settings(self) -> ServoSettings:
+        """What the compiled loop receives."""
+        return ServoSettings(
             float(self.position_resolution), float(self.force_resolution), float(self.max_force),
             float(self.virtual_damping), float(self.velocity_share), float(self.period),
         )  # fmt: skip

@@ -11,7 +11,19 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.errors import ParameterError
-from asperity.simulation.servo_source import COLUMNS
+
+COLUMNS = (
+    ("time", "s"),
+    *((name, "m") for name in ("x", "y", "z")),
+    *((f"v{axis}", "m/s") for axis in "xyz"),
+    *((f"commanded {axis}", "N") for axis in "xyz"),
+    *((f"applied {axis}", "N") for axis in "xyz"),
+    *((f"anchor {axis}", "m") for axis in "xyz"),
+    *((f"supplied {axis}", "J") for axis in "xyz"),
+    *((f"same sample {axis}", "J") for axis in "xyz"),
+    *((name, "J") for name in ("lost", "hand", "friction", "sampling", "stored")),
+)
+"""Columns of the trace with their units."""
 
 HEADER = ",".join(f"{name} [{unit}]" for name, unit in COLUMNS)
 _ROW = ",".join(["%.12g"] * len(COLUMNS)) + "\n"

@@ -11,29 +11,46 @@ damper is m Δp' - (f + g) T + b Δp.
 
 # ruff: noqa: ARG001 - one signature for every body
 
-from typing import Any
+from typing import NamedTuple
 
+from asperity.checks import FloatArray
 from asperity.compiled import Kernels
 from asperity.simulation.kernels.booking import book_energies
 
 KERNELS = Kernels(
-    provides=("advance_axis", "advance_body", "stored_energy"), requires=("book_energies",)
+    provides=("advance_axis", "advance_body", "stored_energy", "stored_in_axes"),
+    requires=("book_energies",),
 )
 
 
+# Where the numbers of an axis stand in its row of the table, after the changes of e and w and the
+# loss: damping and mass of the device, stiffness and constant force of the hand, and the period.
+DAMPING, MASS, STIFFNESS, PUSH, SPAN = 12, 13, 14, 15, 16
+
+
+class AxesPlant(NamedTuple):
+    """A body without coupling between its axes, over a sample.
+
+    Attributes:
+        table: of :func:`advance_axis` (3, 17).
+    """
+
+    table: FloatArray
+
+
 def advance_axis(
-    x: Any, i: int, f: float, a: float, u: float, table: Any
+    x: FloatArray, i: int, f: float, a: float, u: float, table: FloatArray
 ) -> tuple[float, float, float]:
     """Move along one axis; returns the displacement [m], loss and work of the hand [J].
 
-    Row i of the table: 0-5 changes of e and w, 6-11 the loss in ee, ew, eF, ww, wF, FF,
-    12 b, 13 m, 14 K, 15 g, 16 T.
+    Row i of the table: 0-5 changes of e and w, 6-11 the loss in ee, ew, eF, ww, wF, FF, and the
+    numbers named above.
     """
     p = x[i]
     v = x[3 + i]
-    b = table[i, 12]
-    span = table[i, 16]
-    g = table[i, 15]
+    b = table[i, DAMPING]
+    span = table[i, SPAN]
+    g = table[i, PUSH]
     e = p - a
     w = v - u
     push = f + g - b * u
@@ -43,21 +60,21 @@ def advance_axis(
     lost = e * (table[i, 6] * e + table[i, 7] * w + table[i, 8] * push)
     lost += w * (table[i, 9] * w + table[i, 10] * push) + table[i, 11] * push * push
     lost += b * u * (de + dp)
-    hand = u * (table[i, 13] * dw - (f + g) * span + b * dp) + g * dp
+    hand = u * (table[i, MASS] * dw - (f + g) * span + b * dp) + g * dp
     x[i] = p + dp
     x[3 + i] = v + dw
     return dp, lost, hand
 
 
 def advance_body(
-    x: Any, ledger: Any,
+    x: FloatArray, ledger: FloatArray,
     fx: float, fy: float, fz: float,
     ax: float, ay: float, az: float,
     ux: float, uy: float, uz: float,
-    inside: bool, plant: Any,
+    inside: bool, plant: AxesPlant,
 ) -> int:  # fmt: skip
-    """Move the body over one sample; see ``kernels/__init__.py``. plant: the table."""
-    (table,) = plant
+    """Move the body over one sample; see ``body_functions``."""
+    table = plant.table
     dx, lost_x, hand_x = advance_axis(x, 0, fx, ax, ux, table)
     dy, lost_y, hand_y = advance_axis(x, 1, fy, ay, uy, table)
     dz, lost_z, hand_z = advance_axis(x, 2, fz, az, uz, table)
@@ -67,12 +84,17 @@ def advance_body(
     return 0
 
 
-def stored_energy(x: Any, ax: float, ay: float, az: float, plant: Any) -> float:
+def stored_in_axes(x: FloatArray, ax: float, ay: float, az: float, table: FloatArray) -> float:
     """½ m v² + ½ K (a - p)² of every axis [J]."""
-    table = plant[0]
     total = 0.0
     for i in range(3):
         anchor = ax if i == 0 else ay if i == 1 else az
         stretch = anchor - x[i]
-        total += 0.5 * table[i, 13] * x[3 + i] ** 2 + 0.5 * table[i, 14] * stretch * stretch
+        kinetic = 0.5 * table[i, MASS] * x[3 + i] ** 2
+        total += kinetic + 0.5 * table[i, STIFFNESS] * stretch * stretch
     return total
+
+
+def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: AxesPlant) -> float:
+    """½ m v² + ½ K (a - p)² of every axis [J]."""
+    return stored_in_axes(x, ax, ay, az, plant.table)

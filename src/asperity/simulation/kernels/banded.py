@@ -2,12 +2,13 @@
 
 # ruff: noqa: ARG001 - one signature for every body
 
-from typing import Any
+from typing import NamedTuple
 
-from asperity.compiled import Kernels
+from asperity.checks import FloatArray
+from asperity.compiled import Kernels, local_array
 from asperity.simulation.kernels.booking import book_energies
 from asperity.simulation.kernels.dense import friction_force
-from asperity.simulation.kernels.holding import band_turns, hand_energy, hand_force
+from asperity.simulation.kernels.holding import HandRecord, band_turns, hand_energy, hand_force
 
 KERNELS = Kernels(
     provides=("advance_body", "stored_energy"),
@@ -15,29 +16,51 @@ KERNELS = Kernels(
 )
 
 
+class BandedPlant(NamedTuple):
+    """A mass in space on an elastic band.
+
+    Attributes:
+        mass: (3, 3), diagonal [kg].
+        damping: (3, 3) [N s/m].
+        hand: the band.
+        friction: dry friction [N].
+        parts: of a sample.
+        span: duration of a part [s].
+    """
+
+    mass: FloatArray
+    damping: FloatArray
+    hand: HandRecord
+    friction: float
+    parts: int
+    span: float
+
+
 def banded_rates(
-    y: Any, k: Any, fx: float, fy: float, fz: float, ax: float, ay: float, az: float,
-    ux: float, uy: float, uz: float, mass: Any, damping: Any, hand: Any,
+    y: FloatArray, k: FloatArray, fx: float, fy: float, fz: float, ax: float, ay: float, az: float,
+    ux: float, uy: float, uz: float, plant: BandedPlant,
 ) -> None:  # fmt: skip
     """Let k become the rate of y = (p, p', loss, work of the hand)."""
+    hand = plant.hand
     hx, hy, hz, lost = hand_force(
         ax - y[0], ay - y[1], az - y[2], ux - y[3], uy - y[4], uz - y[5], hand
     )
     k[6] = lost
     k[7] = ux * hx + uy * hy + uz * hz
     for i in range(3):
-        drag = damping[i, 0] * y[3] + damping[i, 1] * y[4] + damping[i, 2] * y[5]
+        drag = plant.damping[i, 0] * y[3] + plant.damping[i, 1] * y[4]
+        drag += plant.damping[i, 2] * y[5]
         push = fx + hx if i == 0 else fy + hy if i == 1 else fz + hz
         k[i] = y[3 + i]
-        k[3 + i] = (push + hand[7 + i] - drag) / mass[i, i]
+        k[3 + i] = (push + hand.force[i] - drag) / plant.mass[i, i]
         k[6] += drag * y[3 + i]
-        k[7] += hand[7 + i] * y[3 + i]
+        k[7] += hand.force[i] * y[3 + i]
 
 
 def banded_part(
-    x: Any, fx: float, fy: float, fz: float, ax: float, ay: float, az: float,
-    ux: float, uy: float, uz: float, span: float, mass: Any, damping: Any, hand: Any,
-    change: Any, stage: Any, rate: Any,
+    x: FloatArray, fx: float, fy: float, fz: float, ax: float, ay: float, az: float,
+    ux: float, uy: float, uz: float, span: float, plant: BandedPlant,
+    change: FloatArray, stage: FloatArray, rate: FloatArray,
 ) -> None:  # fmt: skip
     """One step of the classical Runge-Kutta method; ``change`` becomes that of (p, p', ...)."""
     for i in range(8):
@@ -51,7 +74,7 @@ def banded_part(
         banded_rates(
             stage, rate, fx, fy, fz,
             ax + late * span * ux, ay + late * span * uy, az + late * span * uz,
-            ux, uy, uz, mass, damping, hand,
+            ux, uy, uz, plant,
         )  # fmt: skip
         for i in range(8):
             change[i] += weight * span * rate[i]
@@ -60,39 +83,37 @@ def banded_part(
 
 
 def advance_body(
-    x: Any, ledger: Any,
+    x: FloatArray, ledger: FloatArray,
     fx: float, fy: float, fz: float,
     ax: float, ay: float, az: float,
     ux: float, uy: float, uz: float,
-    inside: bool, plant: Any,
+    inside: bool, plant: BandedPlant,
 ) -> int:  # fmt: skip
-    """Move the body over one sample; see ``kernels/__init__.py``.
-
-    plant: mass (3, 3), diagonal, damping, the hand, friction [N], parts, duration of a part [s],
-    and room for the changes, a stage and its rates (8 each).
-    """
-    mass, damping, hand, friction, parts, span, change, stage, rate = plant
+    """Move the body over one sample; see ``body_functions``."""
+    change = local_array((8,))
+    stage = local_array((8,))
+    rate = local_array((8,))
     gx = gy = gz = time = 0.0
     part = fine = 0
-    h = span
-    while part < parts:
+    h = plant.span
+    while part < plant.parts:
         bx = ax + time * ux
         by = ay + time * uy
         bz = az + time * uz
-        if friction > 0.0:
-            banded_rates(x, rate, fx, fy, fz, bx, by, bz, ux, uy, uz, mass, damping, hand)
+        if plant.friction > 0.0:
+            banded_rates(x, rate, fx, fy, fz, bx, by, bz, ux, uy, uz, plant)
             for i in range(3):
                 stage[i] = x[3 + i] + h * rate[3 + i]
-            gx, gy, gz = friction_force(stage[0], stage[1], stage[2], friction, mass, h)
+            gx, gy, gz = friction_force(stage[0], stage[1], stage[2], plant.friction, plant.mass, h)
         banded_part(
-            x, fx + gx, fy + gy, fz + gz, bx, by, bz, ux, uy, uz, h, mass, damping, hand,
+            x, fx + gx, fy + gy, fz + gz, bx, by, bz, ux, uy, uz, h, plant,
             change, stage, rate,
         )  # fmt: skip
-        if fine == 0 and banded_kink(x, change, bx, by, bz, h * ux, h * uy, h * uz, hand):
+        if fine == 0 and banded_kink(x, change, bx, by, bz, h * ux, h * uy, h * uz, plant.hand):
             for i in range(6):
                 x[i] -= change[i]
             fine = 256
-            h = span / 256.0
+            h = plant.span / 256.0
             continue
         time += h
         rubbed = gx * change[0] + gy * change[1] + gz * change[2]
@@ -102,12 +123,20 @@ def advance_body(
         fine = max(fine - 1, 0)
         if fine == 0:
             part += 1
-            h = span
+            h = plant.span
     return 0
 
 
 def banded_kink(
-    x: Any, change: Any, ax: float, ay: float, az: float, dx: float, dy: float, dz: float, hand: Any
+    x: FloatArray,
+    change: FloatArray,
+    ax: float,
+    ay: float,
+    az: float,
+    dx: float,
+    dy: float,
+    dz: float,
+    hand: HandRecord,
 ) -> bool:
     """Whether the band turned slack or taut in a step: its force then has a kink."""
     ex = ax - x[0]
@@ -118,10 +147,9 @@ def banded_kink(
     )
 
 
-def stored_energy(x: Any, ax: float, ay: float, az: float, plant: Any) -> float:
+def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: BandedPlant) -> float:
     """½ m v² of every axis and the energy of the hand [J]."""
-    mass, hand = plant[0], plant[2]
-    total = hand_energy(ax - x[0], ay - x[1], az - x[2], hand)
+    total = hand_energy(ax - x[0], ay - x[1], az - x[2], plant.hand)
     for i in range(3):
-        total += 0.5 * mass[i, i] * x[3 + i] * x[3 + i]
+        total += 0.5 * plant.mass[i, i] * x[3 + i] * x[3 + i]
     return total

@@ -1,20 +1,24 @@
-"""Energies into the ledger."""
+"""The ledger: sums of energies [J], and where each of them stands."""
 
-from typing import Any
-
+from asperity.checks import FloatArray
 from asperity.compiled import Kernels
 
 KERNELS = Kernels(provides=("book_energies",))
 
+# Work of the held force, per axis; the paper's same-sample sum, per axis; loss; work of the hand;
+# work of dry friction; what sampling adds; all without their signs.
+SUPPLIED, SAME_SAMPLE, LOST, HAND, FRICTION, SAMPLING, EXCHANGED = 0, 3, 6, 7, 8, 9, 10
+SUMS = 11
+
 
 def book_energies(
-    ledger: Any, wx: float, wy: float, wz: float, lost: float, hand: float, rubbed: float
+    ledger: FloatArray, wx: float, wy: float, wz: float, lost: float, hand: float, rubbed: float
 ) -> None:
     """Add work of the held force per axis, loss, work of the hand and of dry friction [J]."""
-    ledger[0] += wx
-    ledger[1] += wy
-    ledger[2] += wz
-    ledger[6] += lost
-    ledger[7] += hand
-    ledger[8] += rubbed
-    ledger[10] += abs(wx) + abs(wy) + abs(wz) + abs(lost) + abs(hand) + abs(rubbed)
+    ledger[SUPPLIED] += wx
+    ledger[SUPPLIED + 1] += wy
+    ledger[SUPPLIED + 2] += wz
+    ledger[LOST] += lost
+    ledger[HAND] += hand
+    ledger[FRICTION] += rubbed
+    ledger[EXCHANGED] += abs(wx) + abs(wy) + abs(wz) + abs(lost) + abs(hand) + abs(rubbed)

@@ -3,8 +3,9 @@
 # ruff: noqa: ARG001 - one signature for every body
 
 import math
-from typing import Any
+from typing import NamedTuple
 
+from asperity.checks import FloatArray
 from asperity.compiled import Kernels
 from asperity.simulation.kernels.booking import book_energies
 
@@ -13,19 +14,43 @@ KERNELS = Kernels(
 )
 
 
+class DensePlant(NamedTuple):
+    """A coupled linear body, over a part of a sample: see :class:`asperity.simulation.exact.Step`.
+
+    Attributes:
+        motion: of the step (n, n + 12).
+        loss: likewise (n + 12, n + 12).
+        anchor_work: likewise (3, n + 12).
+        storage: likewise (n + 12, n + 12).
+        room: for state, forces and anchor (n + 12,).
+        press: constant force of the hand (3,) [N].
+        friction: dry friction [N].
+        mass: that friction stops (3, 3) [kg].
+        parts: of a sample.
+        span: duration of a part [s].
+    """
+
+    motion: FloatArray
+    loss: FloatArray
+    anchor_work: FloatArray
+    storage: FloatArray
+    room: FloatArray
+    press: FloatArray
+    friction: float
+    mass: FloatArray
+    parts: int
+    span: float
+
+
 def advance_body(
-    x: Any, ledger: Any,
+    x: FloatArray, ledger: FloatArray,
     fx: float, fy: float, fz: float,
     ax: float, ay: float, az: float,
     ux: float, uy: float, uz: float,
-    inside: bool, plant: Any,
+    inside: bool, plant: DensePlant,
 ) -> int:  # fmt: skip
-    """Move the body over one sample; see ``kernels/__init__.py``.
-
-    plant: motion, loss, anchor_work, storage of a ``Step`` of T/parts, room for z, the hand's
-    force, friction [N], mass that friction stops [kg], parts, duration of a part [s].
-    """
-    _motion, _loss, _work, _storage, z, press, _friction, _mass, parts, span = plant
+    """Move the body over one sample; see ``body_functions``."""
+    z = plant.room
     n = x.shape[0]
     z[n + 3] = ax
     z[n + 4] = ay
@@ -34,48 +59,50 @@ def advance_body(
     z[n + 7] = uy
     z[n + 8] = uz
     for i in range(3):
-        z[n + 9 + i] = press[i]
-    for _part in range(parts):
+        z[n + 9 + i] = plant.press[i]
+    for _part in range(plant.parts):
         dense_part(x, ledger, fx, fy, fz, plant)
         for i in range(3):
-            z[n + 3 + i] += z[n + 6 + i] * span
+            z[n + 3 + i] += z[n + 6 + i] * plant.span
     return 0
 
 
-def dense_part(x: Any, ledger: Any, fx: float, fy: float, fz: float, plant: Any) -> None:
+def dense_part(
+    x: FloatArray, ledger: FloatArray, fx: float, fy: float, fz: float, plant: DensePlant
+) -> None:
     """Move the body by one part of a sample; z holds anchor and hand."""
-    motion, loss, anchor_work, _storage, z, _press, friction, mass, _parts, span = plant
+    z = plant.room
     n = x.shape[0]
     for i in range(n):
         z[i] = x[i]
     z[n] = fx
     z[n + 1] = fy
     z[n + 2] = fz
-    dense_motion(x, z, motion)
+    dense_motion(x, z, plant.motion)
     gx = gy = gz = 0.0
-    if friction > 0.0:
-        gx, gy, gz = friction_force(x[3], x[4], x[5], friction, mass, span)
+    if plant.friction > 0.0:
+        gx, gy, gz = friction_force(x[3], x[4], x[5], plant.friction, plant.mass, plant.span)
         z[n] = fx + gx
         z[n + 1] = fy + gy
         z[n + 2] = fz + gz
-        dense_motion(x, z, motion)
+        dense_motion(x, z, plant.motion)
     dx = x[0] - z[0]
     dy = x[1] - z[1]
     dz = x[2] - z[2]
     h = n - 6  # the part that carries the hand
-    lost = quadratic_form(z, loss)
+    lost = quadratic_form(z, plant.loss)
     hand = z[n + 9] * (x[h] - z[h]) + z[n + 10] * (x[h + 1] - z[h + 1])
     hand += z[n + 11] * (x[h + 2] - z[h + 2])
     for i in range(3):
         row = 0.0
         for j in range(z.shape[0]):
-            row += anchor_work[i, j] * z[j]
+            row += plant.anchor_work[i, j] * z[j]
         hand += z[n + 6 + i] * row
     rubbed = gx * dx + gy * dy + gz * dz
     book_energies(ledger, fx * dx, fy * dy, fz * dz, lost, hand, rubbed)
 
 
-def dense_motion(x: Any, z: Any, motion: Any) -> None:
+def dense_motion(x: FloatArray, z: FloatArray, motion: FloatArray) -> None:
     """Let x be that at the end of the part, from z at its beginning."""
     for i in range(x.shape[0]):
         row = 0.0
@@ -85,7 +112,7 @@ def dense_motion(x: Any, z: Any, motion: Any) -> None:
 
 
 def friction_force(
-    vx: float, vy: float, vz: float, friction: float, mass: Any, span: float
+    vx: float, vy: float, vz: float, friction: float, mass: FloatArray, span: float
 ) -> tuple[float, float, float]:
     """Dry friction [N] that stops the velocity at the end of a part, or its limit against it.
 
@@ -101,7 +128,7 @@ def friction_force(
     return share * vx, share * vy, share * vz
 
 
-def quadratic_form(z: Any, matrix: Any) -> float:
+def quadratic_form(z: FloatArray, matrix: FloatArray) -> float:
     """zᵀ matrix z for a symmetric matrix."""
     total = 0.0
     for i in range(z.shape[0]):
@@ -112,9 +139,9 @@ def quadratic_form(z: Any, matrix: Any) -> float:
     return total
 
 
-def stored_energy(x: Any, ax: float, ay: float, az: float, plant: Any) -> float:
+def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: DensePlant) -> float:
     """½ zᵀ storage z [J]; forces and the anchor's velocity store nothing."""
-    storage, z = plant[3], plant[4]
+    z = plant.room
     n = x.shape[0]
     for i in range(n):
         z[i] = x[i]
@@ -123,4 +150,4 @@ def stored_energy(x: Any, ax: float, ay: float, az: float, plant: Any) -> float:
     z[n + 3] = ax
     z[n + 4] = ay
     z[n + 5] = az
-    return 0.5 * quadratic_form(z, storage)
+    return 0.5 * quadratic_form(z, plant.storage)

@@ -12,16 +12,69 @@ and c(p, p') is what the masses need to stay on their way while p'' = 0.
 # ruff: noqa: ARG001 - one signature for every body
 
 import math
-from typing import Any
+from typing import NamedTuple
 
+from asperity.checks import FloatArray
 from asperity.compiled import Kernels
 from asperity.simulation.kernels.booking import book_energies
-from asperity.simulation.kernels.holding import band_turns, hand_energy, hand_force
+from asperity.simulation.kernels.holding import HandRecord, band_turns, hand_energy, hand_force
 
 KERNELS = Kernels(
     provides=("advance_body", "stored_energy"),
     requires=("band_turns", "book_energies", "hand_energy", "hand_force"),
 )
+
+
+class Bar(NamedTuple):
+    """A five-bar linkage with its masses.
+
+    Attributes:
+        proximal: length of the links at the motors [m].
+        distal: length of the links at the handle [m].
+        base: distance of the motors [m].
+        inertia: I₁ + m₂ l₁²/3 [kg m²].
+        distal_mass: m₂ [kg].
+        handle_mass: at the handle [kg].
+        centre_x: point of the linkage's plane that is the origin of the scene [m].
+        centre_z: likewise.
+        joint_damping: [N m s].
+    """
+
+    proximal: float
+    distal: float
+    base: float
+    inertia: float
+    distal_mass: float
+    handle_mass: float
+    centre_x: float
+    centre_z: float
+    joint_damping: float
+
+
+class PantographPlant(NamedTuple):
+    """A pantograph that a hand holds.
+
+    Attributes:
+        bar: the linkage.
+        hand: the hand.
+        friction: dry friction at the handle [N].
+        rate: the fastest, at rest [1/s].
+        fewest: parts of a sample.
+        period: T [s].
+        share: of a time constant that one step covers.
+        inside_only: whether the brakes act only in contact.
+        least: sine of the angles at the elbows: nearer to stretched or folded it stops.
+    """
+
+    bar: Bar
+    hand: HandRecord
+    friction: float
+    rate: float
+    fewest: int
+    period: float
+    share: float
+    inside_only: bool
+    least: float
 
 
 def bar_arm(
@@ -56,21 +109,19 @@ def bar_arm(
 
 
 def bar_body(
-    x: float, z: float, dx: float, dz: float, bar: Any
+    x: float, z: float, dx: float, dz: float, bar: Bar
 ) -> tuple[float, float, float, float, float, float, float, float]:
-    """Mass matrix (xx, xz, zz), c (x, z) and J⁻ᵀJ⁻¹ (xx, xz, zz).
-
-    bar: 0 proximal, 1 distal, 2 base, 3 I₁ + m₂ l₁²/3, 4 m₂, 5 mass at the handle, 6-7 centre,
-    8 joint damping.
-    """
-    px = bar[6] + x
-    pz = bar[7] + z
-    gx, gz, mxx, mxz, mzz, cx, cz = bar_arm(px, pz, dx, dz, 1.0, bar[0], bar[1], bar[3], bar[4])
+    """Mass matrix (xx, xz, zz), c (x, z) and J⁻ᵀJ⁻¹ (xx, xz, zz)."""
+    px = bar.centre_x + x
+    pz = bar.centre_z + z
+    gx, gz, mxx, mxz, mzz, cx, cz = bar_arm(
+        px, pz, dx, dz, 1.0, bar.proximal, bar.distal, bar.inertia, bar.distal_mass
+    )
     kx, kz, nxx, nxz, nzz, ex, ez = bar_arm(
-        px + bar[2], pz, dx, dz, -1.0, bar[0], bar[1], bar[3], bar[4]
+        px + bar.base, pz, dx, dz, -1.0, bar.proximal, bar.distal, bar.inertia, bar.distal_mass
     )
     return (
-        mxx + nxx + bar[5], mxz + nxz, mzz + nzz + bar[5], cx + ex, cz + ez,
+        mxx + nxx + bar.handle_mass, mxz + nxz, mzz + nzz + bar.handle_mass, cx + ex, cz + ez,
         gx * gx + kx * kx, gx * gz + kx * kz, gz * gz + kz * kz,
     )  # fmt: skip
 
@@ -78,24 +129,24 @@ def bar_body(
 def bar_rates(
     x: float, z: float, dx: float, dz: float,
     fx: float, fz: float, ax: float, az: float, ux: float, uz: float,
-    damping: float, bar: Any, hand: Any,
+    damping: float, bar: Bar, hand: HandRecord,
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """Acceleration [m/s²] in x and z, loss and power of the hand [W]."""
     mxx, mxz, mzz, cx, cz, bxx, bxz, bzz = bar_body(x, z, dx, dz, bar)
     hx, _hy, hz, lost = hand_force(ax - x, 0.0, az - z, ux - dx, 0.0, uz - dz, hand)
     qx = damping * (bxx * dx + bxz * dz)
     qz = damping * (bxz * dx + bzz * dz)
-    power = ux * hx + uz * hz + hand[7] * dx + hand[9] * dz
-    rx = fx + hx + hand[7] - qx - cx
-    rz = fz + hz + hand[9] - qz - cz
+    power = ux * hx + uz * hz + hand.force[0] * dx + hand.force[2] * dz
+    rx = fx + hx + hand.force[0] - qx - cx
+    rz = fz + hz + hand.force[2] - qz - cz
     over = 1.0 / (mxx * mzz - mxz * mxz)
     lost += qx * dx + qz * dz
     return (mzz * rx - mxz * rz) * over, (mxx * rz - mxz * rx) * over, lost, power
 
 
 def bar_friction(
-    x: Any, fx: float, fz: float, ax: float, az: float, ux: float, uz: float,
-    damping: float, friction: float, span: float, bar: Any, hand: Any,
+    x: FloatArray, fx: float, fz: float, ax: float, az: float, ux: float, uz: float,
+    damping: float, friction: float, span: float, bar: Bar, hand: HandRecord,
 ) -> tuple[float, float]:  # fmt: skip
     """Dry friction [N] that stops the handle in a part of a sample, or its limit."""
     if friction == 0.0:
@@ -115,8 +166,8 @@ def bar_friction(
 
 
 def bar_part(
-    x: Any, sx: float, sz: float, ax: float, az: float,
-    ux: float, uz: float, damping: float, span: float, bar: Any, hand: Any,
+    x: FloatArray, sx: float, sz: float, ax: float, az: float,
+    ux: float, uz: float, damping: float, span: float, bar: Bar, hand: HandRecord,
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """One step of the classical Runge-Kutta method; loss and hand's work are integrated along.
 
@@ -160,26 +211,33 @@ def bar_part(
     return dx, dz, lost, work
 
 
-def bar_reached(x: float, z: float, least: float, bar: Any) -> bool:
+def bar_reached(x: float, z: float, least: float, bar: Bar) -> bool:
     """Whether both arms reach a point, with room: |cos| of the angle at the elbow below a limit."""
-    px = bar[6] + x
-    pz = bar[7] + z
-    sides = bar[0] * bar[0] + bar[1] * bar[1]
-    limit = 2.0 * bar[0] * bar[1] * math.sqrt(1.0 - least * least)
+    px = bar.centre_x + x
+    pz = bar.centre_z + z
+    sides = bar.proximal * bar.proximal + bar.distal * bar.distal
+    limit = 2.0 * bar.proximal * bar.distal * math.sqrt(1.0 - least * least)
     right = sides - px * px - pz * pz
-    left = sides - (px + bar[2]) * (px + bar[2]) - pz * pz
+    left = sides - (px + bar.base) * (px + bar.base) - pz * pz
     return bool(pz > 0.0 and abs(right) < limit and abs(left) < limit)
 
 
-def bar_parts(vx: float, vz: float, rate: float, span: float, bar: Any) -> int:
+def bar_parts(vx: float, vz: float, rate: float, span: float, bar: Bar) -> int:
     """Steps for a sample: one for each ``share`` of a time constant, shorter ones at speed."""
-    parts = (rate + 4.0 * math.sqrt(vx * vx + vz * vz) / bar[0]) * span
+    parts = (rate + 4.0 * math.sqrt(vx * vx + vz * vz) / bar.proximal) * span
     # At such speeds the handle leaves the workspace with the first of them.
     return 1 + int(parts) if parts < 1e6 else 1000000
 
 
 def bar_kink(
-    x: Any, dx: float, dz: float, ax: float, az: float, ex: float, ez: float, hand: Any
+    x: FloatArray,
+    dx: float,
+    dz: float,
+    ax: float,
+    az: float,
+    ex: float,
+    ez: float,
+    hand: HandRecord,
 ) -> bool:
     """Whether the band turned slack or taut in a step of the handle, d, and of the anchor, e."""
     sx = ax - x[0]
@@ -188,20 +246,15 @@ def bar_kink(
 
 
 def advance_body(
-    x: Any, ledger: Any,
+    x: FloatArray, ledger: FloatArray,
     fx: float, fy: float, fz: float,
     ax: float, ay: float, az: float,
     ux: float, uy: float, uz: float,
-    inside: bool, plant: Any,
+    inside: bool, plant: PantographPlant,
 ) -> int:  # fmt: skip
-    """Move the handle over one sample; see ``kernels/__init__.py``.
-
-    plant: the bar, the hand, friction [N], fastest rate at rest [1/s], fewest parts, T [s], part
-    of a time constant for a step, whether the brakes act only inside, least sine of the angles at
-    the elbows.
-    """
+    """Move the handle over one sample; see ``body_functions``."""
     bar, hand, friction, rate, fewest, period, share, inside_only, least = plant
-    damping = bar[8] if inside or not inside_only else 0.0
+    damping = bar.joint_damping if inside or not inside_only else 0.0
     px, pz, vx, vz = x[0], x[2], x[3], x[5]
     parts = max(fewest, bar_parts(vx, vz, rate, period / share, bar))
     wx = wz = lost = work = rubbed = time = 0.0
@@ -235,9 +288,9 @@ def advance_body(
     return 0
 
 
-def stored_energy(x: Any, ax: float, ay: float, az: float, plant: Any) -> float:
+def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: PantographPlant) -> float:
     """½ p'ᵀ M p' and the energy of the hand [J]."""
-    bar, hand = plant[0], plant[1]
+    bar = plant.bar
     mxx, mxz, mzz, _cx, _cz, _bxx, _bxz, _bzz = bar_body(x[0], x[2], x[3], x[5], bar)
     kinetic = 0.5 * (mxx * x[3] * x[3] + 2.0 * mxz * x[3] * x[5] + mzz * x[5] * x[5])
-    return float(kinetic + hand_energy(ax - x[0], 0.0, az - x[2], hand))
+    return float(kinetic + hand_energy(ax - x[0], 0.0, az - x[2], plant.hand))

@@ -1,56 +1,86 @@
 """The hand on a body that is integrated: a spring to its anchor, or a band to a far end."""
 
 import math
-from typing import Any
+from typing import NamedTuple
 
 from asperity.compiled import Kernels
 
 KERNELS = Kernels(provides=("band_turns", "hand_energy", "hand_force"))
 
 
+Triple = tuple[float, float, float]
+
+
+class HandRecord(NamedTuple):
+    """A hand: a spring to its anchor, or an elastic band to its far end.
+
+    Attributes:
+        band: whether it is a band.
+        stiffness: per axis; of a band the same three times [N/m].
+        damping: likewise [N s/m].
+        force: constant force [N].
+        length: of the band, from its far end down to the anchor [m].
+        rest_length: of the band [m].
+    """
+
+    band: bool
+    stiffness: Triple
+    damping: Triple
+    force: Triple
+    length: float
+    rest_length: float
+
+
 def hand_force(
     sx: float, sy: float, sz: float,
     rx: float, ry: float, rz: float,
-    hand: Any,
+    hand: HandRecord,
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """Force of spring and damper, or band, on the handle [N], and its loss [W].
 
-    s = a - p and r = u - p' (anchor less handle); hand: 0 whether a band, 1-3 stiffness, 4-6
-    damping, 7-9 constant force, 10 length at the anchor, 11 rest length.
+    s = a - p and r = u - p' (anchor less handle).
     """
-    fx = hand[4] * rx
-    fy = hand[5] * ry
-    fz = hand[6] * rz
+    fx = hand.damping[0] * rx
+    fy = hand.damping[1] * ry
+    fz = hand.damping[2] * rz
     lost = fx * rx + fy * ry + fz * rz
-    if hand[0] > 0.0:
-        sz -= hand[10]
+    if hand.band:
+        sz -= hand.length
         length = math.sqrt(sx * sx + sy * sy + sz * sz)
-        if length > hand[11]:
-            pull = hand[1] * (length - hand[11]) / length
+        if length > hand.rest_length:
+            pull = hand.stiffness[0] * (length - hand.rest_length) / length
             fx += pull * sx
             fy += pull * sy
             fz += pull * sz
         return fx, fy, fz, lost
-    return fx + hand[1] * sx, fy + hand[2] * sy, fz + hand[3] * sz, lost
+    return (
+        fx + hand.stiffness[0] * sx,
+        fy + hand.stiffness[1] * sy,
+        fz + hand.stiffness[2] * sz,
+        lost,
+    )
 
 
 def band_turns(
-    sx: float, sy: float, sz: float, tx: float, ty: float, tz: float, hand: Any
+    sx: float, sy: float, sz: float, tx: float, ty: float, tz: float, hand: HandRecord
 ) -> bool:  # fmt: skip
     """Whether a band is slack at one of two places s = a - p and t, and taut at the other."""
-    if hand[0] == 0.0:
+    if not hand.band:
         return False
-    sz -= hand[10]
-    tz -= hand[10]
-    rest = hand[11] * hand[11]
-    return (sx * sx + sy * sy + sz * sz > rest) != (tx * tx + ty * ty + tz * tz > rest)  # type: ignore[no-any-return]  # arrays are untyped for Numba
+    sz -= hand.length
+    tz -= hand.length
+    rest = hand.rest_length * hand.rest_length
+    return (sx * sx + sy * sy + sz * sz > rest) != (tx * tx + ty * ty + tz * tz > rest)
 
 
-def hand_energy(sx: float, sy: float, sz: float, hand: Any) -> float:
+def hand_energy(sx: float, sy: float, sz: float, hand: HandRecord) -> float:
     """Energy of the spring or the band [J], for s = a - p."""
-    if hand[0] > 0.0:
-        sz -= hand[10]
+    if hand.band:
+        sz -= hand.length
         length = math.sqrt(sx * sx + sy * sy + sz * sz)
-        over = max(length - hand[11], 0.0)
-        return float(0.5 * hand[1] * over * over)
-    return float(0.5 * (hand[1] * sx * sx + hand[2] * sy * sy + hand[3] * sz * sz))
+        over = max(length - hand.rest_length, 0.0)
+        return float(0.5 * hand.stiffness[0] * over * over)
+    return float(
+        0.5
+        * (hand.stiffness[0] * sx * sx + hand.stiffness[1] * sy * sy + hand.stiffness[2] * sz * sz)
+    )

@@ -7,9 +7,10 @@ the hand's constant force g.
 
 # ruff: noqa: ARG001 - one signature for every body
 
-from typing import Any
+from typing import NamedTuple
 
-from asperity.compiled import Kernels
+from asperity.checks import FloatArray
+from asperity.compiled import Kernels, local_array
 from asperity.simulation.kernels.booking import book_energies
 from asperity.simulation.kernels.dense import friction_force
 
@@ -18,29 +19,53 @@ KERNELS = Kernels(
 )
 
 
+# Where the numbers of an axis stand in its row of the table, after 24 numbers of the changes and 21
+# of the loss: damping of the device, masses near and far, the spring between them, stiffness and
+# constant force of the hand, and the period.
+DAMPING, NEAR, FAR, SPRING, STIFFNESS, PUSH, SPAN = 45, 46, 47, 48, 49, 50, 51
+
+
+class ResonantPlant(NamedTuple):
+    """A body with a resonance, over a part of a sample.
+
+    Attributes:
+        table: of :func:`advance_resonant` (3, 52).
+        friction: dry friction [N].
+        mass: that friction stops (3, 3) [kg].
+        parts: of a sample.
+        span: duration of a part [s].
+    """
+
+    table: FloatArray
+    friction: float
+    mass: FloatArray
+    parts: int
+    span: float
+
+
 def resonant_state(
-    x: Any, i: int, f: float, a: float, u: float, table: Any, z: Any
+    x: FloatArray, i: int, f: float, a: float, u: float, table: FloatArray, z: FloatArray
 ) -> float:  # fmt: skip
     """Let z become (e, w, e_r, w_r, F, g) of one axis; returns p' at the end of the part [m/s]."""
     z[0] = x[i] - a
     z[1] = x[3 + i] - u
     z[2] = x[6 + i] - a
     z[3] = x[9 + i] - u
-    z[4] = f - table[i, 45] * u
-    z[5] = table[i, 50]
-    speed = x[3 + i]
+    z[4] = f - table[i, DAMPING] * u
+    z[5] = table[i, PUSH]
+    speed: float = x[3 + i]
     for j in range(6):
         speed += table[i, 6 + j] * z[j]
-    return speed  # type: ignore[no-any-return]  # arrays are untyped for Numba
+    return speed
 
 
 def advance_resonant(
-    x: Any, i: int, f: float, a: float, u: float, table: Any, z: Any
+    x: FloatArray, i: int, f: float, a: float, u: float, table: FloatArray, z: FloatArray
 ) -> tuple[float, float, float]:
     """Move along one axis; returns the displacement [m], loss and work of the hand [J].
 
-    Row i of the table: 0-23 the changes, 24-44 the loss, upper triangle by rows, 45 b, 46 and 47
-    the masses near and far, 48 the spring between, 49 K, 50 g, 51 T.
+    Row i of the table: 0-23 the changes, 24-44 the loss, upper triangle by rows, and the numbers
+    named above.
     """
     v = x[3 + i]
     dw = resonant_state(x, i, f, a, u, table, z) - v
@@ -55,11 +80,11 @@ def advance_resonant(
             row += table[i, place] * z[k]
             place += 1
         lost += z[j] * row
-    b = table[i, 45]
-    span = table[i, 51]
+    b = table[i, DAMPING]
+    span = table[i, SPAN]
     dp = de + u * span
     lost += b * u * (de + dp)
-    impulse = table[i, 46] * dw + table[i, 47] * ds - (f + z[5]) * span + b * dp
+    impulse = table[i, NEAR] * dw + table[i, FAR] * ds - (f + z[5]) * span + b * dp
     hand = u * impulse + z[5] * (dr + u * span)
     x[i] += dp
     x[3 + i] = v + dw
@@ -69,18 +94,15 @@ def advance_resonant(
 
 
 def advance_body(
-    x: Any, ledger: Any,
+    x: FloatArray, ledger: FloatArray,
     fx: float, fy: float, fz: float,
     ax: float, ay: float, az: float,
     ux: float, uy: float, uz: float,
-    inside: bool, plant: Any,
+    inside: bool, plant: ResonantPlant,
 ) -> int:  # fmt: skip
-    """Move the body over one sample; see ``kernels/__init__.py``.
-
-    plant: the table for a part, friction [N], mass that friction stops [kg], parts, duration of a
-    part [s], room for z (6).
-    """
-    table, friction, mass, parts, span, z = plant
+    """Move the body over one sample; see ``body_functions``."""
+    table, friction, mass, parts, span = plant
+    z = local_array((6,))
     gx = gy = gz = 0.0
     for part in range(parts):
         bx = ax + part * span * ux
@@ -101,14 +123,16 @@ def advance_body(
     return 0
 
 
-def stored_energy(x: Any, ax: float, ay: float, az: float, plant: Any) -> float:
+def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: ResonantPlant) -> float:
     """Of both masses, the spring between them and that of the hand [J]."""
-    table = plant[0]
+    table = plant.table
     total = 0.0
     for i in range(3):
         anchor = ax if i == 0 else ay if i == 1 else az
         stretch = anchor - x[6 + i]
         bend = x[6 + i] - x[i]
-        total += 0.5 * table[i, 46] * x[3 + i] ** 2 + 0.5 * table[i, 47] * x[9 + i] ** 2
-        total += 0.5 * table[i, 48] * bend * bend + 0.5 * table[i, 49] * stretch * stretch
+        total += 0.5 * table[i, NEAR] * x[3 + i] ** 2 + 0.5 * table[i, FAR] * x[9 + i] ** 2
+        total += (
+            0.5 * table[i, SPRING] * bend * bend + 0.5 * table[i, STIFFNESS] * stretch * stretch
+        )
     return total

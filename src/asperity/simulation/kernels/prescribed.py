@@ -1,24 +1,35 @@
-"""A handle that is moved: it is where the anchor is."""
+"""A handle whose motion is prescribed: that of the hand's anchor."""
 
 # ruff: noqa: ARG001 - one signature for every body
 
-from typing import Any
+from typing import NamedTuple
 
+from asperity.checks import FloatArray
 from asperity.compiled import Kernels
 from asperity.simulation.kernels.booking import book_energies
 
 KERNELS = Kernels(provides=("advance_body", "stored_energy"), requires=("book_energies",))
 
 
+class PrescribedPlant(NamedTuple):
+    """A handle whose motion is prescribed.
+
+    Attributes:
+        period: T [s].
+    """
+
+    period: float
+
+
 def advance_body(
-    x: Any, ledger: Any,
+    x: FloatArray, ledger: FloatArray,
     fx: float, fy: float, fz: float,
     ax: float, ay: float, az: float,
     ux: float, uy: float, uz: float,
-    inside: bool, plant: Any,
+    inside: bool, plant: PrescribedPlant,
 ) -> int:  # fmt: skip
-    """Move the handle over one sample; see ``kernels/__init__.py``. plant: the period [s]."""
-    (period,) = plant
+    """Move the handle over one sample; see ``body_functions``."""
+    period = plant.period
     dx = ux * period
     dy = uy * period
     dz = uz * period
@@ -35,6 +46,6 @@ def advance_body(
     return 0
 
 
-def stored_energy(x: Any, ax: float, ay: float, az: float, plant: Any) -> float:
+def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: PrescribedPlant) -> float:
     """Nothing is stored."""
     return 0.0

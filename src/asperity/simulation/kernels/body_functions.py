@@ -1,0 +1,43 @@
+"""What the servo loop asks of a body: how it moves over one sample, and what it stores.
+
+These are the interface alone: each module of a body defines them, and the linker binds the calls
+of the loop to the one that is simulated. ``plant`` is the record (NamedTuple) that the module
+declares.
+"""
+
+from asperity.checks import FloatArray
+
+
+def advance_body(
+    x: FloatArray, ledger: FloatArray,
+    fx: float, fy: float, fz: float,
+    ax: float, ay: float, az: float,
+    ux: float, uy: float, uz: float,
+    inside: bool, plant: object,
+) -> int:  # fmt: skip
+    """Move the body over one sample.
+
+    Args:
+        x: state: position [m], velocity [m/s], more; changed.
+        ledger: sums, see ``booking``; added to.
+        fx: held force [N].
+        fy: likewise.
+        fz: likewise.
+        ax: position of the hand's anchor at the beginning of the sample [m].
+        ay: likewise.
+        az: likewise.
+        ux: velocity of the hand's anchor [m/s].
+        uy: likewise.
+        uz: likewise.
+        inside: whether the servo found the probe in contact.
+        plant: what the body is made of.
+
+    Returns:
+        0, or 2 if the body would leave its workspace: it then stays where it was.
+    """
+    raise NotImplementedError
+
+
+def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: object) -> float:
+    """Return the stored energy [J] with the hand's anchor at a [m]."""
+    raise NotImplementedError

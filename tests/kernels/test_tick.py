@@ -1,0 +1,98 @@
+"""The servo's tick on its own: a loop of a user's calls it as the simulation does."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from asperity.checks import FloatArray
+from asperity.kernels import tick
+from asperity.kernels.fuse import fuse_on_texture
+from asperity.kernels.link import module_unit
+from asperity.simulation import Cartesian, MovedHand, Servo, Strokes, simulate
+from asperity.surface import Surface
+from asperity.textures import HeightMap, Sinusoid
+
+SERVO = Servo(
+    1e-4, position_resolution=5e-6, force_resolution=5e-3, max_force=0.4, virtual_damping=0.3,
+    velocity_share=0.2,
+)  # fmt: skip
+WAY = Strokes((0.1e-3, 0.0, -0.05e-3), (7e-3, 3e-3, -0.25e-3), speed=0.05, count=3)
+
+DEVICE = """
+from asperity.compiled import Kernels
+from asperity.kernels.tick import first_state, servo_tick
+
+KERNELS = Kernels(requires=("first_state", "servo_tick"), loops=("device_batch",))
+
+
+def device_batch(positions, forces, settings, texture, law):
+    state = first_state(positions[0, 0], positions[0, 1], positions[0, 2], settings)
+    for i in range(positions.shape[0]):
+        state = servo_tick(
+            state, settings, positions[i, 0], positions[i, 1], positions[i, 2], texture, law
+        )
+        forces[i, 0] = state.fx
+        forces[i, 1] = state.fy
+        forces[i, 2] = state.fz
+    return state
+"""
+
+
+@pytest.fixture(scope="module")
+def device(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
+    folder = tmp_path_factory.mktemp("device")
+    (folder / "my_device.py").write_text(DEVICE, encoding="utf-8")
+    sys.path.insert(0, str(folder))
+    try:
+        yield importlib.import_module("my_device")
+    finally:
+        sys.path.remove(str(folder))
+        del sys.modules["my_device"]
+
+
+def commanded(device: ModuleType, surface: Surface, positions: FloatArray) -> FloatArray:
+    """The forces of the device's loop at the positions of a handle."""
+    loop, servo = module_unit(device), module_unit(tick)
+    fused = fuse_on_texture(surface.law, surface.texture.sampler, "none", (loop,), (servo,))
+    forces = np.empty_like(positions)
+    arguments = surface.texture.arguments, surface.law_arguments
+    state = fused.device_batch(positions, forces, SERVO.settings, *arguments)
+    assert isinstance(state, tick.ServoState)
+    assert state[-3:] == tuple(forces[-1])
+    return forces
+
+
+@pytest.mark.parametrize("letter", ["C", "F", "D"])
+def test_a_device_s_loop_commands_what_the_simulation_does(device: ModuleType, letter: str) -> None:
+    """Reading, law with its anchor, virtual damping, limit and rounding: bit for bit."""
+    heights = 1e-4 * np.random.default_rng(3).normal(size=(8, 9))
+    texture = HeightMap(heights, 0.5e-3) if letter == "D" else Sinusoid(0.2e-3, 2e-3)
+    surface = Surface(texture, letter, 900.0)
+    run = simulate(surface, Cartesian(0.05), MovedHand(), SERVO, WAY, 0.3)
+    forces = commanded(device, surface, np.ascontiguousarray(run.position))
+    np.testing.assert_array_equal(forces, run.commanded)
+    lengths = np.linalg.norm(forces, axis=1)
+    assert 0.1 < lengths.max() <= 0.4 * (1.0 + 1e-12)
+    # In another order the state differs: it is carried from tick to tick.
+    back = commanded(device, surface, np.ascontiguousarray(run.position[::-1]))[::-1]
+    assert np.abs(back - forces).max() > 0.01
+
+
+def test_each_setting_matters(device: ModuleType) -> None:
+    """Without one of them the tick commands something else."""
+    surface = Surface(Sinusoid(0.2e-3, 2e-3), "C", 900.0)
+    positions = np.ascontiguousarray(WAY.at(np.arange(3000) * 1e-4))
+    forces = commanded(device, surface, positions)
+    plain = surface.force(5e-6 * np.floor(positions / 5e-6 + 0.5))
+    short = np.linalg.norm(plain, axis=1) < 0.3
+    assert short.any()
+    damped = np.abs(forces - plain)[short].max()
+    assert 5e-3 < damped < 0.1
+    steps = forces / 5e-3
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
