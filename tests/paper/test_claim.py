@@ -13,8 +13,6 @@ from asperity.paper.claim import (
     VERDICTS,
     Check,
     Claim,
-    Evidence,
-    Finding,
     decide,
     judge,
     relative_error,
@@ -99,12 +97,12 @@ def test_a_claim_is_as_good_as_its_weakest_part(parts: tuple[str, ...], whole: s
     ]
     found = settle(*checks)
     assert found.verdict == whole
-    assert len(found.evidence.numbers) == len(parts)
+    assert len(found.numbers) == len(parts)
 
 
 def test_json_has_no_infinity() -> None:
-    evidence = Evidence("s", {"a": math.inf, "b": [1.0, -math.inf, math.nan], "c": "text"}, "")
-    result = Claim("x-1", ("(1)",), "I", "words", lambda: Finding("holds", evidence)).run()
+    found = Check("holds", "s", {"a": math.inf, "b": [1.0, -math.inf, math.nan], "c": "text"}, "")
+    result = Claim("x-1", ("(1)",), "I", "words", lambda: found).run()
     back = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert list(back) == ["id", "equations", "statement", "verdict", "evidence"]
     assert back["evidence"]["numbers"] == {"a": "inf", "b": [1.0, "-inf", None], "c": "text"}
@@ -112,10 +110,10 @@ def test_json_has_no_infinity() -> None:
 
 
 def test_what_the_package_refuses_is_undecided_and_a_fault_is_a_fault() -> None:
-    def refused() -> Finding:
+    def refused() -> Check:
         raise ParameterError("depth", "must be positive [m]", -1.0)
 
-    def broken() -> Finding:
+    def broken() -> Check:
         raise ZeroDivisionError
 
     result = Claim("x", (), "I", "", refused).run()

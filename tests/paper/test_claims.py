@@ -10,7 +10,7 @@ import pytest
 
 from asperity.errors import ParameterError
 from asperity.paper import CLAIMS, VERDICTS, Result, claim, claims_simulated, reproduce_claims
-from asperity.paper.claim import Evidence, Finding
+from asperity.paper.claim import Check
 from asperity.paper.experiments import FINDINGS
 
 SIMULATED = {
@@ -218,6 +218,6 @@ def test_ids_as_one_text_are_refused() -> None:
 
 def test_simulated_claims_come_from_the_experiments(monkeypatch: pytest.MonkeyPatch) -> None:
     name = "sentence-V.B-A"
-    told = Finding("does not hold", Evidence("measured"))
+    told = Check("does not hold", "measured")
     monkeypatch.setitem(FINDINGS, name, lambda: told)
     assert claim(name).run().evidence.summary == "measured"

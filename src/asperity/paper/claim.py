@@ -54,10 +54,10 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Check:
-    """One comparison.
+    """One comparison, or several put together.
 
     Attributes:
-        verdict: what it alone would give.
+        verdict: what it alone gives.
         says: in words, with its numbers.
         numbers: see :class:`Evidence`.
         correction: see :class:`Evidence`.
@@ -67,14 +67,6 @@ class Check:
     says: str
     numbers: Mapping[str, Number] = field(default_factory=dict)
     correction: str = ""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What computing a claim gives."""
-
-    verdict: Verdict
-    evidence: Evidence
 
 
 @dataclass(frozen=True)
@@ -117,7 +109,7 @@ class Claim:
     equations: tuple[str, ...]
     section: str
     statement: str
-    compute: Callable[[], Finding]
+    compute: Callable[[], Check]
 
     def run(self) -> Result:
         """Compute the evidence and return it with the verdict.
@@ -127,9 +119,10 @@ class Claim:
         try:
             found = self.compute()
         except AsperityError as error:
-            found = Finding("undecided", Evidence(f"could not be computed: {error}"))
+            found = Check("undecided", f"could not be computed: {error}")
+        evidence = Evidence(found.says, found.numbers, found.correction)
         return Result(
-            self.id, self.equations, self.section, self.statement, found.verdict, found.evidence
+            self.id, self.equations, self.section, self.statement, found.verdict, evidence
         )
 
 
@@ -230,7 +223,7 @@ def decide(
     return Check("does not hold", says, known, correction if corrected is None else "")
 
 
-def settle(*checks: Check) -> Finding:
+def settle(*checks: Check) -> Check:
     """Put checks together: a claim is as good as the weakest of its parts."""
     worst = max(checks, key=lambda check: _GRAVITY[check.verdict])
     numbers: dict[str, Number] = {}
@@ -238,7 +231,7 @@ def settle(*checks: Check) -> Finding:
         numbers.update(check.numbers)
     corrections = dict.fromkeys(check.correction for check in checks if check.correction)
     summary = "; ".join(check.says for check in checks)
-    return Finding(worst.verdict, Evidence(summary, numbers, "; ".join(corrections)))
+    return Check(worst.verdict, summary, numbers, "; ".join(corrections))
 
 
 def relative_error(value: ArrayLike | None, target: ArrayLike) -> float:

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.paper.claim import Claim, Finding, decide, judge, settle
+from asperity.paper.claim import Check, Claim, decide, judge, settle
 from asperity.paper.claims_friction import PAPER, Rub, norm_of, random_rubs, stick_entries
 from asperity.paper.claims_god_object import BENT, bent_jacobian, flat_jacobian
 from asperity.paper.comparisons import energy_sign_check
@@ -72,7 +72,7 @@ def true_number(r: Rub) -> float:
     return best
 
 
-def appendix_one() -> Finding:
+def appendix_one() -> Check:
     """(31): an upper bound, and its expansion."""
     rubs = [PAPER, *random_rubs(6)]
     norms = [norm_of(*stick_entries(r)) for r in rubs]
@@ -109,24 +109,23 @@ def _against(
     printed: Callable[[FootRates], object],
     corrected: Callable[[FootRates], object] | None = None,
     correction: str = "",
-) -> Finding:
+) -> Check:
     """Compare formulas at the generic probes."""
     rates = _rates()
 
     def at(formula: Callable[[FootRates], object]) -> FloatArray:
         return np.array([formula(r) for r in rates], dtype=float)
 
-    check = judge(
+    return judge(
         f"{what} at {len(rates)} generic probes",
         printed=at(printed),
         corrected=None if corrected is None else at(corrected),
         truth=at(truth),
         correction=correction,
     )
-    return settle(check)
 
 
-def orthogonal() -> Finding:
+def orthogonal() -> Check:
     """(32)."""
     return _against(
         "p^z - p_h^z",
@@ -135,31 +134,31 @@ def orthogonal() -> Finding:
     )
 
 
-def along_x() -> Finding:
+def along_x() -> Check:
     """(33)."""
     return _against(
         "∂p_h^z/∂p^x", lambda r: r.rate("z", "x"), lambda r: r.spot.slope * r.rate("x", "x")
     )
 
 
-def along_z() -> Finding:
+def along_z() -> Check:
     """(34)."""
     return _against(
         "∂p_h^x/∂p^z", lambda r: r.rate("x", "z"), lambda r: r.rate("z", "z") / r.spot.slope
     )
 
 
-def energy_function() -> Finding:
+def energy_function() -> Check:
     """(35)."""
     places = [r.spot for r in _rates()]
-    return settle(energy_sign_check("D", places, [0.5 * s.distance**2 for s in places]))
+    return energy_sign_check("D", places, [0.5 * s.distance**2 for s in places])
 
 
 def _force(spot: Spot) -> FloatArray:
     return spot.force()
 
 
-def first_line() -> Finding:
+def first_line() -> Check:
     """(36), the derivative of the energy function before it is simplified."""
 
     def printed(r: FootRates) -> float:
@@ -169,7 +168,7 @@ def first_line() -> Finding:
     return _against("f_x of D", lambda r: _force(r.spot)[0], printed)
 
 
-def second_line() -> Finding:
+def second_line() -> Check:
     """(37)."""
 
     def line(r: FootRates, factor: float) -> float:
@@ -194,7 +193,7 @@ def second_line() -> Finding:
     )
 
 
-def force_x() -> Finding:
+def force_x() -> Check:
     """(38), and f_x = 0 where h' = 0."""
     rates = _rates()
     general = judge(
@@ -219,7 +218,7 @@ def force_x() -> Finding:
     )
 
 
-def force_z() -> Finding:
+def force_z() -> Check:
     """(39)."""
     return _against(
         "f_z of D", lambda r: _force(r.spot)[1], lambda r: -r.spot.k * r.spot.from_foot[1]
@@ -231,7 +230,7 @@ def _jacobian(r: FootRates, first: float, second: float) -> FloatArray:
     return -r.spot.k * np.array([[1.0 - r.rate("x", "x"), first], [second, 1.0 - r.rate("z", "z")]])
 
 
-def general_jacobian() -> Finding:
+def general_jacobian() -> Check:
     """(40)."""
     return _against(
         "Jacobian of D",
@@ -242,7 +241,7 @@ def general_jacobian() -> Finding:
     )
 
 
-def reduced_jacobian() -> Finding:
+def reduced_jacobian() -> Check:
     """(41)."""
     return _against(
         "Jacobian of D",
@@ -257,7 +256,7 @@ def _bent(spot: Spot) -> float:
     return 1.0 + spot.slope**2 - spot.d * spot.bend
 
 
-def foot_x() -> Finding:
+def foot_x() -> Check:
     """(42)."""
     return _against(
         "∂p_h^x/∂p^x",
@@ -268,7 +267,7 @@ def foot_x() -> Finding:
     )
 
 
-def foot_z() -> Finding:
+def foot_z() -> Check:
     """(43)."""
     return _against(
         "∂p_h^z/∂p^z",
@@ -279,7 +278,7 @@ def foot_z() -> Finding:
     )
 
 
-def final_jacobian() -> Finding:
+def final_jacobian() -> Check:
     """(44)."""
     return _against(
         "Jacobian of D",

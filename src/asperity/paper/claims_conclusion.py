@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from asperity.paper.claim import Check, Claim, Finding, decide, settle
+from asperity.paper.claim import Check, Claim, decide, settle
 from asperity.paper.claims_experiments import SETTINGS, growth
 from asperity.paper.claims_friction import Rub, norm_of, stick_entries
 from asperity.paper.comparisons import curl_check, q_of
@@ -10,23 +10,21 @@ from asperity.paper.paths import groove_path
 from asperity.paper.plane import LAWS, SCANNING, Setting, random_settings
 
 
-def increases() -> Finding:
+def increases() -> Check:
     """Texture generally raises the effective stiffness."""
     cases = [*SETTINGS.values(), *random_settings(5)]
     numbers = {law: [q_of(case, law) for case in cases] for law in LAWS}
     least = min(min(values) for values in numbers.values())
     raised = [law for law, values in numbers.items() if max(values) > 1.0 + 1e-9]
-    return settle(
-        decide(
-            f"over {len(cases)} settings q >= {least:.6g}; above 1 for {', '.join(raised)}",
-            printed=least >= 1.0 - 1e-6 and len(raised) >= 4,
-            least=least,
-            laws_above_1=", ".join(raised),
-        )
+    return decide(
+        f"over {len(cases)} settings q >= {least:.6g}; above 1 for {', '.join(raised)}",
+        printed=least >= 1.0 - 1e-6 and len(raised) >= 4,
+        least=least,
+        laws_above_1=", ".join(raised),
     )
 
 
-def mostly_proportional() -> Finding:
+def mostly_proportional() -> Check:
     """How often q is proportional to A/l."""
     exponents = {}
     for law in "ABCEFG":
@@ -41,18 +39,16 @@ def mostly_proportional() -> Finding:
     like = [law for law, (a, length) in exponents.items()
             if abs(a - 1.0) < 0.3 and abs(length + 1.0) < 0.3]  # fmt: skip
     said = ", ".join(f"{law} {a:+.2f} {length:+.2f}" for law, (a, length) in exponents.items())
-    return settle(
-        decide(
-            f"exponents of A and l in V.A's setting: {said}; D has no finite number",
-            printed=len(like) > len(LAWS) / 2,
-            correction="A's, and F's where the texture is steep; B's and G's go as A D/l² where it "
-            "is pressed deep, C's in between, and E's is constant",
-            numbers={f"exponents for {law}": pair for law, pair in exponents.items()},
-        )
+    return decide(
+        f"exponents of A and l in V.A's setting: {said}; D has no finite number",
+        printed=len(like) > len(LAWS) / 2,
+        correction="A's, and F's where the texture is steep; B's and G's go as A D/l² where it "
+        "is pressed deep, C's in between, and E's is constant",
+        numbers={f"exponents for {law}": pair for law, pair in exponents.items()},
     )
 
 
-def always_passive() -> Finding:
+def always_passive() -> Check:
     """Passivity can always be had by less gain, more samples or more damping."""
     from asperity.analysis.energy.loops import loop_work
 
@@ -64,19 +60,16 @@ def always_passive() -> Finding:
             work = loop_work(surface, groove_path(SCANNING))
             speeds[law, stiffness, damping] = max(work, 0.0) / (damping * length)
     of_a, of_c = ([v for key, v in speeds.items() if key[0] == law] for law in "AC")
-    return settle(
-        decide(
-            "A is fed below "
-            + ", ".join(f"{v * 1e3:.3g} mm/s" for v in of_a)
-            + f" with κ₀ = 1000, 10, 1000 N/m and 1, 1, 100 N·s/m, C below {max(of_c):.1g} m/s, "
-            "whatever the sampling",
-            printed=max(of_a) <= 1e-12,
-            corrected=min(of_a) > 1e-6 and max(of_c) <= 1e-12,
-            correction="for conservative fields; a loop of any other feeds a hand that is slow "
-            "enough",
-            speeds_for_A=of_a,
-            speeds_for_C=of_c,
-        )
+    return decide(
+        "A is fed below "
+        + ", ".join(f"{v * 1e3:.3g} mm/s" for v in of_a)
+        + f" with κ₀ = 1000, 10, 1000 N/m and 1, 1, 100 N·s/m, C below {max(of_c):.1g} m/s, "
+        "whatever the sampling",
+        printed=max(of_a) <= 1e-12,
+        corrected=min(of_a) > 1e-6 and max(of_c) <= 1e-12,
+        correction="for conservative fields; a loop of any other feeds a hand that is slow enough",
+        speeds_for_A=of_a,
+        speeds_for_C=of_c,
     )
 
 
@@ -94,12 +87,12 @@ def _continuity_check(law: str, *, continuous: bool) -> Check:
     return decide(says, printed=found is continuous)
 
 
-def best_of_c() -> Finding:
+def best_of_c() -> Check:
     """C is continuous and conservative."""
     return settle(_continuity_check("C", continuous=True), curl_check("C", conservative=True))
 
 
-def summary_of_d() -> Finding:
+def summary_of_d() -> Check:
     """D is conservative, keeps the stiffness, and jumps."""
     from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 
@@ -120,12 +113,12 @@ def summary_of_d() -> Finding:
     )
 
 
-def summary_of_e() -> Finding:
+def summary_of_e() -> Check:
     """E cures the jump and loses conservativity."""
     return settle(_continuity_check("E", continuous=True), curl_check("E", conservative=False))
 
 
-def summary_of_f() -> Finding:
+def summary_of_f() -> Check:
     """F has no small number, but a stroke forth and back loses energy."""
     from asperity.analysis.energy.loops import loop_work
 
@@ -133,14 +126,12 @@ def summary_of_f() -> Finding:
     bound = norm_of(*stick_entries(Rub(0.8, 1e-3, 0.8, SCANNING.period, 1e-3)))
     surface, way, depth = SCANNING.surface("F"), 10.0 * SCANNING.deflection, -SCANNING.depth
     work = loop_work(surface, [[0, 0, depth], [way, 0, depth]])
-    return settle(
-        decide(
-            f"q_F = {numbers['F']:.3f} ({bound:.3f} by (26)) against 1 for E and the wall; a "
-            f"stroke of 10 mm forth and back gives {work * 1e3:+.2f} mJ",
-            printed=min(numbers["F"], bound) > 1.1 * numbers["E"] and work < 0.0,
-            numbers={f"q_{law}": q for law, q in numbers.items()},
-            work_of_a_stroke=work,
-        )
+    return decide(
+        f"q_F = {numbers['F']:.3f} ({bound:.3f} by (26)) against 1 for E and the wall; a "
+        f"stroke of 10 mm forth and back gives {work * 1e3:+.2f} mJ",
+        printed=min(numbers["F"], bound) > 1.1 * numbers["E"] and work < 0.0,
+        numbers={f"q_{law}": q for law, q in numbers.items()},
+        work_of_a_stroke=work,
     )
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.paper.claim import Claim, Finding, decide, judge, settle
+from asperity.paper.claim import Check, Claim, decide, judge, settle
 from asperity.paper.claims_appendix import true_number
 from asperity.paper.claims_friction import (
     PAPER,
@@ -34,7 +34,7 @@ SETTINGS = {"V.A": PASSIVITY, "V.B": SCANNING, "V.C": BUMP}
 # --- V --------------------------------------------------------------------------------------------
 
 
-def samples() -> Finding:
+def samples() -> Check:
     """Samples and frequencies at l = 1 mm, said to be the greatest period."""
     periods = [case.period for case in SETTINGS.values()]
     length = 1e-3
@@ -59,7 +59,7 @@ def samples() -> Finding:
     )
 
 
-def wall() -> Finding:
+def wall() -> Check:
     """(30)."""
     surface, draw = PASSIVITY.surface("W"), np.random.default_rng(1)
     points = draw.uniform(-2e-3, 2e-3, (200, 3)) * [1, 0, 1]
@@ -71,26 +71,24 @@ def wall() -> Finding:
     )
 
 
-def number_a() -> Finding:
+def number_a() -> Check:
     """q_A = 5.1."""
     q = q_of(PASSIVITY, "A")
-    return settle(decide(f"q_A = {q:.4f}", printed=round(q, 1) == 5.1, q=q))
+    return decide(f"q_A = {q:.4f}", printed=round(q, 1) == 5.1, q=q)
 
 
-def number_f() -> Finding:
+def number_f() -> Check:
     """q_F = 8.3."""
     own, true, package = norm_of(*stick_entries(PAPER)), true_number(PAPER), q_of(PASSIVITY, "F")
-    return settle(
-        decide(
-            f"(26) gives {own:.4f}, √2 times that is {math.sqrt(2.0) * own:.4f}; the greatest "
-            f"‖J‖/κ₀ of the paper's law is {true:.4f}, of the package's {package:.4f}",
-            printed=any(round(value, 1) == 8.3 for value in (own, true, package)),
-            correction=f"{own:.2f} by (26): a factor √2/2 was dropped",
-            norm_of_the_printed_matrix=own,
-            root_two_times_that=math.sqrt(2.0) * own,
-            number_of_the_papers_law=true,
-            number_of_the_packages_law=package,
-        )
+    return decide(
+        f"(26) gives {own:.4f}, √2 times that is {math.sqrt(2.0) * own:.4f}; the greatest "
+        f"‖J‖/κ₀ of the paper's law is {true:.4f}, of the package's {package:.4f}",
+        printed=any(round(value, 1) == 8.3 for value in (own, true, package)),
+        correction=f"{own:.2f} by (26): a factor √2/2 was dropped",
+        norm_of_the_printed_matrix=own,
+        root_two_times_that=math.sqrt(2.0) * own,
+        number_of_the_papers_law=true,
+        number_of_the_packages_law=package,
     )
 
 
@@ -106,7 +104,7 @@ def _damping(joint: float, x: float) -> float:
     return float(np.linalg.svd(matrix, compute_uv=False)[-1])
 
 
-def rule() -> Finding:
+def rule() -> Check:
     """Condition (1) says of V.A what was observed."""
     numbers = {"W": 1.0, "A": q_of(PASSIVITY, "A"), "F": norm_of(*stick_entries(PAPER))}
     loads = {law: PASSIVITY.stiffness * q for law, q in numbers.items()}
@@ -119,18 +117,16 @@ def rule() -> Finding:
         (loads[name] <= limit) is wanted[name] for name in wanted for limit in least.values()
     )
     said = ", ".join(f"{name} {load:.0f}" for name, load in loads.items())
-    return settle(
-        decide(
-            f"κ₀ q [N/m]: {said}; σ₀/(2T) is {min(least.values()):.0f} to "
-            f"{max(least.values()):.0f} (links not verified)",
-            printed=right,
-            numbers={f"load of {name}": load for name, load in loads.items()},
-            limits=list(least.values()),
-        )
+    return decide(
+        f"κ₀ q [N/m]: {said}; σ₀/(2T) is {min(least.values()):.0f} to "
+        f"{max(least.values()):.0f} (links not verified)",
+        printed=right,
+        numbers={f"load of {name}": load for name, load in loads.items()},
+        limits=list(least.values()),
     )
 
 
-def ensured() -> Finding:
+def ensured() -> Check:
     """Divided by their numbers, A and F still gain on a slow loop."""
     from asperity.analysis.energy.loops import loop_work
 
@@ -142,18 +138,16 @@ def ensured() -> Finding:
         length = float(np.linalg.norm(loop - np.roll(loop, 1, axis=0), axis=1).sum())
         speeds[law] = loop_work(surface, loop) / (damping * length)
     said = ", ".join(f"{law} {speed * 1e3:.1f} mm/s" for law, speed in speeds.items())
-    return settle(
-        decide(
-            f"with κ₀/5.1 and κ₀/8.3 and σ₀ = {damping:.2f} N·s/m, turning the loops of Fig. 3 "
-            f"feeds a hand slower than: {said}",
-            printed=max(speeds.values()) <= 0.0,
-            correction="it ends limit cycles at best; a loop that gains is only slowed down",
-            numbers={f"speed for {law}": speed for law, speed in speeds.items()},
-        )
+    return decide(
+        f"with κ₀/5.1 and κ₀/8.3 and σ₀ = {damping:.2f} N·s/m, turning the loops of Fig. 3 "
+        f"feeds a hand slower than: {said}",
+        printed=max(speeds.values()) <= 0.0,
+        correction="it ends limit cycles at best; a loop that gains is only slowed down",
+        numbers={f"speed for {law}": speed for law, speed in speeds.items()},
     )
 
 
-def energy_sums() -> Finding:
+def energy_sums() -> Check:
     """The paper's Σ f Δp against the work of a force that is held."""
     draw = np.random.default_rng(23)
     surface = SCANNING.surface("W")
@@ -167,19 +161,17 @@ def energy_sums() -> Finding:
     # What the field itself gives along the path is the change of its energy.
     store = 0.5 * surface.stiffness * path[[0, -1], 2] ** 2
     field = float(store[0] - store[1])
-    return settle(
-        judge(
-            "energy from sampling, beyond the change of the stored energy [J]",
-            printed=float(np.sum(force[1:] * step)) - field,
-            corrected=float(np.sum(force[:-1] * step)) - field,
-            truth=held - field,
-            correction="each force times the step that follows it; with the step before it the "
-            "energy that sampling feeds in is counted with the wrong sign",
-        )
+    return judge(
+        "energy from sampling, beyond the change of the stored energy [J]",
+        printed=float(np.sum(force[1:] * step)) - field,
+        corrected=float(np.sum(force[:-1] * step)) - field,
+        truth=held - field,
+        correction="each force times the step that follows it; with the step before it the "
+        "energy that sampling feeds in is counted with the wrong sign",
     )
 
 
-def margins() -> Finding:
+def margins() -> Check:
     """The margin of V.B is larger than that of V.A."""
     ratios = {}
     for law in "WABCEG":
@@ -191,27 +183,23 @@ def margins() -> Finding:
     ]
     ratios["F"] = SCANNING.joint_damping / PASSIVITY.joint_damping * bounds[0] / bounds[1]
     said = ", ".join(f"{law} {ratio:.2f}" for law, ratio in ratios.items())
-    return settle(
-        decide(
-            f"σ₀/(2T κ₀ q) of V.B over that of V.A: {said}",
-            printed=min(ratios.values()) > 1.0,
-            numbers={f"ratio for {law}": ratio for law, ratio in ratios.items()},
-        )
+    return decide(
+        f"σ₀/(2T κ₀ q) of V.B over that of V.A: {said}",
+        printed=min(ratios.values()) > 1.0,
+        numbers={f"ratio for {law}": ratio for law, ratio in ratios.items()},
     )
 
 
-def no_lateral_energy() -> Finding:
+def no_lateral_energy() -> Check:
     """A has no force along the surface."""
     surface, draw = SCANNING.surface("A"), np.random.default_rng(5)
     force = surface.force(draw.uniform(-2e-3, 2e-3, (1000, 3)) * [1, 0, 1])
     most, normal = float(np.abs(force[:, 0]).max()), float(np.abs(force[:, 2]).max())
-    return settle(
-        decide(
-            f"greatest |f_x| of A at 1000 probes {most:g} N, |f_z| {normal:.2f} N",
-            printed=most == 0.0 < normal,
-            lateral=most,
-            normal=normal,
-        )
+    return decide(
+        f"greatest |f_x| of A at 1000 probes {most:g} N, |f_z| {normal:.2f} N",
+        printed=most == 0.0 < normal,
+        lateral=most,
+        normal=normal,
     )
 
 
@@ -220,7 +208,7 @@ def growth(values: list[float], by: list[float]) -> float:
     return math.log(values[1] / values[0]) / math.log(by[1] / by[0])
 
 
-def scaling() -> Finding:
+def scaling() -> Check:
     """q_A grows as A/l, the energy of A as A²."""
     from asperity.analysis.energy.loops import loop_work
 
@@ -238,20 +226,17 @@ def scaling() -> Finding:
     said = ", ".join(f"{name} {value:+.3f}" for name, value in exponents.items())
     near = [abs(exponents["q by A"] - 1.0), abs(exponents["q by l"] + 1.0)]
     energy = [abs(exponents["energy by A"] - 2.0), abs(exponents["energy by l"])]
-    return settle(
-        decide(
-            f"exponents in V.C's setting: {said}; along a horizontal way there and back "
-            f"{straight:g} J",
-            printed=max(near) < 1e-6 and max(energy) < 1e-6,
-            corrected=max(near) < 0.05 and max(energy) < 1e-6 and straight == 0.0,
-            correction="q_A only nearly; the energy around the path of Fig. 3 (a horizontal way "
-            "alone gives none)",
-            numbers=exponents,
-        )
+    return decide(
+        f"exponents in V.C's setting: {said}; along a horizontal way there and back {straight:g} J",
+        printed=max(near) < 1e-6 and max(energy) < 1e-6,
+        corrected=max(near) < 0.05 and max(energy) < 1e-6 and straight == 0.0,
+        correction="q_A only nearly; the energy around the path of Fig. 3 (a horizontal way "
+        "alone gives none)",
+        numbers=exponents,
     )
 
 
-def perpendicular() -> Finding:
+def perpendicular() -> Check:
     """A gives nothing to a probe that moves at right angles to the surface."""
     from asperity.analysis.energy.loops import loop_work
 
@@ -261,12 +246,10 @@ def perpendicular() -> Finding:
         for x in (0.13 * case.period, 0.61 * case.period):
             work = loop_work(surface, [[x, 0, case.amplitude], [x, 0, -case.depth]])
             most = max(most, abs(work) / (case.stiffness * case.amplitude**2))
-    return settle(
-        decide(
-            f"work of A on 8 vertical ways there and back at most {most:.1e} κ₀A²",
-            printed=most < 1e-12,
-            greatest=most,
-        )
+    return decide(
+        f"work of A on 8 vertical ways there and back at most {most:.1e} κ₀A²",
+        printed=most < 1e-12,
+        greatest=most,
     )
 
 
@@ -277,17 +260,15 @@ def leaks() -> dict[str, float]:
     return {law: worst_loop(BUMP.surface(law)).energy for law in "ABD"}
 
 
-def alive() -> Finding:
+def alive() -> Check:
     """Fields that are not conservative feel alive: the leak is computed, what is felt is not."""
     found = leaks()
     said = ", ".join(f"{law} {energy * 1e3:.3g} mJ" for law, energy in found.items())
     numbers: FloatArray = np.array(list(found.values()))
-    return settle(
-        decide(
-            f"worst loops in V.C's setting: {said}; whether a hand notices is not computed",
-            printed=None,
-            worst_loops=[float(value) for value in numbers],
-        )
+    return decide(
+        f"worst loops in V.C's setting: {said}; whether a hand notices is not computed",
+        printed=None,
+        worst_loops=[float(value) for value in numbers],
     )
 
 

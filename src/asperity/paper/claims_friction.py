@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.paper.claim import Check, Claim, Finding, decide, judge, settle
+from asperity.paper.claim import Check, Claim, decide, judge, settle
 from asperity.paper.paths import friction_path
 from asperity.paper.plane import SCANNING, random_settings, spots
 
@@ -70,7 +70,7 @@ def norm_of(a: float, b: float) -> float:
 # --- field and Jacobian ---------------------------------------------------------------------------
 
 
-def field_f() -> Finding:
+def field_f() -> Check:
     """(22): against the definition, and by the work of friction on a sliding probe."""
     from asperity.definition import exact_force
 
@@ -105,7 +105,7 @@ def _sliding_check(correction: str) -> Check:
     )
 
 
-def jacobian_f() -> Finding:
+def jacobian_f() -> Check:
     """(23) against differences of (22) as printed."""
     import mpmath
 
@@ -128,10 +128,9 @@ def jacobian_f() -> Finding:
             h, slope = float(r.modulation(x)), float(r.modulation(x, 1))
             printed.append(_formula(r, d, h, rate, slope))
             corrected.append(_formula(r, d, h, rate, slope * d))
-    return settle(
-        judge("Jacobian of (22) at 12 random states", printed=printed, corrected=corrected,
-              truth=truth, correction="h' must be h' d^x (as printed it has another dimension)")
-    )  # fmt: skip
+    return judge("Jacobian of (22) at 12 random states", printed=printed, corrected=corrected,
+                 truth=truth,
+                 correction="h' must be h' d^x (as printed it has another dimension)")  # fmt: skip
 
 
 def _printed_force(r: Rub, x: float, d: float, rate: float) -> Any:
@@ -149,7 +148,7 @@ def _formula(r: Rub, d: float, h: float, rate: float, slope: float) -> list[list
     return [[-first, -r.friction * (1.0 - h) * d / r.deflection], [0.0, -1.0]]
 
 
-def phases() -> Finding:
+def phases() -> Check:
     """(24): a probe goes forth and back, the package's anchor follows."""
     case = random_settings(1, 21)[0]
     surface = case.surface("F", modulation_depth=0.0)
@@ -165,16 +164,14 @@ def phases() -> Finding:
     slips = np.abs(rate) < 0.5
     forward = slips == (np.abs(end - reach) < 1e-9 * reach)
     both = slips == (np.abs(np.abs(end) - reach) < 1e-9 * reach)
-    return settle(
-        decide(
-            f"of {len(end)} steps forth and back d = d_max tells slip from stick in "
-            f"{forward.mean():.3f}, |d| = d_max in {both.mean():.3f}",
-            printed=bool(forward.all() and len(whole) - whole.sum() <= 3),
-            corrected=bool(both.all() and len(whole) - whole.sum() <= 3),
-            correction="|d^x| in place of d^x: the anchor is dragged both ways",
-            share_as_printed=float(forward.mean()),
-            share_with_absolute_value=float(both.mean()),
-        )
+    return decide(
+        f"of {len(end)} steps forth and back d = d_max tells slip from stick in "
+        f"{forward.mean():.3f}, |d| = d_max in {both.mean():.3f}",
+        printed=bool(forward.all() and len(whole) - whole.sum() <= 3),
+        corrected=bool(both.all() and len(whole) - whole.sum() <= 3),
+        correction="|d^x| in place of d^x: the anchor is dragged both ways",
+        share_as_printed=float(forward.mean()),
+        share_with_absolute_value=float(both.mean()),
     )
 
 
@@ -190,26 +187,22 @@ def _suprema(r: Rub) -> tuple[tuple[float, float], tuple[float, float]]:
     return (slip, across), (stick, across)
 
 
-def slip_entries() -> Finding:
+def slip_entries() -> Check:
     """(25)."""
     rubs = [PAPER, *random_rubs()]
     wave = [_TURN * r.friction * r.depth * r.amplitude / r.period for r in rubs]
-    return settle(
-        judge(
-            "greatest entries while sliding, 5 parameter sets",
-            printed=[[w, 2.0 * r.friction] for w, r in zip(wave, rubs, strict=True)],
-            corrected=[
-                [w, r.friction * (1.0 + r.amplitude)] for w, r in zip(wave, rubs, strict=True)
-            ],
-            truth=[_suprema(r)[0] for r in rubs],
-            tolerance=1e-8,
-            correction="bounds, entry by entry: (1,2) is at most μ(1 + A) for h = A sin, and μ "
-            "where 0 <= h <= 1 as (22) assumes",
-        )
+    return judge(
+        "greatest entries while sliding, 5 parameter sets",
+        printed=[[w, 2.0 * r.friction] for w, r in zip(wave, rubs, strict=True)],
+        corrected=[[w, r.friction * (1.0 + r.amplitude)] for w, r in zip(wave, rubs, strict=True)],
+        truth=[_suprema(r)[0] for r in rubs],
+        tolerance=1e-8,
+        correction="bounds, entry by entry: (1,2) is at most μ(1 + A) for h = A sin, and μ "
+        "where 0 <= h <= 1 as (22) assumes",
     )
 
 
-def stick_bound() -> Finding:
+def stick_bound() -> Check:
     """(26)."""
     rubs = [PAPER, *random_rubs()]
     right = [
@@ -241,7 +234,7 @@ def stick_bound() -> Finding:
 # --- energy ---------------------------------------------------------------------------------------
 
 
-def energy_f() -> Finding:
+def energy_f() -> Check:
     """(27): the law without texture; twice the friction makes its m = 1/2 the paper's h = 0."""
     from asperity.analysis.energy.loops import loop_work
 
@@ -271,7 +264,7 @@ def energy_f() -> Finding:
     )
 
 
-def compliant() -> Finding:
+def compliant() -> Check:
     """The energy grows with d_max."""
     from asperity.analysis.energy.loops import loop_work
 
@@ -281,23 +274,19 @@ def compliant() -> Finding:
         surface = case.surface("F", modulation_depth=0.0, friction=2.0 * case.friction)
         found.append(loop_work(surface, friction_path(case, 1e-7 * case.depth)))
     ratio = found[1] / found[0]
-    return settle(
-        decide(
-            f"d_max from 1 mm to 1 cm multiplies the energy by {ratio:.6f}, to "
-            f"{found[1] * 1e3:.2f} mJ",
-            printed=abs(ratio - 10.0) < 1e-6,
-            energies=found,
-        )
+    return decide(
+        f"d_max from 1 mm to 1 cm multiplies the energy by {ratio:.6f}, to {found[1] * 1e3:.2f} mJ",
+        printed=abs(ratio - 10.0) < 1e-6,
+        energies=found,
     )
 
 
-def deflections() -> Finding:
+def deflections() -> Check:
     """Values of d_max that are realistic."""
-    return settle(decide("a statement on real materials: nothing here can be computed",
-                         printed=None))  # fmt: skip
+    return decide("a statement on real materials: nothing here can be computed", printed=None)
 
 
-def generative_stick() -> Finding:
+def generative_stick() -> Check:
     """Generative in the stick phase only, which is at most 2 d_max wide."""
     case = SCANNING
     surface, reach = case.surface("F"), case.deflection
@@ -310,15 +299,13 @@ def generative_stick() -> Finding:
     worst, sticks = float(gain[slips].max()), float(gain[~slips].max())
     back = np.flatnonzero(~slips & (np.arange(len(gain)) >= 8000))
     width = float(np.abs(np.diff(x)[back]).sum()) / reach
-    return settle(
-        decide(
-            f"greatest gain of a sliding step {worst * 1e9:+.3g} nJ, of a sticking step "
-            f"{sticks * 1e9:+.3g} nJ; after turning it sticks over {width:.3f} d_max",
-            printed=worst < 0.0 < sticks and width <= 2.0 + 1e-3,
-            sliding=worst,
-            sticking=sticks,
-            width_over_d_max=width,
-        )
+    return decide(
+        f"greatest gain of a sliding step {worst * 1e9:+.3g} nJ, of a sticking step "
+        f"{sticks * 1e9:+.3g} nJ; after turning it sticks over {width:.3f} d_max",
+        printed=worst < 0.0 < sticks and width <= 2.0 + 1e-3,
+        sliding=worst,
+        sticking=sticks,
+        width_over_d_max=width,
     )
 
 

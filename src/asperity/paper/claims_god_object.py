@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.paper.claim import Claim, Finding, decide, judge, settle
+from asperity.paper.claim import Check, Claim, decide, judge, settle
 from asperity.paper.comparisons import (
     curl_check,
     energy_sign_check,
@@ -48,7 +48,7 @@ BENT = "with curvature: 1 + h'² becomes 1 + h'² + (p_h^z - p^z) h'' in the der
 # --- D --------------------------------------------------------------------------------------------
 
 
-def potential_d() -> Finding:
+def potential_d() -> Check:
     """(16)."""
     places = list(spots("D"))
 
@@ -67,7 +67,7 @@ def potential_d() -> Finding:
     return settle(gradient, energy_sign_check("D", places, [0.5 * s.distance**2 for s in places]))
 
 
-def field_d() -> Finding:
+def field_d() -> Check:
     """(17), and that it is conservative also across the ridges where it jumps."""
     from asperity.analysis.energy.loops import loop_work
 
@@ -83,12 +83,12 @@ def field_d() -> Finding:
     )
 
 
-def jacobian_d() -> Finding:
+def jacobian_d() -> Check:
     """(18)."""
-    return settle(jacobian_check("D", flat_jacobian, bent_jacobian, BENT))
+    return jacobian_check("D", flat_jacobian, bent_jacobian, BENT)
 
 
-def singular_d() -> Finding:
+def singular_d() -> Check:
     """The Jacobian is singular: moving across the penetration does not change the force."""
     shares = []
     for spot in spots("D"):
@@ -96,17 +96,15 @@ def singular_d() -> Finding:
         across = np.array([-spot.from_foot[1], spot.from_foot[0]]) / math.hypot(*across)
         change = spot.jacobian() @ across
         shares.append(float(np.linalg.norm(change)) / spot.k)
-    return settle(
-        decide(
-            f"moving across, the force of D changes by {min(shares):.3f} to {max(shares):.3f} κ₀",
-            printed=max(shares) < 1e-9,
-            correction="only where the surface is not curved; else by κ₀ δκ/(1 + δκ) per length",
-            change_per_length_over_stiffness=shares,
-        )
+    return decide(
+        f"moving across, the force of D changes by {min(shares):.3f} to {max(shares):.3f} κ₀",
+        printed=max(shares) < 1e-9,
+        correction="only where the surface is not curved; else by κ₀ δκ/(1 + δκ) per length",
+        change_per_length_over_stiffness=shares,
     )
 
 
-def number_d() -> Finding:
+def number_d() -> Check:
     """‖J_D‖ = κ₀ and q_D = 1."""
     from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 
@@ -115,18 +113,16 @@ def number_d() -> Finding:
     q, plus = characteristic_number(surface), one_sided_number(surface)
     gentle = BUMP.surface("D", max_depth=0.8 * _onset(BUMP.amplitude, BUMP.period))
     shallow = characteristic_number(gentle)
-    return settle(
-        decide(
-            f"‖J‖/κ₀ up to {max(norms):.3f} at 12 generic probes; sup {q.value} in V.A's setting, "
-            f"{shallow.value:.3f} at 0.8 of the crests' radius; q⁺ = {plus.value:g}",
-            printed=max(norms) <= 1.0 + 1e-9 and abs(q.value - 1.0) < 1e-9,
-            correction="1 is the one-sided number q⁺; with y = 4π²AD/l², q_D is 1 up to y = 1/2, "
-            "y/(1 - y) up to 1, then infinite",
-            greatest_norm=max(norms),
-            q=q.value,
-            q_at_0_8_of_the_radius=shallow.value,
-            one_sided_number=plus.value,
-        )
+    return decide(
+        f"‖J‖/κ₀ up to {max(norms):.3f} at 12 generic probes; sup {q.value} in V.A's setting, "
+        f"{shallow.value:.3f} at 0.8 of the crests' radius; q⁺ = {plus.value:g}",
+        printed=max(norms) <= 1.0 + 1e-9 and abs(q.value - 1.0) < 1e-9,
+        correction="1 is the one-sided number q⁺; with y = 4π²AD/l², q_D is 1 up to y = 1/2, "
+        "y/(1 - y) up to 1, then infinite",
+        greatest_norm=max(norms),
+        q=q.value,
+        q_at_0_8_of_the_radius=shallow.value,
+        one_sided_number=plus.value,
     )
 
 
@@ -134,7 +130,7 @@ def _onset(amplitude: float, period: float) -> float:
     return period**2 / (4.0 * math.pi**2 * amplitude)
 
 
-def remark_6() -> Finding:
+def remark_6() -> Check:
     """D jumps below the maxima; its potential does not, but has a kink."""
     from asperity.analysis.energy.continuity import continuity
     from asperity.analysis.gain.characteristic import characteristic_number
@@ -185,28 +181,26 @@ def _kink() -> Any:
 _OUTWARD = "without the minus sign: as printed the force pulls the probe further in"
 
 
-def field_e() -> Finding:
+def field_e() -> Check:
     """(19)."""
-    return settle(
-        field_check(
-            "E",
-            lambda s: np.array([0.0, -s.k * s.distance]),
-            lambda s: np.array([0.0, s.k * s.distance]),
-            _OUTWARD,
-        )
+    return field_check(
+        "E",
+        lambda s: np.array([0.0, -s.k * s.distance]),
+        lambda s: np.array([0.0, s.k * s.distance]),
+        _OUTWARD,
     )
 
 
-def jacobian_e() -> Finding:
+def jacobian_e() -> Check:
     """(20)."""
 
     def printed(s: Spot) -> FloatArray:
         return -s.k / s.distance * np.array([[0.0, 0.0], s.from_foot])
 
-    return settle(jacobian_check("E", printed, lambda s: -printed(s), _OUTWARD))
+    return jacobian_check("E", printed, lambda s: -printed(s), _OUTWARD)
 
 
-def norm_e() -> Finding:
+def norm_e() -> Check:
     """(21), q_E = 1."""
     from asperity.analysis.gain.characteristic import characteristic_number
 
@@ -239,7 +233,7 @@ def _steepness_e() -> Any:
     )
 
 
-def energy_e() -> Finding:
+def energy_e() -> Check:
     """The loop of Fig. 3: only one leg works, and it gains."""
     from asperity.analysis.energy.loops import loop_work
 
@@ -261,7 +255,7 @@ def energy_e() -> Finding:
     )
 
 
-def remark_7() -> Finding:
+def remark_7() -> Check:
     """E is not conservative, but continuous."""
     from asperity.analysis.energy.continuity import continuity
     from asperity.analysis.gain.characteristic import characteristic_number

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.paper.claim import Claim, Finding, decide, judge, settle
+from asperity.paper.claim import Check, Claim, decide, judge, settle
 from asperity.paper.comparisons import (
     curl_check,
     energy_sign_check,
@@ -36,17 +36,15 @@ from asperity.paper.plane import (
 # --- A --------------------------------------------------------------------------------------------
 
 
-def field_a() -> Finding:
+def field_a() -> Check:
     """(6)."""
     printed = field_check("A", lambda s: np.array([0.0, -s.k * s.d]), None, "")
     return settle(printed, outside_check("A"))
 
 
-def jacobian_a() -> Finding:
+def jacobian_a() -> Check:
     """(7)."""
-    return settle(
-        jacobian_check("A", lambda s: -s.k * np.array([[0.0, 0.0], [-s.slope, 1.0]]), None, "")
-    )
+    return jacobian_check("A", lambda s: -s.k * np.array([[0.0, 0.0], [-s.slope, 1.0]]), None, "")
 
 
 def _norms_a() -> tuple[list[Spot], FloatArray]:
@@ -54,14 +52,14 @@ def _norms_a() -> tuple[list[Spot], FloatArray]:
     return places, np.array([np.linalg.norm(spot.jacobian(), 2) for spot in places])
 
 
-def norm_a() -> Finding:
+def norm_a() -> Check:
     """(8)."""
     places, norms = _norms_a()
     printed = np.array([spot.k * math.hypot(1.0, spot.slope) for spot in places])
-    return settle(judge("norm of the Jacobian of A", printed=printed, truth=norms))
+    return judge("norm of the Jacobian of A", printed=printed, truth=norms)
 
 
-def number_a() -> Finding:
+def number_a() -> Check:
     """(9): a ratio of the greatest norm is set equal to a value at each place."""
     places = list(spots("A"))
     texture = places[0].surface.texture
@@ -81,7 +79,7 @@ def number_a() -> Finding:
     return settle(local, ratio)
 
 
-def sinusoid_a() -> Finding:
+def sinusoid_a() -> Check:
     """(10): the value, and where it is attained."""
     cases = [PASSIVITY, SCANNING, *random_settings()]
     printed = [c.stiffness * math.hypot(1.0, 2.0 * math.pi * c.amplitude / c.period) for c in cases]
@@ -120,22 +118,20 @@ def _reaches(
     return least
 
 
-def proportional_a() -> Finding:
+def proportional_a() -> Check:
     """The number is nearly 2πA/l: within a tenth in each of the paper's settings."""
     cases = {"V.A": PASSIVITY, "V.B": SCANNING, "V.C": BUMP}
     slopes = {name: 2.0 * math.pi * case.amplitude / case.period for name, case in cases.items()}
     ratios = {name: q_of(case, "A") / slopes[name] for name, case in cases.items()}
     said = ", ".join(f"{name} {slopes[name]:.2f} ({ratios[name]:.3f})" for name in cases)
-    return settle(
-        decide(
-            f"2πA/l, and q_A over it: {said}",
-            printed=max(abs(ratio - 1.0) for ratio in ratios.values()) < 0.1,
-            numbers={f"q_A over 2πA/l in {name}": ratio for name, ratio in ratios.items()},
-        )
+    return decide(
+        f"2πA/l, and q_A over it: {said}",
+        printed=max(abs(ratio - 1.0) for ratio in ratios.values()) < 0.1,
+        numbers={f"q_A over 2πA/l in {name}": ratio for name, ratio in ratios.items()},
     )
 
 
-def energy_a() -> Finding:
+def energy_a() -> Check:
     """The loop of Fig. 3."""
     printed = loop_check("A", lambda c: 0.5 * c.stiffness * c.amplitude**2)
     return settle(printed, curl_check("A", conservative=False))
@@ -144,7 +140,7 @@ def energy_a() -> Finding:
 # --- B --------------------------------------------------------------------------------------------
 
 
-def field_b() -> Finding:
+def field_b() -> Check:
     """(11)."""
 
     def printed(s: Spot) -> FloatArray:
@@ -153,7 +149,7 @@ def field_b() -> Finding:
     return settle(field_check("B", printed, None, ""), outside_check("B"))
 
 
-def energy_b() -> Finding:
+def energy_b() -> Check:
     """(12)."""
 
     def printed(c: Setting) -> float:
@@ -161,15 +157,15 @@ def energy_b() -> Finding:
         root = math.sqrt((length**2 + 4.0 * a**2 * math.pi**2) / length**2)
         return 0.5 * c.stiffness * a**2 + c.stiffness * length**2 / (4.0 * math.pi**2) * (1 - root)
 
-    return settle(loop_check("B", printed))
+    return loop_check("B", printed)
 
 
-def remark_4() -> Finding:
+def remark_4() -> Check:
     """A and B have a curl; what is felt is not computed."""
     return settle(curl_check("A", conservative=False), curl_check("B", conservative=False))
 
 
-def closed_forms() -> Finding:
+def closed_forms() -> Check:
     """The paper finds no closed form for B, C and G: do ours give what a search finds?"""
     from asperity.analysis.gain.closed_forms import q_b, q_c, q_g
 
@@ -205,7 +201,7 @@ def _force_c(s: Spot) -> FloatArray:
     return -s.k * np.array([-s.d * s.slope, s.d])
 
 
-def potential_c() -> Finding:
+def potential_c() -> Check:
     """(13): its gradient, and its sign as an energy."""
     places = list(spots("C"))
     gradient = judge(
@@ -221,22 +217,22 @@ def _printed_potential(spot: Spot) -> Callable[[Any, Any], Any]:
     return lambda x, z: -spot.k * (z - profile(x, 0)) ** 2 / 2
 
 
-def field_c() -> Finding:
+def field_c() -> Check:
     """(14)."""
     return settle(field_check("C", _force_c, None, ""), outside_check("C"))
 
 
-def jacobian_c() -> Finding:
+def jacobian_c() -> Check:
     """(15)."""
 
     def printed(s: Spot) -> FloatArray:
         corner = s.slope**2 - s.d * s.bend
         return -s.k * np.array([[corner, -s.slope], [-s.slope, 1.0]])
 
-    return settle(jacobian_check("C", printed, None, ""))
+    return jacobian_check("C", printed, None, "")
 
 
-def curvature_c() -> Finding:
+def curvature_c() -> Check:
     """At crests and troughs the norm is κ₀ times the greater of 1 and depth times curvature."""
     printed, truth = [], []
     for case in [PASSIVITY, SCANNING, *random_settings()]:
@@ -247,10 +243,10 @@ def curvature_c() -> Finding:
             points = np.column_stack([x, 0 * x, top - depth])
             truth.append(np.linalg.norm(case.surface("C").jacobian(points), 2, axis=(1, 2)))
             printed.append(case.stiffness * np.maximum(1.0, depth * bend))
-    return settle(judge("norm of C's Jacobian at crests and troughs", printed=printed, truth=truth))
+    return judge("norm of C's Jacobian at crests and troughs", printed=printed, truth=truth)
 
 
-def conservative_c() -> Finding:
+def conservative_c() -> Check:
     """Conservative by construction: curl and loops."""
     from asperity.analysis.energy.loops import loop_work
 
@@ -263,7 +259,7 @@ def conservative_c() -> Finding:
     return settle(curl_check("C", conservative=True), loops)
 
 
-def remark_5() -> Finding:
+def remark_5() -> Check:
     """The normalisation alone takes the conservativity."""
     import sympy as sp
 
@@ -288,7 +284,7 @@ def remark_5() -> Finding:
 # --- G --------------------------------------------------------------------------------------------
 
 
-def field_g() -> Finding:
+def field_g() -> Check:
     """(28): a column times a column."""
     import sympy as sp
 
@@ -308,7 +304,7 @@ def field_g() -> Finding:
     return settle(field_check("G", printed, right, correction), outside_check("G"))
 
 
-def energy_g() -> Finding:
+def energy_g() -> Check:
     """(29)."""
     from asperity.analysis.energy.loops import loop_work
 

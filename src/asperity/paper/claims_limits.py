@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.paper.claim import Check, Claim, Finding, decide, settle
+from asperity.paper.claim import Check, Claim, decide, settle
 from asperity.paper.plane import SCANNING, random_settings
 
 # Exponents of metre, second and newton.
@@ -110,19 +110,19 @@ def _counts(
     )
 
 
-def limit_1() -> Finding:
+def limit_1() -> Check:
     """Samples in time."""
     counted = _counts(PRINTED[1], "samples in a wave", lambda v: v["v"] * v["T"], "l", 2)
     return settle(counted, _units(PRINTED[1]))
 
 
-def limit_2() -> Finding:
+def limit_2() -> Check:
     """Steps of position."""
     counted = _counts(PRINTED[2], "steps of position in a wave", lambda v: v["delta"], "l", 3)
     return settle(counted, _units(PRINTED[2]))
 
 
-def limit_3() -> Finding:
+def limit_3() -> Check:
     """The same with α: does it ever decide what limit 2 does not?"""
     draw, alone, merged, count = np.random.default_rng(4), 0, 0, 4000
     for _ in range(count):
@@ -145,7 +145,7 @@ def limit_3() -> Finding:
     )
 
 
-def limit_4() -> Finding:
+def limit_4() -> Check:
     """Steps of force."""
     return settle(
         _counts(CORRECTED[4], "steps of force in an amplitude (corrected)", lambda v: v["b"],
@@ -155,7 +155,7 @@ def limit_4() -> Finding:
     )  # fmt: skip
 
 
-def limit_5() -> Finding:
+def limit_5() -> Check:
     """Gain: what the greatest slope of the force of every law is."""
     from asperity.analysis.gain.characteristic import characteristic_number
 
@@ -202,7 +202,7 @@ def _inside(law: str, draw: np.random.Generator, count: int) -> FloatArray:
     return np.stack([points, points + step])
 
 
-def limit_6() -> Finding:
+def limit_6() -> Check:
     """The frequency of the force while scanning."""
     worst = 0.0
     for case in random_settings(4, 17):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.paper.claim import Check, Claim, Finding, decide, judge, settle
+from asperity.paper.claim import Check, Claim, decide, judge, settle
 from asperity.paper.comparisons import q_of
 from asperity.paper.paths import groove_path
 from asperity.paper.plane import (
@@ -130,28 +130,26 @@ def _no_certificate() -> Check:
     )
 
 
-def corollary() -> Finding:
+def corollary() -> Check:
     """(1)."""
-    return settle(_no_certificate())
+    return _no_certificate()
 
 
-def condition() -> Finding:
+def condition() -> Check:
     """(2): it holds at every step of the loop that gains."""
     net, damping, path, surface = _alive("A")
     step = np.linalg.norm(np.diff(path, axis=0), axis=1)
     change = np.linalg.norm(np.diff(surface.force(path), axis=0), axis=1)
     most = float((change / step).max()) / (damping / (2.0 * SAMPLING_PERIOD))
     quiet = _quiet(0, 41)
-    return settle(
-        decide(
-            f"a loop of A gains {net * 1e3:+.3f} mJ net though |Δf| <= {most:.4f} σ₀/(2T) |Δs| at "
-            f"all of its steps; the best of 132 motions on C gains {quiet:+.1e} κ₀D²",
-            printed=net <= 0.0 or most > 1.0 + 1e-9,
-            corrected=quiet <= 1e-12,
-            correction=_CORRECTION,
-            greatest_left_side=most,
-            net_gain_of_A=net,
-        )
+    return decide(
+        f"a loop of A gains {net * 1e3:+.3f} mJ net though |Δf| <= {most:.4f} σ₀/(2T) |Δs| at "
+        f"all of its steps; the best of 132 motions on C gains {quiet:+.1e} κ₀D²",
+        printed=net <= 0.0 or most > 1.0 + 1e-9,
+        corrected=quiet <= 1e-12,
+        correction=_CORRECTION,
+        greatest_left_side=most,
+        net_gain_of_A=net,
     )
 
 
@@ -159,23 +157,21 @@ def _jacobians() -> list[FloatArray]:
     return [spot.jacobian() / spot.k for law in "ABCDEG" for spot in spots(law, 3)]
 
 
-def product_bound() -> Finding:
+def product_bound() -> Check:
     """(3)."""
     draw, most = np.random.default_rng(2), 0.0
     for matrix in _jacobians():
         steps = draw.normal(size=(200, 2))
         ratio = np.linalg.norm(steps @ matrix.T, axis=1) / np.linalg.norm(steps, axis=1)
         most = max(most, float(ratio.max() / np.linalg.norm(matrix, 2)))
-    return settle(
-        decide(
-            f"‖JΔ‖ is at most {most:.6f} ‖J‖₂|Δ| for 18 Jacobians and 3600 steps",
-            printed=most <= 1.0 + 1e-12,
-            greatest_share=most,
-        )
+    return decide(
+        f"‖JΔ‖ is at most {most:.6f} ‖J‖₂|Δ| for 18 Jacobians and 3600 steps",
+        printed=most <= 1.0 + 1e-12,
+        greatest_share=most,
     )
 
 
-def step_bound() -> Finding:
+def step_bound() -> Check:
     """(4): (1) and (3) together."""
     draw, most = np.random.default_rng(3), 0.0
     for matrix in _jacobians():
@@ -183,19 +179,17 @@ def step_bound() -> Finding:
         steps = draw.normal(size=(200, 2))
         ratio = np.linalg.norm(steps @ matrix.T, axis=1) / np.linalg.norm(steps, axis=1)
         most = max(most, float(ratio.max() / allowed))
-    return settle(
-        decide(
-            f"where (1) holds ‖JΔ‖ is at most {most:.4f} σ₀/(2T) |Δ| for 3600 steps",
-            printed=most <= 1.0 + 1e-12,
-            greatest_share=most,
-        )
+    return decide(
+        f"where (1) holds ‖JΔ‖ is at most {most:.4f} σ₀/(2T) |Δ| for 3600 steps",
+        printed=most <= 1.0 + 1e-12,
+        greatest_share=most,
     )
 
 
 # --- conservativity -------------------------------------------------------------------------------
 
 
-def zero_curl() -> Finding:
+def zero_curl() -> Check:
     """Zero curl makes a field conservative: a field that begins with a jump says when."""
     from asperity.analysis.energy.loops import loop_work
     from asperity.derive.curl import curl_verdict
@@ -209,63 +203,55 @@ def zero_curl() -> Finding:
     work = loop_work(surface, path)
     smooth = [law for law in "WCD" if curl_verdict(find_law(law)).conservative]
     loops = [abs(loop_work(SCANNING.surface(law), groove_path(SCANNING), 1e-10)) for law in smooth]
-    return settle(
-        decide(
-            f"a constant tangential force inside the body has curl {'0' if free else 'not 0'} and "
-            f"gains {work * 1e6:.2f} µJ per loop; W, C, D with curl 0 at most {max(loops):.1e} J",
-            printed=not free or work == 0.0,
-            corrected=len(smooth) == 3 and max(loops) < 1e-12,
-            correction="if the force also has no tangential jump where contact begins",
-            work_with_zero_curl=work,
-            work_of_W_C_D=max(loops),
-        )
+    return decide(
+        f"a constant tangential force inside the body has curl {'0' if free else 'not 0'} and "
+        f"gains {work * 1e6:.2f} µJ per loop; W, C, D with curl 0 at most {max(loops):.1e} J",
+        printed=not free or work == 0.0,
+        corrected=len(smooth) == 3 and max(loops) < 1e-12,
+        correction="if the force also has no tangential jump where contact begins",
+        work_with_zero_curl=work,
+        work_of_W_C_D=max(loops),
     )
 
 
-def case_1() -> Finding:
+def case_1() -> Check:
     """Condition (1) does not hold: energy may be injected."""
     surface = SCANNING.surface("C")
     path = shake(surface, 1e-8)
     scale = surface.stiffness * q_of(SCANNING, "C")
     nets = {part: gained(surface, path, scale / part) for part in (1.9, 2.1)}
-    return settle(
-        decide(
-            "C shaken where q is attained: with σ₀ at 1/3.8 of what (1) asks for it gains "
-            f"{nets[1.9]:+.1e} J, at 1/4.2 {nets[2.1]:+.1e} J",
-            printed=nets[2.1] > 0.0,
-            gain_above_a_quarter=nets[1.9],
-            gain_below_a_quarter=nets[2.1],
-        )
+    return decide(
+        "C shaken where q is attained: with σ₀ at 1/3.8 of what (1) asks for it gains "
+        f"{nets[1.9]:+.1e} J, at 1/4.2 {nets[2.1]:+.1e} J",
+        printed=nets[2.1] > 0.0,
+        gain_above_a_quarter=nets[1.9],
+        gain_below_a_quarter=nets[2.1],
     )
 
 
-def case_2() -> Finding:
+def case_2() -> Check:
     """Condition (1) holds, the algorithm is generative: energy may be injected."""
     nets = {law: _alive(law)[0] for law in "ABE"}
     said = ", ".join(f"{law} {net * 1e3:+.3f} mJ" for law, net in nets.items())
-    return settle(
-        decide(
-            f"at equality in (1) a loop at {_SLOW:g} m/s gains net: {said}",
-            printed=max(nets.values()) > 0.0,
-            numbers={f"net gain of {law}": net for law, net in nets.items()},
-        )
+    return decide(
+        f"at equality in (1) a loop at {_SLOW:g} m/s gains net: {said}",
+        printed=max(nets.values()) > 0.0,
+        numbers={f"net gain of {law}": net for law, net in nets.items()},
     )
 
 
-def case_3() -> Finding:
+def case_3() -> Check:
     """Condition (1) holds, the field is conservative: energy is always taken from the user."""
     quiet, late = max(_quiet(delay, 51 + delay) for delay in (0, 1)), _two_late()
-    return settle(
-        decide(
-            f"the best of 252 motions on C with d = 0, 1 gains {quiet:+.1e} κ₀D²",
-            printed=quiet <= 1e-12,
-            greatest_gain=quiet,
-            gain_of_W_two_samples_late=late,
-        )
+    return decide(
+        f"the best of 252 motions on C with d = 0, 1 gains {quiet:+.1e} κ₀D²",
+        printed=quiet <= 1e-12,
+        greatest_gain=quiet,
+        gain_of_W_two_samples_late=late,
     )
 
 
-def smooth_then_textured() -> Finding:
+def smooth_then_textured() -> Check:
     """A smooth wall that is passive may not be, once textured."""
     wall, textured = SCANNING.surface("W"), SCANNING.surface("C")
     loss = wall.stiffness  # twice what the plain wall needs, σ₀/T = k/2

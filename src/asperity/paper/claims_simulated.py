@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 
-from asperity.paper.claim import Claim, Finding
+from asperity.paper.claim import Check, Claim
 
 
-def simulated(name: str) -> Finding:
+def simulated(name: str) -> Check:
     """Return what the simulated experiment of a claim finds."""
     from asperity.paper.experiments.findings import FINDINGS  # and with it the simulation
 

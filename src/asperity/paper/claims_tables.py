@@ -14,7 +14,6 @@ from asperity.kernels.probe import ClampName
 from asperity.paper.claim import (
     Check,
     Claim,
-    Finding,
     decide,
     judge,
     relative_error,
@@ -37,12 +36,12 @@ def _normal(s: Spot) -> FloatArray:
     return np.array([-s.slope, 1.0]) / math.hypot(1.0, s.slope)
 
 
-def row_a() -> Finding:
+def row_a() -> Check:
     """Row A."""
-    return settle(field_check("A", lambda s: np.array([0.0, -s.k * s.d]), None, ""))
+    return field_check("A", lambda s: np.array([0.0, -s.k * s.d]), None, "")
 
 
-def row_b_and_g() -> Finding:
+def row_b_and_g() -> Check:
     """Row B & G: one formula, two penetrations."""
     return settle(
         field_check("B", lambda s: -s.k * s.d * _normal(s), None, ""),
@@ -50,38 +49,32 @@ def row_b_and_g() -> Finding:
     )
 
 
-def row_c() -> Finding:
+def row_c() -> Check:
     """Row C."""
-    return settle(
-        field_check(
-            "C",
-            lambda s: np.array([-s.k * s.slope * s.d, -s.k * s.d]),
-            lambda s: np.array([s.k * s.slope * s.d, -s.k * s.d]),
-            "the x part with a plus sign, as in (14)",
-        )
+    return field_check(
+        "C",
+        lambda s: np.array([-s.k * s.slope * s.d, -s.k * s.d]),
+        lambda s: np.array([s.k * s.slope * s.d, -s.k * s.d]),
+        "the x part with a plus sign, as in (14)",
     )
 
 
-def row_d() -> Finding:
+def row_d() -> Check:
     """Row D, its n̂ read as the unit vector from the nearest point to the probe."""
-    return settle(
-        field_check("D", lambda s: -s.k * s.distance * (s.from_foot / s.distance), None, "")
-    )
+    return field_check("D", lambda s: -s.k * s.distance * (s.from_foot / s.distance), None, "")
 
 
-def row_e() -> Finding:
+def row_e() -> Check:
     """Row E, d^min being a distance as the text below the table says."""
-    return settle(
-        field_check(
-            "E",
-            lambda s: np.array([0.0, -s.k * s.distance]),
-            lambda s: np.array([0.0, s.k * s.distance]),
-            "d^min counted negative inside, as the other d are",
-        )
+    return field_check(
+        "E",
+        lambda s: np.array([0.0, -s.k * s.distance]),
+        lambda s: np.array([0.0, s.k * s.distance]),
+        "d^min counted negative inside, as the other d are",
     )
 
 
-def row_f() -> Finding:
+def row_f() -> Check:
     """Row F: [-κ(x) d, -κ₀ d], κ(x) = μκ₀(1 - h), d = p^z."""
     from asperity.definition import exact_force
 
@@ -97,10 +90,8 @@ def row_f() -> Finding:
         printed.append([-rub, -k * spot.z])
         corrected.append([rub * share, -k * spot.z])
         truth.append([float(exact[0]), float(exact[2])])
-    return settle(
-        judge("force of F at 4 generic probes", printed=printed, corrected=corrected, truth=truth,
-              correction="the x part times -d^x/d_max")
-    )  # fmt: skip
+    return judge("force of F at 4 generic probes", printed=printed, corrected=corrected,
+                 truth=truth, correction="the x part times -d^x/d_max")  # fmt: skip
 
 
 # --- Table II -------------------------------------------------------------------------------------
@@ -113,13 +104,13 @@ def _table() -> TableTwo:
     return table_two()
 
 
-def table_two_row(letter: str) -> Finding:
+def table_two_row(letter: str) -> Check:
     """Judge a row of Table II, cell by cell."""
     row = _table().row(letter)
     return settle(_number_cell(row), _conservative_cell(row), _continuity_cell(row))
 
 
-def figure_3() -> Finding:
+def figure_3() -> Check:
     """Every law that the figure shows gains; those that it does not show do not."""
     from asperity.paper.figures import loop_energies
 
@@ -128,12 +119,10 @@ def figure_3() -> Finding:
     shown = {law: energy for law, energy in energies.items() if law not in "CD"}
     rest = max(abs(energies[law]) for law in "CD") / scale
     said = ", ".join(f"{law} {energy * 1e6:.1f} µJ" for law, energy in shown.items())
-    return settle(
-        decide(
-            f"around their paths {said}; C and D around that of A {rest:.1e} κ₀A²",
-            printed=min(shown.values()) > 1e-6 * scale and rest < 1e-6,
-            numbers={f"energy of {law}": energy for law, energy in energies.items()},
-        )
+    return decide(
+        f"around their paths {said}; C and D around that of A {rest:.1e} κ₀A²",
+        printed=min(shown.values()) > 1e-6 * scale and rest < 1e-6,
+        numbers={f"energy of {law}": energy for law, energy in energies.items()},
     )
 
 
@@ -203,12 +192,10 @@ def _continuity_cell(row: TableTwoRow) -> Check:
 # --- Remarks --------------------------------------------------------------------------------------
 
 
-def remark_1() -> Finding:
+def remark_1() -> Check:
     """What a texture feels like is not computed."""
-    return settle(
-        decide("a statement on perception and on real contacts: nothing here can be computed",
-               printed=None)
-    )  # fmt: skip
+    return decide("a statement on perception and on real contacts: nothing here can be computed",
+                  printed=None)  # fmt: skip
 
 
 def _finer(case: Setting, times: float) -> Setting:
@@ -216,7 +203,7 @@ def _finer(case: Setting, times: float) -> Setting:
     return Setting(case.stiffness, case.period / times, case.amplitude / times, depth=case.depth)
 
 
-def remark_2() -> Finding:
+def remark_2() -> Check:
     """A Lipschitz bound M takes the place of 2πA/l: the same M, other curvatures."""
     from asperity.analysis.gain.characteristic import characteristic_number
 
@@ -233,17 +220,15 @@ def remark_2() -> Finding:
     moved = [law for law in numbers if law not in fixed]
     margin = _safe_bounds()
     said = ", ".join(f"{law} {numbers[law][0]:.2f} to {numbers[law][1]:.2f}" for law in moved)
-    return settle(
-        decide(
-            f"waves 100 times finer at the same M leave q of {', '.join(fixed)} as it is and "
-            f"change {said}; bounds with K >= |h''| are at least {margin:.3f} times q",
-            printed=not moved,
-            corrected=sorted(fixed) == ["A", "E", "F"] and margin >= 1.0,
-            correction="M alone decides for A, E and F only; with a bound K on h'' too, "
-            "q_B <= √(1 + M²) + DK, q_C <= 1 + M² + DK, q_G <= max(1, DK), q_D = 1 if DK <= 1/2",
-            numbers={f"q_{law}, coarse and fine": pair for law, pair in numbers.items()},
-            least_margin=margin,
-        )
+    return decide(
+        f"waves 100 times finer at the same M leave q of {', '.join(fixed)} as it is and "
+        f"change {said}; bounds with K >= |h''| are at least {margin:.3f} times q",
+        printed=not moved,
+        corrected=sorted(fixed) == ["A", "E", "F"] and margin >= 1.0,
+        correction="M alone decides for A, E and F only; with a bound K on h'' too, "
+        "q_B <= √(1 + M²) + DK, q_C <= 1 + M² + DK, q_G <= max(1, DK), q_D = 1 if DK <= 1/2",
+        numbers={f"q_{law}, coarse and fine": pair for law, pair in numbers.items()},
+        least_margin=margin,
     )
 
 
@@ -265,7 +250,7 @@ def _safe_bounds() -> float:
     return least
 
 
-def remark_3() -> Finding:
+def remark_3() -> Check:
     """The numbers of B, C, F, G grow with depth; holding the depth for the lateral force bounds."""
     from asperity.analysis.energy.loops import loop_work
 
@@ -300,20 +285,19 @@ def remark_3() -> Finding:
     )
 
 
-def unbounded_friction() -> Finding:
+def unbounded_friction() -> Check:
     """F: the gain grows with the depth without bound, and holding the depth bounds it."""
     free = {times: _deep("F", "none", times) / 1000.0 for times in (1.0, 10.0, 1000.0)}
     held = {times: _deep("F", "lateral", times) / 1000.0 for times in (1.0, 10.0, 1000.0)}
-    return settle(
-        decide(
-            "‖J_F‖/κ₀ at 1, 10, 1000 times the depth: "
-            + ", ".join(f"{v:.3g}" for v in free.values())
-            + "; with p^z clamped " + ", ".join(f"{v:.3g}" for v in held.values()),
-            printed=free[1000.0] > 50.0 * free[10.0] and held[1000.0] <= free[1.0] * (1.0 + 1e-9),
-            free=list(free.values()),
-            clamped=list(held.values()),
-        )
-    )  # fmt: skip
+    return decide(
+        "‖J_F‖/κ₀ at 1, 10, 1000 times the depth: "
+        + ", ".join(f"{v:.3g}" for v in free.values())
+        + "; with p^z clamped "
+        + ", ".join(f"{v:.3g}" for v in held.values()),
+        printed=free[1000.0] > 50.0 * free[10.0] and held[1000.0] <= free[1.0] * (1.0 + 1e-9),
+        free=list(free.values()),
+        clamped=list(held.values()),
+    )
 
 
 def _times(ratios: dict[str, float]) -> str:
@@ -339,7 +323,7 @@ def _deep(law: str, clamp: ClampName, times: float) -> float:
     return best
 
 
-_ROWS: dict[str, tuple[str, Callable[[], Finding]]] = {
+_ROWS: dict[str, tuple[str, Callable[[], Check]]] = {
     "A": ("[0, -κ₀ d]", row_a),
     "BG": ("-κ₀ d n", row_b_and_g),
     "D": ("-κ₀ d^min n̂", row_d),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 
-from asperity.paper.claim import Check, Finding, decide, settle
+from asperity.paper.claim import Check, decide
 from asperity.paper.experiments.bump import Bump, bump_experiment
 from asperity.paper.experiments.passivity import Count, count_cycles
 from asperity.paper.experiments.scanning import scanning_experiment
@@ -34,7 +34,7 @@ def _bumps(law: str) -> tuple[Bump, ...]:
     return bump_experiment(law).of(law)
 
 
-def _textured_walls_cycle() -> Finding:
+def _textured_walls_cycle() -> Check:
     """W must settle from every start; A and F must cycle for good from at least a quarter."""
     counts = {(law, d): _count(law, 1.0, d) for law in "WAF" for d in LAGS}
 
@@ -49,30 +49,26 @@ def _textured_walls_cycle() -> Finding:
     numbers = {f"{law}, lag {d}: cycles": float(one.cycles) for (law, d), one in counts.items()}
     slow = {f"{law}, lag {d}: calms down slowly": float(one.slow)
             for (law, d), one in counts.items()}  # fmt: skip
-    return settle(
-        decide(
-            f"of {counts['W', 0].starts} starts cycle for good: {says}",
-            printed=shown(0),
-            corrected=shown(LAG),
-            correction=f"With a loop lag of {lags} samples, which the paper does not state, at a "
-            "working point where x and z couple",
-            numbers=numbers | slow,
-        )
+    return decide(
+        f"of {counts['W', 0].starts} starts cycle for good: {says}",
+        printed=shown(0),
+        corrected=shown(LAG),
+        correction=f"With a loop lag of {lags} samples, which the paper does not state, at a "
+        "working point where x and z couple",
+        numbers=numbers | slow,
     )
 
 
-def _divided_walls_settle() -> Finding:
+def _divided_walls_settle() -> Check:
     counts = [_count(law, by, d) for law, by in (("A", 5.1), ("F", 8.3)) for d in LAGS]
     cycling = sum(one.cycles for one in counts)
     starts = sum(one.starts for one in counts)
     lags = ", ".join(str(lag) for lag in LAGS)
     numbers = {f"{one.law}/{one.divisor:g}, lag {one.delay}": float(one.cycles) for one in counts}
-    return settle(
-        decide(
-            f"A/5.1 and F/8.3 at lags of {lags} samples: {cycling} of {starts} starts cycle",
-            printed=cycling == 0,
-            numbers=numbers,
-        )
+    return decide(
+        f"A/5.1 and F/8.3 at lags of {lags} samples: {cycling} of {starts} starts cycle",
+        printed=cycling == 0,
+        numbers=numbers,
     )
 
 
@@ -92,12 +88,12 @@ def _range(strokes: tuple[Stroke, ...], axis: int) -> str:
     return f"{min(values):+.3g} to {max(values):+.3g} mJ along {'xyz'[axis]}"
 
 
-def _judged(says: str, strokes: tuple[Stroke, ...], printed: bool, correction: str = "") -> Finding:
+def _judged(says: str, strokes: tuple[Stroke, ...], printed: bool, correction: str = "") -> Check:
     check: Check = decide(says, printed=printed, correction=correction, numbers=_numbers(strokes))
-    return settle(check)
+    return check
 
 
-def _law_a_gains() -> Finding:
+def _law_a_gains() -> Check:
     strokes = _strokes("A")
     feeding = sum(one.feeds for one in strokes)
     return _judged(
@@ -108,7 +104,7 @@ def _law_a_gains() -> Finding:
     )
 
 
-def _law_g_is_passive() -> Finding:
+def _law_g_is_passive() -> Check:
     """Marginally passive: along each axis what it gives is small against what it takes, or less."""
     strokes = _strokes("G")
     feeding = sum(one.feeds for one in strokes)
@@ -127,7 +123,7 @@ def _scale(stroke: Stroke) -> float:
     return max(abs(value) for value in stroke.energy)
 
 
-def _law_d_is_passive() -> Finding:
+def _law_d_is_passive() -> Check:
     strokes = _strokes("D")
     along_z = all(abs(one.energy[2]) <= MARGINAL * 1e-3 for one in strokes)
     along_x = all(one.energy[0] < -CLEAR * 1e-3 for one in strokes)
@@ -142,7 +138,7 @@ def _law_d_is_passive() -> Finding:
     )
 
 
-def _law_f_is_passive() -> Finding:
+def _law_f_is_passive() -> Check:
     strokes = _strokes("F")
     return _judged(
         f"{_range(strokes, 0)}, {_range(strokes, 2)}",
@@ -154,17 +150,17 @@ def _law_f_is_passive() -> Finding:
     )
 
 
-def _law_a_throws_off() -> Finding:
+def _law_a_throws_off() -> Check:
     bumps = _bumps("A")
     says = "; ".join(
         f"{one.entry}: {1e3 * one.total:+.3g} mJ, up to {1e3 * one.jump:.3g} mJ in 20 ms, contact "
         f"lost {one.lost} times" for one in bumps
     )  # fmt: skip
     holds = all(one.total > 0.0 and one.jump > 0.25 * one.total and one.lost > 1 for one in bumps)
-    return settle(decide(says, printed=holds, numbers=_of_bumps(bumps)))
+    return decide(says, printed=holds, numbers=_of_bumps(bumps))
 
 
-def _law_d_is_balanced() -> Finding:
+def _law_d_is_balanced() -> Check:
     bumps, lively = _bumps("D"), _bumps("A")
     says = "; ".join(
         f"{one.entry}: {1e3 * one.total:+.3g} mJ against {1e3 * other.total:+.3g} of A, up to "
@@ -173,12 +169,10 @@ def _law_d_is_balanced() -> Finding:
     balanced = all(
         abs(one.total) <= MARGINAL * other.total for one, other in zip(bumps, lively, strict=True)
     )
-    return settle(
-        decide(
-            f"{says} of 20",
-            printed=balanced,
-            numbers=_of_bumps(bumps),
-        )
+    return decide(
+        f"{says} of 20",
+        printed=balanced,
+        numbers=_of_bumps(bumps),
     )
 
 
@@ -193,7 +187,7 @@ def _of_bumps(bumps: tuple[Bump, ...]) -> dict[str, float]:
     return numbers
 
 
-FINDINGS: dict[str, Callable[[], Finding]] = {
+FINDINGS: dict[str, Callable[[], Check]] = {
     "sentence-V.A-cycles": _textured_walls_cycle,
     "sentence-V.A-settles": _divided_walls_settle,
     "sentence-V.B-A": _law_a_gains,
