@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -90,6 +91,17 @@ def test_a_wrong_crest_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(god_object, "supremum", flatter)
     with pytest.raises(InternalError, match="norm"):
         characteristic_number(surface)
+
+
+def test_a_crest_of_which_nothing_is_proved_is_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search that ends before its first proof gives no bound, and no error."""
+    intact = god_object.supremum
+    monkeypatch.setattr(
+        god_object, "supremum", lambda *arguments: replace(intact(*arguments), upper=math.inf)
+    )
+    bound = characteristic_number(Surface(WAVES, "D", max_depth=3e-4))
+    assert (bound.method, bound.upper) == ("sampled", math.inf)
+    assert bound.lower == pytest.approx(2.1244, rel=1e-4)
 
 
 LEAKING = {

@@ -57,7 +57,7 @@ def crest_number(surface: Surface, search: Search) -> Bound:
         least = max(least, 1.0 / texture.bounds[1])
     witness = attained(surface, NORM, foot, depth)
     # What rounding costs grows towards the medial axis.
-    upper = _number(depth / least * (1.0 + _ROUNDING)) * (1.0 + _ROUNDING)
+    upper = _number(_depth_over(least, depth)) * (1.0 + _ROUNDING)
     proof: Method = "certified" if math.isfinite(upper) else "sampled"
     note = "crest curvature" if proof == "certified" else _UNDECIDED
     top = upper_of(surface, NORM, upper, witness)
@@ -105,12 +105,16 @@ def split_number(surface: Surface, search: Search) -> Bound:
     depths = (min(surface.max_depth, (1.0 - 1e-6) * share), min(surface.max_depth, 1.05 * share))
     witness = max((attained(surface, NORM, foot, d) for d in depths), key=lambda w: w.value)
     least = crest.least_radius
-    y = surface.max_depth / least * (1.0 + _ROUNDING) if least > 0.0 else math.inf
-    alone = _number(y)
+    alone = _number(_depth_over(least, surface.max_depth))
     upper = min(c, alone * (1.0 + _ROUNDING) if alone > 1.0 else 1.0)
     if upper < c:
         reason = "law D's number: the depth is too small for the god-object to split"
     return Bound(lower_of(surface, NORM, upper, witness), upper, "theorem", witness.at, reason)
+
+
+def _depth_over(radius: float, depth: float) -> float:
+    """Return y, rounded up; a radius of which nothing is proved is zero."""
+    return depth / radius * (1.0 + _ROUNDING) if radius > 0.0 else math.inf
 
 
 def _number(y: float) -> float:
