@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
+import os
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -13,10 +16,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+import asperity
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.gain import kept as keeping
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.gain.search import Search
+from asperity.analysis.gain.sources import used_modules
+from asperity.analysis.gain.theorems import Theorem, register_theorem
 from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Sinusoid, Texture
@@ -140,9 +146,79 @@ def test_a_law_with_another_parameter_is_another() -> None:
 def test_another_version_of_the_package_makes_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     maker = Maker()
     maker.asked(surface())
-    monkeypatch.setattr(keeping, "_source_digest", lambda: "another")
+    monkeypatch.setattr(keeping, "source_digest", lambda _roots: "another")
     maker.asked(surface())
     assert maker.made == 2
+
+
+USED = ("enclosures/taylor.py", "textures/samplers/heightmap.py", "contacts/vertical.py",
+        "kernels/contact_loop.py", "derive/facts.py", "analysis/gain/safe_bounds.py")  # fmt: skip
+UNUSED = ("report/page.py", "analysis/words/comparison.py", "cli/compare.py", "paper/plane.py",
+          "analysis/compare.py", "simulation/onset.py", "textures/library/knurl.py",
+          "analysis/gain/characteristic.py", "devices/device.py")  # fmt: skip
+
+_KEY = """
+import numpy as np
+from asperity.analysis.gain.kept import _key
+from asperity.analysis.gain.search import Search
+from asperity.analysis.gain.sources import used_modules
+from asperity.analysis.gain.theorems import Theorem, register_theorem
+from asperity import HeightMap, Surface
+heights = 1e-4 * np.random.default_rng(1).normal(size=(8, 9))
+print(_key(Surface(HeightMap(heights, 3e-4), "B", max_depth=1e-4), "norm", Search()))
+"""
+
+
+def test_only_what_a_certificate_rests_on_voids_it(tmp_path: Path) -> None:
+    """A copy of the package: rewording leaves the key as it is, another search does not."""
+    package = tmp_path / "asperity"
+    shutil.copytree(Path(asperity.__file__).parent, package,
+                    ignore=shutil.ignore_patterns("__pycache__"))  # fmt: skip
+
+    def key() -> str:
+        done = subprocess.run(
+            [sys.executable, "-c", _KEY], capture_output=True, text=True, check=True,
+            env=os.environ | {"PYTHONPATH": str(tmp_path)}, cwd=tmp_path,
+        )  # fmt: skip
+        return done.stdout.strip()
+
+    before = key()
+    assert len(before) == 32
+    for name in UNUSED:
+        with (package / name).open("a") as file:
+            file.write("# reworded\n")
+    assert key() == before
+    assert all(used_by(name) for name in USED)
+    with (package / "analysis/bounds/branch_and_bound.py").open("a") as file:
+        file.write("# changed\n")
+    assert key() != before
+
+
+def used_by(name: str) -> bool:
+    """Return whether a file is among those that the certificate of a map rests on."""
+    module = "asperity." + name.removesuffix(".py").replace("/", ".")
+    return module in used_modules(keeping._makers(surface()))
+
+
+def test_what_a_theorem_of_one_s_own_computes_with_counts(tmp_path: Path) -> None:
+    own, path = law(1.5), tmp_path / "my_proof.py"
+    path.write_text("def most(surface):\n    return 7.0\n")
+    spec = importlib.util.spec_from_file_location("my_proof", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["my_proof"] = module
+    try:
+        spec.loader.exec_module(module)
+        without = keeping._key(surface(own), "norm", Search())
+        register_theorem(own, Theorem(norm_at_most=module.most))
+        first = keeping._key(surface(own), "norm", Search())
+        path.write_text("def most(surface):\n    return 7.5\n")
+        assert len({without, first, keeping._key(surface(own), "norm", Search())}) == 3
+        path.unlink()  # as typed into a session: what it says is not known
+        assert keeping._key(surface(own), "norm", Search()) is None
+    finally:
+        del sys.modules["my_proof"]
 
 
 def test_small_textures_are_not_kept(kept: Path) -> None:
