@@ -30,7 +30,7 @@ TUTORIALS = [page for page in PAGES if page.parent.name == "tutorials" and page.
 _BLOCK = re.compile(r"^```(\{run\}|\{shell\}|python)\n(.*?)^```$", re.M | re.S)
 _MATH = re.compile(r"^```\{math\}\n(.*?)^```$", re.M | re.S)
 _INLINE = re.compile(r"(?<![\\$`])\$([^$\n][^$]*?)\$(?!\$)")
-_ROLE = re.compile(r"\{py:\w+\}`~?([\w.]+)`")
+_NAME = re.compile(r"\{py:\w+\}`~?([\w.]+)`|^\.\. auto\w+:: ([\w.]+)$", re.M)
 
 
 def _name(page: Path) -> str:
@@ -73,8 +73,8 @@ def _resolve(target: str) -> Any:
 
 @pytest.mark.parametrize("page", PAGES, ids=_name)
 def test_every_name_that_a_page_refers_to_exists(page: Path) -> None:
-    for target in _ROLE.findall(page.read_text("utf-8")):
-        assert _resolve(target) is not None, target
+    for referred, shown in _NAME.findall(page.read_text("utf-8")):
+        assert _resolve(referred or shown) is not None
 
 
 def test_a_name_that_does_not_exist_is_noticed() -> None:
