@@ -207,6 +207,10 @@ def asked_letters(text: str) -> list[int]:
     return asked_names(text, LETTERS, {"law", "letter", "laws", "letters", "LAWS", "find_law"})
 
 
+def test_no_room_but_contacts_asks_for_a_contact() -> None:
+    assert found_in(rooms_but("contacts"), asked_contacts) == []
+
+
 def test_no_room_but_laws_and_the_paper_asks_for_a_letter() -> None:
     assert found_in(rooms_but("laws", "paper"), asked_letters) == []
 
@@ -256,6 +260,10 @@ def test_other_questions_are_not_counted(text: str) -> None:
 
 
 # --- size, annotations, documentation ------------------------------------------------------------
+
+LINES_AT_MOST = 26_700
+"""Lines of code, without docstrings, comments, blanks and generated files: to be lowered with what
+is taken out, and raised only with a capability that is worth it."""
 
 
 def functions(text: str) -> list[ast.FunctionDef]:
@@ -318,6 +326,10 @@ def not_documented(text: str) -> list[int]:
 def written() -> dict[str, str]:
     """Return the modules that people write."""
     return rooms_but("derive.generated")
+
+
+def test_the_code_does_not_grow_unnoticed() -> None:
+    assert sum(len(lines_of_code(text)) for text in written().values()) < LINES_AT_MOST
 
 
 def test_functions_are_short() -> None:
