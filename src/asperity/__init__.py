@@ -8,43 +8,47 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from asperity.errors import AsperityError, LawError, ParameterError, SurfaceFileError
+from asperity.errors import AsperityError as AsperityError
+from asperity.errors import LawError as LawError
+from asperity.errors import ParameterError as ParameterError
+from asperity.errors import SurfaceFileError as SurfaceFileError
 
 if TYPE_CHECKING:
-    from asperity.analysis import (
-        Bound,
-        Comparison,
-        Leak,
-        Passivity,
-        characteristic_number,
-        compare,
-        curl_number,
-        loop_work,
-        one_sided_number,
-        worst_loop,
-    )
-    from asperity.analysis.analysis_result import Analysis
-    from asperity.analysis.analyze import analyze
-    from asperity.analysis.check_limits import limits
-    from asperity.analysis.judge_passivity import passivity
-    from asperity.analysis.limits.limit_result import Limits
-    from asperity.analysis.split.potential_table import TabulatedSurface, tabulate
-    from asperity.analysis.split.state import PopThrough, SplitState, pop_through, split_state
-    from asperity.devices import Device, load_device
-    from asperity.laws import Law
-    from asperity.surface import Surface
-    from asperity.textures import (
-        Fourier,
-        Grating,
-        HeightMap,
-        Noise,
-        NoiseProfile,
-        Profile,
-        Sinusoid,
-        load_texture,
-        named_surface,
-        surface_names,
-    )
+    from asperity.analysis import Bound as Bound
+    from asperity.analysis import Comparison as Comparison
+    from asperity.analysis import Leak as Leak
+    from asperity.analysis import Passivity as Passivity
+    from asperity.analysis import characteristic_number as characteristic_number
+    from asperity.analysis import compare as compare
+    from asperity.analysis import curl_number as curl_number
+    from asperity.analysis import loop_work as loop_work
+    from asperity.analysis import one_sided_number as one_sided_number
+    from asperity.analysis import worst_loop as worst_loop
+    from asperity.analysis.analysis_result import Analysis as Analysis
+    from asperity.analysis.analyze import analyze as analyze
+    from asperity.analysis.check_limits import limits as limits
+    from asperity.analysis.judge_passivity import passivity as passivity
+    from asperity.analysis.limits.limit_result import Limits as Limits
+    from asperity.analysis.split.potential_table import TabulatedSurface as TabulatedSurface
+    from asperity.analysis.split.potential_table import tabulate as tabulate
+    from asperity.analysis.split.state import PopThrough as PopThrough
+    from asperity.analysis.split.state import SplitState as SplitState
+    from asperity.analysis.split.state import pop_through as pop_through
+    from asperity.analysis.split.state import split_state as split_state
+    from asperity.devices import Device as Device
+    from asperity.devices import load_device as load_device
+    from asperity.laws import Law as Law
+    from asperity.surface import Surface as Surface
+    from asperity.textures import Fourier as Fourier
+    from asperity.textures import Grating as Grating
+    from asperity.textures import HeightMap as HeightMap
+    from asperity.textures import Noise as Noise
+    from asperity.textures import NoiseProfile as NoiseProfile
+    from asperity.textures import Profile as Profile
+    from asperity.textures import Sinusoid as Sinusoid
+    from asperity.textures import load_texture as load_texture
+    from asperity.textures import named_surface as named_surface
+    from asperity.textures import surface_names as surface_names
 
 __version__ = "0.1.0"
 
@@ -86,48 +90,8 @@ _HOMES = {
     "worst_loop": "asperity.analysis",
 }
 
-__all__ = [
-    "Analysis",
-    "AsperityError",
-    "Bound",
-    "Comparison",
-    "Device",
-    "Fourier",
-    "Grating",
-    "HeightMap",
-    "Law",
-    "LawError",
-    "Leak",
-    "Limits",
-    "Noise",
-    "NoiseProfile",
-    "ParameterError",
-    "Passivity",
-    "PopThrough",
-    "Profile",
-    "Sinusoid",
-    "SplitState",
-    "Surface",
-    "SurfaceFileError",
-    "TabulatedSurface",
-    "__version__",
-    "analyze",
-    "characteristic_number",
-    "compare",
-    "curl_number",
-    "limits",
-    "load_device",
-    "load_texture",
-    "loop_work",
-    "named_surface",
-    "one_sided_number",
-    "passivity",
-    "pop_through",
-    "split_state",
-    "surface_names",
-    "tabulate",
-    "worst_loop",
-]
+__all__ = list(_HOMES)
+__all__ += ["AsperityError", "LawError", "ParameterError", "SurfaceFileError", "__version__"]
 
 
 def __getattr__(name: str) -> Any:

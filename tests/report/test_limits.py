@@ -10,8 +10,7 @@ from asperity.analysis.check_limits import limits
 from asperity.analysis.limits.limit_result import Limits
 from asperity.devices import parse_device
 from asperity.report import html_text
-from asperity.report.limits import print_limits
-from asperity.report.words.limits_words import MOST_WAVES, shown_waves
+from asperity.report.limits import MOST_WAVES, print_limits, shown_waves
 from asperity.textures import Fourier, HeightMap, Sinusoid
 
 BENCH = {

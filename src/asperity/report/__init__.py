@@ -8,11 +8,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from asperity.report.analysis import print_analysis
-    from asperity.report.comparison import comparison_table, print_comparison
-    from asperity.report.html import html_text
-    from asperity.report.page import add_section
-    from asperity.report.pictures.plots import plot
+    from asperity.report.analysis import print_analysis as print_analysis
+    from asperity.report.comparison import comparison_table as comparison_table
+    from asperity.report.comparison import print_comparison as print_comparison
+    from asperity.report.html import html_text as html_text
+    from asperity.report.page import add_section as add_section
+    from asperity.report.pictures.plots import plot as plot
 
 _HOMES = {
     "add_section": "asperity.report.page",
@@ -23,14 +24,7 @@ _HOMES = {
     "print_comparison": "asperity.report.comparison",
 }
 
-__all__ = [
-    "add_section",
-    "comparison_table",
-    "html_text",
-    "plot",
-    "print_analysis",
-    "print_comparison",
-]
+__all__ = list(_HOMES)
 
 
 def __getattr__(name: str) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from rich.console import Console
 from rich.table import Table
 
@@ -10,39 +12,19 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.passivity.criteria import Criterion
 from asperity.report import page, terminal
 from asperity.report.devices import numbers_table
-from asperity.report.page import (
-    PAPER,
-    UNFELT,
-    Cell,
-    Cells,
-    Definitions,
-    Page,
-    Row,
-    Section,
-    Words,
-    added_sections,
-    assumed,
-    holds_cell,
-    pairs,
-    pictured,
-)
 from asperity.report.terminal import Column, head, say
 from asperity.report.words import glossary
-from asperity.report.words.analysis_words import (
-    jump_rows,
-    leak_facts,
-    merit_facts,
-    notes,
-    numbers,
-    open_criteria,
-)
 from asperity.report.words.number_words import (
     NONE,
     down_text,
     holds_text,
+    in_one_unit,
     interval_text,
     law_title,
     limit_text,
+    merit_text,
+    place_text,
+    span_text,
     up_text,
     witness_text,
 )
@@ -65,6 +47,112 @@ def _criterion_cells(criterion: Criterion) -> list[str]:
     margin = NONE if criterion.margin is None else down_text(criterion.margin, 3)
     said = [criterion.name, criterion.formula, holds_text(criterion.holds)]
     return [*said, limit_text(criterion.limit), margin]
+
+
+def numbers(analysis: Analysis) -> list[tuple[str, Bound]]:
+    """Return the numbers of an analysis with their symbols."""
+    density = analysis.curl_density
+    found = _searched(analysis)
+    if density is not None and density.upper > 0.0:
+        found.append(("|curl f| [N/m]", density))
+    return found
+
+
+def _searched(analysis: Analysis) -> list[tuple[str, Bound]]:
+    """Return the numbers that were each looked for; the others follow from them."""
+    curl = [] if analysis.curl is None else [("|curl f|/k", analysis.curl)]
+    return [("q", analysis.q), ("q⁺", analysis.one_sided), *curl]
+
+
+def open_criteria(analysis: Analysis) -> list[tuple[str, str]]:
+    """Return what is said of the criteria that decide nothing, those of one answer together."""
+    said: dict[str, list[str]] = {}
+    for criterion in analysis.passivity.criteria:
+        if criterion.holds is None:
+            said.setdefault(criterion.says, []).append(criterion.name)
+    return [("; ".join(names), says) for says, names in said.items()]
+
+
+def notes(analysis: Analysis) -> list[str]:
+    """Return how each number came about, and whether and why the law is conservative."""
+    said = [f"{name}: {bound.note}" for name, bound in _searched(analysis) if bound.note]
+    word = "yes" if analysis.conservative else "no"
+    return [*said, f"conservative: {word}, {analysis.conservative_reason}"]
+
+
+def speed_text(analysis: Analysis) -> str:
+    """Return v* for reading, with what it means or what is missing."""
+    speed = analysis.v_star
+    if speed is None:
+        if analysis.device.value("damping") is None:
+            return "not decidable: needs damping"
+        return "not known: no loop found that gains"
+    if speed == 0.0:
+        return "0 m/s: there is nothing to absorb"
+    if math.isinf(speed):
+        return "∞: a device without damping never absorbs it"
+    datum = analysis.device.data["damping"]
+    mark = "" if datum.verified else " (not verified)"
+    return f"{engineering(speed, 'm/s')}: slower, damping {datum.text}{mark} does not absorb it"
+
+
+def thrust_text(analysis: Analysis) -> str:
+    """Return the mean thrust on a straight scan for reading."""
+    thrust, surface = analysis.leak.thrust, analysis.surface
+    if surface.law.stateful:
+        return "not defined: friction resists anyway"
+    if thrust is None:
+        return "not stated: the line does not repeat"
+    # What is left of the rounding of forces up to k times depth is no thrust.
+    small = abs(thrust) <= 1e-12 * surface.stiffness * surface.max_depth
+    return f"{'0 N' if small else engineering(thrust, 'N')} on a straight scan"
+
+
+def jump_rows(analysis: Analysis) -> list[tuple[str, str, str]]:
+    """Return depth, size and place of every jump that was located, in common units."""
+    jumps = analysis.continuity.jumps
+    depths = in_one_unit([jump.depth for jump in jumps], "m")
+    sizes = in_one_unit([jump.size for jump in jumps], "N")
+    places = [place_text(jump.before) for jump in jumps]
+    return list(zip(depths, sizes, places, strict=True))
+
+
+def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
+    """Return what is known of the worst loop, each with a short name."""
+    leak, density = analysis.leak, analysis.curl_density
+    line = leak.line
+    x, y = (float(part) + 0.0 for part in line.direction)
+    start = ", ".join(f"{1e3 * float(part) + 0.0:.6g}" for part in line.start)
+    facts = [("energy", f"{span_text(leak.energy, leak.upper, 'J')} per turn ({leak.method})")]
+    facts.append(("which", leak.description))
+    plane = f"vertical, along ({x:.6g}, {y:.6g}) through ({start}) mm"
+    facts.append(("plane", f"{plane}, {engineering(line.length, 'm')} of it"))
+    if len(leak.vertices):
+        path = f"{len(leak.vertices)} vertices, {engineering(leak.length, 'm')} long"
+        facts.append(("polygon", path))
+        mean = engineering(leak.per_length, "N")
+        facts.append(("per length", f"{mean}: energy over the length of the line"))
+    facts.append(("v*", speed_text(analysis)))
+    facts.append(("thrust", thrust_text(analysis)))
+    if density is not None and density.upper > 0.0:
+        area = span_text(density.lower, density.upper, "J/m²")
+        facts.append(("small loops", f"gain {area} at most: the greatest |curl f|"))
+    return facts
+
+
+def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
+    """Return strength, support and force on the scan at which laws are compared."""
+    scan, surface = analysis.merit, analysis.surface
+    unit = "" if surface.texture.scan_line().periodic else " m"
+    facts = [
+        ("strength T", f"{merit_text(scan.strength)}{unit}"),
+        ("support S", merit_text(scan.support)),
+        ("texture force", f"{engineering(scan.ripple * surface.stiffness, 'N')} RMS at this k"),
+        ("height", f"z = {engineering(scan.height, 'm')}"),
+    ]
+    if scan.contact_lost > 0.0:
+        facts.append(("no contact", f"on {100.0 * scan.contact_lost:.0f} % of the scan"))
+    return facts
 
 
 # --- in a terminal --------------------------------------------------------------------------------
@@ -131,7 +219,7 @@ def print_analysis(analysis: Analysis, console: Console, texture: str = "") -> N
 # --- as a page ------------------------------------------------------------------------------------
 
 
-def analysis_page(analysis: Analysis, texture: str = "") -> Page:
+def analysis_page(analysis: Analysis, texture: str = "") -> page.Page:
     """Return the report: verdict, numbers, criteria, pictures and assumptions.
 
     Args:
@@ -140,25 +228,25 @@ def analysis_page(analysis: Analysis, texture: str = "") -> Page:
             :func:`asperity.report.words.reproduction_words.reproduction`.
     """
     law, code = analysis.surface.law, "\n".join(reproduction(analysis, texture))
-    return Page(
+    return page.Page(
         title=f"Law {law.letter} on the {analysis.device.name}",
         answer=analysis.answer,
         facts=_facts(analysis),
         sections=[
             _numbers(analysis),
-            Section("Three lines that reproduce q", [Words(code, "code")]),
+            page.Section("Three lines that reproduce q", [page.Words(code, "code")]),
             *_pictures(analysis, "gain", "top", "depth"),
             _criteria(analysis),
-            Section("The worst loop", [pairs(leak_facts(analysis))]),
+            page.Section("The worst loop", [page.pairs(leak_facts(analysis))]),
             *_pictures(analysis, "field"),
             _continuity(analysis),
             *_pictures(analysis, "jumps"),
-            Section("On a straight scan", [pairs(merit_facts(analysis))]),
-            *added_sections(Analysis, analysis),
-            *assumed(analysis.assumptions, numbers_table(analysis.device, _USED)),
-            Section("How to read it", [Definitions(glossary.ANALYSIS)]),
+            page.Section("On a straight scan", [page.pairs(merit_facts(analysis))]),
+            *page.added_sections(Analysis, analysis),
+            *page.assumed(analysis.assumptions, numbers_table(analysis.device, _USED)),
+            page.Section("How to read it", [page.Definitions(glossary.ANALYSIS)]),
         ],
-        footer=f"{PAPER}. {UNFELT}",
+        footer=f"{page.PAPER}. {page.UNFELT}",
     )
 
 
@@ -177,27 +265,34 @@ def _facts(analysis: Analysis) -> list[tuple[str, str]]:
     ]
 
 
-def _numbers(analysis: Analysis) -> Section:
+def _numbers(analysis: Analysis) -> page.Section:
     rows = [_number_cells(name, bound) for name, bound in numbers(analysis)]
     table = page.Table(
         (*_NUMBERS, "lower is attained at"),
-        [Row([Cell(name, "l"), *cells]) for name, *cells in rows],
+        [page.Row([page.Cell(name, "l"), *cells]) for name, *cells in rows],
         numbers=(1, 2),
     )
-    return Section("The numbers", [table], notes=notes(analysis))
+    return page.Section("The numbers", [table], notes=notes(analysis))
 
 
-def _criteria(analysis: Analysis) -> Section:
+def _criteria(analysis: Analysis) -> page.Section:
     judged = analysis.passivity
     rows = []
     for criterion in judged.criteria:
         name, formula, _holds, limit, margin = _criterion_cells(criterion)
-        said = Cell(criterion.says, below=criterion.assumptions)
-        holds = holds_cell(criterion.holds)
-        cells: Cells = [Cell(name, "l"), Cell(formula, "line"), holds, limit, margin, said]
-        rows.append(Row(cells, "best" if name == judged.decided_by else ""))
+        said = page.Cell(criterion.says, below=criterion.assumptions)
+        holds = page.holds_cell(criterion.holds)
+        cells: page.Cells = [
+            page.Cell(name, "l"),
+            page.Cell(formula, "line"),
+            holds,
+            limit,
+            margin,
+            said,
+        ]
+        rows.append(page.Row(cells, "best" if name == judged.decided_by else ""))
     headings = (*_CRITERIA, "what it says, and rests on")
-    return Section(
+    return page.Section(
         f"Passive on the {analysis.device.name}?",
         [page.Table(headings, rows, numbers=(3, 4))],
         caption=(
@@ -208,20 +303,20 @@ def _criteria(analysis: Analysis) -> Section:
     )
 
 
-def _continuity(analysis: Analysis) -> Section:
-    blocks: list[page.Block] = [Words(analysis.continuity.reason)]
-    rows = [Row(cells) for cells in jump_rows(analysis)]
+def _continuity(analysis: Analysis) -> page.Section:
+    blocks: list[page.Block] = [page.Words(analysis.continuity.reason)]
+    rows = [page.Row(cells) for cells in jump_rows(analysis)]
     if rows:
         blocks.append(page.Table((*_JUMPS, "near"), rows, numbers=(0, 1)))
-    return Section("Continuity", blocks)
+    return page.Section("Continuity", blocks)
 
 
-def _pictures(analysis: Analysis, *names: str) -> list[Section]:
+def _pictures(analysis: Analysis, *names: str) -> list[page.Section]:
     """Return the pictures of these names that the analysis has."""
     from asperity.report.pictures.analysis_pictures import analysis_figure, pictures_of
 
     return [
-        pictured(title, analysis_figure(analysis, name), caption, level=3)
+        page.pictured(title, analysis_figure(analysis, name), caption, level=3)
         for name, (title, caption) in ((name, _CAPTIONS[name]) for name in names)
         if name in pictures_of(analysis)
     ]

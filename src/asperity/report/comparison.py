@@ -11,18 +11,6 @@ from asperity.analysis.compare import Comparison
 from asperity.analysis.row import LawRow
 from asperity.report import page, terminal
 from asperity.report.devices import numbers_table
-from asperity.report.page import (
-    PAPER,
-    UNFELT,
-    Cell,
-    Definitions,
-    Page,
-    Row,
-    Section,
-    added_sections,
-    assumed,
-    pictured,
-)
 from asperity.report.terminal import Column
 from asperity.report.words import glossary
 from asperity.report.words.comparison_words import (
@@ -62,21 +50,21 @@ def _headings(comparison: Comparison) -> list[str]:
     return [f"T{unit}" if heading == "T" else heading for heading in _HEADINGS]
 
 
-def _cells(row: LawRow, comparison: Comparison) -> list[Cell]:
+def _cells(row: LawRow, comparison: Comparison) -> list[page.Cell]:
     """Return what the columns say of a law."""
     return [
-        Cell(row.law.letter, "l"),
-        Cell(law_title(row.law.name)),
-        Cell(bound_text(row.q), note=f"{row.q.method}: {row.q.note}"),
-        Cell(bound_text(row.one_sided), note=f"{row.one_sided.method}: {row.one_sided.note}"),
-        Cell(stiffness_text(row)),
-        Cell(row.rule),
-        Cell(holds_text(row.conservative), note=row.conservative_reason),
-        Cell(leak_text(row, comparison), note=row.leak.description),
-        Cell(holds_text(row.continuous), note=row.continuous_reason),
-        Cell(merit_text(row.strength)),
-        Cell(merit_text(row.support)),
-        Cell(force_text(row.texture_force)),
+        page.Cell(row.law.letter, "l"),
+        page.Cell(law_title(row.law.name)),
+        page.Cell(bound_text(row.q), note=f"{row.q.method}: {row.q.note}"),
+        page.Cell(bound_text(row.one_sided), note=f"{row.one_sided.method}: {row.one_sided.note}"),
+        page.Cell(stiffness_text(row)),
+        page.Cell(row.rule),
+        page.Cell(holds_text(row.conservative), note=row.conservative_reason),
+        page.Cell(leak_text(row, comparison), note=row.leak.description),
+        page.Cell(holds_text(row.continuous), note=row.continuous_reason),
+        page.Cell(merit_text(row.strength)),
+        page.Cell(merit_text(row.support)),
+        page.Cell(force_text(row.texture_force)),
     ]
 
 
@@ -151,9 +139,9 @@ def print_comparison(comparison: Comparison, console: Console) -> None:
 # --- as a page ------------------------------------------------------------------------------------
 
 
-def comparison_page(comparison: Comparison) -> Page:
+def comparison_page(comparison: Comparison) -> page.Page:
     """Return the report: answer, tables, pictures, assumptions and pedigree."""
-    return Page(
+    return page.Page(
         title=f"Haptic texture on {comparison.device.name}",
         answer=comparison.recommendation,
         facts=_facts(comparison),
@@ -161,15 +149,15 @@ def comparison_page(comparison: Comparison) -> Page:
             _laws(comparison),
             _troubles(comparison),
             *_pictures(comparison),
-            *added_sections(Comparison, comparison),
-            *assumed(
+            *page.added_sections(Comparison, comparison),
+            *page.assumed(
                 comparison.assumptions,
                 numbers_table(comparison.device, list(comparison.device.data)),
             ),
             _pedigree(comparison),
-            Section("How to read it", [Definitions(glossary.COMPARISON)]),
+            page.Section("How to read it", [page.Definitions(glossary.COMPARISON)]),
         ],
-        footer=f"{PAPER}. {UNFELT}",
+        footer=f"{page.PAPER}. {page.UNFELT}",
     )
 
 
@@ -185,41 +173,47 @@ def _facts(comparison: Comparison) -> list[tuple[str, str]]:
     ]
 
 
-def _rows(comparison: Comparison, cells: Callable[[LawRow], Sequence[str | Cell]]) -> list[Row]:
+def _rows(
+    comparison: Comparison, cells: Callable[[LawRow], Sequence[str | page.Cell]]
+) -> list[page.Row]:
     """Return a row per law, the recommended one tinted."""
-    return [Row(cells(row), "best" if _is_best(row, comparison) else "") for row in comparison.rows]
+    return [
+        page.Row(cells(row), "best" if _is_best(row, comparison) else "") for row in comparison.rows
+    ]
 
 
-def _laws(comparison: Comparison) -> Section:
+def _laws(comparison: Comparison) -> page.Section:
     headings = [text.replace("-\n", "").replace("\n", " ") for text in _headings(comparison)]
     rows = _rows(comparison, lambda row: _cells(row, comparison))
     notes = [SAMPLED_NOTE] if any_sampled(comparison) else []
-    return Section("The laws compared", [page.Table(headings, rows, _NUMBERS)], notes=notes)
+    return page.Section("The laws compared", [page.Table(headings, rows, _NUMBERS)], notes=notes)
 
 
-def _troubles(comparison: Comparison) -> Section:
-    rows = _rows(comparison, lambda row: [Cell(row.law.letter, "l"), row.verdict])
-    return Section("What will go wrong", [page.Table((), rows)])
+def _troubles(comparison: Comparison) -> page.Section:
+    rows = _rows(comparison, lambda row: [page.Cell(row.law.letter, "l"), row.verdict])
+    return page.Section("What will go wrong", [page.Table((), rows)])
 
 
-def _pictures(comparison: Comparison) -> list[Section]:
+def _pictures(comparison: Comparison) -> list[page.Section]:
     from asperity.report.pictures.plots import PICTURES
 
     depth = engineering(comparison.max_depth, "m")
     stiffness = engineering(comparison.stiffness, "N/m")
     return [
-        pictured(title, PICTURES[name](comparison), words.format(depth=depth, stiffness=stiffness))
+        page.pictured(
+            title, PICTURES[name](comparison), words.format(depth=depth, stiffness=stiffness)
+        )
         for name, (title, words) in _CAPTIONS.items()
     ]
 
 
-def _pedigree(comparison: Comparison) -> Section:
+def _pedigree(comparison: Comparison) -> page.Section:
     """Return how each number came about."""
     headings = ("law", "q", "attained at", "q⁺", "conservative", "leak", "continuous")
     rows = [
-        Row(
+        page.Row(
             [
-                Cell(row.law.letter, "l"),
+                page.Cell(row.law.letter, "l"),
                 f"{bound_text(row.q)} ({row.q.method}: {row.q.note})",
                 place_text(row.q.at),
                 f"{bound_text(row.one_sided)} ({row.one_sided.method}: {row.one_sided.note})",
@@ -230,7 +224,7 @@ def _pedigree(comparison: Comparison) -> Section:
         )
         for row in comparison.rows
     ]
-    return Section("Where the numbers come from", [page.Table(headings, rows)])
+    return page.Section("Where the numbers come from", [page.Table(headings, rows)])
 
 
 _CAPTIONS = {

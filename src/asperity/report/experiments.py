@@ -9,12 +9,11 @@ from asperity.paper.experiments.beyond import BeyondExperiment, DeviceOnset
 from asperity.paper.experiments.bump import BumpExperiment
 from asperity.paper.experiments.passivity import PassivityExperiment
 from asperity.paper.experiments.scanning import ScanningExperiment
-from asperity.report.onset import onset_cells, onset_section
+from asperity.report.onset import newton, onset_cells, onset_section
 from asperity.report.page import Cell, Cells, Row, Section, Table, pictured
 from asperity.report.pictures import experiment_pictures, paper_pictures
 from asperity.report.pictures.onset_picture import onset_figure
-from asperity.report.words.onset_words import newton
-from asperity.report.words.scan_words import milli
+from asperity.report.scan import milli
 from asperity.units import engineering
 
 

@@ -5,35 +5,14 @@ from __future__ import annotations
 from rich.console import Console
 from rich.table import Table
 
-from asperity.analysis.limits.limit_result import Limits
-from asperity.analysis.words.limits import speed_text, speeds_text, stiffness_text
+from asperity.analysis.limits.limit_result import Limits, RenderedWave
+from asperity.analysis.limits.limit_rules import RULES, Limit
+from asperity.analysis.words.limits import percent, speed_text, speeds_text, stiffness_text
 from asperity.report import page, terminal
 from asperity.report.devices import numbers_table
-from asperity.report.page import (
-    PAPER,
-    UNFELT,
-    Cell,
-    Cells,
-    Definitions,
-    Page,
-    Row,
-    Section,
-    added_sections,
-    assumed,
-    holds_cell,
-    pictured,
-)
 from asperity.report.terminal import Column, say
 from asperity.report.words import glossary
-from asperity.report.words.limits_words import (
-    ON_WAVES,
-    limit_cells,
-    more_text,
-    shown_waves,
-    symbols,
-    wave_cells,
-)
-from asperity.report.words.number_words import holds_text, law_title
+from asperity.report.words.number_words import INFINITE, NONE, holds_text, law_title
 from asperity.units import engineering
 
 _NAMES_FROM = 96
@@ -44,6 +23,86 @@ _NAME, _HOLDS, _FOR, _SPEEDS = 1, 5, 6, 7
 _NUMBERS = (3, 4, _FOR)
 _WAVES = ("wavelength", "amplitude", "share", "frequency", "force")
 _SIDES = "Left and right: of the wave that comes closest to breaking the limit; for: share of the "
+
+
+MOST_WAVES = 16
+"""Waves that a table lists: those that carry most of the heights."""
+
+ON_WAVES = tuple(rule.number for rule in RULES if rule.number != 5)
+_SYMBOLS = {
+    "T": "update_rate", "δ": "position_resolution", "b": "force_resolution",
+    "K₀": "max_stiffness", "F₀": "bandwidth",
+}  # fmt: skip
+
+
+def side_text(side: float | None, unit: str) -> str:
+    """Return a side of an inequality for reading; "–" where it is not known.
+
+    Example:
+        >>> side_text(5e-5, "m"), side_text(float("inf"), "N/m"), side_text(None, "Hz")
+        ('50 µm', '∞', '–')
+    """
+    if side is None:
+        return NONE
+    return INFINITE if side == float("inf") else engineering(side, unit)
+
+
+def limit_cells(limit: Limit) -> list[str]:
+    """Return number, name, condition, both sides, whether it holds, share, and speeds."""
+    return [
+        str(limit.number),
+        limit.name,
+        limit.inequality,
+        side_text(limit.left, limit.unit),
+        side_text(limit.right, limit.unit),
+        holds_text(limit.holds),
+        "" if limit.share is None else percent(limit.share),
+        f"needs {', '.join(limit.needs)}" if limit.needs else speeds_text(limit.speeds),
+    ]
+
+
+def wave_cells(wave: RenderedWave) -> list[str]:
+    """Return wavelength, amplitude, share of the height variance, frequency, force, and speeds."""
+    return [
+        engineering(wave.wavelength, "m"),
+        engineering(wave.amplitude, "m"),
+        percent(wave.share),
+        engineering(wave.frequency, "Hz"),
+        engineering(wave.force, "N", digits=2),
+        speeds_text((0.0, wave.top_speed)),
+    ]
+
+
+def shown_waves(result: Limits) -> list[RenderedWave]:
+    """Return the waves that a table lists, the longest first."""
+    most = sorted(result.waves, key=lambda wave: -wave.share)[:MOST_WAVES]
+    return sorted(most, key=lambda wave: -wave.wavelength)
+
+
+def more_text(result: Limits) -> str:
+    """Return how many waves are not listed; empty if all are."""
+    more = len(result.waves) - MOST_WAVES
+    return f"and {more} more with less of the height variance" if more > 0 else ""
+
+
+def symbols(result: Limits) -> list[str]:
+    """Return what the symbols mean, with the values that went in."""
+    device, surface = result.device, result.surface
+    known = []
+    for symbol, field in _SYMBOLS.items():
+        if field not in device.data:
+            continue
+        datum = device.data[field]
+        text = f"1/({datum.text})" if field == "update_rate" else datum.text
+        known.append(f"{symbol} = {text}{'' if datum.verified else ' (not verified)'}")
+    q = INFINITE if result.gain.value == float("inf") else f"{result.gain.value:.4g}"
+    return [
+        f"v = {speed_text(result.speed)}, α = {result.time_samples:g}, "
+        f"β = {result.position_samples:g}, γ = {result.force_steps:g}; {device.name}: "
+        f"{', '.join(known) or 'nothing known'}",
+        f"Law {surface.law.letter} at k = {stiffness_text(result)}: "
+        f"{result.gain_symbol} = {q} ({result.gain.method})",
+    ]
 
 
 # --- in a terminal --------------------------------------------------------------------------------
@@ -108,10 +167,10 @@ def print_limits(result: Limits, console: Console) -> None:
 # --- as a page ------------------------------------------------------------------------------------
 
 
-def limits_page(result: Limits) -> Page:
+def limits_page(result: Limits) -> page.Page:
     """Return the report: answer, limits, picture, waves and assumptions."""
     used = [*dict.fromkeys(limit.uses for limit in result.limits), "friction"]
-    return Page(
+    return page.Page(
         title=f"Will I feel it? Law {result.surface.law.letter} on {result.device.name}",
         answer=result.answer,
         facts=_facts(result),
@@ -119,11 +178,11 @@ def limits_page(result: Limits) -> Page:
             _limits(result),
             _picture(result),
             *_waves(result),
-            *added_sections(Limits, result),
-            *assumed(result.assumptions, numbers_table(result.device, used)),
-            Section("How to read it", [Definitions(glossary.LIMITS)]),
+            *page.added_sections(Limits, result),
+            *page.assumed(result.assumptions, numbers_table(result.device, used)),
+            page.Section("How to read it", [page.Definitions(glossary.LIMITS)]),
         ],
-        footer=f"{PAPER}, section II.B. {UNFELT}",
+        footer=f"{page.PAPER}, section II.B. {page.UNFELT}",
     )
 
 
@@ -141,22 +200,22 @@ def _facts(result: Limits) -> list[tuple[str, str]]:
     ]
 
 
-def _limits(result: Limits) -> Section:
+def _limits(result: Limits) -> page.Section:
     rows = []
     for limit in result.limits:
-        cells: Cells = [*limit_cells(limit)]
-        cells[0] = Cell(str(limit.number), "l")
-        cells[_HOLDS] = holds_cell(limit.holds)
-        rows.append(Row(cells))
+        cells: page.Cells = [*limit_cells(limit)]
+        cells[0] = page.Cell(str(limit.number), "l")
+        cells[_HOLDS] = page.holds_cell(limit.holds)
+        rows.append(page.Row(cells))
     note = (
         "Left and right are those of the wave that comes closest to breaking the limit. “For” is "
         "the share of the height variance in waves that meet it."
     )
     notes = [*symbols(result), note]
-    return Section("The six limits", [page.Table(_LIMITS, rows, _NUMBERS)], notes=notes)
+    return page.Section("The six limits", [page.Table(_LIMITS, rows, _NUMBERS)], notes=notes)
 
 
-def _picture(result: Limits) -> Section:
+def _picture(result: Limits) -> page.Section:
     from asperity.report.pictures.limits_picture import limits_figure
 
     caption = (
@@ -165,18 +224,18 @@ def _picture(result: Limits) -> Section:
         "speed; below a dashed line it is too weak. Filled: meets every limit on waves that could "
         "be decided."
     )
-    return pictured("The waves and their forces", limits_figure(result), caption)
+    return page.pictured("The waves and their forces", limits_figure(result), caption)
 
 
-def _waves(result: Limits) -> list[Section]:
+def _waves(result: Limits) -> list[page.Section]:
     if not result.waves:
         return []
     rows = []
     for wave in shown_waves(result):
         *cells, speeds = wave_cells(wave)
-        holds = [holds_cell(wave.holds.get(number)) for number in ON_WAVES]
-        rows.append(Row([*cells, *holds, speeds]))
+        holds = [page.holds_cell(wave.holds.get(number)) for number in ON_WAVES]
+        rows.append(page.Row([*cells, *holds, speeds]))
     headings = (*_WAVES, *(f"limit {number}" for number in ON_WAVES), "at speeds")
     table = page.Table(headings, rows, numbers=range(len(_WAVES)))
     more = more_text(result)
-    return [Section("Wave by wave", [table], notes=[f"{more.capitalize()}."] if more else [])]
+    return [page.Section("Wave by wave", [table], notes=[f"{more.capitalize()}."] if more else [])]

@@ -8,12 +8,12 @@ from itertools import groupby
 from rich.console import Console
 from rich.text import Text
 
-from asperity.paper import Result, Verdict
+from asperity.paper import VERDICTS, Result, Verdict
+from asperity.paper.claim import Number
 from asperity.paper.experiments import Experiments
 from asperity.report import page, terminal
 from asperity.report.page import Cell, Cells, Page, Row, Section, added_sections, assumed
 from asperity.report.terminal import Column, say
-from asperity.report.words.claim_words import counts_text, evidence_text
 
 # Colour in a terminal, and kind of cell on a page.
 _LOOKS: dict[Verdict, tuple[str, str]] = {
@@ -32,6 +32,21 @@ _FOOTER = (
     "on Campion and Hayward, “On the Synthesis of Haptic Textures”. Every verdict follows from "
     "numbers that are computed when this page is made."
 )
+
+
+def counts_text(results: Sequence[Result]) -> str:
+    """Return how many claims got each verdict, "55 hold, ..."."""
+    counts = {verdict: sum(r.verdict == verdict for r in results) for verdict in VERDICTS}
+    words = ("hold", "hold with a correction", "do not hold", "are undecided")
+    parts = [f"{count} {word}" for count, word in zip(counts.values(), words, strict=True)]
+    return f"Of {len(results)} claims {', '.join(parts)}."
+
+
+def evidence_text(value: Number) -> str:
+    """Return a number of the evidence as text."""
+    if isinstance(value, list):
+        return ", ".join(f"{item:.10g}" for item in value)
+    return value if isinstance(value, str) else f"{value:.10g}"
 
 
 def _verdict(result: Result) -> Text:
