@@ -20,7 +20,7 @@ from asperity.cli.options import LAW_OPTIONS, help_of
 from asperity.cli.progress import progress_bar, step_bar
 from asperity.laws import LAWS
 from asperity.measured.arguments import FILE_ARGUMENTS
-from asperity.scene.onsets import onsets
+from asperity.scene.sweeps import onsets
 
 READ_A_SURFACE = ["analyze", "compare", "limits", "onset", "scan", "simulate"]
 

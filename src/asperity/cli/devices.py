@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 
     from asperity.devices import Device
 
-SCHEMA = 1
-
 
 @click.command("devices")
 @click.argument("names", nargs=-1, metavar="[ID|FILE]...")
@@ -30,7 +28,7 @@ def command(names: tuple[str, ...], outputs: Outputs) -> None:
     from asperity.devices import device_names, load_device
 
     devices = [load_device(name) for name in names or device_names()]
-    data = {"schema": SCHEMA, "devices": devices}
+    data = {"schema": 1, "devices": devices}
     outputs.write(data, lambda console: _print(devices, bool(names), console))
 
 

@@ -67,7 +67,7 @@ def command(
 def _onsets(
     setup: Setup, laws: Sequence[Law], delays: Sequence[int], search: dict[str, Any]
 ) -> tuple[Prediction, ...]:
-    from asperity.scene.onsets import onsets
+    from asperity.scene.sweeps import onsets
 
     done, total = count(1), len(laws) * len(delays)
     letters = [law.letter for law in laws]

@@ -41,7 +41,7 @@ def command(scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **values
 
     The motion of the scene must be strokes; their speed and depth are replaced.
     """
-    from asperity.scene.scans import scans
+    from asperity.scene.sweeps import scans
 
     chosen = chosen_laws(laws, values["law"])
     setup = read_setup(scene, values, laws=chosen)

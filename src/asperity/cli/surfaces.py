@@ -7,8 +7,6 @@ import click
 from asperity.cli.options import own_code_option
 from asperity.cli.output import Outputs, output_options
 
-SCHEMA = 1
-
 
 @click.command("surfaces")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
@@ -27,7 +25,7 @@ def command(names: tuple[str, ...], outputs: Outputs) -> None:
 
     listed = listed_surfaces(names)
     outputs.write(
-        {"schema": SCHEMA, "surfaces": listed},
+        {"schema": 1, "surfaces": listed},
         lambda console: print_surfaces(listed, console, in_detail=bool(names)),
         lambda: surfaces_page(listed),
         "Pictures",

@@ -12,7 +12,7 @@ from asperity.paper.experiments.scanning import ScanningExperiment
 from asperity.report.onset import newton, onset_cells, onset_section
 from asperity.report.page import Cell, Cells, Row, Section, Table, pictured
 from asperity.report.pictures import experiment_pictures, paper_pictures
-from asperity.report.pictures.onset_picture import onset_figure
+from asperity.report.pictures.sweep_pictures import onset_figure
 from asperity.report.scan import milli
 from asperity.units import engineering
 

@@ -110,7 +110,7 @@ def print_onsets(setup: Setup, found: Sequence[Prediction], console: Console) ->
 
 def onset_page(setup: Setup, found: Sequence[Prediction]) -> Page:
     """Return the report of the onsets."""
-    from asperity.report.pictures.onset_picture import onset_figure
+    from asperity.report.pictures.sweep_pictures import onset_figure
 
     caption = (
         "Stiffness at which the first of the starts ends in a limit cycle, and what the criteria "

@@ -93,7 +93,7 @@ def print_scans(setup: Setup, found: Sequence[Stroke], console: Console) -> None
 
 def scan_page(setup: Setup, found: Sequence[Stroke]) -> Page:
     """Return the report of the strokes."""
-    from asperity.report.pictures.scan_picture import scan_figure
+    from asperity.report.pictures.sweep_pictures import scan_figure
 
     caption = (
         "Energy that the texture supplies per stroke: black the sum, orange along x, blue along z. "

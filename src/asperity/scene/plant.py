@@ -104,14 +104,9 @@ def default_servo(device: Device, *, keeps_delay: bool = True) -> tuple[Servo, l
     if rate is None:
         rate = DEFAULT_RATE
         said.append(f"The update rate of {device.name} is not known; {rate:g} Hz is simulated")
-    values: dict[str, Any] = {
-        "position_resolution": device.value("position_resolution"),
-        "force_resolution": device.value("force_resolution"),
-        "max_force": device.value("max_force"),
-        "virtual_damping": device.value("virtual_damping"),
-    }
+    fields = ("position_resolution", "force_resolution", "max_force", "virtual_damping")
+    known: dict[str, Any] = {name: device.value(name) for name in fields if name in device.data}
     delay = device.value("delay_samples")
     if delay is None and keeps_delay:
         said.append(f"The delay of {device.name} is not known; none is simulated")
-    known = {name: value for name, value in values.items() if value is not None}
     return Servo(1.0 / rate, delay=int(delay or 0), **known), said

@@ -10,7 +10,7 @@ import numpy as np
 from asperity.checks import FloatArray
 from asperity.files import Record
 from asperity.paper.experiments.settings import FITTED, LAG, LETTERS, band_setup
-from asperity.scene.onsets import onsets
+from asperity.scene.sweeps import onsets
 from asperity.simulation.onset import ends_in_cycle, offsets, runner
 from asperity.simulation.prediction import Prediction
 

@@ -13,7 +13,7 @@ from asperity.analysis.bounds.highest import highest_point
 from asperity.analysis.bounds.measures import spectral_norm
 from asperity.checks import FloatArray
 from asperity.report.pictures.field_picture import Window
-from asperity.report.pictures.map_grid import map_grid
+from asperity.report.pictures.surface_picture import map_grid
 from asperity.report.pictures.vertical_cut import Stretch, feature_length, stretch_of
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine

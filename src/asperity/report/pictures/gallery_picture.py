@@ -8,8 +8,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from asperity.report.pictures import style
-from asperity.report.pictures.map_grid import map_grid
-from asperity.report.pictures.surface_picture import draw_scale_bar, relief
+from asperity.report.pictures.surface_picture import draw_scale_bar, map_grid, relief
 from asperity.textures.texture import Texture
 
 _MAP_POINTS = 420
