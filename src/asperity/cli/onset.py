@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +16,6 @@ from asperity.errors import ParameterError
 
 if TYPE_CHECKING:
     from asperity.laws import Law
-    from asperity.scene.setup import Setup
-    from asperity.simulation.prediction import Prediction
 
 _DELAYS = Argument(
     "delays", "delays in samples", default_words="0 to 5", form="integer", example="0; 2; 5"
@@ -54,7 +51,12 @@ def command(
         raise ParameterError("stiffness", "is what onset looks for: leave it out")
     chosen = chosen_laws(laws, values["law"])
     setup = read_setup(scene, values, duration, chosen, keeps_delay=False)
-    found = _onsets(setup, chosen, delays or list(range(6)), given(values, _SEARCH))
+    from asperity.scene.sweeps import onsets
+
+    lags, letters = delays or list(range(6)), [law.letter for law in chosen]
+    done, total, search = count(1), len(letters) * len(lags), given(values, _SEARCH)
+    with progress_bar("looking for onsets") as told:
+        found = onsets(setup, letters, lags, progress=lambda: told(next(done) / total), **search)
 
     from asperity.report.onset import onset_page, print_onsets
 
@@ -62,14 +64,3 @@ def command(
     outputs.write(
         data, lambda console: print_onsets(setup, found, console), lambda: onset_page(setup, found)
     )
-
-
-def _onsets(
-    setup: Setup, laws: Sequence[Law], delays: Sequence[int], search: dict[str, Any]
-) -> tuple[Prediction, ...]:
-    from asperity.scene.sweeps import onsets
-
-    done, total = count(1), len(laws) * len(delays)
-    letters = [law.letter for law in laws]
-    with progress_bar("looking for onsets") as told:
-        return onsets(setup, letters, delays, progress=lambda: told(next(done) / total), **search)

@@ -121,7 +121,8 @@ def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
     texture = dict(content.get("texture", {}))
     kind = texture.pop("kind", None)
     if not isinstance(kind, str):
-        raise ParameterError("scene", f"{path.name} needs [texture] with kind = {_kinds()}", kind)
+        known = " | ".join(f'"{name}"' for name in KINDS)
+        raise ParameterError("scene", f"{path.name} needs [texture] with kind = {known}", kind)
     if kind == "file":
         texture |= extra
     else:
@@ -139,10 +140,6 @@ def _refuse_code(content: Mapping[str, Any]) -> None:
         if name.replace("-", "_").lower() in {"law_module", "law_modules"}:
             words = "a scene never runs code; name the file on the command line, --law-module FILE"
             raise ParameterError(name, f"is refused: {words}")
-
-
-def _kinds() -> str:
-    return " | ".join(f'"{kind}"' for kind in KINDS)
 
 
 def _scene_device(section: Mapping[str, Any]) -> Device:

@@ -106,7 +106,7 @@ def draw_field(figure: Part, analysis: Analysis) -> None:
     for arrows in axes.findobj(Quiver):
         # Seen on the darkest curl, too.
         arrows.set_path_effects([withStroke(linewidth=1.2, foreground="white")])
-    wide, high = _units(window)
+    wide, high = window.units
     if not _is_true(window):
         axes.set_aspect("auto")
     style.label(axes, f"{_along_text(window)} [{wide.name}]", f"z [{high.name}]")
@@ -121,13 +121,6 @@ def draw_field(figure: Part, analysis: Analysis) -> None:
 def _is_true(window: Window) -> bool:
     """Return whether a picture true to scale fills its panel well."""
     return _BROAD / _TALL <= window.stretch.length / (window.top - window.bottom) <= _FLATTEST
-
-
-def _units(window: Window) -> tuple[style.Unit, style.Unit]:
-    return (
-        style.length_unit(window.stretch.length),
-        style.length_unit(window.top - window.bottom),
-    )
 
 
 def _draw_loop(axes: Axes, x: FloatArray, z: FloatArray) -> None:
@@ -152,7 +145,7 @@ def _pale(axes: Axes, analysis: Analysis, window: Window, field: CurlField) -> N
     beyond = depth - analysis.surface.max_depth
     if beyond.max() <= 0.0:
         return
-    wide, high = _units(window)
+    wide, high = window.units
     places = (field.along * wide.scale, field.z * high.scale)
     axes.contourf(*places, beyond, [0.0, math.inf], colors=[style.FREE], alpha=0.8, zorder=4.5)
     axes.contour(*places, beyond, [0.0], colors=[style.SOFT], linewidths=0.9, zorder=4.6)
@@ -181,7 +174,7 @@ def _gain_scale(analysis: Analysis, values: FloatArray) -> LogNorm:
 def draw_gain(figure: Part, analysis: Analysis) -> None:
     """Draw ‖J‖/k in the vertical plane through the witness of q, and the witness."""
     window, surface = gain_window(analysis), analysis.surface
-    wide, high = _units(window)
+    wide, high = window.units
     field = curl_field(surface, window.stretch, window.bottom, *_CELLS)
     scale = _gain_scale(analysis, field.gain)
     axes: Axes = figure.subplots()

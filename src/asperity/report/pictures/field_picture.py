@@ -46,19 +46,21 @@ class Window:
     bottom: float
     top: float
 
+    @property
+    def units(self) -> tuple[style.Unit, style.Unit]:
+        """The units in which its width and its height are best read."""
+        return style.length_unit(self.stretch.length), style.length_unit(self.top - self.bottom)
+
 
 @dataclass(frozen=True)
 class _Scene:
     """What all panels share."""
 
-    stretch: Stretch
-    bottom: float
-    top: float
+    window: Window
     wide: style.Unit
     high: style.Unit
     limit: float
     per_inch: float
-    true_to_scale: bool
 
 
 def field_stretch(surfaces: Sequence[Surface]) -> Stretch:
@@ -84,9 +86,8 @@ def _columns(count: int) -> int:
 
 
 def _panel_ratio(surfaces: Sequence[Surface]) -> float:
-    stretch = field_stretch(surfaces)
-    bottom, top = field_range(surfaces, stretch)
-    return min(max(stretch.length / (top - bottom), _TALLEST), _FLATTEST)
+    window = field_window(surfaces)
+    return min(max(window.stretch.length / (window.top - window.bottom), _TALLEST), _FLATTEST)
 
 
 def field_window(surfaces: Sequence[Surface]) -> Window:
@@ -138,26 +139,12 @@ def _scene(
     curls: Sequence[CurlField],
     arrows: Sequence[ArrowField],
 ) -> _Scene:
-    stretch, bottom, top = window.stretch, window.bottom, window.top
-    true_ratio = stretch.length / (top - bottom)
     strong = [np.abs(c.curl).ravel() for c in curls if np.abs(c.curl).max() > 1e-9 * c.norm]
     limit = float(np.quantile(np.concatenate(strong), 0.97)) if strong else surfaces[0].stiffness
     sizes = np.concatenate([np.hypot(a.tangential, a.normal) for a in arrows])
     usual = float(np.quantile(sizes, 0.9)) if sizes.size else 1.0
-    return _Scene(
-        stretch,
-        bottom,
-        top,
-        style.length_unit(stretch.length),
-        style.length_unit(top - bottom),
-        _rounded_limit(limit),
-        usual / 0.32,
-        _TALLEST <= true_ratio <= _FLATTEST,
-    )
-
-
-def _rounded_limit(limit: float) -> float:
-    return 2.0 * style.nice_length(0.5 * limit) if limit > 0.0 else 1.0
+    rounded = 2.0 * style.nice_length(0.5 * limit) if limit > 0.0 else 1.0
+    return _Scene(window, *window.units, rounded, usual / 0.32)
 
 
 def _draw_curl(axes: Axes, field: CurlField, scene: _Scene) -> Any:
@@ -198,9 +185,9 @@ def _draw_arrows(axes: Axes, field: ArrowField, scene: _Scene) -> Any:
 
 def _draw_outline(axes: Axes, surface: Surface, scene: _Scene) -> None:
     """Draw the textured body, the surface where contact begins if another, and the scan."""
-    along = scene.stretch.steps(600)
+    along = scene.window.stretch.steps(600)
     x = along * scene.wide.scale
-    xy = scene.stretch.xy(along)
+    xy = scene.window.stretch.xy(along)
     heights = surface.texture.height(xy) * scene.high.scale
     contact = surface.law.contact
     felt = contact.begins_on_texture
@@ -215,10 +202,12 @@ def _draw_outline(axes: Axes, surface: Surface, scene: _Scene) -> None:
 
 def _finish(figure: Figure | SubFigure, panels: list[Axes], scene: _Scene, drawn: Any) -> None:
     mesh, quiver = drawn
+    window = scene.window
+    true_to_scale = _TALLEST <= window.stretch.length / (window.top - window.bottom) <= _FLATTEST
     for axes in panels:
-        axes.set_xlim(0.0, scene.stretch.length * scene.wide.scale)
-        axes.set_ylim(scene.bottom * scene.high.scale, scene.top * scene.high.scale)
-        if scene.true_to_scale and scene.wide == scene.high:
+        axes.set_xlim(0.0, window.stretch.length * scene.wide.scale)
+        axes.set_ylim(window.bottom * scene.high.scale, window.top * scene.high.scale)
+        if true_to_scale and scene.wide == scene.high:
             axes.set_aspect("equal")
     bar = figure.colorbar(
         mesh, ax=panels, location="bottom", shrink=0.5, aspect=40, extend="both", pad=0.02

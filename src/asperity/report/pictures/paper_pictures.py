@@ -62,16 +62,21 @@ def _is_flat(law: str) -> bool:
 
 
 def _draw_body(axes: Axes, panel: ForceField) -> None:
-    """Draw what is solid, the texture, and the wall where depth is counted from it."""
-    x, height = panel.x * _MILLI, panel.height * _MILLI
+    """Draw what is solid, and show the part of the plane that the field fills."""
     low, high = panel.points[..., 1].min() * _MILLI, panel.points[..., 1].max() * _MILLI
-    flat = _is_flat(panel.law)
-    axes.fill_between(x, 0.0 * height if flat else height, low, color=style.BODY, lw=0.0, alpha=0.6)
-    axes.plot(x, height, color=style.INK, lw=1.2, ls=":" if flat else "-")
-    if flat:
-        axes.axhline(0.0, color=style.INK, lw=1.2)
+    _draw_solid(axes, panel, low, 1.2)
     axes.set_xlim(panel.points[..., 0].min() * _MILLI, panel.points[..., 0].max() * _MILLI)
     axes.set_ylim(low, high + 0.15)
+
+
+def _draw_solid(axes: Axes, panel: ForceField | LoopEnergy, low: float, width: float) -> None:
+    """Draw what is solid, the texture, and the wall where depth is counted from it."""
+    x, height = panel.x * _MILLI, panel.height * _MILLI
+    flat = _is_flat(panel.law)
+    axes.fill_between(x, 0.0 * height if flat else height, low, color=style.BODY, lw=0.0, alpha=0.6)
+    axes.plot(x, height, color=style.INK, lw=width, ls=":" if flat else "-")
+    if flat:
+        axes.axhline(0.0, color=style.INK, lw=width)
 
 
 def _draw_forces(axes: Axes, panel: ForceField) -> None:
@@ -153,11 +158,7 @@ def _draw_path(axes: Axes, panel: LoopEnergy) -> None:
     x, height = panel.x * _MILLI, panel.height * _MILLI
     closed = np.concatenate([panel.vertices, panel.vertices[:1]]) * _MILLI
     low = min(float(closed[:, 1].min()), float(height.min())) - 0.2
-    flat = _is_flat(panel.law)
-    axes.fill_between(x, 0.0 * height if flat else height, low, color=style.BODY, lw=0.0, alpha=0.6)
-    axes.plot(x, height, color=style.INK, lw=0.9, ls=":" if flat else "-")
-    if flat:
-        axes.axhline(0.0, color=style.INK, lw=0.9)
+    _draw_solid(axes, panel, low, 0.9)
     axes.plot(closed[:, 0], closed[:, 1], color=style.ORANGE, lw=1.4)
     middle, leg = 0.5 * (closed[1:] + closed[:-1]), np.diff(closed, axis=0)
     axes.quiver(

@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.compare import Comparison
-from asperity.analysis.row import LawRow
 from asperity.errors import ParameterError
 from asperity.report.pictures import style
 from asperity.report.pictures.analysis_pictures import analysis_figure, picture_size, pictures_of
@@ -119,13 +118,10 @@ def field_figure(comparison: Comparison) -> Figure:
 
 
 def _remarks(comparison: Comparison) -> list[str]:
-    return [_remark(row, comparison) for row in comparison.rows]
-
-
-def _remark(row: LawRow, comparison: Comparison) -> str:
-    if row.conservative:
-        return "conservative"
-    return f"leaks up to {leak_text(row, comparison)} per loop"
+    return [
+        "conservative" if row.conservative else f"leaks up to {leak_text(row, comparison)} per loop"
+        for row in comparison.rows
+    ]
 
 
 def _stacked(sizes: list[tuple[float, float]]) -> tuple[Figure, list[Any]]:

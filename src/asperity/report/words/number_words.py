@@ -192,14 +192,6 @@ def place_text(at: tuple[float, float, float] | None) -> str:
     return f"({', '.join(f'{value * scale + 0.0:.6g}' for value in at)}) {unit}"
 
 
-def state_text(bound: Bound) -> str:
-    """Return the state of an anchor at a witness; empty for a law without state."""
-    if bound.deflection is None:
-        return ""
-    x, y = (f"{1e3 * part + 0.0:.6g}" for part in bound.deflection)
-    return f"deflection ({x}, {y}) mm, {'sliding' if bound.sliding else 'sticking'}"
-
-
 def witness_text(bound: Bound) -> str:
     """Return where the lower end is attained, with the state of an anchor; or the onset of ∞.
 
@@ -208,5 +200,8 @@ def witness_text(bound: Bound) -> str:
         'onset (0, 0, 1) mm'
     """
     onset = "onset " if math.isinf(bound.lower) and bound.at is not None else ""
-    state = state_text(bound)
-    return f"{onset}{place_text(bound.at)}{', ' if state else ''}{state}"
+    if bound.deflection is None:
+        return f"{onset}{place_text(bound.at)}"
+    x, y = (f"{1e3 * part + 0.0:.6g}" for part in bound.deflection)
+    state = f"deflection ({x}, {y}) mm, {'sliding' if bound.sliding else 'sticking'}"
+    return f"{onset}{place_text(bound.at)}, {state}"
