@@ -31,8 +31,8 @@ from asperity.simulation import (
     simulate_many,
 )
 from asperity.simulation.loop import Simulation
-from asperity.simulation.machine import machine
 from asperity.simulation.plants import Plant
+from asperity.simulation.sampled_plant import sampled_plant
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 from bench.random_scenes import delay_rule
@@ -78,7 +78,7 @@ class _Own:
 
     def __post_init__(self) -> None:
         surface = Surface(_TEXTURE, self.law, 1000.0)
-        body = machine(self.plant, _HAND, _SERVO)
+        body = sampled_plant(self.plant, _HAND, _SERVO)
         self.simulation = Simulation(surface, body, _SERVO, self.anchor[0])
 
     def run(self) -> None:
@@ -107,7 +107,7 @@ class _InC:
         self._queue = np.zeros((_SERVO.delay + 1, 3))
         self._set = (ctypes.c_double * 6)(*_SERVO.settings)
         self._texture = (ctypes.c_double * 4)(*_TEXTURE.arguments)
-        numbers = machine(self.plant, _HAND, _SERVO).numbers
+        numbers = sampled_plant(self.plant, _HAND, _SERVO).record
         if isinstance(self.plant, Pantograph):
             bar, hand, _friction, rate, fewest, period, share, inside, least = numbers
             held = [hand.band, *hand.stiffness, *hand.damping, *hand.force]

@@ -16,7 +16,7 @@ from asperity.simulation import (
     Strokes,
     simulate,
 )
-from asperity.simulation.machine import dense_machine, machine
+from asperity.simulation.sampled_plant import coupled_plant, sampled_plant
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
@@ -70,8 +70,8 @@ def test_small_forms_equal_the_whole_matrices(kind: str, monkeypatch: pytest.Mon
     """Per-axis kernels and the dense one, written apart, move alike."""
     plant = BODIES[kind]
     small = explored(plant, 0.05)
-    monkeypatch.setattr("asperity.simulation.machine._linear", dense_machine)
-    assert len(machine(plant, HAND, FULL).numbers) > 8
+    monkeypatch.setattr("asperity.simulation.sampled_plant._linear", coupled_plant)
+    assert len(sampled_plant(plant, HAND, FULL).record) > 8
     # The stiff spring of a mode costs the dense forms some digits.
     tolerance = 1e-9 if plant.resonance else 1e-12
     smooth = Servo(1e-4, delay=1)  # rounding would turn the last digit into a step

@@ -21,7 +21,7 @@ from asperity.simulation import (
 from asperity.simulation.body import body
 from asperity.simulation.exact import exact_step
 from asperity.simulation.loop import Simulation
-from asperity.simulation.machine import Machine, machine
+from asperity.simulation.sampled_plant import SampledPlant, sampled_plant
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
@@ -82,7 +82,7 @@ def _response(surface: Surface, delay: int, rest: FloatArray, column: int) -> Fl
     results = []
     for size in (0.0, 1.0):
         servo = Servo(PERIOD, delay)
-        simulation = Simulation(surface, machine(PLANT, SpringHand(), servo), servo, rest)
+        simulation = Simulation(surface, sampled_plant(PLANT, SpringHand(), servo), servo, rest)
         queue = np.zeros(delay)  # oldest last
         if column < 2:
             simulation.state[(2, 5)[column]] += size
@@ -167,7 +167,7 @@ def _potential(surface: Surface, p: FloatArray) -> float:
 def test_a_run_goes_on_where_the_last_one_stopped(letter: str) -> None:
     """In two pieces or in one: state, waiting forces, filter and the law's anchor are carried."""
     surface, servo = Surface(WAVE, letter, 500.0), Servo(1e-3, 2, 1e-5, virtual_damping=0.1)
-    moved: Machine = machine(BODY, HAND, servo)
+    moved: SampledPlant = sampled_plant(BODY, HAND, servo)
     way = WAY.at(np.arange(201) * 1e-3)
     whole = Simulation(surface, moved, servo, np.zeros(3))
     table = np.empty((200, 27))

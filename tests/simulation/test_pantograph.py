@@ -26,11 +26,11 @@ from asperity.simulation import (
     SpringHand,
     Still,
     Strokes,
-    machine,
+    sampled_plant,
     simulate,
 )
 from asperity.simulation.kernels.five_bar import bar_body
-from asperity.simulation.machine import bar_record
+from asperity.simulation.sampled_plant import bar_record
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
@@ -168,7 +168,7 @@ def test_long_steps_do_not_close(monkeypatch: pytest.MonkeyPatch) -> None:
     """Negative control: one step where many are needed; and the order of closing is four."""
     gaps = []
     for share in (4.0, 1.0, 0.25):
-        monkeypatch.setattr("asperity.simulation.machine._LARGEST_PART", share)
+        monkeypatch.setattr("asperity.simulation.sampled_plant._LARGEST_PART", share)
         ledger = run_of(Pantograph(inside_only=False, joint_damping=0.05), SPRING, 4e-3).ledger
         gaps.append(abs(ledger.closure) / ledger.exchanged)
     assert gaps[0] > gaps[1] > gaps[2] > 1e-9
@@ -189,13 +189,15 @@ def test_a_slack_band_needs_the_kink(tmp_path: FilePath, monkeypatch: pytest.Mon
     source = f"from asperity.compiled import Kernels\n{declared}\n{source}"
     (tmp_path / "blind_band.py").write_text(source)
     monkeypatch.syspath_prepend(tmp_path)
-    blind, build = importlib.import_module("blind_band"), machine._pantograph
+    blind, build = importlib.import_module("blind_band"), sampled_plant._pantograph
 
-    def built(*arguments: Any) -> machine.Machine:
+    def built(*arguments: Any) -> sampled_plant.SampledPlant:
         own = build(*arguments)
-        return machine.Machine((own.modules[0], blind, *own.modules[1:]), own.numbers, own.order)
+        return sampled_plant.SampledPlant(
+            (own.modules[0], blind, *own.modules[1:]), own.record, own.order
+        )
 
-    monkeypatch.setattr(machine, "_pantograph", built)
+    monkeypatch.setattr(sampled_plant, "_pantograph", built)
     ledger = run_of(plant, SLACK).ledger
     assert abs(ledger.closure) > 1e-9 * ledger.exchanged
 

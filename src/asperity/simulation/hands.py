@@ -128,7 +128,7 @@ class BandHand:
 
 @dataclass(frozen=True)
 class MovedHand:
-    """The handle itself follows the motion, whatever the force.
+    """A prescribed motion: the handle itself follows the motion, whatever the force.
 
     There are no dynamics: mass, damping and friction of the plant take no part, nothing is stored,
     and the work of the hand is what the texture takes. The texture's own sums mean the same as

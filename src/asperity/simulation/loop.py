@@ -16,8 +16,8 @@ from asperity.simulation.kernels import servo_loop
 from asperity.simulation.kernels.booking import SUMS
 from asperity.simulation.kernels.servo_loop import LoopState
 from asperity.simulation.ledger import Ledger
-from asperity.simulation.machine import Machine
 from asperity.simulation.run import Stop
+from asperity.simulation.sampled_plant import SampledPlant
 from asperity.simulation.servo import Servo
 from asperity.simulation.trace import COLUMNS
 from asperity.surface import Surface
@@ -46,7 +46,7 @@ class Simulation:
 
     Args:
         surface: the surface; its stiffness is what is rendered.
-        moved: the body.
+        plant: the device and the hand that holds it.
         servo: the servo.
         start: position [m], shape (3,).
         velocity: [m/s], shape (3,).
@@ -58,21 +58,21 @@ class Simulation:
     def __init__(
         self,
         surface: Surface,
-        moved: Machine,
+        plant: SampledPlant,
         servo: Servo,
         start: FloatArray,
         velocity: FloatArray | None = None,
     ) -> None:
         if servo.delay > MOST_DELAY:
             raise ParameterError("delay", f"must be at most {MOST_DELAY} samples", servo.delay)
-        self._surface, self._moved, self._servo = surface, moved, servo
-        self.state = moved.state(start, np.zeros(3) if velocity is None else velocity)
+        self._plant, self._servo = plant, servo
+        self.state = plant.state(start, np.zeros(3) if velocity is None else velocity)
         self.queue = np.zeros((servo.delay + 1, 3))
         self._loop, self._ledger = LoopState(), np.zeros(SUMS)
         self._before = 0.0
         clamp: ClampName = surface.clamp if surface.law.clampable else "none"
         with _LOCK:
-            self._loops = _fused(surface.law, surface.texture.sampler, clamp, moved.modules)
+            self._loops = _fused(surface.law, surface.texture.sampler, clamp, plant.modules)
         self._arguments = surface.texture.arguments, surface.law_arguments
 
     @property
@@ -82,10 +82,10 @@ class Simulation:
 
     def stored(self, anchor: FloatArray) -> float:
         """Return the stored energy [J] with the hand's anchor at a place [m]."""
-        return float(self._loops.stored_batch(self.state, anchor, self._moved.numbers))
+        return float(self._loops.stored_batch(self.state, anchor, self._plant.record))
 
     def run(self, anchor: FloatArray, trace: FloatArray | None = None, every: int = 1) -> Stop:
-        """Run one sample for each row of the anchor's way but the last.
+        """Run one sample for each row of the anchor's motion but the last.
 
         Args:
             anchor: positions of the hand's anchor at the samples [m], shape (k + 1, 3), contiguous;
@@ -101,7 +101,7 @@ class Simulation:
         table = np.empty((0, len(COLUMNS))) if trace is None else trace
         first = self.samples
         stop, self.rows, self._loop = self._loops.servo_batch(
-            self.state, self.queue, self._loop, self._ledger, anchor, self._moved.numbers,
+            self.state, self.queue, self._loop, self._ledger, anchor, self._plant.record,
             self._servo.settings, *self._arguments, table, every,
         )  # fmt: skip
         self._anchor = anchor[self.samples - first].copy()

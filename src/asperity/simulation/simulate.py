@@ -14,10 +14,10 @@ from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
 from asperity.simulation.hands import BandHand, Hand, MovedHand, SpringHand
 from asperity.simulation.loop import Simulation
-from asperity.simulation.machine import LEAST_SINE, machine
 from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Cartesian, Pantograph, Plant
 from asperity.simulation.run import Run, Stop
+from asperity.simulation.sampled_plant import LEAST_SINE, sampled_plant
 from asperity.simulation.servo import Servo
 from asperity.simulation.trace import FileTrace, MemoryTrace, NoTrace, Trace
 from asperity.surface import Surface
@@ -85,10 +85,10 @@ def simulate(
         raise ParameterError("every", "must be a whole number of samples, 1 or more", every)
     every = min(int(every), samples)
     simulation = _begin(surface, plant, hand, servo, motion, start, velocity)
-    way = _Way(motion, servo.period, samples, plant)
+    path = _AnchorMotion(motion, servo.period, samples, plant)
     kept = _trace(trace, -(-samples // every))
     try:
-        stop = _go(simulation, way, kept, every, progress)
+        stop = _go(simulation, path, kept, every, progress)
     finally:
         kept.close()
     return Run(
@@ -167,7 +167,7 @@ def _begin(
         reason = "" if isinstance(hand, MovedHand) else left_workspace(plant, place)
         if reason:
             raise ParameterError("start", f"must be in the workspace: {reason}", place.tolist())
-    return Simulation(surface, machine(plant, hand, servo), servo, place, speed)
+    return Simulation(surface, sampled_plant(plant, hand, servo), servo, place, speed)
 
 
 def _check_plane(name: str, values: FloatArray) -> None:
@@ -175,7 +175,7 @@ def _check_plane(name: str, values: FloatArray) -> None:
         raise ParameterError(name, "must stay at y = 0: a pantograph moves in the x-z plane")
 
 
-class _Way:
+class _AnchorMotion:
     """The anchor at the samples, chunk by chunk."""
 
     def __init__(self, motion: Motion, period: float, samples: int, plant: Plant) -> None:
@@ -202,15 +202,15 @@ def _trace(wanted: bool | str | os.PathLike[str], rows: int) -> Trace:
 
 
 def _go(
-    simulation: Simulation, way: _Way, kept: Trace, every: int,
+    simulation: Simulation, path: _AnchorMotion, kept: Trace, every: int,
     progress: Callable[[float], None] | None,
 ) -> Stop:  # fmt: skip
-    while simulation.samples < way.samples:
-        anchor = way.chunk(simulation.samples)
+    while simulation.samples < path.samples:
+        anchor = path.chunk(simulation.samples)
         stop = simulation.run(anchor, kept.room(len(anchor) // every + 1), every)
         kept.keep(simulation.rows)
         if progress is not None:
-            progress(simulation.samples / way.samples)
+            progress(simulation.samples / path.samples)
         if stop:
             return stop
     return Stop.NOTHING

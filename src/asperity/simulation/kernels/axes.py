@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels
+from asperity.simulation.kernels.body_functions import RAN
 from asperity.simulation.kernels.booking import book_energies
 
 KERNELS = Kernels(
@@ -81,7 +82,7 @@ def advance_body(
     lost = lost_x + lost_y + lost_z
     hand = hand_x + hand_y + hand_z
     book_energies(ledger, fx * dx, fy * dy, fz * dz, lost, hand, 0.0)
-    return 0
+    return RAN
 
 
 def stored_in_axes(x: FloatArray, ax: float, ay: float, az: float, table: FloatArray) -> float:

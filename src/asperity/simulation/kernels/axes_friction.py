@@ -7,6 +7,7 @@ from typing import NamedTuple
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels
 from asperity.simulation.kernels.axes import DAMPING, PUSH, advance_axis, stored_in_axes
+from asperity.simulation.kernels.body_functions import RAN
 from asperity.simulation.kernels.booking import book_energies
 from asperity.simulation.kernels.dense import friction_force
 
@@ -66,7 +67,7 @@ def advance_body(
         hand = hand_x + hand_y + hand_z
         rubbed = gx * dx + gy * dy + gz * dz
         book_energies(ledger, fx * dx, fy * dy, fz * dz, lost, hand, rubbed)
-    return 0
+    return RAN
 
 
 def stored_energy(

@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels, local_array
+from asperity.simulation.kernels.body_functions import RAN
 from asperity.simulation.kernels.booking import book_energies
 from asperity.simulation.kernels.dense import friction_force
-from asperity.simulation.kernels.holding import HandRecord, band_turns, hand_energy, hand_force
+from asperity.simulation.kernels.hand import HandRecord, band_turns, hand_energy, hand_force
 
 KERNELS = Kernels(
     provides=("advance_body", "stored_energy"),
@@ -124,7 +125,7 @@ def advance_body(
         if fine == 0:
             part += 1
             h = plant.span
-    return 0
+    return RAN
 
 
 def banded_kink(

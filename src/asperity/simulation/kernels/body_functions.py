@@ -7,6 +7,9 @@ declares.
 
 from asperity.checks import FloatArray
 
+# What the loop says: it ran to the end, the state left all bounds, the body left its workspace.
+RAN, DIVERGED, LEFT = 0, 1, 2
+
 
 def advance_body(
     x: FloatArray, ledger: FloatArray,
@@ -33,7 +36,7 @@ def advance_body(
         plant: what the body is made of.
 
     Returns:
-        0, or 2 if the body would leave its workspace: it then stays where it was.
+        ``RAN``, or ``LEFT`` if the body would leave its workspace: it then stays where it was.
     """
     raise NotImplementedError
 

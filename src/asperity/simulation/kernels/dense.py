@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels
+from asperity.simulation.kernels.body_functions import RAN
 from asperity.simulation.kernels.booking import book_energies
 
 KERNELS = Kernels(
@@ -64,7 +65,7 @@ def advance_body(
         dense_part(x, ledger, fx, fy, fz, plant)
         for i in range(3):
             z[n + 3 + i] += z[n + 6 + i] * plant.span
-    return 0
+    return RAN
 
 
 def dense_part(

@@ -16,8 +16,9 @@ from typing import NamedTuple
 
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels
+from asperity.simulation.kernels.body_functions import LEFT, RAN
 from asperity.simulation.kernels.booking import book_energies
-from asperity.simulation.kernels.holding import HandRecord, band_turns, hand_energy, hand_force
+from asperity.simulation.kernels.hand import HandRecord, band_turns, hand_energy, hand_force
 
 KERNELS = Kernels(
     provides=("advance_body", "stored_energy"),
@@ -268,7 +269,7 @@ def advance_body(
         dx, dz, loss, pulled = bar_part(x, fx + gx, fz + gz, bx, bz, ux, uz, damping, h, bar, hand)
         if not bar_reached(x[0], x[2], least, bar):
             x[0], x[2], x[3], x[5] = px, pz, vx, vz
-            return 2
+            return LEFT
         if fine == 0 and bar_kink(x, dx, dz, bx, bz, h * ux, h * uz, hand):
             x[0], x[2], x[3], x[5] = sx, sz, tx, tz
             fine = 256  # the force has a kink there: again, in small steps
@@ -285,7 +286,7 @@ def advance_body(
             part += 1
             h = period / parts
     book_energies(ledger, wx, 0.0, wz, lost, work, rubbed)
-    return 0
+    return RAN
 
 
 def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: PantographPlant) -> float:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels
+from asperity.simulation.kernels.body_functions import RAN
 from asperity.simulation.kernels.booking import book_energies
 
 KERNELS = Kernels(provides=("advance_body", "stored_energy"), requires=("book_energies",))
@@ -43,7 +44,7 @@ def advance_body(
     wy = fy * dy
     wz = fz * dz
     book_energies(ledger, wx, wy, wz, 0.0, -(wx + wy + wz), 0.0)
-    return 0
+    return RAN
 
 
 def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: PrescribedPlant) -> float:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels, local_array
+from asperity.simulation.kernels.body_functions import RAN
 from asperity.simulation.kernels.booking import book_energies
 from asperity.simulation.kernels.dense import friction_force
 
@@ -120,7 +121,7 @@ def advance_body(
         hand = hand_x + hand_y + hand_z
         rubbed = gx * dx + gy * dy + gz * dz
         book_energies(ledger, fx * dx, fy * dy, fz * dz, lost, hand, rubbed)
-    return 0
+    return RAN
 
 
 def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: ResonantPlant) -> float:

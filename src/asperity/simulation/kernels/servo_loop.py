@@ -13,7 +13,7 @@ from asperity.kernels.tick import (
     flushed_state,
     servo_tick,
 )
-from asperity.simulation.kernels.body_functions import advance_body, stored_energy
+from asperity.simulation.kernels.body_functions import DIVERGED, RAN, advance_body, stored_energy
 from asperity.simulation.kernels.booking import SAME_SAMPLE, SAMPLING
 
 KERNELS = Kernels(
@@ -23,9 +23,6 @@ KERNELS = Kernels(
     ),
     loops=("servo_batch", "stored_batch"),
 )  # fmt: skip
-
-# Why it stops.
-RAN, DIVERGED, LEFT = 0, 1, 2
 
 
 class LoopState(NamedTuple):

@@ -20,7 +20,7 @@ from asperity.simulation import (
     simulate,
 )
 from asperity.simulation.kernels import five_bar
-from asperity.simulation.machine import bar_record, machine
+from asperity.simulation.sampled_plant import bar_record, sampled_plant
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
@@ -52,12 +52,12 @@ TOO_FAST: list[tuple[Plant, Hand, Servo, str]] = [
 @pytest.mark.parametrize(("plant", "hand", "servo", "name"), TOO_FAST)
 def test_what_is_too_fast_is_refused(plant: Plant, hand: Hand, servo: Servo, name: str) -> None:
     with pytest.raises(ParameterError, match="too fast") as caught:
-        machine(plant, hand, servo)
+        sampled_plant(plant, hand, servo)
     assert caught.value.argument == name
 
 
 def rate_on_a_band(damping: float) -> float:
-    return float(machine(Pantograph(), BandHand(damping=damping), MILLISECOND).numbers[3])
+    return float(sampled_plant(Pantograph(), BandHand(damping=damping), MILLISECOND).record[3])
 
 
 def test_ten_thousand_parts_are_the_most() -> None:
@@ -67,9 +67,9 @@ def test_ten_thousand_parts_are_the_most() -> None:
         (Cartesian(0.1), 1e5 * 0.1),
         (Pantograph(), 200.0 + (1e5 - rate_on_a_band(200.0)) / slope),
     ):
-        machine(plant, BandHand(damping=0.999 * limit), MILLISECOND)
+        sampled_plant(plant, BandHand(damping=0.999 * limit), MILLISECOND)
         with pytest.raises(ParameterError, match="damping makes the body too fast"):
-            machine(plant, BandHand(damping=1.001 * limit), MILLISECOND)
+            sampled_plant(plant, BandHand(damping=1.001 * limit), MILLISECOND)
 
 
 @pytest.mark.parametrize("speed", [1e9, 1e300])

@@ -1,4 +1,4 @@
-"""Which compiled body moves for a plant and a hand, and the numbers that it is made of."""
+"""The plant that a servo samples: device and hand together, as the compiled loop takes them."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from asperity.simulation.kernels import (
     booking,
     dense,
     five_bar,
-    holding,
     prescribed,
     resonant,
 )
-from asperity.simulation.kernels.holding import HandRecord
+from asperity.simulation.kernels import hand as hand_kernels
+from asperity.simulation.kernels.hand import HandRecord
 from asperity.simulation.plants import Cartesian, Pantograph, Plant
 from asperity.simulation.servo import Servo
 
@@ -45,17 +45,17 @@ _USUAL = {
 
 
 @dataclass(frozen=True)
-class Machine:
-    """A body as the compiled loop takes it.
+class SampledPlant:
+    """A device and the hand that holds it, over one sample, as the compiled loop takes them.
 
     Attributes:
         modules: the functions that move it, see ``kernels``.
-        numbers: what it is made of, the record ``plant`` of the loop.
+        record: what it is made of, the record ``plant`` of the loop.
         order: number of states.
     """
 
     modules: tuple[ModuleType, ...]
-    numbers: tuple[Any, ...]
+    record: tuple[Any, ...]
     order: int
 
     def state(self, position: FloatArray, velocity: FloatArray) -> FloatArray:
@@ -63,8 +63,8 @@ class Machine:
         return np.concatenate([position, velocity] * (self.order // 6))
 
 
-def machine(plant: Plant, hand: Hand, servo: Servo) -> Machine:
-    """Return the body of a plant that a hand holds, sampled by a servo.
+def sampled_plant(plant: Plant, hand: Hand, servo: Servo) -> SampledPlant:
+    """Return a plant that a hand holds, sampled by a servo.
 
     Raises:
         ParameterError: for a resonance on an elastic band, which is not offered; for a body that is
@@ -72,13 +72,13 @@ def machine(plant: Plant, hand: Hand, servo: Servo) -> Machine:
     """
     if isinstance(hand, MovedHand):
         record = prescribed.PrescribedPlant(float(servo.period))
-        return Machine((prescribed, booking), record, 6)
+        return SampledPlant((prescribed, booking), record, 6)
     try:
         with np.errstate(all="ignore"):  # what overflows is refused here
             made = _held(plant, hand, servo.period)
     except (ArithmeticError, np.linalg.LinAlgError):
         raise _too_fast(plant, hand, servo.period) from None
-    if not _finite(made.numbers):
+    if not _finite(made.record):
         raise _too_fast(plant, hand, servo.period)
     return made
 
@@ -90,7 +90,7 @@ def _finite(record: object) -> bool:
     return bool(np.isfinite(np.asarray(record, dtype=np.float64)).all())
 
 
-def _held(plant: Plant, hand: SpringHand | BandHand, period: float) -> Machine:
+def _held(plant: Plant, hand: SpringHand | BandHand, period: float) -> SampledPlant:
     if isinstance(plant, Pantograph):
         return _pantograph(plant, hand, period)
     if isinstance(hand, BandHand):
@@ -120,25 +120,25 @@ def _too_fast(plant: Plant, hand: SpringHand | BandHand, period: float) -> Param
     return ParameterError(name, words, float(value))
 
 
-def _linear(plant: Cartesian, hand: SpringHand, period: float) -> Machine:
+def _linear(plant: Cartesian, hand: SpringHand, period: float) -> SampledPlant:
     if np.abs(plant.damping - np.diag(np.diag(plant.damping))).max() > 0.0:
-        return dense_machine(plant, hand, period)
+        return coupled_plant(plant, hand, period)
     parts = FRICTION_PARTS if plant.friction > 0.0 else 1
     span, friction, mode = float(period / parts), plant.friction, plant.resonance
     if mode is not None:
         table = np.array([resonant_table(plant, mode, hand, i, span) for i in range(3)])
         stops = np.diag(span / table[:, 10])
         slow = resonant.ResonantPlant(table, friction, stops, parts, span)
-        return Machine((resonant, dense, booking), slow, 12)
+        return SampledPlant((resonant, dense, booking), slow, 12)
     table = np.array([axis_table(plant, hand, i, span) for i in range(3)])
     if friction == 0.0:
-        return Machine((axes, booking), axes.AxesPlant(table), 6)
+        return SampledPlant((axes, booking), axes.AxesPlant(table), 6)
     stops = np.diag(span / table[:, 5])
     rough = axes_friction.FrictionAxesPlant(table, friction, stops, parts, span)
-    return Machine((axes_friction, axes, dense, booking), rough, 6)
+    return SampledPlant((axes_friction, axes, dense, booking), rough, 6)
 
 
-def dense_machine(plant: Cartesian, hand: SpringHand, period: float) -> Machine:
+def coupled_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPlant:
     """Return a linear body moved by whole matrices, whatever its coupling."""
     parts = FRICTION_PARTS if plant.friction > 0.0 else 1
     moved = body(plant.mass, plant.damping, hand, plant.resonance)
@@ -149,7 +149,7 @@ def dense_machine(plant: Cartesian, hand: SpringHand, period: float) -> Machine:
         step.motion, step.loss, step.anchor_work, step.storage, np.zeros(n + 12),
         np.array(hand.force), plant.friction, stops, parts, period / parts,
     )  # fmt: skip
-    return Machine((dense, booking), record, n)
+    return SampledPlant((dense, booking), record, n)
 
 
 def _hand_record(hand: SpringHand | BandHand) -> HandRecord:
@@ -179,7 +179,7 @@ def _fastest(mass: float, damping: float, hand: SpringHand | BandHand) -> float:
     return max((damping + held) / mass, math.sqrt(stiffness / mass))
 
 
-def _banded(plant: Cartesian, hand: BandHand, period: float) -> Machine:
+def _banded(plant: Cartesian, hand: BandHand, period: float) -> SampledPlant:
     if plant.resonance is not None:
         raise ParameterError("resonance", "is not offered together with an elastic band")
     damping = float(np.linalg.eigvalsh(plant.damping)[-1])
@@ -188,10 +188,10 @@ def _banded(plant: Cartesian, hand: BandHand, period: float) -> Machine:
         np.diag(plant.mass), plant.damping, _hand_record(hand), plant.friction, parts,
         period / parts,
     )  # fmt: skip
-    return Machine((banded, holding, dense, booking), record, 6)
+    return SampledPlant((banded, hand_kernels, dense, booking), record, 6)
 
 
-def _pantograph(plant: Pantograph, hand: SpringHand | BandHand, period: float) -> Machine:
+def _pantograph(plant: Pantograph, hand: SpringHand | BandHand, period: float) -> SampledPlant:
     held = hand.mass if isinstance(hand, SpringHand) else 0.0
     bar = bar_record(plant, held)
     mxx, mxz, mzz, _cx, _cz, bxx, _bxz, bzz = five_bar.bar_body(0.0, 0.0, 0.0, 0.0, bar)
@@ -204,7 +204,7 @@ def _pantograph(plant: Pantograph, hand: SpringHand | BandHand, period: float) -
         bar, _hand_record(hand), float(plant.friction), rate, fewest, float(period), _LARGEST_PART,
         bool(plant.inside_only), LEAST_SINE,
     )  # fmt: skip
-    return Machine((five_bar, holding, booking), record, 6)
+    return SampledPlant((five_bar, hand_kernels, booking), record, 6)
 
 
 def bar_record(plant: Pantograph, held: float = 0.0) -> five_bar.Bar:
