@@ -154,10 +154,6 @@ def energy_function() -> Check:
     return energy_sign_check("D", places, [0.5 * s.distance**2 for s in places])
 
 
-def _force(spot: Spot) -> FloatArray:
-    return spot.force()
-
-
 def first_line() -> Check:
     """(36), the derivative of the energy function before it is simplified."""
 
@@ -165,7 +161,7 @@ def first_line() -> Check:
         x, z = r.spot.from_foot
         return float(-r.spot.k * (x * (1.0 - r.rate("x", "x")) - z * r.rate("z", "x")))
 
-    return _against("f_x of D", lambda r: _force(r.spot)[0], printed)
+    return _against("f_x of D", lambda r: r.spot.force()[0], printed)
 
 
 def second_line() -> Check:
@@ -182,7 +178,7 @@ def second_line() -> Check:
 
     def truth(r: FootRates) -> list[float]:
         x, z = r.spot.from_foot
-        return [_force(r.spot)[0], r.spot.k * x * r.rate("x", "x"), r.spot.k * z * r.rate("z", "x")]
+        return [r.spot.force()[0], r.spot.k * x * r.rate("x", "x"), r.spot.k * z * r.rate("z", "x")]
 
     return _against(
         "(37) and the two parts of its bracket as they come from (36)",
@@ -221,7 +217,7 @@ def force_x() -> Check:
 def force_z() -> Check:
     """(39)."""
     return _against(
-        "f_z of D", lambda r: _force(r.spot)[1], lambda r: -r.spot.k * r.spot.from_foot[1]
+        "f_z of D", lambda r: r.spot.force()[1], lambda r: -r.spot.k * r.spot.from_foot[1]
     )
 
 

@@ -73,16 +73,12 @@ def always_passive() -> Check:
     )
 
 
-def _continuous(law: str, case: Setting = SCANNING) -> bool:
+def _continuity_check(law: str, *, continuous: bool) -> Check:
     from asperity.analysis.energy.continuity import continuity
     from asperity.analysis.gain.characteristic import characteristic_number
 
-    surface = case.surface(law)
-    return continuity(surface, characteristic_number(surface)).continuous
-
-
-def _continuity_check(law: str, *, continuous: bool) -> Check:
-    found = _continuous(law)
+    surface = SCANNING.surface(law)
+    found = continuity(surface, characteristic_number(surface)).continuous
     says = f"force of {law} {'does not jump' if found else 'jumps'}"
     return decide(says, printed=found is continuous)
 

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 
-from asperity.checks import FloatArray
 from asperity.paper.claim import Check, Claim, decide, judge, settle
 from asperity.paper.claims_appendix import true_number
 from asperity.paper.claims_friction import (
@@ -253,22 +252,16 @@ def perpendicular() -> Check:
     )
 
 
-def leaks() -> dict[str, float]:
-    """Return what the worst loop gains in V.C's setting, pressed 1 mm deep [J]."""
-    from asperity.analysis.energy.leak import worst_loop
-
-    return {law: worst_loop(BUMP.surface(law)).energy for law in "ABD"}
-
-
 def alive() -> Check:
     """Fields that are not conservative feel alive: the leak is computed, what is felt is not."""
-    found = leaks()
+    from asperity.analysis.energy.leak import worst_loop
+
+    found = {law: worst_loop(BUMP.surface(law)).energy for law in "ABD"}  # pressed 1 mm deep [J]
     said = ", ".join(f"{law} {energy * 1e3:.3g} mJ" for law, energy in found.items())
-    numbers: FloatArray = np.array(list(found.values()))
     return decide(
         f"worst loops in V.C's setting: {said}; whether a hand notices is not computed",
         printed=None,
-        worst_loops=[float(value) for value in numbers],
+        worst_loops=list(found.values()),
     )
 
 

@@ -47,14 +47,10 @@ def jacobian_a() -> Check:
     return jacobian_check("A", lambda s: -s.k * np.array([[0.0, 0.0], [-s.slope, 1.0]]), None, "")
 
 
-def _norms_a() -> tuple[list[Spot], FloatArray]:
-    places = list(spots("A"))
-    return places, np.array([np.linalg.norm(spot.jacobian(), 2) for spot in places])
-
-
 def norm_a() -> Check:
     """(8)."""
-    places, norms = _norms_a()
+    places = list(spots("A"))
+    norms = np.array([np.linalg.norm(spot.jacobian(), 2) for spot in places])
     printed = np.array([spot.k * math.hypot(1.0, spot.slope) for spot in places])
     return judge("norm of the Jacobian of A", printed=printed, truth=norms)
 
@@ -85,7 +81,8 @@ def sinusoid_a() -> Check:
     printed = [c.stiffness * math.hypot(1.0, 2.0 * math.pi * c.amplitude / c.period) for c in cases]
     found = [case.stiffness * greatest_norm(case.surface("A")) for case in cases]
     value = judge("greatest norm for 5 sinusoids", printed=printed, truth=found)
-    as_printed, half = (_reaches(cases, printed, step) for step in (_pi_over_period, _half_period))
+    as_printed = _reaches(cases, printed, [math.pi / case.period for case in cases])
+    half = _reaches(cases, printed, [0.5 * case.period for case in cases])
     place = decide(
         f"the norm at x = nπ/l is {as_printed:.4f} of the greatest at worst, at n l/2 {half:.4f}",
         printed=as_printed > 1.0 - 1e-9,
@@ -97,21 +94,11 @@ def sinusoid_a() -> Check:
     return settle(value, place)
 
 
-def _pi_over_period(case: Setting) -> float:
-    return math.pi / case.period
-
-
-def _half_period(case: Setting) -> float:
-    return 0.5 * case.period
-
-
-def _reaches(
-    cases: list[Setting], greatest: list[float], step: Callable[[Setting], float]
-) -> float:
+def _reaches(cases: list[Setting], greatest: list[float], steps: list[float]) -> float:
     """Return the least share of the greatest norm at multiples of a step on each texture."""
     least = math.inf
-    for case, most in zip(cases, greatest, strict=True):
-        x = np.arange(1, 6) * step(case)
+    for case, most, step in zip(cases, greatest, steps, strict=True):
+        x = np.arange(1, 6) * step
         slope = case.texture.gradient(np.column_stack([x, 0 * x]))[:, 0]
         norms = case.stiffness * np.hypot(1.0, slope)
         least = min(least, float(norms.min()) / most)

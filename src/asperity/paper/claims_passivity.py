@@ -113,7 +113,8 @@ def _two_late() -> float:
     return gained(wall, path, 2.0 * wall.stiffness, delay=2)
 
 
-def _no_certificate() -> Check:
+def corollary() -> Check:
+    """(1)."""
     net, damping, _path, _surface = _alive("A")
     quiet = [_quiet(delay, 31 + delay) for delay in (0, 1)]
     late = _two_late()
@@ -128,11 +129,6 @@ def _no_certificate() -> Check:
         greatest_gain_of_C=max(quiet),
         gain_of_W_two_samples_late=late,
     )
-
-
-def corollary() -> Check:
-    """(1)."""
-    return _no_certificate()
 
 
 def condition() -> Check:
