@@ -1,85 +1,141 @@
-"""A criterion of a user's own stands in every analysis, and decides nothing."""
+"""A criterion of a user's own: it stands in every analysis, and decides nothing."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Iterator
+from fractions import Fraction
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
 
 import asperity as asp
-from asperity.analysis.passivity.criteria import CRITERIA
+from asperity.analysis.passivity.criteria import CRITERIA, LEAK, Criterion, register
+from asperity.devices import parse_device
+from asperity.errors import ParameterError
+from asperity.report import html_text
+from asperity.units import rounded_down
 
 Call = Callable[..., tuple[int, str, str]]
-Answer = Callable[..., Any]
 
-MODULE = '''
-"""Half of the smooth wall's rule: a margin for hands that are lighter than those tested."""
+OWN = '''
+"""Llewellyn's way: half of what the damping takes away, and an amplifier that must not clip."""
 
-from asperity.analysis.passivity.criteria import Criterion, register
+from fractions import Fraction
 
-NAME = "half the wall"
+from asperity.analysis.passivity.criteria import Criterion, Rule, judge, register
 
 
 def half(loop):
-    if loop.wall is None:
-        return Criterion(NAME, "k q <= K0/2", missing=("max_stiffness",))
-    limit = float(loop.wall) / 2 / loop.q.upper
-    stiffness = loop.surface.stiffness
-    return Criterion(NAME, "k q <= K0/2", stiffness <= limit, limit, limit / stiffness)
+    budget = None if loop.loss is None else loop.loss / 2
+    needs = ("update_rate", "damping")
+    return judge(loop, Rule("half the loss", "k q+ <= s/(2T)", Fraction(1), Fraction(0), budget,
+                            needs, "the amplifier is linear"))
 
 
-register(NAME, half)
+def clips(loop):
+    force = loop.device.value("max_force")
+    if force is None:
+        return Criterion("clipping", "k D <= F", missing=("max_force",), uses=("max_force",))
+    limit = force / loop.surface.max_depth
+    return Criterion(
+        "clipping", "k D <= F", holds=bool(loop.stiffness <= limit), limit=limit,
+        margin=limit / float(loop.stiffness), assumptions="static", uses=("max_force",),
+    )
+
+
+register("half the loss", half)
+register("clipping", clips)
 '''
-SPEC = "sinusoid:amplitude=0.2mm,period=1mm"
+RIG = {
+    "damping": "2 N*s/m", "update_rate": "4 kHz", "delay_samples": 0, "max_force": "0.5 N",
+}  # fmt: skip
+SURFACE = asp.Surface(asp.Sinusoid(amplitude=0.1e-3, period=2e-3), "C", 1500.0)
+NAMES = ("half the loss", "clipping")
 
 
 @pytest.fixture
-def module(tmp_path: Path) -> list[str]:
-    (tmp_path / "mine.py").write_text(MODULE, encoding="utf-8")
-    return ["--law-module", str(tmp_path / "mine.py")]
+def own() -> Iterator[None]:
+    """The criteria of a user's module, registered as it does that; taken out again after."""
+    exec(compile(OWN, "own", "exec"), ModuleType("own").__dict__)
+    yield
+    for name in NAMES:
+        del CRITERIA[name]
 
 
-def _own(data: Any) -> Any:
-    return next(one for one in data["passivity"]["criteria"] if one["name"] == "half the wall")
+@pytest.mark.usefixtures("own")
+def test_it_is_judged_worded_and_written() -> None:
+    result = asp.analyze(SURFACE, parse_device(RIG, "mine"))
+    half, clips = (result.passivity.criterion(name) for name in NAMES)
+    limit = Fraction(4000) / Fraction(result.one_sided.upper)  # 2 · 4000 / 2 over q⁺
+    assert half.limit == pytest.approx(float(limit), rel=1e-15)
+    assert half.limit <= limit
+    assert half.says == f"holds: the limit is {rounded_down(half.limit):.10g} N/m"
+    assert half.assumptions.startswith("the amplifier is linear; no deeper than 200 µm; ")
+    assert (clips.holds, clips.says) == (True, "holds: the limit is 2500 N/m")
+    assert clips.assumptions == "static; no deeper than 200 µm; max_force 500 mN (not verified)"
+    written = result.to_dict()["passivity"]["criteria"]
+    assert [one["name"] for one in written][-2:] == list(NAMES)
+    assert set(written[-1]) == set(written[0])
+    json.dumps(written, allow_nan=False)
+    page = html_text(result)
+    for text in (*NAMES, clips.says, "the amplifier is linear"):
+        assert text in page
 
 
-def test_analyze_judges_by_it_too(call: Call, answer: Answer, module: list[str]) -> None:
-    asked = ["analyze", SPEC, "--law", "A", "--device", "omega.3"]
-    data = answer(*asked, *module)
-    own = _own(data)
-    assert own["limit"] == pytest.approx(2500.0 / data["q"]["upper"])
-    assert own["holds"] == (own["limit"] >= 1000.0)
-    code, page, _err = call(*asked, *module, "--html", "-")
-    assert (code, "half the wall" in page) == (0, True)
-    code, out, _err = call(*asked, *module)
-    assert (code, "half the wall" in out) == (0, True)
-    without = answer(*asked)
-    assert without["passivity"]["decided_by"] == data["passivity"]["decided_by"]
-    assert without["answer"] == data["answer"]
-    assert "half the wall" not in CRITERIA
+@pytest.mark.usefixtures("own")
+def test_what_it_misses_is_said() -> None:
+    device = parse_device({"max_stiffness": "2 N/mm"}, "bare")
+    found = asp.analyze(SURFACE, device).passivity
+    half, clips = (found.criterion(name) for name in NAMES)
+    assert half.says == "not decidable: needs update_rate, damping"
+    assert (half.holds, half.limit, clips.missing) == (None, None, ("max_force",))
+    assert clips.says == "not decidable: needs max_force"
+    stiff = asp.analyze(SURFACE.to_stiffness(1e4), parse_device(RIG, "mine")).passivity
+    assert stiff.criterion("clipping").says == "does not hold: the limit is 2500 N/m"
 
 
-def test_what_the_device_lacks_is_said(answer: Answer, module: list[str], tmp_path: Path) -> None:
-    (tmp_path / "bare.toml").write_text('name = "Bare"\nmax_force = "3 N"\n')
-    asked = ["analyze", SPEC, "--law", "A", "--device", str(tmp_path / "bare.toml")]
-    own = _own(answer(*asked, *module))
-    assert (own["holds"], own["missing"]) == (None, ["max_stiffness"])
+def test_it_decides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even one that calls itself the leak."""
+    device = parse_device(RIG, "mine")
+    before = asp.analyze(SURFACE, device).passivity
+
+    def liar(_loop: Any) -> Criterion:
+        return Criterion(LEAK, "nothing is allowed", holds=False, limit=0.0, margin=0.0)
+
+    monkeypatch.setitem(CRITERIA, "liar", liar)
+    after = asp.analyze(SURFACE, device).passivity
+    assert after.criteria[:-1] == before.criteria
+    assert after.criteria[-1].name == "liar"
+    for name in ("verdict", "decided_by", "reason", "safe_stiffness"):
+        assert getattr(after, name) == getattr(before, name)
 
 
-def test_python_gets_it_with_every_analysis() -> None:
-    exec(MODULE, {})
-    try:
-        result = asp.analyze(asp.Surface(asp.Sinusoid(2e-4, 1e-3), "C"), "omega.3")
-        criterion = result.passivity.criterion("half the wall")
-        assert criterion.limit == pytest.approx(2500.0 / result.q.upper)
-    finally:
-        del CRITERIA["half the wall"]
+def test_a_name_that_is_taken_is_refused() -> None:
+    with pytest.raises(ParameterError, match="name is the name of another criterion"):
+        register(LEAK, lambda _loop: Criterion("mine", "0 < 1", holds=True))
 
 
-def test_a_name_that_is_taken_has_its_line(call: Call, tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text(MODULE.replace("half the wall", "leak"), encoding="utf-8")
-    code, out, err = call("analyze", SPEC, "--law", "A", "--law-module", str(tmp_path / "mine.py"))
-    assert (code, out) == (2, "")
-    assert "mine.py, line 17: name is the name of another criterion, got 'leak'" in err
+def test_the_command_line_takes_it_from_a_file(call: Call, tmp_path: Path) -> None:
+    module, page = tmp_path / "own.py", tmp_path / "page.html"
+    module.write_text(OWN, encoding="utf-8")
+    arguments = (
+        "analyze",
+        "sinusoid:amplitude=0.1mm,period=2mm",
+        "--law",
+        "C",
+        "--device",
+        "touch",
+    )
+    told = ("--law-module", str(module), "--html", str(page))
+    code, out, err = call(*arguments, *told)
+    assert (code, err) == (0, "")
+    for name in NAMES:
+        assert name in out
+        assert name in page.read_text("utf-8")
+    code, out, _err = call(*arguments, "--law-module", str(module), "--json", "-")
+    names = [one["name"] for one in json.loads(out)["passivity"]["criteria"]]
+    assert names[-2:] == list(NAMES)
+    assert not set(NAMES) & set(CRITERIA)  # until the command ends
