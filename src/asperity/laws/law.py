@@ -93,15 +93,15 @@ class Law:
             raise LawError(f"law letter must be a letter or a word, got {self.letter!r}")
         if self.clampable and not self.contact.clampable:
             raise LawError(f"law {self.letter}: a law on the {self.contact} contact is not clamped")
+        if self.stateful and not self.contact.holds_anchor:
+            holding = ", ".join(c.name for c in CONTACTS.values() if c.holds_anchor)
+            raise LawError(f"law {self.letter}: a law with state must be on the {holding} contact")
         missing = [name for name in self.contact.parameters if name not in self.arguments]
         if missing:
             raise LawError(
                 f"law {self.letter}: a law on the {self.contact} contact must have the parameter "
                 f"{missing[0]}"
             )
-        if self.stateful and not self.contact.holds_anchor:
-            holding = ", ".join(c.name for c in CONTACTS.values() if c.holds_anchor)
-            raise LawError(f"law {self.letter}: a law with state must be on the {holding} contact")
         if not callable(self.force):
             raise LawError(f"law {self.letter}: force must be a function of the contact symbols")
 
