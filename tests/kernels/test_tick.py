@@ -13,7 +13,6 @@ import pytest
 from asperity.checks import FloatArray
 from asperity.kernels import tick
 from asperity.kernels.fuse import fuse_on_texture
-from asperity.kernels.link import module_unit
 from asperity.simulation import Cartesian, MovedHand, Servo, Strokes, simulate
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Sinusoid
@@ -58,8 +57,7 @@ def device(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
 
 def commanded(device: ModuleType, surface: Surface, positions: FloatArray) -> FloatArray:
     """The forces of the device's loop at the positions of a handle."""
-    loop, servo = module_unit(device), module_unit(tick)
-    fused = fuse_on_texture(surface.law, surface.texture.sampler, "none", (loop,), (servo,))
+    fused = fuse_on_texture(surface.law, surface.texture.sampler, "none", (device,), (tick,))
     forces = np.empty_like(positions)
     arguments = surface.texture.arguments, surface.law_arguments
     state = fused.device_batch(positions, forces, SERVO.settings, *arguments)

@@ -103,27 +103,26 @@ def fuse_surface(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) ->
     from asperity.kernels import anchored_loops, probe_loops
 
     loops = anchored_loops if law.stateful else probe_loops
-    asking = [module_unit(module) for module in (loops, *law.contact.kernels())]
-    return fuse_on_texture(law, sampler, clamp, asking)
+    return fuse_on_texture(law, sampler, clamp, (loops, *law.contact.kernels()))
 
 
 def fuse_on_texture(
     law: Law,
     sampler: tuple[ModuleType, ...],
     clamp: ClampName,
-    asking: Sequence[Unit],
-    further: Sequence[Unit] = (),
+    asking: tuple[ModuleType, ...],
+    further: tuple[ModuleType, ...] = (),
 ) -> ModuleType:
-    """Return the loops of units compiled that ask a sampler, a law and further units.
+    """Return the loops of modules compiled that ask a sampler, a law and further modules.
 
     Raises:
         ParameterError: for a texture that lacks what is asked of it.
     """
-    modules = tuple(module_unit(module) for module in sampler)
-    brought = map(module_unit, law.contact.kernels())
-    at_hand = dict.fromkeys((*modules, *law_units(law, clamp), *asking, *brought, *further))
+    modules = tuple(map(module_unit, sampler))
+    brought = map(module_unit, (*asking, *law.contact.kernels(), *further))
+    at_hand = dict.fromkeys((*modules, *law_units(law, clamp), *brought))
     try:
-        source = link(loops_of(*asking), tuple(at_hand))
+        source = link(loops_of(*map(module_unit, asking)), tuple(at_hand))
     except MissingFunctionError as missing:
         who = f"which law {law} on the {law.contact} contact needs"
         raise _lacking(missing, modules, who) from None
@@ -175,20 +174,18 @@ def fuse_sampler(sampler: tuple[ModuleType, ...], *further: ModuleType) -> Modul
     """
     from asperity.kernels import sampler_loops
 
-    modules = tuple(module_unit(module) for module in sampler)
-    asking = [module_unit(module) for module in (sampler_loops, *further)]
-    at_hand = (*modules, *asking)
+    modules = tuple(map(module_unit, sampler))
+    asking = tuple(map(module_unit, (sampler_loops, *further)))
     served, refused = [], {}
     for loop in loops_of(*asking):
         try:
-            link([loop], at_hand)
+            link([loop], (*modules, *asking))
             served.append(loop)
         except MissingFunctionError as missing:
             refused[loop[0]] = _lacking(missing, modules, "which is asked of it")
-    source = link(served, at_hand)
+    source = link(served, (*modules, *asking))
     module = load_fused(_head(f"Texture {sampler[0].__name__}.", source) + source)
-    for name, error in refused.items():
-        setattr(module, name, partial(_refuse, error))
+    vars(module).update({name: partial(_refuse, error) for name, error in refused.items()})
     return module
 
 

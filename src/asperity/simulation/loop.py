@@ -35,10 +35,8 @@ def _fused(
 ) -> ModuleType:
     from asperity.kernels import tick
     from asperity.kernels.fuse import fuse_on_texture
-    from asperity.kernels.link import module_unit
 
-    servo, *further = (module_unit(module) for module in (servo_loop, tick, *body))
-    return fuse_on_texture(law, sampler, clamp, (servo,), further)
+    return fuse_on_texture(law, sampler, clamp, (servo_loop,), (tick, *body))
 
 
 class Simulation:
