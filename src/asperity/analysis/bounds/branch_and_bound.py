@@ -104,7 +104,7 @@ def supremum(
     problem: Problem,
     tolerance: float,
     work_limit: int = DEFAULT_WORK_LIMIT,
-    wished: float | None = None,
+    cheap_gap: float | None = None,
 ) -> Supremum:
     """Return proved bounds of the supremum of a problem.
 
@@ -114,12 +114,12 @@ def supremum(
         problem: the function on its cells.
         tolerance: relative gap at which to stop.
         work_limit: greatest number of cells to look at; the bounds reached by then are returned.
-        wished: a smaller gap, to be reached as long as few cells are left.
+        cheap_gap: a smaller gap, to be reached as long as few cells are left.
 
     Raises:
         InternalError: if a value is above the proved bound, so that nothing is proved.
     """
-    goal = tolerance if wished is None else min(wished, tolerance)
+    goal = tolerance if cheap_gap is None else min(cheap_gap, tolerance)
     limit = min(work_limit, problem.cells.most or work_limit)
     chunks, half = problem.cells.start()
     best, at = _first(problem)

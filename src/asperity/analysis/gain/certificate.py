@@ -61,7 +61,7 @@ def certified(surface: Surface, number: Number, search: Search) -> Bound:
         return _bound(surface, number, problem, at_once, step(at_once.upper), text)
     try:
         found = supremum(
-            problem, search.gap(problem.cells), search.work_limit, search.wish(problem.cells)
+            problem, search.gap(problem.cells), search.work_limit, search.cheap_gap(problem.cells)
         )
     except TypeError as error:
         text = f"the law has no interval kernel ({error}); not a proof"
@@ -79,7 +79,7 @@ def certified(surface: Surface, number: Number, search: Search) -> Bound:
 def _at_once(problem: Problem, search: Search) -> Supremum | None:
     """Return bounds that need no search, if they are as near as was asked for."""
     found = problem.at_once() if search.extent is None else None
-    gap = search.wish(problem.cells) or search.gap(problem.cells)
+    gap = search.cheap_gap(problem.cells) or search.gap(problem.cells)
     return found if found is not None and found.upper <= found.lower * (1.0 + gap) else None
 
 

@@ -48,7 +48,10 @@ def crest_number(surface: Surface, search: Search) -> Bound:
     cells = texture.cells(search.extent, margin)
     if cells is not None:
         found = supremum(
-            CrestProblem(cells, depth), search.gap(cells), search.work_limit, search.wish(cells)
+            CrestProblem(cells, depth),
+            search.gap(cells),
+            search.work_limit,
+            search.cheap_gap(cells),
         )
         least = 1.0 / found.upper
         if found.at is not None:

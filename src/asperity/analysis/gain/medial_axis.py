@@ -81,7 +81,7 @@ def sharpest_crest(
     if cells is None:
         cells, found = sampled_supremum(texture, CrestProblem)
     else:
-        found = supremum(CrestProblem(cells), tolerance, work_limit, cells.wish)
+        found = supremum(CrestProblem(cells), tolerance, work_limit, cells.cheap_gap)
     if found.at is None:
         return None
     return _crest(texture, _plane(cells, found.at), found.upper)

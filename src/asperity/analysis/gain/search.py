@@ -29,9 +29,9 @@ class Search:
         """Return how far beyond the extent the surface is felt [m]: feet are not below probes."""
         return surface.law.contact.margin(surface.max_depth)
 
-    def wish(self, cells: Cells) -> float | None:
+    def cheap_gap(self, cells: Cells) -> float | None:
         """Return the gap to try for where it costs little."""
-        return cells.wish if self.tolerance is None else None
+        return cells.cheap_gap if self.tolerance is None else None
 
     def gap(self, cells: Cells) -> float:
         """Return the relative gap to reach."""
