@@ -22,7 +22,7 @@ from asperity.contacts.nearest import plane_search
 from asperity.contacts.nearest.plane_search import descend
 from asperity.textures import Domain, ScanLine, Texture
 from asperity.textures.catalogue import register
-from asperity.textures.kinds import Kind
+from asperity.textures.texture import Kind
 
 # --- the sampler: plain Python that Numba compiles ------------------------------------------------
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from asperity.measured import filling, multigrid
+from asperity.measured import filling
 from asperity.measured.filling import fill_in_place
 
 P = 1e-6
@@ -45,7 +45,7 @@ def solver(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
     """Send every hole to one of the two solvers, with many levels of multigrid."""
     if request.param == "multigrid":
         monkeypatch.setattr(filling, "_DIRECT", 0)
-        monkeypatch.setattr(multigrid, "_COARSEST", 4)
+        monkeypatch.setattr(filling, "_COARSEST", 4)
 
 
 @pytest.mark.usefixtures("solver")
@@ -121,7 +121,7 @@ def test_interpolation_keeps_a_constant() -> None:
     for shape in ((9, 12), (8, 7), (5, 5)):
         where = tuple(index.ravel().astype(np.int64) for index in np.indices(shape))
         for halve in ((True, True), (True, False), (False, True)):
-            matrix, coarse = multigrid._interpolation((where[0], where[1]), shape, halve)
+            matrix, coarse = filling._interpolation((where[0], where[1]), shape, halve)
             np.testing.assert_allclose(matrix @ np.ones(len(coarse[0])), 1.0)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from asperity.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import RawSurface, read_surface
-from asperity.measured.reading.mesh_plane import best_plane
+from asperity.measured.reading.mesh import best_plane
 
 sys.path.insert(0, str(Path(__file__).parent))
 from mesh_writer import grid_mesh, write_ascii_stl, write_obj, write_stl

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from asperity.errors import AsperityError, ParameterError, SurfaceFileError
-from asperity.measured.reading import RawSurface, read_surface, shipped
+from asperity.measured.reading import RawSurface, read_surface, registry
 from asperity.measured.reading.spacing import spacing
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
@@ -71,7 +71,7 @@ def test_a_unit_for_a_file_that_names_none(tmp_path: Path) -> None:
 
 
 def test_gigabytes_of_text_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shipped, "_MOST_TEXT", 20)
+    monkeypatch.setattr(registry, "_MOST_TEXT", 20)
     with pytest.raises(SurfaceFileError, match=r"of text; at most 2e-08 GB are read: cut out"):
         read(tmp_path, lines(","))
 

@@ -228,7 +228,7 @@ def test_errors_of_the_file_have_a_line_and_a_reason(
 def test_what_fails_only_when_it_is_used(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "late.py"
     path.write_text(
-        "from asperity.textures.kinds import Kind\n\n\n"
+        "from asperity.textures.texture import Kind\n\n\n"
         "def make():\n    raise ValueError('not\\ntoday')\n\n\nLATE = Kind('late', 'x', make, ())\n"
     )
     code, out, err = call("compare", "late:", "--law-module", str(path))
@@ -263,7 +263,7 @@ def test_the_file_may_define_a_texture_kind_too(call: Call, answer: Answer, tmp_
     (tmp_path / "mine.py").write_text(
         "import asperity as asp\n"
         "from asperity.arguments import Argument\n"
-        "from asperity.textures.kinds import Kind\n"
+        "from asperity.textures.texture import Kind\n"
         "def made(height):\n    return asp.Sinusoid(height / 2, 2e-3)\n"
         "MINE = Kind('my-wave', 'mine', made, (Argument('height', 'of it', 'm', required=True),))\n"
     )

@@ -29,7 +29,7 @@ from asperity.enclosures.cells import NAMES
 from asperity.errors import InternalError, ParameterError
 from asperity.report.html import html_text
 from asperity.textures import Domain, Texture, catalogue
-from asperity.textures.kinds import Kind
+from asperity.textures.texture import Kind
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "own_texture.py"
 A, PERIOD = 0.1e-3, 2e-3

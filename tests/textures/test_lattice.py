@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from asperity.textures.lattice import integer_lattice
+from asperity.textures.plane_waves import integer_lattice
 
 PROFILES = {
     "one wave": ([[3.0, 4.0]], [5.0]),

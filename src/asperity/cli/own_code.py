@@ -56,7 +56,7 @@ def registries() -> tuple[Registry, ...]:
     from asperity.paper import registry
     from asperity.paper.claim import Claim
     from asperity.textures import catalogue
-    from asperity.textures.kinds import Kind
+    from asperity.textures.texture import Kind
 
     return (
         Registry(laws.Law, laws.register, laws.KNOWN_LAWS, symbolic_force),

@@ -1,7 +1,6 @@
 """Real devices, as data with a source for every number."""
 
-from asperity.devices.device import Datum, Device
-from asperity.devices.fields import FIELD_TABLE, FIELDS, Field
+from asperity.devices.device import FIELD_TABLE, FIELDS, Datum, Device, Field
 from asperity.devices.reading import device_names, load_device, parse_device
 
 __all__ = [

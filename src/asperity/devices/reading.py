@@ -11,8 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from asperity.devices.device import Datum, Device
-from asperity.devices.fields import FIELD_TABLE, WORDS
+from asperity.devices.device import FIELD_TABLE, WORDS, Datum, Device
 from asperity.errors import ParameterError, nearest_names
 from asperity.units import quantity
 

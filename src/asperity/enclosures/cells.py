@@ -18,7 +18,7 @@ SAMPLES = 4096
 EPS = float(np.finfo(float).eps)
 # By the number of coordinates.
 GAPS = {1: 1e-6, 2: 1e-6, 3: 1e-4}
-WISHES = {1: 1e-10, 2: 1e-9, 3: 1e-7}
+CHEAP_GAPS = {1: 1e-10, 2: 1e-9, 3: 1e-7}
 
 
 class Cells(ABC):
@@ -27,13 +27,13 @@ class Cells(ABC):
     Attributes:
         dimensions: how many coordinates they have.
         gap: the relative gap that is reached in reasonable time.
-        wish: a smaller one that is worth a try.
+        cheap_gap: a smaller one that is worth a try.
         most: cells beyond which halving them tells little more; as many as asked for by default.
     """
 
     dimensions: int
     gap: float
-    wish: float | None = None
+    cheap_gap: float | None = None
     most: int | None = None
 
     @abstractmethod

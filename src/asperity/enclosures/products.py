@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.enclosures.cells import GAPS, SAMPLES, WISHES, Cells, spread
+from asperity.enclosures.cells import CHEAP_GAPS, GAPS, SAMPLES, Cells, spread
 from asperity.enclosures.taylor import Number, Taylor, TaylorMath
 
 
@@ -26,7 +26,8 @@ class ProductCells(Cells):
         self._tops = np.array(list(further.values()))
         self.dimensions = flat.dimensions + len(further)
         self.gap = max(flat.gap, GAPS.get(self.dimensions, 1e-3))
-        self.wish = None if flat.wish is None else max(flat.wish, WISHES.get(self.dimensions, 1e-6))
+        own = CHEAP_GAPS.get(self.dimensions, 1e-6)
+        self.cheap_gap = None if flat.cheap_gap is None else max(flat.cheap_gap, own)
 
     def start(self) -> tuple[Iterator[FloatArray], FloatArray]:
         """See :class:`Cells`."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -185,12 +185,12 @@ def _whole_power(x: Taylor, power: int) -> Number:
 
 
 def _curved(
-    x: Taylor,
-    function: Callable[[FloatArray], FloatArray],
+    x: Number,
+    function: Callable[[Any], FloatArray],
     slope: Callable[[FloatArray], FloatArray],
     bend: Callable[[FloatArray, FloatArray], FloatArray],
     positive: bool = False,
-) -> Taylor:
+) -> Number:
     """Return f(x): linear part f'(c) g, error |f'| e + ½ max |f''| radius².
 
     Args:
@@ -200,6 +200,8 @@ def _curved(
         bend: a bound of |f''| on [low, high].
         positive: whether f is smooth for positive arguments only.
     """
+    if not isinstance(x, Taylor):
+        return float(function(x))
     radius = x.radius
     low, high = x.c - radius, x.c + radius
     with np.errstate(all="ignore"):
@@ -225,6 +227,7 @@ def reciprocal(x: Taylor) -> Taylor:
         lambda low, _high: 2.0 / low**3,
         positive=True,
     )
+    assert isinstance(one, Taylor)
     return Taylor(sign * one.c, sign * one.g, one.e)
 
 
@@ -250,8 +253,6 @@ class TaylorMath(metaclass=_OnlyThese):
     @staticmethod
     def sqrt(x: Number) -> Number:
         """√x; unbounded where x may be zero."""
-        if not isinstance(x, Taylor):
-            return float(np.sqrt(x))
         return _curved(
             x, np.sqrt, lambda v: 0.5 / np.sqrt(v), lambda low, _high: 0.25 * low**-1.5, True
         )
@@ -259,29 +260,21 @@ class TaylorMath(metaclass=_OnlyThese):
     @staticmethod
     def exp(x: Number) -> Number:
         """Exponential."""
-        if not isinstance(x, Taylor):
-            return float(np.exp(x))
         return _curved(x, np.exp, np.exp, lambda _low, high: np.exp(high))
 
     @staticmethod
     def log(x: Number) -> Number:
         """Natural logarithm; unbounded where x may be zero."""
-        if not isinstance(x, Taylor):
-            return float(np.log(x))
         return _curved(x, np.log, lambda v: 1.0 / v, lambda low, _high: low**-2.0, True)
 
     @staticmethod
     def sin(x: Number) -> Number:
         """Sine."""
-        if not isinstance(x, Taylor):
-            return float(np.sin(x))
         return _curved(x, np.sin, np.cos, lambda low, _high: np.ones_like(low))
 
     @staticmethod
     def cos(x: Number) -> Number:
         """Cosine."""
-        if not isinstance(x, Taylor):
-            return float(np.cos(x))
         return _curved(x, np.cos, lambda v: -np.sin(v), lambda low, _high: np.ones_like(low))
 
     @staticmethod
@@ -292,8 +285,6 @@ class TaylorMath(metaclass=_OnlyThese):
     @staticmethod
     def asin(x: Number) -> Number:
         """Arc sine; unbounded where |x| may be 1."""
-        if not isinstance(x, Taylor):
-            return float(np.arcsin(x))
 
         def bend(low: FloatArray, high: FloatArray) -> FloatArray:
             most = _larger(low, high)
@@ -309,22 +300,16 @@ class TaylorMath(metaclass=_OnlyThese):
     @staticmethod
     def sinh(x: Number) -> Number:
         """Hyperbolic sine."""
-        if not isinstance(x, Taylor):
-            return float(np.sinh(x))
         return _curved(x, np.sinh, np.cosh, lambda low, high: np.sinh(_larger(low, high)))
 
     @staticmethod
     def cosh(x: Number) -> Number:
         """Hyperbolic cosine."""
-        if not isinstance(x, Taylor):
-            return float(np.cosh(x))
         return _curved(x, np.cosh, np.sinh, lambda low, high: np.cosh(_larger(low, high)))
 
     @staticmethod
     def tanh(x: Number) -> Number:
         """Hyperbolic tangent; |f''| <= 4/(3√3)."""
-        if not isinstance(x, Taylor):
-            return float(np.tanh(x))
         return _curved(
             x, np.tanh, lambda v: np.cosh(v) ** -2.0, lambda low, _high: np.full_like(low, 0.77)
         )
@@ -332,8 +317,6 @@ class TaylorMath(metaclass=_OnlyThese):
     @staticmethod
     def atan(x: Number) -> Number:
         """Arc tangent; |f''| <= 3√3/8."""
-        if not isinstance(x, Taylor):
-            return float(np.arctan(x))
         return _curved(
             x,
             np.arctan,

@@ -15,9 +15,8 @@ from asperity.report import page, terminal
 from asperity.report.page import Cards, Cell, Page, Picture, Row, Section, Words, added_sections
 from asperity.report.terminal import Column, say
 from asperity.textures.catalogue import CATALOGUE
-from asperity.textures.kinds import Kind
 from asperity.textures.library import LIBRARY
-from asperity.textures.texture import Texture
+from asperity.textures.texture import Kind, Texture
 from asperity.units import engineering
 
 

@@ -21,7 +21,7 @@ from asperity.simulation import Path as PathMotion
 from asperity.surface import CLAMP, LAW, MAX_DEPTH, STIFFNESS
 from asperity.textures import load_texture
 from asperity.textures.catalogue import CATALOGUE
-from asperity.textures.kinds import Kind
+from asperity.textures.texture import Kind
 
 PATH_COLUMNS = ("time [s]", "x [m]", "y [m]", "z [m]")
 

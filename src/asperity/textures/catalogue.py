@@ -9,10 +9,10 @@ from asperity.arguments import Argument
 from asperity.errors import ParameterError
 from asperity.textures.fourier import Fourier
 from asperity.textures.grating import GRATING
-from asperity.textures.kinds import Kind
 from asperity.textures.library.registry import LIBRARY
 from asperity.textures.noise import NOISE, NOISE_PROFILE
 from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.texture import Kind
 
 _SINUSOID = Kind(
     "sinusoid",

@@ -11,8 +11,7 @@ from typing import Any
 import mpmath
 
 from asperity.checks import FloatArray
-
-ExactHeight = Callable[[Any, Any, int, int], Any]
+from asperity.contacts.contact import ExactHeight
 
 
 def exact_waves(waves: list[tuple[Any, Any, Any, Any]]) -> ExactHeight:

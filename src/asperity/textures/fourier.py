@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from functools import cached_property
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,10 +18,7 @@ from asperity.textures.cells.waves import WaveCells
 from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.plane_waves import PlaneWaves
 from asperity.textures.samplers.fourier import FourierArguments
-from asperity.textures.texture import Texture
-
-if TYPE_CHECKING:
-    from asperity.textures.exact import ExactHeight
+from asperity.textures.texture import ExactHeight, Texture
 
 # How many of the longest waves stand for a sum that never repeats.
 _WAVES_OF_AN_ENDLESS_SUM = 16

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from asperity.arguments import Argument
 from asperity.checks import FloatArray, positive, real
 from asperity.errors import ParameterError
-from asperity.textures.kinds import Kind
 from asperity.textures.profile import Profile
+from asperity.textures.texture import Kind
 
 # Nodes per edge: the spline then meets the closed form to 2e-5 of the height (tested).
 _NODES_PER_EDGE = 40

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,10 +18,7 @@ from asperity.textures.cells.splines import MapCells
 from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.pyramid import plane_pyramid
 from asperity.textures.samplers.heightmap import HeightMapArguments
-from asperity.textures.texture import Texture
-
-if TYPE_CHECKING:
-    from asperity.textures.exact import ExactHeight
+from asperity.textures.texture import ExactHeight, Texture
 
 LEAST_NODES = 4
 # Samples of a dense search: parts of the cells are looked at as long as there are no more.

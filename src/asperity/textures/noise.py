@@ -13,8 +13,8 @@ from asperity.arguments import SEED, Argument, whole
 from asperity.checks import fraction, positive
 from asperity.errors import ParameterError
 from asperity.textures.heightmap import LEAST_NODES, HeightMap
-from asperity.textures.kinds import Kind
 from asperity.textures.profile import Profile
+from asperity.textures.texture import Kind
 from asperity.textures.waves import LEAST_NODES_PER_WAVE, Band, random_field, random_line, with_rms
 
 DEFAULT_HURST = 0.8

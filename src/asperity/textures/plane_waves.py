@@ -1,16 +1,19 @@
-"""Plane waves as data: what sums of them tell those who can do better with waves."""
+"""Plane waves as data: what sums of them tell those who can do better with waves.
+
+Which integer combinations a set of wave vectors is made of: the periods of a Fourier sum.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.textures.lattice import integer_lattice
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,3 +55,123 @@ class SingleWave(Protocol):
     period: float
     phase: float
     direction: tuple[float, float]
+
+
+_LARGEST_DENOMINATOR = 64
+_LARGEST_MULTIPLE = 8
+# Relations between more independent waves than this are not looked for.
+_LARGEST_SEARCHED_RANK = 3
+_TOLERANCE = 1e-9
+
+
+def integer_lattice(waves: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a basis B and integers N with waves = N @ B.
+
+    The number of rows of B is the number of independent phases: 1 for a periodic profile, 2 for a
+    doubly periodic map, more for sums that never repeat. Ratios are recognised as rational up to
+    denominator 64 (8 where three waves or parallel ones are combined) and a relative error of
+    1e-9. A relation that is not recognised leaves more phases independent than there are: a
+    supremum over all phases is then an upper bound, never too low.
+
+    Args:
+        waves: wave vectors [rad/m], shape (n, 2).
+
+    Returns:
+        B [rad/m], shape (r, 2), and N, shape (n, r).
+
+    Example:
+        >>> basis, multiples = integer_lattice(np.array([[4.0, 0.0], [6.0, 0.0]]))
+        >>> basis.tolist(), multiples.tolist()
+        ([[2.0, 0.0]], [[2.0], [3.0]])
+    """
+    basis: FloatArray = np.zeros((0, 2))
+    multiples: FloatArray = np.zeros((len(waves), 0))
+    for index in np.argsort(np.hypot(*waves.T), kind="stable"):
+        wave = waves[index]
+        if not wave.any():
+            continue
+        relation = _relation(basis, wave)
+        if relation is None:
+            basis = np.concatenate([basis, wave[None, :]])
+            multiples = np.column_stack([multiples, np.zeros(len(waves))])
+            multiples[index, -1] = 1.0
+            continue
+        denominator, row = relation
+        if denominator > 1:
+            # The rows of `finer` span the old basis and the wave, in units of basis/denominator.
+            identity = denominator * np.eye(len(basis), dtype=int)
+            finer = np.array(_row_basis([*identity.tolist(), row]), dtype=float)
+            basis = finer @ basis / denominator
+            inverse: FloatArray = np.linalg.inv(finer)
+            multiples = np.round(denominator * multiples @ inverse)
+            row = np.round(np.array(row, dtype=float) @ inverse).tolist()
+        multiples[index] = row
+    return _shorten(basis, multiples)
+
+
+def _relation(basis: FloatArray, wave: FloatArray) -> tuple[int, list[int]] | None:
+    """Return q and n with q·wave = n @ basis, or nothing if there are none of modest size."""
+    rank = len(basis)
+    if rank == 0:
+        return None
+    if rank <= 2 and np.linalg.matrix_rank(basis, tol=_TOLERANCE * np.abs(basis).max()) == rank:
+        return _rational_relation(basis, wave)
+    if rank > _LARGEST_SEARCHED_RANK:
+        return None
+    span = np.arange(-_LARGEST_MULTIPLE, _LARGEST_MULTIPLE + 1)
+    combinations = np.stack(np.meshgrid(*[span] * rank, indexing="ij"), axis=-1).reshape(-1, rank)
+    # Small combinations first: of equal sums the simplest is taken.
+    combinations = combinations[np.argsort(np.abs(combinations).sum(axis=1), kind="stable")]
+    sums = combinations @ basis
+    for q in range(1, _LARGEST_MULTIPLE + 1):
+        close = np.abs(sums - q * wave).max(axis=1) <= _TOLERANCE * float(np.hypot(*wave))
+        if close.any():
+            return q, combinations[int(np.argmax(close))].tolist()
+    return None
+
+
+def _rational_relation(basis: FloatArray, wave: FloatArray) -> tuple[int, list[int]] | None:
+    """Solve for the coefficients and recognise them as ratios of integers."""
+    scale = float(np.hypot(*wave))
+    real = np.linalg.lstsq(basis.T, wave, rcond=None)[0]
+    if np.abs(real @ basis - wave).max() > _TOLERANCE * scale:
+        return None
+    parts = [Fraction(float(c)).limit_denominator(_LARGEST_DENOMINATOR) for c in real]
+    close = np.array([float(p) for p in parts]) @ basis - wave
+    if np.abs(close).max() > _TOLERANCE * scale:
+        return None
+    q = math.lcm(*(p.denominator for p in parts))
+    return q, [int(p * q) for p in parts]
+
+
+def _row_basis(rows: list[list[int]]) -> list[list[int]]:
+    """Return a basis of the integer row space (Hermite normal form by the Euclidean algorithm)."""
+    rows = [row[:] for row in rows]
+    result = []
+    for column in range(len(rows[0])):
+        while sum(row[column] != 0 for row in rows) > 1:
+            rows.sort(key=lambda row: (row[column] == 0, abs(row[column])))
+            pivot = rows[0]
+            for row in rows[1:]:
+                factor = row[column] // pivot[column]
+                row[:] = [a - factor * b for a, b in zip(row, pivot, strict=True)]
+        rows.sort(key=lambda row: row[column] == 0)
+        if rows and rows[0][column] != 0:
+            result.append(rows.pop(0))
+    return result
+
+
+def _shorten(basis: FloatArray, multiples: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a basis of short vectors of a planar lattice (Lagrange-Gauss reduction)."""
+    if len(basis) != 2 or abs(np.linalg.det(basis)) < _TOLERANCE * np.abs(basis).max() ** 2:
+        return basis, multiples
+    a, b = basis
+    while True:
+        if a @ a > b @ b:
+            a, b = b, a
+        factor = round(float(a @ b / (a @ a)))
+        if factor == 0:
+            break
+        b = b - factor * a
+    short = np.array([a, b])
+    return short, np.round(multiples @ basis @ np.linalg.inv(short))

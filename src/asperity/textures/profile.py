@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,10 +18,7 @@ from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.heightmap import LEAST_NODES, mask, padded_coefficients
 from asperity.textures.pyramid import line_pyramid
 from asperity.textures.samplers.profile import ProfileArguments
-from asperity.textures.texture import Texture
-
-if TYPE_CHECKING:
-    from asperity.textures.exact import ExactHeight
+from asperity.textures.texture import ExactHeight, Texture
 
 # Samples of a dense search, at least.
 _LEAST_SAMPLES = 4096

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from functools import cached_property
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -18,10 +18,7 @@ from asperity.textures.cells.waves import WaveCells
 from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.plane_waves import PlaneWaves, SingleWave
 from asperity.textures.samplers.sinusoid import SinusoidArguments
-from asperity.textures.texture import Texture
-
-if TYPE_CHECKING:
-    from asperity.textures.exact import ExactHeight
+from asperity.textures.texture import ExactHeight, Texture
 
 
 class Sinusoid(Texture):

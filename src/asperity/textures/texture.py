@@ -1,27 +1,31 @@
-"""What every texture offers: heights, derivatives, nearest points, extremes and a domain."""
+"""What every texture offers: heights, derivatives, nearest points, extremes and a domain.
+
+A kind of texture that can be asked for by name, as data.
+"""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from asperity.arguments import Argument
 from asperity.checks import FloatArray, array
+from asperity.contacts.contact import ExactHeight
 from asperity.enclosures.cells import Cells
 from asperity.textures.cells.bounded import BoundedCells, DerivativeBounds
 from asperity.textures.cells.lines import Pieces, equal_pieces
 from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.plane_waves import PlaneWaves, SingleWave
 
-if TYPE_CHECKING:
-    from asperity.textures.exact import ExactHeight
-
-__all__ = ["Domain", "ScanLine", "Texture"]
+__all__ = ["Domain", "ExactHeight", "Kind", "ScanLine", "Texture"]
 
 # Points of a grid that shows a texture whose waves are not known: along a profile, along each
 # side of a map; fewer where the shortest wave is long.
@@ -248,3 +252,29 @@ class Texture(ABC):
         out = np.empty((len(points), width))
         getattr(self._loops, loop)(points, out, self.arguments)
         return out
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of texture that can be asked for by name.
+
+    Attributes:
+        name: as on the command line, before the colon.
+        summary: one line.
+        make: makes the texture from its arguments by name.
+        arguments: in the order in which they are listed.
+        example: arguments [SI] that show it; none if the defaults do.
+        source: where its sizes come from.
+    """
+
+    name: str
+    summary: str
+    make: Callable[..., Texture]
+    arguments: tuple[Argument, ...]
+    example: Mapping[str, Any] = field(default_factory=dict)
+    source: str = ""
+
+    @property
+    def required(self) -> tuple[Argument, ...]:
+        """The arguments that have no default."""
+        return tuple(argument for argument in self.arguments if argument.required)

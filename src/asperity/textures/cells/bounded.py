@@ -59,7 +59,7 @@ class BoundedCells(Cells):
         bounds: what is proved.
     """
 
-    gap, wish = 1e-3, None
+    gap, cheap_gap = 1e-3, None
 
     def __init__(
         self,

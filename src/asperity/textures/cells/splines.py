@@ -42,7 +42,7 @@ class MapCells(Cells):
         derivatives: h, h_x, h_y, h_xx, h_xy, h_yy, (n, 6), at points (n, 2) [m].
     """
 
-    dimensions, gap, wish = 2, 1e-3, 1e-6
+    dimensions, gap, cheap_gap = 2, 1e-3, 1e-6
 
     def __init__(
         self,
@@ -119,7 +119,7 @@ class MapCells(Cells):
 class ProfileCells(Cells):
     """The cells of a cubic spline along x, in units of its nodes; see :class:`MapCells`."""
 
-    dimensions, gap, wish = 1, 1e-6, 1e-9
+    dimensions, gap, cheap_gap = 1, 1e-6, 1e-9
 
     def __init__(
         self, coefficients: FloatArray, pitch: float, origin: float, derivatives: Evaluate

@@ -12,13 +12,13 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.enclosures.cells import (
+    CHEAP_GAPS,
     CHUNK,
     EPS,
     GAPS,
     NAMES,
     ORDERS,
     SAMPLES,
-    WISHES,
     Cells,
     spread,
 )
@@ -64,7 +64,7 @@ class WaveCells(Cells):
         every = np.stack(list(self._weights.values()), axis=-1)
         self._even, self._odd = every[:, _EVEN], every[:, _ODD]
         self.dimensions = self._multiples.shape[1]
-        self.gap, self.wish = GAPS.get(self.dimensions, 1e-3), WISHES.get(self.dimensions)
+        self.gap, self.cheap_gap = GAPS.get(self.dimensions, 1e-3), CHEAP_GAPS.get(self.dimensions)
 
     def start(self) -> tuple[Iterator[FloatArray], FloatArray]:
         """See :class:`Cells`."""

@@ -7,9 +7,9 @@ from types import ModuleType
 from typing import Any
 
 from asperity.errors import ParameterError, nearest_names
-from asperity.textures.kinds import Kind
 from asperity.textures.library import brushed_metal, cloth, knurl, sandpaper, tile, wood
 from asperity.textures.library.named import NamedSurface
+from asperity.textures.texture import Kind
 
 _DRAWN: dict[str, ModuleType] = {
     "cloth": cloth,
