@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from asperity.arguments import Argument, Form, read_arguments
+from asperity.arguments import MAX_DEPTH, STIFFNESS, Argument, Form, read_arguments
 from asperity.errors import ParameterError
 from asperity.measured.arguments import FILE_ARGUMENTS, PREPARING
 from asperity.measured.preparation import prepare
-from asperity.surface import CLAMP, LAW, MAX_DEPTH, STIFFNESS, Surface
+from asperity.surface import CLAMP, LAW, Surface
 from asperity.textures import load_texture
 
 READ = [

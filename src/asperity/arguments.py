@@ -203,6 +203,24 @@ def described(arguments: Iterable[Argument]) -> Callable[[Function], Function]:
 
 SEED = Argument("seed", "same seed, same surface", default=0, form="integer")
 
+DEFAULT_STIFFNESS = 1000.0
+STIFFNESS = Argument(
+    "stiffness",
+    "stiffness that you want",
+    "N/m",
+    DEFAULT_STIFFNESS,
+    positive=True,
+    example="500N/m",
+)
+MAX_DEPTH = Argument(
+    "max_depth",
+    "depth to press to",
+    "m",
+    default_words="peak-to-valley height, at most 1 mm",
+    positive=True,
+    example="0.5mm",
+)
+
 
 # --- how each form is read: the argument's name, text, number or list, and the unit ---------------
 
@@ -233,18 +251,17 @@ def _pair(name: str, given: Any, unit: str) -> float | list[float]:
     return values[0] if len(values) == 1 else values
 
 
-def _space(name: str, given: Any, unit: str) -> tuple[float, ...]:
-    parts = _split(given)
-    if len(parts) != 3:
-        raise ParameterError(name, f"must be three quantities for x, y and z [{unit}]", given)
-    return tuple(quantity(name, part, unit) for part in parts)
+def _exactly(count: int, words: str) -> Callable[[str, Any, str], tuple[float, ...]]:
+    def read(name: str, given: Any, unit: str) -> tuple[float, ...]:
+        parts = _split(given)
+        if len(parts) != count:
+            raise ParameterError(name, f"must be {words} [{unit}]", given)
+        return tuple(quantity(name, part, unit) for part in parts)
+
+    return read
 
 
-def _plane(name: str, given: Any, unit: str) -> tuple[float, ...]:
-    parts = _split(given)
-    if len(parts) != 2:
-        raise ParameterError(name, f"must be two quantities [{unit}]", given)
-    return tuple(quantity(name, part, unit) for part in parts)
+_space = _exactly(3, "three quantities for x, y and z")
 
 
 def _axes(name: str, given: Any, unit: str) -> float | tuple[float, ...]:
@@ -300,7 +317,7 @@ _READERS: dict[Form, Callable[[str, Any, str], Any]] = {
     "items": _quantities,
     "vectors": _vectors,
     "space": _space,
-    "plane": _plane,
+    "plane": _exactly(2, "two quantities"),
     "axes": _axes,
     "direction": _direction,
     "integer": _integer,

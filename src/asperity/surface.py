@@ -10,40 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.arguments import Argument
+from asperity.arguments import DEFAULT_STIFFNESS, MAX_DEPTH, STIFFNESS, Argument
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError, nearest_names
 from asperity.kernels.probe import CLAMPS, ClampName
 from asperity.laws import LAW_ARGUMENTS, LAWS, Law, find_law
 from asperity.textures.texture import Texture
 
-DEFAULT_STIFFNESS = 1000.0
 # max_depth unless given: the peak-to-valley height of the texture, at most this [m].
 LARGEST_DEFAULT_DEPTH = 1e-3
 
 LAW = Argument("law", "letter or name of the law", default="C", form="text")
-STIFFNESS = Argument(
-    "stiffness",
-    "stiffness that you want",
-    "N/m",
-    DEFAULT_STIFFNESS,
-    positive=True,
-    example="500N/m",
-)
-MAX_DEPTH = Argument(
-    "max_depth",
-    "depth to press to",
-    "m",
-    default_words="peak-to-valley height, at most 1 mm",
-    positive=True,
-    example="0.5mm",
-)
 CLAMP = Argument(
-    "clamp",
-    "what holds the depth at max_depth",
-    default="none",
-    form="text",
-    choices=CLAMPS,
+    "clamp", "what holds the depth at max_depth", default="none", form="text", choices=CLAMPS
 )
 
 DEFAULT_PARAMETERS = {

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.cli.main import main
+from asperity.cli.main import COMMANDS, main
 
 Call = Callable[..., tuple[int, str, str]]
 
@@ -235,10 +235,11 @@ def test_help_and_version(call: Call) -> None:
     assert (code, out.split()[0]) == (0, "asperity,")
 
 
-def test_starting_up_loads_nothing_heavy() -> None:
-    """Start-up is a feature: --help must not import the numerical libraries."""
+@pytest.mark.parametrize("arguments", [[], *([command] for command in COMMANDS)])
+def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
+    """Start-up is a feature: no --help imports a numerical library, options and all."""
     code = (
-        "import sys; sys.argv = ['asperity', '--help']\n"
+        f"import sys; sys.argv = {['asperity', *arguments, '--help']}\n"
         "from asperity.cli.main import main\n"
         "try: main()\nexcept SystemExit: pass\n"
         "heavy = {'numpy', 'scipy', 'sympy', 'numba', 'matplotlib', 'pint', 'rich', 'jinja2'}\n"

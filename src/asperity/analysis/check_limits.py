@@ -19,12 +19,13 @@ from asperity.analysis.limits.limit_rules import RULES, Case, Decision, Limit, d
 from asperity.analysis.limits.spectrum import LEAST_SHARE, Spectrum, spectrum
 from asperity.analysis.limits.wave_force import wave_forces
 from asperity.analysis.words.limits import answer, assumptions
+from asperity.arguments import DEFAULT_STIFFNESS
 from asperity.checks import FloatArray, positive, real
 from asperity.derive.facts import law_facts
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
 from asperity.laws import Law
-from asperity.surface import DEFAULT_STIFFNESS, Surface
+from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
 DEFAULT_DEVICE = "omega.3"

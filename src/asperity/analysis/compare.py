@@ -14,13 +14,14 @@ from asperity.analysis.gain.characteristic import characteristic_number, one_sid
 from asperity.analysis.recommendation import recommend
 from asperity.analysis.row import LawRow
 from asperity.analysis.words.comparison import assumptions, recommendation, verdict
+from asperity.arguments import DEFAULT_STIFFNESS
 from asperity.checks import positive
 from asperity.derive.facts import law_facts
 from asperity.devices import Device, load_device
 from asperity.files import plain, record
 from asperity.laws import LAWS, Law, find_laws, shared_out
 from asperity.notebook import as_html
-from asperity.surface import DEFAULT_STIFFNESS, Surface
+from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
 SCHEMA = 1

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.arguments import Argument
+from asperity.arguments import STIFFNESS, Argument
 from asperity.cli.options import (
     LAW_OPTIONS,
     device_option,
@@ -22,7 +22,6 @@ from asperity.cli.options import (
 )
 from asperity.cli.output import Outputs, output_options
 from asperity.laws import find_law
-from asperity.surface import STIFFNESS
 
 if TYPE_CHECKING:
     from asperity.devices import Device

@@ -7,13 +7,12 @@ from typing import Any, TypeVar
 
 import click
 
-from asperity.arguments import Argument
+from asperity.arguments import MAX_DEPTH, STIFFNESS, Argument
 from asperity.cli.own_code import load_own_code
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError, nearest_names
 from asperity.laws import LAW_ARGUMENTS, find_law, find_laws, known_arguments
 from asperity.measured.arguments import FILE_ARGUMENTS
-from asperity.surface import MAX_DEPTH, STIFFNESS
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 

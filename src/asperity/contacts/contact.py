@@ -10,13 +10,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from asperity.checks import FloatArray
 from asperity.contacts.sampler import sampled
+
+if TYPE_CHECKING:  # a contact is named at once: NumPy is for who asks it for points
+    from numpy.typing import ArrayLike
+
+    from asperity.checks import FloatArray
 
 
 class HeightField(Protocol):
@@ -171,6 +172,8 @@ class Contact(ABC):
         Returns:
             Where the line begins, at depth 0 [m], shape (3,), and its unit vector, shape (3,).
         """
+        import numpy as np
+
         top = self.begin(texture, np.ascontiguousarray(point[None, :2]))[0]
         return np.array([point[0], point[1], top]), np.array([0.0, 0.0, -1.0])
 
@@ -207,11 +210,13 @@ class Contact(ABC):
 
     def coordinate_size(self, xy: FloatArray, height: float) -> float:
         """Return the size of the coordinates that the depth is a difference of [m]."""
-        return float(abs(height) + np.abs(xy).max())
+        return float(abs(height) + abs(xy).max())
 
 
 def along_normal(xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
     """Return the points (n, 3) [m] at a depth below surface points, along their normals."""
+    import numpy as np
+
     h, hx, hy = derivatives[:, :3].T
     below = depth / np.sqrt(1.0 + hx * hx + hy * hy)
     return np.column_stack([xy[:, 0] + below * hx, xy[:, 1] + below * hy, h - below])

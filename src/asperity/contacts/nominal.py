@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from asperity.checks import FloatArray
 from asperity.contacts.contact import Contact, ContactDerivatives, ExactHeight, HeightField
 from asperity.contacts.sampler import sampled
+
+if TYPE_CHECKING:
+    from asperity.checks import FloatArray
 
 
 class Nominal(Contact):
@@ -40,6 +40,8 @@ class Nominal(Contact):
     def begin(self, texture: HeightField, xy: FloatArray) -> FloatArray:
         """Everywhere at 0."""
         del texture
+        import numpy as np
+
         return np.zeros(len(xy))
 
     def extremes(self, texture: HeightField) -> tuple[float, float]:
@@ -50,6 +52,8 @@ class Nominal(Contact):
     def depth(self, texture: HeightField, points: FloatArray) -> FloatArray:
         """-z."""
         del texture
+        import numpy as np
+
         return np.asarray(-points[:, 2])
 
     def exact_point(
@@ -62,10 +66,14 @@ class Nominal(Contact):
     def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
         """(X, Y, -depth)."""
         del derivatives
+        import numpy as np
+
         return np.column_stack([xy, -depth])
 
     def greatest_depth(self, height: float, derivatives: FloatArray) -> FloatArray:
         """-height."""
+        import numpy as np
+
         return np.full(len(derivatives), -height)
 
     def margin(self, max_depth: float) -> float:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from asperity.checks import FloatArray
 from asperity.contacts.contact import Contact, ContactDerivatives, ExactHeight, HeightField
 from asperity.contacts.sampler import sampled
+
+if TYPE_CHECKING:
+    from asperity.checks import FloatArray
 
 
 class Vertical(Contact):
@@ -43,6 +43,8 @@ class Vertical(Contact):
 
     def depth(self, texture: HeightField, points: FloatArray) -> FloatArray:
         """H - z."""
+        import numpy as np
+
         return np.asarray(texture.height(np.ascontiguousarray(points[:, :2])) - points[:, 2])
 
     def exact_point(
@@ -54,10 +56,14 @@ class Vertical(Contact):
 
     def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
         """(X, Y, h - depth)."""
+        import numpy as np
+
         return np.column_stack([xy, derivatives[:, 0] - depth])
 
     def greatest_depth(self, height: float, derivatives: FloatArray) -> FloatArray:
         """H less the height."""
+        import numpy as np
+
         return np.asarray(derivatives[:, 0] - height)
 
     def margin(self, max_depth: float) -> float:

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from asperity.arguments import Argument, read_arguments
+from asperity.arguments import MAX_DEPTH, STIFFNESS, Argument, read_arguments
 from asperity.errors import ParameterError, nearest_names
 from asperity.laws import LAW_ARGUMENTS, Law, known_arguments
 from asperity.measured.arguments import FILE_ARGUMENTS
 from asperity.scene.plant import BRAKES
 from asperity.simulation import BandHand, MovedHand, SpringHand, Still, Strokes
 from asperity.simulation import Path as PathMotion
-from asperity.surface import CLAMP, LAW, MAX_DEPTH, STIFFNESS
+from asperity.surface import CLAMP, LAW
 from asperity.textures import load_texture
 from asperity.textures.catalogue import CATALOGUE
 from asperity.textures.texture import Kind

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from asperity.checks import FloatArray
 from asperity.contacts.contact import (
     Contact,
     ContactDerivatives,
@@ -15,6 +12,9 @@ from asperity.contacts.contact import (
     along_normal,
 )
 from asperity.contacts.sampler import sampled
+
+if TYPE_CHECKING:
+    from asperity.checks import FloatArray
 
 
 class Nearest(Contact):
@@ -67,12 +67,16 @@ class Nearest(Contact):
 
     def depth(self, texture: HeightField, points: FloatArray) -> FloatArray:
         """Distance to the surface, negative outside of the body."""
+        import numpy as np
+
         feet = texture.nearest(points)
         below = points[:, 2] < texture.height(np.ascontiguousarray(points[:, :2]))
         return np.asarray(np.where(below, 1.0, -1.0) * np.linalg.norm(feet - points, axis=1))
 
     def column(self, texture: HeightField, point: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Along the normal at the foot, into the body."""
+        import numpy as np
+
         foot = texture.nearest(point[None])[0]
         hx, hy = texture.gradient(foot[None, :2])[0]
         inward = np.array([hx, hy, -1.0])
@@ -92,6 +96,8 @@ class Nearest(Contact):
 
     def greatest_depth(self, height: float, derivatives: FloatArray) -> FloatArray:
         """Where the foot's normal line sinks below the height."""
+        import numpy as np
+
         above = derivatives[:, 0] - height
         return np.asarray(above * np.sqrt(1.0 + derivatives[:, 1] ** 2 + derivatives[:, 2] ** 2))
 
