@@ -9,9 +9,9 @@ import numpy as np
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.passivity.criteria import LEAK
 from asperity.analysis.words.passivity import gained
-from asperity.analysis.words.surface import law_parameters
-from asperity.devices import Device
-from asperity.surface import DEFAULT_STIFFNESS, Surface, default_max_depth
+from asperity.analysis.words.surface import default_depth, law_parameters, unverified
+from asperity.arguments import DEFAULT_STIFFNESS
+from asperity.surface import Surface, default_max_depth
 from asperity.textures.texture import Texture
 from asperity.units import engineering, rounded_down
 
@@ -30,10 +30,8 @@ def answer(result: Analysis) -> str:
     """Return the verdict in one sentence."""
     surface, judged = result.surface, result.passivity
     depth = engineering(surface.max_depth, "m")
-    subject = (
-        f"law {surface.law.letter} at {surface.stiffness:g} N/m, pressed to {depth}, "
-        f"on the {result.device.name}"
-    )
+    subject = f"law {surface.law.letter} at {surface.stiffness:g} N/m, pressed to {depth}, "
+    subject += f"on the {result.device.name}"
     rule = judged.criterion(judged.decided_by)
     if judged.verdict == "passive":
         limit = "infinite" if rule.limit == math.inf else f"{rounded_down(rule.limit or 0.0):.10g}"
@@ -82,7 +80,7 @@ def assumptions(result: Analysis, extent: tuple[float, float] | None) -> tuple[s
         said.append("A number without an upper bound is the greatest one found, not a proof")
     if not result.continuity.continuous:
         said.append("Jumps are located where contact begins and below the sharpest crest only")
-    said += _of_the_device(result.device)
+    said += unverified(result.device, _USED)
     said.append("Dry friction and quantisation of the device are in none of the criteria")
     return tuple(said)
 
@@ -93,20 +91,8 @@ def _defaults(surface: Surface) -> list[str]:
     if surface.stiffness == DEFAULT_STIFFNESS:
         said.append(f"Default stiffness {surface.stiffness:g} N/m")
     if surface.max_depth == default_max_depth(surface.texture):
-        depth = engineering(surface.max_depth, "m")
-        said.append(f"Default max depth {depth}: the peak-to-valley height, at most 1 mm")
+        said.append(default_depth(surface))
     if surface.max_depth > surface_width(surface.texture):
         width = engineering(surface_width(surface.texture), "m")
         said.append(f"Below {width}, the surface's width, only its mirror images are felt")
     return said + law_parameters(surface)
-
-
-def _of_the_device(device: Device) -> list[str]:
-    """Return what the criteria use of the device without its being verified, and its notes."""
-    unverified = [
-        f"{field.replace('_', ' ')} {device.data[field].text}"
-        for field in _USED
-        if field in device.data and not device.data[field].verified
-    ]
-    said = [f"Not verified for the {device.name}: {', '.join(unverified)}"] if unverified else []
-    return [*said, *device.notes]

@@ -6,20 +6,20 @@ from collections.abc import Mapping, Sequence
 
 from asperity.analysis.recommendation import Recommendation, felt_force
 from asperity.analysis.row import LawRow
-from asperity.analysis.words.surface import law_parameters
+from asperity.analysis.words.passivity import newtons
+from asperity.analysis.words.surface import default_depth, law_parameters
 from asperity.devices import Device
 from asperity.surface import Surface
-from asperity.units import engineering, rounded_down
+from asperity.units import engineering
 
 
 def verdict(row: LawRow) -> str:
     """Return what will go wrong with a law, in one line."""
     k, parts = row.surface.stiffness, []
     if row.buzzes:
-        parts.append(f"may buzz: {k:g} N/m is above its {limit_text(row.safe_stiffness)}")
+        parts.append(f"may buzz: {k:g} N/m is above its {newtons(row.safe_stiffness)}")
     if row.leaks:
-        gain = engineering(row.leak.worst, "J")
-        parts.append(f"feels alive: a loop gains up to {gain}")
+        parts.append(f"feels alive: a loop gains up to {engineering(row.leak.worst, 'J')}")
     if row.jumps:
         parts.append("clicks: " + row.continuous_reason)
     if row.textureless:
@@ -31,25 +31,14 @@ def verdict(row: LawRow) -> str:
     return "; ".join(parts)
 
 
-def limit_text(stiffness: float) -> str:
-    """Return a greatest stiffness in three digits, rounded down: a limit is never overstated.
-
-    Example:
-        >>> limit_text(975.6), limit_text(5000.0), limit_text(0.8793)
-        ('975 N/m', '5000 N/m', '0.879 N/m')
-    """
-    return f"{rounded_down(stiffness):.10g} N/m"
-
-
 def recommendation(found: Recommendation, device: Device) -> str:
     """Return which law to use, and why."""
     best = found.row
     if best is None:
         return "None of the laws compared renders a texture on this surface."
-    head = (
-        f"Use law {best.law.letter} ({_spoken(best)}) at up to {limit_text(best.safe_stiffness)} "
-        f"on the {device.name}"
-    )
+    name = best.law.name.replace("-", " ")
+    limit = newtons(best.safe_stiffness)
+    head = f"Use law {best.law.letter} ({name}) at up to {limit} on the {device.name}"
     why = _sound_reason(best) if found.sound else _least_leak_reason(best, found)
     tail = _price(best, found.felt) + _saturation(best, device)
     return f"{head}: {why}.{tail}"
@@ -71,7 +60,7 @@ def _least_leak_reason(best: LawRow, found: Recommendation) -> str:
         weak = max(faint, key=lambda row: row.texture_force)
         why_not = (
             f"law {weak.law.letter}, conservative and continuous, gives only "
-            f"{engineering(weak.texture_force, 'N')} RMS at its {limit_text(weak.safe_stiffness)}, "
+            f"{engineering(weak.texture_force, 'N')} RMS at its {newtons(weak.safe_stiffness)}, "
             f"below the {engineering(found.threshold, 'N')} that can be felt"
         )
     else:
@@ -80,10 +69,6 @@ def _least_leak_reason(best: LawRow, found: Recommendation) -> str:
         f"{why_not}; of the continuous laws this one leaks least for its texture force "
         f"({force} RMS, up to {gain} per loop, so it can feel alive)"
     )
-
-
-def _spoken(row: LawRow) -> str:
-    return row.law.name.replace("-", " ")
 
 
 def _price(best: LawRow, textured: Sequence[LawRow]) -> str:
@@ -99,7 +84,7 @@ def _price(best: LawRow, textured: Sequence[LawRow]) -> str:
         trouble.append("its force jumps")
     return (
         f" The price is stiffness: law {rival.law.letter} can be rendered at "
-        f"{limit_text(rival.safe_stiffness)}, but {' and '.join(trouble) or 'has less texture'}."
+        f"{newtons(rival.safe_stiffness)}, but {' and '.join(trouble) or 'has less texture'}."
     )
 
 
@@ -142,12 +127,9 @@ def assumptions(
     ]  # fmt: skip
     if unverified:
         result.append(f"Not verified for the {device.name}: {', '.join(unverified)}")
-    known = device.value("force_resolution") is not None
-    source = (
-        f"the force resolution of the {device.name}"
-        if known
-        else "a default, the device's force resolution being unknown"
-    )
+    source = f"the force resolution of the {device.name}"
+    if device.value("force_resolution") is None:
+        source = "a default, the device's force resolution being unknown"
     force = engineering(felt_force(device), "N")
     result.append(f"Texture below {force} RMS counts as not felt: {source}")
     if any(row.q.method == "sampled" or row.one_sided.method == "sampled" for row in rows):
@@ -169,8 +151,7 @@ def _defaulted(rows: Sequence[LawRow], defaults: Mapping[str, bool]) -> list[str
     if defaults["stiffness"]:
         result.append(f"Default stiffness {first.stiffness:g} N/m")
     if defaults["max_depth"]:
-        depth = engineering(first.max_depth, "m")
-        result.append(f"Default max depth {depth}: the peak-to-valley height, at most 1 mm")
+        result.append(default_depth(first))
     for row in rows:
         said = law_parameters(row.surface)
         result += [f"{parameter} for law {row.law.letter}" for parameter in said]

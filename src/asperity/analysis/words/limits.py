@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from asperity.analysis.limits.limit_result import Limits
 from asperity.analysis.limits.limit_rules import Limit
-from asperity.analysis.words.surface import law_parameters
+from asperity.analysis.words.surface import default_depth, law_parameters, unverified
 from asperity.units import engineering, rounded_down
 
 
@@ -15,17 +15,19 @@ def answer(result: Limits) -> str:
     """Return whether the texture is felt as it is, in a few sentences."""
     if not result.waves:
         return "The surface is flat: there is no texture to feel."
+    speed = speed_text(result.speed)
     failing = [limit for limit in result.limits if limit.holds is False]
     open_ones = [limit for limit in result.limits if limit.holds is None]
     if failing:
-        text = f"{_part(result, failing)} at {_speed(result)}: "
+        text = f"{_part(result, failing)} at {speed}: "
         text += f"{'; '.join(_failure(limit) for limit in failing)}.{_slower(result, failing)}"
     elif len(open_ones) == len(result.limits):
         text = "Nothing can be decided."
     elif open_ones:
-        text = f"As far as can be decided: {_listed(result.limits, True)} at {_speed(result)}."
+        holding = _numbers([limit for limit in result.limits if limit.holds])
+        text = f"As far as can be decided: {holding} hold at {speed}."
     else:
-        text = f"Yes: all six limits hold at {_speed(result)}."
+        text = f"Yes: all six limits hold at {speed}."
     if open_ones:
         missing = dict.fromkeys(need for limit in open_ones for need in limit.needs)
         text += f" Not decidable: {_numbers(open_ones)}, for want of {_joined(list(missing))}."
@@ -58,10 +60,6 @@ def speed_text(speed: float) -> str:
     return f"{speed:.3g} m/s" if speed >= 0.01 else f"{1e3 * speed:.3g} mm/s"
 
 
-def _speed(result: Limits) -> str:
-    return speed_text(result.speed)
-
-
 def _part(result: Limits, failing: Sequence[Limit]) -> str:
     """Return how much of the texture meets the limits that can be decided."""
     if any(limit.share is None for limit in failing) or result.share == 0.0:
@@ -82,9 +80,7 @@ def _slower(result: Limits, failing: Sequence[Limit]) -> str:
     """Return at which speed all would hold, if a slower scan mends it."""
     top = result.speeds[1]
     if top == 0.0:
-        at_none = [
-            limit for limit in failing if limit.speeds is not None and limit.speeds[1] == 0.0
-        ]
+        at_none = [limit for limit in failing if limit.speeds and limit.speeds[1] == 0.0]
         return f" No speed mends {_numbers(at_none)}."
     return f" {speeds_text(result.speeds).capitalize()} they hold."
 
@@ -97,16 +93,13 @@ def force_words(result: Limits) -> str:
     if force.in_band is not None and force.in_band < 0.995:
         text += f", {percent(force.in_band)} of its power within the bandwidth"
     against = []
-    if force.above_resolution is not None:
-        word = "above" if force.above_resolution else "not above"
-        against.append(
-            f"{word} the force resolution of {_newton(device.data['force_resolution'].value)}"
-        )
-    if force.above_friction is not None:
-        word = "above" if force.above_friction else "not above"
-        against.append(
-            f"its amplitude {word} the dry friction of {_newton(device.data['friction'].value)}"
-        )
+    for above, field, words in (
+        (force.above_resolution, "force_resolution", "{} the force resolution of {}"),
+        (force.above_friction, "friction", "its amplitude {} the dry friction of {}"),
+    ):
+        if above is not None:
+            level = _newton(device.data[field].value)
+            against.append(words.format("above" if above else "not above", level))
     return f"{text}{': ' if against else ''}{', '.join(against)}."
 
 
@@ -131,10 +124,6 @@ def percent(share: float) -> str:
 
 def _newton(force: float) -> str:
     return engineering(force, "N", digits=2)
-
-
-def _listed(six: Sequence[Limit], holds: bool) -> str:
-    return f"{_numbers([limit for limit in six if limit.holds is holds])} hold"
 
 
 def _numbers(some: Sequence[Limit]) -> str:
@@ -171,7 +160,8 @@ def assumptions(
         said.append(f"No contact on {percent(contact_lost)} of that scan")
     if result.gain.method == "sampled":
         said.append(f"{result.gain_symbol} = {result.gain.value:.4g} is sampled, not proved")
-    said += _of_the_device(result)
+    used = [*dict.fromkeys(limit.uses for limit in result.limits), "friction"]
+    said += unverified(result.device, used)
     said.append(
         "The limits are necessary, not sufficient; they say nothing of perception: no test with "
         "people stands behind them"
@@ -182,7 +172,7 @@ def assumptions(
 def _defaulted(result: Limits, defaults: Mapping[str, bool]) -> list[str]:
     said = []
     if defaults["speed"]:
-        said.append(f"Default speed {_speed(result)}")
+        said.append(f"Default speed {speed_text(result.speed)}")
     if defaults["samples"]:
         counts = (result.time_samples, result.position_samples, result.force_steps)
         shown = ", ".join(f"{name} = {n:g}" for name, n in zip("αβγ", counts, strict=True))
@@ -195,19 +185,5 @@ def _defaulted(result: Limits, defaults: Mapping[str, bool]) -> list[str]:
             why = f"a default: {symbol} is unbounded, so no stiffness is safe"
         said.append(f"Stiffness {k}: {why}")
     if defaults["max_depth"]:
-        depth = engineering(result.surface.max_depth, "m")
-        said.append(f"Default max depth {depth}: the peak-to-valley height, at most 1 mm")
+        said.append(default_depth(result.surface))
     return said + law_parameters(result.surface)
-
-
-def _of_the_device(result: Limits) -> list[str]:
-    """Return which of the device's numbers were used without being verified, and its notes."""
-    device = result.device
-    used = [*dict.fromkeys(limit.uses for limit in result.limits), "friction"]
-    unverified = [
-        f"{field.replace('_', ' ')} {device.data[field].text}"
-        for field in used
-        if field in device.data and not device.data[field].verified
-    ]
-    said = [f"Not verified for the {device.name}: {', '.join(unverified)}"] if unverified else []
-    return [*said, *device.notes]

@@ -1,8 +1,26 @@
-"""What was taken for a surface, in words."""
+"""What was taken for a surface and a device, in words."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from asperity.devices import Device
 from asperity.surface import Surface
+from asperity.units import engineering
+
+
+def default_depth(surface: Surface) -> str:
+    """Return what max_depth was taken, in a sentence."""
+    depth = engineering(surface.max_depth, "m")
+    return f"Default max depth {depth}: the peak-to-valley height, at most 1 mm"
+
+
+def unverified(device: Device, fields: Iterable[str]) -> list[str]:
+    """Return which of the device's numbers were used without being verified, and its notes."""
+    known = [(field, device.data[field]) for field in fields if field in device.data]
+    said = [f"{name.replace('_', ' ')} {datum.text}" for name, datum in known if not datum.verified]
+    first = [f"Not verified for the {device.name}: {', '.join(said)}"] if said else []
+    return [*first, *device.notes]
 
 
 def law_parameters(surface: Surface) -> list[str]:
