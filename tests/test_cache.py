@@ -1,0 +1,138 @@
+"""What is kept between runs is checked before it is used."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import random
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from asperity import cache
+
+ROOM, KEY, CONTENT = "room", "key of the entry", b"content" * 20
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path / "cache"))
+    cache._say.cache_clear()
+    yield tmp_path / "cache"
+    cache._say.cache_clear()
+
+
+def entry(folder: Path) -> Path:
+    (found,) = [path for path in (folder / ROOM).iterdir() if path.suffix != ".damaged"]
+    return found
+
+
+def test_what_is_kept_is_found_by_its_key_alone():
+    assert cache.recall(ROOM, KEY) is None
+    cache.keep(ROOM, KEY, CONTENT)
+    assert cache.recall(ROOM, KEY) == CONTENT
+    assert cache.recall(ROOM, KEY + " ") is None
+    assert cache.recall("another", KEY) is None
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_flipped_bit_or_a_cut_is_never_believed(folder: Path, seed: int):
+    cache.keep(ROOM, KEY, CONTENT)
+    draw, path = random.Random(seed), entry(folder)
+    whole = bytearray(path.read_bytes())
+    if seed % 4:
+        whole[draw.randrange(len(whole))] ^= 1 << draw.randrange(8)
+    else:
+        del whole[draw.randrange(len(whole)) :]
+    path.write_bytes(whole)
+    with pytest.warns(cache.CacheWarning, match="damaged entry: it was set aside") as said:
+        assert cache.recall(ROOM, KEY) is None
+    assert str(folder) in str(said[0].message)
+    assert cache.recall(ROOM, KEY) is None  # said once, and out of the way
+    cache.keep(ROOM, KEY, CONTENT)
+    assert cache.recall(ROOM, KEY) == CONTENT
+
+
+def test_entries_that_change_places_are_not_believed(folder: Path):
+    cache.keep(ROOM, KEY, CONTENT)
+    first = entry(folder)
+    cache.keep(ROOM, "another", b"other")
+    (other,) = set((folder / ROOM).iterdir()) - {first}
+    other.write_bytes(first.read_bytes())
+    with pytest.warns(cache.CacheWarning, match="damaged"):
+        assert cache.recall(ROOM, "another") is None
+
+
+class _Planted:
+    def __reduce__(self) -> tuple[object, tuple[str]]:
+        return os.system, ("touch planted-code-ran",)
+
+
+def test_a_planted_pickle_is_not_even_read(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(folder.parent)
+    cache.keep(ROOM, KEY, CONTENT)
+    entry(folder).write_bytes(pickle.dumps(_Planted()))
+    with pytest.warns(cache.CacheWarning):
+        assert cache.recall(ROOM, KEY) is None
+    assert not (folder.parent / "planted-code-ran").exists()
+
+
+@pytest.mark.parametrize(
+    ("mode", "reason"), [(0o777, "everybody may write"), (0o1777, "everybody may write")]
+)
+def test_a_folder_that_everybody_may_write_is_refused(folder: Path, mode: int, reason: str):
+    cache.keep(ROOM, KEY, CONTENT)
+    folder.chmod(mode)
+    with pytest.warns(cache.CacheWarning, match=reason):
+        assert cache.recall(ROOM, KEY) is None
+    folder.chmod(0o755)
+    assert cache.recall(ROOM, KEY) == CONTENT
+
+
+@pytest.mark.parametrize(
+    ("uid", "gid", "mode", "reason"),
+    [
+        (4321, 4321, 0o755, "somebody else"),
+        (4321, None, 0o775, "somebody else"),
+        (4321, None, 0o2775, ""),  # made for a group that one is in
+        (4321, 4321, 0o2775, "somebody else"),
+        (None, 4321, 0o775, "another group"),
+        (None, None, 0o775, ""),  # a group of one's own
+        (0, 0, 0o755, ""),  # of the system
+    ],
+)
+def test_who_may_have_put_code_there(
+    uid: int | None, gid: int | None, mode: int, reason: str, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(os, "geteuid", lambda: 77)
+    monkeypatch.setattr(os, "getegid", lambda: 88)
+    monkeypatch.setattr(os, "getgroups", lambda: [88, 99])
+    numbers = (stat.S_IFDIR | mode, 0, 0, 0, 77 if uid is None else uid, 88 if gid is None else gid)
+    assert cache._why_not(os.stat_result((*numbers, 0, 0, 0, 0))).startswith(reason)
+    assert bool(cache._why_not(os.stat_result((*numbers, 0, 0, 0, 0)))) == bool(reason)
+
+
+def test_a_file_where_the_folder_should_be_costs_time_only(folder: Path):
+    folder.write_text("not a folder")
+    with pytest.warns(cache.CacheWarning, match="cannot be used"):
+        cache.keep(ROOM, KEY, CONTENT)
+    assert cache.recall(ROOM, KEY) is None
+    assert folder.read_text() == "not a folder"
+
+
+def test_a_file_where_a_room_should_be_costs_time_only(folder: Path):
+    folder.mkdir()
+    (folder / ROOM).write_text("not a folder")
+    with pytest.warns(cache.CacheWarning, match="cannot be written"):
+        cache.keep(ROOM, KEY, CONTENT)
+    assert cache.recall(ROOM, KEY) is None
+
+
+def test_a_pipe_in_place_of_an_entry_does_not_hang(folder: Path):
+    cache.keep(ROOM, KEY, CONTENT)
+    path = entry(folder)
+    path.unlink()
+    os.mkfifo(path)
+    assert cache.recall(ROOM, KEY) is None
