@@ -45,10 +45,7 @@ def run(console: Console) -> None:
             f"  {name:12}: {answer['total']:5.2f} s in all; laws {laws} s;"
             f" kernels compiled {answer['misses']}"
         )
-    kinds = ", ".join(
-        f"{sum(name.endswith(suffix) for name in filled)} {suffix}" for suffix in (".nbi", ".nbc")
-    )
-    console.print(f"  the first process wrote {len(filled)} files ({kinds})")
+    console.print(f"  the first process wrote {len(filled)} files")
     if not filled or touched or second["misses"]:
         console.print(f"  COMPILED AGAIN: {', '.join(touched) or 'no cache'}", style="bold")
     else:
@@ -56,8 +53,7 @@ def run(console: Console) -> None:
 
 
 def _process(cache: Path) -> dict[str, Any]:
-    environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
-    environment["ASPERITY_CACHE_DIR"] = str(cache)
+    environment = os.environ | {"ASPERITY_CACHE_DIR": str(cache)}
     command = [sys.executable, "-c", _SCRIPT]
     answer = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
     result: dict[str, Any] = json.loads(answer.stdout)

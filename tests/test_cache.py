@@ -47,7 +47,7 @@ def test_a_flipped_bit_or_a_cut_is_never_believed(folder: Path, seed: int):
     else:
         del whole[draw.randrange(len(whole)) :]
     path.write_bytes(whole)
-    with pytest.warns(cache.CacheWarning, match="damaged entry: it was set aside") as said:
+    with pytest.warns(cache.CacheWarning, match="damaged entries: they were set aside") as said:
         assert cache.recall(ROOM, KEY) is None
     assert str(folder) in str(said[0].message)
     assert cache.recall(ROOM, KEY) is None  # said once, and out of the way
@@ -116,7 +116,7 @@ def test_who_may_have_put_code_there(
 
 def test_a_file_where_the_folder_should_be_costs_time_only(folder: Path):
     folder.write_text("not a folder")
-    with pytest.warns(cache.CacheWarning, match="cannot be used"):
+    with pytest.warns(cache.CacheWarning, match="cannot be written"):
         cache.keep(ROOM, KEY, CONTENT)
     assert cache.recall(ROOM, KEY) is None
     assert folder.read_text() == "not a folder"
@@ -135,4 +135,6 @@ def test_a_pipe_in_place_of_an_entry_does_not_hang(folder: Path):
     path = entry(folder)
     path.unlink()
     os.mkfifo(path)
+    with pytest.warns(cache.CacheWarning, match="damaged"):
+        assert cache.recall(ROOM, KEY) is None
     assert cache.recall(ROOM, KEY) is None

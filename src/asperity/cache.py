@@ -2,8 +2,9 @@
 
 One file per entry, in a room (a folder) of the cache folder: ``ASPERITY_CACHE_DIR`` if set, else
 the user's cache directory. A file carries a digest of its key and its content: what is damaged,
-exchanged or planted is set aside and made again. A folder that cannot be used costs time, never
-the answer.
+exchanged or planted is set aside and made again, before anything of it is looked at. Whoever may
+write in the folder may put code there, so one that others own or may write is not used. A folder
+that cannot be used costs time, never the answer.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from asperity.files import whole_file
 
 _MAGIC = b"asperity cache 1\n"
 _DIGEST = 32
+_HEAD = len(_MAGIC) + _DIGEST
 _LARGEST = 2**30
 _SET_ASIDE = ".damaged"
 
@@ -45,36 +47,47 @@ def recall(room: str, key: str) -> bytes | None:
         room: kind of entry, the name of a folder.
         key: everything that the content depends on.
     """
-    folder = _usable(cache_folder())
-    if folder is None:
-        return None
-    path = folder / room / _name(key)
+    path = cache_folder() / room / _name(key)
     try:
+        if not (_trusted(path.parent.parent) and _trusted(path.parent)):
+            return None
         # Not to hang where somebody put a pipe.
         with os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as stream:
-            if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-                return None
-            whole = stream.read(_LARGEST)
-    except OSError:
+            status = os.fstat(stream.fileno())
+            regular = stat.S_ISREG(status.st_mode) and status.st_size <= _LARGEST
+            whole = stream.read(_LARGEST) if regular else b""
+    except (FileNotFoundError, NotADirectoryError):  # what is in the way is said when writing
         return None
-    head, content = whole[: len(_MAGIC) + _DIGEST], whole[len(_MAGIC) + _DIGEST :]
-    if head == _MAGIC + _digest(key, content):
-        return content
-    _set_aside(path)
+    except (OSError, ValueError) as error:
+        _say(f"the cache {cache_folder()} cannot be read ({_reason(error)}): {_AGAIN}")
+        return None
+    if whole[:_HEAD] == _MAGIC + _digest(key, whole[_HEAD:]):
+        return whole[_HEAD:]
+    set_aside(room, key)
     return None
 
 
 def keep(room: str, key: str, content: bytes) -> None:
     """Keep a content under a key, whole or not at all; what cannot be kept is made again."""
-    folder = _usable(cache_folder())
-    if folder is None:
-        return
+    path = cache_folder() / room / _name(key)
     try:
-        (folder / room).mkdir(parents=True, exist_ok=True)
-        with whole_file(folder / room / _name(key)) as stream:
-            stream.write(_MAGIC + _digest(key, content) + content)
-    except OSError as error:
-        _say(f"the cache {folder} cannot be written ({error.strerror}): it is done again each time")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if _trusted(path.parent.parent) and _trusted(path.parent):
+            with whole_file(path) as stream:
+                stream.write(_MAGIC + _digest(key, content) + content)
+    except (OSError, ValueError) as error:
+        _say(f"the cache {cache_folder()} cannot be written ({_reason(error)}): {_AGAIN}")
+
+
+def set_aside(room: str, key: str) -> None:
+    """Move a damaged entry out of the way, where it can be looked at, and say so once."""
+    path = cache_folder() / room / _name(key)
+    with suppress(OSError):  # another process may be mending it now
+        path.replace(path.with_name(path.name + _SET_ASIDE))
+    _say(f"the cache {cache_folder()} had damaged entries: they were set aside and made again")
+
+
+_AGAIN = "the work is done again each time"
 
 
 def _name(key: str) -> str:
@@ -86,11 +99,8 @@ def _digest(key: str, content: bytes) -> bytes:
     return hashlib.sha256(hashlib.sha256(key.encode()).digest() + content).digest()
 
 
-def _set_aside(path: Path) -> None:
-    """Move a damaged entry out of the way, where it can be looked at."""
-    with suppress(OSError):  # another process may be mending it now
-        path.replace(path.with_name(path.name + _SET_ASIDE))
-    _say(f"the cache {path.parent.parent} had a damaged entry: it was set aside and made again")
+def _reason(error: OSError | ValueError) -> str:
+    return getattr(error, "strerror", None) or str(error)
 
 
 @lru_cache(maxsize=32)
@@ -99,26 +109,21 @@ def _say(message: str) -> None:
     warnings.warn(message, CacheWarning, stacklevel=2)
 
 
-def _usable(folder: Path) -> Path | None:
-    """Return the folder if what lies in it can be trusted, made if need be."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        status = folder.stat()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        _say(f"the cache {folder} cannot be used ({reason}): it is done again each time")
-        return None
-    reason = _why_not(status)
+def _trusted(folder: Path) -> bool:
+    """Return whether what lies in a folder can be trusted, and say it if not.
+
+    Raises:
+        OSError: for a folder that is not there.
+    """
+    reason = _why_not(folder.stat())
     if reason:
-        _say(f"the cache {folder} is not used: {reason}; set ASPERITY_CACHE_DIR to one of your own")
-        return None
-    return folder
+        advice = "set ASPERITY_CACHE_DIR to a folder of your own"
+        _say(f"the cache {folder} is not used: {reason}; {advice}")
+    return not reason
 
 
 def _why_not(status: os.stat_result) -> str:
     """Return why a folder's content cannot be trusted: it holds code that is run; else nothing."""
-    if not stat.S_ISDIR(status.st_mode):
-        return "it is no folder"
     if not hasattr(os, "geteuid"):
         return ""  # no owners and modes to look at
     mode, groups = status.st_mode, {os.getegid(), *os.getgroups()}

@@ -44,15 +44,39 @@ def whole_file(path: str | os.PathLike[str], *, durable: bool = False) -> Iterat
     target = Path(os.path.realpath(path))
     beside = target.with_name(f".{secrets.token_hex(8)}.tmp")
     try:
-        with beside.open("xb") as stream:
+        with _without_name(target.parent) or beside.open("xb") as stream:
             yield stream
+            stream.flush()
             if durable:
-                stream.flush()
                 os.fsync(stream.fileno())
+            if stream.name != str(beside):
+                _give_name(stream.fileno(), beside)
         beside.replace(target)
     except BaseException:
         beside.unlink(missing_ok=True)
         raise
+
+
+def _without_name(folder: Path) -> IO[bytes] | None:
+    """Open a file that has no name yet, so that a killed process leaves none behind.
+
+    Nothing where the system or the file system has no such files.
+    """
+    if not hasattr(os, "O_TMPFILE"):
+        return None
+    try:
+        return os.fdopen(os.open(folder, os.O_TMPFILE | os.O_WRONLY, 0o666), "wb")
+    except OSError:
+        return None  # the named file fails in the same way, or can be written
+
+
+def _give_name(descriptor: int, path: Path) -> None:
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        # A folder makes it linkat(), which follows the link of /proc to the open file.
+        os.link(f"/proc/self/fd/{descriptor}", path.name, dst_dir_fd=folder)
+    finally:
+        os.close(folder)
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:

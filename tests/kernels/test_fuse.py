@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.kernels import fuse
+from asperity import cache as checked
+from asperity.kernels import code_store, fuse
 from asperity.kernels.probe import CLAMPS
 from asperity.laws import LAWS, Law
 from asperity.textures import Texture
@@ -20,48 +21,65 @@ Check = Callable[..., Any]
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """An empty cache directory."""
+    """An empty cache folder."""
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path / "cache"))
-    fuse.cache_directory.cache_clear()
     fuse.load_fused.cache_clear()
-    yield tmp_path / "cache" / "kernels"
-    fuse.cache_directory.cache_clear()
+    yield tmp_path / "cache"
     fuse.load_fused.cache_clear()
 
 
-def test_the_cache_lies_where_the_environment_says(cache: Path):
-    assert fuse.cache_directory() == cache
-    module = fuse.load_fused("VALUE = 3\n")
-    assert (module.VALUE, Path(module.__file__ or "").parent) == (3, cache)
+LOOP = """
+from numba import njit
+from asperity.kernels.code_store import keep_code
+@keep_code(njit(nogil=True))
+def twice(x):
+    return 2.0 * x
+"""
 
 
-def test_without_a_place_to_write_the_cache_is_temporary(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    (tmp_path / "file").write_text("in the way", encoding="utf-8")
-    monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path / "file"))
-    fuse.cache_directory.cache_clear()
-    try:
-        assert fuse.cache_directory().is_dir()
-        assert tmp_path not in fuse.cache_directory().parents
-    finally:
-        fuse.cache_directory.cache_clear()
-
-
-def test_a_module_is_named_after_its_content(cache: Path):
+def test_a_module_is_named_after_its_content():
     one, two = fuse.load_fused("VALUE = 1\n"), fuse.load_fused("VALUE = 2\n")
     assert (one.VALUE, two.VALUE, one.__name__ == two.__name__) == (1, 2, False)
-    assert len(list(cache.glob("*.py"))) == 2
-    assert not list(cache.glob("*.tmp"))
 
 
-def test_a_damaged_file_is_written_again(cache: Path):
-    path = Path(fuse.load_fused("VALUE = 1\n").__file__ or "")
-    path.write_text("VALUE = 1", encoding="utf-8")
+def test_a_second_load_compiles_nothing(cache: Path):
+    first = fuse.load_fused(LOOP).twice
+    assert first(3.0) == 6.0
+    assert sum(first.stats.cache_misses.values()) == 1
+    assert len([path for path in cache.rglob("*") if path.is_file()]) == 1
     fuse.load_fused.cache_clear()
-    fuse.load_fused("VALUE = 1\n")
-    assert path.read_text(encoding="utf-8") == "VALUE = 1\n"
-    assert path.parent == cache
+    again = fuse.load_fused(LOOP).twice
+    assert again(3.0) == 6.0
+    assert not again.stats.cache_misses
+    assert sum(again.stats.cache_hits.values()) == 1
+
+
+def test_changed_code_is_compiled_anew_and_said(cache: Path):
+    fuse.load_fused(LOOP).twice(3.0)
+    (path,) = [path for path in cache.rglob("*") if path.is_file()]
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 16
+    path.write_bytes(content)
+    fuse.load_fused.cache_clear()
+    checked._say.cache_clear()
+    again = fuse.load_fused(LOOP).twice
+    with pytest.warns(checked.CacheWarning, match="damaged entries"):
+        assert again(3.0) == 6.0
+    assert sum(again.stats.cache_misses.values()) == 1
+
+
+@pytest.mark.usefixtures("cache")
+def test_code_of_another_build_is_compiled_anew(monkeypatch: pytest.MonkeyPatch):
+    fuse.load_fused(LOOP).twice(3.0)
+    fuse.load_fused.cache_clear()
+    checked._say.cache_clear()
+
+    def refuse(*_arguments: object) -> None:
+        raise TypeError("of another build")
+
+    monkeypatch.setattr(code_store._COMPILED, "_rebuild", refuse)
+    with pytest.warns(checked.CacheWarning):
+        assert fuse.load_fused(LOOP).twice(3.0) == 6.0
 
 
 @pytest.mark.parametrize("texture", ["map"], indirect=True)

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import pickle
 import sys
+from collections.abc import Callable
 from types import FunctionType
 from typing import Any
 
+import llvmlite  # type: ignore[import-untyped]  # it has no types
 import numba
 from numba.core import caching, compiler, serialize
 
-from asperity.cache import cache_folder, keep, recall
+from asperity.cache import cache_folder, keep, recall, set_aside
 
 ROOM = "code"
 # Numba is untyped.
@@ -27,12 +29,11 @@ class CodeStore(caching._Cache):
     """The kept overloads of one function, as Numba's dispatcher asks for them.
 
     Args:
-        function: the plain function.
-        source: digest of all that is compiled with it.
+        function: the plain function, in a module that is named after all that is compiled with it.
     """
 
-    def __init__(self, function: FunctionType, source: str) -> None:
-        self._function, self._source = function, source
+    def __init__(self, function: FunctionType) -> None:
+        self._function = function
 
     @property
     def cache_path(self) -> str:
@@ -51,10 +52,15 @@ class CodeStore(caching._Cache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled overload of a signature, or nothing."""
         target_context.refresh()
-        content = recall(ROOM, self._key(sig, target_context.codegen()))
+        key = self._key(sig, target_context.codegen())
+        content = recall(ROOM, key)
         if content is None:
             return None
-        return _COMPILED._rebuild(target_context, *pickle.loads(content))
+        try:
+            return _COMPILED._rebuild(target_context, *pickle.loads(content))
+        except Exception:  # whole, but of another build of Numba: whatever it raises, compile
+            set_aside(ROOM, key)
+            return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled overload."""
@@ -62,6 +68,17 @@ class CodeStore(caching._Cache):
 
     def _key(self, sig: Any, codegen: Any) -> str:
         """Return all that the machine code depends on: source, types, processor, versions."""
-        version = ".".join(str(part) for part in sys.version_info[:3])
-        parts = (self._source, self._function.__name__, str(sig), codegen.magic_tuple())
-        return repr((*parts, numba.__version__, version, sys.byteorder))
+        versions = (sys.version, numba.__version__, llvmlite.__version__, sys.byteorder)
+        said = (self._function.__module__, self._function.__name__, str(sig))
+        return repr((*said, codegen.magic_tuple(), *versions))
+
+
+def keep_code(decorator: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a decorator of Numba whose functions keep their machine code between runs."""
+
+    def decorate(function: FunctionType) -> Any:
+        dispatcher = decorator(function)
+        dispatcher._cache = CodeStore(function)
+        return dispatcher
+
+    return decorate

@@ -1,25 +1,21 @@
-"""Compiled modules: law, texture sampler and loops fused into one source file, then cached.
+"""Compiled modules: law, texture sampler and loops fused into one source, then compiled.
 
-A fused file lies in the user's cache directory (``ASPERITY_CACHE_DIR`` overrides it), named after
-its content, and Numba keeps the machine code beside it: a second process compiles nothing.
+A fused module is made in memory and named after its content; the machine code of its loops is kept
+in the cache, :mod:`asperity.kernels.code_store`: a second process compiles nothing.
 """
 
 from __future__ import annotations
 
 import hashlib
-import importlib.util
-import os
+import linecache
 import sys
-import tempfile
 from collections.abc import Sequence
 from functools import lru_cache, partial
-from pathlib import Path
 from types import ModuleType
 
 from asperity.contacts.sampler import OFFERED
 from asperity.derive.shipped import generated_path
 from asperity.errors import ParameterError
-from asperity.files import write_text
 from asperity.kernels.link import (
     MissingFunctionError,
     Unit,
@@ -33,7 +29,7 @@ from asperity.laws import LAWS, Law
 
 _HEADER = '''"""{title}
 
-Fused by asperity; may be deleted at any time.
+Fused by asperity.
 """
 
 from __future__ import annotations
@@ -43,6 +39,8 @@ import math
 import numpy as np
 from numba import njit
 
+from asperity.kernels.code_store import keep_code
+
 # Nothing allocates, so nothing is counted: counting references to the arrays of a texture at every
 # call costs more than the arithmetic. Only the loops are called from Python; the others need no
 # wrapper, a fifth of the compile time.
@@ -51,7 +49,7 @@ internal = dict(**plain, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 scalar = njit(**internal)
 inlined = njit(**internal, forceinline=True)
 merged = njit(error_model="numpy", inline="always")
-loop = njit(**plain, cache=True, nogil=True)
+loop = keep_code(njit(**plain, nogil=True))
 
 
 '''
@@ -198,38 +196,13 @@ def _head(title: str, source: str) -> str:
     return _HEADER.format(title=title) + (local if "local_array(" in source else "")
 
 
-@lru_cache(maxsize=1)
-def cache_directory() -> Path:
-    """Return the directory of the fused modules, made if need be.
-
-    ``ASPERITY_CACHE_DIR`` if set, else the user's cache directory; a temporary one for this
-    process if neither can be written.
-    """
-    from platformdirs import user_cache_path
-
-    chosen = os.environ.get("ASPERITY_CACHE_DIR")
-    directory = Path(chosen) if chosen else user_cache_path("asperity")
-    try:
-        (directory / "kernels").mkdir(parents=True, exist_ok=True)
-        if os.access(directory / "kernels", os.W_OK):
-            return directory / "kernels"
-    except OSError:
-        pass
-    return Path(tempfile.mkdtemp(prefix="asperity-kernels-"))
-
-
 @lru_cache(maxsize=256)
 def load_fused(source: str) -> ModuleType:
-    """Write a fused module where it is missing, and import it."""
-    digest = hashlib.sha256(source.encode()).hexdigest()[:20]
-    name = f"asperity_fused_{digest}"
-    path = cache_directory() / f"{name}.py"
-    if not path.exists() or path.read_text(encoding="utf-8") != source:
-        write_text(path, source)
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
+    """Return a fused module; the machine code of its loops is kept between runs."""
+    module = ModuleType(f"asperity_fused_{hashlib.sha256(source.encode()).hexdigest()[:32]}")
+    module.__file__ = f"<{module.__name__}>"
+    # For tracebacks, and for whoever wants to read what was compiled.
+    linecache.cache[module.__file__] = (len(source), None, source.splitlines(True), module.__file__)
+    sys.modules[module.__name__] = module  # kept code names the module that it belongs to
+    exec(compile(source, module.__file__, "exec"), vars(module))
     return module

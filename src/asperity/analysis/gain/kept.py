@@ -2,8 +2,7 @@
 
 The key is a digest of the texture's kind and arguments, the law's kernel and facts, all parameters,
 the search, and the source of the modules that make a certificate: whatever of these changes, it is
-made anew. A file that cannot be read or written, or that says what no certificate says, only costs
-time.
+made anew. One that was changed on disk is not believed, see :mod:`asperity.cache`.
 """
 
 from __future__ import annotations
@@ -13,23 +12,25 @@ import json
 import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import astuple, fields, is_dataclass
 from functools import lru_cache
-from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
-from asperity.analysis.bounds.bound import Bound, Method
+from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.gain.search import Search
 from asperity.analysis.gain.sources import source_digest
 from asperity.analysis.gain.theorems import theorem_of
+from asperity.cache import keep, recall
 from asperity.derive.facts import law_facts
-from asperity.files import json_text, write_text
-from asperity.kernels.fuse import cache_directory, fuse_sampler, kernel_source
+from asperity.files import json_text, record
+from asperity.kernels.fuse import fuse_sampler, kernel_source
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
+
+ROOM = "certificates"
+"""Their folder in the cache."""
 
 # Where the search for a number begins; it imports all that a certificate rests on.
 _SEARCH = "asperity.analysis.gain.certificate"
@@ -43,12 +44,11 @@ def kept(surface: Surface, name: str, search: Search, make: Callable[[], Bound])
     key = _key(surface, name, search) if size >= _LEAST_NUMBERS else None
     if key is None:
         return make()
-    path = cache_directory().parent / "certificates" / f"{key}.json"
-    known = _read(path)
-    if known is not None:
-        return known
+    content = recall(ROOM, key)
+    if content is not None:
+        return _read(content)
     bound = make()
-    _write(path, bound)
+    keep(ROOM, key, json_text(record(bound)).encode())
     return bound
 
 
@@ -102,34 +102,10 @@ def texture_digest(texture: Texture) -> str:
     return digest.hexdigest()
 
 
-def _read(path: Path) -> Bound | None:
-    try:
-        saved = json.loads(path.read_text(encoding="utf-8"))
-        lower, upper = _number(saved["lower"]), _number(saved["upper"])
-        at, held = (saved[name] for name in ("at", "deflection"))
-        if not lower <= upper or saved["method"] not in get_args(Method):
-            return None
-        return Bound(
-            lower,
-            upper,
-            saved["method"],
-            at=None if at is None else (_number(at[0]), _number(at[1]), _number(at[2])),
-            note=str(saved["note"]),
-            deflection=None if held is None else (_number(held[0]), _number(held[1])),
-            sliding=bool(saved["sliding"]),
-        )
-    except (OSError, ValueError, KeyError, TypeError, IndexError):
-        return None
-
-
-def _number(text: float | str) -> float:
-    value = math.inf if text == "inf" else float(text)
-    if math.isnan(value):
-        raise ValueError("not a number")
-    return value
-
-
-def _write(path: Path, bound: Bound) -> None:
-    with suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_text(path, json_text(bound))
+def _read(content: bytes) -> Bound:
+    saved = json.loads(content)
+    for name in ("lower", "upper"):
+        saved[name] = math.inf if saved[name] == "inf" else saved[name]
+    for name in ("at", "deflection"):
+        saved[name] = None if saved[name] is None else tuple(saved[name])
+    return Bound(**saved)
