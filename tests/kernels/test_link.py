@@ -215,7 +215,7 @@ def test_loops_over_a_texture_are_those_that_it_can_serve(user: Make) -> None:
 def test_the_closed_form_of_a_sinusoid_comes_before_the_general_split() -> None:
     split = fuse.fuse_surface(LAWS["H"], Sinusoid(1e-3, 1e-3).sampler, "none")
     text = "".join(linecache.getlines(split.__file__ or ""))
-    assert "def split_root" in text
+    assert "def split_foot" in text
     assert "def split_polish" not in text
 
 

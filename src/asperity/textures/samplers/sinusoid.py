@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from asperity.compiled import Kernels
 
-KERNELS = Kernels(provides=("curvature", "foot", "height", "slope"), called=("foot",))
+KERNELS = Kernels(provides=("curvature", "flank_root", "foot", "height", "slope"), called=("foot",))
 
 
 class SinusoidArguments(NamedTuple):
@@ -80,42 +80,52 @@ def foot(
     u = 2.0 * math.pi * (turns - math.floor(turns + 0.5))  # angle from the nearest crest
     side = 1.0 if u >= 0.0 else -1.0
     u = abs(u)
-    psi, c, s = flank_root(u, over * z, amplitude, k2)
+    depth = amplitude * math.cos(u) - over * z
+    high = min(math.pi, u + math.sqrt(k2) * max(depth, 0.0))
+    psi, c, s = flank_root(1.0, u, high, over * z, amplitude, k2 * amplitude)
     shift = side * (psi - u) / k2
     rate = -over * side * amplitude * s
     return x + kx * shift, y + ky * shift, over * amplitude * c, kx * rate, ky * rate
 
 
-def flank_root(u: float, z: float, amplitude: float, k2: float) -> tuple[float, float, float]:
-    """Return the root ψ of F in [u, π] for a probe below the surface, cos ψ and sin ψ."""
-    k2a = k2 * amplitude
-    depth = amplitude * math.cos(u) - z
-    lo = u
-    hi = min(math.pi, u + math.sqrt(k2) * max(depth, 0.0))
-    mid = 0.5 * math.pi
-    if lo < mid < hi:
-        if mid - u + k2a * z <= 0.0:
-            lo = mid
+def flank_root(
+    share: float, u: float, high: float, z: float, amplitude: float, bend: float
+) -> tuple[float, float, float]:
+    """Return the root ψ of share ψ - u - κ² A sin ψ (A cos ψ - z) on a flank, cos ψ and sin ψ.
+
+    Args:
+        share: 1 for the foot of a probe; 1 - μ, with u = 0, for feet of a split god-object.
+        u: phase from the crest, in [0, π]; the root is not less.
+        high: the root is not more.
+        z: height of the probe, below the surface [m].
+        amplitude: A [m].
+        bend: κ² A [1/m].
+    """
+    low = u
+    middle = 0.5 * math.pi
+    if low < middle < high:
+        if share * middle - u + bend * z <= 0.0:
+            low = middle
         else:
-            hi = mid
-    # From the right end: there Newton falls monotonically to the root of a convex F.
-    psi = hi
+            high = middle
+    # From the right end: there Newton falls monotonically to the root of a convex function.
+    psi = high
     c = s = 0.0
     for _ in range(100):
         s = math.sin(psi)
         c = math.cos(psi)
         gap = amplitude * c - z
-        value = psi - u - k2a * s * gap
+        value = share * psi - u - bend * s * gap
         if value == 0.0:
             break
         if value > 0.0:
-            hi = psi
+            high = psi
         else:
-            lo = psi
-        rate = 1.0 + k2a * (amplitude * s * s - c * gap)
-        new = psi - value / rate if rate > 0.0 else 0.5 * (lo + hi)
-        if new < lo or new > hi:
-            new = 0.5 * (lo + hi)
+            low = psi
+        rate = share + bend * (amplitude * s * s - c * gap)
+        new = psi - value / rate if rate > 0.0 else 0.5 * (low + high)
+        if new < low or new > high:
+            new = 0.5 * (low + high)
         if abs(new - psi) <= 4e-16 * psi:
             psi = new
             break

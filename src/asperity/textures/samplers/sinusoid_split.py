@@ -15,52 +15,11 @@ is then k (c u/κ, A cos ψ - z), else law D's.
 import math
 
 from asperity.compiled import Kernels
-from asperity.textures.samplers.sinusoid import SinusoidArguments, foot
+from asperity.textures.samplers.sinusoid import SinusoidArguments, flank_root, foot
 
 KERNELS = Kernels(
-    provides=("split_contact", "split_derivative", "split_energy"), requires=("foot",)
+    provides=("split_contact", "split_derivative", "split_energy"), requires=("flank_root", "foot")
 )
-
-
-def split_root(share: float, u: float, z: float, amplitude: float, bend: float) -> float:
-    """Return the root ψ in [u, π] of share ψ - u - κ² A sin ψ (A cos ψ - z).
-
-    Args:
-        share: 1 for the foot of a probe; 1 - μ, with u = 0, for feet of a split god-object.
-        u: phase from the crest, in [0, π].
-        z: height of the probe, below the surface [m].
-        amplitude: A [m].
-        bend: κ² A [1/m].
-    """
-    low = u
-    high = math.pi
-    middle = 0.5 * math.pi
-    if low < middle:
-        if share * middle - u + bend * z <= 0.0:
-            low = middle
-        else:
-            high = middle
-    # From the right end: there Newton falls monotonically to the root of a convex function.
-    psi = high
-    for _ in range(100):
-        s = math.sin(psi)
-        c = math.cos(psi)
-        gap = amplitude * c - z
-        value = share * psi - u - bend * s * gap
-        if value == 0.0:
-            break
-        if value > 0.0:
-            high = psi
-        else:
-            low = psi
-        rate = share + bend * (amplitude * s * s - c * gap)
-        new = psi - value / rate if rate > 0.0 else 0.5 * (low + high)
-        if new < low or new > high:
-            new = 0.5 * (low + high)
-        if abs(new - psi) <= 4e-16 * psi:
-            return new
-        psi = new
-    return psi
 
 
 def split_phase(x: float, y: float, texture: SinusoidArguments) -> float:
@@ -78,10 +37,10 @@ def split_foot(
     share = continuity * mu
     # No foot is farther from the crest than the trough; none is split above this height.
     if u < mu * math.pi and bend * (amplitude - z) > share:
-        psi = split_root(share, 0.0, z, amplitude, bend)
+        psi = flank_root(share, 0.0, math.pi, z, amplitude, bend)[0]
         if u < mu * psi:
             return True, psi
-    return False, split_root(1.0, u, z, amplitude, bend)
+    return False, flank_root(1.0, u, math.pi, z, amplitude, bend)[0]
 
 
 def split_contact(
