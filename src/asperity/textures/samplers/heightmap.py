@@ -10,9 +10,10 @@ from asperity.checks import FloatArray
 from asperity.compiled import Kernels
 from asperity.contacts.nearest.plane_search import Point, descend, judge, next_box
 from asperity.textures.samplers.spline import (
+    Four,
     box_bounds,
-    cell_of,
-    fold,
+    cell_at,
+    dot4,
     foreseeable,
     nearest_copy,
     reach_of,
@@ -26,7 +27,7 @@ KERNELS = Kernels(
     provides=("curvature", "foot", "height", "slope"),
     requires=(
         "descend", "judge", "next_box",
-        "box_bounds", "cell_of", "fold", "foreseeable", "nearest_copy", "reach_of", "tile_frame",
+        "box_bounds", "cell_at", "dot4", "foreseeable", "nearest_copy", "reach_of", "tile_frame",
         "weights", "weights_first", "weights_second",
     ),
     called=("foot", "search_tile", "search_tree"),
@@ -58,57 +59,40 @@ class HeightMapArguments(NamedTuple):
     levels: NDArray[np.int64]
 
 
-def dot4(c: FloatArray, i: int, j: int, w0: float, w1: float, w2: float, w3: float) -> float:
-    """Return the weighted sum of four coefficients of row i from column j on."""
-    return float(w0 * c[i, j] + w1 * c[i, j + 1] + w2 * c[i, j + 2] + w3 * c[i, j + 3])
-
-
 def cells_of(c: FloatArray) -> tuple[int, int]:
     """Return the number of cells along x and y."""
     return c.shape[1] - 3, c.shape[0] - 3
 
 
+def row_of(c: FloatArray, i: int, j: int, w: Four) -> float:
+    """Return the weighted sum of four coefficients of row i from column j on."""
+    return dot4(w, (c[i, j], c[i, j + 1], c[i, j + 2], c[i, j + 3]))
+
+
+def rows_of(c: FloatArray, i: int, j: int, w: Four) -> Four:
+    """Return the weighted sums of four rows from i on."""
+    return (
+        row_of(c, i, j, w), row_of(c, i + 1, j, w), row_of(c, i + 2, j, w), row_of(c, i + 3, j, w),
+    )  # fmt: skip
+
+
 def height(x: float, y: float, texture: HeightMapArguments) -> float:
     """Return h [m]."""
     nx, ny = cells_of(texture.c)
-    u, _su = fold((x - texture.x0) * texture.ix, nx, texture.periodic)
-    v, _sv = fold((y - texture.y0) * texture.iy, ny, texture.periodic)
-    j, t = cell_of(u, nx)
-    i, r = cell_of(v, ny)
-    w0, w1, w2, w3 = weights(t)
-    v0, v1, v2, v3 = weights(r)
-    return (
-        v0 * dot4(texture.c, i, j, w0, w1, w2, w3)
-        + v1 * dot4(texture.c, i + 1, j, w0, w1, w2, w3)
-        + v2 * dot4(texture.c, i + 2, j, w0, w1, w2, w3)
-        + v3 * dot4(texture.c, i + 3, j, w0, w1, w2, w3)
-    )
+    j, t, _sx = cell_at(x, texture.x0, texture.ix, nx, texture.periodic)
+    i, r, _sy = cell_at(y, texture.y0, texture.iy, ny, texture.periodic)
+    return dot4(weights(r), rows_of(texture.c, i, j, weights(t)))
 
 
 def slope(x: float, y: float, texture: HeightMapArguments) -> tuple[float, float, float]:
     """Return h [m], h_x, h_y [1]."""
     nx, ny = cells_of(texture.c)
-    u, su = fold((x - texture.x0) * texture.ix, nx, texture.periodic)
-    v, sv = fold((y - texture.y0) * texture.iy, ny, texture.periodic)
-    j, t = cell_of(u, nx)
-    i, r = cell_of(v, ny)
-    w0, w1, w2, w3 = weights(t)
-    d0, d1, d2, d3 = weights_first(t)
-    v0, v1, v2, v3 = weights(r)
-    e0, e1, e2, e3 = weights_first(r)
-    a0 = dot4(texture.c, i, j, w0, w1, w2, w3)
-    a1 = dot4(texture.c, i + 1, j, w0, w1, w2, w3)
-    a2 = dot4(texture.c, i + 2, j, w0, w1, w2, w3)
-    a3 = dot4(texture.c, i + 3, j, w0, w1, w2, w3)
-    b0 = dot4(texture.c, i, j, d0, d1, d2, d3)
-    b1 = dot4(texture.c, i + 1, j, d0, d1, d2, d3)
-    b2 = dot4(texture.c, i + 2, j, d0, d1, d2, d3)
-    b3 = dot4(texture.c, i + 3, j, d0, d1, d2, d3)
-    return (
-        v0 * a0 + v1 * a1 + v2 * a2 + v3 * a3,
-        su * texture.ix * (v0 * b0 + v1 * b1 + v2 * b2 + v3 * b3),
-        sv * texture.iy * (e0 * a0 + e1 * a1 + e2 * a2 + e3 * a3),
-    )
+    j, t, sx = cell_at(x, texture.x0, texture.ix, nx, texture.periodic)
+    i, r, sy = cell_at(y, texture.y0, texture.iy, ny, texture.periodic)
+    rows = rows_of(texture.c, i, j, weights(t))
+    w = weights(r)
+    hx = sx * texture.ix * dot4(w, rows_of(texture.c, i, j, weights_first(t)))
+    return dot4(w, rows), hx, sy * texture.iy * dot4(weights_first(r), rows)
 
 
 def curvature(
@@ -116,37 +100,20 @@ def curvature(
 ) -> tuple[float, float, float, float, float, float]:
     """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
     nx, ny = cells_of(texture.c)
-    u, su = fold((x - texture.x0) * texture.ix, nx, texture.periodic)
-    v, sv = fold((y - texture.y0) * texture.iy, ny, texture.periodic)
-    j, t = cell_of(u, nx)
-    i, r = cell_of(v, ny)
-    w0, w1, w2, w3 = weights(t)
-    d0, d1, d2, d3 = weights_first(t)
-    f0, f1, f2, f3 = weights_second(t)
-    v0, v1, v2, v3 = weights(r)
-    e0, e1, e2, e3 = weights_first(r)
-    g0, g1, g2, g3 = weights_second(r)
-    a0 = dot4(texture.c, i, j, w0, w1, w2, w3)
-    a1 = dot4(texture.c, i + 1, j, w0, w1, w2, w3)
-    a2 = dot4(texture.c, i + 2, j, w0, w1, w2, w3)
-    a3 = dot4(texture.c, i + 3, j, w0, w1, w2, w3)
-    b0 = dot4(texture.c, i, j, d0, d1, d2, d3)
-    b1 = dot4(texture.c, i + 1, j, d0, d1, d2, d3)
-    b2 = dot4(texture.c, i + 2, j, d0, d1, d2, d3)
-    b3 = dot4(texture.c, i + 3, j, d0, d1, d2, d3)
-    hxx = (
-        v0 * dot4(texture.c, i, j, f0, f1, f2, f3)
-        + v1 * dot4(texture.c, i + 1, j, f0, f1, f2, f3)
-        + v2 * dot4(texture.c, i + 2, j, f0, f1, f2, f3)
-        + v3 * dot4(texture.c, i + 3, j, f0, f1, f2, f3)
-    )
+    j, t, sx = cell_at(x, texture.x0, texture.ix, nx, texture.periodic)
+    i, r, sy = cell_at(y, texture.y0, texture.iy, ny, texture.periodic)
+    rows = rows_of(texture.c, i, j, weights(t))
+    first = rows_of(texture.c, i, j, weights_first(t))
+    second = rows_of(texture.c, i, j, weights_second(t))
+    w = weights(r)
+    d = weights_first(r)
     return (
-        v0 * a0 + v1 * a1 + v2 * a2 + v3 * a3,
-        su * texture.ix * (v0 * b0 + v1 * b1 + v2 * b2 + v3 * b3),
-        sv * texture.iy * (e0 * a0 + e1 * a1 + e2 * a2 + e3 * a3),
-        texture.ix * texture.ix * hxx,
-        su * sv * texture.ix * texture.iy * (e0 * b0 + e1 * b1 + e2 * b2 + e3 * b3),
-        texture.iy * texture.iy * (g0 * a0 + g1 * a1 + g2 * a2 + g3 * a3),
+        dot4(w, rows),
+        sx * texture.ix * dot4(w, first),
+        sy * texture.iy * dot4(d, rows),
+        texture.ix * texture.ix * dot4(w, second),
+        sx * sy * texture.ix * texture.iy * dot4(d, first),
+        texture.iy * texture.iy * dot4(weights_second(r), rows),
     )
 
 

@@ -10,9 +10,10 @@ from asperity.checks import FloatArray
 from asperity.compiled import Kernels
 from asperity.contacts.nearest.line_search import Point, descend, judge, next_part
 from asperity.textures.samplers.spline import (
+    Four,
     box_bounds,
-    cell_of,
-    fold,
+    cell_at,
+    dot4,
     foreseeable,
     nearest_copy,
     reach_of,
@@ -26,7 +27,7 @@ KERNELS = Kernels(
     provides=("along", "curvature", "foot", "height", "slope"),
     requires=(
         "descend", "judge", "next_part",
-        "box_bounds", "cell_of", "fold", "foreseeable", "nearest_copy", "reach_of", "tile_frame",
+        "box_bounds", "cell_at", "dot4", "foreseeable", "nearest_copy", "reach_of", "tile_frame",
         "weights", "weights_first", "weights_second",
     ),
     called=("foot", "search_tile", "search_tree"),
@@ -53,44 +54,33 @@ class ProfileArguments(NamedTuple):
     levels: NDArray[np.int64]
 
 
-def dot4(c: FloatArray, j: int, w0: float, w1: float, w2: float, w3: float) -> float:
-    """Return the weighted sum of four coefficients from j on."""
-    return float(w0 * c[j] + w1 * c[j + 1] + w2 * c[j + 2] + w3 * c[j + 3])
+def spline_at(x: float, texture: ProfileArguments) -> tuple[Four, float, float]:
+    """Return the four coefficients that count at x, the place in its cell and the slope's sign."""
+    c = texture.c
+    j, t, sign = cell_at(x, texture.x0, texture.ix, c.size - 3, texture.periodic)
+    return (c[j], c[j + 1], c[j + 2], c[j + 3]), t, sign
 
 
 def height(x: float, y: float, texture: ProfileArguments) -> float:
     """Return h [m]."""
-    cells = texture.c.size - 3
-    u, _sign = fold((x - texture.x0) * texture.ix, cells, texture.periodic)
-    j, t = cell_of(u, cells)
-    w0, w1, w2, w3 = weights(t)
-    return dot4(texture.c, j, w0, w1, w2, w3)
+    c, t, _sign = spline_at(x, texture)
+    return dot4(weights(t), c)
 
 
 def slope(x: float, y: float, texture: ProfileArguments) -> tuple[float, float, float]:
     """Return h [m], h_x, h_y [1]."""
-    cells = texture.c.size - 3
-    u, sign = fold((x - texture.x0) * texture.ix, cells, texture.periodic)
-    j, t = cell_of(u, cells)
-    w0, w1, w2, w3 = weights(t)
-    d0, d1, d2, d3 = weights_first(t)
-    h = dot4(texture.c, j, w0, w1, w2, w3)
-    return h, sign * texture.ix * dot4(texture.c, j, d0, d1, d2, d3), 0.0
+    c, t, sign = spline_at(x, texture)
+    return dot4(weights(t), c), sign * texture.ix * dot4(weights_first(t), c), 0.0
 
 
 def curvature(
     x: float, y: float, texture: ProfileArguments
 ) -> tuple[float, float, float, float, float, float]:
     """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
-    cells = texture.c.size - 3
-    u, sign = fold((x - texture.x0) * texture.ix, cells, texture.periodic)
-    j, t = cell_of(u, cells)
-    w0, w1, w2, w3 = weights(t)
-    d0, d1, d2, d3 = weights_first(t)
-    f0, f1, f2, f3 = weights_second(t)
-    h = dot4(texture.c, j, w0, w1, w2, w3)
-    hx = sign * texture.ix * dot4(texture.c, j, d0, d1, d2, d3)
-    return h, hx, 0.0, texture.ix * texture.ix * dot4(texture.c, j, f0, f1, f2, f3), 0.0, 0.0
+    c, t, sign = spline_at(x, texture)
+    hx = sign * texture.ix * dot4(weights_first(t), c)
+    hxx = texture.ix * texture.ix * dot4(weights_second(t), c)
+    return dot4(weights(t), c), hx, 0.0, hxx, 0.0, 0.0
 
 
 def along(x: float, texture: ProfileArguments) -> tuple[float, float, float]:

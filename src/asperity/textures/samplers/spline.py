@@ -9,37 +9,41 @@ from asperity.compiled import Kernels
 
 KERNELS = Kernels(
     provides=(
-        "box_bounds", "cell_of", "fold", "foreseeable", "nearest_copy", "reach_of", "tile_frame",
+        "box_bounds", "cell_at", "dot4", "foreseeable", "nearest_copy", "reach_of", "tile_frame",
         "weights", "weights_first", "weights_second",
     )
 )  # fmt: skip
 
 
-def fold(u: float, cells: int, periodic: bool) -> tuple[float, float]:
-    """Return the coordinate inside [0, cells] and the sign of its derivative.
+Four = tuple[float, float, float, float]
+
+
+def cell_at(
+    x: float, start: float, per_metre: float, cells: int, periodic: bool
+) -> tuple[int, float, float]:
+    """Return the index of the cell of x, the place in it, in [0, 1], and the sign of derivatives.
 
     Periodic maps repeat; finite ones are mirrored at their border nodes.
     """
-    if 0.0 <= u <= cells:
-        return u, 1.0
-    if periodic:
-        u -= cells * math.floor(u / cells)
-        return min(u, float(cells)), 1.0
-    u -= 2.0 * cells * math.floor(u / (2.0 * cells))
-    if u > cells:
-        return max(2.0 * cells - u, 0.0), -1.0
-    return u, 1.0
+    u = (x - start) * per_metre
+    sign = 1.0
+    if periodic and not 0.0 <= u <= cells:
+        u = min(u - cells * math.floor(u / cells), float(cells))
+    elif not 0.0 <= u <= cells:
+        u -= 2.0 * cells * math.floor(u / (2.0 * cells))
+        if u > cells:
+            u = max(2.0 * cells - u, 0.0)
+            sign = -1.0
+    i = min(int(u), cells - 1)
+    return i, u - i, sign
 
 
-def cell_of(u: float, cells: int) -> tuple[int, float]:
-    """Return the index of the cell and the position in it, in [0, 1]."""
-    i = int(u)
-    if i >= cells:
-        i = cells - 1
-    return i, u - i
+def dot4(a: Four, b: Four) -> float:
+    """Return the sum of four products."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
 
 
-def weights(t: float) -> tuple[float, float, float, float]:
+def weights(t: float) -> Four:
     """Return the four cubic B-spline weights at t in [0, 1]."""
     r = 1.0 - t
     tt = t * t
@@ -52,13 +56,13 @@ def weights(t: float) -> tuple[float, float, float, float]:
     )
 
 
-def weights_first(t: float) -> tuple[float, float, float, float]:
+def weights_first(t: float) -> Four:
     """Return the derivatives of the weights by t."""
     r = 1.0 - t
     return -0.5 * r * r, t * (1.5 * t - 2.0), -r * (1.5 * r - 2.0), 0.5 * t * t
 
 
-def weights_second(t: float) -> tuple[float, float, float, float]:
+def weights_second(t: float) -> Four:
     """Return the second derivatives of the weights by t."""
     r = 1.0 - t
     return r, 3.0 * t - 2.0, 3.0 * r - 2.0, t
@@ -74,7 +78,7 @@ def tile_frame(
     return -1.0, 2.0 * start + (tile + 1) * length
 
 
-def box_bounds(nodes: NDArray[np.float32], k: int) -> tuple[float, float, float, float]:
+def box_bounds(nodes: NDArray[np.float32], k: int) -> Four:
     """Return the least and greatest height and the bounds K and T of box k of the pyramid."""
     return float(nodes[k, 0]), float(nodes[k, 1]), float(nodes[k, 2]), float(nodes[k, 3])
 
