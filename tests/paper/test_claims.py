@@ -9,19 +9,11 @@ from typing import Any
 import pytest
 
 from asperity.errors import ParameterError
-from asperity.paper import CLAIMS, VERDICTS, Result, claim, claims_simulated, reproduce_claims
+from asperity.paper import CLAIMS, VERDICTS, Result, claim, claims_experiments, reproduce_claims
 from asperity.paper.claim import Check
 from asperity.paper.experiments import FINDINGS
 
-SIMULATED = {
-    item.id
-    for part in (
-        claims_simulated.SECTION_V_A,
-        claims_simulated.SECTION_V_B,
-        claims_simulated.SECTION_V_C,
-    )
-    for item in part
-}
+SIMULATED = {f"sentence-{name}" for name in claims_experiments.SIMULATED}
 
 # As printed, by the law's definition, an identity, or a sum that gives what is printed.
 HOLDS = """

@@ -69,6 +69,9 @@ class Check:
     correction: str = ""
 
 
+Computation = Callable[[], Check]
+
+
 @dataclass(frozen=True)
 class Result(Record):
     """A claim with its verdict.
@@ -109,7 +112,7 @@ class Claim:
     equations: tuple[str, ...]
     section: str
     statement: str
-    compute: Callable[[], Check]
+    compute: Computation
 
     def run(self) -> Result:
         """Compute the evidence and return it with the verdict.
@@ -124,6 +127,29 @@ class Claim:
         return Result(
             self.id, self.equations, self.section, self.statement, found.verdict, evidence
         )
+
+
+DECLARED: list[Claim] = []
+"""The claims of the paper, in the order in which their code is read."""
+
+
+def judges(name: str, section: str, *equations: str) -> Callable[[Computation], Computation]:
+    """Declare that a function judges a claim of the paper.
+
+    The first line of its docstring is the statement.
+
+    Args:
+        name: id of the claim.
+        section: of the paper.
+        *equations: numbers of the paper that the claim covers.
+    """
+
+    def declare(compute: Computation) -> Computation:
+        statement = (compute.__doc__ or "").partition("\n")[0]
+        DECLARED.append(Claim(name, equations, section, statement, compute))
+        return compute
+
+    return declare
 
 
 def judge(

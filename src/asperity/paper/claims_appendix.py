@@ -9,10 +9,10 @@ from functools import lru_cache
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.paper.claim import Check, Claim, decide, judge, settle
+from asperity.paper.claim import Check, decide, judge, judges, settle
 from asperity.paper.claims_friction import PAPER, Rub, norm_of, random_rubs, stick_entries
 from asperity.paper.claims_god_object import BENT, bent_jacobian, flat_jacobian
-from asperity.paper.comparisons import energy_sign_check
+from asperity.paper.comparisons import compare_at, energy_sign_check, jacobian_check
 from asperity.paper.plane import FootRates, Spot, foot_rates, random_settings
 
 # --- appendix I -----------------------------------------------------------------------------------
@@ -72,8 +72,9 @@ def true_number(r: Rub) -> float:
     return best
 
 
+@judges("eq-31", "App. I", "(31)")
 def appendix_one() -> Check:
-    """(31): an upper bound, and its expansion."""
+    """An upper bound on q_F, and its expression written out."""
     rubs = [PAPER, *random_rubs(6)]
     norms = [norm_of(*stick_entries(r)) for r in rubs]
     ratios = [true_number(r) / norm for r, norm in zip(rubs, norms, strict=True)]
@@ -97,6 +98,9 @@ def appendix_one() -> Check:
 # --- appendix II ----------------------------------------------------------------------------------
 
 
+Rate = Callable[[FootRates], object]
+
+
 @lru_cache(maxsize=1)
 def _rates() -> tuple[FootRates, ...]:
     """Return feet and their derivatives at generic probes."""
@@ -104,29 +108,15 @@ def _rates() -> tuple[FootRates, ...]:
 
 
 def _against(
-    what: str,
-    truth: Callable[[FootRates], object],
-    printed: Callable[[FootRates], object],
-    corrected: Callable[[FootRates], object] | None = None,
-    correction: str = "",
+    what: str, truth: Rate, printed: Rate, corrected: Rate | None = None, correction: str = ""
 ) -> Check:
     """Compare formulas at the generic probes."""
-    rates = _rates()
-
-    def at(formula: Callable[[FootRates], object]) -> FloatArray:
-        return np.array([formula(r) for r in rates], dtype=float)
-
-    return judge(
-        f"{what} at {len(rates)} generic probes",
-        printed=at(printed),
-        corrected=None if corrected is None else at(corrected),
-        truth=at(truth),
-        correction=correction,
-    )
+    return compare_at(_rates(), what, truth, printed, corrected, correction)
 
 
+@judges("eq-32", "App. II", "(32)")
 def orthogonal() -> Check:
-    """(32)."""
+    """The penetration is at right angles to the surface."""
     return _against(
         "p^z - p_h^z",
         lambda r: r.spot.from_foot[1],
@@ -134,28 +124,32 @@ def orthogonal() -> Check:
     )
 
 
+@judges("eq-33", "App. II", "(33)")
 def along_x() -> Check:
-    """(33)."""
+    """The foot stays on the surface as p moves along x."""
     return _against(
         "∂p_h^z/∂p^x", lambda r: r.rate("z", "x"), lambda r: r.spot.slope * r.rate("x", "x")
     )
 
 
+@judges("eq-34", "App. II", "(34)")
 def along_z() -> Check:
-    """(34)."""
+    """The foot stays on the surface as p moves along z."""
     return _against(
         "∂p_h^x/∂p^z", lambda r: r.rate("x", "z"), lambda r: r.rate("z", "z") / r.spot.slope
     )
 
 
+@judges("eq-35", "App. II", "(35)")
 def energy_function() -> Check:
-    """(35)."""
+    """Energy function of D."""
     places = [r.spot for r in _rates()]
     return energy_sign_check("D", places, [0.5 * s.distance**2 for s in places])
 
 
+@judges("eq-36", "App. II", "(36)")
 def first_line() -> Check:
-    """(36), the derivative of the energy function before it is simplified."""
+    """f_x of D is its derivative, before simplification."""
 
     def printed(r: FootRates) -> float:
         x, z = r.spot.from_foot
@@ -164,8 +158,9 @@ def first_line() -> Check:
     return _against("f_x of D", lambda r: r.spot.force()[0], printed)
 
 
+@judges("eq-37", "App. II", "(37)")
 def second_line() -> Check:
-    """(37)."""
+    """f_x of D after (32) is used."""
 
     def line(r: FootRates, factor: float) -> float:
         left = r.rate("x", "x") - r.rate("z", "x") / r.spot.slope
@@ -189,13 +184,14 @@ def second_line() -> Check:
     )
 
 
+@judges("eq-38", "App. II", "(38)")
 def force_x() -> Check:
-    """(38), and f_x = 0 where h' = 0."""
-    rates = _rates()
-    general = judge(
-        f"f_x of D at {len(rates)} generic probes",
-        printed=[-r.spot.k * r.spot.from_foot[0] for r in rates],
-        truth=[r.spot.force()[0] for r in rates],
+    """f_x of D after (33) is used.
+
+    And f_x = 0 where h' = 0.
+    """
+    general = _against(
+        "f_x of D", lambda r: r.spot.force()[0], lambda r: -r.spot.k * r.spot.from_foot[0]
     )
     level = 0.0
     for case in random_settings():
@@ -214,8 +210,9 @@ def force_x() -> Check:
     )
 
 
+@judges("eq-39", "App. II", "(39)")
 def force_z() -> Check:
-    """(39)."""
+    """f_z of D, by the reasoning of (36) to (38)."""
     return _against(
         "f_z of D", lambda r: r.spot.force()[1], lambda r: -r.spot.k * r.spot.from_foot[1]
     )
@@ -226,8 +223,9 @@ def _jacobian(r: FootRates, first: float, second: float) -> FloatArray:
     return -r.spot.k * np.array([[1.0 - r.rate("x", "x"), first], [second, 1.0 - r.rate("z", "z")]])
 
 
+@judges("eq-40", "App. II", "(40)")
 def general_jacobian() -> Check:
-    """(40)."""
+    """Jacobian of D from the derivatives of the foot."""
     return _against(
         "Jacobian of D",
         lambda r: r.spot.jacobian(),
@@ -237,8 +235,9 @@ def general_jacobian() -> Check:
     )
 
 
+@judges("eq-41", "App. II", "(41)")
 def reduced_jacobian() -> Check:
-    """(41)."""
+    """Jacobian of D after (33) and (34) are used."""
     return _against(
         "Jacobian of D",
         lambda r: r.spot.jacobian(),
@@ -252,8 +251,9 @@ def _bent(spot: Spot) -> float:
     return 1.0 + spot.slope**2 - spot.d * spot.bend
 
 
+@judges("eq-42", "App. II", "(42)")
 def foot_x() -> Check:
-    """(42)."""
+    """∂p_h^x/∂p^x = 1/(1 + h'²)."""
     return _against(
         "∂p_h^x/∂p^x",
         lambda r: r.rate("x", "x"),
@@ -263,8 +263,9 @@ def foot_x() -> Check:
     )
 
 
+@judges("eq-43", "App. II", "(43)")
 def foot_z() -> Check:
-    """(43)."""
+    """∂p_h^z/∂p^z = h'²/(1 + h'²)."""
     return _against(
         "∂p_h^z/∂p^z",
         lambda r: r.rate("z", "z"),
@@ -274,37 +275,7 @@ def foot_z() -> Check:
     )
 
 
+@judges("eq-44", "App. II", "(44)")
 def final_jacobian() -> Check:
-    """(44)."""
-    return _against(
-        "Jacobian of D",
-        lambda r: r.spot.jacobian(),
-        lambda r: flat_jacobian(r.spot),
-        lambda r: bent_jacobian(r.spot),
-        BENT,
-    )
-
-
-APPENDICES = (
-    Claim("eq-31", ("(31)",), "App. I", "An upper bound on q_F, and its expression written out.",
-          appendix_one),
-    Claim("eq-32", ("(32)",), "App. II", "The penetration is at right angles to the surface.",
-          orthogonal),
-    Claim("eq-33", ("(33)",), "App. II", "The foot stays on the surface as p moves along x.",
-          along_x),
-    Claim("eq-34", ("(34)",), "App. II", "The foot stays on the surface as p moves along z.",
-          along_z),
-    Claim("eq-35", ("(35)",), "App. II", "Energy function of D.", energy_function),
-    Claim("eq-36", ("(36)",), "App. II", "f_x of D is its derivative, before simplification.",
-          first_line),
-    Claim("eq-37", ("(37)",), "App. II", "f_x of D after (32) is used.", second_line),
-    Claim("eq-38", ("(38)",), "App. II", "f_x of D after (33) is used.", force_x),
-    Claim("eq-39", ("(39)",), "App. II", "f_z of D, by the reasoning of (36) to (38).", force_z),
-    Claim("eq-40", ("(40)",), "App. II", "Jacobian of D from the derivatives of the foot.",
-          general_jacobian),
-    Claim("eq-41", ("(41)",), "App. II", "Jacobian of D after (33) and (34) are used.",
-          reduced_jacobian),
-    Claim("eq-42", ("(42)",), "App. II", "∂p_h^x/∂p^x = 1/(1 + h'²).", foot_x),
-    Claim("eq-43", ("(43)",), "App. II", "∂p_h^z/∂p^z = h'²/(1 + h'²).", foot_z),
-    Claim("eq-44", ("(44)",), "App. II", "Jacobian of D from the slope alone.", final_jacobian),
-)  # fmt: skip
+    """Jacobian of D from the slope alone."""
+    return jacobian_check("D", flat_jacobian, bent_jacobian, BENT)

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from asperity.analysis.energy.loops import loop_work
 from asperity.checks import FloatArray
-from asperity.paper.claim import Check, Claim, decide, judge, settle
-from asperity.paper.paths import friction_path
-from asperity.paper.plane import SCANNING, random_settings, spots
+from asperity.paper.claim import Check, decide, judge, judges, settle
+from asperity.paper.plane import SCANNING, friction_path, random_settings, spots
 
 _TURN = 2.0 * math.pi
 
@@ -70,8 +70,12 @@ def norm_of(a: float, b: float) -> float:
 # --- field and Jacobian ---------------------------------------------------------------------------
 
 
+@judges("eq-22", "IV.F", "(22)")
 def field_f() -> Check:
-    """(22): against the definition, and by the work of friction on a sliding probe."""
+    """Force of F: the wall, and friction that h modulates.
+
+    Against the definition, and by the work of friction on a sliding probe.
+    """
     from asperity.definition import exact_force
 
     printed, corrected, truth = [], [], []
@@ -105,8 +109,12 @@ def _sliding_check(correction: str) -> Check:
     )
 
 
+@judges("eq-23", "IV.F", "(23)")
 def jacobian_f() -> Check:
-    """(23) against differences of (22) as printed."""
+    """Jacobian of F.
+
+    Against differences of (22) as printed.
+    """
     import mpmath
 
     draw = np.random.default_rng(13)
@@ -148,8 +156,12 @@ def _formula(r: Rub, d: float, h: float, rate: float, slope: float) -> list[list
     return [[-first, -r.friction * (1.0 - h) * d / r.deflection], [0.0, -1.0]]
 
 
+@judges("eq-24", "IV.F", "(24)")
 def phases() -> Check:
-    """(24): a probe goes forth and back, the package's anchor follows."""
+    """d follows the probe while d < d_max and does not change while d = d_max.
+
+    A probe goes forth and back, the package's anchor follows.
+    """  # noqa: D403 - a symbol
     case = random_settings(1, 21)[0]
     surface = case.surface("F", modulation_depth=0.0)
     reach = case.deflection
@@ -187,8 +199,9 @@ def _suprema(r: Rub) -> tuple[tuple[float, float], tuple[float, float]]:
     return (slip, across), (stick, across)
 
 
+@judges("eq-25", "IV.F", "(25)")
 def slip_entries() -> Check:
-    """(25)."""
+    """Greatest entries of F's Jacobian while sliding."""
     rubs = [PAPER, *random_rubs()]
     wave = [_TURN * r.friction * r.depth * r.amplitude / r.period for r in rubs]
     return judge(
@@ -202,8 +215,9 @@ def slip_entries() -> Check:
     )
 
 
+@judges("eq-26", "IV.F", "(26)")
 def stick_bound() -> Check:
-    """(26)."""
+    """Greatest entries of F's Jacobian while sticking."""
     rubs = [PAPER, *random_rubs()]
     right = [
         [r.friction * r.depth / r.deflection
@@ -234,10 +248,18 @@ def stick_bound() -> Check:
 # --- energy ---------------------------------------------------------------------------------------
 
 
-def energy_f() -> Check:
-    """(27): the law without texture; twice the friction makes its m = 1/2 the paper's h = 0."""
-    from asperity.analysis.energy.loops import loop_work
+@judges("sentence-IV.F-deflections", "IV.F")
+def deflections() -> Check:
+    """Realistic d_max go from 1e-2 m (tissue) to 1e-6 m (metal)."""
+    return decide("a statement on real materials: nothing here can be computed", printed=None)
 
+
+@judges("eq-27", "IV.F", "(27)")
+def energy_f() -> Check:
+    """Energy of F without texture around its path of Fig. 3.
+
+    The law without texture; twice the friction makes its m = 1/2 the paper's h = 0.
+    """
     cases, share = [SCANNING, *random_settings(4)], 0.2
     printed, corrected, truth, limit = [], [], [], 0.0
     for case in cases:
@@ -264,30 +286,9 @@ def energy_f() -> Check:
     )
 
 
-def compliant() -> Check:
-    """The energy grows with d_max."""
-    from asperity.analysis.energy.loops import loop_work
-
-    found = []
-    for reach in (1e-3, 1e-2):
-        case = replace(SCANNING, deflection=reach)
-        surface = case.surface("F", modulation_depth=0.0, friction=2.0 * case.friction)
-        found.append(loop_work(surface, friction_path(case, 1e-7 * case.depth)))
-    ratio = found[1] / found[0]
-    return decide(
-        f"d_max from 1 mm to 1 cm multiplies the energy by {ratio:.6f}, to {found[1] * 1e3:.2f} mJ",
-        printed=abs(ratio - 10.0) < 1e-6,
-        energies=found,
-    )
-
-
-def deflections() -> Check:
-    """Values of d_max that are realistic."""
-    return decide("a statement on real materials: nothing here can be computed", printed=None)
-
-
+@judges("sentence-IV.F-stick", "IV.F")
 def generative_stick() -> Check:
-    """Generative in the stick phase only, which is at most 2 d_max wide."""
+    """F generates energy while sticking only, which is at most 2 d_max wide."""
     case = SCANNING
     surface, reach = case.surface("F"), case.deflection
     x = np.concatenate([np.linspace(0.0, 4.0, 8001), np.linspace(4.0, -2.0, 12001)[1:]]) * reach
@@ -317,24 +318,17 @@ def _anchored(x: FloatArray, reach: float) -> FloatArray:
     return d
 
 
-FRICTION = (
-    Claim("eq-22", ("(22)",), "IV.F", "Force of F: the wall, and friction that h modulates.",
-          field_f),
-    Claim("eq-23", ("(23)",), "IV.F", "Jacobian of F.", jacobian_f),
-    Claim("eq-24", ("(24)",), "IV.F",
-          "d follows the probe while d < d_max and does not change while d = d_max.", phases),
-    Claim("eq-25", ("(25)",), "IV.F", "Greatest entries of F's Jacobian while sliding.",
-          slip_entries),
-    Claim("eq-26", ("(26)",), "IV.F", "Greatest entries of F's Jacobian while sticking.",
-          stick_bound),
-    Claim("sentence-IV.F-deflections", (), "IV.F",
-          "Realistic d_max go from 1e-2 m (tissue) to 1e-6 m (metal).", deflections),
-    Claim("eq-27", ("(27)",), "IV.F", "Energy of F without texture around its path of Fig. 3.",
-          energy_f),
-    Claim("sentence-IV.F-stick", (), "IV.F",
-          "F generates energy while sticking only, which is at most 2 d_max wide.",
-          generative_stick),
-    Claim("sentence-IV.F-compliant", (), "IV.F",
-          "The energy that is not conserved is proportional to d_max, as with d_max = 1 cm.",
-          compliant),
-)  # fmt: skip
+@judges("sentence-IV.F-compliant", "IV.F")
+def compliant() -> Check:
+    """The energy that is not conserved is proportional to d_max, as with d_max = 1 cm."""
+    found = []
+    for reach in (1e-3, 1e-2):
+        case = replace(SCANNING, deflection=reach)
+        surface = case.surface("F", modulation_depth=0.0, friction=2.0 * case.friction)
+        found.append(loop_work(surface, friction_path(case, 1e-7 * case.depth)))
+    ratio = found[1] / found[0]
+    return decide(
+        f"d_max from 1 mm to 1 cm multiplies the energy by {ratio:.6f}, to {found[1] * 1e3:.2f} mJ",
+        printed=abs(ratio - 10.0) < 1e-6,
+        energies=found,
+    )

@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from asperity.analysis.energy.continuity import continuity
+from asperity.analysis.energy.loops import loop_work
+from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.checks import FloatArray
-from asperity.paper.claim import Check, Claim, decide, judge, settle
+from asperity.paper.claim import Check, decide, judge, judges, settle
 from asperity.paper.comparisons import (
     curl_check,
     energy_sign_check,
@@ -17,13 +20,13 @@ from asperity.paper.comparisons import (
     jacobian_check,
     leg_work,
 )
-from asperity.paper.paths import groove_path
 from asperity.paper.plane import (
     BUMP,
     PASSIVITY,
     SCANNING,
     Spot,
     foot_of,
+    groove_path,
     path_points,
     random_settings,
     spots,
@@ -48,8 +51,9 @@ BENT = "with curvature: 1 + h'² becomes 1 + h'² + (p_h^z - p^z) h'' in the der
 # --- D --------------------------------------------------------------------------------------------
 
 
+@judges("eq-16", "IV.D", "(16)")
 def potential_d() -> Check:
-    """(16)."""
+    """Potential of D."""
     places = list(spots("D"))
 
     def potential(spot: Spot) -> Any:
@@ -67,29 +71,33 @@ def potential_d() -> Check:
     return settle(gradient, energy_sign_check("D", places, [0.5 * s.distance**2 for s in places]))
 
 
+@judges("eq-17", "IV.D", "(17)")
 def field_d() -> Check:
-    """(17), and that it is conservative also across the ridges where it jumps."""
-    from asperity.analysis.energy.loops import loop_work
+    """Force of D, a spring to the nearest point; conservative.
 
+    Conservative also across the ridges where it jumps.
+    """
     worst = 0.0
     for case in [SCANNING, *random_settings()]:
         energy = loop_work(case.surface("D"), groove_path(case), 1e-10)
         worst = max(worst, abs(energy) / (case.stiffness * case.amplitude**2))
     loops = decide(f"energy around the path {worst:.1e} of κ₀A²", printed=worst < 1e-7, loop=worst)
     return settle(
-        field_check("D", lambda s: -s.k * s.from_foot, None, ""),
+        field_check("D", lambda s: -s.k * s.from_foot),
         curl_check("D", conservative=True),
         loops,
     )
 
 
+@judges("eq-18", "IV.D", "(18)")
 def jacobian_d() -> Check:
-    """(18)."""
+    """Jacobian of D from the slope alone."""
     return jacobian_check("D", flat_jacobian, bent_jacobian, BENT)
 
 
+@judges("sentence-IV.D-singular", "IV.D")
 def singular_d() -> Check:
-    """The Jacobian is singular: moving across the penetration does not change the force."""
+    """Moving at right angles to the penetration leaves D's force as it is."""
     shares = []
     for spot in spots("D"):
         across = np.array([spot.d, spot.at - spot.x])
@@ -104,10 +112,9 @@ def singular_d() -> Check:
     )
 
 
+@judges("sentence-IV.D-number", "IV.D")
 def number_d() -> Check:
-    """‖J_D‖ = κ₀ and q_D = 1."""
-    from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
-
+    """‖J_D‖ = κ₀ whatever the surface, and q_D = 1."""
     norms = [float(np.linalg.norm(s.jacobian(), 2)) / s.k for s in spots("D", 12)]
     surface = PASSIVITY.surface("D")
     q, plus = characteristic_number(surface), one_sided_number(surface)
@@ -130,11 +137,9 @@ def _onset(amplitude: float, period: float) -> float:
     return period**2 / (4.0 * math.pi**2 * amplitude)
 
 
+@judges("remark-6", "IV.D", "Remark 6")
 def remark_6() -> Check:
-    """D jumps below the maxima; its potential does not, but has a kink."""
-    from asperity.analysis.energy.continuity import continuity
-    from asperity.analysis.gain.characteristic import characteristic_number
-
+    """D's force jumps, on a sinusoid below its maxima; its potential has a kink there."""
     checks = []
     for name, case in (("V.A", PASSIVITY), ("V.B", SCANNING), ("V.C", BUMP)):
         surface = case.surface("D")
@@ -181,8 +186,9 @@ def _kink() -> Any:
 _OUTWARD = "without the minus sign: as printed the force pulls the probe further in"
 
 
+@judges("eq-19", "IV.E", "(19)")
 def field_e() -> Check:
-    """(19)."""
+    """Force of E: nearest distance, along the wall's normal."""
     return field_check(
         "E",
         lambda s: np.array([0.0, -s.k * s.distance]),
@@ -191,8 +197,9 @@ def field_e() -> Check:
     )
 
 
+@judges("eq-20", "IV.E", "(20)")
 def jacobian_e() -> Check:
-    """(20)."""
+    """Jacobian of E."""
 
     def printed(s: Spot) -> FloatArray:
         return -s.k / s.distance * np.array([[0.0, 0.0], s.from_foot])
@@ -200,10 +207,9 @@ def jacobian_e() -> Check:
     return jacobian_check("E", printed, lambda s: -printed(s), _OUTWARD)
 
 
+@judges("eq-21", "IV.E", "(21)")
 def norm_e() -> Check:
-    """(21), q_E = 1."""
-    from asperity.analysis.gain.characteristic import characteristic_number
-
+    """‖J_E‖ = κ₀ and q_E = 1."""
     places = list(spots("E", 6))
     norms = judge(
         "norm of the Jacobian of E at 6 generic probes",
@@ -233,10 +239,9 @@ def _steepness_e() -> Any:
     )
 
 
+@judges("sentence-IV.E-energy", "IV.E")
 def energy_e() -> Check:
-    """The loop of Fig. 3: only one leg works, and it gains."""
-    from asperity.analysis.energy.loops import loop_work
-
+    """Around the path of Fig. 3 E gains energy, on the rising leg only."""
     least, other = math.inf, 0.0
     for case in [SCANNING, *random_settings()]:
         surface, points = case.surface("E"), np.array(groove_path(case))
@@ -255,11 +260,9 @@ def energy_e() -> Check:
     )
 
 
+@judges("remark-7", "IV.E", "Remark 7")
 def remark_7() -> Check:
-    """E is not conservative, but continuous."""
-    from asperity.analysis.energy.continuity import continuity
-    from asperity.analysis.gain.characteristic import characteristic_number
-
+    """E is not conservative, but does not jump."""
     surface = PASSIVITY.surface("E")
     found = continuity(surface, characteristic_number(surface))
     across = np.array(path_points((0.25e-3 - 1e-12, 0.0), (0.25e-3 + 1e-12, 0.0)))
@@ -272,27 +275,3 @@ def remark_7() -> Check:
         ),
         curl_check("E", conservative=False),
     )
-
-
-LAW_D = (
-    Claim("eq-16", ("(16)",), "IV.D", "Potential of D.", potential_d),
-    Claim("eq-17", ("(17)",), "IV.D", "Force of D, a spring to the nearest point; conservative.",
-          field_d),
-    Claim("eq-18", ("(18)",), "IV.D", "Jacobian of D from the slope alone.", jacobian_d),
-    Claim("sentence-IV.D-singular", (), "IV.D",
-          "Moving at right angles to the penetration leaves D's force as it is.", singular_d),
-    Claim("sentence-IV.D-number", (), "IV.D", "‖J_D‖ = κ₀ whatever the surface, and q_D = 1.",
-          number_d),
-    Claim("remark-6", ("Remark 6",), "IV.D",
-          "D's force jumps, on a sinusoid below its maxima; its potential has a kink there.",
-          remark_6),
-)  # fmt: skip
-LAW_E = (
-    Claim("eq-19", ("(19)",), "IV.E", "Force of E: nearest distance, along the wall's normal.",
-          field_e),
-    Claim("eq-20", ("(20)",), "IV.E", "Jacobian of E.", jacobian_e),
-    Claim("eq-21", ("(21)",), "IV.E", "‖J_E‖ = κ₀ and q_E = 1.", norm_e),
-    Claim("sentence-IV.E-energy", (), "IV.E",
-          "Around the path of Fig. 3 E gains energy, on the rising leg only.", energy_e),
-    Claim("remark-7", ("Remark 7",), "IV.E", "E is not conservative, but does not jump.", remark_7),
-)  # fmt: skip

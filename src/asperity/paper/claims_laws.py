@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from asperity.analysis.energy.loops import loop_work
+from asperity.analysis.gain.closed_forms import q_b, q_c, q_g
 from asperity.checks import FloatArray
-from asperity.paper.claim import Check, Claim, decide, judge, settle
+from asperity.laws import Law, find_law
+from asperity.paper.claim import Check, decide, judge, judges, settle
 from asperity.paper.comparisons import (
     curl_check,
     energy_sign_check,
@@ -22,13 +25,14 @@ from asperity.paper.comparisons import (
     outside_check,
     q_of,
 )
-from asperity.paper.paths import crossing_path, groove_path
 from asperity.paper.plane import (
     BUMP,
     PASSIVITY,
     SCANNING,
     Setting,
     Spot,
+    crossing_path,
+    groove_path,
     random_settings,
     spots,
 )
@@ -36,27 +40,34 @@ from asperity.paper.plane import (
 # --- A --------------------------------------------------------------------------------------------
 
 
+@judges("eq-6", "IV.A", "(6)")
 def field_a() -> Check:
-    """(6)."""
-    printed = field_check("A", lambda s: np.array([0.0, -s.k * s.d]), None, "")
+    """Force of A: the vertical depth, along the wall's normal."""
+    printed = field_check("A", lambda s: np.array([0.0, -s.k * s.d]))
     return settle(printed, outside_check("A"))
 
 
+@judges("eq-7", "IV.A", "(7)")
 def jacobian_a() -> Check:
-    """(7)."""
-    return jacobian_check("A", lambda s: -s.k * np.array([[0.0, 0.0], [-s.slope, 1.0]]), None, "")
+    """Jacobian of A inside."""
+    return jacobian_check("A", lambda s: -s.k * np.array([[0.0, 0.0], [-s.slope, 1.0]]))
 
 
+@judges("eq-8", "IV.A", "(8)")
 def norm_a() -> Check:
-    """(8)."""
+    """Norm of that Jacobian: κ₀ √(1 + h'²)."""
     places = list(spots("A"))
     norms = np.array([np.linalg.norm(spot.jacobian(), 2) for spot in places])
     printed = np.array([spot.k * math.hypot(1.0, spot.slope) for spot in places])
     return judge("norm of the Jacobian of A", printed=printed, truth=norms)
 
 
+@judges("eq-9", "IV.A", "(9)")
 def number_a() -> Check:
-    """(9): a ratio of the greatest norm is set equal to a value at each place."""
+    """The increase of stiffness by A is √(1 + h'²).
+
+    A ratio of the greatest norm is set equal to a value at each place.
+    """
     places = list(spots("A"))
     texture = places[0].surface.texture
     x = np.linspace(0.0, 2.0 * math.pi / 1e3, 20001) * 1.0
@@ -75,8 +86,12 @@ def number_a() -> Check:
     return settle(local, ratio)
 
 
+@judges("eq-10", "IV.A", "(10)")
 def sinusoid_a() -> Check:
-    """(10): the value, and where it is attained."""
+    """On a sinusoid the greatest norm is κ₀ √(1 + (2πA/l)²), at x = 0 mod π/l.
+
+    The value, and where it is attained.
+    """
     cases = [PASSIVITY, SCANNING, *random_settings()]
     printed = [c.stiffness * math.hypot(1.0, 2.0 * math.pi * c.amplitude / c.period) for c in cases]
     found = [case.stiffness * greatest_norm(case.surface("A")) for case in cases]
@@ -105,8 +120,12 @@ def _reaches(cases: list[Setting], greatest: list[float], steps: list[float]) ->
     return least
 
 
+@judges("sentence-IV.A-proportional", "IV.A")
 def proportional_a() -> Check:
-    """The number is nearly 2πA/l: within a tenth in each of the paper's settings."""
+    """2πA/l is large, so A's number is nearly proportional to A and 1/l.
+
+    Within a tenth in each of the paper's settings.
+    """
     cases = {"V.A": PASSIVITY, "V.B": SCANNING, "V.C": BUMP}
     slopes = {name: 2.0 * math.pi * case.amplitude / case.period for name, case in cases.items()}
     ratios = {name: q_of(case, "A") / slopes[name] for name, case in cases.items()}
@@ -118,8 +137,9 @@ def proportional_a() -> Check:
     )
 
 
+@judges("sentence-IV.A-energy", "IV.A")
 def energy_a() -> Check:
-    """The loop of Fig. 3."""
+    """A is not conservative; around a path of Fig. 3 it generates κ₀A²/2."""
     printed = loop_check("A", lambda c: 0.5 * c.stiffness * c.amplitude**2)
     return settle(printed, curl_check("A", conservative=False))
 
@@ -127,35 +147,29 @@ def energy_a() -> Check:
 # --- B --------------------------------------------------------------------------------------------
 
 
+@judges("eq-11", "IV.B", "(11)")
 def field_b() -> Check:
-    """(11)."""
+    """Force of B: the vertical depth, along the groove's normal."""
 
     def printed(s: Spot) -> FloatArray:
         return -s.k * s.d * np.array([-s.slope, 1.0]) / math.sqrt(1.0 + s.slope**2)
 
-    return settle(field_check("B", printed, None, ""), outside_check("B"))
+    return settle(field_check("B", printed), outside_check("B"))
 
 
-def energy_b() -> Check:
-    """(12)."""
-
-    def printed(c: Setting) -> float:
-        a, length = c.amplitude, c.period
-        root = math.sqrt((length**2 + 4.0 * a**2 * math.pi**2) / length**2)
-        return 0.5 * c.stiffness * a**2 + c.stiffness * length**2 / (4.0 * math.pi**2) * (1 - root)
-
-    return loop_check("B", printed)
+_CLOSED = {
+    "B": "q_B = max(√(1 + G²), y)",
+    "C": "q_C = the greatest of 1, y and the feasible roots of a cubic",
+    "G": "q_G = max(1, y), with G = 2πA/l and y = 4π²AD/l²",
+}
 
 
-def remark_4() -> Check:
-    """A and B have a curl; what is felt is not computed."""
-    return settle(curl_check("A", conservative=False), curl_check("B", conservative=False))
-
-
+@judges("sentence-IV-closed-form", "IV.B")
 def closed_forms() -> Check:
-    """The paper finds no closed form for B, C and G: do ours give what a search finds?"""
-    from asperity.analysis.gain.closed_forms import q_b, q_c, q_g
+    """There is no manageable closed form for the numbers of B, C and G.
 
+    Do ours give what a search finds?
+    """
     cases = [PASSIVITY, SCANNING, *random_settings(6)]
     checks = []
     for law, exact in (("B", q_b), ("C", q_c), ("G", q_g)):
@@ -174,11 +188,22 @@ def closed_forms() -> Check:
     return settle(*checks)
 
 
-_CLOSED = {
-    "B": "q_B = max(√(1 + G²), y)",
-    "C": "q_C = the greatest of 1, y and the feasible roots of a cubic",
-    "G": "q_G = max(1, y), with G = 2πA/l and y = 4π²AD/l²",
-}
+@judges("eq-12", "IV.B", "(12)")
+def energy_b() -> Check:
+    """Energy of B around the path of Fig. 3."""
+
+    def printed(c: Setting) -> float:
+        a, length = c.amplitude, c.period
+        root = math.sqrt((length**2 + 4.0 * a**2 * math.pi**2) / length**2)
+        return 0.5 * c.stiffness * a**2 + c.stiffness * length**2 / (4.0 * math.pi**2) * (1 - root)
+
+    return loop_check("B", printed)
+
+
+@judges("remark-4", "IV.B", "Remark 4")
+def remark_4() -> Check:
+    """A and B are not conservative (that they feel active is not computed)."""
+    return settle(curl_check("A", conservative=False), curl_check("B", conservative=False))
 
 
 # --- C --------------------------------------------------------------------------------------------
@@ -188,8 +213,12 @@ def _force_c(s: Spot) -> FloatArray:
     return -s.k * np.array([-s.d * s.slope, s.d])
 
 
+@judges("eq-13", "IV.C", "(13)")
 def potential_c() -> Check:
-    """(13): its gradient, and its sign as an energy."""
+    """Potential of C.
+
+    Its gradient, and its sign as an energy.
+    """
     places = list(spots("C"))
     gradient = judge(
         "+∇U against the force of C",
@@ -204,23 +233,29 @@ def _printed_potential(spot: Spot) -> Callable[[Any, Any], Any]:
     return lambda x, z: -spot.k * (z - profile(x, 0)) ** 2 / 2
 
 
+@judges("eq-14", "IV.C", "(14)")
 def field_c() -> Check:
-    """(14)."""
-    return settle(field_check("C", _force_c, None, ""), outside_check("C"))
+    """Force of C, the gradient of that potential."""
+    return settle(field_check("C", _force_c), outside_check("C"))
 
 
+@judges("eq-15", "IV.C", "(15)")
 def jacobian_c() -> Check:
-    """(15)."""
+    """Jacobian of C, with the second derivative of h."""
 
     def printed(s: Spot) -> FloatArray:
         corner = s.slope**2 - s.d * s.bend
         return -s.k * np.array([[corner, -s.slope], [-s.slope, 1.0]])
 
-    return jacobian_check("C", printed, None, "")
+    return jacobian_check("C", printed)
 
 
+@judges("sentence-IV.C-curvature", "IV.C")
 def curvature_c() -> Check:
-    """At crests and troughs the norm is κ₀ times the greater of 1 and depth times curvature."""
+    """C's stiffness grows with curvature, very large in sharp asperities and crevices.
+
+    At crests and troughs the norm is κ₀ times the greater of 1 and depth times curvature.
+    """
     printed, truth = [], []
     for case in [PASSIVITY, SCANNING, *random_settings()]:
         x = np.array([0.25, 0.75]) * case.period
@@ -233,10 +268,12 @@ def curvature_c() -> Check:
     return judge("norm of C's Jacobian at crests and troughs", printed=printed, truth=truth)
 
 
+@judges("sentence-IV.C-conservative", "IV.C")
 def conservative_c() -> Check:
-    """Conservative by construction: curl and loops."""
-    from asperity.analysis.energy.loops import loop_work
+    """C is conservative.
 
+    By construction: curl and loops.
+    """
     energies = [
         loop_work(case.surface("C"), groove_path(case)) / (case.stiffness * case.amplitude**2)
         for case in [SCANNING, *random_settings()]
@@ -246,12 +283,12 @@ def conservative_c() -> Check:
     return settle(curl_check("C", conservative=True), loops)
 
 
+@judges("remark-5", "IV.C", "Remark 5")
 def remark_5() -> Check:
-    """The normalisation alone takes the conservativity."""
+    """The factor √(1 + h'²) is what keeps B from being conservative."""
     import sympy as sp
 
     from asperity.derive.curl import curl_verdict
-    from asperity.laws import Law, find_law
 
     without = curl_verdict(
         Law("Bs", "b-times-root", "vertical",
@@ -271,8 +308,12 @@ def remark_5() -> Check:
 # --- G --------------------------------------------------------------------------------------------
 
 
+@judges("eq-28", "IV.G", "(28)")
 def field_g() -> Check:
-    """(28): a column times a column."""
+    """Force of G: the wall's depth, along the texture's normal.
+
+    A column times a column.
+    """
     import sympy as sp
 
     column = sp.Matrix(sp.symbols("nx nz"))
@@ -291,10 +332,9 @@ def field_g() -> Check:
     return settle(field_check("G", printed, right, correction), outside_check("G"))
 
 
+@judges("eq-29", "IV.G", "(29)")
 def energy_g() -> Check:
-    """(29)."""
-    from asperity.analysis.energy.loops import loop_work
-
+    """Around its path of Fig. 3 G gains energy on one leg."""
     worst, least = 0.0, math.inf
     for case in [SCANNING, *random_settings()]:
         a, surface = 0.5 * case.depth, case.surface("G")
@@ -316,45 +356,3 @@ def energy_g() -> Check:
         ),
         curl_check("G", conservative=False),
     )
-
-
-LAW_A = (
-    Claim("eq-6", ("(6)",), "IV.A", "Force of A: the vertical depth, along the wall's normal.",
-          field_a),
-    Claim("eq-7", ("(7)",), "IV.A", "Jacobian of A inside.", jacobian_a),
-    Claim("eq-8", ("(8)",), "IV.A", "Norm of that Jacobian: κ₀ √(1 + h'²).", norm_a),
-    Claim("eq-9", ("(9)",), "IV.A", "The increase of stiffness by A is √(1 + h'²).", number_a),
-    Claim("eq-10", ("(10)",), "IV.A",
-          "On a sinusoid the greatest norm is κ₀ √(1 + (2πA/l)²), at x = 0 mod π/l.", sinusoid_a),
-    Claim("sentence-IV.A-proportional", (), "IV.A",
-          "2πA/l is large, so A's number is nearly proportional to A and 1/l.", proportional_a),
-    Claim("sentence-IV.A-energy", (), "IV.A",
-          "A is not conservative; around a path of Fig. 3 it generates κ₀A²/2.", energy_a),
-)  # fmt: skip
-LAW_B = (
-    Claim("eq-11", ("(11)",), "IV.B", "Force of B: the vertical depth, along the groove's normal.",
-          field_b),
-    Claim("sentence-IV-closed-form", (), "IV.B",
-          "There is no manageable closed form for the numbers of B, C and G.", closed_forms),
-    Claim("eq-12", ("(12)",), "IV.B", "Energy of B around the path of Fig. 3.", energy_b),
-    Claim("remark-4", ("Remark 4",), "IV.B",
-          "A and B are not conservative (that they feel active is not computed).", remark_4),
-)  # fmt: skip
-LAW_C = (
-    Claim("eq-13", ("(13)",), "IV.C", "Potential of C.", potential_c),
-    Claim("eq-14", ("(14)",), "IV.C", "Force of C, the gradient of that potential.", field_c),
-    Claim("eq-15", ("(15)",), "IV.C", "Jacobian of C, with the second derivative of h.",
-          jacobian_c),
-    Claim("sentence-IV.C-curvature", (), "IV.C",
-          "C's stiffness grows with curvature, very large in sharp asperities and crevices.",
-          curvature_c),
-    Claim("sentence-IV.C-conservative", (), "IV.C", "C is conservative.", conservative_c),
-    Claim("remark-5", ("Remark 5",), "IV.C",
-          "The factor √(1 + h'²) is what keeps B from being conservative.", remark_5),
-)  # fmt: skip
-LAW_G = (
-    Claim("eq-28", ("(28)",), "IV.G", "Force of G: the wall's depth, along the texture's normal.",
-          field_g),
-    Claim("eq-29", ("(29)",), "IV.G", "Around its path of Fig. 3 G gains energy on one leg.",
-          energy_g),
-)  # fmt: skip

@@ -7,8 +7,9 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.checks import FloatArray
-from asperity.paper.claim import Check, Claim, decide, settle
+from asperity.paper.claim import Check, decide, judges, settle
 from asperity.paper.plane import SCANNING, random_settings
 
 # Exponents of metre, second and newton.
@@ -110,20 +111,32 @@ def _counts(
     )
 
 
+@judges("limit-1", "II.B", "Limit 1")
 def limit_1() -> Check:
-    """Samples in time."""
+    """Scanning velocity: α v T/l < 1.
+
+    Samples in time.
+    """
     counted = _counts(PRINTED[1], "samples in a wave", lambda v: v["v"] * v["T"], "l", 2)
     return settle(counted, _units(PRINTED[1]))
 
 
+@judges("limit-2", "II.B", "Limit 2")
 def limit_2() -> Check:
-    """Steps of position."""
+    """Low speed reconstruction: β δ/l < 1.
+
+    Steps of position.
+    """
     counted = _counts(PRINTED[2], "steps of position in a wave", lambda v: v["delta"], "l", 3)
     return settle(counted, _units(PRINTED[2]))
 
 
+@judges("limit-3", "II.B", "Limit 3")
 def limit_3() -> Check:
-    """The same with α: does it ever decide what limit 2 does not?"""
+    """High speed reconstruction: α δ/l < 1, one more limit.
+
+    The same with α: does it ever decide what limit 2 does not?
+    """
     draw, alone, merged, count = np.random.default_rng(4), 0, 0, 4000
     for _ in range(count):
         values = {name: float(10.0 ** draw.uniform(-2.0, 1.0)) for name in _UNITS}
@@ -145,8 +158,12 @@ def limit_3() -> Check:
     )
 
 
+@judges("limit-4", "II.B", "Limit 4")
 def limit_4() -> Check:
-    """Steps of force."""
+    """Force reconstruction: γ b/l < A.
+
+    Steps of force.
+    """
     return settle(
         _counts(CORRECTED[4], "steps of force in an amplitude (corrected)", lambda v: v["b"],
                 "force", 6),
@@ -155,10 +172,12 @@ def limit_4() -> Check:
     )  # fmt: skip
 
 
+@judges("limit-5", "II.B", "Limit 5")
 def limit_5() -> Check:
-    """Gain: what the greatest slope of the force of every law is."""
-    from asperity.analysis.gain.characteristic import characteristic_number
+    """Gain: 2πA/l < A₀.
 
+    What the greatest slope of the force of every law is.
+    """
     draw, case = np.random.default_rng(8), SCANNING
     worst, best = 0.0, math.inf
     for law in "ABCEG":
@@ -202,8 +221,12 @@ def _inside(law: str, draw: np.random.Generator, count: int) -> FloatArray:
     return np.stack([points, points + step])
 
 
+@judges("limit-6", "II.B", "Limit 6")
 def limit_6() -> Check:
-    """The frequency of the force while scanning."""
+    """Structure of the device: v/l < F₀.
+
+    The frequency of the force while scanning.
+    """
     worst = 0.0
     for case in random_settings(4, 17):
         surface, v = case.surface("C"), 0.07
@@ -224,14 +247,3 @@ def limit_6() -> Check:
         ),
         _units(PRINTED[6]),
     )
-
-
-LIMITS = (
-    Claim("limit-1", ("Limit 1",), "II.B", "Scanning velocity: α v T/l < 1.", limit_1),
-    Claim("limit-2", ("Limit 2",), "II.B", "Low speed reconstruction: β δ/l < 1.", limit_2),
-    Claim("limit-3", ("Limit 3",), "II.B", "High speed reconstruction: α δ/l < 1, one more limit.",
-          limit_3),
-    Claim("limit-4", ("Limit 4",), "II.B", "Force reconstruction: γ b/l < A.", limit_4),
-    Claim("limit-5", ("Limit 5",), "II.B", "Gain: 2πA/l < A₀.", limit_5),
-    Claim("limit-6", ("Limit 6",), "II.B", "Structure of the device: v/l < F₀.", limit_6),
-)  # fmt: skip

@@ -1,4 +1,4 @@
-"""Section III: the corollary, the characteristic number, and the three cases."""
+"""Section III: the corollary, the characteristic number and what it is for, the three cases."""
 
 from __future__ import annotations
 
@@ -6,13 +6,19 @@ import math
 
 import numpy as np
 
+from asperity.analysis.energy.loops import loop_work
+from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.checks import FloatArray
-from asperity.paper.claim import Check, Claim, decide, judge, settle
+from asperity.laws import Law, find_law
+from asperity.paper.claim import Check, decide, judge, judges, settle
 from asperity.paper.comparisons import q_of
-from asperity.paper.paths import groove_path
 from asperity.paper.plane import (
+    LAWS,
+    PASSIVITY,
     SAMPLING_PERIOD,
     SCANNING,
+    Setting,
+    groove_path,
     path_points,
     random_settings,
     spots,
@@ -48,8 +54,6 @@ def sampled_loop(vertices: FloatArray, step: float) -> FloatArray:
 
 def _alive(law: str) -> tuple[float, float, FloatArray, Surface]:
     """Return the net gain of a slow loop where (1) holds with equality, and what made it."""
-    from asperity.analysis.gain.characteristic import characteristic_number
-
     surface = SCANNING.surface(law)
     q = characteristic_number(surface).value
     damping = 2.0 * SAMPLING_PERIOD * surface.stiffness * q
@@ -63,8 +67,6 @@ def _quiet(delay: int, seed: int, part: float = 1.0) -> float:
     Beyond what was stored at the beginning, relative to k times the square of the depth. Also
     shakes where q is attained. ``part`` is of the damping that (1) asks for.
     """
-    from asperity.analysis.gain.characteristic import characteristic_number
-
     draw, worst = np.random.default_rng(seed), -math.inf
     for case in [SCANNING, *random_settings(2, seed)]:
         low, high = case.texture.extremes
@@ -90,8 +92,6 @@ def _quiet(delay: int, seed: int, part: float = 1.0) -> float:
 
 def shake(surface: Surface, size: float, angle: float = math.pi) -> FloatArray:
     """Return a to and fro along the stiffest direction where q is attained, just inside."""
-    from asperity.analysis.gain.characteristic import characteristic_number
-
     at = characteristic_number(surface).at
     if at is None:
         raise ValueError(f"no place attains q of {surface!r}")
@@ -113,8 +113,9 @@ def _two_late() -> float:
     return gained(wall, path, 2.0 * wall.stiffness, delay=2)
 
 
+@judges("eq-1", "III.A", "(1)")
 def corollary() -> Check:
-    """(1)."""
+    """‖J‖ <= σ₀(B)/(2T) everywhere is sufficient for passivity (Corollary 1)."""
     net, damping, _path, _surface = _alive("A")
     quiet = [_quiet(delay, 31 + delay) for delay in (0, 1)]
     late = _two_late()
@@ -131,8 +132,12 @@ def corollary() -> Check:
     )
 
 
+@judges("eq-2", "III.A", "(2)")
 def condition() -> Check:
-    """(2): it holds at every step of the loop that gains."""
+    """The force changing by at most σ₀/(2T) per length at every step is sufficient.
+
+    It holds at every step of the loop that gains.
+    """
     net, damping, path, surface = _alive("A")
     step = np.linalg.norm(np.diff(path, axis=0), axis=1)
     change = np.linalg.norm(np.diff(surface.force(path), axis=0), axis=1)
@@ -153,8 +158,9 @@ def _jacobians() -> list[FloatArray]:
     return [spot.jacobian() / spot.k for law in "ABCDEG" for spot in spots(law, 3)]
 
 
+@judges("eq-3", "III.A", "(3)")
 def product_bound() -> Check:
-    """(3)."""
+    """‖J Δ‖ <= ‖J‖₂ |Δ|."""
     draw, most = np.random.default_rng(2), 0.0
     for matrix in _jacobians():
         steps = draw.normal(size=(200, 2))
@@ -167,8 +173,12 @@ def product_bound() -> Check:
     )
 
 
+@judges("eq-4", "III.A", "(4)")
 def step_bound() -> Check:
-    """(4): (1) and (3) together."""
+    """With (1), ‖J Δ‖ <= σ₀/(2T) |Δ|.
+
+    (1) and (3) together.
+    """
     draw, most = np.random.default_rng(3), 0.0
     for matrix in _jacobians():
         allowed = draw.uniform(1.0, 3.0) * np.linalg.norm(matrix, 2)  # σ₀/(2T) as (1) asks
@@ -182,14 +192,105 @@ def step_bound() -> Check:
     )
 
 
+# --- the characteristic number --------------------------------------------------------------------
+
+
+@judges("eq-5", "III.B", "(5)")
+def definition() -> Check:
+    """q = σ_n(J)/κ₀ belongs to the algorithm, whatever κ₀ is.
+
+    A number of the algorithm only if J is proportional to κ₀.
+    """  # noqa: D403 - a symbol
+    worst = 0.0
+    for law in LAWS:
+        for spot in spots(law, 2):
+            points = np.array([[spot.x, 0.0, spot.z]])
+            one, other = (
+                Surface(SCANNING.texture, law, stiffness=k).jacobian(points - [0, 0, 2e-3])[0] / k
+                for k in (211.0, 1733.0)
+            )
+            worst = max(worst, float(np.abs(one - other).max() / np.abs(one).max()))
+    return decide(
+        f"J/κ₀ of A to G at two stiffnesses differs by {worst:.1e}",
+        printed=worst < 1e-12,
+        greatest_difference=worst,
+    )
+
+
+@judges("sentence-III.B-reduced", "III.B")
+def reduced() -> Check:
+    """κ₁ = κ₀/q gives the textured wall the norm of the smooth one, for any algorithm."""
+    numbers = {law: q_of(PASSIVITY, law) for law in LAWS}
+    finite = [law for law, q in numbers.items() if math.isfinite(q)]
+    worst = 0.0
+    for law in finite:
+        k = PASSIVITY.stiffness / numbers[law]
+        again = k * q_of(Setting(k, PASSIVITY.period, PASSIVITY.amplitude), law)
+        worst = max(worst, abs(again / PASSIVITY.stiffness - 1.0))
+    without = "".join(law for law in LAWS if law not in finite)
+    return decide(
+        f"in V.A's setting κ₀/q has the norm κ₀ within {worst:.1e} for {''.join(finite)}; "
+        f"q is infinite for {without or 'none'}",
+        printed=worst < 1e-5 and not without,
+        corrected=worst < 1e-5 and without == "D",
+        correction="for D only as long as the depth stays above its medial axis",
+        numbers={f"q_{law}": q for law, q in numbers.items()},
+    )
+
+
+@judges("sentence-III.B-doubling", "III.B")
+def doubling() -> Check:
+    """Doubling the spatial frequency requires half the stiffness."""
+    ratios: dict[str, list[float]] = {}
+    for law in LAWS:
+        values = [q_of(Setting(1000.0, length, 0.4e-3), law) for length in (1e-3, 0.5e-3)]
+        steep = [q_of(Setting(1000.0, length, 0.4e-3), law) for length in (2e-5, 1e-5)]
+        ratios[law] = [values[1] / values[0], steep[1] / steep[0]]
+    # From infinity to infinity the ratio is no number.
+    printed = all(abs(ratio[0] - 2.0) < 0.02 for ratio in ratios.values())
+    halves = "".join(law for law, ratio in ratios.items() if abs(ratio[1] - 2.0) < 0.02)
+    said = ", ".join(
+        f"{law} {ratio[0]:.2f}" for law, ratio in ratios.items() if math.isfinite(ratio[0])
+    )
+    return decide(
+        f"l from 1 to 0.5 mm multiplies q by: {said} (D is infinite both times); "
+        f"from 20 to 10 µm by 2 for {halves}",
+        printed=printed,
+        corrected=halves == "AF",
+        correction="for A and F, where the texture is steep; q of B, C and G then grows four "
+        "times, E's not at all, and D's is infinite",
+        numbers={
+            f"ratios for {law}": [r for r in ratio if math.isfinite(r)]
+            for law, ratio in ratios.items()
+        },
+    )
+
+
+@judges("sentence-III.B-compare", "III.B")
+def no_comparison() -> Check:
+    """q does not rank algorithms: its order depends on the parameters."""  # noqa: D403 - a symbol
+    orders = set()
+    for amplitude, depth in ((0.8e-3, 1e-3), (0.05e-3, 1e-3), (0.05e-3, 0.1e-3)):
+        case = Setting(1000.0, 2e-3, amplitude, depth=depth)
+        numbers = {law: round(q_of(case, law), 6) for law in "ABCEG"}
+        orders.add("".join(sorted(numbers, key=lambda law: (numbers[law], law))))
+    return decide(
+        f"three settings rank A, B, C, E, G by q as {', '.join(sorted(orders))}",
+        printed=len(orders) > 1,
+        orders=", ".join(sorted(orders)),
+    )
+
+
 # --- conservativity -------------------------------------------------------------------------------
 
 
+@judges("sentence-III.C-curl", "III.C")
 def zero_curl() -> Check:
-    """Zero curl makes a field conservative: a field that begins with a jump says when."""
-    from asperity.analysis.energy.loops import loop_work
+    """A field with zero curl is conservative.
+
+    A field that begins with a jump says when.
+    """
     from asperity.derive.curl import curl_verdict
-    from asperity.laws import Law, find_law
 
     stripe = Law("T", "constant-pull", "nominal", lambda c: c.k * 1e-3 * c.tangential([1, 0]))
     verdict = curl_verdict(stripe)
@@ -210,8 +311,9 @@ def zero_curl() -> Check:
     )
 
 
+@judges("sentence-III.C-case-1", "III.C")
 def case_1() -> Check:
-    """Condition (1) does not hold: energy may be injected."""
+    """Where (1) does not hold unwanted energy may be injected."""
     surface = SCANNING.surface("C")
     path = shake(surface, 1e-8)
     scale = surface.stiffness * q_of(SCANNING, "C")
@@ -225,8 +327,9 @@ def case_1() -> Check:
     )
 
 
+@judges("sentence-III.C-case-2", "III.C")
 def case_2() -> Check:
-    """Condition (1) holds, the algorithm is generative: energy may be injected."""
+    """Where (1) holds and the law is generative, some motions may still gain."""
     nets = {law: _alive(law)[0] for law in "ABE"}
     said = ", ".join(f"{law} {net * 1e3:+.3f} mJ" for law, net in nets.items())
     return decide(
@@ -236,8 +339,9 @@ def case_2() -> Check:
     )
 
 
+@judges("sentence-III.C-case-3", "III.C")
 def case_3() -> Check:
-    """Condition (1) holds, the field is conservative: energy is always taken from the user."""
+    """Where (1) holds and the field is conservative, every motion loses."""
     quiet, late = max(_quiet(delay, 51 + delay) for delay in (0, 1)), _two_late()
     return decide(
         f"the best of 252 motions on C with d = 0, 1 gains {quiet:+.1e} κ₀D²",
@@ -247,8 +351,9 @@ def case_3() -> Check:
     )
 
 
+@judges("sentence-abstract-texture", "Abstract")
 def smooth_then_textured() -> Check:
-    """A smooth wall that is passive may not be, once textured."""
+    """A smooth surface that is rendered passively may lose this once textured."""
     wall, textured = SCANNING.surface("W"), SCANNING.surface("C")
     loss = wall.stiffness  # twice what the plain wall needs, σ₀/T = k/2
     on_wall = gained(wall, shake(wall, 1e-8), loss)
@@ -262,29 +367,3 @@ def smooth_then_textured() -> Check:
             gain_on_the_texture=on_texture,
         ),
     )
-
-
-PASSIVE = (
-    Claim("sentence-abstract-texture", (), "Abstract",
-          "A smooth surface that is rendered passively may lose this once textured.",
-          smooth_then_textured),
-)  # fmt: skip
-SECTION_III_A = (
-    Claim("eq-1", ("(1)",), "III.A",
-          "‖J‖ <= σ₀(B)/(2T) everywhere is sufficient for passivity (Corollary 1).", corollary),
-    Claim("eq-2", ("(2)",), "III.A",
-          "The force changing by at most σ₀/(2T) per length at every step is sufficient.",
-          condition),
-    Claim("eq-3", ("(3)",), "III.A", "‖J Δ‖ <= ‖J‖₂ |Δ|.", product_bound),
-    Claim("eq-4", ("(4)",), "III.A", "With (1), ‖J Δ‖ <= σ₀/(2T) |Δ|.", step_bound),
-)  # fmt: skip
-SECTION_III_C = (
-    Claim("sentence-III.C-curl", (), "III.C", "A field with zero curl is conservative.",
-          zero_curl),
-    Claim("sentence-III.C-case-1", (), "III.C",
-          "Where (1) does not hold unwanted energy may be injected.", case_1),
-    Claim("sentence-III.C-case-2", (), "III.C",
-          "Where (1) holds and the law is generative, some motions may still gain.", case_2),
-    Claim("sentence-III.C-case-3", (), "III.C",
-          "Where (1) holds and the field is conservative, every motion loses.", case_3),
-)  # fmt: skip

@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache, partial
 
 import numpy as np
 
+from asperity.analysis.energy.loops import loop_work
+from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.checks import FloatArray
 from asperity.kernels.probe import ClampName
+from asperity.laws import find_law
 from asperity.paper.claim import (
+    DECLARED,
     Check,
     Claim,
     decide,
     judge,
+    judges,
     relative_error,
     settle,
 )
 from asperity.paper.claims_appendix import true_number
 from asperity.paper.claims_friction import PAPER, norm_of, stick_entries
 from asperity.paper.comparisons import field_check
-from asperity.paper.paths import groove_path
-from asperity.paper.plane import SCANNING, Setting, Spot, generic_profile, spots
-from asperity.paper.table_two import TableTwo, TableTwoRow
+from asperity.paper.figures import loop_energies
+from asperity.paper.plane import SCANNING, Setting, Spot, generic_profile, groove_path, spots
+from asperity.paper.table_two import TableTwoRow, table_two
 from asperity.surface import Surface
 from asperity.textures.fourier import Fourier
 from asperity.textures.sinusoid import Sinusoid
@@ -36,36 +40,39 @@ def _normal(s: Spot) -> FloatArray:
     return np.array([-s.slope, 1.0]) / math.hypot(1.0, s.slope)
 
 
+@judges("table-1-A", "IV", "Table I")
 def row_a() -> Check:
-    """Row A."""
-    return field_check("A", lambda s: np.array([0.0, -s.k * s.d]), None, "")
+    """Force of A: [0, -κ₀ d]."""
+    return field_check("A", lambda s: np.array([0.0, -s.k * s.d]))
 
 
+@judges("table-1-BG", "IV", "Table I")
 def row_b_and_g() -> Check:
-    """Row B & G: one formula, two penetrations."""
+    """Force of B and G: -κ₀ d n.
+
+    One formula, two penetrations.
+    """
     return settle(
-        field_check("B", lambda s: -s.k * s.d * _normal(s), None, ""),
-        field_check("G", lambda s: -s.k * s.z * _normal(s), None, ""),
+        field_check("B", lambda s: -s.k * s.d * _normal(s)),
+        field_check("G", lambda s: -s.k * s.z * _normal(s)),
     )
 
 
-def row_c() -> Check:
-    """Row C."""
-    return field_check(
-        "C",
-        lambda s: np.array([-s.k * s.slope * s.d, -s.k * s.d]),
-        lambda s: np.array([s.k * s.slope * s.d, -s.k * s.d]),
-        "the x part with a plus sign, as in (14)",
-    )
-
-
+@judges("table-1-D", "IV", "Table I")
 def row_d() -> Check:
-    """Row D, its n̂ read as the unit vector from the nearest point to the probe."""
-    return field_check("D", lambda s: -s.k * s.distance * (s.from_foot / s.distance), None, "")
+    """Force of D: -κ₀ d^min n̂.
+
+    Its n̂ read as the unit vector from the nearest point to the probe.
+    """
+    return field_check("D", lambda s: -s.k * s.distance * (s.from_foot / s.distance))
 
 
+@judges("table-1-E", "IV", "Table I")
 def row_e() -> Check:
-    """Row E, d^min being a distance as the text below the table says."""
+    """Force of E: [0, -κ₀ d^min].
+
+    d^min being a distance as the text below the table says.
+    """
     return field_check(
         "E",
         lambda s: np.array([0.0, -s.k * s.distance]),
@@ -74,8 +81,12 @@ def row_e() -> Check:
     )
 
 
+@judges("table-1-F", "IV", "Table I")
 def row_f() -> Check:
-    """Row F: [-κ(x) d, -κ₀ d], κ(x) = μκ₀(1 - h), d = p^z."""
+    """Force of F: [-κ(x) d, -κ₀ d].
+
+    With κ(x) = μκ₀(1 - h), d = p^z.
+    """
     from asperity.definition import exact_force
 
     printed, corrected, truth = [], [], []
@@ -94,14 +105,21 @@ def row_f() -> Check:
                  truth=truth, correction="the x part times -d^x/d_max")  # fmt: skip
 
 
+@judges("table-1-C", "IV", "Table I")
+def row_c() -> Check:
+    """Force of C: [-κ₀ h' d, -κ₀ d]."""
+    return field_check(
+        "C",
+        lambda s: np.array([-s.k * s.slope * s.d, -s.k * s.d]),
+        lambda s: np.array([s.k * s.slope * s.d, -s.k * s.d]),
+        "the x part with a plus sign, as in (14)",
+    )
+
+
 # --- Table II -------------------------------------------------------------------------------------
 
 
-@lru_cache(maxsize=1)
-def _table() -> TableTwo:
-    from asperity.paper.table_two import table_two
-
-    return table_two()
+_table = lru_cache(maxsize=1)(table_two)
 
 
 def table_two_row(letter: str) -> Check:
@@ -110,10 +128,12 @@ def table_two_row(letter: str) -> Check:
     return settle(_number_cell(row), _conservative_cell(row), _continuity_cell(row))
 
 
+@judges("sentence-IV-figure-3", "IV.G")
 def figure_3() -> Check:
-    """Every law that the figure shows gains; those that it does not show do not."""
-    from asperity.paper.figures import loop_energies
+    """Along the paths of Fig. 3 A, B, E, F and G gain energy.
 
+    Every law that the figure shows gains; those that it does not show do not.
+    """
     scale = SCANNING.stiffness * SCANNING.amplitude**2
     energies = {panel.law: panel.energy for panel in loop_energies()}
     shown = {law: energy for law, energy in energies.items() if law not in "CD"}
@@ -177,7 +197,6 @@ def _continuity_cell(row: TableTwoRow) -> Check:
     """Judge the condition on h: a force that uses h' jumps where h' does."""
     from asperity.contacts.symbols import HX
     from asperity.derive.jacobian import symbolic_force
-    from asperity.laws import find_law
 
     uses = HX in symbolic_force(find_law(row.law)).free_symbols
     needs = "h'" in row.printed.continuous
@@ -192,8 +211,9 @@ def _continuity_cell(row: TableTwoRow) -> Check:
 # --- Remarks --------------------------------------------------------------------------------------
 
 
+@judges("remark-1", "IV", "Remark 1")
 def remark_1() -> Check:
-    """What a texture feels like is not computed."""
+    """What a texture feels like depends on more than the algorithm."""
     return decide("a statement on perception and on real contacts: nothing here can be computed",
                   printed=None)  # fmt: skip
 
@@ -203,10 +223,12 @@ def _finer(case: Setting, times: float) -> Setting:
     return Setting(case.stiffness, case.period / times, case.amplitude / times, depth=case.depth)
 
 
+@judges("remark-2", "IV", "Remark 2")
 def remark_2() -> Check:
-    """A Lipschitz bound M takes the place of 2πA/l: the same M, other curvatures."""
-    from asperity.analysis.gain.characteristic import characteristic_number
+    """The results hold for any texture with a Lipschitz bound M in the place of 2πA/l.
 
+    The same M, other curvatures.
+    """
     base, numbers = Setting(1000.0, 2e-3, 0.2e-3, depth=0.02e-3), {}
     for law in "ABCDEG":
         pair = [characteristic_number(_finer(base, n).surface(law)).value for n in (1.0, 100.0)]
@@ -234,8 +256,6 @@ def remark_2() -> Check:
 
 def _safe_bounds() -> float:
     """Return the least ratio of the bounds by M and K to q, on sums of waves."""
-    from asperity.analysis.gain.characteristic import characteristic_number
-
     least = math.inf
     for seed, bent in ((5, 0.45), (6, 0.45), (5, 6.0)):
         texture: Fourier = generic_profile(seed)
@@ -250,10 +270,9 @@ def _safe_bounds() -> float:
     return least
 
 
+@judges("remark-3", "IV", "Remark 3")
 def remark_3() -> Check:
-    """The numbers of B, C, F, G grow with depth; holding the depth for the lateral force bounds."""
-    from asperity.analysis.energy.loops import loop_work
-
+    """Limiting the depth that the lateral force uses bounds the numbers of B, C, F and G."""
     growth = {law: _deep(law, "none", 50.0) / _deep(law, "none", 1.0) for law in "BCFG"}
     lateral = {law: _deep(law, "lateral", 50.0) / _deep(law, "none", 1.0) for law in "BCFG"}
     whole = {law: _deep(law, "whole", 50.0) / _deep(law, "none", 1.0) for law in "BCFG"}
@@ -285,8 +304,9 @@ def remark_3() -> Check:
     )
 
 
+@judges("sentence-IV.F-clamp", "IV.F")
 def unbounded_friction() -> Check:
-    """F: the gain grows with the depth without bound, and holding the depth bounds it."""
+    """The gain of F grows with the depth without bound; clamping p^z bounds it."""
     free = {times: _deep("F", "none", times) / 1000.0 for times in (1.0, 10.0, 1000.0)}
     held = {times: _deep("F", "lateral", times) / 1000.0 for times in (1.0, 10.0, 1000.0)}
     return decide(
@@ -323,14 +343,6 @@ def _deep(law: str, clamp: ClampName, times: float) -> float:
     return best
 
 
-_ROWS: dict[str, tuple[str, Callable[[], Check]]] = {
-    "A": ("[0, -κ₀ d]", row_a),
-    "BG": ("-κ₀ d n", row_b_and_g),
-    "D": ("-κ₀ d^min n̂", row_d),
-    "E": ("[0, -κ₀ d^min]", row_e),
-    "F": ("[-κ(x) d, -κ₀ d]", row_f),
-    "C": ("[-κ₀ h' d, -κ₀ d]", row_c),
-}
 _SAID = {
     "A": "q = √(1 + (2πA/l)²); not conservative; continuous if h is",
     "B": "no closed form; not conservative; continuous if h' is",
@@ -340,31 +352,7 @@ _SAID = {
     "F": "q in Appendix I; almost conservative; continuous if h is",
     "G": "no closed form; not conservative; continuous if h' is",
 }
-TABLE_I = tuple(
-    Claim(f"table-1-{letter}", ("Table I",), "IV", f"Force of {' and '.join(letter)}: {text}.", row)
-    for letter, (text, row) in _ROWS.items()
-)
-FIGURE_3 = (
-    Claim("sentence-IV-figure-3", (), "IV.G",
-          "Along the paths of Fig. 3 A, B, E, F and G gain energy.", figure_3),
-)  # fmt: skip
-TABLE_II = tuple(
-    Claim(f"table-2-{letter}", ("Table II",), "IV.H", f"{letter}: {text}.",
-          partial(table_two_row, letter))
-    for letter, text in _SAID.items()
-)  # fmt: skip
-CLAMP = (
-    Claim("sentence-IV.F-clamp", (), "IV.F",
-          "The gain of F grows with the depth without bound; clamping p^z bounds it.",
-          unbounded_friction),
-)  # fmt: skip
-REMARKS = (
-    Claim("remark-1", ("Remark 1",), "IV",
-          "What a texture feels like depends on more than the algorithm.", remark_1),
-    Claim("remark-2", ("Remark 2",), "IV",
-          "The results hold for any texture with a Lipschitz bound M in the place of 2πA/l.",
-          remark_2),
-    Claim("remark-3", ("Remark 3",), "IV",
-          "Limiting the depth that the lateral force uses bounds the numbers of B, C, F and G.",
-          remark_3),
-)  # fmt: skip
+DECLARED += [
+    Claim(f"table-2-{law}", ("Table II",), "IV.H", f"{law}: {said}.", partial(table_two_row, law))
+    for law, said in _SAID.items()
+]

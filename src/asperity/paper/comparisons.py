@@ -2,42 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
+from asperity.analysis.bounds.dense_search import greatest
+from asperity.analysis.bounds.measures import spectral_norm
+from asperity.analysis.energy.loops import integrate, loop_work
+from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.checks import FloatArray
+from asperity.laws import find_law
 from asperity.paper.claim import Check, decide, judge
-from asperity.paper.paths import groove_path
-from asperity.paper.plane import SCANNING, Setting, Spot, random_settings, spots
+from asperity.paper.plane import SCANNING, Setting, Spot, groove_path, random_settings, spots
 from asperity.surface import Surface
 
 Formula = Callable[[Spot], FloatArray]
+Place = TypeVar("Place")
 
 
-def field_check(law: str, printed: Formula, corrected: Formula | None, correction: str) -> Check:
-    """Compare a printed force with the law's definition at generic probes."""
-    places = list(spots(law))
+def compare_at(
+    places: Sequence[Place],
+    what: str,
+    truth: Callable[[Place], object],
+    printed: Callable[[Place], object],
+    corrected: Callable[[Place], object] | None = None,
+    correction: str = "",
+) -> Check:
+    """Compare a printed formula with the truth at generic probes."""
+
+    def at(formula: Callable[[Place], object]) -> FloatArray:
+        return np.array([formula(place) for place in places], dtype=float)
+
     return judge(
-        f"force of {law} at {len(places)} generic probes",
-        printed=np.array([printed(spot) for spot in places]),
-        corrected=None if corrected is None else np.array([corrected(spot) for spot in places]),
+        f"{what} at {len(places)} generic probes",
+        printed=at(printed),
+        corrected=None if corrected is None else at(corrected),
+        truth=at(truth),
         correction=correction,
-        truth=np.array([spot.force() for spot in places]),
     )
 
 
-def jacobian_check(law: str, printed: Formula, corrected: Formula | None, correction: str) -> Check:
-    """Compare a printed Jacobian with differences of the law's definition at generic probes."""
+def field_check(
+    law: str, printed: Formula, corrected: Formula | None = None, correction: str = ""
+) -> Check:
+    """Compare a printed force with the law's definition."""
     places = list(spots(law))
-    return judge(
-        f"Jacobian of {law} at {len(places)} generic probes",
-        printed=np.array([printed(spot) for spot in places]),
-        corrected=None if corrected is None else np.array([corrected(spot) for spot in places]),
-        correction=correction,
-        truth=np.array([spot.jacobian() for spot in places]),
-    )
+    return compare_at(places, f"force of {law}", Spot.force, printed, corrected, correction)
+
+
+def jacobian_check(
+    law: str, printed: Formula, corrected: Formula | None = None, correction: str = ""
+) -> Check:
+    """Compare a printed Jacobian with differences of the law's definition."""
+    places = list(spots(law))
+    return compare_at(places, f"Jacobian of {law}", Spot.jacobian, printed, corrected, correction)
 
 
 def outside_check(law: str) -> Check:
@@ -54,7 +73,6 @@ def outside_check(law: str) -> Check:
 def curl_check(law: str, *, conservative: bool) -> Check:
     """Judge whether a law is conservative by its symbolic curl."""
     from asperity.derive.curl import curl_verdict
-    from asperity.laws import find_law
 
     verdict = curl_verdict(find_law(law))
     kind = "conservative" if verdict.conservative else "not conservative"
@@ -67,8 +85,6 @@ def curl_check(law: str, *, conservative: bool) -> Check:
 
 def loop_check(law: str, printed: Callable[[Setting], float]) -> Check:
     """Compare a printed energy of the path of Fig. 3 with quadrature of the force."""
-    from asperity.analysis.energy.loops import loop_work
-
     cases = [SCANNING, *random_settings()]
     return judge(
         f"energy of {law} around the path for {len(cases)} parameter sets",
@@ -90,8 +106,6 @@ def gradient_of(potential: Callable[[Any, Any], Any], spot: Spot) -> list[float]
 
 def energy_sign_check(law: str, places: list[Spot], halves: list[float]) -> Check:
     """Compare a printed energy -κ₀ · half with the work that pressing straight in takes."""
-    from asperity.analysis.energy.loops import integrate
-
     taken = []
     for spot in places:
         top = float(spot.profile()(spot.x, 0))
@@ -115,8 +129,6 @@ def energy_sign_check(law: str, places: list[Spot], halves: list[float]) -> Chec
 
 def greatest_norm(surface: Surface) -> float:
     """Return the greatest ‖J‖/κ₀ at full depth, by a search over compiled Jacobians."""
-    from asperity.analysis.bounds.dense_search import greatest
-    from asperity.analysis.bounds.measures import spectral_norm
 
     def depths(heights: FloatArray) -> FloatArray:
         return np.full(len(heights), surface.max_depth)
@@ -126,8 +138,6 @@ def greatest_norm(surface: Surface) -> float:
 
 def leg_work(surface: Surface, start: FloatArray, end: FloatArray) -> float:
     """Return the work of the force on a straight way [J]."""
-    from asperity.analysis.energy.loops import integrate
-
     along = end - start
 
     def integrand(s: FloatArray) -> FloatArray:
@@ -138,6 +148,4 @@ def leg_work(surface: Surface, start: FloatArray, end: FloatArray) -> float:
 
 def q_of(case: Setting, law: str) -> float:
     """Return the characteristic number of a law in a setting of the paper."""
-    from asperity.analysis.gain.characteristic import characteristic_number
-
     return characteristic_number(case.surface(law)).value

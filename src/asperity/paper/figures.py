@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from asperity.analysis.energy.loops import loop_work
 from asperity.checks import FloatArray
 from asperity.files import Record
-from asperity.paper.paths import path_of
-from asperity.paper.plane import LAWS, SCANNING
+from asperity.paper.plane import LAWS, SCANNING, path_of
 from asperity.surface import Surface
 
 _COLUMNS, _ROWS, _PROFILE = 33, 13, 401
@@ -133,8 +133,6 @@ def loop_energies() -> tuple[LoopEnergy, ...]:
 
 
 def _loop_energy(law: str) -> LoopEnergy:
-    from asperity.analysis.energy.loops import loop_work
-
     x, height = _profile()
     changes = {}
     if law == "F":

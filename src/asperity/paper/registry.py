@@ -6,53 +6,26 @@ from collections.abc import Callable, Iterable, Iterator
 from difflib import get_close_matches
 
 from asperity.errors import ParameterError
-from asperity.paper import (
+from asperity.paper import (  # noqa: F401 - each declares its claims
     claims_appendix,
-    claims_conclusion,
     claims_experiments,
     claims_friction,
     claims_god_object,
     claims_laws,
     claims_limits,
-    claims_number,
     claims_passivity,
-    claims_simulated,
     claims_tables,
 )
-from asperity.paper.claim import Claim, Result
+from asperity.paper.claim import DECLARED, Claim, Result
 
 # What is called after each claim: its result, how many are done, of how many.
 Progress = Callable[[Result, int, int], None]
 
-_PARTS = (
-    claims_passivity.PASSIVE,
-    claims_limits.LIMITS,
-    claims_passivity.SECTION_III_A,
-    claims_number.SECTION_III_B,
-    claims_passivity.SECTION_III_C,
-    claims_tables.TABLE_I,
-    claims_tables.REMARKS,
-    claims_laws.LAW_A,
-    claims_laws.LAW_B,
-    claims_laws.LAW_C,
-    claims_god_object.LAW_D,
-    claims_god_object.LAW_E,
-    claims_friction.FRICTION,
-    claims_tables.CLAMP,
-    claims_laws.LAW_G,
-    claims_tables.FIGURE_3,
-    claims_tables.TABLE_II,
-    claims_experiments.SECTION_V,
-    claims_simulated.SECTION_V_A,
-    claims_experiments.SECTION_V_B,
-    claims_simulated.SECTION_V_B,
-    claims_experiments.SECTION_V_C,
-    claims_simulated.SECTION_V_C,
-    claims_conclusion.SECTION_VI,
-    claims_appendix.APPENDICES,
-)
-
-CLAIMS: dict[str, Claim] = {claim.id: claim for part in _PARTS for claim in part}
+# Roman numbers of sections sort as text, up to VI.
+CLAIMS: dict[str, Claim] = {
+    claim.id: claim
+    for claim in sorted(DECLARED, key=lambda one: (one.section.startswith("App."), one.section))
+}
 _OF_THE_PAPER = frozenset(CLAIMS)
 
 

@@ -14,8 +14,7 @@ from asperity.derive.facts import law_facts
 from asperity.files import Record, record
 from asperity.notebook import as_html
 from asperity.paper.claims_friction import PAPER, norm_of, stick_entries
-from asperity.paper.paths import TURN, path_of
-from asperity.paper.plane import LAWS, PASSIVITY, SCANNING
+from asperity.paper.plane import LAWS, PASSIVITY, SCANNING, TURN, path_of
 
 # Relative to k A²: loops that do not agree differ by more.
 _SAME_ENERGY = 1e-9
