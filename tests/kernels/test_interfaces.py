@@ -15,18 +15,18 @@ from asperity.kernels.probe import CLAMPS, ProbePlan, contact_source, probe_sour
 from asperity.laws import LAWS
 from asperity.simulation.kernels import (
     axes,
-    axes_friction,
     banded,
     body_functions,
     dense,
     five_bar,
     prescribed,
     resonant,
+    rigid,
 )
 from asperity.textures.samplers import fourier, fourier_line, heightmap, profile, sinusoid
 
 SAMPLERS = (sinusoid, fourier, fourier_line, profile, heightmap)
-BODIES = (axes, axes_friction, banded, dense, five_bar, prescribed, resonant)
+BODIES = (axes, banded, dense, five_bar, prescribed, resonant, rigid)
 PAIRS = [(sampler, one) for one in SAMPLERS] + [(body_functions, one) for one in BODIES]
 
 

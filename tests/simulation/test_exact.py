@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from asperity.checks import FloatArray
-from asperity.simulation.body import Body, Resonance, body
-from asperity.simulation.exact import exact_step, exponential
+from asperity.simulation.exact import Body, body, exact_step, exponential
 from asperity.simulation.hands import SpringHand
+from asperity.simulation.plants import Resonance
 
 MATRIX = np.array([[2.0, 0.5, 0.1], [0.5, 1.0, -0.2], [0.1, -0.2, 0.7]])
 HELD = SpringHand([100.0, 300.0, 200.0], 3.0, mass=0.05, force=(0.2, -0.3, -1.0))

@@ -18,8 +18,7 @@ from asperity.simulation import (
     Strokes,
     simulate,
 )
-from asperity.simulation.body import body
-from asperity.simulation.exact import exact_step
+from asperity.simulation.exact import body, exact_step
 from asperity.simulation.loop import Simulation
 from asperity.simulation.sampled_plant import SampledPlant, sampled_plant
 from asperity.surface import Surface

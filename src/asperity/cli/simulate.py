@@ -44,7 +44,7 @@ def command(
     with progress_bar("simulating") as told:
         run = setup.simulate(trace=outputs.trace or True, progress=told)
     from asperity.report.run import print_run, run_page
-    from asperity.simulation.rereading import reread
+    from asperity.simulation.run import reread
 
     outputs.write(
         {"schema": 1, "scene": setup, "run": run},

@@ -1,12 +1,10 @@
 """Texture, device and hand in one loop, with the energy accounted for exactly."""
 
-from asperity.simulation.body import Resonance
 from asperity.simulation.hands import BandHand, Hand, MovedHand, SpringHand
-from asperity.simulation.ledger import Ledger
 from asperity.simulation.motions import Motion, Path, Still, Strokes
 from asperity.simulation.onset import Onset, find_onset
-from asperity.simulation.plants import Cartesian, LinkMasses, Pantograph, Plant
-from asperity.simulation.run import Run
+from asperity.simulation.plants import Cartesian, LinkMasses, Pantograph, Plant, Resonance
+from asperity.simulation.run import Ledger, Run
 from asperity.simulation.scan import Stroke, scan_strokes
 from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import simulate, simulate_many

@@ -29,6 +29,18 @@ def triple(name: str, value: ArrayLike, unit: str, *, signed: bool = False) -> T
     return float(x), float(y), float(z)
 
 
+def not_negative(name: str, value: object, unit: str) -> float:
+    """Return a number that is finite and not negative.
+
+    Raises:
+        ParameterError: for another one.
+    """
+    number = real(name, value, unit)
+    if number < 0.0:
+        raise ParameterError(name, f"must not be negative [{unit}]", value)
+    return number
+
+
 @dataclass(frozen=True)
 class SpringHand:
     """A spring and a damper from the handle to the moving anchor, a mass and a constant force.
@@ -63,9 +75,7 @@ class SpringHand:
     ) -> None:
         object.__setattr__(self, "stiffness", triple("stiffness", stiffness, "N/m"))
         object.__setattr__(self, "damping", triple("damping", damping, "N s/m"))
-        if real("mass", mass, "kg") < 0.0:
-            raise ParameterError("mass", "must not be negative [kg]", mass)
-        object.__setattr__(self, "mass", float(mass))
+        object.__setattr__(self, "mass", not_negative("mass", mass, "kg"))
         object.__setattr__(self, "force", triple("force", force, "N", signed=True))
 
     def to_dict(self) -> dict[str, Any]:
@@ -109,9 +119,8 @@ class BandHand:
     def __post_init__(self) -> None:
         positive("stiffness", self.stiffness, "N/m")
         positive("length", self.length, "m")
-        for name, unit in (("tension", "N"), ("damping", "N s/m")):
-            if real(name, getattr(self, name), unit) < 0.0:
-                raise ParameterError(name, f"must not be negative [{unit}]", getattr(self, name))
+        not_negative("tension", self.tension, "N")
+        not_negative("damping", self.damping, "N s/m")
         if self.rest_length <= 0.0:
             limit = f"must be less than stiffness * length = {self.stiffness * self.length:g} N"
             raise ParameterError("tension", limit, self.tension)

@@ -15,8 +15,7 @@ from asperity.laws import Law
 from asperity.simulation.kernels import servo_loop
 from asperity.simulation.kernels.booking import SUMS
 from asperity.simulation.kernels.servo_loop import LoopState
-from asperity.simulation.ledger import Ledger
-from asperity.simulation.run import Stop
+from asperity.simulation.run import Ledger, Stop
 from asperity.simulation.sampled_plant import SampledPlant
 from asperity.simulation.servo import Servo
 from asperity.simulation.trace import COLUMNS

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.checks import FloatArray, array, real
+from asperity.checks import FloatArray, array, positive, real
 from asperity.devices.five_bar import FiveBar, joint_angles
 from asperity.errors import ParameterError
-from asperity.files import record
-from asperity.simulation.body import Resonance
-from asperity.simulation.hands import Triple, triple
+from asperity.files import Record, record
+from asperity.simulation.hands import Triple, not_negative, triple
 
 
 def symmetric(name: str, value: ArrayLike, unit: str) -> FloatArray:
@@ -34,11 +33,26 @@ def symmetric(name: str, value: ArrayLike, unit: str) -> FloatArray:
     return np.asarray(0.5 * (matrix + matrix.T))
 
 
-def _not_negative(name: str, value: object, unit: str) -> float:
-    number = real(name, value, unit)
-    if number < 0.0:
-        raise ParameterError(name, f"must not be negative [{unit}]", value)
-    return number
+@dataclass(frozen=True)
+class Resonance(Record):
+    """The first structural mode: part of the mass hangs on a spring, away from motor and sensor.
+
+    Attributes:
+        frequency: of the free vibration of the two masses against each other [Hz].
+        damping_ratio: of that mode [1].
+        share: of the mass that hangs on the spring [1], between 0 and 1.
+    """
+
+    frequency: float
+    damping_ratio: float = 0.02
+    share: float = 0.5
+
+    def __post_init__(self) -> None:
+        positive("frequency", self.frequency, "Hz")
+        if real("damping_ratio", self.damping_ratio) < 0.0:
+            raise ParameterError("damping_ratio", "must not be negative", self.damping_ratio)
+        if not 0.0 < real("share", self.share) < 1.0:
+            raise ParameterError("share", "must be between 0 and 1", self.share)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +102,7 @@ class Cartesian:
         object.__setattr__(self, "mass", axes)
         object.__setattr__(self, "damping", symmetric("damping", damping, "N s/m"))
         object.__setattr__(self, "resonance", resonance)
-        object.__setattr__(self, "friction", _not_negative("friction", friction, "N"))
+        object.__setattr__(self, "friction", not_negative("friction", friction, "N"))
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -120,10 +134,9 @@ class LinkMasses:
     rotor: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, unit in (
-            ("proximal", "kg"), ("distal", "kg"), ("handle", "kg"), ("rotor", "kg m²"),
-        ):  # fmt: skip
-            _not_negative(name, getattr(self, name), unit)
+        for name in ("proximal", "distal", "handle"):
+            not_negative(name, getattr(self, name), "kg")
+        not_negative("rotor", self.rotor, "kg m²")
         if self.distal + self.handle == 0.0:
             raise ParameterError("handle", "must have a mass if the distal links have none")
 
@@ -178,8 +191,8 @@ class Pantograph:
             raise ParameterError("linkage", "must be a FiveBar", self.linkage)
         if not isinstance(self.masses, LinkMasses):
             raise ParameterError("masses", "must be LinkMasses", self.masses)
-        _not_negative("joint_damping", self.joint_damping, "N m s")
-        _not_negative("friction", self.friction, "N")
+        not_negative("joint_damping", self.joint_damping, "N m s")
+        not_negative("friction", self.friction, "N")
         x, z = array("centre", self.centre, (2,), "m")
         object.__setattr__(self, "centre", (float(x), float(z)))
         joint_angles(self.linkage, self.centre)

@@ -159,5 +159,4 @@ def predict(
 
 def with_wall(onsets: Sequence[Onset], delay: int) -> Onset | None:
     """Return the onset of the smooth wall at a delay, if it is among these."""
-    found = [onset for onset in onsets if onset.wall and onset.delay == delay]
-    return found[0] if found else None
+    return next((onset for onset in onsets if onset.wall and onset.delay == delay), None)

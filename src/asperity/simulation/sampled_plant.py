@@ -11,18 +11,17 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.errors import ParameterError
-from asperity.simulation.body import body
-from asperity.simulation.exact import axis_table, exact_step, resonant_table
+from asperity.simulation.exact import axis_table, body, exact_step, resonant_table
 from asperity.simulation.hands import BandHand, Hand, MovedHand, SpringHand
 from asperity.simulation.kernels import (
     axes,
-    axes_friction,
     banded,
     booking,
     dense,
     five_bar,
     prescribed,
     resonant,
+    rigid,
 )
 from asperity.simulation.kernels import hand as hand_kernels
 from asperity.simulation.kernels.hand import HandRecord
@@ -124,18 +123,16 @@ def _linear(plant: Cartesian, hand: SpringHand, period: float) -> SampledPlant:
     if np.abs(plant.damping - np.diag(np.diag(plant.damping))).max() > 0.0:
         return coupled_plant(plant, hand, period)
     parts = FRICTION_PARTS if plant.friction > 0.0 else 1
-    span, friction, mode = float(period / parts), plant.friction, plant.resonance
-    if mode is not None:
-        table = np.array([resonant_table(plant, mode, hand, i, span) for i in range(3)])
-        stops = np.diag(span / table[:, 10])
-        slow = resonant.ResonantPlant(table, friction, stops, parts, span)
-        return SampledPlant((resonant, dense, booking), slow, 12)
-    table = np.array([axis_table(plant, hand, i, span) for i in range(3)])
-    if friction == 0.0:
-        return SampledPlant((axes, booking), axes.AxesPlant(table), 6)
-    stops = np.diag(span / table[:, 5])
-    rough = axes_friction.FrictionAxesPlant(table, friction, stops, parts, span)
-    return SampledPlant((axes_friction, axes, dense, booking), rough, 6)
+    span = float(period / parts)
+    mode = plant.resonance
+    if mode is None:
+        table, speed = np.array([axis_table(plant, hand, i, span) for i in range(3)]), 5
+    else:
+        table, speed = np.array([resonant_table(plant, mode, hand, i, span) for i in range(3)]), 10
+    stops = np.diag(span / table[:, speed]) if plant.friction > 0.0 else np.zeros((3, 3))
+    record = axes.AxesPlant(table, plant.friction, stops, parts, span)
+    modules = (axes, resonant if mode else rigid, dense, booking)
+    return SampledPlant(modules, record, 12 if mode else 6)
 
 
 def coupled_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPlant:

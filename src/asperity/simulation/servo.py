@@ -11,6 +11,7 @@ from asperity.checks import positive, real
 from asperity.errors import ParameterError
 from asperity.files import Record
 from asperity.kernels.tick import ServoSettings
+from asperity.simulation.hands import not_negative
 
 
 @dataclass(frozen=True)
@@ -45,9 +46,8 @@ class Servo(Record):
     def __post_init__(self) -> None:
         positive("period", self.period, "s")
         object.__setattr__(self, "delay", _samples(self.delay))
-        for name, unit in (("position_resolution", "m"), ("force_resolution", "N")):
-            if real(name, getattr(self, name), unit) < 0.0:
-                raise ParameterError(name, f"must not be negative [{unit}]", getattr(self, name))
+        not_negative("position_resolution", self.position_resolution, "m")
+        not_negative("force_resolution", self.force_resolution, "N")
         if isinstance(self.max_force, bool) or not _number(self.max_force) > 0.0:
             raise ParameterError("max_force", "must be positive [N]", self.max_force)
         real("virtual_damping", self.virtual_damping, "N s/m")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from asperity.simulation.plants import Cartesian, Pantograph, Plant
 from asperity.simulation.run import Run, Stop
 from asperity.simulation.sampled_plant import LEAST_SINE, sampled_plant
 from asperity.simulation.servo import Servo
-from asperity.simulation.trace import FileTrace, MemoryTrace, NoTrace, Trace
+from asperity.simulation.trace import FileTrace, MemoryTrace, Trace
 from asperity.surface import Surface
 
 # Samples at a time: memory does not depend on the duration, progress is told in between.
@@ -85,10 +86,10 @@ def simulate(
         raise ParameterError("every", "must be a whole number of samples, 1 or more", every)
     every = min(int(every), samples)
     simulation = _begin(surface, plant, hand, servo, motion, start, velocity)
-    path = _AnchorMotion(motion, servo.period, samples, plant)
+    anchor_from = partial(_anchor, motion, servo.period, samples, plant)
     kept = _trace(trace, -(-samples // every))
     try:
-        stop = _go(simulation, path, kept, every, progress)
+        stop = _go(simulation, anchor_from, samples, kept, every, progress)
     finally:
         kept.close()
     return Run(
@@ -175,42 +176,34 @@ def _check_plane(name: str, values: FloatArray) -> None:
         raise ParameterError(name, "must stay at y = 0: a pantograph moves in the x-z plane")
 
 
-class _AnchorMotion:
-    """The anchor at the samples, chunk by chunk."""
-
-    def __init__(self, motion: Motion, period: float, samples: int, plant: Plant) -> None:
-        self.samples = samples
-        self._motion, self._period = motion, period
-        self._flat = isinstance(plant, Pantograph)
-
-    def chunk(self, first: int) -> FloatArray:
-        """Return the positions from a sample on, one more than the samples of the chunk."""
-        last = min(first + CHUNK, self.samples)
-        times = np.arange(first, last + 1, dtype=np.float64) * float(self._period)
-        points = array("motion", self._motion.at(times), (last + 1 - first, 3), "m")
-        if self._flat:
-            _check_plane("motion", points)
-        return points
+def _anchor(motion: Motion, period: float, samples: int, plant: Plant, first: int) -> FloatArray:
+    """Return the anchor's positions from a sample on, one more than the samples of the chunk."""
+    last = min(first + CHUNK, samples)
+    times = np.arange(first, last + 1, dtype=np.float64) * float(period)
+    points = array("motion", motion.at(times), (last + 1 - first, 3), "m")
+    if isinstance(plant, Pantograph):
+        _check_plane("motion", points)
+    return points
 
 
 def _trace(wanted: bool | str | os.PathLike[str], rows: int) -> Trace:
     if isinstance(wanted, bool):
-        return MemoryTrace(rows) if wanted else NoTrace()
+        return MemoryTrace(rows if wanted else 0)
     if not isinstance(wanted, (str, os.PathLike)):
         raise ParameterError("trace", "must be True, False or a path", wanted)
     return FileTrace(wanted)
 
 
 def _go(
-    simulation: Simulation, path: _AnchorMotion, kept: Trace, every: int,
-    progress: Callable[[float], None] | None,
+    simulation: Simulation, anchor_from: Callable[[int], FloatArray], samples: int, kept: Trace,
+    every: int, progress: Callable[[float], None] | None,
 ) -> Stop:  # fmt: skip
-    while simulation.samples < path.samples:
-        anchor = path.chunk(simulation.samples)
+    while simulation.samples < samples:
+        anchor = anchor_from(simulation.samples)
         stop = simulation.run(anchor, kept.room(len(anchor) // every + 1), every)
         kept.keep(simulation.rows)
         if progress is not None:
-            progress(simulation.samples / path.samples)
+            progress(simulation.samples / samples)
         if stop:
             return stop
     return Stop.NOTHING

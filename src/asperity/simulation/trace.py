@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from contextlib import suppress
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -29,42 +28,8 @@ HEADER = ",".join(f"{name} [{unit}]" for name, unit in COLUMNS)
 _ROW = ",".join(["%.12g"] * len(COLUMNS)) + "\n"
 
 
-class Trace(Protocol):
-    """What takes the rows of a trace."""
-
-    def room(self, rows: int) -> FloatArray:
-        """Return a table with at least so many rows, to be written to."""
-
-    def keep(self, rows: int) -> None:
-        """Keep the first rows of the table that was given last."""
-
-    def table(self) -> FloatArray:
-        """Return what is in memory, shape (n, columns)."""
-
-    def close(self) -> None:
-        """Be done with it."""
-
-
-class NoTrace:
-    """Keeps nothing."""
-
-    def room(self, rows: int) -> FloatArray:  # noqa: ARG002 - asks for none
-        """Return a table without rows: nothing is written."""
-        return np.empty((0, len(COLUMNS)))
-
-    def keep(self, rows: int) -> None:
-        """Do nothing."""
-
-    def table(self) -> FloatArray:
-        """Return an empty table."""
-        return np.empty((0, len(COLUMNS)))
-
-    def close(self) -> None:
-        """Do nothing."""
-
-
 class MemoryTrace:
-    """Keeps all rows in one table."""
+    """Keeps all rows in one table; with no rows it keeps nothing."""
 
     def __init__(self, rows: int) -> None:
         try:
@@ -154,3 +119,6 @@ class FileTrace:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+
+
+Trace = MemoryTrace | FileTrace

@@ -1,12 +1,6 @@
-"""One sample of a body without coupling between its axes: small forms, written out.
+"""One sample of a body axis by axis, each as ``rigid.py`` or ``resonant.py`` has it.
 
-Along one axis, relative to the anchor, with e = p - a, w = p' - u, F = f + g - b u and
-
-    m w' = F - (b + b_h) w - K e,
-
-the changes of e and w over a sample are linear in (e, w, F), and ∫ (b + b_h) w² dt is a quadratic
-form. b p'² + b_h w² = (b + b_h) w² + 2 b u w + b u², and the impulse of the anchor's spring and
-damper is m Δp' - (f + g) T + b Δp.
+Dry friction, which couples the axes, is constant over a part of a sample.
 """
 
 # ruff: noqa: ARG001 - one signature for every body
@@ -15,56 +9,32 @@ from typing import NamedTuple
 
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels
-from asperity.simulation.kernels.body_functions import RAN
+from asperity.simulation.kernels.body_functions import RAN, advance_axis, final_speed
 from asperity.simulation.kernels.booking import book_energies
+from asperity.simulation.kernels.dense import friction_force
 
 KERNELS = Kernels(
-    provides=("advance_axis", "advance_body", "stored_energy", "stored_in_axes"),
-    requires=("book_energies",),
+    provides=("advance_body",),
+    requires=("advance_axis", "book_energies", "final_speed", "friction_force"),
 )
 
 
-# Where the numbers of an axis stand in its row of the table, after the changes of e and w and the
-# loss: damping and mass of the device, stiffness and constant force of the hand, and the period.
-DAMPING, MASS, STIFFNESS, PUSH, SPAN = 12, 13, 14, 15, 16
-
-
 class AxesPlant(NamedTuple):
-    """A body without coupling between its axes, over a sample.
+    """A body without coupling between its axes but for dry friction, over a part of a sample.
 
     Attributes:
-        table: of :func:`advance_axis` (3, 17).
+        table: a row for each axis, of ``rigid.py`` (3, 17) or ``resonant.py`` (3, 52).
+        friction: dry friction [N].
+        mass: that friction stops (3, 3) [kg].
+        parts: of a sample.
+        span: duration of a part [s].
     """
 
     table: FloatArray
-
-
-def advance_axis(
-    x: FloatArray, i: int, f: float, a: float, u: float, table: FloatArray
-) -> tuple[float, float, float]:
-    """Move along one axis; returns the displacement [m], loss and work of the hand [J].
-
-    Row i of the table: 0-5 changes of e and w, 6-11 the loss in ee, ew, eF, ww, wF, FF, and the
-    numbers named above.
-    """
-    p = x[i]
-    v = x[3 + i]
-    b = table[i, DAMPING]
-    span = table[i, SPAN]
-    g = table[i, PUSH]
-    e = p - a
-    w = v - u
-    push = f + g - b * u
-    de = table[i, 0] * e + table[i, 1] * w + table[i, 2] * push
-    dw = table[i, 3] * e + table[i, 4] * w + table[i, 5] * push
-    dp = de + u * span
-    lost = e * (table[i, 6] * e + table[i, 7] * w + table[i, 8] * push)
-    lost += w * (table[i, 9] * w + table[i, 10] * push) + table[i, 11] * push * push
-    lost += b * u * (de + dp)
-    hand = u * (table[i, MASS] * dw - (f + g) * span + b * dp) + g * dp
-    x[i] = p + dp
-    x[3 + i] = v + dw
-    return dp, lost, hand
+    friction: float
+    mass: FloatArray
+    parts: int
+    span: float
 
 
 def advance_body(
@@ -75,27 +45,22 @@ def advance_body(
     inside: bool, plant: AxesPlant,
 ) -> int:  # fmt: skip
     """Move the body over one sample; see ``body_functions``."""
-    table = plant.table
-    dx, lost_x, hand_x = advance_axis(x, 0, fx, ax, ux, table)
-    dy, lost_y, hand_y = advance_axis(x, 1, fy, ay, uy, table)
-    dz, lost_z, hand_z = advance_axis(x, 2, fz, az, uz, table)
-    lost = lost_x + lost_y + lost_z
-    hand = hand_x + hand_y + hand_z
-    book_energies(ledger, fx * dx, fy * dy, fz * dz, lost, hand, 0.0)
+    table, friction, mass, parts, span = plant
+    gx = gy = gz = 0.0
+    for part in range(parts):
+        bx = ax + part * span * ux
+        by = ay + part * span * uy
+        bz = az + part * span * uz
+        if friction > 0.0:
+            vx = final_speed(x, 0, fx, bx, ux, table)
+            vy = final_speed(x, 1, fy, by, uy, table)
+            vz = final_speed(x, 2, fz, bz, uz, table)
+            gx, gy, gz = friction_force(vx, vy, vz, friction, mass, span)
+        dx, lost_x, hand_x = advance_axis(x, 0, fx + gx, bx, ux, table)
+        dy, lost_y, hand_y = advance_axis(x, 1, fy + gy, by, uy, table)
+        dz, lost_z, hand_z = advance_axis(x, 2, fz + gz, bz, uz, table)
+        lost = lost_x + lost_y + lost_z
+        hand = hand_x + hand_y + hand_z
+        rubbed = gx * dx + gy * dy + gz * dz
+        book_energies(ledger, fx * dx, fy * dy, fz * dz, lost, hand, rubbed)
     return RAN
-
-
-def stored_in_axes(x: FloatArray, ax: float, ay: float, az: float, table: FloatArray) -> float:
-    """½ m v² + ½ K (a - p)² of every axis [J]."""
-    total = 0.0
-    for i in range(3):
-        anchor = ax if i == 0 else ay if i == 1 else az
-        stretch = anchor - x[i]
-        kinetic = 0.5 * table[i, MASS] * x[3 + i] ** 2
-        total += kinetic + 0.5 * table[i, STIFFNESS] * stretch * stretch
-    return total
-
-
-def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: AxesPlant) -> float:
-    """½ m v² + ½ K (a - p)² of every axis [J]."""
-    return stored_in_axes(x, ax, ay, az, plant.table)

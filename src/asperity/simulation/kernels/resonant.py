@@ -1,47 +1,21 @@
-"""One sample of a body with a resonance, axis by axis, with dry friction at the handle.
+"""One axis of a body with a resonance.
 
-As in ``axes.py`` but for two masses: with e = p - a, w = p' - u and the same for the part r that
+As in ``rigid.py`` but for two masses: with e = p - a, w = p' - u and the same for the part r that
 hangs on a spring and carries the hand, (e, w, e_r, w_r) changes linearly in itself, F = f - b u and
 the hand's constant force g.
 """
 
-# ruff: noqa: ARG001 - one signature for every body
-
-from typing import NamedTuple
-
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels, local_array
-from asperity.simulation.kernels.body_functions import RAN
-from asperity.simulation.kernels.booking import book_energies
-from asperity.simulation.kernels.dense import friction_force
+from asperity.simulation.kernels.axes import AxesPlant
 
-KERNELS = Kernels(
-    provides=("advance_body", "stored_energy"), requires=("book_energies", "friction_force")
-)
+KERNELS = Kernels(provides=("advance_axis", "final_speed", "stored_energy"))
 
 
 # Where the numbers of an axis stand in its row of the table, after 24 numbers of the changes and 21
 # of the loss: damping of the device, masses near and far, the spring between them, stiffness and
 # constant force of the hand, and the period.
 DAMPING, NEAR, FAR, SPRING, STIFFNESS, PUSH, SPAN = 45, 46, 47, 48, 49, 50, 51
-
-
-class ResonantPlant(NamedTuple):
-    """A body with a resonance, over a part of a sample.
-
-    Attributes:
-        table: of :func:`advance_resonant` (3, 52).
-        friction: dry friction [N].
-        mass: that friction stops (3, 3) [kg].
-        parts: of a sample.
-        span: duration of a part [s].
-    """
-
-    table: FloatArray
-    friction: float
-    mass: FloatArray
-    parts: int
-    span: float
 
 
 def resonant_state(
@@ -60,14 +34,15 @@ def resonant_state(
     return speed
 
 
-def advance_resonant(
-    x: FloatArray, i: int, f: float, a: float, u: float, table: FloatArray, z: FloatArray
+def advance_axis(
+    x: FloatArray, i: int, f: float, a: float, u: float, table: FloatArray
 ) -> tuple[float, float, float]:
     """Move along one axis; returns the displacement [m], loss and work of the hand [J].
 
     Row i of the table: 0-23 the changes, 24-44 the loss, upper triangle by rows, and the numbers
     named above.
     """
+    z = local_array((6,))
     v = x[3 + i]
     dw = resonant_state(x, i, f, a, u, table, z) - v
     de = dr = ds = lost = 0.0
@@ -94,37 +69,12 @@ def advance_resonant(
     return dp, lost, hand
 
 
-def advance_body(
-    x: FloatArray, ledger: FloatArray,
-    fx: float, fy: float, fz: float,
-    ax: float, ay: float, az: float,
-    ux: float, uy: float, uz: float,
-    inside: bool, plant: ResonantPlant,
-) -> int:  # fmt: skip
-    """Move the body over one sample; see ``body_functions``."""
-    table, friction, mass, parts, span = plant
-    z = local_array((6,))
-    gx = gy = gz = 0.0
-    for part in range(parts):
-        bx = ax + part * span * ux
-        by = ay + part * span * uy
-        bz = az + part * span * uz
-        if friction > 0.0:
-            vx = resonant_state(x, 0, fx, bx, ux, table, z)
-            vy = resonant_state(x, 1, fy, by, uy, table, z)
-            vz = resonant_state(x, 2, fz, bz, uz, table, z)
-            gx, gy, gz = friction_force(vx, vy, vz, friction, mass, span)
-        dx, lost_x, hand_x = advance_resonant(x, 0, fx + gx, bx, ux, table, z)
-        dy, lost_y, hand_y = advance_resonant(x, 1, fy + gy, by, uy, table, z)
-        dz, lost_z, hand_z = advance_resonant(x, 2, fz + gz, bz, uz, table, z)
-        lost = lost_x + lost_y + lost_z
-        hand = hand_x + hand_y + hand_z
-        rubbed = gx * dx + gy * dy + gz * dz
-        book_energies(ledger, fx * dx, fy * dy, fz * dz, lost, hand, rubbed)
-    return RAN
+def final_speed(x: FloatArray, i: int, f: float, a: float, u: float, table: FloatArray) -> float:
+    """Velocity along one axis at the end of the part, without friction [m/s]."""
+    return resonant_state(x, i, f, a, u, table, local_array((6,)))
 
 
-def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: ResonantPlant) -> float:
+def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: AxesPlant) -> float:
     """Of both masses, the spring between them and that of the hand [J]."""
     table = plant.table
     total = 0.0
