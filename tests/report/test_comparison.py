@@ -10,6 +10,8 @@ from tests.report.pages import Reader, check_alone, terminal
 import asperity as asp
 from asperity.devices import parse_device
 from asperity.report import comparison_table, html_text, print_comparison
+from asperity.report.comparison import described
+from asperity.textures.catalogue import CATALOGUE
 
 TEXTURE = asp.Sinusoid(amplitude=0.2e-3, period=2e-3)
 
@@ -74,3 +76,19 @@ def test_notebook_table_has_a_row_per_law(result: asp.Comparison) -> None:
     assert text.count("<tr>") == 1 + len(result.rows)
     assert "<td>∞" not in text
     assert result.recommendation[:20] in text
+
+
+def described_of(name: str, **arguments: float) -> dict[str, object]:
+    return CATALOGUE[name].make(**arguments).describe()
+
+
+def test_arguments_are_read_as_their_kind_declares_them() -> None:
+    said = described(described_of("cloth", yarn_thickness=0.2e-3))
+    assert said.startswith("cloth: points 448 × 448, pitch 7.5 µm × 7.5 µm, periodic yes")
+    assert "yarn thickness 200 µm, irregularity 0.05, seed 0" in said
+    assert "groove angle 30°" in described(described_of("knurl"))
+
+
+def test_a_kind_that_nobody_declared_is_said_as_it_is() -> None:
+    found = described({"kind": "moon", "craters": 3, "cutoff": 1e-3, "heights": [1, 2, 3, 4, 5]})
+    assert found == "moon: craters 3, cutoff 1 mm, 5 heights"

@@ -10,8 +10,7 @@ import pytest
 from tests.report.pages import terminal
 
 from asperity.report.page import page_html
-from asperity.report.run import print_run, run_page
-from asperity.report.words.run_words import answer, closing_words, energy, ledger_rows
+from asperity.report.run import answer, closing_words, energy, ledger_rows, print_run, run_page
 from asperity.scene import load_scene
 from asperity.scene.setup import Setup, make_setup
 from asperity.simulation import Run

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from rich.console import Console
-from rich.table import Table
 
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.passivity.criteria import Criterion
 from asperity.report import page, terminal
 from asperity.report.devices import numbers_table
-from asperity.report.terminal import Column, head, say
+from asperity.report.terminal import head, say
 from asperity.report.words import glossary
 from asperity.report.words.number_words import (
     NONE,
     down_text,
-    holds_text,
     in_one_unit,
     interval_text,
     law_title,
@@ -32,21 +30,12 @@ from asperity.report.words.reproduction_words import reproduction
 from asperity.units import engineering
 
 _NUMBERS = ("number", "lower", "upper", "method")
-_CRITERIA = ("criterion", "condition", "holds", "limit", "margin")
+_CRITERIA = (
+    "criterion", "condition", "holds", "limit", "margin", "what it says, and rests on",
+)  # fmt: skip
 _JUMPS = ("at depth", "jumps by")
 # What the criteria of passivity use of the device.
 _USED = ("max_stiffness", "update_rate", "damping", "virtual_damping", "delay_samples")
-
-
-def _number_cells(name: str, bound: Bound) -> list[str]:
-    ends = [down_text(bound.lower), up_text(bound.upper)]
-    return [name, *ends, bound.method, witness_text(bound)]
-
-
-def _criterion_cells(criterion: Criterion) -> list[str]:
-    margin = NONE if criterion.margin is None else down_text(criterion.margin, 3)
-    said = [criterion.name, criterion.formula, holds_text(criterion.holds)]
-    return [*said, limit_text(criterion.limit), margin]
 
 
 def numbers(analysis: Analysis) -> list[tuple[str, Bound]]:
@@ -155,33 +144,50 @@ def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
     return facts
 
 
+# --- tables ---------------------------------------------------------------------------------------
+
+
+def _numbers_table(analysis: Analysis, last: str) -> page.Table:
+    """Return one row per number: lower, upper, method and the point that attains lower."""
+    rows = []
+    for name, bound in numbers(analysis):
+        ends = [down_text(bound.lower), up_text(bound.upper)]
+        rows.append(page.Row([page.Cell(name, "l"), *ends, bound.method, witness_text(bound)]))
+    return page.Table((*_NUMBERS, last), rows, numbers=(1, 2))
+
+
+def _criteria_table(analysis: Analysis) -> page.Table:
+    """Return one row per criterion of passivity, the one that decides marked."""
+    judged = analysis.passivity
+    rows = []
+    for criterion in judged.criteria:
+        decides = criterion.name == judged.decided_by
+        cells: page.Cells = [
+            page.Cell(criterion.name, "l"),
+            page.Cell(criterion.formula, "line"),
+            page.holds_cell(criterion.holds),
+            limit_text(criterion.limit),
+            NONE if criterion.margin is None else down_text(criterion.margin, 3),
+            page.Cell(criterion.says, below=criterion.assumptions),
+        ]
+        style = "dim" if criterion.holds is None and not decides else ""
+        rows.append(page.Row(cells, "best" if decides else "", style=style))
+    return page.Table(_CRITERIA, rows, numbers=(3, 4))
+
+
+def _jumps_table(analysis: Analysis, last: str) -> page.Table:
+    """Return one row per depth at which a jump was located."""
+    rows = [page.Row(cells) for cells in jump_rows(analysis)]
+    return page.Table((*_JUMPS, last), rows, numbers=(0, 1))
+
+
 # --- in a terminal --------------------------------------------------------------------------------
 
 
-def _numbers_table(analysis: Analysis) -> Table:
-    """Return one row per number: lower, upper, method and the point that attains lower."""
-    columns = [Column(name, right=i in {1, 2}) for i, name in enumerate(_NUMBERS)]
-    rows = [(_number_cells(name, bound), "") for name, bound in numbers(analysis)]
-    return terminal.table([*columns, Column("attained at", wraps=True)], rows)
-
-
-def _criteria_table(analysis: Analysis) -> Table:
-    """Return one row per criterion of passivity; the one that decides carries an arrow."""
-    columns = [Column(name, right=i > 2) for i, name in enumerate(_CRITERIA)]
-    columns[0] = Column("criterion", wraps=True, most=18)
-    rows = []
-    for criterion in analysis.passivity.criteria:
-        decides = criterion.name == analysis.passivity.decided_by
-        style = "bold" if decides else "dim" if criterion.holds is None else ""
-        rows.append((["→" if decides else "", *_criterion_cells(criterion)], style))
-    return terminal.table([Column(""), *columns], rows)
-
-
-def _jumps_table(analysis: Analysis) -> Table:
-    """Return one row per depth at which a jump was located."""
-    near = Column("near (both witnesses are in the JSON)", wraps=True)
-    columns = [*(Column(name, right=True) for name in _JUMPS), near]
-    return terminal.table(columns, [(row, "") for row in jump_rows(analysis)])
+def _with_arrow(table: page.Table) -> page.Table:
+    """Return a table with an arrow before the row that decides."""
+    rows = [replace(row, cells=["→" if row.kind else "", *row.cells]) for row in table.rows]
+    return page.Table(("", *table.headings), rows, [1 + i for i in table.numbers])
 
 
 def print_analysis(analysis: Analysis, console: Console, texture: str = "") -> None:
@@ -196,18 +202,20 @@ def print_analysis(analysis: Analysis, console: Console, texture: str = "") -> N
     law = analysis.surface.law
     say(console, analysis.answer, "bold")
     head(console, f"Law {law.letter}, {law_title(law.name)}: suprema over the working region")
-    console.print(_numbers_table(analysis))
+    console.print(terminal.table(_numbers_table(analysis, "attained at"), wraps=(4,)))
     for line in notes(analysis):
         say(console, line, "dim")
     head(console, f"Passive on the {analysis.device.name}? {analysis.passivity.verdict}")
-    console.print(_criteria_table(analysis))
+    criteria = _with_arrow(_criteria_table(analysis))
+    console.print(terminal.table(criteria, wraps=(1,), most={1: 18}, without=(6,)))
     console.print(terminal.pairs(open_criteria(analysis), "dim", most=26))
     head(console, "Worst loop")
     console.print(terminal.pairs(leak_facts(analysis), most=26))
     head(console, "Continuity")
     say(console, analysis.continuity.reason)
     if analysis.continuity.jumps:
-        console.print(_jumps_table(analysis))
+        jumps = _jumps_table(analysis, "near (both witnesses are in the JSON)")
+        console.print(terminal.table(jumps, wraps=(2,)))
     head(console, "On a straight scan")
     console.print(terminal.pairs(merit_facts(analysis), most=26))
     head(console, "Reproduce q")
@@ -266,35 +274,15 @@ def _facts(analysis: Analysis) -> list[tuple[str, str]]:
 
 
 def _numbers(analysis: Analysis) -> page.Section:
-    rows = [_number_cells(name, bound) for name, bound in numbers(analysis)]
-    table = page.Table(
-        (*_NUMBERS, "lower is attained at"),
-        [page.Row([page.Cell(name, "l"), *cells]) for name, *cells in rows],
-        numbers=(1, 2),
-    )
+    table = _numbers_table(analysis, "lower is attained at")
     return page.Section("The numbers", [table], notes=notes(analysis))
 
 
 def _criteria(analysis: Analysis) -> page.Section:
     judged = analysis.passivity
-    rows = []
-    for criterion in judged.criteria:
-        name, formula, _holds, limit, margin = _criterion_cells(criterion)
-        said = page.Cell(criterion.says, below=criterion.assumptions)
-        holds = page.holds_cell(criterion.holds)
-        cells: page.Cells = [
-            page.Cell(name, "l"),
-            page.Cell(formula, "line"),
-            holds,
-            limit,
-            margin,
-            said,
-        ]
-        rows.append(page.Row(cells, "best" if name == judged.decided_by else ""))
-    headings = (*_CRITERIA, "what it says, and rests on")
     return page.Section(
         f"Passive on the {analysis.device.name}?",
-        [page.Table(headings, rows, numbers=(3, 4))],
+        [_criteria_table(analysis)],
         caption=(
             f"Verdict: {judged.verdict}. It rests on: {judged.decided_by}. T is the period of an "
             "update, σ₀ the least damping of the device, b_v virtual damping, d the whole samples "
@@ -305,9 +293,8 @@ def _criteria(analysis: Analysis) -> page.Section:
 
 def _continuity(analysis: Analysis) -> page.Section:
     blocks: list[page.Block] = [page.Words(analysis.continuity.reason)]
-    rows = [page.Row(cells) for cells in jump_rows(analysis)]
-    if rows:
-        blocks.append(page.Table((*_JUMPS, "near"), rows, numbers=(0, 1)))
+    if analysis.continuity.jumps:
+        blocks.append(_jumps_table(analysis, "near"))
     return page.Section("Continuity", blocks)
 
 

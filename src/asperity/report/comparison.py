@@ -3,33 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from asperity.analysis.compare import Comparison
 from asperity.analysis.row import LawRow
+from asperity.arguments import Argument
 from asperity.report import page, terminal
 from asperity.report.devices import numbers_table
-from asperity.report.terminal import Column
 from asperity.report.words import glossary
-from asperity.report.words.comparison_words import (
-    SAMPLED_NOTE,
-    any_sampled,
-    described,
-    leak_text,
-    stiffness_text,
-    strength_has_unit,
-)
 from asperity.report.words.number_words import (
+    SAMPLED,
     bound_text,
     force_text,
     holds_text,
+    in_one_unit,
+    is_sampled,
     law_title,
     merit_text,
     place_text,
 )
-from asperity.units import engineering
+from asperity.textures.catalogue import CATALOGUE
+from asperity.units import engineering, rounded_down
 
 _NAMES_FROM = 112
 """Console width [characters] from which the law's name has a column."""
@@ -43,6 +41,85 @@ _HEADINGS = (
 )  # fmt: skip
 _NAME = 1
 _NUMBERS = (2, 3, 4, 7, 9, 10, 11)
+
+
+SAMPLED_NOTE = (
+    "~ found by sampling, not proved: the true q, q⁺ and leak may be larger, "
+    "the true safe stiffness smaller."
+)
+# Of maps and profiles, which are no arguments of a kind.
+_LENGTHS = {"pitch", "cutoff"}
+_UNSAID = {"kind", "preparation", "phase", "direction", "phases", "wavevectors"}
+
+
+# --- what it says of each law, in words -----------------------------------------------------------
+
+
+def stiffness_text(row: LawRow) -> str:
+    """Return the stiffness up to which the device renders the law: "995 N/m", or "none"."""
+    if row.safe_stiffness <= 0.0:
+        return "none"
+    mark = SAMPLED if is_sampled(row.limiting) else ""
+    return f"{mark}{engineering(rounded_down(row.safe_stiffness), 'N/m')}"
+
+
+def leak_text(row: LawRow, comparison: Comparison) -> str:
+    """Return the energy of the worst loop: "0.64 mJ"; "0" where a proof says so.
+
+    All laws are given in one unit, that of the largest, so that a column can be compared.
+    """
+    leak = row.leak
+    if leak.energy == 0.0 and leak.method == "theorem":
+        return "0"
+    mark = SAMPLED if leak.method == "sampled" else ""
+    energies = [leak.worst, *(other.leak.worst for other in comparison.rows)]
+    return f"{mark}{in_one_unit(energies, 'J', digits=2)[0]}"
+
+
+def strength_has_unit(comparison: Comparison) -> bool:
+    """Return whether T carries metres: a surface without a period has no l to divide by."""
+    return not comparison.texture.scan_line().periodic
+
+
+def any_sampled(comparison: Comparison) -> bool:
+    """Return whether any number of the table carries the ~."""
+    return any(
+        is_sampled(row.q) or is_sampled(row.one_sided) or row.leak.method == "sampled"
+        for row in comparison.rows
+    )
+
+
+def described(description: dict[str, Any]) -> str:
+    """Return the kind of a texture and its plain arguments in words.
+
+    Example:
+        >>> described({"kind": "sinusoid", "amplitude": 8e-4, "period": 1e-3, "phase": 0.0})
+        'sinusoid: amplitude 0.8 mm, period 1 mm'
+    """
+    kind = CATALOGUE.get(description["kind"])
+    declared = {} if kind is None else {argument.name: argument for argument in kind.arguments}
+    parts = []
+    for name, value in description.items():
+        if name in _UNSAID:
+            continue
+        values = value if isinstance(value, list) else [value]
+        if len(values) > 4:
+            parts.append(f"{len(values)} {name}")
+            continue
+        shown = [_value_text(name, one, declared.get(name)) for one in values]
+        parts.append(f"{law_title(name)} {' × '.join(shown)}")
+    return f"{description['kind']}: {', '.join(parts)}"
+
+
+def _value_text(name: str, value: Any, argument: Argument | None) -> str:
+    if isinstance(value, bool):
+        return holds_text(value)
+    if argument is not None:
+        return argument.readable(value)
+    return engineering(value, "m") if name in _LENGTHS and isinstance(value, float) else f"{value}"
+
+
+# --- tables ---------------------------------------------------------------------------------------
 
 
 def _headings(comparison: Comparison) -> list[str]:
@@ -68,8 +145,23 @@ def _cells(row: LawRow, comparison: Comparison) -> list[page.Cell]:
     ]
 
 
-def _is_best(row: LawRow, comparison: Comparison) -> bool:
-    return row is comparison.recommended_row
+def _rows(
+    comparison: Comparison, cells: Callable[[LawRow], Sequence[str | page.Cell]]
+) -> list[page.Row]:
+    """Return a row per law, the recommended one marked."""
+    best = comparison.recommended_row
+    return [page.Row(cells(row), "best" if row is best else "") for row in comparison.rows]
+
+
+def _table(comparison: Comparison) -> page.Table:
+    rows = _rows(comparison, lambda row: _cells(row, comparison))
+    return page.Table(_headings(comparison), rows, _NUMBERS)
+
+
+def _verdicts(comparison: Comparison) -> page.Table:
+    return page.Table(
+        (), _rows(comparison, lambda row: [page.Cell(row.law.letter, "l"), row.verdict])
+    )
 
 
 # --- in a terminal --------------------------------------------------------------------------------
@@ -85,14 +177,13 @@ def comparison_table(comparison: Comparison, width: int = 120) -> Table:
     Returns:
         A Rich table.
     """
-    columns = [Column(heading, i in _NUMBERS) for i, heading in enumerate(_headings(comparison))]
-    columns[_NAME] = Column("name", wraps=True, most=24)
-    shown = [i for i in range(len(columns)) if i != _NAME or width >= _NAMES_FROM]
-    rows = []
-    for row in comparison.rows:
-        cells = _cells(row, comparison)
-        rows.append(([cells[i].text for i in shown], "bold" if _is_best(row, comparison) else ""))
-    return terminal.table([columns[i] for i in shown], rows, gap=1 if width >= _AIRY_FROM else 0)
+    return terminal.table(
+        _table(comparison),
+        wraps=(_NAME,),
+        most={_NAME: 24},
+        without=() if width >= _NAMES_FROM else (_NAME,),
+        gap=1 if width >= _AIRY_FROM else 0,
+    )
 
 
 def _meanings(comparison: Comparison) -> list[tuple[str, str]]:
@@ -110,15 +201,6 @@ def _meanings(comparison: Comparison) -> list[tuple[str, str]]:
     return meanings
 
 
-def _verdicts(comparison: Comparison) -> Table:
-    """Return the verdict of every law, one line each where the width allows."""
-    rows = [
-        ([row.law.letter, row.verdict], "bold" if _is_best(row, comparison) else "")
-        for row in comparison.rows
-    ]
-    return terminal.table([Column(""), Column("", wraps=True)], rows)
-
-
 def print_comparison(comparison: Comparison, console: Console) -> None:
     """Print the answer, the table, the verdicts and what was assumed.
 
@@ -132,7 +214,7 @@ def print_comparison(comparison: Comparison, console: Console) -> None:
     console.print()
     console.print(terminal.pairs(_meanings(comparison), "dim"))
     console.print()
-    console.print(_verdicts(comparison))
+    console.print(terminal.table(_verdicts(comparison), wraps=(1,)))
     terminal.print_assumptions(console, comparison.assumptions)
 
 
@@ -147,7 +229,7 @@ def comparison_page(comparison: Comparison) -> page.Page:
         facts=_facts(comparison),
         sections=[
             _laws(comparison),
-            _troubles(comparison),
+            page.Section("What will go wrong", [_verdicts(comparison)]),
             *_pictures(comparison),
             *page.added_sections(Comparison, comparison),
             *page.assumed(
@@ -173,25 +255,11 @@ def _facts(comparison: Comparison) -> list[tuple[str, str]]:
     ]
 
 
-def _rows(
-    comparison: Comparison, cells: Callable[[LawRow], Sequence[str | page.Cell]]
-) -> list[page.Row]:
-    """Return a row per law, the recommended one tinted."""
-    return [
-        page.Row(cells(row), "best" if _is_best(row, comparison) else "") for row in comparison.rows
-    ]
-
-
 def _laws(comparison: Comparison) -> page.Section:
-    headings = [text.replace("-\n", "").replace("\n", " ") for text in _headings(comparison)]
-    rows = _rows(comparison, lambda row: _cells(row, comparison))
+    table = _table(comparison)
+    headings = [text.replace("-\n", "").replace("\n", " ") for text in table.headings]
     notes = [SAMPLED_NOTE] if any_sampled(comparison) else []
-    return page.Section("The laws compared", [page.Table(headings, rows, _NUMBERS)], notes=notes)
-
-
-def _troubles(comparison: Comparison) -> page.Section:
-    rows = _rows(comparison, lambda row: [page.Cell(row.law.letter, "l"), row.verdict])
-    return page.Section("What will go wrong", [page.Table((), rows)])
+    return page.Section("The laws compared", [replace(table, headings=headings)], notes=notes)
 
 
 def _pictures(comparison: Comparison) -> list[page.Section]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from rich.console import Console
 from rich.table import Table
 
 from asperity.devices import FIELD_TABLE, Datum, Device
 from asperity.report import page
-from asperity.report.terminal import Column, say, table
+from asperity.report.terminal import say, table
 from asperity.report.words.number_words import NONE, law_title
 
 UNVERIFIED = "?"
@@ -50,35 +50,23 @@ def devices_table(devices: Sequence[Device], width: int = 100) -> Table:
         devices: what to list.
         width: of the console in characters; full names are left out on a narrow one.
     """
-    named = width >= _NAMES_FROM
-    columns = [Column("id", style="bold"), *([Column("device", wraps=True)] if named else [])]
-    columns += [Column(heading, right=True) for heading in _COLUMNS]
-    rows = [
-        [
-            device.id,
-            *([device.name] if named else []),
-            *[datum_text(device.data.get(field)) for field in _COLUMNS.values()],
-        ]
-        for device in devices
-    ]
-    return table(columns, [(cells, "") for cells in rows])
+    rows = []
+    for device in devices:
+        texts = [datum_text(device.data.get(field)) for field in _COLUMNS.values()]
+        rows.append(page.Row([page.Cell(device.id, "l"), device.name, *texts]))
+    shown = page.Table(("id", "device", *_COLUMNS), rows, range(2, 2 + len(_COLUMNS)))
+    without = () if width >= _NAMES_FROM else (1,)
+    return table(shown, wraps=(1,), without=without, styles={"l": "bold"})
 
 
 def device_table(device: Device) -> Table:
     """Return every number of a device with its source; other values of it in the rows below."""
-    columns = (
-        Column("what"), Column("value", right=True), Column("verified"),
-        Column("source", wraps=True),
-    )  # fmt: skip
-    return table(columns, _rows(device))
-
-
-def _rows(device: Device) -> Iterator[tuple[list[str], str]]:
+    rows = []
     for field, datum in device.data.items():
-        named = [(law_title(field), datum), *(("  also", other) for other in datum.also)]
-        for what, one in named:
+        for what, one in ((law_title(field), datum), *(("  also", other) for other in datum.also)):
             verified, style = ("yes", "") if one.verified else ("no", "yellow")
-            yield [what, one.text, verified, one.source], style
+            rows.append(page.Row([what, one.text, verified, one.source], style=style))
+    return table(page.Table(("what", "value", "verified", "source"), rows, (1,)), wraps=(3,))
 
 
 def numbers_table(device: Device, fields: Sequence[str]) -> page.Table:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from rich.console import Console
 from rich.table import Table
 
 from asperity.analysis.limits.limit_result import Limits, RenderedWave
-from asperity.analysis.limits.limit_rules import RULES, Limit
+from asperity.analysis.limits.limit_rules import RULES
 from asperity.analysis.words.limits import percent, speed_text, speeds_text, stiffness_text
 from asperity.report import page, terminal
 from asperity.report.devices import numbers_table
-from asperity.report.terminal import Column, say
+from asperity.report.terminal import say
 from asperity.report.words import glossary
 from asperity.report.words.number_words import INFINITE, NONE, holds_text, law_title
 from asperity.units import engineering
@@ -19,7 +21,7 @@ _NAMES_FROM = 96
 """Console width [characters] from which the limits' names are not broken."""
 
 _LIMITS = ("", "limit", "condition", "left", "right", "holds", "for", "at speeds")
-_NAME, _HOLDS, _FOR, _SPEEDS = 1, 5, 6, 7
+_NAME, _FOR, _SPEEDS = 1, 6, 7
 _NUMBERS = (3, 4, _FOR)
 _WAVES = ("wavelength", "amplitude", "share", "frequency", "force")
 _SIDES = "Left and right: of the wave that comes closest to breaking the limit; for: share of the "
@@ -47,36 +49,57 @@ def side_text(side: float | None, unit: str) -> str:
     return INFINITE if side == float("inf") else engineering(side, unit)
 
 
-def limit_cells(limit: Limit) -> list[str]:
+def _limits_table(result: Limits) -> page.Table:
     """Return number, name, condition, both sides, whether it holds, share, and speeds."""
-    return [
-        str(limit.number),
-        limit.name,
-        limit.inequality,
-        side_text(limit.left, limit.unit),
-        side_text(limit.right, limit.unit),
-        holds_text(limit.holds),
-        "" if limit.share is None else percent(limit.share),
-        f"needs {', '.join(limit.needs)}" if limit.needs else speeds_text(limit.speeds),
-    ]
-
-
-def wave_cells(wave: RenderedWave) -> list[str]:
-    """Return wavelength, amplitude, share of the height variance, frequency, force, and speeds."""
-    return [
-        engineering(wave.wavelength, "m"),
-        engineering(wave.amplitude, "m"),
-        percent(wave.share),
-        engineering(wave.frequency, "Hz"),
-        engineering(wave.force, "N", digits=2),
-        speeds_text((0.0, wave.top_speed)),
-    ]
+    rows = []
+    for limit in result.limits:
+        cells: page.Cells = [
+            page.Cell(str(limit.number), "l"),
+            limit.name,
+            limit.inequality,
+            side_text(limit.left, limit.unit),
+            side_text(limit.right, limit.unit),
+            page.holds_cell(limit.holds),
+            "" if limit.share is None else percent(limit.share),
+            f"needs {', '.join(limit.needs)}" if limit.needs else speeds_text(limit.speeds),
+        ]
+        style = "bold red" if limit.holds is False else "dim" if limit.holds is None else ""
+        rows.append(page.Row(cells, style=style))
+    return page.Table(_LIMITS, rows, _NUMBERS)
 
 
 def shown_waves(result: Limits) -> list[RenderedWave]:
     """Return the waves that a table lists, the longest first."""
     most = sorted(result.waves, key=lambda wave: -wave.share)[:MOST_WAVES]
     return sorted(most, key=lambda wave: -wave.wavelength)
+
+
+def _waves_table(
+    result: Limits, holds: Callable[[bool | None], str | page.Cell], heading: str
+) -> page.Table:
+    """Return what the shown waves are, their forces, and whether each meets each limit.
+
+    Args:
+        result: the limits.
+        holds: says that a limit holds.
+        heading: of a limit, with its number for {}.
+    """
+    rows = [
+        page.Row(
+            [
+                engineering(wave.wavelength, "m"),
+                engineering(wave.amplitude, "m"),
+                percent(wave.share),
+                engineering(wave.frequency, "Hz"),
+                engineering(wave.force, "N", digits=2),
+                *[holds(wave.holds.get(number)) for number in ON_WAVES],
+                speeds_text((0.0, wave.top_speed)),
+            ]
+        )
+        for wave in shown_waves(result)
+    ]
+    headings = (*_WAVES, *(heading.format(number) for number in ON_WAVES), "at speeds")
+    return page.Table(headings, rows, numbers=range(len(_WAVES)))
 
 
 def more_text(result: Limits) -> str:
@@ -119,28 +142,12 @@ def limits_table(result: Limits, width: int = 100) -> Table:
         A Rich table.
     """
     wide = width >= _NAMES_FROM
-    columns = [Column(name, right=i in _NUMBERS) for i, name in enumerate(_LIMITS)]
-    columns[_NAME] = Column(_LIMITS[_NAME], wraps=True, most=None if wide else 14)
-    columns[_SPEEDS] = Column(_LIMITS[_SPEEDS], wraps=True)
-    shown = [i for i in range(len(columns)) if i != _FOR or wide]
-    rows = []
-    for limit in result.limits:
-        cells = limit_cells(limit)
-        style = "bold red" if limit.holds is False else "dim" if limit.holds is None else ""
-        rows.append(([cells[i] for i in shown], style))
-    return terminal.table([columns[i] for i in shown], rows)
-
-
-def _waves_table(result: Limits) -> Table:
-    """Return one row per wave: what it is, its force, and whether it meets each limit (y, n, ?)."""
-    columns = [Column(name, right=True) for name in _WAVES]
-    columns += [Column(str(number)) for number in ON_WAVES]
-    rows = []
-    for wave in shown_waves(result):
-        *cells, speeds = wave_cells(wave)
-        holds = [holds_text(wave.holds.get(number))[0] for number in ON_WAVES]
-        rows.append(([*cells, *holds, speeds], ""))
-    return terminal.table([*columns, Column("at speeds")], rows)
+    return terminal.table(
+        _limits_table(result),
+        wraps=(_NAME, _SPEEDS),
+        most={} if wide else {_NAME: 14},
+        without=() if wide else (_FOR,),
+    )
 
 
 def print_limits(result: Limits, console: Console) -> None:
@@ -158,7 +165,8 @@ def print_limits(result: Limits, console: Console) -> None:
         say(console, line, "dim")
     if result.waves:
         console.print()
-        console.print(_waves_table(result))
+        table = _waves_table(result, lambda holds: holds_text(holds)[0], "{}")
+        console.print(terminal.table(table))
     if more_text(result):
         say(console, more_text(result), "dim")
     terminal.print_assumptions(console, result.assumptions)
@@ -201,18 +209,12 @@ def _facts(result: Limits) -> list[tuple[str, str]]:
 
 
 def _limits(result: Limits) -> page.Section:
-    rows = []
-    for limit in result.limits:
-        cells: page.Cells = [*limit_cells(limit)]
-        cells[0] = page.Cell(str(limit.number), "l")
-        cells[_HOLDS] = page.holds_cell(limit.holds)
-        rows.append(page.Row(cells))
     note = (
         "Left and right are those of the wave that comes closest to breaking the limit. “For” is "
         "the share of the height variance in waves that meet it."
     )
     notes = [*symbols(result), note]
-    return page.Section("The six limits", [page.Table(_LIMITS, rows, _NUMBERS)], notes=notes)
+    return page.Section("The six limits", [_limits_table(result)], notes=notes)
 
 
 def _picture(result: Limits) -> page.Section:
@@ -230,12 +232,6 @@ def _picture(result: Limits) -> page.Section:
 def _waves(result: Limits) -> list[page.Section]:
     if not result.waves:
         return []
-    rows = []
-    for wave in shown_waves(result):
-        *cells, speeds = wave_cells(wave)
-        holds = [page.holds_cell(wave.holds.get(number)) for number in ON_WAVES]
-        rows.append(page.Row([*cells, *holds, speeds]))
-    headings = (*_WAVES, *(f"limit {number}" for number in ON_WAVES), "at speeds")
-    table = page.Table(headings, rows, numbers=range(len(_WAVES)))
+    table = _waves_table(result, page.holds_cell, "limit {}")
     more = more_text(result)
     return [page.Section("Wave by wave", [table], notes=[f"{more.capitalize()}."] if more else [])]

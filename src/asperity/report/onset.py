@@ -6,14 +6,12 @@ import math
 from collections.abc import Sequence
 
 from rich.console import Console
-from rich.text import Text
 
 from asperity.report import page, terminal
 from asperity.report.page import Cell, Page, Row, Section, added_sections, assumed, pictured
-from asperity.report.run import FOOTER
-from asperity.report.terminal import Column, say
+from asperity.report.run import FOOTER, facts_of_loop
+from asperity.report.terminal import say
 from asperity.report.words.number_words import INFINITE, NONE
-from asperity.report.words.run_words import facts_of_loop
 from asperity.scene.setup import Setup
 from asperity.simulation.onset import CYCLE_SPEED
 from asperity.simulation.prediction import Prediction
@@ -32,22 +30,28 @@ NOTES = (
 )
 
 
-def cells(found: Prediction) -> list[str]:
-    """Return the texts of a row."""
-    onset = found.onset
-    rule = newton(found.delay_rule)
+def onset_cells(found: Prediction) -> list[Cell]:
+    """Return the cells of a row; rules that allowed what cycled are coloured."""
+    onset, rule = found.onset, newton(found.delay_rule)
     return [
-        onset.law,
-        str(onset.delay),
-        newton(onset.quiet),
-        "none" if math.isinf(onset.cycling) else newton(onset.cycling),
-        f"{onset.cycles}/{onset.starts}",
-        engineering(found.depth, "m", digits=2),
-        INFINITE if math.isinf(found.q) else newton(found.q),
-        newton(found.paper),
-        rule if found.conservative else f"({rule})",
-        NONE if found.wall_rule is None else newton(found.wall_rule),
+        Cell(onset.law, "l"),
+        Cell(str(onset.delay)),
+        Cell(newton(onset.quiet)),
+        Cell("none" if math.isinf(onset.cycling) else newton(onset.cycling)),
+        Cell(f"{onset.cycles}/{onset.starts}"),
+        Cell(engineering(found.depth, "m", digits=2)),
+        Cell(newton(found.q)),
+        Cell(newton(found.paper)),
+        Cell(rule if found.conservative else f"({rule})", "no" if found.missed else ""),
+        Cell(
+            NONE if found.wall_rule is None else newton(found.wall_rule),
+            "no" if found.wall_rule_missed else "",
+        ),
     ]
+
+
+def _table(found: Sequence[Prediction]) -> page.Table:
+    return page.Table(HEADINGS, [Row(onset_cells(one)) for one in found], range(1, len(HEADINGS)))
 
 
 def newton(value: float) -> str:
@@ -80,30 +84,14 @@ def answer(setup: Setup, found: Sequence[Prediction]) -> str:
     return said
 
 
-_RULE, _WALL = HEADINGS.index("delay rule"), HEADINGS.index("K₀/q")
-
-
-def _misses(found: Prediction) -> set[int]:
-    """Return the columns of rules that allowed what cycled."""
-    return {
-        column
-        for column, missed in ((_RULE, found.missed), (_WALL, found.wall_rule_missed))
-        if missed
-    }
-
-
 def print_onsets(setup: Setup, found: Sequence[Prediction], console: Console) -> None:
     """Print answer, table and assumptions."""
     say(console, answer(setup, found), "bold")
     console.print()
     # A number that is too wide goes on in the next line: no digit is ever cut.
-    columns = [Column(name, right=i > 0, wraps=True) for i, name in enumerate(HEADINGS)]
-    rows = []
-    for one in found:
-        missed = _misses(one)
-        texts = [Text(text, "red" if i in missed else "") for i, text in enumerate(cells(one))]
-        rows.append((texts, ""))
-    console.print(terminal.table(columns, rows, gap=2, ruled=False))
+    wraps = range(len(HEADINGS))
+    looks = {"no": "red"}
+    console.print(terminal.table(_table(found), wraps=wraps, styles=looks, gap=2, ruled=False))
     say(console, " ".join(NOTES), "dim")
     terminal.print_assumptions(console, setup.assumptions)
 
@@ -134,12 +122,4 @@ def onset_page(setup: Setup, found: Sequence[Prediction]) -> Page:
 
 def onset_section(title: str, found: Sequence[Prediction], caption: str = "") -> Section:
     """Return onsets and predictions in numbers."""
-    table = page.Table(HEADINGS, [Row(onset_cells(one)) for one in found], range(1, len(HEADINGS)))
-    return Section(title, [table], caption, NOTES)
-
-
-def onset_cells(found: Prediction) -> list[Cell]:
-    """Return the cells of a row; rules that allowed what cycled are coloured."""
-    missed = _misses(found)
-    kinds = {0: "l", **dict.fromkeys(missed, "no")}
-    return [Cell(text, kinds.get(i, "")) for i, text in enumerate(cells(found))]
+    return Section(title, [_table(found)], caption, NOTES)

@@ -94,13 +94,15 @@ class Row:
 
     Attributes:
         cells: as many as the table has columns.
-        kind: "best" is tinted.
+        kind: "best" is tinted, and bold in a terminal.
         id: for links to the row; may be empty.
+        style: Rich's, in a terminal.
     """
 
     cells: Sequence[str | Cell]
     kind: str = ""
     id: str = ""
+    style: str = ""
 
 
 @dataclass(frozen=True)

@@ -6,22 +6,22 @@ from collections.abc import Sequence
 from itertools import groupby
 
 from rich.console import Console
-from rich.text import Text
 
 from asperity.paper import VERDICTS, Result, Verdict
 from asperity.paper.claim import Number
 from asperity.paper.experiments import Experiments
 from asperity.report import page, terminal
 from asperity.report.page import Cell, Cells, Page, Row, Section, added_sections, assumed
-from asperity.report.terminal import Column, say
+from asperity.report.terminal import say
 
-# Colour in a terminal, and kind of cell on a page.
-_LOOKS: dict[Verdict, tuple[str, str]] = {
-    "holds": ("green", "good"),
-    "holds with correction": ("yellow", "part"),
-    "does not hold": ("red", "no"),
-    "undecided": ("dim", "open"),
+# Kind of cell on a page, and the colours of kinds in a terminal.
+_KINDS: dict[Verdict, str] = {
+    "holds": "good",
+    "holds with correction": "part",
+    "does not hold": "no",
+    "undecided": "open",
 }
+_COLOURS = {"good": "green", "part": "yellow", "no": "red", "open": "dim"}
 _FACTS = (
     ("As printed", "holds"),
     ("A small change makes it right", "holds with correction"),
@@ -49,23 +49,20 @@ def evidence_text(value: Number) -> str:
     return value if isinstance(value, str) else f"{value:.10g}"
 
 
-def _verdict(result: Result) -> Text:
-    return Text(result.verdict, style=_LOOKS[result.verdict][0])
-
-
 def print_results(
     results: Sequence[Result], experiments: Experiments | None, console: Console
 ) -> None:
     """Print one row per claim, the counts, and one line per experiment."""
-    rows: list[tuple[list[str | Text], str]] = []
+    rows = []
     for section, members in _by_section(results):
-        rows.append(([Text(f"§ {section}", style="bold"), "", ""], ""))
+        rows.append(Row([f"§ {section}", "", ""], style="bold"))
         for result in members:
             numbers = ", ".join(result.equations)
             statement = f"{numbers}: {result.statement}" if numbers else result.statement
-            rows.append(([result.id, _verdict(result), statement], ""))
-    columns = (Column("claim"), Column("verdict"), Column("states", wraps=True))
-    console.print(terminal.table(columns, rows, gap=2, ruled=False))
+            verdict = Cell(result.verdict, _KINDS[result.verdict])
+            rows.append(Row([result.id, verdict, statement]))
+    table = page.Table(("claim", "verdict", "states"), rows)
+    console.print(terminal.table(table, wraps=(2,), styles=_COLOURS, gap=2, ruled=False))
     console.print()
     say(console, counts_text(results), "bold")
     if experiments is not None:
@@ -81,7 +78,7 @@ def print_evidence(result: Result, console: Console) -> None:
     places = ", ".join((*result.equations, f"section {result.section}"))
     say(console, f"{result.id} ({places})", "bold")
     say(console, result.statement)
-    console.print(_verdict(result))
+    say(console, result.verdict, _COLOURS[_KINDS[result.verdict]])
     say(console, result.evidence.summary)
     if result.evidence.correction:
         say(console, f"Correction: {result.evidence.correction}")
@@ -128,6 +125,6 @@ def _row(result: Result) -> Row:
         Cell(result.id, "l"),
         ", ".join(result.equations),
         Cell(result.statement, details=details),
-        Cell(result.verdict, _LOOKS[result.verdict][1]),
+        Cell(result.verdict, _KINDS[result.verdict]),
     ]
     return Row(cells, id=result.id)

@@ -2,26 +2,139 @@
 
 from __future__ import annotations
 
+import math
+
 from rich.console import Console
 
 from asperity.report import page, terminal
 from asperity.report.page import PAPER, Page, Row, Section, added_sections, assumed, pictured
-from asperity.report.terminal import Column, say
-from asperity.report.words.run_words import answer, closing_words, facts, ledger_rows
+from asperity.report.terminal import say
+from asperity.report.words.number_words import law_title
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
+from asperity.simulation.onset import CYCLE_SPEED, cycles, holds_still, restlessness
+from asperity.units import engineering
 
 FOOTER = f"{PAPER}, section V"
 _ENERGIES = ("energy", "x", "y", "z", "sum")
+
+
+def energy(value: float) -> str:
+    """Return an energy with its sign, "+2.97 mJ"."""
+    if value == 0.0:
+        return "0 J"
+    if not math.isfinite(value):
+        return "not finite"
+    text = engineering(abs(value), "J", digits=3)
+    return f"{'+' if value > 0.0 else '-'}{text}"
+
+
+def answer(setup: Setup, run: Run) -> str:
+    """Return what happened in one or two sentences."""
+    law = setup.surface.law.letter
+    total = run.ledger.total
+    verb = "feeds the hand" if total > 0.0 else "takes from the hand"
+    work = f"{verb} {engineering(abs(total), 'J', digits=3)}" if total else "does no work"
+    if not math.isfinite(total):
+        work = "feeds the hand beyond all numbers"
+    stiffness = engineering(setup.surface.stiffness, "N/m")
+    said = f"Law {law} at {stiffness} {work} in {engineering(run.duration, 's')}"
+    if run.stopped:
+        said = f"{said}. The run stopped: it {run.stopped}"
+    if not run.closes:
+        said = f"{said}. The energy does not add up: believe no number of this run"
+    if run.stopped:
+        return f"{said}."
+    return f"{said}. {unrest(setup, run)}."
+
+
+def unrest(setup: Setup, run: Run) -> str:
+    """Return whether the handle came to rest, in words."""
+    if not holds_still(setup.motion, run.duration):
+        return "The hand was moving to the end"
+    if len(run.time) < 4:
+        return "Too few samples were traced to say whether it came to rest"
+    speed = restlessness(run)
+    kept = "keeps moving: a limit cycle" if cycles(run) else "comes to rest"
+    limit = engineering(CYCLE_SPEED, "m/s")
+    return (
+        f"The handle {kept} (velocity varies by {engineering(speed, 'm/s', digits=3)} in the last "
+        f"quarter; above {limit} counts as a cycle)"
+    )
+
+
+def facts_of_loop(setup: Setup) -> list[tuple[str, str]]:
+    """Return names and values of the device, its servo, the hand and the surface."""
+    servo = setup.servo
+    step = servo.position_resolution
+    return [
+        ("Surface", str(setup.surface.texture.describe()["kind"])),
+        ("Device", setup.device.name),
+        ("Update period", engineering(servo.period, "s")),
+        ("Position resolution", engineering(step, "m") if step else "not limited"),
+        ("Hand", str(setup.hand.to_dict()["kind"])),
+        ("Motion", str(setup.motion.to_dict()["kind"])),
+    ]
+
+
+def facts(setup: Setup, run: Run) -> list[tuple[str, str]]:
+    """Return names and values of what was simulated."""
+    surface = setup.surface
+    return [
+        ("Law", f"{surface.law.letter}, {law_title(surface.law.name)}"),
+        ("Stiffness", engineering(surface.stiffness, "N/m")),
+        *facts_of_loop(setup),
+        ("Delay", f"{setup.servo.delay} sample{'' if setup.servo.delay == 1 else 's'}"),
+        ("Simulated", f"{engineering(run.duration, 's')}, {run.samples} samples"),
+    ]
+
+
+def ledger_rows(run: Run) -> list[tuple[str, list[str]]]:
+    """Return name and cells (x, y, z, sum) of the energies."""
+    ledger = run.ledger
+
+    def axes(values: tuple[float, float, float]) -> list[str]:
+        return [*[energy(value) for value in values], energy(sum(values))]
+
+    def single(value: float) -> list[str]:
+        return ["", "", "", energy(value)]
+
+    return [
+        ("texture, exact", axes(ledger.supplied)),
+        ("texture, the paper's sum", axes(ledger.same_sample)),
+        ("sampling's part of it", single(ledger.sampling)),
+        ("the hand's anchor", single(ledger.hand)),
+        ("lost in damping of device and hand", single(-ledger.lost)),
+        ("dry friction", single(ledger.friction)),
+        ("stored, after less before", single(ledger.after - ledger.before)),
+        ("does not add up", single(ledger.closure)),
+    ]
+
+
+def closing_words(run: Run) -> str:
+    """Return how well the ledger closes."""
+    ledger = run.ledger
+    share = abs(ledger.closure) / ledger.exchanged if ledger.exchanged > 0.0 else 0.0
+    if not math.isfinite(share):
+        return "The run diverged: its energies are beyond all numbers."
+    return (
+        "Positive feeds the hand. Exact: the held force on the true motion. The paper's sum: the "
+        "command and the measured step of one sample. Sampling's part: what holding the force "
+        f"adds, ½ Σ (f_k - f_k+1)·(p_k+1 - p_k). The ledger closes to {share:.1g} of the "
+        f"{engineering(ledger.exchanged, 'J', digits=3)} that were exchanged."
+    )
+
+
+def _ledger(run: Run) -> page.Table:
+    rows = [Row([name, *cells]) for name, cells in ledger_rows(run)]
+    return page.Table(_ENERGIES, rows, numbers=(1, 2, 3, 4))
 
 
 def print_run(setup: Setup, run: Run, console: Console) -> None:
     """Print answer, ledger and assumptions."""
     say(console, answer(setup, run), "bold")
     console.print()
-    columns = [Column(name, right=i > 0, wraps=i == 0) for i, name in enumerate(_ENERGIES)]
-    rows = [([name, *cells], "") for name, cells in ledger_rows(run)]
-    console.print(terminal.table(columns, rows, gap=2, ruled=False))
+    console.print(terminal.table(_ledger(run), wraps=(0,), gap=2, ruled=False))
     say(console, closing_words(run), "dim")
     console.print()
     for name, value in facts(setup, run):
@@ -31,15 +144,13 @@ def print_run(setup: Setup, run: Run, console: Console) -> None:
 
 def run_page(setup: Setup, run: Run) -> Page:
     """Return the report of a run, its trace in memory."""
-    rows = [Row([name, *cells]) for name, cells in ledger_rows(run)]
-    table = page.Table(_ENERGIES, rows, numbers=(1, 2, 3, 4))
     return Page(
         title=f"Law {setup.surface.law.letter} in the loop, {setup.device.name}",
         answer=answer(setup, run),
         facts=facts(setup, run),
         sections=[
             *_pictures(setup, run),
-            Section("Where the energy went", [table], caption=closing_words(run)),
+            Section("Where the energy went", [_ledger(run)], caption=closing_words(run)),
             *added_sections(Run, setup, run),
             *assumed(setup.assumptions),
         ],

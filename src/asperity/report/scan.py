@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from rich.console import Console
-from rich.text import Text
 
 from asperity.report import page, terminal
 from asperity.report.page import Cell, Cells, Page, Row, Section, added_sections, assumed, pictured
-from asperity.report.run import FOOTER
-from asperity.report.terminal import Column, say
-from asperity.report.words.run_words import facts_of_loop
+from asperity.report.run import FOOTER, facts_of_loop
+from asperity.report.terminal import say
 from asperity.scene.setup import Setup
 from asperity.simulation.scan import Stroke
 from asperity.units import engineering
@@ -35,22 +33,25 @@ def milli(value: float, *, sign: bool = True) -> str:
     return "0" if not text.strip("+-0.") else text
 
 
-def cells(stroke: Stroke) -> list[str]:
-    """Return the texts of a row."""
-    place = [
-        stroke.law, engineering(stroke.speed, "m/s"), engineering(stroke.reached, "m", digits=2),
-    ]  # fmt: skip
+def _cells(stroke: Stroke) -> Cells:
+    depth = engineering(stroke.reached, "m", digits=2)
+    place: Cells = [Cell(stroke.law, "l"), engineering(stroke.speed, "m/s"), depth]
     if stroke.stopped:
-        return [*place, "", "", "", "stopped", "", "", "", ""]
+        stopped = Cell("stopped", summary="Why", details=[("stopped", stroke.stopped)])
+        return [*place, "", "", "", stopped, "", "", "", ""]
     return [
         *place,
         *[milli(value) for value in stroke.energy],
         milli(stroke.total),
-        milli(stroke.field),
+        Cell(milli(stroke.field), "no" if stroke.feeds else ""),
         milli(stroke.spread + stroke.error, sign=False),
         milli(stroke.same_sample),
         f"{stroke.lost_contact:.3g}",
     ]
+
+
+def _table(found: Sequence[Stroke]) -> page.Table:
+    return page.Table(HEADINGS, [Row(_cells(one)) for one in found], range(1, len(HEADINGS)))
 
 
 def answer(found: Sequence[Stroke]) -> str:
@@ -69,22 +70,16 @@ def _grouped(found: Sequence[Stroke], feeds: Callable[[Stroke], bool]) -> str:
     return ", ".join(f"{', '.join(laws)} {when}" for when, laws in groups.items() if laws)
 
 
-_Y, _SUM, _FIELD = (HEADINGS.index(name) for name in ("y", "sum", "field"))
-
-
 def print_scans(setup: Setup, found: Sequence[Stroke], console: Console) -> None:
     """Print answer, table and assumptions."""
     say(console, answer(found), "bold")
     console.print()
-    shown = [i for i in range(len(HEADINGS)) if i != _Y]
     # A number that is too wide goes on in the next line: no digit is ever cut.
-    columns = [Column(HEADINGS[i], right=i > 0, wraps=True) for i in shown]
-    rows = []
-    for stroke in found:
-        texts = [Text(text) for text in cells(stroke)]
-        texts[_FIELD].stylize("red" if stroke.feeds else "")
-        rows.append(([texts[i] for i in shown], ""))
-    console.print(terminal.table(columns, rows, gap=2, ruled=False))
+    shown = terminal.table(
+        _table(found), wraps=range(len(HEADINGS)), without=(HEADINGS.index("y"),),
+        styles={"no": "red"}, gap=2, ruled=False,
+    )  # fmt: skip
+    console.print(shown)
     say(console, f"{' '.join(NOTES)} The y axis: --html, --json.", "dim")
     for reason in sorted({stroke.stopped for stroke in found if stroke.stopped}):
         say(console, f"Stopped: it {reason}", "dim")
@@ -99,27 +94,15 @@ def scan_page(setup: Setup, found: Sequence[Stroke]) -> Page:
         "Energy that the texture supplies per stroke: black the sum, orange along x, blue along z. "
         "Above the line it feeds the hand."
     )
-    rows = [Row(_cells(stroke)) for stroke in found]
-    table = page.Table(HEADINGS, rows, range(1, len(HEADINGS)))
     return Page(
         title=f"What a stroke gains, {setup.device.name}",
         answer=answer(found),
         facts=facts_of_loop(setup),
         sections=[
             pictured("Energy per stroke", scan_figure(found), caption),
-            Section("In numbers", [table], notes=NOTES),
+            Section("In numbers", [_table(found)], notes=NOTES),
             *added_sections(Stroke, setup, found),
             *assumed(setup.assumptions),
         ],
         footer=FOOTER,
     )
-
-
-def _cells(stroke: Stroke) -> Cells:
-    texts: Cells = [*cells(stroke)]
-    texts[0] = Cell(stroke.law, "l")
-    if stroke.stopped:
-        texts[_SUM] = Cell("stopped", summary="Why", details=[("stopped", stroke.stopped)])
-    elif stroke.feeds:
-        texts[_FIELD] = Cell(cells(stroke)[_FIELD], "no")
-    return texts

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from rich.console import Console
-from rich.text import Text
 
 from asperity.arguments import Argument
 from asperity.errors import ParameterError, nearest_names
 from asperity.report import page, terminal
 from asperity.report.page import Cards, Cell, Page, Picture, Row, Section, Words, added_sections
-from asperity.report.terminal import Column, say
+from asperity.report.terminal import say
 from asperity.textures.catalogue import CATALOGUE
 from asperity.textures.library import LIBRARY
 from asperity.textures.texture import Kind, Texture
@@ -134,18 +133,15 @@ def _words_of(argument: Argument) -> str:
 
 def print_surfaces(listed: Sequence[Listed], console: Console, *, in_detail: bool = False) -> None:
     """Print one row per surface; in detail, what each of its arguments is."""
-    columns = (
-        Column("name", style="bold"), Column("what it is, and its arguments", wraps=True),
-        Column("size", right=True), Column("height", right=True),
-    )  # fmt: skip
-    rows: list[tuple[list[str | Text], str]] = []
+    rows = []
     for one in listed:
-        words = Text(f"{one.kind.summary}\n").append(arguments_text(one.kind), style="dim")
-        if one.kind.example:
-            words.append(f"\n{one.specification}")
+        words = Cell(one.kind.summary, below=arguments_text(one.kind))
         size = one.size_text.replace(" x ", " x\n")
-        rows.append(([one.kind.name, words, size, one.height_text], ""))
-    console.print(terminal.table(columns, rows, gap=2))
+        rows.append(Row([Cell(one.kind.name, "l"), words, size, one.height_text]))
+        if one.kind.example:
+            rows.append(Row(["", one.specification, "", ""]))
+    headings = ("name", "what it is, and its arguments", "size", "height")
+    _print_table(page.Table(headings, rows, (2, 3)), (1,), console)
     if not in_detail:
         console.print()
         say(
@@ -157,17 +153,17 @@ def print_surfaces(listed: Sequence[Listed], console: Console, *, in_detail: boo
         _print_detail(one, console)
 
 
+def _print_table(table: page.Table, wraps: tuple[int, ...], console: Console) -> None:
+    console.print(terminal.table(table, wraps=wraps, styles={"l": "bold"}, gap=2))
+
+
 def _print_detail(one: Listed, console: Console) -> None:
-    columns = (
-        Column("argument", style="bold"), Column("unit"), Column("default", wraps=True),
-        Column("what it is", wraps=True),
-    )  # fmt: skip
     rows = [
-        ([argument.name, argument.unit, argument.default_text, _words_of(argument)], "")
+        Row([Cell(argument.name, "l"), argument.unit, argument.default_text, _words_of(argument)])
         for argument in one.kind.arguments
     ]
     console.print()
-    console.print(terminal.table(columns, rows, gap=2))
+    _print_table(page.Table(("argument", "unit", "default", "what it is"), rows), (2, 3), console)
     if one.kind.source:
         say(console, f"Sizes: {one.kind.source}.")
 

@@ -2,67 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from rich import box
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-
-@dataclass(frozen=True)
-class Column:
-    """A column of a table.
-
-    Attributes:
-        heading: may have several lines.
-        right: whether it is aligned to the right.
-        wraps: whether a text goes on in the next line; no character is ever cut there.
-        most: its greatest width [characters], where it wraps.
-        style: Rich's.
-    """
-
-    heading: str
-    right: bool = False
-    wraps: bool = False
-    most: int | None = None
-    style: str = ""
+from asperity.report import page
 
 
 def table(
-    columns: Sequence[Column],
-    rows: Iterable[tuple[Sequence[str | Text], str]],
+    shown: page.Table,
     *,
+    wraps: Collection[int] = (),
+    most: Mapping[int, int] | None = None,
+    without: Collection[int] = (),
+    styles: Mapping[str, str] | None = None,
     gap: int = 1,
     ruled: bool = True,
 ) -> Table:
-    """Return a table.
+    """Return a table of a page for a terminal.
 
     Args:
-        columns: its columns.
-        rows: the cells of each row, and the style of the row.
+        shown: the table; notes and details of its cells are for the page alone.
+        wraps: columns whose texts go on in the next line; no character is ever cut there.
+        most: greatest width of columns that wrap [characters].
+        without: columns that are left out.
+        styles: Rich's, of kinds of cells.
         gap: characters between columns.
         ruled: whether a line stands below the headings, if there are any.
     """
-    headed = any(column.heading for column in columns)
     made = Table(
-        box=box.SIMPLE_HEAD if ruled and headed else None,
-        padding=(0, gap, 0, 0), show_edge=False, pad_edge=False, show_header=headed,
+        box=box.SIMPLE_HEAD if ruled and shown.headings else None, padding=(0, gap, 0, 0),
+        show_edge=False, pad_edge=False, show_header=bool(shown.headings),
     )  # fmt: skip
-    for column in columns:
-        justify: Literal["left", "right"] = "right" if column.right else "left"
+    headings = shown.headings or [""] * len(shown.rows[0].cells)
+    columns = [i for i in range(len(headings)) if i not in without]
+    for i in columns:
         made.add_column(
-            Text(column.heading), justify=justify, no_wrap=not column.wraps,
-            overflow="fold" if column.wraps else "ellipsis", max_width=column.most,
-            style=column.style,
+            Text(headings[i]), justify="right" if i in shown.numbers else "left",
+            no_wrap=i not in wraps, overflow="fold" if i in wraps else "ellipsis",
+            max_width=(most or {}).get(i),
         )  # fmt: skip
-    for cells, style in rows:
-        made.add_row(
-            *[Text(cell) if isinstance(cell, str) else cell for cell in cells], style=style
-        )
+    for row in shown.rows:
+        style = row.style or ("bold" if row.kind == "best" else "")
+        made.add_row(*[_text(row.cells[i], styles or {}) for i in columns], style=style)
     return made
+
+
+def _text(cell: str | page.Cell, styles: Mapping[str, str]) -> Text:
+    if isinstance(cell, str):
+        return Text(cell)
+    text = Text(cell.text, styles.get(cell.kind, ""))
+    return text.append(f"\n{cell.below}", "dim") if cell.below else text
 
 
 def pairs(rows: Iterable[tuple[str, str]], style: str = "", *, most: int | None = None) -> Table:
