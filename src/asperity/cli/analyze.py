@@ -12,17 +12,14 @@ from asperity.cli.options import (
     device_option,
     file_options,
     file_values,
-    first_device,
     given,
     law_option,
     law_options,
     options,
-    surface_values,
+    read_surface,
 )
 from asperity.cli.output import Outputs, output_options
 from asperity.cli.progress import step_bar
-from asperity.errors import ParameterError
-from asperity.laws import find_law
 
 if TYPE_CHECKING:
     from asperity.devices import Device
@@ -89,22 +86,13 @@ def command(surface: str, device: Device | None, outputs: Outputs, **values: Any
     or a scene file (TOML).
     """
     from asperity.analysis.analyze import STEPS, analyze
-    from asperity.analysis.compare import DEFAULT_DEVICE
-    from asperity.scene import load_scene
-    from asperity.scene.sections import surface_keywords
     from asperity.surface import Surface
 
-    asked, for_file = surface_values(values), file_values(values)
     with step_bar("reading the surface", len(STEPS)) as step:
-        scene = load_scene(surface, for_file)
-        merged = {**scene.surface, **asked}
-        if "law" not in merged:
-            raise ParameterError("law", "is missing: --law B, or a scene whose [surface] names one")
-        arguments = surface_keywords(merged, find_law(merged["law"]))
-        known = first_device(device, scene.device, default=DEFAULT_DEVICE)
-        whole = Surface(scene.texture, **arguments)
+        texture, known, arguments = read_surface(surface, device, values)
+        whole = Surface(texture, **arguments)
         result = analyze(whole, known, progress=step, **given(values, _SEARCH))
-    code = _texture_code(surface, for_file, scene.texture)
+    code = _texture_code(surface, file_values(values), texture)
 
     from asperity.report.analysis import analysis_page, print_analysis
 

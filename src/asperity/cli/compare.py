@@ -9,11 +9,9 @@ import click
 from asperity.cli.options import (
     device_option,
     file_options,
-    file_values,
-    first_device,
     law_options,
     laws_option,
-    surface_values,
+    read_surface,
 )
 from asperity.cli.output import Outputs, output_options
 from asperity.cli.progress import step_bar
@@ -43,19 +41,14 @@ def command(
     SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
     (X3P, NPY, text matrix, two-column profile) or a scene file (TOML).
     """
-    from asperity.analysis.compare import DEFAULT_DEVICE, compare
-    from asperity.scene import load_scene
-    from asperity.scene.sections import surface_keywords
+    from asperity.analysis.compare import compare
 
     chosen = laws or tuple(KNOWN_LAWS.values())
-    asked = surface_values(values)
     with step_bar("reading the surface", len(chosen)) as step:
-        scene = load_scene(surface, file_values(values))
-        arguments = surface_keywords({**scene.surface, **asked}, *chosen)
+        texture, known, arguments = read_surface(surface, device, values, chosen)
         arguments.pop("law", None)  # a scene names the law to run; here all are compared
-        known = first_device(device, scene.device, default=DEFAULT_DEVICE)
         result = compare(
-            scene.texture, known, chosen, progress=lambda law: step(f"law {law}"), **arguments
+            texture, known, chosen, progress=lambda law: step(f"law {law}"), **arguments
         )
     from asperity.report.comparison import comparison_page, print_comparison
 

@@ -2,18 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
 from asperity.cli.output import Outputs, output_options
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rich.console import Console
-
-    from asperity.devices import Device
 
 
 @click.command("devices")
@@ -26,19 +17,8 @@ def command(names: tuple[str, ...], outputs: Outputs) -> None:
     number with its unit, its source, and whether it was verified.
     """
     from asperity.devices import device_names, load_device
+    from asperity.report.devices import print_devices
 
     devices = [load_device(name) for name in names or device_names()]
     data = {"schema": 1, "devices": devices}
-    outputs.write(data, lambda console: _print(devices, bool(names), console))
-
-
-def _print(devices: Sequence[Device], in_detail: bool, console: Console) -> None:
-    from asperity.report.devices import print_device, print_devices
-
-    if not in_detail:
-        print_devices(devices, console)
-        return
-    for number, device in enumerate(devices):
-        if number:
-            console.print()
-        print_device(device, console)
+    outputs.write(data, lambda console: print_devices(devices, console, in_detail=bool(names)))

@@ -12,16 +12,13 @@ from asperity.cli.options import (
     LAW_OPTIONS,
     device_option,
     file_options,
-    file_values,
-    first_device,
     given,
     law_option,
     law_options,
     options,
-    surface_values,
+    read_surface,
 )
 from asperity.cli.output import Outputs, output_options
-from asperity.laws import find_law
 
 if TYPE_CHECKING:
     from asperity.devices import Device
@@ -53,22 +50,11 @@ def command(surface: str, device: Device | None, outputs: Outputs, **values: Any
     SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
     or a scene file (TOML).
     """
-    from asperity.analysis.check_limits import DEFAULT_DEVICE, DEFAULT_LAW, limits
-    from asperity.scene import load_scene
-    from asperity.scene.sections import surface_keywords
+    from asperity.analysis.check_limits import DEFAULT_LAW, limits
 
-    asked = surface_values(values)
-    scene = load_scene(surface, file_values(values))
-    merged = {"law": DEFAULT_LAW, **scene.surface, **asked}
-    result = limits(
-        scene.texture,
-        first_device(device, scene.device, default=DEFAULT_DEVICE),
-        **given(values, (_SPEED, *_SAMPLES)),
-        **surface_keywords(merged, find_law(merged["law"])),
-    )
+    texture, known, arguments = read_surface(surface, device, values, law=DEFAULT_LAW)
+    result = limits(texture, known, **given(values, (_SPEED, *_SAMPLES)), **arguments)
 
     from asperity.report.limits import limits_page, print_limits
 
-    outputs.write(
-        result, lambda console: print_limits(result, console), lambda: limits_page(result)
-    )
+    outputs.write(result, lambda to: print_limits(result, to), lambda: limits_page(result))

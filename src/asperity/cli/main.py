@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from typing import NoReturn
 
 import click
 
@@ -13,6 +14,7 @@ from asperity.errors import AsperityError, InternalError
 
 BAD_INPUT = 2
 INTERNAL_ERROR = 70  # as sysexits.h has it
+INTERRUPTED = 130  # as shells have it
 
 COMMANDS = {
     "analyze": "Say all that is known of one law on a surface and a device.",
@@ -68,23 +70,23 @@ def main() -> None:
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)
     except click.Abort:
-        click.echo("asperity: interrupted", err=True)
-        sys.exit(130)
+        _stop("interrupted", INTERRUPTED)
     except click.ClickException as error:
         error.show()
         sys.exit(BAD_INPUT)
     except InternalError as error:
-        click.echo(f"asperity: {error}", err=True)
-        sys.exit(INTERNAL_ERROR)
+        _stop(error, INTERNAL_ERROR)
     except AsperityError as error:
-        click.echo(f"asperity: {error}", err=True)
-        sys.exit(BAD_INPUT)
+        _stop(error, BAD_INPUT)
     except MemoryError:
-        click.echo("asperity: the surface is too large for this machine's memory", err=True)
-        sys.exit(BAD_INPUT)
+        _stop("the surface is too large for this machine's memory", BAD_INPUT)
     except Exception as error:
         said = own_fault(error)
         if said is None:
             raise  # a fault of asperity's own
-        click.echo(f"asperity: {said}", err=True)
-        sys.exit(BAD_INPUT)
+        _stop(said, BAD_INPUT)
+
+
+def _stop(said: object, code: int) -> NoReturn:
+    click.echo(f"asperity: {said}", err=True)
+    sys.exit(code)

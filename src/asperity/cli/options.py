@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -11,8 +11,11 @@ from asperity.arguments import MAX_DEPTH, STIFFNESS, Argument
 from asperity.cli.own_code import load_own_code
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError, nearest_names
-from asperity.laws import LAW_ARGUMENTS, find_law, find_laws, known_arguments
+from asperity.laws import LAW_ARGUMENTS, Law, find_law, find_laws, known_arguments
 from asperity.measured.arguments import FILE_ARGUMENTS
+
+if TYPE_CHECKING:
+    from asperity.textures import Texture
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -93,8 +96,7 @@ def several(argument: Argument) -> Read:
 
 def given(values: Mapping[str, Any], arguments: Iterable[Argument]) -> dict[str, Any]:
     """Return the values of the options that the user gave, by argument name."""
-    names = [argument.name for argument in arguments]
-    return {name: values[name] for name in names if values[name] is not None}
+    return {one.name: values[one.name] for one in arguments if values[one.name] is not None}
 
 
 def device_option(
@@ -172,6 +174,33 @@ def surface_values(values: Mapping[str, Any]) -> dict[str, Any]:
     return result
 
 
-def first_device(*devices: Device | None, default: str) -> Device:
-    """Return the first device that is one, else that of the catalogue."""
-    return next((device for device in devices if device is not None), None) or load_device(default)
+def read_surface(
+    source: str,
+    device: Device | None,
+    values: Mapping[str, Any],
+    laws: Sequence[Law] = (),
+    **defaults: Any,
+) -> tuple[Texture, Device, dict[str, Any]]:
+    """Return the texture and the device that SURFACE and the options name, and all other arguments.
+
+    Args:
+        source: a texture with its arguments, a file, or a scene.
+        device: the one of ``--device``; it comes before the scene's.
+        values: of the options, by name.
+        laws: those that are compared; by default the one of ``--law`` or of the scene.
+        defaults: of the other arguments.
+
+    Raises:
+        ParameterError: for what is missing, unknown or wrong.
+    """
+    from asperity.analysis.compare import DEFAULT_DEVICE
+    from asperity.scene import load_scene
+    from asperity.scene.sections import surface_keywords
+
+    asked = surface_values(values)
+    scene = load_scene(source, file_values(values))
+    merged = {**defaults, **scene.surface, **asked}
+    if not laws and "law" not in merged:
+        raise ParameterError("law", "is missing: --law B, or a scene whose [surface] names one")
+    arguments = surface_keywords(merged, *(laws or [find_law(merged["law"])]))
+    return scene.texture, device or scene.device or load_device(DEFAULT_DEVICE), arguments

@@ -79,19 +79,17 @@ def load_own_code(ctx: click.Context, _option: click.Parameter, files: tuple[str
         return
     places = registries()
     for place in places:
-        ctx.find_root().call_on_close(_restoring(place.known))
+        ctx.find_root().with_resource(_restored(place.known))
     for file in files:
         _load(file, places)
 
 
-def _restoring(table: dict[str, Any]) -> Callable[[], None]:
+@contextmanager
+def _restored(table: dict[str, Any]) -> Iterator[None]:
     before = dict(table)
-
-    def restore() -> None:
-        table.clear()
-        table.update(before)
-
-    return restore
+    yield
+    table.clear()
+    table.update(before)
 
 
 def _load(file: str, places: tuple[Registry, ...]) -> None:

@@ -105,8 +105,14 @@ def unknown_fields(device: Device) -> list[str]:
     ]
 
 
-def print_devices(devices: Sequence[Device], console: Console) -> None:
-    """Print the catalogue."""
+def print_devices(devices: Sequence[Device], console: Console, *, in_detail: bool = False) -> None:
+    """Print one row per device; in detail, everything that is known of each."""
+    if in_detail:
+        for number, device in enumerate(devices):
+            if number:
+                console.print()
+            _print_device(device, console)
+        return
     console.print(devices_table(devices, console.width))
     console.print()
     if any(not datum.verified for device in devices for datum in device.data.values()):
@@ -114,7 +120,7 @@ def print_devices(devices: Sequence[Device], console: Console) -> None:
     say(console, "Sources and other values: asperity devices NAME", "dim")
 
 
-def print_device(device: Device, console: Console) -> None:
+def _print_device(device: Device, console: Console) -> None:
     """Print everything that is known of a device, and what is not."""
     title = device.name if device.name == device.id else f"{device.name} ({device.id})"
     say(console, title, "bold")
