@@ -20,11 +20,12 @@ from asperity.report.words.number_words import (
     bound_text,
     force_text,
     holds_text,
-    in_one_unit,
     is_sampled,
     law_title,
+    leak_text,
     merit_text,
     place_text,
+    strength_has_unit,
 )
 from asperity.textures.catalogue import CATALOGUE
 from asperity.units import engineering, rounded_down
@@ -61,24 +62,6 @@ def stiffness_text(row: LawRow) -> str:
         return "none"
     mark = SAMPLED if is_sampled(row.limiting) else ""
     return f"{mark}{engineering(rounded_down(row.safe_stiffness), 'N/m')}"
-
-
-def leak_text(row: LawRow, comparison: Comparison) -> str:
-    """Return the energy of the worst loop: "0.64 mJ"; "0" where a proof says so.
-
-    All laws are given in one unit, that of the largest, so that a column can be compared.
-    """
-    leak = row.leak
-    if leak.energy == 0.0 and leak.method == "theorem":
-        return "0"
-    mark = SAMPLED if leak.method == "sampled" else ""
-    energies = [leak.worst, *(other.leak.worst for other in comparison.rows)]
-    return f"{mark}{in_one_unit(energies, 'J', digits=2)[0]}"
-
-
-def strength_has_unit(comparison: Comparison) -> bool:
-    """Return whether T carries metres: a surface without a period has no l to divide by."""
-    return not comparison.texture.scan_line().periodic
 
 
 def any_sampled(comparison: Comparison) -> bool:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from asperity.analysis.compare import Comparison
-from asperity.report.comparison import strength_has_unit
 from asperity.report.pictures import style
+from asperity.report.words.number_words import strength_has_unit
 
 
 def merit_figure(comparison: Comparison) -> Figure:

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.compare import Comparison
 from asperity.errors import ParameterError
-from asperity.report.comparison import leak_text
 from asperity.report.pictures import style
 from asperity.report.pictures.analysis_pictures import analysis_figure, picture_size, pictures_of
 from asperity.report.pictures.field_picture import draw_fields, field_size
@@ -20,6 +19,7 @@ from asperity.report.pictures.gain_picture import gain_figure
 from asperity.report.pictures.merit_picture import merit_figure
 from asperity.report.pictures.spectrum_picture import spectrum_figure
 from asperity.report.pictures.surface_picture import draw_surface, surface_size
+from asperity.report.words.number_words import leak_text
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.compare import Comparison
+from asperity.analysis.row import LawRow
 from asperity.units import engineering, rounded_down
 
 INFINITE = "∞"
@@ -173,6 +175,24 @@ def span_text(low: float, high: float, unit: str, digits: int = 5) -> str:
     if math.isinf(high):
         return f"at least {lower} {name}"
     return f"{lower} {name}" if lower == upper else f"{lower} to {upper} {name}"
+
+
+def leak_text(row: LawRow, comparison: Comparison) -> str:
+    """Return the energy of the worst loop: "0.64 mJ"; "0" where a proof says so.
+
+    All laws are given in one unit, that of the largest, so that a column can be compared.
+    """
+    leak = row.leak
+    if leak.energy == 0.0 and leak.method == "theorem":
+        return "0"
+    mark = SAMPLED if leak.method == "sampled" else ""
+    energies = [leak.worst, *(other.leak.worst for other in comparison.rows)]
+    return f"{mark}{in_one_unit(energies, 'J', digits=2)[0]}"
+
+
+def strength_has_unit(comparison: Comparison) -> bool:
+    """Return whether T carries metres: a surface without a period has no l to divide by."""
+    return not comparison.texture.scan_line().periodic
 
 
 # --- places ---------------------------------------------------------------------------------------
