@@ -12,9 +12,12 @@ from asperity.errors import ParameterError
 
 FloatArray = NDArray[np.float64]
 
+# Beyond these nothing is a size of this world, and products of a few leave double precision.
+_LEAST, _MOST = 1e-30, 1e30
+
 
 def real(name: str, value: object, unit: str = "") -> float:
-    """Return a finite number.
+    """Return a finite number of at most 1e30 in size.
 
     Raises:
         ParameterError: if it is none.
@@ -22,17 +25,22 @@ def real(name: str, value: object, unit: str = "") -> float:
     unit = f" [{unit}]" if unit else ""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise ParameterError(name, f"must be a number{unit}", value)
-    if not math.isfinite(value):
+    number = float(value)
+    if not math.isfinite(number):
         raise ParameterError(name, f"must be finite{unit}", value)
-    return float(value)
+    if abs(number) > _MOST:
+        raise ParameterError(name, f"must be at most {_MOST:g}{unit}", value)
+    return number
 
 
 def positive(name: str, value: object, unit: str = "") -> float:
-    """Return a positive finite number; see :func:`real`."""
+    """Return a positive number, at least 1e-30; see :func:`real`."""
     number = real(name, value, unit)
+    unit = f" [{unit}]" if unit else ""
     if number <= 0.0:
-        unit = f" [{unit}]" if unit else ""
         raise ParameterError(name, f"must be positive{unit}", value)
+    if number < _LEAST:
+        raise ParameterError(name, f"must be at least {_LEAST:g}{unit}", value)
     return number
 
 

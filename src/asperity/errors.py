@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
+import sys
 from collections.abc import Iterable
+from contextlib import suppress
 
 
 class AsperityError(Exception):
@@ -62,6 +63,17 @@ class InternalError(AsperityError, RuntimeError):
     """
 
 
+def tell(words: str) -> None:
+    """Say something in one line on standard error, if anybody listens.
+
+    Control characters (of a file's name, say) never reach the terminal as they are.
+    """
+    line = " ".join(words.splitlines())
+    line = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in line)
+    with suppress(OSError, ValueError):
+        print(f"asperity: {line}", file=sys.stderr, flush=True)
+
+
 def nearest_names(name: str, known: Iterable[str]) -> str:
     """Return a hint such as ``did you mean 'omega.3'?`` and the full choice.
 
@@ -72,6 +84,8 @@ def nearest_names(name: str, known: Iterable[str]) -> str:
     Returns:
         A phrase for the end of an error message.
     """
+    import difflib  # only when something is wrong
+
     choice = sorted(known)
     lowered = {c.lower(): c for c in choice}
     hits = [lowered[c] for c in difflib.get_close_matches(name.lower(), lowered, n=2, cutoff=0.65)]

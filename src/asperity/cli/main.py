@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import importlib
 import sys
-from typing import NoReturn
+import warnings
+from typing import Any, NoReturn
 
 import click
 
 import asperity
+from asperity.cache import CacheWarning
 from asperity.cli.own_code import own_fault
-from asperity.errors import AsperityError, InternalError
+from asperity.errors import AsperityError, InternalError, tell
 
 BAD_INPUT = 2
 INTERNAL_ERROR = 70  # as sysexits.h has it
@@ -63,10 +65,17 @@ def cli() -> None:
     """
 
 
+def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+    """Say a warning of asperity's own in one line; others are for developers."""
+    if issubclass(category, CacheWarning):
+        tell(str(message))
+
+
 def main() -> None:
     """Run the command line; bad input is one line on standard error and exit code 2."""
+    warnings.showwarning = _show_warning
     try:
-        cli(standalone_mode=False)
+        cli(prog_name="asperity", standalone_mode=False)
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)
     except click.Abort:
@@ -83,10 +92,10 @@ def main() -> None:
     except Exception as error:
         said = own_fault(error)
         if said is None:
-            raise  # a fault of asperity's own
+            raise  # a fault of asperity's own, or of the streams: see asperity.__main__
         _stop(said, BAD_INPUT)
 
 
 def _stop(said: object, code: int) -> NoReturn:
-    click.echo(f"asperity: {said}", err=True)
+    tell(str(said))
     sys.exit(code)
