@@ -6,6 +6,7 @@ Each is a function h(x, y, m, n): the derivative of order (m, n) of the height, 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 from typing import Any
 
 import mpmath
@@ -44,38 +45,28 @@ def exact_continuation(derivatives: Callable[[FloatArray], FloatArray]) -> Exact
     return height
 
 
-def exact_map(
-    coefficients: FloatArray, pitch: tuple[float, float], origin: FloatArray, periodic: bool
+def exact_spline(
+    coefficients: FloatArray, pitch: tuple[float, ...], origin: FloatArray, periodic: bool
 ) -> ExactHeight:
-    """Return the bicubic B-spline of coefficients at nodes, (ny, nx), mirrored or periodic."""
-    ny, nx = coefficients.shape
+    """Return the cubic B-spline of coefficients at nodes, (ny, nx) or (n,)."""
 
     def height(x: Any, y: Any, m: int, n: int) -> Any:
-        u = (x - mpmath.mpf(float(origin[0]))) / mpmath.mpf(pitch[0])
-        v = (y - mpmath.mpf(float(origin[1]))) / mpmath.mpf(pitch[1])
-        columns, rows = _weights(u, nx, periodic, m), _weights(v, ny, periodic, n)
-        total = sum(
-            wr * wc * mpmath.mpf(float(coefficients[i, j]))
-            for i, wr in rows.items()
-            for j, wc in columns.items()
-        )
-        return total / mpmath.mpf(pitch[0]) ** m / mpmath.mpf(pitch[1]) ** n
-
-    return height
-
-
-def exact_profile(
-    coefficients: FloatArray, pitch: float, origin: float, periodic: bool
-) -> ExactHeight:
-    """Return the cubic B-spline along x of coefficients at nodes, mirrored or periodic."""
-
-    def height(x: Any, _y: Any, m: int, n: int) -> Any:
-        if n > 0:
+        if n and coefficients.ndim == 1:
             return mpmath.mpf(0)
-        u = (x - mpmath.mpf(origin)) / mpmath.mpf(pitch)
-        columns = _weights(u, len(coefficients), periodic, m)
-        total = sum(w * mpmath.mpf(float(coefficients[j])) for j, w in columns.items())
-        return total / mpmath.mpf(pitch) ** m
+        steps = [mpmath.mpf(step) for step in pitch]
+        weights = []
+        for place, order, count, step, first in zip(
+            (x, y), (m, n), coefficients.shape[::-1], steps, origin, strict=False
+        ):
+            u = (place - mpmath.mpf(float(first))) / step
+            weights.append(_weights(u, count, periodic, order).items())
+        total = mpmath.mpf(0)
+        for around in product(*reversed(weights)):
+            nodes, shares = zip(*around, strict=True)
+            total += mpmath.fprod(shares) * mpmath.mpf(float(coefficients[nodes]))
+        for step, order in zip(steps, (m, n), strict=False):
+            total /= step**order
+        return total
 
     return height
 

@@ -5,27 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from types import ModuleType
-from typing import Any, ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
 from asperity.textures.bernstein import greatest_height
-from asperity.textures.cells.lines import Pieces, spline_pieces
-from asperity.textures.cells.splines import MapCells
-from asperity.textures.domain import Domain, ScanLine
 from asperity.textures.pyramid import plane_pyramid
 from asperity.textures.samplers.heightmap import HeightMapArguments
-from asperity.textures.texture import ExactHeight, Texture
+from asperity.textures.spline import Spline, node_heights
 
-LEAST_NODES = 4
 # Samples of a dense search: parts of the cells are looked at as long as there are no more.
 _MOST_SAMPLES = 1_200_000
 
 
-class HeightMap(Texture):
+class HeightMap(Spline):
     """The C² bicubic B-spline through heights[i, j] at (x, y) = origin + (j p_x, i p_y).
 
     A finite map is mirrored at its border nodes, so that the surface has no end; a periodic one
@@ -51,7 +47,9 @@ class HeightMap(Texture):
     """
 
     kind: ClassVar[str] = "heightmap"
-    sample_offset: ClassVar[float] = 0.0
+    noun: ClassVar[str] = "map"
+    pitch: tuple[float, float]
+    origin: FloatArray
 
     def __init__(
         self,
@@ -63,18 +61,13 @@ class HeightMap(Texture):
         preparation: Sequence[str] = (),
         filled: ArrayLike | None = None,
     ) -> None:
-        self.heights = array("heights", heights, (None, None), "m").copy()
-        if min(self.heights.shape) < LEAST_NODES:
-            ny, nx = self.heights.shape
-            raise ParameterError("heights", f"must be at least 4 x 4 points, got {ny} x {nx}")
+        self.heights = node_heights(heights, 2)
         pair = (pitch, pitch) if np.ndim(pitch) == 0 else tuple(pitch)  # type: ignore[arg-type]  # narrowed by ndim
         if len(pair) != 2:
             raise ParameterError("pitch", "must be one number or (p_x, p_y) [m]", pitch)
         self.pitch = (positive("pitch", pair[0], "m"), positive("pitch", pair[1], "m"))
-        self.periodic = bool(periodic)
         self.origin = array("origin", origin, (2,), "m")
-        self.preparation = tuple(preparation)
-        self.filled = mask("filled", filled, self.heights.shape)
+        self._keep(periodic, preparation, filled)
 
     def __repr__(self) -> str:
         ny, nx = self.heights.shape
@@ -88,11 +81,6 @@ class HeightMap(Texture):
         from asperity.textures.samplers import heightmap, spline
 
         return heightmap, spline, search
-
-    @cached_property
-    def coefficients(self) -> FloatArray:
-        """B-spline coefficients [m], one row and column before the first cell, two after."""
-        return padded_coefficients(self.heights, self.periodic)
 
     @cached_property
     def arguments(self) -> HeightMapArguments:
@@ -123,43 +111,6 @@ class HeightMap(Texture):
         inflate = 1.0 + 1e-12
         return inflate * float(np.hypot(gx, gy)), inflate * (max(hxx, hyy) + hxy)
 
-    @property
-    def _extent(self) -> tuple[float, float]:
-        cells = [n if self.periodic else n - 1 for n in self.heights.shape]
-        return cells[1] * self.pitch[0], cells[0] * self.pitch[1]
-
-    @cached_property
-    def domain(self) -> Domain:
-        """One period, or the extent of the map."""
-        text = "one period" if self.periodic else "the extent of the map"
-        spans = np.diag(self._extent)
-        return Domain(self.origin, spans, periodic=self.periodic, description=text)
-
-    @property
-    def ends(self) -> bool:
-        """See :class:`Texture`."""
-        return not self.periodic
-
-    def exact_height(self) -> ExactHeight:
-        """See :class:`Texture`."""
-        from asperity.textures.exact import exact_map
-
-        ny, nx = self.heights.shape
-        inner = self.coefficients[1 : ny + 1, 1 : nx + 1]
-        return exact_map(inner, self.pitch, self.origin, self.periodic)
-
-    def cells(
-        self,
-        extent: tuple[float, float] | None = None,  # noqa: ARG002 - all of it, always
-        margin: float = 0.0,  # noqa: ARG002 - likewise
-    ) -> MapCells:
-        """See :class:`Texture`; the cells of the spline, all of them."""
-        return MapCells(self.coefficients, self.pitch, self.origin, self.derivatives)
-
-    def line_pieces(self, line: ScanLine, least: int) -> Pieces | None:
-        """See :class:`Texture`; a line along an axis, from node to node."""
-        return spline_pieces(self.cells(), line, least)
-
     def sample_counts(self) -> list[int]:
         """See :class:`Texture`; whole parts of the cells."""
         counts = [n - self.ends for n in self.heights.shape[::-1]]
@@ -168,57 +119,3 @@ class HeightMap(Texture):
         while counts[0] * counts[1] > _MOST_SAMPLES:
             counts = [-(-n // 2) for n in counts]
         return counts
-
-    def grid_counts(self) -> list[int]:
-        """See :class:`Texture`; the nodes."""
-        return list(self.heights.shape[::-1])
-
-    def samples(self) -> tuple[FloatArray, tuple[float, float], bool]:
-        """See :class:`Texture`; the nodes."""
-        return self.heights, self.pitch, self.periodic
-
-    def scan_line(self) -> ScanLine:
-        """Along x through the middle of the map."""
-        width, depth = self._extent
-        start = self.origin + np.array([0.0, 0.5 * depth])
-        return ScanLine(start, np.array([1.0, 0.0]), width, periodic=self.periodic)
-
-    def describe(self) -> dict[str, Any]:
-        """See :class:`Texture`."""
-        return {
-            "kind": self.kind,
-            "points": list(self.heights.shape[::-1]),
-            "pitch": list(self.pitch),
-            "periodic": self.periodic,
-            "preparation": list(self.preparation),
-        }
-
-
-def mask(name: str, value: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
-    """Return a mask of the shape, or None for none.
-
-    Raises:
-        ParameterError: for another shape, or values that are neither true nor false.
-    """
-    if value is None:
-        return None
-    result = np.ascontiguousarray(value)
-    if result.dtype != np.bool_ or result.shape != shape:
-        wanted = f"must be true or false for each height, shape {shape}"
-        raise ParameterError(name, wanted, f"{result.dtype} of shape {result.shape}")
-    return result
-
-
-def padded_coefficients(heights: FloatArray, periodic: bool) -> FloatArray:
-    """Return the cubic B-spline coefficients of heights on a grid of any dimension.
-
-    Mirrored or periodic at the border, padded by one coefficient before the first cell and two
-    after the last along each axis.
-    """
-    from scipy.ndimage import spline_filter
-
-    mode: Literal["grid-wrap", "mirror"] = "grid-wrap" if periodic else "mirror"
-    inner = spline_filter(heights, order=3, output=np.float64, mode=mode)
-    if periodic:
-        return np.ascontiguousarray(np.pad(inner, (1, 2), mode="wrap"))
-    return np.ascontiguousarray(np.pad(inner, 1, mode="reflect"))

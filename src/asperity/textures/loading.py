@@ -98,18 +98,11 @@ def prepare_file(
 
 def texture_of(prepared: Prepared) -> HeightMap | Profile:
     """Return the spline through a prepared surface."""
+    rest: dict[str, Any] = {
+        "periodic": prepared.periodic,
+        "preparation": prepared.steps,
+        "filled": prepared.filled,
+    }
     if prepared.heights.ndim == 1:
-        return Profile(
-            prepared.heights,
-            prepared.pitch[0],
-            periodic=prepared.periodic,
-            preparation=prepared.steps,
-            filled=prepared.filled,
-        )
-    return HeightMap(
-        prepared.heights,
-        prepared.pitch,
-        periodic=prepared.periodic,
-        preparation=prepared.steps,
-        filled=prepared.filled,
-    )
+        return Profile(prepared.heights, prepared.pitch[0], **rest)
+    return HeightMap(prepared.heights, prepared.pitch, **rest)

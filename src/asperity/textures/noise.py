@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,8 +11,9 @@ import numpy as np
 from asperity.arguments import SEED, Argument, whole
 from asperity.checks import fraction, positive
 from asperity.errors import ParameterError
-from asperity.textures.heightmap import LEAST_NODES, HeightMap
+from asperity.textures.heightmap import HeightMap
 from asperity.textures.profile import Profile
+from asperity.textures.spline import LEAST_NODES, Spline
 from asperity.textures.texture import Kind
 from asperity.textures.waves import LEAST_NODES_PER_WAVE, Band, random_field, random_line, with_rms
 
@@ -27,17 +27,71 @@ _MOST_NODES = 2**24
 _MOST_WAVES = 4096
 
 
-@dataclass(frozen=True)
-class _Plan:
-    """The grid and the wavelengths that the arguments ask for, all lengths in metres."""
+class _SelfAffine(Spline):
+    """What a rough map and a rough profile have in common."""
 
-    counts: tuple[int, ...]
-    pitches: tuple[float, ...]
-    rolloff: float
-    cutoff: float
+    rms: float
+    hurst: float
+    seed: int
+    size: float | tuple[float, float]
+
+    def _plan(
+        self,
+        sides: tuple[float, ...],
+        pitch: float | None,
+        rolloff: float | None,
+        cutoff: float | None,
+    ) -> tuple[tuple[int, ...], tuple[float, ...], Band]:
+        """Return how many nodes along each axis, their distances [m], and the spectrum."""
+        shortest = min(sides)
+        if cutoff is None and pitch is None:
+            cutoff = shortest / _WAVES_PER_SIDE
+        elif cutoff is None:
+            cutoff = _NODES_PER_WAVE * positive("pitch", pitch, "m")
+        cutoff = positive("cutoff", cutoff, "m")
+        if cutoff > shortest:
+            raise ParameterError("cutoff", f"must be at most the period, {shortest:g} m", cutoff)
+        pitch = cutoff / _NODES_PER_WAVE if pitch is None else positive("pitch", pitch, "m")
+        if pitch > cutoff / LEAST_NODES_PER_WAVE * (1.0 + 1e-9):
+            raise ParameterError("pitch", f"must be at most a quarter of the cut-off {cutoff:g} m, "
+                                 "or the spline cannot follow", pitch)  # fmt: skip
+        rolloff = max(shortest / _ROLLOFF_PER_SIDE, cutoff) if rolloff is None else rolloff
+        if positive("rolloff", rolloff, "m") < cutoff:
+            raise ParameterError("rolloff", f"must be at least the cut-off, {cutoff:g} m", rolloff)
+        # The tiny share forgives the rounding of a side that is a whole number of pitches.
+        wanted = [side / pitch - 1e-9 * (side / pitch) for side in sides]
+        if math.prod(wanted) > _MOST_NODES:
+            short = f"asks for {math.prod(wanted):.3g} nodes, at most 2^24 can be used"
+            advice = "give a smaller size, or a longer cut-off and pitch"
+            raise ParameterError("size", f"{short}: {advice}")
+        counts = tuple(max(math.ceil(count), LEAST_NODES) for count in wanted)
+        self.rolloff, self.cutoff = float(rolloff), cutoff
+        # Power q^(-d-2H) is the square of the amplitude.
+        band = Band(0.5 * len(sides) + self.hurst, self.rolloff, self.cutoff)
+        return counts, tuple(side / n for side, n in zip(sides, counts, strict=True)), band
+
+    def __repr__(self) -> str:
+        return (
+            f"{type(self).__name__}(rms={self.rms!r}, size={self.size!r}, "
+            f"pitch={max(self._pitches)!r}, hurst={self.hurst!r}, rolloff={self.rolloff!r}, "
+            f"cutoff={self.cutoff!r}, seed={self.seed})"
+        )
+
+    def describe(self) -> dict[str, Any]:
+        """See :class:`Texture`."""
+        own = {
+            "kind": self.kind,
+            "rms": self.rms,
+            "size": np.array(self.size).tolist(),
+            "hurst": self.hurst,
+            "rolloff": self.rolloff,
+            "cutoff": self.cutoff,
+            "seed": self.seed,
+        }
+        return own | super().describe()
 
 
-class Noise(HeightMap):
+class Noise(_SelfAffine, HeightMap):
     """A self-affine rough surface, isotropic and periodic, by its power spectrum.
 
     C(q) ∝ max(q, q_r)^(-2 - 2H) for q <= q_s, and 0 above, with q_r = 2π/rolloff and
@@ -87,29 +141,15 @@ class Noise(HeightMap):
         self.rms, self.hurst = positive("rms", rms, "m"), fraction("hurst", hurst)
         self.seed = whole("seed", seed)
         self.size = _pair(size)
-        plan = _plan(self.size, pitch, rolloff, cutoff)
-        self.rolloff, self.cutoff = plan.rolloff, plan.cutoff
+        counts, pitches, band = self._plan(self.size, pitch, rolloff, cutoff)
         if max(self.size) > _MOST_WAVES * self.cutoff:
             longest = f"must not be longer than {_MOST_WAVES} cut-offs of {self.cutoff:g} m"
             raise ParameterError("size", longest, size)
-        # Power q^(-2-2H) is the square of the amplitude.
-        band = Band(1.0 + self.hurst, self.rolloff, self.cutoff)
-        field = random_field((plan.counts[1], plan.counts[0]), self.size, band, self.seed)
-        super().__init__(with_rms(field, self.rms), plan.pitches, periodic=True)
-
-    def __repr__(self) -> str:
-        return (
-            f"Noise(rms={self.rms!r}, size={self.size!r}, pitch={max(self.pitch)!r}, "
-            f"hurst={self.hurst!r}, rolloff={self.rolloff!r}, cutoff={self.cutoff!r}, "
-            f"seed={self.seed})"
-        )
-
-    def describe(self) -> dict[str, Any]:
-        """See :class:`Texture`."""
-        return _description(self, list(self.size)) | super().describe()
+        field = random_field((counts[1], counts[0]), self.size, band, self.seed)
+        super().__init__(with_rms(field, self.rms), pitches, periodic=True)
 
 
-class NoiseProfile(Profile):
+class NoiseProfile(_SelfAffine, Profile):
     """A self-affine rough profile, periodic, by its power spectrum.
 
     C(q) ∝ max(q, q_r)^(-1 - 2H) for q <= q_s, and 0 above: what a straight cut through a
@@ -148,22 +188,9 @@ class NoiseProfile(Profile):
         self.rms, self.hurst = positive("rms", rms, "m"), fraction("hurst", hurst)
         self.seed = whole("seed", seed)
         self.size = positive("size", size, "m")
-        plan = _plan((self.size,), pitch, rolloff, cutoff)
-        self.rolloff, self.cutoff = plan.rolloff, plan.cutoff
-        band = Band(0.5 + self.hurst, self.rolloff, self.cutoff)
-        field = random_line(plan.counts[0], self.size, band, self.seed)
-        super().__init__(with_rms(field, self.rms), plan.pitches[0], periodic=True)
-
-    def __repr__(self) -> str:
-        return (
-            f"NoiseProfile(rms={self.rms!r}, size={self.size!r}, pitch={self.pitch!r}, "
-            f"hurst={self.hurst!r}, rolloff={self.rolloff!r}, cutoff={self.cutoff!r}, "
-            f"seed={self.seed})"
-        )
-
-    def describe(self) -> dict[str, Any]:
-        """See :class:`Texture`."""
-        return _description(self, self.size) | super().describe()
+        counts, pitches, band = self._plan((self.size,), pitch, rolloff, cutoff)
+        field = random_line(counts[0], self.size, band, self.seed)
+        super().__init__(with_rms(field, self.rms), pitches[0], periodic=True)
 
 
 def _pair(size: float | Sequence[float]) -> tuple[float, float]:
@@ -171,46 +198,6 @@ def _pair(size: float | Sequence[float]) -> tuple[float, float]:
     if len(both) != 2:
         raise ParameterError("size", "must be one number or (L_x, L_y) [m]", size)
     return positive("size", both[0], "m"), positive("size", both[1], "m")
-
-
-def _plan(
-    sides: tuple[float, ...], pitch: float | None, rolloff: float | None, cutoff: float | None
-) -> _Plan:
-    shortest = min(sides)
-    if cutoff is None and pitch is None:
-        cutoff = shortest / _WAVES_PER_SIDE
-    elif cutoff is None:
-        cutoff = _NODES_PER_WAVE * positive("pitch", pitch, "m")
-    cutoff = positive("cutoff", cutoff, "m")
-    if cutoff > shortest:
-        raise ParameterError("cutoff", f"must be at most the period, {shortest:g} m", cutoff)
-    pitch = cutoff / _NODES_PER_WAVE if pitch is None else positive("pitch", pitch, "m")
-    if pitch > cutoff / LEAST_NODES_PER_WAVE * (1.0 + 1e-9):
-        raise ParameterError("pitch", f"must be at most a quarter of the cut-off {cutoff:g} m, "
-                             "or the spline cannot follow", pitch)  # fmt: skip
-    rolloff = max(shortest / _ROLLOFF_PER_SIDE, cutoff) if rolloff is None else rolloff
-    if positive("rolloff", rolloff, "m") < cutoff:
-        raise ParameterError("rolloff", f"must be at least the cut-off, {cutoff:g} m", rolloff)
-    # The tiny share forgives the rounding of a side that is a whole number of pitches.
-    wanted = [side / pitch - 1e-9 * (side / pitch) for side in sides]
-    if math.prod(wanted) > _MOST_NODES:
-        short = f"asks for {math.prod(wanted):.3g} nodes, at most 2^24 can be used"
-        raise ParameterError("size", f"{short}: give a smaller size, or a longer cut-off and pitch")
-    counts = tuple(max(math.ceil(count), LEAST_NODES) for count in wanted)
-    pitches = tuple(side / count for side, count in zip(sides, counts, strict=True))
-    return _Plan(counts, pitches, float(rolloff), cutoff)
-
-
-def _description(noise: Noise | NoiseProfile, size: float | list[float]) -> dict[str, Any]:
-    return {
-        "kind": noise.kind,
-        "rms": noise.rms,
-        "size": size,
-        "hurst": noise.hurst,
-        "rolloff": noise.rolloff,
-        "cutoff": noise.cutoff,
-        "seed": noise.seed,
-    }
 
 
 def _arguments(size: Argument) -> tuple[Argument, ...]:

@@ -5,26 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.checks import FloatArray, array, positive, real
-from asperity.errors import ParameterError
-from asperity.textures.cells.lines import Pieces, spline_pieces
-from asperity.textures.cells.splines import ProfileCells
-from asperity.textures.domain import Domain, ScanLine
-from asperity.textures.heightmap import LEAST_NODES, mask, padded_coefficients
+from asperity.checks import positive, real
 from asperity.textures.pyramid import line_pyramid
 from asperity.textures.samplers.profile import ProfileArguments
-from asperity.textures.texture import ExactHeight, Texture
+from asperity.textures.spline import Spline, node_heights
 
 # Samples of a dense search, at least.
 _LEAST_SAMPLES = 4096
 
 
-class Profile(Texture):
+class Profile(Spline):
     """The C² cubic B-spline through heights[j] at x = origin + j pitch; constant along y.
 
     A finite profile is mirrored at its border nodes; a periodic one repeats after n pitch.
@@ -48,7 +43,9 @@ class Profile(Texture):
     """
 
     kind: ClassVar[str] = "profile"
-    sample_offset: ClassVar[float] = 0.0
+    noun: ClassVar[str] = "profile"
+    pitch: float
+    origin: float
 
     def __init__(
         self,
@@ -60,14 +57,10 @@ class Profile(Texture):
         preparation: Sequence[str] = (),
         filled: ArrayLike | None = None,
     ) -> None:
-        self.heights = array("heights", heights, (None,), "m").copy()
-        if len(self.heights) < LEAST_NODES:
-            raise ParameterError("heights", f"must be at least 4 points, got {len(self.heights)}")
+        self.heights = node_heights(heights, 1)
         self.pitch = positive("pitch", pitch, "m")
-        self.periodic = bool(periodic)
         self.origin = real("origin", origin, "m")
-        self.preparation = tuple(preparation)
-        self.filled = mask("filled", filled, self.heights.shape)
+        self._keep(periodic, preparation, filled)
 
     def __repr__(self) -> str:
         edge = "periodic" if self.periodic else "finite"
@@ -80,11 +73,6 @@ class Profile(Texture):
         from asperity.textures.samplers import profile, spline
 
         return profile, spline, line
-
-    @cached_property
-    def coefficients(self) -> FloatArray:
-        """B-spline coefficients [m], one before the first cell, two after the last."""
-        return padded_coefficients(self.heights, self.periodic)
 
     @cached_property
     def arguments(self) -> ProfileArguments:
@@ -116,66 +104,7 @@ class Profile(Texture):
         bend = float(np.abs(np.diff(self.coefficients, 2)).max()) / self.pitch**2
         return inflate * slope, inflate * bend
 
-    @property
-    def _extent(self) -> float:
-        return (len(self.heights) - (0 if self.periodic else 1)) * self.pitch
-
-    @cached_property
-    def domain(self) -> Domain:
-        """One period, or the extent of the profile."""
-        text = "one period" if self.periodic else "the extent of the profile"
-        corner: FloatArray = np.array([self.origin, 0.0])
-        spans = np.array([[self._extent, 0.0]])
-        return Domain(corner, spans, periodic=self.periodic, description=text)
-
-    @property
-    def ends(self) -> bool:
-        """See :class:`Texture`."""
-        return not self.periodic
-
-    def exact_height(self) -> ExactHeight:
-        """See :class:`Texture`."""
-        from asperity.textures.exact import exact_profile
-
-        inner = self.coefficients[1 : len(self.heights) + 1]
-        return exact_profile(inner, self.pitch, self.origin, self.periodic)
-
-    def cells(
-        self,
-        extent: tuple[float, float] | None = None,  # noqa: ARG002 - all of it, always
-        margin: float = 0.0,  # noqa: ARG002 - likewise
-    ) -> ProfileCells:
-        """See :class:`Texture`; the cells of the spline, all of them."""
-        return ProfileCells(self.coefficients, self.pitch, self.origin, self.derivatives)
-
-    def line_pieces(self, line: ScanLine, least: int) -> Pieces | None:
-        """See :class:`Texture`; a line along x, from node to node."""
-        return spline_pieces(self.cells(), line, least)
-
     def sample_counts(self) -> list[int]:
         """See :class:`Texture`; whole parts of the cells."""
         cells = len(self.heights) - self.ends
         return [cells * max(1, -(-_LEAST_SAMPLES // cells))]
-
-    def grid_counts(self) -> list[int]:
-        """See :class:`Texture`; the nodes."""
-        return [len(self.heights)]
-
-    def samples(self) -> tuple[FloatArray, tuple[float, float], bool]:
-        """See :class:`Texture`; the nodes."""
-        return self.heights[None], (self.pitch, self.pitch), self.periodic
-
-    def scan_line(self) -> ScanLine:
-        """Along x over the whole profile."""
-        start = np.array([self.origin, 0.0])
-        return ScanLine(start, np.array([1.0, 0.0]), self._extent, periodic=self.periodic)
-
-    def describe(self) -> dict[str, Any]:
-        """See :class:`Texture`."""
-        return {
-            "kind": self.kind,
-            "points": len(self.heights),
-            "pitch": self.pitch,
-            "periodic": self.periodic,
-            "preparation": list(self.preparation),
-        }

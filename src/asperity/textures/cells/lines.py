@@ -10,7 +10,7 @@ import numpy as np
 from asperity.checks import FloatArray
 from asperity.enclosures.cells import Cells
 from asperity.enclosures.taylor import Number, Taylor
-from asperity.textures.cells.splines import MapCells, ProfileCells
+from asperity.textures.cells.splines import SplineCells
 from asperity.textures.cells.waves import WaveCells
 from asperity.textures.domain import ScanLine
 from asperity.textures.plane_waves import PlaneWaves
@@ -57,7 +57,7 @@ def wave_pieces(waves: PlaneWaves, line: ScanLine, least: int) -> Pieces:
     return equal_pieces(_LineOfWaves(waves, line), line, least, line.length)
 
 
-def spline_pieces(cells: MapCells | ProfileCells, line: ScanLine, least: int) -> Pieces | None:
+def spline_pieces(cells: SplineCells, line: ScanLine, least: int) -> Pieces | None:
     """Cut a line at the nodes of a spline and between them; at least so many pieces.
 
     It must begin and end at nodes, and not run across the cells: else there are none.
@@ -68,9 +68,7 @@ def spline_pieces(cells: MapCells | ProfileCells, line: ScanLine, least: int) ->
     return None
 
 
-def _pieces_along(
-    cells: MapCells | ProfileCells, axis: int, line: ScanLine, least: int
-) -> Pieces | None:
+def _pieces_along(cells: SplineCells, axis: int, line: ScanLine, least: int) -> Pieces | None:
     ends = cells.coordinates(np.stack([line.start, line.start + line.length * line.direction]))
     low, high = np.sort(ends[:, axis])
     nodes = round(high - low)

@@ -6,19 +6,18 @@ several cells of a map its B-spline coefficients do.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.checks import FloatArray
 from asperity.enclosures.cells import CHUNK, EPS, ORDERS, SAMPLES, Cells, spread
 from asperity.enclosures.taylor import Number, Taylor
 
-Evaluate = Callable[[FloatArray], FloatArray]
-
 # From uniform B-spline to Bernstein coefficients on one cell, by degree.
 _TO_BERNSTEIN = {
-    0: np.ones((1, 1)),
     1: np.eye(2),
     2: np.array([[1.0, 1.0, 0.0], [0.0, 2.0, 0.0], [0.0, 1.0, 1.0]]) / 2.0,
     3: np.array(
@@ -28,52 +27,58 @@ _TO_BERNSTEIN = {
 }
 
 
-# Cells along the side of the blocks that are looked at first: a power of two.
+# Cells along the side of the blocks of a map that are looked at first: a power of two.
 _BLOCK = 4
+_GAPS = {1: (1e-6, 1e-9), 2: (1e-3, 1e-6)}
 
 
-class MapCells(Cells):
-    """The cells of a bicubic spline, in units of its nodes, and at first blocks of them.
+class SplineCells(Cells):
+    """The cells of a spline, in units of its nodes; of a map at first blocks of them.
 
     Args:
-        coefficients: of the B-spline [m], one row and column before the first cell, two after.
-        pitch: distance of the nodes (p_x, p_y) [m].
-        origin: the first node [m], shape (2,).
+        coefficients: of the B-spline [m], one (row and column) before the first cell, two after;
+            shape (n + 3,) for a profile along x.
+        pitch: distance of the nodes [m], (p_x, p_y) or (p_x,).
+        origin: the first node [m], shape (2,) or (1,).
         derivatives: h, h_x, h_y, h_xx, h_xy, h_yy, (n, 6), at points (n, 2) [m].
     """
-
-    dimensions, gap, cheap_gap = 2, 1e-3, 1e-6
 
     def __init__(
         self,
         coefficients: FloatArray,
-        pitch: tuple[float, float],
+        pitch: tuple[float, ...],
         origin: FloatArray,
-        derivatives: Evaluate,
+        derivatives: Callable[[FloatArray], FloatArray],
     ) -> None:
         self._c, self._per, self._origin = coefficients, 1.0 / np.array(pitch), origin
-        self._counts = np.array([coefficients.shape[1] - 3, coefficients.shape[0] - 3])
+        self._counts = np.array(coefficients.shape[::-1]) - 3
         self._evaluate = derivatives
+        self.dimensions = len(pitch)
+        self.gap, self.cheap_gap = _GAPS[self.dimensions]
 
     def start(self) -> tuple[Iterator[FloatArray], FloatArray]:
         """See :class:`Cells`."""
-        side = _BLOCK
+        side = _BLOCK if self.dimensions > 1 else 1
         while side > self._counts.min():
             side //= 2
         # The last blocks overlap where the cells are no multiple of the side.
-        x, y = (np.append(np.arange(0, n - side, side), n - side) for n in self._counts)
-        total = len(x) * len(y)
+        firsts = [np.append(np.arange(0, n - side, side), n - side) for n in self._counts]
+        shape = [len(first) for first in firsts[::-1]]
+        total = math.prod(shape)
 
         def chunks() -> Iterator[FloatArray]:
-            for first in range(0, total, CHUNK):
-                rows, columns = np.divmod(np.arange(first, min(first + CHUNK, total)), len(x))
-                yield np.stack([x[columns], y[rows]], axis=-1) + 0.5 * side
+            for begin in range(0, total, CHUNK):
+                index = np.unravel_index(np.arange(begin, min(begin + CHUNK, total)), shape)
+                places = zip(firsts, index[::-1], strict=True)
+                yield np.stack([first[k] for first, k in places], axis=-1) + 0.5 * side
 
-        return chunks(), np.full(2, 0.5 * side)
+        return chunks(), np.full(self.dimensions, 0.5 * side)
 
     def samples(self, count: int = SAMPLES) -> FloatArray:
         """See :class:`Cells`; at nodes, where second derivatives of a spline are extreme."""
-        return np.asarray(np.round(spread(count, 2) * self._counts))
+        if self.dimensions == 1:
+            count = min(count, 4 * int(self._counts[0]))
+        return np.asarray(np.round(spread(count, self.dimensions) * self._counts))
 
     def models(
         self, centres: FloatArray, half: FloatArray, names: Sequence[str]
@@ -82,22 +87,31 @@ class MapCells(Cells):
         side = max(1, round(2.0 * float(half.max())))
         first = centres if side == 1 else centres - half
         cell = np.minimum(np.floor(first).astype(np.int64), self._counts - side)
-        step = np.arange(side + 3)
-        patch = self._c[
-            (cell[:, 1, None] + step)[:, :, None], (cell[:, 0, None] + step)[:, None, :]
-        ]
+        patch = self._patches(cell, side + 3)
         matrices = _AxisMatrices(centres - half - cell, 2.0 * half)
         slack = 256.0 * EPS * np.abs(patch).max(axis=(1, 2))
+        per_x, per_y = (*self._per, 1.0)[:2]
         result: dict[str, Number] = {}
         for name in names:
             nx, ny = ORDERS[name]
-            scale = float(self._per[0] ** nx * self._per[1] ** ny)
+            if ny and self.dimensions == 1:
+                result[name] = 0.0
+                continue
+            scale = float(per_x**nx * per_y**ny)
             part = np.diff(np.diff(patch, nx, axis=2), ny, axis=1)
             if side > 1:
                 result[name] = _fit_block(part, side, scale, slack)
             else:
-                result[name] = _fit(matrices.both(part), scale, slack)
+                result[name] = _fit(matrices.bernstein(part), scale, slack)
         return result
+
+    def _patches(self, cell: NDArray[np.int64], width: int) -> FloatArray:
+        """Return the coefficients from a cell on, (n, width, width), (n, 1, width) of a profile."""
+        step = np.arange(width)
+        columns = (cell[:, 0, None] + step)[:, None, :]
+        if self.dimensions == 1:
+            return np.asarray(self._c[columns])
+        return np.asarray(self._c[(cell[:, 1, None] + step)[:, :, None], columns])
 
     def derivatives(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""
@@ -105,78 +119,16 @@ class MapCells(Cells):
 
     def plane(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""
-        return np.ascontiguousarray(self._origin + coordinates / self._per)
+        points = self._origin + coordinates / self._per
+        return np.ascontiguousarray(np.pad(points, ((0, 0), (0, 2 - self.dimensions))))
 
     def coordinates(self, xy: FloatArray) -> FloatArray:
-        """Return the coordinates (n, 2) of points of the plane."""
-        return np.asarray((xy - self._origin) * self._per)
+        """Return the coordinates (n, d) of points of the plane."""
+        return np.asarray((xy[:, : self.dimensions] - self._origin) * self._per)
 
     def inside(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""
         return np.clip(coordinates, 0.0, self._counts)
-
-
-class ProfileCells(Cells):
-    """The cells of a cubic spline along x, in units of its nodes; see :class:`MapCells`."""
-
-    dimensions, gap, cheap_gap = 1, 1e-6, 1e-9
-
-    def __init__(
-        self, coefficients: FloatArray, pitch: float, origin: float, derivatives: Evaluate
-    ) -> None:
-        self._c, self._per, self._origin = coefficients, 1.0 / pitch, origin
-        self._count = len(coefficients) - 3
-        self._evaluate = derivatives
-
-    def start(self) -> tuple[Iterator[FloatArray], FloatArray]:
-        """See :class:`Cells`."""
-        firsts = range(0, self._count, CHUNK)
-
-        def chunks() -> Iterator[FloatArray]:
-            for first in firsts:
-                cells = np.arange(first, min(first + CHUNK, self._count), dtype=float)
-                yield cells[:, None] + 0.5
-
-        return chunks(), np.array([0.5])
-
-    def samples(self, count: int = SAMPLES) -> FloatArray:
-        """See :class:`Cells`; at nodes, where second derivatives of a spline are extreme."""
-        return np.round(spread(min(count, 4 * self._count), 1) * self._count)
-
-    def models(
-        self, centres: FloatArray, half: FloatArray, names: Sequence[str]
-    ) -> dict[str, Number]:
-        """See :class:`Cells`."""
-        cell = np.minimum(np.floor(centres).astype(np.int64), self._count - 1)
-        patch = self._c[cell + np.arange(4)][:, None, :]
-        matrices = _AxisMatrices(centres - half - cell, 2.0 * half)
-        slack = 256.0 * EPS * np.abs(patch).max(axis=(1, 2))
-        result: dict[str, Number] = {}
-        for name in names:
-            nx, ny = ORDERS[name]
-            if ny:
-                result[name] = 0.0
-                continue
-            part = np.diff(patch, nx, axis=2)
-            result[name] = _fit(matrices.along_x(part), float(self._per**nx), slack)
-        return result
-
-    def derivatives(self, coordinates: FloatArray) -> FloatArray:
-        """See :class:`Cells`."""
-        return self._evaluate(self.plane(coordinates))
-
-    def plane(self, coordinates: FloatArray) -> FloatArray:
-        """See :class:`Cells`."""
-        x = self._origin + coordinates[:, 0] / self._per
-        return np.ascontiguousarray(np.stack([x, np.zeros_like(x)], axis=-1))
-
-    def coordinates(self, xy: FloatArray) -> FloatArray:
-        """Return the coordinates (n, 1) of points of the plane."""
-        return np.asarray((xy[:, :1] - self._origin) * self._per)
-
-    def inside(self, coordinates: FloatArray) -> FloatArray:
-        """See :class:`Cells`."""
-        return np.clip(coordinates, 0.0, self._count)
 
 
 class _AxisMatrices:
@@ -197,17 +149,11 @@ class _AxisMatrices:
             self._known[key] = split @ _TO_BERNSTEIN[degree]
         return self._known[key]
 
-    def along_x(self, part: FloatArray) -> FloatArray:
-        """Return the Bernstein coefficients of rows (n, q, p)."""
-        m = self._matrix(0, part.shape[2] - 1)
-        if len(m) == 1:
-            return np.asarray(part @ m[0].T)
-        return np.asarray(part @ m.transpose(0, 2, 1))
-
-    def both(self, part: FloatArray) -> FloatArray:
-        """Return the tensor Bernstein coefficients of patches (n, q, p)."""
-        m = self._matrix(1, part.shape[1] - 1)
-        return np.asarray(m @ self.along_x(part))
+    def bernstein(self, part: FloatArray) -> FloatArray:
+        """Return the tensor Bernstein coefficients of patches (n, q, p); of lines with q = 1."""
+        _, rows, columns = part.shape
+        along = part @ self._matrix(0, columns - 1).transpose(0, 2, 1)
+        return np.asarray(along if rows == 1 else self._matrix(1, rows - 1) @ along)
 
 
 def _subdivision(degree: int, left: FloatArray, right: FloatArray) -> FloatArray:
