@@ -119,10 +119,15 @@ def test_multigrid_needs_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_interpolation_keeps_a_constant() -> None:
     """Where everything is unknown, as at the outer border, of even and odd counts."""
     for shape in ((9, 12), (8, 7), (5, 5)):
-        where = tuple(index.ravel().astype(np.int64) for index in np.indices(shape))
-        for halve in ((True, True), (True, False), (False, True)):
-            matrix, coarse = filling._interpolation((where[0], where[1]), shape, halve)
-            np.testing.assert_allclose(matrix @ np.ones(len(coarse[0])), 1.0)
+        points = np.arange(shape[0] * shape[1])
+        missing = np.ones(shape, dtype=bool)
+        matrix, _ = filling._laplace(np.full(shape, np.nan), missing, points, (1.0, 2.0), 0.0)
+        for side in ((3, 3), (3, 1), (1, 3)):
+            where = (points // shape[1], points % shape[1])
+            inverse = 1.0 / matrix.diagonal()
+            spread, coarse = filling._interpolation(matrix, inverse, where, side)
+            assert len(coarse[0]) == -(-shape[0] // side[0]) * -(-shape[1] // side[1])
+            np.testing.assert_allclose(spread @ np.ones(len(coarse[0])), 1.0)
 
 
 def test_groups_are_whole_holes_and_all_of_them() -> None:

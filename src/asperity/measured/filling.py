@@ -93,9 +93,8 @@ def _solve(
     if len(points) <= _DIRECT:
         solution = spsolve(matrix.tocsc(), right, permc_spec="MMD_AT_PLUS_A")
         return np.asarray(solution) + middle
-    ny, nx = heights.shape
-    where = (points // nx, points % nx)
-    return solve_multigrid(matrix, right, where, (ny, nx), weights, _TOLERANCE) + middle
+    where = (points // heights.shape[1], points % heights.shape[1])
+    return solve_multigrid(matrix, right, where, weights) + middle
 
 
 def _laplace(
@@ -138,6 +137,8 @@ def _laplace(
 
 # Unknowns that are left to the direct solver.
 _COARSEST = 3000
+# Points along the side of a group that one unknown of the next grid stands for.
+_SIDE = 3
 # A direction much weaker than the other is not coarsened: smoothing does not reach along it.
 _STRONG = 0.3
 _DAMPING = 0.7
@@ -159,116 +160,67 @@ def solve_multigrid(
     matrix: csr_array,
     right: FloatArray,
     where: tuple[Indices, Indices],
-    shape: tuple[int, int],
     weights: tuple[float, float],
-    tolerance: float,
 ) -> FloatArray:
     """Solve the five-point equation on the unknown points of a grid.
 
-    Each coarser grid has every second point (of the stronger direction only, where the pitches
-    differ much); corrections are interpolated bilinearly and the coarse matrices are PᵀAP, so
-    that the V-cycle is symmetric and positive definite for a hole of any form.
+    An unknown of a coarser grid stands for a square of points (for a line along the stronger
+    direction, where the pitches differ much); corrections are interpolated by smoothing what is
+    constant on each, and the coarse matrices are PᵀAP, so that the V-cycle is symmetric and
+    positive definite for a hole of any form.
 
     Args:
         matrix: symmetric positive definite, one row for each unknown point.
         right: right side.
         where: row and column of each unknown point.
-        shape: (ny, nx) of the grid.
         weights: of the second differences along x and y.
-        tolerance: of the residual, relative to the right side.
 
     Returns:
         The unknown values.
-    """
-    from scipy.sparse.linalg import LinearOperator, cg
 
-    levels = _levels(matrix, where, shape, weights)
-    bottom = _direct(levels[-1].matrix)
+    Reference:
+        Vaněk, Mandel and Brezina, Computing 56 (1996) 179 (smoothed aggregation).
+    """
+    from scipy.sparse.linalg import LinearOperator, cg, splu
+
+    levels = _levels(matrix, where, weights)
+    bottom = splu(levels[-1].matrix.tocsc()).solve
     cycle = LinearOperator(
         matrix.shape, matvec=lambda rest: _cycle(levels, 0, rest, bottom), dtype=np.float64
     )
-    solution, _ = cg(matrix, right, M=cycle, rtol=tolerance, maxiter=500)
+    solution, _ = cg(matrix, right, M=cycle, rtol=_TOLERANCE, maxiter=500)
     return np.asarray(solution)
 
 
-def _direct(matrix: csr_array) -> Callable[[FloatArray], FloatArray]:
-    from scipy.sparse.linalg import splu
-
-    return splu(matrix.tocsc()).solve
-
-
 def _levels(
-    matrix: csr_array,
-    where: tuple[Indices, Indices],
-    shape: tuple[int, int],
-    weights: tuple[float, float],
+    matrix: csr_array, where: tuple[Indices, Indices], weights: tuple[float, float]
 ) -> list[_Level]:
     levels: list[_Level] = []
     wx, wy = weights
     while True:
         inverse = 1.0 / matrix.diagonal()
-        halve = (wy >= _STRONG * wx, wx >= _STRONG * wy)
-        p, coarse = _interpolation(where, shape, halve)
-        if matrix.shape[0] <= _COARSEST or not 0 < p.shape[1] < 0.9 * matrix.shape[0]:
+        side = (_SIDE if wy >= _STRONG * wx else 1, _SIDE if wx >= _STRONG * wy else 1)
+        p, where = _interpolation(matrix, inverse, where, side)
+        if matrix.shape[0] <= _COARSEST or p.shape[1] >= 0.9 * matrix.shape[0]:
             levels.append(_Level(matrix, inverse, None))
             return levels
         levels.append(_Level(matrix, inverse, p))
         matrix = (p.T @ (matrix @ p)).tocsr()
-        where = coarse
-        shape = (_halved(shape[0], halve[0]), _halved(shape[1], halve[1]))
-        wx, wy = wx / (4.0 if halve[1] else 1.0), wy / (4.0 if halve[0] else 1.0)
-
-
-def _halved(count: int, halve: bool) -> int:
-    return (count + 1) // 2 if halve else count
+        wx, wy = wx / side[1] ** 2, wy / side[0] ** 2
 
 
 def _interpolation(
-    where: tuple[Indices, Indices], shape: tuple[int, int], halve: tuple[bool, bool]
+    matrix: csr_array, inverse: FloatArray, where: tuple[Indices, Indices], side: tuple[int, int]
 ) -> tuple[csr_array, tuple[Indices, Indices]]:
-    """Return the bilinear interpolation from the unknowns at even places, and these places."""
-    from scipy.sparse import csr_array
+    """Return the interpolation from groups of points, and the row and column of each group."""
+    from scipy.sparse import csr_array, diags_array
 
-    rows, columns = where
-    kept = np.ones(len(rows), dtype=bool)
-    for index, half in ((rows, halve[0]), (columns, halve[1])):
-        if half:
-            kept &= index % 2 == 0
-    step = [2 if half else 1 for half in halve]
-    coarse = (rows[kept] // step[0], columns[kept] // step[1])
-    width = _halved(shape[1], halve[1])
-    known = coarse[0] * width + coarse[1]  # sorted, because the unknowns are
-    sources = [
-        (row, column, by_row * by_column)
-        for row, by_row in _neighbours(rows, shape[0], halve[0])
-        for column, by_column in _neighbours(columns, shape[1], halve[1])
-    ]
-    places = np.full((len(rows), len(sources)), -1, dtype=np.int32)
-    values = np.zeros(places.shape)
-    for k, (row, column, weight) in enumerate(sources):
-        flat = row * width + column
-        place = np.minimum(np.searchsorted(known, flat), max(len(known) - 1, 0))
-        found = (weight > 0.0) & (len(known) > 0)
-        found[found] = known[place[found]] == flat[found]
-        places[found, k] = place[found]
-        values[:, k] = weight
-    del sources
-    used = places >= 0
-    starts = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
-    matrix = csr_array((values[used], places[used], starts), shape=(len(rows), len(known)))
-    return matrix, coarse
-
-
-def _neighbours(index: Indices, count: int, halve: bool) -> list[tuple[Indices, FloatArray]]:
-    """Return the coarse places that a fine place takes its value from, with their weights."""
-    if not halve:
-        return [(index, np.ones(len(index)))]
-    odd = index % 2 == 1
-    # Beyond the outer border, where the slope is zero, the last even place stands for both.
-    lonely = odd & (index == count - 1)
-    first = np.where(odd & ~lonely, 0.5, 1.0)
-    second = np.where(odd & ~lonely, 0.5, 0.0)
-    return [(index // 2, first), (index // 2 + 1, second)]
+    count, width = len(inverse), int(where[1].max()) // side[1] + 1
+    place = where[0] // side[0] * width + where[1] // side[1]
+    groups, group = np.unique(place, return_inverse=True)
+    constant = csr_array((np.ones(count), group, np.arange(count + 1)), shape=(count, len(groups)))
+    smoothed = constant - diags_array(_DAMPING * inverse) @ (matrix @ constant)
+    return smoothed.tocsr(), (groups // width, groups % width)
 
 
 def _cycle(
