@@ -231,98 +231,58 @@ def reciprocal(x: Taylor) -> Taylor:
     return Taylor(sign * one.c, sign * one.g, one.e)
 
 
+def _larger(low: FloatArray, high: FloatArray) -> FloatArray:
+    return np.asarray(np.maximum(np.abs(low), np.abs(high)))
+
+
+def _bend_of_asin(low: FloatArray, high: FloatArray) -> FloatArray:
+    most = _larger(low, high)
+    return np.asarray(np.where(most < 1.0, most * (1.0 - most * most) ** -1.5, np.inf))
+
+
+# f, f' and a bound of |f''| on [low, high]; True where f is smooth for positive arguments only.
+_SMOOTH: dict[str, tuple[Any, ...]] = {
+    "sqrt": (np.sqrt, lambda v: 0.5 / np.sqrt(v), lambda low, _high: 0.25 * low**-1.5, True),
+    "exp": (np.exp, np.exp, lambda _low, high: np.exp(high)),
+    "log": (np.log, lambda v: 1.0 / v, lambda low, _high: low**-2.0, True),
+    "sin": (np.sin, np.cos, lambda low, _high: np.ones_like(low)),
+    "cos": (np.cos, lambda v: -np.sin(v), lambda low, _high: np.ones_like(low)),
+    "asin": (np.arcsin, lambda v: (1.0 - v * v) ** -0.5, _bend_of_asin),
+    "sinh": (np.sinh, np.cosh, lambda low, high: np.sinh(_larger(low, high))),
+    "cosh": (np.cosh, np.sinh, lambda low, high: np.cosh(_larger(low, high))),
+    # |f''| is at most 4/(3√3) and 3√3/8.
+    "tanh": (np.tanh, lambda v: np.cosh(v) ** -2.0, lambda low, _high: np.full_like(low, 0.77)),
+    "atan": (np.arctan, lambda v: 1.0 / (1.0 + v * v), lambda low, _high: np.full_like(low, 0.65)),
+}
+
+
 class _OnlyThese(type):
     def __getattr__(cls, name: str) -> Callable[..., Number]:
         if name.startswith("_"):
             raise AttributeError(name)
-        raise TypeError(f"there is no enclosure of the function {name}")
-
-
-def _larger(low: FloatArray, high: FloatArray) -> FloatArray:
-    return np.asarray(np.maximum(np.abs(low), np.abs(high)))
+        if name not in _SMOOTH:
+            raise TypeError(f"there is no enclosure of the function {name}")
+        return lambda x: _curved(x, *_SMOOTH[name])
 
 
 class TaylorMath(metaclass=_OnlyThese):
     """What ``math`` is to numbers: the functions that generated kernels may use.
 
-    Any other function is a TypeError, as a comparison is.
+    √x and log x are unbounded where x may be zero, arc sine and cosine where |x| may be 1, the
+    tangent where x may be at a pole. Any other function is a TypeError, as a comparison is.
     """
 
     pi, e = np.pi, np.e
 
     @staticmethod
-    def sqrt(x: Number) -> Number:
-        """√x; unbounded where x may be zero."""
-        return _curved(
-            x, np.sqrt, lambda v: 0.5 / np.sqrt(v), lambda low, _high: 0.25 * low**-1.5, True
-        )
-
-    @staticmethod
-    def exp(x: Number) -> Number:
-        """Exponential."""
-        return _curved(x, np.exp, np.exp, lambda _low, high: np.exp(high))
-
-    @staticmethod
-    def log(x: Number) -> Number:
-        """Natural logarithm; unbounded where x may be zero."""
-        return _curved(x, np.log, lambda v: 1.0 / v, lambda low, _high: low**-2.0, True)
-
-    @staticmethod
-    def sin(x: Number) -> Number:
-        """Sine."""
-        return _curved(x, np.sin, np.cos, lambda low, _high: np.ones_like(low))
-
-    @staticmethod
-    def cos(x: Number) -> Number:
-        """Cosine."""
-        return _curved(x, np.cos, lambda v: -np.sin(v), lambda low, _high: np.ones_like(low))
-
-    @staticmethod
     def tan(x: Number) -> Number:
-        """Tangent; unbounded where x may be at a pole."""
+        """Tangent."""
         return TaylorMath.sin(x) / TaylorMath.cos(x)
 
     @staticmethod
-    def asin(x: Number) -> Number:
-        """Arc sine; unbounded where |x| may be 1."""
-
-        def bend(low: FloatArray, high: FloatArray) -> FloatArray:
-            most = _larger(low, high)
-            return np.asarray(np.where(most < 1.0, most * (1.0 - most * most) ** -1.5, np.inf))
-
-        return _curved(x, np.arcsin, lambda v: (1.0 - v * v) ** -0.5, bend)
-
-    @staticmethod
     def acos(x: Number) -> Number:
-        """Arc cosine; unbounded where |x| may be 1."""
+        """Arc cosine."""
         return 0.5 * np.pi - TaylorMath.asin(x)
-
-    @staticmethod
-    def sinh(x: Number) -> Number:
-        """Hyperbolic sine."""
-        return _curved(x, np.sinh, np.cosh, lambda low, high: np.sinh(_larger(low, high)))
-
-    @staticmethod
-    def cosh(x: Number) -> Number:
-        """Hyperbolic cosine."""
-        return _curved(x, np.cosh, np.sinh, lambda low, high: np.cosh(_larger(low, high)))
-
-    @staticmethod
-    def tanh(x: Number) -> Number:
-        """Hyperbolic tangent; |f''| <= 4/(3√3)."""
-        return _curved(
-            x, np.tanh, lambda v: np.cosh(v) ** -2.0, lambda low, _high: np.full_like(low, 0.77)
-        )
-
-    @staticmethod
-    def atan(x: Number) -> Number:
-        """Arc tangent; |f''| <= 3√3/8."""
-        return _curved(
-            x,
-            np.arctan,
-            lambda v: 1.0 / (1.0 + v * v),
-            lambda low, _high: np.full_like(low, 0.65),
-        )
 
     @staticmethod
     def pow(x: Number, power: float) -> Number:
