@@ -16,6 +16,7 @@ import numpy as np
 from asperity.analysis.energy.loops import loop_work
 from asperity.checks import FloatArray
 from asperity.paper.claim import Check, decide, judge, judges, settle
+from asperity.paper.comparisons import Potential, gradient_of
 from asperity.paper.plane import SCANNING, friction_path, random_settings, spots
 
 _TURN = 2.0 * math.pi
@@ -115,24 +116,13 @@ def jacobian_f() -> Check:
 
     Against differences of (22) as printed.
     """
-    import mpmath
-
     draw = np.random.default_rng(13)
     printed, corrected, truth = [], [], []
     for r in random_rubs(6):
         x, d = draw.uniform(0.0, r.period), draw.uniform(-1.0, 1.0) * r.deflection
         for rate in (1.0, 0.0):  # sticking, sliding
             force = _printed_force(r, x, d, rate)
-            with mpmath.workdps(50):
-                step = mpmath.mpf(10) ** -20
-                z = mpmath.mpf(-r.depth)
-                pairs = [
-                    (force(step, z), force(-step, z)),
-                    (force(0, z + step), force(0, z - step)),
-                ]
-                truth.append(
-                    [[float((a[i] - b[i]) / (2 * step)) for a, b in pairs] for i in (0, 1)]
-                )
+            truth.append([gradient_of(part, 0.0, -r.depth) for part in force])
             h, slope = float(r.modulation(x)), float(r.modulation(x, 1))
             printed.append(_formula(r, d, h, rate, slope))
             corrected.append(_formula(r, d, h, rate, slope * d))
@@ -141,13 +131,12 @@ def jacobian_f() -> Check:
                  correction="h' must be h' d^x (as printed it has another dimension)")  # fmt: skip
 
 
-def _printed_force(r: Rub, x: float, d: float, rate: float) -> Any:
-    def force(dx: Any, z: Any) -> tuple[Any, Any]:
-        deflection = d + rate * dx
+def _printed_force(r: Rub, x: float, d: float, rate: float) -> tuple[Potential, Potential]:
+    def friction(dx: Any, z: Any) -> Any:
         still = 1 - r.modulation(x + dx)
-        return -r.friction * still * deflection / r.deflection * z, -z
+        return -r.friction * still * (d + rate * dx) / r.deflection * z
 
-    return force
+    return friction, lambda _dx, z: -z
 
 
 def _formula(r: Rub, d: float, h: float, rate: float, slope: float) -> list[list[float]]:

@@ -14,11 +14,10 @@ from asperity.checks import FloatArray
 from asperity.paper.claim import Check, decide, judge, judges, settle
 from asperity.paper.comparisons import (
     curl_check,
-    energy_sign_check,
     field_check,
-    gradient_of,
     jacobian_check,
     leg_work,
+    potential_check,
 )
 from asperity.paper.plane import (
     BUMP,
@@ -54,7 +53,6 @@ BENT = "with curvature: 1 + h'² becomes 1 + h'² + (p_h^z - p^z) h'' in the der
 @judges("eq-16", "IV.D", "(16)")
 def potential_d() -> Check:
     """Potential of D."""
-    places = list(spots("D"))
 
     def potential(spot: Spot) -> Any:
         def value(x: Any, z: Any) -> Any:
@@ -63,12 +61,7 @@ def potential_d() -> Check:
 
         return value
 
-    gradient = judge(
-        "+∇U against the force of D",
-        printed=[gradient_of(potential(s), s) for s in places],
-        truth=np.array([s.force() for s in places]),
-    )
-    return settle(gradient, energy_sign_check("D", places, [0.5 * s.distance**2 for s in places]))
+    return potential_check("D", potential, lambda s: 0.5 * s.distance**2)
 
 
 @judges("eq-17", "IV.D", "(17)")

@@ -15,14 +15,13 @@ from asperity.laws import Law, find_law
 from asperity.paper.claim import Check, decide, judge, judges, settle
 from asperity.paper.comparisons import (
     curl_check,
-    energy_sign_check,
     field_check,
-    gradient_of,
     greatest_norm,
     jacobian_check,
     leg_work,
     loop_check,
     outside_check,
+    potential_check,
     q_of,
 )
 from asperity.paper.plane import (
@@ -219,18 +218,12 @@ def potential_c() -> Check:
 
     Its gradient, and its sign as an energy.
     """
-    places = list(spots("C"))
-    gradient = judge(
-        "+∇U against the force of C",
-        printed=[gradient_of(_printed_potential(s), s) for s in places],
-        truth=np.array([s.force() for s in places]),
-    )
-    return settle(gradient, energy_sign_check("C", places, [0.5 * s.d**2 for s in places]))
 
+    def potential(spot: Spot) -> Callable[[Any, Any], Any]:
+        profile = spot.profile()
+        return lambda x, z: -spot.k * (z - profile(x, 0)) ** 2 / 2
 
-def _printed_potential(spot: Spot) -> Callable[[Any, Any], Any]:
-    profile = spot.profile()
-    return lambda x, z: -spot.k * (z - profile(x, 0)) ** 2 / 2
+    return potential_check("C", potential, lambda s: 0.5 * s.d**2)
 
 
 @judges("eq-14", "IV.C", "(14)")

@@ -73,17 +73,14 @@ def _quiet(delay: int, seed: int, part: float = 1.0) -> float:
         floor = low - case.depth
         surface = case.surface("C", max_depth=high - floor)
         loss = part * 2.0 * case.stiffness * characteristic_number(surface).value
+        paths = [shake(surface, 1e-4 * case.depth, angle) for angle in (math.pi, 2.0, 0.5, 0.1)]
         for size in 10.0 ** draw.uniform(-6.0, -0.5, 40):
             way = np.cumsum(draw.normal(size=(60, 2)) * size, axis=0)
             way = np.where(draw.random() < 0.5, way, way - np.roll(way, 1, axis=0))
             x = draw.uniform(0.0, case.period) + way[:, 0] * case.period
             z = floor + np.abs(draw.uniform(0.0, high - floor) + way[:, 1] * case.depth)
-            path = np.column_stack([x, 0 * x, z])
-            store = 0.5 * case.stiffness * _depth(surface, path[[0, -1]]) ** 2
-            net = gained(surface, path, loss, delay) - float(store[0] - store[1])
-            worst = max(worst, net / (case.stiffness * case.depth**2))
-        for angle in (math.pi, 2.0, 0.5, 0.1):
-            path = shake(surface, 1e-4 * case.depth, angle)
+            paths.append(np.column_stack([x, 0 * x, z]))
+        for path in paths:
             store = 0.5 * case.stiffness * _depth(surface, path[[0, -1]]) ** 2
             net = gained(surface, path, loss, delay) - float(store[0] - store[1])
             worst = max(worst, net / (case.stiffness * case.depth**2))

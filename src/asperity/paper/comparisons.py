@@ -13,11 +13,12 @@ from asperity.analysis.energy.loops import integrate, loop_work
 from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.checks import FloatArray
 from asperity.laws import find_law
-from asperity.paper.claim import Check, decide, judge
+from asperity.paper.claim import Check, decide, judge, settle
 from asperity.paper.plane import SCANNING, Setting, Spot, groove_path, random_settings, spots
 from asperity.surface import Surface
 
 Formula = Callable[[Spot], FloatArray]
+Potential = Callable[[Any, Any], Any]
 Place = TypeVar("Place")
 
 
@@ -93,15 +94,28 @@ def loop_check(law: str, printed: Callable[[Setting], float]) -> Check:
     )
 
 
-def gradient_of(potential: Callable[[Any, Any], Any], spot: Spot) -> list[float]:
-    """Return the gradient at a probe by differences in many digits."""
+def gradient_of(potential: Potential, at_x: float, at_z: float) -> list[float]:
+    """Return the gradient at a place by differences in many digits."""
     import mpmath
 
     with mpmath.workdps(60):
-        x, z, step = mpmath.mpf(spot.x), mpmath.mpf(spot.z), mpmath.mpf(10) ** -20
+        x, z, step = mpmath.mpf(at_x), mpmath.mpf(at_z), mpmath.mpf(10) ** -20
         pairs = [(potential(x + step, z), potential(x - step, z)),
                  (potential(x, z + step), potential(x, z - step))]  # fmt: skip
         return [float((ahead - behind) / (2 * step)) for ahead, behind in pairs]
+
+
+def potential_check(
+    law: str, potential: Callable[[Spot], Potential], half: Callable[[Spot], float]
+) -> Check:
+    """Judge a printed potential by its gradient, and by its sign as an energy."""
+    places = list(spots(law))
+    gradient = judge(
+        f"+∇U against the force of {law}",
+        printed=[gradient_of(potential(s), s.x, s.z) for s in places],
+        truth=np.array([s.force() for s in places]),
+    )
+    return settle(gradient, energy_sign_check(law, places, [half(s) for s in places]))
 
 
 def energy_sign_check(law: str, places: list[Spot], halves: list[float]) -> Check:

@@ -13,7 +13,6 @@ from asperity.paper.experiments.settings import (
     HANDS_GUESSED,
     LETTERS,
     SPEEDS,
-    NamedHand,
     stroke_setup,
 )
 from asperity.simulation import Strokes
@@ -79,15 +78,15 @@ class ScanningExperiment(Record):
         return tuple(one.stroke for one in self.strokes if one.stroke.law == law)
 
 
-def _stroke(law: str, named: NamedHand, speed: float) -> HandStroke:
-    setup = stroke_setup(law, named.hand, speed)
+def _stroke(law: str, hand: str, speed: float) -> HandStroke:
+    setup = stroke_setup(law, hand, speed)
     assert isinstance(setup.motion, Strokes)
     depth = -setup.motion.start[2]
     (found,) = scan_strokes(
         setup.surface, setup.plant, setup.hand, setup.servo, setup.motion, speeds=[speed],
         depths=[depth],
     )  # fmt: skip
-    return HandStroke(named.name, found)
+    return HandStroke(hand, found)
 
 
 def energy_trace(law: str) -> EnergyTrace:

@@ -6,8 +6,6 @@ is taken from elsewhere or fitted, and every result says so.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from asperity.devices import load_device
 from asperity.paper.plane import BUMP, PASSIVITY, SAMPLING_PERIOD, SCANNING
 from asperity.scene.plant import plant_of
@@ -51,32 +49,19 @@ def band_setup(law: str = "A", stiffness: float = PASSIVITY.stiffness, delay: in
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class NamedHand:
-    """A hand of section V.B.
-
-    Attributes:
-        name: in words.
-        hand: what it is.
-    """
-
-    name: str
-    hand: SpringHand
-
-
-HANDS = (
-    NamedHand("300 N/m", SpringHand((300.0, 300.0, 0.0), 3.0, 0.05, (0.0, 0.0, -1.0))),
-    NamedHand("100 N/m", SpringHand((100.0, 100.0, 0.0), 2.0, 0.03, (0.0, 0.0, -1.0))),
-    NamedHand("800 N/m", SpringHand((800.0, 800.0, 0.0), 6.0, 0.10, (0.0, 0.0, -1.0))),
-)
+HANDS = {
+    "300 N/m": SpringHand((300.0, 300.0, 0.0), 3.0, 0.05, (0.0, 0.0, -1.0)),
+    "100 N/m": SpringHand((100.0, 100.0, 0.0), 2.0, 0.03, (0.0, 0.0, -1.0)),
+    "800 N/m": SpringHand((800.0, 800.0, 0.0), 6.0, 0.10, (0.0, 0.0, -1.0)),
+}
 SPEEDS = (0.05, 0.1, 0.15)  # m/s
 
 
-def stroke_setup(law: str = "A", hand: SpringHand = HANDS[0].hand, speed: float = 0.1) -> Setup:
+def stroke_setup(law: str = "A", hand: str = "300 N/m", speed: float = 0.1) -> Setup:
     """Return the loop of section V.B: strokes of 80 mm along the wall, there and back."""
     way = Strokes((-0.04, 0.0, -1e-3), (0.04, 0.0, -1e-3), speed, count=5)
     plant, servo = Pantograph(joint_damping=SCANNING.joint_damping), _servo(0)
-    return _setup(SCANNING.surface(law), plant, hand, servo, way, way.duration)
+    return _setup(SCANNING.surface(law), plant, HANDS[hand], servo, way, way.duration)
 
 
 ENTRIES = {
