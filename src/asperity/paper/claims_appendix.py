@@ -118,9 +118,7 @@ def _against(
 def orthogonal() -> Check:
     """The penetration is at right angles to the surface."""
     return _against(
-        "p^z - p_h^z",
-        lambda r: r.spot.from_foot[1],
-        lambda r: -r.spot.from_foot[0] / r.spot.slope,
+        "p^z - p_h^z", lambda r: r.spot.from_foot[1], lambda r: -r.spot.from_foot[0] / r.spot.slope
     )
 
 

@@ -76,9 +76,7 @@ def field_d() -> Check:
         worst = max(worst, abs(energy) / (case.stiffness * case.amplitude**2))
     loops = decide(f"energy around the path {worst:.1e} of κ₀A²", printed=worst < 1e-7, loop=worst)
     return settle(
-        field_check("D", lambda s: -s.k * s.from_foot),
-        curl_check("D", conservative=True),
-        loops,
+        field_check("D", lambda s: -s.k * s.from_foot), curl_check("D", conservative=True), loops
     )
 
 

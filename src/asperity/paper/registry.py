@@ -64,9 +64,7 @@ def claim(name: str) -> Claim:
 
 
 def reproduce_claims(
-    ids: Iterable[str] | None = None,
-    progress: Progress | None = None,
-    workers: int | None = None,
+    ids: Iterable[str] | None = None, progress: Progress | None = None, workers: int | None = None
 ) -> tuple[Result, ...]:
     """Compute claims and return their results, in the order of the paper.
 

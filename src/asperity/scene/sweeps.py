@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import Any, TypeVar
 
 from asperity.errors import ParameterError
 from asperity.scene.setup import Setup
@@ -14,9 +15,20 @@ from asperity.simulation.onset import LOWEST, Onset, find_onset
 from asperity.simulation.prediction import Prediction, predict, with_wall
 from asperity.simulation.scan import Stroke, scan_strokes
 
-WORKERS = 2
+_WORKERS = 2
 DEFAULT_SPEEDS = (0.02, 0.05, 0.1, 0.2)  # m/s
 DEFAULT_STROKES = 5
+
+
+Found = TypeVar("Found")
+
+
+def side_by_side(
+    function: Callable[..., Found], jobs: Iterable[tuple[Any, ...]]
+) -> tuple[Found, ...]:
+    """Return what a function makes of the arguments of each job, computed at the same time."""
+    with ThreadPoolExecutor(_WORKERS) as pool:
+        return tuple(pool.map(lambda job: function(*job), jobs))
 
 
 def onsets(
@@ -45,8 +57,7 @@ def onsets(
             :func:`~asperity.simulation.find_onset`.
     """
 
-    def one(job: tuple[str, int]) -> Onset:
-        law, delay = job
+    def one(law: str, delay: int) -> Onset:
         loop = setup.with_law(law).with_delay(delay)
         found = find_onset(
             loop.surface, loop.plant, loop.hand, loop.servo, loop.motion, start=loop.start,
@@ -58,8 +69,7 @@ def onsets(
         return found
 
     jobs = [(law, delay) for law in laws for delay in delays]
-    with ThreadPoolExecutor(WORKERS) as pool:
-        found = list(pool.map(one, jobs))
+    found = side_by_side(one, jobs)
     return tuple(
         predict(
             setup.with_law(law).surface, setup.plant, setup.hand, setup.with_delay(delay).servo,
@@ -107,8 +117,7 @@ def scans(
     jobs = [(law, speed, depth) for law in laws for speed in speeds for depth in depths]
     done = [0]
 
-    def one(job: tuple[str, float, float]) -> Stroke:
-        law, speed, depth = job
+    def one(law: str, speed: float, depth: float) -> Stroke:
         (found,) = scan_strokes(
             setup.with_law(law).surface, setup.plant, setup.hand, setup.servo, way,
             speeds=[speed], depths=[depth], start=setup.start, velocity=setup.velocity,
@@ -118,5 +127,4 @@ def scans(
             progress(done[0] / len(jobs))
         return found
 
-    with ThreadPoolExecutor(WORKERS) as pool:
-        return tuple(pool.map(one, jobs))
+    return side_by_side(one, jobs)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +10,7 @@ from asperity.devices import device_names, load_device
 from asperity.errors import ParameterError
 from asperity.files import Record, plain
 from asperity.paper.experiments.settings import device_setup
+from asperity.scene.sweeps import side_by_side
 from asperity.simulation import Pantograph, SpringHand, find_onset
 from asperity.simulation.onset import Onset
 from asperity.simulation.prediction import Prediction, predict
@@ -23,7 +23,6 @@ LAWS = "WACFH"
 STARTS = 4
 LOWEST = 400.0  # N/m: what holds the hand's 1 N at 2.5 mm
 TOLERANCE = 0.1
-WORKERS = 2
 HAND = SpringHand((300.0, 300.0, 0.0), 3.0, 0.0, (0.0, 0.0, -1.0))
 GUESSED = (
     "The hand: 300 N/m sideways, 3 N·s/m, pressing with 1 N. Its damping is all that most of these "
@@ -132,6 +131,4 @@ def beyond_experiment(measured: Texture | None = None, laws: str = LAWS) -> Beyo
             if planar and not texture.is_profile:
                 continue  # its handle stays in the x-z plane
             jobs += [(name, title, Surface(texture, law, max_depth=1e-3)) for law in laws]
-    with ThreadPoolExecutor(WORKERS) as pool:
-        found = tuple(pool.map(lambda job: device_onset(*job), jobs))
-    return BeyondExperiment(found, tuple(skipped))
+    return BeyondExperiment(side_by_side(device_onset, jobs), tuple(skipped))

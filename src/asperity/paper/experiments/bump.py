@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,11 +9,11 @@ import numpy as np
 from asperity.checks import FloatArray
 from asperity.files import Record
 from asperity.paper.experiments.settings import BUMP_GUESSED, ENTRIES, bump_setup
+from asperity.scene.sweeps import side_by_side
 
 LAWS = "ABDEH"
 _WINDOW = 200  # samples, 20 ms
 _EVERY = 10
-WORKERS = 2
 
 
 @dataclass(frozen=True)
@@ -101,5 +100,4 @@ def over_bump(law: str, entry: str) -> Bump:
 def bump_experiment(laws: str = LAWS) -> BumpExperiment:
     """Return section V.C for both entries."""
     jobs = [(law, entry) for entry in ENTRIES for law in laws]
-    with ThreadPoolExecutor(WORKERS) as pool:
-        return BumpExperiment(tuple(pool.map(lambda job: over_bump(*job), jobs)))
+    return BumpExperiment(side_by_side(over_bump, jobs))

@@ -169,11 +169,7 @@ def _law_d_is_balanced() -> Check:
     balanced = all(
         abs(one.total) <= MARGINAL * other.total for one, other in zip(bumps, lively, strict=True)
     )
-    return decide(
-        f"{says} of 20",
-        printed=balanced,
-        numbers=_of_bumps(bumps),
-    )
+    return decide(f"{says} of 20", printed=balanced, numbers=_of_bumps(bumps))
 
 
 def _of_bumps(bumps: tuple[Bump, ...]) -> dict[str, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from asperity.checks import FloatArray
 from asperity.files import Record
 from asperity.paper.experiments.settings import FITTED, LAG, LETTERS, band_setup
-from asperity.scene.sweeps import onsets
+from asperity.scene.sweeps import onsets, side_by_side
 from asperity.simulation.onset import ends_in_cycle, offsets, runner
 from asperity.simulation.prediction import Prediction
 
@@ -21,7 +20,6 @@ PANELS = (("W", 1.0), ("A", 1.0), ("F", 1.0), ("A", 5.1), ("F", 8.3))
 NEW = (("H", 1.0),)
 _STIFFNESS = 2000.0
 _EVERY = 10
-WORKERS = 2
 
 
 @dataclass(frozen=True)
@@ -112,7 +110,6 @@ def passivity_experiment(
         delays: of the onsets [samples].
         starts: of the onsets; the counts have 24.
     """
-    with ThreadPoolExecutor(WORKERS) as pool:
-        counts = tuple(pool.map(lambda job: count_cycles(*job), (*PANELS, *NEW)))
+    counts = side_by_side(count_cycles, (*PANELS, *NEW))
     found = onsets(band_setup("W"), laws, delays, starts=starts, tolerance=0.05, lowest=50.0)
     return PassivityExperiment(counts, found)

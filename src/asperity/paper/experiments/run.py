@@ -42,12 +42,7 @@ class Experiments:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
         return plain(
-            {
-                "V.A": self.passivity,
-                "V.B": self.scanning,
-                "V.C": self.bump,
-                "beyond": self.beyond,
-            }
+            {"V.A": self.passivity, "V.B": self.scanning, "V.C": self.bump, "beyond": self.beyond}
         )
 
     @property

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
 from asperity.checks import FloatArray
 from asperity.files import Record
-from asperity.paper.experiments.settings import (
-    HANDS,
-    HANDS_GUESSED,
-    LETTERS,
-    SPEEDS,
-    stroke_setup,
-)
+from asperity.paper.experiments.settings import HANDS, HANDS_GUESSED, LETTERS, SPEEDS, stroke_setup
+from asperity.scene.sweeps import side_by_side
 from asperity.simulation import Strokes
 from asperity.simulation.scan import Stroke, scan_strokes
 
 SHOWN = "AGDFH"  # figure 6, and law H
 _EVERY = 10
-WORKERS = 2
 
 
 @dataclass(frozen=True)
@@ -105,7 +98,5 @@ def energy_trace(law: str) -> EnergyTrace:
 def scanning_experiment(laws: str = LETTERS) -> ScanningExperiment:
     """Return section V.B for every hand and speed."""
     jobs = [(law, hand, speed) for law in laws for hand in HANDS for speed in SPEEDS]
-    with ThreadPoolExecutor(WORKERS) as pool:
-        strokes = tuple(pool.map(lambda job: _stroke(*job), jobs))
-        traces = tuple(pool.map(energy_trace, [law for law in SHOWN if law in laws]))
-    return ScanningExperiment(strokes, traces)
+    traces = side_by_side(energy_trace, [(law,) for law in SHOWN if law in laws])
+    return ScanningExperiment(side_by_side(_stroke, jobs), traces)
