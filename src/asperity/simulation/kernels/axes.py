@@ -3,13 +3,11 @@
 Dry friction, which couples the axes, is constant over a part of a sample.
 """
 
-# ruff: noqa: ARG001 - one signature for every body
-
 from typing import NamedTuple
 
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels
-from asperity.simulation.kernels.body_functions import RAN, advance_axis, final_speed
+from asperity.simulation.kernels.body_functions import RAN, Held, advance_axis, final_speed
 from asperity.simulation.kernels.booking import book_energies
 from asperity.simulation.kernels.dense import friction_force
 
@@ -37,14 +35,9 @@ class AxesPlant(NamedTuple):
     span: float
 
 
-def advance_body(
-    x: FloatArray, ledger: FloatArray,
-    fx: float, fy: float, fz: float,
-    ax: float, ay: float, az: float,
-    ux: float, uy: float, uz: float,
-    inside: bool, plant: AxesPlant,
-) -> int:  # fmt: skip
+def advance_body(x: FloatArray, ledger: FloatArray, held: Held, plant: AxesPlant) -> int:
     """Move the body over one sample; see ``body_functions``."""
+    fx, fy, fz, ax, ay, az, ux, uy, uz, _inside = held
     table, friction, mass, parts, span = plant
     gx = gy = gz = 0.0
     for part in range(parts):

@@ -1,12 +1,10 @@
 """A mass in space on an elastic band, over one sample, by Runge-Kutta steps."""
 
-# ruff: noqa: ARG001 - one signature for every body
-
 from typing import NamedTuple
 
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels, local_array
-from asperity.simulation.kernels.body_functions import RAN
+from asperity.simulation.kernels.body_functions import RAN, Held
 from asperity.simulation.kernels.booking import book_energies
 from asperity.simulation.kernels.dense import friction_force
 from asperity.simulation.kernels.hand import HandRecord, band_turns, hand_energy, hand_force
@@ -83,14 +81,9 @@ def banded_part(
         x[i] += change[i]
 
 
-def advance_body(
-    x: FloatArray, ledger: FloatArray,
-    fx: float, fy: float, fz: float,
-    ax: float, ay: float, az: float,
-    ux: float, uy: float, uz: float,
-    inside: bool, plant: BandedPlant,
-) -> int:  # fmt: skip
+def advance_body(x: FloatArray, ledger: FloatArray, held: Held, plant: BandedPlant) -> int:
     """Move the body over one sample; see ``body_functions``."""
+    fx, fy, fz, ax, ay, az, ux, uy, uz, _inside = held
     change = local_array((8,))
     stage = local_array((8,))
     rate = local_array((8,))

@@ -5,24 +5,18 @@ of the loop to the one that is simulated. ``plant`` is the record (NamedTuple) t
 declares.
 """
 
+from typing import NamedTuple
+
 from asperity.checks import FloatArray
 
 # What the loop says: it ran to the end, the state left all bounds, the body left its workspace.
 RAN, DIVERGED, LEFT = 0, 1, 2
 
 
-def advance_body(
-    x: FloatArray, ledger: FloatArray,
-    fx: float, fy: float, fz: float,
-    ax: float, ay: float, az: float,
-    ux: float, uy: float, uz: float,
-    inside: bool, plant: object,
-) -> int:  # fmt: skip
-    """Move the body over one sample.
+class Held(NamedTuple):
+    """What does not change over a sample.
 
-    Args:
-        x: state: position [m], velocity [m/s], more; changed.
-        ledger: sums, see ``booking``; added to.
+    Attributes:
         fx: held force [N].
         fy: likewise.
         fz: likewise.
@@ -33,6 +27,27 @@ def advance_body(
         uy: likewise.
         uz: likewise.
         inside: whether the servo found the probe in contact.
+    """
+
+    fx: float
+    fy: float
+    fz: float
+    ax: float
+    ay: float
+    az: float
+    ux: float
+    uy: float
+    uz: float
+    inside: bool
+
+
+def advance_body(x: FloatArray, ledger: FloatArray, held: Held, plant: object) -> int:
+    """Move the body over one sample.
+
+    Args:
+        x: state: position [m], velocity [m/s], more; changed.
+        ledger: sums, see ``booking``; added to.
+        held: what does not change over the sample.
         plant: what the body is made of.
 
     Returns:

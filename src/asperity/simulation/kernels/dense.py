@@ -1,13 +1,11 @@
 """One sample of a coupled linear body: matrices of ``exact.py``, dry friction in parts."""
 
-# ruff: noqa: ARG001 - one signature for every body
-
 import math
 from typing import NamedTuple
 
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels
-from asperity.simulation.kernels.body_functions import RAN
+from asperity.simulation.kernels.body_functions import RAN, Held
 from asperity.simulation.kernels.booking import book_energies
 
 KERNELS = Kernels(
@@ -43,14 +41,9 @@ class DensePlant(NamedTuple):
     span: float
 
 
-def advance_body(
-    x: FloatArray, ledger: FloatArray,
-    fx: float, fy: float, fz: float,
-    ax: float, ay: float, az: float,
-    ux: float, uy: float, uz: float,
-    inside: bool, plant: DensePlant,
-) -> int:  # fmt: skip
+def advance_body(x: FloatArray, ledger: FloatArray, held: Held, plant: DensePlant) -> int:
     """Move the body over one sample; see ``body_functions``."""
+    fx, fy, fz, ax, ay, az, ux, uy, uz, _inside = held
     z = plant.room
     n = x.shape[0]
     z[n + 3] = ax

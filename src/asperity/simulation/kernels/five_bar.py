@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels
-from asperity.simulation.kernels.body_functions import LEFT, RAN
+from asperity.simulation.kernels.body_functions import LEFT, RAN, Held
 from asperity.simulation.kernels.booking import book_energies
 from asperity.simulation.kernels.hand import HandRecord, band_turns, hand_energy, hand_force
 
@@ -246,14 +246,9 @@ def bar_kink(
     return band_turns(sx + dx, 0.0, sz + dz, sx + ex, 0.0, sz + ez, hand)
 
 
-def advance_body(
-    x: FloatArray, ledger: FloatArray,
-    fx: float, fy: float, fz: float,
-    ax: float, ay: float, az: float,
-    ux: float, uy: float, uz: float,
-    inside: bool, plant: PantographPlant,
-) -> int:  # fmt: skip
+def advance_body(x: FloatArray, ledger: FloatArray, held: Held, plant: PantographPlant) -> int:
     """Move the handle over one sample; see ``body_functions``."""
+    fx, _fy, fz, ax, _ay, az, ux, _uy, uz, inside = held
     bar, hand, friction, rate, fewest, period, share, inside_only, least = plant
     damping = bar.joint_damping if inside or not inside_only else 0.0
     px, pz, vx, vz = x[0], x[2], x[3], x[5]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels
-from asperity.simulation.kernels.body_functions import RAN
+from asperity.simulation.kernels.body_functions import RAN, Held
 from asperity.simulation.kernels.booking import book_energies
 
 KERNELS = Kernels(provides=("advance_body", "stored_energy"), requires=("book_energies",))
@@ -22,14 +22,9 @@ class PrescribedPlant(NamedTuple):
     period: float
 
 
-def advance_body(
-    x: FloatArray, ledger: FloatArray,
-    fx: float, fy: float, fz: float,
-    ax: float, ay: float, az: float,
-    ux: float, uy: float, uz: float,
-    inside: bool, plant: PrescribedPlant,
-) -> int:  # fmt: skip
+def advance_body(x: FloatArray, ledger: FloatArray, held: Held, plant: PrescribedPlant) -> int:
     """Move the handle over one sample; see ``body_functions``."""
+    fx, fy, fz, ax, ay, az, ux, uy, uz, _inside = held
     period = plant.period
     dx = ux * period
     dy = uy * period

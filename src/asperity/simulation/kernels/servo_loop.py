@@ -13,7 +13,13 @@ from asperity.kernels.tick import (
     flushed_state,
     servo_tick,
 )
-from asperity.simulation.kernels.body_functions import DIVERGED, RAN, advance_body, stored_energy
+from asperity.simulation.kernels.body_functions import (
+    DIVERGED,
+    RAN,
+    Held,
+    advance_body,
+    stored_energy,
+)
 from asperity.simulation.kernels.booking import SAME_SAMPLE, SAMPLING
 
 KERNELS = Kernels(
@@ -30,13 +36,11 @@ class LoopState(NamedTuple):
 
     Attributes:
         servo: state of the servo.
-        begun: whether there was a sample.
         head: where in the queue the newest force waits.
         samples: that were done.
     """
 
     servo: ServoState = ServoState()
-    begun: bool = False
     head: int = 0
     samples: int = 0
 
@@ -68,26 +72,25 @@ def book_command(ledger: FloatArray, before: ServoState, after: ServoState) -> N
 
 
 def trace_row(
-    trace: FloatArray, row: int, time: float, x: FloatArray, servo: ServoState,
-    fx: float, fy: float, fz: float, ax: float, ay: float, az: float,
+    trace: FloatArray, row: int, time: float, x: FloatArray, servo: ServoState, held: Held,
     ledger: FloatArray, plant: object,
 ) -> None:  # fmt: skip
-    """Write a row of the trace, see ``COLUMNS``: f is held, a the hand's anchor."""
+    """Write a row of the trace, see ``COLUMNS``."""
     trace[row, 0] = time
     for i in range(6):
         trace[row, 1 + i] = x[i]
     trace[row, 7] = servo.fx
     trace[row, 8] = servo.fy
     trace[row, 9] = servo.fz
-    trace[row, 10] = fx
-    trace[row, 11] = fy
-    trace[row, 12] = fz
-    trace[row, 13] = ax
-    trace[row, 14] = ay
-    trace[row, 15] = az
+    trace[row, 10] = held.fx
+    trace[row, 11] = held.fy
+    trace[row, 12] = held.fz
+    trace[row, 13] = held.ax
+    trace[row, 14] = held.ay
+    trace[row, 15] = held.az
     for i in range(10):
         trace[row, 16 + i] = ledger[i]
-    trace[row, 26] = stored_energy(x, ax, ay, az, plant)
+    trace[row, 26] = stored_energy(x, held.ax, held.ay, held.az, plant)
 
 
 def flush(values: FloatArray) -> None:
@@ -120,8 +123,8 @@ def servo_batch(
     Returns:
         What stopped it, the rows written and the state after the last sample.
     """
-    servo, begun, head, done = state
-    if not begun:
+    servo, head, done = state
+    if done == 0:
         servo = first_state(x[0], x[1], x[2], settings)
     samples = anchor.shape[0] - 1
     rate = 1.0 / settings.period
@@ -140,20 +143,21 @@ def servo_batch(
         ax = anchor[sample, 0]
         ay = anchor[sample, 1]
         az = anchor[sample, 2]
-        if tracing:
-            if wait == 0:
-                time = (done + sample) * settings.period
-                trace_row(trace, rows, time, x, servo, fx, fy, fz, ax, ay, az, ledger, plant)
-                rows += 1
-                wait = every
-            wait -= 1
-        stop = advance_body(
-            x, ledger, fx, fy, fz, ax, ay, az,
+        held = Held(
+            fx, fy, fz, ax, ay, az,
             (anchor[sample + 1, 0] - ax) * rate,
             (anchor[sample + 1, 1] - ay) * rate,
             (anchor[sample + 1, 2] - az) * rate,
-            probe_inside(servo.x, servo.y, servo.z, texture), plant,
+            probe_inside(servo.x, servo.y, servo.z, texture),
         )  # fmt: skip
+        if tracing:
+            if wait == 0:
+                time = (done + sample) * settings.period
+                trace_row(trace, rows, time, x, servo, held, ledger, plant)
+                rows += 1
+                wait = every
+            wait -= 1
+        stop = advance_body(x, ledger, held, plant)
         if stop != RAN:
             samples = sample
             break
@@ -162,7 +166,7 @@ def servo_batch(
             stop = DIVERGED
             samples = sample + 1
             break
-    return stop, rows, LoopState(servo, True, head, done + samples)
+    return stop, rows, LoopState(servo, head, done + samples)
 
 
 def stored_batch(x: FloatArray, anchor: FloatArray, plant: object) -> float:
