@@ -27,28 +27,22 @@ _TERMS = 14
 
 @dataclass(frozen=True)
 class Body:
-    """A linear body: x' = A x + B f + C_a a + C_v v + G g, with the energies as quadratic forms.
+    """A linear body, x' = F z with z = (x, f, a, v, g), and its energies as quadratic forms.
 
     f is the force on the handle [N], a and v position and velocity of the hand's anchor, g the
-    constant force of the hand. With z = (x, f, a, v, g) the stored energy is ½ zᵀ S z and the rate
-    of loss zᵀ Q z; the anchor feeds the power v · N z. S and Q are symmetric.
+    constant force of the hand. The stored energy is ½ zᵀ S z and the rate of loss zᵀ Q z; the
+    anchor feeds the power v · N z. S and Q are symmetric.
 
     Attributes:
-        dynamics: A, shape (n, n); the first three states are the handle's position [m], the next
+        flow: F, shape (n, n + 12); the first three states are the handle's position [m], the next
             three its velocity [m/s]; then the same of the part that carries the hand, if it is
             another one.
-        force: B, shape (n, 3).
-        anchor: C_a and C_v side by side, shape (n, 6).
-        press: G, shape (n, 3).
         storage: S, shape (n + 12, n + 12).
         loss: Q, shape (n + 12, n + 12).
         pull: N, the force of the anchor on the body, shape (3, n + 12).
     """
 
-    dynamics: FloatArray
-    force: FloatArray
-    anchor: FloatArray
-    press: FloatArray
+    flow: FloatArray
     storage: FloatArray
     loss: FloatArray
     pull: FloatArray
@@ -56,7 +50,7 @@ class Body:
     @property
     def order(self) -> int:
         """Number of states."""
-        return len(self.dynamics)
+        return len(self.flow)
 
 
 def body(
@@ -108,7 +102,7 @@ def _assembled(
     rows = [speed, np.linalg.inv(mass) @ (z(f=1.0, g=1.0) - friction @ speed + pull)]
     storage = _form(mass, speed) + _form(spring, stretch)
     loss = _form(friction, speed) + _form(damper, rate)
-    return _body(rows, storage, loss, pull)
+    return Body(np.vstack(rows), storage, loss, pull)
 
 
 def _two_masses(
@@ -139,20 +133,11 @@ def _two_masses(
     storage = _form(near, z(dp=1.0)) + _form(far, z(dr=1.0))
     storage += _form(inner, bend) + _form(spring, stretch)
     loss = _form(friction, z(dp=1.0)) + _form(inner_damper, bend_rate) + _form(damper, rate)
-    return _body(rows, storage, loss, pull)
+    return Body(np.vstack(rows), storage, loss, pull)
 
 
 def _form(matrix: FloatArray, rows: FloatArray) -> FloatArray:
     return np.asarray(rows.T @ matrix @ rows)
-
-
-def _body(rows: list[FloatArray], storage: FloatArray, loss: FloatArray, pull: FloatArray) -> Body:
-    every = np.vstack(rows)
-    n = len(every)
-    return Body(
-        every[:, :n], every[:, n : n + 3], every[:, n + 3 : n + 9], every[:, n + 9 :],
-        storage, loss, pull,
-    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -204,7 +189,7 @@ def exact_step(moved: Body, period: float) -> Step:
     n = moved.order
     size = n + 12
     flow = np.zeros((size, size))
-    flow[:n] = np.hstack([moved.dynamics, moved.force, moved.anchor, moved.press])
+    flow[:n] = moved.flow
     flow[n + 3 : n + 6, n + 6 : n + 9] = np.eye(3)
     # In units of one sample: the exponent stays of order one.
     whole = exponential(span * flow)
