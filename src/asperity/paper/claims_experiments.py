@@ -1,9 +1,8 @@
-"""Sections V and VI: the experiments, and what the paper concludes."""
+"""Sections V and VI, but for the sentences that need a simulation."""
 
 from __future__ import annotations
 
 import math
-from functools import partial
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from asperity.analysis.energy.loops import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.devices import load_device
 from asperity.devices.five_bar import FiveBar, handle_damping
-from asperity.paper.claim import DECLARED, Check, Claim, decide, judge, judges, settle
+from asperity.paper.claim import Check, decide, judge, judges, settle
 from asperity.paper.claims_appendix import true_number
 from asperity.paper.claims_friction import PAPER, Rub, norm_of, stick_entries
 from asperity.paper.comparisons import curl_check, outside_check, q_of
@@ -280,32 +279,6 @@ def perpendicular() -> Check:
         printed=most < 1e-12,
         greatest=most,
     )
-
-
-# --- what needs the closed loop ------------------------------------------------------------------
-
-
-def simulated(name: str) -> Check:
-    """Return what the simulated experiment of a claim finds."""
-    from asperity.paper.experiments.findings import FINDINGS  # and with it the simulation
-
-    return FINDINGS[name]()
-
-
-SIMULATED = {
-    "V.A-cycles": "At 2000 N/m W settles; textured with A or F it enters a limit cycle (Fig. 5).",
-    "V.A-settles": "Divided by 5.1 and 8.3 the stiffness of A and F lets them settle (Fig. 5).",
-    "V.B-A": "On a stroke A gains energy along z, none along x (Fig. 6).",
-    "V.B-G": "On a stroke G is marginally passive along x and z (Fig. 6).",
-    "V.B-D": "On a stroke D is marginally passive along z, clearly along x (Fig. 6).",
-    "V.B-F": "On a stroke F is marginally passive along z, passive along x (Fig. 6).",
-    "V.C-A": "On a 20 mm bump A gains in jumps and loses contact (Fig. 7).",
-    "V.C-D": "On a 20 mm bump D keeps its energy in balance (Fig. 7).",
-}
-DECLARED += [
-    Claim(f"sentence-{name}", (), name[:3], statement, partial(simulated, f"sentence-{name}"))
-    for name, statement in SIMULATED.items()
-]
 
 
 # --- VI -------------------------------------------------------------------------------------------

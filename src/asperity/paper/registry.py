@@ -17,6 +17,7 @@ from asperity.paper import (  # noqa: F401 - each declares its claims
     claims_tables,
 )
 from asperity.paper.claim import DECLARED, Claim, Result
+from asperity.paper.experiments import findings  # noqa: F401 - declares its claims
 
 # What is called after each claim: its result, how many are done, of how many.
 Progress = Callable[[Result, int, int], None]

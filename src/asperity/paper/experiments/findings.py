@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import lru_cache
 
-from asperity.paper.claim import Check, decide
+from asperity.paper.claim import DECLARED, Check, decide, judges
 from asperity.paper.experiments.bump import Bump, bump_experiment
-from asperity.paper.experiments.passivity import Count, count_cycles
+from asperity.paper.experiments.passivity import count_cycles
 from asperity.paper.experiments.scanning import scanning_experiment
 from asperity.paper.experiments.settings import LAG
 from asperity.simulation.scan import Stroke
@@ -19,9 +18,7 @@ MARGINAL = 0.05
 CLEAR = 0.01
 
 
-@lru_cache(maxsize=64)
-def _count(law: str, divisor: float, delay: int) -> Count:
-    return count_cycles(law, divisor, delay)
+_count = lru_cache(maxsize=64)(count_cycles)
 
 
 @lru_cache(maxsize=16)
@@ -34,8 +31,12 @@ def _bumps(law: str) -> tuple[Bump, ...]:
     return bump_experiment(law).of(law)
 
 
-def _textured_walls_cycle() -> Check:
-    """W must settle from every start; A and F must cycle for good from at least a quarter."""
+@judges("sentence-V.A-cycles", "V.A")
+def textured_walls_cycle() -> Check:
+    """At 2000 N/m W settles; textured with A or F it enters a limit cycle (Fig. 5).
+
+    W must settle from every start; A and F must cycle for good from at least a quarter.
+    """
     counts = {(law, d): _count(law, 1.0, d) for law in "WAF" for d in LAGS}
 
     def shown(delay: int) -> bool:
@@ -59,7 +60,9 @@ def _textured_walls_cycle() -> Check:
     )
 
 
-def _divided_walls_settle() -> Check:
+@judges("sentence-V.A-settles", "V.A")
+def divided_walls_settle() -> Check:
+    """Divided by 5.1 and 8.3 the stiffness of A and F lets them settle (Fig. 5)."""
     counts = [_count(law, by, d) for law, by in (("A", 5.1), ("F", 8.3)) for d in LAGS]
     cycling = sum(one.cycles for one in counts)
     starts = sum(one.starts for one in counts)
@@ -93,7 +96,9 @@ def _judged(says: str, strokes: tuple[Stroke, ...], printed: bool, correction: s
     return check
 
 
-def _law_a_gains() -> Check:
+@judges("sentence-V.B-A", "V.B")
+def law_a_gains() -> Check:
+    """On a stroke A gains energy along z, none along x (Fig. 6)."""
     strokes = _strokes("A")
     feeding = sum(one.feeds for one in strokes)
     return _judged(
@@ -104,8 +109,12 @@ def _law_a_gains() -> Check:
     )
 
 
-def _law_g_is_passive() -> Check:
-    """Marginally passive: along each axis what it gives is small against what it takes, or less."""
+@judges("sentence-V.B-G", "V.B")
+def law_g_is_passive() -> Check:
+    """On a stroke G is marginally passive along x and z (Fig. 6).
+
+    Marginally: along each axis what it gives is small against what it takes, or less.
+    """
     strokes = _strokes("G")
     feeding = sum(one.feeds for one in strokes)
     passive = all(max(one.energy[0], one.energy[2]) <= MARGINAL * _scale(one) for one in strokes)
@@ -123,7 +132,9 @@ def _scale(stroke: Stroke) -> float:
     return max(abs(value) for value in stroke.energy)
 
 
-def _law_d_is_passive() -> Check:
+@judges("sentence-V.B-D", "V.B")
+def law_d_is_passive() -> Check:
+    """On a stroke D is marginally passive along z, clearly along x (Fig. 6)."""
     strokes = _strokes("D")
     along_z = all(abs(one.energy[2]) <= MARGINAL * 1e-3 for one in strokes)
     along_x = all(one.energy[0] < -CLEAR * 1e-3 for one in strokes)
@@ -138,7 +149,9 @@ def _law_d_is_passive() -> Check:
     )
 
 
-def _law_f_is_passive() -> Check:
+@judges("sentence-V.B-F", "V.B")
+def law_f_is_passive() -> Check:
+    """On a stroke F is marginally passive along z, passive along x (Fig. 6)."""
     strokes = _strokes("F")
     return _judged(
         f"{_range(strokes, 0)}, {_range(strokes, 2)}",
@@ -150,7 +163,9 @@ def _law_f_is_passive() -> Check:
     )
 
 
-def _law_a_throws_off() -> Check:
+@judges("sentence-V.C-A", "V.C")
+def law_a_throws_off() -> Check:
+    """On a 20 mm bump A gains in jumps and loses contact (Fig. 7)."""
     bumps = _bumps("A")
     says = "; ".join(
         f"{one.entry}: {1e3 * one.total:+.3g} mJ, up to {1e3 * one.jump:.3g} mJ in 20 ms, contact "
@@ -160,7 +175,9 @@ def _law_a_throws_off() -> Check:
     return decide(says, printed=holds, numbers=_of_bumps(bumps))
 
 
-def _law_d_is_balanced() -> Check:
+@judges("sentence-V.C-D", "V.C")
+def law_d_is_balanced() -> Check:
+    """On a 20 mm bump D keeps its energy in balance (Fig. 7)."""
     bumps, lively = _bumps("D"), _bumps("A")
     says = "; ".join(
         f"{one.entry}: {1e3 * one.total:+.3g} mJ against {1e3 * other.total:+.3g} of A, up to "
@@ -183,13 +200,5 @@ def _of_bumps(bumps: tuple[Bump, ...]) -> dict[str, float]:
     return numbers
 
 
-FINDINGS: dict[str, Callable[[], Check]] = {
-    "sentence-V.A-cycles": _textured_walls_cycle,
-    "sentence-V.A-settles": _divided_walls_settle,
-    "sentence-V.B-A": _law_a_gains,
-    "sentence-V.B-G": _law_g_is_passive,
-    "sentence-V.B-D": _law_d_is_passive,
-    "sentence-V.B-F": _law_f_is_passive,
-    "sentence-V.C-A": _law_a_throws_off,
-    "sentence-V.C-D": _law_d_is_balanced,
-}
+FINDINGS = tuple(claim.id for claim in DECLARED if claim.compute.__module__ == __name__)
+"""Ids of the sentences that are judged here."""
