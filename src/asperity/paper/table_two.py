@@ -94,16 +94,13 @@ class TableTwoRow:
     @property
     def agrees(self) -> bool:
         """Whether the row stands as printed."""
-        parts = (self.conservativity_agrees, self.continuity_agrees, self.energy_agrees)
-        return self.number_agrees is True and all(parts)
+        return self.verdict == "yes"
 
     @property
     def verdict(self) -> str:
         """``"yes"`` if the row stands, ``"new"`` if only a number is added, else ``"no"``."""
-        if self.agrees:
-            return "yes"
-        parts = (self.conservativity_agrees, self.continuity_agrees, self.energy_agrees)
-        return "new" if self.number_agrees is None and all(parts) else "no"
+        others = self.conservativity_agrees and self.continuity_agrees and self.energy_agrees
+        return {True: "yes", None: "new", False: "no"}[self.number_agrees] if others else "no"
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
@@ -134,10 +131,7 @@ class TableTwo(Record):
         Raises:
             KeyError: for a letter that the table has not.
         """
-        for row in self.rows:
-            if row.law == law:
-                return row
-        raise KeyError(law)
+        return {row.law: row for row in self.rows}[law]
 
     def cells(self) -> list[list[str]]:
         """Return the table as text, its first row the head."""
