@@ -15,7 +15,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.files import Record, json_text, plain, record, whole_file, write_text
+from asperity.errors import ParameterError
+from asperity.files import (
+    Record,
+    json_text,
+    open_input,
+    plain,
+    read_toml,
+    record,
+    whole_file,
+    write_text,
+)
 
 
 class Side(StrEnum):
@@ -181,3 +191,77 @@ def test_a_pipe_is_written_to_and_not_replaced(tmp_path: Path) -> None:
     finally:
         os.close(reader)
     assert pipe.is_fifo()
+
+
+# --- what is read ---------------------------------------------------------------------------------
+
+
+def test_a_link_to_a_file_is_read(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"content")
+    (tmp_path / "link").symlink_to(tmp_path / "file")
+    with open_input(tmp_path / "link") as stream:
+        assert stream.read() == b"content"
+
+
+@pytest.mark.parametrize("kind", ["pipe", "link to a pipe", "folder", "device"])
+def test_what_is_no_file_is_refused_at_once(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "input"
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "device":
+        path = Path("/dev/zero")
+    else:
+        os.mkfifo(path)
+    if kind == "link to a pipe":
+        path = tmp_path / "link"
+        path.symlink_to(tmp_path / "input")
+    with pytest.raises(OSError, match="not a regular file"):
+        open_input(path)
+
+
+def test_a_file_above_the_cap_is_refused_with_both_sizes(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(bytes(101))
+    with pytest.raises(OSError, match="101 bytes; at most 100 are read"):
+        open_input(tmp_path / "file", most=100)
+    with open_input(tmp_path / "file", most=101) as stream:
+        assert len(stream.read()) == 101
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"a = " + b"[" * 20000 + b"]" * 20000, "nested too deeply"),
+        (b"a = " + b"9" * 5000, "not valid TOML"),
+        (b"a = \xff", "not valid TOML"),
+        (b"#" * (2**22 + 1), "at most 4194304 are read"),
+    ],
+    ids=["deep", "integer", "encoding", "size"],
+)
+def test_toml_that_cannot_be_read_is_refused_with_its_name(
+    tmp_path: Path, content: bytes, words: str
+) -> None:
+    path = tmp_path / "file.toml"
+    path.write_bytes(content)
+    with pytest.raises(ParameterError, match=f"scene file .*file.toml .*{words}"):
+        read_toml("scene", path)
+
+
+def test_a_file_being_written_has_no_name(tmp_path: Path) -> None:
+    """A process that is killed while it writes leaves nothing behind."""
+    with whole_file(tmp_path / "target") as stream:
+        stream.write(b"half")
+        stream.flush()
+        assert list(tmp_path.iterdir()) == []
+        stream.write(b" and half")
+    assert (tmp_path / "target").read_bytes() == b"half and half"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_without_such_files_there_is_a_name_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(os, "O_TMPFILE", raising=False)
+    with whole_file(tmp_path / "target") as stream:
+        assert len(list(tmp_path.iterdir())) == 1
+        stream.write(b"content")
+    assert [path.name for path in tmp_path.iterdir()] == ["target"]

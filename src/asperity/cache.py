@@ -9,6 +9,7 @@ that cannot be used costs time, never the answer.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import stat
@@ -17,12 +18,11 @@ from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
-from asperity.files import whole_file
+from asperity.files import open_input, whole_file
 
 _MAGIC = b"asperity cache 1\n"
 _DIGEST = 32
 _HEAD = len(_MAGIC) + _DIGEST
-_LARGEST = 2**30
 _SET_ASIDE = ".damaged"
 
 
@@ -51,15 +51,15 @@ def recall(room: str, key: str) -> bytes | None:
     try:
         if not (_trusted(path.parent.parent) and _trusted(path.parent)):
             return None
-        # Not to hang where somebody put a pipe.
-        with os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as stream:
-            status = os.fstat(stream.fileno())
-            regular = stat.S_ISREG(status.st_mode) and status.st_size <= _LARGEST
-            whole = stream.read(_LARGEST) if regular else b""
+        with open_input(path) as stream:
+            whole = stream.read()
     except (FileNotFoundError, NotADirectoryError):  # what is in the way is said when writing
         return None
     except (OSError, ValueError) as error:
-        _say(f"the cache {cache_folder()} cannot be read ({_reason(error)}): {_AGAIN}")
+        if isinstance(error, OSError) and error.errno == errno.EINVAL:  # a folder, a pipe
+            set_aside(room, key)
+        else:
+            _say(f"the cache {cache_folder()} cannot be read ({_reason(error)}): {_AGAIN}")
         return None
     if whole[:_HEAD] == _MAGIC + _digest(key, whole[_HEAD:]):
         return whole[_HEAD:]

@@ -1,22 +1,78 @@
-"""What leaves the program: files that are whole or not there, and values as plain data for JSON."""
+"""What enters and leaves: files to read, files that are whole or not there, data for JSON."""
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
 import secrets
+import stat
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from enum import Enum
+from io import BufferedReader
 from pathlib import Path
 from typing import IO, Any, ClassVar, overload
+
+from asperity.errors import ParameterError
 
 
 def is_device(path: str | os.PathLike[str]) -> bool:
     """Return whether there is something that is no regular file (a pipe, a device, a folder)."""
     return Path(path).exists() and not Path(path).is_file()
+
+
+def open_input(path: str | os.PathLike[str], most: int = 2**31) -> BufferedReader:
+    """Open a file for reading, if it is one: a pipe or a device would hang or never end.
+
+    Args:
+        path: the file, or a link to it.
+        most: bytes that it may have.
+
+    Raises:
+        OSError: if it cannot be read, is no regular file, or is larger.
+    """
+    # What is looked at is what is read: it is opened once, and a pipe is not waited for.
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    try:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError(errno.EINVAL, "not a regular file", str(path))
+        if status.st_size > most:
+            raise OSError(
+                errno.EFBIG, f"{status.st_size} bytes; at most {most} are read", str(path)
+            )
+        return os.fdopen(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def read_toml(name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the content of a TOML file of at most 4 MiB.
+
+    Args:
+        name: what it is, for the error.
+        path: the file.
+
+    Raises:
+        ParameterError: if it cannot be read, or is no TOML.
+    """
+    import tomllib
+
+    try:
+        with open_input(path, 2**22) as stream:
+            # Editors of some systems put a mark of the encoding in front.
+            return tomllib.loads(stream.read().decode("utf-8-sig"))
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ParameterError(name, f"file {path} cannot be read: {reason}") from None
+    except RecursionError:
+        raise ParameterError(name, f"file {path} is nested too deeply") from None
+    except ValueError as error:  # of TOML, of the encoding, of an impossible path or number
+        raise ParameterError(name, f"file {path} is not valid TOML: {error}") from None
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from typing import Any
 import click
 
 from asperity.errors import AsperityError, ParameterError
+from asperity.files import open_input
 
 OPTION = "law_module"
 _FILES: list[str] = []  # that were run
@@ -111,7 +112,8 @@ def _load(file: str, places: tuple[Registry, ...]) -> None:
 
 def _source(file: str) -> bytes:
     try:
-        return Path(file).read_bytes()
+        with open_input(file, 2**24) as stream:
+            return stream.read()
     except (OSError, ValueError) as error:  # ValueError: of an impossible path
         reason = getattr(error, "strerror", None) or str(error)
         raise ParameterError(OPTION, f"{file} cannot be read: {reason}") from None

@@ -13,6 +13,7 @@ from typing import Any
 
 from asperity.devices.device import FIELD_TABLE, WORDS, Datum, Device
 from asperity.errors import ParameterError, nearest_names
+from asperity.files import read_toml
 from asperity.units import quantity
 
 _KEYS = ("value", "unit", "source", "verified", "also")
@@ -56,23 +57,9 @@ def load_device(device: str | os.PathLike[str] | Device) -> Device:
         if known.lower() == text.strip().lower():
             return parse_device(content, known)
     if text.lower().endswith(".toml"):
-        return _load_file(Path(text))
+        return parse_device(read_toml("device", Path(text)), Path(text).stem)
     hint = nearest_names(text, _catalogue())
     raise ParameterError("device", f"is unknown: {text!r}; {hint}, or a TOML file")
-
-
-def _load_file(path: Path) -> Device:
-    try:
-        # Editors of some systems put a mark of the encoding in front.
-        content = tomllib.loads(path.read_text("utf-8-sig"))
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ParameterError("device", f"file {path} cannot be read: {reason}") from None
-    except RecursionError:
-        raise ParameterError("device", f"file {path} is nested too deeply") from None
-    except ValueError as error:  # of TOML, of the encoding, of an impossible path or number
-        raise ParameterError("device", f"file {path} is not valid TOML: {error}") from None
-    return parse_device(content, path.stem)
 
 
 def parse_device(content: Mapping[str, Any], default_id: str) -> Device:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from asperity.checks import FloatArray
 from asperity.errors import ParameterError, SurfaceFileError
-from asperity.files import whole_file
+from asperity.files import open_input, whole_file
 
 SCHEMA = 1
 """Version of the file's layout."""
@@ -104,7 +104,7 @@ def check_target(target: Path, source: Path) -> None:
 def is_prepared(path: str | os.PathLike[str]) -> bool:
     """Tell by its content whether a file is a prepared surface."""
     try:
-        with Path(path).open("rb") as stream:
+        with open_input(path) as stream:
             if stream.read(4) != _ZIP_MAGIC:
                 return False
             with zipfile.ZipFile(stream) as archive:
@@ -121,7 +121,7 @@ def load_prepared(path: str | os.PathLike[str]) -> Prepared:
     """
     name = Path(path).name
     try:
-        with zipfile.ZipFile(path) as archive:
+        with open_input(path) as stream, zipfile.ZipFile(stream) as archive:
             return _read(archive)
     except SurfaceFileError as error:
         raise SurfaceFileError(f"{name}: {error}") from None
@@ -186,5 +186,5 @@ def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
 
 
 def _sha256(path: Path) -> str:
-    with path.open("rb") as stream:
+    with open_input(path) as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()

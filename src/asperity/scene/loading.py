@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 from asperity.arguments import Argument, read_arguments
 from asperity.devices import Device, load_device, parse_device
 from asperity.errors import ParameterError, nearest_names
+from asperity.files import read_toml
 from asperity.scene.sections import KINDS, surface_arguments
 from asperity.textures import Texture, load_texture
 
@@ -109,7 +109,7 @@ def build_texture(kind: str, arguments: Mapping[str, Any], folder: Path | None =
 
 
 def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
-    content = _read_toml(path)
+    content = read_toml("scene", path)
     _refuse_code(content)
     for name in content:
         if name not in SECTIONS:
@@ -151,15 +151,3 @@ def _scene_device(section: Mapping[str, Any]) -> Device:
     changed = parse_device(own, known.id)
     words = {name: getattr(changed, name) for name in ("name", "axes", "notes") if name in own}
     return replace(known, data={**known.data, **changed.data}, **words)
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text("utf-8"))
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ParameterError("scene", f"{path} cannot be read: {reason}") from None
-    except RecursionError:
-        raise ParameterError("scene", f"{path} is nested too deeply") from None
-    except ValueError as error:  # of TOML, of the encoding, of an impossible path or number
-        raise ParameterError("scene", f"{path} is not valid TOML: {error}") from None

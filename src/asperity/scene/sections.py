@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import warnings
 from collections import ChainMap
 from collections.abc import Callable, Mapping
@@ -13,6 +14,7 @@ import numpy as np
 
 from asperity.arguments import MAX_DEPTH, STIFFNESS, Argument, read_arguments
 from asperity.errors import ParameterError, nearest_names
+from asperity.files import open_input
 from asperity.laws import LAW_ARGUMENTS, Law, known_arguments
 from asperity.measured.arguments import FILE_ARGUMENTS
 from asperity.scene.plant import BRAKES
@@ -38,7 +40,7 @@ def read_path(file: str) -> PathMotion:
             number.
     """
     try:
-        with Path(file).open(encoding="utf-8") as stream:
+        with io.TextIOWrapper(open_input(file), "utf-8") as stream:
             names = [name.strip() for name in stream.readline().split(",")]
             columns = [_column(names, name, file) for name in PATH_COLUMNS]
             with warnings.catch_warnings():

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from asperity.errors import AsperityError, SurfaceFileError
+from asperity.files import open_input
 from asperity.measured.reading.foreign import FORMATS, too_large, unread
 from asperity.measured.reading.raw import RawSurface
 from asperity.measured.reading.reader import ReadingOptions, SurfaceFile
@@ -61,7 +62,7 @@ def read_surface(
     try:
         _ = options.metres  # an unknown unit is refused whatever the file is
         _check_file(Path(path), name)
-        with Path(path).open("rb") as stream:
+        with open_input(path, MAX_BYTES) as stream:
             file = SurfaceFile(Path(path), stream.read(4096))
         return _finite(_read(file, options))
     except MemoryError as error:
