@@ -10,16 +10,14 @@ import numpy as np
 
 from asperity.errors import SurfaceFileError
 from asperity.measured.reading.raw import MAX_POINTS, RawSurface
+from asperity.measured.reading.reader import ReadingOptions, SurfaceFile, naming
 
 NPY_MAGIC = b"\x93NUMPY"
 
 
-def read_npy(path: Path, metres: float | None = None) -> RawSurface:
+@naming
+def read_npy(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     """Read a 1-D (profile) or 2-D (map) real array; heights are metres unless told otherwise.
-
-    Args:
-        path: the file.
-        metres: length of the unit of the heights [m].
 
     Returns:
         The heights [m]; an NPY file has no pitch.
@@ -27,17 +25,17 @@ def read_npy(path: Path, metres: float | None = None) -> RawSurface:
     Raises:
         SurfaceFileError: not a real array of one or two dimensions, or truncated.
     """
-    array = _mapped(path)
-    _check_array(array, path.name)
+    array, metres = _mapped(file.path), options.metres
+    _check_array(array)
     # A long double beyond float64 becomes inf, refused later; a signalling NaN is missing too.
     with np.errstate(over="ignore", invalid="ignore"):
         heights = np.array(array, dtype=np.float64, order="C")
     if metres is None:
         note = "no unit in an NPY file: heights taken as metres"
-        return RawSurface(heights, None, path.name, (note,), has_units=False)
+        return RawSurface(heights, None, file.name, (note,), has_units=False)
     note = f"no unit in an NPY file: {metres:g} m as given"
     with np.errstate(over="ignore"):  # infinities are refused later
-        return RawSurface(heights * metres, None, path.name, (note,))
+        return RawSurface(heights * metres, None, file.name, (note,))
 
 
 def _mapped(path: Path) -> np.ndarray[Any, np.dtype[Any]]:
@@ -47,9 +45,9 @@ def _mapped(path: Path) -> np.ndarray[Any, np.dtype[Any]]:
             warnings.simplefilter("ignore")  # a header of NumPy under Python 2 is fine
             array = np.load(path, mmap_mode="r", allow_pickle=False)
     except Exception as error:  # NumPy names no closed list of what a damaged header raises
-        raise SurfaceFileError(f"{path.name}: {_reason(error, path)}") from error
+        raise SurfaceFileError(_reason(error, path)) from error
     if not isinstance(array, np.ndarray):
-        raise SurfaceFileError(f"{path.name}: not a single NumPy array")
+        raise SurfaceFileError("not a single NumPy array")
     return array
 
 
@@ -62,15 +60,14 @@ def _reason(error: Exception, path: Path) -> str:
     return f"damaged NPY file ({text.splitlines()[0] if text else type(error).__name__})"
 
 
-def _check_array(array: np.ndarray[Any, np.dtype[Any]], name: str) -> None:
+def _check_array(array: np.ndarray[Any, np.dtype[Any]]) -> None:
     if array.dtype.kind not in "iuf":
         raise SurfaceFileError(
-            f"{name}: array of type {array.dtype}; real numbers (integer or float) are expected"
+            f"array of type {array.dtype}; real numbers (integer or float) are expected"
         )
     if array.ndim not in (1, 2) or min(array.shape) < 1:
         raise SurfaceFileError(
-            f"{name}: array of shape {array.shape}; (ny, nx) for a map"
-            " or (n,) for a profile is expected"
+            f"array of shape {array.shape}; (ny, nx) for a map or (n,) for a profile is expected"
         )
     if array.size > MAX_POINTS:
-        raise SurfaceFileError(f"{name}: {array.size} points; at most {MAX_POINTS} are read")
+        raise SurfaceFileError(f"{array.size} points; at most {MAX_POINTS} are read")

@@ -7,7 +7,6 @@ import io
 import os
 import warnings
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from asperity.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading.length_units import metres_of
 from asperity.measured.reading.raw import MAX_POINTS, RawSurface
+from asperity.measured.reading.reader import ReadingOptions, SurfaceFile, naming
 
 # asperity reads these itself, or refuses them for a reason; HGT takes any file of a square size.
 _OURS = frozenset(("sdf", "xyz", "asc", "npy", "npz", "x3p", "hgt"))
@@ -23,44 +23,33 @@ _INFLATION = 1032  # deflate, which all compressed formats use, packs at most so
 _HEAD = 512
 
 
-def read_instrument(
-    path: Path,
-    name: str,
-    *,
-    channel: str | int | None = None,
-    metres: float | None = None,
-    sure: bool = False,
-) -> RawSurface | None:
+@naming
+def read_instrument(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
     """Read a file that one of SurfaceTopography's readers recognises.
 
-    Args:
-        path: the file.
-        name: its name, for messages.
-        channel: name or number (from 0) of the height channel.
-        metres: length of the unit [m] where the file has none.
-        sure: ask only the readers that know the file by its first bytes.
+    Of a text only those readers are asked that know it by its first bytes: some take any.
 
     Returns:
-        Heights [m]; None where no reader recognises the file.
+        Heights [m]; None where no reader recognises the file, or the extra is not installed.
 
     Raises:
-        ModuleNotFoundError: the extra is not installed.
         SurfaceFileError: recognised, but it cannot be read.
         ParameterError: the channel or the unit must be given, or must not.
     """
-    library = _library()
-    with _quiet(), _Bounded(io.FileIO(path)) as stream:
-        reader = _recognised(library, stream, name, sure=sure)
+    if not has_library():
+        return None
+    with _quiet(), _Bounded(io.FileIO(file.path)) as stream:
+        reader = _recognised(_library(), stream, sure=file.is_text)
         if reader is None:
             return None
         with contextlib.closing(reader):
-            what = f"{name}: {reader.name()}"
             try:
-                return _surface(reader, path, name, channel, metres)
+                return _surface(reader, file, options)
             except (SurfaceFileError, ParameterError, MemoryError):
                 raise
             except Exception as error:  # a damaged file can raise anything in there
-                raise SurfaceFileError(f"{what} file, damaged ({_reason(error)})") from error
+                what = f"{reader.name()} file, damaged"
+                raise SurfaceFileError(f"{what} ({_reason(error)})") from error
 
 
 class _Bounded(io.BufferedReader):
@@ -104,7 +93,7 @@ def _quiet() -> Iterator[None]:
         yield
 
 
-def _recognised(library: Any, stream: _Bounded, name: str, *, sure: bool) -> Any | None:
+def _recognised(library: Any, stream: _Bounded, *, sure: bool) -> Any | None:
     head = stream.read(_HEAD)
     for kind in library.readers:
         if kind.format() in _OURS:
@@ -117,9 +106,8 @@ def _recognised(library: Any, stream: _Bounded, name: str, *, sure: bool) -> Any
             return kind(stream)
         except Exception as error:  # each reader says "not mine" in its own way
             if match == "yes":
-                raise SurfaceFileError(
-                    f"{name}: {kind.name()} file, damaged ({_reason(error)})"
-                ) from error
+                what = f"{kind.name()} file, damaged"
+                raise SurfaceFileError(f"{what} ({_reason(error)})") from error
     return None
 
 
@@ -128,16 +116,15 @@ def _reason(error: Exception) -> str:
     return text if 0 < len(text) <= 120 else f"{text[:117]}..." if text else type(error).__name__
 
 
-def _surface(
-    reader: Any, path: Path, name: str, channel: str | int | None, metres: float | None
-) -> RawSurface:
-    chosen = _chosen(reader, name, channel)
+def _surface(reader: Any, file: SurfaceFile, options: ReadingOptions) -> RawSurface:
+    name, metres = file.name, options.metres
+    chosen = _chosen(reader, name, options.channel)
     size = chosen.nb_grid_pts
     points = int(np.prod([int(n) for n in size])) if size is not None else 0
-    if points > MAX_POINTS or points > _INFLATION * path.stat().st_size:
-        raise SurfaceFileError(f"{name}: {points} points, more than are read or the file can hold")
+    if points > MAX_POINTS or points > _INFLATION * file.path.stat().st_size:
+        raise SurfaceFileError(f"{points} points, more than are read or the file can hold")
     if chosen.is_uniform is False:
-        raise SurfaceFileError(f"{name}: sampling is not uniform; resample the profile")
+        raise SurfaceFileError("sampling is not uniform; resample the profile")
     unit = _unit(chosen, name, metres)
     heights, pitch = _data(chosen)
     notes = [f"{reader.name()} file, read by SurfaceTopography"]
@@ -149,7 +136,7 @@ def _surface(
         scaled = heights * unit
     lateral = None if pitch is None else tuple(float(p) * unit for p in pitch)
     if lateral is not None and not all(np.isfinite(lateral) & (np.array(lateral) > 0)):
-        raise SurfaceFileError(f"{name}: the file's pitch {lateral} is not positive")
+        raise SurfaceFileError(f"the file's pitch {lateral} is not positive")
     return RawSurface(scaled, lateral, name, tuple(notes))
 
 
@@ -158,7 +145,7 @@ def _chosen(reader: Any, name: str, channel: str | int | None) -> Any:
     heights = [c for c in reader.channels if c.data_kind.value == "height" and c.dim in (1, 2)]
     if not heights:
         kinds = ", ".join(f"{c.name!r} ({c.data_kind.value})" for c in reader.channels) or "none"
-        raise SurfaceFileError(f"{name}: no height channel; the file has: {kinds}")
+        raise SurfaceFileError(f"no height channel; the file has: {kinds}")
     if channel is None and len(heights) == 1:
         return heights[0]
     names = ", ".join(f"{c.index}: {c.name!r}" for c in heights)

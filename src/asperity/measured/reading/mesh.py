@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from asperity.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading.mesh_raster import Grid, rasterise
-from asperity.measured.reading.quiet import quiet_log
+from asperity.measured.reading.quiet import guarded
 from asperity.measured.reading.raw import RawSurface
+from asperity.measured.reading.reader import Reader, ReadingOptions, SurfaceFile, naming
 
 _STL_HEADER, _STL_RECORD = 84, 50
 _STL_TEXT = re.compile(rb"\s*solid\b[^\n]*\n\s*(facet\s+normal\b|endsolid\b)", re.IGNORECASE)
@@ -59,37 +60,25 @@ def _is_binary_stl(content: bytes) -> bool:
     return bool(len(content) == _STL_HEADER + _STL_RECORD * count)
 
 
-def read_mesh(content: bytes, kind: str, name: str, metres: float | None) -> RawSurface:
-    """Read a mesh patch as heights over its least-squares plane.
+def mesh_reader(kind: str) -> Reader:
+    """Return the reader of "STL" or "OBJ".
 
-    Args:
-        content: the bytes of the file.
-        kind: "STL" or "OBJ".
-        name: name of the file.
-        metres: length of one unit of the coordinates [m], None if not given.
-
-    Returns:
-        Heights [m] on a grid whose pitch is about the median edge; NaN at holes.
-
-    Raises:
-        ParameterError: no unit, which neither format has.
-        SurfaceFileError: damaged, overhanging or folded.
+    Heights [m] are over the patch's least-squares plane, on a grid whose pitch is about the median
+    edge; NaN at holes. A unit is required, which neither format has. What is damaged, overhanging
+    or folded is refused.
     """
-    if metres is None:
-        raise ParameterError(
-            "unit",
-            f"is required: {name} is {_an(kind)} file, which has no unit; say what its"
-            " coordinates are in, such as 'mm'",
-        )
-    try:
-        corners = _corners(content, kind) * metres
-        return _surface(corners, name)
-    except SurfaceFileError as error:
-        raise SurfaceFileError(f"{name}: {error}") from error
 
+    @naming
+    def read(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
+        if options.metres is None:
+            raise ParameterError(
+                "unit",
+                f"is required: {file.name} is an {kind} file, which has no unit; say what its"
+                " coordinates are in, such as 'mm'",
+            )
+        return _surface(_corners(file.content, kind) * options.metres, file.name)
 
-def _an(kind: str) -> str:
-    return "an " + kind
+    return Reader(f"an {kind} mesh", lambda file: mesh_kind(file.content) == kind, read, ("unit",))
 
 
 def _corners(content: bytes, kind: str) -> NDArray[np.float64]:
@@ -110,19 +99,13 @@ def _parsed(content: bytes, kind: str) -> NDArray[np.float64]:
     import trimesh
 
     options: dict[str, Any] = {"skip_materials": True} if kind == "OBJ" else {}
-    try:
-        with quiet_log("trimesh"):
-            loaded: Any = trimesh.load(
-                io.BytesIO(content), file_type=kind.lower(), process=False, **options
-            )
+    with guarded(f"damaged {kind} mesh", "trimesh"):
+        loaded: Any = trimesh.load(
+            io.BytesIO(content), file_type=kind.lower(), process=False, **options
+        )
         meshes = [loaded] if isinstance(loaded, trimesh.Trimesh) else loaded.dump()
         parts = [np.asarray(part.triangles, dtype=np.float64) for part in meshes]
         triangles = np.concatenate(parts) if parts else np.empty((0, 3, 3))
-    except MemoryError:
-        raise
-    except Exception as error:  # trimesh names no closed list of what a damaged file raises
-        reason = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
-        raise SurfaceFileError(f"damaged {kind} mesh ({reason})") from error
     if triangles.ndim != 3 or triangles.shape[1:] != (3, 3):
         raise SurfaceFileError(f"damaged {kind} mesh (its faces are no triangles)")
     expected = _faces_of_obj(content) if kind == "OBJ" else content.lower().count(b"facet normal")

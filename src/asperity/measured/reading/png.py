@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import struct
-import warnings
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from asperity.errors import SurfaceFileError
 from asperity.measured.reading.image import Pixels, check_size
+from asperity.measured.reading.quiet import guarded
 
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 _PIECE = 2**22
@@ -144,13 +144,10 @@ def _check_complete(header: _Header) -> None:
 def _by_pillow(content: bytes, header: _Header) -> NDArray[Any]:
     from PIL import Image
 
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the size was checked above
-            with Image.open(io.BytesIO(content), formats=("PNG",)) as image:
-                values = np.asarray(image)
-    except Exception as error:  # Pillow names no closed list of what a damaged file raises
-        raise SurfaceFileError(f"damaged PNG image ({error})") from error
+    picture = io.BytesIO(content)
+    # The size, of which it warns, was checked above.
+    with guarded("damaged PNG image", "PIL"), Image.open(picture, formats=("PNG",)) as image:
+        values = np.asarray(image)
     expected = (header.rows, header.columns, _CHANNELS[header.colour])
     if values.size != np.prod(expected) or values.dtype.itemsize != header.depth // 8:
         raise SurfaceFileError("damaged PNG image (pixels are missing)")

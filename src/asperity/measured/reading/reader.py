@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 
-from asperity.errors import ParameterError
+from asperity.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading.length_units import metres_of
 from asperity.measured.reading.raw import RawSurface
 
@@ -64,6 +65,9 @@ class ReadingOptions:
         return None if self.unit is None else metres_of(self.unit)
 
 
+Read = Callable[[SurfaceFile, ReadingOptions], RawSurface | None]
+
+
 @dataclass(frozen=True)
 class Reader:
     """Recognises one format by its content, and reads it.
@@ -89,7 +93,7 @@ class Reader:
 
     name: str
     recognises: Callable[[SurfaceFile], bool]
-    read: Callable[[SurfaceFile, ReadingOptions], RawSurface | None]
+    read: Read
     arguments: tuple[str, ...] = ()
     certain: bool = True
 
@@ -110,3 +114,16 @@ class Reader:
                 raise ParameterError(
                     argument, f"must not be given: {file.name} ({self.name}) {why}", given
                 )
+
+
+def naming(read: Read) -> Read:
+    """Let the refusals of a reader begin with the name of the file."""
+
+    @wraps(read)
+    def named(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
+        try:
+            return read(file, options)
+        except SurfaceFileError as error:
+            raise SurfaceFileError(f"{file.name}: {error}") from error
+
+    return named

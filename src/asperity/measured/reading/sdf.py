@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from asperity.errors import SurfaceFileError
 from asperity.measured.reading.numbers import parse_number
 from asperity.measured.reading.raw import MAX_POINTS, RawSurface
+from asperity.measured.reading.reader import ReadingOptions, SurfaceFile, naming
 
 _TEXT = re.compile(
     rb"\s*a[A-Za-z0-9.\-]{2,15}[ \t]*\r*\n(?:[ \t]*(?:;[^\n]*)?\r*\n)*[ \t]*ManufacID\b"
@@ -73,18 +74,12 @@ def is_sdf(head: bytes) -> bool:
     return _TEXT.match(head) is not None or _BINARY.match(head) is not None
 
 
-def read_sdf(content: bytes, name: str) -> RawSurface:
+@naming
+def read_sdf(file: SurfaceFile, _options: ReadingOptions) -> RawSurface:
     """Read a surface data file.
 
     A height is Zscale times the stored number. A point is missing where a text has "BAD" and
     where the number is the one that its data type reserves. Profiles keep the file's order.
-
-    Args:
-        content: the bytes of the file.
-        name: its name, for messages.
-
-    Returns:
-        Heights [m] and pitch [m].
 
     Raises:
         SurfaceFileError: not an SDF that can be read, with the reason.
@@ -92,17 +87,8 @@ def read_sdf(content: bytes, name: str) -> RawSurface:
     Reference:
         ISO 25178-71.
     """
-    try:
-        if _BINARY.match(content):
-            header, stored = _binary(content)
-        else:
-            header, stored = _text(content)
-        return _surface(header, stored, name)
-    except SurfaceFileError as error:
-        raise SurfaceFileError(f"{name}: {error}") from error
-
-
-def _surface(header: _Header, stored: NDArray[np.float64], name: str) -> RawSurface:
+    content = file.content
+    header, stored = _binary(content) if _BINARY.match(content) else _text(content)
     notes = []
     missing = stored == header.kind.missing
     if missing.any():
@@ -112,8 +98,9 @@ def _surface(header: _Header, stored: NDArray[np.float64], name: str) -> RawSurf
     with np.errstate(over="ignore", invalid="ignore"):  # infinities are refused by the caller
         heights = np.where(missing, np.nan, stored * z)
     if header.profiles == 1:
-        return RawSurface(heights, (x,), name, tuple(notes))
-    return RawSurface(heights.reshape(header.profiles, header.points), (x, y), name, tuple(notes))
+        return RawSurface(heights, (x,), file.name, tuple(notes))
+    heights = heights.reshape(header.profiles, header.points)
+    return RawSurface(heights, (x, y), file.name, tuple(notes))
 
 
 def _checked(

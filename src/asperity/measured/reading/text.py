@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import codecs
 import re
-from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from asperity.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading.numbers import parse_number
 from asperity.measured.reading.raw import MAX_POINTS, RawSurface
+from asperity.measured.reading.reader import ReadingOptions, SurfaceFile, naming
 from asperity.measured.reading.spacing import spacing
 from asperity.measured.reading.text_header import (
     MapHeader,
@@ -31,18 +31,14 @@ _LONGEST_HEADER = 1000
 _LONGEST = 10.0  # [m]; a longer measurement is rather one whose unit is not the metre
 
 
-def read_text(content: bytes, name: str, metres: float | None = None) -> RawSurface:
+@naming
+def read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     """Read a matrix, a profile (position, height), a list of x, y, z, or a column of heights.
 
     Cells are separated by tabs, semicolons, commas or white space. Empty cells and "nan"
     are missing points. A decimal comma is accepted where the separator is no comma. Two
     columns are a profile where the first increases (or decreases) throughout; three are points
     of a regular grid, in any order, unless the header is a map's.
-
-    Args:
-        content: the bytes of the file.
-        name: its name, for messages.
-        metres: length of the unit of all numbers [m] where the file names none.
 
     Returns:
         Heights [m]; the pitch [m] of a two-column profile, else None.
@@ -51,18 +47,16 @@ def read_text(content: bytes, name: str, metres: float | None = None) -> RawSurf
         SurfaceFileError: no table of numbers, or one that cannot be read without guessing.
         ParameterError: a unit for a file that names its own.
     """
-    try:
-        table = find_table(_decode(content))
-        _check_table(table)
-        header = map_header(table.header)
-        rows, columns = table.values.shape
-        if columns == 2 and not header.describes_map and _is_monotonic(table):
-            return _profile(table, name, metres)
-        if columns == 3 and rows > 3 and not header.describes_map:
-            return _points(table, name, metres)
-        return _matrix(table, header, name, metres)
-    except SurfaceFileError as error:
-        raise SurfaceFileError(f"{name}: {error}") from error
+    name, metres = file.name, options.metres
+    table = find_table(_decode(file.content))
+    _check_table(table)
+    header = map_header(table.header)
+    rows, columns = table.values.shape
+    if columns == 2 and not header.describes_map and _is_monotonic(table):
+        return _profile(table, name, metres)
+    if columns == 3 and rows > 3 and not header.describes_map:
+        return _points(table, name, metres)
+    return _matrix(table, header, name, metres)
 
 
 def _decode(content: bytes) -> str:
@@ -143,13 +137,14 @@ def _points(table: Table, name: str, metres: float | None) -> RawSurface:
     _refuse_second(named, name, metres)
     known = named is not None or metres is not None
     unit_x, unit_y, unit_z = named or (metres or 1.0,) * 3
-    refuse_missing_positions(table.values)
-    grid = grid_of(table.values, (_resolution(table, 0), _resolution(table, 1)))
-    pitch = (grid.pitch[0] * unit_x, grid.pitch[1] * unit_y)
-    rows, columns = grid.heights.shape
+    if np.isnan(table.values[:, :2]).any():
+        raise SurfaceFileError(f"a position is missing; {_EXPECTED}")
+    heights, steps = grid_of(table.values, (_resolution(table, 0), _resolution(table, 1)))
+    pitch = (steps[0] * unit_x, steps[1] * unit_y)
+    rows, columns = heights.shape
     _refuse_long(max(pitch[0] * (columns - 1), pitch[1] * (rows - 1)), known=known)
     notes = _notes(table, known=known, metres=metres)
-    heights = np.ascontiguousarray(grid.heights * unit_z)
+    heights = np.ascontiguousarray(heights * unit_z)
     if 1 in heights.shape:
         axis = 0 if rows == 1 else 1
         return RawSurface(heights.ravel(), (pitch[axis],), name, notes, has_units=known)
@@ -278,44 +273,25 @@ _EXPECTED = (
 )
 
 
-@dataclass(frozen=True)
-class Grid:
-    """Heights of points sorted onto their grid.
-
-    Attributes:
-        heights: shape (ny, nx), NaN where the list names no point.
-        pitch: (p_x, p_y), in the unit of the positions; 0 along an axis with one point.
-    """
-
-    heights: NDArray[np.float64]
-    pitch: tuple[float, float]
-
-
-def refuse_missing_positions(points: NDArray[np.float64]) -> None:
-    """Refuse a list (n, 3) in which a point has no x or no y.
-
-    Raises:
-        SurfaceFileError: for such a list.
-    """
-    if np.isnan(points[:, :2]).any():
-        raise SurfaceFileError(f"a position is missing; {_EXPECTED}")
-
-
 def grid_of(
     points: NDArray[np.float64], resolution: tuple[NDArray[np.float64], NDArray[np.float64]]
-) -> Grid:
+) -> tuple[NDArray[np.float64], tuple[float, float]]:
     """Return the grid of a list of points.
 
     Args:
         points: x, y, z, shape (n, 3).
         resolution: value of the last printed digit of each x and each y, shape (n,).
 
+    Returns:
+        Heights, shape (ny, nx), NaN where the list names no point; the pitch (p_x, p_y), in the
+        unit of the positions, 0 along an axis with one point.
+
     Raises:
         SurfaceFileError: for points that are on no regular grid, or named twice.
 
     Example:
         >>> points = np.array([[0, 0, 1.0], [0, 2, 3.0], [1, 0, 2.0], [1, 2, 4.0]])
-        >>> grid_of(points, (np.ones(4), np.ones(4))).heights
+        >>> grid_of(points, (np.ones(4), np.ones(4)))[0]
         array([[1., 2.],
                [3., 4.]])
     """
@@ -327,7 +303,7 @@ def grid_of(
         raise SurfaceFileError(f"two points have the same position; {_EXPECTED}")
     heights = np.full((len(y), len(x)), np.nan)
     heights[row, column] = points[:, 2]
-    return Grid(heights, (_step("x", x, resolution[0]), _step("y", y, resolution[1])))
+    return heights, (_step("x", x, resolution[0]), _step("y", y, resolution[1]))
 
 
 def _step(axis: str, positions: NDArray[np.float64], resolution: NDArray[np.float64]) -> float:

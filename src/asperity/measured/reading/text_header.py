@@ -142,7 +142,6 @@ def _shape(lines: Sequence[str]) -> tuple[int, int] | None:
 # Units of other things or of other systems: never to be mistaken for metres.
 _REFUSED = {"in", "inch", "inche", "mil", "thou", "ft", "feet", "volt", "px", "pixel", "mv", "kå"}
 _WORD = re.compile(r"[^\W\d_]+")
-_BRACKET = re.compile(r"[\[(]([^\[\]()]*)[\])]")
 
 
 def units_of(text: str) -> list[float]:
@@ -235,7 +234,7 @@ def _in_brackets(text: str, match: re.Match[str]) -> bool:
 
 def _refuse_brackets(text: str) -> None:
     """Refuse "[V]" and the like: a bracket that stands where a unit stands."""
-    for bracket in _BRACKET.findall(text):
+    for bracket in _BRACKETED.findall(text):
         content = bracket.strip()
         if content and (len(content) <= 3 or _key(content) in _REFUSED):
             raise _unknown(content)

@@ -6,7 +6,6 @@ Tell TIFF files of instruments, which hold calibrated heights, from plain pictur
 from __future__ import annotations
 
 import io
-import warnings
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from asperity.errors import SurfaceFileError
 from asperity.measured.reading.image import Pixels, check_size
-from asperity.measured.reading.quiet import quiet_log
+from asperity.measured.reading.quiet import guarded, quiet_log
 
 TIFF_MAGIC = (b"II*\x00", b"MM\x00*", b"II+\x00", b"MM\x00+")
 _INFLATION = 2000  # no compression that is read packs more bytes into one
@@ -41,18 +40,10 @@ def read_tiff(content: bytes) -> Pixels:
     """
     import tifffile
 
-    try:
-        with warnings.catch_warnings(), quiet_log("tifffile"):
-            warnings.simplefilter("ignore")
-            with tifffile.TiffFile(io.BytesIO(content)) as file:
-                page = _one_page(file)
-                _check_page(page, len(content))
-                return _pixels(page, _decoded(page, content))
-    except (SurfaceFileError, MemoryError):
-        raise
-    except Exception as error:  # tifffile names no closed list of what a damaged file raises
-        reason = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
-        raise SurfaceFileError(f"damaged TIFF image ({reason})") from error
+    with guarded("damaged TIFF image", "tifffile"), tifffile.TiffFile(io.BytesIO(content)) as file:
+        page = _one_page(file)
+        _check_page(page, len(content))
+        return _pixels(page, _decoded(page, content))
 
 
 def _one_page(file: Any) -> Any:

@@ -8,7 +8,6 @@ import struct
 import zipfile
 import zlib
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from asperity.errors import SurfaceFileError
 from asperity.measured.reading.numbers import parse_number
 from asperity.measured.reading.raw import RawSurface
+from asperity.measured.reading.reader import ReadingOptions, SurfaceFile, naming
 from asperity.measured.reading.spacing import spacing
 from asperity.measured.reading.x3p_document import Axis, Document, Link, parse_document
 
@@ -34,15 +34,13 @@ _DAMAGE = (
 )
 
 
-def read_x3p(path: Path) -> RawSurface:
+@naming
+def read_x3p(file: SurfaceFile, _options: ReadingOptions) -> RawSurface:
     """Read an X3P surface or profile.
 
     Heights are offset + increment * stored for an incremental height axis, and offset + stored
     for an absolute one, whatever their data type. A point is missing where its height is NaN,
     its validity bit is 0 or its Datum is empty.
-
-    Args:
-        path: the file.
 
     Returns:
         Heights [m], pitch [m] and what is odd about the file.
@@ -51,12 +49,12 @@ def read_x3p(path: Path) -> RawSurface:
         SurfaceFileError: not an X3P that can be read, with the reason.
     """
     try:
-        with zipfile.ZipFile(path) as file:
-            return _read(_archive(file, path.stat().st_size), path.name)
-    except SurfaceFileError as error:
-        raise SurfaceFileError(f"{path.name}: {error}") from error
+        with zipfile.ZipFile(file.path) as archive:
+            return _read(_archive(archive, file.path.stat().st_size), file.name)
+    except SurfaceFileError:
+        raise
     except _DAMAGE as error:
-        raise SurfaceFileError(f"{path.name}: damaged zip archive ({error})") from error
+        raise SurfaceFileError(f"damaged zip archive ({error})") from error
 
 
 def _read(archive: _Archive, name: str) -> RawSurface:
