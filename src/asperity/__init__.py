@@ -52,43 +52,29 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_HOMES = {
-    "Analysis": "asperity.analysis.analysis_result",
-    "Bound": "asperity.analysis",
-    "Comparison": "asperity.analysis",
-    "Device": "asperity.devices",
-    "Fourier": "asperity.textures",
-    "Grating": "asperity.textures",
-    "HeightMap": "asperity.textures",
-    "Law": "asperity.laws",
-    "Leak": "asperity.analysis",
-    "Limits": "asperity.analysis.limits.limit_result",
-    "Noise": "asperity.textures",
-    "NoiseProfile": "asperity.textures",
-    "Passivity": "asperity.analysis",
-    "PopThrough": "asperity.analysis.split.state",
-    "Profile": "asperity.textures",
-    "Sinusoid": "asperity.textures",
-    "SplitState": "asperity.analysis.split.state",
-    "Surface": "asperity.surface",
-    "TabulatedSurface": "asperity.analysis.split.potential_table",
-    "analyze": "asperity.analysis.analyze",
-    "characteristic_number": "asperity.analysis",
-    "compare": "asperity.analysis",
-    "curl_number": "asperity.analysis",
-    "limits": "asperity.analysis.check_limits",
-    "load_device": "asperity.devices",
-    "load_texture": "asperity.textures",
-    "loop_work": "asperity.analysis",
-    "named_surface": "asperity.textures",
-    "one_sided_number": "asperity.analysis",
-    "passivity": "asperity.analysis.judge_passivity",
-    "pop_through": "asperity.analysis.split.state",
-    "split_state": "asperity.analysis.split.state",
-    "surface_names": "asperity.textures",
-    "tabulate": "asperity.analysis.split.potential_table",
-    "worst_loop": "asperity.analysis",
+_NAMES = {
+    "asperity.analysis": (
+        "Bound Comparison Leak Passivity characteristic_number "
+        "compare curl_number loop_work one_sided_number worst_loop"
+    ),
+    "asperity.analysis.analysis_result": "Analysis",
+    "asperity.analysis.analyze": "analyze",
+    "asperity.analysis.check_limits": "limits",
+    "asperity.analysis.judge_passivity": "passivity",
+    "asperity.analysis.limits.limit_result": "Limits",
+    "asperity.analysis.split.potential_table": "TabulatedSurface tabulate",
+    "asperity.analysis.split.state": "PopThrough SplitState pop_through split_state",
+    "asperity.devices": "Device load_device",
+    "asperity.laws": "Law",
+    "asperity.surface": "Surface",
+    "asperity.textures": (
+        "Fourier Grating HeightMap Noise NoiseProfile "
+        "Profile Sinusoid load_texture named_surface surface_names"
+    ),
 }
+"""Where the public names live."""
+
+_HOMES = {name: home for home, names in _NAMES.items() for name in names.split()}
 
 __all__ = list(_HOMES)
 __all__ += ["AsperityError", "LawError", "ParameterError", "SurfaceFileError", "__version__"]

@@ -16,8 +16,8 @@ from PIL import Image
 from asperity.cli.surfaces import command
 from asperity.errors import ParameterError
 from asperity.report.page import page_html
-from asperity.report.pictures.gallery_picture import gallery_figure
 from asperity.report.pictures.style import png_uri
+from asperity.report.pictures.surface_picture import gallery_figure
 from asperity.report.surfaces import listed_surfaces, surfaces_page
 from asperity.scene import KINDS, load_scene
 from asperity.textures import Sinusoid

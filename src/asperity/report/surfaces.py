@@ -193,8 +193,8 @@ def surfaces_page(listed: Sequence[Listed]) -> Page:
 
 
 def _card(one: Listed) -> Section:
-    from asperity.report.pictures.gallery_picture import gallery_figure
     from asperity.report.pictures.style import png_uri
+    from asperity.report.pictures.surface_picture import gallery_figure
 
     kind = one.kind
     rows = []

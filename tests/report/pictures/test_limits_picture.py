@@ -8,7 +8,8 @@ import pytest
 from asperity.analysis.check_limits import limits
 from asperity.analysis.limits.limit_result import Limits
 from asperity.devices import parse_device
-from asperity.report.pictures.limits_picture import limits_figure, shortest
+from asperity.report.pictures.limits_picture import limits_figure
+from asperity.report.pictures.spectrum_picture import shortest
 from asperity.textures import Fourier, HeightMap, Sinusoid
 
 BENCH = {
@@ -23,13 +24,17 @@ def result() -> Limits:
     return limits(texture, parse_device(BENCH, "bench"), law="A")
 
 
+def shortest_of(result: Limits) -> list[tuple[float, int, str]]:
+    return shortest(result.device, result.speed, result.time_samples, result.position_samples)
+
+
 def test_the_shortest_waves_by_hand(result: Limits) -> None:
     """α v T, β δ and v/F₀; α δ is drawn only where it differs."""
-    assert [(number, round(least, 9)) for least, number, _words in shortest(result)] == [
+    assert [(number, round(least, 9)) for least, number, _words in shortest_of(result)] == [
         (1, 50e-6), (2, 75e-6), (6, 250e-6),
     ]  # fmt: skip
     other = limits(Sinusoid(5e-5, 1e-3), result.device, law="A", time_samples=8.0)
-    assert [(number, round(least, 9)) for least, number, _words in shortest(other)] == [
+    assert [(number, round(least, 9)) for least, number, _words in shortest_of(other)] == [
         (2, 75e-6), (1, 80e-6), (3, 120e-6), (6, 250e-6),
     ]  # fmt: skip
 

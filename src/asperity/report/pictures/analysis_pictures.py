@@ -177,8 +177,7 @@ def draw_gain(figure: Part, analysis: Analysis) -> None:
     wide, high = window.units
     field = curl_field(surface, window.stretch, window.bottom, *_CELLS)
     scale = _gain_scale(analysis, field.gain)
-    axes: Axes = figure.subplots()
-    style.dress(axes)
+    axes = style.panel(figure)
     mesh = draw_gain_field(axes, field, scale, (wide, high))
     _pale(axes, analysis, window, field)
     at = in_window(window, witness(analysis)) if analysis.q.at is not None else None
@@ -208,13 +207,11 @@ def _mark(axes: Axes, x: float, y: float) -> None:
 
 def draw_top(figure: Part, analysis: Analysis) -> None:
     """Draw the greatest ‖J‖/k found over depth, from above, with the witness of q."""
-    view, surface = top_view(analysis), analysis.surface
-    scale = _gain_scale(analysis, view.gain)
-    unit = style.length_unit(float(view.size.max()))
-    (x0, y0), (x1, y1) = view.low * unit.scale, (view.low + view.size) * unit.scale
-    axes: Axes = figure.subplots()
-    style.dress(axes)
-    shown = np.maximum(view.gain, scale.vmin or 0.0)
+    (grid, gain), surface = top_view(analysis), analysis.surface
+    scale = _gain_scale(analysis, gain)
+    unit, (x0, x1, y0, y1) = grid.frame
+    axes = style.panel(figure)
+    shown = np.maximum(gain, scale.vmin or 0.0)
     mesh = axes.imshow(
         shown, norm=scale, cmap="magma_r", origin="lower", extent=(x0, x1, y0, y1),
         interpolation="nearest",
@@ -222,7 +219,8 @@ def draw_top(figure: Part, analysis: Analysis) -> None:
     at = analysis.q.at
     if at is not None:
         spans = surface.texture.domain
-        x, y = _into(np.array(at[:2]), view.low, view.size, periodic=spans.periodic) * unit.scale
+        place = _into(np.array(at[:2]), grid.low, grid.size, periodic=spans.periodic)
+        x, y = place * unit.scale
         _mark(axes, float(x), float(y))
         line = analysis.leak.line
         start = np.array([x, y])
@@ -250,8 +248,7 @@ def draw_depth(figure: Part, analysis: Analysis) -> None:
     """Draw the singular values of J/k against depth at the witness column, with q's bounds."""
     column, surface = witness_column(analysis), analysis.surface
     unit = style.length_unit(surface.max_depth)
-    axes: Axes = figure.subplots()
-    style.dress(axes)
+    axes = style.panel(figure)
     for index, colour in enumerate((style.BLUE, style.GREEN, style.SOFT)):
         values = np.minimum(column.values[:, index], 2.0 * _HIGHEST)
         look: dict[str, Any] = {"color": colour, "lw": 2.2 - 0.5 * index}
@@ -306,8 +303,7 @@ def draw_jumps(figure: Part, analysis: Analysis) -> None:
     depth = np.array([jump.depth for jump in jumps])
     size = np.array([jump.size for jump in jumps])
     wide, high = style.length_unit(float(depth.max())), style.force_unit(float(size.max()))
-    axes: Axes = figure.subplots()
-    style.dress(axes)
+    axes = style.panel(figure)
     axes.plot(depth * wide.scale, size * high.scale, "o-", color=style.BLUE, lw=1.0, ms=5.5)
     axes.set_xlim(0.0, 1.05 * max(float(depth.max()), 1e-12) * wide.scale)
     axes.set_ylim(0.0, 1.12 * float(size.max()) * high.scale)

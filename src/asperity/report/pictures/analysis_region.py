@@ -13,7 +13,7 @@ from asperity.analysis.bounds.highest import highest_point
 from asperity.analysis.bounds.measures import spectral_norm
 from asperity.checks import FloatArray
 from asperity.report.pictures.field_picture import Window
-from asperity.report.pictures.surface_picture import map_grid
+from asperity.report.pictures.surface_picture import MapGrid, map_grid
 from asperity.report.pictures.vertical_cut import Stretch, feature_length, stretch_of
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine
@@ -180,23 +180,8 @@ def _state(surface: Surface, bound: Bound, count: int) -> dict[str, FloatArray]:
     }
 
 
-@dataclass(frozen=True)
-class TopView:
-    """The greatest ‖J‖/k found over depth, seen from above.
-
-    Attributes:
-        low: lower left corner [m], shape (2,).
-        size: width and depth [m], shape (2,).
-        gain: shape (rows, columns).
-    """
-
-    low: FloatArray
-    size: FloatArray
-    gain: FloatArray
-
-
-def top_view(analysis: Analysis) -> TopView:
-    """Return the greatest ‖J‖/k at five depths below every point of a grid, of a map."""
+def top_view(analysis: Analysis) -> tuple[MapGrid, FloatArray]:
+    """Return a grid, of a map, and the greatest ‖J‖/k at five depths below each of its points."""
     surface = analysis.surface
     affordable = math.isqrt(int(_TOP_BUDGET / (len(TOP_LEVELS) * surface.law.contact.cost)))
     grid = map_grid(surface.texture, min(_TOP_CELLS, affordable))
@@ -206,4 +191,4 @@ def top_view(analysis: Analysis) -> TopView:
         points = np.column_stack([grid.xy, tops - part * surface.max_depth])
         jacobians = surface.jacobian(points, **_state(surface, analysis.q, len(points)))
         best = np.maximum(best, spectral_norm(jacobians) / surface.stiffness)
-    return TopView(grid.low, grid.size, best.reshape(grid.shape))
+    return grid, best.reshape(grid.shape)

@@ -19,7 +19,6 @@ from asperity.paper.experiments.settings import bump_setup
 from asperity.report.pictures import style
 from asperity.units import engineering
 
-_COLUMNS = 3
 # Of the laws, in their order.
 _COLOURS = (style.ORANGE, style.SOFT, style.BLUE, "#cc79a7", style.GREEN)
 
@@ -30,8 +29,7 @@ _COLOURS = (style.ORANGE, style.SOFT, style.BLUE, "#cc79a7", style.GREEN)
 def cycles_figure(found: PassivityExperiment) -> Figure:
     """Return the height of the handle against time for each wall of figure 5."""
     counts = found.counts
-    figure = style.new_figure(10.0, 2.1 * math.ceil(len(counts) / _COLUMNS) + 0.4)
-    panels = style.panels(figure, len(counts), _COLUMNS, x="time [s]", y="z [mm]")
+    figure, panels = style.law_panels(len(counts), 2.1, 0.4, x="time [s]", y="z [mm]")
     for axes, count in zip(panels, counts, strict=True):
         _draw_count(axes, count)
     return figure
@@ -55,17 +53,14 @@ def _draw_count(axes: Axes, count: Count) -> None:
 def energies_figure(found: ScanningExperiment) -> Figure:
     """Return energy along x and z against time, one panel per law."""
     traces = found.traces
-    figure = style.new_figure(10.0, 2.3 * math.ceil(len(traces) / _COLUMNS) + 0.4)
-    panels = style.panels(
-        figure, len(traces), _COLUMNS, x="time [s]", y="energy [mJ]", sharey=False
+    figure, panels = style.law_panels(
+        len(traces), 2.3, 0.4, x="time [s]", y="energy [mJ]", sharey=False
     )
     for axes, trace in zip(panels, traces, strict=True):
         for i, (name, colour) in enumerate((("x", style.ORANGE), ("z", style.BLUE))):
             axes.plot(trace.time, 1e3 * trace.exact[:, i], color=colour, lw=1.2, label=name)
             axes.plot(trace.time, 1e3 * trace.paper[:, i], color=colour, lw=0.9, ls="--")
-        axes.axhline(0.0, color=style.FAINT, lw=0.8, zorder=0.0)
-        low, high = axes.get_ylim()
-        axes.set_ylim(min(low, -0.5), max(high, 0.5))
+        style.zero_line(axes, 0.5)
         style.entitle(axes, trace.law, "")
     style.legend(panels[0])
     return figure
@@ -90,7 +85,7 @@ def bumps_figure(found: BumpExperiment) -> Figure:
         for one in (bump for bump in found.bumps if bump.entry == entry):
             left.plot(1e3 * one.x, 1e3 * one.z, color=colours[one.law], lw=0.9, label=one.law)
             right.plot(one.time, 1e3 * one.supplied, color=colours[one.law], lw=1.2, label=one.law)
-        right.axhline(0.0, color=style.FAINT, lw=0.8, zorder=0.0)
+        style.zero_line(right)
         style.legend(right)
         left.set_ylim(-25.0, 25.0)
         style.entitle(left, "Way", entry)

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure, SubFigure
 from asperity.analysis.energy.merit import scan_height
 from asperity.report.pictures import style
 from asperity.report.pictures.vertical_cut import (
-    ArrowField,
     CurlField,
+    PlaneForces,
     Stretch,
     arrow_field,
     curl_field,
@@ -137,7 +137,7 @@ def _scene(
     surfaces: Sequence[Surface],
     window: Window,
     curls: Sequence[CurlField],
-    arrows: Sequence[ArrowField],
+    arrows: Sequence[PlaneForces],
 ) -> _Scene:
     strong = [np.abs(c.curl).ravel() for c in curls if np.abs(c.curl).max() > 1e-9 * c.norm]
     limit = float(np.quantile(np.concatenate(strong), 0.97)) if strong else surfaces[0].stiffness
@@ -163,7 +163,7 @@ def _draw_curl(axes: Axes, field: CurlField, scene: _Scene) -> Any:
     return mesh
 
 
-def _draw_arrows(axes: Axes, field: ArrowField, scene: _Scene) -> Any:
+def _draw_arrows(axes: Axes, field: PlaneForces, scene: _Scene) -> Any:
     return axes.quiver(
         field.along * scene.wide.scale,
         field.z * scene.high.scale,

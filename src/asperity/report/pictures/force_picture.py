@@ -12,7 +12,7 @@ from matplotlib.figure import Figure, SubFigure
 from asperity.analysis.energy.merit import scan_height
 from asperity.report.pictures import style
 from asperity.report.pictures.vertical_cut import (
-    ScanForces,
+    PlaneForces,
     Stretch,
     feature_length,
     scan_forces,
@@ -56,7 +56,7 @@ def draw_forces(figure: Figure | SubFigure, surfaces: Sequence[Surface]) -> None
     _draw_key(figure, panels[0])
 
 
-def _shared_limits(forces: Sequence[ScanForces]) -> tuple[float, float]:
+def _shared_limits(forces: Sequence[PlaneForces]) -> tuple[float, float]:
     """Return the limits of the shared axis [N]: all, unless one law dwarfs the rest."""
     lows = [min(float(f.tangential.min()), float(f.normal.min()), 0.0) for f in forces]
     highs = [max(float(f.tangential.max()), float(f.normal.max()), 0.0) for f in forces]
@@ -69,7 +69,7 @@ def _shared_limits(forces: Sequence[ScanForces]) -> tuple[float, float]:
 
 
 def _draw_panel(
-    axes: Axes, surface: Surface, force: ScanForces, units: tuple[style.Unit, style.Unit]
+    axes: Axes, surface: Surface, force: PlaneForces, units: tuple[style.Unit, style.Unit]
 ) -> None:
     wide, unit = units
     x = force.along * wide.scale
@@ -85,7 +85,9 @@ def _draw_panel(
     )
 
 
-def _mark_cut(axes: Axes, force: ScanForces, limits: tuple[float, float], unit: style.Unit) -> None:
+def _mark_cut(
+    axes: Axes, force: PlaneForces, limits: tuple[float, float], unit: style.Unit
+) -> None:
     """Say how far a curve goes that leaves the panel."""
     both = np.concatenate([force.tangential, force.normal])
     low, high = float(both.min()), float(both.max())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,6 @@ from asperity.report.pictures.field_picture import field_stretch
 from asperity.report.pictures.vertical_cut import CurlField, Stretch, curl_field, field_range
 from asperity.report.words.number_words import bound_text, law_title, number_text
 
-_COLUMNS = 3
 _CELLS = (120, 60)
 
 
@@ -35,9 +33,8 @@ def gain_figure(comparison: Comparison) -> Figure:
     highest = max(float(np.quantile(values[np.isfinite(values)], 0.995)), 2.0)
     scale = LogNorm(min(0.5, float(np.quantile(values[values > 0.0], 0.02))), highest)
     wide, high = style.length_unit(stretch.length), style.length_unit(top - bottom)
-    figure = style.new_figure(10.0, 2.2 * math.ceil(len(surfaces) / _COLUMNS) + 0.9)
     x, y = f"along the scan line [{wide.name}]", f"z [{high.name}]"
-    panels = style.panels(figure, len(surfaces), _COLUMNS, x=x, y=y)
+    figure, panels = style.law_panels(len(surfaces), 2.2, 0.9, x=x, y=y)
     for axes, row, field in zip(panels, comparison.rows, fields, strict=True):
         mesh = draw_gain_field(axes, field, scale, (wide, high))
         style.entitle(axes, row.law.letter, law_title(row.law.name), f"q = {bound_text(row.q)}")

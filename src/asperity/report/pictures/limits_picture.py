@@ -13,6 +13,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 from asperity.analysis.limits.limit_result import Limits
 from asperity.analysis.words.limits import speed_text, stiffness_text
 from asperity.report.pictures import style
+from asperity.report.pictures.spectrum_picture import shortest
 from asperity.units import engineering
 
 _MILLI = 1e3  # wavelengths are drawn in mm, whatever their size: the axis is logarithmic
@@ -74,43 +75,14 @@ def _draw_waves(
         axes.plot(lengths[shown] * _MILLI, values[shown], color=style.BLUE, lw=0.9)
     filled = np.array(met)
     for which, face in ((shown & filled, style.BLUE), (shown & ~filled, style.CARD)):
-        axes.plot(
-            lengths[which] * _MILLI,
-            values[which],
-            "o",
-            ms=5.0,
-            mfc=face,
-            mec=style.BLUE,
-            zorder=4.0,
-        )
+        x = lengths[which] * _MILLI
+        axes.plot(x, values[which], "o", ms=5.0, mfc=face, mec=style.BLUE, zorder=4.0)
     axes.set_ylim(floor, top * 4.0)
-
-
-def shortest(result: Limits) -> list[tuple[float, int, str]]:
-    """Return the wavelengths [m] below which a limit fails at this speed, with number and words.
-
-    Limits 1, 2, 3 and 6; 3 only where it differs from 2.
-    """
-    device, v = result.device, result.speed
-    rate, step = device.value("update_rate"), device.value("position_resolution")
-    bandwidth = device.value("bandwidth")
-    found = []
-    if rate is not None:
-        found.append((result.time_samples * v / rate, 1, f"{result.time_samples:g} updates"))
-    if step is not None:
-        words = f"{result.position_samples:g} position steps"
-        found.append((result.position_samples * step, 2, words))
-        if result.time_samples != result.position_samples:
-            words = f"{result.time_samples:g} position steps"
-            found.append((result.time_samples * step, 3, words))
-    if bandwidth is not None:
-        found.append((v / bandwidth, 6, "bandwidth"))
-    return sorted(found)
 
 
 def _draw_shortest(result: Limits, both: Sequence[Axes]) -> list[float]:
     """Draw the shortest wavelengths in both panels; return them."""
-    found = shortest(result)
+    found = shortest(result.device, result.speed, result.time_samples, result.position_samples)
     for level, (least, number, words) in enumerate(found):
         for axes in both:
             axes.axvline(least * _MILLI, color=style.ORANGE, lw=1.0, ls="--", zorder=1.0)

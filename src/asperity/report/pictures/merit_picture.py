@@ -15,8 +15,7 @@ def merit_figure(comparison: Comparison) -> Figure:
     Laws whose loop gain is unbounded lie at the origin: any texture costs them everything.
     """
     figure = style.new_figure(10.0, 4.6)
-    axes = figure.add_subplot()
-    style.dress(axes)
+    axes = style.panel(figure)
     scale, unit = (1e3, " · l [mm]") if strength_has_unit(comparison) else (1.0, "")
     widest = max(max(row.strength for row in comparison.rows) * scale, 1e-12)
     for row in comparison.rows:

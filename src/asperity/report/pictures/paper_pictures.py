@@ -173,11 +173,9 @@ def _draw_path(axes: Axes, panel: LoopEnergy) -> None:
 
 def _draw_work(axes: Axes, panel: LoopEnergy) -> None:
     way, work = panel.way * _MILLI, panel.work * _MICRO
-    axes.axhline(0.0, color=style.FAINT, lw=0.8, zorder=0.0)
     axes.plot(way, work, color=style.BLUE, lw=1.3)
     axes.plot(way[-1:], work[-1:], "o", color=style.BLUE, ms=4.0, clip_on=False)
-    low, high = axes.get_ylim()
-    axes.set_ylim(min(low, -_LEAST), max(high, _LEAST))
+    style.zero_line(axes, _LEAST)
     axes.set_title(energy_words(panel), loc="left", fontsize=style.LABEL, color=style.SOFT, pad=5.0)
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import singledispatch
+from collections.abc import Callable, Sequence
+from functools import partial, singledispatch
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -56,17 +56,13 @@ def plot(result: Any, picture: str | None = None) -> Figure:
 @plot.register
 def _texture(result: Texture, picture: str | None = None) -> Figure:
     _known(picture, ("surface",))
-    return surface_figure(result)
+    return _alone(_of_texture(result))
 
 
 @plot.register
 def _surface(result: Surface, picture: str | None = None) -> Figure:
     _known(picture, ())
-    sizes = [force_size(1), field_size([result])]
-    figure, parts = _stacked(sizes)
-    draw_forces(parts[0], [result])
-    draw_fields(parts[1], [result])
-    return figure
+    return _stacked([_of_forces([result]), _of_fields([result])])
 
 
 @plot.register
@@ -75,12 +71,8 @@ def _comparison(result: Comparison, picture: str | None = None) -> Figure:
     if picture is not None:
         return PICTURES[picture](result)
     surfaces = [row.surface for row in result.rows]
-    sizes = [surface_size(result.texture), force_size(len(surfaces)), field_size(surfaces)]
-    figure, parts = _stacked(sizes)
-    draw_surface(parts[0], result.texture)
-    draw_forces(parts[1], surfaces)
-    draw_fields(parts[2], surfaces, _remarks(result))
-    return figure
+    fields = _of_fields(surfaces, _remarks(result))
+    return _stacked([_of_texture(result.texture), _of_forces(surfaces), fields])
 
 
 @plot.register
@@ -89,32 +81,30 @@ def _analysis(result: Analysis, picture: str | None = None) -> Figure:
     _known(picture, tuple(drawings))
     if picture is not None:
         return analysis_figure(result, picture)
-    figure, parts = _stacked([picture_size(result, name) for name in drawings])
-    for (draw, _height), part in zip(drawings.values(), parts, strict=True):
-        draw(part, result)
-    return figure
+    return _stacked([_of_analysis(result, name) for name in drawings])
 
 
-def surface_figure(texture: Texture) -> Figure:
-    """Return the picture of a surface."""
-    figure = style.new_figure(*surface_size(texture))
-    draw_surface(figure, texture)
-    return figure
+# Width and height [inch], and what draws it into a figure or a part of one.
+_Drawing = tuple[tuple[float, float], Callable[[Any], object]]
 
 
-def force_figure(comparison: Comparison) -> Figure:
-    """Return the forces along the scan, one panel per law, on shared axes."""
-    figure = style.new_figure(*force_size(len(comparison.rows)))
-    draw_forces(figure, [row.surface for row in comparison.rows])
-    return figure
+def _of_texture(texture: Texture) -> _Drawing:
+    return surface_size(texture), partial(draw_surface, texture=texture)
 
 
-def field_figure(comparison: Comparison) -> Figure:
-    """Return the force fields over their curl, one panel per law, on shared scales."""
-    surfaces = [row.surface for row in comparison.rows]
-    figure = style.new_figure(*field_size(surfaces))
-    draw_fields(figure, surfaces, _remarks(comparison))
-    return figure
+def _of_forces(surfaces: Sequence[Surface]) -> _Drawing:
+    """The forces along the scan, one panel per law, on shared axes."""
+    return force_size(len(surfaces)), partial(draw_forces, surfaces=surfaces)
+
+
+def _of_fields(surfaces: Sequence[Surface], remarks: Sequence[str] = ()) -> _Drawing:
+    """The force fields over their curl, one panel per law, on shared scales."""
+    return field_size(surfaces), partial(draw_fields, surfaces=surfaces, remarks=remarks)
+
+
+def _of_analysis(analysis: Analysis, name: str) -> _Drawing:
+    draw = pictures_of(analysis)[name][0]
+    return picture_size(analysis, name), lambda part: draw(part, analysis)
 
 
 def _remarks(comparison: Comparison) -> list[str]:
@@ -124,14 +114,22 @@ def _remarks(comparison: Comparison) -> list[str]:
     ]
 
 
-def _stacked(sizes: list[tuple[float, float]]) -> tuple[Figure, list[Any]]:
-    """Return a figure with one part below the other."""
-    heights = [height for _, height in sizes]
-    figure = style.new_figure(max(width for width, _ in sizes), sum(heights))
-    parts: Any = figure.subfigures(len(sizes), 1, height_ratios=heights, squeeze=False)
-    for part in parts.ravel():
+def _alone(drawing: _Drawing) -> Figure:
+    size, draw = drawing
+    figure = style.new_figure(*size)
+    draw(figure)
+    return figure
+
+
+def _stacked(drawings: Sequence[_Drawing]) -> Figure:
+    """Return a figure with one drawing below the other."""
+    heights = [height for (_, height), _ in drawings]
+    figure = style.new_figure(max(width for (width, _), _ in drawings), sum(heights))
+    parts: Any = figure.subfigures(len(drawings), 1, height_ratios=heights, squeeze=False)
+    for part, (_, draw) in zip(parts.ravel(), drawings, strict=True):
         part.set_facecolor(style.CARD)
-    return figure, list(parts.ravel())
+        draw(part)
+    return figure
 
 
 def _known(picture: str | None, names: tuple[str, ...]) -> None:
@@ -142,10 +140,12 @@ def _known(picture: str | None, names: tuple[str, ...]) -> None:
 
 # The pictures of a comparison, as the report shows them.
 PICTURES: dict[str, Callable[[Comparison], Figure]] = {
-    "surface": lambda result: surface_figure(result.texture),
+    "surface": lambda result: _alone(_of_texture(result.texture)),
     "spectrum": lambda result: spectrum_figure(result.texture, result.device),
-    "force": force_figure,
-    "field": field_figure,
+    "force": lambda result: _alone(_of_forces([row.surface for row in result.rows])),
+    "field": lambda result: _alone(
+        _of_fields([row.surface for row in result.rows], _remarks(result))
+    ),
     "gain": gain_figure,
     "merit": merit_figure,
 }

@@ -87,7 +87,7 @@ def _draw_energy(axes: Axes, run: Run, shown: slice) -> None:
         axes.plot(run.time[shown], supplied[:, i], color=_COLOURS[i], lw=0.8, label=_AXES[i])
     axes.plot(run.time[shown], supplied.sum(axis=1), color=style.INK, lw=1.4, label="sum, exact")
     axes.plot(run.time[shown], paper, color=style.SOFT, lw=0.9, ls="--", label="the paper's sum")
-    axes.axhline(0.0, color=style.FAINT, lw=0.8, zorder=0.0)
+    style.zero_line(axes)
     style.legend(axes)
     style.label(axes, "time [s]", "energy [mJ]")
     style.entitle(axes, "Energy", "that the texture has supplied; up feeds the hand")

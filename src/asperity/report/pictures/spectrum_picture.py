@@ -34,34 +34,42 @@ def line_spectrum(texture: Texture) -> tuple[FloatArray, FloatArray]:
     return wavelength, amplitude
 
 
-def device_limits(device: Device) -> list[tuple[float, str]]:
-    """Return the wavelengths [m] below which a device renders no texture, and why.
+def shortest(
+    device: Device, speed: float, time_samples: float, position_samples: float
+) -> list[tuple[float, int, str]]:
+    """Return the wavelengths [m] below which a limit fails at a speed, with number and words.
 
-    The paper's limits 2 and 6 of section II.B: β δ < l and v/l < F₀; and α v T < l, limit 1.
+    Limits 1, 2, 3 and 6 of the paper's section II.B, α v T < l, β δ < l, α δ < l and v/l < F₀; 3
+    only where it differs from 2.
     """
-    limits = []
-    resolution, bandwidth = device.value("position_resolution"), device.value("bandwidth")
-    rate = device.value("update_rate")
-    if resolution is not None:
-        least = _SAMPLES_PER_PERIOD * resolution
-        limits.append((least, f"{_SAMPLES_PER_PERIOD:g} position steps: {engineering(least, 'm')}"))
-    speed = f"at {_SPEED:g} m/s"
+    rate, step = device.value("update_rate"), device.value("position_resolution")
+    bandwidth = device.value("bandwidth")
+    found = []
     if rate is not None:
-        least = _SAMPLES_PER_PERIOD * _SPEED / rate
-        limits.append(
-            (least, f"{_SAMPLES_PER_PERIOD:g} updates {speed}: {engineering(least, 'm')}")
-        )
+        found.append((time_samples * speed / rate, 1, f"{time_samples:g} updates"))
+    if step is not None:
+        found.append((position_samples * step, 2, f"{position_samples:g} position steps"))
+        if time_samples != position_samples:
+            found.append((time_samples * step, 3, f"{time_samples:g} position steps"))
     if bandwidth is not None:
-        least = _SPEED / bandwidth
-        limits.append((least, f"bandwidth {speed}: {engineering(least, 'm')}"))
-    return limits
+        found.append((speed / bandwidth, 6, "bandwidth"))
+    return sorted(found)
+
+
+def device_limits(device: Device) -> list[tuple[float, str]]:
+    """Return the wavelengths [m] below which a device renders no texture, and why."""
+    found = shortest(device, _SPEED, _SAMPLES_PER_PERIOD, _SAMPLES_PER_PERIOD)
+    speed = f" at {_SPEED:g} m/s"
+    return [
+        (least, f"{words}{'' if number == 2 else speed}: {engineering(least, 'm')}")
+        for least, number, words in found
+    ]
 
 
 def spectrum_figure(texture: Texture, device: Device) -> Figure:
     """Return amplitude against wavelength, the device's limits drawn in."""
     figure = style.new_figure(10.0, 3.4)
-    axes = figure.add_subplot()
-    style.dress(axes)
+    axes = style.panel(figure)
     wavelength, amplitude = line_spectrum(texture)
     shown = amplitude > 1e-6 * max(float(amplitude.max()), 1e-300)
     unit = style.length_unit(float(amplitude.max()))

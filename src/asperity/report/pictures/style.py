@@ -90,6 +90,38 @@ def dress(axes: Axes) -> None:
         spine.set_linewidth(0.8)
 
 
+def panel(figure: Figure | SubFigure) -> Axes:
+    """Return the only axes of a figure, dressed."""
+    axes: Axes = figure.subplots()
+    dress(axes)
+    return axes
+
+
+def law_panels(
+    count: int, height: float, around: float, *, x: str, y: str, sharey: bool = True
+) -> tuple[Figure, list[Axes]]:
+    """Return a new figure with axes for so many laws, three in a row; see :func:`panels`.
+
+    Args:
+        count: of laws.
+        height: of a row [inch].
+        around: what the figure is higher than its rows [inch].
+        x: what all have along.
+        y: what all have upwards.
+        sharey: whether all have one vertical scale.
+    """
+    figure = new_figure(10.0, height * math.ceil(count / 3) + around)
+    return figure, panels(figure, count, 3, x=x, y=y, sharey=sharey)
+
+
+def zero_line(axes: Axes, least: float = 0.0) -> None:
+    """Draw where values are zero, and show at least so much above and below it."""
+    axes.axhline(0.0, color=FAINT, lw=0.8, zorder=0.0)
+    if least:
+        low, high = axes.get_ylim()
+        axes.set_ylim(min(low, -least), max(high, least))
+
+
 def panels(
     figure: Figure | SubFigure,
     count: int,

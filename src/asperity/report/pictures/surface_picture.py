@@ -1,4 +1,4 @@
-"""The surface as a picture: a map with a section, or a section alone."""
+"""The surface as a picture, large and small: a map with a section, or a section alone."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Colormap, LightSource, Normalize
+from matplotlib.colors import Colormap, LightSource, LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure, SubFigure
 
 from asperity.checks import FloatArray
@@ -33,6 +33,13 @@ class MapGrid:
     size: FloatArray
     shape: tuple[int, int]
     xy: FloatArray
+
+    @property
+    def frame(self) -> tuple[style.Unit, tuple[float, float, float, float]]:
+        """The unit of its axes, and left, right, lower and upper border in it."""
+        unit = style.length_unit(float(self.size.max()))
+        (x0, y0), (x1, y1) = self.low * unit.scale, (self.low + self.size) * unit.scale
+        return unit, (x0, x1, y0, y1)
 
 
 def map_grid(texture: Texture, count: int) -> MapGrid:
@@ -96,26 +103,23 @@ def draw_section(axes: Axes, texture: Texture, stretch: Stretch) -> None:
 
 def _draw_map(figure: Figure | SubFigure, axes: Axes, texture: Texture) -> None:
     grid = map_grid(texture, _MAP_POINTS)
-    low, size = grid.low, grid.size
     heights = texture.height(grid.xy).reshape(grid.shape)
-    wide = style.length_unit(float(size.max()))
+    wide, frame = grid.frame
     high = style.length_unit(texture.peak_to_valley)
     norm = Normalize(float(heights.min()) * high.scale, float(heights.max()) * high.scale)
     colours = matplotlib.colormaps[style.HEIGHTS]
-    shaded = _greyed(relief(heights, size, colours, steepest=1.0, altitude=50.0), texture)
-    x0, y0 = low * wide.scale
-    x1, y1 = (low + size) * wide.scale
-    axes.imshow(shaded, origin="lower", extent=(x0, x1, y0, y1), interpolation="bilinear")
+    shaded = _greyed(_relief(heights, grid.size, colours, steepest=1.0, altitude=50.0), texture)
+    axes.imshow(shaded, origin="lower", extent=frame, interpolation="bilinear")
     axes.set_anchor("W")
     style.dress(axes)
     style.label(axes, f"x [{wide.name}]", f"y [{wide.name}]")
     _draw_scan_line(axes, texture, wide)
-    draw_scale_bar(axes, float(size[0]))
+    _draw_scale_bar(axes, float(grid.size[0]))
     bar: Any = figure.colorbar(ScalarMappable(norm, colours), ax=axes, pad=0.02, aspect=18)
     style.dress_bar(bar, f"height [{high.name}]")
 
 
-def relief(
+def _relief(
     heights: FloatArray, size: FloatArray, colours: Colormap, steepest: float, altitude: float
 ) -> FloatArray:
     """Return a map lit from the upper left as colours (rows, columns, 4).
@@ -159,7 +163,7 @@ def _draw_scan_line(axes: Axes, texture: Texture, unit: style.Unit) -> None:
     style.note(axes, "scan line", start, xycoords="data", xytext=(6, 5), color=style.INK)
 
 
-def draw_scale_bar(axes: Axes, width: float) -> None:
+def _draw_scale_bar(axes: Axes, width: float) -> None:
     """Draw a bar of a round length in the lower right corner of a map of that width [m]."""
     unit, length = style.length_unit(width), style.nice_length(0.22 * width)
     right, span = 0.97, length / width
@@ -170,3 +174,49 @@ def draw_scale_bar(axes: Axes, width: float) -> None:
         )  # fmt: skip
     words, middle = f"{length * unit.scale:g} {unit.name}", right - 0.5 * span
     style.note(axes, words, (middle, 0.085), ha="center", va="bottom", color=style.INK)
+
+
+# --- small pictures that tell textures apart by their relief --------------------------------------
+
+_CARD_MAP_POINTS = 420
+_CARD_SECTION_POINTS = 900
+# A neutral material: what tells the surfaces apart is their relief.
+_MATERIAL = ("#5f5547", "#b9ab92", "#ddd1ba")
+
+
+def gallery_figure(texture: Texture) -> Figure:
+    """Return the map of a texture, lit from the side, and a section below it."""
+    figure = style.new_figure(4.4, 2.0 if texture.is_profile else 5.0)
+    if texture.is_profile:
+        _draw_card_section(figure.subplots(), texture)
+        return figure
+    upper, lower = figure.subplots(2, 1, height_ratios=[4.0, 1.0])
+    _draw_card_map(upper, texture)
+    _draw_card_section(lower, texture)
+    return figure
+
+
+def _draw_card_map(axes: Axes, texture: Texture) -> None:
+    grid = map_grid(texture, _CARD_MAP_POINTS)
+    size, heights = grid.size, texture.height(grid.xy).reshape(grid.shape)
+    colours = LinearSegmentedColormap.from_list("material", _MATERIAL)
+    shaded = _relief(heights, size, colours, steepest=0.7, altitude=45.0)
+    axes.imshow(shaded, origin="lower", extent=(0.0, size[0], 0.0, size[1]))
+    axes.set_axis_off()
+    _draw_scale_bar(axes, float(size[0]))
+
+
+def _draw_card_section(axes: Axes, texture: Texture) -> None:
+    line = texture.scan_line()
+    periods = 3.0 if texture.is_profile and texture.peak_to_valley > 0.05 * line.length else 1.0
+    along = np.linspace(0.0, periods * line.length, _CARD_SECTION_POINTS)
+    heights = texture.height(line.start + along[:, None] * line.direction)
+    wide, high = style.length_unit(float(along[-1])), style.length_unit(texture.peak_to_valley)
+    x, z = along * wide.scale, heights * high.scale
+    margin = 0.15 * float(np.ptp(z))
+    axes.fill_between(x, z, z.min() - margin, color=style.BODY, linewidth=0.0)
+    axes.plot(x, z, color=style.INK, linewidth=0.9)
+    axes.set_xlim(x[0], x[-1])
+    axes.set_ylim(float(z.min()) - margin, float(z.max()) + margin)
+    style.dress(axes)
+    style.label(axes, f"[{wide.name}]", f"[{high.name}]")

@@ -15,15 +15,13 @@ from asperity.simulation.prediction import Prediction
 from asperity.simulation.scan import Stroke
 from asperity.units import engineering
 
-_COLUMNS = 3
 _DASHES = ("-", "--", ":", "-.")
 
 
 def onset_figure(found: Sequence[Prediction]) -> Figure:
     """Return onset stiffness against delay, one panel per law, with the predictions."""
     laws = list(dict.fromkeys(one.onset.law for one in found))
-    figure = style.new_figure(10.0, 2.3 * math.ceil(len(laws) / _COLUMNS) + 0.5)
-    panels = style.panels(figure, len(laws), _COLUMNS, x="delay [samples]", y="stiffness [N/m]")
+    figure, panels = style.law_panels(len(laws), 2.3, 0.5, x="delay [samples]", y="stiffness [N/m]")
     for axes, law in zip(panels, laws, strict=True):
         mine = [one for one in found if one.onset.law == law]
         proved = mine[0].conservative
@@ -56,17 +54,14 @@ def _finite(values: Sequence[float]) -> list[float]:
 def scan_figure(found: Sequence[Stroke]) -> Figure:
     """Return energy per stroke against speed, one panel per law, one line per depth."""
     laws = list(dict.fromkeys(stroke.law for stroke in found))
-    figure = style.new_figure(10.0, 2.3 * math.ceil(len(laws) / _COLUMNS) + 0.5)
-    panels = style.panels(
-        figure, len(laws), _COLUMNS, x="speed [m/s]", y="mJ per stroke", sharey=False
+    figure, panels = style.law_panels(
+        len(laws), 2.3, 0.5, x="speed [m/s]", y="mJ per stroke", sharey=False
     )
     totals = [abs(one.total) for one in found if math.isfinite(one.total)]
     least = 1e3 * 0.01 * max(totals, default=1e-3)
     for axes, law in zip(panels, laws, strict=True):
         _draw_law(axes, [stroke for stroke in found if stroke.law == law])
-        axes.axhline(0.0, color=style.FAINT, lw=0.8, zorder=0.0)
-        low, high = axes.get_ylim()
-        axes.set_ylim(min(low, -least), max(high, least))  # what is nothing looks like nothing
+        style.zero_line(axes, least)  # what is nothing looks like nothing
         axes.xaxis.set_major_locator(MaxNLocator(5))
         style.entitle(axes, law, "")
     style.legend(panels[0])

@@ -15,7 +15,6 @@ from asperity.surface import Surface
 from asperity.textures.texture import ScanLine, Texture
 
 _SURVEY_POINTS = 4096
-_CURL_COLUMNS, _CURL_ROWS = 160, 90
 _ARROW_COLUMNS, _ARROW_ROWS = 20, 12
 # What a field may cost, in heights of a map that are found in the same time; else it is coarser.
 _BUDGET = 2.2e6
@@ -101,26 +100,35 @@ def sliding_state(surface: Surface, count: int, *, jacobian: bool = False) -> di
 
 
 @dataclass(frozen=True)
-class ScanForces:
-    """Forces along a straight scan.
+class PlaneForces:
+    """Forces in the vertical plane of the scan.
 
     Attributes:
-        along: distance [m], shape (n,).
+        along: distance along the scan [m], shape (n,).
+        z: height [m], shape (n,).
         tangential: component along the scan [N], shape (n,).
         normal: component out of the body [N], shape (n,).
     """
 
     along: FloatArray
+    z: FloatArray
     tangential: FloatArray
     normal: FloatArray
 
 
-def scan_forces(surface: Surface, stretch: Stretch, count: int = 900) -> ScanForces:
+def _forces(
+    surface: Surface, stretch: Stretch, along: FloatArray, xy: FloatArray, z: FloatArray
+) -> PlaneForces:
+    points = np.column_stack([xy, z])
+    forces = surface.force(points, **sliding_state(surface, len(points)))
+    return PlaneForces(along, z, forces[:, :2] @ stretch.line.direction, forces[:, 2])
+
+
+def scan_forces(surface: Surface, stretch: Stretch, count: int = 900) -> PlaneForces:
     """Return the forces along the stretch at the height of the scan."""
     along = stretch.steps(count)
-    points = np.column_stack([stretch.xy(along), np.full(count, scan_height(surface))])
-    forces = surface.force(points, **sliding_state(surface, count))
-    return ScanForces(along, forces[:, :2] @ stretch.line.direction, forces[:, 2])
+    height = np.full(count, scan_height(surface))
+    return _forces(surface, stretch, along, stretch.xy(along), height)
 
 
 def field_range(surfaces: Iterable[Surface], stretch: Stretch) -> tuple[float, float]:
@@ -158,8 +166,8 @@ def curl_field(
     surface: Surface,
     stretch: Stretch,
     bottom: float,
-    columns: int = _CURL_COLUMNS,
-    rows: int = _CURL_ROWS,
+    columns: int = 160,
+    rows: int = 90,
 ) -> CurlField:
     """Return the curl below the surface, from the exact Jacobian.
 
@@ -190,39 +198,11 @@ def curl_field(
     return CurlField(corner_t, corner_z, curl.reshape(columns, rows), gain, norm)
 
 
-@dataclass(frozen=True)
-class ArrowField:
-    """Forces on a regular grid, in contact only.
-
-    Attributes:
-        along: position along the scan [m], shape (n,).
-        z: height [m], shape (n,).
-        tangential: component along the scan [N], shape (n,).
-        normal: component out of the body [N], shape (n,).
-    """
-
-    along: FloatArray
-    z: FloatArray
-    tangential: FloatArray
-    normal: FloatArray
-
-
-def arrow_field(
-    surface: Surface,
-    stretch: Stretch,
-    bottom: float,
-    top: float,
-    columns: int = _ARROW_COLUMNS,
-    rows: int = _ARROW_ROWS,
-) -> ArrowField:
-    """Return forces on a regular grid between bottom and top [m]; see :func:`curl_field`."""
-    steps = (np.arange(columns) + 0.5) * (stretch.length / columns)
-    levels = bottom + (np.arange(rows) + 0.5) * ((top - bottom) / rows)
+def arrow_field(surface: Surface, stretch: Stretch, bottom: float, top: float) -> PlaneForces:
+    """Return forces on a regular grid between bottom and top [m], in contact only."""
+    steps = (np.arange(_ARROW_COLUMNS) + 0.5) * (stretch.length / _ARROW_COLUMNS)
+    levels = bottom + (np.arange(_ARROW_ROWS) + 0.5) * ((top - bottom) / _ARROW_ROWS)
     along, z = (grid.ravel() for grid in np.meshgrid(steps, levels, indexing="ij"))
     xy = stretch.xy(along)
     inside = z < surface.law.contact.begin(surface.texture, xy)
-    points = np.column_stack([xy, z])[inside]
-    forces = surface.force(points, **sliding_state(surface, len(points)))
-    return ArrowField(
-        along[inside], z[inside], forces[:, :2] @ stretch.line.direction, forces[:, 2]
-    )
+    return _forces(surface, stretch, along[inside], xy[inside], z[inside])
