@@ -21,12 +21,7 @@ Number = float | str | list[float]
 # Relative to the largest entry; what is compared is computed in double precision or better.
 TOLERANCE = 1e-9
 # From the mildest to the gravest: a claim is as good as the weakest of its parts.
-_GRAVITY: dict[Verdict, int] = {
-    "holds": 0,
-    "holds with correction": 1,
-    "undecided": 2,
-    "does not hold": 3,
-}
+_GRAVITY: tuple[Verdict, ...] = ("holds", "holds with correction", "undecided", "does not hold")
 
 
 @dataclass(frozen=True)
@@ -251,7 +246,7 @@ def decide(
 
 def settle(*checks: Check) -> Check:
     """Put checks together: a claim is as good as the weakest of its parts."""
-    worst = max(checks, key=lambda check: _GRAVITY[check.verdict])
+    worst = max(checks, key=lambda check: _GRAVITY.index(check.verdict))
     numbers: dict[str, Number] = {}
     for check in checks:
         numbers.update(check.numbers)

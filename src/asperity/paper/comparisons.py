@@ -143,21 +143,15 @@ def energy_sign_check(law: str, places: list[Spot], halves: list[float]) -> Chec
 
 def greatest_norm(surface: Surface) -> float:
     """Return the greatest ‖J‖/κ₀ at full depth, by a search over compiled Jacobians."""
-
-    def depths(heights: FloatArray) -> FloatArray:
-        return np.full(len(heights), surface.max_depth)
-
-    return greatest(surface, spectral_norm, depths).value
+    return greatest(
+        surface, spectral_norm, lambda heights: np.full(len(heights), surface.max_depth)
+    ).value
 
 
 def leg_work(surface: Surface, start: FloatArray, end: FloatArray) -> float:
     """Return the work of the force on a straight way [J]."""
     along = end - start
-
-    def integrand(s: FloatArray) -> FloatArray:
-        return np.asarray(surface.force(start + s[:, None] * along) @ along)
-
-    return integrate(integrand, 8, 1e-10)
+    return integrate(lambda s: surface.force(start + s[:, None] * along) @ along, 8, 1e-10)
 
 
 def q_of(case: Setting, law: str) -> float:

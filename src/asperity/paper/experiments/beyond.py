@@ -82,9 +82,7 @@ class BeyondExperiment(Record):
 def surfaces(measured: Texture | None = None) -> dict[str, Texture]:
     """Return a gentle sinusoid, and a measured surface or a drawn one in its place."""
     gentle = {"sinusoid A/l = 0.1": Sinusoid(0.1e-3, 1e-3)}
-    if measured is None:
-        return gentle | {"knurl": named_surface("knurl")}
-    return gentle | {"yours": measured}
+    return gentle | ({"knurl": named_surface("knurl")} if measured is None else {"yours": measured})
 
 
 def usable_devices() -> tuple[list[str], list[str]]:

@@ -92,8 +92,7 @@ def _range(strokes: tuple[Stroke, ...], axis: int) -> str:
 
 
 def _judged(says: str, strokes: tuple[Stroke, ...], printed: bool, correction: str = "") -> Check:
-    check: Check = decide(says, printed=printed, correction=correction, numbers=_numbers(strokes))
-    return check
+    return decide(says, printed=printed, correction=correction, numbers=_numbers(strokes))
 
 
 @judges("sentence-V.B-A", "V.B")
