@@ -103,7 +103,7 @@ def advance_body(x: FloatArray, ledger: FloatArray, held: Held, plant: BandedPla
             x, fx + gx, fy + gy, fz + gz, bx, by, bz, ux, uy, uz, h, plant,
             change, stage, rate,
         )  # fmt: skip
-        if fine == 0 and banded_kink(x, change, bx, by, bz, h * ux, h * uy, h * uz, plant.hand):
+        if fine == 0 and banded_kink(x, change, time, h, held, plant.hand):
             for i in range(6):
                 x[i] -= change[i]
             fine = 256
@@ -122,23 +122,16 @@ def advance_body(x: FloatArray, ledger: FloatArray, held: Held, plant: BandedPla
 
 
 def banded_kink(
-    x: FloatArray,
-    change: FloatArray,
-    ax: float,
-    ay: float,
-    az: float,
-    dx: float,
-    dy: float,
-    dz: float,
-    hand: HandRecord,
+    x: FloatArray, change: FloatArray, time: float, h: float, held: Held, hand: HandRecord
 ) -> bool:
-    """Whether the band turned slack or taut in a step: its force then has a kink."""
-    ex = ax - x[0]
-    ey = ay - x[1]
-    ez = az - x[2]
+    """Whether the band turned slack or taut in a step h from a time on: its force has a kink."""
+    ex = held.ax + time * held.ux - x[0]
+    ey = held.ay + time * held.uy - x[1]
+    ez = held.az + time * held.uz - x[2]
     return band_turns(
-        ex + change[0], ey + change[1], ez + change[2], ex + dx, ey + dy, ez + dz, hand
-    )
+        ex + change[0], ey + change[1], ez + change[2],
+        ex + h * held.ux, ey + h * held.uy, ez + h * held.uz, hand,
+    )  # fmt: skip
 
 
 def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: BandedPlant) -> float:

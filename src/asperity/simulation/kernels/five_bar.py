@@ -231,19 +231,12 @@ def bar_parts(vx: float, vz: float, rate: float, span: float, bar: Bar) -> int:
 
 
 def bar_kink(
-    x: FloatArray,
-    dx: float,
-    dz: float,
-    ax: float,
-    az: float,
-    ex: float,
-    ez: float,
-    hand: HandRecord,
+    x: FloatArray, dx: float, dz: float, time: float, h: float, held: Held, hand: HandRecord
 ) -> bool:
-    """Whether the band turned slack or taut in a step of the handle, d, and of the anchor, e."""
-    sx = ax - x[0]
-    sz = az - x[2]
-    return band_turns(sx + dx, 0.0, sz + dz, sx + ex, 0.0, sz + ez, hand)
+    """Whether the band turned slack or taut in a step h of the handle, d, from a time on."""
+    sx = held.ax + time * held.ux - x[0]
+    sz = held.az + time * held.uz - x[2]
+    return band_turns(sx + dx, 0.0, sz + dz, sx + h * held.ux, 0.0, sz + h * held.uz, hand)
 
 
 def advance_body(x: FloatArray, ledger: FloatArray, held: Held, plant: PantographPlant) -> int:
@@ -265,7 +258,7 @@ def advance_body(x: FloatArray, ledger: FloatArray, held: Held, plant: Pantograp
         if not bar_reached(x[0], x[2], least, bar):
             x[0], x[2], x[3], x[5] = px, pz, vx, vz
             return LEFT
-        if fine == 0 and bar_kink(x, dx, dz, bx, bz, h * ux, h * uz, hand):
+        if fine == 0 and bar_kink(x, dx, dz, time, h, held, hand):
             x[0], x[2], x[3], x[5] = sx, sz, tx, tz
             fine = 256  # the force has a kink there: again, in small steps
             h = period / parts / 256.0
