@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.loops import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.derive.facts import law_facts
-from asperity.files import Record, record
+from asperity.files import Record
 from asperity.notebook import as_html
 from asperity.paper.claims_friction import PAPER, norm_of, stick_entries
 from asperity.paper.plane import LAWS, PASSIVITY, SCANNING, TURN, path_of
@@ -41,7 +40,7 @@ class Printed:
 
 
 @dataclass(frozen=True)
-class TableTwoRow:
+class TableTwoRow(Record):
     """A row of Table II, printed and computed.
 
     Attributes:
@@ -55,6 +54,11 @@ class TableTwoRow:
         energy: what the paper's loop gains, for the parameters of section V.B [J].
         change: what changed, and why.
     """
+
+    written = (
+        "law printed q one_sided formula conservative continuous energy number_agrees "
+        "conservativity_agrees continuity_agrees energy_agrees change"
+    )
 
     law: str
     printed: Printed
@@ -101,14 +105,6 @@ class TableTwoRow:
         """``"yes"`` if the row stands, ``"new"`` if only a number is added, else ``"no"``."""
         others = self.conservativity_agrees and self.continuity_agrees and self.energy_agrees
         return {True: "yes", None: "new", False: "no"}[self.number_agrees] if others else "no"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return {
-            **record(self, without=("change",)),
-            **record(self, "number_agrees", "conservativity_agrees"),
-            **record(self, "continuity_agrees", "energy_agrees", "change"),
-        }
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
-from asperity.files import record
+from asperity.files import Record, record
 from asperity.laws.w_smooth_wall import LAW as SMOOTH_WALL
 from asperity.simulation.hands import Hand, MovedHand
 from asperity.simulation.motions import Motion
@@ -36,7 +36,7 @@ _COARSE = 2.0  # factor from one stiffness to the next while the onset is looked
 
 
 @dataclass(frozen=True)
-class Onset:
+class Onset(Record):
     """The stiffness at which limit cycles begin.
 
     Attributes:
@@ -55,6 +55,8 @@ class Onset:
         cycles: how many of them ended in a limit cycle at ``cycling``.
     """
 
+    written = "law delay quiet cycling starts cycles low high"
+
     law: str
     delay: int
     quiet: float
@@ -64,10 +66,6 @@ class Onset:
     low: tuple[float, float, float]
     high: tuple[float, float, float]
     wall: bool = False
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units; infinity is the string "inf"."""
-        return record(self, without=("wall",))
 
     @property
     def value(self) -> float:

@@ -116,7 +116,9 @@ def law_g_is_passive() -> Check:
     """
     strokes = _strokes("G")
     feeding = sum(one.feeds for one in strokes)
-    passive = all(max(one.energy[0], one.energy[2]) <= MARGINAL * _scale(one) for one in strokes)
+    passive = all(
+        max(one.energy[0], one.energy[2]) <= MARGINAL * max(map(abs, one.energy)) for one in strokes
+    )
     return _judged(
         f"exact ledger: {_range(strokes, 0)}, {_range(strokes, 2)}; its field feeds "
         f"{feeding} of {len(strokes)} hands and speeds",
@@ -124,11 +126,6 @@ def law_g_is_passive() -> Check:
         passive,
         "G feeds slow hands along both axes; its field is not conservative",
     )
-
-
-def _scale(stroke: Stroke) -> float:
-    """Return the largest energy that the axes of a stroke show [J]."""
-    return max(abs(value) for value in stroke.energy)
 
 
 @judges("sentence-V.B-D", "V.B")
