@@ -67,9 +67,11 @@ def remove_outliers(heights: FloatArray, threshold: float) -> str:
         spikes = residual[some] > threshold * spread
         heights[tuple(index[spikes] for index in some)] = np.nan
         count += int(spikes.sum())
+    side = WINDOW[heights.ndim]
+    around = f"{side} points" if heights.ndim == 1 else f"{side} x {side} points"
     return (
         f"outliers: {count} point{'' if count == 1 else 's'} beyond {threshold:g} robust standard"
-        f" deviations, of {_window_text(heights.ndim)} around and of all"
+        f" deviations, of {around} around and of all"
         f" ({length_text(sigma)}, from the {origin} absolute deviation), made missing"
     )
 
@@ -129,8 +131,3 @@ def _robust_deviation(residual: FloatArray) -> tuple[float, str]:
     if middle > 0.0:
         return _FROM_MEDIAN * middle, "median"
     return _FROM_MEAN * float(valid.mean()), "mean"
-
-
-def _window_text(axes: int) -> str:
-    side = WINDOW[axes]
-    return f"{side} points" if axes == 1 else f"{side} x {side} points"

@@ -85,7 +85,7 @@ def prepare(  # noqa: D417 - the others are described where they are declared
         filtered: Gaussian ISO 16610-21, cut-off 40 µm (chosen from the sampling: 4 samples)
         magnified 20 times laterally and in height
     """
-    begin = progress or _silent
+    begin = progress or (lambda _stage: None)
     raw = raw.in_metres(raw.pitch if pitch is None else pitch)
     steps = list(raw.notes)
     _check_heights(raw.heights, max_missing)
@@ -149,10 +149,6 @@ def magnified(
     step = f"{size} in height" if lateral == upward else f"{size} {upward:g} times in height"
     heights *= upward
     return replace(prepared, pitch=wider, steps=(*prepared.steps, f"magnified {step}"))
-
-
-def _silent(_stage: str) -> None:
-    pass
 
 
 def _check_early(

@@ -33,23 +33,16 @@ _HEADER_2 = struct.Struct("<8s10s12s12sIIddddBBB")
 _OLYMPUS = 8  # bytes that Olympus adds to the header of its bISO-1.0 files (Gwyddion, sdfile.c)
 
 
-@dataclass(frozen=True)
-class _Type:
-    """How a height is stored, and the value that stands for a missing one."""
-
-    dtype: str
-    missing: float
-
-
+# By the code of a type: how a height is stored, and the value that stands for a missing one.
 _TYPES = {
-    0: _Type("u1", math.nan),
-    1: _Type("<u2", 2.0**16 - 1),
-    2: _Type("<u4", 2.0**32 - 1),
-    3: _Type("<f4", float(np.finfo(np.float32).min)),
-    4: _Type("i1", -(2.0**7)),
-    5: _Type("<i2", -(2.0**15)),
-    6: _Type("<i4", -(2.0**31)),
-    7: _Type("<f8", float(np.finfo(np.float64).min)),
+    0: ("u1", math.nan),
+    1: ("<u2", 2.0**16 - 1),
+    2: ("<u4", 2.0**32 - 1),
+    3: ("<f4", float(np.finfo(np.float32).min)),
+    4: ("i1", -(2.0**7)),
+    5: ("<i2", -(2.0**15)),
+    6: ("<i4", -(2.0**31)),
+    7: ("<f8", float(np.finfo(np.float64).min)),
 }
 
 
@@ -58,7 +51,8 @@ class _Header:
     points: int
     profiles: int
     scale: tuple[float, float, float]
-    kind: _Type
+    dtype: str
+    missing: float
 
 
 def is_sdf(head: bytes) -> bool:
@@ -90,9 +84,9 @@ def read_sdf(file: SurfaceFile, _options: ReadingOptions) -> RawSurface:
     content = file.content
     header, stored = _binary(content) if _BINARY.match(content) else _text(content)
     notes = []
-    missing = stored == header.kind.missing
+    missing = stored == header.missing
     if missing.any():
-        count, marker = int(missing.sum()), header.kind.missing
+        count, marker = int(missing.sum()), header.missing
         notes.append(f"{count} points hold {marker:.6g}, which marks a missing point")
     x, y, z = header.scale
     with np.errstate(over="ignore", invalid="ignore"):  # infinities are refused by the caller
@@ -125,7 +119,7 @@ def _checked(
     for key, length in needed.items():
         if not (math.isfinite(length) and length > 0):
             raise SurfaceFileError(f"{key} is {length:g}; it must be positive [m]")
-    return _Header(points, profiles, scale, _TYPES[code])
+    return _Header(points, profiles, scale, *_TYPES[code])
 
 
 def _binary(content: bytes) -> tuple[_Header, NDArray[np.float64]]:
@@ -139,7 +133,7 @@ def _binary(content: bytes) -> tuple[_Header, NDArray[np.float64]]:
     compression, code, check = fields[10:]
     options = {"Compression": compression, "CheckType": check}
     header = _checked(points, profiles, (x, y, z), code, options)
-    dtype = np.dtype(header.kind.dtype)
+    dtype = np.dtype(header.dtype)
     expected, rest = points * profiles * dtype.itemsize, len(content) - layout.size
     if rest < expected:
         raise SurfaceFileError(f"truncated: {rest} bytes of heights, {expected} are expected")
