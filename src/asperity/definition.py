@@ -58,18 +58,15 @@ def exact_jacobian(
             if sliding and square > 0:
                 along = (d[0] * move[0] + d[1] * move[1]) / square
                 follow = [move[0] - along * d[0], move[1] - along * d[1]]
-            ahead = _force(
-                surface,
-                [a + b for a, b in zip(p, move, strict=True)],
-                [a + b for a, b in zip(d, follow, strict=True)],
-            )
-            behind = _force(
-                surface,
-                [a - b for a, b in zip(p, move, strict=True)],
-                [a - b for a, b in zip(d, follow, strict=True)],
+            ahead, behind = (
+                _force(surface, _moved(p, sign, move), _moved(d, sign, follow)) for sign in (1, -1)
             )
             columns.append((ahead - behind) / (2 * step))
         return mpmath.matrix([[columns[c][r] for c in range(3)] for r in range(3)])
+
+
+def _moved(place: list[Any], sign: int, step: list[Any]) -> list[Any]:
+    return [a + sign * b for a, b in zip(place, step, strict=True)]
 
 
 def _force(surface: Surface, p: list[Any], d: list[Any]) -> Any:
