@@ -154,7 +154,7 @@ def test_another_version_of_the_package_makes_its_own(monkeypatch: pytest.Monkey
 
 
 USED = ("enclosures/taylor.py", "textures/samplers/heightmap.py", "contacts/vertical.py",
-        "kernels/contact_loop.py", "derive/facts.py", "analysis/gain/safe_bounds.py")  # fmt: skip
+        "kernels/contact_loop.py", "derive/facts.py", "analysis/gain/friction.py")  # fmt: skip
 UNUSED = ("report/page.py", "analysis/words/comparison.py", "cli/compare.py", "paper/plane.py",
           "analysis/compare.py", "simulation/onset.py", "textures/library/knurl.py",
           "analysis/gain/characteristic.py", "devices/device.py")  # fmt: skip
@@ -292,10 +292,10 @@ _SECOND = """
 import sys, numpy as np
 from asperity import HeightMap, Surface, characteristic_number
 from asperity.analysis.bounds import branch_and_bound
-from asperity.analysis.gain import certificate
+from asperity.analysis.gain import search
 def refuse(*_arguments):
     raise SystemExit("computed again")
-certificate.supremum = refuse
+search.supremum = refuse
 heights = 1e-4 * np.random.default_rng(1).normal(size=(8, 9))
 print(repr(characteristic_number(Surface(HeightMap(heights, 3e-4), "B", max_depth=1e-4))))
 """

@@ -6,7 +6,7 @@ there without a texture, so depth zero, the limit from inside, is a sample like 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +27,7 @@ from asperity.textures.texture import Texture
 
 _CANDIDATES = 12
 _ZOOM_STEPS = 44
+_BLOCK = 100_000
 DEPTH_FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 DepthLimit = Callable[[FloatArray], FloatArray]
@@ -40,17 +41,11 @@ class Found:
         value: of the measure, in units of the stiffness [1].
         xy: contact point [m].
         depth: [m].
-        deflection: of the anchor [m].
-        probe: probe position [m].
-        samples: how many contacts were looked at.
     """
 
     value: float
     xy: tuple[float, float]
     depth: float
-    deflection: tuple[float, float]
-    probe: tuple[float, float, float]
-    samples: int
 
 
 class ContactField:
@@ -83,23 +78,28 @@ class ContactField:
         )
         return jacobian
 
-    def worst_deflection(self, derivatives: FloatArray) -> FloatArray:
-        """Return the deflection that maximises every norm of law F, shape (n, 2).
+    def contacts(
+        self, rows: FloatArray, depth_limit: DepthLimit
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return points, depths, derivatives, worst deflections of rows (fractions, depth part)."""
+        xy = self.texture.domain.points(rows[:, :-1])
+        derivatives = self.texture.derivatives(xy)
+        depth = np.ascontiguousarray(rows[:, -1] * np.maximum(depth_limit(derivatives), 0.0))
+        deflection = np.zeros((len(xy), 2))
+        if self.surface.law.stateful:
+            deflection = worst_deflection(self.surface, derivatives[:, 1:3])
+        return xy, depth, derivatives, deflection
 
-        ‖J‖ and λ_max are convex in d, hence greatest for |d| = d_max, and there for d against
-        the slope of the height: the friction then falls along d fastest (MATH section 3).
-        """
-        slope = derivatives[:, 1:3]
-        length = np.hypot(*slope.T)
-        unit = np.where(
-            length[:, None] > 0.0, slope / np.where(length, length, 1.0)[:, None], [1, 0]
-        )
-        return np.ascontiguousarray(-self.surface.parameter("max_deflection") * unit)
 
-    def probe(self, xy: FloatArray, depth: float, derivatives: FloatArray) -> FloatArray:
-        """Return the probe position of one contact [m]."""
-        contact = self.surface.law.contact
-        return np.asarray(contact.probe(xy[None], np.array([depth]), derivatives[None])[0])
+def worst_deflection(surface: Surface, slope: FloatArray) -> FloatArray:
+    """Return the deflection that maximises every norm of law F, (n, 2) [m], for slopes (n, 2).
+
+    ‖J‖ and λ_max are convex in d, hence greatest for |d| = d_max, and there for d against
+    the slope of the height: the friction then falls along d fastest (MATH section 3).
+    """
+    length = np.hypot(*slope.T)[:, None]
+    unit = np.where(length > 0.0, slope / np.where(length > 0.0, length, 1.0), [1.0, 0.0])
+    return np.ascontiguousarray(-surface.parameter("max_deflection") * unit)
 
 
 def need_depths(surface: Surface) -> None:
@@ -143,17 +143,34 @@ def greatest(surface: Surface, measure: Measure, depth_limit: DepthLimit) -> Fou
     """
     need_depths(surface)
     field = ContactField(surface)
+
+    def values(rows: FloatArray) -> FloatArray:
+        return measure(field.jacobians(*field.contacts(rows, depth_limit)))
+
     fractions, spacing = sample_fractions(surface.texture)
     levels = (0.0, 1.0) if law_facts(surface.law).affine_in_depth else DEPTH_FRACTIONS
-    values = _sampled_values(field, measure, depth_limit, fractions, levels)
-    samples = values.size
-    point = _best_of_blocks(values.max(axis=1))
-    level = np.argmax(values[point], axis=1)
+    sampled = _sampled(values, fractions, levels)
+    point = _best_of_blocks(sampled.max(axis=1))
+    level = np.argmax(sampled[point], axis=1)
     centres = np.column_stack([fractions[point], np.array(levels)[level]])
-    centres, zoomed = _zoom(field, measure, depth_limit, centres, np.append(spacing, 0.25))
-    scores = _values(field, measure, depth_limit, centres)
-    best = centres[int(np.argmax(scores))]
-    return _found(field, measure, depth_limit, best, samples + zoomed)
+    bounded = slice(-1 if surface.texture.domain.periodic else 0, None)
+    centres = _zoom(values, centres, np.append(spacing, 0.25), bounded)
+    best = centres[int(np.argmax(values(centres)))]
+    xy, depth, derivatives, deflection = field.contacts(best[None, :], depth_limit)
+    careful = precise_norm if measure is spectral_norm else precise_one_sided
+    value = careful(field.jacobians(xy, depth, derivatives, deflection))[0]
+    return Found(float(value), (float(xy[0, 0]), float(xy[0, 1])), float(depth[0]))
+
+
+def _sampled(values: Measure, fractions: FloatArray, levels: Sequence[float]) -> FloatArray:
+    """Return the values at every sample and depth, shape (n, levels)."""
+    blocks = [fractions[first : first + _BLOCK] for first in range(0, len(fractions), _BLOCK)]
+
+    def at(part: float) -> FloatArray:
+        rows = (np.column_stack([block, np.full(len(block), part)]) for block in blocks)
+        return np.concatenate([values(block) for block in rows])
+
+    return np.stack([at(part) for part in levels], axis=1)
 
 
 def _best_of_blocks(values: FloatArray) -> NDArray[np.intp]:
@@ -164,81 +181,17 @@ def _best_of_blocks(values: FloatArray) -> NDArray[np.intp]:
     return best[np.argsort(values[best], kind="stable")[-_CANDIDATES:]]
 
 
-def _zoom(
-    field: ContactField,
-    measure: Measure,
-    depth_limit: DepthLimit,
-    centres: FloatArray,
-    step: FloatArray,
-) -> tuple[FloatArray, int]:
-    """Return the candidates after halving the step around the best neighbour, and the cost."""
+def _zoom(values: Measure, centres: FloatArray, step: FloatArray, bounded: slice) -> FloatArray:
+    """Return the candidates after halving the step around the best neighbour again and again."""
     width = len(step)
     offsets = np.stack(np.meshgrid(*[(-1.0, -0.5, 0.0, 0.5, 1.0)] * width), axis=-1)
     offsets = offsets.reshape(-1, width)
     # The centre first: of equal values the first one is kept.
     offsets = offsets[np.argsort(np.abs(offsets).sum(axis=1), kind="stable")]
-    bounded = slice(None) if not field.texture.domain.periodic else slice(width - 1, None)
     for _ in range(_ZOOM_STEPS):
         trial = centres[:, None, :] + offsets * step
         trial[..., bounded] = np.clip(trial[..., bounded], 0.0, 1.0)
-        scores = _values(field, measure, depth_limit, trial.reshape(-1, width))
-        scores = scores.reshape(trial.shape[:2])
+        scores = values(trial.reshape(-1, width)).reshape(trial.shape[:2])
         centres = trial[np.arange(len(trial)), np.argmax(scores, axis=1)]
         step = step * 0.5
-    return centres, _ZOOM_STEPS * len(centres) * len(offsets)
-
-
-def _sampled_values(
-    field: ContactField,
-    measure: Measure,
-    depth_limit: DepthLimit,
-    fractions: FloatArray,
-    levels: tuple[float, ...],
-) -> FloatArray:
-    """Return the measure at every sample and depth, shape (n, levels)."""
-    values = np.empty((len(fractions), len(levels)))
-    for level, part in enumerate(levels):
-        for first in range(0, len(fractions), 100_000):
-            block = fractions[first : first + 100_000]
-            rows = np.column_stack([block, np.full(len(block), part)])
-            values[first : first + len(block), level] = _values(field, measure, depth_limit, rows)
-    return values
-
-
-def _contacts(
-    field: ContactField, depth_limit: DepthLimit, rows: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return contact points, depths, derivatives, deflections of rows (fractions, depth part)."""
-    xy = field.texture.domain.points(rows[:, :-1])
-    derivatives = field.texture.derivatives(xy)
-    depth = np.ascontiguousarray(rows[:, -1] * np.maximum(depth_limit(derivatives), 0.0))
-    deflection = (
-        field.worst_deflection(derivatives)
-        if field.surface.law.stateful
-        else np.zeros((len(xy), 2))
-    )
-    return xy, depth, derivatives, deflection
-
-
-def _values(
-    field: ContactField, measure: Measure, depth_limit: DepthLimit, rows: FloatArray
-) -> FloatArray:
-    return measure(field.jacobians(*_contacts(field, depth_limit, rows)))
-
-
-def _found(
-    field: ContactField, measure: Measure, depth_limit: DepthLimit, row: FloatArray, samples: int
-) -> Found:
-    xy, depth, derivatives, deflection = _contacts(field, depth_limit, row[None, :])
-    matrix = field.jacobians(xy, depth, derivatives, deflection)[0]
-    careful = precise_norm if measure is spectral_norm else precise_one_sided
-    value = float(careful(matrix[None])[0])
-    x, y, z = (float(c) for c in field.probe(xy[0], float(depth[0]), derivatives[0]))
-    return Found(
-        value=value,
-        xy=(float(xy[0, 0]), float(xy[0, 1])),
-        depth=float(depth[0]),
-        deflection=(float(deflection[0, 0]), float(deflection[0, 1])),
-        probe=(x, y, z),
-        samples=samples,
-    )
+    return centres

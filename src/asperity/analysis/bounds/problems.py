@@ -7,6 +7,7 @@ there are the slope, the change of the normal and the crest curvature.
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -32,7 +33,8 @@ from asperity.enclosures.taylor import Number, Taylor, TaylorMath
 from asperity.laws import Law
 from asperity.surface import Surface
 
-Entries = Sequence[Sequence[Number]]
+Entries = Sequence[Sequence[Any]]
+Formula = Callable[[Sequence[Any], Callable[[Any], Any]], Entries]
 # Numbers of J/k below this are not resolved; a flat surface would have no relative gap.
 _LEAST = 1e-9
 
@@ -43,23 +45,23 @@ class MatrixProblem(Problem):
     Args:
         cells: of the texture.
         names: the derivatives that are needed.
-        matrices: 3 × 3 entries from the derivatives' models; several, of which the greatest counts.
-        exact: the same matrices from numbers: (n, d) coordinates to several (n, 3, 3).
         number: the measure.
         floor: see :class:`Problem`.
     """
 
     def __init__(
-        self,
-        cells: Cells,
-        names: Sequence[str],
-        matrices: Callable[[dict[str, Number]], list[Entries]],
-        exact: Callable[[FloatArray], list[FloatArray]],
-        number: MatrixNumber,
-        floor: float = 0.0,
+        self, cells: Cells, names: Sequence[str], number: MatrixNumber, floor: float = _LEAST
     ) -> None:
         self.cells, self.floor = cells, floor
-        self._names, self._matrices, self._exact, self._number = names, matrices, exact, number
+        self._names, self._number = names, number
+
+    @abstractmethod
+    def matrices(self, models: dict[str, Number]) -> list[Entries]:
+        """Return 3 × 3 entries from the derivatives' models; several, the greatest counts."""
+
+    @abstractmethod
+    def exact(self, coordinates: FloatArray) -> list[FloatArray]:
+        """Return the same matrices from numbers: (n, d) coordinates to several (n, 3, 3)."""
 
     def at_most(self, centres: FloatArray, half: FloatArray, above: float) -> FloatArray:
         """See :class:`Problem`."""
@@ -67,19 +69,16 @@ class MatrixProblem(Problem):
         best = np.full(n, -np.inf)
         with np.errstate(all="ignore"):
             models = self.cells.models(centres, half, self._names)
-            for entries in self._matrices(models):
+            for entries in self.matrices(models):
                 c, g, e = _stacked(entries, n, d)
                 best = np.maximum(best, self._number.at_most(c, g, e, above))
         return best
 
     def values(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Problem`."""
-        return np.asarray(self.levels(coordinates).max(axis=0))
-
-    def levels(self, coordinates: FloatArray) -> FloatArray:
-        """Return the measure of each of the matrices, shape (matrices, n)."""
         with np.errstate(all="ignore"):
-            return np.stack([self._number.careful(m) for m in self._exact(coordinates)])
+            values = [self._number.careful(matrices) for matrices in self.exact(coordinates)]
+        return np.asarray(np.max(values, axis=0))
 
 
 def _stacked(entries: Entries, n: int, d: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -136,9 +135,10 @@ class LawProblem(MatrixProblem):
             cells = with_depth(cells, depth)
         self._slides = (False, True) if surface.law.stateful else (False,)
         names = [name for name in NAMES if name in arguments]
-        super().__init__(cells, names, self._models, self._jacobians, number, _LEAST)
+        super().__init__(cells, names, number)
 
-    def _models(self, models: dict[str, Number]) -> list[Entries]:
+    def matrices(self, models: dict[str, Number]) -> list[Entries]:
+        """See :class:`MatrixProblem`."""
         result = []
         for sliding in self._slides:
             state = {}
@@ -170,7 +170,8 @@ class LawProblem(MatrixProblem):
                 result.append(Contacts(depth, deflection, sliding))
         return result
 
-    def _jacobians(self, coordinates: FloatArray) -> list[FloatArray]:
+    def exact(self, coordinates: FloatArray) -> list[FloatArray]:
+        """See :class:`MatrixProblem`."""
         derivatives = self.cells.derivatives(coordinates)
         nowhere = np.zeros((len(coordinates), 2))
         return [
@@ -183,7 +184,39 @@ def _rows(entries: Sequence[Number]) -> Entries:
     return [entries[0:3], entries[3:6], entries[6:9]]
 
 
-class SlopeProblem(MatrixProblem):
+class SurfaceProblem(MatrixProblem):
+    """The greatest measure of a matrix that is a formula in derivatives of the height alone.
+
+    Args:
+        cells: of the texture.
+        names: the derivatives that the formula takes, see ``NAMES``.
+        formula: rows of entries from the derivatives and a square root, of models or of numbers.
+        number: the measure.
+        floor: see :class:`Problem`.
+    """
+
+    def __init__(
+        self,
+        cells: Cells,
+        names: Sequence[str],
+        formula: Formula,
+        number: MatrixNumber,
+        floor: float = _LEAST,
+    ) -> None:
+        super().__init__(cells, names, number, floor)
+        self._formula = formula
+
+    def matrices(self, models: dict[str, Number]) -> list[Entries]:
+        """See :class:`MatrixProblem`."""
+        return [self._formula([models[name] for name in self._names], TaylorMath.sqrt)]
+
+    def exact(self, coordinates: FloatArray) -> list[FloatArray]:
+        """See :class:`MatrixProblem`; the entries that a formula leaves out are zero."""
+        derivatives = self.cells.derivatives(coordinates).T[1 : 1 + len(self._names)]
+        return [_stacked(self._formula(list(derivatives), np.sqrt), len(coordinates), 0)[0]]
+
+
+class SlopeProblem(SurfaceProblem):
     """The greatest slope |∇h|.
 
     Args:
@@ -192,16 +225,8 @@ class SlopeProblem(MatrixProblem):
     """
 
     def __init__(self, cells: Cells, beside: float) -> None:
-        def matrices(models: dict[str, Number]) -> list[Entries]:
-            return [[[models["hx"]], [models["hy"]]]]
-
-        def exact(coordinates: FloatArray) -> list[FloatArray]:
-            result = np.zeros((len(coordinates), 3, 3))
-            result[:, :2, 0] = cells.derivatives(coordinates)[:, 1:3]
-            return [result]
-
         self._beside = beside
-        super().__init__(cells, ("hx", "hy"), matrices, exact, NORM, _LEAST)
+        super().__init__(cells, NAMES[1:3], lambda slope, _root: [[part] for part in slope], NORM)
 
     def enough(self, best: float, tolerance: float) -> float:
         """See :class:`Problem`."""
@@ -209,7 +234,7 @@ class SlopeProblem(MatrixProblem):
         return math.sqrt((whole - self._beside) * (whole + self._beside))
 
 
-def _normal_change(derivatives: Sequence[Any], root: Any) -> list[list[Any]]:
+def _normal_change(derivatives: Sequence[Any], root: Callable[[Any], Any]) -> Entries:
     """∂n/∂x and ∂n/∂y as columns: (∂w - n (n · ∂w))/s with w = (-h_x, -h_y, 1)."""
     hx, hy, hxx, hxy, hyy = derivatives
     s = root(1.0 + hx * hx + hy * hy)
@@ -223,20 +248,10 @@ def _normal_change(derivatives: Sequence[Any], root: Any) -> list[list[Any]]:
 
 def normal_problem(cells: Cells, floor: float) -> MatrixProblem:
     """Return the problem of ‖∂n/∂(x, y)‖, the change of the surface normal [1/m]."""
-
-    def matrices(models: dict[str, Number]) -> list[Entries]:
-        return [_normal_change([models[name] for name in NAMES[1:]], TaylorMath.sqrt)]
-
-    def exact(coordinates: FloatArray) -> list[FloatArray]:
-        derivatives = cells.derivatives(coordinates).T[1:]
-        result = np.zeros((len(coordinates), 3, 3))
-        result[:, :, :2] = np.array(_normal_change(list(derivatives), np.sqrt)).transpose(2, 0, 1)
-        return [result]
-
-    return MatrixProblem(cells, NAMES[1:], matrices, exact, NORM, floor)
+    return SurfaceProblem(cells, NAMES[1:], _normal_change, NORM, floor)
 
 
-def _shape_operator(derivatives: Sequence[Any], root: Any) -> list[list[Any]]:
+def _shape_operator(derivatives: Sequence[Any], root: Callable[[Any], Any]) -> Entries:
     """G^(-1/2) H G^(-1/2)/s, whose eigenvalues are the principal curvatures; G = I + g gᵀ.
 
     G^(-1/2) = I - g gᵀ/(s (1 + s)).
@@ -252,7 +267,7 @@ def _shape_operator(derivatives: Sequence[Any], root: Any) -> list[list[Any]]:
     return [[(a * p + b * r) / s, (a * q + b * t) / s], [(b * p + c * r) / s, (b * q + c * t) / s]]
 
 
-class CrestProblem(MatrixProblem):
+class CrestProblem(SurfaceProblem):
     """The greatest downward curvature of the surface [1/m].
 
     Args:
@@ -262,22 +277,10 @@ class CrestProblem(MatrixProblem):
     """
 
     def __init__(self, cells: Cells, depth: float | None = None) -> None:
-        def matrices(models: dict[str, Number]) -> list[Entries]:
-            return [_shape_operator([models[name] for name in NAMES[1:]], TaylorMath.sqrt)]
-
-        def exact(coordinates: FloatArray) -> list[FloatArray]:
-            derivatives = cells.derivatives(coordinates).T[1:]
-            result = np.zeros((len(coordinates), 3, 3))
-            two: FloatArray = np.array(_shape_operator(list(derivatives), np.sqrt)).transpose(
-                2, 0, 1
-            )
-            # No third curvature: the entry is small enough never to be the greatest of a crest.
-            result[:, :2, :2] = two
-            return [result]
-
         self._depth = depth
         floor = _LEAST if depth is None else 0.5 / depth
-        super().__init__(cells, NAMES[1:], matrices, exact, ONE_SIDED, floor)
+        # No third curvature: a zero is small enough never to be the greatest of a crest.
+        super().__init__(cells, NAMES[1:], _shape_operator, ONE_SIDED, floor)
 
     def enough(self, best: float, tolerance: float) -> float:
         """See :class:`Problem`: y/(1 - y) within the tolerance, y = depth times curvature."""

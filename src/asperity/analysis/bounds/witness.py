@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from asperity.analysis.bounds.bound import Bound, Method
 from asperity.analysis.bounds.branch_and_bound import DIFFERENCES, OPERATIONS
 from asperity.analysis.bounds.measures import Number
 from asperity.checks import FloatArray
@@ -82,16 +84,6 @@ def _rounding(surface: Surface, witness: Witness, proved: float) -> float:
     return OPERATIONS * (DIFFERENCES * (1.0 + abs(height) / depth) + moved)
 
 
-def lower_of(surface: Surface, number: Number, value: float, witness: Witness) -> float:
-    """Return what is attained of a number that a theorem gives: all of it, but for rounding.
-
-    Raises:
-        InternalError: if the witness contradicts the theorem.
-    """
-    upper_of(surface, number, value, witness)
-    return value if witness.value >= value * (1.0 - _AGREES) else witness.value
-
-
 def attained(
     surface: Surface,
     number: Number,
@@ -111,3 +103,26 @@ def attained(
     x, y, z = (float(v) for v in probe)
     held = None if deflection is None else (float(deflection[0]), float(deflection[1]))
     return Witness(value, size, (x, y, z), held, sliding)
+
+
+def proved(
+    surface: Surface,
+    number: Number,
+    value: float,
+    method: Method,
+    note: str,
+    xy: FloatArray,
+    depths: Sequence[float],
+) -> Bound:
+    """Return a number that a theorem gives; ``lower`` is what is attained at the best of depths.
+
+    That is all of it, but for rounding.
+
+    Raises:
+        InternalError: if the witness contradicts the theorem.
+    """
+    witnesses = [attained(surface, number, xy, depth) for depth in depths]
+    best = max(witnesses, key=lambda witness: witness.value)
+    upper_of(surface, number, value, best)
+    lower = value if best.value >= value * (1.0 - _AGREES) else best.value
+    return Bound(lower, value, method, best.at, note)

@@ -10,13 +10,12 @@ from functools import partial
 import numpy as np
 
 from asperity.analysis.bounds.bound import Bound, Method
-from asperity.analysis.bounds.branch_and_bound import Problem, Supremum, supremum
+from asperity.analysis.bounds.branch_and_bound import Contacts, Problem, Supremum
 from asperity.analysis.bounds.dense_search import need_depths
 from asperity.analysis.bounds.measures import Number
 from asperity.analysis.bounds.problems import LawProblem
 from asperity.analysis.bounds.sampling import sampled
-from asperity.analysis.bounds.witness import Witness, attained, lower_of, upper_of
-from asperity.analysis.gain.medial_axis import sharpest_crest
+from asperity.analysis.bounds.witness import Witness, attained, proved, upper_of
 from asperity.analysis.gain.search import Search
 from asperity.analysis.gain.theorems import ClosedForm, safe_bound, theorem_of
 from asperity.checks import FloatArray
@@ -60,9 +59,7 @@ def certified(surface: Surface, number: Number, search: Search) -> Bound:
         text = f"convex on an ellipse, within {at_once.cells} of its tangents"
         return _bound(surface, number, problem, at_once, step(at_once.upper), text)
     try:
-        found = supremum(
-            problem, search.gap(problem.cells), search.work_limit, search.cheap_gap(problem.cells)
-        )
+        found = search.supremum(problem)
     except TypeError as error:
         text = f"the law has no interval kernel ({error}); not a proof"
         return _bound(surface, number, problem, sampled(problem), math.inf, text)
@@ -95,8 +92,7 @@ def _least_radius(surface: Surface, search: Search) -> float:
     """Return the depth [m] from which on some feet are no nearest points, if that matters."""
     if surface.law.contact.single_valued or theorem_of(surface.law).on_every_foot:
         return math.inf
-    margin = search.margin(surface)
-    crest = sharpest_crest(surface.texture, extent=search.extent, margin=margin)
+    crest = search.crest(surface)
     return math.inf if crest is None else crest.least_radius
 
 
@@ -122,22 +118,17 @@ def _bound(
 def _witness(surface: Surface, number: Number, problem: Problem, at: FloatArray) -> Witness:
     """Return the best of the depths and states at a contact point."""
     xy = problem.cells.plane(at[None])[0]
-    contacts = problem.contacts(at[None])
-    if not contacts:
-        candidates = [attained(surface, number, xy, depth) for depth in (0.0, surface.max_depth)]
-    else:
-        candidates = [
-            attained(
-                surface,
-                number,
-                xy,
-                float(contact.depth[0]),
-                contact.deflection[0] if surface.law.stateful else None,
-                sliding=contact.sliding,
-            )
-            for contact in contacts
-        ]
-    return max(candidates, key=lambda w: w.value)
+    contacts = problem.contacts(at[None]) or [
+        Contacts(np.array([depth]), np.zeros((1, 2)), sliding=False)
+        for depth in (0.0, surface.max_depth)
+    ]
+    stateful = surface.law.stateful
+    states = [(float(c.depth[0]), c.deflection[0] if stateful else None) for c in contacts]
+    witnesses = [
+        attained(surface, number, xy, depth, held, sliding=contact.sliding)
+        for contact, (depth, held) in zip(contacts, states, strict=True)
+    ]
+    return max(witnesses, key=lambda witness: witness.value)
 
 
 def wave_number(surface: Surface, number: Number, wave: SingleWave, form: ClosedForm) -> Bound:
@@ -148,11 +139,5 @@ def wave_number(surface: Surface, number: Number, wave: SingleWave, form: Closed
     value, phase = (of(wave, surface.max_depth) for of in (form.value, form.phase))
     along = (phase - wave.phase) * wave.period / (2.0 * math.pi)
     depth = surface.max_depth if surface.law.contact.single_valued else 0.0
-    witness = attained(surface, number, along * np.array(wave.direction), depth)
-    return Bound(
-        lower_of(surface, number, value, witness),
-        value,
-        "closed form",
-        witness.at,
-        "MATH section 4",
-    )
+    xy = along * np.array(wave.direction)
+    return proved(surface, number, value, "closed form", "MATH section 4", xy, [depth])

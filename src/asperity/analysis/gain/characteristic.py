@@ -10,13 +10,13 @@ from collections.abc import Sequence
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
-from asperity.analysis.bounds.highest import highest_point
 from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED, Number
-from asperity.analysis.bounds.witness import attained, lower_of
+from asperity.analysis.bounds.sampling import highest_point
+from asperity.analysis.bounds.witness import proved
 from asperity.analysis.gain.certificate import certified, wave_number
 from asperity.analysis.gain.kept import kept
 from asperity.analysis.gain.search import Search
-from asperity.analysis.gain.theorems import Constant, theorem_of
+from asperity.analysis.gain.theorems import theorem_of
 from asperity.checks import positive
 from asperity.derive.facts import law_facts
 from asperity.errors import ParameterError
@@ -132,21 +132,14 @@ def _search(
 
 def _number(surface: Surface, number: Number, search: Search) -> Bound:
     theorem, wave = theorem_of(surface.law), surface.texture.single_wave
-    if number in theorem.constants:
-        return _constant(surface, number, theorem.constants[number])
+    known = theorem.constants.get(number)
+    if known is not None:
+        # Just inside the highest point the normal is e_z.
+        top = highest_point(surface.texture)
+        return proved(surface, number, known.value, "theorem", known.reason, top, [0.0])
     own_way = theorem.own_way.get(number)
     if own_way is not None:
         return kept(surface, f"{number.name}, proved", search, lambda: own_way(surface, search))
     if wave is not None and search.extent is None and number in theorem.on_a_wave:
         return wave_number(surface, number, wave, theorem.on_a_wave[number])
     return kept(surface, number.name, search, lambda: certified(surface, number, search))
-
-
-def _constant(surface: Surface, number: Number, known: Constant) -> Bound:
-    """Return a number that a theorem gives for every surface, attained where it is level.
-
-    Just inside the highest point the normal is e_z.
-    """
-    witness = attained(surface, number, highest_point(surface.texture), 0.0)
-    lower = lower_of(surface, number, known.value, witness)
-    return Bound(lower, known.value, "theorem", witness.at, known.reason)

@@ -17,6 +17,7 @@ from functools import lru_cache
 import numpy as np
 
 from asperity.analysis.bounds.branch_and_bound import Contacts, Problem, Supremum
+from asperity.analysis.bounds.dense_search import worst_deflection
 from asperity.checks import FloatArray
 from asperity.enclosures.cells import Cells
 from asperity.enclosures.taylor import Taylor
@@ -40,6 +41,16 @@ def largest_symmetric_eigenvalue(a: FloatArray, b: FloatArray) -> FloatArray:
     return result
 
 
+def most_f(surface: Surface) -> float:
+    """q_F: that of the greatest entries that |∇h| <= M allows."""
+    swing, friction = surface.parameter("modulation_depth"), surface.parameter("friction")
+    low, high = surface.texture.extremes
+    steep = swing * surface.texture.bounds[0] / max(high - low, 1e-300)
+    still = 0.5 * (1.0 + swing)
+    a = friction * surface.max_depth * (still / surface.parameter("max_deflection") + steep)
+    return float(largest_singular_value(np.array([a]), np.array([friction * still]))[0])
+
+
 class FrictionProblem(Problem):
     """Law F's number, which is that of [[a, b], [0, 1]].
 
@@ -48,13 +59,9 @@ class FrictionProblem(Problem):
     and are convex in them, and a and b are convex in (m, ∇m).
     """
 
-    def __init__(
-        self,
-        surface: Surface,
-        cells: Cells,
-        number: Entries,
-    ) -> None:
-        self.cells, self._number, self._texture = cells, number, surface.texture
+    def __init__(self, surface: Surface, cells: Cells, number: Entries) -> None:
+        self.cells, self._number = cells, number
+        self._surface, self._texture = surface, surface.texture
         _k, middle, half = surface.law_arguments[:3]
         swing = surface.parameter("modulation_depth")
         self._offset, self._share = 0.5 * (1.0 + swing * middle / half), 0.5 * swing / half
@@ -93,10 +100,8 @@ class FrictionProblem(Problem):
     def contacts(self, coordinates: FloatArray) -> list[Contacts]:
         """See :class:`Problem`: at full depth, the deflection against the slope."""
         slope = self._texture.gradient(self.cells.plane(coordinates))
-        length = np.hypot(slope[:, 0], slope[:, 1])[:, None]
-        unit = np.where(length > 0.0, slope / np.where(length > 0.0, length, 1.0), [1.0, 0.0])
         depth = np.full(len(coordinates), self._depth)
-        return [Contacts(depth, -self._longest * unit, sliding=False)]
+        return [Contacts(depth, worst_deflection(self._surface, slope), sliding=False)]
 
     def at_once(self) -> Supremum | None:
         """See :class:`Problem`: on a single wave.

@@ -7,13 +7,12 @@ import math
 import numpy as np
 
 from asperity.analysis.bounds.bound import Bound, Method
-from asperity.analysis.bounds.branch_and_bound import supremum
-from asperity.analysis.bounds.highest import highest_point
 from asperity.analysis.bounds.measures import NORM
 from asperity.analysis.bounds.problems import CrestProblem
-from asperity.analysis.bounds.witness import attained, lower_of, upper_of
+from asperity.analysis.bounds.sampling import highest_point
+from asperity.analysis.bounds.witness import attained, proved, upper_of
 from asperity.analysis.gain import closed_forms
-from asperity.analysis.gain.medial_axis import Crest, sharpest_crest
+from asperity.analysis.gain.medial_axis import sharpest_crest
 from asperity.analysis.gain.search import Search
 from asperity.surface import Surface
 from asperity.textures.plane_waves import SingleWave
@@ -33,26 +32,19 @@ def crest_number(surface: Surface, search: Search) -> Bound:
     if texture.single_wave is not None and search.extent is None:
         return _wave_number(surface, texture.single_wave)
     if depth * texture.bounds[1] <= 0.5:
-        witness = attained(surface, NORM, highest_point(texture), depth)
         note = "depth times the bound of the second derivatives is at most 1/2"
-        return Bound(lower_of(surface, NORM, 1.0, witness), 1.0, "theorem", witness.at, note)
-    margin = search.margin(surface)
-    crest = sharpest_crest(texture, extent=search.extent, margin=margin)
+        return proved(surface, NORM, 1.0, "theorem", note, highest_point(texture), [depth])
+    crest = search.crest(surface)
     if crest is None:
-        witness = attained(surface, NORM, highest_point(texture), 0.0)
-        note = "the surface has no crest"
-        return Bound(lower_of(surface, NORM, 1.0, witness), 1.0, "certified", witness.at, note)
+        note, xy = "the surface has no crest", highest_point(texture)
+        return proved(surface, NORM, 1.0, "certified", note, xy, [0.0])
     if depth >= crest.radius:
-        return Bound(math.inf, math.inf, _method(crest), crest.centre, _ONSET)
+        method: Method = "certified" if crest.least_radius > 0.0 else "sampled"
+        return Bound(math.inf, math.inf, method, crest.centre, _ONSET)
     foot, least = np.array(crest.foot[:2]), crest.least_radius
-    cells = texture.cells(search.extent, margin)
+    cells = texture.cells(search.extent, search.margin(surface))
     if cells is not None:
-        found = supremum(
-            CrestProblem(cells, depth),
-            search.gap(cells),
-            search.work_limit,
-            search.cheap_gap(cells),
-        )
+        found = search.supremum(CrestProblem(cells, depth))
         least = 1.0 / found.upper
         if found.at is not None:
             foot = cells.plane(found.at[None])[0]
@@ -61,10 +53,10 @@ def crest_number(surface: Surface, search: Search) -> Bound:
     witness = attained(surface, NORM, foot, depth)
     # What rounding costs grows towards the medial axis.
     upper = _number(_depth_over(least, depth)) * (1.0 + _ROUNDING)
-    proof: Method = "certified" if math.isfinite(upper) else "sampled"
-    note = "crest curvature" if proof == "certified" else _UNDECIDED
     top = upper_of(surface, NORM, upper, witness)
-    return Bound(witness.value, top, proof, witness.at, note)
+    if math.isinf(upper):
+        return Bound(witness.value, top, "sampled", witness.at, _UNDECIDED)
+    return Bound(witness.value, top, "certified", witness.at, "crest curvature")
 
 
 def _wave_number(surface: Surface, wave: SingleWave) -> Bound:
@@ -72,9 +64,8 @@ def _wave_number(surface: Surface, wave: SingleWave) -> Bound:
     assert crest is not None
     if math.isinf(value):
         return Bound(math.inf, math.inf, "closed form", crest.centre, _ONSET)
-    witness = attained(surface, NORM, np.array(crest.foot[:2]), surface.max_depth)
-    lower = lower_of(surface, NORM, value, witness)
-    return Bound(lower, value, "closed form", witness.at, "MATH section 4")
+    foot = np.array(crest.foot[:2])
+    return proved(surface, NORM, value, "closed form", "MATH section 4", foot, [surface.max_depth])
 
 
 def gain_above_crest(surface: Surface, height: float) -> float:
@@ -95,24 +86,18 @@ def split_number(surface: Surface, search: Search) -> Bound:
     """
     c = surface.parameter("continuity")
     reason = "-c <= Hess U <= 1 for any surface: q = max(1, c)"
-    crest = None
-    if c > 1.0:
-        margin = search.margin(surface)
-        crest = sharpest_crest(surface.texture, extent=search.extent, margin=margin)
+    crest = search.crest(surface) if c > 1.0 else None
     if crest is None:
-        witness = attained(surface, NORM, highest_point(surface.texture), 0.0)
-        return Bound(lower_of(surface, NORM, 1.0, witness), 1.0, "theorem", witness.at, reason)
+        return proved(surface, NORM, 1.0, "theorem", reason, highest_point(surface.texture), [0.0])
     share = c / (1.0 + c) * crest.radius
     foot = np.array(crest.foot[:2])
     # The very depth at which the foot splits has two derivatives.
-    depths = (min(surface.max_depth, (1.0 - 1e-6) * share), min(surface.max_depth, 1.05 * share))
-    witness = max((attained(surface, NORM, foot, d) for d in depths), key=lambda w: w.value)
-    least = crest.least_radius
-    alone = _number(_depth_over(least, surface.max_depth))
+    depths = [min(surface.max_depth, (1.0 - 1e-6) * share), min(surface.max_depth, 1.05 * share)]
+    alone = _number(_depth_over(crest.least_radius, surface.max_depth))
     upper = min(c, alone * (1.0 + _ROUNDING) if alone > 1.0 else 1.0)
     if upper < c:
         reason = "law D's number: the depth is too small for the god-object to split"
-    return Bound(lower_of(surface, NORM, upper, witness), upper, "theorem", witness.at, reason)
+    return proved(surface, NORM, upper, "theorem", reason, foot, depths)
 
 
 def _depth_over(radius: float, depth: float) -> float:
@@ -122,7 +107,3 @@ def _depth_over(radius: float, depth: float) -> float:
 
 def _number(y: float) -> float:
     return math.inf if y >= 1.0 else max(1.0, y / (1.0 - y))
-
-
-def _method(crest: Crest) -> Method:
-    return "certified" if crest.least_radius > 0.0 else "sampled"

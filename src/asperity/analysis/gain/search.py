@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
+from asperity.analysis.bounds.branch_and_bound import (
+    DEFAULT_WORK_LIMIT,
+    Problem,
+    Supremum,
+    supremum,
+)
+from asperity.analysis.gain.medial_axis import Crest, sharpest_crest
 from asperity.enclosures.cells import Cells
 from asperity.surface import Surface
 
@@ -29,12 +35,20 @@ class Search:
         """Return how far beyond the extent the surface is felt [m]: feet are not below probes."""
         return surface.law.contact.margin(surface.max_depth)
 
+    def crest(self, surface: Surface) -> Crest | None:
+        """Return the sharpest crest that is felt; nothing for a surface without crests."""
+        margin = self.margin(surface)
+        return sharpest_crest(surface.texture, extent=self.extent, margin=margin)
+
     def cheap_gap(self, cells: Cells) -> float | None:
         """Return the gap to try for where it costs little."""
         return cells.cheap_gap if self.tolerance is None else None
 
     def gap(self, cells: Cells) -> float:
         """Return the relative gap to reach."""
-        if self.tolerance is not None:
-            return self.tolerance
-        return cells.gap
+        return cells.gap if self.tolerance is None else self.tolerance
+
+    def supremum(self, problem: Problem) -> Supremum:
+        """Return proved bounds of the supremum of a problem, as near as was asked for."""
+        cells = problem.cells
+        return supremum(problem, self.gap(cells), self.work_limit, self.cheap_gap(cells))

@@ -16,12 +16,12 @@ from asperity.analysis.bounds.branch_and_bound import Problem
 from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED, Number
 from asperity.analysis.bounds.problems import SlopeProblem, normal_problem
 from asperity.analysis.gain import closed_forms as forms
-from asperity.analysis.gain import safe_bounds as safe
 from asperity.analysis.gain.friction import (
     Entries,
     FrictionProblem,
     largest_singular_value,
     largest_symmetric_eigenvalue,
+    most_f,
 )
 from asperity.analysis.gain.god_object import crest_number, gain_above_crest, split_number
 from asperity.analysis.gain.search import Search
@@ -111,6 +111,16 @@ def _slope(beside: float) -> Callable[[Surface, Cells], Problem]:
     return lambda _surface, cells: SlopeProblem(cells, beside)
 
 
+def _at_most(bound: Callable[[float, float], float]) -> Callable[[Surface], float]:
+    """Return a bound of q from M >= |∇h| and DK, D the depth, K >= ‖Hess h‖ (MATH section 4)."""
+
+    def of(surface: Surface) -> float:
+        slope, bend = surface.texture.bounds
+        return bound(slope, bend * surface.max_depth)
+
+    return of
+
+
 def _friction(entries: Entries) -> Reduction:
     return Reduction(lambda surface, cells: FrictionProblem(surface, cells, entries))
 
@@ -134,17 +144,18 @@ THEOREMS: dict[Law, Theorem] = {
             ),
             CURL: Reduction(_slope(0.0)),
         },
-        norm_at_most=safe.most_a,
+        norm_at_most=_at_most(lambda slope, _bend: math.hypot(1.0, slope)),
     ),
     LAWS["B"]: Theorem(
-        on_a_wave={NORM: ClosedForm(forms.q_b, forms.phase_b)}, norm_at_most=safe.most_b
+        on_a_wave={NORM: ClosedForm(forms.q_b, forms.phase_b)},
+        norm_at_most=_at_most(lambda slope, bend: math.hypot(1.0, slope) + bend),
     ),
     LAWS["C"]: Theorem(
         on_a_wave={
             NORM: ClosedForm(forms.q_c, forms.phase_c),
             ONE_SIDED: ClosedForm(forms.q_c, forms.phase_c),
         },
-        norm_at_most=safe.most_c,
+        norm_at_most=_at_most(lambda slope, bend: 1.0 + slope * slope + bend),
     ),
     LAWS["D"]: Theorem(
         constants={ONE_SIDED: Constant(1.0, _SQUARE)},
@@ -167,7 +178,7 @@ THEOREMS: dict[Law, Theorem] = {
             NORM: _friction(largest_singular_value),
             ONE_SIDED: _friction(largest_symmetric_eigenvalue),
         },
-        norm_at_most=safe.most_f,
+        norm_at_most=most_f,
     ),
     LAWS["G"]: Theorem(
         on_a_wave={NORM: ClosedForm(forms.q_g, forms.trough)},
@@ -177,7 +188,7 @@ THEOREMS: dict[Law, Theorem] = {
                 lambda surface, change: max(1.0, surface.max_depth * change),
             )
         },
-        norm_at_most=safe.most_g,
+        norm_at_most=_at_most(lambda _slope, bend: max(1.0, bend)),
     ),
     LAWS["H"]: Theorem(
         constants={ONE_SIDED: Constant(1.0, _SPLIT)},

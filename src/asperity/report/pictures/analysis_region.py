@@ -9,8 +9,8 @@ import numpy as np
 
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.bounds.highest import highest_point
 from asperity.analysis.bounds.measures import spectral_norm
+from asperity.analysis.bounds.sampling import highest_point
 from asperity.checks import FloatArray
 from asperity.report.pictures.field_picture import Window
 from asperity.report.pictures.surface_picture import MapGrid, map_grid
