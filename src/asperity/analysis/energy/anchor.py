@@ -26,13 +26,12 @@ class Stretch:
     Attributes:
         start: first point [m], shape (3,).
         end: last point [m], shape (3,).
-        deflection: of the anchor [m] at fractions of the stretch, (m,) -> (m, 2); ``None`` for
-            a law without state.
+        deflection: of the anchor [m] at fractions of the stretch, (m,) -> (m, 2).
     """
 
     start: FloatArray
     end: FloatArray
-    deflection: Deflection | None
+    deflection: Deflection
 
 
 def anchored_stretches(

@@ -9,6 +9,7 @@ between its value in the middle and the mean of its values at the ends: certifie
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -57,10 +58,9 @@ def curl_integral(
 
 
 def _bounds(surface: Surface, line: ScanLine, pieces: Pieces, sign: float) -> tuple[float, float]:
-    depth, scale = surface.max_depth, surface.stiffness * pieces.length
+    scale, affine = surface.stiffness * pieces.length, law_facts(surface.law).affine_in_depth
     low = high = 0.0
-    affine = law_facts(surface.law).affine_in_depth
-    for top, bottom in _layers(depth, affine):
+    for top, bottom in pairwise(_levels(surface)):
         edges = [_curl_model(surface, line, pieces, level) for level in (top, bottom)]
         error = sum(edge.e for edge in edges) * 0.5
         corners = [
@@ -76,9 +76,11 @@ def _bounds(surface: Surface, line: ScanLine, pieces: Pieces, sign: float) -> tu
     return low * (1.0 - 1e-12), high * (1.0 + 1e-12)
 
 
-def _layers(depth: float, affine: bool) -> list[tuple[float, float]]:
-    edges = np.linspace(0.0, depth, 2 if affine else _LAYERS + 1)
-    return [(float(a), float(b)) for a, b in pairwise(edges)]
+def _levels(surface: Surface) -> list[float]:
+    """Return the depths [m] between which the curl is affine, or nearly so."""
+    layers = 1 if law_facts(surface.law).affine_in_depth else _LAYERS
+    levels: list[float] = np.linspace(0.0, surface.max_depth, layers + 1).tolist()
+    return levels
 
 
 def _positive_part(alpha: FloatArray, gamma: FloatArray) -> FloatArray:
@@ -141,9 +143,8 @@ def sampled_sides(surface: Surface, line: ScanLine) -> tuple[float, float]:
     """Return ∬curl⁺ and ∬curl⁻ [J] by sampling: what is certified later for the worst line."""
     steps: FloatArray = np.arange(_NODES, dtype=np.float64) + 0.5
     along = np.asarray(steps * (line.length / _NODES), dtype=np.float64)
-    layers = _layers(surface.max_depth, law_facts(surface.law).affine_in_depth)
     total = np.zeros(2)
-    for top, bottom in layers:
+    for top, bottom in pairwise(_levels(surface)):
         edges = [curl_along(surface, line, along, level) for level in (top, bottom)]
         size = (bottom - top) * line.length / _NODES
         for side, sign in enumerate((1.0, -1.0)):
@@ -171,9 +172,8 @@ def plane_curl(jacobian: FloatArray, line: ScanLine) -> FloatArray:
 def column_loop(surface: Surface, line: ScanLine, sign: float) -> FloatArray:
     """Return the loop around the region where the curl has a sign, vertices (n, 3) [m]."""
     along = np.asarray(np.linspace(0.0, line.length, _node_count(surface.texture, line) + 1))
-    affine = law_facts(surface.law).affine_in_depth
-    levels = np.linspace(0.0, surface.max_depth, 2 if affine else _LAYERS + 1)
-    curls = np.stack([sign * curl_along(surface, line, along, float(level)) for level in levels])
+    levels = _levels(surface)
+    curls = np.stack([sign * curl_along(surface, line, along, level) for level in levels])
     top, bottom = positive_interval(levels, curls)
     xy = line.start + along[:, None] * line.direction
     surface_z = surface.law.contact.begin(surface.texture, np.ascontiguousarray(xy))
@@ -186,7 +186,7 @@ def _node_count(texture: Texture, line: ScanLine) -> int:
     return int(np.clip(_NODES_PER_CELL * cells, _NODES, _MOST_NODES))
 
 
-def positive_interval(levels: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def positive_interval(levels: Sequence[float], values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the longest interval of depth where values (levels, n) are positive, per column.
 
     Linear between the levels; empty intervals begin and end at the same level.
@@ -208,7 +208,7 @@ def positive_interval(levels: FloatArray, values: FloatArray) -> tuple[FloatArra
     return top, bottom
 
 
-def _crossing(levels: FloatArray, values: FloatArray, i: int) -> float:
+def _crossing(levels: Sequence[float], values: FloatArray, i: int) -> float:
     part = values[i - 1] / (values[i - 1] - values[i])
     return float(levels[i - 1] + part * (levels[i] - levels[i - 1]))
 

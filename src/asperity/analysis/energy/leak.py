@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from asperity.analysis.bounds.branch_and_bound import DIFFERENCES, OPERATIONS
-from asperity.analysis.energy.columns import column_loop, curl_integral, sampled_sides
-from asperity.analysis.energy.loops import loop_work
-from asperity.analysis.energy.nearest_loop import nearest_outlines
+from asperity.analysis.energy.columns import (
+    column_loop,
+    comb,
+    curl_integral,
+    plane_curl,
+    positive_interval,
+    sampled_sides,
+)
+from asperity.analysis.energy.loops import integrate, loop_work, smooth_panels
+from asperity.analysis.energy.merit import scan_height
 from asperity.analysis.energy.state_loops import in_plane_loop, light_then_deep_loop
-from asperity.analysis.energy.thrust import mean_thrust
 from asperity.checks import FloatArray, array, positive
 from asperity.derive.facts import law_facts
 from asperity.errors import InternalError, ParameterError
@@ -26,6 +33,12 @@ _NEAREST_LINES = 4
 _TOLERANCE = 1e-12
 # The same where each force is a search for the nearest point.
 _COSTLY = 1e-4
+# Where the region is found by a grid: columns along the line and levels of depth, for profiles and
+# for maps, and halvings to where the surface is max_depth away.
+_GRID = {True: (512, 96), False: (160, 24)}
+_BISECTIONS = 16
+# Equal steps, which a periodic mean is good at.
+_THRUST_STEPS = 512
 
 
 @dataclass(frozen=True)
@@ -177,7 +190,7 @@ def _column_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
         _refuse_contradiction(surface, line, vertices, energy)
     method = "sampled" if bounds is None else "certified"
     text = f"around the region of one sign of the curl, depth to {surface.max_depth * 1e3:g} mm"
-    thrust = mean_thrust(surface, line)
+    thrust = _mean_thrust(surface, line)
     return Leak(energy, max(upper, energy), line, method, text, vertices, thrust)
 
 
@@ -224,15 +237,83 @@ def gaining(
 
 def _nearest_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
     """Return the loop around the curl of one sign where the surface is near enough."""
-    outlines = [outline for line in lines for outline in nearest_outlines(surface, line)]
-    worst = max(outlines, key=lambda outline: outline.promise)
-    vertices, energy = gaining(surface, worst.vertices, _COSTLY)
+    outlines = [outline for line in lines for outline in _nearest_outlines(surface, line)]
+    _promise, polygon, line = max(outlines, key=lambda outline: outline[0])
+    vertices, energy = gaining(surface, polygon, _COSTLY)
     text = (
         "around the region of one sign of the curl where the surface is nearer than "
         f"{surface.max_depth * 1e3:g} mm"
     )
-    thrust = mean_thrust(surface, worst.line)
-    return Leak(energy, math.inf, worst.line, "sampled", text, vertices, thrust)
+    thrust = _mean_thrust(surface, line)
+    return Leak(energy, math.inf, line, "sampled", text, vertices, thrust)
+
+
+def _nearest_outlines(
+    surface: Surface, line: ScanLine
+) -> Iterator[tuple[float, FloatArray, ScanLine]]:
+    """Yield the polygons around the regions of either sign of the curl in a vertical plane.
+
+    Each with ∬|curl| inside [J], by the grid; the work around the polygon tells exactly.
+
+    The region is where the distance to the surface is at most max_depth. The distance grows on
+    the way down, so a column ends where it first exceeds max_depth; in each column the longest
+    interval of the sign is taken.
+    """
+    columns, levels = _GRID[surface.texture.is_profile]
+    along = np.linspace(0.0, line.length, columns + 1)
+    xy = np.ascontiguousarray(line.start + along[:, None] * line.direction)
+    tops = surface.texture.height(xy)
+    reach = _reach(surface, xy, tops)
+    parts: FloatArray = np.linspace(0.0, 1.0, levels + 1)
+    # At the surface itself the sign is that just below it.
+    inside = np.maximum(parts, 0.5 / levels)
+    points = np.concatenate([np.column_stack([xy, tops - part * reach]) for part in inside])
+    curls = plane_curl(surface.jacobian(points), line).reshape(levels + 1, -1)
+    area = reach * line.length / (columns * levels)
+    for sign in (1.0, -1.0):
+        top, bottom = positive_interval(parts.tolist(), sign * curls)
+        chosen = (parts[:, None] >= top) & (parts[:, None] <= bottom) & (sign * curls > 0.0)
+        promise = float((np.where(chosen, np.abs(curls), 0.0) * area).sum())
+        low, high = tops - bottom * reach, tops - top * reach
+        yield promise, comb(xy, high, low, periodic=line.periodic), line
+
+
+def _reach(surface: Surface, xy: FloatArray, tops: FloatArray) -> FloatArray:
+    """Return how far below the surface the distance to it is max_depth [m], by bisection."""
+    # Deeper than the lowest point by max_depth, no point is near enough.
+    low = np.full(len(tops), 0.0)
+    high = tops - surface.texture.extremes[0] + surface.max_depth
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        points = np.column_stack([xy, tops - middle])
+        feet = surface.texture.nearest(points)
+        near = np.linalg.norm(feet - points, axis=1) <= surface.max_depth
+        low, high = np.where(near, middle, low), np.where(near, high, middle)
+    return low
+
+
+def _mean_thrust(surface: Surface, line: ScanLine) -> float:
+    """Return (1/l) ∫ f_t dt along a line at constant height [N].
+
+    At z = max h - max_depth, on the nominal contact at -max_depth.
+
+    Args:
+        surface: a surface whose law has no state.
+        line: the line; its whole length counts.
+    """
+    height = scan_height(surface)
+    tangent = np.array([*line.direction, 0.0])
+
+    def integrand(s: FloatArray) -> FloatArray:
+        xy = line.start + (s * line.length)[:, None] * line.direction
+        points = np.column_stack([xy, np.full(len(s), height)])
+        return np.asarray(surface.force(points) @ tangent)
+
+    if surface.law.contact.costly:
+        # Costly contacts: the periodic mean needs no more than equal steps.
+        steps = (np.arange(_THRUST_STEPS) + 0.5) / _THRUST_STEPS
+        return float(integrand(steps).mean())
+    return integrate(integrand, smooth_panels(surface, line.length))
 
 
 def _state_leak(surface: Surface, line: ScanLine) -> Leak:

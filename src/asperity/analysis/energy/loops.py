@@ -122,8 +122,6 @@ def _stretch_work(surface: Surface, stretch: Stretch, wave: float, tolerance: fl
 
     def integrand(s: FloatArray) -> FloatArray:
         points = stretch.start + s[:, None] * along
-        if stretch.deflection is None:
-            return surface.force(points) @ along
         return surface.force(points, deflection=stretch.deflection(s)) @ along
 
     return integrate(integrand, _panels(length, wave, 1), tolerance)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -77,19 +76,16 @@ def in_plane_loop(surface: Surface, line: ScanLine) -> StateLoop:
     has one sign on either side of the scan line wherever m rises, and the other where it falls.
     The polygon encloses one sign of it within the circle |d| < d_max.
     """
-    outlines = []
-    for start in line.points(_STARTS):
-        for sign in (1.0, -1.0):
-            promise, vertices = _outline(surface, line, start, sign)
-            outlines.append((promise, vertices))
+    outlines = [
+        _outline(surface, line, start, sign)
+        for start in line.points(_STARTS)
+        for sign in (1.0, -1.0)
+    ]
     outlines.sort(key=lambda outline: -outline[0])
-    best = StateLoop(-math.inf, np.zeros((0, 3)), "")
     text = f"in the plane at {surface.max_depth * 1e3:g} mm about an anchor that sticks"
-    for _promise, vertices in outlines[:_TRIED]:
-        energy = loop_work(surface, vertices)
-        if energy > best.energy:
-            best = StateLoop(energy, vertices, text)
-    return best
+    tried = [vertices for _promise, vertices in outlines[:_TRIED]]
+    loops = [StateLoop(loop_work(surface, vertices), vertices, text) for vertices in tried]
+    return max(loops, key=lambda loop: loop.energy)
 
 
 def _outline(
