@@ -12,7 +12,7 @@ from asperity.analysis.energy.leak import Leak
 from asperity.analysis.energy.merit import Merit
 from asperity.analysis.passivity.judgement import Passivity
 from asperity.devices import Device
-from asperity.files import plain
+from asperity.files import plain, record
 from asperity.notebook import as_html
 from asperity.surface import Surface
 
@@ -75,32 +75,17 @@ class Analysis:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number; infinity is the string "inf"."""
         surface = self.surface
-        return plain(
-            {
-                "schema": SCHEMA,
-                "answer": self.answer,
-                "texture": surface.texture.describe(),
-                "law": surface.law.letter,
-                "law_name": surface.law.name,
-                "law_parameters": surface.law_parameters,
-                "clamp": surface.clamp,
-                "stiffness": surface.stiffness,
-                "max_depth": surface.max_depth,
-                "device": self.device,
-                "q": self.q,
-                "one_sided": self.one_sided,
-                "curl": self.curl,
-                "curl_density": self.curl_density,
-                "conservative": self.conservative,
-                "conservative_reason": self.conservative_reason,
-                "leak": self.leak,
-                "v_star": self.v_star,
-                "continuity": self.continuity,
-                "passivity": self.passivity,
-                "merit": self.merit,
-                "assumptions": self.assumptions,
-            }
-        )
+        return {
+            "schema": SCHEMA,
+            "answer": self.answer,
+            "texture": plain(surface.texture.describe()),
+            "law": surface.law.letter,
+            "law_name": surface.law.name,
+            **record(surface, "law_parameters", "clamp", "stiffness", "max_depth"),
+            **record(self, "device", "q", "one_sided", "curl", "curl_density", "conservative"),
+            **record(self, "conservative_reason", "leak", "v_star", "continuity", "passivity"),
+            **record(self, "merit", "assumptions"),
+        }
 
     def _repr_html_(self) -> str:
         """Return the answer, the numbers and the criteria for a notebook."""

@@ -15,7 +15,7 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.merit import merit
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.limits.limit_result import Limits, RenderedWave, TextureForce
-from asperity.analysis.limits.limit_rules import RULES, Case, Decision, Limit, decide
+from asperity.analysis.limits.limit_rules import RULES, Case, Decision, decide
 from asperity.analysis.limits.spectrum import LEAST_SHARE, Spectrum, spectrum
 from asperity.analysis.limits.wave_force import wave_forces
 from asperity.analysis.words.limits import answer, assumptions
@@ -107,8 +107,9 @@ def limits(
     scan = merit(surface)
     force = _texture_force(scan.ripple * surface.stiffness, case, found, forces)
     waves = _rendered(found, kept, case, decisions)
+    top = min((one.speeds[1] for one in six if one.speeds is not None), default=math.inf)
     result = Limits(surface, known, v, alpha, beta, gamma, gain, symbol, safe, six, waves, found,
-                    force, _common(six), "", ())  # fmt: skip
+                    force, (0.0, top), "", ())  # fmt: skip
     defaults = {"speed": speed is None, "stiffness": stiffness is None,
                 "max_depth": max_depth is None,
                 "samples": None in {time_samples, position_samples, force_steps}}  # fmt: skip
@@ -183,8 +184,3 @@ def _texture_force(rms: float, case: Case, found: Spectrum, forces: FloatArray) 
         above_friction=None if friction is None else math.sqrt(2.0) * shown > friction,
         needs=tuple(field for field in asked if field not in device),
     )
-
-
-def _common(six: Sequence[Limit]) -> tuple[float, float]:
-    """Return the speeds at which all limits hold that can be decided."""
-    return 0.0, min((one.speeds[1] for one in six if one.speeds is not None), default=math.inf)

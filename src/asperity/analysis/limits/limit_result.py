@@ -151,16 +151,10 @@ class Limits:
 
 
 def _cells(limit: Limit) -> list[str]:
+    named = [str(limit.number), limit.inequality]
     if limit.left is None or limit.right is None or limit.speeds is None:
-        return [str(limit.number), limit.inequality, "", "", "", "", ", ".join(limit.needs)]
+        return [*named, "", "", "", "", ", ".join(limit.needs)]
     verdict = "yes" if limit.holds else "no"
     sides = [f"{side:.3g} {limit.unit}" for side in (limit.left, limit.right)]
     top = "all" if math.isinf(limit.speeds[1]) else f"{limit.speeds[1]:.3g}"
-    return [
-        str(limit.number),
-        limit.inequality,
-        *sides,
-        verdict,
-        top if limit.speeds[1] else "none",
-        "",
-    ]
+    return [*named, *sides, verdict, top if limit.speeds[1] else "none", ""]

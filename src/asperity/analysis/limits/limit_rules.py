@@ -13,43 +13,14 @@ number against a stiffness. 2 and 3 are one condition as printed, but for the nu
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.checks import FloatArray
 from asperity.files import Record
-
-
-@dataclass(frozen=True)
-class Rule:
-    """One of the six conditions.
-
-    Attributes:
-        number: the paper's.
-        name: the paper's, without "limit".
-        inequality: as used here.
-        unit: of both sides.
-        field: of the device that it needs.
-    """
-
-    number: int
-    name: str
-    inequality: str
-    unit: str
-    field: str
-
-
-RULES = (
-    Rule(1, "scanning velocity", "α v T < l", "m", "update_rate"),
-    Rule(2, "low speed reconstruction", "β δ < l", "m", "position_resolution"),
-    Rule(3, "high speed reconstruction", "α δ < l", "m", "position_resolution"),
-    Rule(4, "force reconstruction", "γ b < A_F", "N", "force_resolution"),
-    Rule(5, "gain", "q k ≤ K₀", "N/m", "max_stiffness"),
-    Rule(6, "device structure", "v / l < F₀", "Hz", "bandwidth"),
-)
 
 
 @dataclass(frozen=True)
@@ -81,6 +52,50 @@ class Case:
     stiffness: float
 
 
+Side = FloatArray | float
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One of the six conditions.
+
+    Attributes:
+        number: the paper's.
+        name: the paper's, without "limit".
+        inequality: as used here.
+        unit: of both sides.
+        field: of the device that it needs.
+        sides: both sides [SI] for a case and that number of the device, for each wave or for all.
+        top_speed: speed [m/s] below which each wave fulfils it; ``None`` if that does not matter.
+    """
+
+    number: int
+    name: str
+    inequality: str
+    unit: str
+    field: str
+    sides: Callable[[Case, float], tuple[Side, Side]]
+    top_speed: Callable[[Case, float], FloatArray] | None = None
+
+
+RULES = (
+    Rule(1, "scanning velocity", "α v T < l", "m", "update_rate",
+         lambda case, rate: (case.time_samples * case.speed / rate, case.wavelengths),
+         lambda case, rate: case.wavelengths * rate / case.time_samples),
+    Rule(2, "low speed reconstruction", "β δ < l", "m", "position_resolution",
+         lambda case, step: (case.position_samples * step, case.wavelengths)),
+    Rule(3, "high speed reconstruction", "α δ < l", "m", "position_resolution",
+         lambda case, step: (case.time_samples * step, case.wavelengths)),
+    Rule(4, "force reconstruction", "γ b < A_F", "N", "force_resolution",
+         lambda case, step: (case.force_steps * step, case.forces)),
+    Rule(5, "gain", "q k ≤ K₀", "N/m", "max_stiffness",
+         lambda case, wall: (case.gain * case.stiffness, wall)),
+    Rule(6, "device structure", "v / l < F₀", "Hz", "bandwidth",
+         lambda case, resonance: (case.speed / case.wavelengths, resonance),
+         lambda case, resonance: case.wavelengths * resonance),
+)  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Limit(Record):
     """One of the six limits, decided for all waves at once.
@@ -106,14 +121,14 @@ class Limit(Record):
     name: str
     inequality: str
     unit: str
-    left: float | None
-    right: float | None
-    wavelength: float | None
-    holds: bool | None
-    share: float | None
-    speeds: tuple[float, float] | None
-    uses: str
-    needs: tuple[str, ...]
+    left: float | None = None
+    right: float | None = None
+    wavelength: float | None = None
+    holds: bool | None = None
+    share: float | None = None
+    speeds: tuple[float, float] | None = None
+    uses: str = ""
+    needs: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -139,61 +154,28 @@ def decide(rule: Rule, case: Case, inequality: str | None = None) -> Decision:
         case: what it is asked of.
         inequality: in symbols, where it differs from the rule's.
     """
-    shown = inequality or rule.inequality
+    shown, on_waves = inequality or rule.inequality, rule.number != 5
+    limit = Limit(rule.number, rule.name, shown, rule.unit, uses=rule.field)
     needs = [] if rule.field in case.device else [rule.field]
-    if not len(case.wavelengths) and rule.number != 5:
+    if on_waves and not len(case.wavelengths):
         needs.append("waves: the surface is flat")
     if needs:
-        limit = Limit(rule.number, rule.name, shown, rule.unit, None, None, None, None, None,
-                      None, rule.field, tuple(needs))  # fmt: skip
-        return Decision(limit, None, None)
-    left, right = sides(rule.number, case)
+        return Decision(replace(limit, needs=tuple(needs)), None, None)
+    number = case.device[rule.field]
+    left, right = np.broadcast_arrays(*map(np.atleast_1d, rule.sides(case, number)))
     # A stiffness that was made K₀/q may miss it by rounding; the other limits are strict.
-    holds = left <= right * (1.0 + 1e-12) if rule.number == 5 else left < right
-    top = _top_speed(rule.number, case, holds)
+    holds = left < right if on_waves else left <= right * (1.0 + 1e-12)
+    top = np.where(holds, math.inf, 0.0)
+    if rule.top_speed is not None:
+        top = rule.top_speed(case, number)
     worst = int(np.argmin(right / left))
-    limit = Limit(
-        number=rule.number,
-        name=rule.name,
-        inequality=shown,
-        unit=rule.unit,
+    limit = replace(
+        limit,
         left=float(left[worst]),
         right=float(right[worst]),
-        wavelength=None if rule.number == 5 else float(case.wavelengths[worst]),
+        wavelength=float(case.wavelengths[worst]) if on_waves else None,
         holds=bool(holds.all()),
-        share=None if rule.number == 5 else _share(case, holds),
+        share=float(case.shares[holds].sum() / case.shares.sum()) if on_waves else None,
         speeds=(0.0, float(top.min())),
-        uses=rule.field,
-        needs=(),
     )
     return Decision(limit, holds, top)
-
-
-def _share(case: Case, holds: NDArray[np.bool_]) -> float:
-    return float(case.shares[holds].sum() / case.shares.sum())
-
-
-def sides(number: int, case: Case) -> tuple[FloatArray, FloatArray]:
-    """Return the two sides of a condition [SI], for each wave; one value for the gain limit."""
-    device, lengths = case.device, case.wavelengths
-    same = np.ones_like(lengths)
-    if number == 1:
-        return case.time_samples * case.speed / device["update_rate"] * same, lengths
-    if number == 2:
-        return case.position_samples * device["position_resolution"] * same, lengths
-    if number == 3:
-        return case.time_samples * device["position_resolution"] * same, lengths
-    if number == 4:
-        return case.force_steps * device["force_resolution"] * same, case.forces
-    if number == 5:
-        return np.array([case.gain * case.stiffness]), np.array([device["max_stiffness"]])
-    return case.speed / lengths, device["bandwidth"] * same
-
-
-def _top_speed(number: int, case: Case, holds: NDArray[np.bool_]) -> FloatArray:
-    """Return the speed [m/s] below which a condition holds; most do not depend on it."""
-    if number == 1:
-        return np.asarray(case.wavelengths * case.device["update_rate"] / case.time_samples)
-    if number == 6:
-        return np.asarray(case.wavelengths * case.device["bandwidth"])
-    return np.where(holds, math.inf, 0.0)

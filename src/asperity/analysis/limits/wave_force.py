@@ -51,10 +51,6 @@ def wave_forces(surface: Surface, spectrum: Spectrum) -> FloatArray:
     return _fitted(surface, spectrum) if spectrum.exact else _by_bands(surface, spectrum)
 
 
-def _costly(surface: Surface) -> bool:
-    return surface.law.contact.costly
-
-
 def scan_forces(surface: Surface, xy: FloatArray) -> FloatArray:
     """Return the forces [N], shape (n, 3), at points (n, 2) [m] of the scan's height."""
     probes = np.column_stack([xy, np.full(len(xy), scan_height(surface))])
@@ -68,7 +64,7 @@ def scan_forces(surface: Surface, xy: FloatArray) -> FloatArray:
 
 def _fitted(surface: Surface, spectrum: Spectrum) -> FloatArray:
     """Return the amplitudes of the waves that fit the force best."""
-    xy = _fit_points(surface.texture, spectrum, _FIT_POINTS[_costly(surface)])
+    xy = _fit_points(surface.texture, spectrum, _FIT_POINTS[surface.law.contact.costly])
     vectors = np.array([wave.vector for wave in spectrum.waves])
     angles = xy @ vectors.T + np.array([wave.phase for wave in spectrum.waves])
     columns = np.hstack([np.ones((len(xy), 1)), np.sin(angles), np.cos(angles)])
@@ -91,7 +87,7 @@ def _fit_points(texture: Texture, spectrum: Spectrum, count: int) -> FloatArray:
 
 def _by_bands(surface: Surface, spectrum: Spectrum) -> FloatArray:
     """Return the amplitude of each band, from the ratio of force to height on a patch."""
-    texture, costly = surface.texture, _costly(surface)
+    texture, costly = surface.texture, surface.law.contact.costly
     most = (_LINE_POINTS if texture.is_profile else _SIDE_POINTS)[costly]
     points, spacing, repeats = texture.domain.grid(texture.grid_counts(), most)
     flat = points.reshape(-1, 2)
