@@ -74,12 +74,12 @@ def _force(surface: Surface, p: list[Any], d: list[Any]) -> Any:
     contact = law.contact.exact_point(surface.texture, h, p)
     if contact is None:
         raise ParameterError("surface", f"with law {law} has no definition in many digits")
-    depth, foot = contact[0], contact[1:]
+    depth, x, y = contact
     if depth <= 0:
         return mpmath.matrix([0, 0, 0])
     names = [*POSITION, DEPTH, H, HX, HY, DX, DY, K, H_MID, H_HALF]
     stiffness, middle, half = surface.law_arguments[:3]
-    values = [*p, depth, h(*foot, 0, 0), h(*foot, 1, 0), h(*foot, 0, 1), *d]
+    values = [*p, depth, h(x, y, 0, 0), h(x, y, 1, 0), h(x, y, 0, 1), *d]
     values += [mpmath.mpf(stiffness), mpmath.mpf(middle), mpmath.mpf(half)]
     for name, value in surface.law_parameters.items():
         names.append(sp.Symbol(name, real=True))

@@ -137,7 +137,6 @@ class Contact(ABC):
         Returns:
             Lines of Python, and the condition that holds in contact.
         """
-        del wanted
         return ["depth, contact_x, contact_y = contact_point(x, y, z, texture)"], "depth > 0.0"
 
     def sample_code(self, wanted: frozenset[str]) -> list[str]:
@@ -179,12 +178,11 @@ class Contact(ABC):
 
     def exact_point(
         self, texture: HeightField, h: ExactHeight, p: list[Any]
-    ) -> tuple[Any, Any, Any] | None:
+    ) -> tuple[Any, ...] | None:
         """Return depth, X and Y [m] of a probe p in mpmath, from h(x, y, m, n), ∂ᵐ⁺ⁿh/∂xᵐ∂yⁿ.
 
         Nothing where the contact has no definition in many digits to test kernels against.
         """
-        del texture, h, p
         return None
 
     @abstractmethod
@@ -211,12 +209,3 @@ class Contact(ABC):
     def coordinate_size(self, xy: FloatArray, height: float) -> float:
         """Return the size of the coordinates that the depth is a difference of [m]."""
         return float(abs(height) + abs(xy).max())
-
-
-def along_normal(xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
-    """Return the points (n, 3) [m] at a depth below surface points, along their normals."""
-    import numpy as np
-
-    h, hx, hy = derivatives[:, :3].T
-    below = depth / np.sqrt(1.0 + hx * hx + hy * hy)
-    return np.column_stack([xy[:, 0] + below * hx, xy[:, 1] + below * hy, h - below])

@@ -30,7 +30,6 @@ class Nominal(Contact):
 
     def begin_code(self, wanted: frozenset[str]) -> tuple[list[str], str]:
         """Below the wall, whatever the texture."""
-        del wanted
         return ["depth = -z"], "depth > 0.0"
 
     def sample_code(self, wanted: frozenset[str]) -> list[str]:
@@ -39,33 +38,26 @@ class Nominal(Contact):
 
     def begin(self, texture: HeightField, xy: FloatArray) -> FloatArray:
         """Everywhere at 0."""
-        del texture
         import numpy as np
 
         return np.zeros(len(xy))
 
     def extremes(self, texture: HeightField) -> tuple[float, float]:
         """0 and 0."""
-        del texture
         return 0.0, 0.0
 
     def depth(self, texture: HeightField, points: FloatArray) -> FloatArray:
         """-z."""
-        del texture
         import numpy as np
 
         return np.asarray(-points[:, 2])
 
-    def exact_point(
-        self, texture: HeightField, h: ExactHeight, p: list[Any]
-    ) -> tuple[Any, Any, Any] | None:
+    def exact_point(self, texture: HeightField, h: ExactHeight, p: list[Any]) -> tuple[Any, ...]:
         """-z, x, y."""
-        del texture, h
         return -p[2], p[0], p[1]
 
     def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
         """(X, Y, -depth)."""
-        del derivatives
         import numpy as np
 
         return np.column_stack([xy, -depth])
@@ -78,12 +70,10 @@ class Nominal(Contact):
 
     def margin(self, max_depth: float) -> float:
         """0: the point is the probe's own."""
-        del max_depth
         return 0.0
 
     def coordinate_size(self, xy: FloatArray, height: float) -> float:
         """0: the depth is no difference."""
-        del xy, height
         return 0.0
 
 

@@ -34,7 +34,6 @@ class Vertical(Contact):
 
     def sample_code(self, wanted: frozenset[str]) -> list[str]:
         """All is known."""
-        del wanted
         return []
 
     def begin(self, texture: HeightField, xy: FloatArray) -> FloatArray:
@@ -47,11 +46,8 @@ class Vertical(Contact):
 
         return np.asarray(texture.height(np.ascontiguousarray(points[:, :2])) - points[:, 2])
 
-    def exact_point(
-        self, texture: HeightField, h: ExactHeight, p: list[Any]
-    ) -> tuple[Any, Any, Any] | None:
+    def exact_point(self, texture: HeightField, h: ExactHeight, p: list[Any]) -> tuple[Any, ...]:
         """H - z, x, y."""
-        del texture
         return h(p[0], p[1], 0, 0) - p[2], p[0], p[1]
 
     def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
@@ -68,12 +64,10 @@ class Vertical(Contact):
 
     def margin(self, max_depth: float) -> float:
         """0: the point is straight above the probe."""
-        del max_depth
         return 0.0
 
     def coordinate_size(self, xy: FloatArray, height: float) -> float:
         """|h|."""
-        del xy
         return abs(height)
 
 

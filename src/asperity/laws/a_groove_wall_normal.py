@@ -7,12 +7,9 @@ x = 0 mod l/2, not mod π/l. Table I agrees. The curl is (-h_y, h_x, 0)·(-k): n
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from asperity.laws.law import Law
-
-if TYPE_CHECKING:
-    from asperity.contacts.symbols import ContactSymbols
+from asperity.laws.law import ContactSymbols, Law
 
 
 def force(c: ContactSymbols) -> Any:

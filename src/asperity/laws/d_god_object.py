@@ -9,12 +9,9 @@ entry (1, 2) and (41) entry (2, 1) are misprinted.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from asperity.laws.law import Law
-
-if TYPE_CHECKING:
-    from asperity.contacts.symbols import ContactSymbols
+from asperity.laws.law import ContactSymbols, Law
 
 
 def force(c: ContactSymbols) -> Any:

@@ -7,12 +7,9 @@ k-Lipschitz even across the medial axis; not conservative.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from asperity.laws.law import Law
-
-if TYPE_CHECKING:
-    from asperity.contacts.symbols import ContactSymbols
+from asperity.laws.law import ContactSymbols, Law
 
 
 def force(c: ContactSymbols) -> Any:

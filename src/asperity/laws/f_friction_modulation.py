@@ -12,13 +12,10 @@ phase keeps its transverse stiffness, ∂d/∂p = I - u uᵀ.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from asperity.arguments import Argument
-from asperity.laws.law import Law
-
-if TYPE_CHECKING:
-    from asperity.contacts.symbols import ContactSymbols
+from asperity.laws.law import ContactSymbols, Law
 
 
 def force(c: ContactSymbols) -> Any:

@@ -13,13 +13,10 @@ as a haptic law is new. No perceptual test was done.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from asperity.arguments import Argument
-from asperity.laws.law import Law
-
-if TYPE_CHECKING:
-    from asperity.contacts.symbols import ContactSymbols
+from asperity.laws.law import ContactSymbols, Law
 
 
 def force(c: ContactSymbols) -> Any:

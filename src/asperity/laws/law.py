@@ -12,10 +12,14 @@ from asperity.arguments import Argument
 from asperity.contacts import CONTACTS, Contact
 from asperity.errors import LawError, nearest_names
 
+__all__ = ["ContactSymbols", "ForceFormula", "Law"]
+
 if TYPE_CHECKING:
     from asperity.contacts.symbols import ContactSymbols
+else:
+    ContactSymbols = Any  # SymPy is loaded only where something is derived
 
-ForceFormula = Callable[["ContactSymbols"], Any]
+ForceFormula = Callable[[ContactSymbols], Any]
 
 
 @dataclass(frozen=True, eq=False, init=False)

@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from asperity.contacts.contact import (
-    Contact,
-    ContactDerivatives,
-    ExactHeight,
-    HeightField,
-    along_normal,
-)
+from asperity.contacts.contact import Contact, ContactDerivatives, ExactHeight, HeightField
 from asperity.contacts.sampler import sampled
 
 if TYPE_CHECKING:
@@ -50,7 +44,6 @@ class Nearest(Contact):
 
     def begin_code(self, wanted: frozenset[str]) -> tuple[list[str], str]:
         """Below the height at the probe: no search out of contact."""
-        del wanted
         return [], "height(x, y, texture) - z > 0.0"
 
     def sample_code(self, wanted: frozenset[str]) -> list[str]:
@@ -84,15 +77,36 @@ class Nearest(Contact):
 
     def exact_point(
         self, texture: HeightField, h: ExactHeight, p: list[Any]
-    ) -> tuple[Any, Any, Any] | None:
-        """The foot, by Newton's method from the kernels' own."""
-        from asperity.contacts.nearest.exact import exact_nearest
+    ) -> tuple[Any, ...] | None:
+        """The foot, by Newton's method from the kernels' own.
 
-        return exact_nearest(texture, h, p)
+        Solves (X - x) + (h - z) h_x = 0, (Y - y) + (h - z) h_y = 0.
+        """
+        import mpmath
+
+        start = texture.nearest([[float(c) for c in p]])[0]
+        fx, fy = mpmath.mpf(start[0]), mpmath.mpf(start[1])
+        for _ in range(60):
+            gap, hx, hy = h(fx, fy, 0, 0) - p[2], h(fx, fy, 1, 0), h(fx, fy, 0, 1)
+            hxx, hxy, hyy = h(fx, fy, 2, 0), h(fx, fy, 1, 1), h(fx, fy, 0, 2)
+            a, b = fx - p[0] + gap * hx, fy - p[1] + gap * hy
+            qxx, qxy, qyy = 1 + hx * hx + gap * hxx, hx * hy + gap * hxy, 1 + hy * hy + gap * hyy
+            det = qxx * qyy - qxy * qxy
+            sx, sy = (qxy * b - qyy * a) / det, (qxy * a - qxx * b) / det
+            fx, fy = fx + sx, fy + sy
+            if abs(sx) + abs(sy) <= mpmath.eps * (abs(fx) + abs(fy) + abs(gap)):
+                break
+        away = [fx - p[0], fy - p[1], h(fx, fy, 0, 0) - p[2]]
+        distance = mpmath.sqrt(sum(part**2 for part in away))
+        return (distance if h(p[0], p[1], 0, 0) > p[2] else -distance), fx, fy
 
     def probe(self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray) -> FloatArray:
         """Below the foot along its normal."""
-        return along_normal(xy, depth, derivatives)
+        import numpy as np
+
+        h, hx, hy = derivatives[:, :3].T
+        below = depth / np.sqrt(1.0 + hx * hx + hy * hy)
+        return np.column_stack([xy[:, 0] + below * hx, xy[:, 1] + below * hy, h - below])
 
     def greatest_depth(self, height: float, derivatives: FloatArray) -> FloatArray:
         """Where the foot's normal line sinks below the height."""

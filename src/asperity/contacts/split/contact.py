@@ -24,15 +24,14 @@ class Split(Nearest):
 
     def kernels(self) -> tuple[ModuleType, ...]:
         """The general solver; a texture kind may offer ``split_contact`` and the like itself."""
-        from asperity.contacts.split import conditions, energy_loop, solver
+        from asperity.contacts.split import conditions, solver
 
-        return solver, conditions, energy_loop
+        return solver, conditions
 
     def exact_point(
         self, texture: HeightField, h: ExactHeight, p: list[Any]
-    ) -> tuple[Any, Any, Any] | None:
+    ) -> tuple[Any, ...] | None:
         """None: its definition is a supremum over space; the theorems on it are tested instead."""
-        del texture, h, p
         return None
 
     def sample_code(self, wanted: frozenset[str]) -> list[str]:

@@ -35,6 +35,7 @@ from asperity.contacts.split.conditions import (
 
 KERNELS = Kernels(
     provides=("split_contact", "split_derivative", "split_energy"),
+    loops=("split_batch",),
     requires=(
         "foot", "height", "split_copy", "split_farther", "split_follow", "split_moving",
         "split_projection", "split_solve", "split_system", "split_value",
@@ -343,3 +344,19 @@ def split_derivative(
         pull[0], pull[1], pull[2], m[0, 0], 0.5 * (m[0, 1] + m[1, 0]), 0.5 * (m[0, 2] + m[2, 0]),
         m[1, 1], 0.5 * (m[1, 2] + m[2, 1]), m[2, 2],
     )  # fmt: skip
+
+
+def split_batch(points: FloatArray, out: FloatArray, continuity: float, texture: object) -> None:
+    """Write potential/k [m²], number of atoms and gap [m²] (n, 3) at points (n, 3) [m]."""
+    for i in range(points.shape[0]):
+        x = points[i, 0]
+        y = points[i, 1]
+        z = points[i, 2]
+        value = 0.0
+        count = 0
+        gap = 0.0
+        if height(x, y, texture) > z:
+            value, count, gap = split_energy(x, y, z, continuity, texture)
+        out[i, 0] = value
+        out[i, 1] = count
+        out[i, 2] = gap
