@@ -122,7 +122,7 @@ def _table_times() -> list[tuple[str, float]]:
         xy = texture.domain.points(rng.uniform(size=(100_000, len(texture.domain.spans))))
         z = rng.uniform(table.floor, texture.extremes[0], len(xy))
         points, out = np.column_stack([xy, z]), np.empty((len(xy), 3))
-        batch = partial(table._force_loop, points, out, STIFFNESS, table._table)
+        batch = partial(table._loops.table_force_batch, points, out, STIFFNESS, table._table)
         runs = take_turns([batch], ROUNDS)
         size = " x ".join(str(count) for count in table.shape)
         what = f"{name}: {size} nodes, {table.bytes / 1e6:.1f} MB, built in {built:.1f} s, "

@@ -23,11 +23,9 @@ def force_batch(
 ) -> None:
     """Write the forces (n, 3) [N] at points (n, 3) with deflections (n, 2) [m]."""
     for i in range(points.shape[0]):
-        fx, fy, fz = probe_force(
-            points[i, 0], points[i, 1], points[i, 2], deflection[i, 0], deflection[i, 1],
-            texture, law,
-        )  # fmt: skip
-        store_force(out, i, fx, fy, fz)
+        dx, dy = deflection[i, 0], deflection[i, 1]
+        force = probe_force(points[i, 0], points[i, 1], points[i, 2], dx, dy, texture, law)
+        store_force(out, i, force)
 
 
 def jacobian_batch(
@@ -39,11 +37,10 @@ def jacobian_batch(
         dx = deflection[i, 0]
         dy = deflection[i, 1]
         sxx, sxy, syy = sliding_derivative(dx, dy, sliding[i])
-        fx, fy, fz, j00, j01, j02, j10, j11, j12, j20, j21, j22 = probe_jacobian(
+        values = probe_jacobian(
             points[i, 0], points[i, 1], points[i, 2], dx, dy, sxx, sxy, syy, texture, law
         )
-        store_force(force, i, fx, fy, fz)
-        store_jacobian(jacobian, i, j00, j01, j02, j10, j11, j12, j20, j21, j22)
+        store_jacobian(force, jacobian, i, values)
 
 
 def trace_batch(points: FloatArray, out: FloatArray, texture: object, law: object) -> None:
@@ -54,4 +51,4 @@ def trace_batch(points: FloatArray, out: FloatArray, texture: object, law: objec
         fx, fy, fz, ax, ay, held = probe_held(
             points[i, 0], points[i, 1], points[i, 2], ax, ay, held, texture, law
         )
-        store_force(out, i, fx, fy, fz)
+        store_force(out, i, (fx, fy, fz))

@@ -7,10 +7,10 @@ from asperity.checks import FloatArray
 from asperity.compiled import Kernels
 from asperity.kernels.anchor import sliding_derivative
 from asperity.kernels.law_functions import contact_jacobian
-from asperity.kernels.storing import store_force, store_jacobian
+from asperity.kernels.storing import store_jacobian
 
 KERNELS = Kernels(
-    requires=("contact_jacobian", "sliding_derivative", "store_force", "store_jacobian"),
+    requires=("contact_jacobian", "sliding_derivative", "store_jacobian"),
     loops=("contact_batch",),
 )
 
@@ -35,11 +35,10 @@ def contact_batch(
         dx = deflection[i, 0]
         dy = deflection[i, 1]
         sxx, sxy, syy = sliding_derivative(dx, dy, sliding[i])
-        fx, fy, fz, j00, j01, j02, j10, j11, j12, j20, j21, j22 = contact_jacobian(
+        values = contact_jacobian(
             points[i, 0], points[i, 1], points[i, 2], depths[i],
             derivatives[i, 0], derivatives[i, 1], derivatives[i, 2],
             derivatives[i, 3], derivatives[i, 4], derivatives[i, 5],
             dx, dy, sxx, sxy, syy, law,
         )  # fmt: skip
-        store_force(force, i, fx, fy, fz)
-        store_jacobian(jacobian, i, j00, j01, j02, j10, j11, j12, j20, j21, j22)
+        store_jacobian(force, jacobian, i, values)

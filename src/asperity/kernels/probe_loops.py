@@ -14,8 +14,8 @@ KERNELS = Kernels(
 def force_batch(points: FloatArray, out: FloatArray, texture: object, law: object) -> None:
     """Write the forces (n, 3) [N] at points (n, 3) [m]."""
     for i in range(points.shape[0]):
-        fx, fy, fz = probe_force(points[i, 0], points[i, 1], points[i, 2], 0.0, 0.0, texture, law)
-        store_force(out, i, fx, fy, fz)
+        force = probe_force(points[i, 0], points[i, 1], points[i, 2], 0.0, 0.0, texture, law)
+        store_force(out, i, force)
 
 
 def jacobian_batch(
@@ -23,8 +23,7 @@ def jacobian_batch(
 ) -> None:
     """Write forces (n, 3) [N] and Jacobians (n, 3, 3) [N/m] at points (n, 3) [m]."""
     for i in range(points.shape[0]):
-        fx, fy, fz, j00, j01, j02, j10, j11, j12, j20, j21, j22 = probe_jacobian(
+        values = probe_jacobian(
             points[i, 0], points[i, 1], points[i, 2], 0.0, 0.0, 1.0, 0.0, 1.0, texture, law
         )
-        store_force(force, i, fx, fy, fz)
-        store_jacobian(jacobian, i, j00, j01, j02, j10, j11, j12, j20, j21, j22)
+        store_jacobian(force, jacobian, i, values)

@@ -25,18 +25,12 @@ def slope_batch(points: FloatArray, out: FloatArray, texture: object) -> None:
 def curvature_batch(points: FloatArray, out: FloatArray, texture: object) -> None:
     """Write heights [m], slopes and second derivatives [1/m] at points (n, 2) [m]."""
     for i in range(points.shape[0]):
-        h, hx, hy, hxx, hxy, hyy = curvature(points[i, 0], points[i, 1], texture)
-        out[i, 0] = h
-        out[i, 1] = hx
-        out[i, 2] = hy
-        out[i, 3] = hxx
-        out[i, 4] = hxy
-        out[i, 5] = hyy
+        values = curvature(points[i, 0], points[i, 1], texture)
+        for d in range(6):
+            out[i, d] = values[d]
 
 
 def nearest_batch(points: FloatArray, out: FloatArray, texture: object) -> None:
     """Write the nearest surface points, x and y [m], of probes (n, 3) [m]."""
     for i in range(points.shape[0]):
-        x, y, _h, _hx, _hy = foot(points[i, 0], points[i, 1], points[i, 2], texture)
-        out[i, 0] = x
-        out[i, 1] = y
+        out[i, 0], out[i, 1], _h, _hx, _hy = foot(points[i, 0], points[i, 1], points[i, 2], texture)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass, field, replace
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -80,7 +80,7 @@ class TabulatedSurface:
         """
         probes = array("points", points, (None, 3), "m")
         out = np.empty((len(probes), 3))
-        self._force_loop(probes, out, self.surface.stiffness, self._table)
+        self._loops.table_force_batch(probes, out, self.surface.stiffness, self._table)
         return out
 
     def potential(self, points: ArrayLike) -> FloatArray:
@@ -104,21 +104,16 @@ class TabulatedSurface:
         return load_device(device).max_stiffness / self.one_sided.value
 
     @property
-    def _force_loop(self) -> Any:
-        from asperity.contacts.split import spline as split_table
+    def _loops(self) -> ModuleType:
+        from asperity.contacts.split import spline
         from asperity.kernels.fuse import fuse_module
 
-        loops = fuse_module(split_table)
-        profile = self.surface.texture.is_profile
-        return loops.profile_force_batch if profile else loops.map_force_batch
+        return fuse_module(spline)
 
     def _expansion(self, points: ArrayLike) -> FloatArray:
-        from asperity.contacts.split import spline as split_table
-        from asperity.kernels.fuse import fuse_module
-
         probes = array("points", points, (None, 3), "m")
         out = np.empty((len(probes), 7))
-        fuse_module(split_table).expansion_batch(probes, out, self._table)
+        self._loops.expansion_batch(probes, out, self._table)
         return out
 
 

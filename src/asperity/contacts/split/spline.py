@@ -13,7 +13,7 @@ from asperity.compiled import Kernels
 
 KERNELS = Kernels(
     provides=("table_hessian",),
-    loops=("expansion_batch", "map_force_batch", "profile_force_batch"),
+    loops=("expansion_batch", "table_force_batch"),
 )
 
 Weights = tuple[float, float, float]
@@ -116,7 +116,25 @@ def table_dot(c: FloatArray, i: int, j: int, m: int, w: Weights) -> float:
     return float(w[0] * c[i, j, m - 1] + w[1] * c[i, j, m] + w[2] * c[i, j, m + 1])
 
 
-def profile_gradient(
+def table_place(x: float, y: float, table: PotentialTable) -> tuple[float, float, float, float]:
+    """Return both coordinates inside the table, in nodes, each with the sign of its derivative."""
+    c = table.c
+    u, u_sign = table_fold(table_first(x, y, table), c.shape[1] - 3, table.mirrored)
+    if c.shape[0] == 1:  # a profile has no second axis
+        return u, u_sign, 0.0, 1.0
+    v, v_sign = table_fold(table_second(x, y, table), c.shape[0] - 3, table.mirrored)
+    return u, u_sign, v, v_sign
+
+
+def table_across(c: FloatArray, v: float) -> tuple[int, Weights, Weights]:
+    """Return node, weights and slopes along the second axis, of the one row of a profile too."""
+    if c.shape[0] == 1:
+        return 0, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    i = int(v + 0.5)
+    return i, table_weights(v - i), table_slopes(v - i)
+
+
+def table_gradient(
     x: float, y: float, z: float, table: PotentialTable
 ) -> tuple[float, float, float]:
     """Return ∇U [m]."""
@@ -124,57 +142,23 @@ def profile_gradient(
     w = (z - table.z0) * table.iz
     if w >= c.shape[2] - 1.5:
         return 0.0, 0.0, 0.0
-    u, sign = table_fold(table_first(x, y, table), c.shape[1] - 3, table.mirrored)
+    u, u_sign, v, v_sign = table_place(x, y, table)
     j = int(u + 0.5)
-    u0, u1, u2 = table_weights(u - j)
-    d0, d1, d2 = table_slopes(u - j)
-    m, below, values, slopes = table_height(w)
-    gu = d0 * table_dot(c, 0, j, m, values)
-    gu += d1 * table_dot(c, 0, j + 1, m, values)
-    gu += d2 * table_dot(c, 0, j + 2, m, values)
-    gw = u0 * table_dot(c, 0, j, m, slopes)
-    gw += u1 * table_dot(c, 0, j + 1, m, slopes)
-    gw += u2 * table_dot(c, 0, j + 2, m, slopes)
-    gu *= sign
-    return table.m00 * gu, table.m01 * gu, table.iz * gw + below / table.iz
-
-
-def map_gradient(x: float, y: float, z: float, table: PotentialTable) -> tuple[float, float, float]:
-    """Return ∇U [m]."""
-    c = table.c
-    w = (z - table.z0) * table.iz
-    if w >= c.shape[2] - 1.5:
-        return 0.0, 0.0, 0.0
-    u, u_sign = table_fold(table_first(x, y, table), c.shape[1] - 3, table.mirrored)
-    v, v_sign = table_fold(table_second(x, y, table), c.shape[0] - 3, table.mirrored)
-    j = int(u + 0.5)
-    i = int(v + 0.5)
-    u0, u1, u2 = table_weights(u - j)
-    d0, d1, d2 = table_slopes(u - j)
-    v0, v1, v2 = table_weights(v - i)
-    e0, e1, e2 = table_slopes(v - i)
-    m, below, values, slopes = table_height(w)
-    a0 = table_dot(c, i, j, m, values)
-    a1 = table_dot(c, i, j + 1, m, values)
-    a2 = table_dot(c, i, j + 2, m, values)
-    b0 = table_dot(c, i + 1, j, m, values)
-    b1 = table_dot(c, i + 1, j + 1, m, values)
-    b2 = table_dot(c, i + 1, j + 2, m, values)
-    c0 = table_dot(c, i + 2, j, m, values)
-    c1 = table_dot(c, i + 2, j + 1, m, values)
-    c2 = table_dot(c, i + 2, j + 2, m, values)
-    gu = v0 * (d0 * a0 + d1 * a1 + d2 * a2)
-    gu += v1 * (d0 * b0 + d1 * b1 + d2 * b2)
-    gu += v2 * (d0 * c0 + d1 * c1 + d2 * c2)
-    gv = e0 * (u0 * a0 + u1 * a1 + u2 * a2)
-    gv += e1 * (u0 * b0 + u1 * b1 + u2 * b2)
-    gv += e2 * (u0 * c0 + u1 * c1 + u2 * c2)
-    gw = 0.0
-    for k in range(3):
-        along = u0 * table_dot(c, i + k, j, m, slopes)
-        along += u1 * table_dot(c, i + k, j + 1, m, slopes)
-        along += u2 * table_dot(c, i + k, j + 2, m, slopes)
-        gw += (v0, v1, v2)[k] * along
+    u0 = table_weights(u - j)
+    u1 = table_slopes(u - j)
+    i, v0, v1 = table_across(c, v)
+    m, below, w0, w1 = table_height(w)
+    gu = gv = gw = 0.0
+    for a in range(min(c.shape[0], 3)):
+        value = along = upward = 0.0
+        for b in range(3):
+            s = table_dot(c, i + a, j + b, m, w0)
+            value += u0[b] * s
+            along += u1[b] * s
+            upward += u0[b] * table_dot(c, i + a, j + b, m, w1)
+        gu += v0[a] * along
+        gv += v1[a] * value
+        gw += v0[a] * upward
     gu *= u_sign
     gv *= v_sign
     return (
@@ -192,9 +176,7 @@ def table_sums(
     u0 = table_weights(u - j)
     u1 = table_slopes(u - j)
     rows = min(c.shape[0], 3)  # one for a profile
-    i = int(v + 0.5)
-    v0 = table_weights(v - i) if rows > 1 else (1.0, 0.0, 0.0)
-    v1 = table_slopes(v - i) if rows > 1 else (0.0, 0.0, 0.0)
+    i, v0, v1 = table_across(c, v)
     m, below, w0, w1 = table_height(w)
     second = (1.0, -2.0, 1.0)
     value = uu = uv = uw = vv = vw = ww = 0.0
@@ -220,11 +202,7 @@ def table_expansion(
     w = (z - table.z0) * table.iz
     if w >= c.shape[2] - 1.5:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    u, u_sign = table_fold(table_first(x, y, table), c.shape[1] - 3, table.mirrored)
-    v = 0.0
-    v_sign = 1.0
-    if c.shape[0] > 1:
-        v, v_sign = table_fold(table_second(x, y, table), c.shape[0] - 3, table.mirrored)
+    u, u_sign, v, v_sign = table_place(x, y, table)
     value, uu, uv, uw, vv, vw, ww = table_sums(c, u, v, w)
     uv *= u_sign * v_sign
     uw *= u_sign
@@ -235,21 +213,10 @@ def table_expansion(
     return value + 0.5 * drop * drop, xx, xy, xz, yy, yz, zz
 
 
-def profile_force_batch(
-    points: FloatArray, out: FloatArray, k: float, table: PotentialTable
-) -> None:
+def table_force_batch(points: FloatArray, out: FloatArray, k: float, table: PotentialTable) -> None:
     """Forces [N] at the points [m]."""
     for i in range(points.shape[0]):
-        gx, gy, gz = profile_gradient(points[i, 0], points[i, 1], points[i, 2], table)
-        out[i, 0] = -k * gx
-        out[i, 1] = -k * gy
-        out[i, 2] = -k * gz
-
-
-def map_force_batch(points: FloatArray, out: FloatArray, k: float, table: PotentialTable) -> None:
-    """Forces [N] at the points [m]."""
-    for i in range(points.shape[0]):
-        gx, gy, gz = map_gradient(points[i, 0], points[i, 1], points[i, 2], table)
+        gx, gy, gz = table_gradient(points[i, 0], points[i, 1], points[i, 2], table)
         out[i, 0] = -k * gx
         out[i, 1] = -k * gy
         out[i, 2] = -k * gz
