@@ -67,10 +67,7 @@ class Comparison:
         Raises:
             KeyError: if the law was not compared.
         """
-        for row in self.rows:
-            if row.law.letter == letter:
-                return row
-        raise KeyError(letter)
+        return {row.law.letter: row for row in self.rows}[letter]
 
     def _repr_html_(self) -> str:
         """Return the answer and a table for a notebook."""

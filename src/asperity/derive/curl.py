@@ -8,13 +8,16 @@ from typing import Any
 
 import sympy as sp
 
-from asperity.contacts.symbols import DEPTH, HX, HY, TOWARD
-from asperity.derive.jacobian import derive, explicit
+from asperity.contacts.symbols import DEPTH, TOWARD
+from asperity.derive.jacobian import (
+    ROOT,
+    ROOT_SQUARED,
+    derive,
+    explicit,
+    with_root_symbol,
+)
 from asperity.laws.law import Law
 
-# s = |w| = √(1 + h_x² + h_y²), as a symbol of its own so that the curl becomes rational.
-_S = sp.Symbol("s", positive=True)
-_S_SQUARED = 1 + HX**2 + HY**2
 _IN_PIECES = (sp.Piecewise, sp.Abs, sp.sign, sp.Max, sp.Min, sp.Heaviside, sp.floor, sp.ceiling)
 
 
@@ -94,13 +97,10 @@ def is_zero(expression: Any) -> bool:
 
 def _reduce(expression: Any) -> Any:
     """Return a canonical form: zero exactly if the expression vanishes identically."""
-    root = sp.sqrt(_S_SQUARED)
-    # Every power of the root, odd or even, becomes a power of s.
-    rational = expression.replace(
-        lambda e: e.is_Pow and e.base == _S_SQUARED, lambda e: _S ** (2 * e.exp)
-    ).subs(root, _S)
+    root = sp.sqrt(ROOT_SQUARED)
+    rational = with_root_symbol(expression).subs(root, ROOT)
     numerator, denominator = sp.fraction(sp.together(rational))
-    remainder = sp.rem(sp.expand(numerator), _S**2 - _S_SQUARED, _S)
+    remainder = sp.rem(sp.expand(numerator), ROOT**2 - ROOT_SQUARED, ROOT)
     if sp.expand(remainder) == 0:
         return sp.Integer(0)
-    return sp.simplify(sp.factor(remainder) / denominator).subs(_S, root)
+    return sp.simplify(sp.factor(remainder) / denominator).subs(ROOT, root)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import ast
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from functools import lru_cache
+from importlib import import_module
 from typing import Any
 
 from asperity.derive.shipped import generated_path
@@ -45,11 +45,8 @@ def law_facts(law: Law) -> LawFacts:
     """
     if LAWS.get(law.letter) is not law:
         return derive_facts(law)
-    tree = ast.parse(generated_path(law).read_text(encoding="utf-8"))
-    for node in tree.body:
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "FACTS":
-            return LawFacts(**ast.literal_eval(node.value))
-    raise AssertionError(f"no FACTS in the generated file of law {law.letter}")
+    generated = import_module(f"asperity.derive.generated.{generated_path(law).stem}")
+    return LawFacts(**generated.FACTS)
 
 
 def derive_facts(law: Law) -> LawFacts:

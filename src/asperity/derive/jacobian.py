@@ -30,6 +30,9 @@ from asperity.contacts.symbols import (
 from asperity.errors import LawError
 from asperity.laws.law import Law
 
+# s = |w| = √(1 + h_x² + h_y²), as a symbol of its own so that formulas become rational.
+ROOT = sp.Symbol("s", positive=True)
+ROOT_SQUARED = 1 + HX**2 + HY**2
 # Names that the kernels use themselves: symbols, intermediate values, loops and libraries.
 _RESERVED = re.compile(
     "|".join(str(symbol) for symbol in ARGUMENT_ORDER)
@@ -97,6 +100,13 @@ def explicit(derivation: Derivation, matrix: Any) -> Any:
     for name, value in reversed(derivation.definitions):
         matrix = matrix.subs(name, value)
     return matrix
+
+
+def with_root_symbol(expression: Any) -> Any:
+    """Return an expression in which every power of the root, odd or even, is a power of s."""
+    return expression.replace(
+        lambda e: e.is_Pow and e.base == ROOT_SQUARED, lambda e: ROOT ** (2 * e.exp)
+    )
 
 
 def symbolic_force(law: Law) -> Any:

@@ -8,13 +8,11 @@ from typing import Any
 import sympy as sp
 from sympy.printing.pycode import PythonCodePrinter
 
-from asperity.contacts.symbols import ARGUMENT_ORDER, HX, HY
-from asperity.derive.jacobian import Derivation, derive
+from asperity.contacts.symbols import ARGUMENT_ORDER
+from asperity.derive.jacobian import ROOT, Derivation, derive, with_root_symbol
 from asperity.errors import LawError
 from asperity.laws.law import Law
 
-_S = sp.Symbol("s", positive=True)
-_S_SQUARED = 1 + HX**2 + HY**2
 _LARGEST_UNROLLED_POWER = 4
 
 
@@ -71,16 +69,16 @@ def function_source(d: Derivation, name: str, values: list[Any], summary: str) -
     values = [sp.sympify(value) for value in values]
     named = {symbol for symbol, _ in d.definitions}
     needed = d.definitions if named & sp.Matrix(values).free_symbols else ()
-    every = [_with_root_symbol(value) for value in [*(v for _, v in needed), *values]]
+    every = [with_root_symbol(value) for value in [*(v for _, v in needed), *values]]
     used = sp.Matrix([*values, *(v for _, v in needed)]).free_symbols
     arguments = [symbol for symbol in ARGUMENT_ORDER if symbol in used]
     own = [sp.Symbol(parameter, real=True) for parameter in d.law.parameters]
     arguments += [symbol for symbol in own if symbol in used]
     lines = []
-    if any(_S in value.free_symbols for value in every):
+    if any(ROOT in value.free_symbols for value in every):
         lines.append("s = math.sqrt(1.0 + hx*hx + hy*hy)")
     printer = _ScalarPrinter({"fully_qualified_modules": True})
-    lines += [f"{symbol} = {printer.doprint(_with_root_symbol(value))}" for symbol, value in needed]
+    lines += [f"{symbol} = {printer.doprint(with_root_symbol(value))}" for symbol, value in needed]
     shared, results = sp.cse(
         every[len(needed) :], symbols=sp.numbered_symbols("t"), order="canonical"
     )
@@ -91,12 +89,6 @@ def function_source(d: Derivation, name: str, values: list[Any], summary: str) -
     body = textwrap.indent("\n".join(lines), "    ")
     header = f"def {name}({', '.join(str(argument) for argument in arguments)}):"
     return f'{header}\n    """{summary}"""\n{body}\n'
-
-
-def _with_root_symbol(expression: Any) -> Any:
-    return expression.replace(
-        lambda e: e.is_Pow and e.base == _S_SQUARED, lambda e: _S ** (2 * e.exp)
-    )
 
 
 def _as_float(text: str) -> str:

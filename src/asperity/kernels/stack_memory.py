@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 from numba.np import arrayobj
@@ -19,25 +20,22 @@ def local_array(_typing: Any, shape: Any) -> Any:
 
     It lives until the function that asks for it returns; hand it down, never up.
     """
-    lengths = [getattr(length, "literal_value", None) for length in shape]
+    lengths: list[Any] = [getattr(length, "literal_value", None) for length in shape]
     if None in lengths:
         return None
     array_type = types.Array(types.float64, len(lengths), "C")
 
     def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
-        count = 1
-        strides: list[int] = []
-        for length in reversed(lengths):
-            strides.insert(0, 8 * count)
-            count *= length
-        memory = _CODE.alloca_once(builder, context.get_value_type(types.float64), size=count)
+        layout = np.empty(lengths)
+        number = context.get_value_type(types.float64)
+        memory = _CODE.alloca_once(builder, number, size=layout.size)
         array = _ARRAYS.make_array(array_type)(context, builder)
         word = context.get_value_type(types.intp)
         _ARRAYS.populate_array(
             array,
             data=memory,
             shape=[word(length) for length in lengths],
-            strides=[word(stride) for stride in strides],
+            strides=[word(stride) for stride in layout.strides],
             itemsize=word(8),
             meminfo=None,
         )

@@ -6,46 +6,19 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from asperity.arguments import Argument
 from asperity.errors import LawError, ParameterError, nearest_names
-from asperity.laws import (
-    a_groove_wall_normal,
-    b_groove_texture_normal,
-    c_change_of_height,
-    d_god_object,
-    e_god_object_wall_normal,
-    f_friction_modulation,
-    g_force_shading,
-    h_split_god_object,
-    w_smooth_wall,
-)
-from asperity.laws.law import Law
-
-__all__ = [
-    "KNOWN_LAWS",
-    "LAWS",
-    "LAW_ARGUMENTS",
-    "Law",
-    "find_law",
-    "find_laws",
-    "known_arguments",
-    "register",
-    "shared_out",
-]
+from asperity.laws.a_groove_wall_normal import LAW as A
+from asperity.laws.b_groove_texture_normal import LAW as B
+from asperity.laws.c_change_of_height import LAW as C
+from asperity.laws.d_god_object import LAW as D
+from asperity.laws.e_god_object_wall_normal import LAW as E
+from asperity.laws.f_friction_modulation import LAW as F
+from asperity.laws.g_force_shading import LAW as G
+from asperity.laws.h_split_god_object import LAW as H
+from asperity.laws.law import Law as Law
+from asperity.laws.w_smooth_wall import LAW as W
 
 # In the order of the paper's tables, the smooth wall first.
-LAWS: dict[str, Law] = {
-    module.LAW.letter: module.LAW
-    for module in (
-        w_smooth_wall,
-        a_groove_wall_normal,
-        b_groove_texture_normal,
-        c_change_of_height,
-        d_god_object,
-        e_god_object_wall_normal,
-        f_friction_modulation,
-        g_force_shading,
-        h_split_god_object,
-    )
-}
+LAWS: dict[str, Law] = {law.letter: law for law in (W, A, B, C, D, E, F, G, H)}
 
 LAW_ARGUMENTS: dict[str, Argument] = {
     name: argument for law in LAWS.values() for name, argument in law.arguments.items()

@@ -8,7 +8,7 @@ certificate.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -122,7 +122,8 @@ def supremum(
     goal = tolerance if cheap_gap is None else min(cheap_gap, tolerance)
     limit = min(work_limit, problem.cells.most or work_limit)
     chunks, half = problem.cells.start()
-    best, at = _first(problem)
+    # Of a few samples, so that most cells are dropped at first sight.
+    best, at = _better(problem, problem.cells.samples(), problem.floor, None)
     dropped, looked = problem.floor, 0
     while True:
         kept, bounds = [], []
@@ -157,16 +158,6 @@ def supremum(
     return Supremum(best, max(best, proved), at, looked, good)
 
 
-def _first(problem: Problem) -> tuple[float, FloatArray | None]:
-    """Return the greatest of a few samples, so that most cells are dropped at first sight."""
-    points = problem.cells.samples()
-    values = problem.values(points)
-    first = _greatest(values)
-    if values[first] > problem.floor:
-        return float(values[first]), points[first]
-    return problem.floor, None
-
-
 def _try(
     problem: Problem,
     centres: FloatArray,
@@ -180,22 +171,22 @@ def _try(
     top = top[upper[top] > best]
     if len(top) == 0:
         return best, at
-    points = problem.cells.inside(
-        (centres[top, None] + _star(len(half)) * half).reshape(-1, len(half))
-    )
+    points = centres[top, None] + _star(len(half)) * half
+    return _better(problem, problem.cells.inside(points.reshape(-1, len(half))), best, at)
+
+
+def _better(
+    problem: Problem, points: FloatArray, best: float, at: FloatArray | None
+) -> tuple[float, FloatArray | None]:
+    """Return the best value and where it is, after a look at some points."""
     values = problem.values(points)
     first = _greatest(values)
-    if values[first] > best:
-        return float(values[first]), points[first]
-    return best, at
+    return (float(values[first]), points[first]) if values[first] > best else (best, at)
 
 
 def _greatest(values: FloatArray) -> int:
     """Return the index of the greatest value; what is no number is smaller than any."""
-    first = int(values.argmax())
-    if np.isnan(values[first]):
-        first = int(np.where(np.isnan(values), -np.inf, values).argmax())
-    return first
+    return int(np.where(np.isnan(values), -np.inf, values).argmax())
 
 
 @lru_cache(maxsize=8)
@@ -219,11 +210,8 @@ def _split(centres: FloatArray, half: FloatArray, parts: int, chunk: int) -> Ite
     grid = np.stack(np.meshgrid(*[ticks] * len(half), indexing="ij"), axis=-1)
     offsets = grid.reshape(-1, len(half)) * half
     step = max(1, chunk // len(offsets))
-    pieces: Iterable[FloatArray] = (
-        (centres[first : first + step, None] + offsets).reshape(-1, len(half))
-        for first in range(0, len(centres), step)
-    )
-    return iter(pieces)
+    for first in range(0, len(centres), step):
+        yield (centres[first : first + step, None] + offsets).reshape(-1, len(half))
 
 
 def polish(

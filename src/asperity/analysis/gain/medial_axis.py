@@ -20,7 +20,6 @@ from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT, Suprem
 from asperity.analysis.bounds.problems import CrestProblem
 from asperity.analysis.bounds.sampling import sampled_supremum
 from asperity.checks import FloatArray
-from asperity.enclosures.cells import Cells
 from asperity.textures.plane_waves import SingleWave
 from asperity.textures.texture import Texture
 
@@ -84,11 +83,7 @@ def sharpest_crest(
         found = supremum(CrestProblem(cells), tolerance, work_limit, cells.cheap_gap)
     if found.at is None:
         return None
-    return _crest(texture, _plane(cells, found.at), found.upper)
-
-
-def _plane(cells: Cells, at: FloatArray) -> FloatArray:
-    return np.asarray(cells.plane(at[None])[0])
+    return _crest(texture, cells.plane(found.at[None])[0], found.upper)
 
 
 def _wave_crest(texture: Texture, wave: SingleWave) -> Crest:

@@ -124,10 +124,7 @@ class Limits:
         Raises:
             KeyError: for a number other than 1 to 6.
         """
-        for limit in self.limits:
-            if limit.number == number:
-                return limit
-        raise KeyError(number)
+        return {limit.number: limit for limit in self.limits}[number]
 
     def _repr_html_(self) -> str:
         """Return the answer and a table for a notebook."""

@@ -84,23 +84,19 @@ class Rule:
 def judge(loop: Loop, rule: Rule) -> Criterion:
     """Return what a rule says of a surface on a device."""
     missing = tuple(field for field in rule.needs if loop.device.value(field) is None)
-    said: dict[str, Any] = {
-        "name": rule.name,
-        "formula": rule.formula,
-        "assumptions": rule.assumptions,
-        "uses": (*rule.needs, *rule.uses),
-    }
+    uses = (*rule.needs, *rule.uses)
+    said = Criterion(rule.name, rule.formula, assumptions=rule.assumptions, uses=uses)
     if rule.obstacle is not None:
-        return Criterion(**said, obstacle=rule.obstacle)
+        return replace(said, obstacle=rule.obstacle)
     if missing or rule.budget is None:
-        return Criterion(**said, missing=missing)
+        return replace(said, missing=missing)
     upper = loop.number(rule.plus, rule.full, "upper")
     proved = _greatest(rule.budget, upper)
     possible = _greatest(rule.budget, loop.number(rule.plus, rule.full, "lower"))
     # Infinity over a finite lower end: the number was only sampled, so no limit is proved.
     known = upper != math.inf or possible == 0
-    return Criterion(
-        **said,
+    return replace(
+        said,
         holds=True if loop.stiffness <= proved else False if loop.stiffness > possible else None,
         limit=_down(proved) if known else None,
         margin=_down(proved / loop.stiffness) if known else None,

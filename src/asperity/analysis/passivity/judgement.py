@@ -81,10 +81,7 @@ class Passivity(Record):
         Raises:
             KeyError: if there is none of that name.
         """
-        for criterion in self.criteria:
-            if criterion.name == name:
-                return criterion
-        raise KeyError(name)
+        return {criterion.name: criterion for criterion in self.criteria}[name]
 
     def _repr_html_(self) -> str:
         """Return the verdict and a table for a notebook."""

@@ -225,9 +225,10 @@ def split_gap(
 
 
 def split_atoms(
-    p: FloatArray, continuity: float, atoms: FloatArray, pull: FloatArray, texture: object
-) -> tuple[int, float]:
-    """Write the atoms of law H, ``atoms`` (5, 4), and z̄ - p, ``pull`` (3,), at a probe inside.
+    x: float, y: float, z: float, continuity: float,
+    p: FloatArray, atoms: FloatArray, pull: FloatArray, texture: object,
+) -> tuple[int, float]:  # fmt: skip
+    """Write p (3,), the atoms of law H (5, 4) and z̄ - p, ``pull`` (3,), at a probe inside.
 
     Returns:
         How many atoms, and the gap between primal and dual [m²]: the force is exact to
@@ -235,7 +236,10 @@ def split_atoms(
     """
     mu = 1.0 / (1.0 + continuity)
     a = local_array((7, 10))
-    y = local_array((3,))
+    at = local_array((3,))
+    p[0] = x
+    p[1] = y
+    p[2] = z
     scale = abs(p[0]) + abs(p[1]) + abs(p[2])
     first: Any = np.int64(0)
     count: Any = np.int64(1)
@@ -246,18 +250,18 @@ def split_atoms(
     for _ in range(60):
         split_value(atoms, count, p, mu, pull)
         for d in range(3):
-            y[d] = p[d] - pull[d] / continuity
-        polished = split_try_polish(atoms, count, p, y, mu, a, texture) if count > 1 else 0
+            at[d] = p[d] - pull[d] / continuity
+        polished = split_try_polish(atoms, count, p, at, mu, a, texture) if count > 1 else 0
         if polished > 0:
             count = polished
             # From y, not from the weights: they are ill-conditioned where atoms meet.
             for d in range(3):
-                pull[d] = continuity * (p[d] - y[d])
-        split_query(y, atoms, count, texture)
-        gap, rounding = split_gap(atoms, count, y, mu, scale)
+                pull[d] = continuity * (p[d] - at[d])
+        split_query(at, atoms, count, texture)
+        gap, rounding = split_gap(atoms, count, at, mu, scale)
         if gap <= rounding:
             doubts += 1
-            if polished > 0 or doubts > 6 or (count == 1 and split_single(atoms, y, texture)):
+            if polished > 0 or doubts > 6 or (count == 1 and split_single(atoms, at, texture)):
                 break
         left = split_weights(atoms, count + 1, p, mu, a)
         if left == 0:
@@ -273,10 +277,7 @@ def split_contact(
     atoms = local_array((5, 4))
     p = local_array((3,))
     pull = local_array((3,))
-    p[0] = x
-    p[1] = y
-    p[2] = z
-    split_atoms(p, continuity, atoms, pull, texture)
+    split_atoms(x, y, z, continuity, p, atoms, pull, texture)
     return pull[0], pull[1], pull[2]
 
 
@@ -287,10 +288,7 @@ def split_energy(
     atoms = local_array((5, 4))
     p = local_array((3,))
     pull = local_array((3,))
-    p[0] = x
-    p[1] = y
-    p[2] = z
-    count, gap = split_atoms(p, continuity, atoms, pull, texture)
+    count, gap = split_atoms(x, y, z, continuity, p, atoms, pull, texture)
     return split_value(atoms, count, p, 1.0 / (1.0 + continuity), pull), count, gap
 
 
@@ -335,10 +333,7 @@ def split_derivative(
     p = local_array((3,))
     pull = local_array((3,))
     m = local_array((3, 3))
-    p[0] = x
-    p[1] = y
-    p[2] = z
-    count, _gap = split_atoms(p, continuity, atoms, pull, texture)
+    count, _gap = split_atoms(x, y, z, continuity, p, atoms, pull, texture)
     split_response(p, continuity, atoms, count, pull, m, texture)
     return (
         pull[0], pull[1], pull[2], m[0, 0], 0.5 * (m[0, 1] + m[1, 0]), 0.5 * (m[0, 2] + m[2, 0]),
