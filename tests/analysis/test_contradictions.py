@@ -13,7 +13,7 @@ from asperity.analysis.bounds.measures import NORM
 from asperity.analysis.bounds.witness import Witness, lower_of, upper_of
 from asperity.analysis.energy import leak as leaks
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.gain import god_object
+from asperity.analysis.gain import search
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.gain.theorems import ClosedForm, Constant, Theorem, register_theorem
 from asperity.errors import AsperityError, InternalError
@@ -82,22 +82,22 @@ def test_a_wrong_theorem_is_found_out() -> None:
 def test_a_wrong_crest_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
     surface = Surface(WAVES, "D", max_depth=3e-4)
     assert characteristic_number(surface).upper > 1.0
-    intact = god_object.supremum
+    intact = search.supremum
 
     def flatter(*arguments: Any) -> Any:
         found = intact(*arguments)
         return replace(found, upper=0.999 * found.upper)
 
-    monkeypatch.setattr(god_object, "supremum", flatter)
+    monkeypatch.setattr(search, "supremum", flatter)
     with pytest.raises(InternalError, match="norm"):
         characteristic_number(surface)
 
 
 def test_a_crest_of_which_nothing_is_proved_is_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
     """A search that ends before its first proof gives no bound, and no error."""
-    intact = god_object.supremum
+    intact = search.supremum
     monkeypatch.setattr(
-        god_object, "supremum", lambda *arguments: replace(intact(*arguments), upper=math.inf)
+        search, "supremum", lambda *arguments: replace(intact(*arguments), upper=math.inf)
     )
     bound = characteristic_number(Surface(WAVES, "D", max_depth=3e-4))
     assert (bound.method, bound.upper) == ("sampled", math.inf)

@@ -105,6 +105,16 @@ def attained(
     return Witness(value, size, (x, y, z), held, sliding)
 
 
+def lower_of(surface: Surface, number: Number, value: float, witness: Witness) -> float:
+    """Return what is attained of a number that a theorem gives: all of it, but for rounding.
+
+    Raises:
+        InternalError: if the witness contradicts the theorem.
+    """
+    upper_of(surface, number, value, witness)
+    return value if witness.value >= value * (1.0 - _AGREES) else witness.value
+
+
 def proved(
     surface: Surface,
     number: Number,
@@ -114,15 +124,11 @@ def proved(
     xy: FloatArray,
     depths: Sequence[float],
 ) -> Bound:
-    """Return a number that a theorem gives; ``lower`` is what is attained at the best of depths.
-
-    That is all of it, but for rounding.
+    """Return a number that a theorem gives, with the best witness of some depths.
 
     Raises:
         InternalError: if the witness contradicts the theorem.
     """
     witnesses = [attained(surface, number, xy, depth) for depth in depths]
     best = max(witnesses, key=lambda witness: witness.value)
-    upper_of(surface, number, value, best)
-    lower = value if best.value >= value * (1.0 - _AGREES) else best.value
-    return Bound(lower, value, method, best.at, note)
+    return Bound(lower_of(surface, number, value, best), value, method, best.at, note)
