@@ -1,0 +1,166 @@
+"""Damage a filled cache at random, and see that nothing comes of it.
+
+``python -m bench.cache_damage [COUNT] [--unchecked]``, 1000 by default.
+
+Each round copies a filled cache, damages it, and lets a fresh process compute forces, Jacobians
+and certificates with it. Counted are crashes, tracebacks, numbers that changed and planted code
+that ran; all must be zero. With ``--unchecked`` the check of the digests is switched off: then
+they must not be zero, or the run shows nothing.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import track
+
+from bench.damage import mutated
+
+_CHILD = """
+import sys
+import numpy as np
+from asperity import HeightMap, Surface, cache, characteristic_number
+if "--unchecked" in sys.argv:
+    class Anything(bytes):
+        def __radd__(self, _magic): return self
+        def __eq__(self, _other): return True
+    cache._digest = lambda key, content: Anything(32)
+heights = 1e-4 * np.random.default_rng(1).normal(size=(8, 9))
+texture = HeightMap(heights, 3e-4)
+points = np.random.default_rng(2).uniform((0, 0, -1e-4), (2e-3, 2e-3, 1e-4), (200, 3))
+for law in "BF":
+    surface = Surface(texture, law, max_depth=1e-4)
+    force, jacobian = surface.force_and_jacobian(points)
+    bound = characteristic_number(surface)
+    print(law, force.tobytes().hex(), jacobian.tobytes().hex(), repr(bound))
+"""
+
+Damage = Callable[[Path, random.Random], None]
+
+
+class Planted:
+    """What is unpickled leaves a file behind."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[object, tuple[str]]:
+        """Say what unpickling is to call."""
+        return os.system, (f"touch {self.path}",)
+
+
+def run(count: int, unchecked: bool, console: Console) -> bool:
+    """Print what so many damages did; return whether that is as it must be."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        filled = folder / "filled"
+        expected = _answer(filled, unchecked=False)[0]
+        warm = [_timed(filled, unchecked) for unchecked in (False, True) * 5]
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            rounds = pool.map(lambda seed: _round(folder, filled, expected, seed, unchecked),
+                              range(count))  # fmt: skip
+            found = Counter(track(rounds, "damages", total=count, console=console, transient=True))
+    said = ", ".join(f"{words}: {number}" for words, number in sorted(found.items()))
+    console.print(f"{count} damages{' without the check' if unchecked else ''}: {said}")
+    checked, without = sorted(warm[::2])[2], sorted(warm[1::2])[2]
+    console.print(
+        f"warm start, median of 5 in turns: {checked / without:.3f} x that without a check"
+    )
+    harm = sum(number for words, number in found.items() if words not in HARMLESS)
+    return bool(harm) == unchecked
+
+
+HARMLESS = ("made again", "not noticed, not needed")
+
+
+def _round(folder: Path, filled: Path, expected: str, seed: int, unchecked: bool) -> str:
+    draw = random.Random(seed)
+    cache, planted = folder / f"cache{seed}", folder / f"planted{seed}"
+    shutil.copytree(filled, cache)
+    for _ in range(draw.choice((1, 1, 2, 5))):
+        _damage(cache, draw, planted)
+    try:
+        output, errors, status = _answer(cache, unchecked)
+    except subprocess.TimeoutExpired:
+        return "HANGS"
+    finally:
+        _removed(cache)
+    if planted.exists():
+        return "PLANTED CODE RAN"
+    if status:
+        return "CRASH" if status < 0 else "ERROR"
+    if "Traceback" in errors:
+        return "TRACEBACK"
+    if output != expected:
+        return "CHANGED NUMBER"
+    return HARMLESS[0] if "the cache" in errors else HARMLESS[1]
+
+
+def _damage(cache: Path, draw: random.Random, planted: Path) -> None:
+    files = sorted(path for path in cache.rglob("*") if path.is_file())
+    if not files:
+        return
+    path, other = draw.choice(files), draw.choice(files)
+    content = path.read_bytes()
+    kind = draw.randrange(11)
+    if kind < 3:
+        path.write_bytes(mutated(content, draw))
+    elif kind == 3:  # one bit, anywhere
+        bits = bytearray(content or b" ")
+        bits[draw.randrange(len(bits))] ^= 1 << draw.randrange(8)
+        path.write_bytes(bits)
+    elif kind == 4:
+        path.write_bytes(b"")
+    elif kind == 5:
+        path.write_bytes(other.read_bytes())
+        other.write_bytes(content)
+    elif kind == 6:  # with the head of a true entry or without
+        head = content[: draw.choice((0, 17, 49))]
+        path.write_bytes(head + pickle.dumps(Planted(planted)))
+    elif kind == 7:
+        path.unlink()
+        path.mkdir()
+    elif kind == 8:
+        os.utime(path, (4e9, 4e9))
+    elif kind == 9 and hasattr(os, "chown") and os.geteuid() == 0:
+        os.chown(draw.choice((path, path.parent, cache)), 54321, 54321)
+    else:
+        draw.choice((path, path.parent, cache)).chmod(draw.choice((0o000, 0o444, 0o555, 0o777)))
+
+
+def _answer(cache: Path, unchecked: bool) -> tuple[str, str, int]:
+    done = subprocess.run(
+        [sys.executable, "-c", _CHILD, *(["--unchecked"] if unchecked else [])],
+        capture_output=True, text=True, check=False, timeout=120,
+        env=os.environ | {"ASPERITY_CACHE_DIR": str(cache)},
+    )  # fmt: skip
+    return done.stdout, done.stderr, done.returncode
+
+
+def _timed(cache: Path, unchecked: bool) -> float:
+    start = time.perf_counter()
+    _answer(cache, unchecked)
+    return time.perf_counter() - start
+
+
+def _removed(cache: Path) -> None:
+    for path in (cache, *cache.iterdir()):
+        path.chmod(0o700)
+    shutil.rmtree(cache)
+
+
+if __name__ == "__main__":
+    count = next((int(word) for word in sys.argv[1:] if word.isdigit()), 1000)
+    sys.exit(not run(count, "--unchecked" in sys.argv, Console(width=100, highlight=False)))
