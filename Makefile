@@ -7,7 +7,7 @@ ifeq ($(shell command -v $(PYTHON) 2>/dev/null),)
 PYTHON := python3
 endif
 
-.PHONY: demo test check docs bench kernels lock clean help
+.PHONY: demo test check compatibility docs bench kernels lock clean help
 
 help:  ## List the commands
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 10
@@ -43,6 +43,9 @@ check: $(VENV)/development  ## Lint, types, import layers, generated files fresh
 
 docs: $(VENV)/development  ## Build the documentation into docs/_build/html
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+
+compatibility: $(VENV)/installer  ## Tests with the lowest and the newest versions, on each Python
+	bash .ci/compatibility
 
 bench: $(VENV)/development  ## Speed and memory, as ratios against C and peers
 	$(BIN)/python -m bench

@@ -29,23 +29,23 @@ LIGHT = LinkMasses(1e-30, 1e-30, 1e-30)
 COUPLED = np.array([[1.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 TOO_FAST: list[tuple[Plant, Hand, Servo, str]] = [
-    (Cartesian(0.05), BandHand(stiffness=1e40), MILLISECOND, "stiffness"),
+    (Cartesian(0.05), BandHand(stiffness=1e30), MILLISECOND, "stiffness"),
     (Cartesian(1e-30), BandHand(), MILLISECOND, "mass"),
-    (Cartesian(0.05, 1e40), BandHand(), MILLISECOND, "damping"),
+    (Cartesian(0.05, 1e30), BandHand(), MILLISECOND, "damping"),
     (Cartesian(0.05), BandHand(), Servo(1e30), "period"),
-    (Pantograph(), SpringHand(1e40), MILLISECOND, "stiffness"),
-    (Pantograph(), BandHand(stiffness=1e40), MILLISECOND, "stiffness"),
-    (Pantograph(joint_damping=1e300), SpringHand(100.0), MILLISECOND, "joint_damping"),
+    (Pantograph(), SpringHand(1e30), MILLISECOND, "stiffness"),
+    (Pantograph(), BandHand(stiffness=1e30), MILLISECOND, "stiffness"),
+    (Pantograph(joint_damping=1e30), SpringHand(100.0), MILLISECOND, "joint_damping"),
     (Pantograph(masses=LIGHT), SpringHand(100.0), MILLISECOND, "handle"),
-    (Cartesian(0.05), SpringHand(1e300), MILLISECOND, "stiffness"),
-    (Cartesian(0.05), SpringHand(1.0, 1e300), MILLISECOND, "damping"),
-    (Cartesian(1e-300, 1.0), SpringHand(1.0), MILLISECOND, "mass"),
-    (Cartesian(1e-300, COUPLED), SpringHand(1.0), MILLISECOND, "mass"),
-    (Cartesian(0.05, COUPLED), SpringHand(1e300), MILLISECOND, "stiffness"),
-    (Cartesian(0.05, 1.0), SpringHand(1.0), Servo(1e300), "period"),
-    (Cartesian(0.05, 0.0, Resonance(1e200)), SpringHand(1.0), MILLISECOND, "frequency"),
-    (Cartesian(0.05, 0.0, Resonance(200.0)), SpringHand(1e300), MILLISECOND, "stiffness"),
-    (Cartesian(5e-324, 0.0, Resonance(200.0)), SpringHand(1.0), MILLISECOND, "mass"),
+    (Cartesian(0.05), SpringHand(1e30), MILLISECOND, "stiffness"),
+    (Cartesian(0.05), SpringHand(1.0, 1e30), MILLISECOND, "damping"),
+    (Cartesian(1e-30, 1.0), SpringHand(1.0), MILLISECOND, "mass"),
+    (Cartesian(1e-30, COUPLED), SpringHand(1.0), MILLISECOND, "mass"),
+    (Cartesian(0.05, COUPLED), SpringHand(1e30), MILLISECOND, "stiffness"),
+    (Cartesian(0.05, 1.0), SpringHand(1.0), Servo(1e30), "period"),
+    (Cartesian(0.05, 0.0, Resonance(1e30)), SpringHand(1.0), MILLISECOND, "frequency"),
+    (Cartesian(0.05, 0.0, Resonance(200.0)), SpringHand(1e30), MILLISECOND, "stiffness"),
+    (Cartesian(1e-30, 0.0, Resonance(200.0)), SpringHand(1.0), MILLISECOND, "mass"),
 ]
 
 
@@ -72,7 +72,7 @@ def test_ten_thousand_parts_are_the_most() -> None:
             sampled_plant(plant, BandHand(damping=1.001 * limit), MILLISECOND)
 
 
-@pytest.mark.parametrize("speed", [1e9, 1e300])
+@pytest.mark.parametrize("speed", [1e9, 1e30])
 def test_a_pantograph_at_any_speed_comes_to_an_end(speed: float) -> None:
     run = simulate(
         Surface(Sinusoid(0.4e-3, 1e-3), "W", 800.0), Pantograph(), SpringHand(100.0), MILLISECOND,

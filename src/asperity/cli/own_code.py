@@ -88,9 +88,11 @@ def load_own_code(ctx: click.Context, _option: click.Parameter, files: tuple[str
 @contextmanager
 def _restored(table: dict[str, Any]) -> Iterator[None]:
     before = dict(table)
-    yield
-    table.clear()
-    table.update(before)
+    try:
+        yield
+    finally:
+        table.clear()
+        table.update(before)
 
 
 def _load(file: str, places: tuple[Registry, ...]) -> None:
