@@ -168,6 +168,19 @@ def test_channels_are_chosen_by_name_or_number(
         read(tmp_path, monkeypatch, phase)
 
 
+def test_a_file_without_a_height_channel_is_left_to_the_next_reader(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    phase = Channel(0, "Phase", data_kind=Kind("phase"))
+    library = Library(phase)
+    library.readers = [library, Library(Channel(0, "Height"))]
+    monkeypatch.setattr(instruments, "_library", lambda: library)
+    assert read_surface(file(tmp_path)).heights.shape == (2, 3)
+    library.readers = [library, Library(fault=ValueError("not mine"))]
+    with pytest.raises(SurfaceFileError, match="damaged"):
+        read_surface(file(tmp_path))
+
+
 def test_units_and_sizes_that_the_file_lacks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -31,7 +31,7 @@ def test_real_types(tmp_path: Path, kind: str) -> None:
     assert raw.heights.dtype == np.float64
     assert raw.pitch is None
     assert not raw.has_units
-    assert raw.notes == ("no unit in an NPY file: heights taken as metres",)
+    assert raw.notes == ("no unit in the file: taken as metres",)
     assert raw.source == "test.npy"
 
 

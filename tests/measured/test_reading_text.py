@@ -339,6 +339,33 @@ def test_a_map_of_three_columns_as_gwyddion_exports_it(
     assert raw.pitch == pytest.approx((4e-6, 2e-6), rel=1e-15)
 
 
+@pytest.mark.parametrize("sign", [".", ","])
+@pytest.mark.parametrize("columns", [3, 5])
+def test_a_map_as_gwyddion_writes_it(tmp_path: Path, sign: str, columns: int) -> None:
+    """As asciiexport.c prints it: sizes as "# %s %.*f %s", values as "%.*g" apart by tabs."""
+    heights = np.random.default_rng(5).normal(0.0, 3e-9, (6, columns))
+    rows = "\n".join("\t".join(f"{z:.5g}" for z in row) for row in heights)
+    head = "# Channel: Z (Retrace)\n# Width: 10.00 µm\n# Height: 4.00 µm\n"
+    raw = read(tmp_path, f"{head}# Value units: m\n{rows}\n".replace(".", sign))
+    np.testing.assert_allclose(raw.heights, heights, rtol=1e-4)
+    assert raw.pitch == pytest.approx((10e-6 / columns, 4e-6 / 6), rel=1e-14)
+    assert raw.has_units
+    raw = read(tmp_path, f"{head}{rows}\n")
+    assert raw.notes == ("no unit in the file: taken as metres",)  # of the heights
+    fails(tmp_path, f"{head}# Value units: V\n{rows}\n", "no unit of length")
+
+
+def test_points_as_gwyddion_writes_them(tmp_path: Path) -> None:
+    """As xyzexport.c prints them: the last line before the numbers is not the only unit."""
+    head = "# XYZ data: Z\n# Lateral units: µm\n# Value units: nm\n"
+    rows = "\n".join(f"{x / 2:.9g}\t{y:.9g}\t{x * y:.9g}" for y in range(4) for x in range(5))
+    raw = read(tmp_path, head + rows)
+    assert raw.pitch == pytest.approx((0.5e-6, 1e-6), rel=1e-14)
+    assert raw.heights[3, 4] == pytest.approx(12e-9, rel=1e-14)
+    fails(tmp_path, head.replace("nm", "V") + rows, "no unit of length")
+    fails(tmp_path, head.replace("µm", "deg") + rows, "no unit of length")
+
+
 # --- lists of points ------------------------------------------------------------------------------
 
 

@@ -167,6 +167,16 @@ def test_a_registered_reader_is_asked_before_text_is_guessed(text: Path) -> None
 
 
 @pytest.mark.usefixtures("empty")
+def test_a_unit_that_a_reader_leaves_open_is_said_to_be_the_metre(text: Path) -> None:
+    said = "no unit in the file: taken as metres"
+    register(groove(RawSurface(np.ones(5), None, "a.txt", ("odd",), has_units=False)))
+    assert read_surface(text).notes == (said, "odd")
+    registry.OWN.clear()
+    register(groove(RawSurface(np.ones(5), None, "a.txt", (), has_units=False, relative=True)))
+    assert read_surface(text).notes == ()
+
+
+@pytest.mark.usefixtures("empty")
 def test_a_reader_that_finds_nothing_leaves_the_file_to_the_next(text: Path) -> None:
     register(groove(None))
     assert read_surface(text).heights[2, 2] == 10.0

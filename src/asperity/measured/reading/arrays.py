@@ -31,8 +31,7 @@ def read_npy(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     with np.errstate(over="ignore", invalid="ignore"):
         heights = np.array(array, dtype=np.float64, order="C")
     if metres is None:
-        note = "no unit in an NPY file: heights taken as metres"
-        return RawSurface(heights, None, file.name, (note,), has_units=False)
+        return RawSurface(heights, None, file.name, (), has_units=False)
     note = f"no unit in an NPY file: {metres:g} m as given"
     with np.errstate(over="ignore"):  # infinities are refused later
         return RawSurface(heights * metres, None, file.name, (note,))

@@ -38,18 +38,23 @@ def read_instrument(file: SurfaceFile, options: ReadingOptions) -> RawSurface | 
     """
     if not has_library():
         return None
+    without = ""
     with _quiet(), _Bounded(io.FileIO(file.path)) as stream:
-        reader = _recognised(_library(), stream, sure=file.is_text)
-        if reader is None:
-            return None
-        with contextlib.closing(reader):
-            try:
-                return _surface(reader, file, options)
-            except (SurfaceFileError, ParameterError, MemoryError):
-                raise
-            except Exception as error:  # a damaged file can raise anything in there
-                what = f"{reader.name()} file, damaged"
-                raise SurfaceFileError(f"{what} ({_reason(error)})") from error
+        for reader in _recognised(_library(), stream, sure=file.is_text):
+            with contextlib.closing(reader):
+                try:
+                    chosen = _chosen(reader, file.name, options.channel)
+                    if chosen is not None:
+                        return _surface(reader, chosen, file, options)
+                    without = without or _channels(reader)
+                except (SurfaceFileError, ParameterError, MemoryError):
+                    raise
+                except Exception as error:  # a damaged file can raise anything in there
+                    what = f"{reader.name()} file, damaged"
+                    raise SurfaceFileError(f"{what} ({_reason(error)})") from error
+    if without:
+        raise SurfaceFileError(f"no height channel; the file has: {without}")
+    return None
 
 
 class _Bounded(io.BufferedReader):
@@ -93,7 +98,8 @@ def _quiet() -> Iterator[None]:
         yield
 
 
-def _recognised(library: Any, stream: _Bounded, *, sure: bool) -> Any | None:
+def _recognised(library: Any, stream: _Bounded, *, sure: bool) -> Iterator[Any]:
+    """Yield the file as each reader that recognises it has opened it."""
     head = stream.read(_HEAD)
     for kind in library.readers:
         if kind.format() in _OURS:
@@ -103,12 +109,15 @@ def _recognised(library: Any, stream: _Bounded, *, sure: bool) -> Any | None:
             continue
         stream.seek(0)
         try:
-            return kind(stream)
+            opened = kind(stream)
+        except MemoryError:
+            raise
         except Exception as error:  # each reader says "not mine" in its own way
             if match == "yes":
                 what = f"{kind.name()} file, damaged"
                 raise SurfaceFileError(f"{what} ({_reason(error)})") from error
-    return None
+        else:
+            yield opened
 
 
 def _reason(error: Exception) -> str:
@@ -116,9 +125,8 @@ def _reason(error: Exception) -> str:
     return text if 0 < len(text) <= 120 else f"{text[:117]}..." if text else type(error).__name__
 
 
-def _surface(reader: Any, file: SurfaceFile, options: ReadingOptions) -> RawSurface:
+def _surface(reader: Any, chosen: Any, file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     name, metres = file.name, options.metres
-    chosen = _chosen(reader, name, options.channel)
     size = chosen.nb_grid_pts
     points = int(np.prod([int(n) for n in size])) if size is not None else 0
     if points > MAX_POINTS or points > _INFLATION * file.path.stat().st_size:
@@ -140,12 +148,15 @@ def _surface(reader: Any, file: SurfaceFile, options: ReadingOptions) -> RawSurf
     return RawSurface(scaled, lateral, name, tuple(notes))
 
 
-def _chosen(reader: Any, name: str, channel: str | int | None) -> Any:
-    """Return the only height channel, or the one that is named."""
+def _channels(reader: Any) -> str:
+    return ", ".join(f"{c.name!r} ({c.data_kind.value})" for c in reader.channels) or "none"
+
+
+def _chosen(reader: Any, name: str, channel: str | int | None) -> Any | None:
+    """Return the only height channel, or the one that is named; None where there is none."""
     heights = [c for c in reader.channels if c.data_kind.value == "height" and c.dim in (1, 2)]
     if not heights:
-        kinds = ", ".join(f"{c.name!r} ({c.data_kind.value})" for c in reader.channels) or "none"
-        raise SurfaceFileError(f"no height channel; the file has: {kinds}")
+        return None
     if channel is None and len(heights) == 1:
         return heights[0]
     names = ", ".join(f"{c.index}: {c.name!r}" for c in heights)

@@ -27,7 +27,7 @@ class RawSurface:
         source: name of the file.
         notes: what was assumed or is odd about the file, one sentence each.
         has_units: True where the file says that its heights are lengths;
-            False where metres were assumed.
+            False where metres were assumed, which ``read_surface`` notes.
         relative: True where the heights are no lengths at all (an image's pixel values):
             they become lengths only by a height range.
         per_pitch: True where the heights are multiples of the pitch (an integrated normal

@@ -87,11 +87,16 @@ def _read(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
             continue
         if raw is not None:
             reader.check(file, options)
-            return replace(raw, notes=(*raw.notes, *faults))
+            return replace(raw, notes=(*_assumed(raw), *raw.notes, *faults))
     refusal = refusal or unread(file)
     if faults and isinstance(refusal, SurfaceFileError):
         raise SurfaceFileError("; ".join((str(refusal), *faults))) from refusal
     raise refusal
+
+
+def _assumed(raw: RawSurface) -> tuple[str, ...]:
+    """Return the sentence for a file that leaves its unit open; pixels have none at all."""
+    return () if raw.has_units or raw.relative else ("no unit in the file: taken as metres",)
 
 
 def _check_file(path: Path, name: str) -> None:

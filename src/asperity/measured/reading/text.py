@@ -19,6 +19,7 @@ from asperity.measured.reading.reader import ReadingOptions, SurfaceFile, naming
 from asperity.measured.reading.spacing import spacing
 from asperity.measured.reading.text_header import (
     MapHeader,
+    is_lateral,
     map_header,
     one_unit,
     two_units,
@@ -55,7 +56,7 @@ def read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     if columns == 2 and not header.describes_map and _is_monotonic(table):
         return _profile(table, name, metres)
     if columns == 3 and rows > 3 and not header.describes_map:
-        return _points(table, name, metres)
+        return _points(table, header, name, metres)
     return _matrix(table, header, name, metres)
 
 
@@ -102,7 +103,7 @@ def _profile(table: Table, name: str, metres: float | None) -> RawSurface:
     named = _near_two(table)
     _refuse_second(named, name, metres)
     known = named is not None or metres is not None
-    notes = _notes(table, known=known, metres=metres)
+    notes = _notes(table, metres)
     unit_x, unit_z = named or (metres or 1.0, metres or 1.0)
     positions, heights = table.values[:, 0], table.values[:, 1] * unit_z
     resolution = _resolution(table)
@@ -131,9 +132,9 @@ def _refuse_long(length: float, *, known: bool) -> None:
         )
 
 
-def _points(table: Table, name: str, metres: float | None) -> RawSurface:
+def _points(table: Table, header: MapHeader, name: str, metres: float | None) -> RawSurface:
     """Return the map, or the profile along one axis, that a list of points is."""
-    named = _near_three(table)
+    named = header.units_of_points or _near_three(table)
     _refuse_second(named, name, metres)
     known = named is not None or metres is not None
     unit_x, unit_y, unit_z = named or (metres or 1.0,) * 3
@@ -143,7 +144,7 @@ def _points(table: Table, name: str, metres: float | None) -> RawSurface:
     pitch = (steps[0] * unit_x, steps[1] * unit_y)
     rows, columns = heights.shape
     _refuse_long(max(pitch[0] * (columns - 1), pitch[1] * (rows - 1)), known=known)
-    notes = _notes(table, known=known, metres=metres)
+    notes = _notes(table, metres)
     heights = np.ascontiguousarray(heights * unit_z)
     if 1 in heights.shape:
         axis = 0 if rows == 1 else 1
@@ -164,10 +165,13 @@ def _matrix(table: Table, header: MapHeader, name: str, metres: float | None) ->
     if code is not None:
         values = np.where(values == code, np.nan, values)
         notes.append(f"the header says that {code:g} is a missing point")
-    own = header.unit if header.unit is not None else one_unit(_last_header(table))
+    last = _last_header(table)
+    own = header.unit
+    if own is None and not is_lateral(last):
+        own = one_unit(last)
     _refuse_second(own, name, metres)
     unit = own if own is not None else metres
-    notes.extend(_notes(table, known=unit is not None, metres=metres))
+    notes.extend(_notes(table, metres))
     heights = np.ascontiguousarray(values * (1.0 if unit is None else unit))
     pitch: tuple[float, ...] | None = header.pitch_of(*values.shape)
     if heights.shape[1] == 1:
@@ -221,11 +225,9 @@ def _near_three(table: Table) -> tuple[float, float, float] | None:
     return None if not found else (found[0], found[len(found) // 2], found[-1])
 
 
-def _notes(table: Table, *, known: bool, metres: float | None) -> tuple[str, ...]:
+def _notes(table: Table, metres: float | None) -> tuple[str, ...]:
     notes = []
-    if not known:
-        notes.append("no unit in the file: taken as metres")
-    elif metres is not None:
+    if metres is not None:
         notes.append(f"no unit in the file: {metres:g} m as given")
     if table.footer:
         notes.append(f"{table.footer} lines of text after the numbers ignored")

@@ -22,6 +22,7 @@ _COUNTS = re.compile(r"\b([hw])=([0-9]+)\b")
 _WIDTH = ("width", "breite", "largeur", "larghezza", "ancho", "šířka", "largura")
 _HEIGHT = ("height", "höhe", "hauteur", "altezza", "alto", "výška", "altura")
 _PIXEL = ("pixel size", "pixel width", "pixel pitch", "pixel spacing", "point spacing")
+_LATERAL = ("lateral unit", "lateral units", "xy unit", "xy units")
 _UNIT = ("data unit", "data units", "value unit", "value units", "z unit", "z units", "height unit")
 
 
@@ -34,6 +35,7 @@ class MapHeader:
         pitch: distance of the points [m], None where it does not say.
         size: (width, height) [m], None where it does not say.
         shape: rows and columns, None where it does not say.
+        lateral: metres per number of positions in a list of points, None where it does not say.
         notes: what was applied, one sentence each.
     """
 
@@ -41,12 +43,20 @@ class MapHeader:
     pitch: float | None = None
     size: tuple[float, float] | None = None
     shape: tuple[int, int] | None = None
+    lateral: float | None = None
     notes: tuple[str, ...] = ()
 
     @property
     def describes_map(self) -> bool:
         """Whether the header is that of a map, whatever the number of its columns."""
         return not (self.pitch is None and self.size is None and self.shape is None)
+
+    @property
+    def units_of_points(self) -> tuple[float, float, float] | None:
+        """Metres per number of x, y and z, None where the header does not say all."""
+        if self.lateral is None or self.unit is None:
+            return None
+        return self.lateral, self.lateral, self.unit
 
     def pitch_of(self, rows: int, columns: int) -> tuple[float, float] | None:
         """Return the pitch of a matrix of so many rows and columns [m]."""
@@ -71,11 +81,22 @@ def map_header(lines: Sequence[str]) -> MapHeader:
     """
     entries = dict(_entry(line) for line in lines if len(line) <= _LONGEST_LINE)
     factor = _factor(entries)
-    unit = factor if factor is not None else _unit(entries)
+    unit = factor if factor is not None else _unit(entries, _UNIT)
     notes = () if factor is None else (f"heights multiplied by the header's factor, {factor:g} m",)
     sides = [_length(entries, names) for names in (_WIDTH, _HEIGHT)]
     size = None if sides[0] is None or sides[1] is None else (sides[0], sides[1])
-    return MapHeader(unit, _length(entries, _PIXEL), size, _shape(lines), notes)
+    lateral = _unit(entries, _LATERAL)
+    return MapHeader(unit, _length(entries, _PIXEL), size, _shape(lines), lateral, notes)
+
+
+def is_lateral(line: str) -> bool:
+    """Whether a header line is about lengths along the surface, so that its unit is not of heights.
+
+    Example:
+        >>> is_lateral("Height: 4.00 µm"), is_lateral("Value units: m")
+        (True, False)
+    """
+    return _entry(line)[0] in (*_WIDTH, *_HEIGHT, *_PIXEL, *_LATERAL)
 
 
 def _entry(line: str) -> tuple[str, str]:
@@ -88,7 +109,7 @@ def _entry(line: str) -> tuple[str, str]:
 def _length(entries: dict[str, str], names: Sequence[str]) -> float | None:
     """Return the positive length [m] that one of the keys names."""
     for name in names:
-        match = _QUANTITY.fullmatch(entries.get(name, ""))
+        match = _QUANTITY.fullmatch(entries.get(name, "").replace(",", "."))
         if match is None:
             continue
         metres = one_unit(match.group(2)) if match.group(2) else None
@@ -115,16 +136,16 @@ def _factor(entries: dict[str, str]) -> float | None:
     return None
 
 
-def _unit(entries: dict[str, str]) -> float | None:
-    """Return the metres per number that the unit of the heights says."""
-    for name in _UNIT:
+def _unit(entries: dict[str, str], names: Sequence[str]) -> float | None:
+    """Return the metres per number that the unit under one of the keys says."""
+    for name in names:
         if name not in entries:
             continue
         metres = one_unit(entries[name])
         if metres is None:
             raise SurfaceFileError(
                 f"the header's {name!r} is {entries[name][:40]!r}, no unit of length, and there is "
-                "no conversion factor: the heights are not known"
+                "no conversion factor: the lengths are not known"
             )
         return metres
     return None
