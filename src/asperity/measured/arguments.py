@@ -15,6 +15,12 @@ READING = (
     ),
     Argument("unit", "unit of the heights where the file names none", form="text", example="um"),
     Argument("integrate_normals", "make heights of a normal map", form="switch"),
+    Argument(
+        "resample",
+        "pitch of the map that is interpolated through x, y, z points on no regular grid",
+        "m",
+        example="5um",
+    ),
 )
 """What is told to the reader of a file."""
 

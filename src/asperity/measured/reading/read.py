@@ -11,6 +11,7 @@ import numpy as np
 
 from asperity.errors import AsperityError, SurfaceFileError
 from asperity.files import open_input
+from asperity.measured.length_words import positive_number
 from asperity.measured.reading.foreign import FORMATS, too_large, unread
 from asperity.measured.reading.raw import RawSurface
 from asperity.measured.reading.reader import ReadingOptions, SurfaceFile
@@ -25,6 +26,7 @@ def read_surface(
     channel: str | int | None = None,
     unit: str | None = None,
     integrate_normals: bool = False,
+    resample: float | None = None,
 ) -> RawSurface:
     r"""Read a measured or drawn surface, recognising its format by content.
 
@@ -39,6 +41,8 @@ def read_surface(
         unit: unit of length of a file that has none, such as "mm": required for STL and OBJ,
             optional for NPY and text (metres if not given).
         integrate_normals: integrate a normal map (an image of slopes) to heights.
+        resample: pitch [m] of the map that is interpolated through a list of x, y, z points on no
+            regular grid; its error is in the notes.
 
     Returns:
         The heights [m] as the file gives them, with the pitch where the file has one. Heights
@@ -58,7 +62,9 @@ def read_surface(
         ((4,), ['5.0e-07'])
     """
     name = Path(path).name or str(path)
-    options = ReadingOptions(channel, unit, integrate_normals)
+    if resample is not None:
+        resample = positive_number("resample", resample)
+    options = ReadingOptions(channel, unit, integrate_normals, resample)
     try:
         _ = options.metres  # an unknown unit is refused whatever the file is
         _check_file(Path(path), name)

@@ -75,9 +75,11 @@ MARKED = (
 )
 """Those that know a file by its own mark."""
 
+_OF_TEXT = ("unit", "resample")
+
 LAST = (
     Reader("a file of another kind", is_foreign, refuse_foreign),
-    Reader("a text file", lambda file: file.is_text, _read_text, ("unit",), certain=False),
+    Reader("a text file", lambda file: file.is_text, _read_text, _OF_TEXT, certain=False),
     Reader(
         "an instrument's file", lambda _: True, read_instrument, ("channel", "unit"), certain=False
     ),

@@ -16,6 +16,7 @@ from asperity.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading.numbers import parse_number
 from asperity.measured.reading.raw import MAX_POINTS, RawSurface
 from asperity.measured.reading.reader import ReadingOptions, SurfaceFile, naming
+from asperity.measured.reading.scatter import fitting_pitch, resampled
 from asperity.measured.reading.spacing import spacing
 from asperity.measured.reading.text_header import (
     MapHeader,
@@ -53,10 +54,13 @@ def read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     _check_table(table)
     header = map_header(table.header)
     rows, columns = table.values.shape
+    is_list = columns == 3 and rows > 3 and not header.describes_map
+    if options.resample is not None and not is_list:
+        raise ParameterError("resample", f"must not be given: {name} is no list of x, y, z points")
     if columns == 2 and not header.describes_map and _is_monotonic(table):
         return _profile(table, name, metres)
-    if columns == 3 and rows > 3 and not header.describes_map:
-        return _points(table, header, name, metres)
+    if is_list:
+        return _points(table, header, name, options)
     return _matrix(table, header, name, metres)
 
 
@@ -132,24 +136,46 @@ def _refuse_long(length: float, *, known: bool) -> None:
         )
 
 
-def _points(table: Table, header: MapHeader, name: str, metres: float | None) -> RawSurface:
+def _points(table: Table, header: MapHeader, name: str, options: ReadingOptions) -> RawSurface:
     """Return the map, or the profile along one axis, that a list of points is."""
-    named = header.units_of_points or _near_three(table)
+    named, metres = header.units_of_points or _near_three(table), options.metres
     _refuse_second(named, name, metres)
     known = named is not None or metres is not None
-    unit_x, unit_y, unit_z = named or (metres or 1.0,) * 3
+    units = np.array(named or (metres or 1.0,) * 3)
     if np.isnan(table.values[:, :2]).any():
         raise SurfaceFileError(f"a position is missing; {_EXPECTED}")
-    heights, steps = grid_of(table.values, (_resolution(table, 0), _resolution(table, 1)))
-    pitch = (steps[0] * unit_x, steps[1] * unit_y)
-    rows, columns = heights.shape
-    _refuse_long(max(pitch[0] * (columns - 1), pitch[1] * (rows - 1)), known=known)
+    points = table.values * units
+    _refuse_long(float(np.ptp(points[:, :2], axis=0).max()), known=known)
     notes = _notes(table, metres)
-    heights = np.ascontiguousarray(heights * unit_z)
+    if options.resample is not None:
+        heights, said = resampled(points, options.resample)
+        pitch = (options.resample, options.resample)
+        return RawSurface(heights, pitch, name, (*notes, said), has_units=known)
+    try:
+        heights, steps = grid_of(table.values, (_resolution(table, 0), _resolution(table, 1)))
+    except _NoGridError as error:
+        raise SurfaceFileError(f"{error}; {_advice(points)}") from None
+    pitch = (steps[0] * float(units[0]), steps[1] * float(units[1]))
+    heights = np.ascontiguousarray(heights * units[2])
     if 1 in heights.shape:
-        axis = 0 if rows == 1 else 1
+        axis = 0 if heights.shape[0] == 1 else 1
         return RawSurface(heights.ravel(), (pitch[axis],), name, notes, has_units=known)
     return RawSurface(heights, pitch, name, notes, has_units=known)
+
+
+class _NoGridError(SurfaceFileError):
+    """Points that are on no regular grid, which interpolation may help."""
+
+
+def _advice(points: NDArray[np.float64]) -> str:
+    """Return how points on no grid can be read."""
+    pitch = fitting_pitch(points[:, :2])
+    if pitch is None:
+        return _EXPECTED
+    return (
+        f"{_EXPECTED}; points on no grid are interpolated to a pitch [m] that you give, such as"
+        f" resample={pitch:g} (--resample {pitch:g}), one grid point for each of theirs"
+    )
 
 
 def _matrix(table: Table, header: MapHeader, name: str, metres: float | None) -> RawSurface:
@@ -300,7 +326,7 @@ def grid_of(
     x, column = np.unique(points[:, 0], return_inverse=True)
     y, row = np.unique(points[:, 1], return_inverse=True)
     if len(x) * len(y) > _SPARSEST * len(points):
-        raise SurfaceFileError(f"the points are on no regular grid; {_EXPECTED}")
+        raise _NoGridError("the points are on no regular grid")
     if len(np.unique(row * len(x) + column)) < len(points):
         raise SurfaceFileError(f"two points have the same position; {_EXPECTED}")
     heights = np.full((len(y), len(x)), np.nan)
@@ -313,8 +339,8 @@ def _step(axis: str, positions: NDArray[np.float64], resolution: NDArray[np.floa
         return 0.0
     result = spacing(positions, float(resolution.max()))
     if not result.uniform:
-        raise SurfaceFileError(
+        raise _NoGridError(
             f"the {axis} positions are not uniform: one is {result.deviation:.3g} from a grid of"
-            f" {result.step:.3g}; {_EXPECTED}"
+            f" {result.step:.3g}"
         )
     return result.step
