@@ -85,6 +85,18 @@ def test_simulate_prints_the_ledger(call: Call, still: str) -> None:
     assert max(map(len, out.splitlines())) <= 80
 
 
+def test_what_is_said_of_the_ending_needs_no_rows(call: Call, still: str, tmp_path: Path) -> None:
+    path, page = tmp_path / "trace.csv", tmp_path / "run.html"
+    _code, plain, _err = call("simulate", still)
+    _code, traced, _err = call("simulate", still, "--trace", str(path))
+    assert traced.startswith(plain)
+    call("simulate", still, "--html", str(page))
+    said = " ".join(plain.split())
+    words = re.search(r"velocity varies by \S+ \S+ in", said)
+    assert words is not None
+    assert words[0] in " ".join(page.read_text(encoding="utf-8").split())
+
+
 def test_simulate_writes_json_and_html(call: Call, strokes: str, tmp_path: Path) -> None:
     code, out, _err = call(
         "simulate", strokes, "--json", "-", "--law", "B", "--stiffness", "300N/m"

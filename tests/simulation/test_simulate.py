@@ -30,6 +30,7 @@ from asperity.simulation import (
     simulate,
     simulate_many,
 )
+from asperity.simulation.onset import CYCLE_SPEED, cycles, restlessness
 from asperity.simulation.trace import HEADER, MemoryTrace
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
@@ -75,6 +76,54 @@ def test_every_thins_the_trace_and_nothing_else() -> None:
     sparse = run_of(every=10**30)
     np.testing.assert_array_equal(sparse.table, whole.table[:1])
     assert sparse.ledger == whole.ledger
+
+
+@pytest.mark.parametrize("most", [0, 1, 10, 57, 400, 1000])
+@pytest.mark.parametrize("chunk", [17, 16_384])
+def test_rows_are_thinned_out_evenly(
+    monkeypatch: pytest.MonkeyPatch, most: int, chunk: int
+) -> None:
+    module = importlib.import_module("asperity.simulation.simulate")  # the name is the function's
+    monkeypatch.setattr(module, "CHUNK", chunk)
+    whole, thin = run_of(), run_of(most_rows=most)
+    rows = whole.table[:: -(-400 // most)] if most else whole.table[:0]
+    assert len(thin.table) == len(rows) <= most
+    assert thin.ledger == whole.ledger
+    np.testing.assert_array_equal(thin.table, rows)
+
+
+@pytest.mark.parametrize("every", [1, 3, 20])
+def test_the_ending_is_that_of_all_rows(every: int) -> None:
+    rest: dict[str, Any] = {"motion": Still((0.0, 0.0, -1e-3)), "velocity": (0.3, 0.0, 0.0)}
+    whole, none = run_of(**rest, every=every), run_of(**rest, every=every, most_rows=0)
+    assert whole.ending is not None
+    assert none.ending is not None
+    assert none.ending.known
+    assert none.ending.restlessness == whole.ending.restlessness
+    assert whole.ending.restlessness == pytest.approx(restlessness(whole), rel=1e-12)
+    assert whole.ending.restlessness > 1e-9  # the handle swings
+    assert (whole.ending.restlessness > CYCLE_SPEED and whole.ending.fed) == cycles(whole)
+
+
+def test_a_run_without_enough_rows_has_no_known_ending() -> None:
+    few = run_of(every=200, most_rows=0).ending
+    assert few is not None
+    assert not few.known
+    assert run_of(trace=False).ending is None
+    with pytest.raises(ParameterError, match="most_rows must be a whole number"):
+        run_of(most_rows=-1)
+
+
+def test_memory_without_rows_is_flat_in_the_duration() -> None:
+    def peak(duration: float) -> int:
+        tracemalloc.start()
+        run_of(duration=duration, motion=Still((0.0, 0.0, -1e-3)), most_rows=0)
+        found = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return found
+
+    peak(20.0)
+    assert peak(400.0) < 1.05 * peak(40.0)  # 86 MB if it kept the rows
 
 
 def test_chunks_leave_no_seam(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -241,7 +290,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"motion": (0, 0, 0)}, "motion must be"),
     ({"duration": 0.0}, "duration must be positive"),
     ({"duration": 1e-5}, "duration must be at least one period"),
-    ({"duration": 1e30}, "duration must be at most"),
+    ({"duration": 1e300}, "duration must be at most"),
     ({"servo": Servo(1e-30)}, "duration must be at most"),
     ({"servo": Servo(1e-3, delay=10**20)}, "delay must be at most"),
     ({"every": 0}, "every must be"),

@@ -41,10 +41,13 @@ def command(
     """
     setup = read_setup(scene, values, duration)
     setup = setup if every is None else replace(setup, every=every)
-    with progress_bar("simulating") as told:
-        run = setup.simulate(trace=outputs.trace or True, progress=told)
     from asperity.report.run import print_run, run_page
-    from asperity.simulation.run import reread
+    from asperity.simulation.run import MOST_ROWS, reread
+
+    # Only pictures need rows, and no more than these.
+    most_rows = 0 if outputs.html is None else MOST_ROWS
+    with progress_bar("simulating") as told:
+        run = setup.simulate(trace=outputs.trace or True, progress=told, most_rows=most_rows)
 
     outputs.write(
         {"schema": 1, "scene": setup, "run": run},

@@ -12,7 +12,7 @@ from asperity.report.terminal import say
 from asperity.report.words.number_words import law_title
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
-from asperity.simulation.onset import CYCLE_SPEED, cycles, holds_still, restlessness
+from asperity.simulation.onset import CYCLE_SPEED, holds_still
 from asperity.units import engineering
 
 FOOTER = f"{PAPER}, section V"
@@ -52,10 +52,11 @@ def unrest(setup: Setup, run: Run) -> str:
     """Return whether the handle came to rest, in words."""
     if not holds_still(setup.motion, run.duration):
         return "The hand was moving to the end"
-    if len(run.time) < 4:
+    if run.ending is None or not run.ending.known:
         return "Too few samples were traced to say whether it came to rest"
-    speed = restlessness(run)
-    kept = "keeps moving: a limit cycle" if cycles(run) else "comes to rest"
+    speed = run.ending.restlessness
+    cycles = speed > CYCLE_SPEED and run.ending.fed
+    kept = "keeps moving: a limit cycle" if cycles else "comes to rest"
     limit = engineering(CYCLE_SPEED, "m/s")
     return (
         f"The handle {kept} (velocity varies by {engineering(speed, 'm/s', digits=3)} in the last "

@@ -58,13 +58,16 @@ class Setup:
     assumptions: tuple[str, ...] = ()
 
     def simulate(
-        self, trace: bool | str | Path = True, progress: Callable[[float], None] | None = None
+        self,
+        trace: bool | str | Path = True,
+        progress: Callable[[float], None] | None = None,
+        most_rows: int | None = None,
     ) -> Run:
         """Run the loop; see :func:`~asperity.simulation.simulate`."""
         return simulate(
             self.surface, self.plant, self.hand, self.servo, self.motion, self.duration,
             start=self.start, velocity=self.velocity, trace=trace, every=self.every,
-            progress=progress,
+            most_rows=most_rows, progress=progress,
         )  # fmt: skip
 
     def with_law(self, law: str | Law, stiffness: float | None = None) -> Setup:

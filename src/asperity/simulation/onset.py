@@ -14,6 +14,7 @@ from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
 from asperity.files import Record, record
 from asperity.laws.w_smooth_wall import LAW as SMOOTH_WALL
+from asperity.simulation.ending import fed
 from asperity.simulation.hands import Hand, MovedHand
 from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Plant
@@ -29,8 +30,6 @@ _LEAST_TOLERANCE = 1e-9
 # A run that is restless at its end is made so many times longer, again and again up to the last.
 PATIENCE = (1.0, 4.0, 16.0)
 _LEAST_SAMPLES = 16
-# Part of the loss that the texture supplies at least: amplitudes beat, so not all of it always.
-_FED = 0.2
 _MOST_STARTS = 10_000
 _COARSE = 2.0  # factor from one stiffness to the next while the onset is looked for
 
@@ -123,15 +122,8 @@ def cycles(run: Run, threshold: float = CYCLE_SPEED) -> bool:
     """
     if run.stop is Stop.DIVERGED:
         return True
-    return restlessness(run) > threshold and _fed(run)
-
-
-def _fed(run: Run) -> bool:
-    energies, first = run.energies, -max(len(run.time) // 4, 2)
-    supplied = energies["supplied"][-1].sum() - energies["supplied"][first].sum()
-    taken = energies["lost"][-1] - energies["lost"][first]
-    taken -= energies["friction"][-1] - energies["friction"][first]
-    return bool(supplied > _FED * taken)
+    first = run.table[-max(len(run.time) // 4, 2)]
+    return restlessness(run) > threshold and fed(first, run.table[-1])
 
 
 def calms_down(run: Run) -> bool:

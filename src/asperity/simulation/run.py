@@ -11,6 +11,7 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.files import plain, record
+from asperity.simulation.ending import Ending
 from asperity.simulation.trace import COLUMNS
 
 MOST_ROWS = 20_000
@@ -110,6 +111,8 @@ class Run:
             with the sample that the body could not follow).
         place: where it left the workspace, in words.
         path: of the trace file, or empty.
+        ending: what the last quarter shows, from all rows that were traced, kept or not; ``None``
+            if none were.
         notes: what about the plant is guessed.
     """
 
@@ -121,6 +124,7 @@ class Run:
     stop: Stop = Stop.NOTHING
     place: str = ""
     path: str = ""
+    ending: Ending | None = None
     notes: tuple[str, ...] = ()
 
     @property

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from asperity.arguments import whole
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
+from asperity.simulation.ending import Ending
 from asperity.simulation.hands import BandHand, Hand, MovedHand, SpringHand
 from asperity.simulation.loop import Simulation
 from asperity.simulation.motions import Motion
@@ -20,7 +22,7 @@ from asperity.simulation.plants import Cartesian, Pantograph, Plant
 from asperity.simulation.run import Run, Stop
 from asperity.simulation.sampled_plant import LEAST_SINE, sampled_plant
 from asperity.simulation.servo import Servo
-from asperity.simulation.trace import FileTrace, MemoryTrace, Trace
+from asperity.simulation.trace import FileTrace, MemoryTrace, ThinTrace, Trace
 from asperity.surface import Surface
 
 # Samples at a time: memory does not depend on the duration, progress is told in between.
@@ -41,6 +43,7 @@ def simulate(
     velocity: ArrayLike | None = None,
     trace: bool | str | os.PathLike[str] = True,
     every: int = 1,
+    most_rows: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
     """Return what happens when a hand explores a surface on a device.
@@ -60,6 +63,8 @@ def simulate(
         trace: whether to keep the trace in memory, or the path of a CSV file for it: rows are
             written as they come, so memory does not depend on the duration.
         every: samples per row of the trace.
+        most_rows: rows that are kept in memory at most, thinned out evenly; by default all, so that
+            memory grows with the duration. How the run ends is told from all rows nevertheless.
         progress: is told the part that is done, in [0, 1], now and then.
 
     Returns:
@@ -87,16 +92,18 @@ def simulate(
     every = min(int(every), samples)
     simulation = _begin(surface, plant, hand, servo, motion, start, velocity)
     anchor_from = partial(_anchor, motion, servo.period, samples, plant)
-    kept = _trace(trace, -(-samples // every))
+    rows = -(-samples // every)
+    kept = _trace(trace, rows, most_rows)
+    ending = None if trace is False else Ending(rows)
     try:
-        stop = _go(simulation, anchor_from, samples, kept, every, progress)
+        stop = _go(simulation, anchor_from, samples, kept, ending, every, progress)
     finally:
         kept.close()
     return Run(
         kept.table(), simulation.state, simulation.samples, float(servo.period),
         simulation.ledger(), stop, _place(stop, simulation.state, plant),
         path=os.fspath(trace) if isinstance(kept, FileTrace) else "",  # type: ignore[arg-type]  # a path then
-        notes=plant.notes,
+        ending=ending, notes=plant.notes,
     )  # fmt: skip
 
 
@@ -186,8 +193,10 @@ def _anchor(motion: Motion, period: float, samples: int, plant: Plant, first: in
     return points
 
 
-def _trace(wanted: bool | str | os.PathLike[str], rows: int) -> Trace:
+def _trace(wanted: bool | str | os.PathLike[str], rows: int, most_rows: int | None) -> Trace:
     if isinstance(wanted, bool):
+        if wanted and most_rows is not None:
+            return ThinTrace(rows, whole("most_rows", most_rows))
         return MemoryTrace(rows if wanted else 0)
     if not isinstance(wanted, (str, os.PathLike)):
         raise ParameterError("trace", "must be True, False or a path", wanted)
@@ -196,12 +205,15 @@ def _trace(wanted: bool | str | os.PathLike[str], rows: int) -> Trace:
 
 def _go(
     simulation: Simulation, anchor_from: Callable[[int], FloatArray], samples: int, kept: Trace,
-    every: int, progress: Callable[[float], None] | None,
+    ending: Ending | None, every: int, progress: Callable[[float], None] | None,
 ) -> Stop:  # fmt: skip
     while simulation.samples < samples:
         anchor = anchor_from(simulation.samples)
-        stop = simulation.run(anchor, kept.room(len(anchor) // every + 1), every)
+        room = kept.room(len(anchor) // every + 1)
+        stop = simulation.run(anchor, room, every)
         kept.keep(simulation.rows)
+        if ending is not None:
+            ending.see(room[: simulation.rows])
         if progress is not None:
             progress(simulation.samples / samples)
         if stop:

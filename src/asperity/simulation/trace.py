@@ -55,6 +55,42 @@ class MemoryTrace:
         """Do nothing: the table stays."""
 
 
+class ThinTrace:
+    """Keeps a bounded number of rows, thinned out evenly from the first.
+
+    Args:
+        rows: that will come.
+        most: that are kept at most; none for 0.
+    """
+
+    def __init__(self, rows: int, most: int) -> None:
+        self._buffer = np.empty((0, len(COLUMNS)))
+        self._step = max(1, -(-rows // most)) if most else rows + 1
+        self._table = np.empty((-(-rows // self._step) if most else 0, len(COLUMNS)))
+        self._seen = self._filled = 0
+
+    def room(self, rows: int) -> FloatArray:
+        """Return a buffer of so many rows."""
+        if len(self._buffer) < rows:
+            self._buffer = np.empty((rows, len(COLUMNS)))
+        return self._buffer
+
+    def keep(self, rows: int) -> None:
+        """Keep every so manieth of the first rows of the buffer."""
+        chosen = self._buffer[-self._seen % self._step : rows : self._step]
+        if len(self._table):
+            self._table[self._filled : self._filled + len(chosen)] = chosen
+            self._filled += len(chosen)
+        self._seen += rows
+
+    def table(self) -> FloatArray:
+        """Return the rows that were kept."""
+        return self._table[: self._filled]
+
+    def close(self) -> None:
+        """Do nothing: the table stays."""
+
+
 class FileTrace:
     """Writes rows of a CSV file in chunks; what is written are whole lines.
 
@@ -121,4 +157,4 @@ class FileTrace:
         self._file.close()
 
 
-Trace = MemoryTrace | FileTrace
+Trace = MemoryTrace | ThinTrace | FileTrace
