@@ -63,14 +63,20 @@ class InternalError(AsperityError, RuntimeError):
     """
 
 
-def tell(words: str) -> None:
-    """Say something in one line on standard error, if anybody listens.
+def printable(text: object) -> str:
+    r"""Return a text without control characters: those of a file's name could drive a terminal.
 
-    Control characters (of a file's name, say) never reach the terminal as they are.
+    Example:
+        >>> printable("a\x1b[31m.x3p")
+        'a\\x1b[31m.x3p'
     """
-    line = " ".join(words.splitlines())
-    line = "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in line)
+    return "".join(sign if sign.isprintable() else repr(sign)[1:-1] for sign in str(text))
+
+
+def tell(words: str) -> None:
+    """Say something in one line on standard error, if anybody listens."""
     with suppress(OSError, ValueError):
+        line = printable(" ".join(words.splitlines()))
         print(f"asperity: {line}", file=sys.stderr, flush=True)
 
 

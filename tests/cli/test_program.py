@@ -74,6 +74,13 @@ def test_a_foreign_backend_of_matplotlib_does_not_matter(tmp_path: Path) -> None
     assert "data:image/svg" in page.read_text()
 
 
+def test_foreign_settings_of_matplotlib_do_not_matter(tmp_path: Path) -> None:
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True\naxes.facecolor: purple\n")
+    surface = "sinusoid:amplitude=0.8mm,period=1mm"
+    done = run(f"asperity analyze {surface} --law C --html page.html", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 _FAULT = """
 import asperity.cli.main as command_line
 def main():

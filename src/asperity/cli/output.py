@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.errors import ParameterError
+from asperity.errors import ParameterError, printable
 from asperity.files import is_device, json_text, write_text
 
 if TYPE_CHECKING:
@@ -54,8 +54,11 @@ class Outputs:
         if self.json is not None:
             write_output("json", self.json, json_text(data))
         if self.html is not None and page is not None:
+            import matplotlib
+
             from asperity.report.page import page_html
 
+            matplotlib.rcdefaults()  # the page looks as it should, whatever the user's settings
             write_output("html", self.html, page_html(page()))
         if STANDARD_OUTPUT in {self.json, self.html}:
             return
@@ -65,7 +68,7 @@ class Outputs:
         say(console)
         for words, path in ((page_words, self.html), ("Trace", self.trace)):
             if path is not None:
-                console.print(f"{words}: {path}", soft_wrap=True, markup=False)
+                console.print(f"{words}: {printable(path)}", soft_wrap=True, markup=False)
 
 
 def output_options(

@@ -9,6 +9,7 @@ import click
 
 from asperity.cli.options import file_options, file_values
 from asperity.cli.progress import progress_bar
+from asperity.errors import printable
 
 if TYPE_CHECKING:
     from asperity.measured.prepared import Prepared
@@ -69,7 +70,7 @@ def _print(prepared: Prepared, output: str) -> None:
     console = Console(highlight=False)
     console.print(table)
     console.print(summary(prepared), markup=False, soft_wrap=True)
-    console.print(f"Saved: {output}", markup=False, soft_wrap=True)
+    console.print(f"Saved: {printable(output)}", markup=False, soft_wrap=True)
 
 
 def summary(prepared: Prepared) -> str:
