@@ -138,3 +138,45 @@ def test_a_pipe_in_place_of_an_entry_does_not_hang(folder: Path):
     with pytest.warns(cache.CacheWarning, match="damaged"):
         assert cache.recall(ROOM, KEY) is None
     assert cache.recall(ROOM, KEY) is None
+
+
+@pytest.mark.parametrize("mode", [0o700, 0o755, 0o2775])
+def test_a_room_is_for_whom_the_folder_is(folder: Path, mode: int):
+    folder.mkdir()
+    folder.chmod(mode)
+    cache.keep(ROOM, KEY, CONTENT)
+    assert stat.S_IMODE((folder / ROOM).stat().st_mode) == mode
+    assert cache.recall(ROOM, KEY) == CONTENT
+
+
+def test_nobody_else_may_write_into_a_new_folder(folder: Path):
+    before = os.umask(0)
+    try:
+        cache.keep(ROOM, KEY, CONTENT)
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o755
+    assert cache.recall(ROOM, KEY) == CONTENT
+
+
+def test_a_read_only_folder_serves_what_it_has(monkeypatch: pytest.MonkeyPatch):
+    cache.keep(ROOM, KEY, CONTENT)
+
+    def refuse(*_arguments: object, **_named: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(cache, "whole_file", refuse)  # root may write wherever it wants
+    with pytest.warns(cache.CacheWarning, match="cannot be written .Permission denied"):
+        cache.keep(ROOM, "another", CONTENT)
+    assert cache.recall(ROOM, KEY) == CONTENT
+
+
+def test_a_full_disk_costs_time_only(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    def full(*_arguments: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    cache.keep(ROOM, KEY, CONTENT)
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.warns(cache.CacheWarning, match="No space left on device"):
+        cache.keep(ROOM, "another", CONTENT)
+    assert len(list((folder / ROOM).iterdir())) == 1

@@ -71,7 +71,7 @@ def keep(room: str, key: str, content: bytes) -> None:
     """Keep a content under a key, whole or not at all; what cannot be kept is made again."""
     path = cache_folder() / room / _name(key)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        _make(path.parent)
         if _trusted(path.parent.parent) and _trusted(path.parent):
             with whole_file(path) as stream:
                 stream.write(_MAGIC + _digest(key, content) + content)
@@ -85,6 +85,13 @@ def set_aside(room: str, key: str) -> None:
     with suppress(OSError):  # another process may be mending it now
         path.replace(path.with_name(path.name + _SET_ASIDE))
     _say(f"the cache {cache_folder()} had damaged entries: they were set aside and made again")
+
+
+def _make(room: Path) -> None:
+    room.parent.mkdir(mode=0o755, parents=True, exist_ok=True)
+    if not room.exists():
+        room.mkdir(exist_ok=True)
+        room.chmod(stat.S_IMODE(room.parent.stat().st_mode))  # made for a group: so is the room
 
 
 _AGAIN = "the work is done again each time"

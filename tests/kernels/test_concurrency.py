@@ -1,0 +1,57 @@
+"""Many threads and processes begin with one empty cache: the same bits, and nothing left over."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+_SCRIPT = """
+import json, multiprocessing, sys
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np
+from asperity import HeightMap, Surface
+
+def answer(_number):
+    texture = HeightMap(1e-4 * np.random.default_rng(1).normal(size=(8, 9)), 3e-4)
+    points = np.random.default_rng(2).uniform((0, 0, -1e-4), (2e-3, 2e-3, 1e-4), (50, 3))
+    return [part.tobytes().hex() for part in Surface(texture, "B").force_and_jacobian(points)]
+
+if __name__ == "__main__":
+    how, count = sys.argv[1], int(sys.argv[2])
+    if how == "threads":
+        with ThreadPoolExecutor(count) as pool:
+            answers = list(pool.map(answer, range(count)))
+    else:
+        with multiprocessing.get_context(how).Pool(count) as pool:
+            answers = pool.map(answer, range(count), chunksize=1)
+    print(json.dumps(answers))
+"""
+
+
+def answers(how: str, count: int, folder: Path) -> list[list[str]]:
+    """Return what so many threads or processes compute."""
+    script = folder / "script.py"
+    script.write_text(_SCRIPT)
+    done = subprocess.run(
+        [sys.executable, str(script), how, str(count)],
+        capture_output=True, text=True, check=True, timeout=300,
+        env=os.environ | {"ASPERITY_CACHE_DIR": str(folder / f"cache-{how}")},
+    )  # fmt: skip
+    assert not done.stderr
+    found: list[list[str]] = json.loads(done.stdout)
+    return found
+
+
+@pytest.mark.parametrize(("how", "count"), [("threads", 8), ("fork", 3), ("spawn", 3)])
+def test_all_who_begin_at_once_have_the_same_bits(how: str, count: int, tmp_path: Path) -> None:
+    alone = answers("threads", 1, tmp_path)
+    together = answers(how, count, tmp_path)
+    assert together == alone * count
+    kept = [path.name for path in (tmp_path / f"cache-{how}").rglob("*") if path.is_file()]
+    assert kept
+    assert all(len(name) == 40 for name in kept)  # entries only: nothing damaged, nothing half
