@@ -290,7 +290,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"motion": (0, 0, 0)}, "motion must be"),
     ({"duration": 0.0}, "duration must be positive"),
     ({"duration": 1e-5}, "duration must be at least one period"),
-    ({"duration": 1e300}, "duration must be at most"),
+    ({"duration": 1e30}, "duration must be at most"),
     ({"servo": Servo(1e-30)}, "duration must be at most"),
     ({"servo": Servo(1e-3, delay=10**20)}, "delay must be at most"),
     ({"every": 0}, "every must be"),
