@@ -10,7 +10,7 @@ from itertools import count
 
 @contextmanager
 def progress_bar(words: str) -> Iterator[Callable[..., None]]:
-    """Show how much is done.
+    """Show what is being done, how much of it, and the time that is left.
 
     Args:
         words: what is being done.
@@ -22,13 +22,22 @@ def progress_bar(words: str) -> Iterator[Callable[..., None]]:
         yield lambda _share, _words=None: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
     columns = (
         TextColumn("{task.description:<24}"),
         BarColumn(),
         TaskProgressColumn(),
         TimeElapsedColumn(),
+        TextColumn("left:"),
+        TimeRemainingColumn(),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(words, total=1.0)

@@ -89,7 +89,7 @@ class SplineCells(Cells):
         cell = np.minimum(np.floor(first).astype(np.int64), self._counts - side)
         patch = self._patches(cell, side + 3)
         matrices = _AxisMatrices(centres - half - cell, 2.0 * half)
-        slack = 256.0 * EPS * np.abs(patch).max(axis=(1, 2))
+        slack = 256.0 * EPS * np.abs(patch).max(axis=(0, 1))
         per_x, per_y = (*self._per, 1.0)[:2]
         result: dict[str, Number] = {}
         for name in names:
@@ -98,7 +98,7 @@ class SplineCells(Cells):
                 result[name] = 0.0
                 continue
             scale = float(per_x**nx * per_y**ny)
-            part = np.diff(np.diff(patch, nx, axis=2), ny, axis=1)
+            part = np.diff(np.diff(patch, nx, axis=1), ny, axis=0)
             if side > 1:
                 result[name] = _fit_block(part, side, scale, slack)
             else:
@@ -106,12 +106,12 @@ class SplineCells(Cells):
         return result
 
     def _patches(self, cell: NDArray[np.int64], width: int) -> FloatArray:
-        """Return the coefficients from a cell on, (n, width, width), (n, 1, width) of a profile."""
+        """Return the coefficients from a cell on, (width, width, n), (1, width, n) of a profile."""
         step = np.arange(width)
-        columns = (cell[:, 0, None] + step)[:, None, :]
+        columns = (cell[:, 0] + step[:, None])[None]
         if self.dimensions == 1:
             return np.asarray(self._c[columns])
-        return np.asarray(self._c[(cell[:, 1, None] + step)[:, :, None], columns])
+        return np.asarray(self._c[(cell[:, 1] + step[:, None])[:, None], columns])
 
     def derivatives(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Cells`."""
@@ -136,24 +136,35 @@ class _AxisMatrices:
 
     def __init__(self, left: FloatArray, width: FloatArray) -> None:
         whole = bool((width >= 1.0).all())
-        # On whole cells one matrix serves all.
-        self._left = np.zeros((1, left.shape[1])) if whole else left
+        # On whole cells one matrix serves all, and equal parts of cells share theirs.
+        lefts = np.zeros((1, left.shape[1])) if whole else left
+        self._parts = [np.unique(column, return_inverse=True) for column in lefts.T]
         self._width = width
         self._known: dict[tuple[int, int], FloatArray] = {}
 
     def _matrix(self, axis: int, degree: int) -> FloatArray:
         key = (axis, degree)
         if key not in self._known:
-            left = self._left[:, axis]
-            split = _subdivision(degree, left, left + self._width[axis])
-            self._known[key] = split @ _TO_BERNSTEIN[degree]
+            left, index = self._parts[axis]
+            split = _subdivision(degree, left, left + self._width[axis]) @ _TO_BERNSTEIN[degree]
+            self._known[key] = np.take(
+                np.ascontiguousarray(split.transpose(1, 2, 0)), index, axis=2
+            )
         return self._known[key]
 
     def bernstein(self, part: FloatArray) -> FloatArray:
-        """Return the tensor Bernstein coefficients of patches (n, q, p); of lines with q = 1."""
-        _, rows, columns = part.shape
-        along = part @ self._matrix(0, columns - 1).transpose(0, 2, 1)
-        return np.asarray(along if rows == 1 else self._matrix(1, rows - 1) @ along)
+        """Return the tensor Bernstein coefficients of patches (q, p, n); of lines with q = 1."""
+        rows, columns, _ = part.shape
+        along = _product(part, self._matrix(0, columns - 1).transpose(1, 0, 2))
+        return along if rows == 1 else _product(self._matrix(1, rows - 1), along)
+
+
+def _product(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the products of matrices (p, q, n) and (q, r, n)."""
+    total = a[:, 0, None] * b[0]
+    for k in range(1, a.shape[1]):
+        total += a[:, k, None] * b[k]
+    return np.asarray(total)
 
 
 def _subdivision(degree: int, left: FloatArray, right: FloatArray) -> FloatArray:
@@ -170,17 +181,16 @@ def _subdivision(degree: int, left: FloatArray, right: FloatArray) -> FloatArray
 
 def _fit(bernstein: FloatArray, scale: float, slack: FloatArray) -> Taylor:
     """Return the linear function through the corners, and the hull of what it leaves out."""
-    n, rows, columns = bernstein.shape
-    left, right = bernstein[:, :, 0], bernstein[:, :, -1]
-    gx = 0.25 * (right[:, 0] + right[:, -1] - left[:, 0] - left[:, -1])
+    rows, columns, _ = bernstein.shape
+    left, right = bernstein[:, 0], bernstein[:, -1]
+    gx = 0.25 * (right[0] + right[-1] - left[0] - left[-1])
     slopes = [gx]
-    linear = gx[:, None, None] * np.linspace(-1.0, 1.0, columns)
+    rest = bernstein - gx * np.linspace(-1.0, 1.0, columns)[:, None]
     if rows > 1:
-        gy = 0.25 * (left[:, -1] + right[:, -1] - left[:, 0] - right[:, 0])
+        gy = 0.25 * (left[-1] + right[-1] - left[0] - right[0])
         slopes.append(gy)
-        linear = linear + gy[:, None, None] * np.linspace(-1.0, 1.0, rows)[:, None]
-    rest = (bernstein - linear).reshape(n, -1)
-    low, high = rest.min(axis=1), rest.max(axis=1)
+        rest -= gy * np.linspace(-1.0, 1.0, rows)[:, None, None]
+    low, high = rest.min(axis=(0, 1)), rest.max(axis=(0, 1))
     c = 0.5 * (low + high)
     # The conversion multiplies and adds at most 16 coefficients, each weight at most one.
     e = 0.5 * (high - low) * (1.0 + 8.0 * EPS) + slack
@@ -194,15 +204,16 @@ def _fit_block(part: FloatArray, side: int, scale: float, slack: FloatArray) -> 
     the rest enclose it.
 
     Args:
-        part: coefficients, shape (n, side + degree along y, side + degree along x).
+        part: coefficients, shape (side + degree along y, side + degree along x, n).
         side: cells along the side of a block.
         scale: factor of the derivative.
         slack: error of the coefficients by rounding.
     """
-    y, x = ((2.0 * np.arange(count) - (count - side - 1) - side) / side for count in part.shape[1:])
-    gx = part.mean(axis=1) @ x / (x @ x)
-    gy = part.mean(axis=2) @ y / (y @ y)
-    rest = part - gx[:, None, None] * x - gy[:, None, None] * y[:, None]
-    low, high = rest.min(axis=(1, 2)), rest.max(axis=(1, 2))
+    y, x = ((2.0 * np.arange(count) - (count - side - 1) - side) / side for count in part.shape[:2])
+    gx = x @ part.mean(axis=0) / (x @ x)
+    gy = y @ part.mean(axis=1) / (y @ y)
+    rest = part - gx * x[:, None]
+    rest -= gy * y[:, None, None]
+    low, high = rest.min(axis=(0, 1)), rest.max(axis=(0, 1))
     c, e = 0.5 * (low + high), 0.5 * (high - low) * (1.0 + 8.0 * EPS) + slack
     return Taylor(scale * c, scale * np.stack([gx, gy]), scale * e * (1.0 + 8.0 * EPS))
