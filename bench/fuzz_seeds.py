@@ -157,6 +157,65 @@ def _frt(_: Path) -> Seeds:
     return [(_DATA / "frt-2.frt").read_bytes()]
 
 
+def _hdf5(folder: Path) -> Seeds:
+    import h5py  # type: ignore[import-untyped]  # it has no types
+
+    with h5py.File(folder / "seed.h5", "w") as file:
+        file["heights"] = _heights()
+    return [(folder / "seed.h5").read_bytes()]
+
+
+def _matlab(folder: Path) -> Seeds:
+    from scipy.io import savemat
+
+    seeds = []
+    for packed in (False, True):
+        savemat(str(folder / "seed.mat"), {"heights": _heights()}, do_compression=packed)
+        seeds.append((folder / "seed.mat").read_bytes())
+    return seeds
+
+
+def _gwyddion(_: Path) -> Seeds:
+    def field(name: str, kind: bytes, content: bytes) -> bytes:
+        return name.encode() + b"\0" + kind + content
+
+    def made(name: str, *fields: bytes) -> bytes:
+        content = b"".join(fields)
+        return name.encode() + b"\0" + struct.pack("<I", len(content)) + content
+
+    heights = _heights()
+    rows, columns = heights.shape
+    data = made(
+        "GwyDataField",
+        field("xres", b"i", struct.pack("<i", columns)),
+        field("yres", b"i", struct.pack("<i", rows)),
+        field("xreal", b"d", struct.pack("<d", 1e-6 * columns)),
+        field("yreal", b"d", struct.pack("<d", 1e-6 * rows)),
+        field("si_unit_xy", b"o", made("GwySIUnit", field("unitstr", b"s", b"m\0"))),
+        field("si_unit_z", b"o", made("GwySIUnit", field("unitstr", b"s", b"m\0"))),
+        field("data", b"D", struct.pack("<I", heights.size) + (1e-9 * heights).tobytes()),
+    )
+    title = field("/0/data/title", b"s", b"Height\0")
+    return [b"GWYP" + made("GwyContainer", field("/0/data", b"o", data), title)]
+
+
+_MARKS = (
+    *(b"AliconaImaging\0\r\n", b"fileformat = bcrstm\r\n", b"[DataSet]\r\n", b"FRTM_GLIDERV1.00"),
+    *(b"GWYP", b"MATLAB 5.0 MAT-file", b"VCA DATA\x01\0\0\x55", b"OmniSurf3D", b"[p3dlin]"),
+    *(b"CDF\x01", b"Binary TrueMap Data File v2.0", b"WSxM file copyright", b"DIGITAL SURF"),
+    *(b"\x89HDF\r\n\x1a\n", b"KPK0", b"VK4_", b"VK6\0", b"\x01\xb2\xff\xff", b"\x00\x05"),
+    *(b"DSCOMPRESSED", b"\x88\x1b\x03\x6f"),
+)
+
+
+def _marks(_: Path) -> Seeds:
+    """No files at all: the first bytes of instruments' formats, then whatever comes."""
+    rng = random.Random("marks")
+    return [mark + rng.randbytes(800 - len(mark)) for mark in _MARKS] + [
+        mark + bytes(rng.choice((0, 0, 0, 1, 8, 255)) for _ in range(800)) for mark in _MARKS
+    ]
+
+
 def _archive(_: Path) -> Seeds:
     """Zip archives that are no X3P."""
     seeds = []
@@ -184,16 +243,26 @@ SEEDS: dict[str, Callable[[Path], Seeds]] = {
     "stl-text": _stl_text,
     "obj": _obj,
     "frt": _frt,
+    "hdf5": _hdf5,
+    "matlab": _matlab,
+    "gwyddion": _gwyddion,
+    "marks": _marks,
     "archive": _archive,
 }
 OPTIONS: dict[str, dict[str, Any]] = {
-    name: {"unit": "mm"} for name in ("stl-binary", "stl-text", "obj")
+    name: {"unit": "mm"} for name in ("stl-binary", "stl-text", "obj", "hdf5", "matlab")
 }
 
 
 def available() -> list[str]:
     """Return the readers that can be fuzzed here: the FRT file is not part of the project."""
-    return [name for name in SEEDS if name != "frt" or (_DATA / "frt-2.frt").exists()]
+    extra = ("frt", "hdf5", "matlab", "gwyddion", "marks")
+    there = importlib.util.find_spec("SurfaceTopography") is not None
+    return [
+        name
+        for name in SEEDS
+        if (there or name not in extra) and (name != "frt" or (_DATA / "frt-2.frt").exists())
+    ]
 
 
 def repaired(reader: str, whole: bytes, content: bytes, rng: random.Random) -> bytes:

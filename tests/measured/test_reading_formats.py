@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from asperity.errors import ParameterError, SurfaceFileError
-from asperity.measured.reading import RawSurface, instruments, read_surface
+from asperity.measured.reading import RawSurface, child, instruments, read_surface, registry
 
 sys.path.insert(0, str(Path(__file__).parent))
 from image_writer import write_tiff
@@ -88,6 +88,13 @@ class Library:
         pass
 
 
+def install(monkeypatch: pytest.MonkeyPatch, library: Library) -> None:
+    """Put a library in place, which is known to this process only: files are read here."""
+    monkeypatch.setattr(instruments, "_library", lambda: library)
+    monkeypatch.setattr(registry, "has_library", lambda: True)
+    monkeypatch.setattr(child, "call", lambda read, file, options: read(file, options))
+
+
 def file(tmp_path: Path) -> Path:
     path = tmp_path / "scan.bin"
     path.write_bytes(b"MADE UP\0" + bytes(200))
@@ -97,7 +104,7 @@ def file(tmp_path: Path) -> Path:
 def read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *channels: Channel, **options: Any
 ) -> RawSurface:
-    monkeypatch.setattr(instruments, "_library", lambda: Library(*channels))
+    install(monkeypatch, Library(*channels))
     return read_surface(file(tmp_path), **options)
 
 
@@ -174,7 +181,7 @@ def test_a_file_without_a_height_channel_is_left_to_the_next_reader(
     phase = Channel(0, "Phase", data_kind=Kind("phase"))
     library = Library(phase)
     library.readers = [library, Library(Channel(0, "Height"))]
-    monkeypatch.setattr(instruments, "_library", lambda: library)
+    install(monkeypatch, library)
     assert read_surface(file(tmp_path)).heights.shape == (2, 3)
     library.readers = [library, Library(fault=ValueError("not mine"))]
     with pytest.raises(SurfaceFileError, match="damaged"):
@@ -214,7 +221,7 @@ def test_what_cannot_be_a_surface(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def test_a_reader_that_fails_is_reported_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: Exception
 ) -> None:
-    monkeypatch.setattr(instruments, "_library", lambda: Library(fault=fault))
+    install(monkeypatch, Library(fault=fault))
     with pytest.raises(SurfaceFileError, match=r"scan\.bin: Made-up scanner file, damaged") as got:
         read_surface(file(tmp_path))
     assert "\n" not in str(got.value)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import ParameterError, SurfaceFileError
+from asperity.measured.reading.child import in_child
 from asperity.measured.reading.mesh_raster import Grid, rasterise
 from asperity.measured.reading.quiet import guarded
 from asperity.measured.reading.raw import RawSurface
@@ -68,26 +69,40 @@ def mesh_reader(kind: str) -> Reader:
     or folded is refused.
     """
 
-    @naming
-    def read(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
+    def read(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
         if options.metres is None:
             raise ParameterError(
                 "unit",
                 f"is required: {file.name} is an {kind} file, which has no unit; say what its"
                 " coordinates are in, such as 'mm'",
             )
-        return _surface(_corners(file.content, kind) * options.metres, file.name)
+        binary = kind == "STL" and _is_binary_stl(file.content)
+        return (_read_binary if binary else read_mesh_text)(file, options)
 
     return Reader(f"an {kind} mesh", lambda file: mesh_kind(file.content) == kind, read, ("unit",))
 
 
-def _corners(content: bytes, kind: str) -> NDArray[np.float64]:
+@naming
+def _read_binary(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
+    return _surface(_binary_stl(file.content) * (options.metres or 1.0), file.name)
+
+
+@in_child
+@naming
+def read_mesh_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
+    """Read an OBJ or an STL in text, which trimesh parses."""
+    content = file.content
+    triangles = _parsed(content, mesh_kind(content) or "STL")
+    return _surface(_finite(triangles) * (options.metres or 1.0), file.name)
+
+
+def _binary_stl(content: bytes) -> NDArray[np.float64]:
     """Return the corners of the triangles, shape (n, 3, 3); the normals in the file are ignored."""
-    if kind == "STL" and _is_binary_stl(content):
-        record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
-        triangles = np.frombuffer(content, record, offset=_STL_HEADER)["corners"]
-    else:
-        triangles = _parsed(content, kind)
+    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+    return _finite(np.frombuffer(content, record, offset=_STL_HEADER)["corners"])
+
+
+def _finite(triangles: NDArray[Any]) -> NDArray[np.float64]:
     with np.errstate(invalid="ignore"):  # what is no number is refused below
         corners = triangles.astype(np.float64)
     if not np.isfinite(corners).all():

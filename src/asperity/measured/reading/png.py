@@ -120,7 +120,9 @@ def _chunks(content: bytes) -> Iterator[tuple[bytes, bytes]]:
         data = content[at + 8 : at + 8 + length]
         if len(data) < length or at + 12 + length > len(content):
             raise SurfaceFileError("truncated PNG image")
-        if zlib.crc32(data, zlib.crc32(kind)) != int.from_bytes(content[at + 8 + length :][:4]):
+        if zlib.crc32(data, zlib.crc32(kind)) != int.from_bytes(
+            content[at + 8 + length : at + 12 + length]
+        ):
             raise SurfaceFileError(f"damaged PNG image (checksum of {kind.decode('latin-1')!r})")
         yield kind, data
         if kind == b"IEND":

@@ -9,7 +9,7 @@ The readers that asperity brings.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from importlib.metadata import EntryPoint, entry_points
 
@@ -24,37 +24,36 @@ from asperity.measured.reading.foreign import (
     refuse_foreign,
     too_large,
 )
-from asperity.measured.reading.image import Pixels, surface_of_pixels
-from asperity.measured.reading.instruments import read_instrument
+from asperity.measured.reading.image import surface_of_pixels
+from asperity.measured.reading.instruments import has_library, read_instrument
 from asperity.measured.reading.mesh import mesh_reader
 from asperity.measured.reading.png import PNG_MAGIC, read_png
 from asperity.measured.reading.raw import RawSurface
 from asperity.measured.reading.reader import Reader, ReadingOptions, SurfaceFile, naming
 from asperity.measured.reading.sdf import is_sdf, read_sdf
 from asperity.measured.reading.text import read_text
-from asperity.measured.reading.tiff import TIFF_MAGIC, is_instrument_tiff, read_tiff
+from asperity.measured.reading.tiff import TIFF_MAGIC, read_tiff_image
 from asperity.measured.reading.x3p import read_x3p
 
 _MOST_TEXT = 5 * 10**8  # numbers in text take several times their size while they are read
 
 
-def _image(
-    name: str, is_one: Callable[[SurfaceFile], bool], decode: Callable[[bytes], Pixels]
-) -> Reader:
-    @naming
-    def read(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
-        integrate = options.integrate_normals
-        return surface_of_pixels(decode(file.content), file.name, integrate_normals=integrate)
-
-    return Reader(name, is_one, read, ("integrate_normals",))
+@naming
+def _read_png(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
+    integrate = options.integrate_normals
+    return surface_of_pixels(read_png(file.content), file.name, integrate_normals=integrate)
 
 
 def _is_x3p(file: SurfaceFile) -> bool:
     return file.head.startswith(ZIP_MAGIC) and archive_kind(file.path) == "X3P"
 
 
-def _is_picture(file: SurfaceFile) -> bool:
-    return file.head.startswith(TIFF_MAGIC) and not is_instrument_tiff(file.content)
+def _is_png(file: SurfaceFile) -> bool:
+    return file.head.startswith(PNG_MAGIC)
+
+
+def _is_tiff(file: SurfaceFile) -> bool:
+    return file.head.startswith(TIFF_MAGIC)
 
 
 def _read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
@@ -67,8 +66,8 @@ def _read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
 MARKED = (
     Reader("an X3P file", _is_x3p, read_x3p),
     Reader("an NPY file", lambda file: file.head.startswith(NPY_MAGIC), read_npy, ("unit",)),
-    _image("a PNG image", lambda file: file.head.startswith(PNG_MAGIC), read_png),
-    _image("a TIFF image", _is_picture, read_tiff),
+    Reader("a PNG image", _is_png, _read_png, ("integrate_normals",)),
+    Reader("a TIFF image", _is_tiff, read_tiff_image, ("integrate_normals",)),
     Reader("an SDF file", lambda file: is_sdf(file.head), read_sdf),
     mesh_reader("STL"),
     mesh_reader("OBJ"),
@@ -81,7 +80,11 @@ LAST = (
     Reader("a file of another kind", is_foreign, refuse_foreign),
     Reader("a text file", lambda file: file.is_text, _read_text, _OF_TEXT, certain=False),
     Reader(
-        "an instrument's file", lambda _: True, read_instrument, ("channel", "unit"), certain=False
+        "an instrument's file",
+        lambda _: has_library(),
+        read_instrument,
+        ("channel", "unit"),
+        certain=False,
     ),
 )
 """Those that take what is left, or refuse it."""

@@ -12,8 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import SurfaceFileError
-from asperity.measured.reading.image import Pixels, check_size
+from asperity.measured.reading.child import in_child
+from asperity.measured.reading.image import Pixels, check_size, surface_of_pixels
 from asperity.measured.reading.quiet import guarded, quiet_log
+from asperity.measured.reading.raw import RawSurface
+from asperity.measured.reading.reader import ReadingOptions, SurfaceFile, naming
 
 TIFF_MAGIC = (b"II*\x00", b"MM\x00*", b"II+\x00", b"MM\x00+")
 _INFLATION = 2000  # no compression that is read packs more bytes into one
@@ -21,6 +24,16 @@ _MINISWHITE, _RGB, _PALETTE = 0, 2, 3
 _GREY = (0, 1)
 _REDUCED, _MASK = 1, 4
 _NODATA = 42113  # GDAL's tag for the value of a missing point
+
+
+@in_child
+@naming
+def read_tiff_image(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
+    """Read the heights of a TIFF, but of an instrument's, which is left to another reader."""
+    content, integrate = file.content, options.integrate_normals
+    if is_instrument_tiff(content):
+        return None
+    return surface_of_pixels(read_tiff(content), file.name, integrate_normals=integrate)
 
 
 def read_tiff(content: bytes) -> Pixels:

@@ -1,0 +1,202 @@
+"""Readers in a process of their own: what they find comes back, and they are stopped in time."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.errors import ParameterError, SurfaceFileError
+from asperity.measured.reading import RawSurface, ReadingOptions, SurfaceFile, child
+
+READERS = '''
+"""Readers as third-party libraries may be."""
+
+import ctypes
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+
+from asperity.errors import ParameterError, SurfaceFileError
+from asperity.measured.reading import RawSurface
+from asperity.measured.reading.child import in_child
+
+HEIGHTS = np.array([[1.0, np.nan, 3.0], [4.0, 5.0, 6.0]])
+
+
+@in_child
+def sound(file, options):
+    print("a library prints")
+    notes = (options.unit, f"{options.channel}", file.head.decode())
+    return RawSurface(HEIGHTS, (1e-6, 2e-6), file.name, notes, has_units=False, relative=True)
+
+
+@in_child
+def nothing(file, options):
+    return None
+
+
+@in_child
+def refusing(file, options):
+    raise SurfaceFileError(f"{file.name}: no surface")
+
+
+@in_child
+def asking(file, options):
+    raise ParameterError("channel", "must be given", 3)
+
+
+@in_child
+def gone(file, options):
+    file.path.unlink()
+    return file.content
+
+
+@in_child
+def looping(file, options):
+    Path(file.path.with_name("pid")).write_text(str(os.getpid()))
+    while True:
+        pass
+
+
+@in_child
+def sleeping(file, options):
+    time.sleep(1000)
+
+
+@in_child
+def hungry(file, options):
+    held = []
+    while True:
+        held.append(np.ones(2**20))
+
+
+@in_child
+def crashing(file, options):
+    ctypes.string_at(0)
+
+
+@in_child
+def faulty(file, options):
+    return {}["nothing"]
+'''
+
+
+@pytest.fixture(scope="module")
+def readers(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    folder = tmp_path_factory.mktemp("hostile")
+    (folder / "hostile_readers.py").write_text(READERS)
+    sys.path.insert(0, str(folder))
+    try:
+        import hostile_readers  # type: ignore[import-not-found]  # written one line above
+
+        yield hostile_readers
+    finally:
+        sys.path.remove(str(folder))
+        sys.modules.pop("hostile_readers", None)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> SurfaceFile:
+    path = tmp_path / "ä file.dat"
+    path.write_bytes(b"head")
+    return SurfaceFile(path, b"head")
+
+
+def test_what_is_found_comes_back_as_it_is(readers: Any, file: SurfaceFile) -> None:
+    raw = readers.sound(file, ReadingOptions(unit="mm", channel=np.int64(2)))  # type: ignore[arg-type]  # as users have it
+    assert isinstance(raw, RawSurface)
+    np.testing.assert_array_equal(raw.heights, readers.HEIGHTS)
+    assert (raw.pitch, raw.source) == ((1e-6, 2e-6), file.name)
+    assert raw.notes == ("mm", "2", "head")
+    assert (raw.has_units, raw.relative, raw.per_pitch) == (False, True, False)
+    assert readers.nothing(file, ReadingOptions()) is None
+
+
+def test_errors_come_back_as_they_are(readers: Any, file: SurfaceFile) -> None:
+    with pytest.raises(SurfaceFileError, match=r"^ä file\.dat: no surface$"):
+        readers.refusing(file, ReadingOptions())
+    with pytest.raises(ParameterError, match=r"^channel must be given, got 3$") as caught:
+        readers.asking(file, ReadingOptions())
+    assert caught.value.argument == "channel"
+    with pytest.raises(SurfaceFileError, match=r"ä file\.dat ends its reader with code 1"):
+        readers.faulty(file, ReadingOptions())
+    with pytest.raises(OSError, match="No such file"):
+        readers.gone(file, ReadingOptions())
+
+
+@pytest.mark.parametrize(
+    ("name", "match"),
+    [
+        ("looping", r"^ä file\.dat takes more than 3 s to be read.*save the heights in another"),
+        ("sleeping", r"^ä file\.dat takes more than 3 s to be read"),
+        ("hungry", r"^ä file\.dat takes more than 0\.3 GB to be read.*MEMORY of asperity\."),
+        ("crashing", r"^ä file\.dat ends its reader with signal SIGSEGV: damaged"),
+    ],
+)
+def test_a_hostile_reader_is_stopped(
+    readers: Any, file: SurfaceFile, monkeypatch: pytest.MonkeyPatch, name: str, match: str
+) -> None:
+    monkeypatch.setattr(child, "SECONDS", 3.0 if name in {"looping", "sleeping"} else 20.0)
+    monkeypatch.setattr(child, "MEMORY", 3 * 10**8)
+    before = time.monotonic()
+    with pytest.raises(SurfaceFileError, match=match):
+        getattr(readers, name)(file, ReadingOptions())
+    assert time.monotonic() - before < 21.0
+
+
+def test_the_time_of_the_processor_is_limited_too(
+    readers: Any, file: SurfaceFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where nobody waits any more, as after the death of the parent, the system ends a loop."""
+    own = subprocess.Popen.wait
+    monkeypatch.setattr(subprocess.Popen, "wait", lambda self, _=None: own(self, 60.0))
+    monkeypatch.setattr(child, "SECONDS", 2.0)
+    with pytest.raises(SurfaceFileError, match="takes more than 2 s"):
+        readers.looping(file, ReadingOptions())
+
+
+def until(condition: Callable[[], bool]) -> bool:
+    end = time.monotonic() + 20.0
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(0.05)
+    return True
+
+
+def running(process: int) -> bool:
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except FileNotFoundError:
+        return False
+    return state not in "ZX"
+
+
+@pytest.mark.usefixtures("readers")
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_a_child_ends_with_its_parent(file: SurfaceFile, end: signal.Signals) -> None:
+    program = (
+        f"import sys, pathlib; sys.path[:] = {sys.path!r}; import hostile_readers as r;"
+        "from asperity.measured.reading import ReadingOptions, SurfaceFile;"
+        f"r.looping(SurfaceFile(pathlib.Path({str(file.path)!r}), b''), ReadingOptions())"
+    )
+    parent = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.DEVNULL)
+    said = file.path.with_name("pid")
+    assert until(lambda: said.exists() and said.read_text() != "")
+    process = int(said.read_text())
+    assert running(process)
+    os.kill(parent.pid, end)
+    parent.wait(20)
+    assert until(lambda: not running(process))
