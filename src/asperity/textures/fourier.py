@@ -16,7 +16,7 @@ from asperity.errors import ParameterError
 from asperity.textures.cells.lines import Pieces, wave_pieces
 from asperity.textures.cells.waves import WaveCells
 from asperity.textures.domain import Domain, ScanLine
-from asperity.textures.plane_waves import PlaneWaves
+from asperity.textures.plane_waves import PlaneWaves, check_bend
 from asperity.textures.samplers.fourier import FourierArguments
 from asperity.textures.texture import ExactHeight, Texture
 
@@ -60,6 +60,9 @@ class Fourier(Texture):
         self.wavevectors = array("wavevectors", wavevectors, (count, 2), "rad/m").copy()
         if not self.wavevectors.any(axis=1).all():
             raise ParameterError("wavevectors", "must not contain a vector of length zero")
+        with np.errstate(over="ignore"):
+            bend = float(np.abs(self.amplitudes) @ np.hypot(*self.wavevectors.T) ** 2)
+        check_bend("amplitudes", bend, "wavevectors")
         given = np.zeros(count) if phases is None else phases
         self.phases = array("phases", given, (count,), "rad").copy()
 

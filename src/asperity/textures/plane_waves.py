@@ -14,6 +14,9 @@ from typing import Protocol
 import numpy as np
 
 from asperity.checks import FloatArray
+from asperity.errors import ParameterError
+
+_LEAST_BEND, _MOST_BEND = 1e-30, 1e30
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,3 +178,19 @@ def _shorten(basis: FloatArray, multiples: FloatArray) -> tuple[FloatArray, Floa
         b = b - factor * a
     short = np.array([a, b])
     return short, np.round(multiples @ basis @ np.linalg.inv(short))
+
+
+def check_bend(name: str, bend: float, other: str) -> None:
+    """Refuse waves whose greatest curvature leaves no digits, and no search of a number ends.
+
+    Args:
+        name: of the argument that gives the heights, for the message.
+        bend: greatest curvature, the sum of a |k|² [1/m].
+        other: name of the argument that gives the wavelengths.
+
+    Raises:
+        ParameterError: for a curvature beyond 1e±30; flat is flat.
+    """
+    if bend and not _LEAST_BEND <= bend <= _MOST_BEND:
+        limits = f"must be {_LEAST_BEND:g}/m to {_MOST_BEND:g}/m"
+        raise ParameterError(name, f"and {other} make a curvature of {bend:.3g}/m, which {limits}")

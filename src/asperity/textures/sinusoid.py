@@ -16,7 +16,7 @@ from asperity.errors import ParameterError
 from asperity.textures.cells.lines import Pieces, wave_pieces
 from asperity.textures.cells.waves import WaveCells
 from asperity.textures.domain import Domain, ScanLine
-from asperity.textures.plane_waves import PlaneWaves, SingleWave
+from asperity.textures.plane_waves import PlaneWaves, SingleWave, check_bend
 from asperity.textures.samplers.sinusoid import SinusoidArguments
 from asperity.textures.texture import ExactHeight, Texture
 
@@ -54,6 +54,8 @@ class Sinusoid(Texture):
     ) -> None:
         self.amplitude = positive("amplitude", amplitude, "m")
         self.period = positive("period", period, "m")
+        wave = 2.0 * math.pi / self.period
+        check_bend("amplitude", self.amplitude * wave * wave, "period")
         self.phase = real("phase", phase, "rad")
         vector = array("direction", direction, (2,), "1")
         length = math.hypot(*vector)

@@ -11,11 +11,14 @@ from asperity.analysis.energy.anchor import Stretch, anchored_stretches
 from asperity.checks import FloatArray, array
 from asperity.errors import ParameterError
 from asperity.surface import Surface
+from asperity.units import engineering
 
 DEFAULT_TOLERANCE = 1e-13
 # A panel that holds a jump is halved until it is this short; what it adds is then negligible.
 _DEEPEST = 52
 _MOST_PANELS = 4096
+# Panels at once: some 200 MB, and seconds. Of a loop around a map of 2048 nodes there are 35 000.
+_MOST_AT_ONCE = 200_000
 # From so many edges on each of them is short.
 _MANY_EDGES = 64
 
@@ -84,6 +87,7 @@ def _field_work(
     """Return the work along all edges together: one quadrature of panels of all of them."""
     along = ends - starts
     counts = [_panels(float(length), wave, len(along)) for length in np.linalg.norm(along, axis=1)]
+    _refuse_work(sum(counts), surface, wave)
     edge = np.repeat(np.arange(len(along)), counts)
     first = np.concatenate([np.arange(count) for count in counts])
     parts = np.repeat(1.0 / np.array(counts), counts)
@@ -96,6 +100,23 @@ def _field_work(
         return np.asarray(np.einsum("ni,ni->n", surface.force(points), along[which]))
 
     return _adaptive(integrand, left, width, tolerance)
+
+
+def _refuse_work(panels: int, surface: Surface, wave: float) -> None:
+    """Refuse a loop that is long beside what the height does, before there are arrays.
+
+    Raises:
+        ParameterError: if it takes too many panels.
+    """
+    if panels <= _MOST_AT_ONCE:
+        return
+    depth, slope = engineering(surface.max_depth, "m"), surface.texture.bounds[0]
+    raise ParameterError(
+        "surface",
+        f"is too steep for its leak, slopes up to {slope:.2g}: a loop down to {depth} turns every "
+        f"{engineering(wave, 'm')}; give less amplitude (rms, height) or max_depth, or a longer "
+        "period (cutoff, pitch)",
+    )
 
 
 def smooth_panels(surface: Surface, length: float) -> int:

@@ -1,0 +1,55 @@
+"""Every kind with extreme arguments: refused, or answered soon and in little memory."""
+
+from __future__ import annotations
+
+import resource
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+
+import pytest
+
+from asperity.analysis.compare import compare
+from asperity.errors import ParameterError
+from asperity.scene import load_scene
+from asperity.textures.catalogue import CATALOGUE
+
+EXTREMES = ("1e-30", "1e30")
+WAVES = [
+    "sinusoid:amplitude=1m,period=1nm",
+    "sinusoid:amplitude=1e30,period=1e-30",
+    "sinusoid:amplitude=1um,period=1e-30",
+    "fourier:amplitudes=1e30,wavevectors=1e30 0",
+    "fourier:amplitudes=1e-30,wavevectors=1e-30 0",
+    "fourier:amplitudes=1,wavevectors=1e10 0",
+    "fourier:amplitudes=1,wavevectors=1e10 1e3; 1 1e10",
+]
+
+
+def _specifications() -> Iterator[str]:
+    yield from WAVES
+    for name, kind in CATALOGUE.items():
+        if name == "fourier":
+            continue
+        for argument in kind.arguments:
+            for value in EXTREMES if argument.form in {"quantity", "pair", "integer"} else ():
+                given = {**(kind.example or {}), argument.name: value}
+                yield f"{name}:" + ",".join(f"{key}={text}" for key, text in given.items())
+
+
+# Heights of 1e30 m overflow here and there: what counts is that it ends.
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("specification", list(_specifications()))
+def test_extreme_arguments_end_soon(specification: str) -> None:
+    begin, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with suppress(ParameterError):
+        compare(load_scene(specification).texture, laws="A")
+    assert time.process_time() - begin < 20.0
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 1_000_000  # kilobytes
+
+
+def test_a_wave_too_steep_for_a_loop_is_named() -> None:
+    with pytest.raises(ParameterError, match=r"too steep for its leak.*amplitude.*period"):
+        compare(load_scene(WAVES[0]).texture, laws="A")
+    with pytest.raises(ParameterError, match="amplitudes and wavevectors make a curvature"):
+        load_scene("fourier:amplitudes=1e30,wavevectors=1e30 0")
