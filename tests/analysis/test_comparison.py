@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.analysis.words.comparison import limit_text
 from asperity.devices import parse_device
 from asperity.errors import ParameterError
 from asperity.laws import Law
+from asperity.report.words.number_words import limit_text
 
 PAPER = asp.Sinusoid(amplitude=0.8e-3, period=1e-3)
 
