@@ -7,6 +7,7 @@ reference pages follow from the declaration.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +29,7 @@ Form = Literal[
     "direction",  # x, y, or two numbers "1,0.5"
     "integer",  # a whole number
     "switch",  # true or false
+    "size",  # of memory, "4GB"
     "channel",  # a name, or a number counted from 0
     "text",
     "path",  # of a file; in a scene relative to it
@@ -221,6 +223,15 @@ MAX_DEPTH = Argument(
     example="0.5mm",
 )
 
+MEMORY = Argument(
+    "memory",
+    "that may be used, an estimate made before there are arrays",
+    "B",
+    default_words="what the machine has free",
+    form="size",
+    example="4GB",
+)
+
 
 # --- how each form is read: the argument's name, text, number or list, and the unit ---------------
 
@@ -290,6 +301,14 @@ def _integer(name: str, given: Any, _unit: str) -> int:
     return round(number)
 
 
+def _size(name: str, given: Any, _unit: str) -> int:
+    match = re.fullmatch(r"\s*(\d{1,15}(?:\.\d{1,6})?)\s*([kMGT]?)(i?)B?\s*", str(given))
+    if match is None:
+        raise ParameterError(name, "must be a size such as '4GB', '500MB' or '2GiB'", given)
+    number, prefix, binary = match.groups()
+    return int(float(number) * (1024.0 if binary else 1000.0) ** " kMGT".index(prefix or " "))
+
+
 def _switch(name: str, given: Any, _unit: str) -> bool:
     words = {"yes": True, "true": True, "no": False, "false": False}
     word = str(given).strip().lower()
@@ -322,6 +341,7 @@ _READERS: dict[Form, Callable[[str, Any, str], Any]] = {
     "direction": _direction,
     "integer": _integer,
     "switch": _switch,
+    "size": _size,
     "channel": _channel,
     "text": _text,
     "path": _text,

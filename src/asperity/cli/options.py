@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from asperity.arguments import MAX_DEPTH, STIFFNESS, Argument
+from asperity.arguments import MAX_DEPTH, MEMORY, STIFFNESS, Argument
 from asperity.cli.own_code import load_own_code
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError, nearest_names
 from asperity.laws import LAW_ARGUMENTS, Law, find_law, find_laws, known_arguments
 from asperity.measured.arguments import FILE_ARGUMENTS
+from asperity.memory import limited
 
 if TYPE_CHECKING:
     from asperity.textures import Texture
@@ -141,7 +142,20 @@ def law_options(arguments: Iterable[Argument] = LAW_OPTIONS) -> Callable[[Comman
     return decorate
 
 
-file_options = options(FILE_ARGUMENTS)
+def _limit(context: click.Context, _option: click.Parameter, text: str | None) -> None:
+    """Limit the memory of surfaces until the command ends."""
+    size = None if text is None else MEMORY.read(text)
+    context.with_resource(limited(str(context.command.name), size))
+
+
+_memory_option = click.option(
+    "--memory", metavar="SIZE", expose_value=False, callback=_limit, help=help_of(MEMORY)
+)
+
+
+def file_options(command: Command) -> Command:
+    """Add the options of a measured file, and of the memory that it may take."""
+    return options(FILE_ARGUMENTS)(_memory_option(command))
 
 
 def file_values(values: Mapping[str, Any]) -> dict[str, Any]:

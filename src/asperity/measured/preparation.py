@@ -22,6 +22,7 @@ from asperity.measured.outliers import remove_outliers
 from asperity.measured.prepared import Prepared
 from asperity.measured.reading.raw import RawSurface
 from asperity.measured.stylus import apply_tip, check_radius
+from asperity.memory import reserve
 
 __all__ = ["ALPHA", "STAGES", "Prepared", "gaussian_filter", "magnified", "prepare"]
 
@@ -94,6 +95,7 @@ def prepare(  # noqa: D417 - the others are described where they are declared
     _factors(magnify, magnify_height)
     cutoffs = find_cutoffs(raw.heights.shape, lateral, cutoff, l_cutoff)
     _check_early(raw.heights.shape, lateral, tip_radius, periodic, blend)
+    reserve(*raw.heights.shape[::-1])
     begin("outliers")
     heights = np.array(raw.heights, dtype=np.float64)
     if outliers is not None:

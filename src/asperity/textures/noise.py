@@ -11,6 +11,7 @@ import numpy as np
 from asperity.arguments import SEED, Argument, whole
 from asperity.checks import fraction, positive
 from asperity.errors import ParameterError
+from asperity.memory import reserve
 from asperity.textures.heightmap import HeightMap
 from asperity.textures.profile import Profile
 from asperity.textures.spline import LEAST_NODES, Spline
@@ -65,6 +66,7 @@ class _SelfAffine(Spline):
             advice = "give a smaller size, or a longer cut-off and pitch"
             raise ParameterError("size", f"{short}: {advice}")
         counts = tuple(max(math.ceil(count), LEAST_NODES) for count in wanted)
+        reserve(*counts)
         self.rolloff, self.cutoff = float(rolloff), cutoff
         # Power q^(-d-2H) is the square of the amplitude.
         band = Band(0.5 * len(sides) + self.hurst, self.rolloff, self.cutoff)

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from asperity.checks import FloatArray, array
 from asperity.errors import ParameterError
+from asperity.memory import reserve
 from asperity.textures.cells.lines import Pieces, spline_pieces
 from asperity.textures.cells.splines import SplineCells
 from asperity.textures.domain import Domain, ScanLine
@@ -130,6 +131,7 @@ def node_heights(heights: ArrayLike, axes: int) -> FloatArray:
     Raises:
         ParameterError: for heights that are not finite, or fewer than 4 along an axis.
     """
+    reserve(*np.shape(heights)[::-1])
     result = array("heights", heights, (None,) * axes, "m").copy()
     if min(result.shape) < LEAST_NODES:
         least, given = (" x ".join(map(str, n)) for n in ((LEAST_NODES,) * axes, result.shape))

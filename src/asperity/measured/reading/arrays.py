@@ -11,6 +11,7 @@ import numpy as np
 from asperity.errors import SurfaceFileError
 from asperity.measured.reading.raw import MAX_POINTS, RawSurface
 from asperity.measured.reading.reader import ReadingOptions, SurfaceFile, naming
+from asperity.memory import reserve
 
 NPY_MAGIC = b"\x93NUMPY"
 
@@ -70,3 +71,4 @@ def _check_array(array: np.ndarray[Any, np.dtype[Any]]) -> None:
         )
     if array.size > MAX_POINTS:
         raise SurfaceFileError(f"{array.size} points; at most {MAX_POINTS} are read")
+    reserve(*array.shape[::-1])

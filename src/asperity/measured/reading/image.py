@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from asperity.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading.normals import integrate, is_normal_map
 from asperity.measured.reading.raw import MAX_POINTS, RawSurface
+from asperity.memory import reserve
 
 _INTEGRATE = "integrate_normals"
 
@@ -40,6 +41,7 @@ def check_size(rows: int, columns: int) -> None:
         raise SurfaceFileError(f"{columns} x {rows} pixels")
     if rows * columns > MAX_POINTS:
         raise SurfaceFileError(f"{columns} x {rows} pixels; at most {MAX_POINTS} are read")
+    reserve(columns, rows)
 
 
 def surface_of_pixels(pixels: Pixels, name: str, *, integrate_normals: bool) -> RawSurface:

@@ -21,6 +21,7 @@ from asperity.errors import SurfaceFileError
 from asperity.measured.reading.numbers import parse_number
 from asperity.measured.reading.raw import MAX_POINTS, RawSurface
 from asperity.measured.reading.reader import ReadingOptions, SurfaceFile, naming
+from asperity.memory import reserve
 
 _TEXT = re.compile(
     rb"\s*a[A-Za-z0-9.\-]{2,15}[ \t]*\r*\n(?:[ \t]*(?:;[^\n]*)?\r*\n)*[ \t]*ManufacID\b"
@@ -108,6 +109,7 @@ def _checked(
         raise SurfaceFileError(f"NumPoints is {points}, NumProfiles {profiles}: both must be > 0")
     if points * profiles > MAX_POINTS:
         raise SurfaceFileError(f"{points} x {profiles} points; at most {MAX_POINTS} are read")
+    reserve(points, profiles)
     if code not in _TYPES:
         raise SurfaceFileError(f"DataType is {code}; 0 to 7 are defined")
     for key, value in options.items():

@@ -27,6 +27,7 @@ from asperity.measured.reading.text_header import (
     units_of,
 )
 from asperity.measured.reading.text_table import Table, find_table
+from asperity.memory import reserve
 
 _LEAST_POINTS = 4
 _LONGEST_HEADER = 1000
@@ -78,6 +79,7 @@ def _check_table(table: Table) -> None:
     rows, columns = table.values.shape
     if rows * columns > MAX_POINTS:
         raise SurfaceFileError(f"{rows * columns} numbers; at most {MAX_POINTS} are read")
+    reserve(columns, rows)
     if table.values.size < _LEAST_POINTS or (columns <= 2 and rows < _LEAST_POINTS):
         raise SurfaceFileError(
             f"{rows} rows of {columns} numbers; at least {_LEAST_POINTS} points are expected"

@@ -12,6 +12,7 @@ import numpy as np
 from asperity.errors import SurfaceFileError
 from asperity.measured.reading.numbers import parse_number
 from asperity.measured.reading.raw import MAX_POINTS
+from asperity.memory import reserve
 
 DTYPES = {"I": "<i2", "L": "<i4", "F": "<f4", "D": "<f8"}
 
@@ -211,6 +212,7 @@ def _shape(root: ET.Element, profile: bool) -> tuple[int, int]:
         raise SurfaceFileError(f"a profile (PRF) has SizeY 1, got {ny}")
     if nx * ny > MAX_POINTS:
         raise SurfaceFileError(f"{nx} x {ny} points; at most {MAX_POINTS} are read")
+    reserve(nx, ny)
     return ny, nx
 
 
