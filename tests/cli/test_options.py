@@ -97,4 +97,5 @@ def test_progress_is_shown_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -
             told(0.5)
             told(1.0, "writing")
         assert ("stroking" in stream.getvalue()) == shown
+        assert ("left:" in stream.getvalue()) == shown
         assert ("second part" in stream.getvalue()) == shown

@@ -19,6 +19,7 @@ from asperity.cli.options import (
     read_surface,
 )
 from asperity.cli.output import Outputs, output_options
+from asperity.cli.progress import step_bar
 
 if TYPE_CHECKING:
     from asperity.devices import Device
@@ -52,8 +53,11 @@ def command(surface: str, device: Device | None, outputs: Outputs, **values: Any
     """
     from asperity.analysis.check_limits import DEFAULT_LAW, limits
 
-    texture, known, arguments = read_surface(surface, device, values, law=DEFAULT_LAW)
-    result = limits(texture, known, **given(values, (_SPEED, *_SAMPLES)), **arguments)
+    with step_bar("reading the surface", 2) as step:
+        step("reading the surface")
+        texture, known, arguments = read_surface(surface, device, values, law=DEFAULT_LAW)
+        step("wave by wave")
+        result = limits(texture, known, **given(values, (_SPEED, *_SAMPLES)), **arguments)
 
     from asperity.report.limits import limits_page, print_limits
 

@@ -16,6 +16,7 @@ from asperity.cli.options import (
     law_options,
     surface_values,
 )
+from asperity.cli.progress import progress_bar
 from asperity.errors import ParameterError
 from asperity.laws import KNOWN_LAWS, Law, find_law
 
@@ -60,8 +61,10 @@ def read_setup(
     surface = surface_values(values)
     if laws:
         surface.setdefault("law", find_law("W"))
+    with progress_bar("reading the surface"):
+        scene = load_scene(source, file_values(values))
     return make_setup(
-        load_scene(source, file_values(values)),
+        scene,
         surface=surface,
         device=values["device"],
         duration=duration,

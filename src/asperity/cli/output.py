@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from asperity.cli.progress import progress_bar
 from asperity.errors import ParameterError, printable
 from asperity.files import is_device, json_text, write_text
 
@@ -59,7 +60,9 @@ class Outputs:
             from asperity.report.page import page_html
 
             matplotlib.rcdefaults()  # the page looks as it should, whatever the user's settings
-            write_output("html", self.html, page_html(page()))
+            with progress_bar("drawing the report"):
+                text = page_html(page())
+            write_output("html", self.html, text)
         if STANDARD_OUTPUT in {self.json, self.html}:
             return
         from rich.console import Console
