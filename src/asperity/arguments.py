@@ -320,7 +320,8 @@ def _switch(name: str, given: Any, _unit: str) -> bool:
 def _channel(name: str, given: Any, _unit: str) -> str | int:
     if isinstance(given, bool) or not isinstance(given, (str, int)):
         raise ParameterError(name, "must be a name or a whole number", given)
-    return int(given) if str(given).strip().isdecimal() else given
+    text = str(given).strip()
+    return int(text) if text.isdecimal() and len(text) < 10 else given
 
 
 def _text(name: str, given: Any, _unit: str) -> str:

@@ -18,6 +18,8 @@ from typing import IO, Any, ClassVar, overload
 
 from asperity.errors import ParameterError
 
+_MOST_DOTS = 10_000  # in a line of TOML
+
 
 def is_device(path: str | os.PathLike[str]) -> bool:
     """Return whether there is something that is no regular file (a pipe, a device, a folder)."""
@@ -65,7 +67,11 @@ def read_toml(name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
     try:
         with open_input(path, 2**22) as stream:
             # Editors of some systems put a mark of the encoding in front.
-            return tomllib.loads(stream.read().decode("utf-8-sig"))
+            text = stream.read().decode("utf-8-sig")
+        # A dotted key takes a time that grows with the square of its length.
+        if any(line.count(".") > _MOST_DOTS for line in text.splitlines()):
+            raise ParameterError(name, f"file {path} has a line with more than {_MOST_DOTS} dots")
+        return tomllib.loads(text)
     except OSError as error:
         reason = error.strerror or str(error)
         raise ParameterError(name, f"file {path} cannot be read: {reason}") from None

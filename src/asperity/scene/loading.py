@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -60,7 +61,7 @@ def load_scene(source: str, file_arguments: Mapping[str, Any] | None = None) -> 
     """
     extra = dict(file_arguments or {})
     match = re.match(r"([A-Za-z][\w-]+):", source)
-    if match and not Path(source).exists():
+    if match and not os.path.exists(source):
         _refuse_file_arguments(extra)
         return Scene(build_texture(match[1].lower(), _parse_arguments(source[match.end() :])))
     if source.lower().endswith(".toml"):

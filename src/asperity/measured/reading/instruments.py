@@ -166,8 +166,8 @@ def _chosen(reader: Any, name: str, channel: str | int | None) -> Any | None:
             "channel", f"must be given: {name} has {len(heights)} height channels: {names}"
         )
     matching = [c for c in heights if c.name == channel]
-    if not matching and str(channel).isdecimal():
-        matching = [c for c in heights if c.index == int(channel)]
+    if not matching:
+        matching = [c for c in heights if str(c.index) == str(channel)]
     if len(matching) != 1:
         raise ParameterError("channel", f"must be one of the height channels {names}", channel)
     return matching[0]

@@ -76,7 +76,7 @@ def find_table(text: str) -> Table:
         SurfaceFileError: no numbers, rows of different length, or text between the rows.
     """
     # Some instruments end a line with two carriage returns.
-    lines = re.split(r"\r*\n|\r", text)
+    lines = re.split(r"(?<!\r)\r*\n|\r", text)
     dialect = _dialect(lines)
     entries = _entries(lines, dialect)
     first, last = _longest_run(entries)
