@@ -1,4 +1,4 @@
-"""Every text of at most 100 kB is accepted or refused soon, by every parser there is."""
+"""Every text of at most 100 kB is accepted or refused within 1 s, by every parser there is."""
 
 from __future__ import annotations
 
@@ -25,9 +25,7 @@ from asperity.scene.sections import read_path
 from asperity.units import quantity
 
 LONGEST = 100_000  # [bytes]
-# Of the processor. One second is the goal, on a machine that rests; a loaded one takes up to three
-# times as long, and what this is to catch takes 8 s and more.
-SECONDS = 4.0
+SECONDS = 1.0  # of the processor, on a machine that has other work
 RANDOM = 8  # texts that are made of random pieces, for each beginning
 
 PIECES = (
@@ -137,19 +135,19 @@ def measured(parse: Callable[[str], object], beginnings: tuple[str, ...]) -> lis
 
 
 @pytest.mark.parametrize("name", PARSERS)
-def test_every_text_is_accepted_or_refused_soon(
+def test_every_text_is_accepted_or_refused_in_a_second(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     parse, beginnings = PARSERS[name]
-    with contextlib.suppress(AsperityError):
-        parse(beginnings[0])  # what is imported at the first call is no part of it
+    for beginning in beginnings:
+        with contextlib.suppress(AsperityError):
+            parse(beginning)  # what is imported at the first call is no part of it
     assert measured(parse, beginnings) == []
 
 
-def test_what_is_slow_or_no_refusal_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_slow_or_no_refusal_is_found() -> None:
     """Negative control: a search that is quadratic, and an error of somebody else's."""
-    monkeypatch.setitem(measured.__globals__, "SECONDS", 0.2)  # a fifth of what it takes, or less
     found = []
 
     def quadratic(text: str) -> object:

@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -239,26 +241,43 @@ MEMORY = Argument(
 def _split(given: Any, separator: str | None = ";") -> list[Any]:
     if isinstance(given, list):
         return given
+    if separator is None:
+        return str(given).split()
     return [part for part in str(given).split(separator) if part.strip()]
 
 
+def _each(name: str, parts: list[Any], unit: str) -> list[float]:
+    if set(map(type, parts)) == {str}:
+        # A list may be long, and most of its numbers are bare.
+        with suppress(ValueError):
+            numbers = list(map(float, parts))
+            if all(map(math.isfinite, numbers)):
+                return numbers
+    return [quantity(name, part, unit) for part in parts]
+
+
 def _quantities(name: str, given: Any, unit: str) -> list[float]:
-    return [quantity(name, part, unit) for part in _split(given)]
+    return _each(name, _split(given), unit)
 
 
 def _vector(name: str, given: Any, unit: str) -> list[float]:
-    return [quantity(name, part, unit) for part in _split(given, None)]
+    return _each(name, _split(given, None), unit)
 
 
 def _vectors(name: str, given: Any, unit: str) -> list[Any]:
-    rows = [_vector(name, row, unit) for row in _split(given)]
-    return [row[0] for row in rows] if all(len(row) == 1 for row in rows) else rows
+    rows = [_split(row, None) for row in _split(given)]
+    values = _each(name, list(chain(*rows)), unit)
+    if all(len(row) == 1 for row in rows):
+        return values
+    following = iter(values)
+    return [list(islice(following, len(row))) for row in rows]
 
 
 def _pair(name: str, given: Any, unit: str) -> float | list[float]:
-    values = _quantities(name, given, unit)
-    if len(values) not in {1, 2}:
+    parts = _split(given)
+    if len(parts) not in {1, 2}:
         raise ParameterError(name, "must be one quantity, or two for x and y: 'a; b'", given)
+    values = _each(name, parts, unit)
     return values[0] if len(values) == 1 else values
 
 

@@ -291,8 +291,7 @@ def _decimal(text: str) -> Decimal:
 def _cell(table: Table, text: str, column: int) -> str:
     if table.dialect.decimal == ",":
         text = text.replace(",", ".")
-    cell = table.dialect.cells(text)[column]
-    return re.sub(r"\s", "", cell)
+    return table.dialect.cells(text)[column]
 
 
 # A list that names fewer of its grid's points than one in so many is no grid.

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import re
+from array import array
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import SurfaceFileError
 
-_COMMENT = ("#", "%")
 _MISSING = frozenset(("", "nan", "na", "n/a", "null", "-", "--", "---", "*", "***"))
 _SAMPLE = 400
 
@@ -78,72 +79,80 @@ def find_table(text: str) -> Table:
     # Some instruments end a line with two carriage returns.
     lines = re.split(r"(?<!\r)\r*\n|\r", text)
     dialect = _dialect(lines)
-    entries = _entries(lines, dialect)
-    first, last = _longest_run(entries)
-    _check_neighbours(entries, first, last)
-    _check_text(entries, first, last, dialect)
-    rows = [entry for entry in entries[first:last] if entry.row is not None]
-    values = _drop_empty_columns(np.array([entry.row for entry in rows]))
+    blocks = _blocks(lines, dialect)
+    chosen = _longest(blocks)
+    _check_neighbours(blocks, chosen)
+    _check_text(blocks, chosen, dialect)
+    block = blocks[chosen]
     return Table(
-        values=values,
-        lines=[entry.number for entry in rows],
-        texts=[_uncommented(lines[entry.number - 1]) for entry in rows],
-        header=[lines[k].lstrip("#% \t") for k in range(entries[first].number - 1)],
-        footer=sum(entry.row is None for entry in entries[last:]),
+        values=_drop_empty_columns(np.array(block.values).reshape(-1, block.width)),
+        lines=block.numbers,
+        texts=block.texts,
+        header=[lines[k].lstrip("#% \t") for k in range(block.numbers[0] - 1)],
+        footer=sum(len(after.numbers) for after in blocks[chosen + 1 :]),
         dialect=dialect,
     )
 
 
-@dataclass(frozen=True)
-class _Entry:
-    """A line that is neither blank nor a comment; row is None where it is no row of numbers."""
+@dataclass
+class _Block:
+    """Lines that follow each other, rows of one length or text; neither blank nor comments.
 
-    number: int
-    text: str
-    row: NDArray[np.float64] | None
+    Attributes:
+        width: how many numbers each line has; 0 for text.
+        numbers: of the lines, from 1.
+        texts: the lines.
+        values: the numbers, line by line, NaN where missing.
+    """
+
+    width: int
+    numbers: list[int] = field(default_factory=list)
+    texts: list[str] = field(default_factory=list)
+    values: array[float] = field(default_factory=lambda: array("d"))
 
 
 def _uncommented(line: str) -> str:
     return line.partition("#")[0].rstrip()
 
 
-def _entries(lines: list[str], dialect: Dialect) -> list[_Entry]:
-    entries = []
+def _blocks(lines: list[str], dialect: Dialect) -> list[_Block]:
+    blocks: list[_Block] = []
     for number, line in enumerate(lines, 1):
         text = _uncommented(line)
-        if text.strip(" \t,;\f\x1a\ufeff") and not text.lstrip().startswith(_COMMENT):
-            entries.append(_Entry(number, text, _row(text, dialect)))
-    return entries
+        if not text.strip(" \t,;\f\x1a\ufeff") or text.lstrip().startswith("%"):
+            continue
+        row = _row(text, dialect)
+        if not blocks or blocks[-1].width != len(row):
+            blocks.append(_Block(len(row)))
+        block = blocks[-1]
+        block.numbers.append(number)
+        block.texts.append(text)
+        block.values.extend(row)
+    return blocks
 
 
-def _row(text: str, dialect: Dialect) -> NDArray[np.float64] | None:
-    """Return the numbers of a line, None where a cell is neither a number nor missing."""
+def _row(text: str, dialect: Dialect) -> list[float]:
+    """Return the numbers of a line, none where a cell is neither a number nor missing."""
     if "_" in text or not text.isascii():  # Python's float would accept 1_000 and ١
-        return None
+        return []
     if dialect.decimal == ",":
         if "." in text:
-            return None
+            return []
         text = text.replace(",", ".")
-    cells = dialect.cells(text)
+    cells = text.split(dialect.separator)
     try:
-        values = [float(cell) for cell in cells]
+        return list(map(float, cells))
     except ValueError:
-        return _row_with_missing(cells)
-    return np.array(values)
+        return _row_with_missing([cell.strip().lower() for cell in cells])
 
 
-def _row_with_missing(cells: list[str]) -> NDArray[np.float64] | None:
-    values = np.full(len(cells), np.nan)
-    numbers = 0
-    for k, cell in enumerate(cells):
-        if cell.lower() in _MISSING:
-            continue
-        try:
-            values[k] = float(cell)
-        except ValueError:
-            return None
-        numbers += 1
-    return values if numbers else None
+def _row_with_missing(cells: list[str]) -> list[float]:
+    if _MISSING.isdisjoint(cells) or _MISSING.issuperset(cells):
+        return []
+    try:
+        return [math.nan if cell in _MISSING else float(cell) for cell in cells]
+    except ValueError:
+        return []
 
 
 def _dialect(lines: list[str]) -> Dialect:
@@ -154,59 +163,42 @@ def _dialect(lines: list[str]) -> Dialect:
     best, most = _DIALECTS[0], 0
     for dialect in _DIALECTS:
         rows = (_row(line, dialect) for line in sample)
-        widths = Counter(len(row) for row in rows if row is not None)
+        widths = Counter(len(row) for row in rows if row)
         count = max(widths.values(), default=0)
         if count > most:
             best, most = dialect, count
     return best
 
 
-def _longest_run(entries: list[_Entry]) -> tuple[int, int]:
-    """Return the longest run of rows of one length, as entries[first:last]."""
-    best = (0, 0)
-    start = 0
-    for k, entry in enumerate(entries):
-        if entry.row is None:
-            start = k + 1
-        elif k > start and not _alike(entry, entries[k - 1]):
-            start = k
-        if entry.row is not None and k + 1 - start > best[1] - best[0]:
-            best = (start, k + 1)
-    if best == (0, 0):
+def _longest(blocks: list[_Block]) -> int:
+    """Return the index of the longest block of numbers."""
+    rows = [len(block.numbers) if block.width else 0 for block in blocks]
+    if not any(rows):
         raise SurfaceFileError("no row of numbers")
-    return best
+    return rows.index(max(rows))
 
 
-def _alike(a: _Entry, b: _Entry) -> bool:
-    return a.row is not None and b.row is not None and len(a.row) == len(b.row)
-
-
-def _check_neighbours(entries: list[_Entry], first: int, last: int) -> None:
+def _check_neighbours(blocks: list[_Block], chosen: int) -> None:
     """Refuse what would make the block a part of a longer table."""
-    inside = entries[first]
-    assert inside.row is not None
-    if first > 0:
-        before = entries[first - 1]
-        if before.row is not None:
-            raise _ragged(before, inside)
-    for k, entry in enumerate(entries[:first]):
-        if _alike(entry, inside) and len(inside.row) > 1:
-            text = next(e for e in entries[k:] if e.row is None)
-            raise _interrupted(text)
-    for k, entry in enumerate(entries[last:], last):
-        if entry.row is not None and k == last:
-            raise _ragged(entry, inside)
-        if entry.row is not None:
-            raise _interrupted(entries[last])
+    inside, after = blocks[chosen], blocks[chosen + 1 :]
+    if chosen > 0 and blocks[chosen - 1].width:
+        raise _ragged(blocks[chosen - 1], -1, inside)
+    for k, block in enumerate(blocks[:chosen]):
+        if block.width == inside.width > 1:
+            raise _interrupted(next(b for b in blocks[k:] if not b.width), 0)
+    if after and after[0].width:
+        raise _ragged(after[0], 0, inside)
+    if any(block.width for block in after):
+        raise _interrupted(after[0], 0)
 
 
-def _check_text(entries: list[_Entry], first: int, last: int, dialect: Dialect) -> None:
+def _check_text(blocks: list[_Block], chosen: int, dialect: Dialect) -> None:
     """Refuse a damaged first or last row, which would pass for a header or a footer."""
-    row = entries[first].row
-    assert row is not None
-    for k in (first - 1, last):
-        if 0 <= k < len(entries) and _is_damaged_row(entries[k].text, dialect, len(row)):
-            raise _interrupted(entries[k])
+    for k, line in ((chosen - 1, -1), (chosen + 1, 0)):
+        if 0 <= k < len(blocks) and _is_damaged_row(
+            blocks[k].texts[line], dialect, blocks[chosen].width
+        ):
+            raise _interrupted(blocks[k], line)
 
 
 def _is_damaged_row(text: str, dialect: Dialect, width: int) -> bool:
@@ -217,22 +209,20 @@ def _is_damaged_row(text: str, dialect: Dialect, width: int) -> bool:
     if not re.search(r"[^\W\d_]", text):  # digits without a letter
         return True
     named = [cell for cell in cells if cell]
-    numbers = [_row(cell, Dialect(None, dialect.decimal)) is not None for cell in named]
+    numbers = [_row(cell, Dialect(None, dialect.decimal)) != [] for cell in named]
     return numbers[0] and 2 * sum(numbers) >= len(named) > 1
 
 
-def _ragged(odd: _Entry, usual: _Entry) -> SurfaceFileError:
-    assert odd.row is not None
-    assert usual.row is not None
+def _ragged(odd: _Block, line: int, usual: _Block) -> SurfaceFileError:
     return SurfaceFileError(
-        f"line {odd.number} has {len(odd.row)} values where line {usual.number}"
-        f" has {len(usual.row)}: every row must have the same number of values"
+        f"line {odd.numbers[line]} has {odd.width} values where line {usual.numbers[0]}"
+        f" has {usual.width}: every row must have the same number of values"
     )
 
 
-def _interrupted(entry: _Entry) -> SurfaceFileError:
-    text = " ".join(entry.text.split())[:40]
-    return SurfaceFileError(f"line {entry.number} ({text!r}) is not a row of numbers")
+def _interrupted(block: _Block, line: int) -> SurfaceFileError:
+    text = " ".join(block.texts[line].split())[:40]
+    return SurfaceFileError(f"line {block.numbers[line]} ({text!r}) is not a row of numbers")
 
 
 def _drop_empty_columns(values: NDArray[np.float64]) -> NDArray[np.float64]:
