@@ -6,12 +6,13 @@ import importlib
 import json
 import subprocess
 import sys
-import tracemalloc
+from functools import partial
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.traced import traced_peak
 
 from asperity.errors import ParameterError
 from asperity.simulation import (
@@ -116,11 +117,8 @@ def test_a_run_without_enough_rows_has_no_known_ending() -> None:
 
 def test_memory_without_rows_is_flat_in_the_duration() -> None:
     def peak(duration: float) -> int:
-        tracemalloc.start()
-        run_of(duration=duration, motion=Still((0.0, 0.0, -1e-3)), most_rows=0)
-        found = tracemalloc.get_traced_memory()[1]
-        tracemalloc.stop()
-        return found
+        still = Still((0.0, 0.0, -1e-3))
+        return traced_peak(lambda: run_of(duration=duration, motion=still, most_rows=0))
 
     peak(20.0)
     assert peak(400.0) < 1.05 * peak(40.0)  # 86 MB if it kept the rows
@@ -217,18 +215,14 @@ def test_a_disk_without_any_room_is_reported(tmp_path: FilePath) -> None:
 def test_memory_does_not_depend_on_the_duration(tmp_path: FilePath) -> None:
     """Ten times as long, no more memory: Python's own allocations, and those of NumPy."""
     peaks = []
-    for samples in (40_000, 400_000):
+    options: dict[str, Any] = {"servo": Servo(1e-4), "every": 10}
+    for duration in (4.0, 40.0):
+        traced = partial(run_of, trace=tmp_path / "run.csv", duration=duration, **options)
         run_of(trace=tmp_path / "run.csv", every=10)
-        tracemalloc.start()
-        run_of(trace=tmp_path / "run.csv", duration=1e-4 * samples, servo=Servo(1e-4), every=10)
-        peaks.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
+        peaks.append(traced_peak(traced))
     assert peaks[1] < 1.1 * peaks[0]
     # Negative control: in memory it does depend.
-    tracemalloc.start()
-    run_of(duration=40.0, servo=Servo(1e-4), every=10)
-    assert tracemalloc.get_traced_memory()[1] > 2.0 * peaks[1]
-    tracemalloc.stop()
+    assert traced_peak(partial(run_of, duration=40.0, **options)) > 2.0 * peaks[1]
 
 
 def test_many_runs_are_the_same_as_one_after_the_other() -> None:
