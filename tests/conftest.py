@@ -273,6 +273,12 @@ def check_derivatives() -> Callable[..., None]:
     return _check_derivatives
 
 
+@pytest.fixture
+def wave(make_texture: Callable[..., Any]) -> Sinusoid:
+    """The sinusoid."""
+    return make_texture("sinusoid")
+
+
 def _grid(texture: Texture, per_side: int) -> np.ndarray:
     ticks = (np.arange(per_side) + 0.5) / per_side
     axes = [ticks] * len(texture.domain.spans)
