@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
 from collections.abc import Iterator
 from types import ModuleType
 
 import numpy as np
 import pytest
+from tests.own_modules import imported
 
 from asperity.checks import FloatArray
 from asperity.kernels import tick
@@ -47,12 +46,8 @@ def device_batch(positions, forces, settings, texture, law):
 def device(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
     folder = tmp_path_factory.mktemp("device")
     (folder / "my_device.py").write_text(DEVICE, encoding="utf-8")
-    sys.path.insert(0, str(folder))
-    try:
-        yield importlib.import_module("my_device")
-    finally:
-        sys.path.remove(str(folder))
-        del sys.modules["my_device"]
+    with imported(folder, "my_device") as module:
+        yield module
 
 
 def commanded(device: ModuleType, surface: Surface, positions: FloatArray) -> FloatArray:

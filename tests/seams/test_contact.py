@@ -5,8 +5,6 @@ The surface is felt at half of its height: depth h/2 - z, contact point (x, y).
 
 from __future__ import annotations
 
-import importlib
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -14,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.own_modules import imported
 
 import asperity as asp
 from asperity.contacts import VERTICAL
@@ -104,12 +103,8 @@ TEXTURES = {
 def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
     folder = tmp_path_factory.mktemp("own")
     (folder / "my_contact.py").write_text(MODULE, encoding="utf-8")
-    sys.path.insert(0, str(folder))
-    try:
-        yield importlib.import_module("my_contact")
-    finally:
-        sys.path.remove(str(folder))
-        del sys.modules["my_contact"]
+    with imported(folder, "my_contact") as module:
+        yield module
 
 
 def probes(texture: asp.Texture, count: int) -> np.ndarray:
@@ -156,7 +151,7 @@ def test_jacobian_is_the_derivative(own: ModuleType, name: str) -> None:
 
 
 def test_derivatives_of_another_contact_are_noticed(own: ModuleType) -> None:
-    class Wrong(own.Halved):  # type: ignore[misc,name-defined]  # a user's class
+    class Wrong(own.Halved):
         def derivatives(self) -> Any:
             return VERTICAL.derivatives()
 
@@ -227,7 +222,7 @@ def test_it_is_analysed_and_compared(own: ModuleType) -> None:
 
 
 def test_what_a_contact_lacks_is_named(own: ModuleType) -> None:
-    class Bare(own.Halved):  # type: ignore[misc,name-defined]  # a user's class
+    class Bare(own.Halved):
         name = "bare"
 
         def kernels(self) -> tuple[ModuleType, ...]:

@@ -20,6 +20,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+from tests.own_modules import imported
 
 import asperity as asp
 from asperity.analysis import one_sided_number
@@ -44,12 +45,8 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
     """The user's module, imported from a directory of the user's."""
     folder = tmp_path_factory.mktemp("own")
     shutil.copy(EXAMPLE, folder / "my_eggs.py")
-    sys.path.insert(0, str(folder))
-    try:
-        yield importlib.import_module("my_eggs")
-    finally:
-        sys.path.remove(str(folder))
-        del sys.modules["my_eggs"]
+    with imported(folder, "my_eggs") as module:
+        yield module
 
 
 @pytest.fixture
