@@ -39,7 +39,7 @@ def _name(page: Path) -> str:
 
 @pytest.fixture(scope="module")
 def formulas() -> ModuleType:
-    pytest.importorskip("sphinx")
+    pytest.importorskip("sphinx", reason="the documentation's tools are not installed")
     spec = importlib.util.spec_from_file_location("mathsvg", DOCS / "_ext" / "mathsvg.py")
     assert spec is not None
     assert spec.loader is not None

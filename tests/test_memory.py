@@ -35,7 +35,7 @@ def _map(folder: Path, side: int) -> str:
     return str(path)
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="the peak is counted in kilobytes on Linux")
+@pytest.mark.skipif(sys.platform != "linux", reason="the peak stands in /proc, on Linux")
 @pytest.mark.parametrize("side", [256, 512])
 @pytest.mark.parametrize("command", ["limits", "prepare"])
 def test_the_estimate_is_above_the_peak(tmp_path: Path, command: str, side: int) -> None:

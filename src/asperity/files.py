@@ -47,7 +47,7 @@ def open_input(path: str | os.PathLike[str], most: int = 2**31) -> BufferedReade
                 errno.EFBIG, f"{status.st_size} bytes; at most {most} are read", str(path)
             )
         return os.fdopen(descriptor, "rb")
-    except BaseException:
+    except BaseException:  # nothing may leave it open, an interrupt neither; all is passed on
         os.close(descriptor)
         raise
 
@@ -114,7 +114,7 @@ def whole_file(path: str | os.PathLike[str], *, durable: bool = False) -> Iterat
             if stream.name != str(beside):
                 _give_name(stream.fileno(), beside)
         beside.replace(target)
-    except BaseException:
+    except BaseException:  # nothing may leave half a file, an interrupt neither; all is passed on
         beside.unlink(missing_ok=True)
         raise
 

@@ -25,6 +25,7 @@ from asperity.analysis.bounds.problems import (
     SlopeProblem,
     normal_problem,
 )
+from asperity.analysis.bounds.sampling import HeightProblem
 from asperity.analysis.gain.friction import (
     FrictionProblem,
     largest_singular_value,
@@ -414,3 +415,12 @@ def test_the_two_numbers_of_two_entries() -> None:
     np.testing.assert_allclose(largest_singular_value(a, b), precise_norm(matrices), rtol=1e-12)
     symmetric = precise_one_sided(-matrices)
     np.testing.assert_allclose(largest_symmetric_eigenvalue(a, b), symmetric, rtol=1e-12)
+
+
+def test_of_the_height_only_what_is_attained_is_known() -> None:
+    texture = HeightMap(1e-4 * np.random.default_rng(3).normal(size=(8, 9)), 3e-4)
+    found = supremum(HeightProblem(texture.sampling_cells()), 1e-3, work_limit=5000)
+    low, high = texture.extremes
+    assert low < found.lower <= high * (1.0 + 1e-14)
+    assert found.upper == math.inf
+    assert not found.reached

@@ -89,7 +89,7 @@ def main() -> None:
         _stop(error, BAD_INPUT)
     except MemoryError:
         _stop("the surface is too large for this machine's memory", BAD_INPUT)
-    except Exception as error:
+    except Exception as error:  # code of the user's own may raise anything
         said = own_fault(error)
         if said is None:
             raise  # a fault of asperity's own, or of the streams: see asperity.__main__

@@ -24,7 +24,14 @@ _MARK = "asperity_schema"
 _ZIP_MAGIC = b"PK\x03\x04"
 _MAX_POINTS = 2**27
 _MAX_TEXT = 2**20
-_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, KeyError, NotImplementedError, RuntimeError)
+_DAMAGE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    EOFError,
+    KeyError,
+    NotImplementedError,  # a compression that zipfile does not know
+    RuntimeError,  # an encrypted member
+)
 
 
 @dataclass(frozen=True, eq=False)

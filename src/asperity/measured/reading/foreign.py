@@ -15,7 +15,13 @@ from asperity.measured.reading.tiff import TIFF_MAGIC
 
 ZIP_MAGIC = (b"PK\x03\x04", b"PK\x05\x06")  # the second begins an empty archive
 _MOST = 2 * 10**9
-_DAMAGE = (zipfile.BadZipFile, ValueError, NotImplementedError, EOFError, KeyError)
+_DAMAGE = (
+    zipfile.BadZipFile,
+    ValueError,
+    NotImplementedError,  # a compression that zipfile does not know
+    EOFError,
+    KeyError,
+)
 
 
 def archive_kind(path: Path) -> str:

@@ -43,6 +43,6 @@ def guarded(what: str, name: str) -> Iterator[None]:
             yield
     except (SurfaceFileError, MemoryError):
         raise
-    except Exception as error:
+    except Exception as error:  # a library of others may raise anything
         reason = str(error).splitlines()[0][:120] if str(error) else type(error).__name__
         raise SurfaceFileError(f"{what} ({reason})") from error

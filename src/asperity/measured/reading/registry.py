@@ -146,7 +146,7 @@ def _guarded(reader: Reader, faults: list[str]) -> Reader:
             return bool(reader.recognises(file))
         except _PASSED:
             raise
-        except Exception as error:
+        except Exception as error:  # a user's code may raise anything
             faults.append(f"the reader of {reader.name} cannot be used ({_reason(error)})")
             return False
 
@@ -155,7 +155,7 @@ def _guarded(reader: Reader, faults: list[str]) -> Reader:
             return _checked(reader.read(file, options))
         except _PASSED:
             raise
-        except Exception as error:
+        except Exception as error:  # as above
             message = f"{file.name}: the reader of {reader.name} failed ({_reason(error)})"
             raise SurfaceFileError(message) from error
 
