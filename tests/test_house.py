@@ -284,7 +284,7 @@ def lines_of_code(text: str) -> set[int]:
     }
     for node in ast.walk(parsed(text)):
         if documented(node):
-            said = node.body[0]  # type: ignore[attr-defined]
+            said = node.body[0]
             lines -= set(range(said.lineno, said.end_lineno + 1))
     return lines
 

@@ -20,7 +20,7 @@ def test_the_table_is_the_one_that_the_command_prints() -> None:
     assert shown is not None
     console = Console(width=88, file=io.StringIO(), force_terminal=False)
     print_comparison(compare(load_scene(shown[1]).texture), console)
-    printed = console.file.getvalue()  # type: ignore[attr-defined]  # a StringIO
+    printed = console.file.getvalue()
     printed_lines = [line.rstrip() for line in printed.splitlines()]
     for line in shown[2].splitlines():
         assert line in printed_lines

@@ -49,7 +49,7 @@ def test_quantities(text: str | float, unit: str, value: float) -> None:
 )  # fmt: skip
 def test_bad_quantities_name_the_argument(text: object, unit: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        quantity("period", text, unit)  # type: ignore[arg-type]
+        quantity("period", text, unit)
     assert caught.value.argument == "period"
 
 

@@ -164,7 +164,7 @@ def test_limits_are_rounded_down(stiffness: float, text: str) -> None:
 )
 def test_bad_arguments_are_named(arguments: dict[str, object], name: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        asp.compare(PAPER, **arguments)  # type: ignore[arg-type]
+        asp.compare(PAPER, **arguments)
     assert caught.value.argument == name
 
 

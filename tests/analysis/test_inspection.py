@@ -256,7 +256,7 @@ def test_unverified_data_and_notes_of_the_device_are_said() -> None:
 def test_bad_arguments_are_named(arguments: dict[str, object], name: str) -> None:
     values = {"surface": surface("A"), "device": "omega.3", **arguments}
     with pytest.raises(ParameterError, match=name):
-        analyze(**values)  # type: ignore[arg-type]  # wrong on purpose
+        analyze(**values)  # wrong on purpose
 
 
 def test_a_wrong_device_file_is_named(tmp_path: Path) -> None:

@@ -23,7 +23,7 @@ TEXTURE = Sinusoid(A, L, direction=(3.0, 4.0))
 
 
 def leak(letter: str, **arguments: float) -> float:
-    return worst_loop(Surface(TEXTURE, letter, K, D, **arguments)).energy  # type: ignore[arg-type]
+    return worst_loop(Surface(TEXTURE, letter, K, D, **arguments)).energy
 
 
 def test_a_leaks_the_total_rise_times_the_depth() -> None:

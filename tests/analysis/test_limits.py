@@ -165,7 +165,7 @@ def test_speeds_that_the_limits_allow() -> None:
 
 @pytest.mark.parametrize("number", [1, 6])
 def test_a_limit_holds_below_its_speed_and_not_above(number: int) -> None:
-    top = ask().limit(number).speeds[1]  # type: ignore[index]  # it is decided
+    top = ask().limit(number).speeds[1]
     assert ask(speed=top * (1 - 1e-9)).limit(number).holds
     assert not ask(speed=top * (1 + 1e-9)).limit(number).holds
 
@@ -232,8 +232,8 @@ def test_verdicts_do_not_depend_on_the_unit_of_length(
     for first, second in zip(one.limits, other.limits, strict=True):
         assert first.left is not None
         assert second.left is not None
-        assert first.left / first.right == pytest.approx(  # type: ignore[operator]  # decided
-            second.left / second.right, rel=1e-4  # type: ignore[operator]
+        assert first.left / first.right == pytest.approx(
+            second.left / second.right, rel=1e-4
         )  # fmt: skip
 
 

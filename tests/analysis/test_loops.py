@@ -23,7 +23,7 @@ TOLERANCE = 1e-8 * K * AMPLITUDE**2
 
 
 def work(letter: str, path: object, **arguments: object) -> float:
-    return loop_work(Surface(TEXTURE, letter, stiffness=K, **arguments), path)  # type: ignore[arg-type]
+    return loop_work(Surface(TEXTURE, letter, stiffness=K, **arguments), path)
 
 
 def test_a_gains_half_k_a_squared() -> None:
@@ -146,7 +146,7 @@ def test_dragged_anchor_keeps_its_distance_and_follows_the_tractrix() -> None:
     first, second = anchored_stretches(start, end, 1e-3)
     assert first.end[0] == pytest.approx(1e-3)
     s = np.linspace(0, 1, 11)
-    np.testing.assert_allclose(np.hypot(*second.deflection(s).T), 1e-3, rtol=1e-12)  # type: ignore[misc]
+    np.testing.assert_allclose(np.hypot(*second.deflection(s).T), 1e-3, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ def run(command: str, **options: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         ["bash", "-c", program + command], capture_output=True, text=True, timeout=120, check=False,
         **options,
-    )  # type: ignore[call-overload, no-any-return]  # fmt: skip  # options are those of run
+    )  # fmt: skip  # options are those of run
 
 
 def one_line(text: str) -> str:

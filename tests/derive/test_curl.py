@@ -19,7 +19,7 @@ Formula = Callable[[ContactSymbols], Any]
 
 
 def law(contact: str, force: Formula, **options: Any) -> Law:
-    return Law("V", "own", contact, force, **options)  # type: ignore[arg-type]
+    return Law("V", "own", contact, force, **options)
 
 
 def scaled_slopes(c: ContactSymbols, factor: Any) -> Any:

@@ -193,7 +193,7 @@ def test_damping_of_the_pantograph_follows_from_its_joints() -> None:
 
 
 def _eigenvalues(matrix: object) -> tuple[float, float]:
-    (a, b), (_b, d) = matrix  # type: ignore[misc, attr-defined]  # a symmetric 2 x 2 array
+    (a, b), (_b, d) = matrix
     middle, half = (a + d) / 2, math.hypot((a - d) / 2, b)
     return middle - half, middle + half
 
@@ -229,7 +229,7 @@ def test_unknown_device_offers_the_nearest(given: str, nearest: str) -> None:
 @pytest.mark.parametrize("given", [None, 5, b"touch", ["touch"]])
 def test_what_is_no_name_is_refused(given: object) -> None:
     with pytest.raises(ParameterError, match="must be an id, a TOML file or a Device"):
-        load_device(given)  # type: ignore[arg-type]  # the point
+        load_device(given)  # the point
 
 
 def test_what_is_not_known_is_none_and_a_stiffness_that_is_needed_an_error() -> None:

@@ -52,7 +52,7 @@ def test_what_is_written_for_a_law_is_what_loops_call(letter: str, clamp: str) -
     law = LAWS[letter]
     if clamp != "none" and not law.clampable:
         return
-    plan = ProbePlan(law, kernel_source(law), clamp)  # type: ignore[arg-type]  # one of CLAMPS
+    plan = ProbePlan(law, kernel_source(law), clamp)
     text = probe_source(plan) + (contact_source(plan) if law.contact.given_by_depth else "")
     found = {
         n.name: len(n.args.args) for n in ast.parse(text).body if isinstance(n, ast.FunctionDef)

@@ -29,7 +29,7 @@ from asperity.textures import Sinusoid
 def compiled_modules() -> Iterator[ModuleType]:
     """All modules of the package that declare themselves."""
     for found in pkgutil.walk_packages(asperity.__path__, "asperity."):
-        path = Path(found.module_finder.path) / f"{found.name.rpartition('.')[2]}.py"  # type: ignore[union-attr]  # a FileFinder
+        path = Path(found.module_finder.path) / f"{found.name.rpartition('.')[2]}.py"
         if path.exists() and "\nKERNELS = " in path.read_text(encoding="utf-8"):
             yield importlib.import_module(found.name)
 
@@ -48,7 +48,7 @@ def written(module: ModuleType) -> tuple[set[str], set[str], set[str]]:
         for node in ast.walk(tree)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
     }
-    known = {"local_array", *dir(__builtins__), *__builtins__}  # type: ignore[misc]  # a dict or a module
+    known = {"local_array", *dir(__builtins__), *__builtins__}
     records = {name for name, value in vars(module).items() if isinstance(value, type)}
     return defined, called & defined, called - defined - known - records
 
@@ -124,7 +124,7 @@ def result(*at_hand: Unit) -> int:
     space: dict[str, object] = {name: lambda f: f for name in ("loop", "inlined", "scalar")}
     exec(text, space)
     assert "idle" not in space
-    return space["run_batch"](0)  # type: ignore[operator,no-any-return]  # it is a function
+    return space["run_batch"](0)
 
 
 def test_the_first_that_provides_a_name_is_taken() -> None:

@@ -31,12 +31,12 @@ def test_the_letter_is_a_word(letter: str):
 @pytest.mark.parametrize("contact", ["", "Nominal", "below", None])
 def test_the_contact_is_one_of_the_known(contact: str):
     with pytest.raises(LawError, match=r"must be one of nominal, vertical, nearest.*got"):
-        Law("V", "name", contact, wall)  # type: ignore[arg-type]
+        Law("V", "name", contact, wall)
 
 
 def test_the_formula_is_a_function():
     with pytest.raises(LawError, match="force must be a function"):
-        Law("V", "name", "nominal", "k*depth")  # type: ignore[arg-type]
+        Law("V", "name", "nominal", "k*depth")
 
 
 def test_a_law_cannot_be_changed():
@@ -45,9 +45,9 @@ def test_a_law_cannot_be_changed():
     given["gain"] = 3.0
     assert dict(law.parameters) == {"gain": 2.0}
     with pytest.raises(TypeError):
-        law.parameters["gain"] = 4.0  # type: ignore[index]
+        law.parameters["gain"] = 4.0
     with pytest.raises(dataclasses.FrozenInstanceError):
-        law.letter = "U"  # type: ignore[misc]
+        law.letter = "U"
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=str)

@@ -68,7 +68,7 @@ def test_an_unknown_law_offers_the_nearest(wrong: str, nearest: str):
 @pytest.mark.parametrize("wrong", [3, None, b"A", ["A"]])
 def test_what_is_no_text_is_no_law(wrong: object):
     with pytest.raises(ParameterError, match="letter, a name or a Law"):
-        find_law(wrong)  # type: ignore[arg-type]
+        find_law(wrong)
 
 
 @pytest.mark.parametrize(
@@ -84,7 +84,7 @@ def test_what_is_no_text_is_no_law(wrong: object):
     ],
 )
 def test_several_laws_in_the_order_asked_for(laws: object, letters: str):
-    found = find_laws(laws)  # type: ignore[arg-type]
+    found = find_laws(laws)
     assert "".join(law.letter for law in found) == letters
 
 
@@ -102,5 +102,5 @@ def test_several_laws_in_the_order_asked_for(laws: object, letters: str):
 )
 def test_several_laws_that_cannot_be(laws: object, argument: str, message: str):
     with pytest.raises(ParameterError, match=message) as caught:
-        find_laws(laws)  # type: ignore[arg-type]
+        find_laws(laws)
     assert caught.value.argument == argument

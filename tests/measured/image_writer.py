@@ -63,7 +63,7 @@ def _filtered(line: list[int], above: list[int], step: int, kind: int) -> list[i
         a = line[k - step] if k >= step else 0
         b = above[k]
         c = above[k - step] if k >= step else 0
-        paeth = min((a, b, c), key=lambda q, p=a + b - c: abs(p - q))  # type: ignore[misc]
+        paeth = min((a, b, c), key=lambda q, p=a + b - c: abs(p - q))
         out.append((value - (0, a, b, (a + b) // 2, paeth)[kind]) % 256)
     return out
 

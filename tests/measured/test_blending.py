@@ -138,4 +138,4 @@ def test_width_without_periodic_and_periodic_that_is_no_answer() -> None:
     with pytest.raises(ParameterError, match=r"blend is the width .* needs periodic"):
         prepare(raw, blend=20e-6)
     with pytest.raises(ParameterError, match="periodic must be true or false"):
-        prepare(raw, periodic="no")  # type: ignore[arg-type]  # the mistake under test
+        prepare(raw, periodic="no")  # the mistake under test

@@ -288,7 +288,7 @@ def test_more_than_a_quarter_missing_needs_consent() -> None:
     assert allowed.filled.sum() == 109
     for wrong in (0.0, 1.0, -0.1, 28.0, np.nan, "0.3"):
         with pytest.raises(ParameterError, match="max_missing must lie between 0 and 1"):
-            prepare(surface(heights), max_missing=wrong)  # type: ignore[arg-type]  # partly text
+            prepare(surface(heights), max_missing=wrong)  # partly text
 
 
 @needs_data

@@ -98,7 +98,7 @@ def readers(tmp_path_factory: pytest.TempPathFactory) -> Any:
     (folder / "hostile_readers.py").write_text(READERS)
     sys.path.insert(0, str(folder))
     try:
-        import hostile_readers  # type: ignore[import-not-found]  # written one line above
+        import hostile_readers
 
         yield hostile_readers
     finally:
@@ -114,7 +114,7 @@ def file(tmp_path: Path) -> SurfaceFile:
 
 
 def test_what_is_found_comes_back_as_it_is(readers: Any, file: SurfaceFile) -> None:
-    raw = readers.sound(file, ReadingOptions(unit="mm", channel=np.int64(2)))  # type: ignore[arg-type]  # as users have it
+    raw = readers.sound(file, ReadingOptions(unit="mm", channel=np.int64(2)))  # as users have it
     assert isinstance(raw, RawSurface)
     np.testing.assert_array_equal(raw.heights, readers.HEIGHTS)
     assert (raw.pitch, raw.source) == ((1e-6, 2e-6), file.name)

@@ -157,7 +157,7 @@ def test_arguments_that_say_nothing_about_the_file(
     tmp_path: Path, argument: str, given: object, match: str
 ) -> None:
     with pytest.raises(ParameterError, match=match) as caught:
-        read_surface(saved(tmp_path, MAP), **{argument: given})  # type: ignore[arg-type]
+        read_surface(saved(tmp_path, MAP), **{argument: given})
     assert caught.value.argument == argument
 
 

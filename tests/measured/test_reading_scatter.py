@@ -82,7 +82,7 @@ def test_what_cannot_be_interpolated(tmp_path: Path) -> None:
             read_surface(path, resample=pitch)
     for wrong in (0.0, -1e-5, np.nan, "5um"):
         with pytest.raises(ParameterError, match="resample must be positive"):
-            read_surface(path, resample=wrong)  # type: ignore[arg-type]  # what is refused
+            read_surface(path, resample=wrong)  # what is refused
     other = tmp_path / "a.txt"
     other.write_text("1 2 3 4\n5 6 7 8\n")
     np.save(tmp_path / "a.npy", np.eye(4))

@@ -129,7 +129,7 @@ def test_olympus_adds_eight_bytes_to_the_header(tmp_path: Path) -> None:
 )
 def test_faults_of_a_text(tmp_path: Path, changes: dict[str, object], match: str) -> None:
     with pytest.raises(SurfaceFileError, match=match) as caught:
-        ascii_of(tmp_path, replace(SPEC, **changes))  # type: ignore[arg-type]
+        ascii_of(tmp_path, replace(SPEC, **changes))
     assert str(caught.value).startswith("test.sdf: ")
 
 

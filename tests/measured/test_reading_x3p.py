@@ -52,7 +52,7 @@ def test_real_files(
     with zipfile.ZipFile(DATA / name) as archive:
         xml = archive.read(f"{folder}main.xml").decode()
         content = archive.read(f"{folder}bindata/data.bin")
-    nx, ny = (int(re.search(f"<Size{k}>(\\d+)<", xml)[1]) for k in "XY")  # type: ignore[index]
+    nx, ny = (int(re.search(f"<Size{k}>(\\d+)<", xml)[1]) for k in "XY")
     assert (nx, ny) == size
     assert raw.heights.shape == (ny, nx)
     assert raw.heights.dtype == np.float64
@@ -244,7 +244,7 @@ def test_absolute_lateral_axes(tmp_path: Path) -> None:
     ],
 )
 def test_faults(tmp_path: Path, changes: dict[str, object], match: str) -> None:
-    fails(tmp_path, replace(SPEC, **changes), match)  # type: ignore[arg-type]
+    fails(tmp_path, replace(SPEC, **changes), match)
 
 
 def test_doctype_is_refused_in_utf_16(tmp_path: Path) -> None:

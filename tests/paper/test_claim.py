@@ -47,7 +47,7 @@ def test_the_tolerance_is_the_border() -> None:
 
 @pytest.mark.parametrize("truth", [math.nan, [1.0, math.nan], []])
 def test_without_truth_nothing_is_decided(truth: object) -> None:
-    assert judge("x", printed=truth, truth=truth).verdict == "undecided"  # type: ignore[arg-type] # any
+    assert judge("x", printed=truth, truth=truth).verdict == "undecided"
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def test_without_truth_nothing_is_decided(truth: object) -> None:
 def test_errors_are_relative_to_the_largest_entry(
     printed: object, truth: object, error: float
 ) -> None:
-    assert relative_error(printed, truth) == pytest.approx(error)  # type: ignore[arg-type] # any
+    assert relative_error(printed, truth) == pytest.approx(error)
 
 
 def test_statements() -> None:
@@ -92,7 +92,7 @@ def test_statements() -> None:
 )
 def test_a_claim_is_as_good_as_its_weakest_part(parts: tuple[str, ...], whole: str) -> None:
     checks = [
-        Check(verdict, verdict[:1], {str(i): 1.0}, f"c{i}" if "cor" in verdict else "")  # type: ignore[arg-type] # text
+        Check(verdict, verdict[:1], {str(i): 1.0}, f"c{i}" if "cor" in verdict else "")
         for i, verdict in enumerate(parts)
     ]
     found = settle(*checks)

@@ -54,4 +54,4 @@ def terminal(show: Callable[..., None], *arguments: Any, width: int) -> str:
     """Return what a function prints on a console of a width."""
     console = Console(width=width, file=io.StringIO(), force_terminal=False)
     show(*arguments, console)
-    return console.file.getvalue()  # type: ignore[attr-defined]  # a StringIO
+    return console.file.getvalue()

@@ -71,4 +71,4 @@ def test_nothing_assumed_is_no_section() -> None:
 
 def test_no_report_for_anything_else() -> None:
     with pytest.raises(TypeError, match="no report is known for a int"):
-        html_text(3)  # type: ignore[arg-type]  # that is the point
+        html_text(3)  # that is the point

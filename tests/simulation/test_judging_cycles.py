@@ -74,8 +74,8 @@ def test_the_search_goes_up_to_the_highest() -> None:
         Still((0.0, 0.0, 0.0)),
     )  # fmt: skip
     more = {"start": (0.0, 0.0, 1e-3), "starts": 1, "duration": 1.0}
-    onset = find_onset(*loop, **more)  # type: ignore[arg-type]  # a test
-    limited = find_onset(*loop, highest=1.2 * onset.cycling, **more)  # type: ignore[arg-type]  # a test
+    onset = find_onset(*loop, **more)
+    limited = find_onset(*loop, highest=1.2 * onset.cycling, **more)
     assert math.isfinite(limited.cycling)
 
 

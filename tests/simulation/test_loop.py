@@ -245,4 +245,4 @@ def test_the_force_never_exceeds_its_limit() -> None:
 )
 def test_bad_servo_is_named(arguments: dict[str, float], named: str) -> None:
     with pytest.raises(ParameterError, match=named):
-        Servo(**arguments)  # type: ignore[arg-type]
+        Servo(**arguments)

@@ -128,7 +128,7 @@ def test_only_strokes_are_scanned() -> None:
             SERVO,
             Still((0, 0, 0)),
             speeds=[0.1],
-            depths=[0.0],  # type: ignore[arg-type]  # the point of the test
+            depths=[0.0],  # the point of the test
         )
     with pytest.raises(ParameterError, match="speeds must be positive"):
         scan_strokes(surface, PLANT, HAND, SERVO, WAY, speeds=[0.0], depths=[0.0])
