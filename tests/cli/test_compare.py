@@ -158,6 +158,8 @@ BAD = [
     ([SPEC, "--max-depth", "0mm"], "max_depth"),
     ([SPEC, "--max-depth", "inf"], "max_depth"),
     ([SPEC, "--modulation-depth", "1.2"], "modulation_depth"),
+    ([SPEC, "--laws", "WB", "--friction", "0.3"], "law W, B does not take it; taken by law F"),
+    ([SPEC, "--laws", "W", "--set", "continuity=2"], "continuity would change nothing"),
     ([SPEC, "--laws", "AXB"], "law"),
     ([SPEC, "--laws", "god-objct"], "did you mean 'god-object'"),
     ([SPEC, "--device", "omga.3"], "did you mean 'omega.3'"),

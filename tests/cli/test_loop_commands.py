@@ -195,6 +195,8 @@ BAD = [
     (["onset", "{still}", "--delays", "1e20"], "delay must be at most"),
     (["simulate", "{still}", "--device", "omega.3"], "apparent_mass is not known"),
     (["simulate", "{still}", "--law", "Z"], "law"),
+    (["simulate", "{still}", "--friction", "0.3"], "law A does not take it; taken by law F"),
+    (["onset", "{still}", "--laws", "WF", "--set", "continuity=2"], "taken by law H"),
     (["onset", "{strokes}"], "must be at rest"),
     (["onset", "{still}", "--delays", "1.5"], "delays must be a whole number"),
     (["onset", "{still}", "--delays", "-1"], "delay must be a whole number"),

@@ -14,6 +14,7 @@ from asperity.cli.options import (
     file_values,
     law_option,
     law_options,
+    refuse_idle,
     surface_values,
 )
 from asperity.cli.progress import progress_bar
@@ -63,6 +64,9 @@ def read_setup(
         surface.setdefault("law", find_law("W"))
     with progress_bar("reading the surface"):
         scene = load_scene(source, file_values(values))
+    named = {**scene.surface, **surface}
+    if laws or "law" in named:
+        refuse_idle(surface, laws or (find_law(named["law"]),))
     return make_setup(
         scene,
         surface=surface,

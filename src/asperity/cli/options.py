@@ -11,7 +11,7 @@ from asperity.arguments import MAX_DEPTH, MEMORY, STIFFNESS, Argument
 from asperity.cli.own_code import load_own_code
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError, nearest_names
-from asperity.laws import LAW_ARGUMENTS, Law, find_law, find_laws, known_arguments
+from asperity.laws import KNOWN_LAWS, LAW_ARGUMENTS, Law, find_law, find_laws, known_arguments
 from asperity.measured.arguments import FILE_ARGUMENTS
 from asperity.memory import limited
 
@@ -188,6 +188,21 @@ def surface_values(values: Mapping[str, Any]) -> dict[str, Any]:
     return result
 
 
+def refuse_idle(asked: Iterable[str], laws: Sequence[Law]) -> None:
+    """Refuse a parameter that was asked for and that none of the laws takes.
+
+    Raises:
+        ParameterError: with the laws that take it.
+    """
+    taken = known_arguments(laws)
+    for name in asked:
+        takers = [law.letter for law in KNOWN_LAWS.values() if name in law.arguments]
+        if takers and name not in taken:
+            letters, others = (", ".join(part) for part in ((law.letter for law in laws), takers))
+            words = f"would change nothing: law {letters} does not take it; taken by law {others}"
+            raise ParameterError(name, words)
+
+
 def read_surface(
     source: str,
     device: Device | None,
@@ -216,5 +231,7 @@ def read_surface(
     merged = {**defaults, **scene.surface, **asked}
     if not laws and "law" not in merged:
         raise ParameterError("law", "is missing: --law B, or a scene whose [surface] names one")
-    arguments = surface_keywords(merged, *(laws or [find_law(merged["law"])]))
+    laws = laws or [find_law(merged["law"])]
+    refuse_idle(asked, laws)
+    arguments = surface_keywords(merged, *laws)
     return scene.texture, device or scene.device or load_device(DEFAULT_DEVICE), arguments
