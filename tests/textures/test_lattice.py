@@ -105,3 +105,36 @@ def test_many_unrelated_waves_are_all_free():
     basis, multiples = integer_lattice(waves)
     assert len(basis) == 12
     np.testing.assert_array_equal(multiples @ basis, waves)
+
+
+@pytest.mark.usefixtures("patience")
+def test_hexagons_turned_by_any_angle_repeat():
+    """Their shortest vectors are equally long, up to rounding: shortening them must end."""
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        angles = rng.uniform(0.0, 4.0) + np.arange(3) * math.pi / 3
+        number = 2 * math.pi / (round(rng.uniform(0.1, 9.9), 1) * 1e-3)
+        rays = number * np.column_stack([np.cos(angles), np.sin(angles)])
+        basis, multiples = integer_lattice(np.concatenate([rays, 2.0 * rays]))
+        assert basis.shape == (2, 2)
+        assert np.hypot(*basis.T) == pytest.approx(number, rel=1e-12)
+        np.testing.assert_allclose(multiples @ basis, np.concatenate([rays, 2.0 * rays]), rtol=1e-9)
+
+
+def test_waves_made_of_wavelengths_are_related_whatever_their_rounding():
+    rng = np.random.default_rng(1)
+    for _ in range(500):
+        length, angle = round(rng.uniform(0.1, 9.9), 2) * 1e-3, math.radians(rng.integers(0, 360))
+        numbers = 2 * math.pi / (length / rng.integers(1, 9, 3))
+        waves = numbers[:, None] * [math.cos(angle), math.sin(angle)]
+        assert len(integer_lattice(waves)[0]) == 1
+
+
+@pytest.mark.parametrize("off", [1e-15, 1e-14, 1e-12, 1e-9])
+def test_nearly_a_ratio_is_none(off: float):
+    """Five units of rounding are more than a wave number made of a wavelength is off."""
+    for factor in (1.0, 2.0, 1.5, 63 / 64):
+        waves = 6283.185307179586 * np.array([[1.0, 0.0], [factor * (1.0 + off), 0.0]])
+        assert len(integer_lattice(waves)[0]) == 2
+    tilted = np.array([[1.0, 0.0], [0.5, 0.8], [1.5 + 40 * off, 0.8]])
+    assert len(integer_lattice(tilted)[0]) == 3

@@ -121,8 +121,7 @@ class Fourier(Texture):
 
     def cells(self, extent: tuple[float, float] | None = None, margin: float = 0.0) -> Cells | None:
         """See :class:`Texture`; more than three independent phases need an extent."""
-        reach = float(np.hypot(*self.domain.spans.T).sum())
-        cells = WaveCells(self.waves, extent, margin, reach)
+        cells = WaveCells(self.waves, extent, margin)
         return cells if cells.dimensions <= _LARGEST_TORUS else None
 
     def sampling_cells(self) -> Cells:

@@ -64,17 +64,23 @@ _LARGEST_DENOMINATOR = 64
 _LARGEST_MULTIPLE = 8
 # Relations between more independent waves than this are not looked for.
 _LARGEST_SEARCHED_RANK = 3
-_TOLERANCE = 1e-9
+# What rounding alone leaves of an exact relation, as a part of the sizes that are added up: a wave
+# number made of a wavelength is four roundings off, and a direction made of an angle as many more.
+_ROUNDING = 4.0 * 2.0**-53
+_NEARLY_PARALLEL = 1e-9
 
 
 def integer_lattice(waves: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return a basis B and integers N with waves = N @ B.
 
     The number of rows of B is the number of independent phases: 1 for a periodic profile, 2 for a
-    doubly periodic map, more for sums that never repeat. Ratios are recognised as rational up to
-    denominator 64 (8 where three waves or parallel ones are combined) and a relative error of
-    1e-9. A relation that is not recognised leaves more phases independent than there are: a
-    supremum over all phases is then an upper bound, never too low.
+    doubly periodic map, more for sums that never repeat. A ratio counts as rational, up to
+    denominator 64 (8 where three waves or parallel ones are combined), if nothing but the rounding
+    of the numbers themselves is left of it: a phase drifts by no more than what rounding changes
+    the phases of the kernels by at the same place. Any other ratio, however near, leaves the
+    phases independent: they drift through all of the torus, far enough out. A relation that is not
+    recognised leaves more phases independent than there are: a supremum over all phases is then
+    an upper bound, never too low.
 
     Args:
         waves: wave vectors [rad/m], shape (n, 2).
@@ -117,7 +123,10 @@ def _relation(basis: FloatArray, wave: FloatArray) -> tuple[int, list[int]] | No
     rank = len(basis)
     if rank == 0:
         return None
-    if rank <= 2 and np.linalg.matrix_rank(basis, tol=_TOLERANCE * np.abs(basis).max()) == rank:
+    if (
+        rank <= 2
+        and np.linalg.matrix_rank(basis, tol=_NEARLY_PARALLEL * np.abs(basis).max()) == rank
+    ):
         return _rational_relation(basis, wave)
     if rank > _LARGEST_SEARCHED_RANK:
         return None
@@ -126,25 +135,35 @@ def _relation(basis: FloatArray, wave: FloatArray) -> tuple[int, list[int]] | No
     # Small combinations first: of equal sums the simplest is taken.
     combinations = combinations[np.argsort(np.abs(combinations).sum(axis=1), kind="stable")]
     sums = combinations @ basis
+    size = float(np.hypot(*wave))
     for q in range(1, _LARGEST_MULTIPLE + 1):
-        close = np.abs(sums - q * wave).max(axis=1) <= _TOLERANCE * float(np.hypot(*wave))
-        if close.any():
-            return q, combinations[int(np.argmax(close))].tolist()
+        near = np.abs(sums - q * wave).max(axis=1) <= _NEARLY_PARALLEL * size
+        for row in combinations[near].tolist():
+            if _is_exact(q, row, basis, wave):
+                return q, row
     return None
+
+
+def _is_exact(q: int, row: list[int], basis: FloatArray, wave: FloatArray) -> bool:
+    """Return whether q·wave = row @ basis, but for the rounding of the waves themselves."""
+    size = q * float(np.hypot(*wave)) + float(np.abs(row) @ np.hypot(*basis.T))
+    across = np.abs(basis[:, 0] * wave[1] - basis[:, 1] * wave[0])
+    turned = across > _NEARLY_PARALLEL * np.hypot(*basis.T) * np.hypot(*wave)
+    allowed = Fraction((2.0 if turned.any() else 1.0) * _ROUNDING * size)
+    for axis in (0, 1):
+        terms = (n * Fraction(b) for n, b in zip(row, basis[:, axis].tolist(), strict=True))
+        if abs(sum(terms, -q * Fraction(float(wave[axis])))) > allowed:
+            return False
+    return True
 
 
 def _rational_relation(basis: FloatArray, wave: FloatArray) -> tuple[int, list[int]] | None:
     """Solve for the coefficients and recognise them as ratios of integers."""
-    scale = float(np.hypot(*wave))
     real = np.linalg.lstsq(basis.T, wave, rcond=None)[0]
-    if np.abs(real @ basis - wave).max() > _TOLERANCE * scale:
-        return None
     parts = [Fraction(float(c)).limit_denominator(_LARGEST_DENOMINATOR) for c in real]
-    close = np.array([float(p) for p in parts]) @ basis - wave
-    if np.abs(close).max() > _TOLERANCE * scale:
-        return None
     q = math.lcm(*(p.denominator for p in parts))
-    return q, [int(p * q) for p in parts]
+    row = [int(p * q) for p in parts]
+    return (q, row) if _is_exact(q, row, basis, wave) else None
 
 
 def _row_basis(rows: list[list[int]]) -> list[list[int]]:
@@ -166,16 +185,17 @@ def _row_basis(rows: list[list[int]]) -> list[list[int]]:
 
 def _shorten(basis: FloatArray, multiples: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return a basis of short vectors of a planar lattice (Lagrange-Gauss reduction)."""
-    if len(basis) != 2 or abs(np.linalg.det(basis)) < _TOLERANCE * np.abs(basis).max() ** 2:
+    if len(basis) != 2 or abs(np.linalg.det(basis)) < _NEARLY_PARALLEL * np.abs(basis).max() ** 2:
         return basis, multiples
     a, b = basis
     while True:
         if a @ a > b @ b:
             a, b = b, a
-        factor = round(float(a @ b / (a @ a)))
-        if factor == 0:
+        shorter = b - round(float(a @ b / (a @ a))) * a
+        # Of a hexagon's lattice three pairs are equally short: rounding would swap them forever.
+        if shorter @ shorter >= b @ b * (1.0 - 1e-12):
             break
-        b = b - factor * a
+        b = shorter
     short = np.array([a, b])
     return short, np.round(multiples @ basis @ np.linalg.inv(short))
 

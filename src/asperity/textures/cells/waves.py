@@ -40,7 +40,6 @@ class WaveCells(Cells):
         waves: of the texture.
         extent: width and depth [m] of the rectangle from the origin; the whole plane by default.
         margin: how far the rectangle reaches beyond that on every side [m].
-        reach: how far from the origin [m] phases must be near those on the torus.
     """
 
     def __init__(
@@ -48,15 +47,13 @@ class WaveCells(Cells):
         waves: PlaneWaves,
         extent: tuple[float, ...] | None = None,
         margin: float = 0.0,
-        reach: float = 0.0,
     ) -> None:
         self._extent = None if extent is None else tuple(side + 2.0 * margin for side in extent)
-        self._margin, self._miss = margin, 0.0
+        self._margin = margin
         self._amplitudes, self._phases = waves.amplitudes, waves.phases
         self._waves = waves.wavevectors
         if extent is None:
             self._basis, self._multiples = waves.lattice
-            self._miss = _missed(waves, reach)
         else:
             self._basis, self._multiples = np.eye(2), self._waves
             self._phases = self._phases - self._waves.sum(axis=1) * margin
@@ -113,7 +110,7 @@ class WaveCells(Cells):
         # What the rounding of the phases costs.
         most = np.abs(centres).max(axis=0, initial=0.0) @ np.abs(self._multiples).T
         largest = float((most + np.abs(self._phases)).max())
-        slack = 16.0 * EPS * (1.0 + largest + len(sine[0])) + self._miss
+        slack = 16.0 * EPS * (1.0 + largest + len(sine[0]))
         result: dict[str, Number] = {}
         for name in names:
             weight, odd = self._weights[name], sum(ORDERS[name]) % 2
@@ -156,18 +153,6 @@ class WaveCells(Cells):
         if self._extent is None:
             return coordinates
         return np.clip(coordinates, 0.0, self._extent)
-
-
-def _missed(waves: PlaneWaves, reach: float) -> float:
-    """Return how far phases are from those on the torus, within a distance of the origin [m].
-
-    Ratios of waves count as rational up to a relative error: see ``integer_lattice``.
-    """
-    basis, multiples = waves.lattice
-    off = np.hypot(*(waves.wavevectors - multiples @ basis).T)
-    # What rounding alone leaves is within the slack anyway.
-    rounding = 16.0 * EPS * np.abs(multiples) @ np.hypot(*basis.T)
-    return float(np.where(off > rounding, off, 0.0).max() * reach)
 
 
 def nearest_phases(basis: FloatArray, wanted: FloatArray, reach: int = 400) -> FloatArray:
