@@ -9,7 +9,6 @@ import pytest
 from scipy.integrate import quad
 
 from asperity.analysis import loop_work
-from asperity.analysis.energy.anchor import anchored_stretches
 from asperity.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.heightmap import HeightMap
@@ -139,14 +138,6 @@ def test_friction_loop_is_the_limit_of_small_steps() -> None:
         errors.append(abs(stepped - exact))
     assert errors[1] < 1e-4 * abs(exact)
     assert math.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.5)  # first order
-
-
-def test_dragged_anchor_keeps_its_distance_and_follows_the_tractrix() -> None:
-    start, end = np.array([[0.0, 0.0, -1e-3]]), np.array([[5e-3, 0.0, -1e-3]])
-    first, second = anchored_stretches(start, end, 1e-3)
-    assert first.end[0] == pytest.approx(1e-3)
-    s = np.linspace(0, 1, 11)
-    np.testing.assert_allclose(np.hypot(*second.deflection(s).T), 1e-3, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 from asperity.contacts.sampler import sampled
 
 if TYPE_CHECKING:  # a contact is named at once: NumPy is for who asks it for points
-    from numpy.typing import ArrayLike
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
     from asperity.checks import FloatArray
 
@@ -160,6 +161,10 @@ class Contact(ABC):
     @abstractmethod
     def depth(self, texture: HeightField, points: FloatArray) -> FloatArray:
         """Return the depths [m], (n,), of probes (n, 3) [m]; negative out of contact."""
+
+    def inside(self, texture: HeightField, points: FloatArray) -> NDArray[np.bool_]:
+        """Return which probes (n, 3) [m] are in contact: depth > 0, as in compiled kernels."""
+        return self.depth(texture, points) > 0.0
 
     def column(self, texture: HeightField, point: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the line through a probe along which depth grows.

@@ -11,10 +11,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from asperity.checks import FloatArray
+from asperity.surface import Surface
+
+# Steps by which it is found where an edge enters and leaves contact: per wave of the height, and
+# at most.
+_STEPS_PER_WAVE, _STEPS = 16, 65_536
+_HALVINGS = 52
 
 Deflection = Callable[[FloatArray], FloatArray]
 
@@ -35,40 +42,57 @@ class Stretch:
 
 
 def anchored_stretches(
-    starts: FloatArray, ends: FloatArray, max_deflection: float
+    surface: Surface, starts: FloatArray, ends: FloatArray, wave: float = math.inf
 ) -> list[Stretch]:
     """Return the edges of a path cut where contact, sticking or sliding begins or ends.
 
+    The anchor is held while the contact's own depth is positive, as in the kernel: a vertex
+    exactly on the surface is out of contact and releases it.
+
     Args:
+        surface: a surface whose law has state.
         starts: first points of the edges [m], shape (n, 3).
         ends: last points [m], shape (n, 3).
-        max_deflection: length of the deflection while sliding [m].
+        wave: length over which the height can change its course [m].
     """
+    longest = surface.parameter("max_deflection")
     result: list[Stretch] = []
     deflection: FloatArray | None = None  # None: the anchor is released
     for start, end in zip(starts, ends, strict=True):
-        for a, b, inside in _contact_parts(start, end):
+        for a, b, inside in _contact_parts(surface, start, end, wave):
             if not inside:
                 deflection = None
                 continue
             held = np.zeros(2) if deflection is None else deflection
-            parts, deflection = _contact_stretches(a, b, held, max_deflection)
+            parts, deflection = _contact_stretches(a, b, held, longest)
             result += parts
     return result
 
 
-def _contact_parts(start: FloatArray, end: FloatArray) -> list[tuple[FloatArray, FloatArray, bool]]:
-    """Return the parts of an edge above and below the nominal plane z = 0."""
-    if (start[2] < 0.0) == (end[2] < 0.0):
-        return [(start, end, bool(start[2] < 0.0))]
-    if start[2] == 0.0 or end[2] == 0.0:
-        return [(start, end, True)]
-    s = start[2] / (start[2] - end[2])
-    crossing = start + s * (end - start)
-    return [
-        (start, crossing, bool(start[2] < 0.0)),
-        (crossing, end, bool(end[2] < 0.0)),
-    ]
+def _contact_parts(
+    surface: Surface, start: FloatArray, end: FloatArray, wave: float
+) -> list[tuple[FloatArray, FloatArray, bool]]:
+    """Return the parts of an edge in and out of contact, in order; they may be points."""
+    contact = surface.law.contact
+
+    def points(s: FloatArray) -> FloatArray:
+        return np.asarray((1.0 - s)[:, None] * start + s[:, None] * end)
+
+    steps = _STEPS_PER_WAVE
+    if contact.begins_on_texture:  # else contact begins at a plane, which an edge meets once
+        length = float(np.linalg.norm(end - start))
+        steps = max(steps, min(math.ceil(steps * length / wave), _STEPS))
+    s: FloatArray = np.linspace(0.0, 1.0, steps + 1)
+    inside = contact.inside(surface.texture, points(s))
+    turns = np.flatnonzero(inside[1:] != inside[:-1])
+    low, high = s[turns], s[turns + 1]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        same = contact.inside(surface.texture, points(middle)) == inside[turns]
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    places = [start, *points(high), end]
+    held = [bool(inside[0]), *inside[turns + 1].tolist()]
+    return [(a, b, kind) for (a, b), kind in zip(pairwise(places), held, strict=True)]
 
 
 def _contact_stretches(

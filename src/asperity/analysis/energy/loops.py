@@ -77,7 +77,7 @@ def loop_work(surface: Surface, vertices: ArrayLike, tolerance: float = DEFAULT_
     wave = _wavelength(surface)
     if not surface.law.stateful:
         return _field_work(surface, corners, ends, wave, tolerance)
-    stretches = anchored_stretches(corners, ends, surface.parameter("max_deflection"))
+    stretches = anchored_stretches(surface, corners, ends, wave)
     return float(sum(_stretch_work(surface, stretch, wave, tolerance) for stretch in stretches))
 
 

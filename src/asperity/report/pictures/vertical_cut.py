@@ -204,5 +204,5 @@ def arrow_field(surface: Surface, stretch: Stretch, bottom: float, top: float) -
     levels = bottom + (np.arange(_ARROW_ROWS) + 0.5) * ((top - bottom) / _ARROW_ROWS)
     along, z = (grid.ravel() for grid in np.meshgrid(steps, levels, indexing="ij"))
     xy = stretch.xy(along)
-    inside = z < surface.law.contact.begin(surface.texture, xy)
+    inside = surface.law.contact.inside(surface.texture, np.column_stack([xy, z]))
     return _forces(surface, stretch, along[inside], xy[inside], z[inside])
