@@ -91,8 +91,8 @@ class LawRow:
 
     @property
     def safe_leak(self) -> float:
-        """What the worst loop gains at the law's own safe stiffness [J]."""
-        return self.leak.worst * self.safe_stiffness / self.surface.stiffness
+        """What the worst loop of one period gains at the law's own safe stiffness [J]."""
+        return self.leak.worst_per_period * self.safe_stiffness / self.surface.stiffness
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""

@@ -112,7 +112,9 @@ def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
     line = leak.line
     x, y = (float(part) + 0.0 for part in line.direction)
     start = ", ".join(f"{1e3 * float(part) + 0.0:.6g}" for part in line.start)
-    facts = [("energy", f"{span_text(leak.energy, leak.upper, 'J')} per turn ({leak.method})")]
+    facts = [
+        ("energy", f"{span_text(leak.energy, leak.upper_per_period, 'J')} per turn ({leak.method})")
+    ]
     facts.append(("which", leak.description))
     plane = f"vertical, along ({x:.6g}, {y:.6g}) through ({start}) mm"
     facts.append(("plane", f"{plane}, {engineering(line.length, 'm')} of it"))

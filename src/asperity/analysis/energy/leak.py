@@ -51,7 +51,9 @@ class Leak(Record):
 
     Attributes:
         energy: work of the field on the probe around ``vertices`` [J]; 0 for a conservative law.
-        upper: proved bound for every simple loop in that plane [J]; infinite if none is proved.
+        upper_per_period: proved bound for every simple loop in that plane [J] that stays within
+            one period of the line, or within its length where it does not repeat; a loop around n
+            periods may gain n times as much. Infinite if none is proved.
         line: the scan line of the plane.
         method: ``"theorem"`` (zero by proof), ``"certified"`` or ``"sampled"``.
         description: the loop in words.
@@ -62,10 +64,10 @@ class Leak(Record):
             conservative law on a line that does not repeat.
     """
 
-    written = "energy upper per_length length thrust line method description vertices"
+    written = "energy upper_per_period per_length length thrust line method description vertices"
 
     energy: float
-    upper: float
+    upper_per_period: float
     line: ScanLine
     method: str
     description: str
@@ -73,9 +75,9 @@ class Leak(Record):
     thrust: float | None
 
     @property
-    def worst(self) -> float:
-        """``upper`` where one is proved, else ``energy`` [J]."""
-        return self.upper if math.isfinite(self.upper) else self.energy
+    def worst_per_period(self) -> float:
+        """``upper_per_period`` where it is proved, else ``energy`` [J]."""
+        return self.upper_per_period if math.isfinite(self.upper_per_period) else self.energy
 
     @property
     def length(self) -> float:
@@ -123,7 +125,7 @@ def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -
         >>> from asperity.textures.sinusoid import Sinusoid
         >>> surface = Surface(Sinusoid(amplitude=0.8e-3, period=2e-3), "A", max_depth=0.8e-3)
         >>> leak = worst_loop(surface)  # k D 2A, down one flank and up the other
-        >>> round(leak.energy * 1e3, 3), round(leak.upper * 1e3, 3)
+        >>> round(leak.energy * 1e3, 3), round(leak.upper_per_period * 1e3, 3)
         (1.28, 1.28)
     """
     line = surface.texture.scan_line() if direction is None else scan_line(surface, direction)

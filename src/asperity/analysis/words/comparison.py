@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from asperity.analysis.recommendation import Recommendation, felt_force
 from asperity.analysis.row import LawRow
 from asperity.analysis.words.passivity import newtons
-from asperity.analysis.words.surface import default_depth, law_parameters
+from asperity.analysis.words.surface import default_depth, law_parameters, most_gained
 from asperity.devices import Device
 from asperity.surface import Surface
 from asperity.units import engineering
@@ -19,7 +19,7 @@ def verdict(row: LawRow) -> str:
     if row.buzzes:
         parts.append(f"may buzz: {k:g} N/m is above its {newtons(row.safe_stiffness)}")
     if row.leaks:
-        parts.append(f"feels alive: a loop gains up to {engineering(row.leak.worst, 'J')}")
+        parts.append(f"feels alive: gains up to {most_gained(row.leak)}")
     if row.jumps:
         parts.append("clicks: " + row.continuous_reason)
     if row.textureless:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
+from asperity.analysis.energy.leak import Leak
 from asperity.devices import Device
 from asperity.surface import Surface
 from asperity.units import engineering
@@ -21,6 +23,21 @@ def unverified(device: Device, fields: Iterable[str]) -> list[str]:
     said = [f"{name.replace('_', ' ')} {datum.text}" for name, datum in known if not datum.verified]
     first = [f"Not verified for the {device.name}: {', '.join(said)}"] if said else []
     return [*first, *device.notes]
+
+
+def most_gained(leak: Leak) -> str:
+    """Return what the worst loop gains: per period, or length of the line, if that is proved.
+
+    Example:
+        >>> from asperity.analysis.energy.leak import worst_loop
+        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> most_gained(worst_loop(Surface(Sinusoid(0.8e-3, 2e-3), "A", max_depth=0.8e-3)))
+        '1.28 mJ per period'
+    """
+    energy = engineering(leak.worst_per_period, "J")
+    if math.isinf(leak.upper_per_period):
+        return f"{energy} per loop"
+    return f"{energy} per {'period' if leak.line.periodic else engineering(leak.line.length, 'm')}"
 
 
 def law_parameters(surface: Surface) -> list[str]:

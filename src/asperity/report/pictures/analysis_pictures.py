@@ -98,8 +98,8 @@ def draw_field(figure: Part, analysis: Analysis) -> None:
     window, leak = loop_window(analysis), analysis.leak
     remark = "conservative: no loop gains"
     if len(leak.vertices):
-        gain = span_text(leak.energy, leak.upper, "J")
-        remark = f"the worst loop gains {gain}"
+        gain = span_text(leak.energy, leak.upper_per_period, "J")
+        remark = f"the worst loop of one period gains {gain}"
     elif not analysis.conservative:
         remark = "no loop found that gains"
     axes = draw_fields(figure, [analysis.surface], [remark], window)[0]

@@ -16,7 +16,8 @@ COMPARISON = (
     (
         "worst leak",
         "The energy that the surface gives to the hand when the probe goes once around the worst "
-        "simple loop, slowly. A law that leaks feels alive, whatever the damping.",
+        "simple loop, slowly, within one period. A law that leaks feels alive, whatever the "
+        "damping.",
     ),
     (
         "T, strength",
@@ -52,7 +53,8 @@ ANALYSIS = (
     (
         "worst loop, v*",
         "The simple loop in a vertical plane on which the surface gives most energy to the hand, "
-        "slowly turned once. Below the speed v* the device's damping takes less than the loop "
+        "slowly turned once, within one period: a loop around n periods may gain n times as much. "
+        "Below the speed v* the device's damping takes less than the loop "
         "gives.",
     ),
     (

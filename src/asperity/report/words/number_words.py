@@ -186,7 +186,7 @@ def leak_text(row: LawRow, comparison: Comparison) -> str:
     if leak.energy == 0.0 and leak.method == "theorem":
         return "0"
     mark = SAMPLED if leak.method == "sampled" else ""
-    energies = [leak.worst, *(other.leak.worst for other in comparison.rows)]
+    energies = [leak.worst_per_period, *(other.leak.worst_per_period for other in comparison.rows)]
     return f"{mark}{in_one_unit(energies, 'J', digits=2)[0]}"
 
 
