@@ -91,6 +91,14 @@ def test_a_folder_that_everybody_may_write_is_refused(folder: Path, mode: int, r
     assert cache.recall(ROOM, KEY) == CONTENT
 
 
+def test_nothing_is_made_in_a_folder_that_is_refused(folder: Path):
+    folder.mkdir()
+    folder.chmod(0o777)
+    with pytest.warns(cache.CacheWarning, match="everybody may write"):
+        cache.keep(ROOM, KEY, CONTENT)
+    assert list(folder.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("uid", "gid", "mode", "reason"),
     [

@@ -71,8 +71,7 @@ def keep(room: str, key: str, content: bytes) -> None:
     """Keep a content under a key, whole or not at all; what cannot be kept is made again."""
     path = cache_folder() / room / _name(key)
     try:
-        _make(path.parent)
-        if _trusted(path.parent.parent) and _trusted(path.parent):
+        if _made(path.parent) and _trusted(path.parent):
             with whole_file(path) as stream:
                 stream.write(_MAGIC + _digest(key, content) + content)
     except (OSError, ValueError) as error:
@@ -87,11 +86,15 @@ def set_aside(room: str, key: str) -> None:
     _say(f"the cache {cache_folder()} had damaged entries: they were set aside and made again")
 
 
-def _make(room: Path) -> None:
+def _made(room: Path) -> bool:
+    """Return whether a room is there, made if need be in a folder that can be trusted."""
     room.parent.mkdir(mode=0o755, parents=True, exist_ok=True)
+    if not _trusted(room.parent):
+        return False
     if not room.exists():
         room.mkdir(exist_ok=True)
         room.chmod(stat.S_IMODE(room.parent.stat().st_mode))  # made for a group: so is the room
+    return True
 
 
 _AGAIN = "the work is done again each time"
