@@ -33,7 +33,11 @@ COMMANDS = (
     "prepare map.npy --pitch 20um -o out.csv",
     "simulate scene.toml --trace out.csv",
     f"limits {WAVE} --device omega.3 --json out.csv",
+    "scan scene.toml --laws B,F --json out.csv",
+    "onset still.toml --laws W --delays 1 --json out.csv",
+    "reproduce --claim eq-5 --json out.csv",
 )
+_EARLIEST = 0.5  # [s] of an interrupt: before that Python itself may be starting, and swallow it
 _SCENE = """
 [texture]
 kind = "sinusoid"
@@ -56,6 +60,11 @@ start = ["0 mm", "0 mm", "-1 mm"]
 end = ["5 mm", "0 mm", "-1 mm"]
 speed = "50 mm/s"
 """
+_STILL = """[motion]
+kind = "still"
+point = ["0 mm", "0 mm", "-1 mm"]
+"""
+_INPUTS = {"map.npy", "scene.toml", "still.toml"}
 
 
 def furnish(folder: Path) -> None:
@@ -64,6 +73,7 @@ def furnish(folder: Path) -> None:
     heights = 2e-5 * np.random.default_rng(3).normal(size=(48, 48))
     np.save(folder / "map.npy", heights)
     (folder / "scene.toml").write_text(_SCENE)
+    (folder / "still.toml").write_text(_SCENE.partition("[motion]")[0] + _STILL)
 
 
 def start(command: str, folder: Path, cache: Path) -> subprocess.Popen[bytes]:
@@ -92,7 +102,7 @@ def disturbed(command: str, folder: Path, cache: Path, after: float, by: int) ->
     if _group_lives(process.pid):
         os.killpg(process.pid, signal.SIGKILL)
         wrong.append("a process is left")
-    left = {path.name for path in folder.iterdir()} - {"map.npy", "scene.toml"}
+    left = {path.name for path in folder.iterdir()} - _INPUTS
     if left - {"out.csv"}:
         wrong.append(f"files are left: {sorted(left)}")
     if "out.csv" in left and not _whole(folder / "out.csv", command):
@@ -145,6 +155,7 @@ def run(count: int, console: Console, seed: int = 0) -> Counter[str]:
             # A quarter begins with an empty cache: then compiling is disturbed too.
             cache = root / ("cache" if draw.random() < 0.75 else f"cache{index}")
             after = draw.uniform(0.1, times[command])
+            after = max(after, _EARLIEST) if by == signal.SIGINT else after
             faults.update(disturbed(command, folder, cache, after, by))
             if index % 10 == 9 and "html" not in command:
                 again = _answer(command, root / f"again{index}", cache)
