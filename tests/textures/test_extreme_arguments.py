@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import resource
 import time
 from collections.abc import Iterator
@@ -9,9 +10,11 @@ from contextlib import suppress
 
 import pytest
 
+from asperity.analysis.analyze import analyze
 from asperity.analysis.compare import compare
 from asperity.errors import ParameterError
 from asperity.scene import load_scene
+from asperity.surface import Surface
 from asperity.textures.catalogue import CATALOGUE
 
 EXTREMES = ("1e-30", "1e30")
@@ -53,3 +56,11 @@ def test_a_wave_too_steep_for_a_loop_is_named() -> None:
         compare(load_scene(WAVES[0]).texture, laws="A")
     with pytest.raises(ParameterError, match="amplitudes and wavevectors make a curvature"):
         load_scene("fourier:amplitudes=1e30,wavevectors=1e30 0")
+
+
+def test_analysis_of_a_radius_below_all_digits() -> None:
+    """A crest of 1 m has a radius of 25e-21 m; an anchor is dragged over a million waves."""
+    wave = load_scene(WAVES[0]).texture
+    assert analyze(Surface(wave, "D")).q.upper == math.inf
+    with pytest.raises(ParameterError, match=r"a loop of 4.2 mm turns.*max_deflection"):
+        analyze(Surface(wave, "F"))

@@ -246,6 +246,8 @@ class _Ridge:
     def descend(self, depth: float) -> FloatArray | None:
         """Return the witness pair (2, 3) [m] at a depth, reached in steps; none if it is lost."""
         for _ in range(_MOST_STEPS):
+            if self.rate <= 0.0:  # below the digits of the points: the ridge is lost
+                return None
             run = (depth - self.depth) / self.rate
             # Within the ball that touches the surface a step cannot leave the body.
             longest = _LONGEST * self.depth

@@ -77,6 +77,8 @@ def loop_work(surface: Surface, vertices: ArrayLike, tolerance: float = DEFAULT_
     wave = _wavelength(surface)
     if not surface.law.stateful:
         return _field_work(surface, corners, ends, wave, tolerance)
+    way = float(np.linalg.norm(ends - corners, axis=1).sum())
+    _refuse_work(2.0 * way / wave, surface, way, wave)
     stretches = anchored_stretches(surface, corners, ends, wave)
     return float(sum(_stretch_work(surface, stretch, wave, tolerance) for stretch in stretches))
 
@@ -86,8 +88,9 @@ def _field_work(
 ) -> float:
     """Return the work along all edges together: one quadrature of panels of all of them."""
     along = ends - starts
-    counts = [_panels(float(length), wave, len(along)) for length in np.linalg.norm(along, axis=1)]
-    _refuse_work(sum(counts), surface, wave)
+    lengths = np.linalg.norm(along, axis=1)
+    counts = [_panels(float(length), wave, len(along)) for length in lengths]
+    _refuse_work(sum(counts), surface, float(lengths.sum()), wave)
     edge = np.repeat(np.arange(len(along)), counts)
     first = np.concatenate([np.arange(count) for count in counts])
     parts = np.repeat(1.0 / np.array(counts), counts)
@@ -102,20 +105,21 @@ def _field_work(
     return _adaptive(integrand, left, width, tolerance)
 
 
-def _refuse_work(panels: int, surface: Surface, wave: float) -> None:
-    """Refuse a loop that is long beside what the height does, before there are arrays.
+def _refuse_work(panels: float, surface: Surface, way: float, wave: float) -> None:
+    """Refuse a loop whose way is long beside what the height does, before there are arrays.
 
     Raises:
         ParameterError: if it takes too many panels.
     """
     if panels <= _MOST_AT_ONCE:
         return
-    depth, slope = engineering(surface.max_depth, "m"), surface.texture.bounds[0]
+    slope = surface.texture.bounds[0]
+    size = "max_deflection" if surface.law.stateful else "max_depth"
     raise ParameterError(
         "surface",
-        f"is too steep for its leak, slopes up to {slope:.2g}: a loop down to {depth} turns every "
-        f"{engineering(wave, 'm')}; give less amplitude (rms, height) or max_depth, or a longer "
-        "period (cutoff, pitch)",
+        f"is too steep for its leak, slopes up to {slope:.2g}: a loop of {engineering(way, 'm')} "
+        f"turns every {engineering(wave, 'm')}; give less amplitude (rms, height) or {size}, or a "
+        "longer period (cutoff, pitch)",
     )
 
 

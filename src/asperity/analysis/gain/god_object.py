@@ -76,7 +76,10 @@ def gain_above_crest(surface: Surface, height: float) -> float:
     crest = sharpest_crest(surface.texture)
     if crest is None:
         return 1.0
-    return _number((crest.foot[2] - height) / (crest.foot[2] - crest.centre[2]))
+    above, reach = crest.foot[2] - height, crest.foot[2] - crest.centre[2]
+    if reach <= 0.0:  # a radius below the digits of the height
+        return math.inf if above > 0.0 else 1.0
+    return _number(above / reach)
 
 
 def split_number(surface: Surface, search: Search) -> Bound:
