@@ -219,6 +219,24 @@ def test_a_limited_force_is_rounded_towards_zero(
     np.testing.assert_array_equal(commanded(force, 1.0 / 32.0, limit), expected)
 
 
+@pytest.mark.parametrize(
+    "direction", [(1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.5, 0.0, 0.25), (-3.0, 0.0, 4.0)]
+)
+def test_a_force_is_cut_to_its_limit_to_the_last_bits(
+    direction: tuple[float, float, float],
+) -> None:
+    """Above the limit it is as long as the limit, along the same line; up to it, as it was."""
+    limit, unit = 0.625, np.array(direction) / np.linalg.norm(direction)
+    for length in (0.626, 0.63, 3.5):
+        np.testing.assert_allclose(
+            commanded(tuple(length * unit), 0.0, limit), limit * unit, rtol=1e-13, atol=1e-16
+        )
+    for length in (0.5, 0.624, 0.6249):
+        np.testing.assert_allclose(
+            commanded(tuple(length * unit), 0.0, limit), length * unit, rtol=1e-13, atol=1e-16
+        )
+
+
 def test_the_force_never_exceeds_its_limit() -> None:
     run = simulate(
         Surface(Sinusoid(0.4e-3, 1e-3), "A", 900.0), Cartesian(0.05, 1.0),
