@@ -58,7 +58,7 @@ def test_json_has_the_schema(call: Call) -> None:
     assert data["experiments"] is None
     assert {one["id"] for one in data["claims"]} == set(FEW)
     for one in data["claims"]:
-        assert set(one) == {"id", "equations", "statement", "verdict", "evidence"}
+        assert set(one) == {"id", "equations", "statement", "verdict", "evidence", "flips_under"}
         assert one["verdict"] in VERDICTS
         assert one["evidence"]["summary"]
 

@@ -92,19 +92,20 @@ def test_statements() -> None:
 )
 def test_a_claim_is_as_good_as_its_weakest_part(parts: tuple[str, ...], whole: str) -> None:
     checks = [
-        Check(verdict, verdict[:1], {str(i): 1.0}, f"c{i}" if "cor" in verdict else "")
+        Check(verdict, verdict[:1], {str(i): 1.0}, f"c{i}" if "cor" in verdict else "", verdict)
         for i, verdict in enumerate(parts)
     ]
     found = settle(*checks)
     assert found.verdict == whole
     assert len(found.numbers) == len(parts)
+    assert found.fitted == "; ".join(dict.fromkeys(parts))
 
 
 def test_json_has_no_infinity() -> None:
     found = Check("holds", "s", {"a": math.inf, "b": [1.0, -math.inf, math.nan], "c": "text"}, "")
     result = Claim("x-1", ("(1)",), "I", "words", lambda: found).run()
     back = json.loads(json.dumps(result.to_dict(), allow_nan=False))
-    assert list(back) == ["id", "equations", "statement", "verdict", "evidence"]
+    assert list(back) == ["id", "equations", "statement", "verdict", "evidence", "flips_under"]
     assert back["evidence"]["numbers"] == {"a": "inf", "b": [1.0, "-inf", None], "c": "text"}
     assert back["equations"] == ["(1)"]
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from asperity.checks import FloatArray
 from asperity.errors import AsperityError
 from asperity.files import Record, plain, record
+from asperity.paper.changes import Change
 
 Verdict = Literal["holds", "holds with correction", "does not hold", "undecided"]
 VERDICTS: tuple[Verdict, ...] = ("holds", "holds with correction", "does not hold", "undecided")
@@ -32,11 +33,13 @@ class Evidence:
         summary: one line, with the numbers that decide.
         numbers: everything computed, by what it is.
         correction: the corrected statement; empty where none is needed or known.
+        fitted: what the paper does not state and was fitted or guessed; empty where nothing was.
     """
 
     summary: str
     numbers: Mapping[str, Number] = field(default_factory=dict)
     correction: str = ""
+    fitted: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, every number a float: counts and truth values among them too."""
@@ -44,7 +47,11 @@ class Evidence:
             name: value if isinstance(value, str) else plain(np.asarray(value, dtype=float))
             for name, value in self.numbers.items()
         }
-        return {**record(self, "summary"), "numbers": numbers, **record(self, "correction")}
+        return {
+            **record(self, "summary"),
+            "numbers": numbers,
+            **record(self, "correction", "fitted"),
+        }
 
 
 @dataclass(frozen=True)
@@ -56,12 +63,14 @@ class Check:
         says: in words, with its numbers.
         numbers: see :class:`Evidence`.
         correction: see :class:`Evidence`.
+        fitted: see :class:`Evidence`.
     """
 
     verdict: Verdict
     says: str
     numbers: Mapping[str, Number] = field(default_factory=dict)
     correction: str = ""
+    fitted: str = ""
 
 
 Computation = Callable[[], Check]
@@ -79,9 +88,10 @@ class Result(Record):
         verdict: ``"holds"`` (as printed), ``"holds with correction"`` (as printed it is wrong, a
             small change makes it right), ``"does not hold"`` or ``"undecided"``.
         evidence: what the verdict follows from.
+        flips_under: what would give another verdict, in words.
     """
 
-    written = "id equations statement verdict evidence"
+    written = "id equations statement verdict evidence flips_under"
 
     id: str
     equations: tuple[str, ...]
@@ -89,6 +99,7 @@ class Result(Record):
     statement: str
     verdict: Verdict
     evidence: Evidence
+    flips_under: str = ""
 
 
 @dataclass(frozen=True)
@@ -101,6 +112,7 @@ class Claim:
         section: of the paper.
         statement: in our words.
         compute: computes the evidence and derives the verdict.
+        flipped_by: a change under which the verdict is another one; a claim of the paper has one.
     """
 
     id: str
@@ -108,6 +120,7 @@ class Claim:
     section: str
     statement: str
     compute: Computation
+    flipped_by: Change | None = None
 
     def run(self) -> Result:
         """Compute the evidence and return it with the verdict.
@@ -118,17 +131,21 @@ class Claim:
             found = self.compute()
         except AsperityError as error:
             found = Check("undecided", f"could not be computed: {error}")
-        evidence = Evidence(found.says, found.numbers, found.correction)
+        evidence = Evidence(found.says, found.numbers, found.correction, found.fitted)
+        flips_under = "" if self.flipped_by is None else self.flipped_by.says
         return Result(
-            self.id, self.equations, self.section, self.statement, found.verdict, evidence
-        )
+            self.id, self.equations, self.section, self.statement, found.verdict, evidence,
+            flips_under,
+        )  # fmt: skip
 
 
 DECLARED: list[Claim] = []
 """The claims of the paper, in the order in which their code is read."""
 
 
-def judges(name: str, section: str, *equations: str) -> Callable[[Computation], Computation]:
+def judges(
+    name: str, section: str, *equations: str, flipped_by: Change
+) -> Callable[[Computation], Computation]:
     """Declare that a function judges a claim of the paper.
 
     The first line of its docstring is the statement.
@@ -137,11 +154,12 @@ def judges(name: str, section: str, *equations: str) -> Callable[[Computation], 
         name: id of the claim.
         section: of the paper.
         *equations: numbers of the paper that the claim covers.
+        flipped_by: a change under which the verdict is another one.
     """
 
     def declare(compute: Computation) -> Computation:
         statement = (compute.__doc__ or "").partition("\n")[0]
-        DECLARED.append(Claim(name, equations, section, statement, compute))
+        DECLARED.append(Claim(name, equations, section, statement, compute, flipped_by))
         return compute
 
     return declare
@@ -244,15 +262,27 @@ def decide(
     return Check("does not hold", says, known, correction if corrected is None else "")
 
 
+OBSERVED: dict[str, bool] = {}
+"""What people felt, or measured on materials, by claim. Nobody was asked: it is empty."""
+
+
+def observation(name: str, says: str, numbers: Mapping[str, Number] | None = None) -> Check:
+    """Judge what no computation can: it stays undecided until somebody observes it."""
+    return decide(says, printed=OBSERVED.get(name), numbers=numbers)
+
+
 def settle(*checks: Check) -> Check:
     """Put checks together: a claim is as good as the weakest of its parts."""
     worst = max(checks, key=lambda check: _GRAVITY.index(check.verdict))
     numbers: dict[str, Number] = {}
     for check in checks:
         numbers.update(check.numbers)
-    corrections = dict.fromkeys(check.correction for check in checks if check.correction)
     summary = "; ".join(check.says for check in checks)
-    return Check(worst.verdict, summary, numbers, "; ".join(corrections))
+    correction, fitted = (
+        "; ".join(dict.fromkeys(text for text in texts if text))
+        for texts in zip(*((check.correction, check.fitted) for check in checks), strict=True)
+    )
+    return Check(worst.verdict, summary, numbers, correction, fitted)
 
 
 def relative_error(value: ArrayLike | None, target: ArrayLike) -> float:

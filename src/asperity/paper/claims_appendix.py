@@ -9,11 +9,12 @@ from functools import lru_cache
 import numpy as np
 
 from asperity.checks import FloatArray
+from asperity.paper.changes import FORCES, JACOBIANS, jacobians, laws
 from asperity.paper.claim import Check, decide, judge, judges, settle
 from asperity.paper.claims_friction import PAPER, Rub, norm_of, random_rubs, stick_entries
 from asperity.paper.claims_god_object import BENT, bent_jacobian, flat_jacobian
 from asperity.paper.comparisons import compare_at, energy_sign_check, jacobian_check
-from asperity.paper.plane import FootRates, Spot, foot_rates, random_settings
+from asperity.paper.plane import FootRates, Spot, foot_rates, random_settings, spots
 
 # --- appendix I -----------------------------------------------------------------------------------
 
@@ -56,23 +57,12 @@ def expansion(r: Rub, *, as_printed: bool) -> float:
 def true_number(r: Rub) -> float:
     """The greatest ‖J_F‖/κ₀ of the paper's law with h = A sin, over x, both phases, |d| = d_max.
 
-    The norm is convex in d and the depth, so both are at an end.
+    By its kernel. The norm is convex in d and the depth, so both are at an end.
     """
-    wave = 2.0 * math.pi / r.period
-    x = np.linspace(0.0, r.period, 20001)
-    still, slope = 1.0 - r.amplitude * np.sin(wave * x), r.amplitude * wave * np.cos(wave * x)
-    b = r.friction * still
-    best = 0.0
-    for rate in (0.0, 1.0):
-        for d in (-r.deflection, r.deflection):
-            a = r.friction * r.depth / r.deflection * (still * rate - slope * d)
-            t = 1.0 + a * a + b * b
-            norm = np.sqrt(0.5 * (t + np.sqrt(np.maximum(t * t - 4.0 * a * a, 0.0))))
-            best = max(best, float(norm.max()))
-    return best
+    return float(np.linalg.norm(r.compiled_jacobians(20001), 2, axis=(-2, -1)).max())
 
 
-@judges("eq-31", "App. I", "(31)")
+@judges("eq-31", "App. I", "(31)", flipped_by=jacobians(1.2))
 def appendix_one() -> Check:
     """An upper bound on q_F, and its expression written out."""
     rubs = [PAPER, *random_rubs(6)]
@@ -111,18 +101,21 @@ def _against(
     what: str, truth: Rate, printed: Rate, corrected: Rate | None = None, correction: str = ""
 ) -> Check:
     """Compare formulas at the generic probes."""
-    return compare_at(_rates(), what, truth, printed, corrected, correction)
+    return compare_at(_rates(), what, (truth,), printed, corrected, correction)
 
 
-@judges("eq-32", "App. II", "(32)")
+@judges("eq-32", "App. II", "(32)", flipped_by=laws(D="E"))
 def orthogonal() -> Check:
     """The penetration is at right angles to the surface."""
-    return _against(
-        "p^z - p_h^z", lambda r: r.spot.from_foot[1], lambda r: -r.spot.from_foot[0] / r.spot.slope
-    )
+
+    # By Newton's foot, and by the force, which is -κ₀ times the same.
+    def part(r: FootRates, axis: int) -> FloatArray:
+        return np.array([r.spot.from_foot[axis], -r.force[axis] / r.spot.k])
+
+    return _against("p^z - p_h^z", lambda r: part(r, 1), lambda r: -part(r, 0) / r.spot.slope)
 
 
-@judges("eq-33", "App. II", "(33)")
+@judges("eq-33", "App. II", "(33)", flipped_by=JACOBIANS)
 def along_x() -> Check:
     """The foot stays on the surface as p moves along x."""
     return _against(
@@ -130,7 +123,7 @@ def along_x() -> Check:
     )
 
 
-@judges("eq-34", "App. II", "(34)")
+@judges("eq-34", "App. II", "(34)", flipped_by=JACOBIANS)
 def along_z() -> Check:
     """The foot stays on the surface as p moves along z."""
     return _against(
@@ -138,14 +131,14 @@ def along_z() -> Check:
     )
 
 
-@judges("eq-35", "App. II", "(35)")
+@judges("eq-35", "App. II", "(35)", flipped_by=FORCES)
 def energy_function() -> Check:
     """Energy function of D."""
-    places = [r.spot for r in _rates()]
+    places = list(spots("D"))
     return energy_sign_check("D", places, [0.5 * s.distance**2 for s in places])
 
 
-@judges("eq-36", "App. II", "(36)")
+@judges("eq-36", "App. II", "(36)", flipped_by=FORCES)
 def first_line() -> Check:
     """f_x of D is its derivative, before simplification."""
 
@@ -153,10 +146,10 @@ def first_line() -> Check:
         x, z = r.spot.from_foot
         return float(-r.spot.k * (x * (1.0 - r.rate("x", "x")) - z * r.rate("z", "x")))
 
-    return _against("f_x of D", lambda r: r.spot.force()[0], printed)
+    return _against("f_x of D", lambda r: r.force[0], printed)
 
 
-@judges("eq-37", "App. II", "(37)")
+@judges("eq-37", "App. II", "(37)", flipped_by=FORCES)
 def second_line() -> Check:
     """f_x of D after (32) is used."""
 
@@ -171,7 +164,7 @@ def second_line() -> Check:
 
     def truth(r: FootRates) -> list[float]:
         x, z = r.spot.from_foot
-        return [r.spot.force()[0], r.spot.k * x * r.rate("x", "x"), r.spot.k * z * r.rate("z", "x")]
+        return [r.force[0], r.spot.k * x * r.rate("x", "x"), r.spot.k * z * r.rate("z", "x")]
 
     return _against(
         "(37) and the two parts of its bracket as they come from (36)",
@@ -182,15 +175,13 @@ def second_line() -> Check:
     )
 
 
-@judges("eq-38", "App. II", "(38)")
+@judges("eq-38", "App. II", "(38)", flipped_by=FORCES)
 def force_x() -> Check:
     """f_x of D after (33) is used.
 
     And f_x = 0 where h' = 0.
     """
-    general = _against(
-        "f_x of D", lambda r: r.spot.force()[0], lambda r: -r.spot.k * r.spot.from_foot[0]
-    )
+    general = _against("f_x of D", lambda r: r.force[0], lambda r: -r.spot.k * r.spot.from_foot[0])
     level = 0.0
     for case in random_settings():
         radius = case.period**2 / (4.0 * math.pi**2 * case.amplitude)
@@ -208,12 +199,10 @@ def force_x() -> Check:
     )
 
 
-@judges("eq-39", "App. II", "(39)")
+@judges("eq-39", "App. II", "(39)", flipped_by=FORCES)
 def force_z() -> Check:
     """f_z of D, by the reasoning of (36) to (38)."""
-    return _against(
-        "f_z of D", lambda r: r.spot.force()[1], lambda r: -r.spot.k * r.spot.from_foot[1]
-    )
+    return _against("f_z of D", lambda r: r.force[1], lambda r: -r.spot.k * r.spot.from_foot[1])
 
 
 def _jacobian(r: FootRates, first: float, second: float) -> FloatArray:
@@ -221,24 +210,24 @@ def _jacobian(r: FootRates, first: float, second: float) -> FloatArray:
     return -r.spot.k * np.array([[1.0 - r.rate("x", "x"), first], [second, 1.0 - r.rate("z", "z")]])
 
 
-@judges("eq-40", "App. II", "(40)")
+@judges("eq-40", "App. II", "(40)", flipped_by=JACOBIANS)
 def general_jacobian() -> Check:
     """Jacobian of D from the derivatives of the foot."""
     return _against(
         "Jacobian of D",
-        lambda r: r.spot.jacobian(),
+        lambda r: r.jacobian,
         lambda r: _jacobian(r, -r.rate("z", "z"), -r.rate("z", "x")),
         lambda r: _jacobian(r, -r.rate("x", "z"), -r.rate("z", "x")),
         "entry (1, 2) is -∂p_h^x/∂p^z",
     )
 
 
-@judges("eq-41", "App. II", "(41)")
+@judges("eq-41", "App. II", "(41)", flipped_by=JACOBIANS)
 def reduced_jacobian() -> Check:
     """Jacobian of D after (33) and (34) are used."""
     return _against(
         "Jacobian of D",
-        lambda r: r.spot.jacobian(),
+        lambda r: r.jacobian,
         lambda r: _jacobian(r, -r.rate("z", "z") / r.spot.slope, -r.spot.slope * r.rate("z", "x")),
         lambda r: _jacobian(r, -r.rate("z", "z") / r.spot.slope, -r.spot.slope * r.rate("x", "x")),
         "entry (2, 1) is -h' ∂p_h^x/∂p^x",
@@ -249,7 +238,7 @@ def _bent(spot: Spot) -> float:
     return 1.0 + spot.slope**2 - spot.d * spot.bend
 
 
-@judges("eq-42", "App. II", "(42)")
+@judges("eq-42", "App. II", "(42)", flipped_by=JACOBIANS)
 def foot_x() -> Check:
     """∂p_h^x/∂p^x = 1/(1 + h'²)."""
     return _against(
@@ -261,7 +250,7 @@ def foot_x() -> Check:
     )
 
 
-@judges("eq-43", "App. II", "(43)")
+@judges("eq-43", "App. II", "(43)", flipped_by=JACOBIANS)
 def foot_z() -> Check:
     """∂p_h^z/∂p^z = h'²/(1 + h'²)."""
     return _against(
@@ -273,7 +262,7 @@ def foot_z() -> Check:
     )
 
 
-@judges("eq-44", "App. II", "(44)")
+@judges("eq-44", "App. II", "(44)", flipped_by=JACOBIANS)
 def final_jacobian() -> Check:
     """Jacobian of D from the slope alone."""
     return jacobian_check("D", flat_jacobian, bent_jacobian, BENT)

@@ -11,6 +11,7 @@ from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.loops import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.checks import FloatArray
+from asperity.paper.changes import FORCES, JACOBIANS, Change, Swap, laws
 from asperity.paper.claim import Check, decide, judge, judges, settle
 from asperity.paper.comparisons import (
     curl_check,
@@ -50,7 +51,7 @@ BENT = "with curvature: 1 + h'² becomes 1 + h'² + (p_h^z - p^z) h'' in the der
 # --- D --------------------------------------------------------------------------------------------
 
 
-@judges("eq-16", "IV.D", "(16)")
+@judges("eq-16", "IV.D", "(16)", flipped_by=FORCES)
 def potential_d() -> Check:
     """Potential of D."""
 
@@ -64,7 +65,7 @@ def potential_d() -> Check:
     return potential_check("D", potential, lambda s: 0.5 * s.distance**2)
 
 
-@judges("eq-17", "IV.D", "(17)")
+@judges("eq-17", "IV.D", "(17)", flipped_by=FORCES)
 def field_d() -> Check:
     """Force of D, a spring to the nearest point; conservative.
 
@@ -80,21 +81,29 @@ def field_d() -> Check:
     )
 
 
-@judges("eq-18", "IV.D", "(18)")
+@judges("eq-18", "IV.D", "(18)", flipped_by=JACOBIANS)
 def jacobian_d() -> Check:
     """Jacobian of D from the slope alone."""
     return jacobian_check("D", flat_jacobian, bent_jacobian, BENT)
 
 
-@judges("sentence-IV.D-singular", "IV.D")
+NO_CURVATURE = Change(
+    "D's Jacobian without curvature, (18)",
+    tuple(
+        Swap(name, lambda _was: flat_jacobian, Spot) for name in ("jacobian", "compiled_jacobian")
+    ),
+)
+
+
+@judges("sentence-IV.D-singular", "IV.D", flipped_by=NO_CURVATURE)
 def singular_d() -> Check:
     """Moving at right angles to the penetration leaves D's force as it is."""
     shares = []
     for spot in spots("D"):
         across = np.array([spot.d, spot.at - spot.x])
         across = np.array([-spot.from_foot[1], spot.from_foot[0]]) / math.hypot(*across)
-        change = spot.jacobian() @ across
-        shares.append(float(np.linalg.norm(change)) / spot.k)
+        for matrix in (spot.jacobian(), spot.compiled_jacobian()):
+            shares.append(float(np.linalg.norm(matrix @ across)) / spot.k)
     return decide(
         f"moving across, the force of D changes by {min(shares):.3f} to {max(shares):.3f} κ₀",
         printed=max(shares) < 1e-9,
@@ -103,10 +112,10 @@ def singular_d() -> Check:
     )
 
 
-@judges("sentence-IV.D-number", "IV.D")
+@judges("sentence-IV.D-number", "IV.D", flipped_by=laws(D="E"))
 def number_d() -> Check:
     """‖J_D‖ = κ₀ whatever the surface, and q_D = 1."""
-    norms = [float(np.linalg.norm(s.jacobian(), 2)) / s.k for s in spots("D", 12)]
+    norms = [float(s.norms().max()) / s.k for s in spots("D", 12)]
     surface = PASSIVITY.surface("D")
     q, plus = characteristic_number(surface), one_sided_number(surface)
     gentle = BUMP.surface("D", max_depth=0.8 * _onset(BUMP.amplitude, BUMP.period))
@@ -128,7 +137,7 @@ def _onset(amplitude: float, period: float) -> float:
     return period**2 / (4.0 * math.pi**2 * amplitude)
 
 
-@judges("remark-6", "IV.D", "Remark 6")
+@judges("remark-6", "IV.D", "Remark 6", flipped_by=laws(D="E"))
 def remark_6() -> Check:
     """D's force jumps, on a sinusoid below its maxima; its potential has a kink there."""
     checks = []
@@ -177,7 +186,7 @@ def _kink() -> Any:
 _OUTWARD = "without the minus sign: as printed the force pulls the probe further in"
 
 
-@judges("eq-19", "IV.E", "(19)")
+@judges("eq-19", "IV.E", "(19)", flipped_by=FORCES)
 def field_e() -> Check:
     """Force of E: nearest distance, along the wall's normal."""
     return field_check(
@@ -188,7 +197,7 @@ def field_e() -> Check:
     )
 
 
-@judges("eq-20", "IV.E", "(20)")
+@judges("eq-20", "IV.E", "(20)", flipped_by=JACOBIANS)
 def jacobian_e() -> Check:
     """Jacobian of E."""
 
@@ -198,14 +207,14 @@ def jacobian_e() -> Check:
     return jacobian_check("E", printed, lambda s: -printed(s), _OUTWARD)
 
 
-@judges("eq-21", "IV.E", "(21)")
+@judges("eq-21", "IV.E", "(21)", flipped_by=FORCES)
 def norm_e() -> Check:
     """‖J_E‖ = κ₀ and q_E = 1."""
     places = list(spots("E", 6))
     norms = judge(
         "norm of the Jacobian of E at 6 generic probes",
-        printed=[s.k for s in places],
-        truth=[np.linalg.norm(s.jacobian(), 2) for s in places],
+        printed=[[s.k, s.k] for s in places],
+        truth=[s.norms() for s in places],
     )
     q = characteristic_number(PASSIVITY.surface("E"))
     number = judge("q_E in V.A's setting", printed=1.0, truth=q.value)
@@ -230,7 +239,7 @@ def _steepness_e() -> Any:
     )
 
 
-@judges("sentence-IV.E-energy", "IV.E")
+@judges("sentence-IV.E-energy", "IV.E", flipped_by=laws(E="D"))
 def energy_e() -> Check:
     """Around the path of Fig. 3 E gains energy, on the rising leg only."""
     least, other = math.inf, 0.0
@@ -251,7 +260,7 @@ def energy_e() -> Check:
     )
 
 
-@judges("remark-7", "IV.E", "Remark 7")
+@judges("remark-7", "IV.E", "Remark 7", flipped_by=laws(E="D"))
 def remark_7() -> Check:
     """E is not conservative, but does not jump."""
     surface = PASSIVITY.surface("E")

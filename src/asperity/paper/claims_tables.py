@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +15,7 @@ from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.checks import FloatArray
 from asperity.kernels.probe import ClampName
 from asperity.laws import find_law
+from asperity.paper.changes import FORCES, laws, numbers, observed, other
 from asperity.paper.claim import (
     DECLARED,
     Check,
@@ -20,6 +23,7 @@ from asperity.paper.claim import (
     decide,
     judge,
     judges,
+    observation,
     relative_error,
     settle,
 )
@@ -40,13 +44,13 @@ def _normal(s: Spot) -> FloatArray:
     return np.array([-s.slope, 1.0]) / math.hypot(1.0, s.slope)
 
 
-@judges("table-1-A", "IV", "Table I")
+@judges("table-1-A", "IV", "Table I", flipped_by=FORCES)
 def row_a() -> Check:
     """Force of A: [0, -κ₀ d]."""
     return field_check("A", lambda s: np.array([0.0, -s.k * s.d]))
 
 
-@judges("table-1-BG", "IV", "Table I")
+@judges("table-1-BG", "IV", "Table I", flipped_by=FORCES)
 def row_b_and_g() -> Check:
     """Force of B and G: -κ₀ d n.
 
@@ -58,7 +62,7 @@ def row_b_and_g() -> Check:
     )
 
 
-@judges("table-1-D", "IV", "Table I")
+@judges("table-1-D", "IV", "Table I", flipped_by=FORCES)
 def row_d() -> Check:
     """Force of D: -κ₀ d^min n̂.
 
@@ -67,7 +71,7 @@ def row_d() -> Check:
     return field_check("D", lambda s: -s.k * s.distance * (s.from_foot / s.distance))
 
 
-@judges("table-1-E", "IV", "Table I")
+@judges("table-1-E", "IV", "Table I", flipped_by=FORCES)
 def row_e() -> Check:
     """Force of E: [0, -κ₀ d^min].
 
@@ -81,7 +85,7 @@ def row_e() -> Check:
     )
 
 
-@judges("table-1-F", "IV", "Table I")
+@judges("table-1-F", "IV", "Table I", flipped_by=FORCES)
 def row_f() -> Check:
     """Force of F: [-κ(x) d, -κ₀ d].
 
@@ -97,15 +101,21 @@ def row_f() -> Check:
         m = 0.5 * (1.0 + surface.modulation_depth * (spot.h - middle) / half)
         share = draw.uniform(-1.0, 1.0)
         rub = k * surface.friction * (1.0 - m) * spot.z
-        exact = exact_force(surface, [spot.x, 0.0, spot.z], [share * surface.max_deflection, 0.0])
-        printed.append([-rub, -k * spot.z])
-        corrected.append([rub * share, -k * spot.z])
-        truth.append([float(exact[0]), float(exact[2])])
-    return judge("force of F at 4 generic probes", printed=printed, corrected=corrected,
-                 truth=truth, correction="the x part times -d^x/d_max")  # fmt: skip
+        probe, d = [spot.x, 0.0, spot.z], [share * surface.max_deflection, 0.0]
+        exact, kernel = exact_force(surface, probe, d), surface.force([probe], [d])[0]
+        printed += [[-rub, -k * spot.z]] * 2
+        corrected += [[rub * share, -k * spot.z]] * 2
+        truth += [[float(exact[0]), float(exact[2])], [kernel[0], kernel[2]]]
+    return judge(
+        "force of F at 4 generic probes, by definition and kernel",
+        printed=printed,
+        corrected=corrected,
+        truth=truth,
+        correction="the x part times -d^x/d_max",
+    )
 
 
-@judges("table-1-C", "IV", "Table I")
+@judges("table-1-C", "IV", "Table I", flipped_by=FORCES)
 def row_c() -> Check:
     """Force of C: [-κ₀ h' d, -κ₀ d]."""
     return field_check(
@@ -128,7 +138,7 @@ def table_two_row(letter: str) -> Check:
     return settle(_number_cell(row), _conservative_cell(row), _continuity_cell(row))
 
 
-@judges("sentence-IV-figure-3", "IV.G")
+@judges("sentence-IV-figure-3", "IV.G", flipped_by=laws(A="C"))
 def figure_3() -> Check:
     """Along the paths of Fig. 3 A, B, E, F and G gain energy.
 
@@ -211,11 +221,12 @@ def _continuity_cell(row: TableTwoRow) -> Check:
 # --- Remarks --------------------------------------------------------------------------------------
 
 
-@judges("remark-1", "IV", "Remark 1")
+@judges("remark-1", "IV", "Remark 1", flipped_by=observed("remark-1"))
 def remark_1() -> Check:
     """What a texture feels like depends on more than the algorithm."""
-    return decide("a statement on perception and on real contacts: nothing here can be computed",
-                  printed=None)  # fmt: skip
+    return observation(
+        "remark-1", "a statement on perception and on real contacts: nothing here can be computed"
+    )
 
 
 def _finer(case: Setting, times: float) -> Setting:
@@ -223,7 +234,7 @@ def _finer(case: Setting, times: float) -> Setting:
     return Setting(case.stiffness, case.period / times, case.amplitude / times, depth=case.depth)
 
 
-@judges("remark-2", "IV", "Remark 2")
+@judges("remark-2", "IV", "Remark 2", flipped_by=numbers(1.1))
 def remark_2() -> Check:
     """The results hold for any texture with a Lipschitz bound M in the place of 2πA/l.
 
@@ -270,7 +281,16 @@ def _safe_bounds() -> float:
     return least
 
 
-@judges("remark-3", "IV", "Remark 3")
+def _with_clamp(name: ClampName, original: Callable[..., float]) -> Callable[..., float]:
+    """Return ``_deep`` with one clamp in the place of the lateral one."""
+    return lambda law, clamp, times: original(law, name if clamp == "lateral" else clamp, times)
+
+
+WHOLE = other("a lateral clamp that holds the whole force", "_deep", partial(_with_clamp, "whole"))
+UNCLAMPED = other("a lateral clamp that holds nothing", "_deep", partial(_with_clamp, "none"))
+
+
+@judges("remark-3", "IV", "Remark 3", flipped_by=WHOLE)
 def remark_3() -> Check:
     """Limiting the depth that the lateral force uses bounds the numbers of B, C, F and G."""
     growth = {law: _deep(law, "none", 50.0) / _deep(law, "none", 1.0) for law in "BCFG"}
@@ -304,7 +324,7 @@ def remark_3() -> Check:
     )
 
 
-@judges("sentence-IV.F-clamp", "IV.F")
+@judges("sentence-IV.F-clamp", "IV.F", flipped_by=UNCLAMPED)
 def unbounded_friction() -> Check:
     """The gain of F grows with the depth without bound; clamping p^z bounds it."""
     free = {times: _deep("F", "none", times) / 1000.0 for times in (1.0, 10.0, 1000.0)}
@@ -343,6 +363,11 @@ def _deep(law: str, clamp: ClampName, times: float) -> float:
     return best
 
 
+def _printing(law: str, value: float, original: Callable[[], Any]) -> Callable[[], Any]:
+    """Return Table II with another number printed for a law."""
+    return lambda: original() | {law: replace(original()[law], value=value)}
+
+
 _SAID = {
     "A": "q = √(1 + (2πA/l)²); not conservative; continuous if h is",
     "B": "no closed form; not conservative; continuous if h' is",
@@ -352,7 +377,20 @@ _SAID = {
     "F": "q in Appendix I; almost conservative; continuous if h is",
     "G": "no closed form; not conservative; continuous if h' is",
 }
+_ROW_FLIPS = {
+    **{
+        law: laws(**{law: by})
+        for law, by in {"A": "C", "B": "A", "C": "A", "E": "A", "G": "A"}.items()
+    },
+    "D": other("∞ printed for q of D", "_printed", partial(_printing, "D", math.inf)),
+    "F": other(
+        "Jacobians of the paper's F times 1.2", "true_number", lambda was: lambda r: 1.2 * was(r)
+    ),
+}
 DECLARED += [
-    Claim(f"table-2-{law}", ("Table II",), "IV.H", f"{law}: {said}.", partial(table_two_row, law))
+    Claim(
+        f"table-2-{law}", ("Table II",), "IV.H", f"{law}: {said}.", partial(table_two_row, law),
+        _ROW_FLIPS[law],
+    )
     for law, said in _SAID.items()
-]
+]  # fmt: skip

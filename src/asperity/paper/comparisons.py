@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
@@ -13,6 +14,7 @@ from asperity.analysis.energy.loops import integrate, loop_work
 from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.checks import FloatArray
 from asperity.laws import find_law
+from asperity.paper.changes import other
 from asperity.paper.claim import Check, decide, judge, settle
 from asperity.paper.plane import SCANNING, Setting, Spot, groove_path, random_settings, spots
 from asperity.surface import Surface
@@ -25,21 +27,22 @@ Place = TypeVar("Place")
 def compare_at(
     places: Sequence[Place],
     what: str,
-    truth: Callable[[Place], object],
+    truths: Sequence[Callable[[Place], object]],
     printed: Callable[[Place], object],
     corrected: Callable[[Place], object] | None = None,
     correction: str = "",
 ) -> Check:
-    """Compare a printed formula with the truth at generic probes."""
+    """Compare a printed formula at generic probes with what it must be, got in several ways."""
 
     def at(formula: Callable[[Place], object]) -> FloatArray:
-        return np.array([formula(place) for place in places], dtype=float)
+        values = np.array([formula(place) for place in places], dtype=float)
+        return np.stack([values] * len(truths))
 
     return judge(
-        f"{what} at {len(places)} generic probes",
+        f"{what} at generic probes, by definition and kernel",
         printed=at(printed),
         corrected=None if corrected is None else at(corrected),
-        truth=at(truth),
+        truth=[[truth(place) for place in places] for truth in truths],  # type: ignore[arg-type] # numbers
         correction=correction,
     )
 
@@ -47,17 +50,17 @@ def compare_at(
 def field_check(
     law: str, printed: Formula, corrected: Formula | None = None, correction: str = ""
 ) -> Check:
-    """Compare a printed force with the law's definition."""
-    places = list(spots(law))
-    return compare_at(places, f"force of {law}", Spot.force, printed, corrected, correction)
+    """Compare a printed force with the law's definition and with its kernel."""
+    places, truths = list(spots(law)), (Spot.force, Spot.compiled_force)
+    return compare_at(places, f"force of {law}", truths, printed, corrected, correction)
 
 
 def jacobian_check(
     law: str, printed: Formula, corrected: Formula | None = None, correction: str = ""
 ) -> Check:
-    """Compare a printed Jacobian with differences of the law's definition."""
-    places = list(spots(law))
-    return compare_at(places, f"Jacobian of {law}", Spot.jacobian, printed, corrected, correction)
+    """Compare a printed Jacobian with differences of the law's definition and with its kernel."""
+    places, truths = list(spots(law)), (Spot.jacobian, Spot.compiled_jacobian)
+    return compare_at(places, f"Jacobian of {law}", truths, printed, corrected, correction)
 
 
 def outside_check(law: str) -> Check:
@@ -152,6 +155,45 @@ def leg_work(surface: Surface, start: FloatArray, end: FloatArray) -> float:
     """Return the work of the force on a straight way [J]."""
     along = end - start
     return integrate(lambda s: surface.force(start + s[:, None] * along) @ along, 8, 1e-10)
+
+
+SLOPES = other(
+    "2πA/l for every q", "q_of",
+    lambda _was: lambda case, _law: 2.0 * math.pi * case.amplitude / case.period,
+)  # fmt: skip
+
+
+def steepest_pairs(seed: int) -> dict[str, float]:
+    """Return the greatest change of the force over length, as a part of q k, of five laws.
+
+    Over 4000 pairs of probes apart, no deeper than max_depth at either end, and 250 close by
+    where q is attained.
+    """
+    draw, case, shares = np.random.default_rng(seed), SCANNING, {}
+    for law in "ABCEG":
+        surface = case.surface(law)
+        q = characteristic_number(surface)
+        start = _inside(law, draw, 4000)
+        small = np.array(q.at) - [0.0, 0.0, 1e-8] + 1e-9 * draw.normal(size=(500, 3)) * [1, 0, 1]
+        pairs = np.concatenate([start, np.stack([small[:250], small[250:]])], axis=1)
+        forces = [surface.force(points) for points in pairs]
+        apart = np.linalg.norm(pairs[1] - pairs[0], axis=1)
+        ratio = np.linalg.norm(forces[1] - forces[0], axis=1) / apart / (case.stiffness * q.value)
+        shares[law] = float(ratio.max())
+    return shares
+
+
+def _inside(law: str, draw: np.random.Generator, count: int) -> FloatArray:
+    """Return pairs of probes no deeper than max_depth at either end of short steps, (2, n, 3)."""
+    case = SCANNING
+    x = draw.uniform(0.0, case.period, count)
+    top = case.texture.height(np.column_stack([x, 0 * x])) if law in "ABC" else 0.0 * x
+    depth = case.depth * draw.uniform(0.1, 0.9, count)
+    if law == "E":
+        depth = depth + case.amplitude
+    points = np.column_stack([x, 0 * x, top - depth])
+    step = case.depth * 1e-3 * draw.normal(size=(count, 3)) * [1, 0, 1]
+    return np.stack([points, points + step])
 
 
 def q_of(case: Setting, law: str) -> float:

@@ -140,6 +140,20 @@ class Spot:
         exact = exact_jacobian(self.surface, [self.x, _ACROSS, self.z], digits=_DIGITS)
         return np.array([[float(exact[i, j]) for j in (0, 2)] for i in (0, 2)])
 
+    def compiled_force(self) -> FloatArray:
+        """Return (f_x, f_z) by the kernel that simulation and servo loop use [N]."""
+        return np.asarray(self.surface.force([[self.x, _ACROSS, self.z]])[0, [0, 2]])
+
+    def compiled_jacobian(self) -> FloatArray:
+        """Return the Jacobian in x and z by the kernel [N/m]."""
+        whole = self.surface.jacobian([[self.x, _ACROSS, self.z]])[0]
+        return np.asarray(whole[::2, ::2])
+
+    def norms(self) -> FloatArray:
+        """Return ‖J‖ by the definition and by the kernel [N/m], shape (2,)."""
+        both = [self.jacobian(), self.compiled_jacobian()]
+        return np.asarray(np.linalg.norm(both, 2, axis=(1, 2)))
+
 
 def generic_profile(seed: int = 5) -> Fourier:
     """Return h(x) of three waves in arbitrary phases: no symmetry that could hide an error."""
@@ -205,10 +219,19 @@ def _newton(profile: Callable[[Any, int], Any], at: Any, x: Any, z: Any) -> tupl
 
 @dataclass(frozen=True)
 class FootRates:
-    """Derivatives of the nearest point by the probe, (x, z) by (x, z)."""
+    """Derivatives of the nearest point by the probe, (x, z) by (x, z), and what D makes of it.
+
+    Attributes:
+        spot: the probe.
+        rates: the derivatives, shape (2, 2).
+        force: of D there [N], shape (2,).
+        jacobian: of D there [N/m], shape (2, 2).
+    """
 
     spot: Spot
     rates: FloatArray = field(compare=False)
+    force: FloatArray = field(compare=False)
+    jacobian: FloatArray = field(compare=False)
 
     def rate(self, of: str, by: str) -> float:
         """Return ∂p_h^of/∂p^by."""
@@ -216,7 +239,12 @@ class FootRates:
 
 
 def foot_rates(count: int = 4) -> list[FootRates]:
-    """Return the derivatives of the nearest point at generic probes, by differences."""
+    """Return the derivatives of the nearest point at generic probes, for each probe three times.
+
+    By differences of Newton's solution, with the force by the definition and with that by D's
+    kernel; and those of the kernel, whose Jacobian is -κ₀ (1 - the derivatives), with the
+    definition's.
+    """
     import mpmath
 
     result = []
@@ -232,7 +260,11 @@ def foot_rates(count: int = 4) -> list[FootRates]:
                 columns.append(
                     [float((a - b) / (2 * step)) for a, b in zip(ahead, behind, strict=True)]
                 )
-        result.append(FootRates(spot, np.array(columns).T))
+        rates, kernel = np.array(columns).T, spot.compiled_jacobian()
+        defined = spot.force(), spot.jacobian()
+        result.append(FootRates(spot, rates, *defined))
+        result.append(FootRates(spot, rates, spot.compiled_force(), kernel))
+        result.append(FootRates(spot, np.eye(2) + kernel / spot.k, *defined))
     return result
 
 

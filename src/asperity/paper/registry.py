@@ -8,6 +8,7 @@ from difflib import get_close_matches
 from asperity.errors import ParameterError
 from asperity.paper import (  # noqa: F401 - each declares its claims
     claims_appendix,
+    claims_conclusion,
     claims_experiments,
     claims_friction,
     claims_god_object,

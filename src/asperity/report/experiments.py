@@ -93,7 +93,7 @@ def _strokes(found: ScanningExperiment) -> Section:
         work = [milli(value) for value in (stroke.energy[0], stroke.energy[2], stroke.total)]
         field = Cell(milli(stroke.field), "no" if stroke.feeds else "")
         spread = milli(stroke.spread + stroke.error, sign=False)
-        rest = [spread, milli(stroke.same_sample), f"{stroke.lost_contact:.1f}"]
+        rest = [spread, milli(sum(stroke.same_sample)), f"{stroke.lost_contact:.1f}"]
         rows.append(Row([*place, *work, field, *rest]))
     notes = (
         "Energies in mJ per stroke of 80 mm. Field: what the law itself gives along the true path; "

@@ -26,7 +26,7 @@ _FACTS = (
     ("As printed", "holds"),
     ("A small change makes it right", "holds with correction"),
     ("True is something else", "does not hold"),
-    ("Perception, or not computable", "undecided"),
+    ("Perception, or left to guesses", "undecided"),
 )
 _FOOTER = (
     "on Campion and Hayward, “On the Synthesis of Haptic Textures”. Every verdict follows from "
@@ -59,6 +59,8 @@ def print_results(
         for result in members:
             numbers = ", ".join(result.equations)
             statement = f"{numbers}: {result.statement}" if numbers else result.statement
+            if result.evidence.fitted:
+                statement += f" ({result.evidence.fitted})"
             verdict = Cell(result.verdict, _KINDS[result.verdict])
             rows.append(Row([result.id, verdict, statement]))
     table = page.Table(("claim", "verdict", "states"), rows)
@@ -80,8 +82,8 @@ def print_evidence(result: Result, console: Console) -> None:
     say(console, result.statement)
     say(console, result.verdict, _COLOURS[_KINDS[result.verdict]])
     say(console, result.evidence.summary)
-    if result.evidence.correction:
-        say(console, f"Correction: {result.evidence.correction}")
+    for name, words in _said(result)[1:]:
+        say(console, f"{name[0].upper()}{name[1:]}: {words}")
     for name, value in result.evidence.numbers.items():
         say(console, f"  {name}: {evidence_text(value)}", "dim")
     console.print()
@@ -114,17 +116,27 @@ def _claims(section: str, members: Sequence[Result]) -> Section:
     return Section(section if section == "Abstract" else f"Section {section}", [table])
 
 
+def _said(result: Result) -> list[tuple[str, str]]:
+    """Return what is said of a claim's evidence, by what it is."""
+    evidence = result.evidence
+    said = [
+        ("found", evidence.summary),
+        ("not stated by the paper", evidence.fitted),
+        ("correction", evidence.correction),
+        ("another verdict with", result.flips_under),
+    ]
+    return [(name, words) for name, words in said if words]
+
+
 def _row(result: Result) -> Row:
     evidence = result.evidence
-    details = [("found", evidence.summary)]
-    if evidence.correction:
-        details.append(("correction", evidence.correction))
+    details = _said(result)
     details += [(name, evidence_text(value)) for name, value in evidence.numbers.items()]
     details.append(("run it again", f"asperity reproduce --claim {result.id}"))
     cells: Cells = [
         Cell(result.id, "l"),
         ", ".join(result.equations),
-        Cell(result.statement, details=details),
+        Cell(result.statement, below=evidence.fitted, details=details),
         Cell(result.verdict, _KINDS[result.verdict]),
     ]
     return Row(cells, id=result.id)

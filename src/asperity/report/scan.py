@@ -45,7 +45,7 @@ def _cells(stroke: Stroke) -> Cells:
         milli(stroke.total),
         Cell(milli(stroke.field), "no" if stroke.feeds else ""),
         milli(stroke.spread + stroke.error, sign=False),
-        milli(stroke.same_sample),
+        milli(sum(stroke.same_sample)),
         f"{stroke.lost_contact:.3g}",
     ]
 

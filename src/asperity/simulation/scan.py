@@ -42,8 +42,8 @@ class Stroke:
         error: of the field's work [J]: of its quadrature by halving the steps, a thousandth of
             all that goes there and back, and what turns store that do not end where they began.
         spread: standard deviation of the field's work from turn to turn [J]; 0 for a single one.
-        same_sample: the paper's sum, all axes, per stroke [J]: commanded force times the measured
-            displacement of the same sample.
+        same_sample: the paper's sum per stroke, along x, y and z [J]: commanded force times the
+            measured displacement of the same sample.
         lost_contact: how often per stroke the force ended.
         closure: energy of the whole run that does not add up, over what was exchanged [1].
         stopped: why the run ended early; empty if it did not.
@@ -57,7 +57,7 @@ class Stroke:
     field: float
     error: float
     spread: float
-    same_sample: float
+    same_sample: tuple[float, float, float]
     lost_contact: float
     closure: float
     stopped: str
@@ -77,8 +77,8 @@ class Stroke:
         return {
             **record(self, "law", "speed", "depth", "reached", "energy", infinity=None),
             "energy_sum": plain(self.total, infinity=None),
-            **record(self, "field", "error", "spread", infinity=None),
-            "same_sample_sum": plain(self.same_sample, infinity=None),
+            **record(self, "field", "error", "spread", "same_sample", infinity=None),
+            "same_sample_sum": plain(sum(self.same_sample), infinity=None),
             **record(self, "lost_contact", "closure", "stopped", infinity=None),
         }
 
@@ -145,7 +145,7 @@ def _stroke(surface: Surface, way: Strokes, run: Run, depth: float) -> Stroke:
         nan = math.nan
         energy = (nan, nan, nan)
         return Stroke(
-            law, speed, depth, reached, energy, nan, nan, nan, nan, nan, closure, run.stopped
+            law, speed, depth, reached, energy, nan, nan, nan, energy, nan, closure, run.stopped
         )
     begins = np.searchsorted(run.time, way.period * np.arange(1, way.count) - 1e-9 * run.period)
 
@@ -163,10 +163,14 @@ def _stroke(surface: Surface, way: Strokes, run: Run, depth: float) -> Stroke:
     works = summed(fine)
     error = np.abs(works - summed(coarse)).mean() + _NEGLIGIBLE * summed(np.abs(fine)).mean()
     error += _not_closed(run, np.array([0, *begins]), len(works))
-    x, y, z = (float(value) for value in _kept(each("supplied")).mean(axis=0))
+
+    def mean(name: str) -> tuple[float, float, float]:
+        x, y, z = (float(value) for value in _kept(each(name)).mean(axis=0))
+        return x, y, z
+
     return Stroke(
-        law, speed, depth, reached, (x, y, z), float(works.mean()), float(error), _spread(works),
-        float(_kept(each("same_sample")).sum(axis=1).mean()), lost / way.count, closure, "",
+        law, speed, depth, reached, mean("supplied"), float(works.mean()), float(error),
+        _spread(works), mean("same_sample"), lost / way.count, closure, "",
     )  # fmt: skip
 
 

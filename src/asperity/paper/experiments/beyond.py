@@ -38,14 +38,20 @@ class DeviceOnset:
     Attributes:
         device: its id.
         surface: its name.
-        allowed: K₀/q with the K₀ of the catalogue [N/m], at the depth that was reached.
+        stiffest: K₀ of the catalogue [N/m].
         prediction: what was simulated, and what the criteria with the hand's damping allow.
     """
 
     device: str
     surface: str
-    allowed: float
+    stiffest: float
     prediction: Prediction
+
+    @property
+    def allowed(self) -> float:
+        """K₀/q with the K₀ of the catalogue [N/m], at the depth that was reached."""
+        q = self.prediction.q
+        return self.stiffest / q if q > 0.0 else math.inf
 
     @property
     def missed(self) -> bool:
@@ -58,6 +64,7 @@ class DeviceOnset:
         own = {
             "device": self.device,
             "surface": self.surface,
+            "catalogue_stiffness": self.stiffest,
             "catalogue_rule": self.allowed,
             "catalogue_rule_missed": self.missed,
         }
@@ -78,6 +85,15 @@ class BeyondExperiment(Record):
     skipped: tuple[str, ...]
     guessed: tuple[str, ...] = GUESSED
 
+    @property
+    def walls(self) -> tuple[float, ...]:
+        """At how many times the catalogue's K₀ the simulated smooth wall itself cycles."""
+        return tuple(
+            one.prediction.onset.cycling / one.stiffest
+            for one in self.onsets
+            if one.prediction.onset.wall
+        )
+
 
 def surfaces(measured: Texture | None = None) -> dict[str, Texture]:
     """Return a gentle sinusoid, and a measured surface or a drawn one in its place."""
@@ -95,8 +111,13 @@ def usable_devices() -> tuple[list[str], list[str]]:
         except ParameterError:
             skipped.append(name)
             continue
-        (skipped if load_device(name).value("max_stiffness") is None else usable).append(name)
+        (skipped if catalogue_stiffness(name) is None else usable).append(name)
     return usable, skipped
+
+
+def catalogue_stiffness(name: str) -> float | None:
+    """Return K₀ of the catalogue [N/m]; ``None`` where it is not known."""
+    return load_device(name).value("max_stiffness")
 
 
 def device_onset(name: str, title: str, surface: Surface) -> DeviceOnset:
@@ -107,8 +128,8 @@ def device_onset(name: str, title: str, surface: Surface) -> DeviceOnset:
         duration=setup.duration, starts=STARTS, tolerance=TOLERANCE, lowest=LOWEST,
     )  # fmt: skip
     said = predict(surface, setup.plant, setup.hand, setup.servo, found)
-    stiffest = load_device(name).max_stiffness
-    return DeviceOnset(name, title, stiffest / said.q if said.q > 0.0 else math.inf, said)
+    stiffest = catalogue_stiffness(name)
+    return DeviceOnset(name, title, math.inf if stiffest is None else stiffest, said)
 
 
 def beyond_experiment(measured: Texture | None = None, laws: str = LAWS) -> BeyondExperiment:

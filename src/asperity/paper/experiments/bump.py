@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -73,6 +74,7 @@ class BumpExperiment(Record):
         return tuple(one for one in self.bumps if one.law == law)
 
 
+@lru_cache(maxsize=16)
 def over_bump(law: str, entry: str) -> Bump:
     """Return what happens to a hand that goes over the bump and back."""
     run = bump_setup(law, entry).simulate()

@@ -68,6 +68,15 @@ class Experiments:
         )
 
     def _onsets(self) -> str:
+        return f"{self._below_the_rule()}; {self._below_the_wall()}"
+
+    def _below_the_wall(self) -> str:
+        """Say how often a texture cycles below the wall's own onset over q."""
+        textured = [one for one in self.passivity.onsets if one.wall_rule and not one.onset.wall]
+        missed = sum(one.wall_rule_missed for one in textured)
+        return f"below K0/q of the wall's own onset in {missed} of {len(textured)} cases"
+
+    def _below_the_rule(self) -> str:
         found = self.passivity.onsets
         missed = [f"{one.onset.law} at d = {one.onset.delay}" for one in found if one.missed]
         cases = sum(one.conservative for one in found)
@@ -92,12 +101,16 @@ class Experiments:
         return ", ".join(parts)
 
     def _devices(self) -> str:
-        found = self.beyond.onsets
+        found, walls = self.beyond.onsets, self.beyond.walls
         missed = sum(one.missed for one in found)
         rules = sum(one.prediction.missed for one in found)
+        far = ""
+        if walls:  # without this the first number would say much more than it does
+            span = f"{min(walls):.0f} to {max(walls):.0f} times the catalogue's K0"
+            far = f"; the simulated wall itself cycles only at {span}"
         return (
             f"{missed} of {len(found)} cases cycle at a stiffness that the catalogue's K0/q "
-            f"allows, {rules} below the delay rule"
+            f"allows, {rules} below the delay rule{far}"
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from asperity.checks import FloatArray
@@ -71,6 +72,7 @@ class ScanningExperiment(Record):
         return tuple(one.stroke for one in self.strokes if one.stroke.law == law)
 
 
+@lru_cache(maxsize=128)
 def _stroke(law: str, hand: str, speed: float) -> HandStroke:
     setup = stroke_setup(law, hand, speed)
     assert isinstance(setup.motion, Strokes)
@@ -82,6 +84,7 @@ def _stroke(law: str, hand: str, speed: float) -> HandStroke:
     return HandStroke(hand, found)
 
 
+@lru_cache(maxsize=16)
 def energy_trace(law: str) -> EnergyTrace:
     """Return the energies of the first stroke of about a second, as in figure 6."""
     setup = stroke_setup(law)

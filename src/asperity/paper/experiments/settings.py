@@ -28,16 +28,27 @@ FITTED = (
 )
 """What section V.A needs and does not state."""
 
+BAND_WITHOUT_LAG = "fitted: working point; guessed: masses, links, band, release"
+BAND = BAND_WITHOUT_LAG.replace("fitted: ", "fitted: lag, ")
+"""The same in one line."""
+
 HANDS_GUESSED = (
     "The hand of section V.B, 300 N/m and 3 N·s/m, 50 g, pressing with 1 N: guessed",
     "Two more hands, softer and stiffer, and three speeds: to see what depends on them",
 )
 """What section V.B needs and does not state."""
 
+THREE_HANDS = "guessed: three hands at three speeds each"
+"""The same in one line."""
+
 BUMP_GUESSED = (
     "Hands, entry height and speeds of section V.C: guessed; the paper's subject did as he liked",
 )
 """What section V.C needs and does not state."""
+
+
+TWO_WAYS = "guessed: two hands with their ways"
+"""The same in one line."""
 
 
 def band_setup(law: str = "A", stiffness: float = PASSIVITY.stiffness, delay: int = LAG) -> Setup:
