@@ -1,6 +1,6 @@
 """Real devices, as data with a source for every number."""
 
-from asperity.devices.device import FIELD_TABLE, FIELDS, Datum, Device, Field
+from asperity.devices.device import FIELD_TABLE, FIELDS, Datum, Device, Field, WallTest
 from asperity.devices.reading import device_names, load_device, parse_device
 
 __all__ = [
@@ -9,6 +9,7 @@ __all__ = [
     "Datum",
     "Device",
     "Field",
+    "WallTest",
     "device_names",
     "load_device",
     "parse_device",

@@ -6,7 +6,7 @@ What can be said of a device: its fields, their units, and which values they may
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
 from asperity.errors import ParameterError
@@ -36,7 +36,7 @@ class Field:
 FIELD_TABLE: dict[str, Field] = {
     "max_force": Field("N", "greatest force, for a moment"),
     "continuous_force": Field("N", "greatest force that it holds without end"),
-    "max_stiffness": Field("N/m", "K₀, the stiffest smooth wall that it renders"),
+    "max_stiffness": Field("N/m", "K₀, the stiffest smooth wall that held without a cycle"),
     "position_resolution": Field("m", "smallest step of the measured position"),
     "force_resolution": Field("N", "smallest step of the force"),
     "update_rate": Field("Hz", "updates of the force per second, 1/T"),
@@ -50,6 +50,7 @@ FIELD_TABLE: dict[str, Field] = {
         "1", "whole samples between measurement and force", "not negative", True
     ),
     "friction": Field("N", "dry friction, felt when moving it", "not negative"),
+    "least_friction": Field("N", "dry friction that it has at least, everywhere", "not negative"),
     "apparent_mass": Field("kg", "mass felt when moving it"),
     "workspace_radius": Field("m", "radius of the ball that it reaches"),
     "workspace_diameter": Field("m", "diameter of the cylinder that it reaches"),
@@ -77,6 +78,8 @@ class Datum(Record):
         source: where the number was read.
         verified: whether it was read in a source that others can read, or follows from such.
         also: what else is said of the same number, by other sources or for other conditions.
+        measured: whether the source says that it was measured on such a device; a constant in a
+            driver or a line of a data sheet is read, not measured.
     """
 
     value: float
@@ -84,6 +87,7 @@ class Datum(Record):
     source: str
     verified: bool
     also: tuple[Datum, ...] = ()
+    measured: bool = False
 
     @property
     def text(self) -> str:
@@ -98,6 +102,41 @@ class Datum(Record):
         if self.unit == "kg" and self.value < 1.0:
             return engineering(1e3 * self.value, "g")
         return engineering(self.value, self.unit).replace("*", "·")
+
+    @property
+    def pedigree(self) -> Pedigree:
+        """What the number rests on: ``"measured"``, ``"read"`` or ``"not verified"``."""
+        if not self.verified:
+            return "not verified"
+        return "measured" if self.measured else "read"
+
+
+Pedigree = Literal["measured", "read", "not verified"]
+Axis = Literal["x", "y", "z"]
+Positions = Literal["exact", "stepped"]
+
+
+@dataclass(frozen=True)
+class WallTest(Datum):
+    """A smooth wall that somebody raised on a device: what held, and what did not.
+
+    It is the entry ``max_stiffness`` of a device: its value is K₀, the stiffness that held without
+    a cycle. What a source does not say stays empty.
+
+    Attributes:
+        directions: axes of the device along which the wall was pushed; empty if not said.
+        cycled: the least stiffness at which it began to cycle [N/m].
+        update_rate: of the test [Hz]; the device's own if not said.
+        positions: whether positions were read ``"exact"``, or ``"stepped"`` by an encoder.
+        lightest: damping in the lightest direction as a share of that along ``directions`` [1],
+            at most 1, as far as geometry or other tests tell.
+    """
+
+    directions: tuple[Axis, ...] = ()
+    cycled: float | None = None
+    update_rate: float | None = None
+    positions: Positions | None = None
+    lightest: float | None = None
 
 
 @dataclass(frozen=True)
@@ -133,8 +172,16 @@ class Device(Record):
         return self.data[field].value if field in self.data else None
 
     @property
+    def wall_test(self) -> WallTest | None:
+        """What is known of the smooth wall K₀; ``None`` if nothing is."""
+        datum = self.data.get("max_stiffness")
+        if datum is None or isinstance(datum, WallTest):
+            return datum
+        return WallTest(**{field.name: getattr(datum, field.name) for field in fields(Datum)})
+
+    @property
     def max_stiffness(self) -> float:
-        """K₀ [N/m]: the stiffest smooth wall that the device renders.
+        """K₀ [N/m]: the stiffest smooth wall that held on the device.
 
         Raises:
             ParameterError: if it is not known.

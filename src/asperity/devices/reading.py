@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import tomllib
@@ -11,12 +12,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from asperity.devices.device import FIELD_TABLE, WORDS, Datum, Device
+from asperity.devices.device import FIELD_TABLE, WORDS, Datum, Device, WallTest
 from asperity.errors import ParameterError, nearest_names
 from asperity.files import read_toml
 from asperity.units import quantity
 
 _KEYS = ("value", "unit", "source", "verified", "also")
+_WALL_KEYS = ("directions", "cycled", "update_rate", "positions", "lightest")
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*")
 
@@ -39,7 +41,10 @@ def load_device(device: str | os.PathLike[str] | Device) -> Device:
     """Return a device of the catalogue by its id, or one from a TOML file.
 
     A file gives ``id``, ``name`` and any of the fields of the catalogue, each as a quantity
-    ("12 N"), or as a table with ``value``, ``unit``, ``source``, ``verified`` and ``also``.
+    ("12 N"), or as a table with ``value``, ``unit``, ``source``, ``verified`` (``true``,
+    ``"read"``, ``"measured"`` or ``false``) and ``also``. ``max_stiffness`` is a wall test and may
+    say ``directions``, ``cycled``, ``update_rate``, ``positions`` and ``lightest``; see
+    :class:`~asperity.devices.device.WallTest`.
 
     Raises:
         ParameterError: for an id that is unknown, or a file with unknown or wrong fields.
@@ -106,21 +111,57 @@ def _datum(field: str, given: Any, nested: bool = False) -> Datum:
     """Return a number of a device from what a file says of it, with all that is said besides."""
     name = f"device.{field}.also" if nested else f"device.{field}"
     table = given if isinstance(given, dict) else {"value": given}
-    keys = _KEYS[:-1] if nested else _KEYS
+    walls = field == "max_stiffness" and not nested
+    keys = (*(_KEYS[:-1] if nested else _KEYS), *(_WALL_KEYS if walls else ()))
     unknown = [key for key in table if key not in keys]
     if unknown or "value" not in table:
         problem = f"unknown key {unknown[0]!r}" if unknown else "no value"
         raise ParameterError(name, f"has {problem}; known: {', '.join(keys)}")
     value = _value(name, field, table)
-    verified = table.get("verified", False)
-    if not isinstance(verified, bool):
-        raise ParameterError(name, "verified must be true or false", verified)
+    verified, measured = _verified(name, table.get("verified", False))
     source = _text(f"{name}.source", table.get("source", "given by the user"))
     others = table.get("also", [])
     if not isinstance(others, list) or not all(isinstance(other, dict) for other in others):
         raise ParameterError(f"{name}.also", "must be a list of tables with value and unit", others)
     also = tuple(_datum(field, other, nested=True) for other in others)
-    return Datum(value, FIELD_TABLE[field].unit, source, verified, also)
+    known = (value, FIELD_TABLE[field].unit, source, verified, also, measured)
+    return WallTest(*known, **_wall_test(name, value, table)) if walls else Datum(*known)
+
+
+def _verified(name: str, given: Any) -> tuple[bool, bool]:
+    """Return whether a number was read in a source, and whether it was measured."""
+    if given in ("read", "measured"):
+        return True, given == "measured"
+    if not isinstance(given, bool):
+        words = "verified must be true or false, 'read' or 'measured'"
+        raise ParameterError(name, words, given)
+    return given, False
+
+
+def _wall_test(name: str, held: float, table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a file says of the wall's test besides the stiffness that held [SI]."""
+    said: dict[str, Any] = {}
+    for key, unit in (("cycled", "N/m"), ("update_rate", "Hz"), ("lightest", "1")):
+        if key in table:
+            said[key] = _quantity(f"{name}.{key}", table[key], unit)
+            if said[key] <= 0.0:
+                raise ParameterError(f"{name}.{key}", f"must be positive [{unit}]", table[key])
+    if said.get("cycled", math.inf) <= held:
+        limit = f"must be above the stiffness that held, {held:g} N/m"
+        raise ParameterError(f"{name}.cycled", limit, table["cycled"])
+    if said.get("lightest", 1.0) > 1.0:
+        limit = "must be at most 1: the lightest direction is damped least"
+        raise ParameterError(f"{name}.lightest", limit, table["lightest"])
+    if "positions" in table:
+        said["positions"] = table["positions"]
+        if said["positions"] not in ("exact", "stepped"):
+            raise ParameterError(
+                f"{name}.positions", "must be 'exact' or 'stepped'", said["positions"]
+            )
+    axes = table.get("directions", [])
+    if not isinstance(axes, list) or not all(axis in ("x", "y", "z") for axis in axes):
+        raise ParameterError(f"{name}.directions", "must be a list of 'x', 'y' and 'z'", axes)
+    return {**said, "directions": tuple(dict.fromkeys(axes))}
 
 
 def _value(name: str, field: str, table: Mapping[str, Any]) -> float:

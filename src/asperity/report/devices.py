@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table
 
-from asperity.devices import FIELD_TABLE, Datum, Device
+from asperity.devices import FIELD_TABLE, Datum, Device, WallTest
 from asperity.report import page
 from asperity.report.terminal import say, table
 from asperity.report.words.number_words import NONE, law_title
+from asperity.units import engineering
 
 UNVERIFIED = "?"
 NOT_VERIFIED_NOTE = (
@@ -43,6 +44,23 @@ def datum_text(datum: Datum | None) -> str:
     return datum.text if datum.verified else f"{datum.text} {UNVERIFIED}"
 
 
+def wall_test_text(test: WallTest) -> str:
+    """Return what is known of a wall's test besides the stiffness that held; "" for nothing.
+
+    Example:
+        >>> wall_test_text(WallTest(1e3, "N/m", "", True, cycled=2e3, directions=("x", "z")))
+        'tried along x, z; cycled at 2000 N/m'
+    """
+    said = [
+        f"tried along {', '.join(test.directions)}" if test.directions else "",
+        f"cycled at {engineering(test.cycled, 'N/m')}" if test.cycled else "",
+        f"at {engineering(test.update_rate, 'Hz')}" if test.update_rate else "",
+        f"{test.positions} positions" if test.positions else "",
+        f"lightest direction {test.lightest:g} of the one tried" if test.lightest else "",
+    ]
+    return "; ".join(part for part in said if part)
+
+
 def devices_table(devices: Sequence[Device], width: int = 100) -> Table:
     """Return one row per device, the first column its id alone.
 
@@ -64,9 +82,11 @@ def device_table(device: Device) -> Table:
     rows = []
     for field, datum in device.data.items():
         for what, one in ((law_title(field), datum), *(("  also", other) for other in datum.also)):
-            verified, style = ("yes", "") if one.verified else ("no", "yellow")
-            rows.append(page.Row([what, one.text, verified, one.source], style=style))
-    return table(page.Table(("what", "value", "verified", "source"), rows, (1,)), wraps=(3,))
+            style = "" if one.verified else "yellow"
+            rows.append(page.Row([what, one.text, one.pedigree, one.source], style=style))
+        if isinstance(datum, WallTest) and wall_test_text(datum):
+            rows.append(page.Row(["  the test", "", "", wall_test_text(datum)]))
+    return table(page.Table(("what", "value", "known from", "source"), rows, (1,)), wraps=(3,))
 
 
 def numbers_table(device: Device, fields: Sequence[str]) -> page.Table:
@@ -83,9 +103,12 @@ def numbers_table(device: Device, fields: Sequence[str]) -> page.Table:
             unknown = page.Cell("not known", "open")
             rows.append(page.Row([law_title(field), "", unknown, FIELD_TABLE[field].words]))
         else:
-            verified = page.holds_cell(datum.verified)
-            rows.append(page.Row([law_title(field), datum.text, verified, datum.source]))
-    return page.Table((device.name, "value", "verified", "source"), rows, numbers=(1,))
+            known = page.Cell(datum.pedigree, "" if datum.verified else "open")
+            test = wall_test_text(datum) if isinstance(datum, WallTest) else ""
+            rows.append(
+                page.Row([law_title(field), datum.text, known, page.Cell(datum.source, below=test)])
+            )
+    return page.Table((device.name, "value", "known from", "source"), rows, numbers=(1,))
 
 
 def unknown_fields(device: Device) -> list[str]:
