@@ -1,4 +1,4 @@
-"""Haptic textures that neither buzz nor feel alive, on the device you have.
+"""Haptic textures for the device you have: which law, at which stiffness, what goes wrong.
 
 Public names are imported when they are first used: starting up costs no SymPy, no SciPy, no
 Numba and no matplotlib.

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from asperity.analysis import check_limits as module
-from asperity.analysis.bounds.bound import Bound
+from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.check_limits import limits
 from asperity.analysis.compare import compare
 from asperity.analysis.energy.merit import merit
@@ -243,22 +242,32 @@ def test_stiffness_is_by_default_what_the_device_renders() -> None:
     assert result.surface.stiffness == pytest.approx(900.0 / q, rel=1e-12)
     assert (result.gain_symbol, result.limit(5).holds) == ("q", True)
     assert result.limit(5).inequality == "q k ≤ K₀"
-    assert any("what the device renders, K₀/q" in words for words in result.assumptions)
+    assert any("quiet against buzz up to" in words for words in result.assumptions)
 
 
-def test_a_conservative_law_is_limited_by_the_one_sided_number() -> None:
-    result = ask(Sinusoid(4e-4, 1e-3), law="D", stiffness=None, max_depth=1e-3)
+def test_a_known_delay_limits_a_conservative_law_by_less_than_q() -> None:
+    deep = Sinusoid(4e-4, 1e-3)
+    result = ask(deep, law="D", stiffness=None, max_depth=1e-3, device=device(delay_samples=0))
     assert (result.gain_symbol, result.gain.value) == ("q⁺", 1.0)
     assert result.surface.stiffness == 900.0
     assert result.limit(5).inequality == "q⁺ k ≤ K₀"
     assert result.limit(5).holds
+    steep = Sinusoid(1e-4, 1e-3, phase=0.3)
+    result = ask(steep, law="C", stiffness=None, max_depth=4e-4, device=device(delay_samples=2))
+    q = characteristic_number(result.surface).upper
+    plus = one_sided_number(result.surface).upper
+    assert result.gain_symbol == "(q⁺/2 + d q)/(1/2 + d)"
+    assert result.gain.value == pytest.approx((plus / 2 + 2 * q) / 2.5, rel=1e-12)
+    assert result.surface.stiffness == pytest.approx(900.0 / result.gain.value, rel=1e-12)
 
 
-@pytest.mark.parametrize("law", ["A", "C", "G"])
-def test_it_agrees_with_the_comparison(law: str) -> None:
-    texture = Sinusoid(4e-4, 1e-3)
-    row = compare(texture, device(), law, max_depth=1e-3).rows[0]
-    result = limits(texture, device(), law=law, max_depth=1e-3)
+@pytest.mark.parametrize("law", ["A", "C", "G", "H"])
+@pytest.mark.parametrize("delay", [None, 0, 2])
+def test_it_agrees_with_the_comparison(law: str, delay: int | None) -> None:
+    texture, rig = Sinusoid(4e-4, 1e-3), device(delay_samples=delay)
+    row = compare(texture, rig, law, max_depth=1e-3).rows[0]
+    result = limits(texture, rig, law=law, max_depth=1e-3)
+    assert result.allowed == row.allowed
     assert result.safe_stiffness == pytest.approx(row.safe_stiffness, rel=1e-12)
     assert result.force.rms == pytest.approx(row.texture_force, rel=1e-9)
 
@@ -266,18 +275,15 @@ def test_it_agrees_with_the_comparison(law: str) -> None:
 def test_an_unknown_stiffest_wall_leaves_the_default() -> None:
     result = ask(stiffness=None, device=device(max_stiffness=None))
     assert result.surface.stiffness == 1000.0
-    assert any("a default, K₀ being unknown" in words for words in result.assumptions)
+    assert any("a default: no stiffness is known" in words for words in result.assumptions)
 
 
-def test_no_stiffness_is_safe_where_q_is_unbounded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(
-        module, "_gain", lambda _surface: (Bound(math.inf, math.inf, "theorem"), "q")
-    )
-    result = ask(stiffness=None)
+def test_no_stiffness_is_known_where_q_is_unbounded() -> None:
+    result = ask(Sinusoid(4e-4, 1e-3), law="D", stiffness=None, max_depth=1e-3)
     assert (result.safe_stiffness, result.surface.stiffness) == (0.0, 1000.0)
     assert not result.limit(5).holds
     assert result.to_dict()["limits"][4]["left"] == "inf"
-    assert any("no stiffness is safe" in words for words in result.assumptions)
+    assert any("no stiffness is known to do" in words for words in result.assumptions)
 
 
 def test_the_force_against_resolution_friction_and_bandwidth() -> None:

@@ -18,10 +18,11 @@ from asperity.analysis.limits.limit_result import Limits, RenderedWave, TextureF
 from asperity.analysis.limits.limit_rules import RULES, Case, Decision, decide
 from asperity.analysis.limits.spectrum import LEAST_SHARE, Spectrum, spectrum
 from asperity.analysis.limits.wave_force import wave_forces
+from asperity.analysis.passivity.allowed import allowed_stiffness
+from asperity.analysis.passivity.judgement import Allowed
 from asperity.analysis.words.limits import answer, assumptions
 from asperity.arguments import DEFAULT_STIFFNESS
 from asperity.checks import FloatArray, positive, real
-from asperity.derive.facts import law_facts
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
 from asperity.laws import Law
@@ -58,8 +59,8 @@ def limits(
         device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`.
         speed: v [m/s] of the scan; 0.1 by default.
         law: letter or name, or a law of your own.
-        stiffness: k [N/m]; by default what the device renders of this law, K₀/q (K₀/q⁺ for a
-            conservative law), and 1000 where that is not known or zero.
+        stiffness: k [N/m]; by default what the device may render of this law, as in a comparison,
+            and 1000 where that is not known or zero.
         max_depth: depth to which the surface is pressed [m]; by default its peak-to-valley
             height, at most 1 mm.
         time_samples: α, updates that a wave needs; at least 2, by the paper 5 to 10; default 5.
@@ -89,15 +90,16 @@ def limits(
     gamma = _samples("force_steps", force_steps, 1.0)
     asked = DEFAULT_STIFFNESS if stiffness is None else stiffness
     surface = Surface(texture, law, asked, max_depth, **surface_arguments)
-    gain, symbol = _gain(surface)
-    greatest = known.value("max_stiffness")
-    safe = None if greatest is None else greatest / gain.value
+    q, one_sided = characteristic_number(surface), one_sided_number(surface)
+    allowed, wall = allowed_stiffness(surface, known, q, one_sided)
+    safe, (gain, symbol) = allowed.stiffness, _gain(q, one_sided, allowed)
     if stiffness is None and safe:
         surface = Surface(texture, law, safe, max_depth, **surface_arguments)
     found = spectrum(texture)
     forces = wave_forces(surface, found)
     kept = _kept(found, forces)
     numbers = {field: datum.value for field, datum in known.data.items()}
+    numbers |= {} if wall is None else {"max_stiffness": wall}
     shares = np.array([wave.share for wave in found.waves])[kept]
     case = Case(numbers, v, alpha, beta, gamma, found.wavelengths[kept], forces[kept], shares,
                 gain.value, surface.stiffness)  # fmt: skip
@@ -108,7 +110,7 @@ def limits(
     force = _texture_force(scan.ripple * surface.stiffness, case, found, forces)
     waves = _rendered(found, kept, case, decisions)
     top = min((one.speeds[1] for one in six if one.speeds is not None), default=math.inf)
-    result = Limits(surface, known, v, alpha, beta, gamma, gain, symbol, safe, six, waves, found,
+    result = Limits(surface, known, v, alpha, beta, gamma, gain, symbol, allowed, six, waves, found,
                     force, (0.0, top), "", ())  # fmt: skip
     defaults = {"speed": speed is None, "stiffness": stiffness is None,
                 "max_depth": max_depth is None,
@@ -125,11 +127,22 @@ def _samples(name: str, value: float | None, least: float) -> float:
     return number
 
 
-def _gain(surface: Surface) -> tuple[Bound, str]:
-    """Return the number that limits the stiffness, and its symbol; as in a comparison."""
-    if law_facts(surface.law).conservative:
-        return one_sided_number(surface), "q⁺"
-    return characteristic_number(surface), "q"
+def _gain(q: Bound, one_sided: Bound, allowed: Allowed) -> tuple[Bound, str]:
+    """Return the number that limits the stiffness on this device, and its symbol.
+
+    It is q for any delay, q⁺ for none, and in between where a delay of d samples is known.
+    """
+    delay = allowed.delay
+    if delay is None or math.isinf(delay):
+        return q, "q"
+    if delay == 0.0:
+        return one_sided, "q⁺"
+    share = delay / (0.5 + delay)
+    lower, upper = (
+        share * full + (1.0 - share) * plus
+        for full, plus in ((q.lower, one_sided.lower), (q.upper, one_sided.upper))
+    )
+    return replace(q, lower=lower, upper=upper), "(q⁺/2 + d q)/(1/2 + d)"
 
 
 def _kept(found: Spectrum, forces: FloatArray) -> NDArray[np.bool_]:

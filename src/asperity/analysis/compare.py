@@ -11,13 +11,16 @@ from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import merit
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
+from asperity.analysis.judge_passivity import passivity
 from asperity.analysis.recommendation import recommend
 from asperity.analysis.row import LawRow
 from asperity.analysis.words.comparison import assumptions, recommendation, verdict
+from asperity.analysis.words.passivity import allowed_text
 from asperity.arguments import DEFAULT_STIFFNESS
 from asperity.checks import positive
 from asperity.derive.facts import law_facts
 from asperity.devices import Device, load_device
+from asperity.errors import ParameterError
 from asperity.files import plain, record
 from asperity.laws import LAWS, Law, find_laws, shared_out
 from asperity.notebook import as_html
@@ -71,13 +74,13 @@ class Comparison:
 
     def _repr_html_(self) -> str:
         """Return the answer and a table for a notebook."""
-        head = ["law", "q", "q⁺", "stiffness up to [N/m]", "conservative", "continuous", "verdict"]
+        head = ["law", "q", "q⁺", "stiffness", "conservative", "continuous", "verdict"]
         rows = [
             [
                 row.law.letter,
                 f"{row.q.value:.4g} ({row.q.method})",
                 f"{row.one_sided.value:.4g} ({row.one_sided.method})",
-                f"{row.safe_stiffness:.4g}",
+                allowed_text(row.allowed),
                 "yes" if row.conservative else "no",
                 "yes" if row.continuous else "no",
                 row.verdict,
@@ -110,9 +113,10 @@ def compare(
 ) -> Comparison:
     """Return which laws render a surface on a device, at which stiffness, and what goes wrong.
 
-    For every law: q and q⁺, the stiffness that the device can still render (K₀/q, the paper's
-    III.B; K₀/q⁺ for a conservative law), whether the field is conservative and what its worst
-    loop gains, whether the force is continuous, strength and support, and a verdict.
+    For every law: q and q⁺, up to which stiffness the device may render it and how well that is
+    known (:func:`~asperity.analysis.judge_passivity.passivity`), whether the field is conservative
+    and what its worst loop gains, whether the force is continuous, strength and support, and a
+    verdict.
 
     Args:
         texture: the surface.
@@ -138,7 +142,7 @@ def compare(
     chosen = find_laws(list(laws) if not isinstance(laws, str) else laws)
     known_device = load_device(device)
     asked = DEFAULT_STIFFNESS if stiffness is None else positive("stiffness", stiffness, "N/m")
-    limit = known_device.max_stiffness
+    _refuse_unknown(known_device)
     shares = shared_out(law_parameters or {}, chosen)
     surfaces = [
         Surface(texture, law, asked, max_depth, law_parameters=own, **surface_arguments)
@@ -148,7 +152,7 @@ def compare(
     for surface in surfaces:
         if progress is not None:
             progress(surface.law.letter)
-        rows.append(_row(surface, limit))
+        rows.append(_row(surface, known_device))
     chosen_one = recommend(rows, known_device)
     defaults = {"stiffness": stiffness is None, "max_depth": max_depth is None}
     return Comparison(
@@ -163,26 +167,33 @@ def compare(
     )
 
 
-def _row(surface: Surface, limit: float) -> LawRow:
+def _refuse_unknown(device: Device) -> None:
+    """Refuse a device of which no stiffness of any law could follow."""
+    proof = ("damping", "update_rate", "delay_samples")
+    if device.wall_test is None and any(device.value(field) is None for field in proof):
+        needs = f"max_stiffness [N/m], or {', '.join(proof)}"
+        raise ParameterError("device", f"{device.id} needs {needs} to compare laws")
+
+
+def _row(surface: Surface, device: Device) -> LawRow:
     facts = law_facts(surface.law)
     q, one_sided = characteristic_number(surface), one_sided_number(surface)
-    scan = merit(surface)
+    scan, leak = merit(surface), worst_loop(surface)
     smooth = continuity(surface, q)
-    safe = limit / (one_sided if facts.conservative else q).value
     row = LawRow(
         surface=surface,
         q=q,
         one_sided=one_sided,
-        safe_stiffness=safe,
+        passivity=passivity(surface, device, q, one_sided, leak),
         conservative=facts.conservative,
         conservative_reason=facts.reason,
-        leak=worst_loop(surface),
+        leak=leak,
         continuous=smooth.continuous,
         continuous_reason=smooth.reason,
         strength=scan.strength,
         support=scan.support,
         contact_lost=scan.contact_lost,
-        texture_force=scan.ripple * safe,
+        ripple=scan.ripple,
         verdict="",
     )
     return replace(row, verdict=verdict(row))

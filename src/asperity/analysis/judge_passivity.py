@@ -6,9 +6,9 @@ import os
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import Leak
-from asperity.analysis.passivity.criteria import criteria
+from asperity.analysis.passivity.criteria import criteria, greatest_buzz
 from asperity.analysis.passivity.device_loop import critical_speed, greatest_delay, make_loop
-from asperity.analysis.passivity.judgement import Passivity, decide
+from asperity.analysis.passivity.judgement import Passivity, allowed, decide
 from asperity.analysis.words.passivity import reason, worded
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
@@ -31,8 +31,14 @@ def passivity(
     * one-sided: k q⁺ <= 2σ₀/T, for a conservative law without delay;
     * delay: k (q⁺/2 + d q) <= σ₀/T, for a conservative law;
     * virtual damping: k (q⁺/2 + d q) T + |b_v| <= σ₀, for a conservative law;
-    * smooth-wall rule: k q <= K₀; one-sided: k (q⁺/2 + d q) <= K₀ (1/2 + d), conservative law;
+    * steps and friction: k q |δ|/2 + |b|/2 <= f_c, for a conservative law, beside one of these;
+    * smooth-wall rule: k q <= K₀, as printed in the paper's III.B: a rule of thumb;
+    * wall test: k (q⁺/2 + d q) <= K₀ (1/2 + d), k q <= K₀ for any delay, for a conservative law:
+      plausible, not proved;
     * leak: no loop of the field gains energy.
+
+    Data of the device that are missing are never guessed: a delay, a damping or a rate that is not
+    known decides nothing. Virtual damping, steps and dry friction that are not given count as none.
 
     Args:
         surface: the surface.
@@ -67,15 +73,17 @@ def passivity(
     loop = make_loop(surface, load_device(device), q, one_sided, leak)
     judged = tuple(worded(loop, criterion) for criterion in criteria(loop))
     by_name = {criterion.name: criterion for criterion in judged}
-    verdict, decisive, ground = decide(loop, by_name)
+    buzz = greatest_buzz(loop)
+    verdict, decisive, ground = decide(loop, by_name, buzz)
     return Passivity(
         criteria=judged,
         decided_by=decisive,
         verdict=verdict,
         ground=ground,
-        reason=reason(loop, by_name[decisive], ground),
+        reason=reason(loop, by_name[decisive], ground, buzz),
         stiffness=surface.stiffness,
-        safe_stiffness=by_name[decisive].limit,
+        allowed=allowed(loop, by_name),
         critical_speed=critical_speed(loop),
         greatest_delay=greatest_delay(loop),
+        buzz=buzz,
     )

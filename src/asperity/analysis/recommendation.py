@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,14 +17,16 @@ class Recommendation:
     """The recommended law, and what it was chosen from.
 
     Attributes:
-        row: of the recommended law; ``None`` if no law renders a texture.
-        sound: whether it is conservative and continuous; else the one that leaks least.
+        row: of the recommended law; ``None`` if no law renders a texture at a known stiffness.
+        rows: of all laws compared.
+        sound: whether it is conservative and continuous; else it leaks least.
         textured: the laws that render a texture.
         felt: those whose texture can be felt; all of them if none can.
         threshold: force below which a texture is not felt [N].
     """
 
     row: LawRow | None
+    rows: tuple[LawRow, ...]
     sound: bool
     textured: tuple[LawRow, ...]
     felt: tuple[LawRow, ...]
@@ -35,9 +36,11 @@ class Recommendation:
 def recommend(rows: Sequence[LawRow], device: Device) -> Recommendation:
     """Return which law to use.
 
-    A law that is conservative and continuous cannot feel alive and does not click; of those the
-    one with the strongest texture at its own safe stiffness is recommended, if it can be felt.
-    Else, of the continuous laws that can be felt, the one that leaks least for its texture force.
+    A law that is conservative and continuous gives no net energy on any closed path and no jump of
+    force; of those the one with the strongest texture at the stiffness that it is allowed is
+    recommended, if it can be felt. Else, of the continuous laws that can be felt, the one that
+    leaks least for its texture force. A law of which no stiffness is known to do is never
+    recommended.
     """
     textured = tuple(row for row in rows if row.texture_force > 0.0)
     threshold = felt_force(device)
@@ -48,7 +51,7 @@ def recommend(rows: Sequence[LawRow], device: Device) -> Recommendation:
         best = _soundest(sound)
     elif felt:
         best = min([row for row in felt if not row.jumps] or felt, key=_aliveness)
-    return Recommendation(best, bool(sound), textured, felt, threshold)
+    return Recommendation(best, tuple(rows), bool(sound), textured, felt, threshold)
 
 
 def felt_force(device: Device) -> float:
@@ -65,7 +68,5 @@ def _soundest(sound: Sequence[LawRow]) -> LawRow:
 
 
 def _aliveness(row: LawRow) -> float:
-    """Leak at the law's own safe stiffness over texture force times length of the scan [1]."""
-    if row.safe_stiffness == 0.0:
-        return math.inf
+    """Leak at the stiffness that the law is allowed, over texture force times length [1]."""
     return row.safe_leak / (row.texture_force * row.leak.line.length)

@@ -7,6 +7,7 @@ from typing import Any
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import Leak
+from asperity.analysis.passivity.judgement import Allowed, Passivity
 from asperity.files import record
 from asperity.laws import Law
 from asperity.surface import Surface
@@ -20,7 +21,8 @@ class LawRow:
         surface: the surface with this law at the stiffness that was asked for.
         q: characteristic number.
         one_sided: one-sided number q⁺.
-        safe_stiffness: the stiffness that the device can still render [N/m]; 0 for q = ∞.
+        passivity: what the device has to do with it: verdict, and up to which stiffness it may be
+            rendered; the same as in an :class:`~asperity.analysis.Analysis`.
         conservative: whether the work around every closed path is zero.
         conservative_reason: one sentence.
         leak: the worst simple loop at the stiffness that was asked for.
@@ -30,14 +32,14 @@ class LawRow:
             has no period.
         support: S, slope of the mean normal force over sup‖J‖ [1].
         contact_lost: fraction of the scan without contact.
-        texture_force: RMS of the oscillating force at the law's own safe stiffness [N].
+        ripple: RMS of the oscillating force per stiffness [m].
         verdict: one line.
     """
 
     surface: Surface
     q: Bound
     one_sided: Bound
-    safe_stiffness: float
+    passivity: Passivity
     conservative: bool
     conservative_reason: str
     leak: Leak
@@ -46,7 +48,7 @@ class LawRow:
     strength: float
     support: float
     contact_lost: float
-    texture_force: float
+    ripple: float
     verdict: str
 
     @property
@@ -55,14 +57,19 @@ class LawRow:
         return self.surface.law
 
     @property
-    def limiting(self) -> Bound:
-        """The number on which the safe stiffness rests: q⁺ for a conservative law, else q."""
-        return self.one_sided if self.conservative else self.q
+    def allowed(self) -> Allowed:
+        """Up to which stiffness the law may be rendered, and how well that is known."""
+        return self.passivity.allowed
 
     @property
-    def rule(self) -> str:
-        """The rule that gave the safe stiffness, "K₀/q" or "K₀/q⁺"."""
-        return "K₀/q⁺" if self.conservative else "K₀/q"
+    def safe_stiffness(self) -> float:
+        """The stiffness of ``allowed`` [N/m], 0 where none is known; its basis says its worth."""
+        return self.allowed.stiffness or 0.0
+
+    @property
+    def texture_force(self) -> float:
+        """RMS of the oscillating force at ``safe_stiffness`` [N]."""
+        return self.ripple * self.safe_stiffness
 
     @property
     def buzzes(self) -> bool:
@@ -82,7 +89,7 @@ class LawRow:
     @property
     def textureless(self) -> bool:
         """Whether the law renders no texture."""
-        return self.texture_force == 0.0
+        return self.ripple == 0.0
 
     @property
     def loses_contact(self) -> bool:
@@ -100,7 +107,8 @@ class LawRow:
             "law": self.law.letter,
             "name": self.law.name,
             **record(self.surface, "law_parameters"),
-            **record(self, "q", "one_sided", "safe_stiffness", "rule"),
+            **record(self, "q", "one_sided", "safe_stiffness", "allowed"),
+            "passivity": self.passivity.verdict,
             **record(self, "conservative", "conservative_reason", "leak"),
             **record(self, "continuous", "continuous_reason", "strength", "support"),
             **record(self, "contact_lost", "texture_force", "verdict"),

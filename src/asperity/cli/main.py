@@ -59,7 +59,7 @@ class Commands(click.Group):
 )
 @click.version_option(asperity.__version__, prog_name="asperity")
 def cli() -> None:
-    """Haptic textures that neither buzz nor feel alive, on the device you have.
+    """Haptic textures for the device you have: which law, at which stiffness, what goes wrong.
 
     Start with: asperity compare sinusoid:amplitude=0.8mm,period=1mm --device omega.3
     """

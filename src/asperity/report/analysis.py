@@ -35,7 +35,10 @@ _CRITERIA = (
 )  # fmt: skip
 _JUMPS = ("at depth", "jumps by")
 # What the criteria of passivity use of the device.
-_USED = ("max_stiffness", "update_rate", "damping", "virtual_damping", "delay_samples")
+_USED = (
+    "max_stiffness", "update_rate", "damping", "virtual_damping", "delay_samples",
+    "position_resolution", "force_resolution", "least_friction",
+)  # fmt: skip
 
 
 def numbers(analysis: Analysis) -> list[tuple[str, Bound]]:

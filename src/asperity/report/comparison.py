@@ -10,10 +10,12 @@ from rich.console import Console
 from rich.table import Table
 
 from asperity.analysis.compare import Comparison
+from asperity.analysis.passivity.judgement import Basis
 from asperity.analysis.row import LawRow
+from asperity.analysis.words.passivity import allowed_text
 from asperity.arguments import Argument
 from asperity.report import page, terminal
-from asperity.report.devices import numbers_table
+from asperity.report.devices import datum_text, numbers_table
 from asperity.report.words import glossary
 from asperity.report.words.number_words import (
     SAMPLED,
@@ -37,7 +39,7 @@ _AIRY_FROM = 90
 """Console width [characters] from which columns stand two characters apart."""
 
 _HEADINGS = (
-    "law", "name", "q", "q⁺", "stiffness\nup to", "by\nrule", "conser-\nvative", "worst\nleak",
+    "law", "name", "q", "q⁺", "stiffness\nup to", "worth", "conser-\nvative", "worst\nleak",
     "contin-\nuous", "T", "S", "texture\nforce",
 )  # fmt: skip
 _NAME = 1
@@ -49,6 +51,12 @@ SAMPLED_NOTE = (
     "the true safe stiffness smaller."
 )
 # Of maps and profiles, which are no arguments of a kind.
+_WORTHS: dict[Basis, str] = {
+    "proved": "proved",
+    "plausible": "plausible",
+    "quiet against buzz": "quiet",
+    "none": "–",
+}
 _LENGTHS = {"pitch", "cutoff"}
 _UNSAID = {"kind", "preparation", "phase", "direction", "phases", "wavevectors"}
 
@@ -60,7 +68,7 @@ def stiffness_text(row: LawRow) -> str:
     """Return the stiffness up to which the device renders the law: "995 N/m", or "none"."""
     if row.safe_stiffness <= 0.0:
         return "none"
-    mark = SAMPLED if is_sampled(row.limiting) else ""
+    mark = SAMPLED if row.allowed.sampled else ""
     return f"{mark}{engineering(rounded_down(row.safe_stiffness), 'N/m')}"
 
 
@@ -118,7 +126,7 @@ def _cells(row: LawRow, comparison: Comparison) -> list[page.Cell]:
         page.Cell(bound_text(row.q), note=f"{row.q.method}: {row.q.note}"),
         page.Cell(bound_text(row.one_sided), note=f"{row.one_sided.method}: {row.one_sided.note}"),
         page.Cell(stiffness_text(row)),
-        page.Cell(row.rule),
+        page.Cell(_WORTHS[row.allowed.basis], note=allowed_text(row.allowed)),
         page.Cell(holds_text(row.conservative), note=row.conservative_reason),
         page.Cell(leak_text(row, comparison), note=row.leak.description),
         page.Cell(holds_text(row.continuous), note=row.continuous_reason),
@@ -174,10 +182,15 @@ def _meanings(comparison: Comparison) -> list[tuple[str, str]]:
     stiffness = engineering(comparison.stiffness, "N/m")
     meanings = [
         ("q, q⁺", "by how much the law multiplies stiffness at worst; smaller is better"),
-        ("stiffness up to", f"what {comparison.device.name} renders by the rule, K₀ over q or q⁺"),
+        ("stiffness up to", f"for the {comparison.device.name}"),
+        (
+            "worth",
+            "proved passive; plausible: a smooth wall of that gain held, no proof; quiet: "
+            "against buzz, yet it feeds the hand below v*",
+        ),
         ("worst leak", f"energy that one loop can give to the hand at {stiffness}"),
         ("T, S", "strength of the texture, support of the hand, for the same q"),
-        ("texture force", "RMS at the law's own stiffness limit"),
+        ("texture force", "RMS at that stiffness"),
     ]
     if any_sampled(comparison):
         meanings.append(("~", "sampled, not proved: leak and q may be larger, the limit lower"))
@@ -232,7 +245,7 @@ def _facts(comparison: Comparison) -> list[tuple[str, str]]:
         ("Surface", described(texture.describe())),
         ("Peak to valley", engineering(texture.peak_to_valley, "m")),
         ("Device", device.name),
-        ("K₀, stiffest smooth wall", engineering(device.max_stiffness, "N/m")),
+        ("K₀, stiffest smooth wall", datum_text(device.wall_test)),
         ("Stiffness asked for", engineering(comparison.stiffness, "N/m")),
         ("Pressed to", engineering(comparison.max_depth, "m")),
     ]

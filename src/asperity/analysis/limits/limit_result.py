@@ -9,6 +9,7 @@ from typing import Any
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.limits.limit_rules import Limit
 from asperity.analysis.limits.spectrum import Spectrum
+from asperity.analysis.passivity.judgement import Allowed
 from asperity.devices import Device
 from asperity.files import Record, record
 from asperity.notebook import as_html
@@ -76,9 +77,9 @@ class Limits:
         time_samples: α, updates in a wave.
         position_samples: β, position steps in a wave.
         force_steps: γ, steps of force in an amplitude.
-        gain: q, or q⁺ for a conservative law: what limit 5 multiplies the stiffness by.
-        gain_symbol: "q" or "q⁺".
-        safe_stiffness: K₀ over that [N/m]; ``None`` if K₀ is not known.
+        gain: what limit 5 multiplies the stiffness by: q, or less where the delay is known.
+        gain_symbol: "q", "q⁺" or what lies between.
+        allowed: up to which stiffness the law may be rendered, as in a comparison.
         limits: the six, in the paper's order.
         waves: what the texture is made of, the longest first.
         spectrum: all waves, with those that were too small to count.
@@ -97,7 +98,7 @@ class Limits:
     force_steps: float
     gain: Bound
     gain_symbol: str
-    safe_stiffness: float | None
+    allowed: Allowed
     limits: tuple[Limit, ...]
     waves: tuple[RenderedWave, ...]
     spectrum: Spectrum
@@ -105,6 +106,11 @@ class Limits:
     speeds: tuple[float, float]
     answer: str
     assumptions: tuple[str, ...]
+
+    @property
+    def safe_stiffness(self) -> float | None:
+        """The stiffness of ``allowed`` [N/m]; ``None`` if none is known."""
+        return self.allowed.stiffness
 
     @property
     def texture(self) -> Texture:
@@ -142,7 +148,9 @@ class Limits:
             **record(surface, "law_parameters", "stiffness", "max_depth"),
             **record(self, "time_samples", "position_samples", "force_steps"),
             "gain": {"symbol": self.gain_symbol} | self.gain.to_dict(),
-            **record(self, "safe_stiffness", "limits", "waves", "spectrum", "force", "share"),
+            **record(
+                self, "safe_stiffness", "allowed", "limits", "waves", "spectrum", "force", "share"
+            ),
             **record(self, "speeds", "answer", "assumptions"),
         }
 

@@ -16,6 +16,7 @@ from fractions import Fraction
 from typing import Any
 
 from asperity.analysis.passivity.device_loop import HALF, Loop, Number, Obstacle, leaks
+from asperity.devices import WallTest
 from asperity.errors import ParameterError
 from asperity.files import record
 
@@ -23,8 +24,9 @@ PAPER = "paper (1)"
 ONE_SIDED = "one-sided"
 DELAY = "delay"
 VIRTUAL = "virtual damping"
+STEPS = "steps and friction"
 WALL = "smooth-wall rule"
-WALL_ONE_SIDED = "smooth-wall rule, one-sided"
+WALL_TEST = "wall test"
 LEAK = "leak"
 
 
@@ -157,23 +159,120 @@ def _virtual(loop: Loop) -> Rule:
     )  # fmt: skip
 
 
-def _walls(loop: Loop) -> tuple[Rule, Rule]:
-    """What a smooth wall K₀ that is passive on the device says of the texture.
-
-    It shows σ₀/T >= K₀ (1/2 + d), whatever d is; q⁺ <= q does the rest.
-    """
-    note = "the smooth wall K₀ is passive on the device, whose damping is alike in all directions"
-    delay = "no delay" if loop.delay is None else "d whole samples of delay"
-    own = f"{note}; conservative law, {delay}"
-    both = f"{note}; for a conservative law with any delay, else the paper's III.B as printed"
-    needs, budget = ("max_stiffness",), loop.wall
-    wide = None if budget is None else budget * (HALF + loop.samples)
-    formula = "k q⁺ <= K₀" if not loop.delay else "k (q⁺/2 + d q) <= K₀ (1/2 + d)"
-    uses = ("delay_samples",)
-    return (
-        Rule(WALL, "k q <= K₀", Fraction(0), Fraction(1), budget, needs, both),
-        Rule(WALL_ONE_SIDED, formula, HALF, loop.samples, wide, needs, own, loop.obstacle, uses),
+def _wall(loop: Loop) -> Rule:
+    note = (
+        "the paper's III.B as printed, for every law; a rule of thumb: that a wall did not cycle "
+        "proves no damping, and no norm bounds what a field with curl gains"
     )
+    return Rule(WALL, "k q <= K₀", Fraction(0), Fraction(1), loop.wall, ("max_stiffness",), note)
+
+
+def _wall_test(loop: Loop) -> Rule:
+    """The least limit over all pairs of damping and delay that the test of a wall admits.
+
+    For a delay d the test admits σ₀/T >= K₀ (1/2 + d), so the delay rule allows
+    K₀ (1/2 + d)/(q⁺/2 + d q). That falls with d, since q⁺ <= q: to K₀/q if d may be anything.
+    """
+    needs = ("max_stiffness",)
+    longest = loop.longest_delay
+    note = (
+        "plausible, not proved: the wall was about to cycle at K₀, as a heavy handle in a loose "
+        f"grip does; and {evenly(loop.test)}; conservative law"
+    )
+    uses = ("delay_samples", "damping", "update_rate")
+    formula, one, budget = "k q <= K₀", Fraction(1), loop.wall
+    if longest is None:
+        budget = None
+        note = "no delay fits: a wall of K₀ needs more damping than the device is said to have"
+    if loop.virtual and loop.delay != 0:
+        longest, budget = None, None
+        note = "no limit: with delay, the wall's test does not show what virtual damping does"
+    if longest is None or longest == math.inf:
+        return Rule(
+            WALL_TEST, formula, Fraction(0), one, budget, needs, note, loop.obstacle, uses
+        )  # fmt: skip
+    delay = Fraction(longest)
+    budget = None if loop.wall is None else loop.wall * (HALF + delay)
+    formula = "k (q⁺/2 + d q) <= K₀ (1/2 + d)"
+    return Rule(WALL_TEST, formula, HALF, delay, budget, needs, note, loop.obstacle, uses)
+
+
+def evenly(test: WallTest | None) -> str:
+    """Return what is assumed of the directions along which no wall was tried."""
+    if test is not None and test.lightest is not None:
+        return f"no direction is damped less than {test.lightest:g} of the one tried"
+    tried = ", ".join(test.directions) if test is not None else ""
+    return f"damping is alike in all directions, tried along {tried or 'one that is not said'}"
+
+
+# --- steps of positions and forces ----------------------------------------------------------------
+
+
+def _steps(loop: Loop) -> Criterion:
+    """What rounding adds against what dry friction takes (MATH section 7).
+
+    A position read in steps is off by at most |δ|/2, so a held force is by φ = k q |δ|/2 + |b|/2,
+    and by |b_v| |δ|/T more where the controller damps; friction takes f_c per metre of way.
+    """
+    formula = "k q |δ|/2 + |b|/2 <= f_c"
+    note = f"{_SIMPLE}; |δ|, |b|: a step along three axes at once; f_c: least_friction"
+    fields = ("position_resolution", "force_resolution")
+    if not (loop.step or loop.force_step):
+        note = "positions and forces are taken as exact: no steps of them are known"
+        return Criterion(STEPS, formula, True, math.inf, math.inf, note, uses=fields)
+    fixed = loop.force_step / 2 + abs(loop.damper) * loop.step
+    rule = Rule(
+        STEPS, formula, Fraction(0), loop.step / 2, loop.friction - fixed, (), note,
+        loop.obstacle, (*fields, "least_friction", "virtual_damping"),
+    )  # fmt: skip
+    if loop.step or loop.obstacle:
+        return judge(loop, rule)
+    holds = fixed <= loop.friction
+    limit = math.inf if holds else 0.0
+    return Criterion(STEPS, formula, holds, limit, limit, note, at_most=limit, uses=rule.uses)
+
+
+@dataclass(frozen=True)
+class Buzz:
+    """What a motion that repeats itself may be at most, where silence is not proved.
+
+    Attributes:
+        speed: RMS, by way per sample over the period [m/s].
+        power: that the hand is fed [W].
+    """
+
+    speed: float
+    power: float
+
+
+def greatest_buzz(loop: Loop) -> Buzz | None:
+    """Return the bound of the buzz that steps may cause; ``None`` if there is none.
+
+    Each step Δ gains at most (φ - f_c)|Δ| - m|Δ|², m = σ₀/T - |b_v|/T - k (q⁺/2 + d q), so a
+    motion that repeats itself has RMS speed (φ - f_c)/(m T) and draws (φ - f_c)²/(4 m T) at most.
+
+    Reference:
+        MATH section 7.
+    """
+    if loop.obstacle or loop.loss is None or loop.delay is None or loop.rate is None:
+        return None
+    q = loop.number(Fraction(0), Fraction(1), "upper")
+    both = loop.number(HALF, loop.samples, "upper")
+    if math.inf in (q, both):
+        return None
+    margin = loop.loss - abs(loop.damper) - loop.stiffness * Fraction(both)
+    force = loop.stiffness * Fraction(q) * loop.step / 2 + loop.force_step / 2
+    excess = max(force + abs(loop.damper) * loop.step - loop.friction, Fraction(0))
+    if margin <= 0:
+        return None
+    speed, power = excess * loop.rate / margin, excess**2 * loop.rate / (4 * margin)
+    return Buzz(_up(speed), _up(power))
+
+
+def _up(value: Fraction) -> float:
+    """Return the least float that is not below the value."""
+    near = float(value)
+    return near if Fraction(near) >= value else math.nextafter(near, math.inf)
 
 
 # --- the leak -------------------------------------------------------------------------------------
@@ -185,7 +284,8 @@ def _leak(loop: Loop) -> Criterion:
     if loop.conservative:
         note = "the law's curl is zero identically; nothing is asked of the device"
         return Criterion(LEAK, formula, True, math.inf, math.inf, note)
-    note = f"one slow turn of the loop ({loop.leak.method}); dry friction is not counted"
+    turned = "" if loop.leak is None else f" ({loop.leak.method})"
+    note = f"one slow turn of the loop{turned}; dry friction is not counted"
     if not leaks(loop):
         return Criterion(LEAK, formula, assumptions=note, uses=("damping",))
     missing = () if loop.damping is not None else ("damping",)
@@ -200,8 +300,9 @@ CRITERIA: dict[str, Judge] = {
     ONE_SIDED: lambda loop: judge(loop, _one_sided(loop)),
     DELAY: lambda loop: judge(loop, _delay(loop)),
     VIRTUAL: lambda loop: judge(loop, _virtual(loop)),
-    WALL: lambda loop: judge(loop, _walls(loop)[0]),
-    WALL_ONE_SIDED: lambda loop: judge(loop, _walls(loop)[1]),
+    STEPS: _steps,
+    WALL: lambda loop: judge(loop, _wall(loop)),
+    WALL_TEST: lambda loop: judge(loop, _wall_test(loop)),
     LEAK: _leak,
 }
 """What judges a surface on a device, by the name of the criterion, in the order of the tables."""

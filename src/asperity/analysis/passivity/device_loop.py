@@ -12,7 +12,7 @@ from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import Leak
 from asperity.analysis.gain.theorems import theorem_of
 from asperity.derive.facts import law_facts
-from asperity.devices import Device
+from asperity.devices import Device, WallTest
 from asperity.errors import ParameterError
 from asperity.surface import Surface
 
@@ -39,7 +39,7 @@ class Loop:
         device: the device.
         q: characteristic number.
         one_sided: one-sided number q⁺.
-        leak: the worst loop.
+        leak: the worst loop; ``None`` where only stiffnesses are asked for.
         conservative: whether the law is.
         obstacle: why the rules for conservative laws do not apply; ``None`` if they do.
         reason: what the curl, or the continuity of the force, says of the obstacle.
@@ -47,14 +47,17 @@ class Loop:
         damping: σ₀ [N s/m].
         virtual: b_v [N s/m].
         delay: d, whole samples.
-        wall: K₀ [N/m].
+        test: what is known of the smooth wall K₀.
+        friction: f_c, dry friction that acts at least [N]; 0 where none is known.
+        step: |δ|, the longest way that positions may jump by when they are read [m].
+        force_step: |b|, the same of the force [N].
     """
 
     surface: Surface
     device: Device
     q: Bound
     one_sided: Bound
-    leak: Leak
+    leak: Leak | None
     conservative: bool
     obstacle: Obstacle | None
     reason: str
@@ -62,7 +65,10 @@ class Loop:
     damping: Fraction | None
     virtual: Fraction | None
     delay: int | None
-    wall: Fraction | None
+    test: WallTest | None
+    friction: Fraction
+    step: Fraction
+    force_step: Fraction
 
     @property
     def stiffness(self) -> Fraction:
@@ -84,6 +90,42 @@ class Loop:
         """d, taken as 0 where it is not known: only for criteria that say so."""
         return Fraction(self.delay or 0)
 
+    @property
+    def wall(self) -> Fraction | None:
+        """K₀ [N/m] at the device's rate, of a texture in the lightest direction."""
+        if self.test is None:
+            return None
+        share = Fraction(1)
+        if self.test.lightest is not None and law_facts(self.surface.law).looks_at_surface:
+            share = Fraction(self.test.lightest)
+        if self.test.update_rate is not None and self.rate is not None:
+            share *= min(Fraction(1), self.rate / Fraction(self.test.update_rate))
+        return share * Fraction(self.test.value)
+
+    @property
+    def longest_delay(self) -> Number | None:
+        """The greatest delay [samples] that the wall's test admits; ``None`` if it admits none.
+
+        With the wall on the verge of cycling, σ₀/T >= K₀ (1/2 + d): any delay, unless d or σ₀ is
+        known; it need not be whole then.
+        """
+        if self.delay is not None:
+            return Fraction(self.delay)
+        if self.loss is None or self.wall is None:
+            return math.inf
+        longest = self.loss / self.wall - HALF
+        return longest if longest >= 0 else None
+
+    @property
+    def cycled(self) -> Fraction | None:
+        """A stiffness K at which a wall cycled with exact positions [N/m]: σ₀/T < K (1/2 + d)."""
+        test = self.test
+        exact = test is not None and test.positions == "exact" and not self.virtual
+        if test is None or test.cycled is None or not exact:
+            return None
+        same = test.update_rate is None or Fraction(test.update_rate) == self.rate
+        return Fraction(test.cycled) if same else None
+
     def number(self, plus: Fraction, full: Fraction, side: str) -> Number:
         """Return plus · q⁺ + full · q at its lower or upper end; a weight of 0 hides infinity."""
         total = Fraction(0)
@@ -95,7 +137,9 @@ class Loop:
         return total
 
 
-def make_loop(surface: Surface, device: Device, q: Bound, one_sided: Bound, leak: Leak) -> Loop:
+def make_loop(
+    surface: Surface, device: Device, q: Bound, one_sided: Bound, leak: Leak | None
+) -> Loop:
     """Return what the criteria are about.
 
     Raises:
@@ -118,8 +162,21 @@ def make_loop(surface: Surface, device: Device, q: Bound, one_sided: Bound, leak
         damping=_fraction(device, "damping", _NOT_NEGATIVE),
         virtual=_fraction(device, "virtual_damping", _FINITE),
         delay=None if delay is None else int(delay),
-        wall=_fraction(device, "max_stiffness", _POSITIVE),
+        test=_wall_test(device),
+        friction=_fraction(device, "least_friction", _NOT_NEGATIVE) or Fraction(0),
+        step=_AXES * (_fraction(device, "position_resolution", _NOT_NEGATIVE) or 0),
+        force_step=_AXES * (_fraction(device, "force_resolution", _NOT_NEGATIVE) or 0),
     )
+
+
+# √3, rounded up: a step along each of three axes at once.
+_AXES = Fraction(17320508075688773, 10**16)
+
+
+def _wall_test(device: Device) -> WallTest | None:
+    """Return what is known of the smooth wall; checked, since a device may be built by hand."""
+    _fraction(device, "max_stiffness", _POSITIVE)
+    return device.wall_test
 
 
 _POSITIVE = ("must be positive", 5e-324)
@@ -156,6 +213,13 @@ def _obstacle(surface: Surface, q: Bound) -> tuple[Obstacle | None, str]:
     return (None, "") if smooth.continuous else (Obstacle.JUMPS, smooth.reason)
 
 
+def contradictory(loop: Loop) -> bool:
+    """Return whether damping and delay prove a wall passive that cycled: one of them is wrong."""
+    if loop.cycled is None or loop.loss is None or loop.delay is None:
+        return False
+    return loop.loss >= loop.cycled * (loop.delay + HALF)
+
+
 def greatest_delay(loop: Loop) -> int | None:
     """Return the greatest d for which the delay rule is proved at this stiffness.
 
@@ -175,14 +239,16 @@ def greatest_delay(loop: Loop) -> int | None:
 
 def leaks(loop: Loop) -> bool:
     """Return whether a loop that gains energy is known."""
+    if loop.conservative or loop.leak is None:
+        return False
     size = loop.surface.stiffness * loop.surface.max_depth * loop.leak.line.length
-    return not loop.conservative and loop.leak.energy > _ROUNDING * size
+    return loop.leak.energy > _ROUNDING * size
 
 
 def critical_speed(loop: Loop) -> float | None:
     """Return v* = W/(σ₀ length) [m/s], 0 for a conservative law, ``None`` if unknown."""
     if loop.conservative:
         return 0.0
-    if loop.damping is None or not leaks(loop):
+    if loop.damping is None or loop.leak is None or not leaks(loop):
         return None
     return loop.leak.speed(float(loop.damping)) if loop.damping > 0 else math.inf

@@ -13,16 +13,19 @@ from asperity.analysis.passivity.criteria import (
     DELAY,
     LEAK,
     ONE_SIDED,
+    STEPS,
     VIRTUAL,
     WALL,
-    WALL_ONE_SIDED,
+    WALL_TEST,
+    Buzz,
     Criterion,
 )
-from asperity.analysis.passivity.device_loop import HALF, Loop
+from asperity.analysis.passivity.device_loop import HALF, Loop, contradictory
 from asperity.files import Record
 from asperity.notebook import as_html
 
-Verdict = Literal["passive", "not passive", "undecided"]
+Verdict = Literal["passive", "bounded", "plausible", "not passive", "undecided"]
+Basis = Literal["proved", "plausible", "quiet against buzz", "none"]
 
 
 class Ground(Enum):
@@ -32,12 +35,44 @@ class Ground(Enum):
     """The deciding criterion holds."""
     CRITERION = auto()
     """What the deciding criterion says."""
+    BOUNDED = auto()
+    """Passive but for the steps of positions and forces, whose buzz is bounded."""
+    UNBOUNDED = auto()
+    """Passive but for the steps of positions and forces, whose buzz has no bound."""
+    WALL_HELD = auto()
+    """A smooth wall that did not cycle: no proof."""
+    WALL_CYCLED = auto()
+    """A smooth wall that cycled at no more than this."""
+    CONTRADICTION = auto()
+    """Damping and delay prove a wall passive that cycled."""
     SHAKEN = auto()
     """A hand that shakes gains energy if damping there is σ₀."""
     SHAKEN_ANYHOW = auto()
     """A hand that shakes gains energy whatever the damping."""
     DEVICE_UNKNOWN = auto()
-    """The smooth wall proves nothing here, and damping or rate of the device are not known."""
+    """The smooth wall says nothing here, and damping or rate of the device are not known."""
+
+
+@dataclass(frozen=True)
+class Allowed(Record):
+    """Up to which stiffness a law may be rendered on a device, and how well that is known.
+
+    Attributes:
+        stiffness: [N/m]; 0 if no stiffness is known to do, ``None`` if it is not decidable.
+        basis: ``"proved"``: passive up to there, under the assumptions of the criterion.
+            ``"plausible"``: a smooth wall of that gain did not cycle. ``"quiet against buzz"``: the
+            same of a law with curl, which feeds the hand below v* at any stiffness. ``"none"``.
+        criterion: the name of the criterion that gives it; empty for none.
+        delay: samples of delay of the pair of damping and delay that binds; infinity where any
+            delay is admissible, ``None`` where no such pair is behind the number.
+        sampled: whether it rests on a number that was only sampled, so that it may be too great.
+    """
+
+    stiffness: float | None
+    basis: Basis
+    criterion: str = ""
+    delay: float | None = None
+    sampled: bool = False
 
 
 @dataclass(frozen=True)
@@ -48,21 +83,24 @@ class Passivity(Record):
         criteria: all of them, also those that do not decide.
         decided_by: name of the criterion that the verdict rests on; where it is "undecided", of
             the one that would decide.
-        verdict: ``"passive"`` (proved, under the assumptions of that criterion), ``"not passive"``
-            (a motion of the hand that gains energy without end is known) or ``"undecided"``.
+        verdict: ``"passive"`` (proved, under the assumptions of that criterion), ``"bounded"``
+            (proved but for the steps of positions and forces, whose buzz stays below ``buzz``),
+            ``"plausible"`` (no proof: a smooth wall did not cycle), ``"not passive"`` (a motion of
+            the hand that gains energy without end is known) or ``"undecided"``.
         ground: what the verdict rests on.
         reason: one sentence.
         stiffness: the surface's [N/m].
-        safe_stiffness: the greatest stiffness that the deciding criterion allows [N/m]; 0 if it
-            allows none, ``None`` if unknown.
+        allowed: up to which stiffness, and how well that is known.
         critical_speed: v* [m/s]: below that speed on the worst loop the damping does not absorb
             what the field gains; 0 for a conservative law, ``None`` if unknown.
         greatest_delay: the most whole samples of delay for which the delay rule is proved at this
             stiffness; ``None`` if not even none is, or if it is unknown.
+        buzz: the most that steps of positions and forces may cause; ``None`` if there is no bound.
     """
 
     written = (
-        "verdict decided_by reason stiffness safe_stiffness critical_speed greatest_delay criteria"
+        "verdict decided_by reason stiffness safe_stiffness allowed critical_speed greatest_delay "
+        "buzz criteria"
     )
 
     criteria: tuple[Criterion, ...]
@@ -71,9 +109,15 @@ class Passivity(Record):
     ground: Ground
     reason: str
     stiffness: float
-    safe_stiffness: float | None
+    allowed: Allowed
     critical_speed: float | None
     greatest_delay: int | None
+    buzz: Buzz | None
+
+    @property
+    def safe_stiffness(self) -> float | None:
+        """The stiffness of ``allowed`` [N/m]; what it is worth, its basis says."""
+        return self.allowed.stiffness
 
     def criterion(self, name: str) -> Criterion:
         """Return a criterion by its name.
@@ -90,7 +134,9 @@ class Passivity(Record):
         return as_html(answer, (["criterion", "formula", "says", "assumes"], rows))
 
 
-def decide(loop: Loop, by_name: Mapping[str, Criterion]) -> tuple[Verdict, str, Ground]:
+def decide(
+    loop: Loop, by_name: Mapping[str, Criterion], buzz: Buzz | None
+) -> tuple[Verdict, str, Ground]:
     """Return the verdict, the name of the criterion that it rests on, and the ground.
 
     A law that is not conservative is judged by its leak, never by a norm.
@@ -99,18 +145,49 @@ def decide(loop: Loop, by_name: Mapping[str, Criterion]) -> tuple[Verdict, str, 
     if not loop.conservative:
         unknown = by_name[LEAK].holds is None
         return "undecided" if unknown else "not passive", LEAK, Ground.CRITERION
+    if contradictory(loop):
+        return "undecided", main, Ground.CONTRADICTION
     if loop.delay is not None and by_name[main].holds:
+        return _but_for_steps(by_name, main, buzz)
+    ground = _pumped(loop)
+    if ground is not None:
+        return "not passive", WALL_TEST if ground is Ground.WALL_CYCLED else main, ground
+    return _not_proved(loop, by_name, main)
+
+
+def _but_for_steps(
+    by_name: Mapping[str, Criterion], main: str, buzz: Buzz | None
+) -> tuple[Verdict, str, Ground]:
+    """Return what steps of positions and forces leave of a passive loop."""
+    if by_name[STEPS].holds:
         return "passive", main, Ground.PROVED
-    if _pumped(loop):
-        ground = Ground.SHAKEN_ANYHOW if _slack_without_bound(loop) else Ground.SHAKEN
-        known = by_name[main].limit is None and by_name[WALL_ONE_SIDED].limit is not None
-        return "not passive", WALL_ONE_SIDED if known else main, ground
-    for rule in _valid_walls(loop):
-        if by_name[rule].holds:
-            return "passive", rule, Ground.PROVED
-    if loop.obstacle is not None:
-        return "undecided", main, Ground.CRITERION
-    return _undecided(loop, by_name, main)
+    if buzz is not None:
+        return "bounded", STEPS, Ground.BOUNDED
+    return "undecided", STEPS, Ground.UNBOUNDED
+
+
+def allowed(loop: Loop, by_name: Mapping[str, Criterion]) -> Allowed:
+    """Return up to which stiffness the law may be rendered, and how well that is known.
+
+    One answer for whoever asks: the comparison of laws, the analysis of one, the device's limits.
+    """
+    main = by_name[_main_rule(loop)]
+    if not loop.conservative:
+        return _allowed("quiet against buzz", by_name[WALL])
+    if loop.obstacle is None and loop.delay is not None and not contradictory(loop):
+        proved = _allowed("proved", main)
+        if proved.stiffness is not None:
+            return proved
+    return _allowed("plausible", by_name[WALL_TEST], loop.longest_delay)
+
+
+def _allowed(basis: Basis, criterion: Criterion, delay: float | Fraction | None = None) -> Allowed:
+    sampled = criterion.limit is None and criterion.at_most is not None
+    stiffness = criterion.at_most if sampled else criterion.limit
+    if not stiffness:
+        return Allowed(stiffness, "none")
+    pair = None if delay is None else float(delay)
+    return Allowed(stiffness, basis, criterion.name, pair, sampled)
 
 
 def _main_rule(loop: Loop) -> str:
@@ -120,19 +197,8 @@ def _main_rule(loop: Loop) -> str:
     return ONE_SIDED if loop.delay == 0 else DELAY
 
 
-def _valid_walls(loop: Loop) -> tuple[str, ...]:
-    """Return the smooth-wall rules that prove passivity here.
-
-    K₀/q covers every delay; the one-sided rule needs a known one. With virtual damping both are
-    proved without delay only: the wall's test does not show its part of the loss then.
-    """
-    if loop.obstacle is not None or (loop.virtual and loop.delay != 0):
-        return ()
-    return (WALL,) if loop.delay is None else (WALL, WALL_ONE_SIDED)
-
-
-def _pumped(loop: Loop) -> bool:
-    """Return whether a small motion at a witness point gains energy without end.
+def _pumped(loop: Loop) -> Ground | None:
+    """Return why a small motion at a witness point gains energy without end, if one does.
 
     A straight shake along the witness direction, p + u ε cos(θ i), where -uᵀJu = K, gains per
     sample 2 ε² sin²(θ/2) times
@@ -140,20 +206,23 @@ def _pumped(loop: Loop) -> bool:
         K sin((d + ½)θ)/(2 sin(θ/2)) - (b_v/T) cos((d + 1)θ) - σ₀/T.
 
     θ -> 0 and θ = πm/(d + 1), m odd, give the first two; for a slack direction, K = -k q, which is
-    where q is attained if q > q⁺, m even gives the third (d >= 1).
+    where q is attained if q > q⁺, m even gives the third (d >= 1). A wall that cycled has
+    σ₀/T < K (½ + d): then θ -> 0 gains from that K on, whatever σ₀ and d are.
     """
     if _slack_without_bound(loop):
-        return True
-    if loop.loss is None:
-        return False
+        return Ground.SHAKEN_ANYHOW
     stiff = loop.number(Fraction(1), Fraction(0), "lower") * loop.stiffness
+    if loop.cycled is not None and stiff >= loop.cycled:
+        return Ground.WALL_CYCLED
+    if loop.loss is None:
+        return None
     gains = [stiff / 2 + loop.damper]
     if loop.delay is not None:
         gains.append(stiff * (loop.delay + HALF) - loop.damper)
     if loop.delay and loop.q.lower > loop.one_sided.upper:
         slack = loop.number(Fraction(0), Fraction(1), "lower") * loop.stiffness
         gains.append(slack / 2 - loop.damper)
-    return max(gains) > loop.loss
+    return Ground.SHAKEN if max(gains) > loop.loss else None
 
 
 def _slack_without_bound(loop: Loop) -> bool:
@@ -161,12 +230,16 @@ def _slack_without_bound(loop: Loop) -> bool:
     return bool(loop.delay) and math.isinf(loop.q.lower) and math.isfinite(loop.one_sided.upper)
 
 
-def _undecided(
+def _not_proved(
     loop: Loop, by_name: Mapping[str, Criterion], main: str
 ) -> tuple[Verdict, str, Ground]:
-    """Return which criterion would decide, and what keeps it from doing so."""
-    if loop.loss is None and by_name[WALL_ONE_SIDED].limit is not None:
-        return "undecided", WALL_ONE_SIDED, Ground.DEVICE_UNKNOWN
+    """Return what the wall's test says, or which criterion would decide."""
+    if by_name[WALL_TEST].holds:
+        return "plausible", WALL_TEST, Ground.WALL_HELD
+    if loop.obstacle is not None:
+        return "undecided", main, Ground.CRITERION
+    if loop.loss is None and by_name[WALL_TEST].limit is not None:
+        return "undecided", WALL_TEST, Ground.DEVICE_UNKNOWN
     if loop.delay is None and not by_name[main].missing:
         main = DELAY
     return "undecided", main, Ground.CRITERION

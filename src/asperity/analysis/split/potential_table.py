@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.passivity.allowed import allowed_stiffness
 from asperity.analysis.split.potential_grid import Grid, Progress, curvatures, potentials
 from asperity.checks import FloatArray, array, positive
 from asperity.contacts.split.spline import PotentialTable
@@ -93,7 +94,10 @@ class TabulatedSurface:
         return -self.surface.stiffness * second.reshape(-1, 3, 3)
 
     def safe_stiffness(self, device: str | os.PathLike[str] | Device) -> float:
-        """Return the stiffness [N/m] up to which a device renders the table, K₀/q⁺.
+        """Return the stiffness [N/m] up to which a device renders the table; 0 if none is known.
+
+        It is as good as what is known of the device: see
+        :class:`~asperity.analysis.passivity.judgement.Allowed`.
 
         Args:
             device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`.
@@ -101,7 +105,9 @@ class TabulatedSurface:
         Raises:
             ParameterError: for an unknown device.
         """
-        return load_device(device).max_stiffness / self.one_sided.value
+        numbers = (self.lipschitz, self.one_sided)
+        found, _wall = allowed_stiffness(self.surface, load_device(device), *numbers)
+        return found.stiffness or 0.0
 
     @property
     def _loops(self) -> ModuleType:

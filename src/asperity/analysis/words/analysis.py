@@ -8,15 +8,18 @@ import numpy as np
 
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.passivity.criteria import LEAK
-from asperity.analysis.words.passivity import gained
+from asperity.analysis.words.passivity import allowed_text, buzz_text, gained, newtons
 from asperity.analysis.words.surface import default_depth, law_parameters, unverified
 from asperity.arguments import DEFAULT_STIFFNESS
 from asperity.surface import Surface, default_max_depth
 from asperity.textures.texture import Texture
-from asperity.units import engineering, rounded_down
+from asperity.units import engineering
 
 # What the criteria of passivity look at.
-_USED = ("max_stiffness", "update_rate", "damping", "delay_samples", "virtual_damping")
+_USED = (
+    "max_stiffness", "update_rate", "damping", "delay_samples", "virtual_damping",
+    "position_resolution", "force_resolution", "least_friction",
+)  # fmt: skip
 
 
 def surface_width(texture: Texture) -> float:
@@ -33,12 +36,17 @@ def answer(result: Analysis) -> str:
     subject = f"law {surface.law.letter} at {surface.stiffness:g} N/m, pressed to {depth}, "
     subject += f"on the {result.device.name}"
     rule = judged.criterion(judged.decided_by)
+    limit = newtons(rule.limit or 0.0)
     if judged.verdict == "passive":
-        limit = "infinite" if rule.limit == math.inf else f"{rounded_down(rule.limit or 0.0):.10g}"
-        said = f"{_capital(subject)} is passive by {rule.formula}, whose limit is {limit} N/m"
+        said = f"{_capital(subject)} is passive by {rule.formula}, whose limit is {limit}"
+    elif judged.verdict == "plausible":
+        said = f"That {subject} is passive is plausible, not proved: {rule.formula}, limit {limit}"
+    elif judged.verdict == "bounded" and judged.buzz is not None:
+        said = f"{_capital(subject)} is passive but for steps: {buzz_text(judged.buzz)}"
     elif judged.verdict == "not passive":
         gain = gained(result.leak.energy, judged.critical_speed)
-        reason = gain if rule.name == LEAK else judged.reason
+        leaks = f"{gain}; {allowed_text(judged.allowed)}"
+        reason = leaks if rule.name == LEAK else judged.reason
         said = f"{_capital(subject)} is not passive: {reason}"
     else:
         said = f"Whether {subject} is passive is undecided: {judged.reason}"
@@ -81,7 +89,7 @@ def assumptions(result: Analysis, extent: tuple[float, float] | None) -> tuple[s
     if not result.continuity.continuous:
         said.append("Jumps are located where contact begins and below the sharpest crest only")
     said += unverified(result.device, _USED)
-    said.append("Dry friction and quantisation of the device are in none of the criteria")
+    said.append("What is said is of energy and forces; no person was asked what they feel")
     return tuple(said)
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from asperity.analysis.passivity.criteria import evenly
 from asperity.analysis.recommendation import Recommendation, felt_force
 from asperity.analysis.row import LawRow
-from asperity.analysis.words.passivity import newtons
+from asperity.analysis.words.passivity import allowed_text, buzz_text, newtons
 from asperity.analysis.words.surface import default_depth, law_parameters, most_gained
 from asperity.devices import Device
 from asperity.surface import Surface
@@ -15,40 +16,75 @@ from asperity.units import engineering
 
 def verdict(row: LawRow) -> str:
     """Return what will go wrong with a law, in one line."""
-    k, parts = row.surface.stiffness, []
-    if row.buzzes:
-        parts.append(f"may buzz: {k:g} N/m is above its {newtons(row.safe_stiffness)}")
+    k, parts = f"{row.surface.stiffness:g} N/m", []
+    if row.passivity.verdict == "not passive" and not row.leaks:
+        parts.append(f"not passive at {k}; {allowed_text(row.allowed)}")
+    elif row.buzzes:
+        parts.append(f"may buzz at {k}; {allowed_text(row.allowed)}")
+    elif not row.leaks:
+        parts.append(_of_passivity(row, k))
     if row.leaks:
-        parts.append(f"feels alive: gains up to {most_gained(row.leak)}")
+        quiet = "" if row.buzzes else f"; {allowed_text(row.allowed)}"
+        parts.append(f"feels alive: gains up to {most_gained(row.leak)}{quiet}")
     if row.jumps:
         parts.append("clicks: " + row.continuous_reason)
     if row.textureless:
         parts.append("no texture")
-    if not parts:
-        parts.append(f"sound at {k:g} N/m: below its limit, conservative, continuous")
     if row.loses_contact:
         parts.append(f"no contact on {100.0 * row.contact_lost:.0f} % of the scan")
     return "; ".join(parts)
+
+
+def _of_passivity(row: LawRow, stiffness: str) -> str:
+    """Return what is known of a law without curl at the stiffness asked for."""
+    judged = row.passivity
+    if judged.verdict == "bounded" and judged.buzz is not None:
+        return f"passive at {stiffness} but for steps: {buzz_text(judged.buzz)}"
+    if judged.verdict == "plausible":
+        return allowed_text(row.allowed)
+    return f"{judged.verdict} at {stiffness}"
 
 
 def recommendation(found: Recommendation, device: Device) -> str:
     """Return which law to use, and why."""
     best = found.row
     if best is None:
-        return "None of the laws compared renders a texture on this surface."
+        return _none(found, device)
     name = best.law.name.replace("-", " ")
     limit = newtons(best.safe_stiffness)
     head = f"Use law {best.law.letter} ({name}) at up to {limit} on the {device.name}"
     why = _sound_reason(best) if found.sound else _least_leak_reason(best, found)
     tail = _price(best, found.felt) + _saturation(best, device)
-    return f"{head}: {why}.{tail}"
+    return f"{head}, {_worth(best, device)}: {why}.{tail}"
+
+
+def _none(found: Recommendation, device: Device) -> str:
+    """Return why no law is recommended."""
+    if all(row.textureless for row in found.rows):
+        return "None of the laws compared renders a texture on this surface."
+    return (
+        f"Of none of the laws compared a stiffness is known that does on the {device.name}: they "
+        "need a known delay, or have no bound at this depth."
+    )
+
+
+def _worth(row: LawRow, device: Device) -> str:
+    """Return what the stiffness that is allowed is worth, in a clause."""
+    if row.allowed.basis == "proved":
+        return "proved passive"
+    if row.allowed.basis == "quiet against buzz":
+        return "quiet against buzz there, though it feeds the hand below v*"
+    test = device.wall_test
+    held = test is not None and test.pedigree == "measured"
+    why = "a smooth wall of that gain held" if held else "no stiffer wall is known to work"
+    return f"plausible, not proved ({why})"
 
 
 def _sound_reason(best: LawRow) -> str:
     force = engineering(best.texture_force, "N")
     return (
-        "its field is conservative and continuous, so it can neither feel alive nor click, "
-        f"and at that stiffness it still gives {force} RMS of texture"
+        "no closed path of its field gives net energy and its force does not jump; "
+        f"it still gives {force} RMS of texture"
     )
 
 
@@ -113,14 +149,7 @@ def assumptions(
     first = rows[0].surface
     result = [*first.texture.preparation]
     result += _defaulted(rows, defaults)
-    datum = device.data["max_stiffness"]
-    mark = "" if datum.verified else " (not verified)"
-    result.append(f"K₀ = {datum.value:g} N/m for the {device.name}{mark}: {datum.source}")
-    if any(row.conservative for row in rows):
-        result.append(
-            "K₀/q⁺ is proved for a loop without delay beyond the hold; K₀/q for every delay, if "
-            "the law is conservative"
-        )
+    result += _of_the_wall(rows, device)
     unverified = [
         field.replace("_", " ") for field, d in device.data.items()
         if not d.verified and field != "max_stiffness"
@@ -142,7 +171,22 @@ def assumptions(
         "The leak is a field's work on one slow turn of its worst loop; delay, quantisation and "
         "friction of the device are not in it"
     )
+    result.append("What is said is of energy and forces; no person was asked what they feel")
     return tuple(result)
+
+
+def _of_the_wall(rows: Sequence[LawRow], device: Device) -> list[str]:
+    """Return where K₀ comes from, and what taking it for a limit assumes."""
+    test = device.wall_test
+    if test is None:
+        return []
+    said = [f"K₀ = {test.value:g} N/m for the {device.name} ({test.pedigree}): {test.source}"]
+    if any(row.allowed.basis == "plausible" for row in rows):
+        said.append(
+            "Plausible, not proved: a wall of K₀ was about to cycle, as with a heavy handle in a "
+            f"loose grip, and {evenly(test)}"
+        )
+    return said
 
 
 def _defaulted(rows: Sequence[LawRow], defaults: Mapping[str, bool]) -> list[str]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from asperity.analysis.limits.limit_result import Limits
 from asperity.analysis.limits.limit_rules import Limit
+from asperity.analysis.words.passivity import allowed_text
 from asperity.analysis.words.surface import default_depth, law_parameters, unverified
 from asperity.units import engineering, rounded_down
 
@@ -178,12 +179,9 @@ def _defaulted(result: Limits, defaults: Mapping[str, bool]) -> list[str]:
         shown = ", ".join(f"{name} = {n:g}" for name, n in zip("αβγ", counts, strict=True))
         said.append(f"Samples in a wave: {shown}; the paper says 5 to 10")
     if defaults["stiffness"]:
-        k, symbol = stiffness_text(result), result.gain_symbol
-        known = result.safe_stiffness is not None and result.safe_stiffness > 0.0
-        why = f"what the device renders, K₀/{symbol}" if known else "a default, K₀ being unknown"
-        if result.safe_stiffness == 0.0:
-            why = f"a default: {symbol} is unbounded, so no stiffness is safe"
-        said.append(f"Stiffness {k}: {why}")
+        why = allowed_text(result.allowed)
+        default = "" if result.safe_stiffness else ", a default"
+        said.append(f"Stiffness {stiffness_text(result)}{default}: {why}")
     if defaults["max_depth"]:
         said.append(default_depth(result.surface))
     return said + law_parameters(result.surface)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from asperity.analysis.passivity.criteria import LEAK, Criterion
+from asperity.analysis.passivity.criteria import LEAK, Buzz, Criterion
 from asperity.analysis.passivity.device_loop import (
     Loop,
     Obstacle,
     critical_speed,
     greatest_delay,
 )
-from asperity.analysis.passivity.judgement import Ground
+from asperity.analysis.passivity.judgement import Allowed, Ground
 from asperity.units import engineering, rounded_down
 
 
@@ -22,24 +22,66 @@ def worded(loop: Loop, criterion: Criterion) -> Criterion:
     return replace(criterion, says=says, assumptions=_assumptions(loop, criterion))
 
 
-def reason(loop: Loop, criterion: Criterion, ground: Ground) -> str:
+def reason(loop: Loop, criterion: Criterion, ground: Ground, buzz: Buzz | None) -> str:
     """Return what the verdict rests on, in one sentence.
 
     Args:
         loop: the surface on the device.
         criterion: the one that decides, in words.
         ground: of the verdict.
+        buzz: the most that steps may cause, if that is known.
     """
-    if ground is Ground.PROVED:
-        return f"{criterion.formula} at {loop.surface.stiffness:g} N/m; {criterion.says}"
-    if ground is Ground.CRITERION:
-        return criterion.says
-    if ground is Ground.DEVICE_UNKNOWN:
-        fields = ("update_rate", "damping", "delay_samples")
-        needs = ", ".join(field for field in fields if loop.device.value(field) is None)
-        return f"{criterion.formula} {criterion.says}; to decide: {needs}"
-    tail = "whatever the damping" if ground is Ground.SHAKEN_ANYHOW else "if damping there is σ₀"
-    return f"a hand that shakes where q⁺ or q is attained gains energy, {tail}"
+    at, says = f"{criterion.formula} at {loop.surface.stiffness:g} N/m", criterion.says
+    wall = "" if loop.cycled is None else f"a smooth wall of {float(loop.cycled):g} N/m cycled"
+    fields = ("update_rate", "damping", "delay_samples")
+    needs = ", ".join(field for field in fields if loop.device.value(field) is None)
+    most = "no bound of the buzz is known" if buzz is None else buzz_text(buzz)
+    return {
+        Ground.PROVED: f"{at}; {says}",
+        Ground.CRITERION: says,
+        Ground.BOUNDED: f"silence is not proved, {criterion.formula} {says}; {most}",
+        Ground.UNBOUNDED: f"silence is not proved, {criterion.formula} {says}; {most}",
+        Ground.WALL_HELD: f"{at}; {says}; {criterion.assumptions}",
+        Ground.WALL_CYCLED: f"{wall}, so {_SHAKES}, {_IF}",
+        Ground.CONTRADICTION: f"{wall}, which damping and delay prove passive: one is wrong",
+        Ground.SHAKEN: f"{_SHAKES}, {_IF}",
+        Ground.SHAKEN_ANYHOW: f"{_SHAKES}, whatever the damping",
+        Ground.DEVICE_UNKNOWN: f"{criterion.formula} {says}; to decide: {needs}",
+    }[ground]
+
+
+_SHAKES = "a hand that shakes where q⁺ or q is attained gains energy"
+_IF = "if damping there is σ₀"
+
+
+def buzz_text(buzz: Buzz) -> str:
+    """Return the most that steps of positions and forces may cause."""
+    speed, power = engineering(buzz.speed, "m/s"), engineering(buzz.power, "W")
+    return f"a buzz that lasts moves at {speed} RMS and draws {power} at most"
+
+
+def allowed_text(allowed: Allowed) -> str:
+    """Return up to which stiffness a law may be rendered, and how well that is known.
+
+    Example:
+        >>> allowed_text(Allowed(1999.9, "plausible", "wall test", math.inf))
+        'plausible up to 1990 N/m, with any delay'
+        >>> allowed_text(Allowed(None, "none")), allowed_text(Allowed(0.0, "none"))
+        ('no stiffness is known: the device says too little', 'no stiffness is known to do')
+    """
+    if allowed.stiffness is None:
+        return "no stiffness is known: the device says too little"
+    if allowed.basis == "none":
+        return "no stiffness is known to do"
+    at_most = f"{'at most ' if allowed.sampled else ''}{newtons(allowed.stiffness)}"
+    if allowed.basis == "quiet against buzz":
+        return f"quiet against buzz up to {at_most}, feeds below v*"
+    if allowed.basis == "proved" or allowed.delay is None:
+        return f"{allowed.basis} up to {at_most}"
+    delay = (
+        "any delay" if math.isinf(allowed.delay) else f"a delay up to {allowed.delay:.3g} samples"
+    )
+    return f"plausible up to {at_most}, with {delay}"
 
 
 def newtons(stiffness: float) -> str:
@@ -103,7 +145,8 @@ def _leak_says(loop: Loop, criterion: Criterion) -> str:
         return "not decidable: no loop found that gains energy, and no proof that none does"
     if criterion.holds:
         return "holds: no loop gains"
-    return f"does not hold: {gained(loop.leak.energy, critical_speed(loop))}"
+    energy = 0.0 if loop.leak is None else loop.leak.energy
+    return f"does not hold: {gained(energy, critical_speed(loop))}"
 
 
 def _assumptions(loop: Loop, criterion: Criterion) -> str:

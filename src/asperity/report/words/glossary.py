@@ -6,12 +6,20 @@ COMPARISON = (
     (
         "q, characteristic number",
         "By how much the law can multiply the stiffness of the smooth wall, at worst over the "
-        "surface down to the depth pressed. The loop gain grows by q, so a device that renders a "
-        "smooth wall of stiffness K₀ renders this law up to K₀/q before it may buzz.",
+        "surface down to the depth pressed. The loop gain grows by q: where a smooth wall of "
+        "stiffness K₀ held, this law has the same gain at K₀/q.",
     ),
     (
         "q⁺, one-sided number",
-        "For a conservative law only the stiffening part counts: K₀/q⁺.",
+        "For a conservative law without delay only the stiffening part counts: K₀/q⁺.",
+    ),
+    (
+        "stiffness up to, worth",
+        "Proved: passive up to there, from the device's damping, rate and delay. Plausible: a "
+        "smooth wall of that gain held on the device, which proves nothing; it takes the wall for "
+        "about to cycle and damping for alike in all directions. Quiet: the same for a law with "
+        "curl, quiet against buzz only, since below the speed v* it feeds the hand at any "
+        "stiffness.",
     ),
     (
         "worst leak",
@@ -28,7 +36,7 @@ COMPARISON = (
         "S, support",
         "How stiff the surface is on average under the scan, over the greatest loop gain.",
     ),
-    ("texture force", "RMS of the oscillating force at the law's own stiffness limit."),
+    ("texture force", "RMS of the oscillating force at that stiffness."),
 )
 
 ANALYSIS = (
