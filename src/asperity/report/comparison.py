@@ -18,6 +18,7 @@ from asperity.report import page, terminal
 from asperity.report.devices import datum_text, numbers_table
 from asperity.report.words import glossary
 from asperity.report.words.number_words import (
+    NONE,
     SAMPLED,
     bound_text,
     force_text,
@@ -132,7 +133,7 @@ def _cells(row: LawRow, comparison: Comparison) -> list[page.Cell]:
         page.Cell(holds_text(row.continuous), note=row.continuous_reason),
         page.Cell(merit_text(row.strength)),
         page.Cell(merit_text(row.support)),
-        page.Cell(force_text(row.texture_force)),
+        page.Cell(force_text(row.texture_force) if row.safe_stiffness or row.textureless else NONE),
     ]
 
 
@@ -182,7 +183,7 @@ def _meanings(comparison: Comparison) -> list[tuple[str, str]]:
     stiffness = engineering(comparison.stiffness, "N/m")
     meanings = [
         ("q, q⁺", "by how much the law multiplies stiffness at worst; smaller is better"),
-        ("stiffness up to", f"for the {comparison.device.name}"),
+        ("stiffness up to", f"on the {comparison.device.name}; what it is worth stands beside it"),
         (
             "worth",
             "proved passive; plausible: a smooth wall of that gain held, no proof; quiet: "

@@ -45,7 +45,7 @@ def answer(result: Analysis) -> str:
         said = f"{_capital(subject)} is passive but for steps: {buzz_text(judged.buzz)}"
     elif judged.verdict == "not passive":
         gain = gained(result.leak.energy, judged.critical_speed)
-        leaks = f"{gain}; {allowed_text(judged.allowed)}"
+        leaks = f"{gain}; {allowed_text(judged.allowed, judged.critical_speed)}"
         reason = leaks if rule.name == LEAK else judged.reason
         said = f"{_capital(subject)} is not passive: {reason}"
     else:

@@ -18,13 +18,13 @@ def verdict(row: LawRow) -> str:
     """Return what will go wrong with a law, in one line."""
     k, parts = f"{row.surface.stiffness:g} N/m", []
     if row.passivity.verdict == "not passive" and not row.leaks:
-        parts.append(f"not passive at {k}; {allowed_text(row.allowed)}")
+        parts.append(f"not passive at {k}; {_up_to(row)}")
     elif row.buzzes:
-        parts.append(f"may buzz at {k}; {allowed_text(row.allowed)}")
+        parts.append(f"may buzz at {k}; {_up_to(row)}")
     elif not row.leaks:
         parts.append(_of_passivity(row, k))
     if row.leaks:
-        quiet = "" if row.buzzes else f"; {allowed_text(row.allowed)}"
+        quiet = "" if row.buzzes else f"; {_up_to(row)}"
         parts.append(f"feels alive: gains up to {most_gained(row.leak)}{quiet}")
     if row.jumps:
         parts.append("clicks: " + row.continuous_reason)
@@ -35,13 +35,17 @@ def verdict(row: LawRow) -> str:
     return "; ".join(parts)
 
 
+def _up_to(row: LawRow) -> str:
+    return allowed_text(row.allowed, row.passivity.critical_speed)
+
+
 def _of_passivity(row: LawRow, stiffness: str) -> str:
     """Return what is known of a law without curl at the stiffness asked for."""
     judged = row.passivity
     if judged.verdict == "bounded" and judged.buzz is not None:
         return f"passive at {stiffness} but for steps: {buzz_text(judged.buzz)}"
     if judged.verdict == "plausible":
-        return allowed_text(row.allowed)
+        return _up_to(row)
     return f"{judged.verdict} at {stiffness}"
 
 

@@ -60,8 +60,12 @@ def buzz_text(buzz: Buzz) -> str:
     return f"a buzz that lasts moves at {speed} RMS and draws {power} at most"
 
 
-def allowed_text(allowed: Allowed) -> str:
+def allowed_text(allowed: Allowed, speed: float | None = None) -> str:
     """Return up to which stiffness a law may be rendered, and how well that is known.
+
+    Args:
+        allowed: the answer.
+        speed: v* [m/s] of a law with curl, where it is known.
 
     Example:
         >>> allowed_text(Allowed(1999.9, "plausible", "wall test", math.inf))
@@ -75,7 +79,8 @@ def allowed_text(allowed: Allowed) -> str:
         return "no stiffness is known to do"
     at_most = f"{'at most ' if allowed.sampled else ''}{newtons(allowed.stiffness)}"
     if allowed.basis == "quiet against buzz":
-        return f"quiet against buzz up to {at_most}, feeds below v*"
+        below = "v*" if speed is None else f"v* = {engineering(speed, 'm/s')}"
+        return f"quiet against buzz up to {at_most}, feeds below {below}"
     if allowed.basis == "proved" or allowed.delay is None:
         return f"{allowed.basis} up to {at_most}"
     delay = (
