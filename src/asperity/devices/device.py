@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Literal
+from typing import Any, Literal
 
 from asperity.errors import ParameterError
-from asperity.files import Record
+from asperity.files import Record, record
 from asperity.units import engineering
 
 Range = Literal["positive", "not negative", "any"]
@@ -89,6 +89,11 @@ class Datum(Record):
     also: tuple[Datum, ...] = ()
     measured: bool = False
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units; ``verified`` is "measured" where the number is."""
+        said = record(self, "value", "unit", "source", "verified", "also")
+        return said | ({"verified": "measured"} if self.pedigree == "measured" else {})
+
     @property
     def text(self) -> str:
         """The value for reading, with an SI prefix.
@@ -137,6 +142,11 @@ class WallTest(Datum):
     update_rate: float | None = None
     positions: Positions | None = None
     lightest: float | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units, with what is known of the test and no more."""
+        test = record(self, "directions", "cycled", "update_rate", "positions", "lightest")
+        return super().to_dict() | {name: value for name, value in test.items() if value}
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,11 @@ def datum_text(datum: Datum | None) -> str:
     return datum.text if datum.verified else f"{datum.text} {UNVERIFIED}"
 
 
+def verified_text(datum: Datum) -> str:
+    """Return "measured", "read" in a source that others can read, or "no"."""
+    return datum.pedigree if datum.verified else "no"
+
+
 def wall_test_text(test: WallTest) -> str:
     """Return what is known of a wall's test besides the stiffness that held; "" for nothing.
 
@@ -83,10 +88,10 @@ def device_table(device: Device) -> Table:
     for field, datum in device.data.items():
         for what, one in ((law_title(field), datum), *(("  also", other) for other in datum.also)):
             style = "" if one.verified else "yellow"
-            rows.append(page.Row([what, one.text, one.pedigree, one.source], style=style))
+            rows.append(page.Row([what, one.text, verified_text(one), one.source], style=style))
         if isinstance(datum, WallTest) and wall_test_text(datum):
             rows.append(page.Row(["  the test", "", "", wall_test_text(datum)]))
-    return table(page.Table(("what", "value", "known from", "source"), rows, (1,)), wraps=(3,))
+    return table(page.Table(("what", "value", "verified", "source"), rows, (1,)), wraps=(3,))
 
 
 def numbers_table(device: Device, fields: Sequence[str]) -> page.Table:
@@ -103,12 +108,12 @@ def numbers_table(device: Device, fields: Sequence[str]) -> page.Table:
             unknown = page.Cell("not known", "open")
             rows.append(page.Row([law_title(field), "", unknown, FIELD_TABLE[field].words]))
         else:
-            known = page.Cell(datum.pedigree, "" if datum.verified else "open")
+            known = page.Cell(verified_text(datum), "" if datum.verified else "open")
             test = wall_test_text(datum) if isinstance(datum, WallTest) else ""
             rows.append(
                 page.Row([law_title(field), datum.text, known, page.Cell(datum.source, below=test)])
             )
-    return page.Table((device.name, "value", "known from", "source"), rows, numbers=(1,))
+    return page.Table((device.name, "value", "verified", "source"), rows, numbers=(1,))
 
 
 def unknown_fields(device: Device) -> list[str]:

@@ -1,0 +1,74 @@
+"""What a device file may say of a wall that was tried, and what is refused."""
+
+from __future__ import annotations
+
+import pytest
+
+from asperity.devices import Datum, Device, WallTest, load_device, parse_device
+from asperity.errors import ParameterError
+
+FULL = {
+    "value": "1.8 N/mm", "directions": ["x", "z", "x"], "cycled": "2 N/mm", "update_rate": "1 kHz",
+    "positions": "stepped", "lightest": 0.7, "source": "tried", "verified": "measured",
+}  # fmt: skip
+
+
+def test_everything_that_a_test_says_is_kept() -> None:
+    test = parse_device({"max_stiffness": FULL}, "mine").wall_test
+    assert test == WallTest(
+        1800.0, "N/m", "tried", True, (), True, ("x", "z"), 2000.0, 1000.0, "stepped", 0.7
+    )
+    assert test.to_dict() == {
+        "value": 1800.0, "unit": "N/m", "source": "tried", "verified": "measured", "also": [],
+        "directions": ["x", "z"], "cycled": 2000.0, "update_rate": 1000.0, "positions": "stepped",
+        "lightest": 0.7,
+    }  # fmt: skip
+
+
+def test_a_plain_number_is_a_test_of_which_nothing_else_is_known() -> None:
+    plain = parse_device({"max_stiffness": "1 kN/m"}, "mine").wall_test
+    assert plain == WallTest(1000.0, "N/m", "given by the user", False)
+    built = Device("x", "x", {"max_stiffness": Datum(1000.0, "N/m", "given by the user", False)})
+    assert built.wall_test == plain
+    assert parse_device({}, "mine").wall_test is None
+
+
+def test_only_the_paper_s_wall_was_measured() -> None:
+    pedigrees = {
+        name: load_device(name).data["max_stiffness"].pedigree
+        for name in ("omega.3", "touch", "inverse3", "pantograph")
+    }
+    assert pedigrees == {
+        "omega.3": "read", "touch": "read", "inverse3": "read", "pantograph": "measured",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"cycled": "1.8 N/mm"}, r"cycled must be above the stiffness that held, 1800 N/m"),
+        ({"cycled": "2 N"}, "another dimension"),
+        ({"cycled": -1}, "must be positive"),
+        ({"update_rate": 0}, r"update_rate must be positive"),
+        ({"lightest": 1.2}, "must be at most 1"),
+        ({"lightest": 0}, r"lightest must be positive"),
+        ({"positions": "fine"}, "'exact' or 'stepped'"),
+        ({"positions": ["exact"]}, "'exact' or 'stepped'"),
+        ({"directions": "z"}, "list of 'x', 'y' and 'z'"),
+        ({"directions": ["up"]}, "list of 'x', 'y' and 'z'"),
+        ({"directions": [["x"]]}, "list of 'x', 'y' and 'z'"),
+        ({"verified": "seen"}, "'read' or 'measured'"),
+        ({"verified": ["read"]}, "'read' or 'measured'"),
+        ({"heard": 3}, "unknown key 'heard'"),
+        ({"also": [{"value": 3, "cycled": 4}]}, "unknown key 'cycled'"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(change: dict[str, object], words: str) -> None:
+    with pytest.raises(ParameterError, match=words) as caught:
+        parse_device({"max_stiffness": {**FULL, **change}}, "mine")
+    assert "device.max_stiffness" in str(caught.value)
+
+
+def test_other_fields_know_no_wall() -> None:
+    with pytest.raises(ParameterError, match="unknown key 'cycled'"):
+        parse_device({"update_rate": {"value": 1000, "cycled": 3}}, "mine")
