@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from asperity.arguments import DEFAULT_STIFFNESS, MAX_DEPTH, STIFFNESS, Argument
 from asperity.checks import FloatArray, array, positive
+from asperity.derive.facts import LawFacts, clamped_facts
 from asperity.errors import ParameterError, nearest_names
 from asperity.kernels.probe import CLAMPS, ClampName
 from asperity.laws import LAW_ARGUMENTS, LAWS, Law, find_law
@@ -233,6 +234,27 @@ class Surface:
         return self._in_effect("continuity")
 
     @property
+    def acting_clamp(self) -> ClampName:
+        """The clamp that changes the force: ``"none"`` for a law that is never clamped."""
+        return self.clamp if self.law.clampable else "none"
+
+    @property
+    def facts(self) -> LawFacts:
+        """What the symbols say of the force that is rendered, of law and clamp together."""
+        return clamped_facts(self.law, self.acting_clamp)
+
+    @property
+    def clamped_depth(self) -> float:
+        """The depth [m] at which the probe is below z_b wherever it is; max_depth without a clamp.
+
+        What holds for a field under a clamp is stated down to there at least.
+        """
+        if self.acting_clamp == "none":
+            return self.max_depth
+        low, high = self.law.contact.extremes(self.texture)
+        return self.max_depth + (high - low)
+
+    @property
     def floor(self) -> float:
         """z_b [m], below which ``clamp="backed"`` adds its wall."""
         return self.law.contact.extremes(self.texture)[0] - self.max_depth
@@ -259,8 +281,7 @@ class Surface:
     def _loops(self) -> ModuleType:
         from asperity.kernels.fuse import fuse_surface
 
-        clamp: ClampName = self.clamp if self.law.clampable else "none"
-        return fuse_surface(self.law, self.texture.sampler, clamp)
+        return fuse_surface(self.law, self.texture.sampler, self.acting_clamp)
 
     def force(self, points: ArrayLike, deflection: ArrayLike | None = None) -> FloatArray:
         """Return the force on the probe (what the device applies to the hand).

@@ -6,8 +6,9 @@ import subprocess
 import sys
 
 import pytest
+import sympy as sp
 
-from asperity.derive.facts import derive_facts, law_facts
+from asperity.derive.facts import clamped_facts, derive_facts, law_facts
 from asperity.laws import LAWS, Law
 
 CONSERVATIVE = "WCD"
@@ -40,6 +41,24 @@ def test_facts_of_a_law_of_ones_own_are_derived():
     facts = law_facts(jumping)
     assert not facts.begins_at_zero
     assert not facts.affine_in_depth  # the position is no constant along the depth
+
+
+def test_a_law_in_pieces_is_not_affine_in_the_depth():
+    """Each piece may be; the greatest Jacobian may be where they meet, at no end of the depth."""
+    pieces = Law(
+        "P", "pieces", "vertical",
+        lambda c: c.k * sp.Piecewise((c.depth**2, c.depth < 1e-4), (0, True)) * c.e_z,
+    )  # fmt: skip
+    assert not law_facts(pieces).affine_in_depth
+
+
+def test_clamps_under_which_a_law_is_conservative():
+    clamps = {letter: law_facts(LAWS[letter]).conservative_clamps for letter in LAWS}
+    assert clamps.pop("C") == ("whole", "backed")
+    assert set(clamps.values()) == {()}
+    assert clamped_facts(LAWS["C"], "lateral").reason.startswith("below max_depth the lateral")
+    # What is never clamped does not change.
+    assert clamped_facts(LAWS["H"], "lateral") is law_facts(LAWS["H"])
 
 
 def test_shipped_facts_need_no_sympy():

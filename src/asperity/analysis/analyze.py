@@ -19,7 +19,6 @@ from asperity.analysis.gain.characteristic import (
 )
 from asperity.analysis.judge_passivity import passivity
 from asperity.analysis.words.analysis import answer, assumptions, surface_width
-from asperity.derive.facts import law_facts
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
 from asperity.surface import Surface, default_max_depth
@@ -98,7 +97,7 @@ def analyze(
     begin(STEPS[5])
     scan = merit(surface)
     begin(STEPS[6])
-    facts, judged = law_facts(surface.law), passivity(surface, known, q, one_sided, leak)
+    facts, judged = surface.facts, passivity(surface, known, q, one_sided, leak)
     result = Analysis(
         surface=surface,
         device=known,

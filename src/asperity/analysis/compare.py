@@ -18,7 +18,6 @@ from asperity.analysis.words.comparison import assumptions, recommendation, verd
 from asperity.analysis.words.passivity import allowed_text
 from asperity.arguments import DEFAULT_STIFFNESS
 from asperity.checks import positive
-from asperity.derive.facts import law_facts
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
 from asperity.files import plain, record
@@ -176,7 +175,7 @@ def _refuse_unknown(device: Device) -> None:
 
 
 def _row(surface: Surface, device: Device) -> LawRow:
-    facts = law_facts(surface.law)
+    facts = surface.facts
     q, one_sided = characteristic_number(surface), one_sided_number(surface)
     scan, leak = merit(surface), worst_loop(surface)
     smooth = continuity(surface, q)

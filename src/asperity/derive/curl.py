@@ -18,7 +18,9 @@ from asperity.derive.jacobian import (
 )
 from asperity.laws.law import Law
 
-_IN_PIECES = (sp.Piecewise, sp.Abs, sp.sign, sp.Max, sp.Min, sp.Heaviside, sp.floor, sp.ceiling)
+IN_PIECES = (sp.Piecewise, sp.Abs, sp.sign, sp.Max, sp.Min, sp.Heaviside, sp.floor, sp.ceiling)
+# The depth at which a clamp holds the force, while the probe goes deeper.
+_HELD_DEPTH = sp.Symbol("held_depth", positive=True)
 
 
 @dataclass(frozen=True)
@@ -55,25 +57,48 @@ def curl_verdict(law: Law) -> CurlVerdict:
     """
     derivation = derive(law)
     jacobian = explicit(derivation, derivation.jacobian)
-    curl = sp.Matrix(
-        [
-            jacobian[2, 1] - jacobian[1, 2],
-            jacobian[0, 2] - jacobian[2, 0],
-            jacobian[1, 0] - jacobian[0, 1],
-        ]
-    ).applyfunc(_reduce)
+    curl = _curl(jacobian)
     if law.stateful:
         reason = "the force depends on the deflection of the anchor: it is no field of position"
         return CurlVerdict(False, curl, reason)
     if any(entry != 0 for entry in curl):
         return CurlVerdict(False, curl, "the curl is not zero")
-    if derivation.force.has(*_IN_PIECES):
+    if derivation.force.has(*IN_PIECES):
         return CurlVerdict(False, curl, "not proved: the formula is in pieces")
     if not _starts_along_the_normal(law, derivation.force):
         return CurlVerdict(False, curl, "where contact begins the force has a tangential part")
     if law.contact.single_valued:
         return CurlVerdict(True, curl, "the curl is zero identically")
     return CurlVerdict(True, curl, "the curl is zero identically, its potential does not jump")
+
+
+def conservative_clamps(law: Law) -> tuple[str, ...]:
+    """Return the depth clamps under which a law that is conservative stays so.
+
+    Below max_depth the force is the law's at that depth; under the lateral clamp its z part is the
+    law's at the probe's own depth. The force is continuous there, and the wall behind a backed
+    clamp has a potential of its own: what decides is the curl below.
+    """
+    if not law.clampable:
+        return ()
+    derivation = derive(law)
+    full = explicit(derivation, derivation.jacobian)
+    held = explicit(derivation, derivation.jacobian_saturated).subs(DEPTH, _HELD_DEPTH)
+    lateral = held[:2, :].col_join(full[2:, :])
+    below = {("whole", "backed"): held, ("lateral",): lateral}
+    kept = (clamps for clamps, jacobian in below.items() if _curl(jacobian) == sp.zeros(3, 1))
+    return tuple(clamp for clamps in kept for clamp in clamps)
+
+
+def _curl(jacobian: Any) -> Any:
+    """Return the curl of a field from its Jacobian, reduced."""
+    return sp.Matrix(
+        [
+            jacobian[2, 1] - jacobian[1, 2],
+            jacobian[0, 2] - jacobian[2, 0],
+            jacobian[1, 0] - jacobian[0, 1],
+        ]
+    ).applyfunc(_reduce)
 
 
 def begins_at_zero(force: Any) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from importlib import import_module
@@ -24,6 +24,8 @@ class LawFacts:
         looks_at_surface: whether the force depends on more of the surface than the depth.
         affine_in_depth: whether the Jacobian is affine in the depth at a fixed contact point; a
             norm of it is then convex, and greatest at an end of the depth range.
+        conservative_clamps: the depth clamps under which the law is conservative, too; empty for
+            a law that is not, or is not clamped.
     """
 
     conservative: bool
@@ -32,6 +34,7 @@ class LawFacts:
     begins_at_zero: bool
     looks_at_surface: bool
     affine_in_depth: bool
+    conservative_clamps: tuple[str, ...] = ()
 
 
 @lru_cache(maxsize=64)
@@ -49,6 +52,23 @@ def law_facts(law: Law) -> LawFacts:
     return LawFacts(**generated.FACTS)
 
 
+def clamped_facts(law: Law, clamp: str) -> LawFacts:
+    """Return the facts of the force that a law renders under a depth clamp.
+
+    Example:
+        >>> from asperity.laws import find_law
+        >>> law = find_law("C")
+        >>> clamped_facts(law, "backed").conservative, clamped_facts(law, "lateral").conservative
+        (True, False)
+    """
+    facts = law_facts(law)
+    unclamped = clamp == "none" or not law.clampable
+    if unclamped or not facts.conservative or clamp in facts.conservative_clamps:
+        return facts
+    reason = f"below max_depth the {clamp} clamp gives the force a curl"
+    return replace(facts, conservative=False, reason=reason)
+
+
 def derive_facts(law: Law) -> LawFacts:
     """Derive the facts of a law from its symbols.
 
@@ -56,7 +76,7 @@ def derive_facts(law: Law) -> LawFacts:
         LawError: see :func:`asperity.derive.jacobian.derive`.
     """
     from asperity.contacts.symbols import HX, HY, POSITION, H
-    from asperity.derive.curl import begins_at_zero, curl_verdict
+    from asperity.derive.curl import IN_PIECES, begins_at_zero, conservative_clamps, curl_verdict
     from asperity.derive.jacobian import derive, explicit
 
     verdict = curl_verdict(law)
@@ -70,7 +90,10 @@ def derive_facts(law: Law) -> LawFacts:
         curl=(x, y, z),
         begins_at_zero=begins_at_zero(force),
         looks_at_surface=bool(force.free_symbols & {H, HX, HY}),
-        affine_in_depth=not moves and _is_affine(explicit(derivation, derivation.jacobian)),
+        affine_in_depth=not moves
+        and not force.has(*IN_PIECES)
+        and _is_affine(explicit(derivation, derivation.jacobian)),
+        conservative_clamps=conservative_clamps(law) if verdict.conservative else (),
     )
 
 

@@ -9,7 +9,6 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.loops import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
-from asperity.derive.facts import law_facts
 from asperity.files import Record
 from asperity.notebook import as_html
 from asperity.paper.claims_friction import PAPER, norm_of, stick_entries
@@ -184,7 +183,7 @@ def _row(letter: str) -> TableTwoRow:
         q=q,
         one_sided=one_sided_number(surface),
         formula=_FORMULAS[letter],
-        conservative=law_facts(surface.law).conservative,
+        conservative=surface.facts.conservative,
         continuous=continuity(surface, q).continuous,
         energy=loop_work(looped, path_of(letter, SCANNING)),
         change=_change(letter, printed, q),

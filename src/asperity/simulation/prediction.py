@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
-from asperity.derive.facts import law_facts
 from asperity.devices.five_bar import handle_damping
 from asperity.files import plain, record
 from asperity.simulation.hands import Hand, SpringHand
@@ -139,7 +138,9 @@ def predict(
     damping = least_damping(plant, onset.low, onset.high, hand, top)
     q = plus = 0.0
     if depth > 0.0:
-        pressed = surface.to_depth(depth)
+        # Deeper than a clamp holds the depth, the numbers are those of the clamped force.
+        clamped = surface.acting_clamp != "none" and depth > surface.max_depth
+        pressed = surface if clamped else surface.to_depth(depth)
         q = characteristic_number(pressed, TOLERANCE).value
         plus = one_sided_number(pressed, TOLERANCE).value
     budget = damping / servo.period
@@ -150,7 +151,7 @@ def predict(
         damping=damping,
         q=q,
         one_sided=plus,
-        conservative=law_facts(surface.law).conservative,
+        conservative=surface.facts.conservative,
         paper=0.5 * budget / q if q > 0.0 else math.inf,
         delay_rule=budget / weight if weight > 0.0 else math.inf,
         wall_rule=None if wall is None or q == 0.0 else wall.quiet / q,

@@ -19,7 +19,6 @@ from asperity.analysis.bounds.measures import (
     spectral_norm,
 )
 from asperity.checks import FloatArray
-from asperity.derive.facts import law_facts
 from asperity.errors import ParameterError
 from asperity.kernels.fuse import fuse_contact, reads_position
 from asperity.surface import Surface
@@ -148,7 +147,7 @@ def greatest(surface: Surface, measure: Measure, depth_limit: DepthLimit) -> Fou
         return measure(field.jacobians(*field.contacts(rows, depth_limit)))
 
     fractions, spacing = sample_fractions(surface.texture)
-    levels = (0.0, 1.0) if law_facts(surface.law).affine_in_depth else DEPTH_FRACTIONS
+    levels = (0.0, 1.0) if surface.facts.affine_in_depth else DEPTH_FRACTIONS
     sampled = _sampled(values, fractions, levels)
     point = _best_of_blocks(sampled.max(axis=1))
     level = np.argmax(sampled[point], axis=1)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,6 @@ from asperity.analysis.bounds.dense_search import ContactField
 from asperity.analysis.bounds.measures import NORM, ONE_SIDED
 from asperity.analysis.bounds.measures import Number as MatrixNumber
 from asperity.checks import FloatArray
-from asperity.derive.facts import law_facts
 from asperity.enclosures.cells import NAMES, Cells
 from asperity.enclosures.products import (
     ANGLE,
@@ -92,8 +92,10 @@ def _stacked(entries: Entries, n: int, d: int) -> tuple[FloatArray, FloatArray, 
     return c, g, e
 
 
-def law_kernel(law: Law) -> tuple[Callable[..., Any], tuple[str, ...]]:
-    """Return a law's generated kernel ``law_jacobian`` for Taylor models, and its arguments.
+def law_kernel(
+    law: Law, name: str = "law_jacobian", math: type[TaylorMath] | ModuleType = TaylorMath
+) -> tuple[Callable[..., Any], tuple[str, ...]]:
+    """Return one of a law's generated kernels for Taylor models or arrays, and its arguments.
 
     Raises:
         TypeError: when called, if the kernel decides by comparing, as pieces and max() do.
@@ -101,9 +103,9 @@ def law_kernel(law: Law) -> tuple[Callable[..., Any], tuple[str, ...]]:
     from asperity.kernels.fuse import kernel_source
 
     source = kernel_source(law)
-    space: dict[str, Any] = {"math": TaylorMath}
+    space: dict[str, Any] = {"math": math}
     exec(compile(source, f"<law {law.letter}>", "exec"), space)
-    kernel = space["law_jacobian"]
+    kernel = space[name]
     return kernel, kernel.__code__.co_varnames[: kernel.__code__.co_argcount]
 
 
@@ -126,7 +128,7 @@ class LawProblem(MatrixProblem):
         self._constants = {n: v for n, v in law_constants(surface).items() if n in arguments}
         self._taken = arguments
         depth = surface.max_depth
-        self._ends = (0.0, depth) if law_facts(surface.law).affine_in_depth else (None,)
+        self._ends = (0.0, depth) if surface.facts.affine_in_depth else (None,)
         if surface.law.stateful:
             level = None if self._ends[0] is not None else depth
             self._longest = surface.parameter("max_deflection")
@@ -149,7 +151,7 @@ class LawProblem(MatrixProblem):
                 taken = {name: known[name] for name in self._taken if name in known}
                 if len(taken) + len(self._constants) < len(self._taken):
                     raise TypeError("the force depends on the position itself")
-                result.append(_rows(self._kernel(**taken, **self._constants)[3:]))
+                result.append(rows_of(self._kernel(**taken, **self._constants)[3:]))
         return result
 
     def contacts(self, coordinates: FloatArray) -> list[Contacts]:
@@ -180,7 +182,8 @@ class LawProblem(MatrixProblem):
         ]
 
 
-def _rows(entries: Sequence[Number]) -> Entries:
+def rows_of(entries: Sequence[Any]) -> Entries:
+    """Return nine entries as three rows."""
     return [entries[0:3], entries[3:6], entries[6:9]]
 
 

@@ -105,6 +105,15 @@ def attained(
     return Witness(value, size, (x, y, z), held, sliding)
 
 
+def rendered(surface: Surface, number: Number, xy: FloatArray, depth: float) -> Witness:
+    """Return what the surface's own Jacobian gives at a contact point, at any depth [m]."""
+    derivatives = surface.texture.derivatives(np.ascontiguousarray(xy[None]))
+    probe = surface.law.contact.probe(xy[None], np.array([depth]), derivatives)
+    scaled = surface.jacobian(probe) / surface.stiffness
+    x, y, z = (float(v) for v in probe[0])
+    return Witness(float(number.careful(scaled)[0]), float(np.linalg.norm(scaled)), (x, y, z))
+
+
 def lower_of(surface: Surface, number: Number, value: float, witness: Witness) -> float:
     """Return what is attained of a number that a theorem gives: all of it, but for rounding.
 

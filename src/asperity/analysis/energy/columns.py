@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from asperity.analysis.bounds.clamp_zone import ZoneKernel
 from asperity.analysis.bounds.dense_search import ContactField
-from asperity.analysis.bounds.problems import law_constants, law_kernel
+from asperity.analysis.bounds.problems import law_constants, law_kernel, rows_of
 from asperity.checks import FloatArray
 from asperity.derive.facts import law_facts
 from asperity.enclosures.cells import NAMES
@@ -33,13 +35,58 @@ _NODES = 1024
 _NODES_PER_CELL, _MOST_NODES = 4, 4096
 
 
+@dataclass(frozen=True)
+class Layer:
+    """Depths between which the curl is affine, or nearly so.
+
+    Attributes:
+        top: upper end [m].
+        bottom: lower end [m].
+        held: whether that is where a clamp holds the depth.
+    """
+
+    top: float
+    bottom: float
+    held: bool = False
+
+
+def layers(surface: Surface, deeper: float = 0.0) -> list[Layer]:
+    """Return the layers of depth in which a loop may gain something.
+
+    Down to max_depth, and where a clamp acts down to where everything is below z_b. A conservative
+    law under a clamp that takes that from it gains only where the clamp acts.
+
+    Args:
+        surface: the surface.
+        deeper: how much deeper than that [m].
+    """
+    clamp, facts = surface.acting_clamp, surface.facts
+    top, bottom = surface.max_depth, surface.clamped_depth + deeper
+    result: list[Layer] = []
+    if clamp == "none" or not law_facts(surface.law).conservative:
+        count = 1 if facts.affine_in_depth else _LAYERS
+        end = bottom if clamp == "none" else top
+        result += [Layer(*ends) for ends in pairwise(np.linspace(0.0, end, count + 1).tolist())]
+    if clamp != "none" and bottom > top:
+        count = 1 if facts.affine_in_depth or clamp != "lateral" else _LAYERS
+        ends = pairwise(np.linspace(top, bottom, count + 1).tolist())
+        result += [Layer(*pair, held=True) for pair in ends]
+    return result
+
+
 def curl_integral(
-    surface: Surface, line: ScanLine
+    surface: Surface, line: ScanLine, deeper: float = 0.0
 ) -> tuple[tuple[float, float], tuple[float, float]] | None:
     """Return lower and upper bounds of ∬curl⁺ and of ∬curl⁻ [J] over the line and the depth.
 
     curl = ∂f_t/∂z - ∂f_z/∂t. Nothing where the law or the line has no enclosures.
+
+    Args:
+        surface: the surface.
+        line: the line.
+        deeper: how much deeper than its layers to integrate [m].
     """
+    parts = layers(surface, deeper)
     count = _LEAST_PIECES
     while True:
         pieces = surface.texture.line_pieces(line, count)
@@ -47,7 +94,7 @@ def curl_integral(
             return None
         try:
             with np.errstate(invalid="ignore", over="ignore"):
-                sides = [_bounds(surface, line, pieces, sign) for sign in (1.0, -1.0)]
+                sides = [_bounds(surface, line, pieces, parts, sign) for sign in (1.0, -1.0)]
         except TypeError:
             return None
         low, high = max(low for low, _ in sides), max(high for _, high in sides)
@@ -57,11 +104,14 @@ def curl_integral(
         count = 2 * len(pieces.centres)
 
 
-def _bounds(surface: Surface, line: ScanLine, pieces: Pieces, sign: float) -> tuple[float, float]:
-    scale, affine = surface.stiffness * pieces.length, law_facts(surface.law).affine_in_depth
+def _bounds(
+    surface: Surface, line: ScanLine, pieces: Pieces, parts: Sequence[Layer], sign: float
+) -> tuple[float, float]:
+    scale, affine = surface.stiffness * pieces.length, surface.facts.affine_in_depth
     low = high = 0.0
-    for top, bottom in pairwise(_levels(surface)):
-        edges = [_curl_model(surface, line, pieces, level) for level in (top, bottom)]
+    for layer in parts:
+        ends = (layer.top, layer.bottom)
+        edges = [_curl_model(surface, line, pieces, end, held=layer.held) for end in ends]
         error = sum(edge.e for edge in edges) * 0.5
         corners = [
             [sign * (edge.c + side * edge.g[0]) for edge in edges] for side in (-1.0, 0.0, 1.0)
@@ -69,18 +119,11 @@ def _bounds(surface: Surface, line: ScanLine, pieces: Pieces, sign: float) -> tu
         left, middle, right = (_positive_part(*corner) for corner in corners)
         if not affine:
             # Between the edges of a layer the curl strays from the chord.
-            error = error + _sag(surface, line, pieces, top, bottom, edges)
-        size = scale * (bottom - top)
+            error = error + _sag(surface, line, pieces, layer, edges)
+        size = scale * (layer.bottom - layer.top)
         low += size * float(np.maximum(middle - error, 0.0).sum())
         high += size * float((0.5 * (left + right) + error).sum())
     return low * (1.0 - 1e-12), high * (1.0 + 1e-12)
-
-
-def _levels(surface: Surface) -> list[float]:
-    """Return the depths [m] between which the curl is affine, or nearly so."""
-    layers = 1 if law_facts(surface.law).affine_in_depth else _LAYERS
-    levels: list[float] = np.linspace(0.0, surface.max_depth, layers + 1).tolist()
-    return levels
 
 
 def _positive_part(alpha: FloatArray, gamma: FloatArray) -> FloatArray:
@@ -95,17 +138,16 @@ def _sag(
     surface: Surface,
     line: ScanLine,
     pieces: Pieces,
-    top: float,
-    bottom: float,
+    layer: Layer,
     edges: list[Taylor],
 ) -> FloatArray:
     """Bound how far the curl inside a layer is from the chord of its edges."""
     n = len(pieces.centres)
-    middle, reach = 0.5 * (top + bottom), 0.5 * (bottom - top)
+    middle, reach = 0.5 * (layer.top + layer.bottom), 0.5 * (layer.bottom - layer.top)
     slopes = np.zeros((2, n))
     slopes[1] = reach
     depth = Taylor(np.full(n, middle), slopes, np.zeros(n))
-    inside = _curl_model(surface, line, pieces, depth)
+    inside = _curl_model(surface, line, pieces, depth, held=layer.held)
     # Both are affine in the two coordinates: they differ most at a corner.
     chord_c = 0.5 * (edges[0].c + edges[1].c)
     chord_t = 0.5 * (edges[0].g[0] + edges[1].g[0])
@@ -115,18 +157,24 @@ def _sag(
     return np.asarray(apart + np.abs(inside.g[1] - chord_d) + twist + inside.e)
 
 
-def _curl_model(surface: Surface, line: ScanLine, pieces: Pieces, depth: float | Taylor) -> Taylor:
+def _curl_model(
+    surface: Surface, line: ScanLine, pieces: Pieces, depth: float | Taylor, *, held: bool
+) -> Taylor:
     """Return the enclosure of the curl over k on every piece at a depth."""
+    zone = ZoneKernel(surface) if held else None
     kernel, arguments = law_kernel(surface.law)
-    models = pieces.models([name for name in NAMES if name in arguments])
-    dimensions = 1
+    names = [name for name in NAMES if name in arguments] if zone is None else zone.names
+    models, dimensions = pieces.models(names), 1
     if isinstance(depth, Taylor):
         dimensions = 2
         models = {name: _lifted(model) for name, model in models.items()}
-    known: dict[str, Any] = {**models, **law_constants(surface), "depth": depth}
-    entries = kernel(**{name: known[name] for name in arguments})[3:]
+    if zone is None:
+        known: dict[str, Any] = {**models, **law_constants(surface), "depth": depth}
+        rows = rows_of(kernel(**{name: known[name] for name in arguments})[3:])
+    else:
+        rows = zone.at(models, depth)
     tx, ty = (float(part) for part in line.direction)
-    curl: Number = tx * entries[2] + ty * entries[5] - (tx * entries[6] + ty * entries[7])
+    curl: Number = tx * rows[0][2] + ty * rows[1][2] - (tx * rows[2][0] + ty * rows[2][1])
     if isinstance(curl, Taylor):
         return curl
     n = len(pieces.centres)
@@ -144,22 +192,32 @@ def sampled_sides(surface: Surface, line: ScanLine) -> tuple[float, float]:
     steps: FloatArray = np.arange(_NODES, dtype=np.float64) + 0.5
     along = np.asarray(steps * (line.length / _NODES), dtype=np.float64)
     total = np.zeros(2)
-    for top, bottom in pairwise(_levels(surface)):
-        edges = [curl_along(surface, line, along, level) for level in (top, bottom)]
-        size = (bottom - top) * line.length / _NODES
+    for layer in layers(surface):
+        edges = _edge_curls(surface, line, along, layer)
+        size = (layer.bottom - layer.top) * line.length / _NODES
         for side, sign in enumerate((1.0, -1.0)):
             total[side] += size * _positive_part(*(sign * edge for edge in edges)).sum()
     return float(total[0]), float(total[1])
 
 
-def curl_along(surface: Surface, line: ScanLine, along: FloatArray, depth: float) -> FloatArray:
-    """Return the curl [N/m] in the plane of a line at distances along it and at a depth."""
+def _edge_curls(
+    surface: Surface, line: ScanLine, along: FloatArray, layer: Layer
+) -> list[FloatArray]:
+    """Return the curl [N/m] at distances along a line, at the top and the bottom of a layer."""
     xy = np.ascontiguousarray(line.start + along[:, None] * line.direction)
-    n = len(xy)
-    jacobians = ContactField(surface).jacobians(
-        xy, np.full(n, depth), surface.texture.derivatives(xy), np.zeros((n, 2))
-    )
-    return surface.stiffness * plane_curl(jacobians, line)
+    derivatives, n = surface.texture.derivatives(xy), len(xy)
+    result = []
+    for level in (layer.top, layer.bottom):
+        depth = np.full(n, level)
+        if layer.held:
+            # Just below max_depth, so that rounding does not put the probe above it.
+            below = surface.law.contact.probe(xy, depth * (1.0 + 1e-9), derivatives)
+            result.append(plane_curl(surface.jacobian(below), line))
+        else:
+            field = ContactField(surface)
+            jacobians = field.jacobians(xy, depth, derivatives, np.zeros((n, 2)))
+            result.append(surface.stiffness * plane_curl(jacobians, line))
+    return result
 
 
 def plane_curl(jacobian: FloatArray, line: ScanLine) -> FloatArray:
@@ -172,9 +230,13 @@ def plane_curl(jacobian: FloatArray, line: ScanLine) -> FloatArray:
 def column_loop(surface: Surface, line: ScanLine, sign: float) -> FloatArray:
     """Return the loop around the region where the curl has a sign, vertices (n, 3) [m]."""
     along = np.asarray(np.linspace(0.0, line.length, _node_count(surface.texture, line) + 1))
-    levels = _levels(surface)
-    curls = np.stack([sign * curl_along(surface, line, along, level) for level in levels])
-    top, bottom = positive_interval(levels, curls)
+    parts = layers(surface)
+    # Where two layers meet the curl may jump: their common level is there twice.
+    levels = [level for layer in parts for level in (layer.top, layer.bottom)]
+    curls = [sign * curl for layer in parts for curl in _edge_curls(surface, line, along, layer)]
+    if not curls:
+        return np.zeros((0, 3))
+    top, bottom = positive_interval(levels, np.stack(curls))
     xy = line.start + along[:, None] * line.direction
     surface_z = surface.law.contact.begin(surface.texture, np.ascontiguousarray(xy))
     return comb(xy, surface_z - top, surface_z - bottom, periodic=line.periodic)

@@ -13,7 +13,6 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.gain.medial_axis import Crest, sharpest_crest
 from asperity.analysis.gain.theorems import theorem_of
 from asperity.checks import FloatArray
-from asperity.derive.facts import law_facts
 from asperity.files import Record
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
@@ -100,7 +99,7 @@ def continuity(surface: Surface, q: Bound) -> Continuity:
         >>> found.continuous, len(found.jumps)
         (False, 8)
     """
-    facts = law_facts(surface.law)
+    facts = surface.facts
     if not facts.begins_at_zero:
         text = "the force jumps where contact begins: its formula does not vanish with the depth"
         return Continuity(False, text, surface=surface)
@@ -187,7 +186,7 @@ def jumps(surface: Surface, levels: int = LEVELS) -> tuple[Jump, ...]:
         >>> bool(np.linalg.norm(after - before) == last.size), f"{last.size:.3f} N"
         (True, '0.611 N')
     """
-    facts = law_facts(surface.law)
+    facts = surface.facts
     found = [] if facts.begins_at_zero else _first_jump(surface)
     if not surface.law.contact.single_valued and facts.looks_at_surface:
         found += _ridge_jumps(surface, levels)

@@ -21,7 +21,6 @@ from asperity.analysis.energy.loops import integrate, loop_work, smooth_panels
 from asperity.analysis.energy.merit import scan_height
 from asperity.analysis.energy.state_loops import in_plane_loop, light_then_deep_loop
 from asperity.checks import FloatArray, array, positive
-from asperity.derive.facts import law_facts
 from asperity.errors import InternalError, ParameterError
 from asperity.files import Record
 from asperity.surface import Surface
@@ -132,7 +131,7 @@ def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -
     nothing = np.zeros((0, 3))
     if surface.law.stateful:
         return _state_leak(surface, line)
-    facts = law_facts(surface.law)
+    facts = surface.facts
     if facts.conservative:
         text = "every closed loop: zero by the symbolic curl"
         thrust = 0.0 if line.periodic else None
@@ -191,7 +190,7 @@ def _column_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
     if energy > upper:
         _refuse_contradiction(surface, line, vertices, energy)
     method = "sampled" if bounds is None else "certified"
-    text = f"around the region of one sign of the curl, depth to {surface.max_depth * 1e3:g} mm"
+    text = f"around the region of one sign of the curl, depth to {surface.clamped_depth * 1e3:g} mm"
     thrust = _mean_thrust(surface, line)
     return Leak(energy, max(upper, energy), line, method, text, vertices, thrust)
 
@@ -201,17 +200,17 @@ def _refuse_contradiction(
 ) -> None:
     """Refuse a loop that gains more than is proved.
 
-    A straight edge between two columns is deeper than max_depth by at most K Δ²/8 where the surface
-    is curved between them, Δ being their distance; so the bound for that depth holds. Beyond that
-    the quadrature of each edge may be wrong by its tolerance, and each force by its rounding.
+    A straight edge between two columns is deeper than the region by at most K Δ²/8 where the
+    surface is curved between them, Δ being their distance; so the bound for that depth holds.
+    Beyond that the quadrature of each edge may be wrong by its tolerance, and each force by its
+    rounding.
 
     Raises:
         InternalError: if the loop gains more than that.
     """
     gap = float(np.hypot(*np.diff(vertices[:, :2], axis=0).T).max())
     sag = surface.texture.bounds[1] * gap * gap / 8.0
-    deeper = surface.max_depth + sag
-    bounds = curl_integral(surface.to_depth(deeper), line) if math.isfinite(deeper) else None
+    bounds = curl_integral(surface, line, sag) if math.isfinite(sag) else None
     if bounds is None:
         return
     proved = max(high for _low, high in bounds)

@@ -11,11 +11,12 @@ import numpy as np
 
 from asperity.analysis.bounds.bound import Bound, Method
 from asperity.analysis.bounds.branch_and_bound import Contacts, Problem, Supremum
+from asperity.analysis.bounds.clamp_zone import ZoneProblem
 from asperity.analysis.bounds.dense_search import need_depths
 from asperity.analysis.bounds.measures import Number
 from asperity.analysis.bounds.problems import LawProblem
 from asperity.analysis.bounds.sampling import sampled
-from asperity.analysis.bounds.witness import Witness, attained, proved, upper_of
+from asperity.analysis.bounds.witness import Witness, attained, proved, rendered, upper_of
 from asperity.analysis.gain.search import Search
 from asperity.analysis.gain.theorems import ClosedForm, safe_bound, theorem_of
 from asperity.checks import FloatArray
@@ -129,6 +130,54 @@ def _witness(surface: Surface, number: Number, problem: Problem, at: FloatArray)
         for contact, (depth, held) in zip(contacts, states, strict=True)
     ]
     return max(witnesses, key=lambda witness: witness.value)
+
+
+def with_clamp(surface: Surface, number: Number, search: Search, above: Bound) -> Bound:
+    """Return a number of the force that is rendered, from that of the law above max_depth.
+
+    Under a whole or backed clamp it holds at every depth, under a lateral one down to
+    ``clamped_depth``. Where nothing is proved of the zone there is no upper bound.
+    """
+    if math.isinf(above.upper) or _nothing_greater(surface, number):
+        return above
+    problem = _zone(surface, number, search, above.upper)
+    try:
+        found = None if problem is None else search.supremum(problem)
+    except (AttributeError, TypeError, ValueError):  # a kernel in pieces, or a function unknown
+        found = None
+    if problem is None or found is None:
+        note = f"{above.note}; where the clamp acts, below max_depth, nothing is proved"
+        return replace(above, upper=math.inf, method="sampled", note=note)
+    if found.upper <= problem.floor:
+        return above
+    note = f"where the {surface.acting_clamp} clamp acts; branch and bound, {found.cells} cells"
+    upper = found.upper * _INFLATE
+    if found.at is None:
+        return replace(above, upper=upper, method="certified", note=note)
+    xy = problem.cells.plane(found.at[None])[0]
+    depths = problem.depths(found.at, surface)
+    witnesses = [rendered(surface, number, xy, depth) for depth in depths]
+    witness = max(witnesses, key=lambda witness: witness.value)
+    top = upper_of(surface, number, upper, witness)
+    if witness.value < above.lower:
+        return replace(above, upper=top, method="certified", note=note)
+    return Bound(witness.value, top, "certified", witness.at, note)
+
+
+def _nothing_greater(surface: Surface, number: Number) -> bool:
+    """Return whether the number is nowhere greater where a clamp acts, if any does."""
+    clamp = surface.acting_clamp
+    held = theorem_of(surface.law).held.get(clamp, ())
+    nowhere = clamp == "lateral" and surface.clamped_depth <= surface.max_depth
+    return clamp == "none" or number in held or nowhere
+
+
+def _zone(surface: Surface, number: Number, search: Search, floor: float) -> ZoneProblem | None:
+    """Return the problem of the zone where the clamp acts, if there are enclosures of it."""
+    cells = surface.texture.cells(search.extent, search.margin(surface))
+    if cells is None or surface.law.stateful:
+        return None
+    return ZoneProblem(surface, cells, number, max(floor, _NOTHING))
 
 
 def wave_number(surface: Surface, number: Number, wave: SingleWave, form: ClosedForm) -> Bound:

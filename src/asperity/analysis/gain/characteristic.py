@@ -13,12 +13,11 @@ from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
 from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED, Number
 from asperity.analysis.bounds.sampling import highest_point
 from asperity.analysis.bounds.witness import proved
-from asperity.analysis.gain.certificate import certified, wave_number
+from asperity.analysis.gain.certificate import certified, wave_number, with_clamp
 from asperity.analysis.gain.kept import kept
 from asperity.analysis.gain.search import Search
 from asperity.analysis.gain.theorems import theorem_of
 from asperity.checks import positive
-from asperity.derive.facts import law_facts
 from asperity.errors import ParameterError
 from asperity.surface import Surface
 
@@ -106,7 +105,7 @@ def curl_number(
     search = _search(surface, tolerance, work_limit, extent)
     if surface.law.stateful:
         raise ParameterError("law", f"{surface.law} has state: its force is no field with a curl")
-    facts = law_facts(surface.law)
+    facts = surface.facts
     if facts.conservative:
         return Bound(0.0, 0.0, "theorem", None, facts.reason)
     return _number(surface, CURL, search)
@@ -131,6 +130,15 @@ def _search(
 
 
 def _number(surface: Surface, number: Number, search: Search) -> Bound:
+    """Return a number of the force that is rendered: of the law, and where its clamp acts."""
+    above = _above_the_clamp(surface, number, search)
+    if surface.acting_clamp == "none":
+        return above
+    name = f"{number.name}, clamped"
+    return kept(surface, name, search, lambda: with_clamp(surface, number, search, above))
+
+
+def _above_the_clamp(surface: Surface, number: Number, search: Search) -> Bound:
     theorem, wave = theorem_of(surface.law), surface.texture.single_wave
     known = theorem.constants.get(number)
     if known is not None:

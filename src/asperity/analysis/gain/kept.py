@@ -23,7 +23,6 @@ from asperity.analysis.gain.search import Search
 from asperity.analysis.gain.sources import source_digest
 from asperity.analysis.gain.theorems import theorem_of
 from asperity.cache import keep, recall
-from asperity.derive.facts import law_facts
 from asperity.files import json_text, record
 from asperity.kernels.fuse import fuse_sampler, kernel_source
 from asperity.surface import Surface
@@ -64,7 +63,7 @@ def _key(surface: Surface, name: str, search: Search) -> str | None:
         tuple(surface.law_parameters.items()),
         surface.clamp,
     )
-    said = repr((name, law.contact.name, parameters, astuple(search), law_facts(law)))
+    said = repr((name, law.contact.name, parameters, astuple(search), surface.facts))
     parts = [said, kernel_source(law), texture_digest(surface.texture), source]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
 

@@ -27,6 +27,7 @@ from asperity.analysis.gain.god_object import crest_number, gain_above_crest, sp
 from asperity.analysis.gain.search import Search
 from asperity.enclosures.cells import Cells
 from asperity.errors import ParameterError
+from asperity.kernels.probe import ClampName
 from asperity.laws import LAWS, Law
 from asperity.surface import Surface
 
@@ -86,6 +87,8 @@ class Theorem:
             U(p + Δ) <= U(p) + ∇U · Δ + k|Δ|²/2 holds across jumps of the force too.
         knows_medial_axis: whether q is infinite exactly where the depth reaches the medial axis,
             at the onset.
+        held: by depth clamp, numbers that are nowhere greater where the clamp acts than above
+            max_depth.
     """
 
     constants: Mapping[Number, Constant] = field(default_factory=dict)
@@ -97,6 +100,7 @@ class Theorem:
     on_every_foot: bool = False
     infimum: bool = False
     knows_medial_axis: bool = False
+    held: Mapping[ClampName, tuple[Number, ...]] = field(default_factory=dict)
 
 
 # --- the table ------------------------------------------------------------------------------------
@@ -119,6 +123,12 @@ def _at_most(bound: Callable[[float, float], float]) -> Callable[[Surface], floa
         return bound(slope, bend * surface.max_depth)
 
     return of
+
+
+# Why nothing is greater where a clamp acts. A: the Jacobian is zero, the wall's, or as above. B and
+# G, whole: the columns that are left are those of J, whose others are at right angles or left out.
+# C: the positive w wᵀ is left out, and 1 <= q⁺. F: blocks of J are left.
+_EVERY_CLAMP: tuple[ClampName, ...] = ("whole", "lateral", "backed")
 
 
 def _friction(entries: Entries) -> Reduction:
@@ -145,10 +155,12 @@ THEOREMS: dict[Law, Theorem] = {
             CURL: Reduction(_slope(0.0)),
         },
         norm_at_most=_at_most(lambda slope, _bend: math.hypot(1.0, slope)),
+        held=dict.fromkeys(_EVERY_CLAMP, (NORM, ONE_SIDED, CURL)),
     ),
     LAWS["B"]: Theorem(
         on_a_wave={NORM: ClosedForm(forms.q_b, forms.phase_b)},
         norm_at_most=_at_most(lambda slope, bend: math.hypot(1.0, slope) + bend),
+        held={"whole": (NORM,)},
     ),
     LAWS["C"]: Theorem(
         on_a_wave={
@@ -156,6 +168,7 @@ THEOREMS: dict[Law, Theorem] = {
             ONE_SIDED: ClosedForm(forms.q_c, forms.phase_c),
         },
         norm_at_most=_at_most(lambda slope, bend: 1.0 + slope * slope + bend),
+        held=dict.fromkeys(("whole", "backed"), (ONE_SIDED,)),
     ),
     LAWS["D"]: Theorem(
         constants={ONE_SIDED: Constant(1.0, _SQUARE)},
@@ -179,6 +192,7 @@ THEOREMS: dict[Law, Theorem] = {
             ONE_SIDED: _friction(largest_symmetric_eigenvalue),
         },
         norm_at_most=most_f,
+        held=dict.fromkeys(_EVERY_CLAMP, (NORM, ONE_SIDED)),
     ),
     LAWS["G"]: Theorem(
         on_a_wave={NORM: ClosedForm(forms.q_g, forms.trough)},
@@ -189,6 +203,7 @@ THEOREMS: dict[Law, Theorem] = {
             )
         },
         norm_at_most=_at_most(lambda _slope, bend: max(1.0, bend)),
+        held={"whole": (NORM,)},
     ),
     LAWS["H"]: Theorem(
         constants={ONE_SIDED: Constant(1.0, _SPLIT)},

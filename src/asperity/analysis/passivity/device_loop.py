@@ -11,7 +11,6 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import Leak
 from asperity.analysis.gain.theorems import theorem_of
-from asperity.derive.facts import law_facts
 from asperity.devices import Device, WallTest
 from asperity.errors import ParameterError
 from asperity.surface import Surface
@@ -26,7 +25,6 @@ class Obstacle(Enum):
     """Why the rules for conservative laws do not apply."""
 
     CURL = auto()
-    LATERAL_CLAMP = auto()
     JUMPS = auto()
 
 
@@ -96,7 +94,7 @@ class Loop:
         if self.test is None:
             return None
         share = Fraction(1)
-        if self.test.lightest is not None and law_facts(self.surface.law).looks_at_surface:
+        if self.test.lightest is not None and self.surface.facts.looks_at_surface:
             share = Fraction(self.test.lightest)
         if self.test.update_rate is not None and self.rate is not None:
             share *= min(Fraction(1), self.rate / Fraction(self.test.update_rate))
@@ -155,7 +153,7 @@ def make_loop(
         q=q,
         one_sided=one_sided,
         leak=leak,
-        conservative=obstacle not in {Obstacle.CURL, Obstacle.LATERAL_CLAMP},
+        conservative=surface.facts.conservative,
         obstacle=obstacle,
         reason=reason,
         rate=_fraction(device, "update_rate", _POSITIVE),
@@ -202,12 +200,9 @@ def _obstacle(surface: Surface, q: Bound) -> tuple[Obstacle | None, str]:
     The rules need U(p + Δ) <= U(p) + ∇U · Δ + q⁺|Δ|²/2. The Jacobian proves that where the force
     is continuous. A jump can break it, but not where a theorem says that U is an infimum.
     """
-    law, facts = surface.law, law_facts(surface.law)
-    if not facts.conservative:
-        return Obstacle.CURL, facts.reason
-    if surface.clamp == "lateral" and law.clampable:
-        return Obstacle.LATERAL_CLAMP, ""
-    if theorem_of(law).infimum:
+    if not surface.facts.conservative:
+        return Obstacle.CURL, surface.facts.reason
+    if theorem_of(surface.law).infimum:
         return None, ""
     smooth = continuity(surface, q)
     return (None, "") if smooth.continuous else (Obstacle.JUMPS, smooth.reason)

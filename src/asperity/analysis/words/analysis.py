@@ -9,7 +9,7 @@ import numpy as np
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.passivity.criteria import LEAK
 from asperity.analysis.words.passivity import allowed_text, buzz_text, gained, newtons
-from asperity.analysis.words.surface import default_depth, law_parameters, unverified
+from asperity.analysis.words.surface import default_depth, depths, law_parameters, unverified
 from asperity.arguments import DEFAULT_STIFFNESS
 from asperity.surface import Surface, default_max_depth
 from asperity.textures.texture import Texture
@@ -80,7 +80,11 @@ def assumptions(result: Analysis, extent: tuple[float, float] | None) -> tuple[s
     region = texture.domain.description
     if extent is not None:
         region = " x ".join(engineering(side, "m") for side in extent) + " from the origin"
-    said.append(f"The numbers are suprema over {region} and depths to {depth}")
+    said.append(f"The numbers are suprema over {region} and {depths(surface)}")
+    if surface.acting_clamp != "none":
+        clamp = f"The {surface.acting_clamp} clamp holds the depth from {depth} down"
+        lowest = engineering(surface.clamped_depth, "m")
+        said.append(f"{clamp}; loops are compared down to depths of {lowest}")
     x, y = (float(part) for part in leak.line.direction)
     said.append(f"Loops in the vertical plane along ({x:g}, {y:g}) are compared")
     bounds = (result.q, result.one_sided, result.curl)

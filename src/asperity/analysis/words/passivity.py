@@ -13,6 +13,7 @@ from asperity.analysis.passivity.device_loop import (
     greatest_delay,
 )
 from asperity.analysis.passivity.judgement import Allowed, Ground
+from asperity.analysis.words.surface import depths
 from asperity.units import engineering, rounded_down
 
 
@@ -130,7 +131,6 @@ def _says(loop: Loop, criterion: Criterion) -> str:
 def _obstacle(loop: Loop, obstacle: Obstacle) -> str:
     return {
         Obstacle.CURL: f"the law is not conservative ({loop.reason})",
-        Obstacle.LATERAL_CLAMP: "the lateral clamp makes the law leak below max_depth",
         Obstacle.JUMPS: f"the force is not continuous: {loop.reason}",
     }[obstacle]
 
@@ -158,7 +158,7 @@ def _assumptions(loop: Loop, criterion: Criterion) -> str:
     """Return the assumptions with the region and the numbers used, the unverified ones marked."""
     if criterion.name == LEAK and criterion.holds:
         return criterion.assumptions
-    depth = f"no deeper than {engineering(loop.surface.max_depth, 'm')}"
+    depth = depths(loop.surface).replace("depths to", "no deeper than").replace("every", "at every")
     used = [
         (field, loop.device.data[field]) for field in criterion.uses if field in loop.device.data
     ]

@@ -17,6 +17,20 @@ def default_depth(surface: Surface) -> str:
     return f"Default max depth {depth}: the peak-to-valley height, at most 1 mm"
 
 
+def depths(surface: Surface) -> str:
+    """Return at which depths q and q⁺ hold.
+
+    Example:
+        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> wave = Sinusoid(1e-4, 1e-3)
+        >>> [depths(Surface(wave, clamp=clamp)) for clamp in ("none", "backed", "lateral")]
+        ['depths to 200 µm', 'every depth', 'depths to 400 µm']
+    """
+    if surface.acting_clamp in {"whole", "backed"}:
+        return "every depth"
+    return f"depths to {engineering(surface.clamped_depth, 'm')}"
+
+
 def unverified(device: Device, fields: Iterable[str]) -> list[str]:
     """Return which of the device's numbers were used without being verified, and its notes."""
     known = [(field, device.data[field]) for field in fields if field in device.data]

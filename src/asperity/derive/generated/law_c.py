@@ -17,6 +17,7 @@ FACTS = {
     'begins_at_zero': True,
     'looks_at_surface': True,
     'affine_in_depth': True,
+    'conservative_clamps': ('whole', 'backed'),
 }
 
 

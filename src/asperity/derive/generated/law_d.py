@@ -19,6 +19,7 @@ FACTS = {
     'begins_at_zero': True,
     'looks_at_surface': True,
     'affine_in_depth': False,
+    'conservative_clamps': (),
 }
 
 
