@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import timedelta
 from itertools import count
 
 
@@ -25,23 +26,47 @@ def progress_bar(words: str) -> Iterator[Callable[..., None]]:
     from rich.progress import (
         BarColumn,
         Progress,
+        ProgressColumn,
+        Task,
         TaskProgressColumn,
         TextColumn,
         TimeElapsedColumn,
-        TimeRemainingColumn,
     )
+    from rich.text import Text
+
+    class Left(ProgressColumn):
+        """The time that is left; rich's own says none before the third step."""
+
+        def render(self, task: Task) -> Text:
+            """Return it for a bar."""
+            return Text(f"left: {time_left(task.elapsed or 0.0, task.completed)}")
 
     columns = (
         TextColumn("{task.description:<24}"),
         BarColumn(),
         TaskProgressColumn(),
         TimeElapsedColumn(),
-        TextColumn("left:"),
-        TimeRemainingColumn(),
+        Left(),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(words, total=1.0)
         yield lambda share, said=None: bar.update(task, completed=share, description=said)
+
+
+def time_left(elapsed: float, share: float) -> str:
+    """Return the time that is left if the rest takes as long as what is done.
+
+    Args:
+        elapsed: since the beginning [s].
+        share: that is done, in [0, 1].
+
+    Example:
+        >>> time_left(30.0, 0.25), time_left(30.0, 0.0)
+        ('0:01:30', '-:--:--')
+    """
+    if share <= 0.0:
+        return "-:--:--"
+    return str(timedelta(seconds=round(elapsed * (1.0 - share) / share)))
 
 
 @contextmanager
