@@ -248,6 +248,13 @@ def test_header_of_gwyddion(tmp_path: Path) -> None:
     assert raw.pitch == pytest.approx((2e-6, 3e-6), rel=1e-14)
 
 
+def test_maps_one_after_the_other_are_not_one_map(tmp_path: Path) -> None:
+    header = "# Channel: Height\n# Width: 8.0 µm\n# Height: 9.0 µm\n# Value units: nm\n"
+    fails(tmp_path, 2 * (header + lines("\t")), "several maps in one file")
+    one = header + lines("\t").replace("\n", "\n# Width: by hand\n")  # a remark is no header
+    np.testing.assert_allclose(read(tmp_path, one).heights, HEIGHTS * 1e-9, rtol=1e-14)
+
+
 def test_declared_value_of_missing_points(tmp_path: Path) -> None:
     raw = read(tmp_path, "ncols 4\nNODATA_value -9999\n1 2 3 -9999\n5 6 7 8\n-9999 2 3 4\n")
     n = np.nan

@@ -54,6 +54,8 @@ def read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     table = find_table(_decode(file.content))
     _check_table(table)
     header = map_header(table.header)
+    if map_header(table.remarks).describes_map:
+        raise SurfaceFileError("several maps in one file: save each in a file of its own")
     rows, columns = table.values.shape
     is_list = columns == 3 and rows > 3 and not header.describes_map
     if options.resample is not None and not is_list:

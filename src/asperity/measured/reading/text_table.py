@@ -52,6 +52,7 @@ class Table:
         lines: line number of each row, from 1.
         texts: the line of each row.
         header: the lines above, comment signs removed.
+        remarks: comments between the rows, likewise.
         footer: how many lines of text follow.
         dialect: how the lines are split.
     """
@@ -60,6 +61,7 @@ class Table:
     lines: list[int]
     texts: list[str]
     header: list[str]
+    remarks: list[str]
     footer: int
     dialect: Dialect
 
@@ -84,11 +86,13 @@ def find_table(text: str) -> Table:
     _check_neighbours(blocks, chosen)
     _check_text(blocks, chosen, dialect)
     block = blocks[chosen]
+    between = lines[block.numbers[0] : block.numbers[-1]]
     return Table(
         values=_drop_empty_columns(np.array(block.values).reshape(-1, block.width)),
         lines=block.numbers,
         texts=block.texts,
         header=[lines[k].lstrip("#% \t") for k in range(block.numbers[0] - 1)],
+        remarks=[line.lstrip("#% \t") for line in between if line.lstrip().startswith(("#", "%"))],
         footer=sum(len(after.numbers) for after in blocks[chosen + 1 :]),
         dialect=dialect,
     )
