@@ -7,7 +7,7 @@ ifeq ($(shell command -v $(PYTHON) 2>/dev/null),)
 PYTHON := python3
 endif
 
-.PHONY: demo test check compatibility docs bench kernels lock clean help
+.PHONY: demo test check compatibility docs bench mutants kernels lock clean help
 
 help:  ## List the commands
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/' | expand -t 10
@@ -50,11 +50,21 @@ compatibility: $(VENV)/installer  ## Tests with the lowest and the newest versio
 bench: $(VENV)/development  ## Speed and memory, as ratios against C and peers
 	$(BIN)/python -m bench
 
+$(VENV)/mutants/ready: mutants.lock | $(VENV)/installer
+	$(PYTHON) -m venv $(VENV)/mutants
+	$(BIN)/uv pip install --quiet --python $(VENV)/mutants/bin/python --require-hashes -r mutants.lock
+	touch $@
+
+MUTANTS := --count 10
+mutants: $(VENV)/mutants/ready $(VENV)/development  ## Do the tests notice when the code is wrong? Takes hours
+	$(VENV)/mutants/bin/python bench/mutants.py --python $(abspath $(BIN))/python $(MUTANTS)
+
 kernels: $(VENV)/runtime  ## Derive the shipped laws again
 	$(BIN)/python -m asperity.derive.generate
 
 lock: $(VENV)/installer  ## Resolve the dependencies anew
 	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --only-group installer -o bootstrap.lock
+	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --only-group mutants -o mutants.lock
 	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --no-default-groups --group build -o requirements.lock
 	$(BIN)/uv export --quiet --format requirements.txt --no-annotate --no-header --no-emit-project --no-default-groups --group build --group dev --group docs --extra formats -o requirements-dev.lock
 

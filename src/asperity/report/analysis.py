@@ -291,7 +291,8 @@ def _criteria(analysis: Analysis) -> page.Section:
         caption=(
             f"Verdict: {judged.verdict}. It rests on: {judged.decided_by}. T is the period of an "
             "update, σ₀ the least damping of the device, b_v virtual damping, d the whole samples "
-            "of delay, K₀ the stiffest smooth wall that it renders."
+            "of delay, K₀ the stiffest smooth wall that held on it, |δ| and |b| steps of position "
+            "and force, f_c dry friction that surely acts."
         ),
     )
 

@@ -1,0 +1,246 @@
+"""Do the tests notice when the code is wrong? A seeded sample of mutants, room by room.
+
+``make mutants`` copies the project, lets Cosmic Ray plan its mutations of a room, draws a sample of
+them with a seed, and runs the tests that stand for that room against each. A mutant that no test
+kills is printed with its difference, unless ``bench/mutants_explained.toml`` says why it changes
+nothing. It takes minutes per room, so it is no part of the tests.
+
+    python bench/mutants.py [--count 20] [--seed 1] [--keep FOLDER] [ROOM ...]
+
+It runs in an environment of its own that has Cosmic Ray, and starts the tests with ``--python``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+# Cosmic Ray is not installed where types are checked, and ships none.
+from cosmic_ray.work_db import WorkDB, use_db  # type: ignore[import-not-found]
+from cosmic_ray.work_item import (  # type: ignore[import-not-found]
+    TestOutcome,
+    WorkerOutcome,
+    WorkResult,
+)
+
+ROOT = Path(__file__).resolve().parents[1]
+EXPLAINED = ROOT / "bench" / "mutants_explained.toml"
+TIMEOUT = 600.0  # [s] for the tests of one mutant; one that hangs is killed
+# What says something about the code: exchanged operators, comparisons, signs, truth values, numbers
+# that are off by one, loops that never run. Not: decorators, types, operators that fail at once.
+_OPERATORS = re.compile(
+    r"core/(ReplaceBinaryOperator_(Add_Sub|Sub_Add|Mul_Div|Div_Mul|Pow_Mul)"
+    r"|ReplaceComparisonOperator_(Lt_LtE|LtE_Lt|Gt_GtE|GtE_Gt|Lt_GtE|Gt_LtE|Eq_NotEq|NotEq_Eq"
+    r"|LtE_Gt|GtE_Lt|Is_IsNot|IsNot_Is)"
+    r"|ReplaceUnaryOperator_(USub_UAdd|Delete_USub|Delete_Not)|AddNot|ReplaceTrueWithFalse"
+    r"|ReplaceFalseWithTrue|ReplaceAndWithOr|ReplaceOrWithAnd|ReplaceBreakWithContinue"
+    r"|ReplaceContinueWithBreak|NumberReplacer|ZeroIterationForLoop)"
+)
+
+
+@dataclass(frozen=True)
+class Room:
+    """A part of the code, and the tests that stand for it.
+
+    Attributes:
+        code: files or folders below ``src/asperity``.
+        tests: what pytest is given.
+    """
+
+    code: tuple[str, ...]
+    tests: tuple[str, ...]
+
+
+ROOMS = {
+    "derive": Room(("derive",), ("tests/derive", "tests/laws")),
+    "contacts": Room(
+        ("contacts",),
+        ("tests/contacts", "tests/textures/test_nearest.py", "tests/analysis/test_split.py"),
+    ),
+    "kernels": Room(
+        ("kernels",), ("tests/kernels", "tests/test_surface.py", "tests/test_definition.py")
+    ),
+    "passivity": Room(
+        ("analysis/passivity", "analysis/judge_passivity.py"),
+        ("tests/analysis/test_wall_test.py", "tests/analysis/test_passivity.py"),
+    ),
+    "limits": Room(
+        ("analysis/limits", "analysis/check_limits.py"),
+        ("tests/analysis/test_limits.py", "tests/analysis/test_spectrum.py",
+         "tests/analysis/test_wave_force.py"),
+    ),
+    "bounds": Room(
+        ("analysis/bounds",),
+        ("tests/analysis/test_branch_and_bound.py", "tests/analysis/test_contradictions.py",
+         "tests/analysis/test_taylor.py", "tests/analysis/test_certified.py"),
+    ),
+    "gain": Room(
+        ("analysis/gain",),
+        ("tests/analysis/test_closed_forms.py", "tests/analysis/test_theorems.py",
+         "tests/analysis/test_certified.py", "tests/analysis/test_kept.py"),
+    ),
+    "energy": Room(
+        ("analysis/energy",),
+        ("tests/analysis/test_leak.py", "tests/analysis/test_loops.py",
+         "tests/analysis/test_continuity.py", "tests/analysis/test_merit.py"),
+    ),
+    "split": Room(
+        ("analysis/split",),
+        ("tests/analysis/test_split_table.py", "tests/analysis/test_split_definition.py"),
+    ),
+    "simulation": Room(("simulation",), ("tests/simulation",)),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """What became of one change of the code.
+
+    Attributes:
+        module: path below ``src/asperity``.
+        change: the lines that were taken out and put in, without their numbers.
+        survived: whether no test failed.
+    """
+
+    module: str
+    change: str
+    survived: bool
+
+
+def copied(folder: Path) -> Path:
+    """Copy what git knows of the project, with ``../shared`` beside it if there is one."""
+    tree = folder / "tree"
+    known = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT, check=True, capture_output=True,
+    ).stdout.decode()  # fmt: skip
+    for name in filter(None, known.split("\0")):
+        if (ROOT / name).is_file():
+            (tree / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, tree / name)
+    if (ROOT.parent / "shared").exists():
+        (folder / "shared").symlink_to(ROOT.parent / "shared")
+    return tree
+
+
+def planned(tree: Path, name: str, room: Room, python: str) -> tuple[Path, Path]:
+    """Write a room's configuration, let Cosmic Ray plan; return configuration and session."""
+    modules = [f"src/asperity/{part}" for part in room.code]
+    tests = f"{python} -m pytest -x -q -p no:xdist -p no:cacheprovider {' '.join(room.tests)}"
+    lines = [
+        "[cosmic-ray]",
+        f"module-path = {modules}",
+        f"timeout = {TIMEOUT}",
+        'excluded-modules = ["src/asperity/derive/generated/*"]',
+        f'test-command = "{tests}"',
+        "[cosmic-ray.distributor]",
+        'name = "local"',
+    ]
+    config, session = tree / f"{name}.toml", tree / f"{name}.sqlite"
+    config.write_text("\n".join(lines) + "\n", "utf-8")
+    _cosmic_ray(tree, "init", config.name, session.name)
+    return config, session
+
+
+def _cosmic_ray(tree: Path, *arguments: str) -> None:
+    environment = {**os.environ, "PYTHONPATH": "src", "PYTHONDONTWRITEBYTECODE": "1",
+                   "ASPERITY_CACHE_DIR": str(tree.parent / "cache")}  # fmt: skip
+    command = [str(Path(sys.executable).with_name("cosmic-ray")), *arguments]
+    subprocess.run(command, cwd=tree, check=True, env=environment)
+
+
+def draw(session: Path, count: int, seed: int) -> int:
+    """Keep a sample of the planned mutants; return how many there are to choose from."""
+    with use_db(str(session), WorkDB.Mode.open) as work:
+        items = sorted(work.work_items, key=lambda item: _order(item.mutations[0]))
+        useful = [item for item in items if _OPERATORS.fullmatch(item.mutations[0].operator_name)]
+        kept = {item.job_id for item in random.Random(seed).sample(useful, min(count, len(useful)))}
+        rest = [item.job_id for item in items if item.job_id not in kept]
+        work.set_multiple_results(rest, WorkResult(WorkerOutcome.SKIPPED))
+    return len(useful)
+
+
+def _order(mutation: object) -> tuple[str, ...]:
+    fields = ("module_path", "start_pos", "operator_name", "occurrence", "operator_args")
+    return tuple(str(getattr(mutation, field)) for field in fields)
+
+
+def outcomes(session: Path) -> list[Mutant]:
+    """Return what became of the sample."""
+    found = []
+    with use_db(str(session), WorkDB.Mode.open) as work:
+        modules = {item.job_id: item.mutations[0].module_path for item in work.work_items}
+        for job, result in work.results:
+            if result.worker_outcome == WorkerOutcome.SKIPPED:
+                continue
+            lines = [line for line in (result.diff or "").splitlines()
+                     if line[:1] in "+-" and line[:3] not in ("+++", "---")]  # fmt: skip
+            module = str(modules[job]).removeprefix("src/asperity/")
+            found.append(
+                Mutant(module, "\n".join(lines), result.test_outcome == TestOutcome.SURVIVED)
+            )
+    return found
+
+
+def explained() -> dict[tuple[str, str], str]:
+    """Return why mutants change nothing, by module and change."""
+    if not EXPLAINED.exists():
+        return {}
+    entries = tomllib.loads(EXPLAINED.read_text("utf-8")).get("mutant", [])
+    return {(one["module"], one["change"].strip("\n")): one["reason"] for one in entries}
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run the rooms that are named, or all; 1 if a survivor is not explained."""
+    parser = argparse.ArgumentParser(description="a seeded sample of mutants, room by room")
+    parser.add_argument("rooms", nargs="*", choices=[*ROOMS, []], help="default: all")
+    parser.add_argument("--count", type=int, default=20, help="mutants of each room")
+    parser.add_argument("--seed", type=int, default=1, help="of the sample")
+    parser.add_argument("--python", default=sys.executable, help="runs the tests")
+    parser.add_argument("--keep", type=Path, help="folder that is kept, to look at")
+    given = parser.parse_args(arguments)
+    folder = given.keep or Path(tempfile.mkdtemp(prefix="mutants-"))
+    reasons, total, killed, equivalent, unexplained = explained(), 0, 0, 0, []
+    try:
+        tree = copied(folder)
+        for name in given.rooms or ROOMS:
+            config, session = planned(tree, name, ROOMS[name], given.python)
+            _cosmic_ray(tree, "baseline", config.name)
+            choice = draw(session, given.count, given.seed)
+            _cosmic_ray(tree, "exec", config.name, session.name)
+            mutants = outcomes(session)
+            alive = [one for one in mutants if one.survived]
+            same = [one for one in alive if (one.module, one.change) in reasons]
+            print(
+                f"{name}: {len(mutants)} of {choice} mutants, {len(mutants) - len(alive)} killed, "
+                f"{len(same)} equivalent, {len(alive) - len(same)} survived",
+                flush=True,
+            )
+            unexplained += [one for one in alive if one not in same]
+            total, killed = total + len(mutants), killed + len(mutants) - len(alive)
+            equivalent += len(same)
+    finally:
+        if given.keep is None:
+            shutil.rmtree(folder, ignore_errors=True)
+    for one in unexplained:
+        print(f"\n{one.module}\n{one.change}")
+    share = 100.0 * killed / max(total - equivalent, 1)
+    print(
+        f"\n{total} mutants, seed {given.seed}: {killed} killed, {equivalent} equivalent; "
+        f"{share:.1f} % of those that change something"
+    )
+    return int(bool(unexplained))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
