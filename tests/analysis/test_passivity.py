@@ -73,6 +73,8 @@ def test_every_limit_is_the_formula_s(name: str, expected: float) -> None:
     rig = {**RIG, "delay_samples": 2, "max_stiffness": "5 N/mm"}
     if name == "virtual damping":
         rig["virtual_damping"] = "0.5 N*s/m"
+    if name == "wall test":
+        del rig["damping"]  # else the pair of damping and delay is known
     found = judge(Surface(WAVE, "C", 500.0), rig, q=exactly(3.0), plus=exactly(2.0)).criterion(name)
     assert found.limit == pytest.approx(expected, rel=1e-15)
     assert found.margin == pytest.approx(expected / 500.0, rel=1e-15)

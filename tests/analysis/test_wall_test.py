@@ -61,10 +61,10 @@ def test_the_limit_is_the_least_over_all_admissible_pairs(
     allowed = []
     for d in delays:
         loss = held * (0.5 + d)
-        if damping is not None and delay is None:
-            if damping * rate < loss:
-                continue  # this delay would have made the wall cycle
-            loss = held * (0.5 + d)  # damping above it admits more, never less
+        if damping is not None and delay is None and damping * rate < loss:
+            continue  # this delay would have made the wall cycle
+        if damping is not None and delay is not None:
+            loss = min(loss, damping * rate)  # the pair is known
         allowed.append(loss / (0.5 * plus + d * q))
     if not allowed:
         assert limit is None
@@ -72,7 +72,8 @@ def test_the_limit_is_the_least_over_all_admissible_pairs(
     assert limit is not None
     assert limit <= min(allowed) * (1.0 + 1e-12)
     # No stricter than the worst pair: K₀/q is what ever longer delays tend to.
-    assert limit >= held / q * (1.0 - 1e-12)
+    if delay is None or damping is None:
+        assert limit >= held / q * (1.0 - 1e-12)
     if delay is not None:
         assert limit == pytest.approx(min(allowed), rel=1e-12)
     elif damping is None:
@@ -215,6 +216,32 @@ def test_steps_leave_a_bounded_buzz_and_friction_silences_it() -> None:
     assert found.buzz is not None
     assert found.buzz.speed == pytest.approx(math.sqrt(3.0) * 0.005 * 4000.0 / margin, rel=1e-9)
     assert judge({**rig, "friction": 5.0}, k, q, plus).verdict == "bounded"
+
+
+def test_the_stiffness_that_is_proved_is_one_that_is_called_passive() -> None:
+    """Steps count in it; a wall that held says more where friction silences little."""
+    rig = {**RIG, "position_resolution": 2e-5, "least_friction": 0.02}
+    found = judge(rig, 100.0, 2.0, 1.5).allowed
+    assert (found.basis, found.proved) == ("proved", found.stiffness)
+    assert found.stiffness == pytest.approx(0.02 / (2.0 * math.sqrt(3.0) * 1e-5), rel=1e-9)
+    assert judge(rig, found.stiffness, 2.0, 1.5).verdict == "passive"
+    assert judge(rig, 1.000001 * found.stiffness, 2.0, 1.5).verdict == "bounded"
+    more = judge({**rig, "max_stiffness": 3000}, 100.0, 2.0, 1.5).allowed
+    assert (more.basis, more.proved) == ("plausible", found.stiffness)
+    assert more.stiffness == pytest.approx(3000 * 1.5 / 2.75, rel=1e-12)
+    silent = judge({**RIG, "position_resolution": 2e-5}, 100.0, 2.0, 1.5).allowed
+    assert (silent.basis, silent.proved) == ("bounded", 0.0)
+    assert silent.stiffness == pytest.approx(8000.0 / 2.75 / 2.0, rel=1e-12)
+
+
+def test_a_test_with_stepped_positions_contradicts_exact_ones() -> None:
+    wall = {"value": 1000, "positions": "stepped"}
+    found = judge({**RIG, "max_stiffness": wall}, 100.0)
+    assert (found.verdict, found.decided_by) == ("undecided", "steps and friction")
+    assert found.criterion("steps and friction").missing == ("position_resolution",)
+    assert found.allowed.basis == "plausible"
+    known = {**RIG, "max_stiffness": wall, "position_resolution": 1e-5, "least_friction": 1.0}
+    assert judge(known, 100.0).verdict == "passive"
 
 
 def test_virtual_damping_makes_steps_louder() -> None:

@@ -67,10 +67,10 @@ def test_every_answer_is_for_the_device(
     assert (code, "Two-motor bench" in page) == (0, True)
     if command == "compare":
         (row,) = data["laws"]
-        # Proved: k (q⁺/2 + d q) <= σ₀/T, whatever the wall of K₀ did.
+        # k (q⁺/2 + d q) <= σ₀/T, which admits less than the wall; steps keep it from a proof.
         share = 0.5 * row["one_sided"]["value"] + row["q"]["value"]
         assert row["safe_stiffness"] == pytest.approx(0.6 * 4000.0 / share)
-        assert row["allowed"]["basis"] == "proved"
+        assert (row["allowed"]["basis"], row["allowed"]["proved"]) == ("plausible", 0.0)
 
 
 def test_the_list_of_devices_shows_its_sources(call: Call, device: str) -> None:

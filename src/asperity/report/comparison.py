@@ -55,6 +55,7 @@ SAMPLED_NOTE = (
 _WORTHS: dict[Basis, str] = {
     "proved": "proved",
     "plausible": "plausible",
+    "bounded": "bounded",
     "quiet against buzz": "quiet",
     "none": "–",
 }
@@ -186,8 +187,8 @@ def _meanings(comparison: Comparison) -> list[tuple[str, str]]:
         ("stiffness up to", f"on the {comparison.device.name}; what it is worth stands beside it"),
         (
             "worth",
-            "proved passive; plausible: a smooth wall of that gain held, no proof; quiet: "
-            "against buzz, yet it feeds the hand below v*",
+            "proved passive; bounded: but for steps of an encoder; plausible: a smooth wall of "
+            "that gain held, no proof; quiet: against buzz, yet it feeds the hand below v*",
         ),
         ("worst leak", f"energy that one loop can give to the hand at {stiffness}"),
         ("T, S", "strength of the texture, support of the hand, for the same q"),

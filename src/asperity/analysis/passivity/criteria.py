@@ -193,6 +193,8 @@ def _wall_test(loop: Loop) -> Rule:
         )  # fmt: skip
     delay = Fraction(longest)
     budget = None if loop.wall is None else loop.wall * (HALF + delay)
+    if budget is not None and loop.loss is not None:
+        budget = min(budget, loop.loss)  # the one pair that is admissible is known
     formula = "k (q⁺/2 + d q) <= K₀ (1/2 + d)"
     return Rule(WALL_TEST, formula, HALF, delay, budget, needs, note, loop.obstacle, uses)
 
@@ -217,6 +219,9 @@ def _steps(loop: Loop) -> Criterion:
     formula = "k q |δ|/2 + |b|/2 <= f_c"
     note = f"{_SIMPLE}; |δ|, |b|: a step along three axes at once; f_c: least_friction"
     fields = ("position_resolution", "force_resolution")
+    if loop.test is not None and loop.test.positions == "stepped" and not loop.step:
+        missing = ("position_resolution",)
+        return Criterion(STEPS, formula, assumptions=note, missing=missing, uses=fields)
     if not (loop.step or loop.force_step):
         note = "positions and forces are taken as exact: no steps of them are known"
         return Criterion(STEPS, formula, True, math.inf, math.inf, note, uses=fields)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from fractions import Fraction
 from typing import Literal
@@ -20,12 +20,12 @@ from asperity.analysis.passivity.criteria import (
     Buzz,
     Criterion,
 )
-from asperity.analysis.passivity.device_loop import HALF, Loop, contradictory
+from asperity.analysis.passivity.device_loop import HALF, Loop, Number, contradictory
 from asperity.files import Record
 from asperity.notebook import as_html
 
 Verdict = Literal["passive", "bounded", "plausible", "not passive", "undecided"]
-Basis = Literal["proved", "plausible", "quiet against buzz", "none"]
+Basis = Literal["proved", "plausible", "bounded", "quiet against buzz", "none"]
 
 
 class Ground(Enum):
@@ -60,12 +60,15 @@ class Allowed(Record):
     Attributes:
         stiffness: [N/m]; 0 if no stiffness is known to do, ``None`` if it is not decidable.
         basis: ``"proved"``: passive up to there, under the assumptions of the criterion.
-            ``"plausible"``: a smooth wall of that gain did not cycle. ``"quiet against buzz"``: the
-            same of a law with curl, which feeds the hand below v* at any stiffness. ``"none"``.
+            ``"plausible"``: a smooth wall of that gain did not cycle. ``"bounded"``: half of what
+            the delay rule allows, where steps of positions and forces leave a buzz with a bound.
+            ``"quiet against buzz"``: a wall of that gain did not cycle, but the law has curl and
+            feeds the hand below v* at any stiffness. ``"none"``.
         criterion: the name of the criterion that gives it; empty for none.
         delay: samples of delay of the pair of damping and delay that binds; infinity where any
             delay is admissible, ``None`` where no such pair is behind the number.
         sampled: whether it rests on a number that was only sampled, so that it may be too great.
+        proved: up to which stiffness it is proved passive [N/m]; 0 for none.
     """
 
     stiffness: float | None
@@ -73,6 +76,7 @@ class Allowed(Record):
     criterion: str = ""
     delay: float | None = None
     sampled: bool = False
+    proved: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -159,9 +163,10 @@ def _but_for_steps(
     by_name: Mapping[str, Criterion], main: str, buzz: Buzz | None
 ) -> tuple[Verdict, str, Ground]:
     """Return what steps of positions and forces leave of a passive loop."""
-    if by_name[STEPS].holds:
+    steps = by_name[STEPS]
+    if steps.holds:
         return "passive", main, Ground.PROVED
-    if buzz is not None:
+    if buzz is not None and not steps.missing:
         return "bounded", STEPS, Ground.BOUNDED
     return "undecided", STEPS, Ground.UNBOUNDED
 
@@ -171,17 +176,33 @@ def allowed(loop: Loop, by_name: Mapping[str, Criterion]) -> Allowed:
 
     One answer for whoever asks: the comparison of laws, the analysis of one, the device's limits.
     """
-    main = by_name[_main_rule(loop)]
+    main, steps = by_name[_main_rule(loop)], by_name[STEPS]
     if not loop.conservative:
         return _allowed("quiet against buzz", by_name[WALL])
-    if loop.obstacle is None and loop.delay is not None and not contradictory(loop):
-        proved = _allowed("proved", main)
-        if proved.stiffness is not None:
-            return proved
-    return _allowed("plausible", by_name[WALL_TEST], loop.longest_delay)
+    plausible = _allowed("plausible", by_name[WALL_TEST], loop.longest_delay)
+    if loop.obstacle is not None or loop.delay is None or contradictory(loop):
+        return plausible
+    proved = _proved(main, steps)
+    if (plausible.stiffness or 0.0) > (proved.stiffness or 0.0):
+        return replace(plausible, proved=proved.proved)
+    if proved.stiffness is None:
+        return plausible
+    if proved.stiffness == 0.0 and main.limit:
+        return Allowed(0.5 * main.limit, "bounded", STEPS)
+    return proved
 
 
-def _allowed(basis: Basis, criterion: Criterion, delay: float | Fraction | None = None) -> Allowed:
+def _proved(main: Criterion, steps: Criterion) -> Allowed:
+    """Return up to which stiffness both the rule and what friction silences are proved."""
+    if main.limit is None or steps.limit is None:
+        sampled = _allowed("proved", main)
+        return sampled if sampled.sampled else Allowed(None, "none")
+    stiffness = min(main.limit, steps.limit)
+    basis: Basis = "proved" if stiffness else "none"
+    return Allowed(stiffness, basis, main.name if stiffness else "", proved=stiffness)
+
+
+def _allowed(basis: Basis, criterion: Criterion, delay: Number | None = None) -> Allowed:
     sampled = criterion.limit is None and criterion.at_most is not None
     stiffness = criterion.at_most if sampled else criterion.limit
     if not stiffness:

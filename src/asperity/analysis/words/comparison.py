@@ -76,12 +76,17 @@ def _worth(row: LawRow, device: Device) -> str:
     """Return what the stiffness that is allowed is worth, in a clause."""
     if row.allowed.basis == "proved":
         return "proved passive"
+    if row.allowed.basis == "bounded":
+        return "passive there but for the steps of positions and forces, whose buzz has a bound"
     if row.allowed.basis == "quiet against buzz":
         return "quiet against buzz there, though it feeds the hand below v*"
     test = device.wall_test
     held = test is not None and test.pedigree == "measured"
     why = "a smooth wall of that gain held" if held else "no stiffer wall is known to work"
-    return f"plausible, not proved ({why})"
+    proof = (
+        f"proved up to {newtons(row.allowed.proved)} only" if row.allowed.proved else "not proved"
+    )
+    return f"plausible, {proof} ({why})"
 
 
 def _sound_reason(best: LawRow) -> str:

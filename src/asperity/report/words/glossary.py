@@ -15,7 +15,9 @@ COMPARISON = (
     ),
     (
         "stiffness up to, worth",
-        "Proved: passive up to there, from the device's damping, rate and delay. Plausible: a "
+        "Proved: passive up to there, from the device's damping, rate and delay. Bounded: the same "
+        "but for steps of positions and forces, whose buzz has a bound; half of what the delay "
+        "rule allows. Plausible: a "
         "smooth wall of that gain held on the device, which proves nothing; it takes the wall for "
         "about to cycle and damping for alike in all directions. Quiet: the same for a law with "
         "curl, quiet against buzz only, since below the speed v* it feeds the hand at any "
