@@ -146,6 +146,20 @@ def test_what_is_not_finite_is_not_bounded(number: Number) -> None:
     assert np.isposinf(huge[[0, 4]]).all()  # its squares overflow
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("number", [NORM, ONE_SIDED])
+def test_where_the_quick_way_does_not_decide_the_careful_bound_holds_too(
+    number: Number, sign: float
+) -> None:
+    """Minus the identity, known to 1e-8: at most 1 + 1e-8 is attained, and rounding is charged."""
+    c, g = -np.eye(3)[None], np.zeros((1, 1, 3, 3))
+    for unknown in (0.0, 1e-8):
+        e = unknown * np.eye(3)[None]
+        reached = float(number.careful(c - e)[0])
+        found = float(number.at_most(c, g, e, above=1.0 + sign * 1e-9)[0])
+        assert reached + 0.9e-14 <= found <= 1.0 + 2.0 * unknown + 1e-13
+
+
 def test_corners_that_overflow_leave_the_rough_bound() -> None:
     """The middle of the cell does not overflow: its number is finite, theirs is not a number."""
     c = np.diag([2e51, 1e51, 1e51])[None]
