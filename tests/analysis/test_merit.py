@@ -7,11 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from asperity.analysis.energy.merit import merit
+from asperity.analysis.energy.merit import merit, parallel_lines
 from asperity.laws import Law
 from asperity.surface import Surface
+from asperity.textures.domain import ScanLine
 from asperity.textures.heightmap import HeightMap
 from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.texture import Texture
 
 PERIOD = 2e-3
 WAVE = Sinusoid(0.2 * PERIOD, PERIOD, direction=(1.0, 1.0))
@@ -94,3 +96,50 @@ def test_a_force_that_nowhere_varies_has_neither_strength_nor_support():
     law = Law("K", "constant", "vertical", lambda c: c.k * 1e-3 * c.e_z)
     found = merit(Surface(Sinusoid(0.2e-3, 1e-3), law))
     assert (found.gain, found.strength, found.support) == (0.0, 0.0, 0.0)
+
+
+def test_a_faint_ripple_on_a_large_force_counts() -> None:
+    """A hundred nanometres under a millimetre: the ripple is A/√2 all the same."""
+    faint = Sinusoid(1e-7, PERIOD)
+    found = merit(Surface(faint, "A", max_depth=1e-3))
+    assert found.ripple == pytest.approx(1e-7 / math.sqrt(2), rel=1e-6)
+
+
+RIDGES = np.cos(np.arange(33) * 0.7) * np.linspace(0.2, 1.0, 25)[:, None]
+SLOPED = HeightMap(5e-5 * RIDGES + 2e-5 * np.arange(25)[:, None], 1e-4)
+
+
+@pytest.mark.parametrize("letter", ["A", "C", "F"])
+@pytest.mark.parametrize("texture", [SLOPED, WAVE], ids=["map", "wave"])
+def test_ripple_of_parallel_lines_each_with_its_own_mean(letter: str, texture: Texture) -> None:
+    """All three components count; the lines of a map are spread evenly from border to border."""
+    surface = Surface(texture, letter, 800.0, max_depth=1e-3, max_deflection=0.3e-3)
+    line, high = texture.scan_line(), surface.law.contact.extremes(texture)[1]
+    across = [np.zeros(2)]
+    if not texture.is_profile:
+        across = [np.array([0.0, (i + 0.5) / 16 * 2.4e-3]) for i in range(16)]
+    t = (np.arange(2048) + 0.5) / 2048 * line.length
+    squares, slopes = [], []
+    for shift in across:
+        xy = line.start * (len(across) == 1) + t[:, None] * line.direction + shift
+        points = np.column_stack([xy, np.full(len(t), high - 1e-3)])
+        trailing = np.tile(0.3e-3 * line.direction, (len(t), 1)) if letter == "F" else None
+        force, jacobian = surface.force_and_jacobian(points, trailing)
+        squares.append(force.var(axis=0).sum())
+        slopes.append(-jacobian[:, 2, 2].mean())
+    found = merit(surface)
+    assert found.ripple == pytest.approx(math.sqrt(np.mean(squares)) / 800.0, rel=2e-3)
+    assert found.support * found.gain == pytest.approx(np.mean(slopes) / 800.0, rel=1e-9)
+    assert found.height == pytest.approx(high - 1e-3, rel=1e-12)
+
+
+def test_lines_of_a_map_are_those_of_its_domain() -> None:
+    """Of a map that begins elsewhere and repeats, too, and across whichever way the scan goes."""
+    periodic = HeightMap(5e-5 * RIDGES[:24, :32], 1e-4, periodic=True)
+    lines = parallel_lines(periodic, periodic.scan_line(), 8)
+    assert lines.shape == (16, 8, 2)
+    spread = np.sort(lines[:, 0, 1] % 2.4e-3)
+    np.testing.assert_allclose(spread, (np.arange(16) + 0.5) / 16 * 2.4e-3, atol=1e-12)
+    upward = ScanLine(np.array([0.4e-3, 0.2e-3]), np.array([0.0, 1.0]), 2.4e-3, periodic=False)
+    lines = parallel_lines(SLOPED, upward, 8)
+    np.testing.assert_allclose(lines[:, 0, 0], (np.arange(16) + 0.5) / 16 * 3.2e-3, atol=1e-12)
