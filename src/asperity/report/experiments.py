@@ -123,7 +123,10 @@ def _devices(found: Experiments) -> Section:
     skipped = (
         f"Not simulated, their apparent mass being unknown: {', '.join(found.beyond.skipped)}."
     )
-    notes = [*_fitted(found.beyond.guessed), skipped]
+    far = [
+        f"Few misses on the left say little: {words}." for words in [found.beyond.how_far] if words
+    ]
+    notes = [*_fitted(found.beyond.guessed), *far, skipped]
     figure = experiment_pictures.devices_figure(found)
     return pictured("Predicted and simulated, every device with data", figure, caption, notes)
 

@@ -72,8 +72,6 @@ class Onset(Record):
 
         Its upper end if even the lowest stiffness cycled, infinite if nothing did.
         """
-        if math.isinf(self.cycling):
-            return math.inf
         return math.sqrt(self.quiet * self.cycling) if self.quiet else self.cycling
 
 

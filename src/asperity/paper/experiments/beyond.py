@@ -94,6 +94,17 @@ class BeyondExperiment(Record):
             if one.prediction.onset.wall
         )
 
+    @property
+    def how_far(self) -> str:
+        """Where the walls cycle, in words; empty if none was simulated.
+
+        Without it the number of cases that cycle below the catalogue's K₀/q would say too much.
+        """
+        if not self.walls:
+            return ""
+        span = f"{min(self.walls):.0f} to {max(self.walls):.0f}"
+        return f"the simulated wall itself cycles only at {span} times the catalogue's K0"
+
 
 def surfaces(measured: Texture | None = None) -> dict[str, Texture]:
     """Return a gentle sinusoid, and a measured surface or a drawn one in its place."""

@@ -101,17 +101,13 @@ class Experiments:
         return ", ".join(parts)
 
     def _devices(self) -> str:
-        found, walls = self.beyond.onsets, self.beyond.walls
+        found = self.beyond.onsets
         missed = sum(one.missed for one in found)
         rules = sum(one.prediction.missed for one in found)
-        far = ""
-        if walls:  # without this the first number would say much more than it does
-            span = f"{min(walls):.0f} to {max(walls):.0f} times the catalogue's K0"
-            far = f"; the simulated wall itself cycles only at {span}"
         return (
             f"{missed} of {len(found)} cases cycle at a stiffness that the catalogue's K0/q "
-            f"allows, {rules} below the delay rule{far}"
-        )
+            f"allows, {rules} below the delay rule"
+        ) + (f"; {self.beyond.how_far}" if self.beyond.how_far else "")
 
 
 def run_experiments(
