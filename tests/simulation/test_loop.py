@@ -209,6 +209,7 @@ def commanded(force: tuple[float, float, float], step: float, limit: float) -> F
         ((0.0, 0.0, 0.609375), 0.609375, (0.0, 0.0, 0.59375)),  # at its limit before rounding
         ((3.0, 0.0, -4.0), 1.0, (0.59375, 0.0, -0.78125)),  # of (0.6, 0, -0.8): 19.2 and 25.6 steps
         ((0.0, 0.0, 2.0), 0.625, (0.0, 0.0, 0.625)),  # 20 steps: none is lost
+        ((0.0, 0.0, 2.0), 0.623, (0.0, 0.0, 0.59375)),  # 20 would be a third of a percent too long
         ((0.0, 0.0, 0.609375), 9.0, (0.0, 0.0, 0.625)),  # nowhere near a limit: the nearest
         ((-0.609375, 0.0, 0.0), 9.0, (-0.59375, 0.0, 0.0)),
     ],
@@ -217,6 +218,11 @@ def test_a_limited_force_is_rounded_towards_zero(
     force: tuple[float, float, float], limit: float, expected: tuple[float, float, float]
 ) -> None:
     np.testing.assert_array_equal(commanded(force, 1.0 / 32.0, limit), expected)
+
+
+def test_a_limit_of_whole_steps_loses_none_to_the_last_bits() -> None:
+    """Three steps of 0.1 are more than 0.3 in binary, and 0.3 over 0.1 is less than three."""
+    assert commanded((0.0, 0.0, 2.0), 0.1, 0.3)[2] == pytest.approx(0.3, rel=1e-12)
 
 
 @pytest.mark.parametrize(
