@@ -199,6 +199,16 @@ def test_a_slack_direction_refutes_with_delay() -> None:
     )
 
 
+def test_only_a_number_above_q_plus_tells_a_slack_direction() -> None:
+    """q = 4 = the upper end of q⁺ may be attained where the field is stiff: nothing is refuted."""
+    device = {**RIG, "delay_samples": 1}
+    loose = Bound(0.5, 4.0, "certified")
+    equal = judge(Surface(WAVE, "C", 4500.0), device, q=exactly(4.0), plus=loose)
+    assert equal.verdict == "undecided"
+    above = judge(Surface(WAVE, "C", 4500.0), device, q=exactly(4.01), plus=loose)
+    assert above.verdict == "not passive"
+
+
 def test_the_greatest_delay_counts_virtual_damping() -> None:
     """It is k (1/2 + d) T + b_v <= σ₀."""
     assert judge(Surface(WAVE, "H"), {**RIG, "virtual_damping": 0.5}).greatest_delay == 5

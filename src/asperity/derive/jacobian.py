@@ -15,6 +15,8 @@ from asperity.contacts.symbols import (
     DEPTH,
     DX,
     DY,
+    H_HALF,
+    H_MID,
     HX,
     HXX,
     HXY,
@@ -26,6 +28,7 @@ from asperity.contacts.symbols import (
     SYY,
     ContactSymbols,
     H,
+    K,
 )
 from asperity.errors import LawError
 from asperity.laws.law import Law
@@ -143,7 +146,7 @@ def _check_symbols(law: Law, force: Any) -> None:
     allowed = {*POSITION, *law.contact.formula_symbols()} | {
         sp.Symbol(n, real=True) for n in law.parameters
     }
-    allowed |= set(ARGUMENT_ORDER[-3:])  # k, h_mid, h_half
+    allowed |= {K, H_MID, H_HALF}
     if law.stateful:
         allowed |= {DX, DY}
     unknown = sorted(str(symbol) for symbol in force.free_symbols - allowed)
