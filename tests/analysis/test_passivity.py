@@ -200,7 +200,7 @@ def test_a_slack_direction_refutes_with_delay() -> None:
 
 
 def test_only_a_number_above_q_plus_tells_a_slack_direction() -> None:
-    """q = 4 = the upper end of q⁺ may be attained where the field is stiff: nothing is refuted."""
+    """Where q is the upper end of q⁺ a stiff direction may attain it: nothing is refuted."""
     device = {**RIG, "delay_samples": 1}
     loose = Bound(0.5, 4.0, "certified")
     equal = judge(Surface(WAVE, "C", 4500.0), device, q=exactly(4.0), plus=loose)

@@ -9,6 +9,7 @@ from rich.console import Console
 
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.words.passivity import allowed_text
 from asperity.report import page, terminal
 from asperity.report.devices import numbers_table
 from asperity.report.terminal import head, say
@@ -63,6 +64,11 @@ def open_criteria(analysis: Analysis) -> list[tuple[str, str]]:
         if criterion.holds is None:
             said.setdefault(criterion.says, []).append(criterion.name)
     return [("; ".join(names), says) for says, names in said.items()]
+
+
+def stiffness_text(analysis: Analysis) -> str:
+    """Return up to which stiffness the law may be rendered, as a comparison says it."""
+    return allowed_text(analysis.passivity.allowed, analysis.passivity.critical_speed)
 
 
 def notes(analysis: Analysis) -> list[str]:
@@ -214,6 +220,7 @@ def print_analysis(analysis: Analysis, console: Console, texture: str = "") -> N
     criteria = _with_arrow(_criteria_table(analysis))
     console.print(terminal.table(criteria, wraps=(1,), most={1: 18}, without=(6,)))
     console.print(terminal.pairs(open_criteria(analysis), "dim", most=26))
+    say(console, f"Stiffness: {stiffness_text(analysis)}")
     head(console, "Worst loop")
     console.print(terminal.pairs(leak_facts(analysis), most=26))
     head(console, "Continuity")
@@ -289,7 +296,8 @@ def _criteria(analysis: Analysis) -> page.Section:
         f"Passive on the {analysis.device.name}?",
         [_criteria_table(analysis)],
         caption=(
-            f"Verdict: {judged.verdict}. It rests on: {judged.decided_by}. T is the period of an "
+            f"Verdict: {judged.verdict}. It rests on: {judged.decided_by}. Stiffness: "
+            f"{stiffness_text(analysis)}. T is the period of an "
             "update, σ₀ the least damping of the device, b_v virtual damping, d the whole samples "
             "of delay, K₀ the stiffest smooth wall that held on it, |δ| and |b| steps of position "
             "and force, f_c dry friction that surely acts."
