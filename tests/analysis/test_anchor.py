@@ -132,3 +132,13 @@ def test_dragged_anchor_keeps_its_distance_and_follows_the_tractrix() -> None:
     u = d / LONGEST
     rate = move - (u @ move)[:, None] * u
     np.testing.assert_allclose(np.gradient(d, s, axis=0)[1:-1], rate[1:-1], atol=1e-7 * 1e-3)
+
+
+def test_a_deflection_is_never_longer_than_allowed() -> None:
+    """An edge a thousandth longer than the way on which the anchor sticks: dragged at its end."""
+    surface = SURFACES["F"]
+    ends = np.array([[0.0, 0.0, -1e-3], [1.0005 * LONGEST, 0.0, -1e-3], [0.0, 0.0, -1e-3]])
+    stuck, dragged, back = anchored_stretches(surface, ends[:-1], ends[1:])
+    assert np.hypot(*dragged.deflection(np.ones(1))[0]) == pytest.approx(LONGEST, rel=1e-12)
+    assert stuck.end[0] == pytest.approx(LONGEST, rel=1e-12)
+    assert back.deflection(np.ones(1))[0, 0] == pytest.approx(-0.0005 * LONGEST, rel=1e-9)

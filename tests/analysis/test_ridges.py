@@ -105,3 +105,19 @@ def test_a_law_that_starts_with_a_jump_is_not_continuous() -> None:
     result = continuity(surface, characteristic_number(surface))
     assert not result.continuous
     assert "where contact begins" in result.reason
+
+
+def test_at_the_very_onset_number_and_continuity_say_the_same() -> None:
+    """Rounding puts the distance of the onset above or below the depth, 1/K at or beside 1."""
+    rng, said = np.random.default_rng(2), set()
+    for _ in range(40):
+        wave = Sinusoid(rng.uniform(0.05e-3, 0.3e-3), rng.uniform(0.5e-3, 3e-3))
+        crest = sharpest_crest(wave)
+        assert crest is not None
+        for depth in (crest.radius, 1.0 / wave.bounds[1]):
+            surface = Surface(wave, "D", max_depth=depth)
+            q = characteristic_number(surface)
+            said.add(depth * wave.bounds[1] == 1.0 and math.isinf(q.upper))
+            if depth * wave.bounds[1] >= 1.0:
+                assert continuity(surface, q).continuous is math.isfinite(q.upper)
+    assert True in said
