@@ -1,0 +1,119 @@
+"""Where the nodes of a tabulated law H are, and what is proved from them, by hand."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from asperity.analysis.split import potential_grid
+from asperity.analysis.split.potential_grid import Grid, curvatures
+from asperity.kernels import fuse
+from asperity.surface import Surface
+from asperity.textures.heightmap import HeightMap
+from asperity.textures.sinusoid import Sinusoid
+
+WAVE = Sinusoid(0.1e-3, 1e-3)
+
+
+def grid(steps: list[list[float]], cells: tuple[int, ...], *, periodic: bool = True) -> Grid:
+    return Grid(np.array(steps), cells, np.array([1e-3, 2e-3]), 6, 0.1, 5.0, periodic)
+
+
+@pytest.mark.parametrize("resolution", [0.7e-4, 1e-4, 3e-4, 1.0])
+def test_nodes_are_nowhere_farther_apart_than_asked_for(resolution: float) -> None:
+    surface = Surface(WAVE, "H", max_depth=0.35e-3)
+    found = Grid.fit(surface, resolution)
+    along, rise = found.spacing
+    for spacing, length, count in (
+        (along, 1e-3, found.cells[0]),
+        (rise, 0.55e-3, found.levels - 3),
+    ):
+        assert spacing <= resolution * (1 + 1e-12)
+        assert count >= 4
+        assert count == 4 or length / (count - 1) > resolution * (1 - 1e-12)
+        assert spacing * count == pytest.approx(length, rel=1e-12)
+    # The floor is halfway between the two lowest levels, two levels are above the highest point.
+    low, next_one = found.height(0), found.height(1)
+    assert 0.5 * (low + next_one) == pytest.approx(-0.1e-3 - 0.35e-3, rel=1e-12)
+    above = found.height(np.arange(found.levels)) > WAVE.extremes[1]
+    np.testing.assert_array_equal(np.flatnonzero(above), [found.levels - 2, found.levels - 1])
+    assert found.height(found.levels - 2) == pytest.approx(0.1e-3 + 0.5 * rise, rel=1e-9)
+
+
+def test_borders_repeat_or_are_mirrored() -> None:
+    steps = [[0.1, 0.0]]
+    assert grid(steps, (4,)).nodes(0).tolist() == [3, 0, 1, 2, 3, 0, 1]
+    assert grid(steps, (4,), periodic=False).nodes(0).tolist() == [1, 0, 1, 2, 3, 4, 3]
+    assert grid([[0.1, 0.0], [0.0, 0.2]], (4, 5)).shape == (7, 8, 6)
+
+
+def test_the_proved_errors_by_hand() -> None:
+    """Variance of a quarter of each squared step, and a twelfth of the step's own."""
+    gradient, potential = grid([[0.3, 0.0], [0.0, 0.2]], (4, 4)).error_bounds(2.0)
+    squares = np.array([0.09, 0.04, 0.01])
+    assert potential == pytest.approx(0.5 * 2.0 * 0.25 * 0.14, rel=1e-12)
+    parts = 2.0 * np.sqrt(0.25 * 0.14 + squares / 12.0)
+    assert gradient == pytest.approx(math.sqrt(float(parts @ parts)), rel=1e-12)
+
+
+def test_steps_that_lean_enlarge_the_error() -> None:
+    """A gradient is solved for from its parts along unit steps at 60 degrees: at most √2 longer."""
+    upright, _ = grid([[0.1, 0.0], [0.0, 0.1]], (4, 4)).error_bounds(1.0)
+    lean = [[0.1, 0.0], [0.05, 0.1 * math.sqrt(0.75)]]
+    leaning, _ = grid(lean, (4, 4)).error_bounds(1.0)
+    directions = np.array(lean) / 0.1
+    longest = 1.0 / np.linalg.svd(directions, compute_uv=False)[-1]
+    assert longest == pytest.approx(math.sqrt(2.0), rel=1e-12)
+    assert leaning == pytest.approx(longest * upright, rel=1e-12)
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+@pytest.mark.parametrize("stiffer", [0, 1])
+def test_the_greatest_of_all_parts_counts(
+    periodic: bool, stiffer: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every column is searched once; positive and negative eigenvalues each by their greatest."""
+    seen: list[int] = []
+
+    def hull_batch(first: int, last: int, out: np.ndarray, _table: object) -> None:
+        seen.extend(range(first, last))
+        for side in range(2):
+            size = (3.0 if side == stiffer else 1.0) + (1.0 if first == 16 else 0.0)
+            out[side] = (size + 0.5, size, first, 0.5, 2.0)
+
+    monkeypatch.setattr(fuse, "fuse_module", lambda *_: SimpleNamespace(hull_batch=hull_batch))
+    own = grid([[0.1, 0.0], [0.0, 0.2]], (40, 4), periodic=periodic)
+    table = own.table(np.full((7, 43, 6), 2.0))
+    norm, positive = curvatures(own, table)
+    assert sorted(seen) == list(range(40 if periodic else 41))
+    rounding = potential_grid._ROUNDING * 2.0 / 0.1**2
+    assert rounding > 0.0
+    assert (norm.lower, norm.upper) == (4.0, 4.5 + rounding)
+    size = 4.0 if stiffer == 0 else 2.0
+    assert (positive.lower, positive.upper) == (size, size + 0.5 + rounding)
+    # At the node (16, ½) and level 2: where the witness was found.
+    place = (1e-3 + 16 * 0.1, 2e-3 + 0.5 * 0.2, 5.0 + 1.5 * 0.1)
+    assert norm.at == pytest.approx(place)
+    assert positive.at == pytest.approx(place)
+
+
+def test_the_table_is_given_the_place_of_its_first_node() -> None:
+    own = grid([[0.1, 0.0], [0.0, 0.2]], (4, 4), periodic=False)
+    table = own.table(np.zeros((7, 7, 6)))
+    place = np.array([1e-3 + 0.25, 2e-3 + 0.3])
+    rates = np.array([[table.m00, table.m01], [table.m10, table.m11]])
+    np.testing.assert_allclose(rates @ (place - [table.x0, table.y0]), [2.5, 1.5], rtol=1e-12)
+    assert table.z0 == pytest.approx(5.0 - 0.05)
+    assert own.bytes == 8 * 7 * 7 * 6
+
+
+def test_a_map_that_ends_is_fitted_from_its_corner() -> None:
+    texture = HeightMap(1e-5 * np.random.default_rng(0).normal(size=(9, 12)), 1e-4)
+    found = Grid.fit(Surface(texture, "H", max_depth=1e-4), 0.9e-4)
+    assert not found.periodic
+    np.testing.assert_allclose(found.start, texture.domain.origin)
+    ends = found.start + np.array(found.cells) @ found.steps
+    np.testing.assert_allclose(ends, texture.domain.origin + texture.domain.spans.sum(axis=0))
