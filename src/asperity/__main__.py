@@ -31,6 +31,9 @@ def main() -> NoReturn:
         tell("interrupted")
     except BaseException as error:  # whatever it is: it is said in one line
         status = _said(error)
+    # An interrupt that came through an exec() of text is remembered: run by -m, Python would then
+    # end by the signal, not by the exit code. Any other exec() makes it forget.
+    exec("")
     sys.exit(INTERRUPTED if _interrupts else _flushed(status))
 
 

@@ -134,6 +134,23 @@ def test_an_interrupt_that_was_swallowed_is_still_told_by_the_exit_code() -> Non
     assert (done.returncode, done.stdout) == (130, "went on\n")
 
 
+def test_an_interrupt_inside_exec_ends_with_its_exit_code(tmp_path: Path) -> None:
+    """Run by -m, Python would end by the signal: a dataclass is made by exec(), for one."""
+    interrupted = "exec('import os, signal; os.kill(os.getpid(), signal.SIGINT)')"
+    (tmp_path / "own.py").write_text(
+        "import sys, types\n"
+        "fake = types.ModuleType('fake')\n"
+        f"fake.main = lambda: {interrupted}\n"
+        "sys.modules['asperity.cli.main'] = fake\n"
+        "from asperity.__main__ import main\n"
+        "main()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "own"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (130, "asperity: interrupted\n")
+
+
 @pytest.mark.parametrize("module", ["click", "asperity.cli.compare", "numba", "numpy"])
 def test_an_interrupt_during_imports_ends_with_its_exit_code(module: str) -> None:
     """The interrupt comes while a module is being imported, wherever that is."""
