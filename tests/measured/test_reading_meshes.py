@@ -32,7 +32,7 @@ def level(heights: Floats) -> Floats:
     i, j = np.mgrid[0.0 : heights.shape[0], 0.0 : heights.shape[1]]
     known = np.isfinite(heights)
     planes = np.stack((i[known], j[known], np.ones(known.sum())), axis=1)
-    fit = np.linalg.lstsq(planes, heights[known])[0]
+    fit = np.linalg.lstsq(planes, heights[known], rcond=None)[0]
     return np.asarray(heights - (fit[0] * i + fit[1] * j + fit[2]))
 
 

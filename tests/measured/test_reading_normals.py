@@ -77,6 +77,7 @@ def test_integration_finds_the_heights(
         fit = np.linalg.lstsq(
             np.stack((COLUMN.ravel(), ROW.ravel(), np.ones(ROW.size)), axis=1),
             (raw.heights - height).ravel(),
+            rcond=None,
         )[0]
         assert np.abs(fit[:2]).max() < 2 / 255
         height = height + fit[0] * COLUMN + fit[1] * ROW
