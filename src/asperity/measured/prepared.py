@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import tokenize
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -31,6 +32,7 @@ _DAMAGE = (
     KeyError,
     NotImplementedError,  # a compression that zipfile does not know
     RuntimeError,  # an encrypted member
+    tokenize.TokenError,  # a damaged header of an array, from Python 3.12 on
 )
 
 
