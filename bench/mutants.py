@@ -72,7 +72,8 @@ ROOMS = {
     ),
     "passivity": Room(
         ("analysis/passivity", "analysis/judge_passivity.py"),
-        ("tests/analysis/test_wall_test.py", "tests/analysis/test_passivity.py"),
+        ("tests/analysis/test_wall_test.py", "tests/analysis/test_passivity.py",
+         "tests/seams/test_criterion.py"),
     ),
     "limits": Room(
         ("analysis/limits", "analysis/check_limits.py"),

@@ -395,3 +395,15 @@ def test_the_fewest_samples_are_allowed() -> None:
 def test_a_limit_that_does_not_exist_is_a_key_error() -> None:
     with pytest.raises(KeyError):
         ask().limit(7)
+
+
+def test_the_share_is_of_the_waves_that_count() -> None:
+    """Bands that are too small to count are in neither part of it: all that hold are all of it."""
+    rng = np.random.default_rng(2)
+    smooth = np.cumsum(np.cumsum(rng.normal(size=400)))
+    result = ask(Profile(1e-5 * smooth / np.abs(smooth).max(), 1e-4), speed=1e-4)
+    assert len(result.waves) < len(result.spectrum.waves)
+    kept = sum(wave.share for wave in result.waves)
+    assert kept < 1.0
+    assert result.limit(1).holds
+    assert result.limit(1).share == pytest.approx(1.0, rel=1e-12)

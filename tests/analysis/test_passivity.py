@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -270,6 +271,17 @@ def test_a_law_that_leaks_is_never_called_passive(letter: str) -> None:
     for name in ("one-sided", "delay", "virtual damping", "wall test"):
         assert (found.criterion(name).holds, found.criterion(name).missing) == (None, ())
         assert found.criterion(name).says.startswith("not applicable: the law is not conservative")
+
+
+@pytest.mark.parametrize(("energy", "verdict"), [(1e-15, "not passive"), (1e-16, "undecided")])
+def test_a_leak_counts_from_what_rounding_cannot_make(energy: float, verdict: str) -> None:
+    """Rounding is 1e-12 of k · depth · length = 1000 N/m · 0.2 mm · 2 mm, 4e-16 J."""
+    surface = Surface(WAVE, "A", 1000.0, 0.2e-3)
+    line = WAVE.scan_line()
+    assert line.length == pytest.approx(2e-3)
+    leak = replace(rectangle(surface), energy=energy)
+    found = passivity(surface, parse_device(RIG, "mine"), exactly(1.0), exactly(1.0), leak)
+    assert found.verdict == verdict
 
 
 def test_without_damping_the_speed_is_missing_but_the_field_still_pumps() -> None:

@@ -244,6 +244,19 @@ def test_a_test_with_stepped_positions_contradicts_exact_ones() -> None:
     assert judge(known, 100.0).verdict == "passive"
 
 
+def test_steps_of_the_force_alone_are_silenced_at_any_stiffness_or_none() -> None:
+    """Half a step along three axes is √3 · 5 mN = 8.66 mN, whatever the stiffness."""
+    rig = {**RIG, "force_resolution": "10 mN"}
+    for friction, limit in ((8.6e-3, 0.0), (8.7e-3, math.inf)):
+        found = judge({**rig, "least_friction": friction}, 100.0).criterion("steps and friction")
+        assert (found.limit, found.at_most, found.holds) == (limit, limit, limit > 0.0)
+    # With steps of the position too, what is left of the friction sets the limit, never below 0.
+    both = {**rig, "position_resolution": 1e-6}
+    for friction, limit in ((0.0, 0.0), (8e-3, 0.0), (0.02, (0.02 / math.sqrt(3.0) - 5e-3) * 2e6)):
+        found = judge({**both, "least_friction": friction}, 100.0).criterion("steps and friction")
+        assert found.limit == pytest.approx(limit, rel=1e-9)
+
+
 def test_virtual_damping_makes_steps_louder() -> None:
     rig = {**RIG, "position_resolution": 2e-5, "virtual_damping": -0.5}
     found = judge(rig, 1000.0, 2.0, 1.5)
