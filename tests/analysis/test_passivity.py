@@ -214,6 +214,9 @@ def test_the_greatest_delay_counts_virtual_damping() -> None:
     """It is k (1/2 + d) T + b_v <= σ₀."""
     assert judge(Surface(WAVE, "H"), {**RIG, "virtual_damping": 0.5}).greatest_delay == 5
     assert judge(Surface(WAVE, "H", 16001.0), RIG).greatest_delay is None
+    # k (q⁺/2 + d q) <= σ₀/T with q = 2, q⁺ = 1.5: d <= (8 - 0.75)/2.
+    found = judge(Surface(WAVE, "C", 1000.0), RIG, q=exactly(2.0), plus=exactly(1.5))
+    assert found.greatest_delay == 3
 
 
 def test_what_is_not_verified_is_named() -> None:
