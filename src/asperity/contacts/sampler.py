@@ -29,26 +29,26 @@ OFFERED = {
 
 def height(x: float, y: float, texture: object) -> float:
     """Return h [m]."""
-    raise NotImplementedError
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
 def slope(x: float, y: float, texture: object) -> tuple[float, float, float]:
     """Return h [m], h_x, h_y [1]."""
-    raise NotImplementedError
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
 def curvature(
     x: float, y: float, texture: object
 ) -> tuple[float, float, float, float, float, float]:
     """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
-    raise NotImplementedError
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
 def foot(x: float, y: float, z: float, texture: object) -> tuple[float, float, float, float, float]:
     """Return X, Y of the globally nearest surface point [m], and h [m], h_x, h_y [1] there."""
-    raise NotImplementedError
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
 def along(x: float, texture: object) -> tuple[float, float, float]:
     """Return h [m], h' [1], h'' [1/m] along a line: of kinds whose heights vary along it only."""
-    raise NotImplementedError
+    raise NotImplementedError  # the interface alone; the linker binds calls of it

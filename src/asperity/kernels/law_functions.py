@@ -13,7 +13,7 @@ def probe_force(
     x: float, y: float, z: float, dx: float, dy: float, texture: object, law: object
 ) -> Triple:
     """Return the force [N]; (dx, dy) is the deflection of the anchor [m] of a law with state."""
-    raise NotImplementedError
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
 def probe_jacobian(
@@ -21,12 +21,12 @@ def probe_jacobian(
     texture: object, law: object,
 ) -> tuple[*Triple, *Nine]:  # fmt: skip
     """Return force [N] and Jacobian [N/m], row by row; s is the derivative of the deflection."""
-    raise NotImplementedError
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
 def probe_inside(x: float, y: float, z: float, texture: object) -> bool:
     """Return whether there is contact."""
-    raise NotImplementedError
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
 def probe_held(
@@ -36,7 +36,7 @@ def probe_held(
 
     A law with state holds its anchor while there is contact; others leave it as it is.
     """
-    raise NotImplementedError
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
 def contact_jacobian(
@@ -45,4 +45,4 @@ def contact_jacobian(
     dx: float, dy: float, sxx: float, sxy: float, syy: float, law: object,
 ) -> tuple[*Triple, *Nine]:  # fmt: skip
     """Return force [N] and Jacobian [N/m], row by row, at a given contact of a probe."""
-    raise NotImplementedError
+    raise NotImplementedError  # the interface alone; the linker binds calls of it

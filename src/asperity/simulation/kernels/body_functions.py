@@ -53,21 +53,21 @@ def advance_body(x: FloatArray, ledger: FloatArray, held: Held, plant: object) -
     Returns:
         ``RAN``, or ``LEFT`` if the body would leave its workspace: it then stays where it was.
     """
-    raise NotImplementedError
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
 def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: object) -> float:
     """Return the stored energy [J] with the hand's anchor at a [m]."""
-    raise NotImplementedError
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
 def advance_axis(
     x: FloatArray, i: int, f: float, a: float, u: float, table: FloatArray
 ) -> tuple[float, float, float]:
     """Move along one axis; returns the displacement [m], loss and work of the hand [J]."""
-    raise NotImplementedError
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
 def final_speed(x: FloatArray, i: int, f: float, a: float, u: float, table: FloatArray) -> float:
     """Velocity along one axis at the end of the part, without friction [m/s]."""
-    raise NotImplementedError
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
