@@ -18,6 +18,7 @@ from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.judge_passivity import passivity
 from asperity.analysis.passivity.judgement import Passivity
 from asperity.devices import Device, parse_device
+from asperity.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures import Fourier, Profile, Sinusoid, Texture
 
@@ -242,6 +243,21 @@ def test_a_test_with_stepped_positions_contradicts_exact_ones() -> None:
     assert found.allowed.basis == "plausible"
     known = {**RIG, "max_stiffness": wall, "position_resolution": 1e-5, "least_friction": 1.0}
     assert judge(known, 100.0).verdict == "passive"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        {"position_resolution": "1e200 m"},
+        {"update_rate": {"value": 1e30, "unit": "kHz"}},
+        {"max_stiffness": {"value": 1, "cycled": 1e40}},
+        {"max_stiffness": {"value": 1, "update_rate": 1e-40}},
+    ],
+)
+def test_numbers_that_no_device_has_are_refused(content: dict[str, Any]) -> None:
+    """Products of such numbers leave the range of floats."""
+    with pytest.raises(ParameterError, match=r"1e[+-]30"):
+        judge({**RIG, **content}, 100.0)
 
 
 def test_steps_of_the_force_alone_are_silenced_at_any_stiffness_or_none() -> None:

@@ -11,6 +11,7 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import Leak
 from asperity.analysis.gain.theorems import theorem_of
+from asperity.checks import positive, real
 from asperity.devices import Device, WallTest
 from asperity.errors import ParameterError
 from asperity.surface import Surface
@@ -174,7 +175,12 @@ _AXES = Fraction(17320508075688773, 10**16)
 def _wall_test(device: Device) -> WallTest | None:
     """Return what is known of the smooth wall; checked, since a device may be built by hand."""
     _fraction(device, "max_stiffness", _POSITIVE)
-    return device.wall_test
+    test = device.wall_test
+    for name in ("cycled", "update_rate", "lightest"):
+        value = None if test is None else getattr(test, name)
+        if value is not None:
+            positive(f"device.max_stiffness.{name}", value)
+    return test
 
 
 _POSITIVE = ("must be positive", 5e-324)
@@ -188,10 +194,10 @@ def _fraction(device: Device, field: str, rule: tuple[str, float]) -> Fraction |
     if value is None:
         return None
     words, least = rule
+    unit = device.data[field].unit
     if value < least or not math.isfinite(value):
-        unit = device.data[field].unit
         raise ParameterError(f"device.{field}", f"{words}, and finite [{unit}]", value)
-    return Fraction(value)
+    return Fraction(real(f"device.{field}", value, unit))
 
 
 def _obstacle(surface: Surface, q: Bound) -> tuple[Obstacle | None, str]:
