@@ -38,6 +38,7 @@ COMMANDS = (
     "reproduce --claim eq-5 --json out.csv",
 )
 _EARLIEST = 0.5  # [s] of an interrupt: before that Python itself may be starting, and swallow it
+_INTERRUPTED = "asperity: interrupted\n"
 _SCENE = """
 [texture]
 kind = "sinusoid"
@@ -96,6 +97,8 @@ def disturbed(command: str, folder: Path, cache: Path, after: float, by: int) ->
         output, errors = process.communicate(timeout=120)
         if by == signal.SIGINT and process.returncode not in {0, 130}:
             return [f"exit code {process.returncode}: {errors.decode()[-300:]}"]
+        if process.returncode == 130 and not errors.decode().endswith(_INTERRUPTED):
+            return [f"interrupted, but said: {errors.decode()[-300:]!r}"]
     wrong = []
     if b"Traceback" in errors + output:
         wrong.append(f"traceback: {errors.decode()[-300:]}")

@@ -6,6 +6,7 @@ import codecs
 import os
 import signal
 import sys
+from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
@@ -16,6 +17,7 @@ INPUT_OUTPUT = 74  # as sysexits.h has it
 INTERNAL_ERROR = 70  # likewise
 BROKEN_PIPE = 141  # 128 + SIGPIPE
 _TRACEBACK = "ASPERITY_TRACEBACK"
+_AGAIN = 1.0  # [s] until an interrupt that has not arrived is raised again
 
 _interrupts: list[int] = []
 
@@ -23,14 +25,12 @@ _interrupts: list[int] = []
 def main() -> NoReturn:
     """Run the command line; every end has an exit code and at most one line on standard error."""
     status = INTERRUPTED
-    try:
+    with suppress(KeyboardInterrupt):
         signal.signal(signal.SIGINT, _interrupt)
-        _open_streams()
         status = _run()
-    except KeyboardInterrupt:
+    _end_interrupts()
+    if _interrupts:
         tell("interrupted")
-    except BaseException as error:  # whatever it is: it is said in one line
-        status = _said(error)
     # An interrupt that came through an exec() of text is remembered: run by -m, Python would then
     # end by the signal, not by the exit code. Any other exec() makes it forget.
     exec("")
@@ -38,25 +38,42 @@ def main() -> NoReturn:
 
 
 def _run() -> int:
-    # Imported here, so that an interrupt while it loads ends like any other.
-    from asperity.cli.main import main as command_line
-
     try:
+        _open_streams()
+        # Imported here, so that an interrupt while it loads ends like any other.
+        from asperity.cli.main import main as command_line
+
         command_line()
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else int(end.code is not None)
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # whatever it is: it is said in one line
+        return _said(error)
     return 0
 
 
 def _interrupt(number: int, _frame: FrameType | None) -> None:
     """Interrupt; the second time at once, and never is it forgotten.
 
-    Code that is called back from C may swallow the exception: the exit code says it all the same.
+    Code that is called back from C may swallow the exception: it is raised again until it arrives
+    at :func:`main`.
     """
-    _interrupts.append(number)
-    if len(_interrupts) > 1:
-        os._exit(INTERRUPTED)
+    if number == signal.SIGINT:
+        _interrupts.append(number)
+        if len(_interrupts) > 1:
+            os._exit(INTERRUPTED)
+        if hasattr(signal, "setitimer"):  # Windows has none: there the exit code alone says it
+            signal.signal(signal.SIGALRM, _interrupt)
+            signal.setitimer(signal.ITIMER_REAL, _AGAIN, _AGAIN)
     raise KeyboardInterrupt
+
+
+def _end_interrupts() -> None:
+    """Let no interrupt come any more: what is written is whole, and the exit code is known."""
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _open_streams() -> None:

@@ -212,9 +212,8 @@ def test_interrupted(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(*place, stop)
-    code, out, err = call("prepare", source, "-o", str(tmp_path / "a.npz"), "--pitch", "2um")
-    assert (code, out) == (130, "")
-    assert "interrupted" in err
+    with pytest.raises(KeyboardInterrupt):  # tests/cli/test_program.py has what is said then
+        call("prepare", source, "-o", str(tmp_path / "a.npz"), "--pitch", "2um")
     assert [p.name for p in tmp_path.iterdir()] == ["map.npy"]
 
 

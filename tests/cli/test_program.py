@@ -114,24 +114,58 @@ def test_a_fault_shows_its_traceback_when_asked() -> None:
 
 
 _SWALLOWS = """
-import os, signal
+import os, signal, time
 import asperity.cli.main as command_line
+class Finalized:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.01)
 def main():
     try:
         os.kill(os.getpid(), signal.SIGINT)
-    except KeyboardInterrupt:
-        print("went on")
+    except BaseException:
+        print("went on", flush=True)
+    {work}
 command_line.main = main
 from asperity.__main__ import main
 main()
 """
 
 
-def test_an_interrupt_that_was_swallowed_is_still_told_by_the_exit_code() -> None:
+@pytest.mark.parametrize(
+    "work", ["return", "time.sleep(30); print('to the end')"], ids=["no longer", "and works on"]
+)
+@pytest.mark.parametrize("swallowed_by", ["try", "finalizer"])
+def test_an_interrupt_that_was_swallowed_is_told_and_ends_the_work(
+    work: str, swallowed_by: str
+) -> None:
+    script = _SWALLOWS.replace("{work}", work)
+    if swallowed_by == "finalizer":
+        script = script.replace(
+            "        os.kill(os.getpid(), signal.SIGINT)\n    except",
+            ("        Finalized()\n        print('went on', flush=True)\n    except"),
+        )
     done = subprocess.run(
-        [sys.executable, "-c", _SWALLOWS], capture_output=True, text=True, check=False
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=60
     )
     assert (done.returncode, done.stdout) == (130, "went on\n")
+    assert done.stderr == "asperity: interrupted\n"
+
+
+def test_an_interrupt_after_the_work_does_not_end_by_the_signal() -> None:
+    """Python hands signals back to the system while it ends: none may come then."""
+    script = (
+        "import atexit, os, signal\n"
+        "atexit.register(lambda: os.kill(os.getpid(), signal.SIGINT))\n"
+        "import asperity.cli.main as command_line\n"
+        "command_line.main = lambda: print('done')\n"
+        "from asperity.__main__ import main\n"
+        "main()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
 
 
 def test_an_interrupt_inside_exec_ends_with_its_exit_code(tmp_path: Path) -> None:

@@ -16,7 +16,6 @@ from asperity.errors import AsperityError, InternalError, tell
 
 BAD_INPUT = 2
 INTERNAL_ERROR = 70  # as sysexits.h has it
-INTERRUPTED = 130  # as shells have it
 
 COMMANDS = {
     "analyze": "Say all that is known of one law on a surface and a device.",
@@ -79,7 +78,7 @@ def main() -> None:
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)
     except click.Abort:
-        _stop("interrupted", INTERRUPTED)
+        raise KeyboardInterrupt from None  # asperity.__main__ says it
     except click.ClickException as error:
         error.show()
         sys.exit(BAD_INPUT)
