@@ -22,7 +22,9 @@ DEFAULT_SAMPLES = 4
 _BLOCK = 2**22
 
 
-def gaussian_filter(heights: FloatArray, pitch: tuple[float, ...], cutoff: float) -> FloatArray:
+def gaussian_filter(
+    heights: FloatArray, pitch: tuple[float, ...], cutoff: float, *, periodic: bool = False
+) -> FloatArray:
     """Gaussian low-pass of ISO 16610-21 (profile) and -61 (map) with a mirrored border.
 
     A wave of wavelength l keeps the fraction exp(-pi (ALPHA cutoff / l)^2) of its
@@ -34,6 +36,7 @@ def gaussian_filter(heights: FloatArray, pitch: tuple[float, ...], cutoff: float
         heights: [m], shape (ny, nx) or (n,), finite, at least two points along each axis.
         pitch: (px, py) or (px,) [m].
         cutoff: cut-off wavelength [m].
+        periodic: whether the surface repeats after n times the pitch and is not mirrored.
 
     Returns:
         The filtered heights [m], same shape.
@@ -47,28 +50,33 @@ def gaussian_filter(heights: FloatArray, pitch: tuple[float, ...], cutoff: float
         True
     """
     smooth = np.array(heights, dtype=np.float64)
-    smooth_in_place(smooth, pitch, cutoff)
+    smooth_in_place(smooth, pitch, cutoff, periodic=periodic)
     return smooth
 
 
-def smooth_in_place(heights: FloatArray, pitch: tuple[float, ...], cutoff: float) -> None:
+def smooth_in_place(
+    heights: FloatArray, pitch: tuple[float, ...], cutoff: float, *, periodic: bool = False
+) -> None:
     """Filter heights where they are; see :func:`gaussian_filter`.
 
     The Gaussian is separable, so that each axis is transformed for itself and in blocks: a map
     of any size costs no second copy.
     """
-    from scipy.fft import dct, idct
+    from scipy.fft import dct, idct, irfft, rfft, rfftfreq
 
     for axis, step in zip(range(heights.ndim - 1, -1, -1), pitch, strict=True):
         n = heights.shape[axis]
-        frequency = np.arange(n) / (2.0 * (n - 1) * step)
+        frequency = rfftfreq(n, step) if periodic else np.arange(n) / (2.0 * (n - 1) * step)
         transmission = np.exp(-np.pi * (ALPHA * cutoff * frequency) ** 2)
         other = tuple(k for k in range(heights.ndim) if k != axis)
         response = np.expand_dims(transmission, other)
         for block in _blocks(heights, axis):
-            spectrum = dct(block, type=1, axis=axis)
+            spectrum = rfft(block, axis=axis) if periodic else dct(block, type=1, axis=axis)
             spectrum *= response
-            block[...] = idct(spectrum, type=1, axis=axis, overwrite_x=True)
+            if periodic:
+                block[...] = irfft(spectrum, n, axis=axis)
+            else:
+                block[...] = idct(spectrum, type=1, axis=axis, overwrite_x=True)
 
 
 def roughen_in_place(heights: FloatArray, pitch: tuple[float, ...], cutoff: float) -> None:

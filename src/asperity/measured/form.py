@@ -58,6 +58,14 @@ def check_degree(degree: int) -> int:
     return int(degree)
 
 
+def most_degree(heights: FloatArray) -> int:
+    """Return the greatest degree that the valid points support: two coordinates a coefficient.
+
+    With fewer the fit eats the texture.
+    """
+    return _points_across(heights) // 2 - 1
+
+
 def fit_form(heights: FloatArray, degree: int = 1) -> Form:
     """Fit the polynomial of total degree n to the valid points, by least squares.
 
@@ -178,18 +186,21 @@ def _normal_equations(
     return gram.reshape(k, k, k, k).transpose(0, 2, 1, 3).reshape(k * k, k * k), right
 
 
-def _check_support(heights: FloatArray, degree: int) -> None:
-    """Ask for two valid coordinates a coefficient: with fewer the fit eats the texture."""
+def _points_across(heights: FloatArray) -> int:
+    """Return how many coordinates hold a valid point, along the axis where they are fewest."""
     valid = ~np.isnan(heights)
     axes = range(heights.ndim)
-    counts = [
+    return min(
         int(valid.any(axis=tuple(other for other in axes if other != axis)).sum()) for axis in axes
-    ]
-    most = min(counts) // 2 - 1
+    )
+
+
+def _check_support(heights: FloatArray, degree: int) -> None:
+    most = most_degree(heights)
     if degree > most:
         raise ParameterError(
             "form",
-            f"must be at most {most} for {min(counts)} points along the shorter side",
+            f"must be at most {most} for {_points_across(heights)} points along the shorter side",
             degree,
         )
 
