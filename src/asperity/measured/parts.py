@@ -142,8 +142,8 @@ def texture_part(
     waviness = gaussian_filter(rest, pitch, nesting, periodic=periodic)
     rest -= waviness
     rest[missing] = np.nan
-    rms_and_range = [_part(part[~missing]) for part in (form, waviness, rest)]
-    return Parts(*rms_and_range, nesting=nesting, heights=rest.reshape(whole))
+    form_part, wavy, texture = (_part(part[~missing]) for part in (form, waviness, rest))
+    return Parts(form_part, wavy, texture, nesting, rest.reshape(whole))
 
 
 def _part(heights: FloatArray) -> Part:
