@@ -70,6 +70,12 @@ def looping(file, options):
 
 
 @in_child
+def waiting(file, options):
+    time.sleep(4)
+    return RawSurface(HEIGHTS, None, file.name, ())
+
+
+@in_child
 def sleeping(file, options):
     time.sleep(1000)
 
@@ -149,21 +155,24 @@ def test_a_hostile_reader_is_stopped(
 ) -> None:
     monkeypatch.setattr(child, "SECONDS", 3.0 if name in {"looping", "sleeping"} else 20.0)
     monkeypatch.setattr(child, "MEMORY", 3 * 10**8)
+    # A loop is ended by the system, as it is after the death of the parent, and sleep by the clock.
+    monkeypatch.setattr(child, "_PATIENCE", 100 if name == "looping" else 1)
     before = time.monotonic()
     with pytest.raises(SurfaceFileError, match=match):
         getattr(readers, name)(file, ReadingOptions())
     assert time.monotonic() - before < 21.0
 
 
-def test_the_time_of_the_processor_is_limited_too(
+def test_other_work_on_the_machine_stops_no_reader(
     readers: Any, file: SurfaceFile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where nobody waits any more, as after the death of the parent, the system ends a loop."""
-    own = subprocess.Popen.wait
-    monkeypatch.setattr(subprocess.Popen, "wait", lambda self, _=None: own(self, 60.0))
-    monkeypatch.setattr(child, "SECONDS", 2.0)
-    with pytest.raises(SurfaceFileError, match="takes more than 2 s"):
-        readers.looping(file, ReadingOptions())
+    """Three seconds of the processor may be many by the clock: only the former are counted."""
+    monkeypatch.setattr(child, "SECONDS", 3.0)
+    raw = readers.waiting(file, ReadingOptions())
+    assert raw.heights.size == 6
+    monkeypatch.setattr(child, "_PATIENCE", 1)  # the negative control
+    with pytest.raises(SurfaceFileError, match="takes more than 3 s"):
+        readers.waiting(file, ReadingOptions())
 
 
 def until(condition: Callable[[], bool]) -> bool:

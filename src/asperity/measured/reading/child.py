@@ -30,9 +30,10 @@ from asperity.measured.reading.raw import RawSurface
 from asperity.measured.reading.reader import Read, ReadingOptions, SurfaceFile
 
 SECONDS = 20.0
-"""Time that the reading of a small file may take."""
+"""Time of the processor that the reading of a small file may take."""
 MEMORY = 10**9
 """Bytes that the reading of a small file may take."""
+_PATIENCE = 6  # times as long by the clock: other work on the machine is no fault of the file
 _SECONDS_PER_BYTE, _BYTES_PER_BYTE = 1e-6, 50  # what a large file explains
 _KEPT = ("pitch", "source", "notes", "has_units", "relative", "per_pitch")
 _ADVICE = (
@@ -88,7 +89,7 @@ def start(
         read: the reader.
         file: what it reads.
         options: how it reads.
-        limits: seconds and bytes.
+        limits: seconds of the processor and bytes.
         answer: file that receives what it found, see :func:`serve`.
 
     Returns:
@@ -104,7 +105,7 @@ def start(
         env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
     ) as process:
         try:
-            return process.wait(limits[0])
+            return process.wait(_PATIENCE * limits[0])
         except subprocess.TimeoutExpired:
             return None
         finally:
@@ -160,8 +161,7 @@ def limit(seconds: float, memory: int) -> None:
     except ModuleNotFoundError:
         return
     # Data, not addresses: libraries that are mapped do not count.
-    wanted = {"DATA": memory, "CPU": math.ceil(seconds), "CORE": 0}
-    for name, most in wanted.items():
+    for name, most in {"DATA": memory, "CPU": math.ceil(seconds), "CORE": 0}.items():
         kind = getattr(resource, f"RLIMIT_{name}")
         hard = resource.getrlimit(kind)[1]
         resource.setrlimit(kind, (most if hard < 0 else min(most, hard), hard))
