@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bench.fuzz_child import Reading
 
 from asperity.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import RawSurface, ReadingOptions, SurfaceFile, child
@@ -161,6 +162,20 @@ def test_a_hostile_reader_is_stopped(
     with pytest.raises(SurfaceFileError, match=match):
         getattr(readers, name)(file, ReadingOptions())
     assert time.monotonic() - before < 21.0
+
+
+def test_a_child_for_many_files_has_the_limits_for_each(
+    readers: Any, file: SurfaceFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The child of the long fuzz run."""
+    monkeypatch.setattr(child, "SECONDS", 2.0)
+    monkeypatch.setattr(child, "MEMORY", 3 * 10**8)
+    with Reading() as reading:
+        monkeypatch.setattr(child, "start", reading.start)
+        for name, match in (("looping", "2 s"), ("hungry", r"0\.3 GB")):
+            with pytest.raises(SurfaceFileError, match=match):
+                getattr(readers, name)(file, ReadingOptions())
+            assert readers.nothing(file, ReadingOptions()) is None
 
 
 def test_other_work_on_the_machine_stops_no_reader(

@@ -7,6 +7,7 @@ import os
 import random
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,13 @@ def results() -> dict[str, dict[str, Any]]:
     """Fuzz all readers in one worker with 1 GB of memory, as the long run does it."""
     readers = seeds.available()
     return dict(zip(readers, fuzz.results(readers, COUNT), strict=True))
+
+
+@pytest.fixture(scope="module")
+def reading() -> Iterator[Any]:
+    """One child for many files, as in the long run."""
+    with importlib.import_module("bench.fuzz_child").Reading() as started:
+        yield started
 
 
 @pytest.mark.parametrize("reader", seeds.SEEDS)
@@ -46,12 +54,12 @@ def test_every_mutated_file_is_read_or_refused(
 
 @pytest.mark.parametrize("reader", seeds.SEEDS)
 def test_the_sound_files_are_read(
-    reader: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    reader: str, tmp_path: Path, reading: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from asperity.errors import SurfaceFileError
     from asperity.measured.reading import child, read_surface
 
-    monkeypatch.setattr(child, "start", fuzz.forked)  # which loads its libraries once
+    monkeypatch.setattr(child, "start", reading.start)
 
     if reader not in seeds.available():
         pytest.skip("real surfaces (../shared/data) or the extra asperity[formats] missing")
