@@ -26,8 +26,10 @@ from asperity.units import engineering, quantity
         ("2 N s m^-1", "N*s/m", 2.0),
         ("2 kg*s**-2", "N/m", 2.0),
         ("3 mm²", "m**2", 3e-6),
-        ("3", "N/m", 3.0),
-        (3, "N/m", 3.0),
+        ("3", "", 3.0),
+        (3, "", 3.0),
+        ("0", "m", 0.0),
+        (0, "N/m", 0.0),
         ("20", "", 20.0),
     ],
 )
@@ -51,6 +53,28 @@ def test_bad_quantities_name_the_argument(text: object, unit: str) -> None:
     with pytest.raises(ParameterError) as caught:
         quantity("period", text, unit)
     assert caught.value.argument == "period"
+
+
+@pytest.mark.parametrize(
+    ("given", "unit", "written"),
+    [
+        ("500", "N/m", "500N/m"),
+        (500, "N/m", "500N/m"),
+        ("1.50 ", "m", "1.50mm or 1.50um or 1.50m"),
+        (-1e-3, "m", "-0.001mm or -0.001um or -0.001m"),
+        ("90", "rad", "90deg or 90rad"),
+        (2, "s", "2s or 2ms"),
+        (3, "N*s/m", "3N*s/m"),
+    ],
+)
+def test_a_number_without_its_unit_is_refused(given: str | float, unit: str, written: str) -> None:
+    """What is offered can be copied: it is read."""
+    with pytest.raises(ParameterError) as caught:
+        quantity("length", given, unit)
+    assert str(caught.value) == f"length needs a unit: write {written}, got {given!r}"
+    for offered in written.split(" or "):
+        assert quantity("length", offered, unit) != 0.0
+    assert quantity("length", given, "") == float(given)
 
 
 @pytest.mark.parametrize(

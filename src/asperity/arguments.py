@@ -9,9 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
-from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -20,11 +18,11 @@ from asperity.files import record
 from asperity.units import engineering, quantity
 
 Form = Literal[
-    "quantity",  # "1.5 mm", or a number in SI units
+    "quantity",  # "1.5 mm"; a bare number only where there is no unit
     "pair",  # "5um", or "5um; 8um" for x and y
     "vector",  # "1 0.4", or a list of numbers
     "items",  # "1mm; 2mm"
-    "vectors",  # "3000 500; -1000 4000"; single numbers lie along x
+    "vectors",  # "3 1 rad/mm; 4 0 rad/mm"; single ones lie along x
     "space",  # "1mm; 0mm; -2mm" for x, y and z
     "plane",  # "37.5mm; 100mm" for x and z
     "axes",  # one quantity for all axes, or three
@@ -36,7 +34,7 @@ Form = Literal[
     "text",
     "path",  # of a file; in a scene relative to it
 ]
-"""How an argument is written as text; in a scene file also as a number or a list."""
+"""How an argument is written as text; in a scene file also as a list, or a number without unit."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -246,38 +244,28 @@ def _split(given: Any, separator: str | None = ";") -> list[Any]:
     return [part for part in str(given).split(separator) if part.strip()]
 
 
-def _each(name: str, parts: list[Any], unit: str) -> list[float]:
-    if set(map(type, parts)) == {str}:
-        # A list may be long, and most of its numbers are bare.
-        with suppress(ValueError):
-            numbers = list(map(float, parts))
-            if all(map(math.isfinite, numbers)):
-                return numbers
-    return [quantity(name, part, unit) for part in parts]
-
-
 def _quantities(name: str, given: Any, unit: str) -> list[float]:
-    return _each(name, _split(given), unit)
+    return [quantity(name, part, unit) for part in _split(given)]
 
 
 def _vector(name: str, given: Any, unit: str) -> list[float]:
-    return _each(name, _split(given, None), unit)
+    parts = _split(given, None)
+    last = parts[-1] if len(parts) > 1 else ""
+    if unit and isinstance(last, str) and last[:1].isalpha():  # "3 1 rad/mm"
+        parts = [f"{part}{last}" for part in parts[:-1]]
+    return [quantity(name, part, unit) for part in parts]
 
 
 def _vectors(name: str, given: Any, unit: str) -> list[Any]:
-    rows = [_split(row, None) for row in _split(given)]
-    values = _each(name, list(chain(*rows)), unit)
-    if all(len(row) == 1 for row in rows):
-        return values
-    following = iter(values)
-    return [list(islice(following, len(row))) for row in rows]
+    rows = [_vector(name, row, unit) for row in _split(given)]
+    return [row[0] for row in rows] if all(len(row) == 1 for row in rows) else rows
 
 
 def _pair(name: str, given: Any, unit: str) -> float | list[float]:
     parts = _split(given)
     if len(parts) not in {1, 2}:
         raise ParameterError(name, "must be one quantity, or two for x and y: 'a; b'", given)
-    values = _each(name, parts, unit)
+    values = _quantities(name, parts, unit)
     return values[0] if len(values) == 1 else values
 
 

@@ -1,4 +1,8 @@
-"""Quantities as text, at the edges only: "0.8 mm" is 0.0008 everywhere else."""
+"""Quantities as text, at the edges only: "0.8 mm" is 0.0008 everywhere else.
+
+What has a dimension is written with its unit, always: a bare number would be read as metres by one
+and as millimetres by another.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +21,16 @@ _BARE = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _FACTOR = r"[^\W\d_]+(?:\s*(?:\^|\*\*)\s*[+-]?[1-9]|⁻?[¹²³])?|[°%]"
 _UNIT = re.compile(rf"(?:1\s*/\s*)?(?:{_FACTOR})(?:\s*[*/·\s]\s*(?:{_FACTOR}))*")
 _LONGEST_UNIT = 64
+_USUAL = {
+    "m": ("mm", "um", "m"),
+    "rad": ("deg", "rad"),
+    "rad/m": ("rad/mm", "rad/m"),
+    "s": ("s", "ms"),
+    "kg": ("g", "kg"),
+    "N": ("N", "mN"),
+    "B": ("MB", "GB"),
+}
+"""The units in which people write a quantity, the likeliest first; else the SI unit itself."""
 
 
 @lru_cache(maxsize=1)
@@ -26,30 +40,43 @@ def _registry() -> pint.UnitRegistry[Any]:
     return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
 
 
-def quantity(name: str, text: str | float, unit: str) -> float:
+def quantity(name: str, given: str | float, unit: str) -> float:
     """Return a quantity in SI units.
 
     Args:
         name: of the argument, for the error message.
-        text: a number with a unit, "500N/m" or "500 N/m"; a bare number is in ``unit``.
+        given: a number with a unit, "500N/m" or "500 N/m"; only zero needs none.
         unit: the SI unit, such as "m", "N/m" or "rad"; "" for a number without unit.
 
     Raises:
-        ParameterError: if the text is no finite quantity of that dimension.
+        ParameterError: if it is no finite quantity of that dimension; for a number without its
+            unit, with the units that it may have.
 
     Example:
         >>> quantity("period", "1.5 mm", "m"), quantity("stiffness", "0.5N/mm", "N/m")
         (0.0015, 500.0)
+        >>> quantity("stiffness", "500", "N/m")
+        Traceback (most recent call last):
+        ...
+        asperity.errors.ParameterError: stiffness needs a unit: write 500N/m, got '500'
     """
-    if isinstance(text, bool) or not isinstance(text, (str, int, float)):
-        raise ParameterError(name, _wanted(unit), text)
-    number = _bare_number(text)
+    if isinstance(given, bool) or not isinstance(given, (str, int, float)):
+        raise ParameterError(name, _wanted(unit), given)
+    number = _bare_number(given)
+    bare = number is not None
     if number is None:
-        number = _with_unit(name, str(text), unit)
+        number = _with_unit(name, str(given), unit)
     if not math.isfinite(number):
-        shown = text if isinstance(text, str) else number  # an int may have too many digits
+        shown = given if isinstance(given, str) else number  # an int may have too many digits
         raise ParameterError(name, f"must be finite; {_wanted(unit)}", shown)
+    if bare and unit and number != 0.0:
+        raise ParameterError(name, f"needs a unit: write {_with_usual_units(given, unit)}", given)
     return number
+
+
+def _with_usual_units(number: str | float, unit: str) -> str:
+    written = number.strip() if isinstance(number, str) else f"{number:g}"
+    return " or ".join(f"{written}{usual}" for usual in _USUAL.get(unit, (unit,)))
 
 
 def _wanted(unit: str) -> str:
@@ -70,22 +97,26 @@ def _with_unit(name: str, text: str, unit: str) -> float:
     if match is None or not unit:
         raise ParameterError(name, _wanted(unit), text)
     words = text.strip()[match.end() :].strip()
-    if len(words) > _LONGEST_UNIT or _UNIT.fullmatch(words) is None:
-        raise ParameterError(name, f"{_wanted(unit)}; the unit is not understood", text)
+    factor = _factor(words, unit) if len(words) <= _LONGEST_UNIT else "is not understood"
+    if isinstance(factor, str):
+        raise ParameterError(name, f"{_wanted(unit)}; the unit {factor}", text)
+    return _scaled(match.group(), factor)
+
+
+@lru_cache(maxsize=1024)
+def _factor(words: str, unit: str) -> float | str:
+    """Return how many SI units a unit is; or what is wrong with it."""
+    if _UNIT.fullmatch(words) is None:
+        return "is not understood"
     import pint
 
-    registry = _registry()
     try:
-        given = registry.Quantity(1.0, words)
         # The number is converted as text would be: 0.8 mm is 0.0008, not 0.8 * 0.001.
-        factor = given.to(unit).magnitude
+        return float(_registry().Quantity(1.0, words).to(unit).magnitude)
     except pint.DimensionalityError:
-        raise ParameterError(name, f"{_wanted(unit)}, not of another dimension", text) from None
-    except (pint.PintError, ValueError, TypeError, AttributeError, SyntaxError):
-        raise ParameterError(name, f"{_wanted(unit)}; the unit is not understood", text) from None
+        return "is of another dimension"
     except Exception:  # pint lets errors of its tokenizer through
-        raise ParameterError(name, f"{_wanted(unit)}; the unit is not understood", text) from None
-    return _scaled(match.group(), float(factor))
+        return "is not understood"
 
 
 def _scaled(number: str, factor: float) -> float:

@@ -105,7 +105,7 @@ def test_jumps_are_listed(call: Call) -> None:
 
 @pytest.mark.parametrize("law", ["W", "A", "B", "C", "E", "F", "G", "H"])
 def test_the_three_lines_reproduce_q(call: Call, law: str) -> None:
-    options = ["--law", law, "--max-depth", "0.2mm", "--stiffness", "700"]
+    options = ["--law", law, "--max-depth", "0.2mm", "--stiffness", "700N/m"]
     options += ["--friction", "0.3"] if law == "F" else []
     _code, out, _err = call(SPEC, *options)
     lines = code_of(out)
@@ -212,7 +212,7 @@ def test_scene_file_names_the_law_and_options_override_it(call: Call, tmp_path: 
     data = json.loads(call(str(scene), "--json", "-")[1])
     assert (data["law"], data["stiffness"], data["device"]["id"]) == ("G", 800.0, "pantograph")
     assert data["clamp"] == "whole"
-    given = ["--law", "A", "--stiffness", "300", "--device", "touch"]
+    given = ["--law", "A", "--stiffness", "300N/m", "--device", "touch"]
     data = json.loads(call(str(scene), *given, "--json", "-")[1])
     assert (data["law"], data["stiffness"], data["device"]["id"]) == ("A", 300.0, "touch")
 

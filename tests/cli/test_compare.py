@@ -115,7 +115,7 @@ def test_scene_file_with_an_option_that_overrides_it(call: Call, tmp_path: Path)
     data = json.loads(out)
     assert (data["stiffness"], data["device"]["id"]) == (800.0, "pantograph")
     _code, out, _err = call("compare", str(scene), "--laws", "A", "--json", "-",
-                            "--stiffness", "300", "--device", "inverse3")  # fmt: skip
+                            "--stiffness", "300N/m", "--device", "inverse3")  # fmt: skip
     data = json.loads(out)
     assert (data["stiffness"], data["device"]["id"]) == (300.0, "inverse3")
 

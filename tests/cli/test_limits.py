@@ -101,7 +101,7 @@ def test_a_limit_that_fails_is_a_verdict(call: Call, bench: str) -> None:
 
 def test_every_option_of_the_law_is_taken(call: Call) -> None:
     options = ["--law", "F", "--friction", "0.3", "--max-deflection", "0.5mm"]
-    options += ["--modulation-depth", "0.5", "--stiffness", "600"]
+    options += ["--modulation-depth", "0.5", "--stiffness", "600N/m"]
     _code, out, _err = call(SPEC, *options, "--max-depth", "0.2mm", "--json", "-")
     force = json.loads(out)["waves"][0]["force"]
     assert force == pytest.approx(600.0 * 0.2e-3 * 0.3 * 0.5 / 2, rel=1e-6)
@@ -141,7 +141,7 @@ def test_scene_file_with_options_that_override_it(call: Call, tmp_path: Path) ->
     _code, out, _err = call(str(scene), "--json", "-")
     data = json.loads(out)
     assert (data["law"], data["stiffness"], data["device"]["id"]) == ("G", 800.0, "pantograph")
-    options = ["--law", "A", "--stiffness", "300", "--device", "touch"]
+    options = ["--law", "A", "--stiffness", "300N/m", "--device", "touch"]
     _code, out, _err = call(str(scene), *options, "--json", "-")
     data = json.loads(out)
     assert (data["law"], data["stiffness"], data["device"]["id"]) == ("A", 300.0, "touch")

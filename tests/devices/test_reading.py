@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -101,14 +102,17 @@ WRONG = [
     ({"max_stiffness": {"value": 3, "unit": 7}}, "must be text such as 'N/m'"),
     ({"max_stiffness": {"value": 3, "unit": "1"}}, "must be text such as 'N/m'"),
     ({"delay_samples": {"value": 3, "unit": 1}}, "plain number"),
+    ({"max_stiffness": "1200"}, "max_stiffness needs a unit: write 1200N/m, got '1200'"),
+    ({"max_stiffness": {"value": "1200"}}, "needs a unit: write 1200N/m"),
+    ({"apparent_mass": "45"}, "apparent_mass needs a unit: write 45g or 45kg"),
     ({"max_stiffness": 0}, "must be positive"),
     ({"max_stiffness": -1}, "must be positive"),
     ({"max_stiffness": "1e-400 N/m"}, "must be positive"),
     ({"max_stiffness": "many"}, "quantity"),
     ({"max_stiffness": [3]}, "quantity"),
     ({"max_stiffness": True}, "quantity"),
-    ({"max_stiffness": {"value": False, "unit": "N/m"}}, "quantity"),
-    ({"max_stiffness": {"value": True, "unit": "N/mm"}}, "quantity"),
+    ({"max_stiffness": {"value": False, "unit": "N/m"}}, "must be a number"),
+    ({"max_stiffness": {"value": True, "unit": "N/mm"}}, "must be a number"),
     ({"max_stiffness": math.inf}, "must be finite"),
     ({"max_stiffness": math.nan}, "must be finite"),
     ({"max_stiffness": {"value": math.nan, "unit": "N/mm"}}, "must be finite"),
@@ -158,6 +162,35 @@ def test_bad_content_is_refused(content: dict[str, object], message: str) -> Non
     assert "device" in str(caught.value)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 700
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("max_stiffness = 1200", "device.max_stiffness needs a unit: write 1200N/m, got 1200"),
+        ("apparent_mass = 0.045", "write 0.045g or 0.045kg"),
+        ("[damping]\nvalue = 2.5\nsource = 'x'", "device.damping needs a unit: write 2.5N"),
+        ("[damping]\nvalue = '1 N*s/m'\n[[damping.also]]\nvalue = 2.5", "write 2.5N"),
+        ("[max_stiffness]\nvalue = '2 N/mm'\ncycled = 2500", "cycled needs a unit: write 2500N/m"),
+        ("[max_stiffness]\nvalue = '2 N/mm'\nupdate_rate = 1", "update_rate needs a unit"),
+    ],
+)
+def test_numbers_of_a_file_need_their_units(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "mine.toml").write_text(text)
+    with pytest.raises(ParameterError, match=re.escape(message)):
+        load_device(tmp_path / "mine.toml")
+
+
+def test_numbers_of_a_file_that_have_units_or_need_none(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(
+        "delay_samples = 2\nfriction = 0\n"
+        "[max_stiffness]\nvalue = 2\nunit = 'N/mm'\nlightest = 0.8\ncycled = '2.5 N/mm'\n"
+        "[[max_stiffness.also]]\nvalue = 3\nunit = 'N/mm'\n"
+    )
+    device = load_device(tmp_path / "mine.toml")
+    assert (device.value("delay_samples"), device.value("friction")) == (2.0, 0.0)
+    assert device.wall_test is not None
+    assert (device.max_stiffness, device.wall_test.cycled) == (2000.0, 2500.0)
 
 
 def test_the_same_without_the_mistake_is_taken() -> None:

@@ -20,11 +20,11 @@ def test_sinusoid_specification() -> None:
 
 
 def test_fourier_specification() -> None:
-    spec = "fourier:amplitudes=0.3mm;0.2mm,wavevectors=3 1;-1 4,phases=0;90deg"
+    spec = "fourier:amplitudes=0.3mm;0.2mm,wavevectors=3 1 rad/m;-1rad/m 4rad/m,phases=0;90deg"
     texture = load_scene(spec).texture
     assert isinstance(texture, Fourier)
     np.testing.assert_allclose(texture.wavevectors, [[3, 1], [-1, 4]])
-    profile = load_scene("fourier:amplitudes=1mm;0.5mm,wavevectors=2000;4000").texture
+    profile = load_scene("fourier:amplitudes=1mm;0.5mm,wavevectors=2rad/mm;4000 rad/m").texture
     assert profile.is_profile
 
 
@@ -62,6 +62,10 @@ def test_scene_with_a_measured_file_beside_it(tmp_path: Path) -> None:
         ("sinusoid:amplitude=1mm,periode=1mm", "sinusoid.periode", "did you mean 'period'"),
         ("sinusoid:amplitude=1mm,amplitude=2mm", "amplitude", "twice"),
         ("sinusoid:amplitude=1N,period=1mm", "amplitude", "dimension"),
+        ("sinusoid:amplitude=1mm,period=1", "period", "needs a unit: write 1mm or 1um or 1m"),
+        ("sinusoid:amplitude=1mm,period=1mm,phase=90", "phase", "write 90deg or 90rad"),
+        ("fourier:amplitudes=1mm;2,wavevectors=1rad/m", "amplitudes", "write 2mm or 2um"),
+        ("fourier:amplitudes=1mm,wavevectors=1 2", "wavevectors", "write 1rad/mm or 1rad/m"),
         ("sinusoid:amplitude=-1mm,period=1mm", "amplitude", "positive"),
         ("sinusoid:amplitude=1mm,period=0", "period", "positive"),
         ("sinusoid:amplitude=nan,period=1mm", "amplitude", "finite"),
@@ -85,6 +89,10 @@ def test_bad_specifications(source: str, argument: str, message: str) -> None:
          "did you mean 'stiffness'"),
         ('[texture]\nkind = "sinusoid"\namplitude = 1\nperiod = 1\n[device]\nid = "tuch"\n',
          "did you mean 'touch'"),
+        ('[texture]\nkind = "sinusoid"\namplitude = 1\nperiod = "1 mm"\n',
+         "amplitude needs a unit: write 1mm or 1um or 1m, got 1"),
+        ('[texture]\nkind = "sinusoid"\namplitude = "1 mm"\nperiod = "1 mm"\n'
+         '[surface]\nstiffness = 800\n', "stiffness needs a unit: write 800N/m"),
         ("texture = 3\n", "must be a section"),
         ("[texture\n", "not valid TOML"),
         ("[surface]\nstiffness = 1" + "0" * 5000, "not valid TOML"),
@@ -95,6 +103,24 @@ def test_bad_scenes(tmp_path: Path, content: str, message: str) -> None:
     (tmp_path / "scene.toml").write_text(content)
     with pytest.raises(ParameterError, match=message):
         load_scene(str(tmp_path / "scene.toml"))
+
+
+def test_a_device_in_a_scene_needs_units(tmp_path: Path) -> None:
+    text = '[texture]\nkind = "sinusoid"\namplitude = "1 mm"\nperiod = "1 mm"\n[device]\n'
+    for lines in ("max_stiffness = 700\n", 'id = "touch"\nmax_stiffness = 700\n'):
+        (tmp_path / "scene.toml").write_text(text + lines)
+        with pytest.raises(ParameterError, match=r"max_stiffness needs a unit: write 700N/m"):
+            load_scene(str(tmp_path / "scene.toml"))
+
+
+def test_what_was_read_comes_before_the_scene(tmp_path: Path) -> None:
+    np.save(tmp_path / "map.npy", 1e-5 * np.random.default_rng(0).normal(size=(12, 16)))
+    (tmp_path / "scene.toml").write_text(
+        '[texture]\nkind = "file"\npath = "map.npy"\npitch = "10 µm"\n'
+    )
+    texture = load_scene(str(tmp_path / "scene.toml"), {"pitch": 3e-5}).texture
+    assert isinstance(texture, HeightMap)
+    assert texture.pitch == (3e-5, 3e-5)
 
 
 def test_file_options_belong_to_files() -> None:

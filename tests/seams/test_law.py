@@ -134,9 +134,9 @@ def test_a_scene_says_the_parameter(call: Call, answer: Answer, module: str, sce
 
 
 def test_loops_over_laws_take_it_along(answer: Answer, module: str, scene: str) -> None:
-    way = 'kind = "strokes"\nstart = "0mm;0mm;-0.3mm"\nend = "4mm;0mm;-0.3mm"\nspeed = 0.1\n'
+    way = 'kind = "strokes"\nstart = "0mm;0mm;-0.3mm"\nend = "4mm;0mm;-0.3mm"\nspeed = "0.1 m/s"\n'
     Path(scene).write_text(LOOP.replace('kind = "still"\n', way).replace("point = ", "# "), "utf-8")
-    options = ["--law-module", module, "--laws", "WX", "--speeds", "0.1", "--strokes", "1"]
+    options = ["--law-module", module, "--laws", "WX", "--speeds", "0.1m/s", "--strokes", "1"]
     soft = answer("scan", scene, *options)
     hard = answer("scan", scene, *options, "--set", "soft_depth=10 mm")
     assert [one["law"] for one in soft["strokes"]] == ["W", "X"]

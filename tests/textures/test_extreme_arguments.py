@@ -22,7 +22,7 @@ WAVES = [
     "sinusoid:amplitude=1m,period=1nm",
     "sinusoid:amplitude=1e30,period=1e-30",
     "sinusoid:amplitude=1um,period=1e-30",
-    "fourier:amplitudes=1e30,wavevectors=1e30 0",
+    "fourier:amplitudes=1e30m,wavevectors=1e30 0 rad/m",
     "fourier:amplitudes=1e-30,wavevectors=1e-30 0",
     "fourier:amplitudes=1,wavevectors=1e10 0",
     "fourier:amplitudes=1,wavevectors=1e10 1e3; 1 1e10",
@@ -55,7 +55,7 @@ def test_a_wave_too_steep_for_a_loop_is_named() -> None:
     with pytest.raises(ParameterError, match=r"too steep for its leak.*amplitude.*period"):
         compare(load_scene(WAVES[0]).texture, laws="A")
     with pytest.raises(ParameterError, match="amplitudes and wavevectors make a curvature"):
-        load_scene("fourier:amplitudes=1e30,wavevectors=1e30 0")
+        load_scene("fourier:amplitudes=1e30m,wavevectors=1e30 0 rad/m")
 
 
 def test_analysis_of_a_radius_below_all_digits() -> None:

@@ -19,6 +19,7 @@ from asperity.units import quantity
 
 _KEYS = ("value", "unit", "source", "verified", "also")
 _WALL_KEYS = ("directions", "cycled", "update_rate", "positions", "lightest")
+_WALL_UNITS = {"cycled": "N/m", "update_rate": "Hz", "lightest": "1"}
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 _NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*")
 
@@ -40,7 +41,7 @@ def _catalogue() -> dict[str, dict[str, Any]]:
 def load_device(device: str | os.PathLike[str] | Device) -> Device:
     """Return a device of the catalogue by its id, or one from a TOML file.
 
-    A file gives ``id``, ``name`` and any of the fields of the catalogue, each as a quantity
+    A file gives ``id``, ``name`` and any of the fields of the catalogue, each with its unit
     ("12 N"), or as a table with ``value``, ``unit``, ``source``, ``verified`` (``true``,
     ``"read"``, ``"measured"`` or ``false``) and ``also``. ``max_stiffness`` is a wall test and may
     say ``directions``, ``cycled``, ``update_rate``, ``positions`` and ``lightest``; see
@@ -62,13 +63,18 @@ def load_device(device: str | os.PathLike[str] | Device) -> Device:
         if known.lower() == text.strip().lower():
             return parse_device(content, known)
     if text.lower().endswith(".toml"):
-        return parse_device(read_toml("device", Path(text)), Path(text).stem)
+        return parse_device(read_toml("device", Path(text)), Path(text).stem, from_file=True)
     hint = nearest_names(text, _catalogue())
     raise ParameterError("device", f"is unknown: {text!r}; {hint}, or a TOML file")
 
 
-def parse_device(content: Mapping[str, Any], default_id: str) -> Device:
-    """Return a device from the content of a file; see :func:`load_device`.
+def parse_device(content: Mapping[str, Any], default_id: str, *, from_file: bool = False) -> Device:
+    """Return a device from its fields; see :func:`load_device`.
+
+    Args:
+        content: fields by name: text with a unit, or a number in SI units.
+        default_id: of a device that says none.
+        from_file: whether people wrote it in a file, where numbers need their units.
 
     Raises:
         ParameterError: for unknown or wrong fields.
@@ -82,6 +88,8 @@ def parse_device(content: Mapping[str, Any], default_id: str) -> Device:
     if unknown:
         hint = nearest_names(unknown[0], [*FIELD_TABLE, *WORDS])
         raise ParameterError("device", f"has an unknown field {unknown[0]!r}; {hint}")
+    if from_file:
+        _refuse_bare(content)
     identity = _text("device.id", content.get("id", default_id))
     name = _text("device.name", content.get("name", identity))
     axes = _text("device.axes", content["axes"]) if "axes" in content else ""
@@ -92,6 +100,29 @@ def parse_device(content: Mapping[str, Any], default_id: str) -> Device:
     data = {field: _datum(field, given) for field, given in content.items() if field in FIELD_TABLE}
     _check_forces(data)
     return Device(identity, name, data, axes, sentences)
+
+
+def _refuse_bare(content: Mapping[str, Any]) -> None:
+    """Refuse numbers without their unit."""
+    for field, given in content.items():
+        if field not in FIELD_TABLE:
+            continue
+        name, table = f"device.{field}", given if isinstance(given, dict) else {"value": given}
+        others = table.get("also", [])
+        for said in (table, *(others if isinstance(others, list) else ())):
+            if isinstance(said, dict) and "unit" not in said:
+                _refuse_number(name, said.get("value"), FIELD_TABLE[field].unit)
+        for key, unit in _WALL_UNITS.items():
+            _refuse_number(f"{name}.{key}", table.get(key), unit)
+
+
+def _refuse_number(name: str, given: Any, unit: str) -> None:
+    if _is_number(given) and unit != "1":
+        quantity(name, given, unit)
+
+
+def _is_number(given: Any) -> bool:
+    return isinstance(given, (int, float)) and not isinstance(given, bool)
 
 
 def _text(name: str, given: Any) -> str:
@@ -141,7 +172,7 @@ def _verified(name: str, given: Any) -> tuple[bool, bool]:
 def _wall_test(name: str, held: float, table: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a file says of the wall's test besides the stiffness that held [SI]."""
     said: dict[str, Any] = {}
-    for key, unit in (("cycled", "N/m"), ("update_rate", "Hz"), ("lightest", "1")):
+    for key, unit in _WALL_UNITS.items():
         if key in table:
             said[key] = _quantity(f"{name}.{key}", table[key], unit)
             if said[key] <= 0.0:
@@ -183,10 +214,10 @@ def _value(name: str, field: str, table: Mapping[str, Any]) -> float:
 
 
 def _quantity(name: str, given: Any, unit: str) -> float:
-    """Return a finite quantity [SI]; "1" is the unit of plain numbers."""
+    """Return a finite quantity [SI]; a number is in SI units, and "1" has none."""
     if isinstance(given, int) and not isinstance(given, bool) and abs(given) > 10**300:
         raise ParameterError(name, f"must be finite [{unit}]", "a number of more than 300 digits")
-    return quantity(name, given, "" if unit == "1" else unit)
+    return quantity(name, given, "" if unit == "1" or _is_number(given) else unit)
 
 
 def _with_named_unit(name: str, given: Any, named: Any, unit: str) -> float:
@@ -206,7 +237,7 @@ def _with_named_unit(name: str, given: Any, named: Any, unit: str) -> float:
         if own:
             return _quantity(name, given, unit)
     quantity(f"{name}.unit", f"1 {named}", unit)  # a wrong unit is told apart from a wrong value
-    plain = _quantity(name, given, unit)
+    plain = _quantity(name, given, "1")
     return plain if named.strip() == unit else quantity(name, f"{given} {named}", unit)
 
 

@@ -94,7 +94,8 @@ def _written(kind: Kind, name: str, value: Any) -> str:
     """Return a value as the command line takes it; micrometres without a Greek letter."""
     argument = next(argument for argument in kind.arguments if argument.name == name)
     if argument.form == "vectors":
-        return "; ".join(" ".join(f"{part:g}" for part in row) for row in value)
+        rows = (" ".join(f"{part:g}" for part in row) for row in value)
+        return "; ".join(f"{row} {argument.unit}" for row in rows)
     if isinstance(value, list):
         return "; ".join(_plain(argument, part) for part in value)
     return _plain(argument, value)

@@ -87,13 +87,19 @@ def _parse_arguments(text: str) -> dict[str, str]:
     return arguments
 
 
-def build_texture(kind: str, arguments: Mapping[str, Any], folder: Path | None = None) -> Texture:
-    """Return a texture from its kind and its arguments as text, numbers or lists.
+def build_texture(
+    kind: str,
+    arguments: Mapping[str, Any],
+    folder: Path | None = None,
+    values: Mapping[str, Any] | None = None,
+) -> Texture:
+    """Return a texture from its kind and its arguments as text or lists.
 
     Args:
         kind: of the catalogue, or "file".
         arguments: by name.
         folder: to which a file is relative.
+        values: of arguments that were read [SI]; they come first.
 
     Raises:
         ParameterError: for an unknown kind or argument, one that is missing, or a wrong value.
@@ -101,12 +107,12 @@ def build_texture(kind: str, arguments: Mapping[str, Any], folder: Path | None =
     if kind not in KINDS:
         raise ParameterError("surface", f"kind is unknown: {kind!r}; {nearest_names(kind, KINDS)}")
     known = KINDS[kind]
-    values = read_arguments(kind, arguments, known.arguments, folder)
+    read = read_arguments(kind, arguments, known.arguments, folder) | dict(values or {})
     required = [argument.name for argument in known.required]
     for name in required:
-        if name not in values:
+        if name not in read:
             raise ParameterError(name, f"is missing: a {kind} needs {', '.join(required)}")
-    return known.make(**values)
+    return known.make(**read)
 
 
 def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
@@ -124,14 +130,13 @@ def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
     if not isinstance(kind, str):
         known = " | ".join(f'"{name}"' for name in KINDS)
         raise ParameterError("scene", f"{path.name} needs [texture] with kind = {known}", kind)
-    if kind == "file":
-        texture |= extra
-    else:
+    if kind != "file":
         _refuse_file_arguments(extra)
     surface = read_arguments("surface", content.get("surface", {}), surface_arguments())
     device = _scene_device(content["device"]) if "device" in content else None
     loop = {name: content[name] for name in LOOP_SECTIONS if name in content}
-    return Scene(build_texture(kind, texture, path.parent), surface, device, loop, path.parent)
+    built = build_texture(kind, texture, path.parent, extra)
+    return Scene(built, surface, device, loop, path.parent)
 
 
 def _refuse_code(content: Mapping[str, Any]) -> None:
@@ -147,8 +152,8 @@ def _scene_device(section: Mapping[str, Any]) -> Device:
     """Return a device of the catalogue, with what the scene says besides; or one of its own."""
     own = {name: value for name, value in section.items() if name != "id"}
     if "id" not in section:
-        return parse_device(own, "the scene's device")
+        return parse_device(own, "the scene's device", from_file=True)
     known = load_device(_ID.read(section["id"]))
-    changed = parse_device(own, known.id)
+    changed = parse_device(own, known.id, from_file=True)
     words = {name: getattr(changed, name) for name in ("name", "axes", "notes") if name in own}
     return replace(known, data={**known.data, **changed.data}, **words)
