@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -129,25 +129,33 @@ def find_cutoffs(
     return Cutoffs(short, long, chosen)
 
 
-def apply_filters(heights: FloatArray, pitch: tuple[float, ...], cutoffs: Cutoffs) -> list[str]:
+def apply_filters(
+    heights: FloatArray,
+    pitch: tuple[float, ...],
+    cutoffs: Cutoffs,
+    record: Callable[..., None] = lambda *_arguments, **_words: None,
+) -> list[str]:
     """Apply the S-filter, then the L-filter, where the heights are.
 
     Args:
         heights: [m], shape (ny, nx) or (n,), finite; replaced.
         pitch: (px, py) or (px,) [m].
         cutoffs: of :func:`find_cutoffs`.
+        record: told after each filter, see :class:`asperity.measured.history.Recorder`.
 
     Returns:
         What was done, one sentence for each filter.
     """
     part = "21" if heights.ndim == 1 else "61"
-    short = f"cut-off {length_text(cutoffs.short)}{cutoffs.chosen}"
-    steps = [f"filtered: Gaussian ISO 16610-{part}, {short}"]
+    short = length_text(cutoffs.short)
+    steps = [f"filtered: Gaussian ISO 16610-{part}, cut-off {short}{cutoffs.chosen}"]
     smooth_in_place(heights, pitch, cutoffs.short)
+    record(f"S-filter {short}", heights, pitch, removes=True)
     if cutoffs.long is not None:
         roughen_in_place(heights, pitch, cutoffs.long)
-        long = f"cut-off {length_text(cutoffs.long)}"
-        steps.append(f"waviness removed: Gaussian L-filter ISO 16610-{part}, {long}")
+        long = length_text(cutoffs.long)
+        record(f"L-filter {long}", heights, pitch, removes=True, nesting=cutoffs.long)
+        steps.append(f"waviness removed: Gaussian L-filter ISO 16610-{part}, cut-off {long}")
     return steps
 
 

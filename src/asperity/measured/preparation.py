@@ -17,6 +17,7 @@ from asperity.measured.blending import check_width, make_periodic
 from asperity.measured.filling import fill_in_place
 from asperity.measured.filters import ALPHA, apply_filters, find_cutoffs, gaussian_filter
 from asperity.measured.form import check_degree, fit_form, subtract_form
+from asperity.measured.history import Recorder, Watch, resized
 from asperity.measured.length_words import by_text, length_text, lengths_text, positive_number
 from asperity.measured.outliers import remove_outliers
 from asperity.measured.prepared import Prepared
@@ -33,6 +34,7 @@ _LEAST = 4
 MAX_MISSING = 0.25
 """Share of missing points that is filled unless more is allowed."""
 
+_LEVELLED = {0: "mean removed", 1: "levelled"}
 _LONGEST = 10.0  # [m]; heights beyond are rather heights whose unit is not the metre
 
 
@@ -53,6 +55,7 @@ def prepare(  # noqa: D417 - the others are described where they are declared
     magnify: float = 1.0,
     magnify_height: float | None = None,
     progress: Callable[[str], None] | None = None,
+    watch: Watch | None = None,
 ) -> Prepared:
     """Make a surface ready to be a texture, as far as it is asked for.
 
@@ -66,6 +69,7 @@ def prepare(  # noqa: D417 - the others are described where they are declared
         raw: the surface as read.
         {arguments}
         progress: called with the name of each stage before it begins.
+        watch: told the heights after each step, see :mod:`asperity.measured.history`.
 
     Returns:
         The prepared surface with what was done to it.
@@ -86,7 +90,7 @@ def prepare(  # noqa: D417 - the others are described where they are declared
         filtered: Gaussian ISO 16610-21, cut-off 40 µm (chosen from the sampling: 4 samples)
         magnified 20 times laterally and in height
     """
-    begin = progress or (lambda _stage: None)
+    begin, record = progress or (lambda _stage: None), Recorder(watch)
     raw = raw.in_metres(raw.pitch if pitch is None else pitch)
     steps = list(raw.notes)
     _check_heights(raw.heights, max_missing)
@@ -98,29 +102,38 @@ def prepare(  # noqa: D417 - the others are described where they are declared
     reserve(*raw.heights.shape[::-1])
     begin("outliers")
     heights = np.array(raw.heights, dtype=np.float64)
+    if height_range is None:
+        record("as read", heights, lateral)
     if outliers is not None:
         steps.append(remove_outliers(heights, outliers))
         _check_missing(heights, max_missing)
     _scale(heights, raw, height_range, steps)
+    if outliers is not None or height_range is not None:
+        record("as read" if outliers is None else "without outliers", heights, lateral)
     begin("form")
     sentence = subtract_form(heights, fit_form(heights, form), lateral)
+    record(_LEVELLED.get(form, "form removed"), heights, lateral, removes=True)
     begin("fill")
     # What the form leaves is interpolated: a hole at the border continues a bow or a tilt.
     filled = _fill(heights, lateral, form, steps)
+    if filled.any():
+        record("holes filled", heights, lateral)
     steps.append(sentence)
     begin("filter")
-    steps.extend(apply_filters(heights, lateral, cutoffs))
+    steps.extend(apply_filters(heights, lateral, cutoffs, record))
     begin("tip")
     if tip_radius is not None:
         heights, sentence = apply_tip(heights, lateral, tip_radius)
+        record(f"tip {length_text(tip_radius)}", heights, lateral, removes=True)
         steps.append(sentence)
     begin("repeat")
     if periodic:
         heights, filled, sentence = make_periodic(heights, filled, lateral, blend)
+        record("periodic", heights, lateral)
         steps.append(sentence)
     begin("magnify")
     mask = filled if filled.any() else None
-    ready = Prepared(heights, lateral, tuple(steps), mask, bool(periodic))
+    ready = Prepared(heights, lateral, tuple(steps), mask, bool(periodic), tuple(record.stages))
     return magnified(ready, magnify, magnify_height)
 
 
@@ -150,7 +163,11 @@ def magnified(
     size = f"{lateral:g} times laterally and"
     step = f"{size} in height" if lateral == upward else f"{size} {upward:g} times in height"
     heights *= upward
-    return replace(prepared, pitch=wider, steps=(*prepared.steps, f"magnified {step}"))
+    history = prepared.history
+    if history:
+        history += (resized("magnified", heights, wider, history[-1], lateral),)
+    steps = (*prepared.steps, f"magnified {step}")
+    return replace(prepared, pitch=wider, steps=steps, history=history)
 
 
 def _check_early(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import tokenize
 import zipfile
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 
 from asperity.checks import FloatArray
 from asperity.errors import ParameterError, SurfaceFileError
-from asperity.files import open_input, whole_file
+from asperity.files import json_text, open_input, whole_file
+from asperity.measured.history import Stage, stages_of
 
 SCHEMA = 1
 """Version of the file's layout."""
@@ -47,6 +49,7 @@ class Prepared:
         filled: where heights were missing and have been interpolated, same shape; None for
             nowhere.
         periodic: whether the surface repeats after n times the pitch.
+        history: the surface's parameters as read and after each step; none of a file of old.
     """
 
     heights: FloatArray
@@ -54,6 +57,7 @@ class Prepared:
     steps: tuple[str, ...]
     filled: NDArray[np.bool_] | None = None
     periodic: bool = False
+    history: tuple[Stage, ...] = ()
 
 
 def save_prepared(
@@ -81,6 +85,7 @@ def save_prepared(
         "periodic": np.array(prepared.periodic),
         "filled": filled,
         "steps": np.array(prepared.steps, dtype=np.str_),
+        "history": np.array(json_text(prepared.history)),
         "source": np.array(Path(source).name),
         "sha256": np.array(_sha256(Path(source))),
     }
@@ -160,7 +165,10 @@ def _read(archive: zipfile.ZipFile) -> Prepared:
     if not np.isfinite(heights).all():
         raise SurfaceFileError("has heights that are not finite")
     mask = filled if filled.any() else None
-    return Prepared(np.ascontiguousarray(heights), pitch, steps, mask, periodic)
+    history: tuple[Stage, ...] = ()
+    if "history.npy" in archive.namelist():  # a file of old has none
+        history = stages_of(json.loads(str(_member(archive, "history", "U", 0))))
+    return Prepared(np.ascontiguousarray(heights), pitch, steps, mask, periodic, history)
 
 
 def _member(archive: zipfile.ZipFile, name: str, kinds: str, axes: int | None = None) -> Any:

@@ -13,6 +13,7 @@ from asperity.textures.heightmap import HeightMap
 from asperity.textures.profile import Profile
 
 if TYPE_CHECKING:
+    from asperity.measured.history import Watch
     from asperity.measured.prepared import Prepared
 
 
@@ -58,6 +59,7 @@ def prepare_file(
     path: str | os.PathLike[str],
     *,
     progress: Callable[[str], None] | None = None,
+    watch: Watch | None = None,
     magnify: float = 1.0,
     magnify_height: float | None = None,
     **arguments: Any,
@@ -67,6 +69,7 @@ def prepare_file(
     Args:
         path: the file.
         progress: called with the name of each stage before it begins.
+        watch: told the heights after each step, see :mod:`asperity.measured.history`.
         magnify: see :func:`load_texture`; also for a prepared surface.
         magnify_height: see :func:`load_texture`; also for a prepared surface.
         **arguments: the others of :func:`load_texture`; None and False mean not given.
@@ -93,6 +96,7 @@ def prepare_file(
         magnify=magnify,
         magnify_height=magnify_height,
         progress=progress,
+        watch=watch,
         **given,
     )
 
@@ -104,6 +108,10 @@ def texture_of(prepared: Prepared) -> HeightMap | Profile:
         "preparation": prepared.steps,
         "filled": prepared.filled,
     }
+    texture: HeightMap | Profile
     if prepared.heights.ndim == 1:
-        return Profile(prepared.heights, prepared.pitch[0], **rest)
-    return HeightMap(prepared.heights, prepared.pitch, **rest)
+        texture = Profile(prepared.heights, prepared.pitch[0], **rest)
+    else:
+        texture = HeightMap(prepared.heights, prepared.pitch, **rest)
+    texture.history = prepared.history
+    return texture

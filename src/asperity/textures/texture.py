@@ -20,6 +20,7 @@ from asperity.arguments import Argument
 from asperity.checks import FloatArray, array
 from asperity.contacts.contact import ExactHeight
 from asperity.enclosures.cells import Cells
+from asperity.measured.history import Stage
 from asperity.textures.cells.bounded import BoundedCells, DerivativeBounds
 from asperity.textures.cells.lines import Pieces, equal_pieces
 from asperity.textures.domain import Domain, ScanLine
@@ -49,12 +50,14 @@ class Texture(ABC):
             derivatives are extreme.
         preparation: what was done to measured heights, in words, for reports.
         filled: where heights were missing and have been interpolated; ``None`` for nowhere.
+        history: surface parameters as read and after each step of the preparation.
     """
 
     kind: ClassVar[str]
     sample_offset: ClassVar[float] = 0.5
     preparation: tuple[str, ...] = ()
     filled: NDArray[np.bool_] | None = None
+    history: tuple[Stage, ...] = ()
 
     @property
     @abstractmethod

@@ -1,0 +1,147 @@
+"""What a preparation writes down of a surface after each of its steps."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.errors import SurfaceFileError
+from asperity.measured.history import Stage, stages_of
+from asperity.measured.preparation import magnified, prepare
+from asperity.measured.prepared import load_prepared, save_prepared
+from asperity.measured.reading import RawSurface
+from asperity.textures.loading import texture_of
+
+MICRO = 1e-6
+
+
+def surface(hole: bool = True) -> RawSurface:
+    """Return waves of 1 mm, 0.1 mm and 20 µm, 4, 2 and 1 µm high, on a tilt of 1 %."""
+    x = np.arange(401) * 5e-6
+    line = sum(
+        height * MICRO * np.cos(2 * np.pi * x / length)
+        for height, length in ((4, 1e-3), (2, 1e-4), (1, 2e-5))
+    )
+    heights = np.tile(line + 0.01 * x, (21, 1))
+    if hole:
+        heights[3:6, 100:110] = np.nan
+    return RawSurface(heights, (5e-6, 5e-6), "made", ())
+
+
+def names(stages: tuple[Stage, ...]) -> list[str]:
+    return [stage.name for stage in stages]
+
+
+def test_every_step_is_written_down() -> None:
+    arguments: dict[str, Any] = {"cutoff": 2e-5, "l_cutoff": 1e-4, "tip_radius": 1e-5}
+    ready = prepare(surface(), outliers=9.0, periodic=True, blend=5e-5, magnify=3.0, **arguments)
+    assert names(ready.history) == [
+        "as read", "without outliers", "levelled", "holes filled", "S-filter 20 µm",
+        "L-filter 100 µm", "tip 10 µm", "periodic", "magnified",
+    ]  # fmt: skip
+    assert names(prepare(surface(hole=False)).history) == [
+        "as read", "levelled", "S-filter 20 µm",
+    ]  # fmt: skip
+    assert names(prepare(surface(), height_range=1e-3, form=2, max_missing=0.5).history)[:2] == [
+        "as read", "form removed",
+    ]  # fmt: skip
+    assert texture_of(ready).history == ready.history
+
+
+def test_what_each_filter_took() -> None:
+    """Cosines without a break at the mirrored border: the filters take their known shares."""
+    ready = prepare(surface(hole=False), form=0, cutoff=2e-5, l_cutoff=1e-4)
+    by_name = {stage.name: stage for stage in ready.history}
+    tilt = 0.01 * np.arange(401) * 5e-6
+    assert by_name["mean removed"].removed is not None
+    assert by_name["mean removed"].removed.range == 0.0
+    short = by_name["S-filter 20 µm"].removed
+    long = by_name["L-filter 100 µm"].removed
+    assert short is not None
+    assert long is not None
+    # The S-filter takes half of the shortest wave, 4 % of the middle one's half ...
+    took = [(1 - 2.0 ** -((2e-5 / length) ** 2)) * h * MICRO for h, length in
+            ((4, 1e-3), (2, 1e-4), (1, 2e-5))]  # fmt: skip
+    assert short.rms == pytest.approx(math.hypot(*took) / math.sqrt(2), rel=0.01)
+    # ... the L-filter nearly all of the longest, half of the middle one, and the tilt.
+    kept = math.hypot(4 * MICRO * 2.0 ** -(0.1**2), MICRO * 2.0 ** -(0.2**2)) / math.sqrt(2)
+    assert long.rms == pytest.approx(math.hypot(kept, tilt.std()), rel=0.02)
+    left = by_name["L-filter 100 µm"].values["Sq"]
+    assert left == pytest.approx(np.std(ready.heights), rel=1e-12)
+
+
+def test_parameters_of_the_measured_points_alone_until_they_are_filled() -> None:
+    raw = surface()
+    ready = prepare(raw)
+    first, level, filled = ready.history[:3]
+    assert first.values["Sq"] == pytest.approx(np.nanstd(raw.heights), rel=1e-12)
+    assert level.removed is not None
+    assert level.removed.range == pytest.approx(0.01 * 400 * 5e-6, rel=0.1)
+    assert (first.removed, filled.removed) == (None, None)
+    assert filled.values["Sq"] != level.values["Sq"]
+
+
+def test_a_profile_is_primary_until_its_waviness_is_gone() -> None:
+    raw = surface(hole=False)
+    line = RawSurface(raw.heights[0], raw.pitch[:1], "made", ())  # type: ignore[index]  # it has one
+    history = prepare(line, l_cutoff=2e-4, magnify=2.0).history
+    kinds = [next(iter(stage.values))[0] for stage in history]
+    assert kinds == ["P", "P", "P", "R", "R"]
+    assert [stage.nesting for stage in history] == [None, None, None, 2e-4, 4e-4]
+    for symbol, before in history[-2].values.items():
+        factor = 1.0 if symbol in {"Rsk", "Rku", "Rdq"} else 2.0
+        assert before is not None
+        assert history[-1].values[symbol] == pytest.approx(factor * before, rel=1e-9)
+
+
+def test_a_watcher_sees_before_and_after() -> None:
+    seen: list[tuple[str, float | None]] = []
+
+    def watch(stage: Stage, after: Any, before: Any) -> None:
+        seen.append((stage.name, None if before is None else float(np.nanstd(before - after))))
+
+    ready = prepare(surface(), watch=watch)
+    assert seen == [
+        (stage.name, None if stage.removed is None else pytest.approx(stage.removed.rms, rel=1e-9))
+        for stage in ready.history
+    ]
+
+
+def test_the_history_is_saved(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(b"x")
+    flat = RawSurface(np.zeros((5, 6)), (1e-6, 1e-6), "flat", ())  # has no skewness
+    for raw in (surface(), flat):
+        ready = prepare(raw)
+        save_prepared(tmp_path / "ready.npz", ready, source)
+        again = load_prepared(tmp_path / "ready.npz")
+        assert again.history == ready.history
+    assert names(magnified(again, 2.0).history)[-1] == "magnified"
+
+
+def test_a_file_of_old_has_no_history(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(b"x")
+    save_prepared(tmp_path / "ready.npz", prepare(surface()), source)
+    with np.load(tmp_path / "ready.npz") as members:
+        old = {name: members[name] for name in members if name != "history"}
+    np.savez(tmp_path / "old.npz", **old)
+    again = load_prepared(tmp_path / "old.npz")
+    assert again.history == ()
+    assert magnified(again, 2.0).history == ()
+    for wrong in ("[", "{}", '[{"name": "x"}]', '[{"name": "x", "values": {"Q": 1}}]', "[1]"):
+        np.savez(tmp_path / "bad.npz", **old, history=np.array(wrong))
+        if wrong == "{}":
+            assert load_prepared(tmp_path / "bad.npz").history == ()
+            continue
+        with pytest.raises(SurfaceFileError, match="damaged prepared surface"):
+            load_prepared(tmp_path / "bad.npz")
+
+
+def test_stages_survive_json() -> None:
+    stages = prepare(surface(), l_cutoff=1e-4).history
+    assert stages_of([stage.to_dict() for stage in stages]) == stages
