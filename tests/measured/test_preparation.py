@@ -245,7 +245,7 @@ def test_arguments_that_are_refused(arguments: dict[str, Any], match: str) -> No
 
 def test_magnification_beyond_all_bounds() -> None:
     with pytest.raises(ParameterError, match="magnify makes the surface too large"):
-        prepare(surface(1e12 * bumpy()), magnify=1e306, magnify_height=1e306)
+        prepare(surface(1e12 * bumpy(), pitch=(1e6, 2e6)), magnify=1e306, magnify_height=1e306)
 
 
 def test_limits_of_the_cutoff_are_accepted() -> None:

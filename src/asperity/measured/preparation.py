@@ -20,6 +20,7 @@ from asperity.measured.form import check_degree, fit_form, subtract_form
 from asperity.measured.history import Recorder, Watch, resized
 from asperity.measured.length_words import by_text, length_text, lengths_text, positive_number
 from asperity.measured.outliers import remove_outliers
+from asperity.measured.plausible import check_heights
 from asperity.measured.prepared import Prepared
 from asperity.measured.reading.raw import RawSurface
 from asperity.measured.stylus import apply_tip, check_radius
@@ -35,7 +36,6 @@ MAX_MISSING = 0.25
 """Share of missing points that is filled unless more is allowed."""
 
 _LEVELLED = {0: "mean removed", 1: "levelled"}
-_LONGEST = 10.0  # [m]; heights beyond are rather heights whose unit is not the metre
 
 
 @described(PREPARING)
@@ -107,7 +107,7 @@ def prepare(  # noqa: D417 - the others are described where they are declared
     if outliers is not None:
         steps.append(remove_outliers(heights, outliers))
         _check_missing(heights, max_missing)
-    _scale(heights, raw, height_range, steps)
+    _scale(heights, raw, lateral, height_range, steps)
     if outliers is not None or height_range is not None:
         record("as read" if outliers is None else "without outliers", heights, lateral)
     begin("form")
@@ -251,14 +251,18 @@ def _checked_pitch(pitch: float | Sequence[float], axes: int) -> tuple[float, ..
 
 
 def _scale(
-    heights: FloatArray, raw: RawSurface, height_range: float | None, steps: list[str]
+    heights: FloatArray,
+    raw: RawSurface,
+    pitch: tuple[float, ...],
+    height_range: float | None,
+    steps: list[str],
 ) -> None:
     low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
     span = high - low
     if not math.isfinite(span):
         raise ParameterError("surface", "has heights too large for floating-point numbers")
     if height_range is None:
-        _check_unit(raw, span)
+        check_heights(raw, heights, pitch)
         return
     wanted = positive_number("height_range", height_range)
     if span == 0.0:
@@ -267,21 +271,6 @@ def _scale(
     steps.append(f"heights scaled from {given} to {length_text(wanted)} peak to valley")
     heights -= low
     heights *= wanted / span
-
-
-def _check_unit(raw: RawSurface, span: float) -> None:
-    if raw.relative:
-        raise ParameterError(
-            "height_range",
-            f"is required: the values of {raw.source} have no unit; give the peak-to-valley"
-            " height [m]",
-        )
-    if span > _LONGEST and not raw.has_units:
-        raise ParameterError(
-            "height_range",
-            f"must be given [m]: heights that span {span:.4g} look not to be in metres,"
-            f" and {raw.source} names no unit",
-        )
 
 
 def _fill(
