@@ -27,7 +27,7 @@ from asperity.analysis.bounds.measures import (
     ONE_SIDED,
     precise_norm,
 )
-from asperity.analysis.gain import closed_forms
+from asperity.analysis.gain import closed_forms, friction
 from asperity.analysis.gain.certificate import certified
 from asperity.analysis.gain.characteristic import curl_number
 from asperity.analysis.gain.friction import largest_singular_value
@@ -161,6 +161,16 @@ def test_law_f_against_the_definition_of_its_number() -> None:
     check(surface, bound, "norm", 1e-6)
     assert "tangents" in at_once.note
     assert "cells" in bound.note
+
+
+@pytest.mark.parametrize("count", [2, 5, 1024])
+def test_tangents_meet_at_the_corners(count: int) -> None:
+    """The polygon encloses half the circle: each corner lies on the tangents on its two sides."""
+    touch, corner, radius = friction._half_circle(count)
+    np.testing.assert_allclose(touch[[0, -1]], [-0.5 * math.pi, 0.5 * math.pi], rtol=1e-15)
+    assert (len(touch), len(corner)) == (count + 1, count)
+    for side in (touch[:-1], touch[1:]):
+        np.testing.assert_allclose(radius * np.cos(corner - side), 1.0, rtol=1e-14)
 
 
 @pytest.mark.parametrize("modulation", [0.0, 0.3, 1.0])

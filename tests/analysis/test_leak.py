@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import dblquad
 
 from asperity.analysis import loop_work
-from asperity.analysis.energy.columns import curl_integral, sampled_sides
-from asperity.analysis.energy.leak import worst_loop
+from asperity.analysis.energy.columns import comb, curl_integral, sampled_sides
+from asperity.analysis.energy.leak import gaining, worst_loop
 from asperity.analysis.energy.state_loops import in_plane_loop
 from asperity.errors import ParameterError
 from asperity.surface import Surface
@@ -76,6 +76,18 @@ def test_friction_leak_is_reproduced_by_its_vertices() -> None:
 def test_conservative_laws_leak_nothing_by_theorem() -> None:
     result = worst_loop(Surface(TEXTURE, "C", K, D))
     assert (result.energy, result.method) == (0.0, "theorem")
+    assert (result.vertices.shape, result.length, result.per_length) == ((0, 3), 0.0, 0.0)
+
+
+def test_a_loop_that_gains_nothing_has_no_vertices() -> None:
+    """No friction, no curl; a single vertex; columns that are all empty."""
+    still = worst_loop(Surface(TEXTURE, "F", K, D, friction=0.0))
+    assert (still.energy, still.upper_per_period) == (0.0, math.inf)
+    assert (still.vertices.shape, still.length, still.speed(1.0)) == ((0, 3), 0.0, 0.0)
+    vertices, energy = gaining(Surface(TEXTURE, "A", K, D), np.zeros((1, 3)))
+    assert (vertices.shape, energy) == ((0, 3), 0.0)
+    level = np.full(5, -D)
+    assert comb(TEXTURE.scan_line().points(5), level, level, periodic=True).shape == (0, 3)
 
 
 @pytest.mark.parametrize("letter", "CW")

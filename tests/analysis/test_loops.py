@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 from asperity.analysis import loop_work
+from asperity.analysis.energy.loops import smooth_panels
 from asperity.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.heightmap import HeightMap
@@ -138,6 +139,15 @@ def test_friction_loop_is_the_limit_of_small_steps() -> None:
         errors.append(abs(stepped - exact))
     assert errors[1] < 1e-4 * abs(exact)
     assert math.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.5)  # first order
+
+
+def test_a_wave_is_two_panels() -> None:
+    """2π M/K is the period of a sinusoid, whatever its amplitude; what is flat has no waves."""
+    for amplitude in (1e-6, AMPLITUDE):
+        surface = Surface(Sinusoid(amplitude, PERIOD, direction=(1.0, 2.0)), "A")
+        assert [smooth_panels(surface, n * PERIOD) for n in (1.0, 50.2)] == [4, 101]
+    flat = Surface(HeightMap(np.zeros((5, 5)), 1e-3), "A", max_depth=1e-3)
+    assert smooth_panels(flat, 1e3) == 4
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import Leak, worst_loop
 from asperity.analysis.judge_passivity import passivity
 from asperity.analysis.passivity.criteria import Criterion
+from asperity.analysis.passivity.device_loop import make_loop
 from asperity.analysis.passivity.judgement import Passivity
 from asperity.derive.facts import law_facts
 from asperity.devices import Datum, Device, parse_device
@@ -394,3 +395,12 @@ def test_an_unknown_name_is_a_key_error() -> None:
     assert isinstance(found.criterion("delay"), Criterion)
     with pytest.raises(KeyError):
         found.criterion("magic")
+
+
+def test_a_step_along_three_axes_at_once_is_never_understated() -> None:
+    """√3 steps, rounded up by less than any number of a device is."""
+    device = parse_device({**RIG, "position_resolution": "3 um", "force_resolution": "0.1 N"}, "x")
+    loop = make_loop(Surface(WAVE, "C"), device, exactly(1.0), exactly(1.0), None)
+    for field, long in (("position_resolution", loop.step), ("force_resolution", loop.force_step)):
+        square = 3 * Fraction(device.value(field) or 0.0) ** 2
+        assert 0 < square < long**2 < square * (1 + Fraction(1, 10**16))

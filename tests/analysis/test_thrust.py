@@ -7,8 +7,14 @@ import math
 import numpy as np
 import pytest
 
+from asperity.analysis import loop_work
 from asperity.analysis.energy import leak
-from asperity.analysis.energy.columns import plane_curl, positive_interval
+from asperity.analysis.energy.columns import (
+    column_loop,
+    plane_curl,
+    positive_interval,
+    sampled_sides,
+)
 from asperity.analysis.energy.leak import worst_loop
 from asperity.surface import Surface
 from asperity.textures.domain import ScanLine
@@ -102,3 +108,15 @@ def test_the_longest_interval_of_depth_is_taken() -> None:
     top, bottom = positive_interval(levels, np.array(columns).T)
     np.testing.assert_allclose(top, [0.5, 0.0, 2.5, 0.0])
     np.testing.assert_allclose(bottom, [2.5, 0.5, 4.0, 0.0])
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_columns_that_begin_below_the_surface_gain_what_is_inside(sign: float) -> None:
+    """On steep flanks the curl of G changes sign on the way down: tops of columns are inside."""
+    surface = Surface(Fourier([0.3e-3, 0.15e-3], [3000.0, 6000.0], [0.3, 1.0]), "G", K, 1e-3)
+    line = surface.texture.scan_line()
+    vertices = column_loop(surface, line, sign)
+    depth = surface.texture.height(np.ascontiguousarray(vertices[:, :2])) - vertices[:, 2]
+    assert (np.abs(depth - 0.5e-3) < 0.4e-3).sum() > 100
+    gained, promised = loop_work(surface, vertices), sampled_sides(surface, line)
+    assert abs(gained) == pytest.approx(promised[0 if sign > 0.0 else 1], rel=1e-4)

@@ -150,3 +150,25 @@ def test_forces_and_jacobians_at_given_contacts(
         hessian = np.array([[hxx, hxy], [hxy, hyy]])
         expected = jacobian_by_hand(letter, g=(hx, hy), hessian=hessian, **here, **state)
         assert np.abs(jacobian[i] - expected).max() <= 1e-11 * np.linalg.norm(expected, 2)
+
+
+def test_a_law_that_looks_at_the_position_is_given_it(interpreted: Check):
+    """The force k depth (1 + a · p) e_z, each coordinate of the probe with a weight of its own."""
+    a = np.array([300.0, -200.0, 500.0])
+    law = Law("P", "placed", "vertical", lambda c: c.k * c.depth * (1 + c.position.dot(a)) * c.e_z)
+    assert fuse.reads_position(law)
+    assert not fuse.reads_position(LAWS["A"])
+    rng = np.random.default_rng(43)
+    points, depths, derivatives = rng.normal(size=(5, 3)), rng.random(5), rng.normal(size=(5, 6))
+    force, jacobian = np.empty((5, 3)), np.empty((5, 3, 3))
+    still = np.zeros((5, 2)), np.zeros(5, dtype=bool)
+    module = interpreted(lambda: fuse.fuse_contact(law))
+    module.contact_batch(
+        points, depths, derivatives, *still, force, jacobian, (700.0, 0.0, 1.0, 1.0, 0.0)
+    )
+    gain = 1.0 + points @ a
+    down = np.column_stack([derivatives[:, 1:3], -np.ones(5)])
+    expected = 700.0 * (gain[:, None] * down + depths[:, None] * a)
+    np.testing.assert_allclose(force[:, 2], 700.0 * depths * gain, rtol=1e-12)
+    np.testing.assert_allclose(jacobian[:, 2], expected, rtol=1e-11)
+    assert not jacobian[:, :2].any()

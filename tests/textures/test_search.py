@@ -284,16 +284,16 @@ def test_a_box_stays_open_when_the_minimum_lies_outside(monkeypatch: pytest.Monk
     """Newton's method was expected to end in the box and did not: its parts decide."""
     monkeypatch.setattr(search, "curvature", profile_as_map)
     monkeypatch.setattr(line, "along", profile)
-    flat, at = np.zeros(4), 0.3
-    monkeypatch.setattr(search, "descend", lambda *_: (at, 0.0, 0.5, 0.0, 0.0, 0.0))
-    monkeypatch.setattr(line, "descend", lambda *_: (at, 0.5, 0.0, 0.0))
-    for at, outside in ((0.3, True), (0.05, False)):
-        best, open_ = search.judge(
-            0.05, 0.0, -1.0, 0.0, 0.0, 0.1, 0.1, 0.0, 0.0, (9.0, 9.0, 1e9, 0.0, 0.0, 0.0), flat
-        )
-        assert (best[0], open_) == (at, outside)
+    flat, at = np.zeros(4), (0.0, 0.0)
+    monkeypatch.setattr(search, "descend", lambda *_: (*at, 0.5, 0.0, 0.0, 0.0))
+    monkeypatch.setattr(line, "descend", lambda *_: (at[0], 0.5, 0.0, 0.0))
+    unknown = (9.0, 9.0, 1e9, 0.0, 0.0, 0.0)
+    for x, y in ((0.3, 0.0), (0.101, 0.0), (-0.101, 0.0), (0.0, 0.101), (0.0, -0.101), (0.1, 0.1)):
+        at = x, y
+        best, open_ = search.judge(0.05, 0.0, -1.0, 0.0, 0.0, 0.1, 0.1, 0.0, 0.0, unknown, flat)
+        assert (best[:2], open_) == (at, max(abs(x), abs(y)) > 0.1)
         best, open_ = line.judge(0.05, -1.0, 0.0, 0.1, 0.0, 0.0, (9.0, 1e9, 0.0, 0.0), flat)
-        assert (best[0], open_) == (at, outside)
+        assert (best[0], open_) == (x, abs(x) > 0.1)
 
 
 def test_a_profile_interval_is_kept_if_it_can_be_level(monkeypatch: pytest.MonkeyPatch):

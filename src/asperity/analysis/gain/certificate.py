@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from asperity.analysis.bounds.bound import Bound, Method
-from asperity.analysis.bounds.branch_and_bound import Contacts, Problem, Supremum
+from asperity.analysis.bounds.branch_and_bound import Problem, Supremum
 from asperity.analysis.bounds.clamp_zone import ZoneProblem
 from asperity.analysis.bounds.dense_search import need_depths
 from asperity.analysis.bounds.measures import Number
@@ -119,15 +119,15 @@ def _bound(
 def _witness(surface: Surface, number: Number, problem: Problem, at: FloatArray) -> Witness:
     """Return the best of the depths and states at a contact point."""
     xy = problem.cells.plane(at[None])[0]
-    contacts = problem.contacts(at[None]) or [
-        Contacts(np.array([depth]), np.zeros((1, 2)), sliding=False)
-        for depth in (0.0, surface.max_depth)
-    ]
     stateful = surface.law.stateful
-    states = [(float(c.depth[0]), c.deflection[0] if stateful else None) for c in contacts]
+    states: list[tuple[float, FloatArray | None, bool]] = [
+        (float(c.depth[0]), c.deflection[0] if stateful else None, c.sliding)
+        for c in problem.contacts(at[None])
+    ]
+    ends = [(depth, None, False) for depth in (0.0, surface.max_depth)]
     witnesses = [
-        attained(surface, number, xy, depth, held, sliding=contact.sliding)
-        for contact, (depth, held) in zip(contacts, states, strict=True)
+        attained(surface, number, xy, depth, held, sliding=sliding)
+        for depth, held, sliding in states or ends
     ]
     return max(witnesses, key=lambda witness: witness.value)
 

@@ -142,7 +142,7 @@ def _taken_together(given: PlaneWaves) -> tuple[Wave, ...]:
     ):  # fmt: skip
         # a sin(-k·x + φ) is a sin(k·x + π - φ).
         turned = (kx, ky) < (0.0, 0.0)
-        vector = (-kx + 0.0, -ky + 0.0) if turned else (kx + 0.0, ky + 0.0)
+        vector = (-kx, -ky) if turned else (kx, ky)
         angle = math.pi - phase if turned else phase
         phasor = amplitude * complex(math.cos(angle), math.sin(angle))
         summed[vector] = summed.get(vector, 0.0) + phasor
@@ -193,8 +193,8 @@ def banded(values: FloatArray, spacing: tuple[float, float], repeats: bool) -> B
     numbers = sorted(sums)
     variances = np.array([sums[number][0] for number in numbers])
     logs = np.array([sums[number][1] for number in numbers])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        wavelength = np.exp(-np.where(variances > 0.0, logs / variances, 0.0))
+    # A band without variance has no logarithms either, and no wavelength of its own.
+    wavelength = np.exp(-logs / np.maximum(variances, np.finfo(float).tiny))
     return Bands(np.array(numbers, dtype=float), variances, wavelength)
 
 
