@@ -101,7 +101,8 @@ def test_a_profile_is_primary_until_its_waviness_is_gone() -> None:
 def test_a_watcher_sees_before_and_after() -> None:
     seen: list[tuple[str, float | None]] = []
 
-    def watch(stage: Stage, after: Any, before: Any) -> None:
+    def watch(stage: Stage, pitch: Any, after: Any, before: Any) -> None:
+        assert pitch == (5e-6, 5e-6)
         seen.append((stage.name, None if before is None else float(np.nanstd(before - after))))
 
     ready = prepare(surface(), watch=watch)

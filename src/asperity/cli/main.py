@@ -26,6 +26,7 @@ COMMANDS = {
     "prepare": "Prepare a measured surface and save it.",
     "reproduce": "Redo the paper and judge each of its statements.",
     "scan": "Energy per stroke, against speed and depth.",
+    "show": "Say a measured surface in numbers, step by step.",
     "simulate": "Run texture, device and hand in one loop.",
     "surfaces": "List the surfaces that can be asked for by name.",
 }

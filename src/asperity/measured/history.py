@@ -34,8 +34,8 @@ class Stage(Record):
     nesting: float | None = None
 
 
-Watch = Callable[[Stage, FloatArray, FloatArray | None], None]
-"""Told each stage with the heights after it, and before it where that is the same size [m]."""
+Watch = Callable[[Stage, tuple[float, ...], FloatArray, FloatArray | None], None]
+"""Told each stage, the pitch, the heights after it, and before it if it took something away [m]."""
 
 
 class Recorder:
@@ -76,7 +76,7 @@ class Recorder:
         stage = Stage(name, values, removed, self._nesting)
         self.stages.append(stage)
         if self._watch is not None:
-            self._watch(stage, heights, before if removes else None)
+            self._watch(stage, pitch, heights, before if removes else None)
         self._before = heights.copy()
 
 

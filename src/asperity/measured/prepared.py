@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from asperity.checks import FloatArray
 from asperity.errors import ParameterError, SurfaceFileError
-from asperity.files import json_text, open_input, whole_file
+from asperity.files import json_text, open_input, plain, whole_file
 from asperity.measured.history import Stage, stages_of
 
 SCHEMA = 1
@@ -58,6 +58,17 @@ class Prepared:
     filled: NDArray[np.bool_] | None = None
     periodic: bool = False
     history: tuple[Stage, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data without the heights, SI units."""
+        return {
+            "schema": SCHEMA,
+            "points": list(self.heights.shape[::-1]),
+            "pitch": list(self.pitch),
+            "periodic": self.periodic,
+            "steps": list(self.steps),
+            "stages": plain(self.history),
+        }
 
 
 def save_prepared(

@@ -16,6 +16,7 @@ from asperity.analysis.words.passivity import allowed_text
 from asperity.arguments import Argument
 from asperity.report import page, terminal
 from asperity.report.devices import datum_text, numbers_table
+from asperity.report.stages import surface_sections
 from asperity.report.words import glossary
 from asperity.report.words.number_words import (
     NONE,
@@ -229,6 +230,7 @@ def comparison_page(comparison: Comparison) -> page.Page:
             _laws(comparison),
             page.Section("What will go wrong", [_verdicts(comparison)]),
             *_pictures(comparison),
+            *surface_sections(comparison.texture),
             *page.added_sections(Comparison, comparison),
             *page.assumed(
                 comparison.assumptions,

@@ -51,6 +51,31 @@ def table(
     return made
 
 
+def too_wide(shown: page.Table, order: Sequence[int], width: int, gap: int = 2) -> set[int]:
+    """Return the columns of a table to leave out so that the others fit, none of them cut.
+
+    Args:
+        shown: the table.
+        order: the columns that may be left out, the one that is wanted most first.
+        width: of the console in characters.
+        gap: characters between columns: one more than those of a ruled table.
+    """
+    cells = [shown.headings, *(row.cells for row in shown.rows)]
+    texts = [[cell if isinstance(cell, str) else cell.text for cell in row] for row in cells]
+    widths = [
+        max(len(line) for text in column for line in text.split("\n")) + gap
+        for column in zip(*texts, strict=True)
+    ]
+    room = width + gap - sum(widths) + sum(widths[i] for i in order)
+    left_out = set(order)
+    for column in order:
+        room -= widths[column]
+        if room < 0:
+            break
+        left_out.discard(column)
+    return left_out
+
+
 def _text(cell: str | page.Cell, styles: Mapping[str, str]) -> Text:
     if isinstance(cell, str):
         return Text(cell)

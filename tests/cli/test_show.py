@@ -1,0 +1,183 @@
+"""``asperity show`` as its users see it."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import asperity as asp
+from asperity.cli.main import main
+from asperity.report import html_text
+from asperity.report.page import Section, Words, add_section
+from asperity.report.stages import surface_sections
+from asperity.textures.shown import Shown
+
+Call = Callable[..., tuple[int, str, str]]
+PLAIN = ["--pitch", "2um", "--unit", "m"]
+
+
+@pytest.fixture
+def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
+    def run(*arguments: str, width: int = 120) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["asperity", *arguments])
+        monkeypatch.setenv("COLUMNS", str(width))
+        code = 0
+        try:
+            main()
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return run
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> str:
+    y, x = np.mgrid[:80, :100] * 2e-6
+    heights = (
+        3e-6 * np.sin(2 * np.pi * x / 20e-6) + 1e-6 * np.cos(2 * np.pi * y / 100e-6) + 0.02 * x
+    )
+    heights[10:13, 20:24] = np.nan
+    np.save(tmp_path / "map.npy", heights)
+    return str(tmp_path / "map.npy")
+
+
+def table_of(out: str) -> list[list[str]]:
+    """Return the cells of the first table, apart by two blanks; its name first in each row."""
+    lines = out.splitlines()
+    rule = next(i for i, line in enumerate(lines) if set(line.strip()) == {"─"})
+    rows = []
+    for line in lines[rule + 1 :]:
+        if not line.strip():
+            break
+        rows.append(re.split(r"\s{2,}", line.strip()))
+    return rows
+
+
+def test_says_each_step_in_parameters(call: Call, source: str) -> None:
+    code, out, err = call("show", source, *PLAIN, "--l-cutoff", "80um")
+    assert (code, err) == (0, "")
+    rows = table_of(out)
+    assert [row[0] for row in rows] == [
+        "as read", "levelled", "holes filled", "S-filter 8 µm", "L-filter 80 µm",
+    ]  # fmt: skip
+    assert all(len(row) == 12 for row in rows)
+    assert re.search(r"^Sdr\s+developed interfacial area ratio", out, re.MULTILINE)
+    assert re.search(r"Sal \d.* µm \(autocorrelation length\)", out)
+    assert out.startswith("Texture of ")
+    assert "pitch 2 µm as given" in out
+    heights = np.load(source)
+    sq = float(rows[0][1])
+    assert sq == pytest.approx(np.nanstd(heights) * 1e6, rel=5e-3)
+
+
+@pytest.mark.parametrize("width", [30, 40, 60, 80, 200])
+def test_columns_are_dropped_and_no_number_is_cut(call: Call, source: str, width: int) -> None:
+    code, out, _ = call("show", source, *PLAIN, "--l-cutoff", "80um", width=width)
+    assert code == 0
+    assert "…" not in out
+    assert max(len(line) for line in out.splitlines()) <= width
+    wide = {
+        row[0]: row[1:] for row in table_of(call("show", source, *PLAIN, "--l-cutoff", "80um")[1])
+    }
+    for row in table_of(out):
+        assert set(row[1:]) <= set(wide[row[0]])
+    assert ("More in a wider terminal" in out) == (width < 100)
+
+
+def test_the_json_holds_all_of_it(call: Call, source: str) -> None:
+    code, out, _ = call("show", source, *PLAIN, "--json", "-")
+    assert code == 0
+    data = json.loads(out)
+    assert data["source"] == "map.npy"
+    assert [stage["name"] for stage in data["stages"]][:2] == ["as read", "levelled"]
+    assert data["stages"][1]["removed"]["range"] == pytest.approx(0.02 * 99 * 2e-6, rel=0.2)
+    assert set(data["stages"][0]["values"]) >= {"Sq", "Sa", "Sdr"}
+    # 3 µm waves 20 µm long on a map 158 µm wide: texture for L = 80 µm.
+    assert data["parts"]["nesting"] == 80e-6
+    assert data["parts"]["texture"]["rms"] == pytest.approx(3e-6 / np.sqrt(2), rel=0.2)
+    assert data["Sal"] < 20e-6
+
+
+def test_the_page_shows_before_after_and_taken_away(
+    call: Call, source: str, tmp_path: Path
+) -> None:
+    page = tmp_path / "page.html"
+    code, out, err = call("show", source, *PLAIN, "--l-cutoff", "80um", "--html", str(page))
+    assert (code, err) == (0, "")
+    assert f"Report: {page}" in out.replace("\n", "")
+    text = page.read_text(encoding="utf-8")
+    for words in (
+        "After each step", "Levelled", "S-filter 8 µm", "L-filter 80 µm", "What of it is texture",
+        "ISO 25178-2:2021, 4.4.3", "what the step took",
+    ):  # fmt: skip
+        assert words in text
+    assert text.count("<img") == 3
+    assert "http" not in re.sub(r"data:image[^\"]*", "", text)
+    assert len(text) < 3_000_000
+
+
+def test_a_profile_and_a_prepared_file(call: Call, tmp_path: Path) -> None:
+    x = np.arange(600) * 1e-6
+    np.save(tmp_path / "line.npy", 1e-6 * np.sin(2 * np.pi * x / 50e-6))
+    ready = str(tmp_path / "line.npz")
+    line = str(tmp_path / "line.npy")
+    code, out, _ = call("show", line, "--pitch", "1um", "--unit", "m", "--l-cutoff", "100um")
+    assert code == 0
+    assert "P/RSm" in out
+    assert "Sal" not in out
+    assert call("prepare", line, "--pitch", "1um", "--unit", "m", "-o", ready)[0] == 0
+    page = tmp_path / "page.html"
+    code, again, _ = call("show", ready, "--html", str(page))
+    assert code == 0
+    assert [row[0] for row in table_of(again)] == ["as read", "levelled", "S-filter 4 µm"]
+    assert page.read_text(encoding="utf-8").count("<img") == 1
+
+
+def test_prepare_says_it_too(call: Call, source: str, tmp_path: Path) -> None:
+    target = str(tmp_path / "ready.npz")
+    code, out, _ = call("prepare", source, *PLAIN, "-o", target)
+    assert code == 0
+    assert [row[0] for row in table_of(out)] == [
+        "as read",
+        "levelled",
+        "holes filled",
+        "S-filter 8 µm",
+    ]
+    code, out, _ = call("prepare", source, *PLAIN, "-o", target, "--json", "-")
+    assert json.loads(out)["stages"][0]["name"] == "as read"
+    code, _, err = call("prepare", source, *PLAIN, "-o", target, "--json", target)
+    assert code == 2
+    assert "cannot both be written to" in err
+
+
+def test_a_texture_is_no_file(call: Call) -> None:
+    code, out, err = call("show", "sinusoid:amplitude=1mm,period=2mm")
+    assert (code, out) == (2, "")
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_reports_of_measured_surfaces_have_the_section(source: str) -> None:
+    texture = asp.load_texture(source, pitch=2e-6, unit="m", magnify=20)
+    (section,) = surface_sections(texture)
+    table = section.blocks[0]
+    assert [row.cells[0].text for row in table.rows][-1] == "magnified"  # type: ignore[union-attr]  # a table of cells
+    assert surface_sections(asp.Sinusoid(1e-4, 1e-3)) == []
+    text = html_text(asp.compare(texture, laws="W"))
+    assert "The surface in numbers" in text
+
+
+def test_a_section_of_ones_own(call: Call, source: str, tmp_path: Path) -> None:
+    def own(shown: Shown) -> Section:
+        return Section("Mine", [Words(f"of {shown.source}")])
+
+    add_section(Shown, own)
+    call("show", source, *PLAIN, "--html", str(tmp_path / "page.html"))
+    assert "of map.npy" in (tmp_path / "page.html").read_text(encoding="utf-8")
