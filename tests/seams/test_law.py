@@ -167,7 +167,7 @@ def test_python_reaches_the_same(scene: str) -> None:
 
 BAD = [
     (["--laws", "X", "--set", "soft_dept=1mm"], "set names 'soft_dept', which is a parameter of no"
-     " law; did you mean 'soft_depth'?"),
+     " law and no field of a device; did you mean 'soft_depth'?"),
     (["--laws", "W", "--set", "soft_depth=1mm"], "law W does not take it; taken by law X"),
     (["--laws", "X", "--set", "soft_depth=1N"], "soft_depth must be a quantity such as '1.5 m'"),
     (["--laws", "X", "--set", "soft_depth=1m"], "soft_depth must be 10 µm to 10 mm"),

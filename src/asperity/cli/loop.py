@@ -9,6 +9,7 @@ import click
 
 from asperity.cli.options import (
     Command,
+    chosen_device,
     device_option,
     file_options,
     file_values,
@@ -70,7 +71,7 @@ def read_setup(
     return make_setup(
         scene,
         surface=surface,
-        device=values["device"],
+        device=chosen_device(values["device"], scene, values),
         duration=duration,
         laws=laws,
         keeps_delay=keeps_delay,

@@ -9,13 +9,15 @@ import click
 
 from asperity.arguments import MAX_DEPTH, MEMORY, STIFFNESS, Argument
 from asperity.cli.own_code import load_own_code
+from asperity.cli.settings import Settings, set_option
 from asperity.devices import Device, load_device
-from asperity.errors import ParameterError, nearest_names
+from asperity.errors import ParameterError
 from asperity.laws import KNOWN_LAWS, LAW_ARGUMENTS, Law, find_law, find_laws, known_arguments
 from asperity.measured.arguments import FILE_ARGUMENTS
 from asperity.memory import limited
 
 if TYPE_CHECKING:
+    from asperity.scene import Scene
     from asperity.textures import Texture
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -132,12 +134,7 @@ def law_options(arguments: Iterable[Argument] = LAW_OPTIONS) -> Callable[[Comman
     """Return a decorator that adds the options of surface and law."""
 
     def decorate(command: Command) -> Command:
-        words = "Parameter of a law, also of your own, 'gain=2.5'; more by repeating it."
-        command = own_code_option(command)
-        command = click.option(
-            "--set", "parameters", metavar="NAME=VALUE", multiple=True, help=words
-        )(command)
-        return options(arguments)(command)
+        return options(arguments)(set_option(own_code_option(command)))
 
     return decorate
 
@@ -167,25 +164,26 @@ def surface_values(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the options say of the surface and of the parameters of laws.
 
     Raises:
-        ParameterError: for a parameter that is unknown (the nearest are offered) or given twice,
-            or a value that is none.
+        ParameterError: for a parameter that has an option and is given by ``--set``, too.
     """
     result = given(values, LAW_OPTIONS)
     if values.get("law") is not None:
         result["law"] = values["law"]
-    known = known_arguments()
-    for text in values["parameters"]:
-        name, equals, value = text.partition("=")
-        name = name.strip().replace("-", "_")
-        if not equals:
-            raise ParameterError("set", "must be NAME=VALUE", text)
-        if name not in known:
-            words = f"names {name!r}, which is a parameter of no law; {nearest_names(name, known)}"
-            raise ParameterError("set", words)
+    for name, value in values["settings"].law.items():
         if name in result:
-            raise ParameterError(name, "is given twice")
-        result[name] = known[name].read(value)
+            flag = f"--{name.replace('_', '-')}"
+            raise ParameterError(name, f"is given twice: by {flag} and by --set {name}=...")
+        result[name] = value
     return result
+
+
+def chosen_device(device: Device | None, scene: Scene, values: Mapping[str, Any]) -> Device:
+    """Return the device of ``--device``, the scene or the default, changed by ``--set``."""
+    from asperity.scene.setup import DEFAULT_DEVICE
+
+    chosen = device or scene.device or load_device(DEFAULT_DEVICE)
+    settings: Settings = values["settings"]
+    return settings.changed(chosen)
 
 
 def refuse_idle(asked: Iterable[str], laws: Sequence[Law]) -> None:
@@ -222,7 +220,6 @@ def read_surface(
     Raises:
         ParameterError: for what is missing, unknown or wrong.
     """
-    from asperity.analysis.compare import DEFAULT_DEVICE
     from asperity.scene import load_scene
     from asperity.scene.sections import surface_keywords
 
@@ -234,4 +231,4 @@ def read_surface(
     laws = laws or [find_law(merged["law"])]
     refuse_idle(asked, laws)
     arguments = surface_keywords(merged, *laws)
-    return scene.texture, device or scene.device or load_device(DEFAULT_DEVICE), arguments
+    return scene.texture, chosen_device(device, scene, values), arguments

@@ -19,7 +19,7 @@ def command(names: tuple[str, ...], outputs: Outputs) -> None:
     """List kinds of textures and named surfaces: arguments, units, defaults, size and height.
 
     Given NAMEs, says more about those. Use them as SURFACE in other commands, with arguments or
-    without: cloth: or sandpaper:grit=P60 or noise:rms=20um,size=10mm
+    without: cloth or sandpaper:grit=P60 or noise:rms=20um,size=10mm
     """
     from asperity.report.surfaces import listed_surfaces, print_surfaces, surfaces_page
 

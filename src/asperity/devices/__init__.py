@@ -1,7 +1,7 @@
 """Real devices, as data with a source for every number."""
 
 from asperity.devices.device import FIELD_TABLE, FIELDS, Datum, Device, Field, WallTest
-from asperity.devices.reading import device_names, load_device, parse_device
+from asperity.devices.reading import changed_device, device_names, load_device, parse_device
 
 __all__ = [
     "FIELDS",
@@ -10,6 +10,7 @@ __all__ = [
     "Device",
     "Field",
     "WallTest",
+    "changed_device",
     "device_names",
     "load_device",
     "parse_device",

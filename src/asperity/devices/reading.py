@@ -7,6 +7,7 @@ import os
 import re
 import tomllib
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
@@ -100,6 +101,28 @@ def parse_device(content: Mapping[str, Any], default_id: str, *, from_file: bool
     data = {field: _datum(field, given) for field, given in content.items() if field in FIELD_TABLE}
     _check_forces(data)
     return Device(identity, name, data, axes, sentences)
+
+
+def changed_device(device: Device, content: Mapping[str, Any]) -> Device:
+    """Return a device of which a scene or a command line says something else.
+
+    Args:
+        device: what is known.
+        content: fields by name, with their units.
+
+    Raises:
+        ParameterError: for unknown or wrong fields, or ones that the others contradict.
+
+    Example:
+        >>> stiff = changed_device(load_device("touch"), {"max_stiffness": "1.5 N/mm"})
+        >>> stiff.id, stiff.max_stiffness, stiff.data["max_stiffness"].source
+        ('touch', 1500.0, 'given by the user')
+    """
+    changed = parse_device(content, device.id, from_file=True)
+    words = {name: getattr(changed, name) for name in ("name", "axes", "notes") if name in content}
+    data = {**device.data, **changed.data}
+    _check_forces(data)
+    return replace(device, data=data, **words)
 
 
 def _refuse_bare(content: Mapping[str, Any]) -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from asperity.arguments import Argument, read_arguments
-from asperity.devices import Device, load_device, parse_device
+from asperity.devices import Device, changed_device, load_device, parse_device
 from asperity.errors import ParameterError, nearest_names
 from asperity.files import read_toml
 from asperity.scene.sections import KINDS, surface_arguments
@@ -45,8 +45,8 @@ def load_scene(source: str, file_arguments: Mapping[str, Any] | None = None) -> 
     """Return the scene that a text names.
 
     Args:
-        source: ``kind:argument=value,...`` ("sinusoid:amplitude=0.8mm,period=1mm"), the path of
-            a scene file (TOML), or of a measured surface.
+        source: ``kind:argument=value,...`` ("sinusoid:amplitude=0.8mm,period=1mm", or "cloth"
+            with its defaults), the path of a scene file (TOML), or of a measured surface.
         file_arguments: arguments of :func:`~asperity.textures.load_texture`, for a measured
             surface.
 
@@ -60,10 +60,15 @@ def load_scene(source: str, file_arguments: Mapping[str, Any] | None = None) -> 
         0.001
     """
     extra = dict(file_arguments or {})
-    match = re.match(r"([A-Za-z][\w-]+):", source)
-    if match and not os.path.exists(source):
+    kind, colon, arguments = source.partition(":")
+    if re.fullmatch(r"[A-Za-z][\w-]+", kind) and not os.path.exists(source):
+        named = kind.lower()
+        if not colon and (named == "file" or named not in KINDS):
+            hint = nearest_names(kind, KINDS)
+            words = f"is no file, and no surface that is known by name: {source!r}; {hint}"
+            raise ParameterError("surface", words)
         _refuse_file_arguments(extra)
-        return Scene(build_texture(match[1].lower(), _parse_arguments(source[match.end() :])))
+        return Scene(build_texture(named, _parse_arguments(arguments)))
     if source.lower().endswith(".toml"):
         return _load_scene_file(Path(source), extra)
     return Scene(load_texture(source, **extra))
@@ -153,7 +158,4 @@ def _scene_device(section: Mapping[str, Any]) -> Device:
     own = {name: value for name, value in section.items() if name != "id"}
     if "id" not in section:
         return parse_device(own, "the scene's device", from_file=True)
-    known = load_device(_ID.read(section["id"]))
-    changed = parse_device(own, known.id, from_file=True)
-    words = {name: getattr(changed, name) for name in ("name", "axes", "notes") if name in own}
-    return replace(known, data={**known.data, **changed.data}, **words)
+    return changed_device(load_device(_ID.read(section["id"])), own)

@@ -1,0 +1,148 @@
+"""``--set``, options that are given twice, and names without a colon."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+import pytest
+
+from asperity.cli import main as program
+from asperity.cli.main import COMMANDS, cli
+
+Call = Callable[..., tuple[int, str, str]]
+SPEC = "sinusoid:amplitude=0.2mm,period=2mm"
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Call:
+    """Return a function that runs the program and returns exit code, output and errors."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["asperity", *arguments])
+        try:
+            program.main()
+            code = 0
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        return code, *capsys.readouterr()
+
+    return run
+
+
+def test_a_field_of_the_device_is_set(call: Call) -> None:
+    given = ["--device", "touch", "--set", "max_stiffness=1.5N/mm", "--set", "delay-samples=3"]
+    code, out, err = call("compare", SPEC, "--laws", "W", *given, "--json", "-")
+    assert (code, err) == (0, "")
+    device = json.loads(out)["device"]
+    assert device["id"] == "touch"
+    assert device["data"]["max_stiffness"]["value"] == 1500.0
+    assert device["data"]["max_stiffness"]["source"] == "given by the user"
+    assert device["data"]["delay_samples"]["value"] == 3.0
+    assert device["data"]["max_force"]["value"] == 3.3  # of the catalogue
+
+
+def test_the_default_device_and_that_of_a_scene_are_set(call: Call, tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text('[texture]\nkind = "tile"\n[device]\nid = "touch"\nmax_force = "2 N"\n')
+    for source, device, force in ((SPEC, "omega.3", 12.0), (str(scene), "touch", 2.0)):
+        given = ["--law", "W", "--set", "update_rate=2kHz", "--json", "-"]
+        found = json.loads(call("limits", source, *given)[1])["device"]
+        assert found["id"] == device
+        assert found["data"]["update_rate"]["value"] == 2000.0
+        assert found["data"]["max_force"]["value"] == force
+
+
+def test_a_name_that_law_and_device_share_is_the_laws(call: Call) -> None:
+    given = ["--law", "F", "--set", "friction=0.5", "--set", "device.friction=80mN", "--json", "-"]
+    found = json.loads(call("analyze", SPEC, *given)[1])
+    assert found["law_parameters"]["friction"] == 0.5
+    assert found["device"]["data"]["friction"]["value"] == 0.08
+
+
+WRONG = [
+    (["--set", "max_stiffness=1500"], "device.max_stiffness needs a unit: write 1500N/m"),
+    (["--set", "max_stifness=1N/m"], "did you mean 'max_stiffness'"),
+    (["--set", "hand.friction=1N"], "set names 'hand.friction', which is a parameter of no law"),
+    (["--set", "device.continuity=1"], "set names 'continuity'"),
+    (["--set", "max_stiffness"], "must be NAME=VALUE"),
+    (["--set", "max_force=1N", "--set", "device.max_force=2N"],
+     "set is given twice for max_force: 'max_force=1N' and 'device.max_force=2N'"),
+    (["--set", "continuity=1", "--set", "continuity=2"],
+     "set is given twice for continuity: 'continuity=1' and 'continuity=2'"),
+    (["--friction", "1", "--set", "friction=2"], "given twice: by --friction and by --set"),
+    (["--device", "touch", "--set", "continuous_force=9N"], "not be greater than max_force, 3.3 N"),
+    (["--stiffness", "500"], "stiffness needs a unit: write 500N/m, got '500'"),
+    (["--max-depth", "1"], "max_depth needs a unit: write 1mm or 1um or 1m"),
+    (["--stiffness", "1N/m", "--stiffness=2N/m"], "stiffness is given twice: give --"),
+    (["--law", "F", "--law", "F"], "law is given twice"),
+    (["--json", "-", "--json", "-"], "json is given twice"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("given", "words"), WRONG, ids=lambda value: " ".join(value)[:50])
+def test_contradictions_are_one_line(call: Call, given: list[str], words: str) -> None:
+    law = [] if "--law" in given else ["--law", "F"]
+    code, out, err = call("analyze", SPEC, *law, *given)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert words in err
+
+
+def test_no_option_of_any_command_is_silently_the_last() -> None:
+    """Whatever options there are: twice is refused unless they are made to be repeated."""
+    context = click.Context(cli)
+    checked = 0
+    for name in COMMANDS:
+        command = cli.get_command(context, name)
+        assert command is not None
+        for option in command.params:
+            if not isinstance(option, click.Option):
+                continue
+            twice = [option.opts[-1], "1"][: 1 if option.is_flag else 2] * 2
+            if option.multiple:
+                program.refuse_repeated(command, twice)
+                continue
+            with pytest.raises(ValueError, match="is given twice"):
+                program.refuse_repeated(command, twice)
+            program.refuse_repeated(command, twice[: len(twice) // 2])
+            checked += 1
+    assert checked > 100
+
+
+def test_lists_say_how_they_are_written(call: Call) -> None:
+    _code, _out, err = call("scan", "x.toml", "--speeds", "1m/s", "--speeds", "2m/s")
+    assert "give --speeds once; several values are one text, 'a; b'" in err
+
+
+def test_a_surface_by_its_name_alone(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    alone, colon = (
+        call("limits", source, "--law", "W", "--json", "-")[1] for source in ("Knurl", "knurl:")
+    )
+    assert alone == colon != ""
+    (tmp_path / "knurl").write_text("no heights")  # a file comes first
+    code, _out, err = call("limits", "knurl", "--law", "W")
+    assert code == 2
+    assert "no row of numbers" in err
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        (
+            "sandpapr",
+            "no file, and no surface that is known by name: 'sandpapr'; did you mean",
+        ),
+        ("file", "is no file"),
+        ("sinusoid", "amplitude is missing: a sinusoid needs amplitude, period"),
+    ],
+)
+def test_names_that_are_none(call: Call, name: str, words: str) -> None:
+    code, _out, err = call("limits", name)
+    assert (code, err.count("\n")) == (2, 1)
+    assert words in err
