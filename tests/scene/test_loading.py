@@ -125,4 +125,4 @@ def test_what_was_read_comes_before_the_scene(tmp_path: Path) -> None:
 
 def test_file_options_belong_to_files() -> None:
     with pytest.raises(ParameterError, match="measured surfaces only"):
-        load_scene("sinusoid:amplitude=1mm,period=1mm", {"magnify": 2.0})
+        load_scene("sinusoid:amplitude=1mm,period=1mm", {"outliers": 2.0})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -107,7 +108,7 @@ def _texture_code(source: str, for_file: Mapping[str, Any], texture: Texture) ->
     """Return an expression that makes the texture; empty if its own ``repr`` does."""
     if not repr(texture).startswith("<"):
         return ""
-    if source.lower().endswith(".toml"):
+    if source.lower().endswith(".toml") or not os.path.exists(source):
         extra = f", {dict(for_file)!r}" if for_file else ""
         return f"load_scene({source!r}{extra}).texture"
     arguments = [repr(source), *[f"{name}={value!r}" for name, value in for_file.items()]]

@@ -5,6 +5,8 @@ All lengths are in the surface's own metres, before magnification.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from asperity.arguments import Argument
 
 READING = (
@@ -86,3 +88,11 @@ PREPARING = (
 
 FILE_ARGUMENTS = (*READING, *PREPARING)
 """Everything that can be told of a measured file."""
+
+_OF_ANY = ("height_range", "cutoff", "l_cutoff", "tip_radius", "magnify", "magnify_height")
+DRAWN = tuple(
+    replace(argument, default_words="none") if argument.name == "cutoff" else argument
+    for argument in PREPARING
+    if argument.name in _OF_ANY
+)
+"""What can be told of any texture: a drawn one has no missing points, no spikes and no form."""

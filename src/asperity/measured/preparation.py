@@ -96,7 +96,7 @@ def prepare(  # noqa: D417 - the others are described where they are declared
     _check_heights(raw.heights, max_missing)
     lateral = _chosen_pitch(raw, pitch, steps)
     check_degree(form)
-    _factors(magnify, magnify_height)
+    factors(magnify, magnify_height)
     cutoffs = find_cutoffs(raw.heights.shape, lateral, cutoff, l_cutoff)
     _check_early(raw.heights.shape, lateral, tip_radius, periodic, blend)
     reserve(*raw.heights.shape[::-1])
@@ -150,7 +150,7 @@ def magnified(
     Raises:
         ParameterError: for a factor that is not positive, or beyond all bounds.
     """
-    lateral, upward = _factors(magnify, magnify_height)
+    lateral, upward = factors(magnify, magnify_height)
     heights, pitch = prepared.heights, prepared.pitch
     greatest = max(float(heights.max()), -float(heights.min()))
     with np.errstate(over="ignore"):
@@ -160,14 +160,18 @@ def magnified(
         raise ParameterError("magnify", "makes the surface too large or small to compute", magnify)
     if lateral == upward == 1.0:
         return prepared
-    size = f"{lateral:g} times laterally and"
-    step = f"{size} in height" if lateral == upward else f"{size} {upward:g} times in height"
     heights *= upward
     history = prepared.history
     if history:
         history += (resized("magnified", heights, wider, history[-1], lateral),)
-    steps = (*prepared.steps, f"magnified {step}")
+    steps = (*prepared.steps, magnified_text(lateral, upward))
     return replace(prepared, pitch=wider, steps=steps, history=history)
+
+
+def magnified_text(lateral: float, upward: float) -> str:
+    """Return by how much a surface was magnified, in words."""
+    size = f"magnified {lateral:g} times laterally and"
+    return f"{size} in height" if lateral == upward else f"{size} {upward:g} times in height"
 
 
 def _check_early(
@@ -188,7 +192,12 @@ def _check_early(
         check_width(shape, pitch, blend)
 
 
-def _factors(magnify: float, magnify_height: float | None) -> tuple[float, float]:
+def factors(magnify: float, magnify_height: float | None) -> tuple[float, float]:
+    """Return the factors along the surface and in height.
+
+    Raises:
+        ParameterError: for one that is not positive.
+    """
     lateral = positive_number("magnify", magnify, "")
     if magnify_height is None:
         return lateral, lateral

@@ -13,8 +13,11 @@ from asperity.arguments import Argument, read_arguments
 from asperity.devices import Device, changed_device, load_device, parse_device
 from asperity.errors import ParameterError, nearest_names
 from asperity.files import read_toml
+from asperity.measured.arguments import DRAWN
 from asperity.scene.sections import KINDS, surface_arguments
 from asperity.textures import Texture, load_texture
+from asperity.textures.drawn import prepare_texture
+from asperity.textures.texture import Kind
 
 _ID = Argument("device.id", "device of the catalogue", form="text")
 LOOP_SECTIONS = ("hand", "motion", "run")
@@ -47,8 +50,8 @@ def load_scene(source: str, file_arguments: Mapping[str, Any] | None = None) -> 
     Args:
         source: ``kind:argument=value,...`` ("sinusoid:amplitude=0.8mm,period=1mm", or "cloth"
             with its defaults), the path of a scene file (TOML), or of a measured surface.
-        file_arguments: arguments of :func:`~asperity.textures.load_texture`, for a measured
-            surface.
+        file_arguments: arguments of :func:`~asperity.textures.load_texture`; of those other
+            textures take the ones of :func:`~asperity.textures.drawn.prepare_texture`.
 
     Raises:
         ParameterError: for an unknown kind or argument (the nearest are offered), or a value
@@ -67,16 +70,10 @@ def load_scene(source: str, file_arguments: Mapping[str, Any] | None = None) -> 
             hint = nearest_names(kind, KINDS)
             words = f"is no file, and no surface that is known by name: {source!r}; {hint}"
             raise ParameterError("surface", words)
-        _refuse_file_arguments(extra)
-        return Scene(build_texture(named, _parse_arguments(arguments)))
+        return Scene(build_texture(named, _parse_arguments(arguments), values=extra))
     if source.lower().endswith(".toml"):
         return _load_scene_file(Path(source), extra)
     return Scene(load_texture(source, **extra))
-
-
-def _refuse_file_arguments(extra: Mapping[str, Any]) -> None:
-    for name in extra:
-        raise ParameterError(name, "applies to measured surfaces only")
 
 
 def _parse_arguments(text: str) -> dict[str, str]:
@@ -102,9 +99,9 @@ def build_texture(
 
     Args:
         kind: of the catalogue, or "file".
-        arguments: by name.
+        arguments: by name, of the kind and of its preparation.
         folder: to which a file is relative.
-        values: of arguments that were read [SI]; they come first.
+        values: of arguments of the preparation that were read [SI]; they come first.
 
     Raises:
         ParameterError: for an unknown kind or argument, one that is missing, or a wrong value.
@@ -112,12 +109,33 @@ def build_texture(
     if kind not in KINDS:
         raise ParameterError("surface", f"kind is unknown: {kind!r}; {nearest_names(kind, KINDS)}")
     known = KINDS[kind]
-    read = read_arguments(kind, arguments, known.arguments, folder) | dict(values or {})
-    required = [argument.name for argument in known.required]
+    own = {argument.name for argument in known.arguments}
+    preparing = () if kind == "file" else [one for one in DRAWN if one.name not in own]
+    read = read_arguments(kind, arguments, (*known.arguments, *preparing), folder)
+    prepared = {name: read.pop(name) for name in set(read) - own} | dict(values or {})
+    if kind == "file":
+        return known.make(**_complete(known, read | prepared))
+    _refuse_others(prepared)
+    texture = known.make(**_complete(known, read))
+    return prepare_texture(texture, **prepared) if prepared else texture
+
+
+def _complete(kind: Kind, read: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments if none is missing."""
+    required = [argument.name for argument in kind.required]
     for name in required:
         if name not in read:
-            raise ParameterError(name, f"is missing: a {kind} needs {', '.join(required)}")
-    return known.make(**read)
+            raise ParameterError(name, f"is missing: a {kind.name} needs {', '.join(required)}")
+    return read
+
+
+def _refuse_others(given: Mapping[str, Any]) -> None:
+    """Refuse what only a measured surface can be told."""
+    names = [argument.name for argument in DRAWN]
+    for name in given:
+        if name not in names:
+            words = f"applies to measured surfaces only; others take {', '.join(names)}"
+            raise ParameterError(name, words)
 
 
 def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
@@ -135,8 +153,6 @@ def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
     if not isinstance(kind, str):
         known = " | ".join(f'"{name}"' for name in KINDS)
         raise ParameterError("scene", f"{path.name} needs [texture] with kind = {known}", kind)
-    if kind != "file":
-        _refuse_file_arguments(extra)
     surface = read_arguments("surface", content.get("surface", {}), surface_arguments())
     device = _scene_device(content["device"]) if "device" in content else None
     loop = {name: content[name] for name in LOOP_SECTIONS if name in content}
