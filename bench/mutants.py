@@ -68,7 +68,7 @@ ROOMS = {
         ("contacts/contact.py", "contacts/nearest", "contacts/nominal.py", "contacts/sampler.py",
          "contacts/symbols.py", "contacts/vertical.py"),
         ("tests/contacts", "tests/textures/test_nearest.py", "tests/textures/test_search.py",
-         "tests/test_definition.py"),
+         "tests/test_definition.py", "tests/derive/test_generate.py"),
     ),
     "kernels": Room(
         ("kernels",),

@@ -10,12 +10,16 @@ import pytest
 import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.linalg import eigh
 from tests.analysis.promises import as_sum, check, evaluated, fixed
 
 from asperity.analysis import characteristic_number, one_sided_number
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.bounds.dense_search import worst_deflection
 from asperity.analysis.gain.characteristic import curl_number
 from asperity.analysis.gain.friction import largest_singular_value
-from asperity.analysis.gain.medial_axis import sharpest_crest
+from asperity.analysis.gain.god_object import gain_above_crest
+from asperity.analysis.gain.medial_axis import crest_curvature, sharpest_crest
 from asperity.errors import ParameterError
 from asperity.laws import Law
 from asperity.surface import Surface
@@ -50,6 +54,50 @@ def test_at_the_very_centre_of_curvature_the_number_is_one_or_the_other() -> Non
         assert bound.upper > 1e12
         assert bound.lower > 1e12
         assert bound.method == "closed form"
+
+
+def test_at_the_radius_of_the_crest_itself_the_force_jumps() -> None:
+    texture = as_sum(Sinusoid(0.8e-3, 1e-3))
+    crest = sharpest_crest(texture)
+    assert crest is not None
+    bound = characteristic_number(Surface(texture, "D", max_depth=crest.radius))
+    assert (bound.lower, bound.upper, bound.at) == (math.inf, math.inf, crest.centre)
+    less = characteristic_number(Surface(texture, "D", max_depth=crest.radius * (1.0 - 1e-6)))
+    assert less.lower < math.inf
+
+
+def test_a_gap_is_relative_to_what_is_attained() -> None:
+    found = [Bound(*ends, "certified").gap for ends in ((2.0, 3.0), (0.0, 3.0), (-1.0, 3.0))]
+    assert found == [0.5, math.inf, math.inf]
+    assert Bound(math.inf, math.inf, "certified").gap == 0.0
+
+
+def test_the_worst_deflection_is_as_long_as_it_can_be_and_against_the_slope() -> None:
+    surface = Surface(WAVE, "F", max_deflection=0.3e-3)
+    found = worst_deflection(surface, np.array([[3.0, -4.0], [0.0, 2e-9], [0.0, 0.0]]))
+    np.testing.assert_allclose(found[:2] / 0.3e-3, [[-0.6, 0.8], [0.0, -1.0]], rtol=1e-15)
+    assert np.hypot(*found[2]) == pytest.approx(0.3e-3, rel=1e-15)
+
+
+def test_law_d_has_a_number_above_each_height() -> None:
+    """y/(1 - y) where the height is y radii below the top of the sharpest crest."""
+    wave = Sinusoid(0.2e-3, 2e-3, 0.3)
+    radius = wave.period**2 / (4 * math.pi**2 * wave.amplitude)
+    for y, expected in ((-0.2, 1.0), (0.3, 1.0), (0.7, 7.0 / 3.0), (0.99, 99.0), (1.1, math.inf)):
+        height = wave.amplitude - y * radius
+        for texture in (wave, as_sum(wave)):
+            found = gain_above_crest(Surface(texture, "D"), height)
+            assert found == pytest.approx(expected, rel=1e-6)
+
+
+def test_crest_curvature_is_the_greatest_eigenvalue_of_minus_the_shape() -> None:
+    """S = G⁻¹ H / s as a generalised eigenvalue problem, at generic slopes and bends."""
+    derivatives = np.random.default_rng(45).normal(size=(200, 6))
+    found = crest_curvature(derivatives)
+    for (_h, hx, hy, hxx, hxy, hyy), value in zip(derivatives, found, strict=True):
+        metric = np.array([[1.0 + hx * hx, hx * hy], [hx * hy, 1.0 + hy * hy]])
+        bend = np.array([[hxx, hxy], [hxy, hyy]]) / math.sqrt(1.0 + hx * hx + hy * hy)
+        assert value == pytest.approx(-eigh(bend, metric)[0][0], rel=1e-10, abs=1e-12)
 
 
 ridged = st.lists(st.floats(-1.0, 1.0), min_size=8, max_size=24)

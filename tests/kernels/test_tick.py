@@ -89,3 +89,8 @@ def test_each_setting_matters(device: ModuleType) -> None:
     assert 5e-3 < damped < 0.1
     steps = forces / 5e-3
     np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+
+
+def test_a_state_that_nothing_is_said_of_rests_at_the_origin() -> None:
+    assert tick.ServoState() == tick.first_state(0.0, 0.0, 0.0, SERVO.settings)
+    assert tick.first_state(1.2e-5, -1e-6, 3.7e-6, SERVO.settings)[:4] == (1e-5, 0.0, 5e-6, 0.0)

@@ -48,7 +48,7 @@ def crest_number(surface: Surface, search: Search) -> Bound:
         least = 1.0 / found.upper
         if found.at is not None:
             foot = cells.plane(found.at[None])[0]
-    elif texture.bounds[1] > 0.0:
+    else:
         least = max(least, 1.0 / texture.bounds[1])
     witness = attained(surface, NORM, foot, depth)
     # What rounding costs grows towards the medial axis.
