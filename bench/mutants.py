@@ -89,8 +89,9 @@ ROOMS = {
     "bounds": Room(
         ("analysis/bounds",),
         ("tests/analysis/test_branch_and_bound.py", "tests/analysis/test_contradictions.py",
-         "tests/analysis/test_taylor.py", "tests/analysis/test_clamps.py",
-         "tests/analysis/test_certified.py", "tests/analysis/test_certified_laws.py"),
+         "tests/analysis/test_merit.py", "tests/analysis/test_clamps.py",
+         "tests/analysis/test_taylor.py", "tests/analysis/test_certified.py",
+         "tests/analysis/test_certified_laws.py"),
     ),
     "gain": Room(
         ("analysis/gain",),

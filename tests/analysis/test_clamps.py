@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -238,6 +239,15 @@ def test_the_force_under_a_clamp_has_the_lipschitz_constant_that_is_said() -> No
     assert float(size) / K == pytest.approx(q.lower, rel=1e-12)
 
 
+def test_a_witness_is_just_where_the_clamp_begins_to_act() -> None:
+    """Law G's backing is as stiff at every depth: of all witnesses the nearest is named."""
+    shallow = 0.05e-3
+    for number in (characteristic_number, one_sided_number):
+        found = number(Surface(WAVE, "G", K, shallow, clamp="backed"), 1e-3)
+        assert found.at is not None
+        assert shallow < -found.at[2] < shallow * (1.0 + 1e-8)
+
+
 PULLED = Law("S", "pulled", "nominal",
              lambda c: c.k * c.depth * (c.e_z - c.tangential(c.deflection) / 1e-3),
              clampable=True, stateful=True, parameters={"max_deflection": 1e-3})  # fmt: skip
@@ -255,6 +265,23 @@ def test_a_law_that_is_not_affine_in_the_depth_is_bounded_in_the_zone(clamp: Cla
     surface = clamped(SUM, CUBED, clamp)
     found = characteristic_number(surface)
     assert found.method == "certified"
+    assert worst_secants(surface)[0] <= found.upper * (1 + 1e-6)
+    assert found.lower >= found.upper * (1 - 2e-3)
+
+
+def test_a_law_that_is_stiffest_inside_the_zone_is_bounded_there() -> None:
+    """The slope of δ + (s - δ/3) (δ/s)² is 1 + δ (2 s - δ)/s², greatest at δ = s."""
+
+    def force(c: Any) -> Any:
+        size = c.parameter("size")
+        return c.k * (c.depth + (size - c.depth / 3) * (c.depth / size) ** 2) * c.e_z
+
+    law = Law("P", "peak", "vertical", force, clampable=True, parameters={"size": 1.5 * D})
+    surface = clamped(WAVE, law, "lateral")
+    found = characteristic_number(surface)
+    assert found.at is not None
+    depth = WAVE.height(np.array([found.at])[:, :2])[0] - found.at[2]
+    assert depth == pytest.approx(1.5 * D, rel=0.05)
     assert worst_secants(surface)[0] <= found.upper * (1 + 1e-6)
     assert found.lower >= found.upper * (1 - 2e-3)
 

@@ -121,16 +121,13 @@ class Number:
         bound = self.quick(c) + moved + unknown + slack
         bound = np.where(np.isnan(bound), np.inf, bound)
         close = np.flatnonzero((bound > above) & np.isfinite(bound))
-        if len(close):
-            best = _at_corners(self.quick, c[close], g[:, close]) + unknown[close]
-            bound[close] = np.minimum(bound[close], best + slack[close])
-            # Where only the error of the quick way decides, take the careful one.
-            unsure = (best + slack[close] > above) & (best - slack[close] <= above)
-            close = close[unsure]
-        if len(close):
-            best = _at_corners(self.careful, c[close], g[:, close]) + unknown[close]
-            careful_slack = _LAPACK_SLACK * (size[close] + moved[close])
-            bound[close] = np.minimum(bound[close], best + careful_slack)
+        best = _at_corners(self.quick, c[close], g[:, close]) + unknown[close]
+        bound[close] = np.minimum(bound[close], best + slack[close])
+        # Where only the error of the quick way decides, take the careful one.
+        close = close[(best + slack[close] > above) & (best - slack[close] <= above)]
+        best = _at_corners(self.careful, c[close], g[:, close]) + unknown[close]
+        careful_slack = _LAPACK_SLACK * (size[close] + moved[close])
+        bound[close] = np.minimum(bound[close], best + careful_slack)
         return np.asarray(bound)
 
 
