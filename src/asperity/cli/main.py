@@ -21,6 +21,7 @@ COMMANDS = {
     "analyze": "Say all that is known of one law on a surface and a device.",
     "compare": "Compare the laws on a surface and a device.",
     "devices": "List devices, and the source of every number.",
+    "init": "Write a scene to begin with.",
     "limits": "Say whether a texture can be felt on a device.",
     "onset": "Find the stiffness at which limit cycles begin.",
     "prepare": "Prepare a measured surface and save it.",

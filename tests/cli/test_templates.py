@@ -1,0 +1,131 @@
+"""Files to begin with: they are read as they stand, and so is every line of their comments."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from asperity.arguments import read_arguments
+from asperity.cli.main import main
+from asperity.devices import FIELDS, load_device
+from asperity.devices.template import device_template
+from asperity.scene import load_scene
+from asperity.scene.sections import RUN
+from asperity.scene.setup import make_setup
+from asperity.scene.template import scene_template
+
+Call = Callable[..., tuple[int, str, str]]
+COMMENT = re.compile(r"# (?=[a-z_]+ = )")
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Call:
+    """Return a function that runs the program and returns exit code, output and errors."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["asperity", *arguments])
+        try:
+            main()
+            code = 0
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        return code, *capsys.readouterr()
+
+    return run
+
+
+def test_the_device_template_is_read_as_it_stands(call: Call, tmp_path: Path) -> None:
+    code, out, err = call("devices", "--template")
+    assert (code, err) == (0, "")
+    path = tmp_path / "mine.toml"
+    path.write_text(out, encoding="utf-8")
+    assert load_device(path).data == {}
+    assert call("devices", str(path))[0] == 0
+
+
+def test_every_line_of_the_device_template_is_read(tmp_path: Path) -> None:
+    fields, table = device_template().split("\n# Of each number")
+    path = tmp_path / "mine.toml"
+    path.write_text("".join(COMMENT.sub("", line) for line in fields.splitlines(keepends=True)))
+    device = load_device(path)
+    assert set(device.data) == set(FIELDS)
+    assert (device.axes[:2], len(device.notes)) == ("x ", 1)
+    lines = [line.removeprefix("# ") for line in table.splitlines()[1:]]
+    path.write_text("\n".join(lines))
+    test = load_device(path).wall_test
+    assert test is not None
+    assert (test.value, test.cycled, test.pedigree) == (1800.0, 2000.0, "measured")
+    assert (test.directions, test.update_rate, test.positions) == (("x", "z"), 1000.0, "stepped")
+
+
+def test_the_device_template_names_every_unit() -> None:
+    for name, unit in FIELDS.items():
+        line = next(line for line in device_template().splitlines() if f"# {name} = " in line)
+        assert unit == "1" or line.endswith(f"[{unit}]")
+
+
+def test_the_device_template_stands_alone(call: Call) -> None:
+    for more in (["touch"], ["--json", "-"]):
+        code, out, err = call("devices", "--template", *more)
+        assert (code, out) == (2, "")
+        assert "goes with nothing else" in err
+
+
+def test_the_scene_that_is_written_runs(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    code, out, err = call("init", str(path))
+    assert (code, err) == (0, "")
+    assert f"asperity simulate {path}" in out
+    code, out, err = call("simulate", str(path), "--duration", "50ms", "--json", "-")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["run"]["stopped"] in (None, "")
+    code, out, err = call("limits", str(path), "--json", "-")
+    assert (code, json.loads(out)["device"]["id"]) == (0, "touch")
+
+
+def test_a_file_is_replaced_only_by_force(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text("mine")
+    code, _out, err = call("init", str(path))
+    assert code == 2
+    assert "exists" in err
+    assert "--force replaces it" in err
+    assert path.read_text() == "mine"
+    assert call("init", str(path), "--force")[0] == 0
+    assert path.read_text(encoding="utf-8") == scene_template("scene.toml")
+
+
+@pytest.mark.parametrize("name", ["scene.txt", "none/scene.toml", "folder.toml"])
+def test_where_no_scene_can_be_written(call: Call, tmp_path: Path, name: str) -> None:
+    (tmp_path / "folder.toml").mkdir()
+    code, out, err = call("init", str(tmp_path / name), "--force")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+
+
+LINES = [line for line in scene_template().splitlines() if COMMENT.match(line)]
+
+
+@pytest.mark.parametrize("line", LINES, ids=lambda line: line[2:20])
+def test_every_comment_of_the_scene_is_read(tmp_path: Path, line: str) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(scene_template().replace(line, COMMENT.sub("", line)), encoding="utf-8")
+    scene = load_scene(str(path))
+    assert read_arguments("run", scene.loop["run"], RUN) is not None
+    # A mass has no five-bar's plane, and no mode of a bandwidth that is not known.
+    if not line.startswith(("# centre", "# resonance", "# brakes")):
+        assert make_setup(scene).device.id == "touch"
+
+
+def test_the_scene_says_all_that_scenes_may_say() -> None:
+    sections = tomllib.loads(
+        "".join(COMMENT.sub("", one + "\n") for one in scene_template().split("\n"))
+    )
+    assert list(sections) == ["texture", "surface", "device", "hand", "motion", "run"]
+    assert {argument.name for argument in RUN} == set(sections["run"])
+    assert len(LINES) > 15
