@@ -12,6 +12,7 @@ from asperity.errors import ParameterError
 from asperity.paper import CLAIMS, VERDICTS, Result, claim, reproduce_claims
 from asperity.paper.experiments import FINDINGS, findings
 from asperity.paper.experiments.settings import TWO_WAYS
+from asperity.paper.registry import find_claims
 
 SIMULATED = set(FINDINGS)
 
@@ -133,6 +134,35 @@ def test_every_number_of_the_paper_has_a_claim() -> None:
     assert set(covered) == set(wanted)
     tables = [covered.count(name) for name in ("Table I", "Table II")]
     assert tables == [6, 7]
+
+
+FOUND = [
+    ("eq-12", ["eq-12"]),
+    ("(12)", ["eq-12"]),
+    ("Fig. 5", ["sentence-V.A-cycles", "sentence-V.A-settles"]),
+    ("figure-7", ["sentence-V.C-A", "sentence-V.C-D"]),
+    ("fig-6", [f"sentence-V.B-{law}" for law in "AGDF"]),
+    ("table-1", [f"table-1-{row}" for row in ("A", "BG", "D", "E", "F", "C")]),
+    ("Table I", [f"table-1-{row}" for row in ("A", "BG", "D", "E", "F", "C")]),
+    ("remark 6", ["remark-6"]),
+]
+
+
+@pytest.mark.parametrize(("name", "ids"), FOUND)
+def test_a_place_of_the_paper_finds_its_claims(name: str, ids: list[str]) -> None:
+    assert sorted(one.id for one in find_claims(name)) == sorted(ids)
+
+
+def test_the_figures_that_show_what_is_claimed_are_found() -> None:
+    """1 and 4 are drawings of a tool and of the device."""
+    for number in (2, 3, 5, 6, 7):
+        assert len(find_claims(f"fig-{number}")) >= 2
+    three = [one.id for one in find_claims("fig-3")]
+    assert set(three) >= {"sentence-IV-figure-3", "eq-12", "eq-27", "eq-29"}
+    for name in ("fig-1", "fig-4", "fig", "fig-33", ""):
+        with pytest.raises(ParameterError, match="claim is unknown"):
+            find_claims(name)
+    assert len(find_claims("eq")) == 44
 
 
 def test_claims_are_in_the_order_of_the_paper() -> None:

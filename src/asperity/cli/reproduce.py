@@ -25,7 +25,11 @@ _CLAIMS = 0.35
 
 @click.command("reproduce")
 @click.option(
-    "--claim", "names", metavar="ID", multiple=True, help="Only this claim, with its evidence."
+    "--claim",
+    "names",
+    metavar="ID",
+    multiple=True,
+    help="Only this claim, or those of fig-3, with evidence.",
 )
 @click.option("--skip-experiments", is_flag=True, help="Leave out what is simulated at length.")
 @click.option(
@@ -45,10 +49,10 @@ def command(
 
     Each claim is code that computes its evidence; the verdict follows from the numbers.
     """
-    from asperity.paper import claim
+    from asperity.paper.registry import find_claims
 
     for name in names:
-        claim(name)  # a misspelt one is refused before anything is computed
+        find_claims(name)  # a misspelt one is refused before anything is computed
     measured = _texture(surface, values)
     alone = bool(names) or skip_experiments
     results, experiments = _reproduced(names or None, measured, with_experiments=not alone)

@@ -139,7 +139,7 @@ def _onset(amplitude: float, period: float) -> float:
 
 @judges("remark-6", "IV.D", "Remark 6", flipped_by=laws(D="E"))
 def remark_6() -> Check:
-    """D's force jumps, on a sinusoid below its maxima; its potential has a kink there."""
+    """D's force jumps, on a sinusoid below its maxima (Fig. 2); its potential has a kink there."""
     checks = []
     for name, case in (("V.A", PASSIVITY), ("V.B", SCANNING), ("V.C", BUMP)):
         surface = case.surface("D")

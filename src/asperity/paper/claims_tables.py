@@ -46,13 +46,13 @@ def _normal(s: Spot) -> FloatArray:
 
 @judges("table-1-A", "IV", "Table I", flipped_by=FORCES)
 def row_a() -> Check:
-    """Force of A: [0, -κ₀ d]."""
+    """Force of A (Fig. 2): [0, -κ₀ d]."""
     return field_check("A", lambda s: np.array([0.0, -s.k * s.d]))
 
 
 @judges("table-1-BG", "IV", "Table I", flipped_by=FORCES)
 def row_b_and_g() -> Check:
-    """Force of B and G: -κ₀ d n.
+    """Force of B and G (Fig. 2): -κ₀ d n.
 
     One formula, two penetrations.
     """
@@ -64,7 +64,7 @@ def row_b_and_g() -> Check:
 
 @judges("table-1-D", "IV", "Table I", flipped_by=FORCES)
 def row_d() -> Check:
-    """Force of D: -κ₀ d^min n̂.
+    """Force of D (Fig. 2): -κ₀ d^min n̂.
 
     Its n̂ read as the unit vector from the nearest point to the probe.
     """
@@ -73,7 +73,7 @@ def row_d() -> Check:
 
 @judges("table-1-E", "IV", "Table I", flipped_by=FORCES)
 def row_e() -> Check:
-    """Force of E: [0, -κ₀ d^min].
+    """Force of E (Fig. 2): [0, -κ₀ d^min].
 
     d^min being a distance as the text below the table says.
     """
@@ -87,7 +87,7 @@ def row_e() -> Check:
 
 @judges("table-1-F", "IV", "Table I", flipped_by=FORCES)
 def row_f() -> Check:
-    """Force of F: [-κ(x) d, -κ₀ d].
+    """Force of F (Fig. 2): [-κ(x) d, -κ₀ d].
 
     With κ(x) = μκ₀(1 - h), d = p^z.
     """
@@ -117,7 +117,7 @@ def row_f() -> Check:
 
 @judges("table-1-C", "IV", "Table I", flipped_by=FORCES)
 def row_c() -> Check:
-    """Force of C: [-κ₀ h' d, -κ₀ d]."""
+    """Force of C (Fig. 2): [-κ₀ h' d, -κ₀ d]."""
     return field_check(
         "C",
         lambda s: np.array([-s.k * s.slope * s.d, -s.k * s.d]),

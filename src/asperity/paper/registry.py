@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from difflib import get_close_matches
 
@@ -59,10 +60,43 @@ def claim(name: str) -> Claim:
         close += [f"eq-{text}"] if text.isdecimal() else []
         near = [known for known in CLAIMS if known.lower() in close]
         hint = f"did you mean {' or '.join(map(repr, near))}? " if near else ""
-        raise ParameterError(
-            "claim", f"is unknown: {name!r}; {hint}there are {len(CLAIMS)}, all listed without it"
-        )
+        known = f"there are {len(CLAIMS)}, all listed without it, and fig-3 finds a figure's"
+        raise ParameterError("claim", f"is unknown: {name!r}; {hint}{known}")
     return CLAIMS[name]
+
+
+def find_claims(name: str) -> tuple[Claim, ...]:
+    """Return the claims that a name stands for, in the order of the paper.
+
+    Args:
+        name: an id; the beginning of several, "table-1"; or what they are about: "fig-3",
+            "Fig. 3", "(12)", "Remark 6".
+
+    Raises:
+        ParameterError: if there is none; the nearest are offered.
+
+    Example:
+        >>> [found.id for found in find_claims("fig-5")]
+        ['sentence-V.A-cycles', 'sentence-V.A-settles']
+    """
+    if isinstance(name, str) and name not in CLAIMS and (wanted := _place(name)):
+        found = tuple(one for one in CLAIMS.values() if wanted in _places(one))
+        if found:
+            return found
+    return (claim(name),)
+
+
+def _place(text: str) -> str:
+    """Return a place of the paper however it is written: "fig3", "remark6", "12"."""
+    return re.sub(r"[^a-z0-9]", "", text.lower()).replace("figure", "fig")
+
+
+def _places(one: Claim) -> set[str]:
+    """Return the places that a claim is about, the figures that its statement names too."""
+    figures = re.findall(r"Fig\. \d+", one.statement)
+    parts = one.id.split("-")
+    beginnings = ["-".join(parts[:count]) for count in range(1, len(parts))]
+    return {_place(text) for text in (*one.equations, *figures, *beginnings)}
 
 
 def reproduce_claims(
@@ -71,7 +105,7 @@ def reproduce_claims(
     """Compute claims and return their results, in the order of the paper.
 
     Args:
-        ids: which; all by default.
+        ids: which, see :func:`find_claims`; all by default.
         progress: called after each claim.
         workers: processes to use; this one alone by default.
 
@@ -88,7 +122,7 @@ def reproduce_claims(
         raise ParameterError("workers", "must be a whole number, 1 or more", workers)
     if isinstance(ids, str):
         raise ParameterError("ids", "must be a sequence of ids, not one text", ids)
-    wanted = None if ids is None else {claim(given).id for given in ids}
+    wanted = None if ids is None else {found.id for given in ids for found in find_claims(given)}
     names = [name for name in CLAIMS if wanted is None or name in wanted]
     results = []
     for result in _computed(names, 1 if workers is None else int(workers)):
