@@ -135,6 +135,41 @@ def _tiff(folder: Path) -> Seeds:
     return seeds
 
 
+def _tiff_lengths(folder: Path) -> Seeds:
+    """TIFF with the metadata of ImageJ and of OME."""
+    writer = _writer("image_writer")
+    path, values = folder / "seed.tif", _heights().astype(np.float32)
+    keys = "ImageJ=1.54f\nimages=1\nunit=micron\ncf=0\nc0=1.5\nc1=2.0\nvunit=nm\n"
+    pixels = '<Pixels PhysicalSizeX="0.5" PhysicalSizeY="250" PhysicalSizeYUnit="nm" SizeX="12"/>'
+    ome = f'<?xml version="1.0"?><OME xmlns="x"><Image>{pixels}</Image></OME>'
+    tags = dict.fromkeys((282, 283), (5, struct.pack("<II", 4, 1)))
+    return [
+        writer.write_tiff(path, values, tags={**tags, 270: (2, text.encode() + b"\0")}).read_bytes()
+        for text in (keys, ome)
+    ]
+
+
+def _esri(_: Path) -> Seeds:
+    rows = "\n".join(" ".join(f"{z:g}" for z in row) for row in _heights())
+    return [
+        f"ncols 12\nnrows 9\n{corner}\ncellsize 2.5\nNODATA_value -9999\n{rows}\n".encode()
+        for corner in ("xllcorner 10\nyllcorner 20", "xllcenter 1.5\nyllcenter -3")
+    ]
+
+
+def _columns(_: Path) -> Seeds:
+    """Profiles and points with a column of validity or of numbering, and uneven positions."""
+    line = [f"{0.5 * k:g};{z:g};{k % 3 > 0:d}" for k, z in enumerate(_heights()[0])]
+    points = [
+        f"{n},{x},{y},{z:g}"
+        for n, ((y, x), z) in enumerate(zip(np.ndindex(9, 12), _heights().ravel(), strict=True))
+    ]
+    uneven = [f"{k + 0.2 * (k % 2):g} {z:g}" for k, z in enumerate(_heights()[0])]
+    tables = (["X;Y;valid", "[mm];[mm];[1/0]", *line], ["index,x in um,y in um,z in um", *points],
+              uneven)  # fmt: skip
+    return ["\n".join(table).encode() for table in tables]
+
+
 def _stl(folder: Path) -> Seeds:
     writer = _writer("mesh_writer")
     vertices, faces = writer.grid_mesh(_heights() / 100, 0.5)
@@ -239,6 +274,9 @@ SEEDS: dict[str, Callable[[Path], Seeds]] = {
     "sdf-binary": _sdf_binary,
     "png": _png,
     "tiff": _tiff,
+    "tiff-lengths": _tiff_lengths,
+    "esri": _esri,
+    "columns": _columns,
     "stl-binary": _stl,
     "stl-text": _stl_text,
     "obj": _obj,

@@ -107,7 +107,7 @@ def test_signatures_are_the_declarations() -> None:
     """Python users have explicit keywords: in name and order those that are declared."""
     names = [argument.name for argument in FILE_ARGUMENTS]
     assert list(_keywords(load_texture, "path")) == names
-    ready = _keywords(prepare, "raw", "progress")
+    ready = _keywords(prepare, "raw", "progress", "watch")
     assert list(ready) == [argument.name for argument in PREPARING]
     for argument in PREPARING:
         if argument.form != "switch":

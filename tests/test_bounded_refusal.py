@@ -17,9 +17,11 @@ from asperity.arguments import Argument, Form
 from asperity.devices.reading import load_device
 from asperity.errors import AsperityError
 from asperity.measured.reading import ReadingOptions, SurfaceFile
+from asperity.measured.reading.esri import read_esri
 from asperity.measured.reading.registry import MARKED
 from asperity.measured.reading.sdf import read_sdf
 from asperity.measured.reading.text import read_text
+from asperity.measured.reading.tiff_scale import ome_scale
 from asperity.measured.reading.x3p_document import parse_document
 from asperity.scene.loading import load_scene
 from asperity.scene.sections import read_path
@@ -100,6 +102,7 @@ BOMB = '<!DOCTYPE a [<!ENTITY a "aaaaaaaa">' + "".join(
 SDF = (
     "aISO-1.0\nManufacID = x\nNumPoints = 4\nNumProfiles = 2\nXscale = 1\nYscale = 1\nZscale = 1\n"
 )
+ESRI = "ncols 4\nnrows 3\ncellsize 1\n"
 PARSERS: dict[str, tuple[Callable[[str], object], tuple[str, ...]]] = {
     "quantity": (lambda text: quantity("period", text, "m"), ("", "1 ", "1 mm")),
     "argument": (every_form, ("",)),
@@ -109,6 +112,15 @@ PARSERS: dict[str, tuple[Callable[[str], object], tuple[str, ...]]] = {
     "path of a motion": (as_file(read_path), ("", "t,x,y,z\n")),
     "mark of a format": (recognise, ("", "solid ", "aISO-1.0\n", "v 1 2 3\n")),
     "text": (lambda text: read_text(file_of(text), ReadingOptions()), ("", "# Width: ", "x [um] ")),
+    "text, resampled": (
+        lambda text: read_text(file_of(text), ReadingOptions(resample=1.0)),
+        ("", "x;z;valid\n[mm];[mm];[1/0]\n", "index,x [m],z [m]\n"),
+    ),
+    "ESRI grid": (
+        lambda text: read_esri(file_of(text), ReadingOptions()),
+        ("ncols ", ESRI, f"{ESRI}1 "),
+    ),
+    "OME": (ome_scale, ("", "<Pixels ", '<a:Pixels PhysicalSizeX="1" ')),
     "SDF": (lambda text: read_sdf(file_of(text), ReadingOptions()), ("aISO-1.0\n", SDF, SDF + "*")),
     "XML of an X3P": (
         lambda text: parse_document(text.encode()),

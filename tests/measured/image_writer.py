@@ -112,7 +112,7 @@ def write_tiff(
 def _directory(
     content: bytes, pointer: int, entries: dict[int, tuple[int, bytes]], order: str
 ) -> tuple[bytes, int]:
-    sizes = {2: 1, 3: 2, 4: 4, 7: 1, 12: 8}
+    sizes = {2: 1, 3: 2, 4: 4, 5: 8, 7: 1, 12: 8}
     table = b""
     for code, (kind, value) in sorted(entries.items()):
         if len(value) > 4:

@@ -87,7 +87,7 @@ def test_what_cannot_be_interpolated(tmp_path: Path) -> None:
     other.write_text("1 2 3 4\n5 6 7 8\n")
     np.save(tmp_path / "a.npy", np.eye(4))
     for file in (other, tmp_path / "a.npy"):
-        with pytest.raises(ParameterError, match="no list of x, y, z points"):
+        with pytest.raises(ParameterError, match="no list of points"):
             read_surface(file, resample=1e-5)
 
 

@@ -19,7 +19,7 @@ READING = (
     Argument("integrate_normals", "make heights of a normal map", form="switch"),
     Argument(
         "resample",
-        "pitch of the map that is interpolated through x, y, z points on no regular grid",
+        "pitch of the map or profile that is interpolated through points on no regular grid",
         "m",
         example="5um",
     ),

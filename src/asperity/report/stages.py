@@ -61,6 +61,8 @@ def _column(
 
 def _unit_of(values: Iterable[float | None]) -> tuple[str, float]:
     greatest = max((abs(value) for value in values if value is not None), default=0.0)
+    if greatest == 0.0:
+        return "", 1.0
     return next(((name, size) for name, size in _UNITS if greatest >= size), _UNITS[-1])
 
 

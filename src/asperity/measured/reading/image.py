@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from asperity.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading.normals import integrate, is_normal_map
 from asperity.measured.reading.raw import MAX_POINTS, RawSurface
+from asperity.measured.reading.tiff_scale import NO_SCALE, Scale
 from asperity.memory import reserve
 
 _INTEGRATE = "integrate_normals"
@@ -24,11 +25,13 @@ class Pixels:
         values: shape (rows, columns, channels), unsigned, signed or float.
         alpha: True where the last channel is opacity.
         notes: what was odd about the file.
+        scale: what the file says of lengths.
     """
 
     values: NDArray[Any]
     alpha: bool
     notes: tuple[str, ...] = ()
+    scale: Scale = NO_SCALE
 
 
 def check_size(rows: int, columns: int) -> None:
@@ -44,7 +47,9 @@ def check_size(rows: int, columns: int) -> None:
     reserve(columns, rows)
 
 
-def surface_of_pixels(pixels: Pixels, name: str, *, integrate_normals: bool) -> RawSurface:
+def surface_of_pixels(
+    pixels: Pixels, name: str, *, integrate_normals: bool, metres: float | None = None
+) -> RawSurface:
     """Turn pixels into heights: values as they are, or integrated slopes of a normal map.
 
     Row i is the picture's row i from the top, so y runs down the picture.
@@ -53,24 +58,30 @@ def surface_of_pixels(pixels: Pixels, name: str, *, integrate_normals: bool) -> 
         pixels: the picture.
         name: name of the file.
         integrate_normals: whether a normal map is integrated; refused otherwise.
+        metres: per value, as the user says; None for not said.
 
     Returns:
-        Heights without a unit, without a pitch.
+        Heights without a unit unless the file or the user names one, the pitch where the file
+        has one.
 
     Raises:
         SurfaceFileError: colours, transparency, or a normal map that nobody asked to integrate.
-        ParameterError: integrate_normals for a picture that is no normal map.
+        ParameterError: integrate_normals for a picture that is no normal map; a unit for slopes,
+            or for a file that names its own.
     """
     values, notes = _opaque(pixels)
+    pitch = pixels.scale.pitch
     if is_normal_map(values):
         if not integrate_normals:
             raise SurfaceFileError(
                 "looks like a normal map (slopes as colours), not like heights;"
                 " have it integrated to heights with integrate_normals=True (--integrate-normals)"
             )
+        if metres is not None:
+            raise ParameterError("unit", f"must not be given: {name} holds slopes, without unit")
         heights, found = integrate(values)
         return RawSurface(
-            heights, None, name, (*notes, *found), has_units=False, relative=True, per_pitch=True
+            heights, pitch, name, (*notes, *found), has_units=False, relative=True, per_pitch=True
         )
     if integrate_normals:
         raise ParameterError(
@@ -79,8 +90,17 @@ def surface_of_pixels(pixels: Pixels, name: str, *, integrate_normals: bool) -> 
     grey, notes = _grey(values, notes)
     with np.errstate(invalid="ignore"):  # a signalling NaN is a missing point too
         heights = grey.astype(np.float64)
-    note = "an image has no unit: heights are pixel values, y runs down the image"
-    return RawSurface(heights, None, name, (*notes, note), has_units=False, relative=True)
+    heights = pixels.scale.factor * heights + pixels.scale.offset
+    unit = pixels.scale.unit
+    if unit is not None and metres is not None:
+        raise ParameterError("unit", f"must not be given: {name} names its unit")
+    if unit is None:
+        unit = metres
+    if unit is None:
+        note = "an image has no unit: heights are pixel values, y runs down the image"
+        return RawSurface(heights, pitch, name, (*notes, note), has_units=False, relative=True)
+    given = () if metres is None else (f"no unit in the file: {metres:g} m a value as given",)
+    return RawSurface(unit * heights, pitch, name, (*notes, *given, "y runs down the image"))
 
 
 def _opaque(pixels: Pixels) -> tuple[NDArray[Any], tuple[str, ...]]:

@@ -18,6 +18,7 @@ from asperity.measured.reading.child import in_child
 from asperity.measured.reading.length_units import metres_of
 from asperity.measured.reading.raw import MAX_POINTS, RawSurface
 from asperity.measured.reading.reader import ReadingOptions, SurfaceFile, naming
+from asperity.measured.reading.scatter import advice, resampled_line
 
 # asperity reads these itself, or refuses them for a reason; HGT takes any file of a square size.
 _OURS = frozenset(("sdf", "xyz", "asc", "npy", "npz", "x3p", "hgt"))
@@ -132,11 +133,9 @@ def _surface(reader: Any, chosen: Any, file: SurfaceFile, options: ReadingOption
     points = int(np.prod([int(n) for n in size])) if size is not None else 0
     if points > MAX_POINTS or points > _INFLATION * file.path.stat().st_size:
         raise SurfaceFileError(f"{points} points, more than are read or the file can hold")
-    if chosen.is_uniform is False:
-        raise SurfaceFileError("sampling is not uniform; resample the profile")
     unit = _unit(chosen, name, metres)
-    heights, pitch = _data(chosen)
-    notes = [f"{reader.name()} file, read by SurfaceTopography"]
+    heights, pitch, said = _data(chosen, unit, options.resample)
+    notes = [f"{reader.name()} file, read by SurfaceTopography", *said]
     if len(reader.channels) > 1:
         notes.append(f"channel {chosen.name!r} of {len(reader.channels)}")
     if metres is not None:
@@ -185,21 +184,41 @@ def _unit(chosen: Any, name: str, metres: float | None) -> float:
     return metres_of(str(chosen.unit))
 
 
-def _data(chosen: Any) -> tuple[NDArray[np.float64], tuple[float, ...] | None]:
-    """Return heights with x along the last axis, and the pitch; both in the file's unit."""
+def _data(
+    chosen: Any, unit: float, resample: float | None
+) -> tuple[NDArray[np.float64], tuple[float, ...] | None, list[str]]:
+    """Return heights with x along the last axis, the pitch, both in the file's unit, and notes."""
     options: dict[str, Any] = {}
-    if chosen.physical_sizes is None:  # it must be told something; the pitch is dropped again
+    # It must be told something, unless its points are uneven; the pitch is dropped again.
+    if chosen.physical_sizes is None and chosen.is_uniform is not False:
         options["physical_sizes"] = tuple(1.0 for _ in chosen.nb_grid_pts)
     if chosen.unit is None:
         options["unit"] = "m"
     topography = chosen.topography(**options)
     if not topography.is_uniform:
-        raise SurfaceFileError("sampling is not uniform; resample the profile")
+        return _uneven(topography, unit, resample)
+    if resample is not None:
+        raise ParameterError("resample", "must not be given: the points are on a grid", resample)
     stored = np.ma.masked_array(topography.heights(), dtype=np.float64)
     heights = np.ascontiguousarray(stored.filled(np.nan).T)
     if heights.ndim not in (1, 2) or heights.size == 0:
         raise SurfaceFileError(f"heights of shape {heights.shape}")
     if chosen.physical_sizes is None:
-        return heights, None
+        return heights, None, []
     sizes = np.atleast_1d(np.asarray(chosen.physical_sizes, dtype=np.float64))
-    return heights, tuple(sizes / np.array(heights.shape[::-1]))
+    return heights, tuple(sizes / np.array(heights.shape[::-1])), []
+
+
+def _uneven(
+    topography: Any, unit: float, resample: float | None
+) -> tuple[NDArray[np.float64], tuple[float, ...], list[str]]:
+    """Return a profile of uneven points, interpolated; see :func:`_data`."""
+    positions = np.asarray(topography.positions(), dtype=np.float64).ravel()
+    heights = np.ma.masked_array(topography.heights(), dtype=np.float64).filled(np.nan).ravel()
+    steps = np.diff(positions)
+    if len(positions) != len(heights) or len(steps) == 0 or not np.all(steps > 0):
+        raise SurfaceFileError("sampling is not uniform, and the positions do not increase")
+    if resample is None:
+        raise SurfaceFileError(f"sampling is not uniform; {advice(float(steps.mean()) * unit)}")
+    line, said = resampled_line(positions * unit, heights * unit, resample)
+    return line / unit, (resample / unit,), [said]

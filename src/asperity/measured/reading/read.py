@@ -42,7 +42,7 @@ def read_surface(
             optional for NPY and text (metres if not given).
         integrate_normals: integrate a normal map (an image of slopes) to heights.
         resample: pitch [m] of the map that is interpolated through a list of x, y, z points on no
-            regular grid; its error is in the notes.
+            regular grid, or of the profile through uneven ones; its error is in the notes.
 
     Returns:
         The heights [m] as the file gives them, with the pitch where the file has one. Heights

@@ -53,7 +53,7 @@ class ReadingOptions:
         channel: name or number (from 0) of the height channel, for a file with several.
         unit: unit of length of a file that has none.
         integrate_normals: integrate a normal map (an image of slopes) to heights.
-        resample: pitch [m] to which a list of points on no regular grid is interpolated.
+        resample: pitch [m] to which points on no regular grid are interpolated.
     """
 
     channel: str | int | None = None
@@ -109,7 +109,7 @@ class Reader:
             ("channel", "has no channels to choose from"),
             ("unit", "has its own unit, or none at all"),
             ("integrate_normals", "is no image"),
-            ("resample", "is no list of x, y, z points"),
+            ("resample", "is no list of points"),
         ):
             given = getattr(options, argument)
             absent = given is None or given is False  # a channel may be number 0

@@ -17,6 +17,7 @@ import numpy as np
 
 from asperity.errors import AsperityError, ParameterError, SurfaceFileError
 from asperity.measured.reading.arrays import NPY_MAGIC, read_npy
+from asperity.measured.reading.esri import is_esri, read_esri
 from asperity.measured.reading.foreign import (
     ZIP_MAGIC,
     archive_kind,
@@ -67,7 +68,8 @@ MARKED = (
     Reader("an X3P file", _is_x3p, read_x3p),
     Reader("an NPY file", lambda file: file.head.startswith(NPY_MAGIC), read_npy, ("unit",)),
     Reader("a PNG image", _is_png, _read_png, ("integrate_normals",)),
-    Reader("a TIFF image", _is_tiff, read_tiff_image, ("integrate_normals",)),
+    Reader("a TIFF image", _is_tiff, read_tiff_image, ("integrate_normals", "unit")),
+    Reader("an ESRI ASCII grid", is_esri, read_esri, ("unit",)),
     Reader("an SDF file", lambda file: is_sdf(file.head), read_sdf),
     mesh_reader("STL"),
     mesh_reader("OBJ"),
@@ -83,7 +85,7 @@ LAST = (
         "an instrument's file",
         lambda _: has_library(),
         read_instrument,
-        ("channel", "unit"),
+        ("channel", "unit", "resample"),
         certain=False,
     ),
 )

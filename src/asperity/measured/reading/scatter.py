@@ -8,11 +8,30 @@ from asperity.checks import FloatArray
 from asperity.errors import ParameterError, SurfaceFileError
 from asperity.measured.length_words import by_text, length_text
 from asperity.measured.reading.raw import MAX_POINTS
+from asperity.units import engineering
 
 _MOST = 2 * 10**6  # points: their triangles take some seconds and a gigabyte
 _FINEST = 100  # grid points for each point of the list: finer says nothing more
 _THIN = 1e-6  # points as close to one line are on it but for rounding
 _LEFT_OUT = 10  # one point in so many is left out to find the error
+
+
+def advice(pitch: float) -> str:
+    """Return how points on no grid can be read.
+
+    Args:
+        pitch: that fits them [m].
+
+    Example:
+        >>> advice(4.5e-6)[-43:]
+        'such as resample=4.5e-06 (--resample 4.5um)'
+    """
+    pitch = float(f"{pitch:.2g}")
+    said = engineering(pitch, "m", digits=2).replace(" ", "").replace("µ", "u")
+    return (
+        "points on no grid are interpolated to a pitch that you give, such as"
+        f" resample={pitch:g} (--resample {said})"
+    )
 
 
 def fitting_pitch(positions: FloatArray) -> float | None:
@@ -78,6 +97,41 @@ def resampled(points: FloatArray, pitch: float) -> tuple[FloatArray, str]:
         f" pitch {length_text(pitch)}; {_error(places, points[:, 2])}"
     )
     return heights, said
+
+
+def resampled_line(
+    positions: FloatArray, heights: FloatArray, pitch: float
+) -> tuple[FloatArray, str]:
+    """Interpolate a profile linearly between its points.
+
+    Args:
+        positions: [m], shape (n,), increasing.
+        heights: [m], shape (n,); points without one are left out.
+        pitch: of the profile [m], which begins at the first position.
+
+    Returns:
+        Heights [m], shape (m,); what was done, with its error as in :func:`resampled`.
+
+    Raises:
+        SurfaceFileError: for fewer than two points with a height.
+        ParameterError: for a pitch that is much finer than the points.
+    """
+    known = ~np.isnan(heights)
+    positions, heights = positions[known], heights[known]
+    if len(positions) < 2:
+        raise SurfaceFileError("a profile needs two points with a height")
+    length = float(positions[-1] - positions[0])
+    count = int(min(length / pitch + 1e-9, 2.0**40)) + 1
+    if count > min(MAX_POINTS, _FINEST * len(positions)):
+        raise ParameterError("resample", f"is too fine for {len(positions)} points", pitch)
+    along = positions[0] + pitch * np.arange(count)
+    missed = np.abs(np.interp(positions[1::2], positions[::2], heights[::2]) - heights[1::2])
+    rms = length_text(float(np.sqrt(np.mean(missed**2))))
+    said = (
+        f"{len(positions)} points interpolated linearly to {count} of pitch {length_text(pitch)};"
+        f" from every other point the rest are missed by {rms} rms"
+    )
+    return np.interp(along, positions, heights), said
 
 
 def _linear(places: FloatArray, heights: FloatArray, at: tuple[FloatArray, ...]) -> FloatArray:

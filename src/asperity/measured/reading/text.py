@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import codecs
 import re
+from dataclasses import replace
 from decimal import Decimal, InvalidOperation
 
 import numpy as np
@@ -16,8 +17,14 @@ from asperity.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading.numbers import parse_number
 from asperity.measured.reading.raw import MAX_POINTS, RawSurface
 from asperity.measured.reading.reader import ReadingOptions, SurfaceFile, naming
-from asperity.measured.reading.scatter import fitting_pitch, resampled
+from asperity.measured.reading.scatter import (
+    advice,
+    fitting_pitch,
+    resampled,
+    resampled_line,
+)
 from asperity.measured.reading.spacing import spacing
+from asperity.measured.reading.text_columns import lengths_alone
 from asperity.measured.reading.text_header import (
     MapHeader,
     is_lateral,
@@ -53,18 +60,21 @@ def read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     name, metres = file.name, options.metres
     table = find_table(_decode(file.content))
     _check_table(table)
+    table, said = lengths_alone(table)
     header = map_header(table.header)
     if map_header(table.remarks).describes_map:
         raise SurfaceFileError("several maps in one file: save each in a file of its own")
     rows, columns = table.values.shape
     is_list = columns == 3 and rows > 3 and not header.describes_map
-    if options.resample is not None and not is_list:
-        raise ParameterError("resample", f"must not be given: {name} is no list of x, y, z points")
     if columns == 2 and not header.describes_map and _is_monotonic(table):
-        return _profile(table, name, metres)
-    if is_list:
-        return _points(table, header, name, options)
-    return _matrix(table, header, name, metres)
+        raw = _profile(table, name, options)
+    elif is_list:
+        raw = _points(table, header, name, options)
+    elif options.resample is not None:
+        raise ParameterError("resample", f"must not be given: {name} is no list of points")
+    else:
+        raw = _matrix(table, header, name, metres)
+    return replace(raw, notes=(*said, *raw.notes))
 
 
 def _decode(content: bytes) -> str:
@@ -107,8 +117,8 @@ def _is_monotonic(table: Table) -> bool:
     )
 
 
-def _profile(table: Table, name: str, metres: float | None) -> RawSurface:
-    named = _near_two(table)
+def _profile(table: Table, name: str, options: ReadingOptions) -> RawSurface:
+    named, metres = _near_two(table), options.metres
     _refuse_second(named, name, metres)
     known = named is not None or metres is not None
     notes = _notes(table, metres)
@@ -121,14 +131,16 @@ def _profile(table: Table, name: str, metres: float | None) -> RawSurface:
         resolution, lines = resolution[::-1], lines[::-1]
         notes = (*notes, "positions decrease: the profile is reversed")
     result = spacing(positions, resolution)
-    if not result.uniform:
-        raise SurfaceFileError(
-            f"sampling is not uniform: line {lines[result.index]} is"
-            f" {result.deviation * unit_x:.3g} m from a grid of {result.step * unit_x:.3g} m;"
-            " resample the profile"
-        )
     pitch = result.step * unit_x
     _refuse_long(pitch * (len(heights) - 1), known=known)
+    if options.resample is not None:
+        heights, said = resampled_line(positions * unit_x, heights, options.resample)
+        notes, pitch = (*notes, said), options.resample
+    elif not result.uniform:
+        raise SurfaceFileError(
+            f"sampling is not uniform: line {lines[result.index]} is"
+            f" {result.deviation * unit_x:.3g} m from a grid of {pitch:.3g} m; {advice(pitch)}"
+        )
     return RawSurface(np.ascontiguousarray(heights), (pitch,), name, notes, has_units=known)
 
 
@@ -176,10 +188,7 @@ def _advice(points: NDArray[np.float64]) -> str:
     pitch = fitting_pitch(points[:, :2])
     if pitch is None:
         return _EXPECTED
-    return (
-        f"{_EXPECTED}; points on no grid are interpolated to a pitch [m] that you give, such as"
-        f" resample={pitch:g} (--resample {pitch:g}), one grid point for each of theirs"
-    )
+    return f"{_EXPECTED}; {advice(pitch)}, one grid point for each of theirs"
 
 
 def _matrix(table: Table, header: MapHeader, name: str, metres: float | None) -> RawSurface:

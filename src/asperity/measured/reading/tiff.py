@@ -6,6 +6,7 @@ Tell TIFF files of instruments, which hold calibrated heights, from plain pictur
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from asperity.measured.reading.image import Pixels, check_size, surface_of_pixel
 from asperity.measured.reading.quiet import guarded, quiet_log
 from asperity.measured.reading.raw import RawSurface
 from asperity.measured.reading.reader import ReadingOptions, SurfaceFile, naming
+from asperity.measured.reading.tiff_scale import NO_SCALE, Scale, imagej_scale, ome_scale
 
 TIFF_MAGIC = (b"II*\x00", b"MM\x00*", b"II+\x00", b"MM\x00+")
 _INFLATION = 2000  # no compression that is read packs more bytes into one
@@ -33,7 +35,9 @@ def read_tiff_image(file: SurfaceFile, options: ReadingOptions) -> RawSurface | 
     content, integrate = file.content, options.integrate_normals
     if is_instrument_tiff(content):
         return None
-    return surface_of_pixels(read_tiff(content), file.name, integrate_normals=integrate)
+    return surface_of_pixels(
+        read_tiff(content), file.name, integrate_normals=integrate, metres=options.metres
+    )
 
 
 def read_tiff(content: bytes) -> Pixels:
@@ -43,7 +47,8 @@ def read_tiff(content: bytes) -> Pixels:
         content: the bytes of the file.
 
     Returns:
-        The pixels as stored; the missing value that GDAL's tag names becomes NaN.
+        The pixels as stored, with the lengths that ImageJ or OME name; the missing value that
+        GDAL's tag names becomes NaN.
 
     Raises:
         SurfaceFileError: several pages, a palette, an unknown compression, damage.
@@ -56,7 +61,26 @@ def read_tiff(content: bytes) -> Pixels:
     with guarded("damaged TIFF image", "tifffile"), tifffile.TiffFile(io.BytesIO(content)) as file:
         page = _one_page(file)
         _check_page(page, len(content))
-        return _pixels(page, _decoded(page, content))
+        pixels, scale = _pixels(page, _decoded(page, content)), _scale(file, page)
+        return replace(pixels, notes=(*pixels.notes, *scale.notes), scale=scale)
+
+
+def _scale(file: Any, page: Any) -> Scale:
+    """Return what ImageJ or OME says of lengths; resolution tags alone are those of a printer."""
+    if file.is_imagej:
+        return imagej_scale(file.imagej_metadata or {}, _resolution(page))
+    return ome_scale(str(page.description)) if file.is_ome else NO_SCALE
+
+
+def _resolution(page: Any) -> tuple[float, float] | None:
+    """Return the pixels per unit along x and y, from the resolution tags."""
+    found = []
+    for name in ("XResolution", "YResolution"):
+        tag = page.tags.get(name)
+        if tag is None or int(tag.value[1]) == 0:
+            return None
+        found.append(int(tag.value[0]) / int(tag.value[1]))
+    return found[0], found[1]
 
 
 def _one_page(file: Any) -> Any:
