@@ -296,6 +296,45 @@ def test_a_box_stays_open_when_the_minimum_lies_outside(monkeypatch: pytest.Monk
         assert (best[0], open_) == (x, abs(x) > 0.1)
 
 
+def test_a_descent_begins_at_the_best_point_in_the_box_or_by_newton(
+    monkeypatch: pytest.MonkeyPatch,
+):
+    """Below a plane Newton's method leads straight above the probe; a mirror image is elsewhere."""
+    monkeypatch.setattr(search, "curvature", profile_as_map)
+    monkeypatch.setattr(line, "along", profile)
+    starts: list[tuple[float, ...]] = []
+
+    def from_here(*arguments: float) -> tuple[float, ...]:
+        start = arguments[3:5] if len(arguments) == 6 else arguments[2:3]
+        starts.append(start)
+        return *start, *[0.0] * (len(arguments) - 2)
+
+    monkeypatch.setattr(search, "descend", from_here)
+    monkeypatch.setattr(line, "descend", from_here)
+    flat, above = np.zeros(4), (0.52, 0.31)
+    for x, y in itertools.product((0.45, -0.45, 0.61), (0.35, -0.35, 0.41)):
+        known = (x, y) == (0.45, 0.35)
+        best = (x, y, 1e9, 0.0, 0.0, 0.0)
+        search.judge(*above, -1.0, 0.5, 0.3, 0.1, 0.1, 0.0, 0.0, best, flat)
+        assert starts.pop() == pytest.approx((x, y) if known else above, abs=1e-15)
+        line.judge(0.52, -1.0, 0.5, 0.1, 0.0, 0.0, (x, 1e9, 0.0, 0.0), flat)
+        assert starts.pop() == pytest.approx((0.45 if x == 0.45 else 0.52,), abs=1e-15)
+
+
+def test_rounding_drops_no_level_point_on_the_border(monkeypatch: pytest.MonkeyPatch):
+    """Planes however steep: the room for rounding grows with Q, a level point in a corner stays."""
+    monkeypatch.setattr(line, "along", profile)
+    rng = np.random.default_rng(46)
+    for steep in np.geomspace(1.0, 1e5, 100):
+        c, (a, b) = np.zeros((4, 4)), rng.uniform(0.01, 0.3, 2)
+        c[1, 0] = steep
+        probe = below(c, a, b, rng.exponential())
+        assert not hopeless(c, probe, a, b, np.inf)
+        unknown = (9.0, 1e99, 0.0, 0.0)
+        best, _open = line.judge(probe[0], probe[2], 0.0, a, 0.0, 0.0, unknown, c[:, 0])
+        assert best[0] == pytest.approx(a, rel=1e-9)
+
+
 def test_a_profile_interval_is_kept_if_it_can_be_level(monkeypatch: pytest.MonkeyPatch):
     """The slope at the centre just below and just above what the interval can take away."""
     monkeypatch.setattr(line, "along", profile)
