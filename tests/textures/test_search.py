@@ -347,6 +347,26 @@ def test_a_profile_interval_is_kept_if_it_can_be_level(monkeypatch: pytest.Monke
         assert (best == start and not open_) == dropped
 
 
+def test_a_descent_ends_at_a_local_minimum(monkeypatch: pytest.MonkeyPatch):
+    """Far from a cubic Newton's steps are too long, and are halved until they lead down."""
+    monkeypatch.setattr(search, "curvature", curvature)
+    monkeypatch.setattr(line, "along", profile)
+    rng = np.random.default_rng(47)
+    for _ in range(100):
+        c, start = cubic(rng, 1.0), 3.0 * rng.normal(size=2)
+        probe = np.append(rng.normal(size=2), -rng.exponential(2.0))
+        x, y, phi, *_surface = search.descend(*probe, *start, c)
+        _phi, slope, q = expansion(c, probe, np.array([[x, y]]))
+        assert np.hypot(*slope[0]) <= 1e-6 * np.linalg.norm(q[0], 2)
+        assert np.linalg.eigvalsh(q[0])[0] > 0.0
+        assert phi <= expansion(c, probe, start[None])[0][0]
+        h = np.polynomial.Polynomial(c[:, 0])
+        own = np.polynomial.Polynomial([-probe[0], 1.0]) ** 2 + (h - probe[2]) ** 2
+        x, phi, *_profile = line.descend(probe[0], probe[2], start[0], c[:, 0])
+        assert abs(own.deriv()(x)) <= 1e-6 * own.deriv(2)(x)
+        assert phi <= own(start[0])
+
+
 def test_next_box_visits_every_box_once():
     """Three levels down from the whole, from every side: 64 boxes, the nearest first."""
     for u, v in itertools.product((0.1, 3.3, 7.9), repeat=2):
