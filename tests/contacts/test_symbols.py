@@ -1,0 +1,15 @@
+"""The symbols in which laws are written stand for real numbers."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from asperity.contacts.symbols import ARGUMENT_ORDER, ContactSymbols
+
+
+def test_every_symbol_is_real() -> None:
+    """Or the root of a square would not simplify in a law; a symbol of its own is the control."""
+    parameter = ContactSymbols(("size",)).parameter("size")
+    for symbol in (*ARGUMENT_ORDER, parameter):
+        assert sp.sqrt(symbol**2) == sp.Abs(symbol)
+    assert sp.sqrt(sp.Symbol("h") ** 2) != sp.Abs(sp.Symbol("h"))
