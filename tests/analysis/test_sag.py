@@ -145,3 +145,19 @@ def test_layers_follow_each_other_to_the_depth() -> None:
     assert all(a < b for a, b in pairwise(ends))
     assert (ends[0], ends[-1]) == (0.0, pytest.approx(D + 1e-5))
     assert columns.layers(Surface(SAW, "C", K, D, clamp="whole"))[0].top == D
+
+
+def test_a_curl_that_is_the_same_everywhere() -> None:
+    """Of k (δ e_x + δ³ e_z/s²) on the smooth wall it is -k; the Jacobian is not affine in δ."""
+    law = Law(
+        "P", "pushed", "nominal",
+        lambda c: c.k * (
+            c.depth * c.tangential((1, 0)) + c.depth**3 / c.parameter("size") ** 2 * c.e_z
+        ),
+        parameters={"size": D},
+    )  # fmt: skip
+    surface = Surface(SAW, law, K, D)
+    assert not surface.facts.affine_in_depth
+    bounds = columns.curl_integral(surface, SAW.scan_line())
+    assert bounds is not None
+    np.testing.assert_allclose(bounds, [[0.0, 0.0], [K * L * D, K * L * D]], rtol=1e-9, atol=0.0)
