@@ -151,12 +151,16 @@ def test_the_bound_is_tight(letter: str) -> None:
     assert found.upper_per_period * (1 - 2 * gap) < found.energy
 
 
-def test_a_law_that_is_not_affine_in_depth_is_certified_too() -> None:
-    """The curl of k δ² e_z/D is 2 k δ h'/D, over the depth k D h', over the flank 2A k D."""
+@pytest.mark.parametrize("power", [2, 3])
+def test_a_law_that_is_not_affine_in_depth_is_certified_too(power: int) -> None:
+    """The curl of k δⁿ e_z/Dⁿ⁻¹ is n k δⁿ⁻¹ h'/Dⁿ⁻¹, over the depth k D h', the flank 2A k D."""
     from asperity.laws import Law
 
-    law = Law("Q", "square", "vertical", lambda c: c.k * c.depth**2 / c.parameter("size") * c.e_z,
-              parameters={"size": D})  # fmt: skip
+    law = Law(
+        "Q", "power", "vertical",
+        lambda c: c.k * c.depth * (c.depth / c.parameter("size")) ** (power - 1) * c.e_z,
+        parameters={"size": D},
+    )  # fmt: skip
     found = worst_loop(Surface(Sinusoid(A, L), law, K, D))
     exact = 2 * K * D * A
     assert found.method == "certified"
