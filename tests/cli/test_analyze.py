@@ -270,7 +270,7 @@ BAD = [
     ([SPEC, "--law", "A", "--direction", "1,nan"], "direction"),
     ([SPEC, "--law", "A", "--extent", "1;2;3"], "extent"),
     ([SPEC, "--law", "A", "--extent", "-1mm"], "extent"),
-    ([SPEC, "--law", "A", "--magnify", "2"], "magnify"),
+    ([SPEC, "--law", "A", "--outliers", "6"], "outliers"),
     ([SPEC, "--law", "A", "--html", "no/such/folder/r.html"], "html"),
     ([SPEC, "--law", "A", "--json", "-", "--html", "-"], "standard output"),
     ([SPEC, "--law", "A", "--no-such-option"], "--no-such-option"),

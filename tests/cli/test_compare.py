@@ -164,7 +164,7 @@ BAD = [
     ([SPEC, "--laws", "god-objct"], "did you mean 'god-object'"),
     ([SPEC, "--device", "omga.3"], "did you mean 'omega.3'"),
     ([SPEC, "--device", "none.toml"], "none.toml"),
-    ([SPEC, "--magnify", "2"], "magnify"),
+    ([SPEC, "--outliers", "6"], "outliers"),
     ([SPEC, "--html", "no/such/folder/r.html"], "html"),
     ([SPEC, "--json", "no/such/folder/r.json"], "json"),
     ([SPEC, "--json", "-", "--html", "-"], "standard output"),

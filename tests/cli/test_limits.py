@@ -181,7 +181,7 @@ BAD = [
     ([SPEC, "--law", "god-objct"], "did you mean 'god-object'"),
     ([SPEC, "--device", "omga.3"], "did you mean 'omega.3'"),
     ([SPEC, "--stiffness", "0"], "stiffness"),
-    ([SPEC, "--magnify", "2"], "magnify"),
+    ([SPEC, "--outliers", "6"], "outliers"),
     ([SPEC, "--html", "no/such/folder/r.html"], "html"),
     ([SPEC, "--json", "-", "--html", "-"], "standard output"),
     ([SPEC, "--no-such-option"], "--no-such-option"),

@@ -166,12 +166,24 @@ def compare(
     )
 
 
+def line_to_add(device: Device) -> str:
+    """Return the line that a device's file lacks to compare laws on it; empty if it lacks none.
+
+    Example:
+        >>> line_to_add(load_device("touch")), line_to_add(load_device("2diy"))
+        ('', 'max_stiffness = "... N/m"')
+    """
+    proof = ("damping", "update_rate", "delay_samples")
+    proved = all(device.value(field) is not None for field in proof)
+    return "" if device.wall_test is not None or proved else 'max_stiffness = "... N/m"'
+
+
 def _refuse_unknown(device: Device) -> None:
     """Refuse a device of which no stiffness of any law could follow."""
-    proof = ("damping", "update_rate", "delay_samples")
-    if device.wall_test is None and any(device.value(field) is None for field in proof):
-        needs = f"max_stiffness [N/m], or {', '.join(proof)}"
-        raise ParameterError("device", f"{device.id} needs {needs} to compare laws")
+    if line := line_to_add(device):
+        others = "damping, update_rate and delay_samples"
+        needs = f"needs max_stiffness to compare laws: add {line}, the stiffest smooth wall"
+        raise ParameterError("device", f"{device.id} {needs} that held, to its file; or {others}")
 
 
 def _row(surface: Surface, device: Device) -> LawRow:

@@ -2,36 +2,46 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from asperity.arguments import MAX_DEPTH, STIFFNESS
 from asperity.cli.options import (
+    LAW_OPTIONS,
     device_option,
     file_options,
     law_options,
     laws_option,
+    read_devices,
     read_surface,
 )
 from asperity.cli.output import Outputs, output_options
 from asperity.cli.progress import step_bar
+from asperity.errors import ParameterError
 from asperity.laws import KNOWN_LAWS
 
 if TYPE_CHECKING:
+    from asperity.analysis.several import Comparisons
     from asperity.devices import Device
     from asperity.laws import Law
+
+_DEPTHS = replace(MAX_DEPTH, form="items", example="0.1mm; 0.5mm")
 
 
 @click.command("compare")
 @click.argument("surface")
-@device_option()
+@device_option(
+    "Devices of the catalogue, or TOML files, 'touch,mine.toml'.  [default: omega.3]", read_devices
+)
 @laws_option("Laws to compare, 'WAC' or names with commas.  [default: all]")
-@law_options()
+@law_options((STIFFNESS, _DEPTHS, *LAW_OPTIONS[2:]))
 @file_options
 @output_options("Write a report with pictures; - is standard output.")
 def command(
     surface: str,
-    device: Device | None,
+    device: tuple[Device, ...] | None,
     laws: tuple[Law, ...] | None,
     outputs: Outputs,
     **values: Any,
@@ -39,17 +49,47 @@ def command(
     """Say which law renders SURFACE on a device, at which stiffness, and what will go wrong.
 
     SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
-    (X3P, NPY, text matrix, two-column profile) or a scene file (TOML).
+    (X3P, NPY, text matrix, two-column profile) or a scene file (TOML). Several devices and depths
+    are answered in one table.
     """
-    from asperity.analysis.compare import compare
+    from asperity.analysis.several import compare_several
 
     chosen = laws or tuple(KNOWN_LAWS.values())
-    with step_bar("reading the surface", len(chosen)) as step:
-        texture, known, arguments = read_surface(surface, device, values, chosen)
+    first, *others = device or (None,)
+    cases = (1 + len(others)) * len(values["max_depth"] or [None])
+    with step_bar("reading the surface", len(chosen) * cases) as step:
+        texture, known, arguments = read_surface(surface, first, values, chosen)
         arguments.pop("law", None)  # a scene names the law to run; here all are compared
-        result = compare(
-            texture, known, chosen, progress=lambda law: step(f"law {law}"), **arguments
+        depths = arguments.pop("max_depth", None)  # of a scene it is one
+        found = compare_several(
+            texture,
+            [known, *(values["settings"].changed(other) for other in others if other)],
+            [depths] if isinstance(depths, float) else depths,
+            chosen,
+            progress=lambda on, _depth, law: step(f"{on.id}, law {law}"),
+            **arguments,
         )
-    from asperity.report.comparison import comparison_page, print_comparison
+    _write(found, outputs)
 
-    outputs.write(result, lambda to: print_comparison(result, to), lambda: comparison_page(result))
+
+def _write(found: Comparisons, outputs: Outputs) -> None:
+    """Write the one comparison that was asked for, or the table of several.
+
+    Raises:
+        ParameterError: if of no device enough is known, once the table has said what to add.
+    """
+    if len(found.comparisons) == 1 and not found.lacking:
+        from asperity.report.comparison import comparison_page, print_comparison
+
+        one = found.comparisons[0]
+        outputs.write(one, lambda to: print_comparison(one, to), lambda: comparison_page(one))
+        return
+    from asperity.report.several import comparisons_page, print_comparisons
+
+    if found.comparisons or len(found.lacking) > 1:
+        outputs.write(
+            found, lambda to: print_comparisons(found, to), lambda: comparisons_page(found)
+        )
+    if not found.comparisons:
+        said = "; ".join(one.sentence for one in found.lacking)
+        raise ParameterError("device", f"is not known well enough to compare laws: {said}")

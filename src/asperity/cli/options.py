@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -66,7 +67,8 @@ def options(
                 command = click.option(flag, is_flag=True, default=None, help=words)(command)
                 continue
             value = as_read(argument.read if read is None else read(argument))
-            shown = "LIST" if read is several else "N" if argument.form == "integer" else "TEXT"
+            listed = read is several or argument.form == "items"
+            shown = "LIST" if listed else "N" if argument.form == "integer" else "TEXT"
             command = click.option(flag, metavar=shown, callback=value, help=words)(command)
         return command
 
@@ -104,9 +106,25 @@ def given(values: Mapping[str, Any], arguments: Iterable[Argument]) -> dict[str,
 
 def device_option(
     words: str = "Device of the catalogue, or a TOML file.  [default: omega.3]",
+    read: Read = load_device,
 ) -> Callable[[Command], Command]:
     """Return a decorator that adds ``--device``."""
-    return click.option("--device", metavar="ID|FILE", callback=as_read(load_device), help=words)
+    return click.option("--device", metavar="ID|FILE", callback=as_read(read), help=words)
+
+
+def read_devices(text: str) -> tuple[Device, ...]:
+    """Return the devices that a text names, with commas or semicolons between.
+
+    Raises:
+        ParameterError: for one that is unknown, or is named twice.
+    """
+    if Path(text).exists():  # whatever signs the name of a file has
+        return (load_device(text),)
+    parts = [part.strip() for part in text.replace(";", ",").split(",") if part.strip()]
+    devices = tuple(load_device(part) for part in parts or [text])
+    if len({device.id for device in devices}) < len(devices):
+        raise ParameterError("device", "names one device twice", text)
+    return devices
 
 
 def law_option(words: str) -> Callable[[Command], Command]:

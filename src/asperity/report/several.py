@@ -1,0 +1,110 @@
+"""Several devices and depths in one table: in a terminal, and as a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.console import Console
+
+from asperity.analysis.compare import Comparison
+from asperity.analysis.several import Comparisons
+from asperity.report import page, terminal
+from asperity.report.comparison import described, stiffness_text
+from asperity.report.stages import surface_sections
+from asperity.report.words.number_words import NONE, force_text
+from asperity.units import engineering
+
+_HEADINGS = ("device", "depth", "law", "up to", "texture")
+_NUMBERS = (1, 3, 4)
+_MEANINGS = [
+    ("depth", "to which the surface is pressed"),
+    ("law", "the one to use there; none: none can be recommended"),
+    ("up to", "the stiffness up to which the device may render it"),
+    ("texture", "RMS of its force at that stiffness"),
+]
+
+
+def _row(one: Comparison) -> page.Row:
+    depth, best = engineering(one.max_depth, "m"), one.recommended_row
+    if best is None:
+        return page.Row([one.device.name, depth, "none", NONE, NONE])
+    letter = page.Cell(best.law.letter, "l", note=one.recommendation)
+    numbers = [stiffness_text(best), force_text(best.texture_force)]
+    return page.Row([one.device.name, depth, letter, *numbers])
+
+
+def _table(found: Comparisons) -> page.Table:
+    rows = [_row(one) for one in found.comparisons]
+    rows += [page.Row([one.device, NONE, "K₀ missing", NONE, NONE]) for one in found.lacking]
+    return page.Table(_HEADINGS, rows, _NUMBERS)
+
+
+def _title(one: Comparison) -> str:
+    return f"{one.device.name}, {engineering(one.max_depth, 'm')} deep"
+
+
+def print_comparisons(found: Comparisons, console: Console) -> None:
+    """Print a row for each device and depth, then what is to be said of each.
+
+    Args:
+        found: the result.
+        console: where to.
+    """
+    console.print(terminal.table(_table(found), wraps=(0,)))
+    console.print()
+    console.print(terminal.pairs(_MEANINGS, "dim"))
+    for one in found.comparisons:
+        console.print()
+        terminal.say(console, f"{_title(one)}: {one.recommendation}")
+    for missing in found.lacking:
+        console.print()
+        terminal.say(console, missing.sentence)
+    if found.comparisons:
+        terminal.print_assumptions(console, _shared(found.comparisons))
+
+
+def _shared(comparisons: Sequence[Comparison]) -> list[str]:
+    """Return what was assumed in all cases alike."""
+    first, *others = (one.assumptions for one in comparisons)
+    return [said for said in first if all(said in other for other in others)]
+
+
+def comparisons_page(found: Comparisons) -> page.Page:
+    """Return the report: the table, then each device and depth with its laws and assumptions."""
+    texture = found.texture
+    return page.Page(
+        title="Haptic texture on several devices",
+        answer=f"{len(found.comparisons)} cases compared: {described(texture.describe())}.",
+        facts=[
+            ("Surface", described(texture.describe())),
+            ("Peak to valley", engineering(texture.peak_to_valley, "m")),
+        ],
+        sections=[
+            page.Section("In one table", [_table(found), page.Definitions(_MEANINGS)]),
+            *[_case(one) for one in found.comparisons],
+            *_lacking(found),
+            *surface_sections(texture),
+        ],
+        footer=f"{page.PAPER}. {page.UNFELT}",
+    )
+
+
+def _case(one: Comparison) -> page.Section:
+    """Return what is said of one device and depth."""
+    rows = [
+        page.Row(
+            [page.Cell(row.law.letter, "l"), stiffness_text(row), row.verdict],
+            "best" if row is one.recommended_row else "",
+        )
+        for row in one.rows
+    ]
+    table = page.Table(("law", "up to", "verdict"), rows, (1,))
+    return page.Section(
+        _title(one), [page.Words(one.recommendation), table, page.Items(one.assumptions)]
+    )
+
+
+def _lacking(found: Comparisons) -> list[page.Section]:
+    if not found.lacking:
+        return []
+    return [page.Section("Missing", [page.Items([one.sentence for one in found.lacking])])]

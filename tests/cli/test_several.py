@@ -1,0 +1,168 @@
+"""``asperity compare`` for several devices and depths: one table, one page, one JSON."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import asperity as asp
+from asperity.analysis.several import compare_several
+from asperity.cli.main import main
+from asperity.errors import ParameterError
+
+Call = Callable[..., tuple[int, str, str]]
+SPEC = "sinusoid:amplitude=0.2mm,period=2mm"
+BARE = 'name = "Bare"\nmax_force = "3 N"\n'
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Call:
+    """Return a function that runs the program and returns exit code, output and errors."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["asperity", "compare", *arguments])
+        monkeypatch.setenv("COLUMNS", "100")
+        try:
+            main()
+            code = 0
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        return code, *capsys.readouterr()
+
+    return run
+
+
+def test_devices_and_depths_are_one_table(call: Call) -> None:
+    given = ["--device", "touch,inverse3", "--max-depth", "0.1mm; 0.3mm", "--laws", "WC"]
+    code, out, err = call(SPEC, *given)
+    assert (code, err) == (0, "")
+    rows = [line.split("  ") for line in out.splitlines() if re.search(r"\d N/m", line[:60])]
+    cells = [[cell.strip() for cell in row if cell.strip()] for row in rows]
+    assert [row[:3] for row in cells[:4]] == [
+        [device, depth, "C"]
+        for device in ("3D Systems Touch", "Haply Inverse3")
+        for depth in ("100 µm", "300 µm")
+    ]
+    code, out, err = call(SPEC, *given, "--json", "-")
+    assert (code, err) == (0, "")
+    found = json.loads(out)
+    cases = [(one["device"]["id"], one["max_depth"]) for one in found["comparisons"]]
+    assert cases == [("touch", 1e-4), ("touch", 3e-4), ("inverse3", 1e-4), ("inverse3", 3e-4)]
+    assert found["lacking"] == []
+
+
+def test_each_case_is_what_it_is_alone(call: Call) -> None:
+    among = json.loads(call(SPEC, "--device", "omega.3; touch", "--laws", "WA", "--json", "-")[1])
+    for one in among["comparisons"]:
+        device = one["device"]["id"]
+        alone = json.loads(call(SPEC, "--device", device, "--laws", "WA", "--json", "-")[1])
+        assert alone == one
+
+
+def test_one_device_and_depth_stay_one_comparison(call: Call) -> None:
+    found = json.loads(call(SPEC, "--max-depth", "0.1mm", "--laws", "W", "--json", "-")[1])
+    assert (found["max_depth"], found["device"]["id"]) == (1e-4, "omega.3")
+
+
+def test_a_scene_gives_what_the_options_leave(call: Call, tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        '[texture]\nkind = "sinusoid"\namplitude = "0.2 mm"\nperiod = "2 mm"\n'
+        '[surface]\nmax_depth = "0.2 mm"\n[device]\nid = "touch"\n'
+    )
+    depths = ["--max-depth", "0.1mm;0.3mm"]
+    found = json.loads(call(str(scene), "--laws", "W", *depths, "--json", "-")[1])["comparisons"]
+    assert [(one["device"]["id"], one["max_depth"]) for one in found] == [
+        ("touch", 1e-4),
+        ("touch", 3e-4),
+    ]
+    devices = ["--device", "touch,inverse3"]
+    found = json.loads(call(str(scene), "--laws", "W", *devices, "--json", "-")[1])["comparisons"]
+    assert [one["max_depth"] for one in found] == [2e-4, 2e-4]
+
+
+def test_what_is_set_is_set_on_each_device(call: Call) -> None:
+    given = ["--device", "touch,inverse3", "--set", "max_stiffness=700N/m", "--laws", "W"]
+    found = json.loads(call(SPEC, *given, "--json", "-")[1])["comparisons"]
+    assert [one["device"]["data"]["max_stiffness"]["value"] for one in found] == [700.0, 700.0]
+
+
+def test_the_page_has_every_case(call: Call) -> None:
+    given = ["--device", "touch,2diy", "--max-depth", "0.1mm;0.2mm", "--laws", "WC"]
+    code, page, err = call(SPEC, *given, "--html", "-")
+    assert (code, err) == (0, "")
+    for words in ("3D Systems Touch, 100 µm deep", "3D Systems Touch, 200 µm deep", "2diy"):
+        assert words in page
+    assert "max_stiffness=...N/m" in page
+    assert len(page) < 3_000_000
+
+
+def test_a_device_without_a_wall_says_what_to_add(call: Call) -> None:
+    code, out, err = call(SPEC, "--device", "touch,2diy", "--laws", "W")
+    assert (code, err) == (0, "")
+    assert re.search(r"2diy +– +K₀ missing", out)
+    said = " ".join(out.split())
+    assert 'add max_stiffness = "... N/m" to its file, or give --set max_stiffness=...N/m' in said
+
+
+def test_devices_of_which_none_has_a_wall(call: Call, tmp_path: Path) -> None:
+    """The table says what is missing, and the exit code that there is no answer."""
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.toml").write_text(BARE)
+    both = f"{tmp_path / 'a.toml'},{tmp_path / 'b.toml'}"
+    code, out, err = call(SPEC, "--device", both)
+    assert (code, err.count("\n")) == (2, 1)
+    assert out.count("K₀ missing") == 2
+    assert 'a: nobody says which smooth wall it held; measure it, and add max_stiffness = "' in err
+    code, out, err = call(SPEC, "--device", str(tmp_path / "a.toml"))
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    code, out, _err = call(SPEC, "--device", both, "--json", "-")
+    assert code == 2
+    assert [one["device"] for one in json.loads(out)["lacking"]] == ["a", "b"]
+
+
+def test_the_line_to_add_is_enough(tmp_path: Path) -> None:
+    texture = asp.Sinusoid(2e-4, 2e-3)
+    path = tmp_path / "bare.toml"
+    path.write_text(BARE)
+    (missing,) = compare_several(texture, [path], laws="W").lacking
+    path.write_text(BARE + missing.add.replace("...", "900") + "\n")
+    found = compare_several(texture, [path], laws="W")
+    assert found.lacking == ()
+    assert found.comparisons[0].device.max_stiffness == 900.0
+
+
+def test_a_file_may_have_a_comma_in_its_name(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "mine, old.toml"
+    path.write_text(BARE + 'max_stiffness = "900 N/m"\n')
+    code, out, _err = call(SPEC, "--device", str(path), "--laws", "W", "--json", "-")
+    assert (code, json.loads(out)["device"]["name"]) == (0, "Bare")
+
+
+WRONG = [
+    (["--device", "touch,tuch"], "did you mean 'touch'"),
+    (["--device", "touch,Touch"], "device names one device twice"),
+    (["--device", ","], "device is unknown"),
+    (["--device", "touch", "--device", "inverse3"], "device is given twice"),
+    (["--max-depth", "0.1mm; 0.5"], "max_depth needs a unit: write 0.5mm"),
+    (["--max-depth", "0.1mm; -1mm"], "max_depth must be positive"),
+    (["--max-depth", ";"], "max_depth must be"),
+    (["--max-depth", "0.1mm; 100um"], "max_depth names one depth twice"),
+]
+
+
+@pytest.mark.parametrize(("given", "words"), WRONG, ids=lambda value: " ".join(value)[:40])
+def test_bad_input_is_one_line(call: Call, given: list[str], words: str) -> None:
+    code, out, err = call(SPEC, *given, "--laws", "W")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert words in err
+
+
+def test_no_device_is_an_error() -> None:
+    with pytest.raises(ParameterError, match="device must be one or several"):
+        compare_several(asp.Sinusoid(2e-4, 2e-3), [])
