@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from asperity.simulation import (
     BandHand,
@@ -41,7 +42,7 @@ def test_a_moved_handle_meets_the_field_alone() -> None:
     run = run_of(surface=surface, hand=MovedHand(), motion=way, servo=Servo(1e-5), duration=0.2)
     t = np.linspace(0.0, 1.0, 200_001)
     depth = np.maximum(0.3e-3 * np.sin(np.pi * 1e3 * 0.3e-3 * t + 0.3) + 2e-3 * t, 0.0)
-    work = -2e-3 * 800.0 * float(np.trapezoid(depth, t))
+    work = -2e-3 * 800.0 * float(trapezoid(depth, t))
     assert run.ledger.supplied[2] == pytest.approx(work, rel=1e-4)
     assert run.ledger.supplied[0] == 0.0
     assert run.ledger.hand == pytest.approx(-run.ledger.total, rel=1e-12)
