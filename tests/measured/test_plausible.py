@@ -32,7 +32,7 @@ def test_a_relief_of_metres_at_a_pitch_of_micrometres_is_asked_about() -> None:
     said = str(caught.value)
     assert said.startswith("height_range must be given: heights that span 5.9 m at a pitch of 2.5")
     assert f"mean slope of {slope:.3g}" in said
-    assert "in um: --unit um" in said
+    assert "in um: unit='um' (--unit um)" in said
     assert "if it is so: height_range=5.9 (--height-range 5.9m)" in said
 
 
@@ -45,7 +45,7 @@ def test_it_is_so() -> None:
 def test_a_file_that_names_its_unit_is_scaled() -> None:
     """Where the file names a unit, --unit is refused: its height is what can be said."""
     heights = GROUND * 0.02 / np.ptp(GROUND)
-    with pytest.raises(ParameterError, match=r"in um: --height-range 0\.02um"):
+    with pytest.raises(ParameterError, match=r"in um: height_range=2e-08 \(--height-range 0\.02um"):
         check_heights(raw(GROUND, has_units=True), heights, (1e-6, 1e-6))
 
 
@@ -54,6 +54,20 @@ def test_a_wrong_unit_is_noticed_on_rough_surfaces(wrong: float) -> None:
     prepare(raw(GROUND))
     with pytest.raises(ParameterError, match="height_range"):
         prepare(raw(GROUND * wrong))
+
+
+def test_heights_of_many_metres_in_no_unit_are_asked_about() -> None:
+    """A list of points whose unit is not known is steep in none."""
+    far = RawSurface(np.linspace(0.0, 15.0, 50), (1.0,), "part.txt", (), has_units=False)
+    with pytest.raises(ParameterError, match=r"span 15 m look not to be in metres.*--unit mm"):
+        prepare(far)
+    prepare(RawSurface(far.heights, (1.0,), "part.txt", (), has_units=True))
+
+
+def test_heights_near_the_largest_float_are_steep() -> None:
+    heights = np.resize([0.0, 1.5e308], 40)
+    with pytest.raises(ParameterError, match="mean slope of inf"):
+        check_heights(raw(heights), heights, (1e-6,))
 
 
 def test_the_limit_is_the_mean_slope_of_the_steeper_axis() -> None:

@@ -40,12 +40,6 @@ def check_heights(raw: RawSurface, heights: FloatArray, pitch: tuple[float, ...]
             " height [m]",
         )
     span = float(np.nanmax(heights)) - float(np.nanmin(heights))
-    if span > _LONGEST and not raw.has_units:
-        raise ParameterError(
-            "height_range",
-            f"must be given [m]: heights that span {span:.4g} look not to be in metres,"
-            f" and {raw.source} names no unit",
-        )
     slope = mean_slope(heights, pitch)
     if slope > STEEPEST:
         raise ParameterError(
@@ -54,14 +48,22 @@ def check_heights(raw: RawSurface, heights: FloatArray, pitch: tuple[float, ...]
             f" {lengths_text(pitch)} have a mean slope of {slope:.3g}, and no instrument measures"
             f" {STEEPEST:g}; {_ways_out(raw, span, slope)}",
         )
+    if span > _LONGEST and not raw.has_units:
+        raise ParameterError(
+            "height_range",
+            f"must be given: heights that span {length_text(span)} look not to be in metres, and"
+            f" {raw.source} names no unit; {_ways_out(raw, span, slope)}",
+        )
 
 
 def _ways_out(raw: RawSurface, span: float, slope: float) -> str:
     """Return what to say where the unit is another, and where all is as it seems."""
     unit = next((u for u, factor in _UNITS.items() if slope * factor <= 1.0), "nm")
-    option = f"--height-range {span:.6g}{unit}" if raw.has_units else f"--unit {unit}"
+    other = f"unit='{unit}' (--unit {unit})"
+    if raw.has_units:  # the file's own: what can be said is how high it is
+        other = f"height_range={span * _UNITS[unit]:.6g} (--height-range {span:.6g}{unit})"
     so = f"height_range={span:.6g} (--height-range {span:.6g}m)"
-    return f"if they are in {unit}: {option}; if it is so: {so}; spikes go with --outliers 6"
+    return f"if they are in {unit}: {other}; if it is so: {so}; spikes go with --outliers 6"
 
 
 def mean_slope(heights: FloatArray, pitch: tuple[float, ...]) -> float:
@@ -80,7 +82,8 @@ def mean_slope(heights: FloatArray, pitch: tuple[float, ...]) -> float:
         lines = np.moveaxis(heights, heights.ndim - 1 - axis, -1)
         if lines.ndim > 1:
             lines = lines[:: -(-len(lines) // _MOST_LINES)]
-        rises = np.abs(np.diff(lines, axis=-1))
-        rises = rises[~np.isnan(rises)]
-        slopes.append(float(rises.mean()) / step if rises.size else 0.0)
+        with np.errstate(over="ignore"):  # heights near the largest float
+            rises = np.abs(np.diff(lines, axis=-1))
+            rises = rises[~np.isnan(rises)]
+            slopes.append(float(rises.mean()) / step if rises.size else 0.0)
     return max(slopes)
