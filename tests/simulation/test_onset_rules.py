@@ -21,6 +21,7 @@ from asperity.simulation import (
     find_onset,
     onset,
 )
+from asperity.simulation.ending import Ending
 from asperity.simulation.onset import Onset, calms_down, cycles, ends_in_cycle, holds_still, offsets
 from asperity.simulation.run import Ledger, Run, Stop
 from asperity.simulation.trace import COLUMNS
@@ -265,3 +266,22 @@ def test_offsets_do_not_reach_the_period_again() -> None:
     shifts: FloatArray = offsets(SURFACE, 5)
     np.testing.assert_allclose(shifts[:, 0], np.arange(5) * 0.4e-3, atol=1e-18)
     assert not shifts[:, 1:].any()
+
+
+def test_an_ending_is_told_from_rows_as_they_come() -> None:
+    """Whatever the parts: as from the last quarter of the whole table, column by its name."""
+    rng, answers = np.random.default_rng(48), set()
+    for rows in range(4, 64):
+        table = rng.normal(size=(rows, len(COLUMNS)))
+        ending, seen = Ending(rows), 0
+        for part in np.split(table, np.sort(rng.integers(0, rows + 1, 3))):
+            ending.see(part)
+            seen += len(part)
+            assert ending.known == (seen == rows)
+        moving = table[rows - rows // 4 :, [NAMES.index(f"v{axis}") for axis in "xyz"]]
+        assert ending.restlessness == pytest.approx(np.std(moving, axis=0).sum(), abs=1e-15)
+        change = dict(zip(NAMES, table[-1] - table[rows - max(rows // 4, 2)], strict=True))
+        supplied = sum(change[f"supplied {axis}"] for axis in "xyz")
+        assert ending.fed == (supplied > 0.2 * (change["lost"] - change["friction"]))
+        answers.add(ending.fed)
+    assert answers == {True, False}
