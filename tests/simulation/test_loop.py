@@ -189,6 +189,28 @@ def test_divergence_is_reported_and_the_trace_kept() -> None:
     assert np.isfinite(run.table).all()
 
 
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_is_out_of_all_bounds_has_diverged(axis: int, sign: float) -> None:
+    """A handle that flies on at 6e5 m/s along an axis: with its distance 1e6 after 2/3 s."""
+    outside = Surface(WAVE, "W", 1e-9)
+    run = simulate(
+        outside, Cartesian(1.0), SpringHand(1e-9), Servo(1e-2), Still((0.0, 0.0, 1.0)), 2.0,
+        velocity=sign * 6e5 * np.eye(3)[axis],
+    )  # fmt: skip
+    assert run.stopped == "diverged"
+    assert run.samples == pytest.approx(67, abs=1)
+
+
+def test_the_longest_delay_is_taken() -> None:
+    start = np.zeros(3)
+    plant = sampled_plant(PLANT, SpringHand(100.0), Servo(1e-3))
+    longest = Servo(1e-3, delay=1_000_000)
+    assert len(Simulation(Surface(WAVE, "W"), plant, longest, start).queue) == 1_000_001
+    with pytest.raises(ParameterError, match="delay"):
+        Simulation(Surface(WAVE, "W"), plant, Servo(1e-3, delay=1_000_001), start)
+
+
 def commanded(force: tuple[float, float, float], step: float, limit: float) -> FloatArray:
     """What the servo makes of a force: virtual damping of a handle that is moved at -force."""
     start, period = np.array([0.0, 0.0, 1.0]), 0.25

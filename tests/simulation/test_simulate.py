@@ -32,6 +32,7 @@ from asperity.simulation import (
     simulate_many,
 )
 from asperity.simulation.onset import CYCLE_SPEED, cycles, restlessness
+from asperity.simulation.run import reread
 from asperity.simulation.trace import HEADER, MemoryTrace
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
@@ -345,3 +346,13 @@ def test_wrong_parts_are_named(
 ) -> None:
     with pytest.raises(ParameterError, match=words):
         kind(*given, **named)
+
+
+@pytest.mark.parametrize("most", [1000, 40, 7, 1])
+def test_a_written_trace_is_read_back_thinned_out_evenly(tmp_path: FilePath, most: int) -> None:
+    surface_to_end = (WALL, Cartesian(0.1, 1.0), SpringHand(100.0, 2.0), Servo(1e-3))
+    ask = partial(simulate, *surface_to_end, Still((0.0, 0.0, -1e-3)), 0.04)
+    whole, read = ask().table, reread(ask(trace=tmp_path / "run.csv"), most).table
+    step = -(-len(whole) // most)
+    assert len(read) <= most
+    np.testing.assert_allclose(read, whole[::step], rtol=1e-11)
