@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import sys
@@ -9,11 +10,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 import asperity as asp
 from asperity.analysis.several import compare_several
 from asperity.cli.main import main
 from asperity.errors import ParameterError
+from asperity.report.several import print_comparisons
 
 Call = Callable[..., tuple[int, str, str]]
 SPEC = "sinusoid:amplitude=0.2mm,period=2mm"
@@ -148,6 +151,7 @@ WRONG = [
     (["--device", "touch,tuch"], "did you mean 'touch'"),
     (["--device", "touch,Touch"], "device names one device twice"),
     (["--device", ","], "device is unknown"),
+    (["--device", "a" * 5000], "device is unknown"),
     (["--device", "touch", "--device", "inverse3"], "device is given twice"),
     (["--max-depth", "0.1mm; 0.5"], "max_depth needs a unit: write 0.5mm"),
     (["--max-depth", "0.1mm; -1mm"], "max_depth must be positive"),
@@ -161,6 +165,27 @@ def test_bad_input_is_one_line(call: Call, given: list[str], words: str) -> None
     code, out, err = call(SPEC, *given, "--laws", "W")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert words in err
+
+
+def test_other_commands_take_one_device(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["asperity", "limits", SPEC, "--device", "touch,inverse3"])
+    with pytest.raises(SystemExit, match="2"):
+        main()
+    assert "device must be a single one here: compare takes several" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("width", [40, 60, 200])
+def test_a_narrow_table_leaves_out_columns_and_cuts_nothing(width: int) -> None:
+    found = compare_several(asp.Sinusoid(2e-4, 2e-3), ["touch", "2diy"], [1e-4, 2e-4], "WC")
+    text = io.StringIO()
+    print_comparisons(found, Console(file=text, width=width, highlight=False))
+    said = text.getvalue()
+    assert "…" not in said
+    assert max(map(len, said.splitlines())) <= width
+    assert ("up to" in said.splitlines()[0]) == (width > 40)
+    assert re.search(r"3D Systems Touch +200 µm +C", said)
 
 
 def test_no_device_is_an_error() -> None:

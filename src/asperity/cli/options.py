@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -104,9 +104,20 @@ def given(values: Mapping[str, Any], arguments: Iterable[Argument]) -> dict[str,
     return {one.name: values[one.name] for one in arguments if values[one.name] is not None}
 
 
+def read_device(text: str) -> Device:
+    """Return the one device that a text names.
+
+    Raises:
+        ParameterError: for one that is unknown, or several.
+    """
+    if len(devices := read_devices(text)) > 1:
+        raise ParameterError("device", "must be a single one here: compare takes several", text)
+    return devices[0]
+
+
 def device_option(
     words: str = "Device of the catalogue, or a TOML file.  [default: omega.3]",
-    read: Read = load_device,
+    read: Read = read_device,
 ) -> Callable[[Command], Command]:
     """Return a decorator that adds ``--device``."""
     return click.option("--device", metavar="ID|FILE", callback=as_read(read), help=words)
@@ -118,7 +129,7 @@ def read_devices(text: str) -> tuple[Device, ...]:
     Raises:
         ParameterError: for one that is unknown, or is named twice.
     """
-    if Path(text).exists():  # whatever signs the name of a file has
+    if os.path.exists(text):  # whatever signs the name of a file has
         return (load_device(text),)
     parts = [part.strip() for part in text.replace(";", ",").split(",") if part.strip()]
     devices = tuple(load_device(part) for part in parts or [text])

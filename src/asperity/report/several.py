@@ -16,6 +16,7 @@ from asperity.units import engineering
 
 _HEADINGS = ("device", "depth", "law", "up to", "texture")
 _NUMBERS = (1, 3, 4)
+_OPTIONAL = (3, 4)  # what a narrow console leaves out, the more wanted first
 _MEANINGS = [
     ("depth", "to which the surface is pressed"),
     ("law", "the one to use there; none: none can be recommended"),
@@ -50,9 +51,13 @@ def print_comparisons(found: Comparisons, console: Console) -> None:
         found: the result.
         console: where to.
     """
-    console.print(terminal.table(_table(found), wraps=(0,)))
+    table = _table(found)
+    without = terminal.too_wide(table, _OPTIONAL, console.width)
+    console.print(terminal.table(table, wraps=(0,), without=without))
     console.print()
-    console.print(terminal.pairs(_MEANINGS, "dim"))
+    left = [_HEADINGS[column] for column in without]
+    shown = [meaning for meaning in _MEANINGS if meaning[0] not in left]
+    console.print(terminal.pairs(shown, "dim"))
     for one in found.comparisons:
         console.print()
         terminal.say(console, f"{_title(one)}: {one.recommendation}")
