@@ -158,16 +158,19 @@ def _esri(_: Path) -> Seeds:
 
 
 def _columns(_: Path) -> Seeds:
-    """Profiles and points with a column of validity or of numbering, and uneven positions."""
+    """Profiles and points with a column of validity or of numbering."""
     line = [f"{0.5 * k:g};{z:g};{k % 3 > 0:d}" for k, z in enumerate(_heights()[0])]
     points = [
         f"{n},{x},{y},{z:g}"
         for n, ((y, x), z) in enumerate(zip(np.ndindex(9, 12), _heights().ravel(), strict=True))
     ]
-    uneven = [f"{k + 0.2 * (k % 2):g} {z:g}" for k, z in enumerate(_heights()[0])]
-    tables = (["X;Y;valid", "[mm];[mm];[1/0]", *line], ["index,x in um,y in um,z in um", *points],
-              uneven)  # fmt: skip
+    tables = (["X;Y;valid", "[mm];[mm];[1/0]", *line], ["index,x in um,y in um,z in um", *points])
     return ["\n".join(table).encode() for table in tables]
+
+
+def _uneven(_: Path) -> Seeds:
+    rows = (f"{k + 0.2 * (k % 2):g} {z:g}" for k, z in enumerate(_heights()[0]))
+    return ["\n".join(rows).encode()]
 
 
 def _stl(folder: Path) -> Seeds:
@@ -277,6 +280,7 @@ SEEDS: dict[str, Callable[[Path], Seeds]] = {
     "tiff-lengths": _tiff_lengths,
     "esri": _esri,
     "columns": _columns,
+    "uneven": _uneven,
     "stl-binary": _stl,
     "stl-text": _stl_text,
     "obj": _obj,
@@ -289,7 +293,7 @@ SEEDS: dict[str, Callable[[Path], Seeds]] = {
 }
 OPTIONS: dict[str, dict[str, Any]] = {
     name: {"unit": "mm"} for name in ("stl-binary", "stl-text", "obj", "hdf5", "matlab")
-}
+} | {"uneven": {"unit": "m", "resample": 0.5}}
 
 
 def available() -> list[str]:

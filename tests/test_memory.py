@@ -82,7 +82,7 @@ def test_this_machine_says_what_is_free() -> None:
     assert free is None or free > 10**6
 
 
-@pytest.mark.parametrize("command", ["compare", "analyze", "limits", "prepare"])
+@pytest.mark.parametrize("command", ["compare", "analyze", "limits", "prepare", "show"])
 def test_every_command_with_a_surface_has_the_limit(
     command: str,
     tmp_path: Path,

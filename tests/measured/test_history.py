@@ -88,10 +88,10 @@ def test_parameters_of_the_measured_points_alone_until_they_are_filled() -> None
 def test_a_profile_is_primary_until_its_waviness_is_gone() -> None:
     raw = surface(hole=False)
     line = RawSurface(raw.heights[0], raw.pitch[:1], "made", ())  # type: ignore[index]  # it has one
-    history = prepare(line, l_cutoff=2e-4, magnify=2.0).history
+    history = prepare(line, l_cutoff=2e-4, tip_radius=1e-5, magnify=2.0).history
     kinds = [next(iter(stage.values))[0] for stage in history]
-    assert kinds == ["P", "P", "P", "R", "R"]
-    assert [stage.nesting for stage in history] == [None, None, None, 2e-4, 4e-4]
+    assert kinds == ["P", "P", "P", "R", "R", "R"]
+    assert [stage.nesting for stage in history] == [None, None, None, 2e-4, 2e-4, 4e-4]
     for symbol, before in history[-2].values.items():
         factor = 1.0 if symbol in {"Rsk", "Rku", "Rdq"} else 2.0
         assert before is not None

@@ -10,7 +10,7 @@ import pytest
 from scipy.special import ellipe
 
 from asperity.measured import parameters as module
-from asperity.measured.correlation import correlation
+from asperity.measured.correlation import _autocorrelation, correlation
 from asperity.measured.parameters import AREAL, PROFILE, declared, parameters
 
 MICRO = 1e-6
@@ -199,6 +199,16 @@ def test_noise_on_the_mean_line_makes_no_profile_element() -> None:
     assert coarse < noisy / 2  # of 14 % of Rz it does
 
 
+def test_crossings_lie_between_the_samples() -> None:
+    """Two whole waves of 7.3 samples: crossings to a sample's half would be 5 % off."""
+    x = np.arange(19) * 1e-6
+    wave = MICRO * np.sin(2 * np.pi * (x - 1.1e-6) / 7.3e-6)
+    # A chord misses the zero of a sine by at most u²/(9 √3) of a sample's length, u = 2π/7.3.
+    chord = (2 * np.pi / 7.3) ** 2 / (9 * math.sqrt(3)) * 1e-6
+    spacing = module._spacing(wave, 1e-6, 0.1 * MICRO)
+    assert spacing == pytest.approx(7.3e-6, abs=2 * chord)
+
+
 def test_a_gap_does_not_shorten_the_spacing() -> None:
     x = np.arange(2001) * 1e-6
     wave = MICRO * np.sin(2 * np.pi * x / 200e-6 + 0.3)
@@ -242,6 +252,18 @@ def test_correlation_of_gaussian_noise(stretch: float) -> None:
     assert ratio == pytest.approx(1 / stretch, rel=0.12)
     heights[100:300, 200:400] = np.nan  # holes are left out, not taken for zeros
     assert correlation(heights, (1e-6, 1e-6))[0] == pytest.approx(length, rel=0.03)
+
+
+def test_the_correlation_is_the_mean_over_all_known_pairs() -> None:
+    heights = np.random.default_rng(8).standard_normal((9, 12)) + np.arange(12)
+    heights[2, 3] = heights[7, 7] = np.nan
+    f = _autocorrelation(heights)
+    z = heights - np.nanmean(heights)
+    for down, along in ((0, 0), (0, 5), (4, 0), (3, 6), (-4, 2)):
+        first = z[max(-down, 0) : 9 - max(down, 0), : 12 - along]
+        second = z[max(down, 0) : 9 - max(-down, 0), along:]
+        expected = np.nanmean(first * second) / np.nanmean(z * z)
+        assert f[down, along] == pytest.approx(expected, rel=1e-10)
 
 
 def test_no_correlation_of_a_plane() -> None:

@@ -73,8 +73,10 @@ def test_a_column_that_numbers_the_points(tmp_path: Path) -> None:
     assert raw.pitch == pytest.approx((5e-7,), rel=1e-9)
     np.testing.assert_allclose(raw.heights, 1e-6 * np.array([0, 1, 2, 0, 1, 2]), rtol=1e-12)
     assert raw.notes == ("the first column numbers the points: left out",)
-    with pytest.raises(SurfaceFileError):  # it does not count: three columns are points x, y, z
-        read(tmp_path, "index,x in µm,y in µm\n" + rows.replace("3,", "8,", 1), "utf-16")
+    later = "".join(f"{k + 5},{-9 + 0.5 * k},{k % 3}\n" for k in range(6))
+    for other in (rows.replace("3,", "8,", 1), later):  # it does not count the points: x, y, z
+        with pytest.raises(SurfaceFileError, match="unit of all three columns or of none"):
+            read(tmp_path, "index,x in µm,y in µm\n" + other, "utf-16")
 
 
 # --- uneven profiles ------------------------------------------------------------------------------

@@ -197,6 +197,8 @@ def _data(
     topography = chosen.topography(**options)
     if not topography.is_uniform:
         return _uneven(topography, unit, resample)
+    if chosen.is_uniform is False:
+        raise SurfaceFileError("sampling is not uniform, yet the points have no positions")
     if resample is not None:
         raise ParameterError("resample", "must not be given: the points are on a grid", resample)
     stored = np.ma.masked_array(topography.heights(), dtype=np.float64)
