@@ -37,6 +37,10 @@ READ = [
     ("channel", "2", 2),
     ("channel", "height", "height"),
     ("text", "um", "um"),
+    ("size", "1.5GiB", 1610612736),
+    ("size", "2 kB", 2000),
+    ("size", "512B", 512),
+    ("size", "0", 0),
 ]
 
 
@@ -50,6 +54,8 @@ def test_each_form_reads_text_numbers_and_lists(form: Form, given: Any, value: A
 
 WRONG = [
     ("quantity", "3 N", "dimension"),
+    ("size", "4000", "needs a unit: write 4000MB or 4000GB"),
+    ("size", 4000, "needs a unit: write 4000MB or 4000GB"),
     ("quantity", "3", "needs a unit: write 3mm or 3um or 3m"),
     ("pair", "3mm; 4", "write 4mm or 4um or 4m"),
     ("pair", 3, "write 3mm"),

@@ -65,7 +65,7 @@ def test_a_surface_that_does_not_fit_is_refused_before_it_is_made() -> None:
 
 @pytest.mark.parametrize(
     ("text", "size"),
-    [("4GB", 4 * 10**9), ("500 MB", 5 * 10**8), ("2GiB", 2 * 2**30), ("12", 12), ("1.5k", 1500)],
+    [("4GB", 4 * 10**9), ("500 MB", 5 * 10**8), ("2GiB", 2 * 2**30), ("12B", 12), ("1.5k", 1500)],
 )
 def test_sizes_are_read(text: str, size: int) -> None:
     assert MEMORY.read(text) == size

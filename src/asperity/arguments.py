@@ -309,10 +309,12 @@ def _integer(name: str, given: Any, _unit: str) -> int:
 
 
 def _size(name: str, given: Any, _unit: str) -> int:
-    match = re.fullmatch(r"\s*(\d{1,15}(?:\.\d{1,6})?)\s*([kMGT]?)(i?)B?\s*", str(given))
+    match = re.fullmatch(r"\s*(\d{1,15}(?:\.\d{1,6})?)\s*([kMGT]?)(i?)(B?)\s*", str(given))
     if match is None:
         raise ParameterError(name, "must be a size such as '4GB', '500MB' or '2GiB'", given)
-    number, prefix, binary = match.groups()
+    number, prefix, binary, byte = match.groups()
+    if not prefix + byte:
+        quantity(name, number, "B")
     return int(float(number) * (1024.0 if binary else 1000.0) ** " kMGT".index(prefix or " "))
 
 
