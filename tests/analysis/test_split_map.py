@@ -12,6 +12,7 @@ import pytest
 
 import asperity as asp
 from asperity.analysis.split.state import split_state
+from asperity.contacts.split import conditions, solver
 from asperity.surface import Surface
 from asperity.textures.heightmap import HeightMap
 from asperity.textures.texture import Texture
@@ -102,6 +103,33 @@ def test_jacobian_against_differences(name: str) -> None:
     values = np.linalg.eigvalsh(-exact / K)
     assert values.max() <= 1.0 + 1e-9
     assert values.min() >= -c - 1e-9
+
+
+def test_the_plain_solver_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As plain Python, where an index beyond an array is an error."""
+    texture = _texture("egg crate")
+
+    def curvature(x: float, y: float, _texture: object) -> tuple[float, ...]:
+        return tuple(texture.derivatives(np.array([[x, y]]))[0].tolist())
+
+    def foot(x: float, y: float, z: float, _texture: object) -> tuple[float, ...]:
+        fx, fy, _h = texture.nearest([[x, y, z]])[0].tolist()
+        return fx, fy, *curvature(fx, fy, None)[:3]
+
+    monkeypatch.setattr(conditions, "curvature", curvature)
+    monkeypatch.setattr(solver, "foot", foot)
+    for module in (conditions, solver):
+        monkeypatch.setattr(module, "height", lambda *place: curvature(*place)[0])
+    surface = Surface(texture, "H", K, continuity=2.0)
+    points = _probes(texture, 40, seed=9)
+    assert set(split_state(surface, points).atoms) > {1, 2}
+    for p, force, jacobian in zip(
+        points, surface.force(points), surface.jacobian(points), strict=True
+    ):
+        *pull, xx, xy, xz, yy, yz, zz = solver.split_derivative(*p.tolist(), 2.0, None)
+        np.testing.assert_allclose(K * np.array(pull), force, rtol=0, atol=1e-12 * K)
+        matrix = K * np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        np.testing.assert_allclose(matrix, jacobian, rtol=0, atol=1e-6 * K)
 
 
 def test_a_finite_map_goes_on_in_the_mirror() -> None:
