@@ -36,6 +36,7 @@ from asperity.simulation.sampled_plant import sampled_plant
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 from bench.random_scenes import delay_rule
+from bench.random_steps import steps_rule
 from bench.reference import FLAGS, DisagreementError
 from bench.timing import median_ratio, seconds, take_turns
 
@@ -245,11 +246,14 @@ def main() -> int:
     """Run the benchmark, or the delay rule on many random scenes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--random", type=int, metavar="N", help="random scenes for the delay rule")
+    parser.add_argument("--steps", type=int, metavar="N", help="the same with encoders, friction")
     parser.add_argument("--seed", type=int, default=1)
     given = parser.parse_args()
     console = Console(width=100, highlight=False)
     if given.random:
         return delay_rule(given.random, given.seed, console)
+    if given.steps:
+        return steps_rule(given.steps, given.seed, console)
     run(console)
     return 0
 
