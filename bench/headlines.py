@@ -1,0 +1,116 @@
+"""Does what the comparison recommends cycle at the stiffness to begin with? Over the catalogue.
+
+``python -m bench.headlines``: for every device whose K₀ is known, every surface of the table and
+delays of 0 and 2 samples, the recommended law is simulated at its start, in loops in which the
+smooth wall of K₀ is just passive by the delay rule: damping K₀ (1/2 + d) T along every axis, the
+device's mass (0.1 kg where it is not known), its steps, a hand that holds and one that holds
+loosely. Misses are shown. Takes some minutes: run it by night.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from rich.console import Console
+from rich.progress import track
+
+from asperity.analysis.compare import Comparison, compare
+from asperity.devices import Device, device_names, load_device
+from asperity.scene import load_scene
+from asperity.scene.plant import default_servo
+from asperity.simulation import Cartesian, Servo, SpringHand, Still
+from asperity.simulation.onset import ends_in_cycle, offsets, runner
+from asperity.surface import Surface
+from bench.margins import HANDS, pressing
+
+SURFACES = (
+    "sinusoid:amplitude=20um,period=1mm", "sinusoid:amplitude=50um,period=0.3mm",
+    "sinusoid:amplitude=0.1mm,period=2mm", "sinusoid:amplitude=0.4mm,period=1.5mm",
+    "sinusoid:amplitude=0.8mm,period=1mm", "sinusoid:amplitude=1mm,period=8mm",
+    "knurl", "sandpaper:grit=P60",
+)  # fmt: skip
+LAWS = "WABCDEFGH"
+DELAYS = (0, 2)
+STARTS = 6
+DURATION = 0.3  # [s]
+MASS = 0.1  # [kg] where none is known
+PRESS = 0.25  # of stiffness times max_depth
+
+
+@dataclass(frozen=True)
+class Loop:
+    """One loop, with what became of it."""
+
+    device: str
+    surface: str
+    delay: int
+    hand: str
+    law: str
+    stiffness: float
+    cycles: int
+
+
+def loops(device: Device, spec: str, found: Comparison) -> list[Loop]:
+    """Return what becomes of the recommended law on a device."""
+    row, test = found.recommended_row, device.wall_test
+    if row is None or test is None:
+        return []
+    surface = row.surface.to_stiffness(row.start)
+    result = []
+    for delay, (name, hand) in product(DELAYS, HANDS.items()):
+        servo, _said = default_servo(device, keeps_delay=False)
+        servo = Servo(
+            servo.period, delay, servo.position_resolution, servo.force_resolution, servo.max_force
+        )
+        damping = test.value * (0.5 + delay) * servo.period
+        plant = Cartesian(device.value("apparent_mass") or MASS, damping)
+        held = pressing(hand, PRESS * row.start * surface.max_depth)
+        count = _cycles(surface, plant, held, servo)
+        result.append(Loop(device.id, spec, delay, name, row.law.letter, row.start, count))
+    return result
+
+
+def _cycles(surface: Surface, plant: Cartesian, hand: SpringHand, servo: Servo) -> int:
+    """Return how many starts end in a limit cycle."""
+    begin = np.array([0.0, 0.0, surface.texture.extremes[1] + 0.2 * surface.max_depth])
+    found = 0
+    for shift in offsets(surface, STARTS):
+        run_for = runner(
+            surface,
+            plant,
+            hand,
+            servo,
+            Still((0.0, 0.0, 0.0)),
+            begin,
+            None,
+            shift,
+        )
+        found += ends_in_cycle(run_for, DURATION)[0]
+    return found
+
+
+def main() -> int:
+    """Print how many loops cycle, and which."""
+    console = Console(width=100, highlight=False)
+    known = [device for device in map(load_device, device_names()) if device.wall_test is not None]
+    done: list[Loop] = []
+    for device, spec in track(list(product(known, SURFACES)), "devices", console=console):
+        done += loops(device, spec, compare(load_scene(spec).texture, device, LAWS))
+    missed = [loop for loop in done if loop.cycles]
+    for loop in missed:
+        console.print(
+            f"MISS {loop.device}, {loop.surface}: law {loop.law} at {loop.stiffness:g} N/m cycles "
+            f"from {loop.cycles} of {STARTS} starts; delay {loop.delay}, {loop.hand}"
+        )
+    console.print(
+        f"{len(known)} devices x {len(SURFACES)} surfaces: {len(done)} loops at the recommended "
+        f"start, {len(missed)} of them cycle"
+    )
+    return int(bool(missed))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
