@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -214,6 +214,13 @@ STIFFNESS = Argument(
     positive=True,
     example="500N/m",
 )
+OWN_STIFFNESS = replace(
+    STIFFNESS,
+    words="stiffness to ask about",
+    default=None,
+    default_words="each law's own, the one to begin with",
+)
+SPEED = Argument("speed", "scanning speed", "m/s", default_words="0.1 m/s", example="0.1m/s")
 MAX_DEPTH = Argument(
     "max_depth",
     "depth to press to",

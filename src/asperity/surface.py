@@ -172,6 +172,19 @@ class Surface:
         """
         return self._changed(max_depth=MAX_DEPTH.checked(max_depth))
 
+    def to_texture(self, texture: Texture, max_depth: float | None = None) -> Surface:
+        """Return the same law, stiffness and depth on another texture.
+
+        Args:
+            texture: the other one.
+            max_depth: [m], if it is to change too.
+
+        Raises:
+            ParameterError: for a depth that is not positive.
+        """
+        depth = self.max_depth if max_depth is None else MAX_DEPTH.checked(max_depth)
+        return self._changed(texture=texture, max_depth=depth)
+
     def to_stiffness(self, stiffness: float) -> Surface:
         """Return the same surface with another stiffness [N/m].
 
@@ -242,6 +255,14 @@ class Surface:
     def facts(self) -> LawFacts:
         """What the symbols say of the force that is rendered, of law and clamp together."""
         return clamped_facts(self.law, self.acting_clamp)
+
+    @property
+    def feels_texture(self) -> bool:
+        """Whether the texture has a part in the force; the smooth wall alone has none.
+
+        Such a force may act in any direction, and change with the position in any.
+        """
+        return self.law.contact.begins_on_texture or self.facts.looks_at_surface
 
     @property
     def clamped_depth(self) -> float:

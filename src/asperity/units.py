@@ -161,3 +161,16 @@ def rounded_down(value: float, digits: int = 3) -> float:
     step = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
     # What rounding of the value itself took away is given back: 1000.0 stays 1000.
     return round(math.floor(value / step * (1.0 + 1e-12)) * step, 12)
+
+
+def rounded_up(value: float, digits: int = 3) -> float:
+    """Return the value with so many digits, never less than it is.
+
+    Example:
+        >>> rounded_up(10.2, 2), rounded_up(20.0, 2), rounded_up(0.0)
+        (11.0, 20.0, 0.0)
+    """
+    if value <= 0.0 or not math.isfinite(value):
+        return value
+    step = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    return round(math.ceil(value / step * (1.0 - 1e-12)) * step, 12)

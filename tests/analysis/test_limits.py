@@ -149,8 +149,9 @@ def test_a_device_without_data_decides_nothing() -> None:
     assert verdicts(result) == dict.fromkeys(range(1, 7))
     assert result.answer.startswith("Nothing can be decided.")
     assert result.safe_stiffness is None
-    assert result.force.needs == ("force_resolution", "friction", "bandwidth")
-    assert (result.force.above_resolution, result.force.above_friction) == (None, None)
+    assert result.felt.unknown == (
+        "force_resolution", "friction", "bandwidth", "update_rate", "position_resolution",
+    )  # fmt: skip
 
 
 def test_speeds_that_the_limits_allow() -> None:
@@ -239,7 +240,10 @@ def test_verdicts_do_not_depend_on_the_unit_of_length(
 def test_stiffness_is_by_default_what_the_device_renders() -> None:
     result = ask(stiffness=None)
     q = math.hypot(1.0, 2 * math.pi * A / L)
-    assert result.surface.stiffness == pytest.approx(900.0 / q, rel=1e-12)
+    assert result.safe_stiffness == pytest.approx(900.0 / q, rel=1e-12)
+    assert result.margin.law == "A"
+    assert result.surface.stiffness == pytest.approx(900.0 / q * result.margin.factor, rel=1e-2)
+    assert result.surface.stiffness <= 900.0 / q * result.margin.factor
     assert (result.gain_symbol, result.limit(5).holds) == ("q", True)
     assert result.limit(5).inequality == "q k ≤ K₀"
     assert any("quiet against buzz up to" in words for words in result.assumptions)
@@ -249,7 +253,7 @@ def test_a_known_delay_limits_a_conservative_law_by_less_than_q() -> None:
     deep = Sinusoid(4e-4, 1e-3)
     result = ask(deep, law="D", stiffness=None, max_depth=1e-3, device=device(delay_samples=0))
     assert (result.gain_symbol, result.gain.value) == ("q⁺", 1.0)
-    assert result.surface.stiffness == 900.0
+    assert result.safe_stiffness == 900.0
     assert result.limit(5).inequality == "q⁺ k ≤ K₀"
     assert result.limit(5).holds
     steep = Sinusoid(1e-4, 1e-3, phase=0.3)
@@ -258,7 +262,7 @@ def test_a_known_delay_limits_a_conservative_law_by_less_than_q() -> None:
     plus = one_sided_number(result.surface).upper
     assert result.gain_symbol == "(q⁺/2 + d q)/(1/2 + d)"
     assert result.gain.value == pytest.approx((plus / 2 + 2 * q) / 2.5, rel=1e-12)
-    assert result.surface.stiffness == pytest.approx(900.0 / result.gain.value, rel=1e-12)
+    assert result.safe_stiffness == pytest.approx(900.0 / result.gain.value, rel=1e-12)
 
 
 @pytest.mark.parametrize("law", ["A", "C", "G", "H"])
@@ -269,7 +273,8 @@ def test_it_agrees_with_the_comparison(law: str, delay: int | None) -> None:
     result = limits(texture, rig, law=law, max_depth=1e-3)
     assert result.allowed == row.allowed
     assert result.safe_stiffness == pytest.approx(row.safe_stiffness, rel=1e-12)
-    assert result.force.rms == pytest.approx(row.texture_force, rel=1e-9)
+    assert result.felt == row.felt
+    assert result.felt.rms == pytest.approx(row.texture_force, rel=1e-9)
 
 
 def test_an_unknown_stiffest_wall_leaves_the_default() -> None:
@@ -280,7 +285,7 @@ def test_an_unknown_stiffest_wall_leaves_the_default() -> None:
 
 def test_no_stiffness_is_known_where_q_is_unbounded() -> None:
     result = ask(Sinusoid(4e-4, 1e-3), law="D", stiffness=None, max_depth=1e-3)
-    assert (result.safe_stiffness, result.surface.stiffness) == (0.0, 1000.0)
+    assert (result.safe_stiffness, result.surface.stiffness) == (0.0, 900.0)  # at K₀
     assert not result.limit(5).holds
     assert result.to_dict()["limits"][4]["left"] == "inf"
     assert any("no stiffness is known to do" in words for words in result.assumptions)
@@ -288,38 +293,27 @@ def test_no_stiffness_is_known_where_q_is_unbounded() -> None:
 
 def test_the_force_against_resolution_friction_and_bandwidth() -> None:
     """Law A: RMS k √(Σ a²/2); of it the long wave alone is below 300 Hz."""
-    result = ask(TWO)
+    felt = ask(TWO).felt
     rms = 500.0 * math.sqrt((5e-5**2 + 2.4e-5**2) / 2)
-    assert result.force.rms == pytest.approx(rms, rel=1e-3)
-    assert result.force.rms == pytest.approx(500.0 * merit(Surface(TWO, "A", 500.0, D)).ripple)
-    assert result.force.in_band == pytest.approx(LONG, rel=1e-6)
-    assert result.force.in_band_rms == pytest.approx(500.0 * 5e-5 / math.sqrt(2), rel=1e-3)
-    assert result.force.above_resolution
-    assert result.force.above_friction
-    assert result.force.needs == ()
-    assert f"{100 * LONG:.3g} % of its power within the bandwidth" in result.answer
-    assert "above the force resolution of 2 mN" in result.answer
-    assert "its amplitude above the dry friction of 5 mN" in result.answer
+    assert felt.rms == felt.texture == pytest.approx(rms, rel=1e-3)
+    assert felt.rms == pytest.approx(500.0 * merit(Surface(TWO, "A", 500.0, D)).ripple)
+    assert felt.resolved == pytest.approx(LONG, rel=1e-6)
+    assert felt.shown == pytest.approx(500.0 * 5e-5 / math.sqrt(2), rel=1e-3)
+    assert felt.unknown == ()
+    assert ask(TWO).answer.endswith("20 mN RMS of texture: felt.")
 
 
-@pytest.mark.parametrize(
-    ("field", "verdict", "value"),
-    [
-        ("force_resolution", "above_resolution", 500.0 * A / math.sqrt(2)),
-        ("friction", "above_friction", 500.0 * A),
-    ],
-)
-def test_a_force_below_what_the_device_shows(field: str, verdict: str, value: float) -> None:
-    for factor, expected in ((0.999, True), (1.001, False)):
-        result = ask(device=device(**{field: value * factor}))
-        assert getattr(result.force, verdict) is expected
-        assert ("not above" in result.answer) is not expected
+@pytest.mark.parametrize("field", ["force_resolution", "friction"])
+def test_a_force_below_what_the_device_shows(field: str) -> None:
+    for factor, hidden in ((0.999, False), (1.001, True)):
+        result = ask(device=device(**{field: 500.0 * A * factor}))
+        assert (result.felt.tier == "not felt") is hidden
+        assert (": not felt;" in result.answer) is hidden
 
 
 def test_a_force_beyond_the_bandwidth_is_not_felt() -> None:
-    force = ask(speed=1.0).force
-    assert (force.in_band, force.in_band_rms) == (0.0, 0.0)
-    assert (force.above_resolution, force.above_friction) == (False, False)
+    felt = ask(speed=1.0).felt
+    assert (felt.resolved, felt.shown, felt.tier) == (0.0, 0.0, "not felt")
 
 
 def test_a_map_of_a_wave_is_judged_like_the_wave() -> None:

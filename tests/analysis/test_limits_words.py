@@ -51,7 +51,7 @@ def test_plain_data_says_everything() -> None:
     assert content["limits"][1]["speeds"] == [0.0, "inf"]
     assert content["waves"][0]["holds"] == {"1": True, "2": True, "3": True, "4": True, "6": True}
     assert content["speed"] == V
-    assert content["force"]["in_band"] == pytest.approx(LONG)
+    assert content["felt"]["resolved"] == pytest.approx(LONG)
     assert content["gain"]["symbol"] == "q"
 
 

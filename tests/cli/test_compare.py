@@ -51,7 +51,7 @@ def test_table_has_one_row_per_law_with_the_letter_first(call: Call) -> None:
     for letter in "WABCDEFGH":
         assert letter in rows
     assert "omega.3" in out
-    assert "Default stiffness 1000 N/m" in out
+    assert "Default scanning speed 0.1 m/s" in out
 
 
 def test_json_on_standard_output_is_alone(call: Call) -> None:

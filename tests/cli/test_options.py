@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 import asperity as asp
 from asperity.analysis.check_limits import DEFAULT_SAMPLES, DEFAULT_SPEED
-from asperity.arguments import MAX_DEPTH, Argument
+from asperity.arguments import MAX_DEPTH, SPEED, Argument
 from asperity.cli import analyze, compare, limits, onset
 from asperity.cli.main import COMMANDS, cli
 from asperity.cli.options import LAW_OPTIONS, help_of
@@ -55,7 +55,7 @@ def test_defaults_in_the_help_are_those_of_the_functions() -> None:
             if argument.default is not None and default is not None:
                 assert argument.default == default, argument.name
     assert {one.default for one in limits._SAMPLES} == {DEFAULT_SAMPLES}
-    assert limits._SPEED.default_words == f"{DEFAULT_SPEED:g} m/s"
+    assert SPEED.default_words == f"{DEFAULT_SPEED:g} m/s"
 
 
 def test_help_loads_nothing_heavy() -> None:

@@ -50,8 +50,8 @@ def check_alone(page: str) -> Reader:
     return reader
 
 
-def terminal(show: Callable[..., None], *arguments: Any, width: int) -> str:
+def terminal(show: Callable[..., None], *arguments: Any, width: int, **how: Any) -> str:
     """Return what a function prints on a console of a width."""
     console = Console(width=width, file=io.StringIO(), force_terminal=False)
-    show(*arguments, console)
+    show(*arguments, console, **how)
     return console.file.getvalue()

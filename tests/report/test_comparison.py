@@ -11,6 +11,7 @@ import asperity as asp
 from asperity.devices import parse_device
 from asperity.report import comparison_table, html_text, print_comparison
 from asperity.report.comparison import described
+from asperity.report.words.number_words import limit_text
 from asperity.textures.catalogue import CATALOGUE
 
 TEXTURE = asp.Sinusoid(amplitude=0.2e-3, period=2e-3)
@@ -26,20 +27,50 @@ def page(result: asp.Comparison) -> str:
     return html_text(result)
 
 
-@pytest.mark.parametrize("width", [80, 100, 120])
-def test_the_answer_fits_the_terminal(result: asp.Comparison, width: int) -> None:
-    text = terminal(print_comparison, result, width=width)
+@pytest.mark.parametrize("full", [False, True])
+@pytest.mark.parametrize("width", [40, 60, 80, 100, 120, 200])
+def test_the_answer_fits_the_terminal(result: asp.Comparison, width: int, full: bool) -> None:
+    text = terminal(print_comparison, result, width=width, full=full)
     assert max(len(line) for line in text.splitlines()) <= width
     for row in result.rows:
         found = [line for line in text.splitlines() if re.match(rf"{row.law.letter} +\S", line)]
-        assert len(found) >= 2  # the table's row and the verdict
+        # The table's row; on a narrow terminal, or where all numbers are shown, the verdict too.
+        assert len(found) >= (2 if width < 72 or full else 1)
     assert "…" not in text
     assert "K₀" in text
 
 
+def test_a_narrow_table_has_fewer_columns_and_whole_numbers(result: asp.Comparison) -> None:
+    counts = [len(comparison_table(result, width).columns) for width in (30, 40, 60, 80, 120)]
+    assert counts == [3, 4, 6, 7, 8]
+    starts = [str(cell) for cell in comparison_table(result, 40).columns[1].cells]
+    assert starts[:2] == ["5000 N/m", limit_text(result.row("A").start)]
+
+
+def test_a_newcomer_finds_the_answer_in_the_first_lines(result: asp.Comparison) -> None:
+    """Which law, which stiffness, whether it is felt, why: a checklist for the page's answer."""
+    text = result.recommendation
+    best = result.recommended_row
+    assert best is not None
+    checks = {
+        "which law": f"Use law {best.law.letter} ({best.law.name.replace('-', ' ')})",
+        "on what": "on the Force Dimension omega.3",
+        "which stiffness": f"start at {limit_text(best.start)}",
+        "is it felt": "felt, ",
+        "how much": "RMS of texture",
+        "is it proved": "Not proved",
+        "why so much": "simulated loops",
+    }
+    missing = [question for question, words in checks.items() if words not in text]
+    assert not missing
+    faint = asp.compare(asp.Sinusoid(1e-6, 1e-3), "touch", "CH").recommendation
+    for words in ("Nothing of this texture will be felt", "dry friction of 260 mN", "magnify"):
+        assert words in faint
+
+
 def test_sampled_numbers_carry_a_mark() -> None:
     found = asp.compare(asp.Sinusoid(amplitude=0.1e-3, period=2e-3), laws="ACF")
-    leaks = [str(cell) for cell in comparison_table(found, 120).columns[7].cells]
+    leaks = [str(cell) for cell in comparison_table(found, 120).columns[5].cells]
     assert leaks[0][0].isdigit()  # A's leak is certified
     assert leaks[1] == "0"  # C's is zero by theorem
     assert leaks[2].startswith("~")  # F's is the worst loop that was tried

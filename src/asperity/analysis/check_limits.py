@@ -12,14 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.compare import DEFAULT_DEVICE, law_to_ask_about
 from asperity.analysis.energy.merit import merit
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
-from asperity.analysis.limits.limit_result import Limits, RenderedWave, TextureForce
+from asperity.analysis.limits.felt import DEFAULT_SAMPLES, DEFAULT_SPEED, texture_felt
+from asperity.analysis.limits.limit_result import Limits, RenderedWave
 from asperity.analysis.limits.limit_rules import RULES, Case, Decision, decide
 from asperity.analysis.limits.spectrum import LEAST_SHARE, Spectrum, spectrum
 from asperity.analysis.limits.wave_force import wave_forces
-from asperity.analysis.passivity.allowed import allowed_stiffness
 from asperity.analysis.passivity.judgement import Allowed
+from asperity.analysis.passivity.margin import at_start, start
 from asperity.analysis.words.limits import answer, assumptions
 from asperity.arguments import DEFAULT_STIFFNESS
 from asperity.checks import FloatArray, positive, real
@@ -29,17 +31,12 @@ from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
-DEFAULT_DEVICE = "omega.3"
-DEFAULT_LAW = "C"
-DEFAULT_SPEED = 0.1  # [m/s], a brisk stroke
-DEFAULT_SAMPLES = 5.0  # "typically 5 to 10"
-
 
 def limits(
     texture: Texture,
     device: str | os.PathLike[str] | Device = DEFAULT_DEVICE,
     speed: float | None = None,
-    law: str | Law = DEFAULT_LAW,
+    law: str | Law | None = None,
     stiffness: float | None = None,
     max_depth: float | None = None,
     *,
@@ -58,9 +55,9 @@ def limits(
         texture: the surface.
         device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`.
         speed: v [m/s] of the scan; 0.1 by default.
-        law: letter or name, or a law of your own.
-        stiffness: k [N/m]; by default what the device may render of this law, as in a comparison,
-            and 1000 where that is not known or zero.
+        law: letter or name, or a law of your own; by default the one that a comparison recommends.
+        stiffness: k [N/m]; by default the one to begin with, as in a comparison; where none is
+            known to do, K₀.
         max_depth: depth to which the surface is pressed [m]; by default its peak-to-valley
             height, at most 1 mm.
         time_samples: α, updates that a wave needs; at least 2, by the paper 5 to 10; default 5.
@@ -89,17 +86,19 @@ def limits(
     beta = _samples("position_samples", position_samples, 2.0)
     gamma = _samples("force_steps", force_steps, 1.0)
     asked = DEFAULT_STIFFNESS if stiffness is None else stiffness
+    if law is None:
+        law = law_to_ask_about(texture, known, max_depth, speed=v, **surface_arguments)
     surface = Surface(texture, law, asked, max_depth, **surface_arguments)
     q, one_sided = characteristic_number(surface), one_sided_number(surface)
-    allowed, wall = allowed_stiffness(surface, known, q, one_sided)
-    safe, (gain, symbol) = allowed.stiffness, _gain(q, one_sided, allowed)
-    if stiffness is None and safe:
-        surface = Surface(texture, law, safe, max_depth, **surface_arguments)
+    begin = start(surface, known, q, one_sided)
+    gain, symbol = _gain(q, one_sided, begin.allowed)
+    if stiffness is None:
+        surface = at_start(surface, known, begin)
     found = spectrum(texture)
     forces = wave_forces(surface, found)
     kept = _kept(found, forces)
     numbers = {field: datum.value for field, datum in known.data.items()}
-    numbers |= {} if wall is None else {"max_stiffness": wall}
+    numbers |= {} if begin.wall is None else {"max_stiffness": begin.wall}
     shares = np.array([wave.share for wave in found.waves])[kept]
     case = Case(numbers, v, alpha, beta, gamma, found.wavelengths[kept], forces[kept], shares,
                 gain.value, surface.stiffness)  # fmt: skip
@@ -107,11 +106,15 @@ def limits(
                  for rule in RULES]  # fmt: skip
     six = tuple(decision.limit for decision in decisions)
     scan = merit(surface)
-    force = _texture_force(scan.ripple * surface.stiffness, case, found, forces)
+    felt = texture_felt(
+        surface, known, texture.texture_part(), rms=scan.ripple * surface.stiffness, speed=v,
+        time_samples=alpha, position_samples=beta, force_steps=gamma, deep=max_depth is not None,
+    )  # fmt: skip
     waves = _rendered(found, kept, case, decisions)
     top = min((one.speeds[1] for one in six if one.speeds is not None), default=math.inf)
-    result = Limits(surface, known, v, alpha, beta, gamma, gain, symbol, allowed, six, waves, found,
-                    force, (0.0, top), "", ())  # fmt: skip
+    result = Limits(surface, known, v, alpha, beta, gamma, gain, symbol, begin.allowed,
+                    begin.margin, six,
+                    waves, found, felt, (0.0, top), "", ())  # fmt: skip
     defaults = {"speed": speed is None, "stiffness": stiffness is None,
                 "max_depth": max_depth is None,
                 "samples": None in {time_samples, position_samples, force_steps}}  # fmt: skip
@@ -176,24 +179,4 @@ def _rendered(
             top_speed=min((float(top[i]) for _number, _holds, top in on_waves), default=math.inf),
         )
         for i, wave in enumerate(waves)
-    )
-
-
-def _texture_force(rms: float, case: Case, found: Spectrum, forces: FloatArray) -> TextureForce:
-    """Return the force of the texture against what the device can show."""
-    device = case.device
-    in_band, total = None, float(np.sum(forces**2))
-    if "bandwidth" in device and total > 0.0:
-        passes = case.speed / found.wavelengths < device["bandwidth"]
-        in_band = float(np.sum(forces[passes] ** 2)) / total
-    shown = rms if in_band is None else rms * math.sqrt(in_band)
-    step, friction = device.get("force_resolution"), device.get("friction")
-    asked = ("force_resolution", "friction", "bandwidth")
-    return TextureForce(
-        rms=rms,
-        in_band=in_band,
-        in_band_rms=shown,
-        above_resolution=None if step is None else shown > step,
-        above_friction=None if friction is None else math.sqrt(2.0) * shown > friction,
-        needs=tuple(field for field in asked if field not in device),
     )

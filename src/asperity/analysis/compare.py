@@ -12,6 +12,8 @@ from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import merit
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.judge_passivity import passivity
+from asperity.analysis.limits.felt import DEFAULT_SPEED, texture_felt
+from asperity.analysis.passivity.margin import at_start, start
 from asperity.analysis.recommendation import recommend
 from asperity.analysis.row import LawRow
 from asperity.analysis.words.comparison import assumptions, recommendation, verdict
@@ -24,7 +26,7 @@ from asperity.files import plain, record
 from asperity.laws import LAWS, Law, find_laws, shared_out
 from asperity.notebook import as_html
 from asperity.surface import Surface
-from asperity.textures.texture import Texture
+from asperity.textures.texture import Texture, TexturePart
 
 SCHEMA = 1
 DEFAULT_DEVICE = "omega.3"
@@ -40,10 +42,13 @@ class Comparison:
     Attributes:
         texture: the texture.
         device: the device.
-        stiffness: the stiffness that was asked for [N/m].
+        stiffness: the stiffness that was asked for [N/m]; ``None`` if each law was taken at its
+            own, the one to begin with.
         max_depth: the depth to which the surface is pressed [m].
+        speed: of the scan on which the texture is to be felt [m/s].
         rows: one per law, in the order asked for.
         recommended_row: of the recommended law; ``None`` if none can be recommended.
+        nearest_row: where nothing is felt, of the law that comes nearest to it; else ``None``.
         recommendation: the recommendation with its reason, in words.
         assumptions: what was assumed, in sentences: defaults, unverified device data, the steps
             of preparing the surface, regions and resolutions of sampling.
@@ -51,10 +56,12 @@ class Comparison:
 
     texture: Texture
     device: Device
-    stiffness: float
+    stiffness: float | None
     max_depth: float
+    speed: float
     rows: tuple[LawRow, ...]
     recommended_row: LawRow | None
+    nearest_row: LawRow | None
     recommendation: str
     assumptions: tuple[str, ...]
 
@@ -93,7 +100,7 @@ class Comparison:
         return {
             "schema": SCHEMA,
             "texture": self.texture.describe(),
-            **record(self, "device", "stiffness", "max_depth"),
+            **record(self, "device", "stiffness", "max_depth", "speed"),
             "laws": plain(self.rows),
             **record(self, "recommended", "recommendation", "assumptions"),
         }
@@ -106,6 +113,7 @@ def compare(
     stiffness: float | None = None,
     max_depth: float | None = None,
     *,
+    speed: float | None = None,
     progress: Progress | None = None,
     law_parameters: Mapping[str, float] | None = None,
     **surface_arguments: Any,
@@ -115,15 +123,18 @@ def compare(
     For every law: q and q⁺, up to which stiffness the device may render it and how well that is
     known (:func:`~asperity.analysis.judge_passivity.passivity`), whether the field is conservative
     and what its worst loop gains, whether the force is continuous, strength and support, and a
-    verdict.
+    verdict. First of all: whether its texture is felt, at the stiffness to begin with
+    (:func:`~asperity.analysis.limits.felt.texture_felt`).
 
     Args:
         texture: the surface.
         device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`.
         laws: letters or names, or laws of your own.
-        stiffness: the stiffness that you want [N/m]; 1000 by default.
+        stiffness: the stiffness that you ask about [N/m]; by default each law's own, the one to
+            begin with on this device.
         max_depth: the depth to which the surface is pressed [m]; by default its peak-to-valley
             height, at most 1 mm.
+        speed: of the scan on which the texture is to be felt [m/s]; 0.1 by default.
         progress: called with the letter of each law before it is analysed.
         law_parameters: values of laws' parameters by name; each goes to the laws that declare it.
         **surface_arguments: further arguments of :class:`~asperity.surface.Surface`.
@@ -140,29 +151,34 @@ def compare(
     """
     chosen = find_laws(list(laws) if not isinstance(laws, str) else laws)
     known_device = load_device(device)
-    asked = DEFAULT_STIFFNESS if stiffness is None else positive("stiffness", stiffness, "N/m")
+    asked = None if stiffness is None else positive("stiffness", stiffness, "N/m")
+    brisk = DEFAULT_SPEED if speed is None else positive("speed", speed, "m/s")
     _refuse_unknown(known_device)
     shares = shared_out(law_parameters or {}, chosen)
     surfaces = [
-        Surface(texture, law, asked, max_depth, law_parameters=own, **surface_arguments)
+        Surface(texture, law, asked or DEFAULT_STIFFNESS, max_depth, law_parameters=own,
+                **surface_arguments)
         for law, own in zip(chosen, shares, strict=True)
-    ]
+    ]  # fmt: skip
+    question = _Question(known_device, asked, brisk, texture.texture_part(), max_depth is not None)
     rows = []
     for surface in surfaces:
         if progress is not None:
             progress(surface.law.letter)
-        rows.append(_row(surface, known_device))
-    chosen_one = recommend(rows, known_device)
-    defaults = {"stiffness": stiffness is None, "max_depth": max_depth is None}
+        rows.append(_row(surface, question))
+    found = recommend(rows)
+    defaults = {"max_depth": max_depth is None, "speed": speed is None}
     return Comparison(
         texture=texture,
         device=known_device,
         stiffness=asked,
         max_depth=surfaces[0].max_depth,
+        speed=brisk,
         rows=tuple(rows),
-        recommended_row=chosen_one.row,
-        recommendation=recommendation(chosen_one, known_device),
-        assumptions=assumptions(rows, known_device, defaults),
+        recommended_row=found.row,
+        nearest_row=found.nearest,
+        recommendation=recommendation(found, known_device),
+        assumptions=assumptions(rows, question.part, known_device, defaults),
     )
 
 
@@ -178,6 +194,43 @@ def line_to_add(device: Device) -> str:
     return "" if device.wall_test is not None or proved else 'max_stiffness = "... N/m"'
 
 
+def law_to_ask_about(
+    texture: Texture,
+    device: str | os.PathLike[str] | Device = DEFAULT_DEVICE,
+    max_depth: float | None = None,
+    **arguments: Any,
+) -> Law:
+    """Return the law that a comparison recommends; where nothing is felt, the one that is nearest.
+
+    Args:
+        texture: the surface.
+        device: see :func:`compare`.
+        max_depth: see :func:`compare`.
+        **arguments: further ones of :func:`compare`.
+
+    Raises:
+        ParameterError: where no law is better than another, since none is known to do.
+    """
+    found = compare(texture, device, max_depth=max_depth, **arguments)
+    row = found.recommended_row or found.nearest_row
+    if row is None:
+        raise ParameterError(
+            "law", f"is missing, and none can be recommended: {found.recommendation}"
+        )
+    return row.law
+
+
+@dataclass(frozen=True)
+class _Question:
+    """What is asked of every law."""
+
+    device: Device
+    stiffness: float | None
+    speed: float
+    part: TexturePart
+    deep: bool
+
+
 def _refuse_unknown(device: Device) -> None:
     """Refuse a device of which no stiffness of any law could follow."""
     if line := line_to_add(device):
@@ -186,16 +239,29 @@ def _refuse_unknown(device: Device) -> None:
         raise ParameterError("device", f"{device.id} {needs} that held, to its file; or {others}")
 
 
-def _row(surface: Surface, device: Device) -> LawRow:
-    facts = surface.facts
+def _row(surface: Surface, question: _Question) -> LawRow:
+    device = question.device
     q, one_sided = characteristic_number(surface), one_sided_number(surface)
+    begin = start(surface, device, q, one_sided)
+    if question.stiffness is None:
+        surface = at_start(surface, device, begin)
+    facts = surface.facts
     scan, leak = merit(surface), worst_loop(surface)
     smooth = continuity(surface, q)
+    felt = None
+    if begin.stiffness:
+        felt = texture_felt(
+            surface.to_stiffness(begin.stiffness), device, question.part,
+            rms=scan.ripple * begin.stiffness, speed=question.speed, deep=question.deep,
+        )  # fmt: skip
     row = LawRow(
         surface=surface,
         q=q,
         one_sided=one_sided,
         passivity=passivity(surface, device, q, one_sided, leak),
+        margin=begin.margin,
+        start=begin.stiffness,
+        felt=felt,
         conservative=facts.conservative,
         conservative_reason=facts.reason,
         leak=leak,

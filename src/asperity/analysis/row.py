@@ -7,7 +7,9 @@ from typing import Any
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import Leak
+from asperity.analysis.limits.felt import Felt, Tier
 from asperity.analysis.passivity.judgement import Allowed, Passivity
+from asperity.analysis.passivity.margin import Margin
 from asperity.files import record
 from asperity.laws import Law
 from asperity.surface import Surface
@@ -18,11 +20,16 @@ class LawRow:
     """What is known of one law on the surface.
 
     Attributes:
-        surface: the surface with this law at the stiffness that was asked for.
+        surface: the surface with this law at the stiffness that was asked for; where none was, at
+            ``start``, or at the smooth wall's K₀ if no stiffness is known to do.
         q: characteristic number.
         one_sided: one-sided number q⁺.
         passivity: what the device has to do with it: verdict, and up to which stiffness it may be
             rendered; the same as in an :class:`~asperity.analysis.Analysis`.
+        margin: the share of what is allowed at which to begin.
+        start: the stiffness to begin with [N/m]: margin times what is allowed; 0 if no stiffness is
+            known to do.
+        felt: whether the texture is felt at ``start``; ``None`` if there is none.
         conservative: whether the work around every closed path is zero.
         conservative_reason: one sentence.
         leak: the worst simple loop at the stiffness that was asked for.
@@ -40,6 +47,9 @@ class LawRow:
     q: Bound
     one_sided: Bound
     passivity: Passivity
+    margin: Margin
+    start: float
+    felt: Felt | None
     conservative: bool
     conservative_reason: str
     leak: Leak
@@ -68,8 +78,18 @@ class LawRow:
 
     @property
     def texture_force(self) -> float:
-        """RMS of the oscillating force at ``safe_stiffness`` [N]."""
-        return self.ripple * self.safe_stiffness
+        """RMS of the oscillating force at ``start`` [N]."""
+        return self.ripple * self.start
+
+    @property
+    def tier(self) -> Tier | None:
+        """Whether the texture is felt at ``start``; ``None`` where no stiffness is known."""
+        return None if self.felt is None else self.felt.tier
+
+    @property
+    def shown_force(self) -> float:
+        """RMS of the texture's force that the device resolves, at ``start`` [N]."""
+        return 0.0 if self.felt is None else self.felt.shown
 
     @property
     def buzzes(self) -> bool:
@@ -97,9 +117,9 @@ class LawRow:
         return self.contact_lost > 0.0 and self.law.contact.begins_on_texture
 
     @property
-    def safe_leak(self) -> float:
-        """What the worst loop of one period gains at the law's own safe stiffness [J]."""
-        return self.leak.worst_per_period * self.safe_stiffness / self.surface.stiffness
+    def start_leak(self) -> float:
+        """What the worst loop of one period gains at ``start`` [J]."""
+        return self.leak.worst_per_period * self.start / self.surface.stiffness
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
@@ -107,7 +127,9 @@ class LawRow:
             "law": self.law.letter,
             "name": self.law.name,
             **record(self.surface, "law_parameters"),
-            **record(self, "q", "one_sided", "safe_stiffness", "allowed"),
+            **record(self, "q", "one_sided", "safe_stiffness", "allowed", "margin", "start"),
+            "stiffness": self.surface.stiffness,
+            **record(self, "felt"),
             "passivity": self.passivity.verdict,
             **record(self, "conservative", "conservative_reason", "leak"),
             **record(self, "continuous", "continuous_reason", "strength", "support"),

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.arguments import Argument
+from asperity.arguments import OWN_STIFFNESS, Argument
 from asperity.cli.options import (
+    LAW_OPTIONS,
     device_option,
     file_options,
     file_values,
@@ -24,6 +25,7 @@ from asperity.cli.progress import step_bar
 
 if TYPE_CHECKING:
     from asperity.devices import Device
+    from asperity.surface import Surface
     from asperity.textures import Texture
 
 _SEARCH = (
@@ -74,9 +76,9 @@ def _checked(argument: Argument) -> Callable[[str], Any]:
 
 @click.command("analyze")
 @click.argument("surface")
-@law_option("Law, by letter or name; needed unless a scene names it.")
+@law_option("Law, by letter or name.  [default: the scene's, or what compare recommends]")
 @device_option()
-@law_options()
+@law_options((OWN_STIFFNESS, *LAW_OPTIONS[1:]))
 @options(_SEARCH, _checked)
 @file_options
 @output_options("Write a report with pictures; - is standard output.")
@@ -87,11 +89,10 @@ def command(surface: str, device: Device | None, outputs: Outputs, **values: Any
     or a scene file (TOML).
     """
     from asperity.analysis.analyze import STEPS, analyze
-    from asperity.surface import Surface
 
     with step_bar("reading the surface", len(STEPS)) as step:
         texture, known, arguments = read_surface(surface, device, values)
-        whole = Surface(texture, **arguments)
+        whole = _whole(texture, known, arguments)
         result = analyze(whole, known, progress=step, **given(values, _SEARCH))
     code = _texture_code(surface, file_values(values), texture)
 
@@ -102,6 +103,22 @@ def command(surface: str, device: Device | None, outputs: Outputs, **values: Any
         lambda console: print_analysis(result, console, code),
         lambda: analysis_page(result, code),
     )
+
+
+def _whole(texture: Texture, device: Device, arguments: dict[str, Any]) -> Surface:
+    """Return the surface: with the law that is recommended, at the stiffness to begin with."""
+    from asperity.analysis.compare import law_to_ask_about
+    from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
+    from asperity.analysis.passivity.margin import at_start, start
+    from asperity.surface import Surface
+
+    if "law" not in arguments:
+        arguments = {"law": law_to_ask_about(texture, device, **arguments), **arguments}
+    whole = Surface(texture, **arguments)
+    if "stiffness" in arguments:
+        return whole
+    numbers = characteristic_number(whole), one_sided_number(whole)
+    return at_start(whole, device, start(whole, device, *numbers))
 
 
 def _texture_code(source: str, for_file: Mapping[str, Any], texture: Texture) -> str:

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.arguments import MAX_DEPTH, STIFFNESS
+from asperity.arguments import MAX_DEPTH, OWN_STIFFNESS, SPEED
 from asperity.cli.options import (
     LAW_OPTIONS,
     device_option,
     file_options,
+    given,
     law_options,
     laws_option,
+    options,
     read_devices,
     read_surface,
 )
@@ -35,14 +37,17 @@ _DEPTHS = replace(MAX_DEPTH, form="items", example="0.1mm; 0.5mm")
 @device_option(
     "Devices of the catalogue, or TOML files, 'touch,mine.toml'.  [default: omega.3]", read_devices
 )
+@options([SPEED])
 @laws_option("Laws to compare, 'WAC' or names with commas.  [default: all]")
-@law_options((STIFFNESS, _DEPTHS, *LAW_OPTIONS[2:]))
+@law_options((OWN_STIFFNESS, _DEPTHS, *LAW_OPTIONS[2:]))
 @file_options
+@click.option("--full", is_flag=True, help="Show q, q⁺, limits, leaks, T and S of every law.")
 @output_options("Write a report with pictures; - is standard output.")
 def command(
     surface: str,
     device: tuple[Device, ...] | None,
     laws: tuple[Law, ...] | None,
+    full: bool,
     outputs: Outputs,
     **values: Any,
 ) -> None:
@@ -67,12 +72,13 @@ def command(
             [depths] if isinstance(depths, float) else depths,
             chosen,
             progress=lambda on, _depth, law: step(f"{on.id}, law {law}"),
+            **given(values, [SPEED]),
             **arguments,
         )
-    _write(found, outputs)
+    _write(found, outputs, full)
 
 
-def _write(found: Comparisons, outputs: Outputs) -> None:
+def _write(found: Comparisons, outputs: Outputs, full: bool) -> None:
     """Write the one comparison that was asked for, or the table of several.
 
     Raises:
@@ -82,7 +88,7 @@ def _write(found: Comparisons, outputs: Outputs) -> None:
         from asperity.report.comparison import comparison_page, print_comparison
 
         one = found.comparisons[0]
-        outputs.write(one, lambda to: print_comparison(one, to), lambda: comparison_page(one))
+        outputs.write(one, lambda to: print_comparison(one, to, full), lambda: comparison_page(one))
         return
     from asperity.report.several import comparisons_page, print_comparisons
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.arguments import STIFFNESS, Argument
+from asperity.arguments import OWN_STIFFNESS, SPEED, Argument
 from asperity.cli.options import (
     LAW_OPTIONS,
     device_option,
@@ -24,10 +23,6 @@ from asperity.cli.progress import step_bar
 if TYPE_CHECKING:
     from asperity.devices import Device
 
-_STIFFNESS = replace(
-    STIFFNESS, words="stiffness", default_words="what the device renders of the law, K₀/q"
-)
-_SPEED = Argument("speed", "scanning speed", "m/s", default_words="0.1 m/s", example="0.1m/s")
 # Samples that a wave, or an amplitude, needs: the paper says 5 to 10.
 _SAMPLES = (
     Argument("time_samples", "updates that a wave needs, α", default=5.0),
@@ -39,10 +34,10 @@ _SAMPLES = (
 @click.command("limits")
 @click.argument("surface")
 @device_option()
-@options([_SPEED])
-@law_option("Law, by letter or name.  [default: C]")
+@options([SPEED])
+@law_option("Law, by letter or name.  [default: the one that compare recommends]")
 @options(_SAMPLES)
-@law_options((_STIFFNESS, *LAW_OPTIONS[1:]))
+@law_options((OWN_STIFFNESS, *LAW_OPTIONS[1:]))
 @file_options
 @output_options("Write a report with a picture; - is standard output.")
 def command(surface: str, device: Device | None, outputs: Outputs, **values: Any) -> None:
@@ -51,13 +46,13 @@ def command(surface: str, device: Device | None, outputs: Outputs, **values: Any
     SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
     or a scene file (TOML).
     """
-    from asperity.analysis.check_limits import DEFAULT_LAW, limits
+    from asperity.analysis.check_limits import limits
 
     with step_bar("reading the surface", 2) as step:
         step("reading the surface")
-        texture, known, arguments = read_surface(surface, device, values, law=DEFAULT_LAW)
+        texture, known, arguments = read_surface(surface, device, values)
         step("wave by wave")
-        result = limits(texture, known, **given(values, (_SPEED, *_SAMPLES)), **arguments)
+        result = limits(texture, known, **given(values, (SPEED, *_SAMPLES)), **arguments)
 
     from asperity.report.limits import limits_page, print_limits
 

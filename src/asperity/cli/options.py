@@ -243,7 +243,8 @@ def read_surface(
         source: a texture with its arguments, a file, or a scene.
         device: the one of ``--device``; it comes before the scene's.
         values: of the options, by name.
-        laws: those that are compared; by default the one of ``--law`` or of the scene.
+        laws: those that are compared; by default the one of ``--law`` or of the scene, which is
+            then among the arguments.
         defaults: of the other arguments.
 
     Raises:
@@ -255,9 +256,8 @@ def read_surface(
     asked = surface_values(values)
     scene = load_scene(source, file_values(values))
     merged = {**defaults, **scene.surface, **asked}
-    if not laws and "law" not in merged:
-        raise ParameterError("law", "is missing: --law B, or a scene whose [surface] names one")
-    laws = laws or [find_law(merged["law"])]
+    if not laws:
+        laws = [find_law(merged["law"])] if "law" in merged else tuple(KNOWN_LAWS.values())
     refuse_idle(asked, laws)
     arguments = surface_keywords(merged, *laws)
     return scene.texture, chosen_device(device, scene, values), arguments

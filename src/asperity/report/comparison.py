@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rich.console import Console
@@ -12,6 +12,7 @@ from rich.table import Table
 from asperity.analysis.compare import Comparison
 from asperity.analysis.passivity.judgement import Basis
 from asperity.analysis.row import LawRow
+from asperity.analysis.words.felt import speed_text, tier_text
 from asperity.analysis.words.passivity import allowed_text
 from asperity.arguments import Argument
 from asperity.report import page, terminal
@@ -24,9 +25,11 @@ from asperity.report.words.number_words import (
     bound_text,
     force_text,
     holds_text,
+    in_one_unit,
     is_sampled,
     law_title,
     leak_text,
+    limit_text,
     merit_text,
     place_text,
     strength_has_unit,
@@ -34,18 +37,30 @@ from asperity.report.words.number_words import (
 from asperity.textures.catalogue import CATALOGUE
 from asperity.units import engineering, rounded_down
 
-_NAMES_FROM = 112
-"""Console width [characters] from which the law's name has a column."""
-
 _AIRY_FROM = 90
 """Console width [characters] from which columns stand two characters apart."""
 
-_HEADINGS = (
-    "law", "name", "q", "q⁺", "stiffness\nup to", "worth", "conser-\nvative", "worst\nleak",
-    "contin-\nuous", "T", "S", "texture\nforce",
-)  # fmt: skip
-_NAME = 1
-_NUMBERS = (2, 3, 4, 7, 9, 10, 11)
+_VERDICT_FROM = 72
+"""Console width [characters] from which the verdicts stand in the table, not below it."""
+
+
+@dataclass(frozen=True)
+class _Column:
+    """A column of the table of laws.
+
+    Attributes:
+        heading: in a terminal, broken into lines.
+        cell: what it says of a law.
+        number: whether it is set to the right.
+        least: width of the console [characters] from which it is shown.
+        means: what it means, in a few words; empty where the heading says it.
+    """
+
+    heading: str
+    cell: Callable[[LawRow, Comparison], page.Cell]
+    number: bool = False
+    least: int = 0
+    means: str = ""
 
 
 SAMPLED_NOTE = (
@@ -116,27 +131,115 @@ def _value_text(name: str, value: Any, argument: Argument | None) -> str:
 # --- tables ---------------------------------------------------------------------------------------
 
 
-def _headings(comparison: Comparison) -> list[str]:
-    unit = " [m]" if strength_has_unit(comparison) else ""
-    return [f"T{unit}" if heading == "T" else heading for heading in _HEADINGS]
+def start_text(row: LawRow) -> str:
+    """Return the stiffness to begin with: "3050 N/m", or "none"."""
+    return limit_text(row.start) if row.start else "none"
 
 
-def _cells(row: LawRow, comparison: Comparison) -> list[page.Cell]:
-    """Return what the columns say of a law."""
-    return [
-        page.Cell(row.law.letter, "l"),
-        page.Cell(law_title(row.law.name)),
-        page.Cell(bound_text(row.q), note=f"{row.q.method}: {row.q.note}"),
-        page.Cell(bound_text(row.one_sided), note=f"{row.one_sided.method}: {row.one_sided.note}"),
-        page.Cell(stiffness_text(row)),
-        page.Cell(_WORTHS[row.allowed.basis], note=allowed_text(row.allowed)),
-        page.Cell(holds_text(row.conservative), note=row.conservative_reason),
-        page.Cell(leak_text(row, comparison), note=row.leak.description),
-        page.Cell(holds_text(row.continuous), note=row.continuous_reason),
-        page.Cell(merit_text(row.strength)),
-        page.Cell(merit_text(row.support)),
-        page.Cell(force_text(row.texture_force) if row.safe_stiffness or row.textureless else NONE),
-    ]
+def _texture_text(row: LawRow, comparison: Comparison) -> str:
+    """Return RMS of the texture that the device shows, all laws in one unit."""
+    if row.felt is None:
+        return NONE
+    forces = [row.shown_force, *(other.shown_force for other in comparison.rows)]
+    return in_one_unit(forces, "N", digits=2)[0]
+
+
+_LETTER = _Column("law", lambda row, _: page.Cell(row.law.letter, "l"))
+_TITLE = _Column("name", lambda row, _: page.Cell(law_title(row.law.name)), least=112)
+_VERDICT = _Column("verdict", lambda row, _: page.Cell(row.verdict), least=_VERDICT_FROM)
+_SHORT = (
+    _LETTER,
+    _TITLE,
+    _Column(
+        "start at",
+        lambda row, _: page.Cell(start_text(row), note=allowed_text(row.allowed)), True,
+        means="stiffness to begin with on this device; none: no stiffness is known to do",
+    ),
+    _Column(
+        "texture", lambda row, all_: page.Cell(_texture_text(row, all_)), True, 44,
+        "RMS of the force that is texture and that the device resolves, at the start",
+    ),
+    _Column(
+        "felt?", lambda row, _: page.Cell(tier_text(row.felt)),
+        means="whether a hand can feel that on this device",
+    ),
+    _Column(
+        "feeds?",
+        lambda row, all_: page.Cell(leak_text(row, all_), note=row.leak.description), True, 44,
+        "energy that one loop can give to the hand: the surface feels alive; 0: proved none",
+    ),
+    _Column(
+        "clicks?",
+        lambda row, _: page.Cell(holds_text(row.jumps), note=row.continuous_reason), least=36,
+        means="whether the force jumps",
+    ),
+)  # fmt: skip
+_FULL = (
+    _LETTER,
+    _TITLE,
+    _Column(
+        "q", lambda row, _: page.Cell(bound_text(row.q), note=f"{row.q.method}: {row.q.note}"),
+        True, means="by how much the law multiplies stiffness at worst; smaller is better",
+    ),
+    _Column(
+        "q⁺",
+        lambda row, _: page.Cell(
+            bound_text(row.one_sided), note=f"{row.one_sided.method}: {row.one_sided.note}"
+        ),
+        True, means="the same where only what stiffens counts: no delay",
+    ),
+    _Column(
+        "stiffness\nup to", lambda row, _: page.Cell(stiffness_text(row)), True,
+        means="limit on this device; the start is below it",
+    ),
+    _Column(
+        "worth",
+        lambda row, _: page.Cell(_WORTHS[row.allowed.basis], note=allowed_text(row.allowed)),
+        means="proved passive; bounded: but for steps of an encoder; plausible: a smooth wall of "
+        "that gain held, no proof; quiet: against buzz, yet it feeds the hand below v*",
+        least=60,
+    ),
+    _Column(
+        "conser-\nvative",
+        lambda row, _: page.Cell(holds_text(row.conservative), note=row.conservative_reason),
+        means="no closed path of the field gives energy", least=80,
+    ),
+    _Column(
+        "worst\nleak",
+        lambda row, all_: page.Cell(leak_text(row, all_), note=row.leak.description),
+        True, 60, "energy that one loop can give to the hand",
+    ),
+    _Column(
+        "contin-\nuous",
+        lambda row, _: page.Cell(holds_text(row.continuous), note=row.continuous_reason),
+        means="the force does not jump", least=80,
+    ),
+    _Column(
+        "T", lambda row, _: page.Cell(merit_text(row.strength)), True, 80,
+        "strength of the texture for the same q",
+    ),
+    _Column(
+        "S", lambda row, _: page.Cell(merit_text(row.support)), True, 80,
+        "support of the hand for the same q",
+    ),
+    _Column(
+        "texture\nforce",
+        lambda row, _: page.Cell(
+            force_text(row.texture_force) if row.start or row.textureless else NONE
+        ),
+        True, 80, "RMS of all that oscillates, at the start",
+    ),
+)  # fmt: skip
+
+
+def _heading(column: _Column, comparison: Comparison) -> str:
+    unit = " [m]" if column.heading == "T" and strength_has_unit(comparison) else ""
+    return f"{column.heading}{unit}"
+
+
+def _plain(heading: str) -> str:
+    """Return a heading in one line."""
+    return heading.replace("-\n", "").replace("\n", " ")
 
 
 def _rows(
@@ -147,9 +250,10 @@ def _rows(
     return [page.Row(cells(row), "best" if row is best else "") for row in comparison.rows]
 
 
-def _table(comparison: Comparison) -> page.Table:
-    rows = _rows(comparison, lambda row: _cells(row, comparison))
-    return page.Table(_headings(comparison), rows, _NUMBERS)
+def _table(comparison: Comparison, columns: Sequence[_Column]) -> page.Table:
+    rows = _rows(comparison, lambda row: [one.cell(row, comparison) for one in columns])
+    numbers = [i for i, one in enumerate(columns) if one.number]
+    return page.Table([_heading(one, comparison) for one in columns], rows, numbers)
 
 
 def _verdicts(comparison: Comparison) -> page.Table:
@@ -161,59 +265,51 @@ def _verdicts(comparison: Comparison) -> page.Table:
 # --- in a terminal --------------------------------------------------------------------------------
 
 
-def comparison_table(comparison: Comparison, width: int = 120) -> Table:
+def comparison_table(comparison: Comparison, width: int = 120, full: bool = False) -> Table:
     """Return one row per law, the first column the law's letter alone.
 
     Args:
         comparison: the result.
-        width: of the console in characters; names of the laws are left out on a narrow one.
+        width: of the console in characters; on a narrow one columns are left out.
+        full: whether to show q, q⁺, the limit with its worth, leak, T and S instead of the answer
+            in short.
 
     Returns:
         A Rich table.
     """
-    return terminal.table(
-        _table(comparison),
-        wraps=(_NAME,),
-        most={_NAME: 24},
-        without=() if width >= _NAMES_FROM else (_NAME,),
-        gap=1 if width >= _AIRY_FROM else 0,
-    )
+    columns = _columns(full, width)
+    wrapping = [i for i, one in enumerate(columns) if one in (_TITLE, _VERDICT)]
+    most = {i: 24 for i in wrapping if columns[i] is _TITLE}
+    gap = 1 if width >= _AIRY_FROM else 0
+    return terminal.table(_table(comparison, columns), wraps=wrapping, most=most, gap=gap)
 
 
-def _meanings(comparison: Comparison) -> list[tuple[str, str]]:
-    """Return what the columns mean, one line each."""
-    stiffness = engineering(comparison.stiffness, "N/m")
-    meanings = [
-        ("q, q⁺", "by how much the law multiplies stiffness at worst; smaller is better"),
-        ("stiffness up to", f"on the {comparison.device.name}; what it is worth stands beside it"),
-        (
-            "worth",
-            "proved passive; bounded: but for steps of an encoder; plausible: a smooth wall of "
-            "that gain held, no proof; quiet: against buzz, yet it feeds the hand below v*",
-        ),
-        ("worst leak", f"energy that one loop can give to the hand at {stiffness}"),
-        ("T, S", "strength of the texture, support of the hand, for the same q"),
-        ("texture force", "RMS at that stiffness"),
-    ]
-    if any_sampled(comparison):
-        meanings.append(("~", "sampled, not proved: leak and q may be larger, the limit lower"))
-    return meanings
+def _columns(full: bool, width: int) -> list[_Column]:
+    """Return the columns for which there is room."""
+    every = _FULL if full else (*_SHORT, _VERDICT)
+    return [one for one in every if one.least <= width]
 
 
-def print_comparison(comparison: Comparison, console: Console) -> None:
+def print_comparison(comparison: Comparison, console: Console, full: bool = False) -> None:
     """Print the answer, the table, the verdicts and what was assumed.
 
     Args:
         comparison: the result.
         console: where to; its width decides about the columns.
+        full: whether to show every number instead of the answer in short.
     """
+    columns = _columns(full, console.width)
+    meanings = [(_plain(one.heading), one.means) for one in columns if one.means]
+    if any_sampled(comparison):
+        meanings.append(("~", "sampled, not proved: leak and q may be larger, the limit lower"))
     terminal.say(console, comparison.recommendation, "bold")
     console.print()
-    console.print(comparison_table(comparison, console.width))
+    console.print(comparison_table(comparison, console.width, full))
     console.print()
-    console.print(terminal.pairs(_meanings(comparison), "dim"))
-    console.print()
-    console.print(terminal.table(_verdicts(comparison), wraps=(1,)))
+    console.print(terminal.pairs(meanings, "dim"))
+    if _VERDICT not in columns:
+        console.print()
+        console.print(terminal.table(_verdicts(comparison), wraps=(1,)))
     terminal.print_assumptions(console, comparison.assumptions)
 
 
@@ -227,8 +323,7 @@ def comparison_page(comparison: Comparison) -> page.Page:
         answer=comparison.recommendation,
         facts=_facts(comparison),
         sections=[
-            _laws(comparison),
-            page.Section("What will go wrong", [_verdicts(comparison)]),
+            *_laws(comparison),
             *_pictures(comparison),
             *surface_sections(comparison.texture),
             *page.added_sections(Comparison, comparison),
@@ -250,23 +345,34 @@ def _facts(comparison: Comparison) -> list[tuple[str, str]]:
         ("Peak to valley", engineering(texture.peak_to_valley, "m")),
         ("Device", device.name),
         ("K₀, stiffest smooth wall", datum_text(device.wall_test)),
-        ("Stiffness asked for", engineering(comparison.stiffness, "N/m")),
+        ("Stiffness asked for", _asked(comparison)),
         ("Pressed to", engineering(comparison.max_depth, "m")),
+        ("Scanned at", speed_text(comparison.speed)),
     ]
 
 
-def _laws(comparison: Comparison) -> page.Section:
-    table = _table(comparison)
-    headings = [text.replace("-\n", "").replace("\n", " ") for text in table.headings]
+def _asked(comparison: Comparison) -> str:
+    asked = comparison.stiffness
+    return "each law's own, to begin with" if asked is None else engineering(asked, "N/m")
+
+
+def _laws(comparison: Comparison) -> list[page.Section]:
+    short, full = (
+        replace(table, headings=[_plain(heading) for heading in table.headings])
+        for table in (_table(comparison, _SHORT), _table(comparison, _FULL))
+    )
     notes = [SAMPLED_NOTE] if any_sampled(comparison) else []
-    return page.Section("The laws compared", [replace(table, headings=headings)], notes=notes)
+    return [
+        page.Section("The laws compared", [short]),
+        page.Section("What will go wrong", [_verdicts(comparison)]),
+        page.Section("Every number", [full], notes=notes),
+    ]
 
 
 def _pictures(comparison: Comparison) -> list[page.Section]:
     from asperity.report.pictures.plots import PICTURES
 
-    depth = engineering(comparison.max_depth, "m")
-    stiffness = engineering(comparison.stiffness, "N/m")
+    depth, stiffness = engineering(comparison.max_depth, "m"), _asked(comparison)
     return [
         page.pictured(
             title, PICTURES[name](comparison), words.format(depth=depth, stiffness=stiffness)
@@ -304,7 +410,7 @@ _CAPTIONS = {
     "force": (
         "Force along a scan",
         "Straight scan at constant height, {depth} below the highest point (below the smooth wall "
-        "for laws that act below it), at {stiffness}.",
+        "for laws that act below it). Stiffness: {stiffness}.",
     ),
     "field": (
         "Force field over its curl",

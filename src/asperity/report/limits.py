@@ -9,7 +9,8 @@ from rich.table import Table
 
 from asperity.analysis.limits.limit_result import Limits, RenderedWave
 from asperity.analysis.limits.limit_rules import RULES
-from asperity.analysis.words.limits import percent, speed_text, speeds_text, stiffness_text
+from asperity.analysis.words.felt import amount, speed_text
+from asperity.analysis.words.limits import percent, speeds_text, stiffness_text
 from asperity.report import page, terminal
 from asperity.report.devices import numbers_table
 from asperity.report.terminal import say
@@ -204,7 +205,7 @@ def _facts(result: Limits) -> list[tuple[str, str]]:
         ("Scanning speed", speed_text(result.speed)),
         ("Stiffness", stiffness_text(result)),
         ("Speeds at which all decided limits hold", speeds_text(result.speeds)),
-        ("Texture force", engineering(result.force.rms, "N", digits=2) + " RMS"),
+        ("Texture force", f"{amount(result.felt)}: {result.felt.tier}"),
     ]
 
 

@@ -8,35 +8,37 @@ from rich.console import Console
 
 from asperity.analysis.compare import Comparison
 from asperity.analysis.several import Comparisons
+from asperity.analysis.words.felt import millinewtons, tier_text
 from asperity.report import page, terminal
-from asperity.report.comparison import described, stiffness_text
+from asperity.report.comparison import described, start_text
 from asperity.report.stages import surface_sections
-from asperity.report.words.number_words import NONE, force_text
+from asperity.report.words.number_words import NONE, limit_text
 from asperity.units import engineering
 
-_HEADINGS = ("device", "depth", "law", "up to", "texture")
+_HEADINGS = ("device", "depth", "law", "start at", "texture", "felt?")
 _NUMBERS = (1, 3, 4)
 _OPTIONAL = (3, 4)  # what a narrow console leaves out, the more wanted first
 _MEANINGS = [
     ("depth", "to which the surface is pressed"),
-    ("law", "the one to use there; none: none can be recommended"),
-    ("up to", "the stiffness up to which the device may render it"),
-    ("texture", "RMS of its force at that stiffness"),
+    ("law", "the one to use there; in brackets the nearest, where nothing is felt"),
+    ("start at", "the stiffness to begin with"),
+    ("texture", "RMS of the force that is texture and that the device resolves, at the start"),
 ]
 
 
 def _row(one: Comparison) -> page.Row:
-    depth, best = engineering(one.max_depth, "m"), one.recommended_row
+    depth, best = engineering(one.max_depth, "m"), one.recommended_row or one.nearest_row
     if best is None:
-        return page.Row([one.device.name, depth, "none", NONE, NONE])
-    letter = page.Cell(best.law.letter, "l", note=one.recommendation)
-    numbers = [stiffness_text(best), force_text(best.texture_force)]
-    return page.Row([one.device.name, depth, letter, *numbers])
+        return page.Row([one.device.name, depth, "none", NONE, NONE, NONE])
+    text = best.law.letter if one.recommended else f"({best.law.letter})"
+    letter = page.Cell(text, "l", note=one.recommendation)
+    said = [limit_text(best.start), millinewtons(best.shown_force), tier_text(best.felt)]
+    return page.Row([one.device.name, depth, letter, *said])
 
 
 def _table(found: Comparisons) -> page.Table:
     rows = [_row(one) for one in found.comparisons]
-    rows += [page.Row([one.device, NONE, "K₀ missing", NONE, NONE]) for one in found.lacking]
+    rows += [page.Row([one.device, NONE, "K₀ missing", NONE, NONE, NONE]) for one in found.lacking]
     return page.Table(_HEADINGS, rows, _NUMBERS)
 
 
@@ -98,12 +100,12 @@ def _case(one: Comparison) -> page.Section:
     """Return what is said of one device and depth."""
     rows = [
         page.Row(
-            [page.Cell(row.law.letter, "l"), stiffness_text(row), row.verdict],
+            [page.Cell(row.law.letter, "l"), start_text(row), tier_text(row.felt), row.verdict],
             "best" if row is one.recommended_row else "",
         )
         for row in one.rows
     ]
-    table = page.Table(("law", "up to", "verdict"), rows, (1,))
+    table = page.Table(("law", "start at", "felt?", "verdict"), rows, (1,))
     return page.Section(
         _title(one), [page.Words(one.recommendation), table, page.Items(one.assumptions)]
     )

@@ -74,6 +74,10 @@ class HeightMap(Spline):
         edge = "periodic" if self.periodic else "finite"
         return f"<HeightMap {nx} x {ny} points, pitch {self.pitch} m, {edge}>"
 
+    def with_heights(self, heights: ArrayLike) -> HeightMap:
+        """See :class:`Spline`."""
+        return HeightMap(heights, self.pitch, periodic=self.periodic, origin=tuple(self.origin))
+
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""

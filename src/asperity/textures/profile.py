@@ -66,6 +66,10 @@ class Profile(Spline):
         edge = "periodic" if self.periodic else "finite"
         return f"<Profile of {len(self.heights)} points, pitch {self.pitch} m, {edge}>"
 
+    def with_heights(self, heights: ArrayLike) -> Profile:
+        """See :class:`Spline`."""
+        return Profile(heights, self.pitch, periodic=self.periodic, origin=self.origin)
+
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""

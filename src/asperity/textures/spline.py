@@ -15,7 +15,7 @@ from asperity.memory import reserve
 from asperity.textures.cells.lines import Pieces, spline_pieces
 from asperity.textures.cells.splines import SplineCells
 from asperity.textures.domain import Domain, ScanLine
-from asperity.textures.texture import ExactHeight, Texture
+from asperity.textures.texture import ExactHeight, Texture, TexturePart
 
 LEAST_NODES = 4
 
@@ -46,6 +46,18 @@ class Spline(Texture):
     @property
     def _pitches(self) -> tuple[float, ...]:
         return tuple(np.atleast_1d(self.pitch).tolist())
+
+    def with_heights(self, heights: ArrayLike) -> Spline:
+        """Return the spline through other heights at the same nodes."""
+        raise NotImplementedError  # a profile and a map each know their own arguments
+
+    def texture_part(self) -> TexturePart:
+        """See :class:`Texture`; :func:`~asperity.measured.parts.texture_part` says how."""
+        from asperity.measured.parts import texture_part
+
+        parts = texture_part(self.heights, self._pitches, periodic=self.periodic)
+        left = self.with_heights(parts.heights)
+        return TexturePart(left, parts.nesting, parts.form.range, parts.waviness.range)
 
     @property
     def _sides(self) -> tuple[float, ...]:

@@ -36,6 +36,24 @@ _PROFILE_SAMPLES, _SIDE_SAMPLES, _SAMPLES_PER_WAVE = 4096, 512, 24
 _LEAST_SAMPLES, _MOST_SAMPLES = 64, 1000
 
 
+@dataclass(frozen=True, eq=False)
+class TexturePart:
+    """A texture without form and waviness.
+
+    Attributes:
+        texture: what is left.
+        nesting: the wavelength from which on waves were taken away as waviness [m]; ``None`` if
+            nothing was.
+        form: range of the form that was taken away [m].
+        waviness: range of the waviness [m].
+    """
+
+    texture: Texture
+    nesting: float | None = None
+    form: float = 0.0
+    waviness: float = 0.0
+
+
 class Texture(ABC):
     """A height function h(x, y) [m], twice continuously differentiable.
 
@@ -174,6 +192,13 @@ class Texture(ABC):
             return [most] * len(sides)
         wanted = np.ceil(_POINTS_PER_WAVE * sides / self.waves.shortest)
         return [int(count) for count in np.clip(wanted, 16, most)]
+
+    def texture_part(self) -> TexturePart:
+        """Return what of the heights is texture: all of them, where they were written down.
+
+        Measured heights have form and waviness too, which are felt as a shape.
+        """
+        return TexturePart(self)
 
     def samples(self) -> tuple[FloatArray, tuple[float, float], bool]:
         """Return heights on a grid of the domain, the nodes of a measured texture.

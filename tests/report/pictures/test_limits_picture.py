@@ -21,7 +21,7 @@ BENCH = {
 @pytest.fixture(scope="module")
 def result() -> Limits:
     texture = Fourier([5e-5, 2e-5], [2 * np.pi / 1e-3, 2 * np.pi / 0.2e-3])
-    return limits(texture, parse_device(BENCH, "bench"), law="A")
+    return limits(texture, parse_device(BENCH, "bench"), law="A", stiffness=1450.0)
 
 
 def shortest_of(result: Limits) -> list[tuple[float, int, str]]:

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.limits.felt import Felt
 from asperity.analysis.limits.limit_rules import Limit
 from asperity.analysis.limits.spectrum import Spectrum
 from asperity.analysis.passivity.judgement import Allowed
+from asperity.analysis.passivity.margin import Margin
 from asperity.devices import Device
 from asperity.files import Record, record
 from asperity.notebook import as_html
@@ -44,29 +46,6 @@ class RenderedWave(Record):
 
 
 @dataclass(frozen=True)
-class TextureForce(Record):
-    """The texture's force against what the device can show.
-
-    Attributes:
-        rms: RMS of the oscillating force on a scan at constant height [N].
-        in_band: share of its variance at frequencies below the device's bandwidth; ``None`` if
-            that is not known.
-        in_band_rms: RMS of that part [N]; of all where the bandwidth is not known.
-        above_resolution: whether that is more than the device's smallest step of force.
-        above_friction: whether its amplitude, √2 RMS, is more than the device's dry friction,
-            which hides less.
-        needs: what is missing to decide these.
-    """
-
-    rms: float
-    in_band: float | None
-    in_band_rms: float
-    above_resolution: bool | None
-    above_friction: bool | None
-    needs: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class Limits:
     """The six limits for one surface on one device at one scanning speed.
 
@@ -80,10 +59,11 @@ class Limits:
         gain: what limit 5 multiplies the stiffness by: q, or less where the delay is known.
         gain_symbol: "q", "q⁺" or what lies between.
         allowed: up to which stiffness the law may be rendered, as in a comparison.
+        margin: the share of that at which to begin.
         limits: the six, in the paper's order.
         waves: what the texture is made of, the longest first.
         spectrum: all waves, with those that were too small to count.
-        force: the texture's force against resolution, friction and bandwidth.
+        felt: whether the texture is felt at this stiffness and speed.
         speeds: speeds [m/s] at which all limits hold that could be decided, from the first up to
             but without the second.
         answer: in words.
@@ -99,10 +79,11 @@ class Limits:
     gain: Bound
     gain_symbol: str
     allowed: Allowed
+    margin: Margin
     limits: tuple[Limit, ...]
     waves: tuple[RenderedWave, ...]
     spectrum: Spectrum
-    force: TextureForce
+    felt: Felt
     speeds: tuple[float, float]
     answer: str
     assumptions: tuple[str, ...]
@@ -148,9 +129,8 @@ class Limits:
             **record(surface, "law_parameters", "stiffness", "max_depth"),
             **record(self, "time_samples", "position_samples", "force_steps"),
             "gain": {"symbol": self.gain_symbol} | self.gain.to_dict(),
-            **record(
-                self, "safe_stiffness", "allowed", "limits", "waves", "spectrum", "force", "share"
-            ),
+            **record(self, "safe_stiffness", "allowed", "margin", "limits", "waves", "spectrum"),
+            **record(self, "felt", "share"),
             **record(self, "speeds", "answer", "assumptions"),
         }
 

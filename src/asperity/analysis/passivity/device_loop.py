@@ -95,7 +95,7 @@ class Loop:
         if self.test is None:
             return None
         share = Fraction(1)
-        if self.test.lightest is not None and self.surface.facts.looks_at_surface:
+        if self.test.lightest is not None and self.surface.feels_texture:
             share = Fraction(self.test.lightest)
         if self.test.update_rate is not None and self.rate is not None:
             share *= min(Fraction(1), self.rate / Fraction(self.test.update_rate))

@@ -2,34 +2,55 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
+from asperity.analysis.limits.felt import (
+    CLEARLY,
+    DEFAULT_SAMPLES,
+    DEFAULT_SPEED,
+    NOTICED,
+    Felt,
+)
 from asperity.analysis.passivity.criteria import evenly
-from asperity.analysis.recommendation import Recommendation, felt_force
+from asperity.analysis.recommendation import Recommendation
 from asperity.analysis.row import LawRow
+from asperity.analysis.words.felt import (
+    amount,
+    cures_text,
+    form_removed,
+    hidden_by,
+    millinewtons,
+    speed_text,
+)
 from asperity.analysis.words.passivity import allowed_text, buzz_text, newtons
 from asperity.analysis.words.surface import default_depth, law_parameters, most_gained
 from asperity.devices import Device
 from asperity.surface import Surface
+from asperity.textures.texture import TexturePart
 from asperity.units import engineering
 
 
 def verdict(row: LawRow) -> str:
     """Return what will go wrong with a law, in one line."""
-    k, parts = f"{row.surface.stiffness:g} N/m", []
+    k, parts = newtons(row.surface.stiffness), []
     if row.passivity.verdict == "not passive" and not row.leaks:
         parts.append(f"not passive at {k}; {_up_to(row)}")
+    elif not row.start:
+        parts.append(_up_to(row))
     elif row.buzzes:
         parts.append(f"may buzz at {k}; {_up_to(row)}")
     elif not row.leaks:
         parts.append(_of_passivity(row, k))
     if row.leaks:
-        quiet = "" if row.buzzes else f"; {_up_to(row)}"
+        quiet = f"; {_up_to(row)}" if row.start and not row.buzzes else ""
         parts.append(f"feels alive: gains up to {most_gained(row.leak)}{quiet}")
     if row.jumps:
         parts.append("clicks: " + row.continuous_reason)
     if row.textureless:
         parts.append("no texture")
+    elif row.felt is not None and row.tier != "felt":
+        parts.append(f"{row.tier}: {amount(row.felt)}")
     if row.loses_contact:
         parts.append(f"no contact on {100.0 * row.contact_lost:.0f} % of the scan")
     return "; ".join(parts)
@@ -50,126 +71,186 @@ def _of_passivity(row: LawRow, stiffness: str) -> str:
 
 
 def recommendation(found: Recommendation, device: Device) -> str:
-    """Return which law to use, and why."""
+    """Return which law to use and where to begin, whether it is felt, and why."""
     best = found.row
-    if best is None:
+    if best is None or best.felt is None:
         return _none(found, device)
-    name = best.law.name.replace("-", " ")
-    limit = newtons(best.safe_stiffness)
-    head = f"Use law {best.law.letter} ({name}) at up to {limit} on the {device.name}"
-    why = _sound_reason(best) if found.sound else _least_leak_reason(best, found)
-    tail = _price(best, found.felt) + _saturation(best, device)
-    return f"{head}, {_worth(best, device)}: {why}.{tail}"
+    said = [
+        f"Use law {_titled(best)} on the {device.name} and start at {newtons(best.start)}: "
+        f"{_felt(best, device)}.",
+        "" if best.tier == "felt" else cures_text(best.felt),
+        _contact(best),
+        _sound_reason() if found.sound else _least_leak_reason(best, found),
+        _worth(best, device),
+        _price(best, found.textured),
+        _saturation(best, device),
+    ]
+    return " ".join(part for part in said if part)
+
+
+def _titled(row: LawRow) -> str:
+    return f"{row.law.letter} ({row.law.name.replace('-', ' ')})"
+
+
+def _felt(row: LawRow, device: Device) -> str:
+    """Return whether the texture is felt, in a clause."""
+    assert row.felt is not None
+    if row.tier == "felt":
+        return f"felt, {amount(row.felt)}"
+    return f"{row.tier}, {amount(row.felt)}; {hidden_by(row.felt, device)}"
+
+
+def _contact(row: LawRow) -> str:
+    if not row.loses_contact:
+        return ""
+    depth = engineering(row.surface.max_depth, "m")
+    return f"Pressed to {depth} it loses contact on {100.0 * row.contact_lost:.0f} % of the scan."
 
 
 def _none(found: Recommendation, device: Device) -> str:
     """Return why no law is recommended."""
     if all(row.textureless for row in found.rows):
         return "None of the laws compared renders a texture on this surface."
+    row = found.nearest
+    if row is None or row.felt is None:
+        return (
+            f"Of none of the laws compared a stiffness is known that does on the {device.name}: "
+            "they need a known delay, or have no bound at this depth."
+        )
     return (
-        f"Of none of the laws compared a stiffness is known that does on the {device.name}: they "
-        "need a known delay, or have no bound at this depth."
+        f"Nothing of this texture will be felt on the {device.name}: law {_titled(row)}, which "
+        f"comes nearest, gives at {newtons(row.start)} {amount(row.felt)}; "
+        f"{hidden_by(row.felt, device)}. {cures_text(row.felt)}"
     )
 
 
 def _worth(row: LawRow, device: Device) -> str:
-    """Return what the stiffness that is allowed is worth, in a clause."""
-    if row.allowed.basis == "proved":
-        return "proved passive"
-    if row.allowed.basis == "bounded":
-        return "passive there but for the steps of positions and forces, whose buzz has a bound"
-    if row.allowed.basis == "quiet against buzz":
-        return "quiet against buzz there, though it feeds the hand below v*"
+    """Return what the stiffness to begin with is worth, in a sentence."""
+    allowed, limit = row.allowed, newtons(row.safe_stiffness)
+    if allowed.basis == "proved":
+        delay = device.value("delay_samples") or 0.0
+        most = row.passivity.greatest_delay
+        reach = f"{delay:.0f}" if most is None or most < delay else f"up to {most}"
+        return f"It is proved passive up to {limit}, at the start with {reach} samples of delay."
+    if allowed.basis == "bounded":
+        buzz = row.passivity.buzz
+        most_text = "" if buzz is None else f": {buzz_text(buzz)}"
+        return f"It is passive there but for the steps of positions and forces{most_text}."
+    if allowed.basis == "quiet against buzz":
+        v = row.passivity.critical_speed
+        speed = "v*" if v is None else f"v* = {engineering(v, 'm/s')}"
+        return f"Quiet against buzz up to {limit}, it feeds the hand below {speed}; {_share(row)}."
+    proof = f", of which {newtons(allowed.proved)} is proved" if allowed.proved else ""
+    plausible = f"so {limit} is plausible{_delays(row)}{proof}"
+    return f"Not proved: {_wall(device)}, {plausible}; {_share(row)}."
+
+
+def _wall(device: Device) -> str:
     test = device.wall_test
-    held = test is not None and test.pedigree == "measured"
-    why = "a smooth wall of that gain held" if held else "no stiffer wall is known to work"
-    proof = (
-        f"proved up to {newtons(row.allowed.proved)} only" if row.allowed.proved else "not proved"
-    )
-    return f"plausible, {proof} ({why})"
+    if test is not None and test.pedigree == "measured":
+        return f"a smooth wall of {newtons(test.value)} held"
+    most = "" if test is None else f" than {newtons(test.value)}"
+    return f"no wall stiffer{most} is known to work"
 
 
-def _sound_reason(best: LawRow) -> str:
-    force = engineering(best.texture_force, "N")
+def _delays(row: LawRow) -> str:
+    delay = row.allowed.delay
+    if delay is None:
+        return ""
+    if math.isinf(delay):
+        return " with any delay"
+    return f" with a delay up to {delay:.3g} samples"
+
+
+def _share(row: LawRow) -> str:
+    """Return how far below the limit to begin, and why."""
+    share = row.margin
+    if not share.cases:
+        return "begin there"
+    if share.factor == 1.0:
+        return f"it held up to there in all {share.cases} simulated loops"
     return (
-        "no closed path of its field gives net energy and its force does not jump; "
-        f"it still gives {force} RMS of texture"
+        f"begin at {share.factor:g} of it, where law {share.law} still held in all {share.cases} "
+        "simulated loops"
     )
+
+
+def _sound_reason() -> str:
+    return "No closed path of its field gives net energy, and its force does not jump."
 
 
 def _least_leak_reason(best: LawRow, found: Recommendation) -> str:
-    force = engineering(best.texture_force, "N")
-    gain = engineering(best.safe_leak, "J")
+    gain = engineering(best.start_leak, "J")
     faint = [row for row in found.textured if not (row.leaks or row.jumps)]
     if faint:
-        weak = max(faint, key=lambda row: row.texture_force)
+        weak = max(faint, key=lambda row: row.shown_force)
         why_not = (
-            f"law {weak.law.letter}, conservative and continuous, gives only "
-            f"{engineering(weak.texture_force, 'N')} RMS at its {newtons(weak.safe_stiffness)}, "
-            f"below the {engineering(found.threshold, 'N')} that can be felt"
+            f"Law {weak.law.letter}, conservative and continuous, gives only "
+            f"{millinewtons(weak.shown_force)} RMS at its {newtons(weak.start)}, which is not felt"
         )
     else:
-        why_not = "none of the laws compared is conservative and continuous"
+        why_not = "None of the laws compared is conservative, continuous and known to work here"
     return (
-        f"{why_not}; of the continuous laws this one leaks least for its texture force "
-        f"({force} RMS, up to {gain} per loop, so it can feel alive)"
+        f"{why_not}; of the continuous laws this one leaks least for its texture force, "
+        f"up to {gain} per loop, so it can feel alive."
     )
 
 
 def _price(best: LawRow, textured: Sequence[LawRow]) -> str:
     """Return what the recommended law gives up against the others."""
-    stiffer = [row for row in textured if row.safe_stiffness > 1.5 * best.safe_stiffness]
+    stiffer = [row for row in textured if row.start > 1.5 * best.start]
     if not stiffer:
         return ""
-    rival = max(stiffer, key=lambda row: row.safe_stiffness)
+    rival = max(stiffer, key=lambda row: row.start)
     trouble = []
     if rival.leaks:
-        trouble.append(f"gains up to {engineering(rival.safe_leak, 'J')} per loop there")
+        trouble.append(f"gains up to {engineering(rival.start_leak, 'J')} per loop there")
     if rival.jumps:
         trouble.append("its force jumps")
     return (
-        f" The price is stiffness: law {rival.law.letter} can be rendered at "
-        f"{newtons(rival.safe_stiffness)}, but {' and '.join(trouble) or 'has less texture'}."
+        f"The price is stiffness: law {rival.law.letter} can start at "
+        f"{newtons(rival.start)}, but {' and '.join(trouble) or 'has less texture'}."
     )
 
 
 def _saturation(best: LawRow, device: Device) -> str:
     """Return a warning if pressing to the full depth asks for more force than there is."""
     limit = device.value("max_force")
-    pressed = best.safe_stiffness * best.surface.max_depth
+    pressed = best.start * best.surface.max_depth
     if limit is None or pressed <= limit:
         return ""
     return (
-        f" Pressed to {engineering(best.surface.max_depth, 'm')} it asks for "
+        f"Pressed to {engineering(best.surface.max_depth, 'm')} it asks for "
         f"{engineering(pressed, 'N')}; the device gives {engineering(limit, 'N')}."
     )
 
 
 def assumptions(
-    rows: Sequence[LawRow], device: Device, defaults: Mapping[str, bool]
+    rows: Sequence[LawRow], part: TexturePart, device: Device, defaults: Mapping[str, bool]
 ) -> tuple[str, ...]:
     """Return what was assumed, in sentences.
 
     Args:
         rows: the laws compared.
+        part: what of the surface is texture.
         device: the device.
-        defaults: whether stiffness and max_depth are defaults.
+        defaults: whether max_depth and speed are defaults.
     """
     first = rows[0].surface
+    felt = next((row.felt for row in rows if row.felt is not None), None)
     result = [*first.texture.preparation]
     result += _defaulted(rows, defaults)
+    result += form_removed(felt, part.form, part.waviness)
     result += _of_the_wall(rows, device)
+    result += _of_the_margin(rows)
     unverified = [
         field.replace("_", " ") for field, d in device.data.items()
         if not d.verified and field != "max_stiffness"
     ]  # fmt: skip
     if unverified:
         result.append(f"Not verified for the {device.name}: {', '.join(unverified)}")
-    source = f"the force resolution of the {device.name}"
-    if device.value("force_resolution") is None:
-        source = "a default, the device's force resolution being unknown"
-    force = engineering(felt_force(device), "N")
-    result.append(f"Texture below {force} RMS counts as not felt: {source}")
+    if felt is not None:
+        result.append(_of_feeling(felt))
     if any(row.q.method == "sampled" or row.one_sided.method == "sampled" for row in rows):
         region = first.texture.domain.description
         result.append(
@@ -182,6 +263,29 @@ def assumptions(
     )
     result.append("What is said is of energy and forces; no person was asked what they feel")
     return tuple(result)
+
+
+def _of_feeling(felt: Felt) -> str:
+    unknown = ", ".join(field.replace("_", " ") for field in felt.unknown)
+    return (
+        f"Felt: an amplitude of {CLEARLY:g} times the {millinewtons(NOTICED)} that a hand is taken "
+        f"to notice and {CLEARLY:g} times the dry friction, of {DEFAULT_SAMPLES:g} steps of force, "
+        f"in waves that the device resolves at {speed_text(felt.speed)}"
+        + (f"; taken as if it hid nothing, being unknown: {unknown}" if unknown else "")
+    )
+
+
+def _of_the_margin(rows: Sequence[LawRow]) -> list[str]:
+    """Return what the share of the limit rests on at which to begin."""
+    shares = [row.margin for row in rows if row.margin.cases]
+    if not shares:
+        return []
+    told = ", ".join(f"{one.law} {one.factor:g}" for one in shares if one.factor < 1.0)
+    return [
+        f"Starts are below the limit by what simulation found ({told or 'no law below it'}): "
+        "pantograph and a mass in space, brakes of the paper, two hands, delays of 0 to 6 samples, "
+        "two sinusoids; a device of another build may need less"
+    ]
 
 
 def _of_the_wall(rows: Sequence[LawRow], device: Device) -> list[str]:
@@ -201,8 +305,8 @@ def _of_the_wall(rows: Sequence[LawRow], device: Device) -> list[str]:
 def _defaulted(rows: Sequence[LawRow], defaults: Mapping[str, bool]) -> list[str]:
     first: Surface = rows[0].surface
     result = []
-    if defaults["stiffness"]:
-        result.append(f"Default stiffness {first.stiffness:g} N/m")
+    if defaults["speed"]:
+        result.append(f"Default scanning speed {speed_text(DEFAULT_SPEED)}")
     if defaults["max_depth"]:
         result.append(default_depth(first))
     for row in rows:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from asperity.analysis.limits.limit_result import Limits
 from asperity.analysis.limits.limit_rules import Limit
+from asperity.analysis.words.felt import amount, cures_text, hidden_by, speed_text
 from asperity.analysis.words.passivity import allowed_text
 from asperity.analysis.words.surface import default_depth, law_parameters, unverified
 from asperity.units import engineering, rounded_down
@@ -51,16 +52,6 @@ def speeds_text(speeds: tuple[float, float] | None) -> str:
     return f"below {speed_text(rounded_down(speeds[1]))}"
 
 
-def speed_text(speed: float) -> str:
-    """Return a speed for reading.
-
-    Example:
-        >>> speed_text(0.1), speed_text(0.00034)
-        ('0.1 m/s', '0.34 mm/s')
-    """
-    return f"{speed:.3g} m/s" if speed >= 0.01 else f"{1e3 * speed:.3g} mm/s"
-
-
 def _part(result: Limits, failing: Sequence[Limit]) -> str:
     """Return how much of the texture meets the limits that can be decided."""
     if any(limit.share is None for limit in failing) or result.share == 0.0:
@@ -87,21 +78,12 @@ def _slower(result: Limits, failing: Sequence[Limit]) -> str:
 
 
 def force_words(result: Limits) -> str:
-    """Return how strong the texture's force is, against what the device can show."""
-    force, device = result.force, result.device
-    k = stiffness_text(result)
-    text = f"At {k} law {result.surface.law.letter} pushes with {_newton(force.rms)} RMS of texture"
-    if force.in_band is not None and force.in_band < 0.995:
-        text += f", {percent(force.in_band)} of its power within the bandwidth"
-    against = []
-    for above, field, words in (
-        (force.above_resolution, "force_resolution", "{} the force resolution of {}"),
-        (force.above_friction, "friction", "its amplitude {} the dry friction of {}"),
-    ):
-        if above is not None:
-            level = _newton(device.data[field].value)
-            against.append(words.format("above" if above else "not above", level))
-    return f"{text}{': ' if against else ''}{', '.join(against)}."
+    """Return whether the texture's force is felt, and what would help."""
+    felt, k = result.felt, stiffness_text(result)
+    text = f"At {k} law {result.surface.law.letter} gives {amount(felt)}: {felt.tier}"
+    if felt.tier == "felt":
+        return f"{text}."
+    return f"{text}; {hidden_by(felt, result.device)}. {cures_text(felt)}".rstrip()
 
 
 def stiffness_text(result: Limits) -> str:
@@ -179,9 +161,10 @@ def _defaulted(result: Limits, defaults: Mapping[str, bool]) -> list[str]:
         shown = ", ".join(f"{name} = {n:g}" for name, n in zip("αβγ", counts, strict=True))
         said.append(f"Samples in a wave: {shown}; the paper says 5 to 10")
     if defaults["stiffness"]:
-        why = allowed_text(result.allowed)
+        share, why = result.margin.factor, allowed_text(result.allowed)
         default = "" if result.safe_stiffness else ", a default"
-        said.append(f"Stiffness {stiffness_text(result)}{default}: {why}")
+        part = f"{share:g} of what is " if result.safe_stiffness and share < 1.0 else ""
+        said.append(f"Stiffness {stiffness_text(result)}{default}: {part}{why}")
     if defaults["max_depth"]:
         said.append(default_depth(result.surface))
     return said + law_parameters(result.surface)

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from asperity.analysis.limits.limit_result import Limits
-from asperity.analysis.words.limits import speed_text, stiffness_text
+from asperity.analysis.words.felt import speed_text
+from asperity.analysis.words.limits import stiffness_text
 from asperity.report.pictures import style
 from asperity.report.pictures.spectrum_picture import shortest
 from asperity.units import engineering

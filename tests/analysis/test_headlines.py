@@ -1,0 +1,117 @@
+"""Headlines for surfaces on devices: which law, and is it felt? Each decided by a stated rule.
+
+The rule: of the force along a scan at constant height, by hand, the amplitude √2 RMS is held
+against the device's levels. Below 10 mN, the dry friction, or a step of force: nothing. From
+20 mN, twice the friction and five steps on: felt. Waves of fewer than five updates or position
+steps come distorted, and are borderline at best; of fewer than two nothing comes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from asperity.analysis.check_limits import limits
+from asperity.analysis.compare import Comparison, compare
+from asperity.analysis.row import LawRow
+from asperity.devices import Device, load_device
+from asperity.scene import load_scene
+from asperity.textures import Sinusoid
+
+DEVICES = ("touch", "touch-x", "inverse3", "omega.3", "pantograph", "falcon", "premium-1.5")
+# Amplitude and period [mm]; then, device by device, the law that an expert would take, "-" if it
+# is not felt whatever the law, and "?" where it is borderline.
+SINUSOIDS = """
+    0.001 0.1    -    -    -    -    -    -    -
+    0.005 0.5    -    -    -    C    -    C?   -
+    0.02  1      -    -    C?   C    C    C    -
+    0.05  0.3    -    -    C?   C    C    H?   -
+    0.1   2      -    C?   C    C    C    C    C?
+    0.4   1.5    -    H    H    H    H    H    H
+    0.8   1      -    -    H?   H    H    H    H?
+    1     8      -    H    H    H    H    H    H
+"""
+OTHERS = {
+    ("sandpaper:grit=P60", "touch"): "-",
+    ("sandpaper:grit=P60", "omega.3"): "H",
+    ("brushed-metal", "touch"): "-",
+    ("brushed-metal", "premium-1.5"): "-",
+    ("knurl", "omega.3"): "H",
+    ("knurl", "touch"): "-",
+}
+
+
+def cases() -> list[tuple[float, float, str, str]]:
+    """Return amplitude [m], period [m], device and headline."""
+    rows = [line.split() for line in SINUSOIDS.strip().splitlines()]
+    return [
+        (1e-3 * float(row[0]), 1e-3 * float(row[1]), device, expected)
+        for row in rows
+        for device, expected in zip(DEVICES, row[2:], strict=True)
+    ]
+
+
+def headline(result: Comparison) -> str:
+    row = result.recommended_row
+    if row is None:
+        return "-"
+    return row.law.letter + ("?" if row.tier == "borderline" else "")
+
+
+@pytest.mark.parametrize(("amplitude", "period", "name", "expected"), cases())
+def test_a_sinusoid(amplitude: float, period: float, name: str, expected: str) -> None:
+    result = compare(Sinusoid(amplitude, period), name, "ACH")
+    assert headline(result) == expected
+    for row in result.rows:
+        assert row.tier == tier_by_hand(row, result.device, amplitude, period)
+
+
+@pytest.mark.parametrize(("spec", "name"), OTHERS)
+def test_a_surface_of_the_library(spec: str, name: str) -> None:
+    result = compare(load_scene(spec).texture, name, "CH")
+    assert headline(result) == OTHERS[spec, name]
+
+
+def test_what_limits_calls_not_felt_is_never_recommended() -> None:
+    """Limits asks about the law that the comparison of all laws recommends."""
+    for amplitude, period, name, expected in cases()[::9]:
+        asked = limits(Sinusoid(amplitude, period), name)
+        wanted = "not felt" if expected == "-" else "borderline" if "?" in expected else "felt"
+        assert asked.felt.tier == wanted
+
+
+def tier_by_hand(row: LawRow, device: Device, amplitude: float, period: float) -> str:
+    """Return the tier by the rule above, from forces on a scan."""
+    surface = row.surface.to_stiffness(row.start)
+    x = (np.arange(4000) + 0.5) / 4000 * period
+    height = amplitude - surface.max_depth
+    force = surface.force(np.column_stack([x, 0.0 * x, np.full(4000, height)]))
+    strength = math.sqrt(2.0 * force.var(axis=0).sum())
+    friction, step = device.value("friction") or 0.0, device.value("force_resolution") or 0.0
+    samples = _samples(device, period)
+    if samples < 2.0 or strength < max(0.01, friction, step):
+        return "not felt"
+    if samples < 5.0 or strength < max(0.02, 2.0 * friction, 5.0 * step):
+        return "borderline"
+    return "felt"
+
+
+def _samples(device: Device, period: float, speed: float = 0.1) -> float:
+    """Return updates or position steps in a wave, whichever are fewer; 0 above the bandwidth."""
+    counts = [math.inf]
+    rate, step = device.value("update_rate"), device.value("position_resolution")
+    if rate is not None:
+        counts.append(period * rate / speed)
+    if step is not None:
+        counts.append(period / step)
+    bandwidth = device.value("bandwidth")
+    if bandwidth is not None and speed / period >= bandwidth:
+        counts.append(0.0)
+    return min(counts)
+
+
+def test_the_table_has_at_least_sixty_cases() -> None:
+    assert len(cases()) + len(OTHERS) >= 60
+    assert {load_device(name).id for name in DEVICES}
