@@ -151,6 +151,14 @@ def test_the_bound_is_tight(letter: str) -> None:
     assert found.upper_per_period * (1 - 2 * gap) < found.energy
 
 
+def test_a_polygon_leaves_out_the_widest_gap() -> None:
+    """Columns 0, 2, 6 and 7 of a period of 8: from 5 on, over the period's end, to 11."""
+    x, full = np.arange(9.0), np.array([1, 0, 1, 0, 0, 0, 1, 1, 1])
+    found = comb(np.column_stack([x, 0.0 * x]), np.zeros(9), -1.0 * full, periodic=True)
+    assert (found[:, 0].min(), found[:, 0].max()) == (5.0, 11.0)
+    assert set(found[found[:, 2] < 0.0, 0]) == {6.0, 7.0, 8.0, 10.0}
+
+
 @pytest.mark.parametrize("power", [2, 3])
 def test_a_law_that_is_not_affine_in_depth_is_certified_too(power: int) -> None:
     """The curl of k δⁿ e_z/Dⁿ⁻¹ is n k δⁿ⁻¹ h'/Dⁿ⁻¹, over the depth k D h', the flank 2A k D."""
