@@ -102,9 +102,9 @@ def compare_several(
 
     Example:
         >>> from asperity.textures.sinusoid import Sinusoid
-        >>> found = compare_several(Sinusoid(1e-4, 2e-3), ["touch", "2diy"], [1e-4, 2e-4], "WC")
+        >>> found = compare_several(Sinusoid(2e-4, 2e-3), ["omega.3", "2diy"], [2e-4, 4e-4], "WC")
         >>> [(one.device.id, one.max_depth, one.recommended) for one in found.comparisons]
-        [('touch', 0.0001, 'C'), ('touch', 0.0002, 'C')]
+        [('omega.3', 0.0002, 'C'), ('omega.3', 0.0004, 'C')]
         >>> [one.device for one in found.lacking]
         ['2diy']
     """
