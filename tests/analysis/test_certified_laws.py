@@ -88,6 +88,9 @@ def test_law_d_has_a_number_above_each_height() -> None:
         for texture in (wave, as_sum(wave)):
             found = gain_above_crest(Surface(texture, "D"), height)
             assert found == pytest.approx(expected, rel=1e-6)
+    # A radius below the digits of the height: it jumps below the crest, and above is nothing.
+    sharp = Surface(Sinusoid(1.0, 1e-9), "D")
+    assert [gain_above_crest(sharp, height) for height in (0.9, 1.1)] == [math.inf, 1.0]
 
 
 def test_crest_curvature_is_the_greatest_eigenvalue_of_minus_the_shape() -> None:
