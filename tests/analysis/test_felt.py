@@ -122,6 +122,7 @@ def test_form_is_no_texture() -> None:
     assert found.rms > 0.3 * k * 1e-3 / 3
     assert found.texture == pytest.approx(k * 20e-6 * RMS, rel=0.1)
     assert "of which" in amount(found)
+    assert "--form 2 and --l-cutoff remove it" in result.recommendation
     assert "L-filter of 8 mm" in " ".join(result.assumptions)
 
 

@@ -79,6 +79,7 @@ def recommendation(found: Recommendation, device: Device) -> str:
         f"Use law {_titled(best)} on the {device.name} and start at {newtons(best.start)}: "
         f"{_felt(best, device)}.",
         "" if best.tier == "felt" else cures_text(best.felt),
+        _of_the_form(best.felt),
         _contact(best),
         _sound_reason() if found.sound else _least_leak_reason(best, found),
         _worth(best, device),
@@ -98,6 +99,13 @@ def _felt(row: LawRow, device: Device) -> str:
     if row.tier == "felt":
         return f"felt, {amount(row.felt)}"
     return f"{row.tier}, {amount(row.felt)}; {hidden_by(row.felt, device)}"
+
+
+def _of_the_form(felt: Felt) -> str:
+    """Return what to do about form and waviness, where they make most of the force."""
+    if not felt.mostly_form:
+        return ""
+    return "Most of it is form and waviness, felt as a shape: --form 2 and --l-cutoff remove it."
 
 
 def _contact(row: LawRow) -> str:
@@ -120,7 +128,7 @@ def _none(found: Recommendation, device: Device) -> str:
     return (
         f"Nothing of this texture will be felt on the {device.name}: law {_titled(row)}, which "
         f"comes nearest, gives at {newtons(row.start)} {amount(row.felt)}; "
-        f"{hidden_by(row.felt, device)}. {cures_text(row.felt)}"
+        f"{hidden_by(row.felt, device)}. {cures_text(row.felt)} {_of_the_form(row.felt)}".rstrip()
     )
 
 
