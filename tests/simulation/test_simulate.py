@@ -356,3 +356,11 @@ def test_a_written_trace_is_read_back_thinned_out_evenly(tmp_path: FilePath, mos
     step = -(-len(whole) // most)
     assert len(read) <= most
     np.testing.assert_allclose(read, whole[::step], rtol=1e-11)
+
+
+def test_the_parts_of_a_trace_are_its_columns_by_name() -> None:
+    run = run_of()
+    names = [name.split(" [")[0] for name in HEADER.split(",")]
+    for part, head in (("velocity", "v"), ("applied", "applied "), ("anchor", "anchor ")):
+        columns = [names.index(head + axis) for axis in "xyz"]
+        np.testing.assert_array_equal(getattr(run, part), run.table[:, columns])
