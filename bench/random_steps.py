@@ -123,6 +123,18 @@ def speed(run: Run) -> float:
     return float(np.sqrt(np.square(steps).sum(axis=1).mean()) / run.period)
 
 
+def runs_down(run: Run) -> bool:
+    """Return whether the last quarter lives on what the hand gives: then it does not repeat itself.
+
+    A hand that is pulled aside, whose friction a faint trembling loosens, creeps home for long.
+    """
+    begin = -(len(run.position) // 4)
+    energies = run.energies
+    taken = energies["lost"][-1] - energies["lost"][begin]
+    taken += abs(energies["friction"][-1] - energies["friction"][begin])
+    return bool(energies["hand"][-1] - energies["hand"][begin] > 0.01 * taken)
+
+
 def _deepest(scene: Scene, run: Run) -> float:
     """Return the depth that is reached below the texture, or the plane of the smooth wall [m]."""
     texture, places = scene.job["surface"].texture, run.position
@@ -135,7 +147,7 @@ def shares(some: list[Scene]) -> list[float]:
     """Return speed over bound, for scenes that stay where their numbers hold.
 
     A silent scene counts as 0 if it comes to rest, else as infinite. What is above its bound is run
-    longer: it may only not have settled.
+    longer: it may only not have settled; and one that still runs down then counts as 0.
     """
     runs = simulate_many([scene.job for scene in some])
     found = []
@@ -145,7 +157,8 @@ def shares(some: list[Scene]) -> list[float]:
         share = _share(scene, speed(run))
         if share > 1.0:
             longer = {**scene.job, "duration": LONGER * scene.job["duration"]}
-            share = _share(scene, speed(simulate_many([longer])[0]))
+            (lasting,) = simulate_many([longer])
+            share = 0.0 if runs_down(lasting) else _share(scene, speed(lasting))
         found.append(share)
     return found
 
