@@ -163,3 +163,12 @@ def test_what_is_not_felt_is_not_recommended() -> None:
     assert "magnify" in result.recommendation
     # Limits asks about the law that comes nearest.
     assert limits(Sinusoid(1e-6, 1e-3), "touch").surface.law is result.nearest_row.law
+
+
+def test_of_equals_one_that_jumps_at_no_depth_is_taken() -> None:
+    """Shallower than its focal depth D is as good as C and H; pressed deeper it would click."""
+    result = compare(Sinusoid(1e-4, 1.5e-3), "omega.3", "CDH", max_depth=1e-4)
+    shown = {row.law.letter: row.shown_force for row in result.rows}
+    assert shown["D"] > 0.8 * max(shown.values())
+    assert result.row("D").continuous
+    assert result.recommended in {"C", "H"}

@@ -60,13 +60,10 @@ def _nearest(textured: Sequence[LawRow]) -> LawRow | None:
 
 
 def _soundest(sound: Sequence[LawRow]) -> LawRow:
-    """Return the strongest law; of nearly equal ones the stiffest.
-
-    Of those that start alike one whose force cannot jump at any depth comes first.
-    """
+    """Return the strongest law; of nearly equal ones the stiffest whose force jumps at no depth."""
     strongest = max(row.shown_force for row in sound)
     equal = [row for row in sound if row.shown_force >= NEARLY * strongest]
-    return max(equal, key=lambda row: (row.start, row.surface.law.contact.single_valued))
+    return max(equal, key=lambda row: (row.surface.law.contact.single_valued, row.start))
 
 
 def _aliveness(row: LawRow) -> float:
