@@ -123,16 +123,15 @@ def speed(run: Run) -> float:
     return float(np.sqrt(np.square(steps).sum(axis=1).mean()) / run.period)
 
 
-def runs_down(run: Run) -> bool:
-    """Return whether the last quarter lives on what the hand gives: then it does not repeat itself.
+def creeps(run: Run) -> bool:
+    """Return whether the last quarter goes somewhere, so that it does not repeat itself.
 
-    A hand that is pulled aside, whose friction a faint trembling loosens, creeps home for long.
+    A hand that is pulled aside, whose friction a faint trembling loosens, creeps home for long: its
+    way from beginning to end is a good part of the way that it went. That of a buzz is not.
     """
-    begin = -(len(run.position) // 4)
-    energies = run.energies
-    taken = energies["lost"][-1] - energies["lost"][begin]
-    taken += abs(energies["friction"][-1] - energies["friction"][begin])
-    return bool(energies["hand"][-1] - energies["hand"][begin] > 0.01 * taken)
+    places = run.position[-(len(run.position) // 4) :]
+    way = speed(run) * run.period * (len(places) - 1)
+    return float(np.linalg.norm(places[-1] - places[0])) > 0.3 * way
 
 
 def _deepest(scene: Scene, run: Run) -> float:
@@ -147,7 +146,7 @@ def shares(some: list[Scene]) -> list[float]:
     """Return speed over bound, for scenes that stay where their numbers hold.
 
     A silent scene counts as 0 if it comes to rest, else as infinite. What is above its bound is run
-    longer: it may only not have settled; and one that still runs down then counts as 0.
+    longer: it may only not have settled; and one that then still creeps counts as 0.
     """
     runs = simulate_many([scene.job for scene in some])
     found = []
@@ -158,7 +157,7 @@ def shares(some: list[Scene]) -> list[float]:
         if share > 1.0:
             longer = {**scene.job, "duration": LONGER * scene.job["duration"]}
             (lasting,) = simulate_many([longer])
-            share = 0.0 if runs_down(lasting) else _share(scene, speed(lasting))
+            share = 0.0 if creeps(lasting) else _share(scene, speed(lasting))
         found.append(share)
     return found
 
