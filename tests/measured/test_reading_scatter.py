@@ -13,7 +13,7 @@ import pytest
 from asperity import load_texture
 from asperity.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import read_surface
-from asperity.measured.reading.scatter import resampled
+from asperity.measured.reading.scatter import resampled, resampled_line
 
 MAIN = "from asperity.cli.main import main; main()"
 RNG = np.random.default_rng(11)
@@ -110,3 +110,9 @@ def test_library_scene_and_command_line_have_it(tmp_path: Path) -> None:
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
         assert "interpolated" in done.stdout
+
+
+def test_what_a_line_misses_may_be_huge() -> None:
+    """The square of 1e308 is infinite: its mean was said, with a warning of NumPy's."""
+    _, said = resampled_line(np.arange(4.0), np.array([0.0, 1e308, 0.0, 0.0]), 1.0)
+    assert "inf" not in said

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from asperity.checks import FloatArray
@@ -126,7 +128,7 @@ def resampled_line(
         raise ParameterError("resample", f"is too fine for {len(positions)} points", pitch)
     along = positions[0] + pitch * np.arange(count)
     missed = np.abs(np.interp(positions[1::2], positions[::2], heights[::2]) - heights[1::2])
-    rms = length_text(float(np.sqrt(np.mean(missed**2))))
+    rms = length_text(math.hypot(*missed) / math.sqrt(len(missed)))  # no square of 1e308
     said = (
         f"{len(positions)} points interpolated linearly to {count} of pitch {length_text(pitch)};"
         f" from every other point the rest are missed by {rms} rms"
