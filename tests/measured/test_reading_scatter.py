@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ import pytest
 from asperity import load_texture
 from asperity.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import read_surface
-from asperity.measured.reading.scatter import resampled, resampled_line
+from asperity.measured.reading.scatter import _error, resampled, resampled_line
 
 MAIN = "from asperity.cli.main import main; main()"
 RNG = np.random.default_rng(11)
@@ -116,3 +117,11 @@ def test_what_a_line_misses_may_be_huge() -> None:
     """The square of 1e308 is infinite: its mean was said, with a warning of NumPy's."""
     _, said = resampled_line(np.arange(4.0), np.array([0.0, 1e308, 0.0, 0.0]), 1.0)
     assert "inf" not in said
+
+
+def test_what_a_plane_misses_may_be_huge() -> None:
+    x, y = (axis.ravel().astype(float) for axis in np.meshgrid(np.arange(20), np.arange(20)))
+    heights = 1e300 * RNG.normal(size=400)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert "inf" not in _error(np.column_stack([x, y]), heights)

@@ -128,7 +128,7 @@ def resampled_line(
         raise ParameterError("resample", f"is too fine for {len(positions)} points", pitch)
     along = positions[0] + pitch * np.arange(count)
     missed = np.abs(np.interp(positions[1::2], positions[::2], heights[::2]) - heights[1::2])
-    rms = length_text(math.hypot(*missed) / math.sqrt(len(missed)))  # no square of 1e308
+    rms = length_text(_rms(missed))
     said = (
         f"{len(positions)} points interpolated linearly to {count} of pitch {length_text(pitch)};"
         f" from every other point the rest are missed by {rms} rms"
@@ -157,8 +157,13 @@ def _error(places: FloatArray, heights: FloatArray) -> str:
     missed = missed[~np.isnan(missed)]
     if not len(missed):
         return "too few points to know its error"
-    rms = float(np.sqrt(np.mean(missed**2)))
+    rms = _rms(missed)
     return (
         f"{len(missed)} points that were left out are missed by {length_text(rms)} rms,"
         f" {length_text(float(missed.max()))} at most"
     )
+
+
+def _rms(values: FloatArray) -> float:
+    """Return the root mean square without a square, which of 1e308 would be infinite."""
+    return math.hypot(*values) / math.sqrt(len(values))
