@@ -72,6 +72,10 @@ class Analysis:
         """
         return self.passivity.critical_speed
 
+    def __repr__(self) -> str:
+        law, verdict = self.surface.law.letter, self.passivity.verdict
+        return f"<Analysis of law {law} on {self.device.id}: q = {self.q.value:.4g}, {verdict}>"
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number; infinity is the string "inf"."""
         surface = self.surface

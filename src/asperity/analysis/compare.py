@@ -78,6 +78,11 @@ class Comparison:
         """
         return {row.law.letter: row for row in self.rows}[letter]
 
+    def __repr__(self) -> str:
+        row = self.recommended_row
+        said = "none recommended" if row is None else f"{row!r} recommended"
+        return f"<Comparison of {len(self.rows)} laws on {self.device.id}: {said}>"
+
     def _repr_html_(self) -> str:
         """Return the answer and a table for a notebook."""
         head = ["law", "q", "q⁺", "stiffness", "conservative", "continuous", "verdict"]

@@ -61,6 +61,11 @@ class LawRow:
     ripple: float
     verdict: str
 
+    def __repr__(self) -> str:
+        return (
+            f"<LawRow {self.law.letter}: start at {self.start:g} N/m, {self.tier or 'none known'}>"
+        )
+
     @property
     def law(self) -> Law:
         """The law of this row."""

@@ -57,6 +57,9 @@ class Comparisons:
     comparisons: tuple[Comparison, ...]
     lacking: tuple[Lacking, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<Comparisons: {len(self.comparisons)} answered, {len(self.lacking)} lacking>"
+
     def _repr_html_(self) -> str:
         """Return a table for a notebook."""
         rows = [

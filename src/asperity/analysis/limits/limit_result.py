@@ -113,6 +113,11 @@ class Limits:
         """
         return {limit.number: limit for limit in self.limits}[number]
 
+    def __repr__(self) -> str:
+        law, held = self.surface.law.letter, sum(bool(limit.holds) for limit in self.limits)
+        said = f"{held} of 6 hold, {self.felt.tier}"
+        return f"<Limits of law {law} on {self.device.id} at {self.speed:g} m/s: {said}>"
+
     def _repr_html_(self) -> str:
         """Return the answer and a table for a notebook."""
         head = ["limit", "", "left", "right", "holds", "speeds up to [m/s]", "needs"]
