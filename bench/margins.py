@@ -110,11 +110,10 @@ def measure(laws: str, console: Console) -> dict[str, Found]:
     found: dict[str, list[Case]] = {law: [] for law in laws}
     for loop, surface, delay in track(cases, "loops", console=console):
         case = setup(loop, surface)
-        (smooth,) = onsets(case, "W", (delay,), starts=STARTS, tolerance=TOLERANCE, lowest=LOWEST)
-        wall = smooth.onset.quiet
+        wall = wall_onset(case, delay)
 
         def ratio(law: str, case: Setup = case, delay: int = delay, wall: float = wall) -> float:
-            return _ratio(case.with_law(law), delay, wall)
+            return ratio_to_wall(case.with_law(law), delay, wall)
 
         some = [law for law in laws if math.isfinite(_number(case.with_law(law)))]
         for law, share in zip(some, side_by_side(ratio, [(law,) for law in some]), strict=True):
@@ -123,12 +122,18 @@ def measure(laws: str, console: Console) -> dict[str, Found]:
     return {law: _least(ratios) for law, ratios in found.items()}
 
 
+def wall_onset(case: Setup, delay: int) -> float:
+    """Return the greatest stiffness at which the smooth wall held in a loop [N/m]."""
+    (smooth,) = onsets(case, "W", (delay,), starts=STARTS, tolerance=TOLERANCE, lowest=LOWEST)
+    return smooth.onset.quiet
+
+
 def _number(case: Setup) -> float:
     """Return q, infinite for D where ridges are in reach: it has no K₀/q then."""
     return characteristic_number(case.surface).upper
 
 
-def _ratio(case: Setup, delay: int, wall: float) -> float:
+def ratio_to_wall(case: Setup, delay: int, wall: float) -> float:
     """Return where a law held over K₀/q, with K₀ where the smooth wall of the same loop held.
 
     The hand presses with as much of what the surface gives at full depth as of K₀/q the search
@@ -185,16 +190,17 @@ def write(found: dict[str, Found], path: Path = TARGET) -> None:
     ]
     for law, one in found.items():
         lines += [
-            "", f"[{law}]", f"factor = {_factor(one.ratio)}",
-            f"along_lightest = {_factor(one.lightest)}", f'loop = "{one.loop}"',
+            "", f"[{law}]", f"factor = {factor(one.ratio):.2f}",
+            f"along_lightest = {factor(one.lightest):.2f}", f'loop = "{one.loop}"',
             f'surface = "{one.surface}"', f"delay = {one.delay}", f"below = {one.below}",
             f"cases = {one.count}",
         ]  # fmt: skip
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def _factor(ratio: float) -> str:
-    return f"{math.floor(100.0 * min(ratio, 1.0)) / 100.0:.2f}"
+def factor(ratio: float) -> float:
+    """Return a ratio as it is used: rounded down to hundredths, at most 1."""
+    return math.floor(100.0 * min(ratio, 1.0)) / 100.0
 
 
 def main(arguments: list[str]) -> int:

@@ -9,6 +9,7 @@ steps come distorted, and are borderline at best; of fewer than two nothing come
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +19,10 @@ from asperity.analysis.compare import Comparison, compare
 from asperity.analysis.row import LawRow
 from asperity.devices import Device, load_device
 from asperity.scene import load_scene
-from asperity.textures import Sinusoid
+from asperity.textures import Sinusoid, load_texture
 
+DATA = Path(__file__).parents[3] / "shared" / "data"
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason=f"no sample surfaces in {DATA}")
 DEVICES = ("touch", "touch-x", "inverse3", "omega.3", "pantograph", "falcon", "premium-1.5")
 # Amplitude and period [mm]; then, device by device, the law that an expert would take, "-" if it
 # is not felt whatever the law, and "?" where it is borderline.
@@ -115,3 +118,22 @@ def _samples(device: Device, period: float, speed: float = 0.1) -> float:
 def test_the_table_has_at_least_sixty_cases() -> None:
     assert len(cases()) + len(OTHERS) >= 60
     assert {load_device(name).id for name in DEVICES}
+
+
+REAL = [
+    ("sample-land.x3p", 1.0, "omega.3", "H?"),  # strong, but too fine for it at 0.1 m/s
+    ("sample-land.x3p", 20.0, "touch", "-"),
+    ("sample-land.x3p", 20.0, "inverse3", "H?"),  # its form is ten times its texture
+    ("dektak-1.csv", 20.0, "touch", "-"),
+]
+
+
+@needs_data
+@pytest.mark.parametrize(("name", "magnify", "device", "expected"), REAL)
+def test_a_measured_surface(name: str, magnify: float, device: str, expected: str) -> None:
+    result = compare(load_texture(DATA / name, magnify=magnify), device, "CH")
+    assert headline(result) == expected
+    row = result.recommended_row or result.nearest_row
+    assert row is not None
+    assert row.felt is not None
+    assert row.felt.nesting is not None  # form and waviness were told from texture
