@@ -154,8 +154,8 @@ def texture_felt(
         >>> wave = Sinusoid(amplitude=1e-4, period=1e-3)
         >>> surface = Surface(wave, "A", stiffness=500.0)
         >>> found = texture_felt(surface, load_device("touch"), TexturePart(wave), rms=0.035)
-        >>> found.tier, found.hides.value, [(cure.kind, cure.value) for cure in found.cures]
-        ('not felt', 'friction', [('magnify', 11.0), ('friction', 0.025)])
+        >>> found.tier, found.hides.value, [f"{one.kind} {one.value:.3g}" for one in found.cures]
+        ('not felt', 'friction', ['magnify 11', 'friction 0.0247'])
     """
     alone = surface
     if part.nesting is not None:

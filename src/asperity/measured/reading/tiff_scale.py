@@ -90,9 +90,10 @@ def ome_scale(description: str) -> Scale:
         OME model 2016-06, Pixels: PhysicalSizeX and PhysicalSizeXUnit, micrometres by default.
 
     Example:
-        >>> ome_scale('<OME><Pixels PhysicalSizeX="0.5" PhysicalSizeY="250"'
-        ...           ' PhysicalSizeYUnit="nm">').pitch
-        (5e-07, 2.5e-07)
+        >>> pitch = ome_scale('<OME><Pixels PhysicalSizeX="0.5" PhysicalSizeY="250"'
+        ...                   ' PhysicalSizeYUnit="nm">').pitch
+        >>> [f"{step:g} m" for step in pitch]
+        ['5e-07 m', '2.5e-07 m']
     """
     found = _PIXELS.search(description[:_MOST_TEXT])
     if found is None:
