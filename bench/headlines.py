@@ -4,7 +4,9 @@
 delays of 0 and 2 samples, the recommended law is simulated at its start, in loops in which the
 smooth wall of K₀ is just passive by the delay rule: damping K₀ (1/2 + d) T along every axis, the
 device's mass (0.1 kg where it is not known), its steps, a hand that holds and one that holds
-loosely. Misses are shown. Takes some minutes: run it by night.
+loosely. Misses are shown, apart from those where the smooth wall cycles too, at K₀ or at the start:
+there the steps of the positions do it, and K₀ would not have held. Takes some minutes: run it by
+night.
 """
 
 from __future__ import annotations
@@ -51,6 +53,7 @@ class Loop:
     law: str
     stiffness: float
     cycles: int
+    wall_cycles: bool
 
 
 def loops(device: Device, spec: str, found: Comparison) -> list[Loop]:
@@ -69,7 +72,10 @@ def loops(device: Device, spec: str, found: Comparison) -> list[Loop]:
         plant = Cartesian(device.value("apparent_mass") or MASS, damping)
         held = pressing(hand, PRESS * row.start * surface.max_depth)
         count = _cycles(surface, plant, held, servo)
-        result.append(Loop(device.id, spec, delay, name, row.law.letter, row.start, count))
+        wall = surface.to_law("W")
+        walls = [wall.to_stiffness(k) for k in (row.start, test.value)] if count else []
+        too = any(_cycles(one, plant, held, servo) for one in walls)
+        result.append(Loop(device.id, spec, delay, name, row.law.letter, row.start, count, too))
     return result
 
 
@@ -99,7 +105,8 @@ def main() -> int:
     done: list[Loop] = []
     for device, spec in track(list(product(known, SURFACES)), "devices", console=console):
         done += loops(device, spec, compare(load_scene(spec).texture, device, LAWS))
-    missed = [loop for loop in done if loop.cycles]
+    cycling = [loop for loop in done if loop.cycles]
+    missed = [loop for loop in cycling if not loop.wall_cycles]
     for loop in missed:
         console.print(
             f"MISS {loop.device}, {loop.surface}: law {loop.law} at {loop.stiffness:g} N/m cycles "
@@ -107,7 +114,8 @@ def main() -> int:
         )
     console.print(
         f"{len(known)} devices x {len(SURFACES)} surfaces: {len(done)} loops at the recommended "
-        f"start, {len(missed)} of them cycle"
+        f"start, {len(cycling)} of them cycle, {len(cycling) - len(missed)} of these with the "
+        f"smooth wall: {len(missed)} misses"
     )
     return int(bool(missed))
 
