@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, ClassVar, Literal
@@ -47,9 +48,9 @@ class Spline(Texture):
     def _pitches(self) -> tuple[float, ...]:
         return tuple(np.atleast_1d(self.pitch).tolist())
 
+    @abstractmethod
     def with_heights(self, heights: ArrayLike) -> Spline:
         """Return the spline through other heights at the same nodes."""
-        raise NotImplementedError  # a profile and a map each know their own arguments
 
     def texture_part(self) -> TexturePart:
         """See :class:`Texture`; :func:`~asperity.measured.parts.texture_part` says how."""
