@@ -110,6 +110,17 @@ def test_the_lightest_direction_and_the_rate_of_the_test_count() -> None:
     assert judge(fields, 100.0, law="W").safe_stiffness == 2000.0
 
 
+@pytest.mark.parametrize("law", sorted(set(LEAKS) - {"W"}))
+def test_every_law_that_feels_the_texture_meets_the_lightest_direction(law: str) -> None:
+    """A and H too, whose formulas look at no slope: the force of H acts sideways all the same."""
+    whole, share = (
+        {"max_stiffness": {"value": "2 kN/m", **more}} for more in ({}, {"lightest": 0.7})
+    )
+    expected = 0.7 * (judge(whole, 100.0, law=law).allowed.stiffness or 0.0)
+    assert judge(share, 100.0, law=law).allowed.stiffness == pytest.approx(expected, rel=1e-12)
+    assert expected > 0.0
+
+
 def test_a_wall_that_cycled_refutes_whatever_damping_and_delay_are() -> None:
     test = {"value": 1000, "cycled": "1500 N/m", "positions": "exact"}
     found = judge({"max_stiffness": test}, 1500.0)
