@@ -7,14 +7,11 @@ import io
 import json
 import math
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-from asperity.cli.main import main
 
 Call = Callable[..., tuple[int, str, str]]
 
@@ -25,20 +22,8 @@ needs_data = pytest.mark.skipif(
 )
 
 
-@pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
-    def run(*arguments: str, width: int = 100) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["asperity", "analyze", *arguments])
-        monkeypatch.setenv("COLUMNS", str(width))
-        code = 0
-        try:
-            main()
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return run
+COMMAND = "analyze"  # what the fixture "call" runs
+WIDTH = 100
 
 
 def section(out: str, head: str) -> list[str]:

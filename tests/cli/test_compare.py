@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.cli.main import COMMANDS, main
+from asperity.cli.main import COMMANDS
 
 Call = Callable[..., tuple[int, str, str]]
 
@@ -22,25 +22,6 @@ DATA = Path(__file__).parents[3] / "shared" / "data"
 needs_data = pytest.mark.skipif(
     not DATA.is_dir(), reason="the real surfaces of ../shared/data are not there"
 )
-
-
-def run(
-    arguments: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> tuple[int, str, str]:
-    """Run the command in this process; return exit code, standard output, standard error."""
-    monkeypatch.setattr(sys, "argv", ["asperity", *arguments])
-    code = 0
-    try:
-        main()
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
-
-
-@pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
-    return lambda *arguments: run(list(arguments), monkeypatch, capsys)
 
 
 def test_table_has_one_row_per_law_with_the_letter_first(call: Call) -> None:

@@ -3,32 +3,18 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from asperity.cli.main import main
 from asperity.devices import FIELDS, device_names, load_device
 
 Call = Callable[..., tuple[int, str, str]]
 
 
-@pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
-    def run(*arguments: str, width: int = 100) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["asperity", "devices", *arguments])
-        monkeypatch.setenv("COLUMNS", str(width))
-        code = 0
-        try:
-            main()
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return run
+COMMAND = "devices"  # what the fixture "call" runs
+WIDTH = 100
 
 
 @pytest.mark.parametrize("width", [80, 100, 120])

@@ -5,14 +5,11 @@ from __future__ import annotations
 import json
 import math
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-from asperity.cli.main import main
 
 Call = Callable[..., tuple[int, str, str]]
 
@@ -32,20 +29,8 @@ update_rate = "10 kHz"
 """
 
 
-@pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
-    def run(*arguments: str, width: int = 100) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["asperity", "limits", *arguments])
-        monkeypatch.setenv("COLUMNS", str(width))
-        code = 0
-        try:
-            main()
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return run
+COMMAND = "limits"  # what the fixture "call" runs
+WIDTH = 100
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from asperity.cli.main import cli, main
+from asperity.cli.main import cli
 
 Call = Callable[..., tuple[int, str, str]]
 
@@ -42,21 +42,6 @@ start = ["0 mm", "0 mm", "-0.5 mm"]
 end = ["8 mm", "0 mm", "-0.5 mm"]
 speed = "0.1 m/s"
 """
-
-
-@pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr("sys.argv", ["asperity", *arguments])
-        code = 0
-        try:
-            main()
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return run
 
 
 @pytest.fixture

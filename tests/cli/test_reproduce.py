@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
@@ -12,26 +11,13 @@ from pathlib import Path
 import pytest
 from rich.cells import cell_len
 
-from asperity.cli.main import main
 from asperity.paper import CLAIMS, VERDICTS, claim
 
 Call = Callable[..., tuple[int, str, str]]
 FEW = ("eq-12", "eq-44", "table-1-A", "remark-3", "limit-4", "sentence-V.A-qF")
 
 
-@pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["asperity", "reproduce", *arguments])
-        code = 0
-        try:
-            main()
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return run
+COMMAND = "reproduce"  # what the fixture "call" runs
 
 
 def only(*names: str) -> list[str]:

@@ -23,21 +23,8 @@ SPEC = "sinusoid:amplitude=0.2mm,period=2mm"
 BARE = 'name = "Bare"\nmax_force = "3 N"\n'
 
 
-@pytest.fixture
-def call(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Call:
-    """Return a function that runs the program and returns exit code, output and errors."""
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["asperity", "compare", *arguments])
-        monkeypatch.setenv("COLUMNS", "100")
-        try:
-            main()
-            code = 0
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        return code, *capsys.readouterr()
-
-    return run
+COMMAND = "compare"  # what the fixture "call" runs
+WIDTH = 100
 
 
 def test_devices_and_depths_are_one_table(call: Call) -> None:

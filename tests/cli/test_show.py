@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,7 +11,6 @@ import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.cli.main import main
 from asperity.report import html_text
 from asperity.report.page import Section, Words, add_section
 from asperity.report.stages import surface_sections
@@ -22,20 +20,7 @@ Call = Callable[..., tuple[int, str, str]]
 PLAIN = ["--pitch", "2um", "--unit", "m"]
 
 
-@pytest.fixture
-def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
-    def run(*arguments: str, width: int = 120) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["asperity", *arguments])
-        monkeypatch.setenv("COLUMNS", str(width))
-        code = 0
-        try:
-            main()
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        captured = capsys.readouterr()
-        return code, captured.out, captured.err
-
-    return run
+WIDTH = 120
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from asperity.arguments import read_arguments
-from asperity.cli.main import main
 from asperity.devices import FIELDS, load_device
 from asperity.devices.template import device_template
 from asperity.scene import load_scene
@@ -22,22 +20,6 @@ from asperity.scene.template import scene_template
 
 Call = Callable[..., tuple[int, str, str]]
 COMMENT = re.compile(r"# (?=[a-z_]+ = )")
-
-
-@pytest.fixture
-def call(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Call:
-    """Return a function that runs the program and returns exit code, output and errors."""
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["asperity", *arguments])
-        try:
-            main()
-            code = 0
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        return code, *capsys.readouterr()
-
-    return run
 
 
 def test_the_device_template_is_read_as_it_stands(call: Call, tmp_path: Path) -> None:
