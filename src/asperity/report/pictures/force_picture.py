@@ -43,7 +43,8 @@ def draw_forces(figure: Figure | SubFigure, surfaces: Sequence[Surface]) -> None
     """Draw tangential and normal force along the scan for every law, on shared axes."""
     stretch = force_stretch(surfaces[0].texture)
     forces = [scan_forces(surface, stretch) for surface in surfaces]
-    limits = _shared_limits(forces)
+    alike = len({surface.stiffness for surface in surfaces}) == 1
+    limits = _shared_limits(forces, alike)
     unit = style.force_unit(max(map(abs, limits)))
     wide = style.length_unit(stretch.length)
     x, y = f"along the scan line [{wide.name}]", f"force [{unit.name}]"
@@ -56,12 +57,15 @@ def draw_forces(figure: Figure | SubFigure, surfaces: Sequence[Surface]) -> None
     _draw_key(figure, panels[0])
 
 
-def _shared_limits(forces: Sequence[PlaneForces]) -> tuple[float, float]:
-    """Return the limits of the shared axis [N]: all, unless one law dwarfs the rest."""
+def _shared_limits(forces: Sequence[PlaneForces], alike: bool) -> tuple[float, float]:
+    """Return the limits of the shared axis [N]: all, unless one law dwarfs the rest.
+
+    It may do so at its own stiffness, which is then the answer: only laws at one stiffness are cut.
+    """
     lows = [min(float(f.tangential.min()), float(f.normal.min()), 0.0) for f in forces]
     highs = [max(float(f.tangential.max()), float(f.normal.max()), 0.0) for f in forces]
     spans = sorted(max(high, -low) for low, high in zip(lows, highs, strict=True))
-    usual = spans[(len(spans) - 1) // 2]
+    usual = spans[(len(spans) - 1) // 2 if alike else -1]
     limit = _DWARFED * usual if usual > 0.0 else (spans[-1] or 1.0)
     low, high = max(min(lows), -limit), min(max(highs), limit)
     margin = 0.08 * ((high - low) or 1.0)
