@@ -225,7 +225,7 @@ def test_a_law_parameter_must_be_a_number(wave: Sinusoid):
 POINTS: list[Any] = [
     0.0,
     [],
-    [0.0, 0.0, 0.0],
+    [0.0, 0.0, math.nan],
     [[0.0, 0.0]],
     [[0.0, 0.0, 0.0, 0.0]],
     np.zeros((2, 2, 3)),

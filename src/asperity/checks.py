@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from asperity.errors import ParameterError
 
 FloatArray = NDArray[np.float64]
+Values = TypeVar("Values", bound=NDArray[Any])
 
 # Beyond these nothing is a size of this world, and products of a few leave double precision.
 _LEAST, _MOST = 1e-30, 1e30
@@ -62,25 +64,91 @@ def array(name: str, value: ArrayLike, shape: tuple[int | None, ...], unit: str)
         >>> array("points", [[0, 0, 1]], (None, 3), "m").shape
         (1, 3)
     """
+    described = _described(shape)
+    return _fitting(name, _numbers(name, value, described, unit), shape, described, unit)
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Points that were given, and in which form.
+
+    Attributes:
+        rows: shape (n, width); one row for one point.
+        single: whether it was one point by itself, shape (width,).
+    """
+
+    rows: FloatArray
+    single: bool
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return len(self.rows)
+
+    def answer(self, values: Values) -> Values:
+        """Return values, one for each point along the first axis; of one point without that axis.
+
+        Where there is no other axis the value of one point is a number.
+
+        Example:
+            >>> points("points", [0, 0, 1], 3, "m").answer(np.array([0.5])).item()
+            0.5
+        """
+        if not self.single:
+            return values
+        own: Any = values[0]  # of values without another axis a number, as NumPy itself has it
+        return cast(Values, own)
+
+    def beside(self, name: str, value: ArrayLike, width: int, unit: str) -> FloatArray:
+        """Return what was given beside the points, shape (n, width), (width,) beside one point."""
+        shape = (width,) if self.single else (self.count, width)
+        return array(name, value, shape, unit).reshape(self.count, width)
+
+
+def points(name: str, value: ArrayLike, width: int, unit: str) -> Points:
+    """Return points, shape (n, width), or (width,) for one; whoever takes points calls this.
+
+    Raises:
+        ParameterError: for another shape, or a value that is not finite.
+
+    Example:
+        >>> points("points", [0, 0, 1], 3, "m").rows.shape, points("xy", [[0, 1]], 2, "m").single
+        ((1, 3), False)
+    """
+    described = f"(n, {width}), or ({width},) for one point"
+    given = _numbers(name, value, described, unit)
+    single = given.shape == (width,)
+    rows = given[None] if single else given
+    return Points(_fitting(name, rows, (None, width), described, unit), single)
+
+
+def _numbers(name: str, value: ArrayLike, described: str, unit: str) -> FloatArray:
     try:
         given = np.asarray(value)
     except (TypeError, ValueError):  # rows of different length
         given = np.array(None)
     if given.dtype.kind not in "fiu" and given.size:
-        raise ParameterError(name, f"must be numbers of shape {_described(shape)} [{unit}]")
-    result: FloatArray = np.ascontiguousarray(given, dtype=np.float64)
-    fits = result.ndim == len(shape)
-    for wanted, length in zip(shape, result.shape, strict=False):
+        raise ParameterError(name, f"must be numbers of shape {described} [{unit}]")
+    return np.ascontiguousarray(given, dtype=np.float64)
+
+
+def _fitting(
+    name: str, values: FloatArray, shape: tuple[int | None, ...], described: str, unit: str
+) -> FloatArray:
+    """Return the values if they are finite and have the shape, which is described in words."""
+    fits = values.ndim == len(shape)
+    for wanted, length in zip(shape, values.shape, strict=False):
         fits = fits and wanted in (None, length)
     if not fits:
-        raise ParameterError(name, f"must have shape {_described(shape)} [{unit}]", result.shape)
-    if not np.isfinite(result).all():
-        raise ParameterError(name, f"must be finite [{unit}]; {_first_bad(result)}")
-    return result
+        raise ParameterError(name, f"must have shape {described} [{unit}]", values.shape)
+    if not np.isfinite(values).all():
+        raise ParameterError(name, f"must be finite [{unit}]; {_first_bad(values)}")
+    return values
 
 
 def _described(shape: tuple[int | None, ...]) -> str:
-    return f"({', '.join('n' if length is None else str(length) for length in shape)})"
+    lengths = ["n" if length is None else str(length) for length in shape]
+    return f"({lengths[0]},)" if len(lengths) == 1 else f"({', '.join(lengths)})"
 
 
 def _first_bad(values: FloatArray) -> str:

@@ -8,10 +8,11 @@ from types import MappingProxyType, ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from asperity.arguments import DEFAULT_STIFFNESS, MAX_DEPTH, STIFFNESS, Argument
-from asperity.checks import FloatArray, array, positive
+from asperity.checks import FloatArray, Points, array, positive
+from asperity.checks import points as read_points
 from asperity.derive.facts import LawFacts, clamped_facts
 from asperity.errors import ParameterError, nearest_names
 from asperity.kernels.probe import CLAMPS, ClampName
@@ -48,6 +49,18 @@ def _merged(law: Law, given: dict[str, float], own: dict[str, float]) -> dict[st
             raise ParameterError(name, "is given twice, by keyword and in law_parameters", value)
         given[name] = law.arguments[name].checked(value)
     return given
+
+
+def _truths(probes: Points, sliding: ArrayLike | None) -> NDArray[np.bool_]:
+    """Return which anchors are dragged."""
+    if sliding is None:
+        return np.zeros(probes.count, dtype=bool)
+    given = np.asarray(sliding)
+    wanted = () if probes.single else (probes.count,)
+    if given.shape != wanted or given.dtype != bool:
+        truths = "one truth value" if probes.single else f"{probes.count} truth values"
+        raise ParameterError("sliding", f"must be {truths}", sliding)
+    return np.ascontiguousarray(given).reshape(probes.count)
 
 
 class Surface:
@@ -308,7 +321,8 @@ class Surface:
         """Return the force on the probe (what the device applies to the hand).
 
         Args:
-            points: probe positions p [m], shape (n, 3).
+            points: probe positions p [m], shape (n, 3), or (3,) for one: then all here and in the
+                answer is without the first axis.
             deflection: tangential deflection d of the anchor [m], shape (n, 2), for laws with
                 state; zero by default.
 
@@ -322,11 +336,12 @@ class Surface:
         Reference:
             The paper's Table I, with the corrections named in each law.
         """
-        probes = array("points", points, (None, 3), "m")
-        out = np.empty((len(probes), 3))
-        state = self._state(len(probes), deflection)
-        self._loops.force_batch(probes, *state, out, self.texture.arguments, self.law_arguments)
-        return out
+        probes = read_points("points", points, 3, "m")
+        out = np.empty((probes.count, 3))
+        state = self._state(probes, deflection)
+        arguments = (self.texture.arguments, self.law_arguments)
+        self._loops.force_batch(probes.rows, *state, out, *arguments)
+        return probes.answer(out)
 
     def jacobian(
         self,
@@ -339,7 +354,7 @@ class Surface:
         J[i, j] = ∂f_i/∂p_j, with the curvature of the surface; zero out of contact.
 
         Args:
-            points: probe positions p [m], shape (n, 3).
+            points: see :meth:`force`.
             deflection: see :meth:`force`.
             sliding: whether the anchor is dragged, shape (n,), for laws with state; the
                 derivative of the deflection is then I - u uᵀ, u = d/|d|. False by default.
@@ -362,21 +377,17 @@ class Surface:
         sliding: ArrayLike | None = None,
     ) -> tuple[FloatArray, FloatArray]:
         """Return both f [N], (n, 3), and J [N/m], (n, 3, 3), for the price of :meth:`jacobian`."""
-        probes = array("points", points, (None, 3), "m")
-        count = len(probes)
-        state = self._state(count, deflection)
+        probes = read_points("points", points, 3, "m")
+        state = self._state(probes, deflection)
         if self.law.stateful:
-            slides = np.zeros(count, dtype=bool) if sliding is None else np.asarray(sliding)
-            if slides.shape != (count,) or slides.dtype != bool:
-                raise ParameterError("sliding", f"must be {count} truth values", sliding)
-            state = (*state, np.ascontiguousarray(slides))
+            state = (*state, _truths(probes, sliding))
         elif sliding is not None:
             raise ParameterError("sliding", f"is meaningless for law {self.law}, without state")
-        forces, jacobians = np.empty((count, 3)), np.empty((count, 3, 3))
+        forces, jacobians = np.empty((probes.count, 3)), np.empty((probes.count, 3, 3))
         self._loops.jacobian_batch(
-            probes, *state, forces, jacobians, self.texture.arguments, self.law_arguments
+            probes.rows, *state, forces, jacobians, self.texture.arguments, self.law_arguments
         )
-        return forces, jacobians
+        return probes.answer(forces), probes.answer(jacobians)
 
     def trace(self, path: ArrayLike) -> FloatArray:
         """Return the forces along a path, the law's state carried from point to point.
@@ -401,14 +412,14 @@ class Surface:
         self._loops.trace_batch(probes, out, self.texture.arguments, self.law_arguments)
         return out
 
-    def _state(self, count: int, deflection: ArrayLike | None) -> tuple[Any, ...]:
+    def _state(self, probes: Points, deflection: ArrayLike | None) -> tuple[Any, ...]:
         if not self.law.stateful:
             if deflection is not None:
                 raise ParameterError("deflection", f"is meaningless for law {self.law}, stateless")
             return ()
         if deflection is None:
-            return (np.zeros((count, 2)),)
-        given = array("deflection", deflection, (count, 2), "m")
+            return (np.zeros((probes.count, 2)),)
+        given = probes.beside("deflection", deflection, 2, "m")
         longest = float(np.hypot(given[:, 0], given[:, 1]).max(initial=0.0))
         # Rounding of a deflection of exactly that length is forgiven.
         if longest > self.max_deflection * (1.0 + 1e-12):

@@ -112,7 +112,7 @@ def test_positions_that_cannot_be_used(wave: Sinusoid, method: str):
     width = 3 if method == "nearest" else 2
     argument = "points" if method == "nearest" else "xy"
     wrong: list[Any] = [
-        np.zeros(width),
+        np.zeros(width + 1),
         np.zeros((4, width + 1)),
         np.full((2, width), np.nan),
         np.full((1, width), np.inf),

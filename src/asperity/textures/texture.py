@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from asperity.arguments import Argument
-from asperity.checks import FloatArray, array
+from asperity.checks import FloatArray, Points
+from asperity.checks import points as read_points
 from asperity.contacts.contact import ExactHeight
 from asperity.enclosures.cells import Cells
 from asperity.measured.history import Stage
@@ -233,7 +234,8 @@ class Texture(ABC):
         """Return the height h(x, y).
 
         Args:
-            xy: points [m], shape (n, 2).
+            xy: points [m], shape (n, 2), or (2,) for one: then the answer has no first axis
+                either.
 
         Returns:
             Heights [m], shape (n,).
@@ -241,20 +243,23 @@ class Texture(ABC):
         Raises:
             ParameterError: for another shape, or positions that are not finite.
         """
-        return self._sample("height_batch", xy, 1)[:, 0]
+        points, values = self._sample("height_batch", xy, 1)
+        return points.answer(values[:, 0])
 
     def gradient(self, xy: ArrayLike) -> FloatArray:
         """Return the slopes (h_x, h_y) [1], shape (n, 2); see :meth:`height`."""
-        return np.ascontiguousarray(self._sample("slope_batch", xy, 3)[:, 1:])
+        points, values = self._sample("slope_batch", xy, 3)
+        return points.answer(np.ascontiguousarray(values[:, 1:]))
 
     def hessian(self, xy: ArrayLike) -> FloatArray:
         """Return the Hessian of h [1/m], shape (n, 2, 2); see :meth:`height`."""
-        values = self._sample("curvature_batch", xy, 6)
-        return values[:, [3, 4, 4, 5]].reshape(-1, 2, 2)
+        points, values = self._sample("curvature_batch", xy, 6)
+        return points.answer(values[:, [3, 4, 4, 5]].reshape(-1, 2, 2))
 
     def derivatives(self, xy: ArrayLike) -> FloatArray:
         """Return h, h_x, h_y, h_xx, h_xy, h_yy in SI units, shape (n, 6); see :meth:`height`."""
-        return self._sample("curvature_batch", xy, 6)
+        points, values = self._sample("curvature_batch", xy, 6)
+        return points.answer(values)
 
     def nearest(self, points: ArrayLike) -> FloatArray:
         """Return the globally nearest surface point of each probe point (the god-object).
@@ -262,24 +267,24 @@ class Texture(ABC):
         p_h = argmin |p - (X, Y, h(X, Y))|. At a tie one of the nearest points, always the same.
 
         Args:
-            points: probe points [m], shape (n, 3).
+            points: probe points [m], shape (n, 3), or (3,) for one.
 
         Returns:
-            Surface points [m], shape (n, 3).
+            Surface points [m], of the same shape.
 
         Raises:
             ParameterError: for another shape, or positions that are not finite.
         """
-        probes = array("points", points, (None, 3), "m")
-        feet = np.empty((len(probes), 2))
-        self._loops.nearest_batch(probes, feet, self.arguments)
-        return np.column_stack([feet, self.height(feet)])
+        probes = read_points("points", points, 3, "m")
+        feet = np.empty((probes.count, 2))
+        self._loops.nearest_batch(probes.rows, feet, self.arguments)
+        return probes.answer(np.column_stack([feet, self.height(feet)]))
 
-    def _sample(self, loop: str, xy: ArrayLike, width: int) -> FloatArray:
-        points = array("xy", xy, (None, 2), "m")
-        out = np.empty((len(points), width))
-        getattr(self._loops, loop)(points, out, self.arguments)
-        return out
+    def _sample(self, loop: str, xy: ArrayLike, width: int) -> tuple[Points, FloatArray]:
+        points = read_points("xy", xy, 2, "m")
+        out = np.empty((points.count, width))
+        getattr(self._loops, loop)(points.rows, out, self.arguments)
+        return points, out
 
 
 @dataclass(frozen=True)

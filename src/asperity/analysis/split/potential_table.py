@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.passivity.allowed import allowed_stiffness
 from asperity.analysis.split.potential_grid import Grid, Progress, curvatures, potentials
-from asperity.checks import FloatArray, array, positive
+from asperity.checks import FloatArray, Points, positive
+from asperity.checks import points as read_points
 from asperity.contacts.split.spline import PotentialTable
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
@@ -74,24 +75,27 @@ class TabulatedSurface:
         """Return the force on the probe [N], shape (n, 3).
 
         Args:
-            points: probe positions [m], shape (n, 3).
+            points: probe positions [m], shape (n, 3), or (3,) for one: then the answer has no first
+                axis either.
 
         Raises:
             ParameterError: for another shape, or positions that are not finite.
         """
-        probes = array("points", points, (None, 3), "m")
-        out = np.empty((len(probes), 3))
-        self._loops.table_force_batch(probes, out, self.surface.stiffness, self._table)
-        return out
+        probes = read_points("points", points, 3, "m")
+        out = np.empty((probes.count, 3))
+        self._loops.table_force_batch(probes.rows, out, self.surface.stiffness, self._table)
+        return probes.answer(out)
 
     def potential(self, points: ArrayLike) -> FloatArray:
         """Return the energy [J], shape (n,); see :meth:`force`."""
-        return self.surface.stiffness * self._expansion(points)[:, 0]
+        probes, values = self._expansion(points)
+        return probes.answer(self.surface.stiffness * values[:, 0])
 
     def jacobian(self, points: ArrayLike) -> FloatArray:
         """Return J = -k Hess U_T [N/m], shape (n, 3, 3); see :meth:`force`."""
-        second = self._expansion(points)[:, [1, 2, 3, 2, 4, 5, 3, 5, 6]]
-        return -self.surface.stiffness * second.reshape(-1, 3, 3)
+        probes, values = self._expansion(points)
+        second = values[:, [1, 2, 3, 2, 4, 5, 3, 5, 6]].reshape(-1, 3, 3)
+        return probes.answer(-self.surface.stiffness * second)
 
     def safe_stiffness(self, device: str | os.PathLike[str] | Device) -> float:
         """Return the stiffness [N/m] up to which a device renders the table; 0 if none is known.
@@ -116,11 +120,11 @@ class TabulatedSurface:
 
         return fuse_module(spline)
 
-    def _expansion(self, points: ArrayLike) -> FloatArray:
-        probes = array("points", points, (None, 3), "m")
-        out = np.empty((len(probes), 7))
-        self._loops.expansion_batch(probes, out, self._table)
-        return out
+    def _expansion(self, points: ArrayLike) -> tuple[Points, FloatArray]:
+        probes = read_points("points", points, 3, "m")
+        out = np.empty((probes.count, 7))
+        self._loops.expansion_batch(probes.rows, out, self._table)
+        return probes, out
 
 
 def tabulate(

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from asperity.checks import FloatArray, array, positive
+from asperity.checks import FloatArray, positive
+from asperity.checks import points as read_points
 from asperity.contacts.split.contact import SPLIT
 from asperity.errors import ParameterError
 from asperity.surface import Surface
@@ -36,7 +37,7 @@ def split_state(surface: Surface, points: ArrayLike) -> SplitState:
 
     Args:
         surface: a surface with a law on the split contact.
-        points: probe positions [m], shape (n, 3).
+        points: probe positions [m], shape (n, 3), or (3,) for one, whose state is three numbers.
 
     Raises:
         ParameterError: for another law, another shape, or positions that are not finite.
@@ -51,12 +52,16 @@ def split_state(surface: Surface, points: ArrayLike) -> SplitState:
         [2, 1]
     """
     _need_split(surface)
-    probes = array("points", points, (None, 3), "m")
-    out = np.empty((len(probes), 3))
-    surface._loops.split_batch(probes, out, surface.continuity, surface.texture.arguments)
+    probes = read_points("points", points, 3, "m")
+    out = np.empty((probes.count, 3))
+    surface._loops.split_batch(probes.rows, out, surface.continuity, surface.texture.arguments)
     potential, atoms, gap = out.T
     k = surface.stiffness
-    return SplitState(k * potential, atoms.astype(np.intp), k * gap)
+    return SplitState(
+        potential=probes.answer(k * potential),
+        atoms=probes.answer(atoms.astype(np.intp)),
+        gap=probes.answer(k * gap),
+    )
 
 
 @dataclass(frozen=True)
@@ -86,10 +91,10 @@ class PopThrough:
         """Return which probes are so deep that the law is no longer certainly that of the plate.
 
         Args:
-            points: probe positions [m], shape (n, 3).
+            points: probe positions [m], shape (n, 3), or (3,) for one.
         """
-        probes = array("points", points, (None, 3), "m")
-        return np.asarray(probes[:, 2] < self.highest - self.depth)
+        probes = read_points("points", points, 3, "m")
+        return probes.answer(np.asarray(probes.rows[:, 2] < self.highest - self.depth))
 
 
 def pop_through(surface: Surface, thickness: float) -> PopThrough:

@@ -1,0 +1,120 @@
+"""Whatever takes points takes one by itself, and answers as for the only row of an array."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import asperity as asp
+
+PROBE, PLACE = (0.31e-3, -0.17e-3, -0.05e-3), (0.31e-3, -0.17e-3)
+PULLED = (2e-4, -1e-4)
+STEEP = asp.Sinusoid(0.2e-3, 1e-3, direction=(3, 4))
+
+
+def surface(law: str) -> asp.Surface:
+    return asp.Surface(STEEP, law)
+
+
+def table() -> asp.TabulatedSurface:
+    return asp.tabulate(surface("H"), resolution=40e-6)
+
+
+TAKERS: dict[str, tuple[Callable[[], Callable[[Any], Any]], tuple[float, ...]]] = {
+    "height": (lambda: STEEP.height, PLACE),
+    "gradient": (lambda: STEEP.gradient, PLACE),
+    "hessian": (lambda: STEEP.hessian, PLACE),
+    "derivatives": (lambda: STEEP.derivatives, PLACE),
+    "nearest": (lambda: STEEP.nearest, PROBE),
+    **{f"force {law}": (lambda law=law: surface(law).force, PROBE) for law in "WABCDEFGH"},
+    **{f"jacobian {law}": (lambda law=law: surface(law).jacobian, PROBE) for law in "BF"},
+    "force_and_jacobian": (lambda: surface("C").force_and_jacobian, PROBE),
+    "table force": (lambda: table().force, PROBE),
+    "table potential": (lambda: table().potential, PROBE),
+    "table jacobian": (lambda: table().jacobian, PROBE),
+    "split_state": (lambda: lambda at: parts(asp.split_state(surface("H"), at)), PROBE),
+    "beyond": (lambda: asp.pop_through(surface("H"), 2e-3).beyond, PROBE),
+}
+
+
+def parts(state: asp.SplitState) -> tuple[Any, ...]:
+    return state.potential, state.atoms, state.gap
+
+
+def together(answer: Any) -> tuple[Any, ...]:
+    return answer if isinstance(answer, tuple) else (answer,)
+
+
+@pytest.mark.parametrize("name", TAKERS)
+def test_one_point_is_the_only_row(name: str) -> None:
+    made, point = TAKERS[name]
+    takes = made()
+    rows, alone = together(takes([point])), together(takes(point))
+    for row, own in zip(rows, alone, strict=True):
+        assert row.shape[0] == 1
+        assert own.shape == row.shape[1:]
+        assert np.array_equal(own, row[0])
+        assert own.ndim or float(own) == float(row[0])  # a number, no array
+        assert own.ndim or not isinstance(own, np.ndarray)
+    assert any(np.any(own != 0) for own in alone) or name == "beyond"
+
+
+@pytest.mark.parametrize("name", TAKERS)
+def test_no_points_are_no_answers(name: str) -> None:
+    made, point = TAKERS[name]
+    for answer in together(made()(np.empty((0, len(point))))):
+        assert len(answer) == 0
+
+
+@pytest.mark.parametrize("name", TAKERS)
+@pytest.mark.parametrize(
+    "wrong", [lambda p: [[p]], lambda p: p[:-1], lambda p: (*p, 0.0), lambda _: []]
+)
+def test_other_shapes_name_both(name: str, wrong: Callable[[Any], Any]) -> None:
+    made, point = TAKERS[name]
+    width = len(point)
+    said = rf"must have shape \(n, {width}\), or \({width},\) for one point \[m\]"
+    with pytest.raises(asp.ParameterError, match=said):
+        made()(wrong(point))
+
+
+def test_the_state_beside_one_point_has_no_first_axis_either() -> None:
+    law_f = surface("F")
+    many, matrices = law_f.force_and_jacobian([PROBE], [PULLED], [True])
+    one, matrix = law_f.force_and_jacobian(PROBE, PULLED, True)
+    assert np.array_equal(one, many[0])
+    assert np.array_equal(matrix, matrices[0])
+    assert np.array_equal(law_f.jacobian(PROBE, PULLED, np.True_), matrices[0])
+    assert np.array_equal(law_f.force(PROBE, PULLED), law_f.force([PROBE], [PULLED])[0])
+    still = law_f.jacobian(PROBE, PULLED, False)
+    assert not np.array_equal(still, matrix)
+    assert not np.array_equal(law_f.force(PROBE), one)
+
+
+def test_a_state_of_another_form_is_refused() -> None:
+    law_f = surface("F")
+    with pytest.raises(asp.ParameterError, match=r"deflection must have shape \(2,\) \[m\]"):
+        law_f.force(PROBE, [PULLED])
+    with pytest.raises(asp.ParameterError, match=r"deflection must have shape \(1, 2\) \[m\]"):
+        law_f.force([PROBE], PULLED)
+    with pytest.raises(asp.ParameterError, match="sliding must be one truth value"):
+        law_f.jacobian(PROBE, PULLED, [True])
+    with pytest.raises(asp.ParameterError, match="sliding must be 1 truth values"):
+        law_f.jacobian([PROBE], [PULLED], True)
+    with pytest.raises(asp.ParameterError, match="max_deflection"):
+        law_f.force(PROBE, (1.0, 0.0))
+
+
+def test_a_point_that_is_not_finite_is_named() -> None:
+    with pytest.raises(asp.ParameterError, match=r"must be finite \[m\]; the value at \[0, 2\]"):
+        surface("C").force((0.0, 0.0, np.nan))
+
+
+def test_paths_and_polygons_stay_rows() -> None:
+    with pytest.raises(asp.ParameterError, match=r"path must have shape \(n, 3\) \[m\]"):
+        surface("C").trace(PROBE)
+    with pytest.raises(asp.ParameterError, match=r"vertices must have shape \(n, 3\) \[m\]"):
+        asp.loop_work(surface("C"), PROBE)
