@@ -37,7 +37,7 @@ SURFACES = (
 LAWS = "WABCDEFGH"
 DELAYS = (0, 2)
 STARTS = 6
-DURATION = 0.3  # [s]
+DURATION = 1.0  # [s], of the first run; a light hand and little damping take that long to calm down
 MASS = 0.1  # [kg] where none is known
 PRESS = 0.25  # of stiffness times max_depth
 
