@@ -98,6 +98,25 @@ def test_the_page_needs_no_network_and_links_to_rows(call: Call, tmp_path: Path)
         assert f"asperity reproduce --claim {name}" in text
 
 
+def test_figures_are_files_in_a_folder_that_is_made(call: Call, tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "figures"
+    code, out, err = call("--claim", "eq-12", "--figures", str(folder), "--format", "PNG")
+    assert (code, err) == (0, "")
+    assert out.splitlines()[-1] == f"Figures in {folder}: fig-3.png"
+    assert [path.name for path in folder.iterdir()] == ["fig-3.png"]
+    code, out, _err = call("--claim", "fig-2", "--figures", str(folder), "--json", "-")
+    assert code == 0
+    assert json.loads(out)["claims"]  # and nothing else on standard output
+    assert {path.name for path in folder.iterdir()} == {"fig-3.png", "fig-2.svg"}
+
+
+def test_a_report_in_the_folders_place_is_refused_at_once(call: Call, tmp_path: Path) -> None:
+    path = str(tmp_path / "same")
+    code, _out, err = call("--claim", "eq-12", "--figures", path, "--html", path)
+    assert code == 2
+    assert "html must be a file, not a folder" in err
+
+
 BAD = [
     (["--claim", "eq-99"], "did you mean"),
     (["--claim", ""], "claim is unknown"),
@@ -105,6 +124,13 @@ BAD = [
     (["--json", "no/where.json"], "folder that exists"),
     (["--surface", "sinusiod:amplitude=1mm,period=1mm"], "did you mean 'sinusoid'"),
     (["--magnify", "20"], "applies to a measured surface"),
+    (["--format", "png"], "give --figures DIR"),
+    (["--figures", "new", "--format", "pdf"], "format is unknown: 'pdf'"),
+    (["--figures", "new", "--claim", "eq-44"], "nothing is drawn of eq-44, but of fig-2"),
+    (["--figures", "new", "--claim", "eq-99"], "did you mean"),
+    (["--figures", "/dev/null"], "must be a folder, not a file"),
+    (["--figures", "/dev/null/figures"], "must be a folder, not a file"),
+    (["--figures", "a\0b"], "cannot be made"),
 ]
 
 

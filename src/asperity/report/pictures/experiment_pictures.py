@@ -59,7 +59,8 @@ def energies_figure(found: ScanningExperiment) -> Figure:
     for axes, trace in zip(panels, traces, strict=True):
         for i, (name, colour) in enumerate((("x", style.ORANGE), ("z", style.BLUE))):
             axes.plot(trace.time, 1e3 * trace.exact[:, i], color=colour, lw=1.2, label=name)
-            axes.plot(trace.time, 1e3 * trace.paper[:, i], color=colour, lw=0.9, ls="--")
+            summed = 1e3 * trace.paper[:, i]
+            axes.plot(trace.time, summed, color=colour, lw=0.9, ls="--", label=f"{name}, paper's")
         style.zero_line(axes, 0.5)
         style.entitle(axes, trace.law, "")
     style.legend(panels[0])
@@ -82,12 +83,13 @@ def bumps_figure(found: BumpExperiment) -> Figure:
         for axes in (left, right):
             style.dress(axes)
         left.fill_between(1e3 * x, 1e3 * height, -25.0, color=style.BODY, alpha=0.7, lw=0.0)
-        for one in (bump for bump in found.bumps if bump.entry == entry):
+        runs = [bump for bump in found.bumps if bump.entry == entry]
+        for one in runs:
             left.plot(1e3 * one.x, 1e3 * one.z, color=colours[one.law], lw=0.9, label=one.law)
             right.plot(one.time, 1e3 * one.supplied, color=colours[one.law], lw=1.2, label=one.law)
         style.zero_line(right)
         style.legend(right)
-        left.set_ylim(-25.0, 25.0)
+        left.set_ylim(-25.0, max(25.0, *(1e3 * one.z.max() + 2.0 for one in runs)))
         style.entitle(left, "Way", entry)
         style.entitle(right, "Energy", "supplied to the hand")
         style.label(left, "x [mm]", "z [mm]")
@@ -145,12 +147,18 @@ def _draw_rule(axes: Axes, points: Sequence[_Point]) -> None:
     style.dress(axes)
     axes.set_xscale("log")
     axes.set_yscale("log")
+    named: dict[tuple[int, int], list[_Point]] = {}  # by place, so that letters do not overlap
     for point in points:
         if not (math.isfinite(point.onset) and math.isfinite(point.allowed) and point.allowed > 0):
             continue
+        place = round(3.0 * math.log10(point.allowed)), round(8.0 * math.log10(point.onset))
+        named.setdefault(place, []).append(point)
         colour = style.ORANGE if point.missed else style.BLUE
         axes.plot(point.allowed, point.onset, point.marker, ms=5.5, mec=colour, mew=0.9,
                   mfc=style.ORANGE if point.missed else style.CARD)  # fmt: skip
-        axes.annotate(point.law, (point.allowed, point.onset), (4, 2), fontsize=7.0,
+    for near in named.values():
+        letters = "".join(dict.fromkeys(point.law for point in near))
+        last = max(near, key=lambda point: point.allowed)
+        axes.annotate(letters, (last.allowed, last.onset), (5, 3), fontsize=7.0,
                       textcoords="offset points", color=style.SOFT)  # fmt: skip
     axes.plot([1.0, 1e5], [1.0, 1e5], color=style.FAINT, lw=1.2, zorder=0.0)
