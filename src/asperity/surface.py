@@ -17,6 +17,7 @@ from asperity.derive.facts import LawFacts, clamped_facts
 from asperity.errors import ParameterError, nearest_names
 from asperity.kernels.probe import CLAMPS, ClampName
 from asperity.laws import LAW_ARGUMENTS, LAWS, Law, find_law
+from asperity.textures.naming import TextureLike, as_texture
 from asperity.textures.texture import Texture
 
 # max_depth unless given: the peak-to-valley height of the texture, at most this [m].
@@ -67,7 +68,8 @@ class Surface:
     """A textured surface as a force field: the body is z < h(x, y), z points out of it.
 
     Args:
-        texture: the height function.
+        texture: the height function, or what names it on the command line: "sandpaper:grit=P60",
+            "cloth", the path of a measured file; see :func:`~asperity.textures.naming.as_texture`.
         law: letter, name, or a :class:`~asperity.laws.Law` of your own.
         stiffness: k [N/m] of the smooth wall.
         max_depth: D [m], the depth to which the surface is meant to be pressed; it bounds the
@@ -108,7 +110,7 @@ class Surface:
 
     def __init__(
         self,
-        texture: Texture,
+        texture: TextureLike,
         law: str | Law = "C",
         stiffness: float = DEFAULT_STIFFNESS,
         max_depth: float | None = None,
@@ -119,9 +121,7 @@ class Surface:
         continuity: float | None = None,
         law_parameters: Mapping[str, float] | None = None,
     ) -> None:
-        if not isinstance(texture, Texture):
-            raise ParameterError("texture", "must be a texture such as Sinusoid", texture)
-        own = find_law(law)
+        own, made = find_law(law), as_texture(texture)
         keywords = {
             "friction": friction,
             "max_deflection": max_deflection,
@@ -135,9 +135,9 @@ class Surface:
         }
         if clamp not in CLAMPS:
             raise ParameterError("clamp", f"must be one of {', '.join(CLAMPS)}", clamp)
-        depth = default_max_depth(texture) if max_depth is None else MAX_DEPTH.checked(max_depth)
+        depth = default_max_depth(made) if max_depth is None else MAX_DEPTH.checked(max_depth)
         self._set(
-            texture=texture,
+            texture=made,
             law=own,
             stiffness=STIFFNESS.checked(stiffness),
             max_depth=depth,
@@ -185,18 +185,18 @@ class Surface:
         """
         return self._changed(max_depth=MAX_DEPTH.checked(max_depth))
 
-    def to_texture(self, texture: Texture, max_depth: float | None = None) -> Surface:
+    def to_texture(self, texture: TextureLike, max_depth: float | None = None) -> Surface:
         """Return the same law, stiffness and depth on another texture.
 
         Args:
-            texture: the other one.
+            texture: the other one, or what names it.
             max_depth: [m], if it is to change too.
 
         Raises:
             ParameterError: for a depth that is not positive.
         """
         depth = self.max_depth if max_depth is None else MAX_DEPTH.checked(max_depth)
-        return self._changed(texture=texture, max_depth=depth)
+        return self._changed(texture=as_texture(texture), max_depth=depth)
 
     def to_stiffness(self, stiffness: float) -> Surface:
         """Return the same surface with another stiffness [N/m].

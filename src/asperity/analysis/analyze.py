@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
-from asperity.analysis.compare import DEFAULT_DEVICE
+from asperity.analysis.compare import DEFAULT_DEVICE, law_to_ask_about
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import merit
@@ -18,10 +19,12 @@ from asperity.analysis.gain.characteristic import (
     one_sided_number,
 )
 from asperity.analysis.judge_passivity import passivity
+from asperity.analysis.passivity.margin import at_start, start
 from asperity.analysis.words.analysis import answer, assumptions, surface_width
 from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
 from asperity.surface import Surface, default_max_depth
+from asperity.textures.naming import TextureLike, as_texture
 from asperity.units import engineering
 
 STEPS = ("q", "q⁺", "curl", "worst loop", "continuity", "strength and support", "passivity")
@@ -30,7 +33,7 @@ Progress = Callable[[str], None]
 
 
 def analyze(
-    surface: Surface,
+    surface: Surface | TextureLike,
     device: str | os.PathLike[str] | Device = DEFAULT_DEVICE,
     *,
     direction: tuple[float, float] | None = None,
@@ -38,6 +41,7 @@ def analyze(
     work_limit: int = DEFAULT_WORK_LIMIT,
     extent: tuple[float, float] | None = None,
     progress: Progress | None = None,
+    **surface_arguments: Any,
 ) -> Analysis:
     """Return everything that is known of one law on one surface and one device.
 
@@ -46,7 +50,9 @@ def analyze(
     jumps; every criterion of passivity, and which one decides.
 
     Args:
-        surface: the surface with its law, stiffness k [N/m] and max_depth [m].
+        surface: the surface with its law, stiffness k [N/m] and max_depth [m]; or a texture, or
+            what names one ("sandpaper:grit=P60"): then the law is the one that a comparison
+            recommends and the stiffness its start on this device, unless given.
         device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`.
         direction: (x, y) of the vertical plane of the worst loop; by default that of the
             texture's scan line, which is x unless the heights vary along another line.
@@ -56,6 +62,8 @@ def analyze(
             reached, the bounds found by then are returned and their note says so.
         extent: width and depth [m] of the part of the plane that counts, for sums of waves.
         progress: called with the name of each of ``STEPS`` before it begins.
+        **surface_arguments: of :class:`~asperity.surface.Surface` (law, stiffness, max_depth, ...),
+            for a texture.
 
     Returns:
         An :class:`Analysis`. What the device's data cannot decide is listed with what is missing.
@@ -76,10 +84,9 @@ def analyze(
         >>> round(result.leak.energy * 1e3, 3), round(result.v_star, 3)
         (1.6, 0.255)
     """
-    if not isinstance(surface, Surface):
-        raise ParameterError("surface", "must be a Surface", surface)
-    _refuse_beyond(surface)
     known = load_device(device)
+    surface = _surface(surface, known, surface_arguments)
+    _refuse_beyond(surface)
     begin: Progress = progress or (lambda _step: None)
     begin(STEPS[0])
     q = characteristic_number(surface, tolerance, work_limit, extent)
@@ -114,6 +121,24 @@ def analyze(
         assumptions=(),
     )
     return replace(result, answer=answer(result), assumptions=assumptions(result, extent))
+
+
+def _surface(asked: Surface | TextureLike, device: Device, arguments: dict[str, Any]) -> Surface:
+    """Return the surface: of a texture with the recommended law, at the stiffness to begin with."""
+    given = {name: value for name, value in arguments.items() if value is not None}
+    if isinstance(asked, Surface):
+        for name in given:
+            words = "belongs to the surface: give a texture, or change it by to_law, to_stiffness"
+            raise ParameterError(name, words)
+        return asked
+    texture = as_texture(asked)
+    if "law" not in given:
+        given["law"] = law_to_ask_about(texture, device, **given)
+    surface = Surface(texture, **given)
+    if "stiffness" in given:
+        return surface
+    numbers = characteristic_number(surface), one_sided_number(surface)
+    return at_start(surface, device, start(surface, device, *numbers))
 
 
 def _refuse_beyond(surface: Surface) -> None:

@@ -29,11 +29,11 @@ from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
 from asperity.laws import Law
 from asperity.surface import Surface
-from asperity.textures.texture import Texture
+from asperity.textures.naming import TextureLike, as_texture
 
 
 def limits(
-    texture: Texture,
+    texture: TextureLike,
     device: str | os.PathLike[str] | Device = DEFAULT_DEVICE,
     speed: float | None = None,
     law: str | Law | None = None,
@@ -52,7 +52,7 @@ def limits(
     it is, not sufficient. What the device's data cannot decide is listed with what is missing.
 
     Args:
-        texture: the surface.
+        texture: the surface, or what names it; see :func:`~asperity.analysis.compare.compare`.
         device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`.
         speed: v [m/s] of the scan; 0.1 by default.
         law: letter or name, or a law of your own; by default the one that a comparison recommends.
@@ -86,6 +86,7 @@ def limits(
     beta = _samples("position_samples", position_samples, 2.0)
     gamma = _samples("force_steps", force_steps, 1.0)
     asked = DEFAULT_STIFFNESS if stiffness is None else stiffness
+    texture = as_texture(texture)
     if law is None:
         law = law_to_ask_about(texture, known, max_depth, speed=v, **surface_arguments)
     surface = Surface(texture, law, asked, max_depth, **surface_arguments)

@@ -26,6 +26,7 @@ from asperity.files import plain, record
 from asperity.laws import LAWS, Law, find_laws, shared_out
 from asperity.notebook import as_html
 from asperity.surface import Surface
+from asperity.textures.naming import TextureLike, as_texture
 from asperity.textures.texture import Texture, TexturePart
 
 SCHEMA = 1
@@ -112,7 +113,7 @@ class Comparison:
 
 
 def compare(
-    texture: Texture,
+    texture: TextureLike,
     device: str | os.PathLike[str] | Device = DEFAULT_DEVICE,
     laws: str | Sequence[str | Law] = ALL_LAWS,
     stiffness: float | None = None,
@@ -132,7 +133,8 @@ def compare(
     (:func:`~asperity.analysis.limits.felt.texture_felt`).
 
     Args:
-        texture: the surface.
+        texture: the surface, or what names it on the command line: "sandpaper:grit=P60", "cloth",
+            the path of a measured file; see :func:`~asperity.textures.naming.as_texture`.
         device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`.
         laws: letters or names, or laws of your own.
         stiffness: the stiffness that you ask about [N/m]; by default each law's own, the one to
@@ -149,8 +151,7 @@ def compare(
             declares; it names the argument.
 
     Example:
-        >>> from asperity.textures.sinusoid import Sinusoid
-        >>> result = compare(Sinusoid(amplitude=0.8e-3, period=1e-3), laws="WA")
+        >>> result = compare("sinusoid:amplitude=0.8mm,period=1mm", laws="WA")
         >>> [f"{row.law.letter} {row.safe_stiffness:.0f} N/m" for row in result.rows]
         ['W 5000 N/m', 'A 976 N/m']
     """
@@ -160,12 +161,13 @@ def compare(
     brisk = DEFAULT_SPEED if speed is None else positive("speed", speed, "m/s")
     _refuse_unknown(known_device)
     shares = shared_out(law_parameters or {}, chosen)
+    made = as_texture(texture)
     surfaces = [
-        Surface(texture, law, asked or DEFAULT_STIFFNESS, max_depth, law_parameters=own,
+        Surface(made, law, asked or DEFAULT_STIFFNESS, max_depth, law_parameters=own,
                 **surface_arguments)
         for law, own in zip(chosen, shares, strict=True)
     ]  # fmt: skip
-    question = _Question(known_device, asked, brisk, texture.texture_part(), max_depth is not None)
+    question = _Question(known_device, asked, brisk, made.texture_part(), max_depth is not None)
     rows = []
     for surface in surfaces:
         if progress is not None:
@@ -174,7 +176,7 @@ def compare(
     found = recommend(rows)
     defaults = {"max_depth": max_depth is None, "speed": speed is None}
     return Comparison(
-        texture=texture,
+        texture=made,
         device=known_device,
         stiffness=asked,
         max_depth=surfaces[0].max_depth,
@@ -200,7 +202,7 @@ def line_to_add(device: Device) -> str:
 
 
 def law_to_ask_about(
-    texture: Texture,
+    texture: TextureLike,
     device: str | os.PathLike[str] | Device = DEFAULT_DEVICE,
     max_depth: float | None = None,
     **arguments: Any,

@@ -13,6 +13,7 @@ from asperity.errors import ParameterError
 from asperity.files import Record, plain
 from asperity.laws import KNOWN_LAWS, Law
 from asperity.notebook import as_html
+from asperity.textures.naming import TextureLike, as_texture
 from asperity.textures.texture import Texture
 
 # Is told the device, the depth, if one was asked for, and the letter of the law that is next.
@@ -80,7 +81,7 @@ class Comparisons:
 
 
 def compare_several(
-    texture: Texture,
+    texture: TextureLike,
     devices: Sequence[str | os.PathLike[str] | Device],
     max_depths: Sequence[float] | None = None,
     laws: str | Sequence[str | Law] | None = None,
@@ -91,7 +92,7 @@ def compare_several(
     """Return the laws compared on each of several devices, at each of several depths.
 
     Args:
-        texture: the surface.
+        texture: the surface, or what names it; see :func:`~asperity.analysis.compare.compare`.
         devices: ids of the catalogue, TOML files, or devices.
         max_depths: to which the surface is pressed [m]; by default the one of
             :func:`~asperity.analysis.compare.compare`.
@@ -120,7 +121,7 @@ def compare_several(
         raise ParameterError("max_depth", "must be one or several depths")
     if len(set(depths)) < len(depths):
         raise ParameterError("max_depth", "names one depth twice", list(depths))
-    found, lacking = [], []
+    made, found, lacking = as_texture(texture), [], []
     for device in known:
         if line := line_to_add(device):
             lacking.append(Lacking(device.id, line))
@@ -131,7 +132,5 @@ def compare_several(
                 if progress is not None:
                     progress(device, depth, letter)
 
-            found.append(
-                compare(texture, device, chosen, max_depth=depth, progress=step, **arguments)
-            )
-    return Comparisons(texture, tuple(found), tuple(lacking))
+            found.append(compare(made, device, chosen, max_depth=depth, progress=step, **arguments))
+    return Comparisons(made, tuple(found), tuple(lacking))

@@ -25,7 +25,6 @@ from asperity.cli.progress import step_bar
 
 if TYPE_CHECKING:
     from asperity.devices import Device
-    from asperity.surface import Surface
     from asperity.textures import Texture
 
 _SEARCH = (
@@ -92,8 +91,7 @@ def command(surface: str, device: Device | None, outputs: Outputs, **values: Any
 
     with step_bar("reading the surface", len(STEPS)) as step:
         texture, known, arguments = read_surface(surface, device, values)
-        whole = _whole(texture, known, arguments)
-        result = analyze(whole, known, progress=step, **given(values, _SEARCH))
+        result = analyze(texture, known, progress=step, **given(values, _SEARCH), **arguments)
     code = _texture_code(surface, file_values(values), texture)
 
     from asperity.report.analysis import analysis_page, print_analysis
@@ -103,22 +101,6 @@ def command(surface: str, device: Device | None, outputs: Outputs, **values: Any
         lambda console: print_analysis(result, console, code),
         lambda: analysis_page(result, code),
     )
-
-
-def _whole(texture: Texture, device: Device, arguments: dict[str, Any]) -> Surface:
-    """Return the surface: with the law that is recommended, at the stiffness to begin with."""
-    from asperity.analysis.compare import law_to_ask_about
-    from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
-    from asperity.analysis.passivity.margin import at_start, start
-    from asperity.surface import Surface
-
-    if "law" not in arguments:
-        arguments = {"law": law_to_ask_about(texture, device, **arguments), **arguments}
-    whole = Surface(texture, **arguments)
-    if "stiffness" in arguments:
-        return whole
-    numbers = characteristic_number(whole), one_sided_number(whole)
-    return at_start(whole, device, start(whole, device, *numbers))
 
 
 def _texture_code(source: str, for_file: Mapping[str, Any], texture: Texture) -> str:

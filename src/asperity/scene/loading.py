@@ -1,9 +1,7 @@
-"""From text to a texture: a specification, a scene file or a measured file."""
+"""From text to a scene: a scene file, or what names a texture alone."""
 
 from __future__ import annotations
 
-import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,11 +11,9 @@ from asperity.arguments import Argument, read_arguments
 from asperity.devices import Device, changed_device, load_device, parse_device
 from asperity.errors import ParameterError, nearest_names
 from asperity.files import read_toml
-from asperity.measured.arguments import DRAWN
-from asperity.scene.sections import KINDS, surface_arguments
-from asperity.textures import Texture, load_texture
-from asperity.textures.drawn import prepare_texture
-from asperity.textures.texture import Kind
+from asperity.scene.sections import surface_arguments
+from asperity.textures.naming import KINDS, as_texture, build_texture, is_scene, specified
+from asperity.textures.texture import Texture
 
 _ID = Argument("device.id", "device of the catalogue", form="text")
 LOOP_SECTIONS = ("hand", "motion", "run")
@@ -63,79 +59,9 @@ def load_scene(source: str, file_arguments: Mapping[str, Any] | None = None) -> 
         0.001
     """
     extra = dict(file_arguments or {})
-    kind, colon, arguments = source.partition(":")
-    if re.fullmatch(r"[A-Za-z][\w-]+", kind) and not os.path.exists(source):
-        named = kind.lower()
-        if not colon and (named == "file" or named not in KINDS):
-            hint = nearest_names(kind, KINDS)
-            words = f"is no file, and no surface that is known by name: {source!r}; {hint}"
-            raise ParameterError("surface", words)
-        return Scene(build_texture(named, _parse_arguments(arguments), values=extra))
-    if source.lower().endswith(".toml"):
+    if is_scene(source) and specified(source) is None:
         return _load_scene_file(Path(source), extra)
-    return Scene(load_texture(source, **extra))
-
-
-def _parse_arguments(text: str) -> dict[str, str]:
-    arguments: dict[str, str] = {}
-    for part in text.split(",") if text.strip() else ():
-        name, equals, value = part.partition("=")
-        name = name.strip().replace("-", "_")
-        if not equals or not name:
-            raise ParameterError("surface", "must be kind:argument=value,...", part.strip())
-        if name in arguments:
-            raise ParameterError(name, "is given twice")
-        arguments[name] = value.strip()
-    return arguments
-
-
-def build_texture(
-    kind: str,
-    arguments: Mapping[str, Any],
-    folder: Path | None = None,
-    values: Mapping[str, Any] | None = None,
-) -> Texture:
-    """Return a texture from its kind and its arguments as text or lists.
-
-    Args:
-        kind: of the catalogue, or "file".
-        arguments: by name, of the kind and of its preparation.
-        folder: to which a file is relative.
-        values: of arguments of the preparation that were read [SI]; they come first.
-
-    Raises:
-        ParameterError: for an unknown kind or argument, one that is missing, or a wrong value.
-    """
-    if kind not in KINDS:
-        raise ParameterError("surface", f"kind is unknown: {kind!r}; {nearest_names(kind, KINDS)}")
-    known = KINDS[kind]
-    own = {argument.name for argument in known.arguments}
-    preparing = () if kind == "file" else [one for one in DRAWN if one.name not in own]
-    read = read_arguments(kind, arguments, (*known.arguments, *preparing), folder)
-    prepared = {name: read.pop(name) for name in set(read) - own} | dict(values or {})
-    if kind == "file":
-        return known.make(**_complete(known, read | prepared))
-    _refuse_others(prepared)
-    texture = known.make(**_complete(known, read))
-    return prepare_texture(texture, **prepared) if prepared else texture
-
-
-def _complete(kind: Kind, read: dict[str, Any]) -> dict[str, Any]:
-    """Return the arguments if none is missing."""
-    required = [argument.name for argument in kind.required]
-    for name in required:
-        if name not in read:
-            raise ParameterError(name, f"is missing: a {kind.name} needs {', '.join(required)}")
-    return read
-
-
-def _refuse_others(given: Mapping[str, Any]) -> None:
-    """Refuse what only a measured surface can be told."""
-    names = [argument.name for argument in DRAWN]
-    for name in given:
-        if name not in names:
-            words = f"applies to measured surfaces only; others take {', '.join(names)}"
-            raise ParameterError(name, words)
+    return Scene(as_texture(source, extra))
 
 
 def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections import ChainMap
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,14 +15,10 @@ from asperity.arguments import MAX_DEPTH, STIFFNESS, Argument, read_arguments
 from asperity.errors import ParameterError, nearest_names
 from asperity.files import open_input
 from asperity.laws import LAW_ARGUMENTS, Law, known_arguments
-from asperity.measured.arguments import FILE_ARGUMENTS
 from asperity.scene.plant import BRAKES
 from asperity.simulation import BandHand, MovedHand, SpringHand, Still, Strokes
 from asperity.simulation import Path as PathMotion
 from asperity.surface import CLAMP, LAW
-from asperity.textures import load_texture
-from asperity.textures.catalogue import CATALOGUE
-from asperity.textures.texture import Kind
 
 PATH_COLUMNS = ("time [s]", "x [m]", "y [m]", "z [m]")
 
@@ -61,19 +56,6 @@ def _column(names: list[str], name: str, file: str) -> int:
         raise ParameterError("motion.file", f"{file} has no column '{name}' in its first line")
     return names.index(name)
 
-
-_FILE = Kind(
-    "file",
-    "a measured surface",
-    load_texture,
-    (
-        Argument("path", "the file, relative to the scene", form="path", required=True),
-        *FILE_ARGUMENTS,
-    ),
-)
-
-KINDS: Mapping[str, Kind] = ChainMap({_FILE.name: _FILE}, CATALOGUE)
-"""What [texture] can be: a kind of the catalogue, as it stands now, or a file."""
 
 SURFACE = (LAW, STIFFNESS, MAX_DEPTH, CLAMP)
 """What [surface] can say, beside the parameters of its law."""

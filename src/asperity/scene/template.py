@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping
 from asperity.arguments import Argument
 from asperity.devices import device_names
 from asperity.measured.arguments import DRAWN
-from asperity.scene.sections import HANDS, KINDS, MOTIONS, RUN, Part, surface_arguments
+from asperity.scene.sections import HANDS, MOTIONS, RUN, Part, surface_arguments
+from asperity.textures.naming import KINDS
 from asperity.textures.texture import Kind
 
 _HEAD = """\
