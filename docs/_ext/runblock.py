@@ -6,23 +6,20 @@
 
 from __future__ import annotations
 
-import ast
 import contextlib
-import io
 import os
-import shlex
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
+from commands import execute, first_paragraphs, run_command
 from docutils import nodes
 from docutils.parsers.rst import Directive, directives
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
-COLUMNS = "88"  # characters that fit the width of a page
 _DPI = 130
 
 
@@ -44,38 +41,6 @@ class Page:
 
 
 _PAGES: dict[str, Page] = {}
-
-
-def execute(source: str, names: dict[str, Any], expect_error: bool = False) -> tuple[str, Any]:
-    """Run a block; return what it printed and the value of its last line.
-
-    Args:
-        source: Python statements, the last of which may be an expression.
-        names: variables, which are changed.
-        expect_error: whether the block must end with one of asperity's own errors, whose
-            message is then printed.
-
-    Raises:
-        RuntimeError: if an expected error does not happen.
-    """
-    from asperity.errors import AsperityError
-
-    tree = ast.parse(source)
-    last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
-    value, printed = None, io.StringIO()
-    with contextlib.redirect_stdout(printed):
-        try:
-            exec(compile(tree, "<page>", "exec"), names)
-            if last is not None and isinstance(last, ast.Expr):
-                value = eval(compile(ast.Expression(last.value), "<page>", "eval"), names)
-        except AsperityError as error:
-            if not expect_error:
-                raise
-            print(f"{type(error).__name__}: {error}")
-            return printed.getvalue(), None
-    if expect_error:
-        raise RuntimeError("the block was expected to be refused, but ran")
-    return printed.getvalue(), value
 
 
 class _Block(SphinxDirective):
@@ -138,10 +103,14 @@ class Run(_Block):
 
 
 class Shell(_Block):
-    """Commands ``$ asperity ...`` that run; ``:quiet:``; ``:exit: 2`` where one must be refused."""
+    """Commands ``$ asperity ...`` that run.
+
+    ``:exit: 2`` where one must be refused, ``:quiet:``, ``:first: 2`` for so many paragraphs only.
+    """
 
     option_spec: ClassVar[dict[str, Any]] = {
         "exit": directives.nonnegative_int,
+        "first": directives.positive_int,
         "quiet": directives.flag,
     }
 
@@ -157,33 +126,9 @@ class Shell(_Block):
                 return self.failed(RuntimeError(f"{line}: exit code {code}: {text[-300:]}"))
             result.append(self.literal(line, "console"))
             if text.strip() and "quiet" not in self.options:
-                result.append(self.literal(text.rstrip(), "text", "output"))
+                shown = first_paragraphs(text.strip(), self.options.get("first"))
+                result.append(self.literal(shown, "text", "output"))
         return result
-
-
-def run_command(command: str, folder: str) -> tuple[int, str]:
-    """Run ``asperity ...`` in this process; return its exit code and what it printed."""
-    from unittest import mock
-
-    from asperity.cli import main
-
-    words = shlex.split(command)
-    if words[0] != "asperity":
-        raise ValueError(f"not an asperity command: {command}")
-    printed, code = io.StringIO(), 0
-    environment = {**os.environ, "COLUMNS": COLUMNS, "NO_COLOR": "1"}
-    with (
-        contextlib.chdir(folder),
-        mock.patch("sys.argv", words),
-        mock.patch.dict(os.environ, environment),
-        contextlib.redirect_stdout(printed),
-        contextlib.redirect_stderr(printed),
-    ):
-        try:
-            main.main()
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-    return code, "\n".join(line.rstrip() for line in printed.getvalue().splitlines())
 
 
 def table_of(rows: Sequence[Sequence[str]]) -> nodes.table:

@@ -292,7 +292,7 @@ def _of_the_margin(rows: Sequence[LawRow]) -> list[str]:
     return [
         f"Starts are below the limit by what simulation found ({told or 'no law below it'}): "
         "pantograph and a mass in space, brakes of the paper, two hands, delays of 0 to 6 samples, "
-        "two sinusoids; a device of another build may need less"
+        "three sinusoids; a device of another build may need less"
     ]
 
 
