@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import json
 import math
 import os
@@ -157,6 +158,18 @@ def json_text(value: Any) -> str:
         }
     """
     return json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def digest(text: str) -> str:
+    """Return the first 12 digits of the SHA-256 of a text in UTF-8.
+
+    Of :func:`json_text` it is what ``sha256sum`` says of the file that ``--json`` writes.
+
+    Example:
+        >>> digest(json_text({"reach": 1.0}))
+        '4a07eef8f6b6'
+    """
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 @overload

@@ -96,7 +96,7 @@ def test_simulate_writes_json_and_html(call: Call, strokes: str, tmp_path: Path)
     code, out, _err = call("simulate", strokes, "--html", str(tmp_path / "run.html"))
     text = (tmp_path / "run.html").read_text(encoding="utf-8")
     assert code == 0
-    assert text.count("data:image/svg+xml") == 1
+    assert text.count("<svg") == 1
     assert "://" not in re.sub(r"data:[^\"]*", "", text)
     assert "Where the energy went" in text
 
@@ -112,7 +112,7 @@ def test_the_trace_has_columns_with_units(call: Call, still: str, tmp_path: Path
     table = np.loadtxt(path, delimiter=",", skiprows=1)
     assert table.shape == (400, len(names))
     assert table[1, 0] == pytest.approx(2 / 4000)
-    assert "data:image/svg+xml" in Path(page).read_text(encoding="utf-8")
+    assert "<svg" in Path(page).read_text(encoding="utf-8")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")

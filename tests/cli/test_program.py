@@ -71,7 +71,7 @@ def test_a_foreign_backend_of_matplotlib_does_not_matter(tmp_path: Path) -> None
     surface = "sinusoid:amplitude=0.8mm,period=1mm"
     done = run(f"MPLBACKEND=nonsense asperity analyze {surface} --law C --html {page}")
     assert (done.returncode, done.stderr) == (0, "")
-    assert "data:image/svg" in page.read_text()
+    assert "<svg" in page.read_text()
 
 
 def test_foreign_settings_of_matplotlib_do_not_matter(tmp_path: Path) -> None:

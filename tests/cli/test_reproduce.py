@@ -93,7 +93,7 @@ def test_the_page_needs_no_network_and_links_to_rows(call: Call, tmp_path: Path)
     assert set(FEW) <= set(tags.ids)
     assert len(set(tags.ids)) == len(tags.ids)
     assert "://" not in re.sub(r"data:[^\"]*", "", text)
-    assert text.count("data:image/svg+xml") == 2  # figures 2 and 3
+    assert text.count("<svg") == 2  # figures 2 and 3
     for name in FEW:
         assert f"asperity reproduce --claim {name}" in text
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import io
+import json
+import re
 from collections.abc import Callable
 from html.parser import HTMLParser
 from typing import Any
@@ -11,7 +15,11 @@ from rich.console import Console
 
 
 class Reader(HTMLParser):
-    """Collects the tags of a page, what it loads, its text, and the cells of its tables."""
+    """Collects the tags of a page, what it loads, its text, and the cells of its tables.
+
+    ``alts`` are the words for its pictures, ``numbers`` what their numbers are, ``scripts`` what is
+    run.
+    """
 
     def __init__(self, page: str) -> None:
         super().__init__()
@@ -19,15 +27,37 @@ class Reader(HTMLParser):
         self.loaded: list[str] = []
         self.cells: list[str] = []
         self.texts: list[str] = []
+        self.alts: list[str] = []
+        self.numbers: list[Any] = []
+        self.scripts: list[str] = []
+        self.policy = ""
         self._open: list[str] = []
+        self._script: str | None = None
         self.feed(page)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
         self._open.append(tag)
-        self.loaded += [str(value) for name, value in attrs if name in {"src", "href"}]
+        given = {name: str(value) for name, value in attrs}
+        links = [given[name] for name in ("src", "href", "xlink:href") if name in given]
+        self.loaded += [link for link in links if not link.startswith("#")]
+        assert not [name for name in given if name.startswith("on")]
+        if tag == "script":
+            self._script = given.get("type", "")
+        if tag == "svg":
+            assert given["role"] == "img"
+            self.alts.append(given["aria-label"])
+        if given.get("http-equiv") == "Content-Security-Policy":
+            self.policy = given["content"]
 
     def handle_data(self, data: str) -> None:
+        if self._script is not None:
+            if self._script == "application/json":
+                self.numbers.append(json.loads(data))
+            else:
+                self.scripts.append(data)
+            self._script = None
+            return
         if data.strip():
             self.texts.append(data.strip())
         if self._open and self._open[-1] == "td" and data.strip():
@@ -41,13 +71,37 @@ class Reader(HTMLParser):
 def check_alone(page: str) -> Reader:
     """Assert that a page is one file that loads nothing and suits light, dark and print."""
     reader = Reader(page)
-    assert all(source.startswith("data:image/") for source in reader.loaded)
-    assert "script" not in reader.tags
-    assert not {"url(", "@import"} & {word for word in ("url(", "@import") if word in page}
+    assert all(source.startswith("data:image/png;base64,") for source in reader.loaded)
+    assert page.count("url(") == page.count('"url(#')
+    assert "@import" not in page
+    assert "http" not in re.sub(r"http-equiv|data:image[^\"]*", "", page)
+    check_script(reader)
+    ids = re.findall(r' id="(p[0-9a-f]{6}-[^"]+)"', page)
+    assert len(set(ids)) == len(ids)
     assert "prefers-color-scheme: dark" in page
     assert "@media print" in page
     assert len(page) < 3_000_000
     return reader
+
+
+def check_script(reader: Reader) -> None:
+    """Assert that one script may run, the page's own, and that pictures have words and numbers."""
+    assert len(reader.scripts) == 1
+    digest = base64.b64encode(hashlib.sha256(reader.scripts[0].encode()).digest()).decode()
+    assert "default-src 'none'" in reader.policy
+    assert f"script-src 'sha256-{digest}'" in reader.policy
+    assert "svg" not in reader.tags or len(reader.numbers) == len(reader.alts)
+
+
+def check_alts(reader: Reader, page: str) -> None:
+    """Assert that the words for pictures say what is seen, with numbers, and are no titles."""
+    titles = set(re.findall(r"<h[1-3]>([^<]*)</h[1-3]>", page))
+    assert reader.alts
+    for alt in reader.alts:
+        assert alt.strip()
+        assert alt.strip(" .") not in titles
+        assert re.search(r"\d", alt), alt
+        assert "nan" not in alt.split()
 
 
 def terminal(show: Callable[..., None], *arguments: Any, width: int, **how: Any) -> str:

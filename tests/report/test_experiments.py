@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from asperity.paper.experiments.beyond import BeyondExperiment, device_onset
@@ -35,7 +37,8 @@ def test_sections_in_order(found: Experiments) -> None:
     drawn = [section for section in sections if isinstance(section.blocks[0], Picture)]
     for section in drawn:
         assert isinstance(section.blocks[0], Picture)
-        assert section.blocks[0].source.startswith("data:image/svg+xml")
+        assert section.blocks[0].svg.startswith("<svg ")
+        assert re.search(r"\d", section.blocks[0].alt)
     assert "Not stated by the paper" in drawn[0].notes[0]
     assert "falcon" in drawn[-1].notes[1]
     html = page_html(Page("title", "answer", [], sections))

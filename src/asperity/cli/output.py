@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import os
+import shlex
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +15,7 @@ import click
 
 from asperity.cli.progress import progress_bar
 from asperity.errors import ParameterError, printable
-from asperity.files import is_device, json_text, write_text
+from asperity.files import digest, is_device, json_text, write_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -57,11 +59,12 @@ class Outputs:
         if self.html is not None and page is not None:
             import matplotlib
 
-            from asperity.report.page import page_html
+            from asperity.report.page import Origin, page_html
 
+            origin = Origin(_command(), digest(json_text(data)))
             matplotlib.rcdefaults()  # the page looks as it should, whatever the user's settings
             with progress_bar("drawing the report"):
-                text = page_html(page())
+                text = page_html(page(), origin)
             write_output("html", self.html, text)
         if STANDARD_OUTPUT in {self.json, self.html}:
             return
@@ -72,6 +75,11 @@ class Outputs:
         for words, path in ((page_words, self.html), ("Trace", self.trace)):
             if path is not None:
                 console.print(f"{words}: {printable(path)}", soft_wrap=True, markup=False)
+
+
+def _command() -> str:
+    """Return the command as a shell takes it."""
+    return printable(shlex.join(["asperity", *sys.argv[1:]]))
 
 
 def output_options(

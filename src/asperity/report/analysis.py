@@ -28,6 +28,7 @@ from asperity.report.words.number_words import (
     witness_text,
 )
 from asperity.report.words.reproduction_words import reproduction
+from asperity.report.words.seen import of_analysis
 from asperity.units import engineering
 
 _NUMBERS = ("number", "lower", "upper", "method")
@@ -317,7 +318,9 @@ def _pictures(analysis: Analysis, *names: str) -> list[page.Section]:
     from asperity.report.pictures.analysis_pictures import analysis_figure, pictures_of
 
     return [
-        page.pictured(title, analysis_figure(analysis, name), caption, level=3)
+        page.pictured(
+            title, analysis_figure(analysis, name), of_analysis(analysis, name), caption, level=3
+        )
         for name, (title, caption) in ((name, _CAPTIONS[name]) for name in names)
         if name in pictures_of(analysis)
     ]

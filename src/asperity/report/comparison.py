@@ -18,7 +18,7 @@ from asperity.arguments import Argument
 from asperity.report import page, terminal
 from asperity.report.devices import datum_text, numbers_table
 from asperity.report.stages import surface_sections
-from asperity.report.words import glossary
+from asperity.report.words import glossary, seen
 from asperity.report.words.number_words import (
     NONE,
     SAMPLED,
@@ -247,7 +247,10 @@ def _rows(
 ) -> list[page.Row]:
     """Return a row per law, the recommended one marked."""
     best = comparison.recommended_row
-    return [page.Row(cells(row), "best" if row is best else "") for row in comparison.rows]
+    return [
+        page.Row(cells(row), "best" if row is best else "", law=row.law.letter)
+        for row in comparison.rows
+    ]
 
 
 def _table(comparison: Comparison, columns: Sequence[_Column]) -> page.Table:
@@ -375,7 +378,10 @@ def _pictures(comparison: Comparison) -> list[page.Section]:
     depth, stiffness = engineering(comparison.max_depth, "m"), _asked(comparison)
     return [
         page.pictured(
-            title, PICTURES[name](comparison), words.format(depth=depth, stiffness=stiffness)
+            title,
+            PICTURES[name](comparison),
+            seen.COMPARISON[name](comparison),
+            words.format(depth=depth, stiffness=stiffness),
         )
         for name, (title, words) in _CAPTIONS.items()
     ]
@@ -394,7 +400,8 @@ def _pedigree(comparison: Comparison) -> page.Section:
                 row.conservative_reason,
                 f"{row.leak.method}: {row.leak.description}",
                 row.continuous_reason,
-            ]
+            ],
+            law=row.law.letter,
         )
         for row in comparison.rows
     ]

@@ -7,12 +7,15 @@ from collections.abc import Sequence
 from asperity.paper.experiments import Experiments
 from asperity.paper.experiments.beyond import BeyondExperiment, DeviceOnset
 from asperity.paper.experiments.bump import BumpExperiment
-from asperity.paper.experiments.passivity import PassivityExperiment
+from asperity.paper.experiments.passivity import Count, PassivityExperiment
 from asperity.paper.experiments.scanning import ScanningExperiment
-from asperity.report.onset import newton, onset_cells, onset_section
+from asperity.paper.figures import loop_energies
+from asperity.report.onset import newton, onset_cells, onset_section, onset_seen
 from asperity.report.page import Cell, Cells, Row, Section, Table, pictured
 from asperity.report.pictures import experiment_pictures, paper_pictures
+from asperity.report.pictures.paper_pictures import energy_words, figure_three
 from asperity.report.pictures.sweep_pictures import onset_figure
+from asperity.report.run import energy
 from asperity.report.scan import milli
 from asperity.units import engineering
 
@@ -29,9 +32,16 @@ def paper_sections() -> list[Section]:
         "law that ends above zero can be turned again and again: it feeds the hand. C and D, which "
         "the paper does not show, go the way of A."
     )
+    fields_seen = (
+        "Arrows of force below a sinusoid of 0.8 mm by 2 mm, a panel for each law, and larger ones "
+        "at a handle on either flank of the crest."
+    )
+    panels = loop_energies()
+    gained = "; ".join(f"{panel.law} {energy_words(panel)}" for panel in panels)
+    loops_seen = f"A closed path and the work along it for each of {len(panels)} laws: {gained}."
     return [
-        pictured("Figure 2: forces", paper_pictures.figure_two(), fields),
-        pictured("Figure 3: energy around closed paths", paper_pictures.figure_three(), loops),
+        pictured("Figure 2: forces", paper_pictures.figure_two(), fields_seen, fields),
+        pictured("Figure 3: energy around closed paths", figure_three(panels), loops_seen, loops),
     ]
 
 
@@ -57,7 +67,14 @@ def _cycles(found: PassivityExperiment) -> Section:
         "samples. Cycling: still moving after 2 s and not calming down."
     )
     figure = experiment_pictures.cycles_figure(found)
-    return pictured("V.A, who begins to cycle", figure, caption, _fitted(found.fitted))
+    counts = ", ".join(f"{one.cycles} with {_wall(one)}" for one in found.counts)
+    seen = f"Height of the handle over time. Of {found.counts[0].starts} starts cycle: {counts}."
+    return pictured("V.A, who begins to cycle", figure, seen, caption, _fitted(found.fitted))
+
+
+def _wall(one: Count) -> str:
+    """Return the law of a wall, and by what its stiffness is divided."""
+    return one.law if one.divisor == 1.0 else f"{one.law}/{one.divisor:g}"
 
 
 def _fitted(sentences: Sequence[str]) -> list[str]:
@@ -71,7 +88,8 @@ def _onsets(found: PassivityExperiment) -> Section:
         "exact positions."
     )
     figure = onset_figure(found.onsets)
-    return pictured("V.A, onset against lag, all laws", figure, caption)
+    seen = onset_seen(found.onsets)
+    return pictured("V.A, onset against lag, all laws", figure, seen, caption)
 
 
 def _energies(found: ScanningExperiment) -> Section:
@@ -81,7 +99,8 @@ def _energies(found: ScanningExperiment) -> Section:
         "same sample. Up feeds the hand; the paper draws it downwards."
     )
     figure = experiment_pictures.energies_figure(found)
-    return pictured("V.B, energy of a stroke", figure, caption, _fitted(found.guessed))
+    seen = f"Energy along x and z over one stroke, a panel for each of {len(found.traces)} laws."
+    return pictured("V.B, energy of a stroke", figure, seen, caption, _fitted(found.guessed))
 
 
 def _strokes(found: ScanningExperiment) -> Section:
@@ -94,7 +113,7 @@ def _strokes(found: ScanningExperiment) -> Section:
         field = Cell(milli(stroke.field), "no" if stroke.feeds else "")
         spread = milli(stroke.spread + stroke.error, sign=False)
         rest = [spread, milli(sum(stroke.same_sample)), f"{stroke.lost_contact:.1f}"]
-        rows.append(Row([*place, *work, field, *rest]))
+        rows.append(Row([*place, *work, field, *rest], law=stroke.law))
     notes = (
         "Energies in mJ per stroke of 80 mm. Field: what the law itself gives along the true path; "
         "the rest is sampling and steps of the encoder. Coloured: the field feeds the hand.",
@@ -110,7 +129,11 @@ def _bumps(found: BumpExperiment) -> Section:
         "and H keep their balance, and hold the hand at the flank instead of lifting it."
     )
     figure = experiment_pictures.bumps_figure(found)
-    return pictured("V.C, the enlarged bump", figure, caption, _fitted(found.guessed))
+    gains = "; ".join(
+        f"{one.law} {energy(float(one.supplied[-1]))} ({one.entry})" for one in found.bumps
+    )
+    seen = f"Way of the handle over the bump, and energy supplied in the end: {gains}."
+    return pictured("V.C, the enlarged bump", figure, seen, caption, _fitted(found.guessed))
 
 
 def _devices(found: Experiments) -> Section:
@@ -128,12 +151,17 @@ def _devices(found: Experiments) -> Section:
     ]
     notes = [*_fitted(found.beyond.guessed), *far, skipped]
     figure = experiment_pictures.devices_figure(found)
-    return pictured("Predicted and simulated, every device with data", figure, caption, notes)
+    missed = sum(one.missed for one in found.beyond.onsets)
+    seen = (
+        f"Onset against what two rules allow. On other devices K₀/q was too much in {missed} of "
+        f"{len(found.beyond.onsets)} cases."
+    )
+    return pictured("Predicted and simulated, every device with data", figure, seen, caption, notes)
 
 
 def _device_table(found: BeyondExperiment) -> Section:
     headings = ("device", "surface", "law", "q", "K₀/q", "delay rule", "cycles", "starts", "depth")
-    rows = [Row(_device_cells(one)) for one in found.onsets]
+    rows = [Row(_device_cells(one), law=one.prediction.onset.law) for one in found.onsets]
     notes = (
         "Stiffnesses in N/m. q at the depth that the handle got to. Delay rule: with the damping "
         "of the hand, a proof for conservative laws and exact positions, else in brackets.",

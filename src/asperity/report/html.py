@@ -7,10 +7,11 @@ from typing import Any
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.compare import Comparison
 from asperity.analysis.limits.limit_result import Limits
+from asperity.files import digest, json_text
 from asperity.report.analysis import analysis_page
 from asperity.report.comparison import comparison_page
 from asperity.report.limits import limits_page
-from asperity.report.page import page_html
+from asperity.report.page import Origin, page_html
 
 _PAGES: dict[type, Any] = {
     Analysis: analysis_page,
@@ -29,4 +30,4 @@ def html_text(result: Comparison | Analysis | Limits) -> str:
     """
     if type(result) not in _PAGES:
         raise TypeError(f"no report is known for a {type(result).__name__}")
-    return page_html(_PAGES[type(result)](result))
+    return page_html(_PAGES[type(result)](result), Origin(content=digest(json_text(result))))

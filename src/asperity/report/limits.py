@@ -227,7 +227,9 @@ def _picture(result: Limits) -> page.Section:
         "speed; below a dashed line it is too weak. Filled: meets every limit on waves that could "
         "be decided."
     )
-    return page.pictured("The waves and their forces", limits_figure(result), caption)
+    met = sum(all(wave.holds.values()) for wave in result.waves)
+    seen = f"{len(result.waves)} waves, of which {met} meet every limit."
+    return page.pictured("The waves and their forces", limits_figure(result), seen, caption)
 
 
 def _waves(result: Limits) -> list[page.Section]:

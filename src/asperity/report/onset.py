@@ -51,7 +51,11 @@ def onset_cells(found: Prediction) -> list[Cell]:
 
 
 def _table(found: Sequence[Prediction]) -> page.Table:
-    return page.Table(HEADINGS, [Row(onset_cells(one)) for one in found], range(1, len(HEADINGS)))
+    return page.Table(
+        HEADINGS,
+        [Row(onset_cells(one), law=one.onset.law) for one in found],
+        range(1, len(HEADINGS)),
+    )
 
 
 def newton(value: float) -> str:
@@ -111,13 +115,19 @@ def onset_page(setup: Setup, found: Sequence[Prediction]) -> Page:
         answer=answer(setup, found),
         facts=facts_of_loop(setup),
         sections=[
-            pictured("Onset against delay", onset_figure(found), caption),
+            pictured("Onset against delay", onset_figure(found), onset_seen(found), caption),
             onset_section("In numbers, N/m", found, words),
             *added_sections(Prediction, setup, found),
             *assumed(setup.assumptions),
         ],
         footer=FOOTER,
     )
+
+
+def onset_seen(found: Sequence[Prediction]) -> str:
+    """Return what is seen in the picture of the onsets, without its numbers."""
+    laws = ", ".join(dict.fromkeys(one.onset.law for one in found))
+    return f"Stiffness at which limit cycles begin, and what rules allow, over delay: {laws}."
 
 
 def onset_section(title: str, found: Sequence[Prediction], caption: str = "") -> Section:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import os
 import re
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import resources
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import asperity
@@ -54,13 +59,16 @@ class Picture:
     """A picture.
 
     Attributes:
-        source: data URI.
-        alt: what it shows, for who does not see it; by default the title of its section.
+        svg: SVG text of :func:`asperity.report.pictures.svg.svg_text`, which stands in the page as
+            it is: never words from elsewhere.
+        alt: what is seen, with its numbers, for who does not see it.
+        numbers: what it shows as JSON, for the script of the page; "[]" for nothing.
     """
 
     form: ClassVar[str] = "picture"
-    source: str
-    alt: str = ""
+    svg: str
+    alt: str
+    numbers: str = "[]"
 
 
 @dataclass(frozen=True)
@@ -97,12 +105,14 @@ class Row:
         kind: "best" is tinted, and bold in a terminal.
         id: for links to the row; may be empty.
         style: Rich's, in a terminal.
+        law: letter of the law that the row is of, if it can be hidden with it.
     """
 
     cells: Sequence[str | Cell]
     kind: str = ""
     id: str = ""
     style: str = ""
+    law: str = ""
 
 
 @dataclass(frozen=True)
@@ -174,18 +184,50 @@ class Page:
     footer: str = ""
 
 
+@dataclass(frozen=True)
+class Origin:
+    """Where a page comes from.
+
+    Attributes:
+        command: that made it, as a shell takes it; empty from Python.
+        content: digest of the result, see :func:`asperity.files.digest`; may be empty.
+    """
+
+    command: str = ""
+    content: str = ""
+
+
 def pairs(rows: Sequence[tuple[str, str]]) -> Table:
     """Return a table without headings: bold words, and what is said of each."""
     return Table((), [Row([Cell(word, "l"), words]) for word, words in rows])
 
 
-def pictured(
-    title: str, figure: Figure, caption: str, notes: Sequence[str] = (), level: int = 2
-) -> Section:
-    """Return a section that shows a figure."""
-    from asperity.report.pictures.style import data_uri
+def picture(figure: Figure, seen: str, dpi: int = 160) -> Picture:
+    """Return a figure as a picture, with its numbers.
 
-    return Section(title, [Picture(data_uri(figure))], caption, notes, level)
+    Args:
+        figure: the figure.
+        seen: what is seen, in a sentence or two; what the lines and colours range over is added.
+        dpi: of what in it is drawn as pixels.
+    """
+    from asperity.report.pictures.readings import panels_json, panels_of, ranges_text
+    from asperity.report.pictures.svg import svg_text
+
+    svg = svg_text(figure, dpi)  # draws it, after which it is known where the panels are
+    panels = panels_of(figure)
+    return Picture(svg, seen + ranges_text(panels), panels_json(panels))
+
+
+def pictured(
+    title: str,
+    figure: Figure,
+    seen: str,
+    caption: str = "",
+    notes: Sequence[str] = (),
+    level: int = 2,
+) -> Section:
+    """Return a section that shows a figure; see :func:`picture`."""
+    return Section(title, [picture(figure, seen)], caption, notes, level)
 
 
 def holds_cell(holds: bool | None) -> Cell:
@@ -227,13 +269,44 @@ def added_sections(result: type, *arguments: Any) -> list[Section]:
 # --- HTML -----------------------------------------------------------------------------------------
 
 
-def page_html(page: Page) -> str:
-    """Return the page as HTML; nothing is loaded from elsewhere; light, dark and print."""
-    environment = _environment()
+def page_html(page: Page, origin: Origin | None = None) -> str:
+    """Return the page as HTML; nothing is loaded from elsewhere; light, dark and print.
+
+    Args:
+        page: what it says.
+        origin: of what it says, for its foot.
+    """
     # Blanks that mean nothing make no page larger.
-    style = re.sub(r"\s*([{};])\s*", r"\1", environment.get_template("style.css").render())
-    template = environment.get_template("page.html.j2")
-    return template.render(page=page, style=style, version=asperity.__version__)
+    style = re.sub(r"\s*([{};])\s*", r"\1", _file("style.css"))
+    script = _file("page.js")
+    return (
+        _environment()
+        .get_template("page.html.j2")
+        .render(
+            page=page, style=style, script=script, allowed=_sha256(script),
+            version=asperity.__version__, date=_date(), origin=origin or Origin(),
+        )
+    )  # fmt: skip
+
+
+def _file(name: str) -> str:
+    return resources.files("asperity.report").joinpath("templates", name).read_text("utf-8")
+
+
+def _sha256(script: str) -> str:
+    """Return the digest by which a content security policy knows the one script of the page."""
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
+
+
+def _date() -> str:
+    """Return the day (UTC), or that of SOURCE_DATE_EPOCH, so that a page can be made again.
+
+    Reference:
+        https://reproducible-builds.org/specs/source-date-epoch
+    """
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
+    seconds = int(epoch) if epoch.isdecimal() and len(epoch) < 12 else time.time()
+    return time.strftime("%Y-%m-%d", time.gmtime(seconds))
 
 
 @lru_cache(maxsize=1)

@@ -169,4 +169,8 @@ def _pictures(setup: Setup, run: Run) -> list[Section]:
         "held force on the true motion; the paper's sum multiplies command and step of the same "
         "sample, which turns the sign of what sampling adds."
     )
-    return [pictured("Motion, force, energy, phase", run_figure(setup, run), caption)]
+    seen = (
+        f"Height, force and energy over {engineering(run.duration, 's')}, the path, and two phase "
+        f"portraits. In the end the texture has supplied {energy(run.ledger.total)}."
+    )
+    return [pictured("Motion, force, energy, phase", run_figure(setup, run), seen, caption)]

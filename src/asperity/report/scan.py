@@ -51,7 +51,9 @@ def _cells(stroke: Stroke) -> Cells:
 
 
 def _table(found: Sequence[Stroke]) -> page.Table:
-    return page.Table(HEADINGS, [Row(_cells(one)) for one in found], range(1, len(HEADINGS)))
+    return page.Table(
+        HEADINGS, [Row(_cells(one), law=one.law) for one in found], range(1, len(HEADINGS))
+    )
 
 
 def answer(found: Sequence[Stroke]) -> str:
@@ -94,12 +96,14 @@ def scan_page(setup: Setup, found: Sequence[Stroke]) -> Page:
         "Energy that the texture supplies per stroke: black the sum, orange along x, blue along z. "
         "Above the line it feeds the hand."
     )
+    laws = ", ".join(dict.fromkeys(stroke.law for stroke in found))
+    seen = f"Energy of a stroke over its speed, a panel for each of the laws {laws}."
     return Page(
         title=f"What a stroke gains, {setup.device.name}",
         answer=answer(found),
         facts=facts_of_loop(setup),
         sections=[
-            pictured("Energy per stroke", scan_figure(found), caption),
+            pictured("Energy per stroke", scan_figure(found), seen, caption),
             Section("In numbers", [_table(found)], notes=NOTES),
             *added_sections(Stroke, setup, found),
             *assumed(setup.assumptions),

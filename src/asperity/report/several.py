@@ -102,6 +102,7 @@ def _case(one: Comparison) -> page.Section:
         page.Row(
             [page.Cell(row.law.letter, "l"), start_text(row), tier_text(row.felt), row.verdict],
             "best" if row is one.recommended_row else "",
+            law=row.law.letter,
         )
         for row in one.rows
     ]

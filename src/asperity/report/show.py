@@ -113,13 +113,16 @@ def _pictures(shown: Shown) -> list[page.Section]:
 
     if not shown.changes:
         figure = heights_figure({"heights": thinned(shown.prepared.heights)}, shown.sides)
-        return [page.pictured("The surface", figure, "As it was prepared.")]
+        seen = f"The surface as it was prepared: {summary(shown.prepared)}."
+        return [page.pictured("The surface", figure, seen, "As it was prepared.")]
     made = []
     for number, change in enumerate(shown.changes):
         words = f"Before, after, and what the step took away: {taken_text(change.stage)}"
         title = change.stage.name[0].upper() + change.stage.name[1:]
         figure = step_figure(change)
-        made.append(page.pictured(title, figure, words, level=3 if number else 2))
+        made.append(
+            page.pictured(title, figure, f"{title}. {words}.", words, level=3 if number else 2)
+        )
     return made
 
 

@@ -11,7 +11,7 @@ from rich.console import Console
 from asperity.arguments import Argument
 from asperity.errors import ParameterError, nearest_names
 from asperity.report import page, terminal
-from asperity.report.page import Cards, Cell, Page, Picture, Row, Section, Words, added_sections
+from asperity.report.page import Cards, Cell, Page, Row, Section, Words, added_sections, picture
 from asperity.report.terminal import say
 from asperity.textures.catalogue import CATALOGUE
 from asperity.textures.library import LIBRARY
@@ -194,7 +194,6 @@ def surfaces_page(listed: Sequence[Listed]) -> Page:
 
 
 def _card(one: Listed) -> Section:
-    from asperity.report.pictures.style import png_uri
     from asperity.report.pictures.surface_picture import gallery_figure
 
     kind = one.kind
@@ -204,7 +203,7 @@ def _card(one: Listed) -> Section:
         name = Cell(f"{argument.name}{unit}", "mono")
         rows.append(Row([name, argument.default_text, _words_of(argument)]))
     blocks: list[page.Block] = [
-        Picture(png_uri(gallery_figure(one.texture)), f"{kind.name}: {kind.summary}"),
+        picture(gallery_figure(one.texture), f"{kind.name}: {kind.summary}.", dpi=110),
         Words(f"{one.size_text}, {one.height_text} from peak to valley", "note"),
         Words(f"asperity compare {_quoted(one.specification)}", "mono"),
         page.Table(("argument", "default", "what it is"), rows),

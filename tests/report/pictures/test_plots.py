@@ -56,7 +56,7 @@ def test_filled_places_are_pale_in_the_picture() -> None:
     filled = np.zeros((40, 60), dtype=bool)
     filled[:, 30:] = True
     pictures = [
-        plot(asp.HeightMap(heights, 1e-4, filled=mask)).axes[0].images[0].get_array()
+        plot(asp.HeightMap(heights, 1e-4, filled=mask)).axes[0].images[-1].get_array()
         for mask in (None, filled)
     ]
     change = np.abs(np.asarray(pictures[1]) - np.asarray(pictures[0])).max(axis=2)

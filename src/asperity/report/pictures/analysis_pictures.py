@@ -44,7 +44,9 @@ _FLATTEST = 2.4
 _AROUND = 1.9
 _GRAPH = 3.6  # height of a graph [inch]
 _CELLS = (200, 110)
-_HALO = [withStroke(linewidth=4.0, foreground="white")]
+# What lies on a field has colours that stay in the dark.
+_BLUE, _WHITE = style.on_field(style.BLUE), style.on_field(style.CARD)
+_HALO = [withStroke(linewidth=4.0, foreground=_WHITE)]
 # Where the numbers of a picture grow without bound it is cut off here.
 _HIGHEST = 1e3
 _ARROWS = 5
@@ -105,7 +107,7 @@ def draw_field(figure: Part, analysis: Analysis) -> None:
     axes = draw_fields(figure, [analysis.surface], [remark], window)[0]
     for arrows in axes.findobj(Quiver):
         # Seen on the darkest curl, too.
-        arrows.set_path_effects([withStroke(linewidth=1.2, foreground="white")])
+        arrows.set_path_effects([withStroke(linewidth=1.2, foreground=_WHITE)])
     wide, high = window.units
     if not _is_true(window):
         axes.set_aspect("auto")
@@ -126,12 +128,12 @@ def _is_true(window: Window) -> bool:
 def _draw_loop(axes: Axes, x: FloatArray, z: FloatArray) -> None:
     """Draw a closed polygon with arrows that tell its sense."""
     x, z = np.append(x, x[0]), np.append(z, z[0])
-    axes.plot(x, z, color=style.BLUE, lw=1.6, zorder=5.0, path_effects=_HALO)
+    axes.plot(x, z, color=_BLUE, lw=1.6, zorder=5.0, path_effects=_HALO)
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     steps = np.hypot(np.diff(x) / (right - left), np.diff(z) / (high - low))
     seen = (np.maximum(x[1:], x[:-1]) > left) & (np.minimum(x[1:], x[:-1]) < right)
     passed = np.concatenate([[0.0], np.cumsum(np.where(seen, steps, 0.0))])
-    arrow = {"arrowstyle": "-|>", "color": style.BLUE, "lw": 1.6, "mutation_scale": 14}
+    arrow = {"arrowstyle": "-|>", "color": _BLUE, "lw": 1.6, "mutation_scale": 14}
     for part in (np.arange(_ARROWS) + 0.5) / _ARROWS:
         ways = part * passed[-1] + np.array([-0.004, 0.004])
         start, end = zip(np.interp(ways, passed, x), np.interp(ways, passed, z), strict=True)
@@ -148,7 +150,9 @@ def _pale(axes: Axes, analysis: Analysis, window: Window, field: CurlField) -> N
     wide, high = window.units
     places = (field.along * wide.scale, field.z * high.scale)
     axes.contourf(*places, beyond, [0.0, math.inf], colors=[style.FREE], alpha=0.8, zorder=4.5)
-    axes.contour(*places, beyond, [0.0], colors=[style.SOFT], linewidths=0.9, zorder=4.6)
+    axes.contour(
+        *places, beyond, [0.0], colors=[style.on_field(style.SOFT)], linewidths=0.9, zorder=4.6
+    )
 
 
 def _along_text(window: Window) -> str:
@@ -200,9 +204,9 @@ def _gain_remark(analysis: Analysis) -> str:
 
 def _mark(axes: Axes, x: float, y: float) -> None:
     """Draw a cross that is seen on dark and on light."""
-    halo = [Stroke(linewidth=5.0, foreground="white"), withStroke(linewidth=2.0)]
-    axes.plot(x, y, "x", color=style.BLUE, ms=10, mew=2.2, zorder=7, path_effects=halo[:1])
-    axes.plot(x, y, "x", color=style.BLUE, ms=10, mew=2.2, zorder=8, clip_on=False)
+    halo = [Stroke(linewidth=5.0, foreground=_WHITE), withStroke(linewidth=2.0)]
+    axes.plot(x, y, "x", color=_BLUE, ms=10, mew=2.2, zorder=7, path_effects=halo[:1])
+    axes.plot(x, y, "x", color=_BLUE, ms=10, mew=2.2, zorder=8, clip_on=False)
 
 
 def draw_top(figure: Part, analysis: Analysis) -> None:
@@ -225,7 +229,7 @@ def draw_top(figure: Part, analysis: Analysis) -> None:
         line = analysis.leak.line
         start = np.array([x, y])
         axes.axline(
-            tuple(start), tuple(start + line.direction), color=style.BLUE, lw=0.8, ls=":", zorder=3
+            tuple(start), tuple(start + line.direction), color=_BLUE, lw=0.8, ls=":", zorder=3
         )
         axes.set_xlim(x0, x1)
         axes.set_ylim(y0, y1)
@@ -304,7 +308,9 @@ def draw_jumps(figure: Part, analysis: Analysis) -> None:
     size = np.array([jump.size for jump in jumps])
     wide, high = style.length_unit(float(depth.max())), style.force_unit(float(size.max()))
     axes = style.panel(figure)
-    axes.plot(depth * wide.scale, size * high.scale, "o-", color=style.BLUE, lw=1.0, ms=5.5)
+    axes.plot(
+        depth * wide.scale, size * high.scale, "o-", color=style.BLUE, lw=1.0, ms=5.5, label="jump"
+    )
     axes.set_xlim(0.0, 1.05 * max(float(depth.max()), 1e-12) * wide.scale)
     axes.set_ylim(0.0, 1.12 * float(size.max()) * high.scale)
     axes.grid(color=style.FAINT, lw=0.5)

@@ -38,12 +38,13 @@ def cycles_figure(found: PassivityExperiment) -> Figure:
 def _draw_count(axes: Axes, count: Count) -> None:
     axes.axhspan(-100.0, 0.0, color=style.BODY, alpha=0.5, lw=0.0, zorder=0.0)
     colour = style.ORANGE if count.cycles else style.BLUE
-    axes.plot(count.time, 1e3 * count.z, color=colour, lw=0.8)
+    axes.plot(count.time, 1e3 * count.z, color=colour, lw=0.8, label="height")
     axes.set_ylim(-13.0, 6.5)
     name = count.law if count.divisor == 1.0 else f"{count.law}/{count.divisor:g}"
     words = f"{count.cycles} of {count.starts} starts cycle"
     if count.slow:
         words += f", {count.slow} calm down slowly"
+    style.of_law(axes, count.law)
     style.entitle(axes, name, engineering(round(count.stiffness), "N/m"), words)
 
 
@@ -63,6 +64,7 @@ def energies_figure(found: ScanningExperiment) -> Figure:
             axes.plot(trace.time, summed, color=colour, lw=0.9, ls="--", label=f"{name}, paper's")
         style.zero_line(axes, 0.5)
         style.entitle(axes, trace.law, "")
+        style.of_law(axes, trace.law)
     style.legend(panels[0])
     return figure
 

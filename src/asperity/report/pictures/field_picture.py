@@ -129,6 +129,7 @@ def draw_fields(
         _draw_outline(axes, surface, scene)
         remark = remarks[index] if index < len(remarks) else ""
         style.entitle(axes, surface.law.letter, law_title(surface.law.name), remark)
+        style.of_law(axes, surface.law.letter)
     _finish(figure, panels, scene, (mesh, quiver))
     return panels
 
@@ -178,7 +179,7 @@ def _draw_arrows(axes: Axes, field: PlaneForces, scene: _Scene) -> Any:
         headlength=4.5,
         headaxislength=4.0,
         minlength=0.6,
-        color=style.INK,
+        color=style.on_field(style.INK),
         zorder=4,
     )
 
@@ -191,12 +192,13 @@ def _draw_outline(axes: Axes, surface: Surface, scene: _Scene) -> None:
     heights = surface.texture.height(xy) * scene.high.scale
     contact = surface.law.contact
     felt = contact.begins_on_texture
-    axes.plot(x, heights, color=style.INK, linewidth=1.3, linestyle="-" if felt else ":")
+    ink, green = style.on_field(style.INK), style.on_field(style.GREEN)
+    axes.plot(x, heights, color=ink, linewidth=1.3, linestyle="-" if felt else ":")
     if not felt:
         tops = contact.begin(surface.texture, xy) * scene.high.scale
-        axes.plot(x, tops, color=style.INK, linewidth=1.3)
+        axes.plot(x, tops, color=ink, linewidth=1.3)
     axes.axhline(
-        scan_height(surface) * scene.high.scale, color=style.GREEN, linewidth=1.0, linestyle="--"
+        scan_height(surface) * scene.high.scale, color=green, linewidth=1.0, linestyle="--"
     )
 
 
@@ -222,6 +224,7 @@ def _finish(figure: Figure | SubFigure, panels: list[Axes], scene: _Scene, drawn
         force,
         f"{force * unit.scale:g} {unit.name}",
         labelpos="W",
+        color=style.INK,
         fontproperties={"size": style.TICK},
         labelcolor=style.INK,
     )

@@ -81,6 +81,7 @@ def _draw_panel(
     axes.plot(x, force.normal * unit.scale, color=style.ORANGE, linewidth=1.3, label="normal")
     axes.plot(x, force.tangential * unit.scale, color=style.BLUE, linewidth=1.3, label="tangential")
     style.entitle(axes, surface.law.letter, law_title(surface.law.name))
+    style.of_law(axes, surface.law.letter)
     axes.set_title(
         f"z = {engineering(scan_height(surface), 'm', digits=2)}",
         loc="right",

@@ -38,6 +38,7 @@ def gain_figure(comparison: Comparison) -> Figure:
     for axes, row, field in zip(panels, comparison.rows, fields, strict=True):
         mesh = draw_gain_field(axes, field, scale, (wide, high))
         style.entitle(axes, row.law.letter, law_title(row.law.name), f"q = {bound_text(row.q)}")
+        style.of_law(axes, row.law.letter)
         _draw_witness(axes, row, stretch, (wide, high))
         axes.set_ylim(bottom * high.scale, top * high.scale)
     gain_bar(figure, mesh, panels, "‖J‖ / k: loop gain over that of the smooth wall [1]")
@@ -55,7 +56,7 @@ def _draw_witness(
     aside = float(np.linalg.norm(offset - along * stretch.line.direction))
     if 0.0 <= along <= stretch.length and aside < 0.01 * stretch.length:
         x, y = along * units[0].scale, row.q.at[2] * units[1].scale
-        axes.plot(x, y, "x", color=style.BLUE, ms=7, mew=2, zorder=5)
+        axes.plot(x, y, "x", color=style.on_field(style.BLUE), ms=7, mew=2, zorder=5)
 
 
 def draw_gain_field(

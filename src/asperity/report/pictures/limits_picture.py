@@ -33,7 +33,7 @@ def limits_figure(result: Limits) -> Figure:
         axes.set_xscale("log")
         axes.set_yscale("log")
     if not result.waves:
-        upper.annotate("flat: no waves", (0.5, 0.5), xycoords="axes fraction", ha="center")
+        style.note(upper, "flat: no waves", (0.5, 0.5), ha="center")
         return figure
     lengths = np.array([wave.wavelength for wave in result.waves])
     heights = np.array([wave.amplitude for wave in result.waves])
@@ -75,9 +75,12 @@ def _draw_waves(
     else:
         axes.plot(lengths[shown] * _MILLI, values[shown], color=style.BLUE, lw=0.9)
     filled = np.array(met)
-    for which, face in ((shown & filled, style.BLUE), (shown & ~filled, style.CARD)):
+    for which, face, name in (
+        (shown & filled, style.BLUE, "meets every limit"),
+        (shown & ~filled, style.CARD, "breaks a limit"),
+    ):
         x = lengths[which] * _MILLI
-        axes.plot(x, values[which], "o", ms=5.0, mfc=face, mec=style.BLUE, zorder=4.0)
+        axes.plot(x, values[which], "o", ms=5.0, mfc=face, mec=style.BLUE, zorder=4.0, label=name)
     axes.set_ylim(floor, top * 4.0)
 
 

@@ -21,8 +21,10 @@ def merit_figure(comparison: Comparison) -> Figure:
     for row in comparison.rows:
         sound = row.conservative and row.continuous
         x, y = row.strength * scale, row.support
-        axes.plot(x, y, "o", ms=8, color=style.GREEN if sound else style.ORANGE, clip_on=False)
-        axes.annotate(
+        colour = style.GREEN if sound else style.ORANGE
+        name = f"_{row.law.letter}"
+        (point,) = axes.plot(x, y, "o", ms=8, color=colour, clip_on=False, label=name)
+        letter = axes.annotate(
             row.law.letter,
             (x, y),
             xytext=(0, 7),
@@ -32,6 +34,8 @@ def merit_figure(comparison: Comparison) -> Figure:
             color=style.INK,
             fontweight="bold" if row is comparison.recommended_row else "normal",
         )
+        for artist in (point, letter):
+            style.of_law(artist, row.law.letter)
     axes.set_xlim(0.0, 1.15 * widest)
     axes.set_ylim(0.0, 1.15)
     axes.grid(color=style.FAINT, lw=0.5)

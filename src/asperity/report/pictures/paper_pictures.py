@@ -39,6 +39,7 @@ def figure_two(panels: Sequence[ForceField] | None = None) -> Figure:
         style.dress(axes)
         _draw_body(axes, panel)
         _draw_forces(axes, panel)
+        style.of_law(axes, panel.law)
         start = "flat wall" if _is_flat(panel.law) else "texture"
         style.entitle(axes, panel.law, law_title(panel.name), f"depth below the {start}")
         style.label(
@@ -145,6 +146,7 @@ def figure_three(panels: Sequence[LoopEnergy] | None = None) -> Figure:
         path, work = places[2 * number], places[2 * number + 1]
         for axes in (path, work):
             style.dress(axes)
+            style.of_law(axes, panel.law)
         lowest = number + 2 >= len(panels)
         _draw_path(path, panel)
         _draw_work(work, panel)
@@ -173,7 +175,8 @@ def _draw_path(axes: Axes, panel: LoopEnergy) -> None:
 
 def _draw_work(axes: Axes, panel: LoopEnergy) -> None:
     way, work = panel.way * _MILLI, panel.work * _MICRO
-    axes.plot(way, work, color=style.BLUE, lw=1.3)
+    axes.set_label(panel.law)
+    axes.plot(way, work, color=style.BLUE, lw=1.3, label="energy")
     axes.plot(way[-1:], work[-1:], "o", color=style.BLUE, ms=4.0, clip_on=False)
     style.zero_line(axes, _LEAST)
     axes.set_title(energy_words(panel), loc="left", fontsize=style.LABEL, color=style.SOFT, pad=5.0)

@@ -107,7 +107,9 @@ def _draw_path(axes: Axes, setup: Setup, run: Run, shown: slice) -> None:
         line[:, i] * wide.scale, height * high.scale, floor * high.scale, color=style.BODY,
         lw=0.0, alpha=0.7,
     )  # fmt: skip
-    axes.plot(place[:, i] * wide.scale, place[:, 2] * high.scale, color=style.BLUE, lw=0.7)
+    axes.plot(
+        place[:, i] * wide.scale, place[:, 2] * high.scale, color=style.BLUE, lw=0.7, label="path"
+    )
     style.label(axes, f"{_AXES[i]} [{wide.name}]", f"z [{high.name}]")
     style.entitle(axes, "Path", f"in the {_AXES[i]}-z plane")
 
@@ -117,7 +119,7 @@ def _draw_phase(axes: Axes, run: Run, i: int, shown: slice) -> None:
     unit = style.length_unit(float(np.abs(place).max()))
     fast = style.length_unit(float(np.abs(speed).max()))
     last = len(place) - max(len(place) // 4, 1)
-    axes.plot(place * unit.scale, speed * fast.scale, color=style.FAINT, lw=0.6)
+    axes.plot(place * unit.scale, speed * fast.scale, color=style.FAINT, lw=0.6, label="phase")
     axes.plot(place[last:] * unit.scale, speed[last:] * fast.scale, color=style.BLUE, lw=0.8)
     style.label(axes, f"{_AXES[i]} [{unit.name}]", f"d{_AXES[i]}/dt [{fast.name}/s]")
     style.entitle(axes, "Phase", f"along {_AXES[i]}, last quarter blue")

@@ -75,10 +75,22 @@ def spectrum_figure(texture: Texture, device: Device) -> Figure:
     unit = style.length_unit(float(amplitude.max()))
     limits = device_limits(device)
     if shown.sum() > 40:
-        axes.plot(wavelength[shown] * 1e3, amplitude[shown] * unit.scale, color=style.BLUE, lw=1.0)
+        axes.plot(
+            wavelength[shown] * 1e3,
+            amplitude[shown] * unit.scale,
+            color=style.BLUE,
+            lw=1.0,
+            label="amplitude",
+        )
     else:
         axes.vlines(wavelength[shown] * 1e3, 0.0, amplitude[shown] * unit.scale, color=style.BLUE)
-        axes.plot(wavelength[shown] * 1e3, amplitude[shown] * unit.scale, "o", color=style.BLUE)
+        axes.plot(
+            wavelength[shown] * 1e3,
+            amplitude[shown] * unit.scale,
+            "o",
+            color=style.BLUE,
+            label="amplitude",
+        )
     axes.set_xscale("log")
     axes.set_yscale("log")
     for index, (least, words) in enumerate(sorted(limits)):

@@ -57,7 +57,7 @@ def _draw_line(axes: Axes, heights: FloatArray, length: float, title: str) -> No
     known = heights[~np.isnan(heights)]
     high = style.length_unit(float(np.ptp(known)))
     along = np.linspace(0.0, length * wide.scale, len(heights))
-    axes.plot(along, heights * high.scale, color=style.INK, linewidth=0.8)
+    axes.plot(along, heights * high.scale, color=style.INK, linewidth=0.8, label="height")
     axes.set_xlim(along[0], along[-1])
     style.dress(axes)
     style.label(axes, "", f"height [{high.name}]")

@@ -1,27 +1,34 @@
-"""One look for every picture: colours, type sizes, units, and writing as SVG."""
+"""One look for every picture: colours, type sizes, units."""
 
 from __future__ import annotations
 
-import base64
-import io
 import math
-import re
 from dataclasses import dataclass
 from typing import Any
 
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure, SubFigure
 
 CARD = "#ffffff"
-"""Background of every picture, light in both themes."""
+"""Background of every picture."""
 FREE = "#eceef1"
-"""Free space: where the probe touches nothing."""
+"""Free space in a field: where the probe touches nothing."""
 INK, SOFT, FAINT = "#1d2733", "#5b6673", "#c9ced6"
 BODY = "#d9cdb8"
 # Okabe and Ito's palette: told apart by colour-blind readers.
 BLUE, ORANGE, GREEN = "#0072b2", "#d55e00", "#009e73"
+THEMED = {
+    CARD: "card", INK: "ink", "#000000": "ink", SOFT: "soft", FAINT: "faint", BODY: "body",
+    BLUE: "blue", ORANGE: "orange", GREEN: "green",
+}  # fmt: skip
+"""The colours that follow the theme of a page: names of the variables that stand for them.
+
+Their values in the dark are in ``templates/style.css``; in the light, in print and in a file of its
+own a picture has the colours above.
+"""
 TITLE, LABEL, TICK = 10.0, 9.0, 8.0
 HEIGHTS = "cividis"
 
@@ -30,6 +37,19 @@ CURL = LinearSegmentedColormap.from_list(
     "asperity_curl",
     ["#4d1a6b", "#8073ac", "#c5bfdf", "#ffffff", "#fbc98a", "#e08214", "#7f3b08"],
 )
+
+
+def on_field(colour: str) -> str:
+    """Return a colour of the palette for what lies on a field, which is as light in the dark.
+
+    It is off by one part in 255, so that no variable stands for it.
+
+    Example:
+        >>> on_field("#1d2733"), on_field("#ffffff")
+        ('#1d2732', '#fffffe')
+    """
+    value = int(colour[1:], 16)
+    return f"#{value - 1 if value & 1 else value + 1:06x}"
 
 
 @dataclass(frozen=True)
@@ -168,8 +188,18 @@ def note(axes: Axes, words: str, place: tuple[float, float], **options: Any) -> 
     axes.annotate(words, place, **{**defaults, **options})
 
 
+LAW = "law-"
+"""Begins the ``gid`` of what belongs to one law; the rest is its letter."""
+
+
+def of_law(artist: Artist, letter: str) -> None:
+    """Say that an artist, or axes with all in them, is of one law: a page can hide it."""
+    artist.set_gid(f"{LAW}{letter}")
+
+
 def entitle(axes: Axes, letter: str, name: str, remark: str = "") -> None:
     """Write a title: the letter bold, the name after it, and a remark below them."""
+    axes.set_label(f"{letter}, {name}" if name else letter)
     above = TICK + 6.0 if remark else 0.0
     if remark:
         axes.set_title(remark, loc="left", fontsize=TICK, color=SOFT, pad=5.0)
@@ -193,36 +223,6 @@ def _above(axes: Axes, text: str, right: float, up: float, **style: Any) -> None
     )
 
 
-def svg_text(figure: Figure) -> str:
-    """Return the figure as SVG, the same text for the same figure."""
-    buffer = io.BytesIO()
-    options: dict[str, Any] = {"facecolor": CARD, "metadata": {"Date": None, "Creator": None}}
-    figure.savefig(buffer, format="svg", dpi=160, **options)
-    text = buffer.getvalue().decode("utf-8")
-    # A page needs no prologue, no words about the file and no indentation.
-    text = re.sub(r"\s*<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
-    text = re.sub(r"\n +", "\n", text)
-    # Matplotlib draws its identifiers at random; numbered in order, the text is reproducible.
-    found = dict.fromkeys(re.findall(r'id="((?:image|[a-zA-Z])[0-9a-f]{10})"', text))
-    for number, identifier in enumerate(found):
-        text = text.replace(identifier, f"i{number}")
-    return text
-
-
-def data_uri(figure: Figure) -> str:
-    """Return the figure as a data URI for an HTML image."""
-    encoded = base64.b64encode(svg_text(figure).encode("utf-8")).decode("ascii")
-    return f"data:image/svg+xml;base64,{encoded}"
-
-
-def png_uri(figure: Figure) -> str:
-    """Return the figure as a data URI of its pixels, which many small pictures share well."""
-    buffer = io.BytesIO()
-    options: dict[str, Any] = {"metadata": {"Software": None}, "pil_kwargs": {"optimize": True}}
-    figure.savefig(buffer, format="png", dpi=110, facecolor=CARD, **options)
-    return f"data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode('ascii')}"
-
-
 def label(axes: Axes, x: str = "", y: str = "") -> None:
     """Name the axes, unit included."""
     axes.set_xlabel(x, fontsize=LABEL, color=SOFT)
@@ -233,4 +233,5 @@ def dress_bar(bar: Any, text: str) -> None:
     """Give a colour bar the common look."""
     bar.ax.tick_params(labelsize=TICK, colors=SOFT, length=3, width=0.6)
     bar.outline.set_edgecolor(FAINT)
+    bar.solids.set_rasterized(True)  # its colours are data, whatever the theme
     bar.set_label(text, fontsize=LABEL, color=SOFT)

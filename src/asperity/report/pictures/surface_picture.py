@@ -8,7 +8,6 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, LightSource, LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure, SubFigure
 
@@ -87,7 +86,7 @@ def draw_section(axes: Axes, texture: Texture, stretch: Stretch) -> None:
     low, top = float(z.min()), float(z.max())
     margin = 0.12 * max(top - low, 1e-9)
     axes.fill_between(x, z, low - 3.0 * margin, color=style.BODY, linewidth=0.0)
-    axes.plot(x, z, color=style.INK, linewidth=1.1)
+    axes.plot(x, z, color=style.INK, linewidth=1.1, label="height")
     axes.set_xlim(x[0], x[-1])
     axes.set_ylim(low - 3.0 * margin, top + margin)
     axes.set_facecolor(style.CARD)
@@ -109,13 +108,15 @@ def _draw_map(figure: Figure | SubFigure, axes: Axes, texture: Texture) -> None:
     norm = Normalize(float(heights.min()) * high.scale, float(heights.max()) * high.scale)
     colours = matplotlib.colormaps[style.HEIGHTS]
     shaded = _greyed(_relief(heights, grid.size, colours, steepest=1.0, altitude=50.0), texture)
+    # Covered by the relief: what the colour bar and the reader of numbers know of the heights.
+    known = axes.imshow(heights * high.scale, colours, norm, origin="lower", extent=frame)
     axes.imshow(shaded, origin="lower", extent=frame, interpolation="bilinear")
     axes.set_anchor("W")
     style.dress(axes)
     style.label(axes, f"x [{wide.name}]", f"y [{wide.name}]")
     _draw_scan_line(axes, texture, wide)
     _draw_scale_bar(axes, float(grid.size[0]))
-    bar: Any = figure.colorbar(ScalarMappable(norm, colours), ax=axes, pad=0.02, aspect=18)
+    bar: Any = figure.colorbar(known, ax=axes, pad=0.02, aspect=18)
     style.dress_bar(bar, f"height [{high.name}]")
 
 
@@ -215,7 +216,7 @@ def _draw_card_section(axes: Axes, texture: Texture) -> None:
     x, z = along * wide.scale, heights * high.scale
     margin = 0.15 * float(np.ptp(z))
     axes.fill_between(x, z, z.min() - margin, color=style.BODY, linewidth=0.0)
-    axes.plot(x, z, color=style.INK, linewidth=0.9)
+    axes.plot(x, z, color=style.INK, linewidth=0.9, label="height")
     axes.set_xlim(x[0], x[-1])
     axes.set_ylim(float(z.min()) - margin, float(z.max()) + margin)
     style.dress(axes)

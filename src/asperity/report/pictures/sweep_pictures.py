@@ -38,6 +38,7 @@ def onset_figure(found: Sequence[Prediction]) -> Figure:
         for name, (values, look) in lines.items():
             axes.plot([one.onset.delay for one in mine], _finite(values), label=name, **look)
         style.entitle(axes, law, "conservative" if proved else "not conservative: no proof")
+        style.of_law(axes, law)
     style.legend(panels[0])
     return figure
 
@@ -64,6 +65,7 @@ def scan_figure(found: Sequence[Stroke]) -> Figure:
         style.zero_line(axes, least)  # what is nothing looks like nothing
         axes.xaxis.set_major_locator(MaxNLocator(5))
         style.entitle(axes, law, "")
+        style.of_law(axes, law)
     style.legend(panels[0])
     return figure
 
@@ -74,9 +76,10 @@ def _draw_law(axes: Axes, strokes: Sequence[Stroke]) -> None:
     for depth, dashes in zip(depths, _DASHES * len(depths), strict=False):
         mine = [one for one in strokes if one.depth == depth]
         speeds = [one.speed for one in mine]
+        name = f"{engineering(depth, 'm', digits=3)} deep"
         for i, colour in ((0, style.ORANGE), (2, style.BLUE)):
             values = [1e3 * one.energy[i] for one in mine]
-            axes.plot(speeds, values, dashes, color=colour, lw=0.9)
-        name = f"{engineering(depth, 'm', digits=3)} deep"
+            along = f"_{'xyz'[i]}, {name}"
+            axes.plot(speeds, values, dashes, color=colour, lw=0.9, label=along)
         values = [1e3 * one.total for one in mine]
         axes.plot(speeds, values, dashes, color=style.INK, lw=1.5, marker="o", ms=3.0, label=name)
