@@ -1,0 +1,207 @@
+"""The script of a page, run in a browser; not run where there is none."""
+
+from __future__ import annotations
+
+import csv
+import html
+import io
+import json
+import re
+import shutil
+import subprocess
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from tests.report.pages import Reader
+
+import asperity as asp
+from asperity.report import html_text
+from asperity.report.page import Page, page_html, pictured
+from asperity.report.pictures import style
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+BROWSER = next((found for found in map(shutil.which, NAMES) if found), None)
+needs_browser = pytest.mark.skipif(BROWSER is None, reason="not run: no browser (chromium) here")
+
+
+def in_browser(page: str, path: Path) -> str:
+    """Return the page as it is once its scripts have run."""
+    path.write_text(page, "utf-8")
+    home = f"--user-data-dir={path.parent / 'browser'}"
+    how = (
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--virtual-time-budget=3000",
+        "--dump-dom",
+    )
+    command = [str(BROWSER), *how, home, "--window-size=1100,900", path.as_uri()]
+    done = subprocess.run(command, capture_output=True, check=True, timeout=120)
+    return done.stdout.decode("utf-8")
+
+
+def asked(page: str, path: Path, script: str) -> Any:
+    """Return what a script, run after the page's own, returns: the policy would not let it run."""
+    without = re.sub(r"<meta http-equiv[^>]*>", "", page)
+    asks = (
+        "<script>const told = (() => {" + script + "})();"
+        "document.body.append(Object.assign(document.createElement('pre'),"
+        "{id: 'told', textContent: JSON.stringify(told)}))</script></body>"
+    )
+    dom = in_browser(without.replace("</body>", asks), path)
+    found = re.search(r'<pre id="told">(.*?)</pre>', dom, re.DOTALL)
+    assert found is not None, "the script stopped"
+    return json.loads(html.unescape(found[1]))
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    return html_text(asp.compare(asp.Sinusoid(0.2e-3, 2e-3), laws="WAC", max_depth=0.3e-3))
+
+
+@needs_browser
+def test_it_runs_under_the_policy_and_nothing_else_does(page: str, tmp_path: Path) -> None:
+    injected = page.replace("</body>", "<script>document.title = 'taken'</script></body>")
+    dom = in_browser(injected, tmp_path / "page.html")
+    assert dom.count('class="tools"') == 6
+    assert dom.count('type="checkbox"') == 3
+    assert "<title>taken" not in dom
+    assert "<title>Haptic texture on" in dom
+
+
+POINTER = """
+const figure = document.querySelectorAll("figure")[2], svg = figure.querySelector("svg");
+const panels = JSON.parse(figure.querySelector("script").textContent), panel = panels[1];
+const [x, y] = place(panel, values(panel.series[0].x)[100], panel.series[0].y[100]);
+const at = new DOMPoint(x, y).matrixTransform(svg.getScreenCTM());
+svg.dispatchEvent(new PointerEvent("pointermove", { clientX: at.x, clientY: at.y }));
+const box = figure.querySelector(".reading");
+const said = [...box.children].map((line) => line.textContent);
+const marks = svg.querySelectorAll(".marks circle").length;
+svg.dispatchEvent(new PointerEvent("pointerleave"));
+return [said, marks, box.hidden, panel];
+"""
+
+
+@needs_browser
+def test_the_pointer_reads_the_nearest_points(page: str, tmp_path: Path) -> None:
+    said, marks, hidden, panel = asked(page, tmp_path / "page.html", POINTER)
+    assert said[0] == panel["name"] == "A, groove wall normal"
+    assert said[1].startswith("along the scan line: ")
+    for line, series in zip(said[2:], panel["series"], strict=True):
+        words, value = line.replace("−", "-").split(": ")
+        assert words == series["name"]
+        assert float(value.split()[0]) == pytest.approx(series["y"][100], rel=1e-3)
+        assert value.split()[1] in ("N", "mN")
+    assert marks == 2
+    assert hidden is True
+
+
+ZOOM = """
+const svg = document.querySelectorAll("figure svg")[0], seen = [svg.getAttribute("viewBox")];
+const [plus, minus, whole] = svg.closest("figure").querySelectorAll(".tools button");
+const turn = (ctrlKey) => {
+  const event = new WheelEvent("wheel", { deltaY: -300, ctrlKey, cancelable: true });
+  svg.dispatchEvent(event);
+  seen.push(svg.getAttribute("viewBox"));
+  return event.defaultPrevented;
+};
+const trapped = [turn(false), turn(true)];
+const press = (key) => svg.dispatchEvent(new KeyboardEvent("keydown", { key, cancelable: true }));
+press("ArrowRight");
+for (const button of [null, minus, plus, whole]) {
+  button?.click();
+  seen.push(svg.getAttribute("viewBox"));
+}
+return [trapped, seen, press("ArrowDown")];
+"""
+
+
+@needs_browser
+def test_a_picture_is_enlarged_and_scrolling_is_left_alone(page: str, tmp_path: Path) -> None:
+    trapped, seen, free = asked(page, tmp_path / "page.html", ZOOM)
+    assert trapped == [False, True]
+    boxes = [[float(part) for part in one.split()] for one in seen]
+    first, plain, near, moved, less, more, whole = boxes
+    assert plain == first == whole
+    assert near[2] == pytest.approx(first[2] / np.e)
+    assert near[2] / near[3] == pytest.approx(first[2] / first[3])
+    assert moved[0] == pytest.approx(near[0] + 0.1 * near[2])
+    assert less[2] == pytest.approx(1.5 * near[2])
+    assert more[2] == pytest.approx(near[2])
+    assert free is True  # the whole picture leaves arrows to the page
+
+
+LAWS = """
+const box = document.querySelector('.laws input[name="A"]');
+box.click();
+const figures = [...document.querySelectorAll("figure")];
+const of = (figure) => JSON.parse(figure.querySelector("script").textContent);
+const hidden = [...document.querySelectorAll('[data-law="A"]')].map((one) =>
+  one.hidden || getComputedStyle(one).visibility === "hidden");
+const axes = [...document.querySelectorAll('[data-law="A"] .shared')].map((one) =>
+  getComputedStyle(one).visibility);
+const others = [...document.querySelectorAll('[data-law="C"]')].map((one) =>
+  one.hidden || getComputedStyle(one).visibility === "hidden");
+const csv = figures.map((figure) => csvFile(of(figure)));
+const svg = figures.map((figure) => svgFile(figure.querySelector("svg"), "0 0 1 1"));
+document.querySelectorAll(".laws button")[0].click();
+return { hidden, axes, others, csv, svg, again: csvFile(of(figures[2])) };
+"""
+
+
+@needs_browser
+def test_laws_are_hidden_and_what_is_seen_is_saved(page: str, tmp_path: Path) -> None:
+    told = asked(page, tmp_path / "page.html", LAWS)
+    assert len(told["hidden"]) >= 8  # rows of four tables, three panels, a point with its letter
+    assert all(told["hidden"])
+    assert not any(told["others"])
+    assert set(told["axes"]) == {"visible"}
+    forces = [*csv.reader(io.StringIO(told["csv"][2]))]
+    assert not [name for name in forces[0] if name.startswith("A")]
+    unit = forces[0][1].split()[-1]
+    assert forces[0][3:] == [
+        "C, change of height: along the scan line [mm]",
+        f"C, change of height: normal {unit}",
+        f"C, change of height: tangential {unit}",
+    ]
+    shown = Reader(page).numbers[2][2]["series"]
+    assert [float(row[4]) for row in forces[1:]] == shown[0]["y"]
+    assert "A, groove" in told["again"]
+    fields = [*csv.reader(io.StringIO(told["csv"][3]))]
+    assert fields[0][2].endswith("curl [N/m]")
+    assert all(np.isfinite([float(cell) for cell in fields[1][:3]]))
+    for text in told["svg"]:
+        root = ET.fromstring(text)
+        assert root.tag == "{http://www.w3.org/2000/svg}svg"
+        assert "var(" not in text
+        assert root[0].text  # its title: what is seen
+        assert "#1d2733" in text
+
+
+def three_scales() -> Figure:
+    figure = style.new_figure(8.0, 3.0)
+    for axes, scale in zip(figure.subplots(1, 3), ("linear", "log", "symlog"), strict=True):
+        axes.plot([0.02, 0.7, 30.0], [0.3, 2.0, 11.0], label="line")
+        axes.set_xscale(scale)
+        axes.set_yscale(scale)
+    return figure
+
+
+@needs_browser
+def test_points_lie_where_they_are_drawn_on_every_scale(tmp_path: Path) -> None:
+    figure = three_scales()
+    text = page_html(Page("title", "answer", [], [pictured("One", figure, "Three lines.")]))
+    script = """
+    const panels = JSON.parse(document.querySelector("figure script").textContent);
+    return panels.map((one) => one.series[0].x.map((x, i) => place(one, x, one.series[0].y[i])));
+    """
+    told = asked(text, tmp_path / "page.html", script)
+    drawn = re.findall(r'<path d="M ([^"]*)" clip-path', text)
+    for points, path in zip(told, drawn, strict=True):
+        numbers = np.array(re.findall(r"-?\d+\.?\d*", path), dtype=float).reshape(-1, 2)
+        assert np.abs(np.array(points) - numbers).max() < 0.01
