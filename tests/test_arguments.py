@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from asperity.arguments import MAX_DEPTH, STIFFNESS, Argument, Form, read_arguments
+from asperity.arguments import MAX_DEPTH, STIFFNESS, Argument, Form, described, read_arguments
 from asperity.errors import ParameterError
 from asperity.measured.arguments import FILE_ARGUMENTS, PREPARING
 from asperity.measured.preparation import prepare
@@ -128,3 +128,15 @@ def test_docstrings_list_what_is_declared() -> None:
         text = inspect.getdoc(function) or ""
         for argument in arguments:
             assert f"\n    {argument.name}: {argument.words}" in text
+
+
+@pytest.mark.parametrize("indent", ["    ", "        "])  # Python 3.13 takes that of the code away
+def test_a_list_stands_as_deep_as_its_mark(indent: str) -> None:
+    def function() -> None: ...
+
+    function.__doc__ = f"One.\n\n{indent}{{arguments}}\n{indent}last"
+    described((Argument("gain", "of the spring"), Argument("phase", "at 0", "rad")))(function)
+    lines = ["gain: of the spring.", "phase: at 0 [rad].", "last"]
+    assert function.__doc__ == "One.\n\n" + "\n".join(indent + line for line in lines)
+    function.__doc__ = None  # python -OO
+    assert described(())(function).__doc__ is None

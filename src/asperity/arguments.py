@@ -195,9 +195,11 @@ def described(arguments: Iterable[Argument]) -> Callable[[Function], Function]:
         lines.append(f"{argument.name}: {argument.words}{unit}{default}.")
 
     def describe(function: Function) -> Function:
-        if function.__doc__ is not None:  # which python -OO leaves out
-            text = "\n        ".join(lines)
-            function.__doc__ = function.__doc__.replace("{arguments}", text)
+        text = function.__doc__ or ""  # which python -OO leaves out
+        before, mark, after = text.partition("{arguments}")
+        if mark:
+            indent = before[before.rindex("\n") :]  # from Python 3.13 on without that of the code
+            function.__doc__ = before + indent.join(lines) + after
         return function
 
     return describe

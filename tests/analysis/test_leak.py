@@ -81,9 +81,11 @@ def test_conservative_laws_leak_nothing_by_theorem() -> None:
 
 def test_a_loop_that_gains_nothing_has_no_vertices() -> None:
     """No friction, no curl; a single vertex; columns that are all empty."""
-    still = worst_loop(Surface(TEXTURE, "F", K, D, friction=0.0))
-    assert (still.energy, still.upper_per_period) == (0.0, math.inf)
-    assert (still.vertices.shape, still.length, still.speed(1.0)) == ((0, 3), 0.0, 0.0)
+    for depth in np.linspace(0.1e-3, 1e-3, 8):  # at some of them rounding leaves 1e-20 J
+        still = worst_loop(Surface(TEXTURE, "F", K, depth, friction=0.0))
+        assert (still.energy, still.upper_per_period) == (0.0, math.inf)
+        assert (still.vertices.shape, still.length, still.speed(1.0)) == ((0, 3), 0.0, 0.0)
+    assert worst_loop(Surface(TEXTURE, "F", K, D, friction=1e-6)).energy > 0.0
     vertices, energy = gaining(Surface(TEXTURE, "A", K, D), np.zeros((1, 3)))
     assert (vertices.shape, energy) == ((0, 3), 0.0)
     level = np.full(5, -D)

@@ -321,7 +321,8 @@ def _state_leak(surface: Surface, line: ScanLine) -> Leak:
     """Return the worst of the paper's path of (27) and of loops at constant depth."""
     found = [light_then_deep_loop(surface, line), in_plane_loop(surface, line)]
     worst = max(found, key=lambda loop: loop.energy)
-    if worst.energy <= 0.0:
+    pressing = 0.5 * surface.stiffness * surface.max_depth**2
+    if worst.energy <= _TOLERANCE * pressing:  # what quadrature leaves of nothing
         text = "no loop that was tried gains energy"
         return Leak(0.0, math.inf, line, "sampled", text, np.zeros((0, 3)), None)
     return Leak(worst.energy, math.inf, line, "sampled", worst.description, worst.vertices, None)
