@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 
 from asperity.paper.experiments.beyond import BeyondExperiment, device_onset
 from asperity.paper.experiments.bump import bump_experiment
-from asperity.paper.experiments.passivity import passivity_experiment
+from asperity.paper.experiments.passivity import passivity_experiment, passivity_onsets
 from asperity.paper.experiments.run import Experiments
 from asperity.paper.experiments.scanning import scanning_experiment
 from asperity.report.experiments import experiment_sections
 from asperity.report.page import Page, Picture, Table, page_html
 from asperity.report.pictures.experiment_pictures import cycles_figure, devices_figure
+from asperity.report.pictures.sweep_pictures import onset_figure
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
@@ -55,6 +57,16 @@ def test_tables_have_as_many_cells_as_headings(found: Experiments) -> None:
         assert table.rows
         for row in table.rows:
             assert len(row.cells) == len(table.headings)
+
+
+def test_an_onset_that_may_be_lower_is_marked() -> None:
+    def marked(laws: str) -> list[bool]:
+        figure = onset_figure(passivity_onsets(laws, 2, 1))
+        lines = {line.get_label(): line for line in figure.axes[-1].lines}
+        return list(np.isfinite(lines["the least tried"].get_ydata())) if len(lines) > 4 else []
+
+    assert marked("WC") == [True]  # C cycles at 50 N/m, where the search begins
+    assert marked("WH") == []
 
 
 def test_figures_show_what_was_found(found: Experiments) -> None:

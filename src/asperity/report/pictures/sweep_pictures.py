@@ -37,6 +37,10 @@ def onset_figure(found: Sequence[Prediction]) -> Figure:
         }  # fmt: skip
         for name, (values, look) in lines.items():
             axes.plot([one.onset.delay for one in mine], _finite(values), label=name, **look)
+        if any(one.onset.quiet == 0.0 for one in found):
+            below = [math.nan if one.onset.quiet else one.onset.cycling for one in mine]
+            look = _look(style.BLUE, "", marker="v") | {"ms": 8.0, "mfc": style.CARD}
+            axes.plot([one.onset.delay for one in mine], below, label="the least tried", **look)
         style.entitle(axes, law, "conservative" if proved else "not conservative: no proof")
         style.of_law(axes, law)
     style.legend(panels[0])
