@@ -189,4 +189,4 @@ def wave_number(surface: Surface, number: Number, wave: SingleWave, form: Closed
     along = (phase - wave.phase) * wave.period / (2.0 * math.pi)
     depth = surface.max_depth if surface.law.contact.single_valued else 0.0
     xy = along * np.array(wave.direction)
-    return proved(surface, number, value, "closed form", "MATH section 4", xy, [depth])
+    return proved(surface, number, value, "closed form", "formula on a sinusoid", xy, [depth])

@@ -65,7 +65,9 @@ def _wave_number(surface: Surface, wave: SingleWave) -> Bound:
     if math.isinf(value):
         return Bound(math.inf, math.inf, "closed form", crest.centre, _ONSET)
     foot = np.array(crest.foot[:2])
-    return proved(surface, NORM, value, "closed form", "MATH section 4", foot, [surface.max_depth])
+    return proved(
+        surface, NORM, value, "closed form", "formula on a sinusoid", foot, [surface.max_depth]
+    )
 
 
 def gain_above_crest(surface: Surface, height: float) -> float:
