@@ -14,6 +14,7 @@ from asperity.arguments import DEFAULT_STIFFNESS, MAX_DEPTH, STIFFNESS, Argument
 from asperity.checks import FloatArray, Points, array, positive
 from asperity.checks import points as read_points
 from asperity.derive.facts import LawFacts, clamped_facts
+from asperity.display import Plotted
 from asperity.errors import ParameterError, nearest_names
 from asperity.kernels.probe import CLAMPS, ClampName
 from asperity.laws import LAW_ARGUMENTS, LAWS, Law, find_law
@@ -64,7 +65,7 @@ def _truths(probes: Points, sliding: ArrayLike | None) -> NDArray[np.bool_]:
     return np.ascontiguousarray(given).reshape(probes.count)
 
 
-class Surface:
+class Surface(Plotted):
     """A textured surface as a force field: the body is z < h(x, y), z points out of it.
 
     Args:

@@ -73,7 +73,7 @@ def test_a_verified_number_is_not_called_unverified() -> None:
 
 def test_notebooks_show_a_table() -> None:
     text = ask(device=device(bandwidth=None))._repr_html_()
-    assert text.count("<tr>") == 7
+    assert text.count("<tr") == 7
     assert "needs" in text
     assert "bandwidth" in text
 

@@ -387,7 +387,7 @@ def test_plain_data_is_json_without_infinities() -> None:
 def test_notebook_table_is_escaped() -> None:
     page = judge(Surface(WAVE, "H"), RIG)._repr_html_()
     assert "k q⁺ &lt;= 2σ₀/T" in page
-    assert page.count("<tr>") == 9
+    assert page.count("<tr") == 9
 
 
 def test_an_unknown_name_is_a_key_error() -> None:

@@ -29,6 +29,7 @@ from asperity.surface import Surface
 from asperity.textures import Sinusoid
 
 NAMES = [name for name, _unit in COLUMNS]
+SURFACE = Surface(Sinusoid(0.2e-3, 2e-3), "A", max_depth=1e-3)
 
 
 def run_of(velocity: list[float], supplied: list[float], lost: float = 1.0, stop: str = "") -> Run:
@@ -38,7 +39,7 @@ def run_of(velocity: list[float], supplied: list[float], lost: float = 1.0, stop
     table[:, NAMES.index("supplied x")] = supplied
     table[:, NAMES.index("lost")] = lost * np.arange(len(velocity))
     ledger = Ledger((0.0,) * 3, (0.0,) * 3, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
-    return Run(table, np.zeros(6), len(velocity), 1e-3, ledger, Stop(stop))
+    return Run(table, np.zeros(6), len(velocity), 1e-3, ledger, SURFACE, Stop(stop))
 
 
 def lively(size: float = 1.0, share: float = 1.0, stop: str = "") -> Run:
@@ -176,7 +177,6 @@ def test_what_cycles_at_once_has_no_quiet_end() -> None:
 # --- the whole search, on runs that are told ------------------------------------------------------
 
 
-SURFACE = Surface(Sinusoid(0.2e-3, 2e-3), "A", max_depth=1e-3)
 PLANT, SERVO = Cartesian(0.05, 3.0), Servo(1e-3)
 HAND = SpringHand((100.0, 100.0, 0.0), 1.0, 0.0, (0.0, 0.0, -1.0))
 

@@ -12,15 +12,15 @@ from asperity.analysis.energy.leak import Leak
 from asperity.analysis.energy.merit import Merit
 from asperity.analysis.passivity.judgement import Passivity
 from asperity.devices import Device
+from asperity.display import Plotted, Reported
 from asperity.files import plain, record
-from asperity.notebook import as_html
 from asperity.surface import Surface
 
 SCHEMA = 1
 
 
 @dataclass(frozen=True)
-class Analysis:
+class Analysis(Plotted, Reported):
     """What is known of one law on one surface and one device.
 
     Attributes:
@@ -90,18 +90,3 @@ class Analysis:
             **record(self, "conservative_reason", "leak", "v_star", "continuity", "passivity"),
             **record(self, "merit", "assumptions"),
         }
-
-    def _repr_html_(self) -> str:
-        """Return the answer, the numbers and the criteria for a notebook."""
-        bounds = (("q", self.q), ("q⁺", self.one_sided), ("sup |curl|/k", self.curl))
-        numbers = [
-            [name, f"{bound.lower:.6g}", f"{bound.upper:.6g}", bound.method, str(bound.at or "")]
-            for name, bound in bounds
-            if bound is not None
-        ]
-        rules = [[c.name, c.formula, c.says] for c in self.passivity.criteria]
-        return as_html(
-            self.answer,
-            (["number", "lower", "upper", "method", "at [m]"], numbers),
-            (["criterion", "condition", "says"], rules),
-        )

@@ -17,14 +17,13 @@ from asperity.analysis.passivity.margin import at_start, start
 from asperity.analysis.recommendation import recommend
 from asperity.analysis.row import LawRow
 from asperity.analysis.words.comparison import assumptions, recommendation, verdict
-from asperity.analysis.words.passivity import allowed_text
 from asperity.arguments import DEFAULT_STIFFNESS
 from asperity.checks import positive
 from asperity.devices import Device, load_device
+from asperity.display import Plotted, Reported
 from asperity.errors import ParameterError
 from asperity.files import plain, record
 from asperity.laws import LAWS, Law, find_laws, shared_out
-from asperity.notebook import as_html
 from asperity.surface import Surface
 from asperity.textures.naming import TextureLike, as_texture
 from asperity.textures.texture import Texture, TexturePart
@@ -37,7 +36,7 @@ Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(Plotted, Reported):
     """The laws compared on one surface and one device.
 
     Attributes:
@@ -83,23 +82,6 @@ class Comparison:
         row = self.recommended_row
         said = "none recommended" if row is None else f"{row!r} recommended"
         return f"<Comparison of {len(self.rows)} laws on {self.device.id}: {said}>"
-
-    def _repr_html_(self) -> str:
-        """Return the answer and a table for a notebook."""
-        head = ["law", "q", "q⁺", "stiffness", "conservative", "continuous", "verdict"]
-        rows = [
-            [
-                row.law.letter,
-                f"{row.q.value:.4g} ({row.q.method})",
-                f"{row.one_sided.value:.4g} ({row.one_sided.method})",
-                allowed_text(row.allowed),
-                "yes" if row.conservative else "no",
-                "yes" if row.continuous else "no",
-                row.verdict,
-            ]
-            for row in self.rows
-        ]
-        return as_html(self.recommendation, (head, rows))
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""

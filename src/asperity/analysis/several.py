@@ -9,10 +9,10 @@ from typing import Any
 
 from asperity.analysis.compare import SCHEMA, Comparison, compare, line_to_add
 from asperity.devices import Device, load_device
+from asperity.display import Reported
 from asperity.errors import ParameterError
 from asperity.files import Record, plain
 from asperity.laws import KNOWN_LAWS, Law
-from asperity.notebook import as_html
 from asperity.textures.naming import TextureLike, as_texture
 from asperity.textures.texture import Texture
 
@@ -45,7 +45,7 @@ class Lacking(Record):
 
 
 @dataclass(frozen=True)
-class Comparisons:
+class Comparisons(Reported):
     """A surface on several devices, pressed to several depths.
 
     Attributes:
@@ -60,15 +60,6 @@ class Comparisons:
 
     def __repr__(self) -> str:
         return f"<Comparisons: {len(self.comparisons)} answered, {len(self.lacking)} lacking>"
-
-    def _repr_html_(self) -> str:
-        """Return a table for a notebook."""
-        rows = [
-            [one.device.name, f"{one.max_depth:g}", one.recommended, one.recommendation]
-            for one in self.comparisons
-        ]
-        rows += [[one.device, "", "", one.sentence] for one in self.lacking]
-        return as_html("", (["device", "depth [m]", "law", "answer"], rows))
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""

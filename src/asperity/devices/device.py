@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
+from asperity.display import Displayed
 from asperity.errors import ParameterError
 from asperity.files import Record, record
 from asperity.units import engineering
@@ -150,7 +151,7 @@ class WallTest(Datum):
 
 
 @dataclass(frozen=True)
-class Device(Record):
+class Device(Record, Displayed):
     """A force-feedback device.
 
     Attributes:
@@ -176,6 +177,9 @@ class Device(Record):
     data: Mapping[str, Datum]
     axes: str = ""
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<Device {self.id}, {self.name}: {len(self.data)} numbers>"
 
     def value(self, field: str) -> float | None:
         """Return a number in SI units, or ``None`` if it is not known."""

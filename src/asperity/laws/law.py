@@ -62,6 +62,9 @@ class Law:
     parameters: Mapping[str, float] = field(default_factory=dict)
     arguments: Mapping[str, Argument] = field(init=False, repr=False)
 
+    def __repr__(self) -> str:
+        return f"<Law {self.letter}, {self.name}, on the {self.contact} contact>"
+
     def __init__(
         self,
         letter: str,

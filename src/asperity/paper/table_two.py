@@ -9,8 +9,8 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.loops import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
+from asperity.display import Displayed
 from asperity.files import Record
-from asperity.notebook import as_html
 from asperity.paper.claims_friction import PAPER, norm_of, stick_entries
 from asperity.paper.plane import LAWS, PASSIVITY, SCANNING, TURN, path_of
 
@@ -107,7 +107,7 @@ class TableTwoRow(Record):
 
 
 @dataclass(frozen=True)
-class TableTwo(Record):
+class TableTwo(Record, Displayed):
     """The paper's Table II, printed and computed.
 
     Attributes:
@@ -133,10 +133,8 @@ class TableTwo(Record):
         head = ["law", "q printed", "q", "q⁺", "conservative", "continuous", "loop", "stands"]
         return [head, *(_cells(row) for row in self.rows)]
 
-    def _repr_html_(self) -> str:
-        """Return the table for a notebook."""
-        head, *rows = self.cells()
-        return as_html(self.parameters, (head, rows))
+    def __repr__(self) -> str:
+        return f"<TableTwo: {sum(row.agrees for row in self.rows)} of {len(self.rows)} rows stand>"
 
 
 def table_two() -> TableTwo:

@@ -9,6 +9,7 @@ from rich.console import Console
 
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.passivity.judgement import Passivity
 from asperity.analysis.words.passivity import allowed_text
 from asperity.report import page, terminal
 from asperity.report.devices import numbers_table
@@ -159,7 +160,7 @@ def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
 # --- tables ---------------------------------------------------------------------------------------
 
 
-def _numbers_table(analysis: Analysis, last: str) -> page.Table:
+def suprema_table(analysis: Analysis, last: str = "attained at") -> page.Table:
     """Return one row per number: lower, upper, method and the point that attains lower."""
     rows = []
     for name, bound in numbers(analysis):
@@ -168,9 +169,8 @@ def _numbers_table(analysis: Analysis, last: str) -> page.Table:
     return page.Table((*_NUMBERS, last), rows, numbers=(1, 2))
 
 
-def _criteria_table(analysis: Analysis) -> page.Table:
+def criteria_table(judged: Passivity) -> page.Table:
     """Return one row per criterion of passivity, the one that decides marked."""
-    judged = analysis.passivity
     rows = []
     for criterion in judged.criteria:
         decides = criterion.name == judged.decided_by
@@ -214,11 +214,11 @@ def print_analysis(analysis: Analysis, console: Console, texture: str = "") -> N
     law = analysis.surface.law
     say(console, analysis.answer, "bold")
     head(console, f"Law {law.letter}, {law_title(law.name)}: suprema over the working region")
-    console.print(terminal.table(_numbers_table(analysis, "attained at"), wraps=(4,)))
+    console.print(terminal.table(suprema_table(analysis), wraps=(4,)))
     for line in notes(analysis):
         say(console, line, "dim")
     head(console, f"Passive on the {analysis.device.name}? {analysis.passivity.verdict}")
-    criteria = _with_arrow(_criteria_table(analysis))
+    criteria = _with_arrow(criteria_table(analysis.passivity))
     console.print(terminal.table(criteria, wraps=(1,), most={1: 18}, without=(6,)))
     console.print(terminal.pairs(open_criteria(analysis), "dim", most=26))
     say(console, f"Stiffness: {stiffness_text(analysis)}")
@@ -287,7 +287,7 @@ def _facts(analysis: Analysis) -> list[tuple[str, str]]:
 
 
 def _numbers(analysis: Analysis) -> page.Section:
-    table = _numbers_table(analysis, "lower is attained at")
+    table = suprema_table(analysis, "lower is attained at")
     return page.Section("The numbers", [table], notes=notes(analysis))
 
 
@@ -295,7 +295,7 @@ def _criteria(analysis: Analysis) -> page.Section:
     judged = analysis.passivity
     return page.Section(
         f"Passive on the {analysis.device.name}?",
-        [_criteria_table(analysis)],
+        [criteria_table(analysis.passivity)],
         caption=(
             f"Verdict: {judged.verdict}. It rests on: {judged.decided_by}. Stiffness: "
             f"{stiffness_text(analysis)}. T is the period of an "

@@ -359,11 +359,19 @@ def _asked(comparison: Comparison) -> str:
     return "each law's own, to begin with" if asked is None else engineering(asked, "N/m")
 
 
+def answers_table(comparison: Comparison) -> page.Table:
+    """Return one row per law: the answer in short, and what will go wrong."""
+    return _one_line(comparison, (*_SHORT, _VERDICT))
+
+
+def _one_line(comparison: Comparison, columns: Sequence[_Column]) -> page.Table:
+    """Return a table whose headings are not broken into lines."""
+    table = _table(comparison, columns)
+    return replace(table, headings=[_plain(heading) for heading in table.headings])
+
+
 def _laws(comparison: Comparison) -> list[page.Section]:
-    short, full = (
-        replace(table, headings=[_plain(heading) for heading in table.headings])
-        for table in (_table(comparison, _SHORT), _table(comparison, _FULL))
-    )
+    short, full = _one_line(comparison, _SHORT), _one_line(comparison, _FULL)
     notes = [SAMPLED_NOTE] if any_sampled(comparison) else []
     return [
         page.Section("The laws compared", [short]),

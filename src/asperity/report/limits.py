@@ -50,7 +50,7 @@ def side_text(side: float | None, unit: str) -> str:
     return INFINITE if side == float("inf") else engineering(side, unit)
 
 
-def _limits_table(result: Limits) -> page.Table:
+def six_table(result: Limits) -> page.Table:
     """Return number, name, condition, both sides, whether it holds, share, and speeds."""
     rows = []
     for limit in result.limits:
@@ -144,7 +144,7 @@ def limits_table(result: Limits, width: int = 100) -> Table:
     """
     wide = width >= _NAMES_FROM
     return terminal.table(
-        _limits_table(result),
+        six_table(result),
         wraps=(_NAME, _SPEEDS),
         most={} if wide else {_NAME: 14},
         without=() if wide else (_FOR,),
@@ -215,7 +215,7 @@ def _limits(result: Limits) -> page.Section:
         "the share of the height variance in waves that meet it."
     )
     notes = [*symbols(result), note]
-    return page.Section("The six limits", [_limits_table(result)], notes=notes)
+    return page.Section("The six limits", [six_table(result)], notes=notes)
 
 
 def _picture(result: Limits) -> page.Section:

@@ -13,6 +13,7 @@ from asperity.report.words.number_words import law_title
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
 from asperity.simulation.onset import CYCLE_SPEED, holds_still
+from asperity.surface import Surface
 from asperity.units import engineering
 
 FOOTER = f"{PAPER}, section V"
@@ -29,16 +30,21 @@ def energy(value: float) -> str:
     return f"{'+' if value > 0.0 else '-'}{text}"
 
 
-def answer(setup: Setup, run: Run) -> str:
-    """Return what happened in one or two sentences."""
-    law = setup.surface.law.letter
+def work_text(surface: Surface, run: Run) -> str:
+    """Return what the texture did to the hand."""
+    law = surface.law.letter
     total = run.ledger.total
     verb = "feeds the hand" if total > 0.0 else "takes from the hand"
     work = f"{verb} {engineering(abs(total), 'J', digits=3)}" if total else "does no work"
     if not math.isfinite(total):
         work = "feeds the hand beyond all numbers"
-    stiffness = engineering(setup.surface.stiffness, "N/m")
-    said = f"Law {law} at {stiffness} {work} in {engineering(run.duration, 's')}"
+    stiffness = engineering(surface.stiffness, "N/m")
+    return f"Law {law} at {stiffness} {work} in {engineering(run.duration, 's')}"
+
+
+def answer(setup: Setup, run: Run) -> str:
+    """Return what happened in one or two sentences."""
+    said = work_text(setup.surface, run)
     if run.stopped:
         said = f"{said}. The run stopped: it {run.stopped}"
     if not run.closes:
@@ -126,7 +132,8 @@ def closing_words(run: Run) -> str:
     )
 
 
-def _ledger(run: Run) -> page.Table:
+def ledger_table(run: Run) -> page.Table:
+    """Return where the energy went."""
     rows = [Row([name, *cells]) for name, cells in ledger_rows(run)]
     return page.Table(_ENERGIES, rows, numbers=(1, 2, 3, 4))
 
@@ -135,7 +142,7 @@ def print_run(setup: Setup, run: Run, console: Console) -> None:
     """Print answer, ledger and assumptions."""
     say(console, answer(setup, run), "bold")
     console.print()
-    console.print(terminal.table(_ledger(run), wraps=(0,), gap=2, ruled=False))
+    console.print(terminal.table(ledger_table(run), wraps=(0,), gap=2, ruled=False))
     say(console, closing_words(run), "dim")
     console.print()
     for name, value in facts(setup, run):
@@ -150,8 +157,8 @@ def run_page(setup: Setup, run: Run) -> Page:
         answer=answer(setup, run),
         facts=facts(setup, run),
         sections=[
-            *_pictures(setup, run),
-            Section("Where the energy went", [_ledger(run)], caption=closing_words(run)),
+            *_pictures(run),
+            Section("Where the energy went", [ledger_table(run)], caption=closing_words(run)),
             *added_sections(Run, setup, run),
             *assumed(setup.assumptions),
         ],
@@ -159,7 +166,7 @@ def run_page(setup: Setup, run: Run) -> Page:
     )
 
 
-def _pictures(setup: Setup, run: Run) -> list[Section]:
+def _pictures(run: Run) -> list[Section]:
     if len(run.time) < 2:
         return []
     from asperity.report.pictures.run_picture import run_figure
@@ -173,4 +180,4 @@ def _pictures(setup: Setup, run: Run) -> list[Section]:
         f"Height, force and energy over {engineering(run.duration, 's')}, the path, and two phase "
         f"portraits. In the end the texture has supplied {energy(run.ledger.total)}."
     )
-    return [pictured("Motion, force, energy, phase", run_figure(setup, run), seen, caption)]
+    return [pictured("Motion, force, energy, phase", run_figure(run), seen, caption)]

@@ -36,7 +36,8 @@ def _row(one: Comparison) -> page.Row:
     return page.Row([one.device.name, depth, letter, *said])
 
 
-def _table(found: Comparisons) -> page.Table:
+def cases_table(found: Comparisons) -> page.Table:
+    """Return a row for each device and depth."""
     rows = [_row(one) for one in found.comparisons]
     rows += [page.Row([one.device, NONE, "K₀ missing", NONE, NONE, NONE]) for one in found.lacking]
     return page.Table(_HEADINGS, rows, _NUMBERS)
@@ -53,7 +54,7 @@ def print_comparisons(found: Comparisons, console: Console) -> None:
         found: the result.
         console: where to.
     """
-    table = _table(found)
+    table = cases_table(found)
     without = terminal.too_wide(table, _OPTIONAL, console.width)
     console.print(terminal.table(table, wraps=(0,), without=without))
     console.print()
@@ -87,7 +88,7 @@ def comparisons_page(found: Comparisons) -> page.Page:
             ("Peak to valley", engineering(texture.peak_to_valley, "m")),
         ],
         sections=[
-            page.Section("In one table", [_table(found), page.Definitions(_MEANINGS)]),
+            page.Section("In one table", [cases_table(found), page.Definitions(_MEANINGS)]),
             *[_case(one) for one in found.comparisons],
             *_lacking(found),
             *surface_sections(texture),

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from asperity.checks import FloatArray
+from asperity.display import Plotted
 from asperity.files import plain, record
 from asperity.simulation.ending import Ending
 from asperity.simulation.trace import COLUMNS
+from asperity.surface import Surface
 
 MOST_ROWS = 20_000
 
@@ -95,7 +97,7 @@ class Ledger:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Plotted):
     """What a simulation gave.
 
     Attributes:
@@ -107,6 +109,7 @@ class Run:
         samples: that were done.
         period: T [s].
         ledger: the energies of the whole run.
+        surface: what was explored.
         stop: what ended it early; then trace and ledger end there (where it left the workspace,
             with the sample that the body could not follow).
         place: where it left the workspace, in words.
@@ -121,11 +124,17 @@ class Run:
     samples: int
     period: float
     ledger: Ledger
+    surface: Surface
     stop: Stop = Stop.NOTHING
     place: str = ""
     path: str = ""
     ending: Ending | None = None
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        law, stopped = self.surface.law.letter, f", {self.stopped}" if self.stop else ""
+        work = f"{self.ledger.total:+.4g} J to the hand"
+        return f"<Run of law {law}, {self.duration:g} s, {work}{stopped}>"
 
     @property
     def stopped(self) -> str:

@@ -101,7 +101,7 @@ def simulate(
         kept.close()
     return Run(
         kept.table(), simulation.state, simulation.samples, float(servo.period),
-        simulation.ledger(), stop, _place(stop, simulation.state, plant),
+        simulation.ledger(), surface, stop, _place(stop, simulation.state, plant),
         path=os.fspath(trace) if isinstance(kept, FileTrace) else "",  # type: ignore[arg-type]  # a path then
         ending=ending, notes=plant.notes,
     )  # fmt: skip

@@ -23,6 +23,7 @@ from asperity.textures.texture import ExactHeight, Texture
 # How many of the longest waves stand for a sum that never repeats.
 _WAVES_OF_AN_ENDLESS_SUM = 16
 _CELL_LIMIT = 400_000
+_SAID = 8  # waves that its repr lists
 # Suprema are searched over at most this many independent phases.
 _LARGEST_TORUS = 3
 
@@ -67,6 +68,8 @@ class Fourier(Texture):
         self.phases = array("phases", given, (count,), "rad").copy()
 
     def __repr__(self) -> str:
+        if len(self.amplitudes) > _SAID:
+            return f"<Fourier of {len(self.amplitudes)} waves>"
         return (
             f"Fourier(amplitudes={self.amplitudes.tolist()}, "
             f"wavevectors={self.wavevectors.tolist()}, phases={self.phases.tolist()})"

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from asperity.checks import FloatArray
+from asperity.display import Reported
 from asperity.files import plain
 from asperity.measured.correlation import correlation
 from asperity.measured.history import Stage
@@ -38,7 +39,7 @@ class Change:
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class Shown(Reported):
     """A measured file in numbers.
 
     Attributes:
@@ -55,6 +56,9 @@ class Shown:
     parts: Parts
     correlation: tuple[float | None, float | None] = (None, None)
     changes: tuple[Change, ...] = field(default=())
+
+    def __repr__(self) -> str:
+        return f"<Shown {self.source}, {self.prepared.heights.size} points>"
 
     @property
     def sides(self) -> tuple[float, ...]:

@@ -20,6 +20,7 @@ from asperity.arguments import Argument
 from asperity.checks import FloatArray, Points
 from asperity.checks import points as read_points
 from asperity.contacts.contact import ExactHeight
+from asperity.display import Plotted
 from asperity.enclosures.cells import Cells
 from asperity.measured.history import Stage
 from asperity.textures.cells.bounded import BoundedCells, DerivativeBounds
@@ -55,7 +56,7 @@ class TexturePart:
     waviness: float = 0.0
 
 
-class Texture(ABC):
+class Texture(Plotted, ABC):
     """A height function h(x, y) [m], twice continuously differentiable.
 
     A texture kind names its sampler (scalar functions that are compiled together with a law) and

@@ -6,13 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from asperity.display import Displayed
 from asperity.files import Record
 
 Method = Literal["theorem", "closed form", "certified", "sampled"]
 
 
 @dataclass(frozen=True)
-class Bound(Record):
+class Bound(Record, Displayed):
     """A supremum, with what is known of it.
 
     Attributes:

@@ -73,6 +73,10 @@ class Leak(Record):
     vertices: FloatArray
     thrust: float | None
 
+    def __repr__(self) -> str:
+        upper = f"at most {self.upper_per_period:.4g} J per period"
+        return f"<Leak: {self.energy:.4g} J per turn, {upper}, {self.method}>"
+
     @property
     def worst_per_period(self) -> float:
         """``upper_per_period`` where it is proved, else ``energy`` [J]."""

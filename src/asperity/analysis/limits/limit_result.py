@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,8 +12,8 @@ from asperity.analysis.limits.spectrum import Spectrum
 from asperity.analysis.passivity.judgement import Allowed
 from asperity.analysis.passivity.margin import Margin
 from asperity.devices import Device
+from asperity.display import Plotted, Reported
 from asperity.files import Record, record
-from asperity.notebook import as_html
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -46,7 +45,7 @@ class RenderedWave(Record):
 
 
 @dataclass(frozen=True)
-class Limits:
+class Limits(Plotted, Reported):
     """The six limits for one surface on one device at one scanning speed.
 
     Attributes:
@@ -118,11 +117,6 @@ class Limits:
         said = f"{held} of 6 hold, {self.felt.tier}"
         return f"<Limits of law {law} on {self.device.id} at {self.speed:g} m/s: {said}>"
 
-    def _repr_html_(self) -> str:
-        """Return the answer and a table for a notebook."""
-        head = ["limit", "", "left", "right", "holds", "speeds up to [m/s]", "needs"]
-        return as_html(self.answer, (head, [_cells(limit) for limit in self.limits]))
-
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""
         surface = self.surface
@@ -138,13 +132,3 @@ class Limits:
             **record(self, "felt", "share"),
             **record(self, "speeds", "answer", "assumptions"),
         }
-
-
-def _cells(limit: Limit) -> list[str]:
-    named = [str(limit.number), limit.inequality]
-    if limit.left is None or limit.right is None or limit.speeds is None:
-        return [*named, "", "", "", "", ", ".join(limit.needs)]
-    verdict = "yes" if limit.holds else "no"
-    sides = [f"{side:.3g} {limit.unit}" for side in (limit.left, limit.right)]
-    top = "all" if math.isinf(limit.speeds[1]) else f"{limit.speeds[1]:.3g}"
-    return [*named, *sides, verdict, top if limit.speeds[1] else "none", ""]

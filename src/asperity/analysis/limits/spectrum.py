@@ -64,6 +64,9 @@ class Spectrum(Record):
     exact: bool
     description: str
 
+    def __repr__(self) -> str:
+        return f"<Spectrum of {len(self.waves)} waves: {self.description}>"
+
     @property
     def wavelengths(self) -> FloatArray:
         """Wavelengths l [m], shape (n,)."""

@@ -21,8 +21,8 @@ from asperity.analysis.passivity.criteria import (
     Criterion,
 )
 from asperity.analysis.passivity.device_loop import HALF, Loop, Number, contradictory
+from asperity.display import Displayed
 from asperity.files import Record
-from asperity.notebook import as_html
 
 Verdict = Literal["passive", "bounded", "plausible", "not passive", "undecided"]
 Basis = Literal["proved", "plausible", "bounded", "quiet against buzz", "none"]
@@ -80,7 +80,7 @@ class Allowed(Record):
 
 
 @dataclass(frozen=True)
-class Passivity(Record):
+class Passivity(Record, Displayed):
     """Whether a surface on a device can be made to give energy to the hand without end.
 
     Attributes:
@@ -131,11 +131,10 @@ class Passivity(Record):
         """
         return {criterion.name: criterion for criterion in self.criteria}[name]
 
-    def _repr_html_(self) -> str:
-        """Return the verdict and a table for a notebook."""
-        rows = [[c.name, c.formula, c.says, c.assumptions] for c in self.criteria]
-        answer = f"{self.verdict}, decided by {self.decided_by}: {self.reason}"
-        return as_html(answer, (["criterion", "formula", "says", "assumes"], rows))
+    def __repr__(self) -> str:
+        known = self.safe_stiffness
+        limit = "not known" if known is None else f"{known:.4g} N/m"
+        return f"<Passivity: {self.verdict}, decided by {self.decided_by}, stiffness up to {limit}>"
 
 
 def decide(

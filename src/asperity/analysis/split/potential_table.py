@@ -61,6 +61,10 @@ class TabulatedSurface:
     potential_error_bound: float
     _table: PotentialTable = field(repr=False, compare=False)
 
+    def __repr__(self) -> str:
+        nodes = " x ".join(str(count) for count in self.shape)
+        return f"<TabulatedSurface of law H, {nodes} nodes, q at most {self.lipschitz.value:.4g}>"
+
     @property
     def resolution(self) -> float:
         """Greatest distance of nodes [m]."""

@@ -10,16 +10,20 @@ from matplotlib.figure import Figure
 
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.compare import Comparison
+from asperity.analysis.limits.limit_result import Limits
 from asperity.errors import ParameterError
 from asperity.report.pictures import style
 from asperity.report.pictures.analysis_pictures import analysis_figure, picture_size, pictures_of
 from asperity.report.pictures.field_picture import draw_fields, field_size
 from asperity.report.pictures.force_picture import draw_forces, force_size
 from asperity.report.pictures.gain_picture import gain_figure
+from asperity.report.pictures.limits_picture import limits_figure
 from asperity.report.pictures.merit_picture import merit_figure
+from asperity.report.pictures.run_picture import run_figure
 from asperity.report.pictures.spectrum_picture import spectrum_figure
 from asperity.report.pictures.surface_picture import draw_surface, surface_size
 from asperity.report.words.number_words import leak_text
+from asperity.simulation import Run
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -31,8 +35,10 @@ def plot(result: Any, picture: str | None = None) -> Figure:
     Args:
         result: a :class:`~asperity.analysis.compare.Comparison` (the surface, the forces and
             the fields of all laws), a :class:`~asperity.surface.Surface` (forces and field of its
-            law), a texture (the surface) or an :class:`~asperity.analysis.analysis_result.Analysis`
-            (the field with the worst loop, the loop gain, the singular values).
+            law), a texture (the surface), an :class:`~asperity.analysis.analysis_result.Analysis`
+            (the field with the worst loop, the loop gain, the singular values), the
+            :class:`~asperity.analysis.limits.limit_result.Limits` (waves and their forces) or a
+            :class:`~asperity.simulation.Run` (motion, force, energy, phase).
         picture: one picture of the report alone; of a comparison "surface", "spectrum", "force",
             "field", "gain" or "merit", of an analysis "field", "gain", "depth", for a map also
             "top", and where the force jumps "jumps".
@@ -82,6 +88,20 @@ def _analysis(result: Analysis, picture: str | None = None) -> Figure:
     if picture is not None:
         return analysis_figure(result, picture)
     return _stacked([_of_analysis(result, name) for name in drawings])
+
+
+@plot.register
+def _limits(result: Limits, picture: str | None = None) -> Figure:
+    _known(picture, ())
+    return limits_figure(result)
+
+
+@plot.register
+def _run(result: Run, picture: str | None = None) -> Figure:
+    _known(picture, ())
+    if len(result.time) < 2:
+        raise ParameterError("trace", "must be kept in memory to be drawn")
+    return run_figure(result)
 
 
 # Width and height [inch], and what draws it into a figure or a part of one.

@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from asperity.report.pictures import style
-from asperity.scene.setup import Setup
 from asperity.simulation import Run
 
 _MOST_POINTS = 6000
@@ -17,11 +16,10 @@ _AXES = ("x", "y", "z")
 _COLOURS = (style.ORANGE, style.GREEN, style.BLUE)
 
 
-def run_figure(setup: Setup, run: Run) -> Figure:
+def run_figure(run: Run) -> Figure:
     """Return height, force and energy against time, the path, and the phase portrait.
 
     Args:
-        setup: the closed loop.
         run: with its trace in memory.
     """
     figure = style.new_figure(10.0, 8.2)
@@ -34,10 +32,10 @@ def run_figure(setup: Setup, run: Run) -> Figure:
     path, phase_z, phase_x = (figure.add_subplot(grid[i, 2]) for i in range(3))
     for axes in (motion, force, energy, path, phase_z, phase_x):
         style.dress(axes)
-    _draw_motion(motion, setup, run, shown)
+    _draw_motion(motion, run, shown)
     _draw_force(force, run, shown)
     _draw_energy(energy, run, shown)
-    _draw_path(path, setup, run, shown)
+    _draw_path(path, run, shown)
     _draw_phase(phase_z, run, 2, shown)
     _draw_phase(phase_x, run, _scan_axis(run), shown)
     return figure
@@ -48,9 +46,9 @@ def _scan_axis(run: Run) -> int:
     return int(np.argmax(np.ptp(run.position[:, :2], axis=0)))
 
 
-def _draw_motion(axes: Axes, setup: Setup, run: Run, shown: slice) -> None:
+def _draw_motion(axes: Axes, run: Run, shown: slice) -> None:
     time, place, anchor = run.time[shown], run.position[shown], run.anchor[shown]
-    height = setup.surface.texture.height(place[:, :2])
+    height = run.surface.texture.height(place[:, :2])
     unit = style.length_unit(float(np.abs(np.append(place[:, 2], height)).max()))
     low = min(float(place[:, 2].min()), float(height.min())) * unit.scale
     axes.fill_between(time, height * unit.scale, low, color=style.BODY, lw=0.0, alpha=0.7)
@@ -93,7 +91,7 @@ def _draw_energy(axes: Axes, run: Run, shown: slice) -> None:
     style.entitle(axes, "Energy", "that the texture has supplied; up feeds the hand")
 
 
-def _draw_path(axes: Axes, setup: Setup, run: Run, shown: slice) -> None:
+def _draw_path(axes: Axes, run: Run, shown: slice) -> None:
     i = _scan_axis(run)
     place = run.position[shown]
     wide = style.length_unit(float(np.abs(place[:, i]).max()))
@@ -101,7 +99,7 @@ def _draw_path(axes: Axes, setup: Setup, run: Run, shown: slice) -> None:
     low, top = float(place[:, i].min()), float(place[:, i].max())
     line = np.repeat(np.median(run.position, axis=0)[None, :2], 600, axis=0)
     line[:, i] = np.linspace(low, top, 600) if top > low else low
-    height = setup.surface.texture.height(line)
+    height = run.surface.texture.height(line)
     floor = min(float(place[:, 2].min()), float(height.min()))
     axes.fill_between(
         line[:, i] * wide.scale, height * high.scale, floor * high.scale, color=style.BODY,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -94,9 +95,24 @@ def nice_length(target: float) -> float:
     return round(step * power, 12)
 
 
+class Drawn(Figure):
+    """A figure that a notebook shows, with ``%matplotlib inline`` or without."""
+
+    def _repr_png_(self) -> bytes:
+        """Return the figure as PNG, as wide as a notebook's column."""
+        return png(self)
+
+
+def png(figure: Figure) -> bytes:
+    """Return a figure as PNG: 720 pixels for its 10 inches."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=72)
+    return buffer.getvalue()
+
+
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure [inch] that belongs to nobody: no pyplot, no global state."""
-    figure = Figure(figsize=(width, height), facecolor=CARD, layout="constrained")
+    figure = Drawn(figsize=(width, height), facecolor=CARD, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
