@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.report.pages import check_alone, check_alts
 
 from asperity.cli.main import COMMANDS
 
@@ -61,6 +62,27 @@ def test_files_are_written_whole(call: Call, tmp_path: Path) -> None:
     assert html_path.stat().st_size < 3_000_000
     assert str(html_path) in out.replace("\n", "")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.html", "a.json"]
+
+
+def test_the_page_says_which_command_made_it_of_which_result(call: Call, tmp_path: Path) -> None:
+    data, path = tmp_path / "a.json", tmp_path / "it's <b>\x1b[31m.html"
+    call("compare", SPEC, "--laws", "W", "--json", str(data), "--html", str(path))
+    text = path.read_text("utf-8")
+    assert hashlib.sha256(data.read_bytes()).hexdigest()[:12] in check_alone(text).text
+    said = check_alone(text).text
+    assert f"asperity compare {SPEC} --laws W --json {data} --html '" in said
+    assert "it'\"'\"'s <b>\\x1b[31m.html'" in said
+    assert "\x1b" not in text
+
+
+@needs_data
+def test_the_page_of_a_measured_surface_is_small(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "land.html"
+    options = ["--magnify", "20", "--device", "touch", "--html", str(path)]
+    assert call("compare", str(DATA / "sample-land.x3p"), *options)[0] == 0
+    text = path.read_text("utf-8")
+    check_alts(check_alone(text), text)
+    assert path.stat().st_size < 3_000_000
 
 
 def test_a_stiffness_above_the_limit_is_a_verdict(call: Call) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -87,8 +87,11 @@ def bumps_figure(found: BumpExperiment) -> Figure:
         left.fill_between(1e3 * x, 1e3 * height, -25.0, color=style.BODY, alpha=0.7, lw=0.0)
         runs = [bump for bump in found.bumps if bump.entry == entry]
         for one in runs:
-            left.plot(1e3 * one.x, 1e3 * one.z, color=colours[one.law], lw=0.9, label=one.law)
-            right.plot(one.time, 1e3 * one.supplied, color=colours[one.law], lw=1.2, label=one.law)
+            look: dict[str, Any] = {"color": colours[one.law], "label": one.law}
+            drawn = left.plot(1e3 * one.x, 1e3 * one.z, lw=0.9, **look)
+            drawn += right.plot(one.time, 1e3 * one.supplied, lw=1.2, **look)
+            for line in drawn:
+                style.of_law(line, one.law)
         style.zero_line(right)
         style.legend(right)
         left.set_ylim(-25.0, max(25.0, *(1e3 * one.z.max() + 2.0 for one in runs)))
@@ -102,6 +105,9 @@ def bumps_figure(found: BumpExperiment) -> Figure:
 # --- other devices and surfaces -------------------------------------------------------------------
 
 
+_OWN = "section V.A"  # in the place of a device
+
+
 @dataclass(frozen=True)
 class _Point:
     """One case: what a rule allows [N/m], from where it cycles [N/m]."""
@@ -109,7 +115,7 @@ class _Point:
     allowed: float
     onset: float
     law: str
-    marker: str
+    device: str
     missed: bool
 
 
@@ -117,35 +123,34 @@ def devices_figure(found: Experiments) -> Figure:
     """Return onset against allowed stiffness for two rules, on logarithmic axes."""
     figure = style.new_figure(10.0, 5.2)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-    devices = list(dict.fromkeys(one.device for one in found.beyond.onsets))
-    markers = dict(zip(devices, "osD^vP*" * len(devices), strict=False))
+    devices = dict.fromkeys(one.device for one in found.beyond.onsets)
+    markers = {**dict(zip(devices, "osD^vP*" * len(devices), strict=False)), _OWN: "X"}
     rules: tuple[list[_Point], list[_Point]] = ([], [])
     for one in found.beyond.onsets:
-        said, marker = one.prediction, markers[one.device]
+        said = one.prediction
         value, law = said.onset.value, said.onset.law
-        rules[0].append(_Point(one.allowed, value, law, marker, one.missed))
+        rules[0].append(_Point(one.allowed, value, law, one.device, one.missed))
         if said.conservative:
-            rules[1].append(_Point(said.delay_rule, value, law, marker, said.missed))
+            rules[1].append(_Point(said.delay_rule, value, law, one.device, said.missed))
     for said in found.passivity.onsets:
         value, law = said.onset.value, said.onset.law
         allowed = said.wall_rule or math.nan
-        rules[0].append(_Point(allowed, value, law, "X", said.wall_rule_missed))
+        rules[0].append(_Point(allowed, value, law, _OWN, said.wall_rule_missed))
         if said.conservative:
-            rules[1].append(_Point(said.delay_rule, value, law, "X", said.missed))
+            rules[1].append(_Point(said.delay_rule, value, law, _OWN, said.missed))
     names = ("K₀/q", "delay rule")
     for axes, points, name in zip((left, right), rules, names, strict=True):
-        _draw_rule(axes, points)
+        _draw_rule(axes, points, markers)
         style.label(axes, f"allowed by {name} [N/m]", "cycles from [N/m]" if axes is left else "")
         missed = sum(point.missed for point in points)
         style.entitle(axes, name, f"{missed} of {len(points)} wrong")
-    for device in devices:
-        left.plot([], [], markers[device], mfc=style.CARD, mec=style.BLUE, label=device)
-    left.plot([], [], "X", mfc=style.CARD, mec=style.BLUE, label="section V.A")
+    for device, marker in markers.items():
+        left.plot([], [], marker, mfc=style.CARD, mec=style.BLUE, label=device)
     style.legend(left)
     return figure
 
 
-def _draw_rule(axes: Axes, points: Sequence[_Point]) -> None:
+def _draw_rule(axes: Axes, points: Sequence[_Point], markers: Mapping[str, str]) -> None:
     style.dress(axes)
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -156,8 +161,11 @@ def _draw_rule(axes: Axes, points: Sequence[_Point]) -> None:
         place = round(3.0 * math.log10(point.allowed)), round(8.0 * math.log10(point.onset))
         named.setdefault(place, []).append(point)
         colour = style.ORANGE if point.missed else style.BLUE
-        axes.plot(point.allowed, point.onset, point.marker, ms=5.5, mec=colour, mew=0.9,
-                  mfc=style.ORANGE if point.missed else style.CARD)  # fmt: skip
+        (drawn,) = axes.plot(
+            point.allowed, point.onset, markers[point.device], ms=5.5, mec=colour, mew=0.9,
+            mfc=style.ORANGE if point.missed else style.CARD, label=f"_{point.law}, {point.device}",
+        )  # fmt: skip
+        style.of_law(drawn, point.law)
     for near in named.values():
         letters = "".join(dict.fromkeys(point.law for point in near))
         last = max(near, key=lambda point: point.allowed)

@@ -217,7 +217,8 @@ def _finish(figure: Figure | SubFigure, panels: list[Axes], scene: _Scene, drawn
     style.dress_bar(bar, "curl [N/m]: white is conservative")
     force = style.nice_length(0.35 * scene.per_inch)
     unit = style.force_unit(force)
-    quiver.axes.quiverkey(
+    # In the group of the bar, which no law takes along when it is hidden.
+    bar.ax.quiverkey(
         quiver,
         0.92,
         1.04,

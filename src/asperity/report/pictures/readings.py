@@ -246,6 +246,10 @@ def _rounded(values: FloatArray, digits: int) -> list[float | int | None]:
 
 _EACH = 3
 """Panels up to which each is told; of more only those that vary most and least."""
+_MOST_QUANTITIES = 6
+"""Quantities up to which each is told; of more those of one axis are told together."""
+_MOST_TOLD = 12
+"""Lone points up to which each is told; of more only how many there are."""
 
 
 def ranges_text(panels: Sequence[Panel]) -> str:
@@ -253,27 +257,36 @@ def ranges_text(panels: Sequence[Panel]) -> str:
 
     Lone points are told by both of their coordinates.
     """
+    groups = _quantities(panels, each=True)
+    if len(groups) > _MOST_QUANTITIES:
+        groups = _quantities(panels, each=False)
+    said = [f"{quantity}: {_told(members)}" for quantity, members in groups.items()]
+    points = [one for panel in panels for one in panel.series if len(one.x) == 1]
+    if len(points) > _MOST_TOLD:
+        said.append(f"{len(points)} points")
+    elif points:
+        told = "; ".join(f"{one.name} at {one.x[0]:.3g}, {one.y[0]:.3g}" for one in points)
+        said.append(f"{panels[0].x} and {panels[0].y}: {told}")
+    return "".join(f" {words[0].upper()}{words[1:]}." for words in said)
+
+
+def _quantities(
+    panels: Sequence[Panel], *, each: bool
+) -> dict[str, list[tuple[str, float, float]]]:
+    """Return panel, least and greatest value by quantity: of each line, or of all on one axis."""
     groups: dict[str, list[tuple[str, float, float]]] = {}
-    points = []
     for panel in panels:
         for one in panel.series:
-            if len(one.x) == 1:
-                points.append(f"{one.name} at {one.x[0]:.3g}, {one.y[0]:.3g}")
-            else:
-                _add(groups, _named(one.name, panel.y), panel.name, one.y)
+            if len(one.x) > 1:
+                _add(groups, _named(one.name, panel.y) if each else panel.y, panel.name, one.y)
         if panel.field is not None:
             _add(groups, panel.field.name, panel.name, panel.field.values)
-    said = [f"{quantity}: {_told(members)}" for quantity, members in groups.items()]
-    if points:
-        said.append(f"{panels[0].x} and {panels[0].y}: {'; '.join(points)}")
-    return "".join(f" {words[0].upper()}{words[1:]}." for words in said)
+    return groups
 
 
 def _named(series: str, axis: str) -> str:
     """Return a quantity with its unit, once: "normal force [N]"."""
-    if not series or axis.startswith(series):
-        return axis
-    return f"{series}, {axis}"
+    return axis if series in ("", axis.split(" [", maxsplit=1)[0]) else f"{series}, {axis}"
 
 
 def _add(

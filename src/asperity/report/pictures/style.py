@@ -219,24 +219,13 @@ def entitle(axes: Axes, letter: str, name: str, remark: str = "") -> None:
     above = TICK + 6.0 if remark else 0.0
     if remark:
         axes.set_title(remark, loc="left", fontsize=TICK, color=SOFT, pad=5.0)
-    _above(axes, letter, 0.0, above, fontweight="bold")
-    _above(axes, name, 0.72 * TITLE * len(letter) + 7.0, above)
-
-
-def _above(axes: Axes, text: str, right: float, up: float, **style: Any) -> None:
-    """Write text above the upper left corner of the axes, shifted by points."""
-    axes.annotate(
-        text,
-        (0.0, 1.0),
-        (right, up + 5.0),
-        xycoords="axes fraction",
-        textcoords="offset points",
-        fontsize=TITLE,
-        color=INK,
-        parse_math=False,
-        annotation_clip=False,
-        **style,
-    )
+    look: dict[str, Any] = {
+        "textcoords": "offset points", "fontsize": TITLE, "color": INK, "parse_math": False,
+        "annotation_clip": False, "va": "bottom",
+    }  # fmt: skip
+    corner: dict[str, Any] = {"xycoords": "axes fraction", "fontweight": "bold"}
+    bold = axes.annotate(letter, (0.0, 1.0), (0.0, above + 3.0), **corner, **look)
+    axes.annotate(name, (1.0, 0.0), (5.0, 0.0), xycoords=bold, **look)
 
 
 def label(axes: Axes, x: str = "", y: str = "") -> None:
