@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import re
 import shlex
+import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -71,6 +72,18 @@ def test_what_is_left_out_is_not_compared(
 def test_a_command_that_fails_is_no_answer(answers: ModuleType) -> None:
     with pytest.raises(RuntimeError, match="exit code 2"):
         answers.printed("asperity devices tuch")
+
+
+def test_a_block_whose_words_are_wrong_stops_the_build(answers: ModuleType) -> None:
+    """What words claim of an output is asserted below it; {run} and {shell} run by these."""
+    commands = sys.modules[answers.run_command.__module__]
+    names: dict[str, object] = {}
+    assert commands.execute("found = 0.61\nprint(found)\nfound", names) == ("0.61\n", 0.61)
+    with pytest.raises(AssertionError):
+        commands.execute("assert f'{found:.2f}' == '0.62'", names)
+    with pytest.raises(RuntimeError, match="expected to be refused"):
+        commands.execute("found", names, True)
+    assert commands.first_paragraphs("a\n\nb\n\nc", 2) == "a\n\nb\n\n..."
 
 
 def test_the_python_example_runs() -> None:

@@ -110,6 +110,20 @@ def experiments() -> Experiments:
     )
 
 
+def test_an_onset_below_what_was_tried_counts_as_unknown(experiments: Experiments) -> None:
+    def said(quiet: float, rule: float) -> str:
+        first = next(one for one in experiments.passivity.onsets if not one.onset.wall)
+        onset = replace(first.onset, quiet=quiet, cycling=50.0)
+        changed = (replace(first, onset=onset, wall_rule=rule),)
+        found = replace(experiments, passivity=replace(experiments.passivity, onsets=changed))
+        return dict(found.lines)["V.A onsets"].rpartition("; ")[2]
+
+    own = "below K0/q of the wall's own onset in"
+    assert said(0.0, 14.0) == f"{own} 0 of 1 cases, unknown in 1"
+    assert said(0.0, 60.0) == f"{own} 1 of 1 cases"  # it cycles below, however far
+    assert said(45.0, 14.0) == f"{own} 0 of 1 cases"
+
+
 def test_the_result_is_plain_data(experiments: Experiments) -> None:
     data = json.loads(json.dumps(experiments.to_dict(), allow_nan=False))
     assert set(data) == {"V.A", "V.B", "V.C", "beyond"}
