@@ -8,12 +8,14 @@ import pickle
 import re
 import subprocess
 import sys
+import tempfile
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from rich.console import Console
@@ -28,7 +30,9 @@ from asperity.report.analysis import print_analysis
 from asperity.report.comparison import print_comparison
 from asperity.report.limits import print_limits
 from asperity.report.several import print_comparisons
+from asperity.report.show import print_shown
 from asperity.simulation import Cartesian, Run, Servo, SpringHand, Still, simulate
+from asperity.textures.shown import Shown, show_file
 
 WAVE = asp.Sinusoid(2e-4, 2e-3)
 HOSTILE = "<script>alert(1)</script>"
@@ -39,6 +43,14 @@ def run(trace: bool = True) -> Run:
     hand = SpringHand(stiffness=200.0, damping=2.0)
     still, servo = Still((0.0, 0.0, -1e-3)), Servo(1e-3)
     return simulate(asp.Surface(WAVE, "C"), Cartesian(0.05), hand, servo, still, 0.1, trace=trace)
+
+
+def shown_file() -> Shown:
+    x = np.arange(200) * 1e-5
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "ridge.txt")
+        np.savetxt(path, np.column_stack([x, 1e-6 * np.sin(9e3 * x)]), header="x [m] z [m]")
+        return show_file(path)
 
 
 MAKERS: dict[str, Any] = {
@@ -54,15 +66,17 @@ MAKERS: dict[str, Any] = {
     "device": lambda: asp.load_device("touch"),
     "run": run,
     "run without a trace": lambda: run(trace=False),
+    "file": shown_file,
     "table": lambda: TableTwo((), "nothing"),
 }
 PICTURED = {"texture", "map", "surface", "comparison", "analysis", "limits", "run"}
-REPORTED = {"comparison", "several", "analysis", "limits"}
+REPORTED = {"comparison", "several", "analysis", "limits", "file"}
 PRINT = {
     "comparison": print_comparison,
     "several": print_comparisons,
     "analysis": print_analysis,
     "limits": print_limits,
+    "file": print_shown,
 }
 
 
@@ -162,7 +176,8 @@ assert "matplotlib" in sys.modules and "matplotlib.pyplot" not in sys.modules
     assert done.returncode == 0, done.stderr
 
 
-def test_a_notebook_session() -> None:
+def test_a_notebook_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path))  # where it keeps what was typed
     shell = pytest.importorskip("IPython.core.interactiveshell")
     session = shell.InteractiveShell.instance()
     try:
