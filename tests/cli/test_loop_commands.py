@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from tests.report.pages import check_alone, check_alts
 
 from asperity.cli.main import cli
 
@@ -97,6 +98,7 @@ def test_simulate_writes_json_and_html(call: Call, strokes: str, tmp_path: Path)
     text = (tmp_path / "run.html").read_text(encoding="utf-8")
     assert code == 0
     assert text.count("<svg") == 1
+    check_alts(check_alone(text), text)
     assert "://" not in re.sub(r"data:[^\"]*", "", text)
     assert "Where the energy went" in text
 
@@ -144,7 +146,9 @@ def test_onset_finds_brackets(call: Call, still: str, tmp_path: Path) -> None:
         assert one["quiet"] < one["cycling"] <= 1.2 * one["quiet"] * (1 + 1e-9)
         assert one["cycling"] > one["delay_rule"]
     code, _out, _err = call("onset", still, *options, "--html", str(tmp_path / "o.html"))
-    assert "Onset against delay" in (tmp_path / "o.html").read_text(encoding="utf-8")
+    text = (tmp_path / "o.html").read_text(encoding="utf-8")
+    assert "Onset against delay" in text
+    check_alts(check_alone(text), text)
 
 
 def test_scan_tells_gain_from_loss(call: Call, strokes: str, tmp_path: Path) -> None:
@@ -162,7 +166,9 @@ def test_scan_tells_gain_from_loss(call: Call, strokes: str, tmp_path: Path) -> 
     ]  # fmt: skip
     assert len(found) == 8
     code, _out, _err = call("scan", strokes, *options, "--html", str(tmp_path / "s.html"))
-    assert "Energy per stroke" in (tmp_path / "s.html").read_text(encoding="utf-8")
+    text = (tmp_path / "s.html").read_text(encoding="utf-8")
+    assert "Energy per stroke" in text
+    check_alts(check_alone(text), text)
 
 
 BAD = [

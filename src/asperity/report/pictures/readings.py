@@ -267,7 +267,12 @@ def ranges_text(panels: Sequence[Panel]) -> str:
     elif points:
         told = "; ".join(f"{one.name} at {one.x[0]:.3g}, {one.y[0]:.3g}" for one in points)
         said.append(f"{panels[0].x} and {panels[0].y}: {told}")
-    return "".join(f" {words[0].upper()}{words[1:]}." for words in said)
+    return "".join(f" {_sentence(words)}." for words in said)
+
+
+def _sentence(words: str) -> str:
+    """Return words with a capital, unless they begin with a symbol: σ is not Σ."""
+    return words[0].upper() + words[1:] if words[0].isascii() else words
 
 
 def _quantities(

@@ -67,7 +67,7 @@ def _draw_line(axes: Axes, heights: FloatArray, length: float, title: str) -> No
 def _draw_map(
     figure: Figure, axes: Axes, heights: FloatArray, sides: tuple[float, float], title: str
 ) -> None:
-    """Draw a map in the colours of its own heights; white where nothing was measured."""
+    """Draw a map in the colours of its own heights; none where nothing was measured."""
     wide = style.length_unit(max(sides))
     known = heights[~np.isnan(heights)]
     high = style.length_unit(float(np.ptp(known)))

@@ -30,10 +30,9 @@ function values(given) {
 /** Return a value as far as it is along its axis: linear, in logarithms, or both about zero. */
 function scaled(axis, value) {
   if (axis.scale === "log") return Math.log10(value);
-  if (axis.scale !== "symlog" || Math.abs(value) <= axis.linear) {
-    return axis.scale === "symlog" ? (value / axis.linear) * (10 / 9) : value;
-  }
-  return Math.sign(value) * (10 / 9 + Math.log10(Math.abs(value) / axis.linear));
+  if (axis.scale !== "symlog") return value;
+  const size = Math.abs(value) / axis.linear;
+  return Math.sign(value) * (size <= 1 ? size * (10 / 9) : 10 / 9 + Math.log10(size));
 }
 
 /** Return what part of an axis lies below a value. */
