@@ -94,7 +94,10 @@ def check_script(reader: Reader) -> None:
 
 
 def check_alts(reader: Reader, page: str) -> None:
-    """Assert that the words for pictures say what is seen, with numbers, and are no titles."""
+    """Assert that the words for pictures say what is seen, with numbers, and are no titles.
+
+    The axes of their numbers have units, or none is due.
+    """
     titles = set(re.findall(r"<h[1-3]>([^<]*)</h[1-3]>", page))
     assert reader.alts
     for alt in reader.alts:
@@ -102,6 +105,9 @@ def check_alts(reader: Reader, page: str) -> None:
         assert alt.strip(" .") not in titles
         assert re.search(r"\d", alt), alt
         assert "nan" not in alt.split()
+    for panel in [panel for panels in reader.numbers for panel in panels]:
+        for name in (panel["x"]["name"], panel["y"]["name"]):
+            assert name.endswith("]") or name in {"strength T", "support S"}, name
 
 
 def terminal(show: Callable[..., None], *arguments: Any, width: int, **how: Any) -> str:

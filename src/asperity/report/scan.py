@@ -93,7 +93,7 @@ def scan_page(setup: Setup, found: Sequence[Stroke]) -> Page:
     from asperity.report.pictures.sweep_pictures import scan_figure
 
     caption = (
-        "Energy that the texture supplies per stroke: black the sum, orange along x, blue along z. "
+        "Energy that the texture supplies per stroke: thick the sum, orange along x, blue along z. "
         "Above the line it feeds the hand."
     )
     laws = ", ".join(dict.fromkeys(stroke.law for stroke in found))

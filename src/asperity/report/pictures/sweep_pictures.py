@@ -60,7 +60,7 @@ def scan_figure(found: Sequence[Stroke]) -> Figure:
     """Return energy per stroke against speed, one panel per law, one line per depth."""
     laws = list(dict.fromkeys(stroke.law for stroke in found))
     figure, panels = style.law_panels(
-        len(laws), 2.3, 0.5, x="speed [m/s]", y="mJ per stroke", sharey=False
+        len(laws), 2.3, 0.5, x="speed [m/s]", y="energy per stroke [mJ]", sharey=False
     )
     totals = [abs(one.total) for one in found if math.isfinite(one.total)]
     least = 1e3 * 0.01 * max(totals, default=1e-3)

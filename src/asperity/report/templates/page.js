@@ -58,7 +58,7 @@ function place(panel, x, y) {
 function said(name, value) {
   const [, words, unit] = /^(.*?)\s*(?:\[(.*?)\])?$/.exec(name);
   const number = String(Number(value.toPrecision(4))).replace("-", "−");
-  return `${words || "value"}: ${number}${unit && unit !== "1" ? ` ${unit}` : ""}`;
+  return `${words ? `${words}: ` : ""}${number}${unit && unit !== "1" ? ` ${unit}` : ""}`;
 }
 
 /** Return the name of a line with the unit of its axis. */
