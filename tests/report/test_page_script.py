@@ -148,7 +148,7 @@ const axes = [...document.querySelectorAll('[data-law="A"] .shared')].map((one) 
 const others = [...document.querySelectorAll('[data-law="C"]')].map((one) =>
   one.hidden || getComputedStyle(one).visibility === "hidden");
 const csv = figures.map((figure) => csvFile(of(figure)));
-const svg = figures.map((figure) => svgFile(figure.querySelector("svg"), "0 0 1 1"));
+const svg = figures.map((figure) => svgFile(figure.querySelector("svg"), "0 0 72 36"));
 document.querySelectorAll(".laws button")[0].click();
 return { hidden, axes, others, csv, svg, again: csvFile(of(figures[2])) };
 """
@@ -171,6 +171,7 @@ def test_laws_are_hidden_and_what_is_seen_is_saved(page: str, tmp_path: Path) ->
     ]
     shown = Reader(page).numbers[2][2]["series"]
     assert [float(row[4]) for row in forces[1:]] == shown[0]["y"]
+    assert max(len(row[3]) for row in forces[1:]) <= 11  # eight digits, no noise of rounding
     assert "A, groove" in told["again"]
     fields = [*csv.reader(io.StringIO(told["csv"][3]))]
     assert fields[0][2].endswith("curl [N/m]")
@@ -178,6 +179,7 @@ def test_laws_are_hidden_and_what_is_seen_is_saved(page: str, tmp_path: Path) ->
     for text in told["svg"]:
         root = ET.fromstring(text)
         assert root.tag == "{http://www.w3.org/2000/svg}svg"
+        assert (root.get("width"), root.get("height")) == ("72pt", "36pt")
         assert "var(" not in text
         assert root[0].text  # its title: what is seen
         assert "#1d2733" in text

@@ -24,7 +24,7 @@ function button(sign, words, act) {
 function values(given) {
   if (Array.isArray(given)) return given;
   const step = (given.to - given.from) / (given.count - 1);
-  return Array.from({ length: given.count }, (_, i) => given.from + i * step);
+  return Array.from({ length: given.count }, (_, i) => Number((given.from + i * step).toPrecision(8)));
 }
 
 /** Return a value as far as it is along its axis: linear, in logarithms, or both about zero. */
@@ -217,7 +217,9 @@ function svgFile(svg, viewBox) {
   const copy = svg.cloneNode(true);
   copy.querySelector(".marks")?.remove();
   for (const name of ["class", "tabindex", "aria-label", "role"]) copy.removeAttribute(name);
-  copy.setAttribute("viewBox", viewBox);
+  const [, , width, height] = viewBox.split(/[\s,]+/);
+  const size = { viewBox, width: `${width}pt`, height: `${height}pt` };
+  Object.entries(size).forEach(([name, value]) => copy.setAttribute(name, value));
   const title = document.createElementNS(svg.namespaceURI, "title");
   title.textContent = svg.getAttribute("aria-label");
   copy.prepend(title);
