@@ -243,7 +243,8 @@ def test_unverified_data_and_notes_of_the_device_are_said() -> None:
 @pytest.mark.parametrize(
     ("arguments", "name"),
     [
-        ({"surface": TEXTURE}, "surface"),
+        ({"surface": 3.0}, "^surface must be a texture"),
+        ({"surface": "scene.toml"}, "^surface is a scene"),
         ({"device": "omga.3"}, "device"),
         ({"direction": (0.0, 0.0)}, "direction"),
         ({"direction": (1.0, 0.0, 0.0)}, "direction"),

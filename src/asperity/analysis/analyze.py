@@ -131,7 +131,7 @@ def _surface(asked: Surface | TextureLike, device: Device, arguments: dict[str, 
             words = "belongs to the surface: give a texture, or change it by to_law, to_stiffness"
             raise ParameterError(name, words)
         return asked
-    texture = as_texture(asked)
+    texture = as_texture(asked, name="surface")
     if "law" not in given:
         given["law"] = law_to_ask_about(texture, device, **given)
     surface = Surface(texture, **given)

@@ -34,7 +34,9 @@ KINDS: Mapping[str, Kind] = ChainMap({_FILE.name: _FILE}, CATALOGUE)
 """What [texture] can be: a kind of the catalogue, as it stands now, or a file."""
 
 
-def as_texture(texture: TextureLike, values: Mapping[str, Any] | None = None) -> Texture:
+def as_texture(
+    texture: TextureLike, values: Mapping[str, Any] | None = None, name: str = "texture"
+) -> Texture:
     """Return a texture as it is, or the one that a text or a path names.
 
     Args:
@@ -43,6 +45,7 @@ def as_texture(texture: TextureLike, values: Mapping[str, Any] | None = None) ->
             path of a file is that file.
         values: arguments of :func:`~asperity.textures.load_texture` [SI]; of those textures that
             are not measured take the ones of :func:`~asperity.textures.drawn.prepare_texture`.
+        name: of the argument, for errors.
 
     Raises:
         ParameterError: for an unknown kind or argument (the nearest are offered), a value that
@@ -57,13 +60,13 @@ def as_texture(texture: TextureLike, values: Mapping[str, Any] | None = None) ->
         return texture
     if not isinstance(texture, (str, os.PathLike)):
         words = "must be a texture, a text such as 'sandpaper:grit=P60', or the path of a file"
-        raise ParameterError("texture", words, texture)
+        raise ParameterError(name, words, texture)
     extra = dict(values or {})
     if isinstance(texture, str) and (named := specified(texture)) is not None:
         return build_texture(*named, values=extra)
     if is_scene(texture):
         words = "is a scene, which names more than a texture; asperity.scene.load_scene reads it"
-        raise ParameterError("texture", words, os.fspath(texture))
+        raise ParameterError(name, words, os.fspath(texture))
     return load_texture(texture, **extra)
 
 
