@@ -94,6 +94,8 @@ def test_long_maps_are_looked_at_line_by_line() -> None:
 @pytest.mark.parametrize("name", ["sample-land.x3p", "testing.x3p", "dektak-1.csv", "frt-2.frt"])
 def test_real_surfaces_are_far_from_the_limit(name: str) -> None:
     """And a unit that is wrong a thousandfold would be noticed on the rough ones."""
+    if name.endswith(".frt"):
+        pytest.importorskip("SurfaceTopography", reason="the extra 'formats' is not installed")
     surface = read_surface(DATA / name)
     assert surface.pitch is not None
     slope = mean_slope(surface.heights, surface.pitch)

@@ -155,7 +155,7 @@ def _kept(found: Spectrum, forces: FloatArray) -> NDArray[np.bool_]:
         return np.ones(len(forces), dtype=bool)
     heights = np.array([wave.share for wave in found.waves])
     squares = forces**2
-    pushed = squares / max(float(squares.sum()), math.ulp(0.0))
+    pushed = squares / (float(squares.sum()) or 1.0)  # the smooth wall has no force
     return np.asarray((heights >= LEAST_SHARE) | (pushed >= LEAST_SHARE))
 
 
