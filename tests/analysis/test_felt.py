@@ -12,7 +12,7 @@ import pytest
 from asperity.analysis.check_limits import limits
 from asperity.analysis.compare import compare
 from asperity.analysis.limits.felt import CLEARLY, NOTICED, Felt, Hides, texture_felt
-from asperity.analysis.words.felt import amount, cures_text, hidden_by
+from asperity.analysis.words.felt import amount, cures_text, form_removed, hidden_by
 from asperity.devices import Device, parse_device
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Sinusoid
@@ -172,3 +172,11 @@ def test_of_equals_one_that_jumps_at_no_depth_is_taken() -> None:
     assert shown["D"] > 0.8 * max(shown.values())
     assert result.row("D").continuous
     assert result.recommended in {"C", "H"}
+
+
+def test_what_rounding_leaves_of_a_form_is_none() -> None:
+    found = felt(1e-4, device(), SHORT)
+    known = replace(found, nesting=8e-3)
+    (said,) = form_removed(known, 3e-6, 1.8e-21)
+    assert said.endswith("L-filter of 8 mm leave; they take form 3 µm high and no waviness")
+    assert form_removed(replace(found, nesting=None), 3e-6, 1e-6) == []

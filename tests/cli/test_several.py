@@ -17,6 +17,7 @@ from asperity.analysis.several import compare_several
 from asperity.cli.main import main
 from asperity.errors import ParameterError
 from asperity.report.several import print_comparisons
+from asperity.units import engineering
 
 Call = Callable[..., tuple[int, str, str]]
 SPEC = "sinusoid:amplitude=0.2mm,period=2mm"
@@ -172,8 +173,29 @@ def test_a_narrow_table_leaves_out_columns_and_cuts_nothing(width: int) -> None:
     said = text.getvalue()
     assert "…" not in said
     assert max(map(len, said.splitlines())) <= width
-    assert ("texture" in said.splitlines()[0]) == (width > 60)
+    headings = next(line for line in said.splitlines() if re.match(" *device  ", line))
+    assert ("texture" in headings) == (width > 60)
     assert re.search(r"3D Systems( Touch)? +200 µm +\(?C", said)
+
+
+def test_the_answer_names_the_best_case_and_counts_the_others() -> None:
+    coarse, fine = asp.Sinusoid(2e-4, 2e-3), asp.Sinusoid(1e-7, 2e-3)
+    found = compare_several(coarse, ["touch", "omega.3", "2diy"], [1e-4, 4e-4], "WC")
+    felt = [one for one in found.comparisons if one.recommended]
+    best = max(felt, key=lambda one: one.recommended_row.shown_force)
+    start = engineering(best.recommended_row.start, "N/m")
+    assert best.max_depth == 4e-4
+    assert found.recommendation.startswith(
+        f"Best on the Force Dimension omega.3, pressed to 400 µm: law C from {start}, felt, "
+    )
+    assert found.recommendation.endswith(
+        "Of 4 cases: felt in 2, not felt in 2. No smooth wall is known to have held on 2diy."
+    )
+    assert found.to_dict()["recommendation"] == found.recommendation
+    (none,) = compare_several(fine, ["touch"], laws="C").comparisons
+    assert not none.recommended
+    assert compare_several(fine, ["touch"], laws="C").recommendation == "Of 1 case: not felt in 1."
+    assert compare_several(fine, ["2diy"], laws="C").recommendation.startswith("No smooth wall")
 
 
 def test_no_device_is_an_error() -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.analysis.compare import SCHEMA, Comparison, compare, line_to_add
+from asperity.analysis.words.several import Case, several_answer
 from asperity.devices import Device, load_device
 from asperity.display import Reported
 from asperity.errors import ParameterError
@@ -58,6 +59,16 @@ class Comparisons(Reported):
     comparisons: tuple[Comparison, ...]
     lacking: tuple[Lacking, ...] = ()
 
+    @property
+    def recommendation(self) -> str:
+        """Where the texture comes out best and with which law, and in how many cases it is felt."""
+        cases = [
+            Case(one.device.name, one.max_depth, row or one.nearest_row, row is not None)
+            for one in self.comparisons
+            for row in (one.recommended_row,)
+        ]
+        return several_answer(cases, [one.device for one in self.lacking])
+
     def __repr__(self) -> str:
         return f"<Comparisons: {len(self.comparisons)} answered, {len(self.lacking)} lacking>"
 
@@ -66,6 +77,7 @@ class Comparisons(Reported):
         return {
             "schema": SCHEMA,
             "texture": self.texture.describe(),
+            "recommendation": self.recommendation,
             "comparisons": plain(self.comparisons),
             "lacking": plain(self.lacking),
         }

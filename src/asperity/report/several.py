@@ -54,6 +54,8 @@ def print_comparisons(found: Comparisons, console: Console) -> None:
         found: the result.
         console: where to.
     """
+    terminal.say(console, found.recommendation, "bold")
+    console.print()
     table = cases_table(found)
     without = terminal.too_wide(table, _OPTIONAL, console.width)
     console.print(terminal.table(table, wraps=(0,), without=without))
@@ -82,7 +84,7 @@ def comparisons_page(found: Comparisons) -> page.Page:
     texture = found.texture
     return page.Page(
         title="Haptic texture on several devices",
-        answer=f"{len(found.comparisons)} cases compared: {described(texture.describe())}.",
+        answer=found.recommendation,
         facts=[
             ("Surface", described(texture.describe())),
             ("Peak to valley", engineering(texture.peak_to_valley, "m")),

@@ -6,6 +6,8 @@ from asperity.analysis.limits.felt import Cure, Felt, Hides
 from asperity.devices import Device
 from asperity.units import engineering, rounded_down
 
+_NO_HEIGHT = 1e-12  # [m], far below an atom: what rounding leaves
+
 
 def speed_text(speed: float) -> str:
     """Return a speed for reading.
@@ -97,8 +99,12 @@ def form_removed(felt: Felt | None, form: float, waviness: float) -> list[str]:
     """
     if felt is None or felt.nesting is None:
         return []
-    heights = f"form {engineering(form, 'm')} and waviness {engineering(waviness, 'm')} high"
     return [
         f"What counts as texture is what a form of second degree and a Gaussian L-filter of "
-        f"{engineering(felt.nesting, 'm')} leave; they take {heights}"
+        f"{engineering(felt.nesting, 'm')} leave; they take {_taken('form', form)} and "
+        f"{_taken('waviness', waviness)}"
     ]
+
+
+def _taken(part: str, height: float) -> str:
+    return f"no {part}" if height < _NO_HEIGHT else f"{part} {engineering(height, 'm')} high"
