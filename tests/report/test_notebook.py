@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import html
 import io
 import pickle
 import re
@@ -207,6 +208,12 @@ def test_plot_is_the_picture_of_the_report(name: str) -> None:
     assert figure._repr_png_().startswith(b"\x89PNG")
     with pytest.raises(asp.ParameterError, match="picture must be"):
         shown.plot("nonsense")
+
+
+def test_several_begin_with_their_answer() -> None:
+    said = html.unescape(result("several")._repr_html_())
+    assert said.index(result("several").recommendation) < said.index("<table")
+    assert "2diy: nobody says which smooth wall it held" in said
 
 
 def test_one_picture_of_several() -> None:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from asperity.report.page import Table, _environment
+from asperity.report.page import Table, environment
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,7 +34,7 @@ class Fragment:
 def fragment_html(fragment: Fragment) -> str:
     """Return the fragment as HTML; all words of it are escaped."""
     picture = "" if fragment.draw is None else _png(fragment.draw)
-    template = _environment().get_template("notebook.html.j2")
+    template = environment().get_template("notebook.html.j2")
     return template.render(fragment=fragment, picture=picture)
 
 

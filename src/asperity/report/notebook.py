@@ -73,8 +73,8 @@ def _comparison(result: Comparison) -> Fragment:
 
 @fragment_of.register
 def _comparisons(result: Comparisons) -> Fragment:
-    said = "; ".join(missing.sentence for missing in result.lacking)
-    return Fragment(said, [cases_table(result)])
+    said = [result.recommendation, *(f"{missing.sentence}." for missing in result.lacking)]
+    return Fragment(" ".join(said), [cases_table(result)])
 
 
 @fragment_of.register

@@ -280,7 +280,7 @@ def page_html(page: Page, origin: Origin | None = None) -> str:
     style = re.sub(r"\s*([{};])\s*", r"\1", _file("style.css"))
     script = _file("page.js")
     return (
-        _environment()
+        environment()
         .get_template("page.html.j2")
         .render(
             page=page, style=style, script=script, allowed=_sha256(script),
@@ -310,7 +310,8 @@ def _date() -> str:
 
 
 @lru_cache(maxsize=1)
-def _environment() -> jinja2.Environment:
+def environment() -> jinja2.Environment:
+    """Return the templates of this room; all words are escaped."""
     import jinja2
 
     return jinja2.Environment(
