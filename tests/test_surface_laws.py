@@ -184,7 +184,7 @@ def test_a_flat_texture_modulates_nothing(plain: Check):
 
 
 WRONG: list[tuple[str, Any]] = [
-    *[("texture", value) for value in (None, "sinusoid", np.zeros((4, 4)))],
+    *[("texture", value) for value in (None, 3.0, np.zeros((4, 4)))],
     *[("law", value) for value in ("X", "", None, 1)],
     *[("stiffness", value) for value in (0.0, -1.0, math.nan, math.inf, "500 N/m", None, True)],
     *[("max_depth", value) for value in (0.0, -1e-3, math.nan, "1 mm")],

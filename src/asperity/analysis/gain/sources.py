@@ -10,19 +10,22 @@ from functools import lru_cache
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parents[2]
+# Which texture a name means: the texture that was found is part of a certificate's key itself.
+_BESIDE = frozenset({"asperity.textures.naming"})
 
 
 def used_modules(roots: Iterable[str]) -> frozenset[str]:
     """Return the modules that the roots import, directly or not, functions included.
 
-    Of a module of one's own only what it imports of this package is followed. What a package
-    imports in its ``__init__`` counts only where a name of the package itself is asked for.
+    Of a module of one's own only what it imports of this package is followed; what finds a texture
+    by its name is not. What a package imports in its ``__init__`` counts only where a name of the
+    package itself is asked for.
     """
     found: set[str] = set()
     left = list(roots)
     while left:
         module = left.pop()
-        if module not in found:
+        if module not in found | _BESIDE:
             found.add(module)
             file = _file(module)
             left += () if file is None else _imported(file, file.stat().st_mtime_ns)
