@@ -6,9 +6,15 @@ import json
 import os
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import ModuleType
 
 import pytest
+
+from asperity.compiled import Kernels
+from asperity.kernels import link
 
 _SCRIPT = """
 import json, multiprocessing, sys
@@ -55,3 +61,20 @@ def test_all_who_begin_at_once_have_the_same_bits(how: str, count: int, tmp_path
     kept = [path.name for path in (tmp_path / f"cache-{how}").rglob("*") if path.is_file()]
     assert kept
     assert all(len(name) == 40 for name in kept)  # entries only: nothing damaged, nothing half
+
+
+def test_threads_that_ask_at_once_get_one_unit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The linker tells units by identity: two of one module would leave loops out."""
+    module = ModuleType("at_once")
+    vars(module)["KERNELS"] = Kernels(provides=("height",))
+    meeting = threading.Barrier(8, timeout=30)
+
+    def source(_module: ModuleType) -> str:
+        meeting.wait()  # all have found that there is none yet
+        return "def height(x, y):\n    return x + y\n"
+
+    monkeypatch.setattr(link.inspect, "getsource", source)
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(link.module_unit, [module] * 8))
+    assert {id(unit) for unit in found} == {id(link.module_unit(module))}
+    assert list(found[0].texts) == ["height"]

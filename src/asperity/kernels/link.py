@@ -11,7 +11,6 @@ import builtins
 import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from types import MappingProxyType, ModuleType
 
 from asperity.compiled import Kernels
@@ -123,17 +122,23 @@ def written_unit(
     return replace(unit, kernels=Kernels(provides, requires, loops, merged=merged))
 
 
-@lru_cache(maxsize=64)
+_UNITS: dict[ModuleType, Unit] = {}
+
+
 def module_unit(module: ModuleType) -> Unit:
-    """Return the unit of a compiled module.
+    """Return the unit of a compiled module: one and the same, whichever thread asks.
 
     Raises:
         ParameterError: for a module that does not declare itself.
     """
+    if module in _UNITS:
+        return _UNITS[module]
     kernels = getattr(module, "KERNELS", None)
     if not isinstance(kernels, Kernels):
         raise ParameterError("sampler", f"{module.__name__} must declare KERNELS = Kernels(...)")
-    return text_unit(module.__name__, inspect.getsource(module), kernels, vars(module))
+    made = text_unit(module.__name__, inspect.getsource(module), kernels, vars(module))
+    # Units are told apart by identity: of two that threads make at once, the first is kept.
+    return _UNITS.setdefault(module, made)
 
 
 def loops_of(*units: Unit) -> list[tuple[str, Unit]]:
