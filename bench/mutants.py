@@ -27,8 +27,8 @@ from pathlib import Path
 from typing import Any
 
 # Cosmic Ray is not installed where types are checked, and ships none.
-from cosmic_ray.work_db import WorkDB, use_db  # type: ignore[import-not-found]
-from cosmic_ray.work_item import (  # type: ignore[import-not-found]
+from cosmic_ray.work_db import WorkDB, use_db  # type: ignore[import-not-found]  # as said
+from cosmic_ray.work_item import (  # type: ignore[import-not-found]  # as said
     TestOutcome,
     WorkerOutcome,
     WorkResult,

@@ -196,7 +196,7 @@ class Unit(Cells):
         return np.random.default_rng(0).random((count, self.dimensions))
 
     def models(self, *_arguments: Any) -> Any:
-        raise NotImplementedError
+        raise NotImplementedError  # no part of what is searched here
 
     derivatives = plane = models
 

@@ -3,31 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from tests.report.pages import check_alone, check_alts
 
-from asperity.paper.experiments.beyond import BeyondExperiment, device_onset
-from asperity.paper.experiments.bump import bump_experiment
-from asperity.paper.experiments.passivity import passivity_experiment, passivity_onsets
+from asperity.paper.experiments.passivity import passivity_onsets
 from asperity.paper.experiments.run import Experiments
-from asperity.paper.experiments.scanning import scanning_experiment
 from asperity.report.experiments import experiment_sections
 from asperity.report.page import Page, Picture, Table, page_html
 from asperity.report.pictures.experiment_pictures import cycles_figure, devices_figure
 from asperity.report.pictures.sweep_pictures import onset_figure
-from asperity.surface import Surface
-from asperity.textures.sinusoid import Sinusoid
-
-
-@pytest.fixture(scope="module")
-def found() -> Experiments:
-    surface = Surface(Sinusoid(0.1e-3, 1e-3), "A", max_depth=1e-3)
-    return Experiments(
-        passivity_experiment("WH", (0,), starts=2),
-        scanning_experiment("A"),
-        bump_experiment("AD"),
-        BeyondExperiment((device_onset("touch", "sinusoid", surface),), ("falcon",)),
-    )
 
 
 def test_sections_in_order(found: Experiments) -> None:

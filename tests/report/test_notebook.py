@@ -179,7 +179,7 @@ assert "matplotlib" in sys.modules and "matplotlib.pyplot" not in sys.modules
 
 def test_a_notebook_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path))  # where it keeps what was typed
-    shell = pytest.importorskip("IPython.core.interactiveshell")
+    shell = pytest.importorskip("IPython.core.interactiveshell", reason="not run: no IPython here")
     session = shell.InteractiveShell.instance()
     try:
         session.run_cell("import asperity as asp")

@@ -12,29 +12,12 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from asperity.errors import ParameterError
-from asperity.paper.experiments.beyond import BeyondExperiment, device_onset
-from asperity.paper.experiments.bump import bump_experiment
 from asperity.paper.experiments.passivity import passivity_experiment
 from asperity.paper.experiments.run import Experiments
-from asperity.paper.experiments.scanning import scanning_experiment
 from asperity.report import paper_figures
 from asperity.report.paper_figures import DRAWINGS, find_drawings, write_figures
-from asperity.surface import Surface
-from asperity.textures import Sinusoid
 
 NAMES = ["fig-2", "fig-3", "fig-5", "onsets", "fig-6", "fig-7", "devices"]
-
-
-@pytest.fixture(scope="module")
-def found() -> Experiments:
-    """Every experiment, smaller than the paper's; the same as in test_experiments.py."""
-    surface = Surface(Sinusoid(0.1e-3, 1e-3), "A", max_depth=1e-3)
-    return Experiments(
-        passivity_experiment("WH", (0,), starts=2),
-        scanning_experiment("A"),
-        bump_experiment("AD"),
-        BeyondExperiment((device_onset("touch", "sinusoid", surface),), ("falcon",)),
-    )
 
 
 @pytest.fixture(scope="module")
