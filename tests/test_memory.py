@@ -59,7 +59,8 @@ def test_a_surface_that_does_not_fit_is_refused_before_it_is_made() -> None:
         with pytest.raises(ParameterError, match="2 times as long"):
             HeightMap(np.broadcast_to(0.0, (2000, 2000)), 1e-5)
     reserve(10**9)  # nothing is limited outside of a command
-    with pytest.raises(ParameterError, match="at least 420 MB for compare"), limited("compare", 1):
+    words = "at least 420 MB for compare, got 999999 bytes"
+    with pytest.raises(ParameterError, match=words), limited("compare", 999_999):
         pass
 
 

@@ -58,7 +58,8 @@ def limited(command: str, limit: int | None) -> Iterator[None]:
     """
     base = estimate(command, 0)
     if limit is not None and limit < base:
-        raise ParameterError("memory", f"must be at least {_size(base)} for {command}", limit)
+        words = f"must be at least {_size(base)} for {command}, got {_size(limit)}"
+        raise ParameterError("memory", words)
     allowed, words = (limit, "given") if limit is not None else (free_memory(), "free")
     token = _BUDGET.set(None if allowed is None else Budget(allowed, base, words))
     try:
@@ -100,6 +101,8 @@ def _advice(points: int, budget: Budget, axes: int) -> str:
 
 
 def _size(count: int) -> str:
+    if count < 10**6:
+        return f"{count} bytes"
     return f"{count / 1e9:.3g} GB" if count >= 10**9 else f"{count / 1e6:.0f} MB"
 
 

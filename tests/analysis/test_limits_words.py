@@ -43,6 +43,18 @@ def verdicts(result: Limits) -> dict[int, bool | None]:
     return {limit.number: limit.holds for limit in result.limits}
 
 
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"bandwidth": None}, "limits 1, 2, 3, 4 and 5 hold at 0.12 m/s"),
+        (dict.fromkeys(NUMBERS.keys() - {"max_stiffness"}), "limit 5 holds at 0.12 m/s"),
+    ],
+)
+def test_one_limit_holds_and_several_hold(changes: dict[str, None], words: str) -> None:
+    result = ask(device=device(**changes))
+    assert f"As far as can be decided: {words}. Not decidable: " in result.answer
+
+
 def test_plain_data_says_everything() -> None:
     result = ask(TWO)
     content = json.loads(json.dumps(result.to_dict(), allow_nan=False))

@@ -26,8 +26,9 @@ def answer(result: Limits) -> str:
     elif len(open_ones) == len(result.limits):
         text = "Nothing can be decided."
     elif open_ones:
-        holding = _numbers([limit for limit in result.limits if limit.holds])
-        text = f"As far as can be decided: {holding} hold at {speed}."
+        holding = [limit for limit in result.limits if limit.holds]
+        verb = "hold" if len(holding) > 1 else "holds"
+        text = f"As far as can be decided: {_numbers(holding)} {verb} at {speed}."
     else:
         text = f"Yes: all six limits hold at {speed}."
     if open_ones:
