@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from itertools import pairwise
 
 from asperity.textures.plane_waves import SingleWave
 
 ClosedForm = Callable[[SingleWave, float], float]
+# More than it takes to halve an interval down to the digits of its ends.
+_HALVINGS = 200
 
 
 def _slope(wave: SingleWave) -> float:
@@ -34,47 +35,40 @@ def q_b(wave: SingleWave, depth: float) -> float:
 
 
 def q_c(wave: SingleWave, depth: float) -> float:
-    """q_C = max{1, y, feasible roots λ of the cubic}.
+    """q_C = y, or the feasible root λ of the cubic, where there is one.
 
     λ³ - (1 + G₁² + E²/4) λ² + (E²/2) λ - E²/4 = 0 with E = 2πD/l; a root is feasible if λ > 1 and
-    E (λ - 1) <= 2 G₁ λ. At depth 0 the norm is 1 + G₁².
+    E (λ - 1) <= 2 G₁ λ. Where none is, y = G₁ E > 1 + 2 G₁².
     """
-    return max(1.0, _bend(wave, depth), *_feasible_roots(wave, depth))
+    return max(_bend(wave, depth), _feasible_root(wave, depth))
 
 
-def _feasible_roots(wave: SingleWave, depth: float) -> list[float]:
-    """Return the feasible roots by t = 1/λ: (E²/4) t (1 - t)² + (1 + G₁²) t = 1, 0 < t < 1."""
+def _feasible_root(wave: SingleWave, depth: float) -> float:
+    """Return the feasible root, 0 for none, by t = 1/λ: (E²/4) t (1 - t)² + (1 + G₁²) t = 1.
+
+    Feasible are t from 1 - 2 G₁/E on. Where the left side is stationary there, it is more than 1:
+    so it crosses 1 at most once, on its way up to 1 + G₁² at t = 1.
+    """
     g, e = _slope(wave), 2.0 * math.pi * depth / wave.period
     bend, rate = e * e / 4.0, 1.0 + g * g
-    # Between these the left side is monotone: 3t² - 4t + 1 + rate/bend = 0.
-    inner = 4.0 - 3.0 * (1.0 + rate / bend) if rate < bend else -1.0
-    turns = [(2.0 - math.sqrt(inner)) / 3.0, (2.0 + math.sqrt(inner)) / 3.0] if inner > 0.0 else []
-    ends = [0.0, *turns, 1.0]
-    roots = [_root(bend, rate, low, high) for low, high in pairwise(ends)]
-    found = [1.0 / t for t in roots if t is not None]
-    return [r for r in found if r > 1.0 and e * (r - 1.0) <= 2.0 * g * r * (1.0 + 1e-12)]
-
-
-def _root(bend: float, rate: float, low: float, high: float) -> float | None:
-    """Return where bend t (1 - t)² + rate t = 1 between two points, by Newton and halving."""
 
     def excess(t: float) -> float:
         return (bend * (1.0 - t) ** 2 + rate) * t - 1.0
 
-    sign = 1.0 if excess(high) > 0.0 else -1.0
-    if sign * excess(low) > 0.0:
-        return None
-    t = min(max(1.0 / rate, low), high)
-    for _ in range(200):
-        off = sign * excess(t)
+    low, high = max(1.0 - 2.0 * g / e, 0.0), 1.0
+    if excess(low) > 0.0:
+        return 0.0
+    t = max(1.0 / rate, low)
+    for _ in range(_HALVINGS):
+        off = excess(t)
         low, high = (t, high) if off <= 0.0 else (low, t)
-        slope = sign * (bend * (1.0 - t) * (1.0 - 3.0 * t) + rate)
+        slope = bend * (1.0 - t) * (1.0 - 3.0 * t) + rate
         step = t - off / slope if slope > 0.0 else low
         step = step if low < step < high else 0.5 * (low + high)
         if abs(step - t) <= 1e-16 * t:
-            return step
+            break
         t = step
-    return t
+    return 1.0 / t
 
 
 def q_d(wave: SingleWave, depth: float) -> float:
@@ -113,8 +107,8 @@ def phase_b(wave: SingleWave, depth: float) -> float:
 
 def phase_c(wave: SingleWave, depth: float) -> float:
     """sin(phase) = -E (λ - 1)/(2 G₁ λ): there λ is stationary along the profile."""
-    root = max(_feasible_roots(wave, depth), default=0.0)
-    if root < max(1.0, _bend(wave, depth)):
+    root = _feasible_root(wave, depth)
+    if root <= _bend(wave, depth):
         return trough(wave, depth)
     e = 2.0 * math.pi * depth / wave.period
     return math.asin(max(-1.0, -0.5 * e * (root - 1.0) / (root * _slope(wave))))
