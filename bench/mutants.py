@@ -95,8 +95,9 @@ ROOMS = {
     ),
     "gain": Room(
         ("analysis/gain",),
-        ("tests/analysis/test_theorems.py", "tests/analysis/test_closed_forms.py",
-         "tests/analysis/test_kept.py", "tests/analysis/test_certified.py",
+        ("tests/analysis/test_gain_by_definition.py", "tests/analysis/test_theorems.py",
+         "tests/analysis/test_closed_forms.py", "tests/analysis/test_kept.py",
+         "tests/analysis/test_clamps.py", "tests/analysis/test_certified.py",
          "tests/analysis/test_certified_laws.py"),
     ),
     "energy": Room(
@@ -116,7 +117,8 @@ ROOMS = {
     "simulation": Room(
         ("simulation",),
         ("tests/simulation/test_prediction.py", "tests/simulation/test_onset_rules.py",
-         "tests/simulation/test_hands.py", "tests/simulation/test_exact.py",
+         "tests/simulation/test_bodies_by_definition.py", "tests/simulation/test_hands.py",
+         "tests/simulation/test_exact.py",
          "tests/simulation"),
     ),
 }  # fmt: skip
