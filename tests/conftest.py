@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from asperity import kept
 from asperity.kernels import fuse
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
@@ -41,6 +42,17 @@ TEXTURES: dict[str, Callable[[], Texture]] = {
     "profile": lambda: Profile(1e-4 * _ROUGH[0], 3e-4, origin=-0.7e-3),
     "periodic profile": lambda: Profile(1.5e-3 * _ROUGH[1], 3e-4, periodic=True, origin=0.4e-3),
 }
+
+
+@pytest.fixture(autouse=True)
+def fresh_answers(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Answers are worked out, whatever an earlier run has kept: a test may break the code.
+
+    A test of what is kept says so: ``@pytest.mark.keeps_answers``.
+    """
+    if request.node.get_closest_marker("keeps_answers") is None:
+        monkeypatch.setattr(kept, "recall", lambda _room, _key: None)
+        monkeypatch.setattr(kept, "keep", lambda _room, _key, _content: None)
 
 
 @pytest.fixture(params=list(TEXTURES))

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from asperity import cache
+from asperity.errors import ParameterError
 
 ROOM, KEY, CONTENT = "room", "key of the entry", b"content" * 20
 
@@ -19,6 +20,7 @@ ROOM, KEY, CONTENT = "room", "key of the entry", b"content" * 20
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setitem(cache._unseen, "left", 0)
     cache._say.cache_clear()
     yield tmp_path / "cache"
     cache._say.cache_clear()
@@ -188,3 +190,65 @@ def test_a_full_disk_costs_time_only(folder: Path, monkeypatch: pytest.MonkeyPat
     with pytest.warns(cache.CacheWarning, match="No space left on device"):
         cache.keep(ROOM, "another", CONTENT)
     assert len(list((folder / ROOM).iterdir())) == 1
+
+
+# --- its size -------------------------------------------------------------------------------------
+
+
+def test_what_was_not_used_for_longest_goes_first(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("ASPERITY_CACHE_SIZE", "10kB")
+    for number in range(8):
+        cache.keep(ROOM, str(number), bytes(1000))
+        for entry in cache.entries():  # a clock that every keeping moves by a second
+            os.utime(entry.path, ns=(entry.used - 10**9, entry.used - 10**9))
+    assert cache.recall(ROOM, "0") is not None  # used now
+    for number in range(8, 12):
+        cache.keep(ROOM, str(number), bytes(1000))
+    assert sum(entry.size for entry in cache.entries()) <= 10_000
+    there = {number for number in range(12) if cache.recall(ROOM, str(number)) is not None}
+    assert {0, 11} <= there
+    assert there.isdisjoint({1, 2})
+
+
+def test_a_content_that_would_drive_out_all_others_is_not_kept(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("ASPERITY_CACHE_SIZE", "8kB")
+    cache.keep(ROOM, "small", bytes(1000))
+    cache.keep(ROOM, "large", bytes(1001))
+    assert cache.recall(ROOM, "small") is not None
+    assert cache.recall(ROOM, "large") is None
+
+
+def test_a_size_of_nothing_keeps_nothing(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("ASPERITY_CACHE_SIZE", "0")
+    cache.keep(ROOM, KEY, CONTENT)
+    assert cache.entries() == []
+
+
+@pytest.mark.parametrize("given", ["5", "much", "-1GB", "4 furlongs", "1e9"])
+def test_a_wrong_size_is_said(given: str, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("ASPERITY_CACHE_SIZE", given)
+    with pytest.raises(ParameterError, match="must be a size such as '500MB' or '4GB'"):
+        cache.size_limit()
+
+
+def test_only_entries_are_deleted(folder: Path):
+    cache.keep(ROOM, KEY, CONTENT)
+    theirs = [folder / "notes.txt", folder / ROOM / "notes.txt"]
+    for path in theirs:
+        path.write_text("mine")
+    assert len(cache.entries()) == 1
+    assert cache.clear() == []
+    assert cache.recall(ROOM, KEY) is None
+    assert all(path.exists() for path in theirs)
+
+
+def test_without_the_cache_nothing_is_taken_or_left(folder: Path):
+    cache.keep(ROOM, KEY, CONTENT)
+    with cache.no_cache():
+        assert cache.recall(ROOM, KEY) is None
+        cache.keep(ROOM, KEY, b"other")
+        elsewhere = cache.cache_folder()
+        assert cache.recall(ROOM, KEY) == b"other"
+    assert not elsewhere.exists()
+    assert cache.cache_folder() == folder
+    assert cache.recall(ROOM, KEY) == CONTENT

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from asperity import units
 from asperity.errors import ParameterError
 from asperity.units import engineering, quantity
 
@@ -90,3 +91,10 @@ def test_a_number_without_its_unit_is_refused(given: str | float, unit: str, wri
 )
 def test_engineering(value: float, unit: str, text: str) -> None:
     assert engineering(value, unit) == text
+
+
+def test_the_commonest_units_are_what_pint_says() -> None:
+    for unit, factors in units._FACTORS.items():
+        for words, factor in factors.items():
+            assert units._UNIT.fullmatch(words) is not None
+            assert factor == units._registry().Quantity(1.0, words).to(unit).magnitude, words

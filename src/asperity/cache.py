@@ -4,7 +4,8 @@ One file per entry, in a room (a folder) of the cache folder: ``ASPERITY_CACHE_D
 the user's cache directory. A file carries a digest of its key and its content: what is damaged,
 exchanged or planted is set aside and made again, before anything of it is looked at. Whoever may
 write in the folder may put code there, so one that others own or may write is not used. A folder
-that cannot be used costs time, never the answer.
+that cannot be used costs time, never the answer. The folder has a limit of size,
+:func:`size_limit`: what was not used for longest goes first.
 """
 
 from __future__ import annotations
@@ -12,18 +13,32 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+import re
 import stat
+import tempfile
 import warnings
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+from asperity.errors import ParameterError
 from asperity.files import open_input, whole_file
 
 _MAGIC = b"asperity cache 1\n"
 _DIGEST = 32
 _HEAD = len(_MAGIC) + _DIGEST
 _SET_ASIDE = ".damaged"
+# What this package has put there; whatever else lies in the folder is not counted nor deleted.
+_ENTRY = re.compile(r"[0-9a-f]{40}(\.damaged)?|\.[0-9a-f]{16}\.tmp")
+
+_DIR, _SIZE = "ASPERITY_CACHE_DIR", "ASPERITY_CACHE_SIZE"
+DEFAULT_SIZE = 2 * 10**9
+"""The size [bytes] that the folder may have unless ``ASPERITY_CACHE_SIZE`` says otherwise."""
+_LARGEST = 8
+"""One entry may have this part of the limit, so that none drives out all others."""
+_KEPT_OF_FULL = 0.75
 
 
 class CacheWarning(UserWarning):
@@ -32,12 +47,88 @@ class CacheWarning(UserWarning):
 
 def cache_folder() -> Path:
     """Return the cache folder, whether or not it exists."""
-    chosen = os.environ.get("ASPERITY_CACHE_DIR")
+    chosen = os.environ.get(_DIR)
     if chosen:
         return Path(chosen)
     from platformdirs import user_cache_path
 
     return user_cache_path("asperity")
+
+
+def size_limit() -> int:
+    """Return the size [bytes] that the folder may have: ``ASPERITY_CACHE_SIZE``, or 2 GB.
+
+    Raises:
+        ParameterError: for a value that is no size.
+    """
+    given = os.environ.get(_SIZE)
+    if not given:
+        return DEFAULT_SIZE
+    match = re.fullmatch(r"\s*(\d{1,15}(?:\.\d{1,6})?)\s*(k|M|G|T)B\s*|\s*0\s*", given)
+    if match is None:
+        raise ParameterError(_SIZE, "must be a size such as '500MB' or '4GB'", given)
+    return int(float(match[1]) * 1000.0 ** " kMGT".index(match[2])) if match[1] else 0
+
+
+@contextmanager
+def no_cache() -> Iterator[None]:
+    """Take nothing from the cache and leave nothing: it is an empty folder, gone afterwards."""
+    before = os.environ.get(_DIR)
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        os.environ[_DIR] = folder
+        try:
+            yield
+        finally:
+            if before is None:
+                del os.environ[_DIR]
+            else:
+                os.environ[_DIR] = before
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A file of the cache.
+
+    Attributes:
+        room: the name of its folder.
+        path: the file.
+        size: [bytes].
+        used: when it was last used [ns].
+    """
+
+    room: str
+    path: Path
+    size: int
+    used: int
+
+
+def entries() -> list[Entry]:
+    """Return all that is in the cache; what cannot be looked at counts as not there."""
+    found = []
+    with suppress(OSError):
+        for room in sorted(path for path in cache_folder().iterdir() if path.is_dir()):
+            with suppress(OSError):
+                for path in room.iterdir():
+                    if _ENTRY.fullmatch(path.name):
+                        status = path.stat()
+                        found.append(Entry(room.name, path, status.st_size, status.st_mtime_ns))
+    return found
+
+
+def clear() -> list[Entry]:
+    """Delete all that is in the cache, and nothing else that lies in its folder.
+
+    Returns:
+        What is left: what could not be deleted.
+    """
+    _delete(entries())
+    return entries()
+
+
+def _delete(some: list[Entry]) -> None:
+    for entry in some:
+        with suppress(OSError):  # another process may have deleted it, or it may be in use
+            entry.path.unlink()
 
 
 def recall(room: str, key: str) -> bytes | None:
@@ -62,6 +153,8 @@ def recall(room: str, key: str) -> bytes | None:
             _say(f"the cache {cache_folder()} cannot be read ({_reason(error)}): {_AGAIN}")
         return None
     if whole[:_HEAD] == _MAGIC + _digest(key, whole[_HEAD:]):
+        with suppress(OSError):  # in a folder that can only be read nothing goes
+            os.utime(path)  # what was not used for longest goes first
         return whole[_HEAD:]
     set_aside(room, key)
     return None
@@ -69,11 +162,14 @@ def recall(room: str, key: str) -> bytes | None:
 
 def keep(room: str, key: str, content: bytes) -> None:
     """Keep a content under a key, whole or not at all; what cannot be kept is made again."""
+    if len(content) > size_limit() // _LARGEST:
+        return
     path = cache_folder() / room / _name(key)
     try:
         if _made(path.parent) and _trusted(path.parent):
             with whole_file(path) as stream:
                 stream.write(_MAGIC + _digest(key, content) + content)
+            _stay_small(_HEAD + len(content))
     except (OSError, ValueError) as error:
         _say(f"the cache {cache_folder()} cannot be written ({_reason(error)}): {_AGAIN}")
 
@@ -95,6 +191,27 @@ def _made(room: Path) -> bool:
         room.mkdir(exist_ok=True)
         room.chmod(stat.S_IMODE(room.parent.stat().st_mode))  # made for a group: so is the room
     return True
+
+
+# Bytes that this process may write before it looks at the whole folder again.
+_unseen = {"left": 0}
+
+
+def _stay_small(written: int) -> None:
+    """Delete what was not used for longest, once the folder is above its limit."""
+    _unseen["left"] -= written
+    if _unseen["left"] > 0:
+        return
+    limit, there = size_limit(), entries()
+    size = sum(entry.size for entry in there)
+    if size > limit:
+        there.sort(key=lambda entry: entry.used)
+        while there and size > _KEPT_OF_FULL * limit:
+            oldest = there.pop(0)
+            _delete([oldest])
+            size -= oldest.size
+    # Other processes write too: each looks again after a part of what is left.
+    _unseen["left"] = (limit - size) // _LARGEST
 
 
 _AGAIN = "the work is done again each time"

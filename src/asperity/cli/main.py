@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import click
 
 import asperity
-from asperity.cache import CacheWarning
+from asperity.cache import CacheWarning, size_limit
 from asperity.cli.own_code import own_fault
 from asperity.errors import AsperityError, InternalError, ParameterError, tell
 
@@ -19,6 +19,7 @@ INTERNAL_ERROR = 70  # as sysexits.h has it
 
 COMMANDS = {
     "analyze": "Say all that is known of one law on a surface and a device.",
+    "cache": "Say what is kept between runs, or delete it.",
     "compare": "Compare the laws on a surface and a device.",
     "devices": "List devices, and the source of every number.",
     "init": "Write a scene to begin with.",
@@ -101,6 +102,7 @@ def main() -> None:
     """Run the command line; bad input is one line on standard error and exit code 2."""
     warnings.showwarning = _show_warning
     try:
+        size_limit()  # a wrong one is said before any work is done
         cli(prog_name="asperity", standalone_mode=False)
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)

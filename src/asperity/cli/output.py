@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from asperity.cache import no_cache
 from asperity.cli.progress import progress_bar
 from asperity.errors import ParameterError, printable
 from asperity.files import digest, is_device, json_text, write_text
@@ -104,9 +105,19 @@ def output_options(
 
         if html is not None:
             run = click.option("--html", "html_path", metavar="PATH", help=html)(run)
+        run = click.option(
+            "--no-cache", is_flag=True, expose_value=False, callback=_without_cache,
+            help="Work everything out anew, and keep nothing.",
+        )(run)  # fmt: skip
         return click.option("--json", "json_path", metavar="PATH", help=json)(run)
 
     return decorate
+
+
+def _without_cache(context: click.Context, _option: click.Parameter, asked: bool) -> None:
+    """Let a command work without the cache until it ends."""
+    if asked:
+        context.with_resource(no_cache())
 
 
 def check_outputs(**paths: str | None) -> None:

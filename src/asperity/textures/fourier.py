@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from asperity.checks import FloatArray, array
 from asperity.enclosures.cells import Cells
 from asperity.errors import ParameterError
+from asperity.kept import content_digest, is_shipped, kept
 from asperity.textures.cells.lines import Pieces, wave_pieces
 from asperity.textures.cells.waves import WaveCells
 from asperity.textures.domain import Domain, ScanLine
@@ -73,6 +74,15 @@ class Fourier(Texture):
         return (
             f"Fourier(amplitudes={self.amplitudes.tolist()}, "
             f"wavevectors={self.wavevectors.tolist()}, phases={self.phases.tolist()})"
+        )
+
+    @cached_property
+    def content(self) -> str | None:
+        """See :class:`Texture`; what it was made of."""
+        if not is_shipped(type(self)):
+            return None
+        return content_digest(
+            type(self).__qualname__, self.amplitudes, self.wavevectors, self.phases
         )
 
     @property
@@ -139,6 +149,9 @@ class Fourier(Texture):
     @cached_property
     def extremes(self) -> tuple[float, float]:
         """Least and greatest height [m], certified on the torus of independent phases."""
+        return kept("extremes", self.content, self._extremes)
+
+    def _extremes(self) -> tuple[float, float]:
         return -self._supremum(-self.amplitudes), self._supremum(self.amplitudes)
 
     @cached_property

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
+from asperity.kept import kept
 from asperity.textures.bernstein import greatest_height
 from asperity.textures.pyramid import plane_pyramid
 from asperity.textures.samplers.heightmap import HeightMapArguments
@@ -97,11 +98,17 @@ class HeightMap(Spline):
     @cached_property
     def extremes(self) -> tuple[float, float]:
         """Least and greatest height of the spline [m], certified by Bernstein hulls."""
-        return -greatest_height(-self.coefficients), greatest_height(self.coefficients)
+        return kept("extremes", self.content, self._extremes)
 
     @cached_property
     def bounds(self) -> tuple[float, float]:
         """Greatest differences of coefficients (convex hull property of B-splines)."""
+        return kept("bounds", self.content, self._bounds)
+
+    def _extremes(self) -> tuple[float, float]:
+        return -greatest_height(-self.coefficients), greatest_height(self.coefficients)
+
+    def _bounds(self) -> tuple[float, float]:
         c, (px, py) = self.coefficients, self.pitch
 
         def greatest(values: FloatArray) -> float:

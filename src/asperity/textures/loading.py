@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from asperity.arguments import described
 from asperity.errors import ParameterError
+from asperity.files import open_input
+from asperity.kept import content_digest, kept
 from asperity.measured.arguments import FILE_ARGUMENTS, READING
 from asperity.textures.heightmap import HeightMap
 from asperity.textures.profile import Profile
@@ -90,14 +93,38 @@ def prepare_file(
         for name in given:
             raise ParameterError(name, f"cannot be applied: {os.fspath(path)} was prepared already")
         return magnified(load_prepared(path), magnify, magnify_height)
-    reading = {a.name: given.pop(a.name) for a in READING if a.name in given}
-    return prepare(
-        read_surface(path, **reading),
-        magnify=magnify,
-        magnify_height=magnify_height,
-        progress=progress,
-        watch=watch,
-        **given,
+    asked = {**given, "magnify": magnify, "magnify_height": magnify_height}
+
+    def make() -> Prepared:
+        reading = {a.name: asked.pop(a.name) for a in READING if a.name in asked}
+        return prepare(read_surface(path, **reading), progress=progress, watch=watch, **asked)
+
+    return kept("prepared", None if watch is not None else _content(path, asked), make)
+
+
+def _content(path: str | os.PathLike[str], asked: Mapping[str, Any]) -> str | None:
+    """Return what a prepared surface depends on; ``None`` where readers of others may have a part.
+
+    The name counts: what is said of a surface may name the file.
+    """
+    from asperity.measured.reading.registry import outside_readers
+
+    library = outside_readers()
+    if library is None:
+        return None
+    try:
+        with open_input(path) as stream:
+            whole = hashlib.file_digest(stream, "sha256").hexdigest()
+    except (OSError, ValueError):  # the reader says what is wrong with it
+        return None
+    said = tuple((name, _plain(value)) for name, value in sorted(asked.items()))
+    return content_digest(whole, os.path.basename(os.fspath(path)), library, said)
+
+
+def _plain(value: Any) -> Any:
+    """Return a pitch that is a list or an array as a tuple."""
+    return (
+        value if value is None or isinstance(value, (str, float, int)) else tuple(map(float, value))
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.checks import positive, real
+from asperity.kept import kept
 from asperity.textures.pyramid import line_pyramid
 from asperity.textures.samplers.profile import ProfileArguments
 from asperity.textures.spline import Spline, node_heights
@@ -88,6 +89,14 @@ class Profile(Spline):
     @cached_property
     def extremes(self) -> tuple[float, float]:
         """Least and greatest height of the spline [m]: nodes and roots of h' in every cell."""
+        return kept("extremes", self.content, self._extremes)
+
+    @cached_property
+    def bounds(self) -> tuple[float, float]:
+        """Greatest differences of coefficients (convex hull property of B-splines)."""
+        return kept("bounds", self.content, self._bounds)
+
+    def _extremes(self) -> tuple[float, float]:
         c = np.lib.stride_tricks.sliding_window_view(self.coefficients, 4)
         c0, c1, c2, c3 = c.T
         # h'(t) = a t² + b t + d on the cell, t in [0, 1].
@@ -100,9 +109,7 @@ class Profile(Spline):
         h = (c0 + 4 * c1 + c2) / 6 + t * (d + t * (b / 2 + t * a / 3))
         return float(h.min()), float(h.max())
 
-    @cached_property
-    def bounds(self) -> tuple[float, float]:
-        """Greatest differences of coefficients (convex hull property of B-splines)."""
+    def _bounds(self) -> tuple[float, float]:
         inflate = 1.0 + 1e-12
         slope = float(np.abs(np.diff(self.coefficients)).max()) / self.pitch
         bend = float(np.abs(np.diff(self.coefficients, 2)).max()) / self.pitch**2

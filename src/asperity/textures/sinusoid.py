@@ -13,6 +13,7 @@ import numpy as np
 from asperity.checks import array, positive, real
 from asperity.enclosures.cells import Cells
 from asperity.errors import ParameterError
+from asperity.kept import content_digest, is_shipped
 from asperity.textures.cells.lines import Pieces, wave_pieces
 from asperity.textures.cells.waves import WaveCells
 from asperity.textures.domain import Domain, ScanLine
@@ -67,6 +68,15 @@ class Sinusoid(Texture):
         return (
             f"Sinusoid(amplitude={self.amplitude!r}, period={self.period!r}, "
             f"phase={self.phase!r}, direction={self.direction!r})"
+        )
+
+    @cached_property
+    def content(self) -> str | None:
+        """See :class:`Texture`; what it was made of."""
+        if not is_shipped(type(self)):
+            return None
+        return content_digest(
+            type(self).__qualname__, self.amplitude, self.period, self.phase, self.direction
         )
 
     @property

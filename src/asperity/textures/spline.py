@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from asperity.checks import FloatArray, array
 from asperity.errors import ParameterError
+from asperity.kept import content_digest, is_shipped, kept
 from asperity.memory import reserve
 from asperity.textures.cells.lines import Pieces, spline_pieces
 from asperity.textures.cells.splines import SplineCells
@@ -54,17 +55,29 @@ class Spline(Texture):
 
     def texture_part(self) -> TexturePart:
         """See :class:`Texture`; :func:`~asperity.measured.parts.texture_part` says how."""
+        heights, nesting, form, waviness = kept("texture part", self.content, self._parts)
+        return TexturePart(self.with_heights(heights), nesting, form, waviness)
+
+    def _parts(self) -> tuple[FloatArray, float, float, float]:
+        """Take form and waviness away: the heights that are left, nesting index, both ranges."""
         from asperity.measured.parts import texture_part
 
         parts = texture_part(self.heights, self._pitches, periodic=self.periodic)
-        left = self.with_heights(parts.heights)
-        return TexturePart(left, parts.nesting, parts.form.range, parts.waviness.range)
+        return parts.heights, parts.nesting, parts.form.range, parts.waviness.range
 
     @property
     def _sides(self) -> tuple[float, ...]:
         """One period, or the extent, along each axis [m]."""
         counts = self.heights.shape[::-1]
         return tuple((n - self.ends) * p for n, p in zip(counts, self._pitches, strict=True))
+
+    @cached_property
+    def content(self) -> str | None:
+        """See :class:`Texture`; the nodes, and which kind goes through them."""
+        if not is_shipped(type(self)):
+            return None
+        name, pitches, origin = type(self).__qualname__, self._pitches, np.atleast_1d(self.origin)
+        return content_digest(name, self.heights, pitches, origin, self.periodic)
 
     @cached_property
     def coefficients(self) -> FloatArray:

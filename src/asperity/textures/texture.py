@@ -115,6 +115,14 @@ class Texture(Plotted, ABC):
     # --- what a kind may know better --------------------------------------------------------------
 
     @property
+    def content(self) -> str | None:
+        """A digest of all that the heights depend on, under which answers are kept between runs.
+
+        ``None`` where that is not known, as of a kind of one's own: nothing of it is kept.
+        """
+        return None
+
+    @property
     def twist(self) -> float:
         """A proved bound T >= ‖D³h‖ [1/m²], the rate of change of the Hessian; infinite if none.
 

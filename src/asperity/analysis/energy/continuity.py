@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.gain.answers import kept_answer
 from asperity.analysis.gain.medial_axis import Crest, sharpest_crest
 from asperity.analysis.gain.theorems import theorem_of
 from asperity.checks import FloatArray
@@ -118,6 +119,21 @@ def _nearest(surface: Surface, q: Bound) -> Continuity:
     depth = surface.max_depth
     if depth * surface.texture.bounds[1] < 1.0:
         return _smooth(surface, q, "the nearest point is unique down to 1/K, K >= ‖Hess h‖")
+    asked = repr((q.lower, q.upper, q.at))
+    onset, proved = kept_answer("onset of jumps", surface, lambda: _onset(surface, q), asked)
+    if onset <= depth:
+        onset_text = engineering(rounded_down(onset), "m")
+        text = f"the contact point jumps below crests, from {onset_text} down"
+        return Continuity(False, text, surface=surface)
+    deep = engineering(depth, "m")
+    if proved:
+        return _smooth(surface, q, f"no crest is so sharp that the nearest point jumps at {deep}")
+    return _smooth(surface, q, f"no medial axis found down to {deep}; the force jumps below it")
+
+
+def _onset(surface: Surface, q: Bound) -> tuple[float, bool]:
+    """Return where jumps begin [m], and whether it is proved that there are none above that."""
+    depth = surface.max_depth
     if theorem_of(surface.law).knows_medial_axis:
         onset = math.inf
         if math.isinf(q.lower) and q.at is not None:
@@ -127,14 +143,7 @@ def _nearest(surface: Surface, q: Bound) -> Continuity:
         crest = sharpest_crest(surface.texture)
         onset = math.inf if crest is None else crest.radius
         proved = crest is not None and depth < crest.least_radius
-    if onset <= depth:
-        onset_text = engineering(rounded_down(onset), "m")
-        text = f"the contact point jumps below crests, from {onset_text} down"
-        return Continuity(False, text, surface=surface)
-    deep = engineering(depth, "m")
-    if proved:
-        return _smooth(surface, q, f"no crest is so sharp that the nearest point jumps at {deep}")
-    return _smooth(surface, q, f"no medial axis found down to {deep}; the force jumps below it")
+    return onset, proved
 
 
 def _distance(surface: Surface, point: Point) -> float:

@@ -20,6 +20,7 @@ from asperity.analysis.energy.columns import (
 from asperity.analysis.energy.loops import integrate, loop_work, smooth_panels
 from asperity.analysis.energy.merit import scan_height
 from asperity.analysis.energy.state_loops import in_plane_loop, light_then_deep_loop
+from asperity.analysis.gain.answers import at_unit_stiffness, kept_answer
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import InternalError, ParameterError
 from asperity.files import Record
@@ -93,6 +94,18 @@ class Leak(Record):
         """Energy over the length of the line [J/m]: a mean thrust [N]."""
         return self.energy / self.line.length
 
+    def scaled(self, factor: float) -> Leak:
+        """Return the same loop in a field that is stiffer by a factor; a bound is rounded up."""
+        if factor == 1.0:
+            return self
+        upper = self.upper_per_period * factor
+        return replace(
+            self,
+            energy=self.energy * factor,
+            upper_per_period=math.nextafter(upper, math.inf) if upper > 0.0 else 0.0,
+            thrust=None if self.thrust is None else self.thrust * factor,
+        )
+
     def speed(self, damping: float) -> float:
         """Return v* = W/(σ₀ · length), the speed below which damping does not absorb the loop.
 
@@ -132,6 +145,13 @@ def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -
         (1.28, 1.28)
     """
     line = surface.texture.scan_line() if direction is None else scan_line(surface, direction)
+    unit = at_unit_stiffness(surface)
+    asked = repr((line.start.tolist(), line.direction.tolist(), line.length, line.periodic))
+    found = kept_answer("worst loop", unit, lambda: _worst_loop(unit, line), asked)
+    return found.scaled(surface.stiffness / unit.stiffness)
+
+
+def _worst_loop(surface: Surface, line: ScanLine) -> Leak:
     nothing = np.zeros((0, 3))
     if surface.law.stateful:
         return _state_leak(surface, line)

@@ -9,6 +9,7 @@ import numpy as np
 
 from asperity.analysis.bounds.dense_search import greatest
 from asperity.analysis.bounds.measures import spectral_norm
+from asperity.analysis.gain.answers import at_unit_stiffness, kept_answer
 from asperity.analysis.gain.theorems import theorem_of
 from asperity.checks import FloatArray
 from asperity.surface import Surface
@@ -48,6 +49,11 @@ def merit(surface: Surface) -> Merit:
     (nominal contact), along the texture's scan line; on a map along parallel lines, each with
     its own mean. A law with state slides: its anchor trails the probe at full deflection.
     """
+    unit = at_unit_stiffness(surface)
+    return kept_answer("merit", unit, lambda: _merit(unit))
+
+
+def _merit(surface: Surface) -> Merit:
     line = surface.texture.scan_line()
     height = scan_height(surface)
     forces, slopes, lost = _scan(surface, line, height)

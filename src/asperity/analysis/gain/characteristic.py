@@ -7,12 +7,14 @@ section 4). Both are taken over the working region: depths up to the surface's m
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import astuple
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
 from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED, Number
 from asperity.analysis.bounds.sampling import highest_point
 from asperity.analysis.bounds.witness import proved
+from asperity.analysis.gain.answers import at_unit_stiffness, kept_answer
 from asperity.analysis.gain.certificate import certified, wave_number, with_clamp
 from asperity.analysis.gain.kept import kept
 from asperity.analysis.gain.search import Search
@@ -131,6 +133,11 @@ def _search(
 
 def _number(surface: Surface, number: Number, search: Search) -> Bound:
     """Return a number of the force that is rendered: of the law, and where its clamp acts."""
+    unit, asked = at_unit_stiffness(surface), repr(astuple(search))
+    return kept_answer(f"number {number.name}", unit, lambda: _found(unit, number, search), asked)
+
+
+def _found(surface: Surface, number: Number, search: Search) -> Bound:
     above = _above_the_clamp(surface, number, search)
     if surface.acting_clamp == "none":
         return above

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.gain.answers import is_shipped_law
 from asperity.analysis.gain.search import Search
 from asperity.analysis.gain.sources import source_digest
 from asperity.analysis.gain.theorems import theorem_of
@@ -57,8 +58,10 @@ def _key(surface: Surface, name: str, search: Search) -> str | None:
     source = source_digest(_makers(surface))
     if source is None:
         return None
+    # Of a shipped law the stiffness is a factor; one of one's own may depend on it in any way.
+    first = 1 if is_shipped_law(law) else 0
     parameters = (
-        surface.law_arguments[1:],
+        surface.law_arguments[first:],
         surface.max_depth,
         tuple(surface.law_parameters.items()),
         surface.clamp,

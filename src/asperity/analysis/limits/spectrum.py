@@ -14,6 +14,7 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.files import Record
+from asperity.kept import kept
 from asperity.textures.plane_waves import PlaneWaves
 from asperity.textures.texture import Texture
 
@@ -104,6 +105,10 @@ def spectrum(texture: Texture) -> Spectrum:
         >>> [(wave.wavelength, wave.amplitude) for wave in spectrum(Sinusoid(4e-4, 1e-3)).waves]
         [(0.001, 0.0004)]
     """
+    return kept("spectrum", texture.content, lambda: _spectrum(texture))
+
+
+def _spectrum(texture: Texture) -> Spectrum:
     waves = _plane_waves(texture)
     if waves is not None and len(waves) <= _MOST_WAVES:
         return Spectrum(waves, True, "the waves of the sum")

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from asperity.analysis.energy.merit import scan_height
+from asperity.analysis.gain.answers import at_unit_stiffness, kept_answer
 from asperity.analysis.limits.spectrum import BANDS_PER_OCTAVE, Spectrum, banded
 from asperity.checks import FloatArray
 from asperity.surface import Surface
@@ -48,7 +49,11 @@ def wave_forces(surface: Surface, spectrum: Spectrum) -> FloatArray:
     """
     if not spectrum.waves:
         return np.zeros(0)
-    return _fitted(surface, spectrum) if spectrum.exact else _by_bands(surface, spectrum)
+    unit = at_unit_stiffness(surface)
+    forces = _fitted if spectrum.exact else _by_bands
+    asked = repr((spectrum.exact, spectrum.waves))
+    found = kept_answer("wave forces", unit, lambda: forces(unit, spectrum), asked)
+    return found * (surface.stiffness / unit.stiffness)
 
 
 def scan_forces(surface: Surface, xy: FloatArray) -> FloatArray:

@@ -21,6 +21,9 @@ from asperity.measured.reading.reader import ReadingOptions, SurfaceFile, naming
 from asperity.measured.reading.scatter import advice, resampled_line
 
 # asperity reads these itself, or refuses them for a reason; HGT takes any file of a square size.
+LIBRARY = "SurfaceTopography"
+"""Of others, which reads the files of instruments."""
+
 _OURS = frozenset(("sdf", "xyz", "asc", "npy", "npz", "x3p", "hgt"))
 _INFLATION = 1032  # deflate, which all compressed formats use, packs at most so many bytes into one
 _HEAD = 512
@@ -76,7 +79,7 @@ class _Bounded(io.BufferedReader):
 
 def has_library() -> bool:
     """Tell whether the extra is installed, without the seconds that its import takes."""
-    return find_spec("SurfaceTopography") is not None
+    return find_spec(LIBRARY) is not None
 
 
 def _library() -> Any:
@@ -85,7 +88,7 @@ def _library() -> Any:
         try:
             from importlib import import_module
 
-            return import_module("SurfaceTopography.IO")
+            return import_module(f"{LIBRARY}.IO")
         except ModuleNotFoundError:
             raise
         except Exception as error:  # a broken installation counts as none

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, entry_points, version
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from asperity.measured.reading.foreign import (
     too_large,
 )
 from asperity.measured.reading.image import surface_of_pixels
-from asperity.measured.reading.instruments import has_library, read_instrument
+from asperity.measured.reading.instruments import LIBRARY, has_library, read_instrument
 from asperity.measured.reading.mesh import mesh_reader
 from asperity.measured.reading.png import PNG_MAGIC, read_png
 from asperity.measured.reading.raw import RawSurface
@@ -127,6 +127,16 @@ def readers(faults: list[str]) -> Iterator[Reader]:
         if loaded is not None:
             yield _guarded(loaded, faults)
     yield from LAST
+
+
+def outside_readers() -> str | None:
+    """Return what reads files besides this package: the version of the library, if it is there.
+
+    ``None`` where readers of one's own may have a part, of which nothing is known.
+    """
+    if OWN or entry_points(group=ENTRY_POINTS):
+        return None
+    return version(LIBRARY) if has_library() else ""
 
 
 def _loaded(point: EntryPoint, faults: list[str]) -> Reader | None:
