@@ -116,15 +116,33 @@ def fuse_on_texture(
     Raises:
         ParameterError: for a texture that lacks what is asked of it.
     """
+    units = tuple(map(module_unit, asking))
+    brought = (*units, *map(module_unit, (*law.contact.kernels(), *further)))
+    source = link_on_texture(law, sampler, clamp, loops_of(*units), brought)
+    return load_fused(_head(f"Law {law} on {sampler[0].__name__}.", source) + source)
+
+
+def link_on_texture(
+    law: Law,
+    sampler: tuple[ModuleType, ...],
+    clamp: ClampName,
+    roots: Sequence[tuple[str, Unit]],
+    further: Sequence[Unit],
+) -> str:
+    """Return the text of functions, each named with its unit, and of all that they call.
+
+    They may ask a sampler, a law and further units.
+
+    Raises:
+        ParameterError: for a texture that lacks what is asked of it.
+    """
     modules = tuple(map(module_unit, sampler))
-    brought = map(module_unit, (*asking, *law.contact.kernels(), *further))
-    at_hand = dict.fromkeys((*modules, *law_units(law, clamp), *brought))
+    at_hand = dict.fromkeys((*modules, *law_units(law, clamp), *further))
     try:
-        source = link(loops_of(*map(module_unit, asking)), tuple(at_hand))
+        return link(roots, tuple(at_hand))
     except MissingFunctionError as missing:
         who = f"which law {law} on the {law.contact} contact needs"
         raise _lacking(missing, modules, who) from None
-    return load_fused(_head(f"Law {law} on {sampler[0].__name__}.", source) + source)
 
 
 def _lacking(missing: MissingFunctionError, modules: Sequence[Unit], who: str) -> ParameterError:

@@ -1,0 +1,90 @@
+"""Exported C gives the force of the kernel, bit by bit, on every law and texture kind."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.exported import COMPILERS, differing, forces, kernel_forces, library, probes, same_bits
+
+from asperity.export.header import header_text
+from asperity.kernels.probe import CLAMPS
+from asperity.laws import LAWS, Law
+from asperity.surface import Surface
+from asperity.textures import HeightMap, Sinusoid, Texture
+from asperity.textures.naming import as_texture
+
+LIBRARY = ("sandpaper:grit=P60", "cloth:", "tile:", "knurl:", "wood:", "brushed-metal:")
+SAME_MACHINE = platform.machine() == "x86_64"
+
+
+def _count(law: Law) -> int:
+    """Return how many probes: fewer where each takes a long search."""
+    return 20_000 if not law.contact.costly else 2_000 if law.contact.cost < 1000 else 400
+
+
+def _check(folder: Path, surfaces: dict[str, Surface], *flags: str) -> None:
+    headers = {name: header_text(surface, name, single=False) for name, surface in surfaces.items()}
+    paths = {
+        name: probes(surface.texture, surface.max_depth, _count(surface.law), 11)
+        for name, surface in surfaces.items()
+    }
+    kernel = {name: kernel_forces(surface, paths[name]) for name, surface in surfaces.items()}
+    for compiler in COMPILERS:
+        made = library(folder, compiler, headers, *(flags or ("-O1",)))
+        equal = [_agree(surfaces[n], paths[n], forces(made, n, paths[n]), kernel[n]) for n in paths]
+        assert not differing(surfaces, equal), compiler
+    assert all(np.any(force != 0.0) for force in kernel.values())
+
+
+def _agree(surface: Surface, at: np.ndarray, force: np.ndarray, kernel: np.ndarray) -> np.ndarray:
+    if SAME_MACHINE:
+        return same_bits(force, kernel)
+    h = surface.texture.height(np.ascontiguousarray(at[:, :2]))
+    size = surface.stiffness * np.maximum(np.abs(h), np.abs(at[:, 2]))
+    return np.abs(force - kernel).max(axis=1) <= 2.0 * np.finfo(float).eps * size
+
+
+def test_every_law_on_every_kind(texture: Texture, tmp_path: Path) -> None:
+    _check(tmp_path, {f"t{x}": Surface(texture, x, clamp="backed") for x in LAWS})
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_library_textures(name: str, tmp_path: Path) -> None:
+    texture = as_texture(name)
+    _check(tmp_path, {f"t{x}": Surface(texture, x, max_depth=2e-4) for x in "BDH"})
+
+
+def test_every_clamp(make_texture: Callable[[str], Texture], tmp_path: Path) -> None:
+    texture = make_texture("map")
+    surfaces = {
+        f"{x}_{clamp}": Surface(texture, x, clamp=clamp)  # type: ignore[arg-type]  # names of clamps
+        for x in "BCGF"
+        for clamp in CLAMPS
+    }
+    _check(tmp_path, surfaces)
+
+
+@pytest.mark.parametrize("flags", [("-O2",), ("-O3", "-march=native"), ("-O2", "-std=gnu99")])
+def test_any_optimisation(
+    make_texture: Callable[[str], Texture], tmp_path: Path, flags: tuple[str, ...]
+) -> None:
+    texture = make_texture("map")
+    _check(tmp_path, {f"t{x}": Surface(texture, x, clamp="backed") for x in "BDFH"}, *flags)
+
+
+def test_a_flat_texture(tmp_path: Path) -> None:
+    texture = HeightMap(np.zeros((4, 5)), 1e-3)
+    _check(tmp_path, {f"t{x}": Surface(texture, x, max_depth=1e-3) for x in "WDF"})
+
+
+def test_another_force_is_noticed(wave: Sinusoid, tmp_path: Path) -> None:
+    surface = Surface(wave, "B")
+    at = probes(wave, surface.max_depth, 400, 3)
+    text = header_text(surface, "t", single=False)
+    assert "1.0 + hx * hx" in text
+    made = library(tmp_path, "gcc", {"t": text.replace("1.0 + hx * hx", "1.0 - hx * hx")})
+    assert not same_bits(forces(made, "t", at), surface.force(at)).all()

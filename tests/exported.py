@@ -1,0 +1,121 @@
+"""Exported C, compiled and called: what the tests of the export share."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.surface import Surface
+from asperity.textures import Texture
+
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
+COMPILERS = ("gcc", "clang")
+
+
+def tool(name: str) -> str:
+    """Return the path of a program; without it the test is not run."""
+    path = shutil.which(name)
+    if path is None:
+        pytest.skip(f"not run: no {name} here")
+    return path
+
+
+def run(*command: str | Path, cwd: Path | None = None) -> str:
+    """Run a program that must succeed and return what it says."""
+    done = subprocess.run(
+        [str(part) for part in command], capture_output=True, text=True, check=False, cwd=cwd
+    )
+    assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
+    return done.stdout
+
+
+_MANY = """
+#include "{name}.h"
+void {name}_many(const {real} *at, {real} *f, int64_t n);
+void {name}_many(const {real} *at, {real} *f, int64_t n)
+{{
+    {name}_state state;
+    {name}_reset(&state);
+    for (int64_t i = 0; i < n; i++) {{
+        {name}_force(&state, at + 3 * i, f + 3 * i);
+    }}
+}}
+"""
+
+
+def library(
+    folder: Path, compiler: str, headers: Mapping[str, str], *flags: str, single: bool = False
+) -> ctypes.CDLL:
+    """Return exported headers, by name, compiled into one library: ``NAME_many`` for each."""
+    real = "float" if single else "double"
+    for name, text in headers.items():
+        (folder / f"{name}.h").write_text(text, encoding="utf-8")
+    source, made = folder / "all.c", folder / f"all_{compiler}{len(list(folder.iterdir()))}.so"
+    source.write_text("".join(_MANY.format(name=name, real=real) for name in headers))
+    run(tool(compiler), *STRICT, *flags, "-shared", "-fPIC", source, "-o", made, "-lm")
+    return ctypes.CDLL(str(made))
+
+
+def forces(made: ctypes.CDLL, name: str, points: Any) -> Any:
+    """Return the forces along a path of probe positions, in their precision."""
+    out = np.empty_like(points)
+    given = [array.ctypes.data_as(ctypes.c_void_p) for array in (points, out)]
+    getattr(made, f"{name}_many")(*given, ctypes.c_int64(len(points)))
+    return out
+
+
+def kernel_forces(surface: Surface, points: Any) -> Any:
+    """Return the kernel's forces along a path of probe positions."""
+    return surface.trace(points) if surface.law.stateful else surface.force(points)
+
+
+def same_bits(first: Any, second: Any) -> Any:
+    """Return which rows are the same bit by bit."""
+    return (first.view(np.int64) == second.view(np.int64)).all(axis=1)
+
+
+def probes(texture: Texture, depth: float, count: int, seed: int) -> Any:
+    """Return probe positions, a quarter each: anywhere, below crests, at borders, at the surface.
+
+    Those at borders (of cells, copies and the patch) and below crests are off by as little as
+    1e-12 of a period.
+    """
+    rng = np.random.default_rng(seed)
+    n = count // 4
+    domain, (low, high) = texture.domain, texture.extremes
+    spans = domain.spans
+    wide = domain.points(rng.uniform(-1.2, 2.2, (4 * n, len(spans))))
+    if texture.is_profile:
+        wide = wide + rng.normal(size=(4 * n, 1)) * 1e-3 * np.array([-spans[0][1], spans[0][0]])
+    reach = float(np.hypot(*spans[0]))
+    near = reach * 10.0 ** rng.uniform(-12, -2, (n, 2)) * rng.choice([-1.0, 1.0], (n, 2))
+    crests = _climbed(texture, wide[n : 2 * n]) + near
+    steps = rng.integers(-4, 9, (n, len(spans))) / rng.choice([1, 2, 6, 8], (n, 1))
+    borders = domain.points(steps) + near
+    xy = np.ascontiguousarray(np.vstack([wide[:n], crests, borders, wide[3 * n :]]))
+    h = texture.height(xy)
+    z = h - (depth + high - low) * rng.uniform(-0.1, 1.3, 4 * n)
+    z[3 * n :] = h[3 * n :] - depth * 10.0 ** rng.uniform(-16, -1, n) * rng.choice([-1, 1], n)
+    points = np.column_stack([xy, z])
+    return np.ascontiguousarray(points[rng.permutation(4 * n)])
+
+
+def _climbed(texture: Texture, xy: Any) -> Any:
+    """Return points moved towards the nearest crests."""
+    bend = max(texture.bounds[1], 1e-30)
+    for _ in range(60):
+        xy = np.ascontiguousarray(xy + texture.gradient(xy) / bend)
+    return xy
+
+
+def differing(names: Iterable[str], equal: Sequence[Any]) -> str:
+    """Return how many points differ, by name, of those of which any do."""
+    counts = {name: int((~one).sum()) for name, one in zip(names, equal, strict=True)}
+    return ", ".join(f"{name}: {count}" for name, count in counts.items() if count)
