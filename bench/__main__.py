@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from rich.console import Console
 
-from bench import cache, certificates, kernels, nearest, simulation, split, startup
+from bench import cache, certificates, kernels, nearest, recording, simulation, split, startup
 
 PARTS: dict[str, Callable[[Console], None]] = {
     "kernels": kernels.run,
@@ -15,6 +15,7 @@ PARTS: dict[str, Callable[[Console], None]] = {
     "nearest": nearest.run,
     "split": split.run,
     "simulation": simulation.run,
+    "recording": recording.run,
     "certificates": certificates.run,
     "startup": startup.run,
 }

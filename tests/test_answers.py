@@ -13,7 +13,8 @@ import click
 import pytest
 
 import asperity
-from asperity.cli.main import COMMANDS, cli, refuse_repeated
+from asperity.cli.group import refuse_repeated
+from asperity.cli.main import COMMANDS, cli
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text("utf-8")

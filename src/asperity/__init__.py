@@ -12,6 +12,7 @@ from asperity.errors import AsperityError as AsperityError
 from asperity.errors import LawError as LawError
 from asperity.errors import ParameterError as ParameterError
 from asperity.errors import SurfaceFileError as SurfaceFileError
+from asperity.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from asperity.analysis import Bound as Bound
@@ -38,6 +39,11 @@ if TYPE_CHECKING:
     from asperity.devices import Device as Device
     from asperity.devices import load_device as load_device
     from asperity.laws import Law as Law
+    from asperity.recording.recording import Recording as Recording
+    from asperity.recording.recording import open_recording as open_recording
+    from asperity.recording.replay import Replay as Replay
+    from asperity.recording.replay import replay as replay
+    from asperity.recording.writer import RecordingWriter as RecordingWriter
     from asperity.surface import Surface as Surface
     from asperity.textures import Fourier as Fourier
     from asperity.textures import Grating as Grating
@@ -49,8 +55,6 @@ if TYPE_CHECKING:
     from asperity.textures import load_texture as load_texture
     from asperity.textures import named_surface as named_surface
     from asperity.textures import surface_names as surface_names
-
-__version__ = "0.1.0"
 
 _NAMES = {
     "asperity.analysis": (
@@ -66,6 +70,9 @@ _NAMES = {
     "asperity.analysis.split.state": "PopThrough SplitState pop_through split_state",
     "asperity.devices": "Device load_device",
     "asperity.laws": "Law",
+    "asperity.recording.recording": "Recording open_recording",
+    "asperity.recording.replay": "Replay replay",
+    "asperity.recording.writer": "RecordingWriter",
     "asperity.surface": "Surface",
     "asperity.textures": (
         "Fourier Grating HeightMap Noise NoiseProfile "

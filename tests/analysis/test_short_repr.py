@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +21,20 @@ HEIGHTS = 1e-5 * np.random.default_rng(1).normal(size=(32, 32))
 
 def surface(law: str = "C") -> asp.Surface:
     return asp.Surface(asp.Sinusoid(2e-4, 2e-3), law)
+
+
+def recorded() -> Path:
+    """Return the recording of a short run."""
+    path = Path(tempfile.mkdtemp(), "run.mcap")
+    hand, still = SpringHand(stiffness=200.0), Still((0.0, 0.0, -1e-3))
+    simulate(surface("W"), Cartesian(0.05), hand, Servo(1e-3), still, 0.1, trace=path)
+    return path
+
+
+def closed_writer() -> asp.RecordingWriter:
+    writer = asp.RecordingWriter(Path(tempfile.mkdtemp(), "run.mcap"), (("time", "s"),))
+    writer.close()
+    return writer
 
 
 MADE: dict[str, Callable[[], Any]] = {
@@ -37,6 +53,9 @@ MADE: dict[str, Callable[[], Any]] = {
     "Passivity": lambda: asp.analyze(surface("B"), "pantograph").passivity,
     "PopThrough": lambda: asp.pop_through(surface("H"), 2e-3),
     "Profile": lambda: asp.Profile(HEIGHTS[0], 5e-5),
+    "Recording": lambda: asp.open_recording(recorded()),
+    "RecordingWriter": closed_writer,
+    "Replay": lambda: asp.replay(asp.open_recording(recorded())),
     "Sinusoid": lambda: asp.Sinusoid(2e-4, 2e-3),
     "SplitState": lambda: asp.split_state(surface("H"), np.zeros((200, 3))),
     "Surface": lambda: asp.Surface(MANY, "F", max_depth=1e-5),

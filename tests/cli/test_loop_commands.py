@@ -117,6 +117,63 @@ def test_the_trace_has_columns_with_units(call: Call, still: str, tmp_path: Path
     assert "<svg" in Path(page).read_text(encoding="utf-8")
 
 
+def test_a_run_is_recorded_and_replayed(call: Call, still: str, tmp_path: Path) -> None:
+    path, page = str(tmp_path / "run.mcap"), tmp_path / "run.html"
+    code, out, _err = call("simulate", still, "--trace", path, "--html", str(page))
+    assert (code, f"Trace: {path}" in out) == (0, True)
+    assert "<svg" in page.read_text(encoding="utf-8")
+    code, out, _err = call("recording", "info", path)
+    assert code == 0
+    assert out.startswith("800 rows, 200 ms at 4 kHz: law A at 400 N/m on sinusoid")
+    assert re.search(r"commanded z +[-0-9.]+ +[0-9.]+ +N", out)
+    assert call("recording", "replay", path)[:2] == (
+        0, "All 800 rows come out the same, bit for bit.\n",
+    )  # fmt: skip
+    Path(still).write_text(Path(still).read_text(encoding="utf-8") + "\n", encoding="utf-8")
+    code, out, _err = call(
+        "recording", "replay", path, "--surface", "sinusoid:amplitude=0.3mm,period=2mm,phase=30deg"
+    )
+    assert code == 0
+    said = " ".join(out.split())
+    assert re.match(r"\d+ of 800 rows differ; the first is row \d+, at .*: commanded", said)
+    assert f"The file {still} has changed since" in said
+    assert "Recorded on another surface" in said
+    for name in ("run.csv", "run.mat", "page.html", "run.png", "run.svg"):
+        verb = "export" if name[:3] == "run" and name[-3:] in {"csv", "mat"} else "plot"
+        code, out, _err = call("recording", verb, path, "-o", str(tmp_path / name))
+        assert (code, out) == (0, f"Saved: {tmp_path / name}\n")
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    check_alts(check_alone(text), text)
+    code, out, _err = call("recording", "info", path, "--json", "-")
+    assert json.loads(out)["about"]["device"]["name"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["info", "{still}"], "it is no recording"),
+        (["info", "."], "not a regular file"),
+        (["replay", "missing.mcap"], "No such file"),
+        (["export", "{run}", "-o", "a.xls"], "must end in .csv, .mat, .parquet"),
+        (["export", "{run}", "-o", "{run}"], "must be another file than the recording"),
+        (["export", "{run}", "-o", "no/a.csv"], "folder that exists"),
+        (["plot", "{run}", "-o", "a.gif"], "must end in .html, .svg, .png, .pdf"),
+        (["plot", "{run}", "-o", "a.png", "-o", "b.png"], "output is given twice"),
+        (["replay", "{run}", "--surface", "no:thing=1"], "surface"),
+    ],
+)
+def test_bad_input_of_recordings_is_one_line(
+    call: Call, still: str, tmp_path: Path, arguments: list[str], words: str
+) -> None:
+    run = tmp_path / "run.mcap"
+    call("simulate", still, "--trace", str(run), "--duration", "10ms")
+    given = [one.format(still=still, run=run) for one in arguments]
+    code, out, err = call("recording", *given)
+    assert (code, out) == (2, "")
+    assert words in err
+    assert err.count("\n") == 1
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
 def test_a_full_disk_is_said(call: Call, still: str, tmp_path: Path) -> None:
     full = tmp_path / "full.csv"
@@ -176,7 +233,7 @@ BAD = [
     (["simulate", "{still}", "--duration", "0s"], "duration must be positive"),
     (["simulate", "{still}", "--every", "1.5"], "every must be a whole number"),
     (["simulate", "{still}", "--every", "0"], "every must be a whole number"),
-    (["simulate", "{still}", "--trace", "trace.xls"], "must be the path of a .csv"),
+    (["simulate", "{still}", "--trace", "trace.xls"], "must be the path of a .mcap"),
     (["simulate", "{still}", "--trace", "no/trace.csv"], "folder that exists"),
     (["simulate", "{still}", "--json", "-", "--html", "-"], "cannot both"),
     (["simulate", "{still}", "--trace", "a.csv", "--json", "a.csv"], "cannot both"),

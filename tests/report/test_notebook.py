@@ -40,7 +40,7 @@ HOSTILE = "<script>alert(1)</script>"
 VOID = {"br", "img", "meta", "hr", "line", "link", "input"}
 
 
-def run(trace: bool = True) -> Run:
+def run(trace: bool | Path = True) -> Run:
     hand = SpringHand(stiffness=200.0, damping=2.0)
     still, servo = Still((0.0, 0.0, -1e-3)), Servo(1e-3)
     return simulate(asp.Surface(WAVE, "C"), Cartesian(0.05), hand, servo, still, 0.1, trace=trace)
@@ -52,6 +52,12 @@ def shown_file() -> Shown:
         path = Path(folder, "ridge.txt")
         np.savetxt(path, np.column_stack([x, 1e-6 * np.sin(9e3 * x)]), header="x [m] z [m]")
         return show_file(path)
+
+
+def recorded() -> Path:
+    path = Path(tempfile.mkdtemp(), "run.mcap")
+    run(trace=path)
+    return path
 
 
 MAKERS: dict[str, Any] = {
@@ -67,10 +73,12 @@ MAKERS: dict[str, Any] = {
     "device": lambda: asp.load_device("touch"),
     "run": run,
     "run without a trace": lambda: run(trace=False),
+    "recording": lambda: asp.open_recording(recorded()),
+    "replay": lambda: asp.replay(result("recording")),
     "file": shown_file,
     "table": lambda: TableTwo((), "nothing"),
 }
-PICTURED = {"texture", "map", "surface", "comparison", "analysis", "limits", "run"}
+PICTURED = {"texture", "map", "surface", "comparison", "analysis", "limits", "run", "recording"}
 REPORTED = {"comparison", "several", "analysis", "limits", "file"}
 PRINT = {
     "comparison": print_comparison,

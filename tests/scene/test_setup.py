@@ -89,12 +89,13 @@ def test_a_moved_hand_needs_no_mass(tmp_path: Path) -> None:
     assert abs(run.ledger.total - run.ledger.sampling) < 1e-3 * abs(run.ledger.exchanged)
 
 
-def test_a_trace_is_a_path_for_another_scene(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["trace.csv", "trace.mcap"])
+def test_a_trace_is_a_path_for_another_scene(tmp_path: Path, name: str) -> None:
     first = scene(tmp_path, MASS, SPRING, STILL, '[run]\nduration = "0.05 s"\n')
-    run = first.simulate(trace=str(tmp_path / "trace.csv"))
+    run = first.simulate(trace=str(tmp_path / name))
     assert run.path
     again = scene(tmp_path, MASS, '[hand]\nkind = "moved"\n[motion]\nkind = "path"\n'
-                  'file = "trace.csv"\n')  # fmt: skip
+                  f'file = "{name}"\n')  # fmt: skip
     shown = first.simulate()
     at = again.motion.at(shown.time)
     np.testing.assert_allclose(at, shown.position, rtol=1e-9, atol=1e-15)

@@ -73,7 +73,7 @@ def test_the_hand_is_where_the_motion_says() -> None:
 def test_every_thins_the_trace_and_nothing_else() -> None:
     whole, thin, none = run_of(), run_of(every=7), run_of(trace=False)
     np.testing.assert_array_equal(thin.table, whole.table[::7])
-    assert none.table.shape == (0, 27)
+    assert none.table.shape == (0, 30)
     assert whole.ledger == thin.ledger == none.ledger
     sparse = run_of(every=10**30)
     np.testing.assert_array_equal(sparse.table, whole.table[:1])
@@ -153,7 +153,9 @@ def test_the_file_holds_the_trace(tmp_path: FilePath) -> None:
 def test_a_file_that_cannot_be_written_is_named(tmp_path: FilePath) -> None:
     with pytest.raises(ParameterError, match="trace cannot be written"):
         run_of(trace=tmp_path / "missing" / "run.csv")
-    with pytest.raises(ParameterError, match=r"\.csv"):
+    with pytest.raises(ParameterError, match="trace cannot be written"):
+        run_of(trace=tmp_path / "missing" / "run.mcap")
+    with pytest.raises(ParameterError, match=r"\.mcap.*\.csv"):
         run_of(trace=tmp_path / "run.npy")
     assert list(tmp_path.iterdir()) == []
 
@@ -201,7 +203,7 @@ def test_a_full_disk_ends_the_run_and_leaves_whole_lines(tmp_path: FilePath) -> 
     assert text.endswith("\n")
     assert size - 1000 < len(text) <= size
     read = np.loadtxt(path, delimiter=",", skiprows=1)
-    assert read.shape == (rows, 27)
+    assert read.shape == (rows, 30)
     np.testing.assert_allclose(read[:, 0], 1e-4 * np.arange(rows), atol=1e-12)
 
 
@@ -213,13 +215,14 @@ def test_a_disk_without_any_room_is_reported(tmp_path: FilePath) -> None:
         run_of(trace=full)
 
 
-def test_memory_does_not_depend_on_the_duration(tmp_path: FilePath) -> None:
+@pytest.mark.parametrize("name", ["run.csv", "run.mcap"])
+def test_memory_does_not_depend_on_the_duration(tmp_path: FilePath, name: str) -> None:
     """Ten times as long, no more memory: Python's own allocations, and those of NumPy."""
     peaks = []
-    options: dict[str, Any] = {"servo": Servo(1e-4), "every": 10}
+    options: dict[str, Any] = {"servo": Servo(1e-4), "every": 5}
     for duration in (4.0, 40.0):
-        traced = partial(run_of, trace=tmp_path / "run.csv", duration=duration, **options)
-        run_of(trace=tmp_path / "run.csv", every=10)
+        traced = partial(run_of, trace=tmp_path / name, duration=duration, **options)
+        run_of(trace=tmp_path / name, every=5)
         peaks.append(traced_peak(traced))
     assert peaks[1] < 1.1 * peaks[0]
     # Negative control: in memory it does depend.
@@ -348,11 +351,14 @@ def test_wrong_parts_are_named(
         kind(*given, **named)
 
 
+@pytest.mark.parametrize("name", ["run.csv", "run.mcap", "run"])
 @pytest.mark.parametrize("most", [1000, 40, 7, 1])
-def test_a_written_trace_is_read_back_thinned_out_evenly(tmp_path: FilePath, most: int) -> None:
+def test_a_written_trace_is_read_back_thinned_out_evenly(
+    tmp_path: FilePath, most: int, name: str
+) -> None:
     surface_to_end = (WALL, Cartesian(0.1, 1.0), SpringHand(100.0, 2.0), Servo(1e-3))
     ask = partial(simulate, *surface_to_end, Still((0.0, 0.0, -1e-3)), 0.04)
-    whole, read = ask().table, reread(ask(trace=tmp_path / "run.csv"), most).table
+    whole, read = ask().table, reread(ask(trace=tmp_path / name), most).table
     step = -(-len(whole) // most)
     assert len(read) <= most
     np.testing.assert_allclose(read, whole[::step], rtol=1e-11)

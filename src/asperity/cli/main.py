@@ -11,8 +11,9 @@ import click
 
 import asperity
 from asperity.cache import CacheWarning, size_limit
+from asperity.cli.group import Group
 from asperity.cli.own_code import own_fault
-from asperity.errors import AsperityError, InternalError, ParameterError, tell
+from asperity.errors import AsperityError, InternalError, tell
 
 BAD_INPUT = 2
 INTERNAL_ERROR = 70  # as sysexits.h has it
@@ -26,6 +27,7 @@ COMMANDS = {
     "limits": "Say whether a texture can be felt on a device.",
     "onset": "Find the stiffness at which limit cycles begin.",
     "prepare": "Prepare a measured surface and save it.",
+    "recording": "Say, draw, export or replay what a loop did.",
     "reproduce": "Redo the paper and judge each of its statements.",
     "scan": "Energy per stroke, against speed and depth.",
     "show": "Say a measured surface in numbers, step by step.",
@@ -35,7 +37,7 @@ COMMANDS = {
 """The commands with what each does; each is ``command`` in the module of its name."""
 
 
-class Commands(click.Group):
+class Commands(Group):
     """Commands that are imported when they are asked for, so that the program starts at once."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
@@ -49,35 +51,10 @@ class Commands(click.Group):
         command: click.Command = importlib.import_module(f"asperity.cli.{cmd_name}").command
         return command
 
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command that is asked for, once no option of it is given twice."""
-        name, command, rest = super().resolve_command(ctx, args)
-        if command is not None:
-            refuse_repeated(command, rest)
-        return name, command, rest
-
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - as above
         """Write what the commands do."""
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
-
-
-def refuse_repeated(command: click.Command, words: list[str]) -> None:
-    """Refuse an option that is given twice: click would take the last and say nothing.
-
-    Raises:
-        ParameterError: with the option; those that are made to be repeated count for nothing.
-    """
-    # A mistake in the words is said where they are parsed for good.
-    with click.Context(command, resilient_parsing=True) as trial:
-        _, _, given = command.make_parser(trial).parse_args(list(words))
-    for option in given:
-        if isinstance(option, click.Option) and not option.multiple and given.count(option) > 1:
-            several = "; several values are one text, 'a; b'" if option.metavar == "LIST" else ""
-            flag = max(option.opts, key=len)
-            raise ParameterError(flag.lstrip("-"), f"is given twice: give {flag} once{several}")
 
 
 @click.group(

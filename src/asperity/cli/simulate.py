@@ -28,7 +28,10 @@ _RUN = (
 @loop_options
 @options(_RUN)
 @click.option(
-    "--trace", "trace_path", metavar="PATH", help="Write every sample to a .csv file as it comes."
+    "--trace",
+    "trace_path",
+    metavar="PATH",
+    help="Record every sample as it comes, 'run.mcap'; as a table of text, 'run.csv'.",
 )
 @output_options("Write a report; - is standard output.")
 def command(

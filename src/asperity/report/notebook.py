@@ -17,6 +17,8 @@ from asperity.analysis.passivity.judgement import Passivity
 from asperity.analysis.several import Comparisons
 from asperity.devices import Device
 from asperity.paper.table_two import TableTwo
+from asperity.recording.recording import Recording
+from asperity.recording.replay import Replay
 from asperity.report import page
 from asperity.report.analysis import criteria_table, print_analysis, suprema_table
 from asperity.report.comparison import answers_table, described, print_comparison
@@ -24,6 +26,7 @@ from asperity.report.devices import numbers_table
 from asperity.report.fragment import Fragment, fragment_html
 from asperity.report.limits import print_limits, six_table
 from asperity.report.pictures.plots import plot
+from asperity.report.recording import answer, columns_table, replay_answer
 from asperity.report.run import ledger_table, work_text
 from asperity.report.several import cases_table, print_comparisons
 from asperity.report.show import print_shown
@@ -131,6 +134,18 @@ def _run(result: Run) -> Fragment:
     said = f"{work_text(result.surface, result)}."
     draw = partial(plot, result) if len(result.time) > 1 else None  # else no trace was kept
     return Fragment(said, [ledger_table(result)], draw, "Motion, force, energy and phase")
+
+
+@fragment_of.register
+def _recording(result: Recording) -> Fragment:
+    draw = partial(plot, result) if result.rows > 1 else None
+    words = "Motion, force, energy and phase"
+    return Fragment(answer(result), [columns_table(result, result.ranges())], draw, words)
+
+
+@fragment_of.register
+def _replay(result: Replay) -> Fragment:
+    return Fragment(" ".join([replay_answer(result), *result.notes]))
 
 
 @fragment_of.register

@@ -171,13 +171,24 @@ def _pictures(run: Run) -> list[Section]:
         return []
     from asperity.report.pictures.run_picture import run_figure
 
+    caption, seen = run_caption(run.duration)
+    seen += f". In the end the texture has supplied {energy(run.ledger.total)}."
+    return [
+        pictured(
+            "Motion, force, energy, phase",
+            run_figure(run, run.surface.texture.height),
+            seen,
+            caption,
+        )
+    ]
+
+
+def run_caption(duration: float) -> tuple[str, str]:
+    """Return what stands below the pictures of a loop, and what is seen in them."""
     caption = (
         "Brown: the body, as high as it is below the handle. The exact energy is the work of the "
         "held force on the true motion; the paper's sum multiplies command and step of the same "
         "sample, which turns the sign of what sampling adds."
     )
-    seen = (
-        f"Height, force and energy over {engineering(run.duration, 's')}, the path, and two phase "
-        f"portraits. In the end the texture has supplied {energy(run.ledger.total)}."
-    )
-    return [pictured("Motion, force, energy, phase", run_figure(run), seen, caption)]
+    seen = f"Height, force and energy over {engineering(duration, 's')}, the path, and two phase"
+    return caption, f"{seen} portraits"

@@ -31,6 +31,7 @@ class Scene:
         loop: the sections [hand], [motion] and [run] as they were given; see
             :func:`~asperity.scene.setup.make_setup`.
         folder: to which paths in these sections are relative.
+        files: that it was read from, the scene file and a measured surface.
     """
 
     texture: Texture
@@ -38,6 +39,7 @@ class Scene:
     device: Device | None = None
     loop: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     folder: Path = Path()
+    files: tuple[Path, ...] = ()
 
 
 def load_scene(source: str, file_arguments: Mapping[str, Any] | None = None) -> Scene:
@@ -83,7 +85,8 @@ def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
     device = _scene_device(content["device"]) if "device" in content else None
     loop = {name: content[name] for name in LOOP_SECTIONS if name in content}
     built = build_texture(kind, texture, path.parent, extra)
-    return Scene(built, surface, device, loop, path.parent)
+    files = [path.parent / texture["path"]] if "path" in texture else []
+    return Scene(built, surface, device, loop, path.parent, (path, *files))
 
 
 def _refuse_code(content: Mapping[str, Any]) -> None:

@@ -15,6 +15,7 @@ from asperity.arguments import MAX_DEPTH, STIFFNESS, Argument, read_arguments
 from asperity.errors import ParameterError, nearest_names
 from asperity.files import open_input
 from asperity.laws import LAW_ARGUMENTS, Law, known_arguments
+from asperity.recording.recording import is_recording, open_recording
 from asperity.scene.plant import BRAKES
 from asperity.simulation import BandHand, MovedHand, SpringHand, Still, Strokes
 from asperity.simulation import Path as PathMotion
@@ -27,13 +28,19 @@ def read_path(file: str) -> PathMotion:
     """Return the motion that a file of positions describes.
 
     Args:
-        file: text with a line of names, ``time [s]``, ``x [m]``, ``y [m]``, ``z [m]``, and others
-            that are not read; commas between. The traces of ``asperity simulate`` are such files.
+        file: a recording, or text with a line of names, ``time [s]``, ``x [m]``, ``y [m]``,
+            ``z [m]``, and others that are not read; commas between. The traces of ``asperity
+            simulate`` are such files.
 
     Raises:
         ParameterError: for a file that cannot be read, lacks a column, has no rows or a wrong
             number.
     """
+    if is_recording(file):
+        traced = open_recording(file).traced()
+        if not len(traced.time):
+            raise ParameterError("motion.file", f"{file} has no rows")
+        return PathMotion(traced.time, traced.position)
     try:
         with io.TextIOWrapper(open_input(file), "utf-8") as stream:
             names = [name.strip() for name in stream.readline().split(",")]

@@ -15,6 +15,7 @@ from asperity.devices import Device, load_device
 from asperity.errors import ParameterError
 from asperity.files import plain, record
 from asperity.laws import Law, find_law, shared_out
+from asperity.recording.replay import file_content
 from asperity.scene.loading import Scene
 from asperity.scene.plant import default_servo, plant_of
 from asperity.scene.sections import DURATION, HANDS, MOTIONS, RUN, built, surface_keywords
@@ -43,6 +44,7 @@ class Setup:
         velocity: of the handle at the start [m/s], ``None`` for rest.
         every: samples from one row of the trace to the next.
         assumptions: what was assumed, in sentences.
+        files: that the scene was read from.
     """
 
     surface: Surface
@@ -56,6 +58,7 @@ class Setup:
     velocity: tuple[float, ...] | None = None
     every: int = 1
     assumptions: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
 
     def simulate(
         self,
@@ -67,8 +70,17 @@ class Setup:
         return simulate(
             self.surface, self.plant, self.hand, self.servo, self.motion, self.duration,
             start=self.start, velocity=self.velocity, trace=trace, every=self.every,
-            most_rows=most_rows, progress=progress,
+            most_rows=most_rows, progress=progress, about=self._about(),
         )  # fmt: skip
+
+    def _about(self) -> dict[str, Any]:
+        """Return what a recording says of the scene, besides its parts."""
+        contents = {str(path): file_content(path) for path in self.files}
+        return {
+            "device": {"id": self.device.id, "name": self.device.name},
+            **record(self, "duration", "start", "velocity", "assumptions"),
+            "files": {name: content for name, content in contents.items() if content is not None},
+        }
 
     def with_law(self, law: str | Law, stiffness: float | None = None) -> Setup:
         """Return the same loop with another law, and another stiffness [N/m] if one is given."""
@@ -92,7 +104,7 @@ class Setup:
                 "parameters": plain(surface.law_parameters),
             },
             "device": self.device.id,
-            **record(self, without=("surface", "device")),
+            **record(self, without=("surface", "device", "files")),
         }
 
 
@@ -147,7 +159,8 @@ def make_setup(
         said += [f"{parameter} for law {law.letter}" for parameter in parameters]
     return Setup(
         whole, chosen, plant, hand, servo, motion, span,
-        assumptions=(*assumed, *said, *of_span, *_leaving(scene.texture, motion, span)), **run,
+        assumptions=(*assumed, *said, *of_span, *_leaving(scene.texture, motion, span)),
+        files=scene.files, **run,
     )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,10 @@ import numpy as np
 from asperity.checks import FloatArray
 from asperity.display import Plotted
 from asperity.files import plain, record
+from asperity.recording.recording import open_recording
+from asperity.recording.traced import Parts
 from asperity.simulation.ending import Ending
-from asperity.simulation.trace import COLUMNS
+from asperity.simulation.trace import COLUMNS, is_text
 from asperity.surface import Surface
 
 MOST_ROWS = 20_000
@@ -97,7 +100,7 @@ class Ledger:
 
 
 @dataclass(frozen=True, eq=False)
-class Run(Plotted):
+class Run(Parts, Plotted):
     """What a simulation gave.
 
     Attributes:
@@ -130,6 +133,7 @@ class Run(Plotted):
     path: str = ""
     ending: Ending | None = None
     notes: tuple[str, ...] = ()
+    columns = COLUMNS
 
     def __repr__(self) -> str:
         law, stopped = self.surface.law.letter, f", {self.stopped}" if self.stop else ""
@@ -157,46 +161,6 @@ class Run(Plotted):
         bits = 1e-15 * max(ledger.before, ledger.after)
         return abs(ledger.closure) <= 1e-9 * ledger.exchanged + bits
 
-    @property
-    def time(self) -> FloatArray:
-        """Of the traced samples [s], shape (k,)."""
-        return self.table[:, 0]
-
-    @property
-    def position(self) -> FloatArray:
-        """True position of the handle at the samples [m], shape (k, 3)."""
-        return self.table[:, 1:4]
-
-    @property
-    def velocity(self) -> FloatArray:
-        """True velocity of the handle at the samples [m/s], shape (k, 3)."""
-        return self.table[:, 4:7]
-
-    @property
-    def commanded(self) -> FloatArray:
-        """Force that the law asked for at the sample, rounded and limited [N], shape (k, 3)."""
-        return self.table[:, 7:10]
-
-    @property
-    def applied(self) -> FloatArray:
-        """Force that is held from the sample on, after the delay [N], shape (k, 3)."""
-        return self.table[:, 10:13]
-
-    @property
-    def anchor(self) -> FloatArray:
-        """Of the hand at the samples [m], shape (k, 3)."""
-        return self.table[:, 13:16]
-
-    @property
-    def energies(self) -> dict[str, FloatArray]:
-        """Sums of the ledger up to the samples [J].
-
-        ``supplied`` and ``same_sample`` have shape (k, 3), one column per axis; ``lost``, ``hand``,
-        ``friction``, ``sampling`` and ``stored`` have shape (k,).
-        """
-        single = {name: self.table[:, i] for i, (name, _unit) in enumerate(COLUMNS) if i >= 22}
-        return {"supplied": self.table[:, 16:19], "same_sample": self.table[:, 19:22], **single}
-
     def to_dict(self) -> dict[str, Any]:
         """Return plain data without the trace, SI units; None for what overflowed."""
         names = ("duration", "samples", "period", "stopped", "state", "ledger")
@@ -213,7 +177,10 @@ def reread(run: Run, most: int = MOST_ROWS) -> Run:
 
     Raises:
         OSError: if the file is gone.
+        ParameterError: likewise, of a recording.
     """
+    if not is_text(Path(run.path)):
+        return replace(run, table=open_recording(run.path).table(most))
     with open(run.path, encoding="utf-8") as file:
         rows = sum(1 for _line in file) - 1
         file.seek(0)

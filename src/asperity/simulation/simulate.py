@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from numpy.typing import ArrayLike
 from asperity.arguments import whole
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
+from asperity.files import plain
+from asperity.recording.field import describe_field, field_files
 from asperity.simulation.ending import Ending
 from asperity.simulation.hands import BandHand, Hand, MovedHand, SpringHand
 from asperity.simulation.loop import Simulation
@@ -22,7 +25,14 @@ from asperity.simulation.plants import Cartesian, Pantograph, Plant
 from asperity.simulation.run import Run, Stop
 from asperity.simulation.sampled_plant import LEAST_SINE, sampled_plant
 from asperity.simulation.servo import Servo
-from asperity.simulation.trace import FileTrace, MemoryTrace, ThinTrace, Trace
+from asperity.simulation.trace import (
+    FileTrace,
+    MemoryTrace,
+    TextTrace,
+    ThinTrace,
+    Trace,
+    is_text,
+)
 from asperity.surface import Surface
 
 # Samples at a time: memory does not depend on the duration, progress is told in between.
@@ -45,6 +55,7 @@ def simulate(
     every: int = 1,
     most_rows: int | None = None,
     progress: Callable[[float], None] | None = None,
+    about: Mapping[str, Any] | None = None,
 ) -> Run:
     """Return what happens when a hand explores a surface on a device.
 
@@ -60,19 +71,21 @@ def simulate(
         duration: [s]; the nearest whole number of samples is done.
         start: where the handle is at first [m], shape (3,); default: where the motion begins.
         velocity: of the handle at first [m/s], shape (3,); default: at rest.
-        trace: whether to keep the trace in memory, or the path of a CSV file for it: rows are
-            written as they come, so memory does not depend on the duration.
+        trace: whether to keep the trace in memory, or the path of a file for it: a recording
+            (.mcap), or a table of text (.csv). Rows are written as they come, so memory does not
+            depend on the duration.
         every: samples per row of the trace.
         most_rows: rows that are kept in memory at most, thinned out evenly; by default all, so that
             memory grows with the duration. How the run ends is told from all rows nevertheless.
         progress: is told the part that is done, in [0, 1], now and then.
+        about: what a recording is to say of itself besides surface, servo and hand; plain data.
 
     Returns:
         The run; its ledger covers every sample, traced or not.
 
     Raises:
         ParameterError: for parts that do not fit together, or a trace file that cannot be written
-            (what was written stays, in whole lines).
+            (what was written stays, in whole lines or blocks).
 
     Example:
         >>> from asperity.textures.sinusoid import Sinusoid
@@ -93,7 +106,8 @@ def simulate(
     simulation = _begin(surface, plant, hand, servo, motion, start, velocity)
     anchor_from = partial(_anchor, motion, servo.period, samples, plant)
     rows = -(-samples // every)
-    kept = _trace(trace, rows, most_rows)
+    said = partial(_said, surface, plant, hand, servo, motion, every, about or {})
+    kept = _trace(trace, rows, most_rows, said, surface)
     ending = None if trace is False else Ending(rows)
     try:
         stop = _go(simulation, anchor_from, samples, kept, ending, every, progress)
@@ -102,7 +116,7 @@ def simulate(
     return Run(
         kept.table(), simulation.state, simulation.samples, float(servo.period),
         simulation.ledger(), surface, stop, _place(stop, simulation.state, plant),
-        path=os.fspath(trace) if isinstance(kept, FileTrace) else "",  # type: ignore[arg-type]  # a path then
+        path="" if isinstance(trace, bool) else os.fspath(trace),
         ending=ending, notes=plant.notes,
     )  # fmt: skip
 
@@ -193,14 +207,34 @@ def _anchor(motion: Motion, period: float, samples: int, plant: Plant, first: in
     return points
 
 
-def _trace(wanted: bool | str | os.PathLike[str], rows: int, most_rows: int | None) -> Trace:
+def _trace(
+    wanted: bool | str | os.PathLike[str], rows: int, most_rows: int | None,
+    said: Callable[[], dict[str, Any]], surface: Surface,
+) -> Trace:  # fmt: skip
     if isinstance(wanted, bool):
         if wanted and most_rows is not None:
             return ThinTrace(rows, whole("most_rows", most_rows))
         return MemoryTrace(rows if wanted else 0)
     if not isinstance(wanted, (str, os.PathLike)):
         raise ParameterError("trace", "must be True, False or a path", wanted)
-    return FileTrace(wanted)
+    if is_text(Path(wanted)):
+        return TextTrace(wanted)
+    return FileTrace(wanted, said(), field_files(surface))
+
+
+def _said(
+    surface: Surface, plant: Plant, hand: Hand, servo: Servo, motion: Motion, every: int,
+    about: Mapping[str, Any],
+) -> dict[str, Any]:  # fmt: skip
+    """Return what a recording says of itself."""
+    parts = {"servo": servo, "plant": plant, "hand": hand, "motion": motion}
+    return {
+        "made_by": "simulate",
+        "surface": describe_field(surface),
+        **{name: plain(part) for name, part in parts.items()},
+        "every": every,
+        **about,
+    }
 
 
 def _go(

@@ -1,15 +1,18 @@
-"""The trace of a run, in memory or in a file that other tools read."""
+"""The trace of a run: in memory, in a recording, or in a table of text."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.errors import ParameterError
+from asperity.recording.writer import RecordingWriter
 
 COLUMNS = (
     ("time", "s"),
@@ -21,11 +24,27 @@ COLUMNS = (
     *((f"supplied {axis}", "J") for axis in "xyz"),
     *((f"same sample {axis}", "J") for axis in "xyz"),
     *((name, "J") for name in ("lost", "hand", "friction", "sampling", "stored")),
+    *((f"law anchor {axis}", "m") for axis in "xy"),
+    ("law held", "1"),
 )
 """Columns of the trace with their units."""
 
 HEADER = ",".join(f"{name} [{unit}]" for name, unit in COLUMNS)
+_TEXT, _RECORDING = (".csv", ".txt"), (".mcap", "")
 _ROW = ",".join(["%.12g"] * len(COLUMNS)) + "\n"
+
+
+def is_text(path: Path) -> bool:
+    """Tell by its name whether a trace is a table of text, or a recording.
+
+    Raises:
+        ParameterError: for a name that says something else.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in (*_TEXT, *_RECORDING):
+        words = "must be the path of a .mcap file (a recording), or of a .csv file (text)"
+        raise ParameterError("trace", words, str(path))
+    return suffix in _TEXT
 
 
 class MemoryTrace:
@@ -92,6 +111,47 @@ class ThinTrace:
 
 
 class FileTrace:
+    """Writes rows of a recording in blocks.
+
+    Args:
+        path: of the file.
+        about: what the recording says of itself.
+        attached: files inside it.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        about: Mapping[str, Any] | None = None,
+        attached: Mapping[str, bytes] | None = None,
+    ) -> None:
+        self._buffer = np.empty((0, len(COLUMNS)))
+        self._writer = RecordingWriter(path, COLUMNS, about, attached, "trace")
+
+    def room(self, rows: int) -> FloatArray:
+        """Return a buffer of so many rows."""
+        if len(self._buffer) < rows:
+            self._buffer = np.empty((rows, len(COLUMNS)))
+        return self._buffer
+
+    def keep(self, rows: int) -> None:
+        """Hand on the first rows of the buffer.
+
+        Raises:
+            ParameterError: if the file cannot grow; it then ends with a whole block.
+        """
+        self._writer.append(self._buffer[:rows])
+
+    def table(self) -> FloatArray:
+        """Return an empty table: the rows are in the file."""
+        return np.empty((0, len(COLUMNS)))
+
+    def close(self) -> None:
+        """Write what waits, and close the file."""
+        self._writer.close()
+
+
+class TextTrace:
     """Writes rows of a CSV file in chunks; what is written are whole lines.
 
     The first line names the columns with their units, ``time [s],x [m],...``.
@@ -99,8 +159,6 @@ class FileTrace:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self._path = Path(path)
-        if self._path.suffix.lower() not in {".csv", ".txt"}:
-            raise ParameterError("trace", "must be the path of a .csv or .txt file", str(path))
         self._buffer = np.empty((0, len(COLUMNS)))
         self.rows = 0
         try:
@@ -157,4 +215,4 @@ class FileTrace:
         self._file.close()
 
 
-Trace = MemoryTrace | ThinTrace | FileTrace
+Trace = MemoryTrace | ThinTrace | FileTrace | TextTrace

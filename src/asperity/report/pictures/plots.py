@@ -12,6 +12,7 @@ from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.compare import Comparison
 from asperity.analysis.limits.limit_result import Limits
 from asperity.errors import ParameterError
+from asperity.recording.recording import Recording
 from asperity.report.pictures import style
 from asperity.report.pictures.analysis_pictures import analysis_figure, picture_size, pictures_of
 from asperity.report.pictures.field_picture import draw_fields, field_size
@@ -19,7 +20,7 @@ from asperity.report.pictures.force_picture import draw_forces, force_size
 from asperity.report.pictures.gain_picture import gain_figure
 from asperity.report.pictures.limits_picture import limits_figure
 from asperity.report.pictures.merit_picture import merit_figure
-from asperity.report.pictures.run_picture import run_figure
+from asperity.report.pictures.run_picture import recording_figure, run_figure
 from asperity.report.pictures.spectrum_picture import spectrum_figure
 from asperity.report.pictures.surface_picture import draw_surface, surface_size
 from asperity.report.words.number_words import leak_text
@@ -37,8 +38,9 @@ def plot(result: Any, picture: str | None = None) -> Figure:
             the fields of all laws), a :class:`~asperity.surface.Surface` (forces and field of its
             law), a texture (the surface), an :class:`~asperity.analysis.analysis_result.Analysis`
             (the field with the worst loop, the loop gain, the singular values), the
-            :class:`~asperity.analysis.limits.limit_result.Limits` (waves and their forces) or a
-            :class:`~asperity.simulation.Run` (motion, force, energy, phase).
+            :class:`~asperity.analysis.limits.limit_result.Limits` (waves and their forces), a
+            :class:`~asperity.simulation.Run` or a :class:`~asperity.Recording` (motion, force,
+            energy, phase).
         picture: one picture of the report alone; of a comparison "surface", "spectrum", "force",
             "field", "gain" or "merit", of an analysis "field", "gain", "depth", for a map also
             "top", and where the force jumps "jumps".
@@ -101,7 +103,13 @@ def _run(result: Run, picture: str | None = None) -> Figure:
     _known(picture, ())
     if len(result.time) < 2:
         raise ParameterError("trace", "must be kept in memory to be drawn")
-    return run_figure(result)
+    return run_figure(result, result.surface.texture.height)
+
+
+@plot.register
+def _recording(result: Recording, picture: str | None = None) -> Figure:
+    _known(picture, ())
+    return recording_figure(result)
 
 
 # Width and height [inch], and what draws it into a figure or a part of one.

@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from asperity.checks import FloatArray
+from asperity.errors import ParameterError
+from asperity.recording.recording import Recording
+from asperity.recording.replay import recorded_field
+from asperity.recording.traced import Parts
 from asperity.report.pictures import style
-from asperity.simulation import Run
+from asperity.simulation.run import MOST_ROWS
 
 _MOST_POINTS = 6000
 _AXES = ("x", "y", "z")
 _COLOURS = (style.ORANGE, style.GREEN, style.BLUE)
 
 
-def run_figure(run: Run) -> Figure:
+Height = Callable[[FloatArray], FloatArray]
+"""Returns the heights of the surface [m], shape (n,), at places (n, 2) [m]."""
+
+
+def run_figure(run: Parts, height: Height) -> Figure:
     """Return height, force and energy against time, the path, and the phase portrait.
 
     Args:
         run: with its trace in memory.
+        height: of the surface.
     """
     figure = style.new_figure(10.0, 8.2)
     grid: Any = figure.add_gridspec(3, 3, width_ratios=[1.0, 1.0, 0.95])
@@ -32,23 +43,35 @@ def run_figure(run: Run) -> Figure:
     path, phase_z, phase_x = (figure.add_subplot(grid[i, 2]) for i in range(3))
     for axes in (motion, force, energy, path, phase_z, phase_x):
         style.dress(axes)
-    _draw_motion(motion, run, shown)
+    _draw_motion(motion, run, height, shown)
     _draw_force(force, run, shown)
     _draw_energy(energy, run, shown)
-    _draw_path(path, run, shown)
+    _draw_path(path, run, height, shown)
     _draw_phase(phase_z, run, 2, shown)
     _draw_phase(phase_x, run, _scan_axis(run), shown)
     return figure
 
 
-def _scan_axis(run: Run) -> int:
+def recording_figure(recording: Recording) -> Figure:
+    """Return motion, force, energy and phase of a recording.
+
+    Raises:
+        ParameterError: for one with less than two rows, or without what is drawn.
+    """
+    traced = recording.traced(MOST_ROWS)
+    if len(traced.table) < 2:
+        raise ParameterError("recording", "needs at least two rows to be drawn")
+    return run_figure(traced, recorded_field(recording).height)
+
+
+def _scan_axis(run: Parts) -> int:
     """Return 0 or 1: along which the handle moves farther."""
     return int(np.argmax(np.ptp(run.position[:, :2], axis=0)))
 
 
-def _draw_motion(axes: Axes, run: Run, shown: slice) -> None:
+def _draw_motion(axes: Axes, run: Parts, height_at: Height, shown: slice) -> None:
     time, place, anchor = run.time[shown], run.position[shown], run.anchor[shown]
-    height = run.surface.texture.height(place[:, :2])
+    height = height_at(place[:, :2])
     unit = style.length_unit(float(np.abs(np.append(place[:, 2], height)).max()))
     low = min(float(place[:, 2].min()), float(height.min())) * unit.scale
     axes.fill_between(time, height * unit.scale, low, color=style.BODY, lw=0.0, alpha=0.7)
@@ -66,7 +89,7 @@ def _moving(values: np.ndarray) -> list[int]:
     return [i for i in range(3) if np.any(values[:, i] != 0.0)] or [2]
 
 
-def _draw_force(axes: Axes, run: Run, shown: slice) -> None:
+def _draw_force(axes: Axes, run: Parts, shown: slice) -> None:
     applied = run.applied[shown]
     unit = style.force_unit(float(np.abs(applied).max()))
     for i in _moving(applied):
@@ -78,7 +101,7 @@ def _draw_force(axes: Axes, run: Run, shown: slice) -> None:
     style.entitle(axes, "Force", "applied to the handle")
 
 
-def _draw_energy(axes: Axes, run: Run, shown: slice) -> None:
+def _draw_energy(axes: Axes, run: Parts, shown: slice) -> None:
     supplied = run.energies["supplied"][shown] * 1e3
     paper = run.energies["same_sample"][shown].sum(axis=1) * 1e3
     for i in _moving(supplied):
@@ -91,7 +114,7 @@ def _draw_energy(axes: Axes, run: Run, shown: slice) -> None:
     style.entitle(axes, "Energy", "that the texture has supplied; up feeds the hand")
 
 
-def _draw_path(axes: Axes, run: Run, shown: slice) -> None:
+def _draw_path(axes: Axes, run: Parts, height_at: Height, shown: slice) -> None:
     i = _scan_axis(run)
     place = run.position[shown]
     wide = style.length_unit(float(np.abs(place[:, i]).max()))
@@ -99,7 +122,7 @@ def _draw_path(axes: Axes, run: Run, shown: slice) -> None:
     low, top = float(place[:, i].min()), float(place[:, i].max())
     line = np.repeat(np.median(run.position, axis=0)[None, :2], 600, axis=0)
     line[:, i] = np.linspace(low, top, 600) if top > low else low
-    height = run.surface.texture.height(line)
+    height = height_at(line)
     floor = min(float(place[:, 2].min()), float(height.min()))
     axes.fill_between(
         line[:, i] * wide.scale, height * high.scale, floor * high.scale, color=style.BODY,
@@ -112,7 +135,7 @@ def _draw_path(axes: Axes, run: Run, shown: slice) -> None:
     style.entitle(axes, "Path", f"in the {_AXES[i]}-z plane")
 
 
-def _draw_phase(axes: Axes, run: Run, i: int, shown: slice) -> None:
+def _draw_phase(axes: Axes, run: Parts, i: int, shown: slice) -> None:
     place, speed = run.position[shown, i], run.velocity[shown, i]
     unit = style.length_unit(float(np.abs(place).max()))
     fast = style.length_unit(float(np.abs(speed).max()))

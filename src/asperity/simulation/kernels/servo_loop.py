@@ -91,6 +91,9 @@ def trace_row(
     for i in range(10):
         trace[row, 16 + i] = ledger[i]
     trace[row, 26] = stored_energy(x, held.ax, held.ay, held.az, plant)
+    trace[row, 27] = servo.anchor_x
+    trace[row, 28] = servo.anchor_y
+    trace[row, 29] = 1.0 if servo.held else 0.0
 
 
 def flush(values: FloatArray) -> None:

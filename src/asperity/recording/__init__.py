@@ -1,0 +1,1 @@
+"""What a loop did, on disk, whatever happens: see :mod:`asperity.recording.writer`."""

@@ -1,0 +1,293 @@
+"""Reading a recording: a whole one, or one that ends where its process did."""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from asperity.checks import FloatArray
+from asperity.display import Plotted
+from asperity.errors import ParameterError, nearest_names
+from asperity.files import open_input
+from asperity.recording import mcap
+from asperity.recording.rows import Columns, row_type, schema_columns, values_of
+from asperity.recording.traced import Traced
+from asperity.recording.writer import FORMAT, NAME
+
+# A day of a loop at 10 kHz, and more.
+_MOST_BYTES = 2**40
+# Of one of the records before the rows: a map of 11000 x 11000 points.
+_MOST_HEAD = 2**30
+
+
+@dataclass(frozen=True, eq=False)
+class Recording(Plotted):
+    """What a loop did, in a file. Rows are read when they are asked for.
+
+    Attributes:
+        path: of the file.
+        columns: names and units.
+        rows: how many there are.
+        about: what the recording says of itself: ``surface``, ``servo``, ``scene`` and more.
+        version: of the asperity that wrote it.
+        whole: whether it was closed; if not, it ends with the last block that was written.
+        unread: bytes at the end that are no whole block.
+    """
+
+    path: Path
+    columns: Columns
+    rows: int
+    about: Mapping[str, Any]
+    version: str
+    whole: bool
+    unread: int
+    _chunks: tuple[mcap.Chunk, ...] = field(repr=False, default=())
+    _attached: Mapping[str, tuple[int, int]] = field(repr=False, default_factory=dict)
+
+    def __repr__(self) -> str:
+        ends = "" if self.whole else ", not closed"
+        return f"<Recording {self.path.name}, {self.rows} rows, {self.duration:g} s{ends}>"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(name for name, _unit in self.columns)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first row to the last [s]."""
+        if not self._chunks:
+            return 0.0
+        return 1e-9 * (self._chunks[-1].times[1] - self._chunks[0].times[0])
+
+    def blocks(self) -> Iterator[FloatArray]:
+        """Yield the rows in order, some thousands at a time, shape (n, columns).
+
+        Raises:
+            ParameterError: if the file is gone, or a block is damaged.
+        """
+        seen = 0
+        with _opened(self.path) as stream:
+            for chunk in self._chunks:
+                stream.seek(chunk.rows_at)
+                data = stream.read(chunk.size)
+                if zlib.crc32(data) != chunk.checksum:
+                    raise _unreadable(self.path, f"the block after row {seen} is damaged")
+                try:
+                    table = values_of(data, len(self.columns))
+                except mcap.DamagedError as error:
+                    raise _unreadable(self.path, str(error)) from None
+                seen += len(table)
+                yield table
+
+    def table(self, most: int | None = None) -> FloatArray:
+        """Return the rows, shape (rows, columns).
+
+        Args:
+            most: rows at most, thinned out evenly from the first; by default all.
+
+        Raises:
+            ParameterError: see :meth:`blocks`.
+        """
+        step = 1 if most is None else max(1, -(-self.rows // most))
+        parts, seen = [np.empty((0, len(self.columns)))], 0
+        for block in self.blocks():
+            parts.append(block[-seen % step :: step])
+            seen += len(block)
+        return np.concatenate(parts)
+
+    def traced(self, most: int | None = None) -> Traced:
+        """Return the rows with their parts by name: time, position, forces; see :meth:`table`."""
+        return Traced(self.columns, self.table(most))
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Return a column, shape (rows,).
+
+        Raises:
+            ParameterError: for a name that there is not; the nearest are offered.
+        """
+        if name not in self.names:
+            hint = nearest_names(name, self.names)
+            raise ParameterError("column", f"is unknown: {name!r}; {hint}")
+        at = self.names.index(name)
+        return np.concatenate([np.empty(0), *(block[:, at] for block in self.blocks())])
+
+    def ranges(self) -> tuple[FloatArray, FloatArray]:
+        """Return the least and the greatest value of each column; NaN if there are no rows."""
+        low, high = np.full((2, len(self.columns)), np.nan)
+        for block in self.blocks():
+            low, high = np.fmin(low, block.min(axis=0)), np.fmax(high, block.max(axis=0))
+        return low, high
+
+    def attached(self, name: str) -> bytes | None:
+        """Return a file inside the recording; ``None`` if there is none of this name.
+
+        Raises:
+            ParameterError: if it is damaged.
+        """
+        if name not in self._attached:
+            return None
+        at, length = self._attached[name]
+        with _opened(self.path) as stream:
+            stream.seek(at)
+            try:
+                return mcap.read_attachment(stream.read(length))[2]
+            except mcap.DamagedError as error:
+                raise _unreadable(self.path, str(error)) from None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data without the rows."""
+        return {
+            "schema": 1,
+            "path": str(self.path),
+            "version": self.version,
+            "rows": self.rows,
+            "duration": self.duration,
+            "whole": self.whole,
+            "unread": self.unread,
+            "columns": [{"name": name, "unit": unit} for name, unit in self.columns],
+            "about": dict(self.about),
+        }
+
+
+def is_recording(path: str | os.PathLike[str]) -> bool:
+    """Tell by its first bytes whether a file is MCAP."""
+    try:
+        with open_input(path, _MOST_BYTES) as stream:
+            return stream.read(len(mcap.MAGIC)) == mcap.MAGIC
+    except (OSError, ValueError):
+        return False
+
+
+def open_recording(path: str | os.PathLike[str]) -> Recording:
+    """Open a recording, also one that ends where its process was killed.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        ParameterError: for a file that cannot be read, is no recording, or one of a later version.
+
+    Example:
+        >>> import tempfile
+        >>> from pathlib import Path
+        >>> from asperity.recording.writer import RecordingWriter
+        >>> path = Path(tempfile.mkdtemp()) / "run.mcap"
+        >>> writer = RecordingWriter(path, (("time", "s"), ("x", "m")))
+        >>> writer.append([[0.0, 1e-3], [0.1, 2e-3]])
+        >>> writer.flush()
+        >>> open_recording(path)
+        <Recording run.mcap, 2 rows, 0.1 s, not closed>
+        >>> writer.close()
+        >>> open_recording(path)
+        <Recording run.mcap, 2 rows, 0.1 s>
+    """
+    place = Path(path)
+    with _opened(place) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        if not size:
+            raise _unreadable(place, "it is empty")
+        if stream.read(len(mcap.MAGIC)) != mcap.MAGIC:
+            raise _unreadable(place, "it is no recording (MCAP)")
+        try:
+            return _read(place, stream, size)
+        except mcap.DamagedError as error:
+            raise _unreadable(place, str(error)) from None
+
+
+def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
+    columns: Columns = ()
+    said: dict[str, str] = {}
+    chunks: list[mcap.Chunk] = []
+    attached: dict[str, tuple[int, int]] = {}
+    whole, foreign, end = False, False, len(mcap.MAGIC)
+    for op, at, length in mcap.walk(stream, size):
+        if op == mcap.Op.DATA_END:
+            whole = True
+            break
+        if op == mcap.Op.CHUNK and not said:
+            foreign = True
+            break
+        if op == mcap.Op.CHUNK:
+            chunks.append(mcap.read_chunk(stream, at, length))
+        elif op == mcap.Op.SCHEMA and not columns:
+            columns = _columns(_content(stream, at, length))
+        elif op == mcap.Op.METADATA:
+            content = _content(stream, at, length)
+            said = content.texts() if content.text() == NAME else said
+        elif op == mcap.Op.ATTACHMENT:
+            attached[_attachment_name(stream, at)] = at, length
+        end = at + length
+    about = _about(said, whole or foreign)
+    if not columns:
+        raise mcap.DamagedError("it does not say what its rows are")
+    if not whole and chunks and not _sound(stream, chunks[-1]):
+        end = chunks.pop().begin  # what a loss of power leaves
+    rows = sum(chunk.size for chunk in chunks) // row_type(len(columns)).itemsize
+    unread = 0 if whole else size - end
+    return Recording(
+        path, columns, rows, about, said["version"], whole, unread, tuple(chunks), attached
+    )
+
+
+def _content(stream: IO[bytes], at: int, length: int) -> mcap.Reader:
+    if length > _MOST_HEAD:
+        raise mcap.DamagedError(f"a record of {length} bytes before the rows")
+    stream.seek(at)
+    return mcap.Reader(stream.read(length))
+
+
+def _columns(content: mcap.Reader) -> Columns:
+    content.take(2)
+    name, encoding = content.text(), content.text()
+    if encoding != "ros2msg":
+        raise mcap.DamagedError(f"its rows are {name!r} in {encoding!r}, none that asperity writes")
+    return schema_columns(content.text())
+
+
+def _attachment_name(stream: IO[bytes], at: int) -> str:
+    stream.seek(at + 16)
+    size = int.from_bytes(stream.read(4), "little")
+    return mcap.Reader(size.to_bytes(4, "little") + stream.read(min(size, 1024))).text()
+
+
+def _sound(stream: IO[bytes], chunk: mcap.Chunk) -> bool:
+    stream.seek(chunk.rows_at)
+    return zlib.crc32(stream.read(chunk.size)) == chunk.checksum
+
+
+def _about(said: Mapping[str, str], foreign: bool) -> dict[str, Any]:
+    """Return what a recording says of itself, if it is one that this asperity reads."""
+    if not {"format", "version", "about"} <= said.keys():
+        whose = "it was not written by asperity" if foreign else "it ends before its first row"
+        raise mcap.DamagedError(whose)
+    if said["format"] != str(FORMAT):
+        words = f"it is of format {said['format']}, of asperity {said['version']}"
+        raise mcap.DamagedError(f"{words}; this asperity reads format {FORMAT}")
+    try:
+        about = json.loads(said["about"])
+    except ValueError as error:
+        raise mcap.DamagedError(f"what it says of itself is no JSON: {error}") from None
+    if not isinstance(about, dict):
+        raise mcap.DamagedError("what it says of itself is no table")
+    return about
+
+
+def _opened(path: Path) -> IO[bytes]:
+    try:
+        return open_input(path, _MOST_BYTES)
+    except OSError as error:
+        raise _unreadable(path, error.strerror or str(error)) from None
+    except ValueError as error:  # a name that no file can have
+        raise _unreadable(path, str(error)) from None
+
+
+def _unreadable(path: Path, reason: str) -> ParameterError:
+    return ParameterError("recording", f"{path} cannot be read: {reason}")

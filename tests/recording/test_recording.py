@@ -1,0 +1,332 @@
+"""Recordings on disk: every bit comes back, wherever the file ends, and others read it, too."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import time
+import zlib
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bench import recording_kills
+from mcap.reader import make_reader
+from mcap.writer import Writer as PeerWriter
+from mcap_ros2.decoder import DecoderFactory
+from rich.console import Console
+
+import asperity as asp
+from asperity.errors import ParameterError
+from asperity.files import write_text
+from asperity.recording import mcap, writer
+from asperity.recording.recording import Recording, is_recording, open_recording
+from asperity.recording.rows import row_type, schema_columns, schema_text
+from asperity.recording.writer import RecordingWriter
+
+COLUMNS = (("time", "s"), ("x", "m"), ("applied x", "N"), ("law held", "1"))
+ROW = row_type(len(COLUMNS)).itemsize
+
+
+def rows_of(count: int, seed: int = 0) -> np.ndarray:
+    """Return rows of any bits, and of times that go on."""
+    bits = np.random.default_rng(seed).integers(0, 2**63, (count, len(COLUMNS)), dtype=np.uint64)
+    table = bits.view(np.float64)
+    table[::7, 1], table[1::7, 1], table[2::7, 1] = np.nan, -np.inf, -0.0
+    table[:, 0] = 1e-4 * np.arange(count)
+    return table
+
+
+def written(path: Path, table: np.ndarray, block: int = 100, close: bool = True) -> Path:
+    out = RecordingWriter(path, COLUMNS, {"law": "B"}, {"a.bin": b"abc"})
+    for first in range(0, len(table), block):
+        out.append(table[first : first + block])
+    out.flush()
+    (out.close if close else partial(abandon, out))()
+    return path
+
+
+def abandon(out: RecordingWriter) -> None:
+    """Leave a recording as a process does that is killed."""
+    out._file.close()
+
+
+def assert_same(found: np.ndarray, wanted: np.ndarray) -> None:
+    assert found.shape == wanted.shape
+    np.testing.assert_array_equal(found.view(np.uint64), wanted.view(np.uint64))
+
+
+@pytest.mark.parametrize("block", [1, 100, 4096, 20_000])
+def test_every_bit_comes_back(tmp_path: Path, block: int) -> None:
+    table = rows_of(9001 if block > 1 else 301)
+    found = open_recording(written(tmp_path / "run.mcap", table, block))
+    assert_same(found.table(), table)
+    assert (found.rows, found.columns, found.whole, found.unread) == (len(table), COLUMNS, True, 0)
+    assert found.about == {"law": "B"}
+    assert found.attached("a.bin") == b"abc"
+    assert found.attached("b.bin") is None
+    assert found.duration == pytest.approx(table[-1, 0])
+    assert_same(found["applied x"], np.ascontiguousarray(table[:, 2]))
+    assert sum(map(len, found.blocks())) == found.rows
+
+
+@pytest.mark.parametrize("most", [10_000, 4097, 100, 7, 1])
+def test_rows_are_thinned_out_evenly(tmp_path: Path, most: int) -> None:
+    table = rows_of(9001)
+    found = open_recording(written(tmp_path / "run.mcap", table)).table(most)
+    assert len(found) <= most
+    assert_same(found, table[:: -(-9001 // most)])
+
+
+def test_the_library_of_others_reads_the_same(tmp_path: Path) -> None:
+    table = rows_of(9001)
+    table[:, 1:] = np.random.default_rng(1).normal(size=(9001, 3))
+    with written(tmp_path / "run.mcap", table).open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        assert summary.statistics.message_count == 9001
+        assert summary.statistics.message_end_time == 900_000_000
+        assert [one.name for one in reader.iter_metadata()] == ["asperity"]
+        assert [(one.name, one.data) for one in reader.iter_attachments()] == [("a.bin", b"abc")]
+        read = [
+            (message.sequence, row.time, row.x, row.applied_x, row.law_held)
+            for _schema, _channel, message, row in reader.iter_decoded_messages()
+        ]
+        # From the end: by the index of the rows.
+        late = next(iter(reader.iter_messages(reverse=True)))[2]
+    assert_same(np.array(read)[:, 1:], table)
+    assert [row[0] for row in read] == list(range(9001))
+    assert late.sequence == 9000
+
+
+def test_cut_anywhere_it_opens(tmp_path: Path) -> None:
+    """At any byte from the first row on; before it the file never is without its beginning."""
+    table = rows_of(40)
+    single = RecordingWriter(tmp_path / "blocks.mcap", COLUMNS, {})
+    begin = (tmp_path / "blocks.mcap").stat().st_size
+    for first in range(0, 40, 10):
+        single.append(table[first : first + 10])
+        single.flush()
+    single.close()
+    data = (tmp_path / "blocks.mcap").read_bytes()
+    cut, seen = tmp_path / "cut.mcap", set()
+    for size in range(begin, len(data), 3):
+        cut.write_bytes(data[:size])
+        found = open_recording(cut)
+        assert_same(found.table(), table[: found.rows])
+        assert found.rows >= 10 * ((size - begin) // (10 * (ROW + 16) + 200))
+        assert found.whole or found.rows in {0, 10, 20, 30, 40}
+        assert "not closed" in repr(found) or found.whole
+        seen.add(found.rows)
+    assert seen == {0, 10, 20, 30, 40}
+    for size in range(1, begin, 3):
+        cut.write_bytes(data[:size])
+        with pytest.raises(ParameterError, match="cannot be read: it"):
+            open_recording(cut)
+
+
+def test_a_block_that_power_has_spoiled_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    table = rows_of(9001)
+    data = bytearray(written(path, table, close=False).read_bytes())
+    data[-20_000:] = bytes(20_000)  # the index of the last block, and the end of its rows
+    path.write_bytes(data)
+    found = open_recording(path)
+    assert (found.rows, found.whole) == (8192, False)
+    assert found.unread > 20_000
+    assert_same(found.table(), table[:8192])
+
+
+def test_a_block_that_is_damaged_inside_is_said(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.mcap", rows_of(9001))
+    data = bytearray(path.read_bytes())
+    data[(ROW + 16) * 4096 + 50 * ROW] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(ParameterError, match="the block after row 4096 is damaged"):
+        open_recording(path).table()
+
+
+def test_rows_are_on_disk_after_half_a_second(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [100.0]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+    path = tmp_path / "run.mcap"
+    out = RecordingWriter(path, COLUMNS)
+    for wait, seen in ((0.1, 0), (0.3, 0), (0.2, 3), (0.3, 3), (0.3, 5)):
+        now[0] += wait
+        out.append(rows_of(1))
+        assert open_recording(path).rows == seen
+    assert repr(out) == "<RecordingWriter of run.mcap, 5 rows written>"
+    out.append(rows_of(1))
+    out.close()
+    out.close()  # again: nothing to do
+    assert open_recording(path).rows == 6
+
+
+def test_what_was_there_stays_until_the_beginning_is_whole(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    write_text(path, "precious")
+    with pytest.raises(ParameterError, match="columns must begin"):
+        RecordingWriter(path, (("x", "m"),))
+    assert path.read_text() == "precious"
+    abandon(RecordingWriter(path, COLUMNS))
+    assert open_recording(path).rows == 0
+    assert [one.name for one in tmp_path.iterdir()] == ["run.mcap"]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+def test_a_disk_without_room_is_said(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=r"path cannot be written: .*No space left"):
+        RecordingWriter("/dev/full", COLUMNS)
+    with pytest.raises(ParameterError, match=r"trace cannot be written: .*No such file"):
+        RecordingWriter(tmp_path / "no" / "run.mcap", COLUMNS, argument="trace")
+
+
+_FULL = """
+import resource, signal, sys
+import numpy as np
+from asperity.errors import ParameterError
+from asperity.recording.writer import RecordingWriter
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))
+out = RecordingWriter(sys.argv[1], (("time", "s"), ("x", "m")))
+try:
+    out.append(np.arange(40_000.0).reshape(-1, 2))
+except ParameterError as error:
+    print(error)
+"""
+
+
+def test_a_disk_that_fills_up_leaves_whole_blocks(tmp_path: Path) -> None:
+    """A limit on the size of files stands for a full disk: writes come back short, then fail."""
+    path = tmp_path / "run.mcap"
+    answer = subprocess.run(
+        [sys.executable, "-c", _FULL, str(path)], capture_output=True, text=True, check=True,
+        timeout=60,
+    )  # fmt: skip
+    found = open_recording(path)
+    words = "path cannot be written any further (File too large): 4096 rows are in"
+    assert answer.stdout.startswith(words)
+    assert (found.rows, found.unread) == (4096, 0)
+    assert_same(found.table(), np.arange(40_000.0).reshape(-1, 2)[:4096])
+
+
+def of_others(path: Path) -> None:
+    with path.open("wb") as stream:
+        peer = PeerWriter(stream)
+        peer.start()
+        schema = peer.register_schema("a", "jsonschema", b"{}")
+        channel = peer.register_channel("/a", "json", schema)
+        peer.add_message(channel, 0, b"{}", 0)
+        peer.finish()
+
+
+def later(path: Path) -> None:
+    data = written(path, rows_of(3)).read_bytes()
+    path.write_bytes(data.replace(b"\x01\0\0\x001", b"\x01\0\0\x002", 1))
+
+
+def compressed(path: Path) -> None:
+    data = bytearray(written(path, rows_of(3)).read_bytes())
+    at = data.index(struct.pack("<Q", 3 * ROW)) + 8 + 4
+    assert struct.unpack_from("<I", data, at - 4)[0] == zlib.crc32(
+        data[at + 12 : at + 12 + 3 * ROW]
+    )
+    data[at] = 4
+    path.write_bytes(data)
+
+
+def a_folder(path: Path) -> None:
+    path.mkdir()
+
+
+BAD: dict[str, tuple[Callable[[Path], object], str]] = {
+    "missing": (lambda path: path.exists(), "No such file"),
+    "empty": (lambda path: path.write_bytes(b""), "it is empty"),
+    "a folder": (a_folder, "not a regular file"),
+    "a picture": (lambda path: path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(99)), "no recording"),
+    "magic alone": (lambda path: path.write_bytes(mcap.MAGIC), "ends before its first row"),
+    "of others": (of_others, "it was not written by asperity"),
+    "later": (later, "of format 2, of asperity .*; this asperity reads format 1"),
+    "compressed": (compressed, "blocks are compressed"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_cannot_be_read_is_said(tmp_path: Path, name: str) -> None:
+    make, words = BAD[name]
+    path = tmp_path / "run.mcap"
+    make(path)
+    with pytest.raises(ParameterError, match=f"recording .*run.mcap cannot be read: .*{words}"):
+        open_recording(path)
+
+
+def test_any_bit_that_is_changed_is_no_fault_of_the_program(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    data = written(path, rows_of(40), block=40).read_bytes()
+    draw = np.random.default_rng(5)
+    for _ in range(500):
+        spoiled = bytearray(data)
+        for at in draw.integers(len(mcap.MAGIC), len(data), 3):
+            spoiled[at] ^= 1 << draw.integers(8)
+        path.write_bytes(spoiled)
+        with suppress(ParameterError):
+            open_recording(path).table()
+
+
+def test_a_recording_is_known_by_its_first_bytes(tmp_path: Path) -> None:
+    path = written(tmp_path / "anything", rows_of(3))
+    assert is_recording(path)
+    path.write_bytes(b"time [s]\n")
+    assert not is_recording(path)
+    assert not is_recording(tmp_path)
+
+
+def test_columns_and_schema_are_one(tmp_path: Path) -> None:
+    assert schema_columns(schema_text(COLUMNS)) == COLUMNS
+    for bad in ("X", "x_y", "1x", "x ", "", "x y"):
+        columns = (("time", "s"), (bad, "m"), ("x y", "m"))
+        with pytest.raises(ParameterError, match="columns must"):
+            schema_text(columns)
+    with pytest.raises(mcap.DamagedError, match="no table"):
+        schema_columns("float64 time # [s]\nstring x # [m]\n")
+    out = RecordingWriter(tmp_path / "run.mcap", COLUMNS)
+    with pytest.raises(ParameterError, match=r"block must have the shape \(rows, 4\)"):
+        out.append(np.zeros((3, 5)))
+    out.close()
+    with pytest.raises(ParameterError, match="column is unknown: 'applied'; did you mean"):
+        open_recording(tmp_path / "run.mcap")["applied"]
+
+
+def test_killed_at_any_moment_it_loses_less_than_a_second() -> None:
+    """Processes that record and are killed: a small number of what the benchmark does."""
+    assert writer.LONGEST_WAIT <= 0.5
+    assert recording_kills.run(8, Console(quiet=True)) == {}
+
+
+def test_recordings_are_public(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.mcap", rows_of(3))
+    found = asp.open_recording(path)
+    assert type(found) is asp.Recording is Recording
+    assert repr(found) == "<Recording run.mcap, 3 rows, 0.0002 s>"
+    data = found.to_dict()
+    assert (data["rows"], data["whole"], data["columns"][2]) == (
+        3, True, {"name": "applied x", "unit": "N"},
+    )  # fmt: skip
+    link = tmp_path / "link.mcap"
+    os.symlink(path, link)
+    RecordingWriter(link, COLUMNS).close()
+    assert link.is_symlink()
+    assert open_recording(path).rows == 0
+    shutil.rmtree(tmp_path)
+    with pytest.raises(ParameterError, match="No such file"):
+        found.table()
