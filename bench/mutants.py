@@ -104,6 +104,7 @@ ROOMS = {
         ("analysis/energy",),
         ("tests/analysis/test_anchor.py", "tests/analysis/test_sag.py",
          "tests/analysis/test_thrust.py", "tests/analysis/test_loops.py",
+         "tests/analysis/test_energy_by_definition.py",
          "tests/analysis/test_merit.py", "tests/analysis/test_leak.py",
          "tests/analysis/test_continuity.py", "tests/analysis/test_ridges.py",
          "tests/analysis/test_contradictions.py"),

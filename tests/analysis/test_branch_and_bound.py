@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.bounds.branch_and_bound import Problem, Supremum, supremum
+from asperity.analysis.bounds.branch_and_bound import Problem, Supremum, polish, supremum
 from asperity.analysis.bounds.measures import (
     CURL,
     NORM,
@@ -249,6 +249,15 @@ def test_polishing_ends_at_the_top() -> None:
     for power, near in ((2.0, 1e-16), (1.0, 1e-10)):
         found = supremum(Hill(np.array([0.3141, 0.7]), power), 1e-2)
         assert 1.0 - found.lower <= near
+
+
+def test_polishing_goes_on_with_smaller_steps() -> None:
+    """From far off its scale: the finest step, 1e-10 of the cell, is what is left of the way."""
+    for top in ([0.3141, 0.7], [0.29997, 0.70003]):
+        problem = Hill(np.array(top), 1.0)
+        best, at = polish(problem, np.array([0.3, 0.7]), np.array([0.5, 0.5]), 0.0)
+        assert 1.0 - best < 1e-8
+        np.testing.assert_allclose(at, top, atol=1e-8)
 
 
 def test_bounds_that_are_none_are_noticed() -> None:

@@ -50,6 +50,7 @@ def test_a_texture_whose_bounds_lie_is_found_out() -> None:
     said = str(caught.value)
     for part in ("norm", "law='A'", "proved to be at most", "is attained at (", "report"):
         assert part in said
+    assert "deflection" not in said
     assert isinstance(caught.value, AsperityError)
 
 

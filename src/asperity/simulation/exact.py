@@ -165,7 +165,7 @@ def exponential(matrix: FloatArray) -> FloatArray:
     SciPy's takes milliseconds here, most of it in starting threads, and many short runs need it.
     """
     size = float(np.abs(matrix).sum(axis=-1).max())
-    squarings = max(0, math.ceil(math.log2(size / 0.25))) if size > 0.25 else 0
+    squarings = math.ceil(math.log2(size / 0.25)) if size > 0.25 else 0
     part = matrix / 2.0**squarings
     result = np.eye(matrix.shape[-1]) + part / _TERMS
     for term in range(_TERMS - 1, 0, -1):

@@ -145,8 +145,8 @@ def simulate_many(jobs: Sequence[Mapping[str, Any]], workers: int | None = None)
         >>> [run.samples for run in simulate_many([job, job])]
         [1000, 1000]
     """
-    count = os.cpu_count() or 1 if workers is None else int(positive("workers", workers))
-    with ThreadPoolExecutor(max(count, 1)) as pool:
+    count = os.cpu_count() or 1 if workers is None else whole("workers", workers, 1)
+    with ThreadPoolExecutor(count) as pool:
         return list(pool.map(lambda job: simulate(**job), jobs))
 
 

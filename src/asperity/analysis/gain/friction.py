@@ -122,7 +122,7 @@ class FrictionProblem(Problem):
         bend = before - 2.0 * here + after
         shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
         step = float(touch[1] - touch[0])
-        tries = touch[index] + step * np.array([-1.0, 0.0, 1.0, min(max(shift, -1.0), 1.0)])
+        tries = np.array([touch[values.argmax()], touch[index] + step * min(max(shift, -1.0), 1.0)])
         found = self._entries(height * np.sin(tries), slope * np.cos(tries))
         best = int(found.argmax())
         at = np.array([tries[best] - wave.phase])

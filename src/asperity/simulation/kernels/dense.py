@@ -139,8 +139,6 @@ def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: DensePl
     n = x.shape[0]
     for i in range(n):
         z[i] = x[i]
-    for i in range(n, z.shape[0]):
-        z[i] = 0.0
     z[n + 3] = ax
     z[n + 4] = ay
     z[n + 5] = az

@@ -1,0 +1,166 @@
+"""What a contact promises by default, and where it is."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from asperity.checks import FloatArray
+from asperity.contacts import Contact
+from asperity.contacts.nearest import line_search, plane_search
+from asperity.laws import LAWS
+from asperity.textures import Fourier
+
+WAVES = Fourier([0.1e-3, 0.07e-3], [[3000.0, 1000.0], [-1500.0, 2500.0]], [0.3, 1.2])
+POINTS = np.random.default_rng(3).uniform(-4e-4, 4e-4, (200, 3))
+
+
+def test_a_contact_promises_nothing_unless_it_says_so() -> None:
+    assert not Contact.single_valued
+    assert not Contact.above_probe
+    assert not Contact.clampable
+    assert not Contact.holds_anchor
+    assert Contact.begins_on_texture
+    assert Contact.given_by_depth
+    assert (Contact.cost, Contact.parameters) == (1000.0, ())
+
+
+@pytest.mark.parametrize("letter", ["A", "D", "H", "W"])
+def test_inside_is_where_the_depth_is_positive(letter: str) -> None:
+    """On the texture's side of where contact begins, and not on it."""
+    contact = LAWS[letter].contact
+    begin = contact.begin(WAVES, POINTS[:, :2])
+    inside = contact.inside(WAVES, POINTS)
+    np.testing.assert_array_equal(inside, POINTS[:, 2] < begin)
+    assert 20 < inside.sum() < 180
+    on = np.column_stack([POINTS[:20, :2], begin[:20]])
+    if letter == "W":
+        assert not contact.inside(WAVES, on).any()
+
+
+# --- descents -------------------------------------------------------------------------------------
+
+
+def along(x: float, coefficients: tuple[float, ...]) -> tuple[float, float, float]:
+    """Return h, h', h'' of a polynomial."""
+    p = np.polynomial.Polynomial(coefficients)
+    return float(p(x)), float(p.deriv()(x)), float(p.deriv(2)(x))
+
+
+class Looks:
+    """A polynomial of the line, the same along x and y in the plane, and where each was asked."""
+
+    def __init__(self, *coefficients: float) -> None:
+        self.coefficients = coefficients
+        self.line: list[float] = []
+        self.plane: list[FloatArray] = []
+
+    def along(self, x: float, _texture: object) -> tuple[float, float, float]:
+        self.line.append(x)
+        return along(x, self.coefficients)
+
+    def curvature(self, x: float, y: float, _texture: object) -> tuple[float, ...]:
+        self.plane.append(np.array([x, y]))
+        (h, hx, hxx), (g, gy, gyy) = along(x, self.coefficients), along(y, self.coefficients)
+        return h + g, hx, gy, hxx, 0.0, gyy
+
+    def descend(
+        self, probe: tuple[float, float, float], start: float, monkeypatch: pytest.MonkeyPatch
+    ) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Descend along a line and in the plane; return both ends."""
+        monkeypatch.setattr(line_search, "along", self.along)
+        monkeypatch.setattr(plane_search, "curvature", self.curvature)
+        x, y, z = probe
+        on_line = line_search.descend(x, z, start, None)
+        return on_line, plane_search.descend(x, y, z, start, 0.7 * start, None)
+
+
+def test_a_descent_takes_few_looks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Newton's steps double the digits: it ends as soon as there are no more."""
+    rng, on_lines, in_planes = np.random.default_rng(8), 0, 0
+    for _ in range(40):
+        looks = Looks(*rng.normal(size=4) * [1.0, 0.5, 0.2, 0.05])
+        x, y = rng.normal(size=2)
+        z = 2.0 * along(x, looks.coefficients)[0] - rng.uniform(0.1, 0.5)
+        on_line, in_plane = looks.descend((x, y, z), x + 0.2, monkeypatch)
+        on_lines, in_planes = on_lines + len(looks.line), in_planes + len(looks.plane)
+        h, h1, _h2 = along(on_line[0], looks.coefficients)
+        assert abs(on_line[0] - x + (h - z) * h1) < 1e-13 * (1.0 + abs(h - z) * (1.0 + abs(h1)))
+        assert on_line[2:] == pytest.approx((h, h1), rel=1e-13, abs=1e-14)
+        px, py = in_plane[:2]
+        (hx, gx, _), (hy, gy, _) = (along(at, looks.coefficients) for at in (px, py))
+        gap = hx + hy - z
+        assert abs(px - x + gap * gx) < 1e-12 * (1.0 + abs(gap) * (1.0 + abs(gx)))
+        assert abs(py - y + gap * gy) < 1e-12 * (1.0 + abs(gap) * (1.0 + abs(gy)))
+        assert in_plane[3:] == pytest.approx((hx + hy, gx, gy), rel=1e-12, abs=1e-13)
+    assert on_lines <= 4.5 * 40
+    assert in_planes <= 5 * 40
+
+
+def test_where_rounding_swamps_the_steps_a_descent_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nearly at a centre of curvature steps no longer shrink: none of 200 would be the last."""
+    for share in (1.0 - 1e-7, 1.0 - 1e-8):
+        for start in (0.05, -0.03, 0.01):
+            looks = Looks(1.0, 0.3, -0.5 * share, 0.02)
+            h, h1, h2 = along(0.0, looks.coefficients)
+            gap = -(1.0 + h1 * h1) / h2 * share
+            looks.descend((gap * h1, gap * h1, h - gap), start, monkeypatch)
+            assert len(looks.line) < 60
+            assert len(looks.plane) < 60
+    # High above the origin, where each height has few digits left.
+    high = Looks(5597.246940191622, 1.1220665821e-3, -0.4999999856541567, 0.04077, -1.158e-3)
+    h, h1, h2 = along(0.0, high.coefficients)
+    gap = -(1.0 + h1 * h1) / h2 * (1.0 - 2.8691686721844097e-08)
+    high.descend((gap * h1, gap * h1, 2.0 * h - gap), 0.0022611303330464334, monkeypatch)
+    assert len(high.plane) < 30
+
+
+def test_a_step_too_far_is_halved(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where φ is greater the next look is half as far on the same way."""
+    looks = Looks(0.0, 0.0, 0.0, 0.0, 1.0)  # h = x⁴, the probe above
+    looks.descend((0.1, 0.2, 3.0), 0.45, monkeypatch)
+    halved = 0
+    for places in ([np.array([x]) for x in looks.line], looks.plane):
+        best, phi = places[0], np.inf
+        for at, following in pairwise(places):
+            now = float(((at - [0.1, 0.2][: len(at)]) ** 2).sum() + ((at**4).sum() - 3.0) ** 2)
+            if now > phi * (1.0 + 1e-9):
+                np.testing.assert_allclose(following - best, 0.5 * (at - best), rtol=1e-12)
+                halved += 1
+            elif now <= phi:
+                best, phi = at, now
+    assert halved >= 2
+
+
+def test_a_piece_right_below_the_probe_is_as_far_as_its_plane() -> None:
+    """On the normal through its middle: what rounding leaves aside is none, and no error."""
+    rng = np.random.default_rng(5)
+    for hx, hy, depth in rng.normal(size=(300, 3)):
+        away = (-hx * depth, -hy * depth, depth)
+        far = abs(depth) * np.sqrt(1.0 + hx * hx + hy * hy)
+        found = plane_search.clearance(away, hx, hy, 0.1, 0.0)
+        assert found == pytest.approx(far, rel=1e-12)
+        lifted = plane_search.clearance(away, hx, hy, 0.1, 0.3 * far)
+        assert lifted == pytest.approx(0.7 * far, rel=1e-12)
+        assert plane_search.clearance(away, hx, hy, 0.1, 2.0 * far) == 0.0
+
+
+@pytest.mark.parametrize("u", [0.1, 3.3, 4.0, 7.9])
+def test_every_part_of_an_interval_is_looked_at_once(u: float) -> None:
+    """Three levels down from the whole: 8 parts, the nearest first, of halves the nearer."""
+    level, side, i = 3, 8.0, 0
+    seen = []
+    while level <= 3:
+        if level == 0:
+            seen.append(i)
+            level, side, i = line_search.next_part(0, 1.0, i, 3, u)
+        else:
+            level, side = level - 1, 0.5 * side
+            i = 2 * i + int(u >= (2 * i + 1) * side)
+    assert sorted(seen) == list(range(8))
+    assert seen[0] == int(u)
+    for first in (0, 2, 4, 6):
+        nearer = min((first, first + 1), key=lambda part: abs(part + 0.5 - u))
+        assert seen.index(nearer) < seen.index(2 * first + 1 - nearer)
