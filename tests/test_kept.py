@@ -265,3 +265,27 @@ def test_a_file_is_prepared_once_until_it_changes(
     np.save(file, 2e-5 * HEIGHTS.repeat(4, 0).repeat(4, 1))
     assert np.ptp(prepare_file(file, pitch=1e-4).heights) > 1.5 * np.ptp(first.heights)
     assert len(made) == 5
+
+
+# --- pictures -------------------------------------------------------------------------------------
+
+
+def test_a_report_draws_no_picture_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    from asperity.report.comparison import comparison_page
+    from asperity.report.pictures import plots
+
+    drawn: list[str] = []
+
+    def counted(name: str, draw: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        return lambda result: drawn.append(name) or draw(result)
+
+    monkeypatch.setattr(plots, "PICTURES", {
+        name: counted(name, draw) for name, draw in plots.PICTURES.items()
+    })  # fmt: skip
+    first = comparison_page(compare(WAVE, laws="WA"))
+    assert sorted(drawn) == sorted(plots.PICTURES)
+    assert comparison_page(compare(WAVE, laws="WA")).sections == first.sections
+    assert len(drawn) == len(plots.PICTURES)
+    for changed in ({"laws": "WC"}, {"stiffness": 321.0}, {"device": "touch"}):
+        comparison_page(compare(WAVE, **{"laws": "WA"} | changed))
+    assert len(drawn) == 4 * len(plots.PICTURES)

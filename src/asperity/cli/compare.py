@@ -88,7 +88,10 @@ def _write(found: Comparisons, outputs: Outputs, full: bool) -> None:
         from asperity.report.comparison import comparison_page, print_comparison
 
         one = found.comparisons[0]
-        outputs.write(one, lambda to: print_comparison(one, to, full), lambda: comparison_page(one))
+        outputs.write(
+            one, lambda to: print_comparison(one, to, full), lambda: comparison_page(one),
+            keeps_pictures=True,
+        )  # fmt: skip
         return
     from asperity.report.several import comparisons_page, print_comparisons
 

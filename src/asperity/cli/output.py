@@ -7,6 +7,7 @@ import os
 import shlex
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -46,6 +47,8 @@ class Outputs:
         say: Callable[[Console], None],
         page: Callable[[], Page] | None = None,
         page_words: str = "Report",
+        *,
+        keeps_pictures: bool = False,
     ) -> None:
         """Write a result where it was asked for, else say it on standard output.
 
@@ -54,17 +57,17 @@ class Outputs:
             say: prints the result for reading.
             page: returns the report, of a command that has one.
             page_words: what the report is called.
+            keeps_pictures: whether the page cares for the look of its pictures, which may be kept.
         """
         if self.json is not None:
             write_output("json", self.json, json_text(data))
         if self.html is not None and page is not None:
-            import matplotlib
-
-            from asperity.report.page import Origin, page_html
+            from asperity.report.page import Origin, own_look, page_html
 
             origin = Origin(_command(), digest(json_text(data)))
-            matplotlib.rcdefaults()  # the page looks as it should, whatever the user's settings
-            with progress_bar("drawing the report"):
+            # The page looks as it should, whatever the user's settings.
+            look = nullcontext() if keeps_pictures else own_look()
+            with progress_bar("drawing the report"), look:
                 text = page_html(page(), origin)
             write_output("html", self.html, text)
         if STANDARD_OUTPUT in {self.json, self.html}:

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from asperity.analysis.compare import Comparison
+from asperity.analysis.gain.answers import surface_content
 from asperity.analysis.passivity.judgement import Basis
 from asperity.analysis.row import LawRow
 from asperity.analysis.words.felt import speed_text, tier_text
 from asperity.analysis.words.passivity import allowed_text
 from asperity.arguments import Argument
+from asperity.files import json_text
+from asperity.kept import content_digest
 from asperity.report import page, terminal
 from asperity.report.devices import datum_text, numbers_table
 from asperity.report.stages import surface_sections
@@ -381,18 +385,31 @@ def _laws(comparison: Comparison) -> list[page.Section]:
 
 
 def _pictures(comparison: Comparison) -> list[page.Section]:
-    from asperity.report.pictures.plots import PICTURES
-
     depth, stiffness = engineering(comparison.max_depth, "m"), _asked(comparison)
+    content = _content(comparison)
     return [
-        page.pictured(
+        page.Section(
             title,
-            PICTURES[name](comparison),
-            seen.COMPARISON[name](comparison),
+            [page.kept_picture(name, content, partial(_picture, comparison, name))],
             words.format(depth=depth, stiffness=stiffness),
         )
         for name, (title, words) in _CAPTIONS.items()
     ]
+
+
+def _picture(comparison: Comparison, name: str) -> page.Picture:
+    from asperity.report.pictures.plots import PICTURES
+
+    return page.picture(PICTURES[name](comparison), seen.COMPARISON[name](comparison))
+
+
+def _content(comparison: Comparison) -> str | None:
+    """Return a digest of all that a comparison's pictures show; ``None`` where it is not known."""
+    contents = [surface_content(row.surface) for row in comparison.rows]
+    known = [content for content in contents if content is not None]
+    if len(known) < len(contents):
+        return None
+    return content_digest(json_text(comparison), comparison.texture.filled, tuple(known))
 
 
 def _pedigree(comparison: Comparison) -> page.Section:

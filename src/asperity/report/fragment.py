@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from asperity.report.page import Table, environment
+from asperity.report.page import Table, environment, own_look
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,13 +43,3 @@ def _png(draw: Callable[[], Figure]) -> str:
 
     with own_look():
         return base64.b64encode(png(draw())).decode("ascii")
-
-
-@contextmanager
-def own_look() -> Iterator[None]:
-    """Let figures look as they should, whatever the user's settings are, which stay."""
-    import matplotlib
-
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        yield

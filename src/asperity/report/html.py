@@ -11,9 +11,8 @@ from asperity.analysis.several import Comparisons
 from asperity.files import digest, json_text
 from asperity.report.analysis import analysis_page
 from asperity.report.comparison import comparison_page
-from asperity.report.fragment import own_look
 from asperity.report.limits import limits_page
-from asperity.report.page import Origin, page_html
+from asperity.report.page import Origin, own_look, page_html
 from asperity.report.several import comparisons_page
 from asperity.report.show import shown_page
 from asperity.textures.shown import Shown

@@ -7,13 +7,16 @@ import hashlib
 import os
 import re
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import asperity
+from asperity.kept import content_digest, kept
 from asperity.report.words.number_words import holds_text
 
 if TYPE_CHECKING:
@@ -230,6 +233,34 @@ def pictured(
     return Section(title, [picture(figure, seen)], caption, notes, level)
 
 
+@contextmanager
+def own_look() -> Iterator[None]:
+    """Let figures look as they should, whatever the user's settings are, which stay."""
+    import matplotlib
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        yield
+
+
+def kept_picture(name: str, content: str | None, make: Callable[[], Picture]) -> Picture:
+    """Return a picture from disk, or draw it in its own look and keep it there.
+
+    Args:
+        name: of the picture.
+        content: a digest of what it shows; ``None`` where that is not known.
+        make: draws it.
+    """
+
+    def drawn() -> Picture:
+        with own_look():
+            return make()
+
+    if content is None:
+        return drawn()
+    return kept(f"picture {name}", content_digest(content, version("matplotlib")), drawn)
+
+
 def holds_cell(holds: bool | None) -> Cell:
     """Return yes, no, or ? for what cannot be decided."""
     return Cell(holds_text(holds), "open" if holds is None else "" if holds else "no")
@@ -262,7 +293,9 @@ def add_section(result: type, section: Callable[..., Section | None]) -> None:
 
 def added_sections(result: type, *arguments: Any) -> list[Section]:
     """Return the sections that were added to the pages of a type of result."""
-    made = [section(*arguments) for section in _ADDED.get(result, ())]
+    sections = _ADDED.get(result, ())
+    with own_look() if sections else nullcontext():
+        made = [section(*arguments) for section in sections]
     return [section for section in made if section is not None]
 
 

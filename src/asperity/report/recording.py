@@ -15,8 +15,7 @@ from asperity.recording.recording import Recording
 from asperity.recording.replay import Replay
 from asperity.report import page, terminal
 from asperity.report.comparison import described
-from asperity.report.fragment import own_look
-from asperity.report.page import Origin, Page, Row, Section, page_html, pictured
+from asperity.report.page import Origin, Page, Row, Section, own_look, page_html, pictured
 from asperity.report.pictures.run_picture import recording_figure
 from asperity.report.run import run_caption
 from asperity.report.terminal import say

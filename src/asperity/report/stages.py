@@ -6,8 +6,10 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+import numpy as np
 from rich.console import Console
 
+from asperity.kept import kept
 from asperity.measured.history import Stage
 from asperity.measured.parameters import Parameter, declared
 from asperity.measured.parts import Parts, texture_part
@@ -126,11 +128,16 @@ def surface_sections(texture: Texture) -> list[page.Section]:
     """Return the section that says a measured surface in numbers; none of any other."""
     if not texture.history:
         return []
-    heights, pitch, periodic = texture.samples()
-    parts = texture_part(heights, pitch, periodic=periodic)
+    parts = kept("parts", texture.content, lambda: _parts(texture))
     blocks = [stages_table(texture.history), parts_table(parts)]
     notes = [parts_text(parts), "More: asperity show."]
     return [page.Section("The surface in numbers", blocks, texture_text(parts), notes)]
+
+
+def _parts(texture: Texture) -> Parts:
+    heights, pitch, periodic = texture.samples()
+    parts = texture_part(heights, pitch, periodic=periodic)
+    return replace(parts, heights=np.zeros(0))  # nobody looks at them here
 
 
 def parts_text(parts: Parts) -> str:
