@@ -25,6 +25,7 @@ COMMANDS = {
     "devices": "List devices, and the source of every number.",
     "init": "Write a scene to begin with.",
     "limits": "Say whether a texture can be felt on a device.",
+    "maps": "Write heights or normals for other tools.",
     "onset": "Find the stiffness at which limit cycles begin.",
     "prepare": "Prepare a measured surface and save it.",
     "recording": "Say, draw, export or replay what a loop did.",

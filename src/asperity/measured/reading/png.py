@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from asperity.errors import SurfaceFileError
 from asperity.measured.reading.image import Pixels, check_size
+from asperity.measured.reading.png_scale import png_scale
 from asperity.measured.reading.quiet import guarded
+from asperity.measured.reading.tiff_scale import NO_SCALE, Scale
 
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 _PIECE = 2**22
@@ -43,6 +45,7 @@ class _Header:
     colour: int
     interlaced: bool
     packed: list[bytes]
+    scale: Scale = NO_SCALE
 
     @property
     def pixel(self) -> int:
@@ -67,7 +70,7 @@ def read_png(content: bytes) -> Pixels:
         content: the bytes of the file.
 
     Returns:
-        The pixels as stored.
+        The pixels as stored, with the lengths that the chunks sCAL and pCAL name.
 
     Raises:
         SurfaceFileError: palette, less than 8 bit, animation, transparency by colour, damage.
@@ -80,9 +83,11 @@ def read_png(content: bytes) -> Pixels:
         alpha = header.colour in (_GREY_ALPHA, _COLOUR_ALPHA)
         # Pillow cuts 16 bit to 8 where there are several channels.
         if header.depth == 16 and header.colour != _GREY:
-            return Pixels(_sixteen_bit(header), alpha)
-        _check_complete(header)
-        return Pixels(_by_pillow(content, header), alpha)
+            values: NDArray[Any] = _sixteen_bit(header)
+        else:
+            _check_complete(header)
+            values = _by_pillow(content, header)
+        return Pixels(values, alpha, header.scale.notes, header.scale)
     except (struct.error, zlib.error) as error:
         raise SurfaceFileError(f"damaged PNG image ({error})") from error
 
@@ -105,7 +110,8 @@ def _header(content: bytes) -> _Header:
                 f"is an animation of {struct.unpack_from('>I', data)[0]} frames; one is expected"
             )
     packed = [data for kind, data in chunks if kind == b"IDAT"]
-    header = _Header(columns, rows, depth, colour, interlace != 0, packed)
+    scale = png_scale(dict(chunks), depth)
+    header = _Header(columns, rows, depth, colour, interlace != 0, packed, scale)
     if _INFLATION * sum(map(len, packed)) < header.size:  # refused before memory is asked for
         raise SurfaceFileError(
             f"truncated: {sum(map(len, packed))} bytes cannot hold {columns} x {rows} pixels"
