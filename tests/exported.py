@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from asperity.export.c99 import c99_files
+from asperity.export.order import Order
 from asperity.surface import Surface
 from asperity.textures import Texture
 
@@ -36,6 +38,11 @@ def run(*command: str | Path, cwd: Path | None = None) -> str:
     return done.stdout
 
 
+def header(surface: Surface, name: str = "texture", precision: str = "double") -> str:
+    """Return the whole header of a surface."""
+    return c99_files(Order(surface, name, precision), name)[f"{name}.h"]
+
+
 _MANY = """
 #include "{name}.h"
 void {name}_many(const {real} *at, {real} *f, int64_t n);
@@ -50,6 +57,17 @@ void {name}_many(const {real} *at, {real} *f, int64_t n)
 """
 
 
+_ENERGY = """
+void {name}_energies(const {real} *at, {real} *u, int64_t n);
+void {name}_energies(const {real} *at, {real} *u, int64_t n)
+{{
+    for (int64_t i = 0; i < n; i++) {{
+        u[i] = {name}_energy(at + 3 * i);
+    }}
+}}
+"""
+
+
 def library(
     folder: Path, compiler: str, headers: Mapping[str, str], *flags: str, single: bool = False
 ) -> ctypes.CDLL:
@@ -58,7 +76,11 @@ def library(
     for name, text in headers.items():
         (folder / f"{name}.h").write_text(text, encoding="utf-8")
     source, made = folder / "all.c", folder / f"all_{compiler}{len(list(folder.iterdir()))}.so"
-    source.write_text("".join(_MANY.format(name=name, real=real) for name in headers))
+    parts = [
+        _MANY + (_ENERGY if f"{name}_energy(" in text else "") for name, text in headers.items()
+    ]
+    texts = [part.format(name=name, real=real) for part, name in zip(parts, headers, strict=True)]
+    source.write_text("".join(texts), encoding="utf-8")
     run(tool(compiler), *STRICT, *flags, "-shared", "-fPIC", source, "-o", made, "-lm")
     return ctypes.CDLL(str(made))
 
@@ -68,6 +90,14 @@ def forces(made: ctypes.CDLL, name: str, points: Any) -> Any:
     out = np.empty_like(points)
     given = [array.ctypes.data_as(ctypes.c_void_p) for array in (points, out)]
     getattr(made, f"{name}_many")(*given, ctypes.c_int64(len(points)))
+    return out
+
+
+def energies(made: ctypes.CDLL, name: str, points: Any) -> Any:
+    """Return the potential energies at probe positions."""
+    out = np.empty(len(points), points.dtype)
+    given = [array.ctypes.data_as(ctypes.c_void_p) for array in (points, out)]
+    getattr(made, f"{name}_energies")(*given, ctypes.c_int64(len(points)))
     return out
 
 

@@ -8,9 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.exported import COMPILERS, differing, forces, kernel_forces, library, probes, same_bits
+from tests.exported import (
+    COMPILERS,
+    differing,
+    forces,
+    header,
+    kernel_forces,
+    library,
+    probes,
+    same_bits,
+)
 
-from asperity.export.header import header_text
 from asperity.kernels.probe import CLAMPS
 from asperity.laws import LAWS, Law
 from asperity.surface import Surface
@@ -27,7 +35,7 @@ def _count(law: Law) -> int:
 
 
 def _check(folder: Path, surfaces: dict[str, Surface], *flags: str) -> None:
-    headers = {name: header_text(surface, name, single=False) for name, surface in surfaces.items()}
+    headers = {name: header(surface, name) for name, surface in surfaces.items()}
     paths = {
         name: probes(surface.texture, surface.max_depth, _count(surface.law), 11)
         for name, surface in surfaces.items()
@@ -84,7 +92,7 @@ def test_a_flat_texture(tmp_path: Path) -> None:
 def test_another_force_is_noticed(wave: Sinusoid, tmp_path: Path) -> None:
     surface = Surface(wave, "B")
     at = probes(wave, surface.max_depth, 400, 3)
-    text = header_text(surface, "t", single=False)
+    text = header(surface, "t")
     assert "1.0 + hx * hx" in text
     made = library(tmp_path, "gcc", {"t": text.replace("1.0 + hx * hx", "1.0 - hx * hx")})
     assert not same_bits(forces(made, "t", at), surface.force(at)).all()

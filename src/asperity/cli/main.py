@@ -23,6 +23,7 @@ COMMANDS = {
     "cache": "Say what is kept between runs, or delete it.",
     "compare": "Compare the laws on a surface and a device.",
     "devices": "List devices, and the source of every number.",
+    "export": "Write a surface with its law as a C program.",
     "init": "Write a scene to begin with.",
     "limits": "Say whether a texture can be felt on a device.",
     "maps": "Write heights or normals for other tools.",

@@ -120,6 +120,30 @@ class Contact(ABC):
 
         return sp.zeros(force.shape[0], 3)
 
+    def inward(self) -> Any:
+        """Return the unit vector along which the probe moves as the depth alone grows, or None.
+
+        In the contact symbols: the contact point stays where it is. ``None`` unless it is known.
+        """
+        return None
+
+    def potential(self, force: Any) -> Any:
+        """Return the potential energy [J] of a conservative force in contact, or None.
+
+        The work against the force from where contact begins, along :meth:`inward`, in the contact
+        symbols. ``None`` where it has no closed form.
+        """
+        import sympy as sp
+
+        from asperity.contacts.symbols import DEPTH, POSITION
+
+        inward = self.inward()
+        if inward is None:
+            return None
+        push = sp.simplify(-(force.T * inward)[0])
+        work = sp.integrate(push, (DEPTH, 0, DEPTH))
+        return None if work.has(sp.Integral) or work.free_symbols & set(POSITION) else work
+
     def kernels(self) -> tuple[ModuleType, ...]:
         """Return the compiled modules that the contact brings; their loops go along.
 

@@ -28,6 +28,12 @@ class Nominal(Contact):
 
         return ContactDerivatives(sp.Matrix([[0, 0, -1]]), sp.Matrix([[1, 0, 0], [0, 1, 0]]))
 
+    def inward(self) -> Any:
+        """Straight down."""
+        import sympy as sp
+
+        return sp.Matrix([0, 0, -1])
+
     def begin_code(self, wanted: frozenset[str]) -> tuple[list[str], str]:
         """Below the wall, whatever the texture."""
         return ["depth = -z"], "depth > 0.0"

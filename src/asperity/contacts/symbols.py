@@ -23,6 +23,8 @@ SXX, SXY, SYY = sp.symbols("sxx sxy syy", real=True)
 # god-object [m], and the derivative of that vector by the probe position, symmetric.
 TOWARD = sp.symbols("tx ty tz", real=True)
 MXX, MXY, MXZ, MYY, MYZ, MZZ = sp.symbols("mxx mxy mxz myy myz mzz", real=True)
+# Potential energy of a spring of stiffness 1 to that point, where it is no depth²/2 [m²].
+TOWARD_ENERGY = sp.Symbol("energy_tk", nonnegative=True)
 TOWARD_DERIVATIVE = sp.Matrix([[MXX, MXY, MXZ], [MXY, MYY, MYZ], [MXZ, MYZ, MZZ]])
 # Stiffness of the smooth wall [N/m].
 K = sp.Symbol("k", positive=True)
@@ -33,7 +35,7 @@ H_HALF = sp.Symbol("h_half", positive=True)
 # The order in which a kernel takes its arguments; it takes those that it uses.
 ARGUMENT_ORDER = (
     *POSITION, DEPTH, *HEIGHT_DERIVATIVES, DX, DY, SXX, SXY, SYY,
-    *TOWARD, MXX, MXY, MXZ, MYY, MYZ, MZZ, K, H_MID, H_HALF,
+    *TOWARD, TOWARD_ENERGY, MXX, MXY, MXZ, MYY, MYZ, MZZ, K, H_MID, H_HALF,
 )  # fmt: skip
 
 

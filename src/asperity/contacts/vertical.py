@@ -28,6 +28,12 @@ class Vertical(Contact):
 
         return ContactDerivatives(sp.Matrix([[HX, HY, -1]]), sp.Matrix([[1, 0, 0], [0, 1, 0]]))
 
+    def inward(self) -> Any:
+        """Straight down."""
+        import sympy as sp
+
+        return sp.Matrix([0, 0, -1])
+
     def begin_code(self, wanted: frozenset[str]) -> tuple[list[str], str]:
         """Below the height at the probe; what is wanted besides is sampled with it."""
         return [*sampled(wanted | {"h"}, "x, y"), "depth = h - z"], "depth > 0.0"

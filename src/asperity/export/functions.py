@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from asperity.errors import ParameterError
 from asperity.export.data import Store, store_of
+from asperity.export.energy import energy_units
 from asperity.export.program import Linked, Program
 from asperity.export.subset import BOOL, FLOAT, Kind
 from asperity.kernels.fuse import law_units, link_on_texture
 from asperity.kernels.link import Unit, module_unit
 from asperity.surface import Surface
 
-# Names after the prefix that the program has besides its functions.
+# Names after the prefix that a program has besides its functions.
 _PUBLIC = frozenset(("state", "reset", "force", "energy", "surface", "law"))
-_PROBE = (FLOAT, FLOAT, FLOAT)
 
 
 @dataclass(frozen=True)
@@ -24,12 +26,14 @@ class Functions:
         code: their definitions, with the types that they use.
         held: name of the function that returns force and anchor.
         held_type: C type of what it returns.
+        energy: name of the function that returns the energy; empty if there is none.
         store: the data.
     """
 
     code: str
     held: str
     held_type: str
+    energy: str
     store: Store
 
 
@@ -46,14 +50,27 @@ def surface_functions(surface: Surface, prefix: str, *, single: bool) -> Functio
     """
     law, clamp = surface.law, surface.acting_clamp
     probe = next(unit for unit in law_units(law, clamp) if "probe_held" in unit.texts)
-    roots: list[tuple[str, Unit]] = [("probe_held", probe)]
-    brought = [module_unit(module) for module in law.contact.kernels()]
+    energy = energy_units(law, clamp)
+    roots = [("probe_held", probe), *[("probe_energy", unit) for unit in energy[:1]]]
+    brought = [*map(module_unit, law.contact.kernels()), *energy]
     text = link_on_texture(law, surface.texture.sampler, clamp, roots, brought)
+    if single:
+        _refuse_iterations(surface, text, brought)
     program = Program(Linked(text), prefix, single=single, taken=_PUBLIC)
     store = store_of(surface, prefix, single=single)
     constants: tuple[Kind, Kind] = (store.texture, store.law)
-    kinds = (*_PROBE, FLOAT, FLOAT, BOOL, *constants)
+    place = (FLOAT, FLOAT, FLOAT)
+    kinds = (*place, FLOAT, FLOAT, BOOL, *constants)
     held = program.function("probe_held", kinds)
     held_type = program.type_of(program.scope("probe_held", kinds).result)
+    stored = program.function("probe_energy", (*place, *constants)) if energy else ""
     code = "\n".join([*program.types, *program.helpers, *program.functions])
-    return Functions(code, held, held_type, store)
+    return Functions(code, held, held_type, stored, store)
+
+
+def _refuse_iterations(surface: Surface, text: str, units: Sequence[Unit]) -> None:
+    """Refuse single precision where a solver iterates to the last digits of double precision."""
+    for unit in units:
+        if unit.kernels.iterates and any(part in text for part in unit.texts.values()):
+            words = f"must be double: law {surface.law} on this texture is found by iterations"
+            raise ParameterError("precision", f"{words} that end at rounding", "float")

@@ -226,3 +226,19 @@ def comment(text: str) -> str:
         .replace("/*", "/ *")
     )
     return f"/* {first} */\n" if first else ""
+
+
+def block_comment(text: str) -> str:
+    """Return a text as a C comment, line by line; empty for no text.
+
+    Example:
+        >>> print(block_comment("f = k d w"), end="")
+        /*
+         * f = k d w
+         */
+    """
+    safe = text.strip().replace("*/", "* /").replace("/*", "/ *")
+    if not safe:
+        return ""
+    lines = "".join(f" * {line}".rstrip() + "\n" for line in safe.splitlines())
+    return f"/*\n{lines} */\n"

@@ -178,7 +178,7 @@ class Statements:
     def _end(self, node: ast.For, end: ast.expr) -> tuple[str, list[str]]:
         """Return the end of a loop: what may change meanwhile is looked at once, before it."""
         text = self.say.as_kind(end, INT, 8)
-        changed = {name for inner in node.body for name in stored_in(inner)}
+        changed = set(stored_in(node))
         read = {part.id for part in ast.walk(end) if isinstance(part, ast.Name)}
         calls = any(isinstance(part, (ast.Call, ast.Subscript)) for part in ast.walk(end))
         if self.scope.length(end) is not None or not (read & changed or calls):
@@ -291,12 +291,23 @@ class Statements:
             lines.append(f"const {self.program.type_of(kind)} {name} = {self.say.text(value)};")
             places = [f"{name}{field(kind, index)}" for index, _target in pairs]
         for index, target in wanted:
-            own = self.scope.sure(as_value(target))
-            text = places[index]
-            if own != items[index] and isinstance(own, Number):
-                text = f"({self.program.type_of(own)}){text}"
-            lines.append(self._given(node, target, text))
+            lines += self._take(node, target, items[index], places[index])
         return lines
+
+    def _take(self, node: ast.stmt, target: ast.expr, kind: Kind, place: str) -> list[str]:
+        """Return the lines that give a target, or the parts of one, what lies at a place."""
+        if isinstance(target, ast.Tuple) and isinstance(kind, Group):
+            parts = enumerate(zip(target.elts, kind.items, strict=True))
+            return [
+                line
+                for index, (part, item) in parts
+                if not isinstance(part, ast.Name) or part.id in self._live
+                for line in self._take(node, part, item, f"{place}{field(kind, index)}")
+            ]
+        own = self.scope.sure(as_value(target))
+        if own != kind and isinstance(own, Number):
+            place = f"({self.program.type_of(own)}){place}"
+        return [self._given(node, target, place)]
 
     def _temporary(self, word: str) -> str:
         self._temporaries += 1

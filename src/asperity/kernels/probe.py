@@ -141,6 +141,24 @@ fx, fy, fz = probe_force(x, y, z, dx, dy, texture, law)
 """
 
 
+def energy_source(plan: ProbePlan) -> str:
+    """Return ``probe_energy``, the potential energy [J] of a conservative law.
+
+    The plan's source is ``law_energy``, which returns the energy and its derivative by the depth:
+    where a clamp holds the depth the force is constant along it.
+    """
+    lines = _in_contact(plan, plan.wanted("law_energy"), ("energy",))
+    clamped = plan.clamp in {"whole", "backed"}
+    if clamped:
+        lines += ["beyond = max(depth - clamp_depth, 0.0)", "depth = min(depth, clamp_depth)"]
+    lines.append(f"energy, rate = {plan.call('law_energy')}")
+    if clamped:
+        lines.append("energy += rate * beyond")
+    if plan.clamp == "backed":
+        lines += ["if z < floor:", "    energy += 0.5 * k * (floor - z) * (floor - z)"]
+    return _function("probe_energy(x, y, z, texture, law)", [*lines, "return energy"])
+
+
 def contact_source(plan: ProbePlan) -> str:
     """Return ``contact_jacobian``, which is given the contact and the height derivatives there."""
     given = ("x", "y", "z", "depth", "h", "hx", "hy", "hxx", "hxy", "hyy", *_STATE)

@@ -42,6 +42,12 @@ class Nearest(Contact):
             definitions=definitions,
         )
 
+    def inward(self) -> Any:
+        """Against the normal at the foot."""
+        from asperity.contacts.symbols import unit_normal
+
+        return -unit_normal()
+
     def begin_code(self, wanted: frozenset[str]) -> tuple[list[str], str]:
         """Below the height at the probe: no search out of contact."""
         return [], "height(x, y, texture) - z > 0.0"

@@ -36,6 +36,8 @@ class Split(Nearest):
 
     def sample_code(self, wanted: frozenset[str]) -> list[str]:
         """The vector to the mean, with its derivative where that is wanted."""
+        if "energy_tk" in wanted:
+            return ["energy_tk, _count, _gap = split_energy(x, y, z, continuity, texture)"]
         if "mxx" in wanted:
             derivative = "tx, ty, tz, mxx, mxy, mxz, myy, myz, mzz"
             return [f"{derivative} = split_derivative(x, y, z, continuity, texture)"]
@@ -52,6 +54,16 @@ class Split(Nearest):
         from asperity.contacts.symbols import TOWARD
 
         return tuple(TOWARD)
+
+    def potential(self, force: Any) -> Any:
+        """Return k U of a force that is k times the vector to the mean."""
+        import sympy as sp
+
+        from asperity.contacts.symbols import TOWARD, TOWARD_ENERGY
+
+        k = force[0].coeff(TOWARD[0])
+        spring = k != 0 and not k.free_symbols & set(TOWARD)
+        return k * TOWARD_ENERGY if spring and force == k * sp.Matrix(TOWARD) else None
 
     def toward(self) -> Any:
         """z̄ - p [m]."""
