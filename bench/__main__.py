@@ -7,10 +7,21 @@ from collections.abc import Callable, Sequence
 
 from rich.console import Console
 
-from bench import cache, certificates, kernels, nearest, recording, simulation, split, startup
+from bench import (
+    batches,
+    cache,
+    certificates,
+    kernels,
+    nearest,
+    recording,
+    simulation,
+    split,
+    startup,
+)
 
 PARTS: dict[str, Callable[[Console], None]] = {
     "kernels": kernels.run,
+    "batches": batches.run,
     "cache": cache.run,
     "nearest": nearest.run,
     "split": split.run,

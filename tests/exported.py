@@ -14,6 +14,8 @@ import pytest
 
 from asperity.export.c99 import c99_files
 from asperity.export.order import Order
+from asperity.kernels import anchored_loops, probe_loops
+from asperity.kernels.fuse import fuse_on_texture
 from asperity.surface import Surface
 from asperity.textures import Texture
 
@@ -102,8 +104,17 @@ def energies(made: ctypes.CDLL, name: str, points: Any) -> Any:
 
 
 def kernel_forces(surface: Surface, points: Any) -> Any:
-    """Return the kernel's forces along a path of probe positions."""
-    return surface.trace(points) if surface.law.stateful else surface.force(points)
+    """Return the forces of the kernel of loops and simulations along a path of probe positions.
+
+    Batches have a sine of their own, :mod:`asperity.kernels.batch_sine`.
+    """
+    law, clamp = surface.law, surface.acting_clamp
+    asked = anchored_loops if law.stateful else probe_loops
+    loops = fuse_on_texture(law, surface.texture.sampler, clamp, (asked,))
+    run = loops.trace_batch if law.stateful else loops.force_batch
+    out = np.empty((len(points), 3))
+    run(points, out, surface.texture.arguments, surface.law_arguments)
+    return out
 
 
 def same_bits(first: Any, second: Any) -> Any:

@@ -98,10 +98,11 @@ def fuse_surface(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) ->
     Raises:
         ParameterError: for a texture that lacks what the law looks at.
     """
-    from asperity.kernels import anchored_loops, probe_loops
+    from asperity.kernels import anchored_loops, batch_sine, probe_loops
 
     loops = anchored_loops if law.stateful else probe_loops
-    return fuse_on_texture(law, sampler, clamp, (loops, *law.contact.kernels()))
+    asking = (loops, *law.contact.kernels())
+    return fuse_on_texture(law, sampler, clamp, asking, instead=(batch_sine,))
 
 
 def fuse_on_texture(
@@ -110,15 +111,25 @@ def fuse_on_texture(
     clamp: ClampName,
     asking: tuple[ModuleType, ...],
     further: tuple[ModuleType, ...] = (),
+    instead: tuple[ModuleType, ...] = (),
 ) -> ModuleType:
     """Return the loops of modules compiled that ask a sampler, a law and further modules.
+
+    Args:
+        law: the law.
+        sampler: the modules whose functions make up the sampler.
+        clamp: the depth clamp.
+        asking: the modules with the loops.
+        further: what they ask besides.
+        instead: modules whose functions are taken instead of those of that name elsewhere.
 
     Raises:
         ParameterError: for a texture that lacks what is asked of it.
     """
     units = tuple(map(module_unit, asking))
     brought = (*units, *map(module_unit, (*law.contact.kernels(), *further)))
-    source = link_on_texture(law, sampler, clamp, loops_of(*units), brought)
+    first = tuple(map(module_unit, instead))
+    source = link_on_texture(law, sampler, clamp, loops_of(*units), brought, first)
     return load_fused(_head(f"Law {law} on {sampler[0].__name__}.", source) + source)
 
 
@@ -128,16 +139,17 @@ def link_on_texture(
     clamp: ClampName,
     roots: Sequence[tuple[str, Unit]],
     further: Sequence[Unit],
+    instead: Sequence[Unit] = (),
 ) -> str:
     """Return the text of functions, each named with its unit, and of all that they call.
 
-    They may ask a sampler, a law and further units.
+    They may ask a sampler, a law and further units; ``instead`` come before all of them.
 
     Raises:
         ParameterError: for a texture that lacks what is asked of it.
     """
     modules = tuple(map(module_unit, sampler))
-    at_hand = dict.fromkeys((*modules, *law_units(law, clamp), *further))
+    at_hand = dict.fromkeys((*instead, *modules, *law_units(law, clamp), *further))
     try:
         return link(roots, tuple(at_hand))
     except MissingFunctionError as missing:
@@ -188,18 +200,19 @@ def fuse_sampler(sampler: tuple[ModuleType, ...], *further: ModuleType) -> Modul
     and ``nearest_batch`` (points (n, 3), result (n, 2)), and the loops of further modules. A loop
     that asks what the sampler does not offer raises a ParameterError when it is called.
     """
-    from asperity.kernels import sampler_loops
+    from asperity.kernels import batch_sine, sampler_loops
 
     modules = tuple(map(module_unit, sampler))
     asking = tuple(map(module_unit, (sampler_loops, *further)))
+    at_hand = (module_unit(batch_sine), *modules, *asking)
     served, refused = [], {}
     for loop in loops_of(*asking):
         try:
-            link([loop], (*modules, *asking))
+            link([loop], at_hand)
             served.append(loop)
         except MissingFunctionError as missing:
             refused[loop[0]] = _lacking(missing, modules, "which is asked of it")
-    source = link(served, (*modules, *asking))
+    source = link(served, at_hand)
     module = load_fused(_head(f"Texture {sampler[0].__name__}.", source) + source)
     vars(module).update({name: partial(_refuse, error) for name, error in refused.items()})
     return module

@@ -13,6 +13,8 @@ KERNELS = Kernels(
 
 def force_batch(points: FloatArray, out: FloatArray, texture: object, law: object) -> None:
     """Write the forces (n, 3) [N] at points (n, 3) [m]."""
+    if points.shape[1] != 3 or out.shape[1] != 3:
+        return  # never; with known lengths of rows many points go at once
     for i in range(points.shape[0]):
         force = probe_force(points[i, 0], points[i, 1], points[i, 2], 0.0, 0.0, texture, law)
         store_force(out, i, force)
@@ -22,6 +24,8 @@ def jacobian_batch(
     points: FloatArray, force: FloatArray, jacobian: FloatArray, texture: object, law: object
 ) -> None:
     """Write forces (n, 3) [N] and Jacobians (n, 3, 3) [N/m] at points (n, 3) [m]."""
+    if points.shape[1] != 3 or force.shape[1] != 3 or jacobian.shape[1:] != (3, 3):
+        return  # see force_batch
     for i in range(points.shape[0]):
         values = probe_jacobian(
             points[i, 0], points[i, 1], points[i, 2], 0.0, 0.0, 1.0, 0.0, 1.0, texture, law

@@ -90,9 +90,9 @@ class Fourier(Texture):
         """See :class:`Texture`."""
         from asperity.contacts.nearest import line_search as line
         from asperity.contacts.nearest import plane_search as search
-        from asperity.textures.samplers import fourier, fourier_line
+        from asperity.textures.samplers import fourier, fourier_line, sine
 
-        return (fourier_line, fourier, line) if self._parallel else (fourier, search)
+        return (fourier_line, fourier, line, sine) if self._parallel else (fourier, search, sine)
 
     @cached_property
     def arguments(self) -> FourierArguments:

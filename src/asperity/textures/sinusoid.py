@@ -82,9 +82,9 @@ class Sinusoid(Texture):
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
-        from asperity.textures.samplers import sinusoid, sinusoid_split
+        from asperity.textures.samplers import sine, sinusoid, sinusoid_split
 
-        return sinusoid, sinusoid_split
+        return sinusoid, sinusoid_split, sine
 
     @cached_property
     def arguments(self) -> SinusoidArguments:

@@ -6,10 +6,11 @@ from typing import NamedTuple
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels
 from asperity.contacts.nearest.plane_search import descend, judge, next_box
+from asperity.textures.samplers.sine import cosine, sine
 
 KERNELS = Kernels(
     provides=("curvature", "foot", "height", "slope"),
-    requires=("descend", "judge", "next_box"),
+    requires=("cosine", "descend", "judge", "next_box", "sine"),
     called=("foot",),
 )
 
@@ -49,7 +50,7 @@ def height(x: float, y: float, texture: FourierArguments) -> float:
     h = 0.0
     for i in range(texture.amplitudes.size):
         angle = texture.kx[i] * x + texture.ky[i] * y + texture.phases[i]
-        h += texture.amplitudes[i] * math.sin(angle)
+        h += texture.amplitudes[i] * sine(angle)
     return h
 
 
@@ -58,8 +59,8 @@ def slope(x: float, y: float, texture: FourierArguments) -> tuple[float, float, 
     h = hx = hy = 0.0
     for i in range(texture.amplitudes.size):
         angle = texture.kx[i] * x + texture.ky[i] * y + texture.phases[i]
-        c = texture.amplitudes[i] * math.cos(angle)
-        h += texture.amplitudes[i] * math.sin(angle)
+        c = texture.amplitudes[i] * cosine(angle)
+        h += texture.amplitudes[i] * sine(angle)
         hx += texture.kx[i] * c
         hy += texture.ky[i] * c
     return h, hx, hy
@@ -72,8 +73,8 @@ def curvature(
     h = hx = hy = hxx = hxy = hyy = 0.0
     for i in range(texture.amplitudes.size):
         angle = texture.kx[i] * x + texture.ky[i] * y + texture.phases[i]
-        s = texture.amplitudes[i] * math.sin(angle)
-        c = texture.amplitudes[i] * math.cos(angle)
+        s = texture.amplitudes[i] * sine(angle)
+        c = texture.amplitudes[i] * cosine(angle)
         h += s
         hx += texture.kx[i] * c
         hy += texture.ky[i] * c

@@ -4,8 +4,13 @@ import math
 from typing import NamedTuple
 
 from asperity.compiled import Kernels
+from asperity.textures.samplers.sine import cosine, sine
 
-KERNELS = Kernels(provides=("curvature", "flank_root", "foot", "height", "slope"), called=("foot",))
+KERNELS = Kernels(
+    provides=("curvature", "flank_root", "foot", "height", "slope"),
+    requires=("cosine", "sine"),
+    called=("foot",),
+)
 
 
 class SinusoidArguments(NamedTuple):
@@ -26,14 +31,14 @@ class SinusoidArguments(NamedTuple):
 
 def height(x: float, y: float, texture: SinusoidArguments) -> float:
     """Return h [m]."""
-    return texture.amplitude * math.sin(texture.kx * x + texture.ky * y + texture.phase)
+    return texture.amplitude * sine(texture.kx * x + texture.ky * y + texture.phase)
 
 
 def slope(x: float, y: float, texture: SinusoidArguments) -> tuple[float, float, float]:
     """Return h [m], h_x, h_y [1]."""
     angle = texture.kx * x + texture.ky * y + texture.phase
-    c = texture.amplitude * math.cos(angle)
-    return texture.amplitude * math.sin(angle), texture.kx * c, texture.ky * c
+    c = texture.amplitude * cosine(angle)
+    return texture.amplitude * sine(angle), texture.kx * c, texture.ky * c
 
 
 def curvature(
@@ -41,8 +46,8 @@ def curvature(
 ) -> tuple[float, float, float, float, float, float]:
     """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
     angle = texture.kx * x + texture.ky * y + texture.phase
-    h = texture.amplitude * math.sin(angle)
-    c = texture.amplitude * math.cos(angle)
+    h = texture.amplitude * sine(angle)
+    c = texture.amplitude * cosine(angle)
     kx = texture.kx
     ky = texture.ky
     return h, kx * c, ky * c, -kx * kx * h, -kx * ky * h, -ky * ky * h
