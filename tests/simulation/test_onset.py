@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import random
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +24,7 @@ from asperity.simulation import (
     simulate,
 )
 from asperity.simulation.onset import Shifted, calms_down, cycles, offsets, restlessness
-from asperity.simulation.prediction import least_damping, predict, with_wall
+from asperity.simulation.prediction import expected, least_damping, predict, with_wall
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
@@ -195,3 +197,26 @@ def test_steps_of_the_encoder_can_break_the_delay_rule() -> None:
     assert not found[0.0].missed
     assert 19e3 < found[0.0].delay_rule < 21e3
     assert found[15e-6].missed
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_from_the_prediction_the_same_onset_is_found(seed: int) -> None:
+    """Random loops: a heavier or lighter handle, damped more or less, laws, textures, delays."""
+    draw = random.Random(seed)
+    law = draw.choice("WABC")
+    texture = Sinusoid(draw.uniform(0.05e-3, 0.4e-3), draw.uniform(1e-3, 3e-3))
+    surface = Surface(texture, law, max_depth=0.5e-3)
+    plant = Cartesian(draw.uniform(0.03, 0.2), draw.uniform(1.0, 6.0))
+    servo = Servo(PERIOD, delay=draw.randrange(4))
+    start = (0.0, 0.0, texture.amplitude + 1e-3)
+    near = expected(surface, plant, HAND, servo, start)
+    assert near is not None
+    more: dict[str, Any] = {"start": start, "duration": 0.4, "starts": 2, "tolerance": 0.05,
+                            "lowest": 20.0}  # fmt: skip
+    climbed = find_onset(surface, plant, HAND, servo, REST, **more)
+    assert find_onset(surface, plant, HAND, servo, REST, near=near, **more) == climbed
+
+
+def test_a_loop_without_damping_is_expected_nowhere() -> None:
+    loose = replace(HAND, damping=0.0)
+    assert expected(WALL, Cartesian(MASS, 0.0), loose, SERVO, (0.0, 0.0, 0.0)) is None

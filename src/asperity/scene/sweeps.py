@@ -7,12 +7,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any, TypeVar
 
+import numpy as np
+
 from asperity.errors import ParameterError
 from asperity.scene.setup import Setup
 from asperity.simulation.hands import SpringHand
 from asperity.simulation.motions import Strokes
 from asperity.simulation.onset import LOWEST, Onset, find_onset
-from asperity.simulation.prediction import Prediction, predict, with_wall
+from asperity.simulation.prediction import Prediction, expected, predict, with_wall
 from asperity.simulation.scan import Stroke, scan_strokes
 
 _WORKERS = 2
@@ -59,10 +61,12 @@ def onsets(
 
     def one(law: str, delay: int) -> Onset:
         loop = setup.with_law(law).with_delay(delay)
+        begin = loop.motion.at(np.zeros(1))[0] if loop.start is None else loop.start
+        near = expected(loop.surface, loop.plant, loop.hand, loop.servo, begin)
         found = find_onset(
             loop.surface, loop.plant, loop.hand, loop.servo, loop.motion, start=loop.start,
             velocity=loop.velocity, duration=loop.duration, starts=starts, tolerance=tolerance,
-            lowest=lowest,
+            lowest=lowest, near=near,
         )  # fmt: skip
         if progress is not None:
             progress()

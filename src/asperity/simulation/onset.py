@@ -23,6 +23,8 @@ from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import simulate
 from asperity.surface import Surface
 
+Place = tuple[float, float, float]
+
 # The paper does not say when an oscillation counts; here above this :func:`restlessness` [m/s].
 CYCLE_SPEED = 15e-3
 LOWEST, HIGHEST = 1.0, 1e6  # stiffness [N/m]
@@ -45,7 +47,8 @@ class Onset(Record):
             cycle [N/m]; 0 if even the lowest one cycled.
         cycling: the least stiffness tried at which one did [N/m]; infinite if none up to the
             highest did. The onset of these starts lies between the two, unless it is not monotone:
-            from the lowest on, stiffnesses were tried in steps of a factor of 2 first.
+            of stiffnesses that are a factor of 2 apart, see :func:`find_onset`, the first pair was
+            taken of which the upper one cycles.
         low: least position reached in the runs at ``cycling`` (at the highest stiffness if nothing
             cycled), per axis [m].
         high: greatest position reached there [m].
@@ -200,6 +203,7 @@ def find_onset(
     threshold: float = CYCLE_SPEED,
     lowest: float = LOWEST,
     highest: float = HIGHEST,
+    near: float | None = None,
     progress: Callable[[], None] | None = None,
 ) -> Onset:
     """Return the stiffness at which limit cycles begin, by bisection over many starting phases.
@@ -220,6 +224,11 @@ def find_onset(
         lowest: stiffness from which the search goes up [N/m]; one that does not hold the hand's
             force lets the handle sink to where the law's numbers no longer hold.
         highest: stiffness to which the search goes [N/m].
+        near: stiffness at which cycles are expected to begin [N/m]. Of the same stiffnesses, a
+            factor of 2 apart from the lowest on, the search then begins with the one nearest to
+            it, and goes up from one that is quiet, down from one that cycles. Where loops cycle
+            above one stiffness only, the answer is the same, and a quarter of the runs is enough;
+            a window of cycles farther down, below a stiffness that is quiet, is then passed over.
         progress: called after every stiffness.
 
     Raises:
@@ -236,40 +245,102 @@ def find_onset(
     shifts = offsets(surface, int(starts))
     begin = motion.at(np.zeros(1))[0] if start is None else array("start", start, (3,), "m")
 
-    def count(stiffness: float, enough: int) -> tuple[int, FloatArray]:
-        """Return how many starts cycle, at most so many, and the box (2, 3) that they reached."""
-        stiff, found, box = surface.to_stiffness(stiffness), 0, np.array([[np.inf], [-np.inf]])
-        for shift in shifts:
-            run_for = runner(stiff, plant, hand, servo, motion, begin, velocity, shift)
-            ended, run = ends_in_cycle(run_for, duration, limit)
-            found += ended
-            place = run.position
-            box = np.array([np.fmin(box[0], place.min(axis=0)), np.fmax(box[1], place.max(axis=0))])
-            if found >= enough:
-                break
-        if progress is not None:
-            progress()
-        return found, box
-
-    quiet, cycling = _bracket(lambda k: count(k, 1)[0] > 0, lowest, highest, width)
-    every, box = count(quiet if math.isinf(cycling) else cycling, len(shifts))
-    low, high = ((float(row[0]), float(row[1]), float(row[2])) for row in box)
+    tried = _Tried(
+        lambda stiffness, shift: ends_in_cycle(
+            runner(surface.to_stiffness(stiffness), plant, hand, servo, motion, begin, velocity,
+                   shift),
+            duration, limit,
+        ),
+        shifts, progress,
+    )  # fmt: skip
+    quiet, cycling = _bracket(tried.cycles, lowest, highest, width, near)
+    every, (low, high) = tried.all(quiet if math.isinf(cycling) else cycling)
     return Onset(surface.law.letter, servo.delay, quiet, cycling, len(shifts), every, low, high,
                  wall=surface.law is SMOOTH_WALL)  # fmt: skip
 
 
+class _Tried:
+    """What the starts came to at each stiffness, none run twice.
+
+    Args:
+        run: returns whether a start, a shift [m], cycles at a stiffness [N/m], and its run.
+        shifts: of the starts [m], shape (n, 3).
+        progress: called after every stiffness.
+    """
+
+    def __init__(
+        self,
+        run: Callable[[float, FloatArray], tuple[bool, Run]],
+        shifts: FloatArray,
+        progress: Callable[[], None] | None,
+    ) -> None:
+        self.run, self.shifts, self.progress = run, shifts, progress
+        self.known: dict[tuple[float, int], tuple[bool, FloatArray]] = {}
+        self.first = 0  # the start that cycled last: the likeliest to do so again
+
+    def cycles(self, stiffness: float) -> bool:
+        """Return whether any start cycles at a stiffness."""
+        count = len(self.shifts)
+        found = False
+        for index in ((self.first + step) % count for step in range(count)):
+            found = self._start(stiffness, index)[0]
+            if found:
+                self.first = index
+                break
+        self._told()
+        return found
+
+    def all(self, stiffness: float) -> tuple[int, tuple[Place, Place]]:
+        """Return how many starts cycle at a stiffness, and the box [m] that they reached."""
+        found = [self._start(stiffness, index) for index in range(len(self.shifts))]
+        low = np.fmin.reduce([box[0] for _, box in found])
+        high = np.fmax.reduce([box[1] for _, box in found])
+        self._told()
+        return sum(ended for ended, _ in found), (_place(low), _place(high))
+
+    def _start(self, stiffness: float, index: int) -> tuple[bool, FloatArray]:
+        if (stiffness, index) not in self.known:
+            ended, run = self.run(stiffness, self.shifts[index])
+            box = np.array([run.position.min(axis=0), run.position.max(axis=0)])
+            self.known[stiffness, index] = ended, box
+        return self.known[stiffness, index]
+
+    def _told(self) -> None:
+        if self.progress is not None:
+            self.progress()
+
+
+def _place(row: FloatArray) -> Place:
+    x, y, z = (float(value) for value in row)
+    return x, y, z
+
+
 def _bracket(
-    cycling_at: Callable[[float], bool], lowest: float, highest: float, width: float
+    cycling_at: Callable[[float], bool],
+    lowest: float,
+    highest: float,
+    width: float,
+    near: float | None = None,
 ) -> tuple[float, float]:
     """Return the greatest stiffness found quiet and the least found cycling [N/m].
 
-    Upwards from the lowest in steps of a factor of 2 until something cycles, then bisection.
+    Upwards from the lowest in steps of a factor of 2 until something cycles, then bisection; with
+    ``near``, from the step nearest to it, downwards first if that one cycles.
     """
-    quiet, cycling = 0.0, lowest
-    while not cycling_at(cycling):
-        if cycling >= highest:
-            return cycling, math.inf
-        quiet, cycling = cycling, min(cycling * _COARSE, highest)
+    steps = _steps(lowest, highest)
+    index = 0
+    if near is not None and near > 0.0:
+        index = int(np.argmin(np.abs(np.log(steps) - math.log(near))))
+    if cycling_at(steps[index]):
+        while index > 0 and cycling_at(steps[index - 1]):
+            index -= 1
+    else:
+        index += 1
+        while index < len(steps) and not cycling_at(steps[index]):
+            index += 1
+        if index == len(steps):
+            return steps[-1], math.inf
+    quiet, cycling = (steps[index - 1] if index else 0.0), steps[index]
     while quiet > 0.0 and cycling > quiet * (1.0 + width):
         middle = math.sqrt(quiet * cycling)
         if cycling_at(middle):
@@ -277,6 +348,14 @@ def _bracket(
         else:
             quiet = middle
     return quiet, cycling
+
+
+def _steps(lowest: float, highest: float) -> list[float]:
+    """Return stiffnesses a factor of 2 apart, the last step shorter [N/m]."""
+    steps = [lowest]
+    while steps[-1] < highest:
+        steps.append(min(steps[-1] * _COARSE, highest))
+    return steps
 
 
 def _refuse(hand: Hand, motion: Motion, servo: Servo, duration: float, starts: int) -> None:

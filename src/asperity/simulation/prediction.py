@@ -106,10 +106,36 @@ def least_damping(
     ]
     # Corners of the box that the arms do not reach are places where it was not.
     places = [plant.centre + p[[0, 2]] for p in grid if not left_workspace(plant, p)]
-    return min(
+    dampings = [
         float(np.linalg.eigvalsh(handle_damping(plant.linkage, plant.joint_damping, place))[0])
         for place in places
-    )
+    ]
+    return min(dampings, default=0.0)
+
+
+def expected(
+    surface: Surface, plant: Plant, hand: Hand, servo: Servo, start: ArrayLike
+) -> float | None:
+    """Return the stiffness [N/m] near which cycles may be expected to begin: the delay rule.
+
+    With the numbers of the surface's max_depth and the damping where the handle starts. Nothing
+    where the rule says nothing: without damping, or for a law without a Jacobian.
+
+    Args:
+        surface: texture, law and depth; its stiffness does not count.
+        plant: of the simulation.
+        hand: of the simulation.
+        servo: with the delay of the simulation.
+        start: of the handle [m], shape (3,).
+    """
+    top = surface.law.contact.extremes(surface.texture)[1]
+    damping = least_damping(plant, start, start, hand, top)
+    plus = one_sided_number(surface, TOLERANCE).value
+    q = characteristic_number(surface, TOLERANCE).value
+    # Below a medial axis q has no bound, and most starts never get there.
+    weight = 0.5 * plus + servo.delay * (q if math.isfinite(q) else plus)
+    rule = damping / servo.period / weight if weight > 0.0 else math.inf
+    return rule if 0.0 < rule < math.inf else None
 
 
 def predict(
