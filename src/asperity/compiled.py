@@ -28,6 +28,7 @@ class Kernels:
         called: functions that are too large to be copied to every place that calls them.
         merged: functions that are made one with their caller before they compile, where something
             iterates: the compiler optimises everything again at each level of a chain of calls.
+        native: functions of :mod:`asperity.kernels.native` that it calls.
         iterates: whether iterations run in it that are so long that copies of functions only
             compile more slowly.
     """
@@ -37,6 +38,7 @@ class Kernels:
     loops: tuple[str, ...] = ()
     called: tuple[str, ...] = ()
     merged: tuple[str, ...] = ()
+    native: tuple[str, ...] = ()
     iterates: bool = False
 
 

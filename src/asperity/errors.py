@@ -5,10 +5,17 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable
 from contextlib import suppress
+from typing import ClassVar
 
 
 class AsperityError(Exception):
-    """Base of every error that asperity raises on purpose."""
+    """Base of every error that asperity raises on purpose.
+
+    Attributes:
+        exit_code: of the program that ends by it; 2 for bad input.
+    """
+
+    exit_code: ClassVar[int] = 2
 
 
 class ParameterError(AsperityError, ValueError):

@@ -108,6 +108,6 @@ def test_the_scene_says_all_that_scenes_may_say() -> None:
     sections = tomllib.loads(
         "".join(COMMENT.sub("", one + "\n") for one in scene_template().split("\n"))
     )
-    assert list(sections) == ["texture", "surface", "device", "hand", "motion", "run"]
+    assert list(sections) == ["texture", "surface", "device", "hand", "motion", "run", "servo"]
     assert {argument.name for argument in RUN} == set(sections["run"])
     assert len(LINES) > 15

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -41,6 +41,7 @@ def read_setup(
     laws: Sequence[Law] = (),
     *,
     keeps_delay: bool = True,
+    defaults: Mapping[str, Any] | None = None,
 ) -> Setup:
     """Return the closed loop that a scene file and the options name.
 
@@ -50,6 +51,7 @@ def read_setup(
         duration: of the run [s]; comes before the scene's.
         laws: those that the loop will be changed to; the scene's own does not count then.
         keeps_delay: whether the device's delay counts.
+        defaults: of the surface, where neither the options nor the scene say anything.
 
     Raises:
         ParameterError: for what is missing, unknown or wrong.
@@ -65,6 +67,7 @@ def read_setup(
         surface.setdefault("law", find_law("W"))
     with progress_bar("reading the surface"):
         scene = load_scene(source, file_values(values))
+    surface |= {k: v for k, v in (defaults or {}).items() if k not in {**scene.surface, **surface}}
     named = {**scene.surface, **surface}
     if laws or "law" in named:
         refuse_idle(surface, laws or (find_law(named["law"]),))

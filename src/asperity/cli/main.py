@@ -31,6 +31,7 @@ COMMANDS = {
     "prepare": "Prepare a measured surface and save it.",
     "recording": "Say, draw, export or replay what a loop did.",
     "reproduce": "Redo the paper and judge each of its statements.",
+    "run": "Render a surface on a device, or a simulated one, as time goes.",
     "scan": "Energy per stroke, against speed and depth.",
     "show": "Say a measured surface in numbers, step by step.",
     "simulate": "Run texture, device and hand in one loop.",
@@ -93,7 +94,7 @@ def main() -> None:
     except InternalError as error:
         _stop(error, INTERNAL_ERROR)
     except AsperityError as error:
-        _stop(error, BAD_INPUT)
+        _stop(error, error.exit_code)
     except MemoryError:
         _stop("the surface is too large for this machine's memory", BAD_INPUT)
     except Exception as error:  # code of the user's own may raise anything

@@ -174,6 +174,12 @@ class Contact(ABC):
         """
         return sampled(wanted, "contact_x, contact_y")
 
+    def depth_code(self) -> list[str]:
+        """Return the body of a compiled function: the depth of ``x, y, z``, 0 out of contact."""
+        lines, condition = self.begin_code(frozenset())
+        sampled_lines = self.sample_code(frozenset({"depth"}))
+        return [*lines, f"if not {condition}:", "    return 0.0", *sampled_lines, "return depth"]
+
     @abstractmethod
     def begin(self, texture: HeightField, xy: FloatArray) -> FloatArray:
         """Return the height z [m], (n,), below which there is contact at points (n, 2) [m]."""

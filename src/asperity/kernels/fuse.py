@@ -126,11 +126,23 @@ def fuse_on_texture(
     Raises:
         ParameterError: for a texture that lacks what is asked of it.
     """
+    return load_fused(source_on_texture(law, sampler, clamp, asking, further, instead))
+
+
+def source_on_texture(
+    law: Law,
+    sampler: tuple[ModuleType, ...],
+    clamp: ClampName,
+    asking: tuple[ModuleType, ...],
+    further: tuple[ModuleType, ...] = (),
+    instead: tuple[ModuleType, ...] = (),
+) -> str:
+    """Return the text of such a module, which another process can load; see above."""
     units = tuple(map(module_unit, asking))
     brought = (*units, *map(module_unit, (*law.contact.kernels(), *further)))
     first = tuple(map(module_unit, instead))
     source = link_on_texture(law, sampler, clamp, loops_of(*units), brought, first)
-    return load_fused(_head(f"Law {law} on {sampler[0].__name__}.", source) + source)
+    return _head(f"Law {law} on {sampler[0].__name__}.", source) + source
 
 
 def link_on_texture(

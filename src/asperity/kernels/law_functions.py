@@ -29,6 +29,11 @@ def probe_inside(x: float, y: float, z: float, texture: object) -> bool:
     raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
+def probe_depth(x: float, y: float, z: float, texture: object) -> float:
+    """Return the depth [m]; 0 out of contact."""
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
+
+
 def probe_held(
     x: float, y: float, z: float, ax: float, ay: float, held: bool, texture: object, law: object
 ) -> tuple[float, float, float, float, float, bool]:

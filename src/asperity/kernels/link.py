@@ -84,7 +84,7 @@ def text_unit(
     unit = Unit(name, kernels, {}, {}, {})
     for node in ast.parse(source).body:
         if isinstance(node, ast.FunctionDef):
-            lines = _lines(node, space)
+            lines = _lines(node, space, kernels.native)
             unit.texts[node.name] = ast.get_source_segment(source, node) or ""
             unit.lines[node.name] = lines
             unit.calls[node.name] = tuple(sorted(_calls(node) - lines.keys()))
@@ -97,14 +97,16 @@ def _calls(function: ast.FunctionDef) -> frozenset[str]:
     return frozenset(call.id for call in calls if isinstance(call, ast.Name)) - _COMMON
 
 
-def _lines(function: ast.FunctionDef, space: Mapping[str, object]) -> dict[str, str]:
-    """Return the lines that define the records and numbers that a function's body uses."""
+def _lines(
+    function: ast.FunctionDef, space: Mapping[str, object], native: tuple[str, ...]
+) -> dict[str, str]:
+    """Return the lines that define records, numbers and native functions that a body uses."""
     body = (node for part in function.body for node in ast.walk(part))
     names = {node.id for node in body if isinstance(node, ast.Name)}
     lines = {}
     for name in sorted(names & space.keys()):
         value = space[name]
-        if isinstance(value, type) and issubclass(value, tuple):
+        if name in native or (isinstance(value, type) and issubclass(value, tuple)):
             lines[name] = f"from {value.__module__} import {name}"
         elif isinstance(value, (int, float)):
             lines[name] = f"{name} = {value!r}"

@@ -65,8 +65,8 @@ class ProbePlan:
 
 def probe_source(plan: ProbePlan) -> str:
     """Return the functions of a probe point, as source."""
-    parts = [_probe_force(plan), _probe_jacobian(plan), _probe_inside(plan), _probe_held(plan)]
-    return "\n\n\n".join(parts)
+    parts = (_probe_force, _probe_jacobian, _probe_inside, _probe_depth, _probe_held)
+    return "\n\n\n".join(part(plan) for part in parts)
 
 
 def _function(head: str, lines: Sequence[str]) -> str:
@@ -119,6 +119,10 @@ def _probe_jacobian(plan: ProbePlan) -> str:
 def _probe_inside(plan: ProbePlan) -> str:
     lines, condition = plan.law.contact.begin_code(frozenset())
     return _function("probe_inside(x, y, z, texture)", [*lines, f"return {condition}"])
+
+
+def _probe_depth(plan: ProbePlan) -> str:
+    return _function("probe_depth(x, y, z, texture)", plan.law.contact.depth_code())
 
 
 def _probe_held(plan: ProbePlan) -> str:

@@ -16,7 +16,7 @@ from asperity.textures.naming import KINDS, as_texture, build_texture, is_scene,
 from asperity.textures.texture import Texture
 
 _ID = Argument("device.id", "device of the catalogue", form="text")
-LOOP_SECTIONS = ("hand", "motion", "run")
+LOOP_SECTIONS = ("hand", "motion", "run", "servo")
 SECTIONS = ("texture", "surface", "device", *LOOP_SECTIONS)
 
 
@@ -28,7 +28,7 @@ class Scene:
         texture: the texture.
         surface: arguments of :class:`~asperity.surface.Surface` that were given.
         device: the device, if one was given.
-        loop: the sections [hand], [motion] and [run] as they were given; see
+        loop: the sections [hand], [motion], [run] and [servo] as they were given; see
             :func:`~asperity.scene.setup.make_setup`.
         folder: to which paths in these sections are relative.
         files: that it was read from, the scene file and a measured surface.

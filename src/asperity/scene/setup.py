@@ -19,6 +19,8 @@ from asperity.recording.replay import file_content
 from asperity.scene.loading import Scene
 from asperity.scene.plant import default_servo, plant_of
 from asperity.scene.sections import DURATION, HANDS, MOTIONS, RUN, built, surface_keywords
+from asperity.servo import safety
+from asperity.servo.safety import Safety
 from asperity.simulation import Hand, Motion, MovedHand, Plant, Run, Servo, simulate
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
@@ -45,6 +47,7 @@ class Setup:
         every: samples from one row of the trace to the next.
         assumptions: what was assumed, in sentences.
         files: that the scene was read from.
+        safety: limits of the loop, where it runs on a device.
     """
 
     surface: Surface
@@ -59,6 +62,7 @@ class Setup:
     every: int = 1
     assumptions: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
+    safety: Safety = safety.USUAL
 
     def simulate(
         self,
@@ -104,7 +108,7 @@ class Setup:
                 "parameters": plain(surface.law_parameters),
             },
             "device": self.device.id,
-            **record(self, without=("surface", "device", "files")),
+            **record(self, without=("surface", "device", "files", "safety")),
         }
 
 
@@ -141,6 +145,7 @@ def make_setup(
     hand = built("hand", scene.loop["hand"], HANDS, scene.folder)
     motion = built("motion", scene.loop["motion"], MOTIONS, scene.folder)
     run = read_arguments("run", scene.loop.get("run", {}), RUN)
+    guards = read_arguments("servo", scene.loop.get("servo", {}), safety.ARGUMENTS)
     chosen = device or scene.device or load_device(DEFAULT_DEVICE)
     needs_plant = not isinstance(hand, MovedHand)
     brakes, share = run.pop("brakes", None), run.pop("velocity_share", None)
@@ -160,7 +165,7 @@ def make_setup(
     return Setup(
         whole, chosen, plant, hand, servo, motion, span,
         assumptions=(*assumed, *said, *of_span, *_leaving(scene.texture, motion, span)),
-        files=scene.files, **run,
+        files=scene.files, safety=Safety(**guards), **run,
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from asperity.arguments import Argument
 from asperity.devices import device_names
 from asperity.measured.arguments import DRAWN
 from asperity.scene.sections import HANDS, MOTIONS, RUN, Part, surface_arguments
+from asperity.servo import safety
 from asperity.textures.naming import KINDS
 from asperity.textures.texture import Kind
 
@@ -16,12 +17,13 @@ _HEAD = """\
 #   asperity compare {name}   which law, at which stiffness
 #   asperity limits {name}    whether it can be felt
 #   asperity simulate {name}  run it and say where the energy goes
+#   asperity run {name}       the same as time goes, in a loop as on a device
 #   asperity onset {name}     the stiffness at which it begins to buzz (motion: still)
 # Take the "# " away from a line to use it. Every quantity needs its unit.
 """
 # What the scene says; a value in the form in which TOML has it.
 _TEXTURE = {"amplitude": '"0.1 mm"', "period": '"2 mm"'}
-_SURFACE = {"law": '"C"', "stiffness": '"800 N/m"', "max_depth": '"0.5 mm"'}
+_SURFACE = {"law": '"C"', "stiffness": '"300 N/m"', "max_depth": '"0.5 mm"'}
 _DEVICE = {"id": '"touch"', "damping": '"0.5 N*s/m"', "update_rate": '"1 kHz"'}
 _HAND = {"stiffness": '["300 N/m", "300 N/m", "0 N/m"]', "damping": '"3 N*s/m"', "mass": '"50 g"',
          "force": '["0 N", "0 N", "-0.3 N"]'}  # fmt: skip
@@ -65,6 +67,8 @@ def scene_template(name: str = "scene.toml") -> str:
             _lines(MOTIONS["strokes"].arguments, _MOTION),
             "[run]",
             _lines(RUN, {}),
+            "[servo]",
+            _lines(safety.ARGUMENTS, {}),
         ]
     )
 

@@ -176,6 +176,19 @@ def _begin(
     surface: Surface, plant: Plant, hand: Hand, servo: Servo, motion: Motion,
     start: ArrayLike | None, velocity: ArrayLike | None,
 ) -> Simulation:  # fmt: skip
+    place, speed = begin(plant, hand, servo, motion, start, velocity)
+    return Simulation(surface, sampled_plant(plant, hand, servo), servo, place, speed)
+
+
+def begin(
+    plant: Plant, hand: Hand, servo: Servo, motion: Motion,
+    start: ArrayLike | None, velocity: ArrayLike | None,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Return where a handle begins [m], and how fast [m/s]; see :func:`simulate`.
+
+    Raises:
+        ParameterError: for a beginning that the hand or the plant does not allow.
+    """
     origin = motion.at(np.zeros(1))[0]
     place = origin if start is None else array("start", start, (3,), "m")
     speed = np.zeros(3) if velocity is None else array("velocity", velocity, (3,), "m/s")
@@ -189,7 +202,7 @@ def _begin(
         reason = "" if isinstance(hand, MovedHand) else left_workspace(plant, place)
         if reason:
             raise ParameterError("start", f"must be in the workspace: {reason}", place.tolist())
-    return Simulation(surface, sampled_plant(plant, hand, servo), servo, place, speed)
+    return place, speed
 
 
 def _check_plane(name: str, values: FloatArray) -> None:
@@ -199,7 +212,15 @@ def _check_plane(name: str, values: FloatArray) -> None:
 
 def _anchor(motion: Motion, period: float, samples: int, plant: Plant, first: int) -> FloatArray:
     """Return the anchor's positions from a sample on, one more than the samples of the chunk."""
-    last = min(first + CHUNK, samples)
+    return anchor_points(motion, period, plant, first, min(first + CHUNK, samples))
+
+
+def anchor_points(motion: Motion, period: float, plant: Plant, first: int, last: int) -> FloatArray:
+    """Return the anchor's positions at the samples from one to another [m], both included.
+
+    Raises:
+        ParameterError: for a motion that is not finite, or that the plant does not allow.
+    """
     times = np.arange(first, last + 1, dtype=np.float64) * float(period)
     points = array("motion", motion.at(times), (last + 1 - first, 3), "m")
     if isinstance(plant, Pantograph):

@@ -43,6 +43,12 @@ class Split(Nearest):
             return [f"{derivative} = split_derivative(x, y, z, continuity, texture)"]
         return ["tx, ty, tz = split_contact(x, y, z, continuity, texture)"]
 
+    def depth_code(self) -> list[str]:
+        """The distance to the nearest point; the two contact points are about as far."""
+        lines, condition = self.begin_code(frozenset())
+        nearest = super().sample_code(frozenset({"depth"}))
+        return [*lines, f"if not {condition}:", "    return 0.0", *nearest, "return depth"]
+
     def derivatives(self) -> ContactDerivatives:
         """Nothing by depth or point: see :meth:`jacobian_part`."""
         import sympy as sp

@@ -23,6 +23,7 @@ from asperity.simulation.kernels.body_functions import (
 from asperity.simulation.kernels.booking import SAME_SAMPLE, SAMPLING
 
 KERNELS = Kernels(
+    provides=("wait_in_queue",),
     requires=(
         "advance_body", "first_state", "flushed", "flushed_state", "probe_inside", "servo_tick",
         "stored_energy",

@@ -1,0 +1,142 @@
+"""``asperity run``: a surface in a loop that keeps time, on a simulated device or a real one."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.arguments import Argument
+from asperity.cli.loop import loop_options, read_setup
+from asperity.cli.options import options
+from asperity.cli.output import Outputs, output_options
+from asperity.cli.progress import progress_bar
+from asperity.errors import ParameterError, tell
+
+if TYPE_CHECKING:
+    from asperity.scene.setup import Setup
+    from asperity.servo.fault import Cause
+    from asperity.servo.process import ServoProcess
+
+LOOK = 0.05
+"""[s] between two looks at the loop."""
+
+_RUN = (
+    Argument("duration", "of the run", "s", default_words="the scene's", example="10s",
+             positive=True),
+)  # fmt: skip
+
+
+@click.command("run")
+@loop_options
+@options(_RUN)
+@click.option("--accept-risk", is_flag=True, help="Render a stiffness above the analysed limit.")
+@output_options(None)
+def command(
+    scene: str, outputs: Outputs, duration: float | None, accept_risk: bool, **values: Any
+) -> None:
+    """Render SCENE (TOML) on its device, simulated, as time goes.
+
+    The loop is a process of its own that reads, computes and writes at the device's rate, with
+    limits on force, slew, depth, lateness and energy: section [servo] of the scene. Ctrl-C lets the
+    force go and ends it; a fault makes the force zero and ends with exit code 3.
+    """
+    # Its force is bounded, and what is said of it holds at every depth, if the law can be clamped.
+    setup = read_setup(scene, values, duration, defaults={"clamp": "backed"})
+    if not accept_risk:
+        refuse_risk(setup)
+    from asperity.report.device_run import print_device_run
+    from asperity.servo.drivers.simulated import simulated_driver
+    from asperity.servo.process import ServoProcess
+
+    driver = simulated_driver(
+        setup.plant, setup.hand, setup.servo, setup.motion, setup.duration, setup.start,
+        setup.velocity,
+    )  # fmt: skip
+    loop = ServoProcess(setup.surface, driver, setup.servo, setup.safety, duration=setup.duration)
+    with interrupts() as asked:
+        with progress_bar("compiling the loop"):
+            loop.start()
+        try:
+            cause = watched(loop, asked)
+        finally:
+            loop.stop()
+    data = {
+        "schema": 1, "scene": setup, "driver": driver.name, "ended": cause.name.lower(),
+        "notes": loop.notes, "statistics": loop.statistics,
+    }  # fmt: skip
+    outputs.write(data, lambda console: print_device_run(setup, loop, cause, console))
+
+
+def refuse_risk(setup: Setup) -> None:
+    """Refuse a stiffness above the analysed limit.
+
+    Raises:
+        ParameterError: with the reason.
+    """
+    from asperity.servo.risk import risk
+
+    with progress_bar("analysing the surface"):
+        reason = risk(setup.surface, setup.device)
+    if reason:
+        raise ParameterError("stiffness", f"is refused: {reason}; --accept-risk renders it")
+
+
+@contextmanager
+def interrupts() -> Iterator[list[int]]:
+    """Collect the signals that ask for an end, instead of being ended by them."""
+    asked: list[int] = []
+
+    def note(number: int, _frame: FrameType | None) -> None:
+        asked.append(number)
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def watched(loop: ServoProcess, asked: list[int]) -> Cause:
+    """Watch a loop until it ends, or is asked to.
+
+    Returns:
+        What ended it.
+
+    Raises:
+        DeviceFault: if it was a fault.
+    """
+    from asperity.servo.fault import Cause
+
+    for note in loop.notes:
+        tell(note)
+    with live_view() as show:
+        while (cause := loop.poll()) is Cause.GOING:
+            if asked:
+                loop.stop()
+                continue
+            show(loop)
+            time.sleep(LOOK)
+    return cause
+
+
+@contextmanager
+def live_view() -> Iterator[Any]:
+    """Show position, force, energy and lateness on standard error, if that is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda _loop: None
+        return
+    from rich.console import Console
+    from rich.live import Live
+
+    from asperity.report.device_run import state_line
+
+    with Live(console=Console(stderr=True), transient=True, refresh_per_second=20) as live:
+        yield lambda loop: live.update(state_line(loop))

@@ -1,0 +1,74 @@
+"""A device that is simulated: delay, body and hand, one sample on for each force."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.checks import FloatArray
+from asperity.compiled import Kernels
+from asperity.kernels.tick import flushed
+from asperity.simulation.kernels.body_functions import DIVERGED, RAN, Held, advance_body
+from asperity.simulation.kernels.servo_loop import wait_in_queue
+
+KERNELS = Kernels(
+    provides=("device_read", "device_write"), requires=("advance_body", "flushed", "wait_in_queue")
+)
+
+
+class SimulatedDevice(NamedTuple):
+    """A body that a hand holds.
+
+    Attributes:
+        x: state of the body, position [m], velocity [m/s], more.
+        queue: forces that wait (d + 1, 3) [N].
+        done: where in the queue the newest force waits; samples that were done (2,).
+        anchor: positions of the hand's anchor at the samples (k, 3) [m]; then it stays.
+        ledger: sums of energies, see ``simulation.kernels.booking``.
+        rate: 1/T [1/s].
+        plant: record of the body.
+    """
+
+    x: FloatArray
+    queue: FloatArray
+    done: NDArray[np.int64]
+    anchor: FloatArray
+    ledger: FloatArray
+    rate: float
+    plant: object
+
+
+def device_read(place: FloatArray, device: SimulatedDevice) -> int:
+    """Write the true position of the handle [m]; see ``device_functions``."""
+    x = device.x
+    if device.done[1] & 255 == 0:
+        for i in range(x.shape[0]):
+            x[i] = flushed(x[i])
+    for i in range(3):
+        place[i] = x[i]
+    return RAN
+
+
+def device_write(fx: float, fy: float, fz: float, inside: bool, device: SimulatedDevice) -> int:
+    """Hold the force that is due [N] and move on by a sample; see ``device_functions``."""
+    x = device.x
+    head, hx, hy, hz = wait_in_queue(device.queue, device.done[0], fx, fy, fz)
+    here = min(device.done[1], device.anchor.shape[0] - 1)
+    there = min(here + 1, device.anchor.shape[0] - 1)
+    ax = device.anchor[here, 0]
+    ay = device.anchor[here, 1]
+    az = device.anchor[here, 2]
+    held = Held(
+        hx, hy, hz, ax, ay, az,
+        (device.anchor[there, 0] - ax) * device.rate,
+        (device.anchor[there, 1] - ay) * device.rate,
+        (device.anchor[there, 2] - az) * device.rate,
+        inside,
+    )  # fmt: skip
+    device.done[0] = head
+    device.done[1] += 1
+    stop = advance_body(x, device.ledger, held, device.plant)
+    size = abs(x[0]) + abs(x[1]) + abs(x[2]) + abs(x[3]) + abs(x[4]) + abs(x[5])
+    if stop == RAN and not size < 1e6:
+        return DIVERGED
+    return stop

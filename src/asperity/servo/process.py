@@ -1,0 +1,244 @@
+"""A loop in a process of its own, as the program sees it that starts and watches it."""
+
+from __future__ import annotations
+
+import math
+import pickle
+import sys
+import threading
+import time
+from importlib.util import find_spec
+from multiprocessing.context import SpawnContext
+from types import TracebackType
+from typing import Any, Self
+
+from asperity.checks import FloatArray
+from asperity.errors import AsperityError, ParameterError
+from asperity.servo.child import Job, Modules, serve
+from asperity.servo.drivers.driver import Driver
+from asperity.servo.fault import KEPT, Cause, DeviceFault
+from asperity.servo.loop import render
+from asperity.servo.safety import Safety
+from asperity.servo.shared import Shared
+from asperity.servo.statistics import Statistics
+from asperity.simulation.servo import Servo
+from asperity.surface import Surface
+
+LONGEST_START = 120.0
+"""[s] until the loop must run: compiling for the first time takes most of it."""
+_FOREVER = 2**62
+_LAST_WORDS = 2.0  # [s] that a process gets to say how it ended
+
+_WORDS = {
+    Cause.NUMBER: "a position or a force is not a number",
+    Cause.WORKSPACE: "the handle was read outside its workspace",
+    Cause.DEPTH: "the probe is deeper than max_depth, for which the surface was analysed",
+    Cause.MISSES: "too many samples in a row were late",
+    Cause.LATE: "a sample was too late",
+    Cause.PARENT: "the program that watches the loop was not heard of",
+    Cause.SILENT: "the device does not answer",
+    Cause.DIED: "the process of the loop ended",
+}
+
+
+class ServoProcess:
+    """A surface on a device, rendered by a process of its own.
+
+    Args:
+        surface: what is felt.
+        driver: the device.
+        servo: period, steps of position and force, greatest force, virtual damping.
+        safety: limits.
+        reach: of the handle from the surface's origin [m]; a reading further away is a fault.
+        duration: after which it ends [s]; ``None`` for not by itself.
+
+    Raises:
+        ParameterError: for a surface that cannot be rendered, or a device that moves and whose
+            greatest force is not known.
+
+    Example:
+        >>> with ServoProcess(surface, driver, Servo(1e-3)) as loop:  # doctest: +SKIP
+        ...     while loop.poll() is Cause.GOING:
+        ...         time.sleep(0.05)
+    """
+
+    def __init__(
+        self, surface: Surface, driver: Driver, servo: Servo, safety: Safety | None = None,
+        reach: float = math.inf, duration: float | None = None,
+    ) -> None:  # fmt: skip
+        if driver.moving and not math.isfinite(servo.max_force):
+            words = "is not known: a device that moves needs it, --set max_force=3N"
+            raise ParameterError("max_force", words)
+        self._driver, self._safety = driver, safety or Safety()
+        last = _FOREVER if duration is None else round(duration / servo.period)
+        self._job = Job(render(surface, driver), driver, servo, self._safety, reach, last)
+        self.shared = Shared(1.0 / servo.period)
+        self.notes: tuple[str, ...] = ()
+        self._cause, self._said = Cause.GOING, ""
+        self._seen, self._since = 0, 0.0
+        self._beating = threading.Event()
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def start(self) -> None:
+        """Start the process; it renders when this returns.
+
+        Raises:
+            ParameterError: for a device that cannot be opened.
+            DeviceFault: if the process ends or hangs.
+        """
+        context = SpawnContext()
+        self._line, theirs = context.Pipe()
+        arguments = (theirs, self.shared, *_packed(self._job))
+        self._process = context.Process(target=serve, args=arguments, daemon=True)
+        self._process.start()
+        theirs.close()
+        threading.Thread(target=self._beat, daemon=True).start()
+        try:
+            self.notes = self._heard("ready", LONGEST_START)
+        except BaseException:
+            self._end()
+            raise
+        self._since = time.monotonic()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:  # fmt: skip
+        self.stop()
+
+    @property
+    def statistics(self) -> Statistics:
+        """What the loop counted."""
+        return Statistics.of(self.shared.status)
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process of the loop is there."""
+        return bool(self._process.is_alive())
+
+    @property
+    def pid(self) -> int:
+        """Of the process of the loop."""
+        return int(self._process.pid or 0)
+
+    def poll(self) -> Cause:
+        """Return why the loop has ended, or ``GOING``.
+
+        Raises:
+            DeviceFault: if it was a fault.
+        """
+        if self._cause is Cause.GOING:
+            self._look()
+        if self._cause.is_fault:
+            raise self.fault()
+        return self._cause
+
+    def fault(self) -> DeviceFault:
+        """Return the fault that ended the loop."""
+        words = self._said if self._cause is Cause.DEVICE else _WORDS[self._cause]
+        rows, _first = self.shared.rows(self.shared.head - KEPT)
+        at = f" at {rows[-1, 0]:.4g} s" if len(rows) else ""
+        end = f"{words}{at}; the force was made zero"
+        if self._cause in {Cause.SILENT, Cause.DIED}:
+            end = f"{words}{at}. {self._driver.when_lost}"
+        return DeviceFault(self._cause, end, rows)
+
+    def change(self, surface: Surface) -> None:
+        """Render another surface: the force goes, the surface is exchanged, the force comes.
+
+        It is compiled before, while the one that runs goes on.
+
+        Raises:
+            ParameterError: for a surface that cannot be rendered.
+            DeviceFault: if the loop has ended by one.
+        """
+        modules, packed = _packed(render(surface, self._driver))
+        self.poll()
+        self._line.send((modules, packed))
+        self._heard("loaded", LONGEST_START)
+
+    def rows(self, first: int) -> tuple[FloatArray, int]:
+        """Return the rows from one on that are still there, and the number of the first."""
+        return self.shared.rows(first)
+
+    def stop(self) -> None:
+        """Let the force go, and end the loop and its process."""
+        if self._cause is Cause.GOING:
+            self.shared.stop()
+            deadline = time.monotonic() + self._safety.ramp + _LAST_WORDS
+            while self._cause is Cause.GOING and time.monotonic() < deadline:
+                self._look(0.01)
+        self._end()
+
+    def _end(self) -> None:
+        """End the process, which has let go of the device unless it hangs."""
+        self._process.join(_LAST_WORDS)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+        self._beating.set()
+        self._line.close()
+
+    def _beat(self) -> None:
+        while not self._beating.wait(0.1 * self._safety.silence):
+            self.shared.beat()
+
+    def _look(self, patience: float = 0.0) -> None:
+        """Listen to the process, and see whether it goes on."""
+        try:
+            while self._line.poll(patience):
+                self._take(self._line.recv())
+        except (EOFError, OSError):
+            self._cause = Cause.DIED if self._cause is Cause.GOING else self._cause
+        now, head = time.monotonic(), self.shared.head
+        if head != self._seen:
+            self._seen, self._since = head, now
+        elif self._cause is Cause.GOING and now - self._since > self._safety.silence:
+            self._cause = Cause.SILENT
+            self._process.kill()
+
+    def _take(self, message: tuple[str, Any]) -> str:
+        kind, content = message
+        if kind == "ended":
+            self._cause, self._said = content
+        return kind
+
+    def _heard(self, wanted: str, patience: float) -> Any:
+        """Return what the process says next, of the wanted kind."""
+        try:
+            while self._line.poll(patience):
+                kind, content = message = self._line.recv()
+                if kind == wanted:
+                    return content
+                if kind in {"failed", "refused"}:
+                    raise ParameterError("device" if kind == "failed" else "surface", content)
+                self._take(message)
+                self.poll()
+        except (EOFError, OSError):
+            self._cause = Cause.DIED
+        else:
+            self._cause = Cause.SILENT
+        raise self.fault()
+
+
+def _packed(thing: object) -> tuple[Modules, bytes]:
+    """Return a thing for another process, and the files of modules that it cannot import."""
+    files = {}
+    for name, module in list(sys.modules.items()):
+        if name.startswith("own_") and find_spec_of(name) is None:
+            files[name] = str(getattr(module, "__file__", ""))
+    try:
+        return tuple(files.items()), pickle.dumps(thing)
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise AsperityError(f"cannot be sent to the loop's process: {error}") from None
+
+
+def find_spec_of(name: str) -> Any:
+    """Return how a module is found by its name; ``None`` if it is not."""
+    try:
+        return find_spec(name)
+    except ValueError:  # it was made by hand: it has no spec
+        return None

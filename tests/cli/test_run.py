@@ -1,0 +1,144 @@
+"""``asperity run``: what is refused, what is said, how it ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+COMMAND = "run"
+Call = Callable[..., tuple[int, str, str]]
+
+SCENE = """
+[texture]
+kind = "sinusoid"
+amplitude = "0.1 mm"
+period = "2 mm"
+[surface]
+law = "C"
+stiffness = "100 N/m"
+max_depth = "3 mm"
+[device]
+id = "touch"
+update_rate = "1 kHz"
+[hand]
+kind = "spring"
+stiffness = "300 N/m"
+damping = "3 N*s/m"
+mass = "50 g"
+[motion]
+kind = "still"
+point = ["0 mm", "0 mm", "-2 mm"]
+[servo]
+ramp = "20 ms"
+lateness = "60 s"
+misses = 1000000
+silence = "30 s"
+"""
+
+
+_LIMITS = 'ramp = "20 ms"\nlateness = "60 s"\nmisses = 1000000\n'
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Callable[..., str]:
+    def write(old: str = "", new: str = "") -> str:
+        path = tmp_path / "scene.toml"
+        path.write_text(SCENE.replace(old, new) if old else SCENE)
+        return str(path)
+
+    return write
+
+
+def test_it_runs_and_says_what_it_did(call: Call, scene: Callable[..., str]) -> None:
+    code, out, err = call(scene(), "--duration", "0.3s", "--json", "-")
+    # Whether the system allows priority is said on standard error.
+    assert code == 0, err
+    said = json.loads(out)
+    assert (said["ended"], said["driver"]) == ("finished", "simulated")
+    counted = said["statistics"]
+    assert counted["samples"] + counted["skipped"] >= 300
+    assert sum(counted["histogram"]) == counted["samples"]
+    code, out, _err = call(scene(), "--duration", "0.3s")
+    assert code == 0
+    assert "Law C, change of height, at 100 N/m" in out
+    assert "Energy to the hand" in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_a_stiffness_above_the_limit_is_refused(call: Call, scene: Callable[..., str]) -> None:
+    path = scene('100 N/m"\nmax', '1500 N/m"\nmax')
+    code, out, err = call(path, "--duration", "0.1s")
+    assert (code, out) == (2, "")
+    assert "stiffness is refused: 1500 N/m is above the limit of" in err
+    assert "--accept-risk" in err
+    assert call(path, "--duration", "0.1s", "--accept-risk")[0] == 0
+
+
+def test_a_fault_is_one_line_and_exit_code_3(call: Call, scene: Callable[..., str]) -> None:
+    path = scene('max_depth = "3 mm"', 'max_depth = "0.2 mm"\nclamp = "none"')
+    code, out, err = call(path, "--duration", "5s")
+    assert (code, out) == (3, "")
+    last = err.splitlines()[-1]
+    assert last.startswith("asperity: the probe is deeper than max_depth")
+    assert "the force was made zero" in last
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('ramp = "-1 s"', "ramp"),
+        ('beyond_depth = "never"', "fault"),
+        ('rampe = "1 s"', "ramp"),
+        ("misses = -1", "misses"),
+    ],
+)
+def test_a_wrong_limit_is_named(
+    call: Call, scene: Callable[..., str], line: str, said: str
+) -> None:
+    code, _out, err = call(scene(_LIMITS, f"{line}\n"))
+    assert code == 2
+    assert said in err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupt_lets_the_force_go(
+    scene: Callable[..., str], number: int, tmp_path: Path
+) -> None:
+    out = tmp_path / "said.json"
+    arguments = ["run", scene(), "--duration", "3600s", "--json", str(out)]
+    program = [sys.executable, "-c", _WAITS, *arguments]
+    with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                          start_new_session=True) as started:  # fmt: skip
+        assert started.stderr is not None
+        for line in started.stderr:
+            if "watching" in line:
+                break
+        time.sleep(0.05)
+        # As a terminal does: to the loop's process, too.
+        os.killpg(started.pid, number) if number == signal.SIGINT else started.send_signal(number)
+        _said, errors = started.communicate(timeout=120)
+    assert started.returncode == 0, errors
+    assert json.loads(out.read_text())["ended"] == "stopped"
+
+
+# The program, which says when it watches.
+_WAITS = """
+import asperity.cli.run as run
+from asperity.__main__ import main
+watched = run.watched
+def told(*arguments):
+    import sys
+    print("watching", file=sys.stderr, flush=True)
+    return watched(*arguments)
+run.watched = told
+if __name__ == "__main__":
+    main()
+"""

@@ -1,0 +1,40 @@
+"""What the tests of the loop share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from tests.servo.python_device import SURFACE, PythonClock, PythonDevice, shown_of
+
+from asperity.servo.loop import Loop, no_clock
+from asperity.servo.safety import Safety
+from asperity.servo.shared import Shared
+from asperity.simulation import Servo
+from asperity.surface import Surface
+
+
+@pytest.fixture
+def go() -> Callable[..., SimpleNamespace]:
+    """``go(device, samples, ...)``: a loop on it, run; cause, code, forces and rows."""
+
+    def run(
+        device: PythonDevice, samples: int, servo: Servo | None = None,
+        safety: Safety | None = None, *, surface: Surface = SURFACE, reach: float = 1.0,
+        clock: PythonClock | None = None, control: Callable[[Shared], None] = lambda _shared: None,
+    ) -> SimpleNamespace:  # fmt: skip
+        settings = servo or Servo(1e-3, max_force=3.0)
+        shared = Shared(1.0 / settings.period)
+        ticks = no_clock() if clock is None else clock.record
+        loop = Loop(device, settings, safety or Safety(), reach, shared.board(), ticks)
+        control(shared)
+        cause, code = loop.run(shown_of(surface), device.open(), samples)
+        rows, first = shared.rows(0)
+        return SimpleNamespace(
+            cause=cause, code=code, forces=np.array(device.forces), rows=rows, first=first,
+            shared=shared, loop=loop,
+        )  # fmt: skip
+
+    return run

@@ -1,0 +1,93 @@
+"""A device and a clock that are Python functions."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from types import ModuleType
+from typing import Any, ClassVar
+
+import numpy as np
+
+from asperity.servo.drivers.driver import Driver
+from asperity.servo.kernels import by_address
+from asperity.servo.kernels.by_address import AddressedDevice
+from asperity.servo.kernels.clock import Clock
+from asperity.servo.loop import Rendered, address, render
+from asperity.surface import Surface
+from asperity.textures import Sinusoid
+
+_NUMBERS = ctypes.POINTER(ctypes.c_double)
+_READ = ctypes.CFUNCTYPE(ctypes.c_int, _NUMBERS)
+_WRITE = ctypes.CFUNCTYPE(ctypes.c_int, _NUMBERS, ctypes.c_int)
+_WORDS = ctypes.POINTER(ctypes.c_int64)
+_GETTIME = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_int, _WORDS)
+_SLEEP = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_int, ctypes.c_int, _WORDS, ctypes.c_void_p)
+
+
+@dataclass(eq=False)
+class PythonDevice(Driver):
+    """A device whose handle is where ``path(k)`` says at the k-th reading.
+
+    ``codes`` is what the k-th reading or writing returns, by ("read" or "write", k).
+    """
+
+    name: ClassVar[str] = "python"
+    when_lost: ClassVar[str] = "Nothing."
+
+    path: Callable[[int], Any]
+    codes: dict[tuple[str, int], int] = field(default_factory=dict)
+    forces: list[tuple[float, float, float]] = field(default_factory=list)
+    reads: int = 0
+
+    def _read(self, place: Any) -> int:
+        for axis, value in enumerate(self.path(self.reads)):
+            place[axis] = value
+        self.reads += 1
+        return self.codes.get(("read", self.reads - 1), 0)
+
+    def _write(self, force: Any, _contact: int) -> int:
+        self.forces.append((force[0], force[1], force[2]))
+        return self.codes.get(("write", len(self.forces) - 1), 0)
+
+    def kernels(self) -> tuple[ModuleType, ...]:
+        return (by_address,)
+
+    def blank(self) -> AddressedDevice:
+        return AddressedDevice(0, 0)
+
+    def open(self) -> AddressedDevice:
+        self._kept = _READ(self._read), _WRITE(self._write)
+        return AddressedDevice(*map(address, self._kept))
+
+
+class PythonClock:
+    """A clock whose k-th wait ends ``lateness(k)`` [ns] after it should."""
+
+    def __init__(self, lateness: Callable[[int], int]) -> None:
+        self._lateness, self._now, self._waits = lateness, 10**9, 0
+        self._kept = _GETTIME(self._gettime), _SLEEP(self._sleep)
+        self.record = Clock(*map(address, self._kept), np.zeros(2, np.int64))
+
+    def _gettime(self, _clock: int, words: Any) -> int:
+        words[0], words[1] = divmod(self._now, 10**9)
+        return 0
+
+    def _sleep(self, _clock: int, _flags: int, words: Any, _rest: Any) -> int:
+        due = words[0] * 10**9 + words[1]
+        self._now = max(self._now, due) + self._lateness(self._waits)
+        self._waits += 1
+        return 0
+
+
+SURFACE = Surface(
+    Sinusoid(0.2e-3, 1e-3, phase=0.4, direction=(2.0, 1.0)), "C", stiffness=900.0, max_depth=5e-3
+)
+
+
+@cache
+def shown_of(surface: Surface) -> Rendered:
+    """Return a surface as the loop of a :class:`PythonDevice` takes it."""
+    return render(surface, PythonDevice(lambda _k: (0.0, 0.0, 0.0)))

@@ -1,0 +1,126 @@
+"""The loop in a process of its own: it starts, changes, stops, and lets go whatever dies."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from asperity.errors import ParameterError
+from asperity.servo.drivers.simulated import simulated_driver
+from asperity.servo.fault import KEPT, Cause, DeviceFault
+from asperity.servo.kernels.published import COLUMNS
+from asperity.servo.process import ServoProcess
+from asperity.servo.safety import Safety
+from asperity.simulation import Cartesian, Servo, SpringHand, Still
+from asperity.surface import Surface
+from asperity.textures import Sinusoid
+
+SURFACE = Surface(Sinusoid(0.1e-3, 2e-3), "C", stiffness=300.0, max_depth=5e-3)
+HAND = SpringHand(stiffness=300.0, damping=3.0, mass=0.05, force=(0.0, 0.0, -0.6))
+SERVO = Servo(1e-3, max_force=3.0)
+# A busy machine is late, and that is not what is tested here.
+PATIENT = Safety(ramp=0.02, lateness=60.0, misses=10**6, silence=30.0)
+
+
+def process(safety: Safety = PATIENT, motion: Still | None = None) -> ServoProcess:
+    still = motion or Still((0.0, 0.0, -1e-3))
+    driver = simulated_driver(Cartesian(0.05, 1.0), HAND, SERVO, still, 1.0)
+    return ServoProcess(SURFACE, driver, SERVO, safety)
+
+
+@pytest.fixture
+def loop() -> Iterator[ServoProcess]:
+    with process() as running:
+        yield running
+
+
+def until(reached: Callable[[], bool], patience: float = 60.0) -> bool:
+    """Wait for something; whether it came."""
+    end = time.monotonic() + patience
+    while not reached() and time.monotonic() < end:
+        time.sleep(0.005)
+    return reached()
+
+
+def applied(loop: ServoProcess) -> np.ndarray:
+    return loop.rows(loop.shared.head - 1)[0][-1, 7:10]
+
+
+def test_it_renders_changes_and_stops_without_force(loop: ServoProcess) -> None:
+    assert until(lambda: loop.shared.head > 300 and applied(loop)[2] > 0.3)
+    pressed = loop.rows(loop.shared.head - 1)[0][-1, 3]
+    before = loop.shared.head
+    loop.change(SURFACE.to_law("B").to_stiffness(150.0))
+    assert until(lambda: loop.shared.head > before + 400)
+    rows, _first = loop.rows(before)
+    assert (rows[:, 10] == 0.0).any(), "the force goes before the surface is exchanged"
+    jumps = np.abs(np.diff(rows[:, 7:10], axis=0)).max()
+    assert jumps <= SERVO.max_force / 5e-3 * SERVO.period
+    assert until(lambda: loop.rows(loop.shared.head - 1)[0][-1, 3] < pressed - 0.3e-3)
+    loop.stop()
+    assert (loop.poll(), loop.alive) == (Cause.STOPPED, False)
+    assert (applied(loop) == 0.0).all()
+
+
+def test_a_law_that_the_texture_cannot_serve_leaves_the_loop_alone(loop: ServoProcess) -> None:
+    with pytest.raises(ParameterError):
+        loop.change(SURFACE.to_stiffness(-1.0))
+    seen = loop.shared.head
+    assert until(lambda: loop.shared.head > seen)
+
+
+def test_a_fault_carries_the_last_samples() -> None:
+    shallow = SURFACE.to_depth(1.2e-3)
+    driver = simulated_driver(Cartesian(0.05, 1.0), HAND, SERVO, Still((0.0, 0.0, -3e-3)), 1.0)
+    with ServoProcess(shallow, driver, SERVO, PATIENT) as loop:
+        with pytest.raises(DeviceFault, match="deeper than max_depth") as raised:
+            until(lambda: loop.poll() is not Cause.GOING)
+        with pytest.raises(DeviceFault):  # it stays one
+            loop.poll()
+    fault = raised.value
+    assert (fault.cause, fault.exit_code) == (Cause.DEPTH, 3)
+    assert fault.samples.shape == (KEPT, len(COLUMNS))
+    assert (fault.samples[-1, 7:10] == 0.0).all()
+    assert fault.samples[-1, 3] < -1.2e-3 < fault.samples[0, 3] + 1e-3
+
+
+def test_a_loop_that_dies_is_a_fault(loop: ServoProcess) -> None:
+    assert until(lambda: loop.shared.head > 20)
+    os.kill(loop.pid, signal.SIGKILL)
+    with pytest.raises(DeviceFault, match="process of the loop ended") as raised:
+        until(lambda: loop.poll() is not Cause.GOING)
+    assert raised.value.cause is Cause.DIED
+
+
+def test_a_device_that_does_not_answer_is_a_fault() -> None:
+    with process(Safety(ramp=0.02, lateness=60.0, misses=10**6, silence=2.0)) as loop:
+        assert until(lambda: loop.shared.head > 20)
+        os.kill(loop.pid, signal.SIGSTOP)  # as a driver that hangs
+        with pytest.raises(DeviceFault, match="does not answer") as raised:
+            until(lambda: loop.poll() is not Cause.GOING)
+    assert raised.value.cause is Cause.SILENT
+    assert not loop.alive
+
+
+def test_a_loop_without_a_watcher_lets_go() -> None:
+    with process(Safety(ramp=0.02, lateness=60.0, misses=10**6, silence=2.0)) as loop:
+        assert until(lambda: loop.shared.head > 20)
+        loop._beating.set()  # no heartbeat any more
+        with pytest.raises(DeviceFault, match="not heard of"):
+            until(lambda: loop.poll() is not Cause.GOING)
+        assert (loop.fault().samples[-1, 3:4] < 0.0).all()
+
+
+def test_a_device_that_moves_needs_its_greatest_force() -> None:
+    driver = simulated_driver(Cartesian(0.05), HAND, SERVO, Still((0.0, 0.0, 0.0)), 1.0)
+    ServoProcess(SURFACE, driver, Servo(1e-3))  # nothing moves
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(type(driver), "moving", True)
+        with pytest.raises(ParameterError, match="max_force is not known"):
+            ServoProcess(SURFACE, driver, Servo(1e-3, max_force=math.inf))
