@@ -8,15 +8,15 @@ second before the kill.
 
 from __future__ import annotations
 
-import os
+import multiprocessing
 import random
-import signal
 import sys
 import tempfile
 import time
 from collections import Counter, deque
+from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Console
@@ -31,19 +31,22 @@ LONGEST = 3.0
 """[s] that a process lives."""
 MOST_LOST = 1.0
 _AT_ONCE = 16
+# Its processes begin at once, with everything imported, and without threads of this one.
+_CONTEXT = multiprocessing.get_context("forkserver")
 _COLUMNS = (("time", "s"), ("clock", "s"), *((f"c{i}", "N") for i in range(28)))
 
 
 class _Child(NamedTuple):
-    process: int
+    process: BaseProcess
     path: Path
-    begun: float
+    begun: Any
     kill_at: float
     closes_at: float
 
 
 def run(count: int, console: Console, seed: int = 0) -> Counter[str]:
     """Print what so many kills did; return how often each fault was seen."""
+    _CONTEXT.set_forkserver_preload(["asperity.recording.recording", "asperity.recording.writer"])
     draw, faults, lost = random.Random(seed), Counter[str](), [0.0]
     waiting: deque[_Child] = deque()
     with tempfile.TemporaryDirectory() as folder:
@@ -63,20 +66,17 @@ def run(count: int, console: Console, seed: int = 0) -> Counter[str]:
 
 
 def _start(path: Path, draw: random.Random) -> _Child:
-    begun = time.monotonic()
-    kill_at = begun + draw.uniform(0.0, LONGEST)
-    closes_at = begun + draw.uniform(0.0, 2.0 * LONGEST)
-    process = os.fork()
-    if not process:
-        try:
-            _record(path, begun, closes_at)
-        finally:
-            os._exit(1)  # a child that comes here does nothing of its parent's
+    now, begun = time.monotonic(), _CONTEXT.Value("d", 0.0)
+    kill_at = now + draw.uniform(0.0, LONGEST)
+    closes_at = now + draw.uniform(0.0, 2.0 * LONGEST)
+    process = _CONTEXT.Process(target=_record, args=(path, begun, closes_at), daemon=True)
+    process.start()
     return _Child(process, path, begun, kill_at, closes_at)
 
 
-def _record(path: Path, begun: float, closes_at: float) -> None:
-    """Record until the end comes."""
+def _record(path: Path, began: Any, closes_at: float) -> None:
+    """Say when it begins, and record until the end comes."""
+    began.value = begun = time.monotonic()
     writer = RecordingWriter(path, _COLUMNS, {"made_by": "bench.recording_kills"})
     row = 0
     while time.monotonic() < closes_at:
@@ -101,11 +101,12 @@ def _end(child: _Child) -> tuple[str, float]:
     """Kill a process when it is due; return what is wrong then, and what was lost [s]."""
     time.sleep(max(child.kill_at - time.monotonic(), 0.0))
     killed = time.monotonic()
-    os.kill(child.process, signal.SIGKILL)
-    os.waitpid(child.process, 0)
-    end = min(killed, child.closes_at)
+    child.process.kill()
+    child.process.join()
+    begun = child.begun.value or killed  # killed before it could begin: nothing to lose
+    end = max(min(killed, child.closes_at), begun)
     if not child.path.exists():
-        lost = end - child.begun
+        lost = end - begun
         return ("no file" if lost > MOST_LOST else ""), lost
     try:
         recording = open_recording(child.path)
@@ -116,7 +117,7 @@ def _end(child: _Child) -> tuple[str, float]:
         child.path.unlink()
     if (table[:, 2] != np.arange(len(table))).any():
         return "rows are missing", 0.0
-    lost = end - (float(table[-1, 1]) if len(table) else child.begun)
+    lost = end - (float(table[-1, 1]) if len(table) else begun)
     return ("more than a second lost" if lost > MOST_LOST else ""), lost
 
 
