@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import struct
@@ -18,6 +19,8 @@ import numpy as np
 import pytest
 from bench import recording_kills
 from mcap.reader import make_reader
+from mcap.records import Chunk, MessageIndex
+from mcap.stream_reader import StreamReader
 from mcap.writer import Writer as PeerWriter
 from mcap_ros2.decoder import DecoderFactory
 from rich.console import Console
@@ -105,6 +108,27 @@ def test_the_library_of_others_reads_the_same(tmp_path: Path) -> None:
     assert_same(np.array(read)[:, 1:], table)
     assert [row[0] for row in read] == list(range(9001))
     assert late.sequence == 9000
+
+
+def test_the_index_leads_where_it_says(tmp_path: Path) -> None:
+    data = written(tmp_path / "run.mcap", rows_of(9001)).read_bytes()
+    chunks, indices = [], []
+    for record in StreamReader(io.BytesIO(data), emit_chunks=True, validate_crcs=True).records:
+        if isinstance(record, Chunk):
+            chunks.append(record)
+        elif isinstance(record, MessageIndex):
+            indices.append(record)
+    assert len(chunks) == len(indices) == 3
+    for chunk, index in zip(chunks, indices, strict=True):
+        times, places = zip(*index.records, strict=True)
+        assert list(places) == list(range(0, len(chunk.data), ROW))
+        logged = np.frombuffer(chunk.data, row_type(len(COLUMNS)))["logged"]
+        assert list(times) == logged.tolist()
+        assert (chunk.message_start_time, chunk.message_end_time) == (times[0], times[-1])
+    # The footer: where the summary begins, and its checksum.
+    start, _offsets, checksum = struct.unpack_from("<QQI", data, len(data) - 28)
+    assert data[start] == mcap.Op.SCHEMA
+    assert checksum == zlib.crc32(data[start:-12])
 
 
 def test_cut_anywhere_it_opens(tmp_path: Path) -> None:
@@ -197,27 +221,41 @@ import numpy as np
 from asperity.errors import ParameterError
 from asperity.recording.writer import RecordingWriter
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))
-out = RecordingWriter(sys.argv[1], (("time", "s"), ("x", "m")))
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
 try:
+    out = RecordingWriter(sys.argv[1], (("time", "s"), ("x", "m")))
     out.append(np.arange(40_000.0).reshape(-1, 2))
 except ParameterError as error:
     print(error)
 """
 
 
+def on_disk_of(size: int, path: Path) -> str:
+    """Return what a process says that records where files have at most so many bytes.
+
+    The limit stands for a full disk: writes come back short, then fail.
+    """
+    script = [sys.executable, "-c", _FULL, str(path), str(size)]
+    done = subprocess.run(script, capture_output=True, text=True, check=True, timeout=60)
+    return done.stdout
+
+
 def test_a_disk_that_fills_up_leaves_whole_blocks(tmp_path: Path) -> None:
-    """A limit on the size of files stands for a full disk: writes come back short, then fail."""
     path = tmp_path / "run.mcap"
-    answer = subprocess.run(
-        [sys.executable, "-c", _FULL, str(path)], capture_output=True, text=True, check=True,
-        timeout=60,
-    )  # fmt: skip
+    said = on_disk_of(400_000, path)
     found = open_recording(path)
     words = "path cannot be written any further (File too large): 4096 rows are in"
-    assert answer.stdout.startswith(words)
+    assert said.startswith(words)
     assert (found.rows, found.unread) == (4096, 0)
     assert_same(found.table(), np.arange(40_000.0).reshape(-1, 2)[:4096])
+
+
+def test_a_full_disk_takes_nothing_that_was_there(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    path.write_text("precious")
+    assert on_disk_of(100, path).startswith("path cannot be written: [Errno 27] File too large")
+    assert path.read_text() == "precious"
+    assert [one.name for one in tmp_path.iterdir()] == ["run.mcap"]
 
 
 def of_others(path: Path) -> None:

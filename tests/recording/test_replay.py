@@ -86,9 +86,21 @@ def test_the_first_row_that_differs_is_named(tmp_path: Path) -> None:
     assert (found.first.row, found.first.column) == (row, "commanded y")
     assert (found.first.recorded, found.first.replayed) == (value + 0.25, value)
     assert found.largest == pytest.approx(0.25)
-    # The last bit counts, and the sign of zero.
+    # The last bit counts.
     spoilt(path, row, column, float(np.nextafter(value, 9.0)))
     assert asp.replay(open_recording(path)).differing == 1
+
+
+def test_the_sign_of_zero_counts_and_what_is_no_number() -> None:
+    block = np.zeros((4, 1 + len(COMPARED)))
+    block[:, 0] = np.arange(4)
+    replayed = np.zeros((4, len(COMPARED)))
+    block[1, 2], block[2, 3], replayed[2, 2] = -0.0, np.nan, np.nan
+    found = replay._Comparison()
+    found.see(100, block, replayed)
+    assert (found.rows, found.differing, found.largest) == (4, 1, 0.0)
+    assert found.first is not None
+    assert (found.first.row, found.first.column) == (101, "commanded y")
 
 
 def test_the_state_goes_from_row_to_row(tmp_path: Path) -> None:
