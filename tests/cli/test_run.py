@@ -11,7 +11,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from asperity.recording.recording import open_recording
+from asperity.recording.replay import replay
 
 COMMAND = "run"
 Call = Callable[..., tuple[int, str, str]]
@@ -71,6 +75,50 @@ def test_it_runs_and_says_what_it_did(call: Call, scene: Callable[..., str]) -> 
     assert "Law C, change of height, at 100 N/m" in out
     assert "Energy to the hand" in out
     assert max(map(len, out.splitlines())) <= 80
+
+
+def test_a_recording_replays_bit_for_bit(
+    call: Call, scene: Callable[..., str], tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    code, out, _err = call(scene(), "--duration", "0.5s", "--record", str(path))
+    assert code == 0
+    assert f"Recording: {path}\n" in out
+    assert "record" in call(scene(), "--record", str(tmp_path))[2]
+    recording = open_recording(path)
+    assert recording.whole
+    samples = recording["time"]
+    if (np.diff(np.rint(samples / 1e-3)) == 1).all():  # else a busy machine left some out
+        assert replay(recording).same
+    assert recording.rows == len(samples) >= 100
+    assert np.abs(recording["applied z"]).max() > 0.01
+
+
+def test_a_killed_program_leaves_a_recording_and_no_loop(
+    scene: Callable[..., str], tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    limits = scene('silence = "30 s"', 'silence = "2 s"')
+    program = [sys.executable, "-m", "asperity", "run", limits, "--duration", "3600s",
+               "--record", str(path)]  # fmt: skip
+    with subprocess.Popen(program, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as run:
+        assert until(lambda: path.exists() and path.stat().st_size > 100_000)
+        # The loop's process is the child that runs this program, too.
+        children = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
+        run.kill()
+    assert children
+    assert until(lambda: not any(Path(f"/proc/{child}").exists() for child in children))
+    recording = open_recording(path)
+    assert not recording.whole
+    assert recording.rows > 200
+
+
+def until(reached: Callable[[], bool], patience: float = 120.0) -> bool:
+    """Wait for something; whether it came."""
+    end = time.monotonic() + patience
+    while not reached() and time.monotonic() < end:
+        time.sleep(0.02)
+    return reached()
 
 
 def test_a_stiffness_above_the_limit_is_refused(call: Call, scene: Callable[..., str]) -> None:

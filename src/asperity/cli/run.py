@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ import click
 from asperity.arguments import Argument
 from asperity.cli.loop import loop_options, read_setup
 from asperity.cli.options import options
-from asperity.cli.output import Outputs, output_options
+from asperity.cli.output import Outputs, check_outputs, output_options
 from asperity.cli.progress import progress_bar
 from asperity.errors import ParameterError, tell
 
@@ -36,10 +36,20 @@ _RUN = (
 @click.command("run")
 @loop_options
 @options(_RUN)
+@click.option(
+    "--record",
+    metavar="PATH",
+    help="Record every sample as it comes, 'run.mcap': asperity recording reads it.",
+)
 @click.option("--accept-risk", is_flag=True, help="Render a stiffness above the analysed limit.")
 @output_options(None)
 def command(
-    scene: str, outputs: Outputs, duration: float | None, accept_risk: bool, **values: Any
+    scene: str,
+    outputs: Outputs,
+    duration: float | None,
+    record: str | None,
+    accept_risk: bool,
+    **values: Any,
 ) -> None:
     """Render SCENE (TOML) on its device, simulated, as time goes.
 
@@ -47,6 +57,7 @@ def command(
     limits on force, slew, depth, lateness and energy: section [servo] of the scene. Ctrl-C lets the
     force go and ends it; a fault makes the force zero and ends with exit code 3.
     """
+    check_outputs(json=outputs.json, record=record)
     # Its force is bounded, and what is said of it holds at every depth, if the law can be clamped.
     setup = read_setup(scene, values, duration, defaults={"clamp": "backed"})
     if not accept_risk:
@@ -60,18 +71,18 @@ def command(
         setup.velocity,
     )  # fmt: skip
     loop = ServoProcess(setup.surface, driver, setup.servo, setup.safety, duration=setup.duration)
-    with interrupts() as asked:
+    with interrupts() as asked, recorder(record, loop, setup) as take:
         with progress_bar("compiling the loop"):
             loop.start()
         try:
-            cause = watched(loop, asked)
+            cause = watched(loop, asked, take)
         finally:
             loop.stop()
     data = {
         "schema": 1, "scene": setup, "driver": driver.name, "ended": cause.name.lower(),
         "notes": loop.notes, "statistics": loop.statistics,
     }  # fmt: skip
-    outputs.write(data, lambda console: print_device_run(setup, loop, cause, console))
+    outputs.write(data, lambda console: print_device_run(setup, loop, cause, record, console))
 
 
 def refuse_risk(setup: Setup) -> None:
@@ -104,8 +115,27 @@ def interrupts() -> Iterator[list[int]]:
             signal.signal(number, handler)
 
 
-def watched(loop: ServoProcess, asked: list[int]) -> Cause:
+@contextmanager
+def recorder(path: str | None, loop: ServoProcess, setup: Setup) -> Iterator[Callable[[], None]]:
+    """Record a loop, if that is asked for; yield what takes the rows that have come."""
+    if path is None:
+        yield lambda: None
+        return
+    from asperity.servo.recorder import Recorder
+
+    with Recorder(path, loop, setup.surface, setup.servo, setup.about()) as kept:
+        yield kept.take
+    if kept.lost:
+        tell(f"{kept.lost} rows are missing in the recording: this program was too slow")
+
+
+def watched(loop: ServoProcess, asked: list[int], take: Callable[[], None]) -> Cause:
     """Watch a loop until it ends, or is asked to.
+
+    Args:
+        loop: that runs.
+        asked: signals that ask for an end.
+        take: what is called at each look.
 
     Returns:
         What ended it.
@@ -122,6 +152,7 @@ def watched(loop: ServoProcess, asked: list[int]) -> Cause:
             if asked:
                 loop.stop()
                 continue
+            take()
             show(loop)
             time.sleep(LOOK)
     return cause

@@ -6,6 +6,7 @@ import math
 
 from rich.console import Console
 
+from asperity.errors import printable
 from asperity.report.run import energy
 from asperity.report.terminal import say
 from asperity.report.words.number_words import law_title
@@ -29,7 +30,9 @@ def state_line(loop: ServoProcess) -> str:
     return f"{time:8.2f} s  ({place}) mm  {force:6.3f} N  {energy(given):>10}  late {late}"
 
 
-def print_device_run(setup: Setup, loop: ServoProcess, cause: Cause, console: Console) -> None:
+def print_device_run(
+    setup: Setup, loop: ServoProcess, cause: Cause, path: str | None, console: Console
+) -> None:  # fmt: skip
     """Print what a loop has done."""
     statistics, rows = loop.statistics, loop.rows(loop.shared.head - 1)[0]
     surface = setup.surface
@@ -54,3 +57,5 @@ def print_device_run(setup: Setup, loop: ServoProcess, cause: Cause, console: Co
         say(console, f"Energy to the hand: {energy(float(rows[-1, 11]))}")
     for assumption in (*setup.assumptions, *loop.notes):
         say(console, f"- {assumption}")
+    if path is not None:
+        console.print(f"Recording: {printable(path)}", soft_wrap=True, markup=False)

@@ -74,10 +74,10 @@ class Setup:
         return simulate(
             self.surface, self.plant, self.hand, self.servo, self.motion, self.duration,
             start=self.start, velocity=self.velocity, trace=trace, every=self.every,
-            most_rows=most_rows, progress=progress, about=self._about(),
+            most_rows=most_rows, progress=progress, about=self.about(),
         )  # fmt: skip
 
-    def _about(self) -> dict[str, Any]:
+    def about(self) -> dict[str, Any]:
         """Return what a recording says of the scene, besides its parts."""
         contents = {str(path): file_content(path) for path in self.files}
         return {

@@ -285,6 +285,9 @@ def publish(at: Carried, sensed: Sensed, late: int, took: int, inside: bool, boa
     rows[row, 13] = 1e-9 * late
     rows[row, 14] = 1e-9 * took
     rows[row, 15] = 1.0 if inside else 0.0
+    rows[row, 16] = at.servo.anchor_x
+    rows[row, 17] = at.servo.anchor_y
+    rows[row, 18] = 1.0 if at.servo.held else 0.0
     store_release(board.status, HEAD, head + 1)
 
 

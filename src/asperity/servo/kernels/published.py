@@ -27,6 +27,7 @@ COLUMNS = (
     ("applied x", "N"), ("applied y", "N"), ("applied z", "N"),
     ("share", "1"), ("supplied", "J"), ("controlled", "N s/m"),
     ("late", "s"), ("took", "s"), ("inside", "1"),
+    ("law anchor x", "m"), ("law anchor y", "m"), ("law held", "1"),
 )  # fmt: skip
 """Columns of the rows with their units; the frame is the surface's."""
 
