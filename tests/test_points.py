@@ -118,3 +118,31 @@ def test_paths_and_polygons_stay_rows() -> None:
         surface("C").trace(PROBE)
     with pytest.raises(asp.ParameterError, match=r"vertices must have shape \(n, 3\) \[m\]"):
         asp.loop_work(surface("C"), PROBE)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("place", range(3))
+@pytest.mark.parametrize("form", [list, np.array, lambda row: np.array([row])])
+def test_one_point_that_is_not_finite_is_refused(
+    bad: float, place: int, form: Callable[[list[float]], Any]
+) -> None:
+    row = list(PROBE)
+    row[place] = bad
+    with pytest.raises(asp.ParameterError, match=rf"finite .*\[0, {place}\] is {bad}"):
+        surface("C").force(form(row))
+
+
+def test_infinities_that_cancel_are_refused() -> None:
+    with pytest.raises(asp.ParameterError, match="finite"):
+        surface("C").force(np.array([np.inf, -np.inf, 0.0]))
+
+
+def test_numbers_whose_sum_is_beyond_all_numbers_are_points() -> None:
+    far = np.array([1.7e308, 1.7e308, -1e-3])
+    assert surface("W").force(far)[2] > 0.0
+
+
+def test_every_third_number_of_an_array_is_a_point_like_any_other() -> None:
+    spread = np.repeat(PROBE, 3)[::3]
+    assert not spread.flags.c_contiguous
+    assert np.array_equal(surface("C").force(spread), surface("C").force(PROBE))

@@ -16,6 +16,7 @@ Values = TypeVar("Values", bound=NDArray[Any])
 
 # Beyond these nothing is a size of this world, and products of a few leave double precision.
 _LEAST, _MOST = 1e-30, 1e30
+_FLOAT = np.dtype(np.float64)
 
 
 def real(name: str, value: object, unit: str = "") -> float:
@@ -68,7 +69,7 @@ def array(name: str, value: ArrayLike, shape: tuple[int | None, ...], unit: str)
     return _fitting(name, _numbers(name, value, described, unit), shape, described, unit)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(slots=True, eq=False)
 class Points:
     """Points that were given, and in which form.
 
@@ -115,11 +116,21 @@ def points(name: str, value: ArrayLike, width: int, unit: str) -> Points:
         >>> points("points", [0, 0, 1], 3, "m").rows.shape, points("xy", [[0, 1]], 2, "m").single
         ((1, 3), False)
     """
-    described = f"(n, {width}), or ({width},) for one point"
-    given = _numbers(name, value, described, unit)
-    single = given.shape == (width,)
+    plain = type(value) is np.ndarray and value.dtype is _FLOAT and value.flags.c_contiguous
+    given: Any = value if plain else _numbers(name, value, _rows(width), unit)
+    shape, item = given.shape, given.item
+    single = shape == (width,)
+    # One point is asked for inside of loops; its two or three numbers are finite if their sum is.
+    if single or shape == (1, width):
+        total: float = item(0) + item(1) + item(-1)
+        if total - total == 0.0:
+            return Points(given[None] if single else given, single)
     rows = given[None] if single else given
-    return Points(_fitting(name, rows, (None, width), described, unit), single)
+    return Points(_fitting(name, rows, (None, width), _rows(width), unit), single)
+
+
+def _rows(width: int) -> str:
+    return f"(n, {width}), or ({width},) for one point"
 
 
 def _numbers(name: str, value: ArrayLike, described: str, unit: str) -> FloatArray:

@@ -318,6 +318,10 @@ class Surface(Plotted):
 
         return fuse_surface(self.law, self.texture.sampler, self.acting_clamp)
 
+    @cached_property
+    def _force_batch(self) -> Any:  # Numba is untyped
+        return self._loops.force_batch
+
     def force(self, points: ArrayLike, deflection: ArrayLike | None = None) -> FloatArray:
         """Return the force on the probe (what the device applies to the hand).
 
@@ -338,11 +342,13 @@ class Surface(Plotted):
             The paper's Table I, with the corrections named in each law.
         """
         probes = read_points("points", points, 3, "m")
-        out = np.empty((probes.count, 3))
-        state = self._state(probes, deflection)
-        arguments = (self.texture.arguments, self.law_arguments)
-        self._loops.force_batch(probes.rows, *state, out, *arguments)
-        return probes.answer(out)
+        out = np.empty(probes.rows.shape)
+        texture, law = self.texture.arguments, self.law_arguments
+        if deflection is None and not self.law.stateful:
+            self._force_batch(probes.rows, out, texture, law)
+        else:
+            self._force_batch(probes.rows, *self._state(probes, deflection), out, texture, law)
+        return out[0] if probes.single else out
 
     def jacobian(
         self,
