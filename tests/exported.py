@@ -1,25 +1,31 @@
-"""Exported C, compiled and called: what the tests of the export share."""
+"""Tools that the tests of the export need, and what they share with the benchmark."""
 
 from __future__ import annotations
 
 import ctypes
 import shutil
-import subprocess
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
+from bench import c_programs
+from bench.c_programs import (
+    STRICT,
+    differing,
+    energies,
+    forces,
+    header,
+    kernel_forces,
+    probes,
+    run,
+    same_bits,
+)
 
-from asperity.export.c99 import c99_files
-from asperity.export.order import Order
-from asperity.kernels import anchored_loops, probe_loops
-from asperity.kernels.fuse import fuse_on_texture
-from asperity.surface import Surface
-from asperity.textures import Texture
+__all__ = [
+    "COMPILERS", "STRICT", "differing", "energies", "forces", "header", "kernel_forces", "library",
+    "probes", "run", "same_bits", "tool",
+]  # fmt: skip
 
-STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 COMPILERS = ("gcc", "clang")
 
 
@@ -31,132 +37,8 @@ def tool(name: str) -> str:
     return path
 
 
-def run(*command: str | Path, cwd: Path | None = None) -> str:
-    """Run a program that must succeed and return what it says."""
-    done = subprocess.run(
-        [str(part) for part in command], capture_output=True, text=True, check=False, cwd=cwd
-    )
-    assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
-    return done.stdout
-
-
-def header(surface: Surface, name: str = "texture", precision: str = "double") -> str:
-    """Return the whole header of a surface."""
-    return c99_files(Order(surface, name, precision), name)[f"{name}.h"]
-
-
-_MANY = """
-#include "{name}.h"
-void {name}_many(const {real} *at, {real} *f, int64_t n);
-void {name}_many(const {real} *at, {real} *f, int64_t n)
-{{
-    {name}_state state;
-    {name}_reset(&state);
-    for (int64_t i = 0; i < n; i++) {{
-        {name}_force(&state, at + 3 * i, f + 3 * i);
-    }}
-}}
-"""
-
-
-_ENERGY = """
-void {name}_energies(const {real} *at, {real} *u, int64_t n);
-void {name}_energies(const {real} *at, {real} *u, int64_t n)
-{{
-    for (int64_t i = 0; i < n; i++) {{
-        u[i] = {name}_energy(at + 3 * i);
-    }}
-}}
-"""
-
-
 def library(
     folder: Path, compiler: str, headers: Mapping[str, str], *flags: str, single: bool = False
 ) -> ctypes.CDLL:
-    """Return exported headers, by name, compiled into one library: ``NAME_many`` for each."""
-    real = "float" if single else "double"
-    for name, text in headers.items():
-        (folder / f"{name}.h").write_text(text, encoding="utf-8")
-    source, made = folder / "all.c", folder / f"all_{compiler}{len(list(folder.iterdir()))}.so"
-    parts = [
-        _MANY + (_ENERGY if f"{name}_energy(" in text else "") for name, text in headers.items()
-    ]
-    texts = [part.format(name=name, real=real) for part, name in zip(parts, headers, strict=True)]
-    source.write_text("".join(texts), encoding="utf-8")
-    run(tool(compiler), *STRICT, *flags, "-shared", "-fPIC", source, "-o", made, "-lm")
-    return ctypes.CDLL(str(made))
-
-
-def forces(made: ctypes.CDLL, name: str, points: Any) -> Any:
-    """Return the forces along a path of probe positions, in their precision."""
-    out = np.empty_like(points)
-    given = [array.ctypes.data_as(ctypes.c_void_p) for array in (points, out)]
-    getattr(made, f"{name}_many")(*given, ctypes.c_int64(len(points)))
-    return out
-
-
-def energies(made: ctypes.CDLL, name: str, points: Any) -> Any:
-    """Return the potential energies at probe positions."""
-    out = np.empty(len(points), points.dtype)
-    given = [array.ctypes.data_as(ctypes.c_void_p) for array in (points, out)]
-    getattr(made, f"{name}_energies")(*given, ctypes.c_int64(len(points)))
-    return out
-
-
-def kernel_forces(surface: Surface, points: Any) -> Any:
-    """Return the forces of the kernel of loops and simulations along a path of probe positions.
-
-    Batches have a sine of their own, :mod:`asperity.kernels.batch_sine`.
-    """
-    law, clamp = surface.law, surface.acting_clamp
-    asked = anchored_loops if law.stateful else probe_loops
-    loops = fuse_on_texture(law, surface.texture.sampler, clamp, (asked,))
-    run = loops.trace_batch if law.stateful else loops.force_batch
-    out = np.empty((len(points), 3))
-    run(points, out, surface.texture.arguments, surface.law_arguments)
-    return out
-
-
-def same_bits(first: Any, second: Any) -> Any:
-    """Return which rows are the same bit by bit."""
-    return (first.view(np.int64) == second.view(np.int64)).all(axis=1)
-
-
-def probes(texture: Texture, depth: float, count: int, seed: int) -> Any:
-    """Return probe positions, a quarter each: anywhere, below crests, at borders, at the surface.
-
-    Those at borders (of cells, copies and the patch) and below crests are off by as little as
-    1e-12 of a period.
-    """
-    rng = np.random.default_rng(seed)
-    n = count // 4
-    domain, (low, high) = texture.domain, texture.extremes
-    spans = domain.spans
-    wide = domain.points(rng.uniform(-1.2, 2.2, (4 * n, len(spans))))
-    if texture.is_profile:
-        wide = wide + rng.normal(size=(4 * n, 1)) * 1e-3 * np.array([-spans[0][1], spans[0][0]])
-    reach = float(np.hypot(*spans[0]))
-    near = reach * 10.0 ** rng.uniform(-12, -2, (n, 2)) * rng.choice([-1.0, 1.0], (n, 2))
-    crests = _climbed(texture, wide[n : 2 * n]) + near
-    steps = rng.integers(-4, 9, (n, len(spans))) / rng.choice([1, 2, 6, 8], (n, 1))
-    borders = domain.points(steps) + near
-    xy = np.ascontiguousarray(np.vstack([wide[:n], crests, borders, wide[3 * n :]]))
-    h = texture.height(xy)
-    z = h - (depth + high - low) * rng.uniform(-0.1, 1.3, 4 * n)
-    z[3 * n :] = h[3 * n :] - depth * 10.0 ** rng.uniform(-16, -1, n) * rng.choice([-1, 1], n)
-    points = np.column_stack([xy, z])
-    return np.ascontiguousarray(points[rng.permutation(4 * n)])
-
-
-def _climbed(texture: Texture, xy: Any) -> Any:
-    """Return points moved towards the nearest crests."""
-    bend = max(texture.bounds[1], 1e-30)
-    for _ in range(60):
-        xy = np.ascontiguousarray(xy + texture.gradient(xy) / bend)
-    return xy
-
-
-def differing(names: Iterable[str], equal: Sequence[Any]) -> str:
-    """Return how many points differ, by name, of those of which any do."""
-    counts = {name: int((~one).sum()) for name, one in zip(names, equal, strict=True)}
-    return ", ".join(f"{name}: {count}" for name, count in counts.items() if count)
+    """Return exported headers, by name, compiled into one library; see ``bench.c_programs``."""
+    return c_programs.library(folder, tool(compiler), headers, *flags, single=single)

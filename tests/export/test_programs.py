@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from tests.exported import COMPILERS, STRICT, run, tool
+from bench.firmware import firmware, missing_tool
+from tests.exported import COMPILERS, STRICT, kernel_forces, run, tool
 
 import asperity as asp
 from asperity.export.order import Order
 from asperity.export.targets import find_target
 from asperity.export.writing import write_files
 
+CPP = Path(__file__).parent / "cpp"
 EXAMPLES = Path(__file__).parents[2] / "examples" / "export"
 
 
@@ -38,3 +42,69 @@ def test_a_servo_loop(compiler: str, tmp_path: Path) -> None:
     forces = [float(line.split(",")[1].split(")")[0]) for line in lines]
     assert all(-0.4 < z < 0.1 for z in heights)
     assert all(0.1 < f < 0.2 for f in forces[1:])
+
+
+EXPECTED = [[0.25e-3 * tick, 0.1e-3, -0.05e-3] for tick in range(5)]
+
+
+def expected(law: str = "C") -> list[list[float]]:
+    """Return the kernel's forces at the callers' positions."""
+    surface = asp.Surface(asp.Sinusoid(0.1e-3, 2e-3), law, 800.0, clamp="backed")
+    return [list(force) for force in kernel_forces(surface, np.array(EXPECTED))]
+
+
+def hexed(text: str) -> list[list[float]]:
+    return [[float.fromhex(part) for part in line.split()] for line in text.splitlines()]
+
+
+@pytest.mark.parametrize("law", ["C", "F"])
+@pytest.mark.parametrize("compiler", ["g++", "clang++"])
+def test_c_plus_plus(compiler: str, law: str, tmp_path: Path) -> None:
+    folder = exported(tmp_path, law)
+    strict = ("-std=c++17", *STRICT[1:], "-O2", *(f"-I{path}" for path in (folder, EXAMPLES, CPP)))
+    for name in ("scene", "values"):
+        run(tool(compiler), *strict, CPP / f"{name}.cpp", "-o", folder / name, "-lm")
+        assert hexed(run(folder / name)) == expected(law)
+
+
+@pytest.fixture
+def shared(tmp_path: Path) -> Path:
+    """An exported library, built by CMake: the folder of the library."""
+    folder = exported(tmp_path, shared=True)
+    build = folder / "build"
+    run(tool("cmake"), "-S", folder, "-B", build)
+    run(tool("cmake"), "--build", build)
+    return build
+
+
+def test_a_library_called_from_python(shared: Path) -> None:
+    said = run(sys.executable, EXAMPLES / "caller.py", shared / "libtexture.so")
+    assert hexed(said) == expected()
+
+
+def test_a_library_called_from_c_sharp(shared: Path) -> None:
+    program = shared / "Caller.exe"
+    run(tool("mcs"), EXAMPLES / "Caller.cs", f"-out:{program}")
+    said = run(tool("env"), f"LD_LIBRARY_PATH={shared}", tool("mono"), program)
+    assert [[float(part) for part in line.split()] for line in said.splitlines()] == expected()
+
+
+def test_a_library_shows_its_contract_only(shared: Path) -> None:
+    shown = run(tool("nm"), "-D", "--defined-only", shared / "libtexture.so").split()
+    assert {name for name in shown if name.startswith("texture")} == {
+        "texture_reset", "texture_force", "texture_energy",
+    }  # fmt: skip
+
+
+def test_a_microcontroller(tmp_path: Path) -> None:
+    lacking = missing_tool()
+    if lacking is not None:
+        pytest.skip(f"not run: no {lacking} here")
+    surface = asp.Surface(asp.Sinusoid(0.1e-3, 2e-3), "C", 800.0, clamp="backed")
+    built = firmware(surface, tmp_path)
+    at = np.column_stack([250e-6 * np.arange(8), np.zeros(8), np.full(8, -0.05e-3)])
+    said = [[int(part) for part in line.split()[:3]] for line in built.said.splitlines()]
+    np.testing.assert_allclose(said, 1e6 * surface.force(at), atol=2.0)
+    assert 400 < built.flash < 16_000
+    assert 12 <= built.ram < 1_000
+    assert 50 < built.instructions < 2_000

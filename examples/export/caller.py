@@ -1,0 +1,26 @@
+"""The exported library called from Python, by ctypes.
+
+asperity export sinusoid:amplitude=0.1mm,period=2mm --law C --shared -o texture.h
+cmake -B build . && cmake --build build
+python caller.py build/libtexture.so
+"""
+
+import ctypes
+import sys
+
+Vector = ctypes.c_double * 3
+
+
+class State(ctypes.Structure):
+    """What is carried from tick to tick."""
+
+    _fields_ = [("anchor", ctypes.c_double * 2), ("held", ctypes.c_int)]
+
+
+texture = ctypes.CDLL(sys.argv[1])
+state, force = State(), Vector()
+texture.texture_reset(ctypes.byref(state))
+for tick in range(5):
+    position = Vector(0.25e-3 * tick, 0.1e-3, -0.05e-3)
+    texture.texture_force(ctypes.byref(state), position, force)
+    print(*[component.hex() for component in force])

@@ -1,0 +1,80 @@
+"""Exported C under the sanitizers of addresses and of undefined behaviour."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.exported import COMPILERS, STRICT, header, kernel_forces, probes, run, tool
+
+from asperity.surface import Surface
+from asperity.textures import Texture
+
+CLEAN = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-O1", "-g")
+LAWS = "BDFH"
+_MAIN = """
+static int {name}_run(const char *file)
+{{
+    double at[3], f[3];
+    {name}_state state;
+    FILE *in = fopen(file, "rb");
+    if (in == NULL) {{
+        return 1;
+    }}
+    {name}_reset(&state);
+    while (fread(at, sizeof at[0], 3, in) == 3) {{
+        {name}_force(&state, at, f);
+        fwrite(f, sizeof f[0], 3, stdout);
+    }}
+    return fclose(in);
+}}
+"""
+
+
+def _program(names: list[str]) -> str:
+    includes = "".join(f'#include "{name}.h"\n' for name in names)
+    calls = " || ".join(f'{name}_run("{name}.bin")' for name in names)
+    runs = "".join(_MAIN.format(name=name) for name in names)
+    return f"#include <stdio.h>\n{includes}{runs}int main(void)\n{{\n    return {calls};\n}}\n"
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("kind", ["sinusoid", "fourier", "steep map", "periodic profile"])
+def test_nothing_is_undefined(
+    kind: str, compiler: str, make_texture: Callable[[str], Texture], tmp_path: Path
+) -> None:
+    texture = make_texture(kind)
+    digest = hashlib.sha256()
+    for x in LAWS:
+        surface = Surface(texture, x, clamp="backed")
+        (tmp_path / f"{x}.h").write_text(header(surface, x))
+        at = probes(texture, surface.max_depth, 80 if x == "H" else 400, 21)
+        # Beyond all borders, and what is no position.
+        far = [[9e2, -9e2, -1e-4], [np.nan, 0, -1e-4], [np.inf, 0, 0], [0, 0, -1e30], [1e3, 0, 0]]
+        at = np.vstack([at, far[:1] if x != "H" else at[:1], far[1:4]])
+        at.tofile(tmp_path / f"{x}.bin")
+        inside = kernel_forces(surface, np.ascontiguousarray(at[:-3]))
+        digest.update(np.vstack([inside, np.zeros((3, 3))]).tobytes())
+    (tmp_path / "main.c").write_text(_program(list(LAWS)))
+    run(tool(compiler), *STRICT, *CLEAN, "main.c", "-o", "main", "-lm", cwd=tmp_path)
+    (tmp_path / "run.sh").write_text("./main > forces.bin\n")
+    run(tool("sh"), "run.sh", cwd=tmp_path)
+    said = (tmp_path / "forces.bin").read_bytes()
+    assert hashlib.sha256(said).hexdigest() == digest.hexdigest()
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_what_is_undefined_is_noticed(
+    compiler: str, make_texture: Callable[[str], Texture], tmp_path: Path
+) -> None:
+    text = header(Surface(make_texture("map"), "B"), "B")
+    assert "B_data_c[i][j + 3]" in text
+    (tmp_path / "B.h").write_text(text.replace("B_data_c[i][j + 3]", "B_data_c[i][j + 300]"))
+    np.array([[0.0, 0.0, -1e-4]]).tofile(tmp_path / "B.bin")
+    (tmp_path / "main.c").write_text(_program(["B"]))
+    run(tool(compiler), *STRICT, *CLEAN, "main.c", "-o", "main", "-lm", cwd=tmp_path)
+    with pytest.raises(RuntimeError, match=r"out of bounds|overflow"):
+        run(tmp_path / "main", cwd=tmp_path)
