@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.servo.test_drivers import EXAMPLE, compiled
 
 from asperity.recording.recording import open_recording
 from asperity.recording.replay import replay
@@ -190,3 +191,22 @@ run.watched = told
 if __name__ == "__main__":
     main()
 """
+
+
+def test_a_device_of_one_s_own_is_one_word(
+    call: Call, scene: Callable[..., str], tmp_path: Path
+) -> None:
+    library = compiled(EXAMPLE, tmp_path)
+    out = call(scene(), "--driver", str(library), "--duration", "0.3s")
+    assert out[0] == 0, out
+    assert "3D Systems Touch: done" in out[1]
+    assert "a hand near its switch" in out[2]
+    # Nobody is simulated: any surface will do.
+    wave = "sinusoid:amplitude=0.1mm,period=2mm"
+    more = ["--law", "C", "--stiffness", "100N/m", "--max-depth", "3mm", "--device", "touch"]
+    code, _out, err = call(wave, *more, "--driver", "forcedimension")
+    assert (code, "install the SDK of Force Dimension" in err) == (2, True)
+    code, _out, err = call(
+        wave, *more[:-1], "pantograph", "--accept-risk", "--driver", str(library)
+    )
+    assert (code, "max_force is not known" in err) == (2, True)

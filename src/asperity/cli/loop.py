@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -23,6 +24,7 @@ from asperity.errors import ParameterError
 from asperity.laws import KNOWN_LAWS, Law, find_law
 
 if TYPE_CHECKING:
+    from asperity.scene import Scene
     from asperity.scene.setup import Setup
 
 
@@ -42,6 +44,7 @@ def read_setup(
     *,
     keeps_delay: bool = True,
     defaults: Mapping[str, Any] | None = None,
+    simulated: bool = True,
 ) -> Setup:
     """Return the closed loop that a scene file and the options name.
 
@@ -52,6 +55,7 @@ def read_setup(
         laws: those that the loop will be changed to; the scene's own does not count then.
         keeps_delay: whether the device's delay counts.
         defaults: of the surface, where neither the options nor the scene say anything.
+        simulated: whether device and hand are; if not, any surface will do for a scene.
 
     Raises:
         ParameterError: for what is missing, unknown or wrong.
@@ -59,7 +63,7 @@ def read_setup(
     from asperity.scene import load_scene
     from asperity.scene.setup import make_setup
 
-    if not source.lower().endswith(".toml"):
+    if simulated and not source.lower().endswith(".toml"):
         words = "must be a scene file (.toml) with [texture], [hand] and [motion]"
         raise ParameterError("scene", words, source)
     surface = surface_values(values)
@@ -67,7 +71,9 @@ def read_setup(
         surface.setdefault("law", find_law("W"))
     with progress_bar("reading the surface"):
         scene = load_scene(source, file_values(values))
-    surface |= {k: v for k, v in (defaults or {}).items() if k not in {**scene.surface, **surface}}
+    scene = scene if simulated else replace(scene, loop={**_NOBODY, **_servo(scene)})
+    unsaid = (defaults or {}).keys() - scene.surface.keys() - surface.keys()
+    surface |= {name: (defaults or {})[name] for name in unsaid}
     named = {**scene.surface, **surface}
     if laws or "law" in named:
         refuse_idle(surface, laws or (find_law(named["law"]),))
@@ -79,6 +85,18 @@ def read_setup(
         laws=laws,
         keeps_delay=keeps_delay,
     )
+
+
+# Where a real hand holds a real device nothing of it is computed.
+_NOBODY: dict[str, Any] = {
+    "hand": {"kind": "moved"},
+    "motion": {"kind": "still", "point": [0, 0, 0]},
+}
+
+
+def _servo(scene: Scene) -> dict[str, Any]:
+    """Return what a scene says of the loop itself."""
+    return {name: section for name, section in scene.loop.items() if name == "servo"}
 
 
 def chosen_laws(laws: tuple[Law, ...] | None, law: Law | None) -> tuple[Law, ...]:

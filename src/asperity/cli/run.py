@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from asperity.servo.fault import Cause
     from asperity.servo.process import ServoProcess
 
+SIMULATED = "simulated"
 LOOK = 0.05
 """[s] between two looks at the loop."""
 
@@ -37,6 +39,12 @@ _RUN = (
 @loop_options
 @options(_RUN)
 @click.option(
+    "--driver",
+    metavar="NAME",
+    default=SIMULATED,
+    help="simulated, forcedimension, or a library of your own, ./device.so  [default: simulated]",
+)
+@click.option(
     "--record",
     metavar="PATH",
     help="Record every sample as it comes, 'run.mcap': asperity recording reads it.",
@@ -47,11 +55,12 @@ def command(
     scene: str,
     outputs: Outputs,
     duration: float | None,
+    driver: str,
     record: str | None,
     accept_risk: bool,
     **values: Any,
 ) -> None:
-    """Render SCENE (TOML) on its device, simulated, as time goes.
+    """Render SCENE (TOML) as time goes, on its device simulated, or by a driver on a real one.
 
     The loop is a process of its own that reads, computes and writes at the device's rate, with
     limits on force, slew, depth, lateness and energy: section [servo] of the scene. Ctrl-C lets the
@@ -59,18 +68,15 @@ def command(
     """
     check_outputs(json=outputs.json, record=record)
     # Its force is bounded, and what is said of it holds at every depth, if the law can be clamped.
-    setup = read_setup(scene, values, duration, defaults={"clamp": "backed"})
+    real = driver != SIMULATED
+    setup = read_setup(scene, values, duration, defaults={"clamp": "backed"}, simulated=not real)
+    if real:
+        setup = with_its_own_electronics(setup)
     if not accept_risk:
         refuse_risk(setup)
     from asperity.report.device_run import print_device_run
-    from asperity.servo.drivers.simulated import simulated_driver
-    from asperity.servo.process import ServoProcess
 
-    driver = simulated_driver(
-        setup.plant, setup.hand, setup.servo, setup.motion, setup.duration, setup.start,
-        setup.velocity,
-    )  # fmt: skip
-    loop = ServoProcess(setup.surface, driver, setup.servo, setup.safety, duration=setup.duration)
+    loop = real_loop(setup, driver, duration) if real else simulated_loop(setup)
     with interrupts() as asked, recorder(record, loop, setup) as take:
         with progress_bar("compiling the loop"):
             loop.start()
@@ -79,10 +85,47 @@ def command(
         finally:
             loop.stop()
     data = {
-        "schema": 1, "scene": setup, "driver": driver.name, "ended": cause.name.lower(),
+        "schema": 1, "scene": setup, "driver": driver, "ended": cause.name.lower(),
         "notes": loop.notes, "statistics": loop.statistics,
     }  # fmt: skip
     outputs.write(data, lambda console: print_device_run(setup, loop, cause, record, console))
+
+
+def simulated_loop(setup: Setup) -> ServoProcess:
+    """Return a loop on the simulated device and hand of a scene."""
+    from asperity.servo.drivers.simulated import simulated_driver
+    from asperity.servo.process import ServoProcess
+
+    driver = simulated_driver(
+        setup.plant, setup.hand, setup.servo, setup.motion, setup.duration, setup.start,
+        setup.velocity,
+    )  # fmt: skip
+    reach = setup.safety.reach_on(setup.device)
+    return ServoProcess(setup.surface, driver, setup.servo, setup.safety, reach, setup.duration)
+
+
+def with_its_own_electronics(setup: Setup) -> Setup:
+    """Return the same on a real device: there steps and delay are its own."""
+    servo = replace(setup.servo, delay=0, position_resolution=0.0, force_resolution=0.0)
+    return replace(setup, servo=servo)
+
+
+def real_loop(setup: Setup, name: str, duration: float | None) -> ServoProcess:
+    """Return a loop on a real device.
+
+    Raises:
+        ParameterError: for a driver that is unknown, or a device without a greatest force.
+    """
+    from asperity.servo.drivers.choice import hardware_driver
+    from asperity.servo.process import ServoProcess
+
+    safety = setup.safety
+    driver = hardware_driver(name, safety.wall, safety.origin)
+    tell(f"a real device, {setup.device.name}: a hand near its switch. If the loop dies:"
+         f" {driver.when_lost}")  # fmt: skip
+    return ServoProcess(
+        setup.surface, driver, setup.servo, safety, safety.reach_on(setup.device), duration
+    )
 
 
 def refuse_risk(setup: Setup) -> None:

@@ -34,11 +34,12 @@ def print_device_run(
     setup: Setup, loop: ServoProcess, cause: Cause, path: str | None, console: Console
 ) -> None:  # fmt: skip
     """Print what a loop has done."""
+    how = "" if loop.moving else ", simulated"
     statistics, rows = loop.statistics, loop.rows(loop.shared.head - 1)[0]
     surface = setup.surface
     law = f"Law {surface.law.letter}, {law_title(surface.law.name)},"
     say(console, f"{law} at {engineering(surface.stiffness, 'N/m')}"
-                 f" on {setup.device.name}, simulated: {_ENDS[cause]}")  # fmt: skip
+                 f" on {setup.device.name}{how}: {_ENDS[cause]}")  # fmt: skip
     span = engineering(setup.servo.period * statistics.samples, "s", digits=3)
     say(console, f"{statistics.samples} samples in {span}, at"
                  f" {engineering(1.0 / setup.servo.period, 'Hz')}")  # fmt: skip

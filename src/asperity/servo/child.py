@@ -72,8 +72,8 @@ class _Serving:
         """Run until the loop ends, and say why."""
         driver = self._job.driver
         self._loop.load(self._shown)
+        device = driver.open()
         try:
-            device = driver.open()
             threading.Thread(target=self._listen, daemon=True).start()
             self._line.send(("ready", ask_for_priority()))
             cause, code = Cause.SWAP, 0

@@ -66,15 +66,18 @@ def render(surface: Surface, driver: Driver) -> Rendered:
     )
 
 
-def limits_of(servo: Servo, safety: Safety, reach: float, shown: Rendered) -> Limits:
+def limits_of(
+    servo: Servo, safety: Safety, reach: float, middle: FloatArray, shown: Rendered
+) -> Limits:  # fmt: skip
     """Return when the loop holds the force back and gives up."""
     period = servo.period
     share = 1.0 if safety.ramp < period else period / safety.ramp
+    x, y, z = map(float, middle)
     return Limits(
         round(1e9 * period), safety.slew(servo.max_force) * period, share,
         float(safety.passivity_damping), int(safety.misses), round(1e9 * safety.lateness),
-        round(1e9 * safety.silence), float(reach), 0.0, 0.0, 0.0, shown.shallow,
-        shown.depth, safety.beyond_depth == "fault",
+        round(1e9 * safety.silence), float(reach), x, y, z, shown.shallow, shown.depth,
+        safety.beyond_depth == "fault",
     )  # fmt: skip
 
 
@@ -103,7 +106,7 @@ class Loop:
         driver: the device; it is opened and closed by whoever runs the loop.
         servo: period, steps of position and force, greatest force, virtual damping.
         safety: limits.
-        reach: of the handle from the origin of the surface [m].
+        reach: of the handle from the origin of the device [m].
         board: where rows and counts go.
         ticks: the clock.
     """
@@ -147,7 +150,7 @@ class Loop:
     def _call(
         self, shown: Rendered, device: tuple[Any, ...], carried: Carried, last: int
     ) -> tuple[int, int, Carried]:
-        limits = limits_of(self._servo, self._safety, self._reach, shown)
+        limits = limits_of(self._servo, self._safety, self._reach, self._frame[:3, 3], shown)
         answer: tuple[int, int, Carried] = load_fused(shown.source).device_loop(
             carried, last, self._settings, limits, self._frame, self._clock, device, self._board,
             shown.texture, shown.law,

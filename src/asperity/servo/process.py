@@ -49,7 +49,7 @@ class ServoProcess:
         driver: the device.
         servo: period, steps of position and force, greatest force, virtual damping.
         safety: limits.
-        reach: of the handle from the surface's origin [m]; a reading further away is a fault.
+        reach: of the handle from the device's origin [m]; a reading further away is a fault.
         duration: after which it ends [s]; ``None`` for not by itself.
 
     Raises:
@@ -113,6 +113,11 @@ class ServoProcess:
     def statistics(self) -> Statistics:
         """What the loop counted."""
         return Statistics.of(self.shared.status)
+
+    @property
+    def moving(self) -> bool:
+        """Whether a real handle moves."""
+        return self._driver.moving
 
     @property
     def alive(self) -> bool:

@@ -15,6 +15,7 @@ from asperity.files import Record
 RISE = 5e-3
 """[s] in which the force may go from nothing to its greatest, unless a slew limit is given."""
 BEYOND = ("fault", "warn")
+LIES = ("lying", "standing")
 
 BEYOND_REACH = 1.5
 """Times the reach of a device: a reading further away is none."""
@@ -36,6 +37,9 @@ class Safety(Record):
         passivity_damping: greatest damping of the passivity controller [N s/m]; 0 for none.
         reach: of the handle from the middle of the workspace [m]; a reading further away is a
             fault. ``None`` for 1.5 times the device's.
+        wall: how the surface lies before the user: "lying", like a table, or "standing", facing
+            him.
+        origin: of the surface, in the device's axes [m].
 
     Raises:
         ParameterError: for a value out of its range.
@@ -49,6 +53,8 @@ class Safety(Record):
     beyond_depth: Literal["fault", "warn"] = "fault"
     passivity_damping: float = 0.0
     reach: float | None = None
+    wall: str = "lying"
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         for name in ("ramp", "passivity_damping"):
@@ -60,6 +66,8 @@ class Safety(Record):
             if getattr(self, name) is not None:
                 positive(name, getattr(self, name))
         whole("misses", self.misses)
+        if self.wall not in LIES:
+            raise ParameterError("wall", "must be 'lying' or 'standing'", self.wall)
         if self.beyond_depth not in BEYOND:
             raise ParameterError("beyond_depth", "must be 'fault' or 'warn'", self.beyond_depth)
 
@@ -109,6 +117,14 @@ ARGUMENTS: tuple[Argument, ...] = (
     Argument(
         "reach", "of the handle from the middle of the workspace", "m", positive=True,
         example="100mm", default_words="1.5 times the device's",
+    ),
+    Argument(
+        "wall", "how the surface lies: like a table, or facing the user", "", Safety.wall,
+        form="text", choices=LIES,
+    ),
+    Argument(
+        "origin", "of the surface, in the device's axes", "m", form="space",
+        default_words="the device's",
     ),
 )  # fmt: skip
 """What [servo] can say."""

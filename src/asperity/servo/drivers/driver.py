@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, ClassVar
@@ -56,6 +57,30 @@ class Frame:
         return table
 
 
+UNTURNED = Frame()
+"""The surface's own frame."""
+
+RIGHT, AWAY, UP = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+TOWARDS = (0.0, -1.0, 0.0)
+WALLS = {"lying": (RIGHT, AWAY, UP), "standing": (RIGHT, UP, TOWARDS)}
+"""Where x, y and z of a surface point, seen by the user: on a table, or facing him."""
+
+
+def frame_of(axes: Sequence[Vector], wall: str, origin: Vector, unit: float) -> Frame:
+    """Return where a surface lies in the frame of a device.
+
+    Args:
+        axes: where the device's x, y and z point, seen by the user: right, away, up.
+        wall: one of ``WALLS``.
+        origin: of the surface, in the device's axes [m].
+        unit: one unit of the device's positions [m].
+    """
+    turn = np.array(axes) @ np.array(WALLS[wall]).T
+    x, y, z = (value / unit for value in origin)
+    rows = tuple((float(a), float(b), float(c)) for a, b, c in turn)
+    return Frame(rows, (x, y, z), unit)  # type: ignore[arg-type]  # three rows
+
+
 class Driver(ABC):
     """A kind of device; what is made of it goes to the loop's process, so it must be picklable.
 
@@ -72,7 +97,7 @@ class Driver(ABC):
     @property
     def frame(self) -> Frame:
         """Where the surface lies in the device's frame."""
-        return Frame()
+        return UNTURNED
 
     @abstractmethod
     def kernels(self) -> tuple[ModuleType, ...]:
