@@ -11,7 +11,8 @@ import pytest
 
 from asperity.analysis.check_limits import limits
 from asperity.analysis.compare import compare
-from asperity.analysis.limits.felt import CLEARLY, NOTICED, Felt, Hides, texture_felt
+from asperity.analysis.limits.felt import CLEARLY, NOTICED, Felt, Hides, judge, texture_felt
+from asperity.analysis.limits.limit_rules import Case
 from asperity.analysis.words.felt import amount, cures_text, form_removed, hidden_by
 from asperity.devices import Device, parse_device
 from asperity.surface import Surface
@@ -106,6 +107,24 @@ def test_only_the_waves_that_come_through_count() -> None:
     found = texture_felt(surface, device(bandwidth="100 Hz"), TexturePart(wave), rms=rms)
     assert found.resolved == pytest.approx(0.5, rel=1e-6)
     assert found.shown == pytest.approx(rms * RMS, rel=1e-6)
+
+
+def test_a_slower_scan_brings_the_share_through_that_is_needed() -> None:
+    """Of three waves, 1/2, 1/3 and 1/6 of the variance: of an amplitude the square."""
+    lengths, shares = np.array([4e-3, 2e-3, 1e-3]), np.array([1 / 2, 1 / 3, 1 / 6])
+    k, rms = 1000.0, 1.0
+    whole = math.sqrt(2.0) * rms
+    for part, expected in ((0.6, 4e-3), (0.75, 2e-3), (0.93, 1e-3)):
+        known = device(bandwidth="100 Hz", friction=f"{0.5 * part * whole} N")
+        case = Case(
+            {name: datum.value for name, datum in known.data.items()}, 1.0, 5.0, 5.0, 5.0, lengths,
+            np.sqrt(shares), shares, math.nan, k,
+        )  # fmt: skip
+        found = judge(case, rms, rms, None)
+        assert found.clear == pytest.approx(part * whole)
+        (slower,) = (cure for cure in found.cures if cure.kind == "slower")
+        # part² of the variance lies in waves of that length and more; 100 Hz let them through.
+        assert slower.value == pytest.approx(expected * 100.0)
 
 
 def test_form_is_no_texture() -> None:
