@@ -371,6 +371,15 @@ def test_a_sample_is_cut_into_hundredths_of_a_time_constant() -> None:
         assert five_bar.bar_parts(vx, vz, rate, 1.0, bar) == expected
 
 
+@pytest.mark.parametrize("damping", [0.5, COUPLED])
+@pytest.mark.parametrize("mode", [None, MODE])
+def test_only_friction_cuts_a_linear_sample(damping: Any, mode: Resonance | None) -> None:
+    for friction, parts in ((0.0, 1), (0.1, 4)):
+        made = sampled_plant(Cartesian(MASS, damping, mode, friction), SPRING, Servo(PERIOD)).record
+        assert (made.parts, made.span) == (parts, PERIOD / parts)  # type: ignore[attr-defined]  # of a linear body
+        assert made.mass.any() == (friction > 0.0 or damping is COUPLED)  # type: ignore[attr-defined]  # likewise
+
+
 def test_the_arms_reach_where_the_angles_at_the_elbows_allow() -> None:
     """|cos| of the angle at either elbow below √(1 - s²), and before the motors."""
     plant, least = HEAVY, 0.3
