@@ -55,6 +55,12 @@ def fresh_answers(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatc
         monkeypatch.setattr(kept, "keep", lambda _room, _key, _content: None)
 
 
+@pytest.fixture(autouse=True)
+def one_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands share nothing out: the tests themselves run side by side."""
+    monkeypatch.setattr("asperity.cli.options.cores", lambda: 1)
+
+
 @pytest.fixture(params=list(TEXTURES))
 def texture(request: pytest.FixtureRequest) -> Texture:
     """One texture of each kind; a test names fewer with ``indirect``."""

@@ -241,6 +241,10 @@ MEMORY = Argument(
     example="4GB",
 )
 
+JOBS = Argument(
+    "jobs", "processes that share the work", default_words="one per core", form="integer", low=1
+)
+
 
 # --- how each form is read: the argument's name, text, number or list, and the unit ---------------
 

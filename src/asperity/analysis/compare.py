@@ -10,9 +10,12 @@ from typing import Any
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import merit
+from asperity.analysis.gain.answers import surface_content
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.judge_passivity import passivity
-from asperity.analysis.limits.felt import DEFAULT_SPEED, texture_felt
+from asperity.analysis.limits.felt import DEFAULT_SPEED, texture_alone, texture_felt
+from asperity.analysis.limits.spectrum import spectrum
+from asperity.analysis.limits.wave_force import wave_forces
 from asperity.analysis.passivity.margin import at_start, start
 from asperity.analysis.recommendation import recommend
 from asperity.analysis.row import LawRow
@@ -23,7 +26,9 @@ from asperity.devices import Device, load_device
 from asperity.display import Plotted, Reported
 from asperity.errors import ParameterError
 from asperity.files import plain, record
+from asperity.kernels.probe import ClampName
 from asperity.laws import LAWS, Law, find_laws, shared_out
+from asperity.processes import helped
 from asperity.surface import Surface
 from asperity.textures.naming import TextureLike, as_texture
 from asperity.textures.texture import Texture, TexturePart
@@ -151,10 +156,11 @@ def compare(
     ]  # fmt: skip
     question = _Question(known_device, asked, brisk, made.texture_part(), max_depth is not None)
     rows = []
-    for surface in surfaces:
-        if progress is not None:
-            progress(surface.law.letter)
-        rows.append(_row(surface, question))
+    with helped(answer_ahead, _tasks(surfaces, question)) as turns:
+        for surface, _ in zip(surfaces, turns, strict=True):
+            if progress is not None:
+                progress(surface.law.letter)
+            rows.append(_row(surface, question))
     found = recommend(rows)
     defaults = {"max_depth": max_depth is None, "speed": speed is None}
     return Comparison(
@@ -226,6 +232,48 @@ def _refuse_unknown(device: Device) -> None:
         others = "damping, update_rate and delay_samples"
         needs = f"needs max_stiffness to compare laws: add {line}, the stiffest smooth wall"
         raise ParameterError("device", f"{device.id} {needs} that held, to its file; or {others}")
+
+
+@dataclass(frozen=True)
+class _Task:
+    """A shipped law on a shipped texture, for a process that answers ahead."""
+
+    texture: Texture
+    law: str
+    max_depth: float
+    clamp: ClampName
+    law_parameters: dict[str, float]
+    deep: bool
+
+
+def _tasks(surfaces: Sequence[Surface], question: _Question) -> list[_Task | None]:
+    """Return what can be answered ahead, law by law: what is kept."""
+    return [
+        None if surface_content(surface) is None else _Task(
+            surface.texture, surface.law.letter, surface.max_depth, surface.clamp,
+            dict(surface.law_parameters), question.deep,
+        )
+        for surface in surfaces
+    ]  # fmt: skip
+
+
+def answer_ahead(task: _Task | None) -> None:
+    """Work out, and keep, what of a row costs time: all that does not depend on the device."""
+    if task is None:
+        return
+    surface = Surface(
+        task.texture, task.law, max_depth=task.max_depth, clamp=task.clamp,
+        law_parameters=task.law_parameters,
+    )  # fmt: skip
+    q = characteristic_number(surface)
+    one_sided_number(surface)
+    merit(surface)
+    worst_loop(surface)
+    continuity(surface, q)
+    part = surface.texture.texture_part()
+    alone = texture_alone(surface, part, deep=task.deep)
+    merit(alone)
+    wave_forces(alone, spectrum(part.texture))
 
 
 def _row(surface: Surface, question: _Question) -> LawRow:

@@ -13,6 +13,7 @@ from asperity.cli.options import (
     device_option,
     file_options,
     given,
+    jobs_option,
     law_options,
     laws_option,
     options,
@@ -42,6 +43,7 @@ _DEPTHS = replace(MAX_DEPTH, form="items", example="0.1mm; 0.5mm")
 @law_options((OWN_STIFFNESS, _DEPTHS, *LAW_OPTIONS[2:]))
 @file_options
 @click.option("--full", is_flag=True, help="Show q, q⁺, limits, leaks, T and S of every law.")
+@jobs_option
 @output_options("Write a report with pictures; - is standard output.")
 def command(
     surface: str,

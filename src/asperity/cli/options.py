@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from asperity.arguments import MAX_DEPTH, MEMORY, STIFFNESS, Argument
+from asperity.arguments import JOBS, MAX_DEPTH, MEMORY, STIFFNESS, Argument
 from asperity.cli.own_code import load_own_code
 from asperity.cli.settings import Settings, set_option
 from asperity.devices import Device, load_device
@@ -16,6 +16,7 @@ from asperity.errors import ParameterError
 from asperity.laws import KNOWN_LAWS, LAW_ARGUMENTS, Law, find_law, find_laws, known_arguments
 from asperity.measured.arguments import FILE_ARGUMENTS
 from asperity.memory import limited
+from asperity.processes import at_most, cores
 
 if TYPE_CHECKING:
     from asperity.scene import Scene
@@ -176,6 +177,16 @@ def _limit(context: click.Context, _option: click.Parameter, text: str | None) -
 
 _memory_option = click.option(
     "--memory", metavar="SIZE", expose_value=False, callback=_limit, help=help_of(MEMORY)
+)
+
+
+def _share(context: click.Context, _option: click.Parameter, text: str | None) -> None:
+    """Share the work out until the command ends."""
+    context.with_resource(at_most(cores() if text is None else JOBS.checked(JOBS.read(text))))
+
+
+jobs_option = click.option(
+    "--jobs", metavar="N", expose_value=False, callback=_share, help=help_of(JOBS)
 )
 
 

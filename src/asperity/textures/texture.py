@@ -79,6 +79,10 @@ class Texture(Plotted, ABC):
     filled: NDArray[np.bool_] | None = None
     history: tuple[Stage, ...] = ()
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what another process needs: compiled loops are its own."""
+        return {name: value for name, value in vars(self).items() if name != "_loops"}
+
     @property
     @abstractmethod
     def sampler(self) -> tuple[ModuleType, ...]:

@@ -157,10 +157,7 @@ def texture_felt(
         >>> found.tier, found.hides.value, [f"{one.kind} {one.value:.3g}" for one in found.cures]
         ('not felt', 'friction', ['magnify 11', 'friction 0.0247'])
     """
-    alone = surface
-    if part.nesting is not None:
-        depth = surface.max_depth if deep else default_max_depth(part.texture)
-        alone = surface.to_texture(part.texture, depth)
+    alone = texture_alone(surface, part, deep=deep)
     texture = rms if part.nesting is None else merit(alone).ripple * surface.stiffness
     waves = spectrum(part.texture)
     case = Case(
@@ -170,6 +167,14 @@ def texture_felt(
         math.nan, surface.stiffness,
     )  # fmt: skip
     return judge(case, rms, texture, part.nesting)
+
+
+def texture_alone(surface: Surface, part: TexturePart, *, deep: bool) -> Surface:
+    """Return the surface without form and waviness; see :func:`texture_felt`."""
+    if part.nesting is None:
+        return surface
+    depth = surface.max_depth if deep else default_max_depth(part.texture)
+    return surface.to_texture(part.texture, depth)
 
 
 def judge(case: Case, rms: float, texture: float, nesting: float | None) -> Felt:

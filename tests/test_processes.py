@@ -1,0 +1,141 @@
+"""Helpers: the same results whatever they do, and none of them left behind."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from asperity import cache, kept, processes
+from asperity.analysis import compare
+from asperity.analysis.compare import answer_ahead
+from asperity.files import json_text
+from asperity.textures import Sinusoid
+
+
+@pytest.fixture(autouse=True)
+def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Helpers begin without waiting."""
+    monkeypatch.setattr(processes, "PATIENCE", 0.0)
+
+
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """The processes that are started."""
+    found: list[Any] = []
+    start = processes._Board._start
+
+    def noted(board: Any) -> Any:
+        found.append(start(board))
+        return found[-1]
+
+    monkeypatch.setattr(processes._Board, "_start", noted)
+    return found
+
+
+def told(work: Any, tasks: list[Any], jobs: int, wait: float = 0.0) -> list[Any]:
+    """Return what helpers have found, None for what is to be done here, which takes a while."""
+    result = []
+    with processes.at_most(jobs), processes.helped(work, tasks) as turns:
+        for found in turns:
+            result.append(found)
+            time.sleep(wait if found is None else 0.0)
+    return result
+
+
+def ended(started: list[Any]) -> bool:
+    return all(process.poll() is not None for process in started)
+
+
+@pytest.mark.parametrize("jobs", [1, 2, 3])
+def test_every_task_has_its_turn_and_what_is_found_is_right(jobs: int, started: list[Any]) -> None:
+    tasks = [float(number) for number in range(12)]
+    found = told(math.sqrt, tasks, jobs, wait=0.3)
+    assert len(found) == 12
+    assert all(one in (None, math.sqrt(task)) for one, task in zip(found, tasks, strict=True))
+    assert (found.count(None) < 12) == (jobs > 1)
+    assert found[0] is None
+    assert len(started) <= jobs - 1
+    assert ended(started)
+
+
+def test_no_helper_for_what_is_done_at_once(
+    monkeypatch: pytest.MonkeyPatch, started: list[Any]
+) -> None:
+    monkeypatch.setattr(processes, "PATIENCE", 30.0)
+    assert told(math.sqrt, [1.0] * 5, 2) == [None] * 5
+    assert started == []
+
+
+def test_what_a_helper_cannot_do_is_done_here(started: list[Any]) -> None:
+    assert told(math.sqrt, [-1.0] * 6, 2, wait=0.2) == [None] * 6  # it raises
+    assert told(lambda task: task, [1.0] * 6, 2, wait=0.2) == [None] * 6  # it cannot be sent
+    assert told(os._exit, [1] * 6, 2, wait=0.2) == [None] * 6  # it dies
+    assert ended(started)
+
+
+def test_an_interrupt_leaves_no_process_behind(started: list[Any]) -> None:
+    def interrupted() -> None:
+        with processes.at_most(2), processes.helped(time.sleep, [60.0] * 4) as turns:
+            next(turns)
+            while not started:
+                time.sleep(0.01)
+            raise KeyboardInterrupt
+
+    before = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert ended(started)
+    assert time.monotonic() - before < 30.0
+
+
+@pytest.fixture
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+WAVE = Sinusoid(0.31e-3, 1.3e-3)
+
+
+@pytest.mark.keeps_answers
+@pytest.mark.usefixtures("own_cache")
+def test_a_comparison_is_the_same_however_many_work_on_it(started: list[Any]) -> None:
+    def answer() -> str:
+        return json_text(compare(WAVE, laws="WACE", stiffness=700.0))
+
+    alone = answer()
+    cache.clear()
+    with processes.at_most(2):
+        assert answer() == alone
+    assert len(started) == 1
+    assert ended(started)
+
+
+@pytest.mark.keeps_answers
+@pytest.mark.usefixtures("own_cache")
+def test_a_law_that_is_answered_ahead_asks_for_nothing_more(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    module = import_module("asperity.analysis.compare")
+    tasks: list[Any] = []
+
+    def noted(surfaces: Any, question: Any) -> list[Any]:
+        tasks.extend(intact(surfaces, question))
+        return [None] * len(surfaces)
+
+    intact = module._tasks
+    monkeypatch.setattr(module, "_tasks", noted)
+    with monkeypatch.context() as patch:
+        patch.setattr(kept, "keep", lambda *_: None)
+        compare(WAVE, laws="D")
+    answer_ahead(tasks[0])
+    made: list[str] = []
+    monkeypatch.setattr(kept, "keep", lambda _room, key, _content: made.append(key))
+    compare(WAVE, laws="D")
+    assert made == []
