@@ -109,12 +109,21 @@ def _pictures() -> list[NDArray[Any]]:
 
 
 def _png(folder: Path) -> Seeds:
+    from asperity.export.maps import height_png, normal_png
+    from asperity.export.sampled import sample_map
+    from asperity.textures import HeightMap
+
     writer = _writer("image_writer")
     path = folder / "seed.png"
+    sampled = sample_map(HeightMap(1e-6 * _heights(), 1e-5))
     return [
-        writer.write_png(path, picture, filters=filters).read_bytes()
-        for picture in _pictures()
-        for filters in (False, True)
+        *(
+            writer.write_png(path, picture, filters=filters).read_bytes()
+            for picture in _pictures()
+            for filters in (False, True)
+        ),
+        height_png(sampled),
+        normal_png(sampled),
     ]
 
 

@@ -24,6 +24,8 @@ import numpy as np
 from rich.console import Console
 from rich.progress import track
 
+from asperity.recording.recording import is_recording, open_recording
+
 WAVE = "sinusoid:amplitude=0.8mm,period=1mm"
 # Each writes its result to `out`; in a folder that holds a small map and a scene.
 COMMANDS = (
@@ -32,6 +34,7 @@ COMMANDS = (
     f"analyze {WAVE} --law D --json out.csv",
     "prepare map.npy --pitch 20um -o out.csv",
     "simulate scene.toml --trace out.csv",
+    "simulate scene.toml --trace out.mcap",
     f"limits {WAVE} --device omega.3 --json out.csv",
     "scan scene.toml --laws B,F --json out.csv",
     "onset still.toml --laws W --delays 1 --json out.csv",
@@ -65,6 +68,7 @@ _STILL = """[motion]
 kind = "still"
 point = ["0 mm", "0 mm", "-1 mm"]
 """
+_OUTPUTS = {"out.csv", "out.mcap"}
 _INPUTS = {"map.npy", "scene.toml", "still.toml"}
 
 
@@ -106,10 +110,9 @@ def disturbed(command: str, folder: Path, cache: Path, after: float, by: int) ->
         os.killpg(process.pid, signal.SIGKILL)
         wrong.append("a process is left")
     left = {path.name for path in folder.iterdir()} - _INPUTS
-    if left - {"out.csv"}:
+    if left - _OUTPUTS:
         wrong.append(f"files are left: {sorted(left)}")
-    if "out.csv" in left and not _whole(folder / "out.csv", command):
-        wrong.append("half a file")
+    wrong += ["half a file" for name in left & _OUTPUTS if not _whole(folder / name, command)]
     return wrong
 
 
@@ -123,6 +126,8 @@ def _group_lives(group: int) -> bool:
 
 def _whole(path: Path, command: str) -> bool:
     """Return whether an output is whole; a trace is written row by row, its last may be short."""
+    if path.suffix == ".mcap":
+        return is_recording(path) and open_recording(path).table().shape[1] > 1
     if "--trace" in command:
         return path.read_text().startswith("time")
     if "--json" in command:
@@ -137,8 +142,8 @@ def _answer(command: str, folder: Path, cache: Path) -> tuple[int, bytes]:
     furnish(folder)
     process = start(command, folder, cache)
     process.communicate(timeout=300)
-    path = folder / "out.csv"
-    return process.returncode, path.read_bytes() if path.exists() else b""
+    written = b"".join(path.read_bytes() for name in _OUTPUTS if (path := folder / name).exists())
+    return process.returncode, written
 
 
 def run(count: int, console: Console, seed: int = 0) -> Counter[str]:

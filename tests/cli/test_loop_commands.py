@@ -7,12 +7,14 @@ import os
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from tests.report.pages import check_alone, check_alts
 
+import asperity as asp
 from asperity.cli.main import cli
 
 Call = Callable[..., tuple[int, str, str]]
@@ -146,6 +148,28 @@ def test_a_run_is_recorded_and_replayed(call: Call, still: str, tmp_path: Path) 
     check_alts(check_alone(text), text)
     code, out, _err = call("recording", "info", path, "--json", "-")
     assert json.loads(out)["about"]["device"]["name"]
+
+
+@pytest.mark.parametrize(
+    "about",
+    [
+        {},
+        {"surface": {"law": "B"}, "servo": {"delay": 1}, "device": "touch"},
+        {"surface": 3, "servo": {"period": "often"}, "every": "other", "hand": {}},
+    ],
+)
+def test_what_others_record_is_shown_as_far_as_it_goes(
+    call: Call, tmp_path: Path, about: dict[str, Any]
+) -> None:
+    path = tmp_path / "run.mcap"
+    with asp.RecordingWriter(path, (("time", "s"), ("x", "m")), about) as writer:
+        writer.append(np.array([[0.0, 1.0], [0.5, 2.0]]))
+    code, out, err = call("recording", "info", str(path))
+    assert (code, err) == (0, "")
+    assert out.startswith("2 rows, 500 ms.\n")
+    for verb in (["replay", str(path)], ["plot", str(path), "-o", str(tmp_path / "a.png")]):
+        code, out, err = call("recording", *verb)
+        assert (code, out, err.count("\n")) == (2, "", 1)
 
 
 @pytest.mark.parametrize(

@@ -157,9 +157,10 @@ def _settings(about: Mapping[str, Any]) -> ServoSettings:
         raise ParameterError("recording", f"cannot be replayed: it {words}")
     names = ("position_resolution", "force_resolution", "max_force", "virtual_damping",
              "velocity_share", "period")  # fmt: skip
-    if not isinstance(servo, Mapping) or not servo.keys() >= set(names):
-        raise ParameterError("recording", "does not say the settings of its servo")
-    return ServoSettings(*(float(servo[name]) for name in names))
+    try:
+        return ServoSettings(*(float(servo[name]) for name in names))  # type: ignore[index]  # else a TypeError
+    except (KeyError, TypeError, ValueError):
+        raise ParameterError("recording", "does not say the settings of its servo") from None
 
 
 @lru_cache(maxsize=16)

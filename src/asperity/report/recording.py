@@ -30,8 +30,8 @@ def answer(recording: Recording) -> str:
     about = recording.about
     rate = f" at {engineering(1.0 / period, 'Hz')}" if (period := _period(about)) else ""
     said = f"{recording.rows} rows, {engineering(recording.duration, 's')}{rate}"
-    surface = about.get("surface")
-    if isinstance(surface, Mapping):
+    surface = _surface(about)
+    if surface is not None:
         stiffness = engineering(float(surface["stiffness"]), "N/m")
         said += f": law {surface['law']} at {stiffness} on {described(surface['texture'])}"
     if recording.whole:
@@ -40,19 +40,33 @@ def answer(recording: Recording) -> str:
     return f"{said}. It was not closed: it ends with the last block that was written{lost}."
 
 
+def _surface(about: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """Return what a recording says of its surface; ``None`` if that is not all that is shown."""
+    said = about.get("surface")
+    names = {"texture", "law", "law_name", "stiffness", "max_depth", "content"}
+    if not isinstance(said, Mapping) or not said.keys() >= names:
+        return None
+    known = isinstance(said["texture"], Mapping) and "kind" in said["texture"]
+    return said if known and _are_numbers(said["stiffness"], said["max_depth"]) else None
+
+
 def _period(about: Mapping[str, Any]) -> float:
     """Return the time from row to row [s]; 0 if it is not said."""
-    servo = about.get("servo")
-    every = about.get("every", 1)
-    return float(servo["period"]) * every if isinstance(servo, Mapping) else 0.0
+    servo, every = about.get("servo"), about.get("every", 1)
+    period: Any = servo.get("period") if isinstance(servo, Mapping) else None
+    return float(period) * every if _are_numbers(period, every) else 0.0
+
+
+def _are_numbers(*values: Any) -> bool:
+    return all(isinstance(value, (int, float)) and value > 0 for value in values)
 
 
 def facts(recording: Recording) -> list[tuple[str, str]]:
     """Return names and values of what was recorded."""
     about = recording.about
-    surface, device = about.get("surface"), about.get("device")
+    surface, device = _surface(about), about.get("device")
     rows = [("Recorded by", f"asperity {recording.version}, {about.get('made_by', 'unknown')}")]
-    if isinstance(surface, Mapping):
+    if surface is not None:
         law = f"{surface['law']}, {law_title(str(surface['law_name']))}"
         rows += [("Surface", described(surface["texture"])), ("Law", law)]
         rows += [("Stiffness", engineering(float(surface["stiffness"]), "N/m"))]
