@@ -14,6 +14,7 @@ from bench import (
     kernels,
     nearest,
     recording,
+    servo,
     simulation,
     split,
     startup,
@@ -27,6 +28,7 @@ PARTS: dict[str, Callable[[Console], None]] = {
     "split": split.run,
     "simulation": simulation.run,
     "recording": recording.run,
+    "servo": servo.run,
     "certificates": certificates.run,
     "startup": startup.run,
 }

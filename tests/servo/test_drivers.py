@@ -13,15 +13,17 @@ import pytest
 from tests.servo.python_device import SURFACE
 
 from asperity.errors import ParameterError
+from asperity.recording.recording import open_recording
 from asperity.servo.drivers.choice import hardware_driver
 from asperity.servo.drivers.driver import RIGHT, TOWARDS, UP, Driver, Frame, frame_of
 from asperity.servo.drivers.force_dimension import LIBRARY, ForceDimensionDriver
 from asperity.servo.drivers.own import OwnDriver
+from asperity.servo.drivers.replay import replay_driver
 from asperity.servo.fault import Cause
 from asperity.servo.loop import Loop, no_clock, render
 from asperity.servo.safety import Safety
 from asperity.servo.shared import Shared
-from asperity.simulation import Servo
+from asperity.simulation import Cartesian, Servo, SpringHand, Still, simulate
 
 HERE = Path(__file__).parent
 EXAMPLE = HERE.parents[1] / "examples" / "own_device.c"
@@ -195,3 +197,20 @@ def test_a_frame_goes_there_and_back() -> None:
 def test_an_unknown_driver_is_named(text: str, said: str) -> None:
     with pytest.raises(ParameterError, match=said):
         hardware_driver(text, "lying", (0.0, 0.0, 0.0))
+
+
+def test_a_recording_is_a_device(tmp_path: Path) -> None:
+    """The loop along a recording answers with the forces of the recording."""
+    place, path = Still((0.0, 0.0, -1e-3)), tmp_path / "run.mcap"
+    hand = SpringHand(stiffness=300.0, damping=3.0, mass=0.05)
+    simulate(SURFACE, Cartesian(0.05), hand, Servo(1e-3), place, 0.3, trace=path)
+    recording = open_recording(path)
+    cause, _code, rows = run(replay_driver(str(path), 1e-3), 300)
+    assert cause is Cause.FINISHED
+    for name, column in (("x", 1), ("z", 3), ("commanded x", 4), ("commanded z", 6)):
+        np.testing.assert_array_equal(rows[:300, column], recording[name])
+    assert rows[300, 3] == recording["z"][-1]  # it stays
+    with pytest.raises(ParameterError, match=r"not sampled evenly at 4 kHz.*update_rate=1kHz"):
+        replay_driver(str(path), 2.5e-4)
+    with pytest.raises(ParameterError):
+        replay_driver(str(tmp_path / "none.mcap"), 1e-3)

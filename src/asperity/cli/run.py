@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from asperity.servo.process import ServoProcess
 
 SIMULATED = "simulated"
+REPLAY = "replay:"
 LOOK = 0.05
 """[s] between two looks at the loop."""
 
@@ -42,7 +43,7 @@ _RUN = (
     "--driver",
     metavar="NAME",
     default=SIMULATED,
-    help="simulated, forcedimension, or a library of your own, ./device.so  [default: simulated]",
+    help="simulated, replay:run.mcap, forcedimension, or ./device.so.  [default: simulated]",
 )
 @click.option(
     "--record",
@@ -70,13 +71,16 @@ def command(
     # Its force is bounded, and what is said of it holds at every depth, if the law can be clamped.
     real = driver != SIMULATED
     setup = read_setup(scene, values, duration, defaults={"clamp": "backed"}, simulated=not real)
-    if real:
+    if real and not driver.startswith(REPLAY):
         setup = with_its_own_electronics(setup)
     if not accept_risk:
         refuse_risk(setup)
     from asperity.report.device_run import print_device_run
 
-    loop = real_loop(setup, driver, duration) if real else simulated_loop(setup)
+    if driver.startswith(REPLAY):
+        loop = replaying_loop(setup, driver.removeprefix(REPLAY), duration)
+    else:
+        loop = real_loop(setup, driver, duration) if real else simulated_loop(setup)
     with interrupts() as asked, recorder(record, loop, setup) as take:
         with progress_bar("compiling the loop"):
             loop.start()
@@ -108,6 +112,17 @@ def with_its_own_electronics(setup: Setup) -> Setup:
     """Return the same on a real device: there steps and delay are its own."""
     servo = replace(setup.servo, delay=0, position_resolution=0.0, force_resolution=0.0)
     return replace(setup, servo=servo)
+
+
+def replaying_loop(setup: Setup, path: str, duration: float | None) -> ServoProcess:
+    """Return a loop whose handle goes where it went in a recording."""
+    from asperity.servo.drivers.replay import replay_driver
+    from asperity.servo.process import ServoProcess
+
+    driver = replay_driver(path, setup.servo.period)
+    span = setup.servo.period * len(driver.points) if duration is None else duration
+    reach = setup.safety.reach_on(setup.device)
+    return ServoProcess(setup.surface, driver, setup.servo, setup.safety, reach, span)
 
 
 def real_loop(setup: Setup, name: str, duration: float | None) -> ServoProcess:

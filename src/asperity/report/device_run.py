@@ -34,7 +34,7 @@ def print_device_run(
     setup: Setup, loop: ServoProcess, cause: Cause, path: str | None, console: Console
 ) -> None:  # fmt: skip
     """Print what a loop has done."""
-    how = "" if loop.moving else ", simulated"
+    how = "" if loop.moving else f", {loop.driver}"
     statistics, rows = loop.statistics, loop.rows(loop.shared.head - 1)[0]
     surface = setup.surface
     law = f"Law {surface.law.letter}, {law_title(surface.law.name)},"

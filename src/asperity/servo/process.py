@@ -120,6 +120,11 @@ class ServoProcess:
         return self._driver.moving
 
     @property
+    def driver(self) -> str:
+        """Name of the driver."""
+        return self._driver.name
+
+    @property
     def alive(self) -> bool:
         """Whether the process of the loop is there."""
         return bool(self._process.is_alive())

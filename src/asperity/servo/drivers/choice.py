@@ -7,8 +7,7 @@ from asperity.servo.drivers.driver import AWAY, RIGHT, TOWARDS, UP, Driver, Vect
 from asperity.servo.drivers.force_dimension import ForceDimensionDriver
 from asperity.servo.drivers.own import OwnDriver
 
-SIMULATED = "simulated"
-NAMES = (SIMULATED, "forcedimension", "a shared library of your own, ./device.so")
+NAMES = ("simulated", "replay:run.mcap", "forcedimension", "a library of your own, ./device.so")
 _LIBRARIES = (".so", ".dylib", ".dll")
 
 

@@ -1,0 +1,117 @@
+"""The loop of a device: what it costs besides law and device, and how it keeps time.
+
+``python -m bench.servo 5`` for 5 s per loop instead of 60.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from asperity.servo.drivers.own import OwnDriver
+from asperity.servo.drivers.simulated import simulated_driver
+from asperity.servo.fault import Cause
+from asperity.servo.loop import Loop, address, no_clock, render, system_clock
+from asperity.servo.process import ServoProcess
+from asperity.servo.safety import Safety
+from asperity.servo.shared import Shared
+from asperity.simulation import Cartesian, Servo, SpringHand, Still
+from asperity.surface import Surface
+from asperity.textures import Sinusoid
+from bench.timing import take_turns
+
+HERE = Path(__file__).parent / "c"
+SECONDS = 60.0
+RATES = (1e3, 4e3, 10e3)  # [Hz]
+SAMPLES = 200_000
+TEXTURE = Sinusoid(0.1e-3, 2e-3)
+# Nothing but lateness is to be counted, and a busy machine ends nothing.
+PATIENT = Safety(lateness=60.0, misses=10**9, silence=60.0, beyond_depth="warn")
+_NOTHING = """
+int asperity_open(void) { return 0; }
+int asperity_read(double p[3]) { p[0] = p[1] = 0.0; p[2] = 1e-3; return 0; }
+int asperity_write(const double f[3], int contact) { (void)f; (void)contact; return 0; }
+int asperity_close(void) { return 0; }
+int at_once(int clock, int how, const void *due, void *rest)
+{ (void)clock; (void)how; (void)due; (void)rest; return 0; }
+"""
+
+
+@contextmanager
+def compiled(text: str, *flags: str) -> Iterator[Path]:
+    """Compile C; yield the result."""
+    with tempfile.TemporaryDirectory() as folder:
+        source, made = Path(folder) / "source.c", Path(folder) / "made.so"
+        source.write_text(text)
+        subprocess.run(["gcc", "-O2", *flags, "-o", made, source], check=True)
+        yield made
+
+
+def own_cost(console: Console) -> None:
+    """Print what a sample costs besides device, law and waiting, with and without the clock."""
+    with compiled(_NOTHING, "-shared", "-fPIC") as path:
+        driver = OwnDriver(str(path))
+        shown, record = render(Surface(TEXTURE, "W", stiffness=300.0), driver), driver.open()
+        at_once = address(ctypes.CDLL(str(path)).at_once)
+        clocks = no_clock(), system_clock()._replace(nanosleep=at_once)
+
+        def go(index: int) -> None:
+            servo, board = Servo(1e-4, max_force=3.0), Shared(1e4).board()
+            Loop(driver, servo, PATIENT, 1.0, board, clocks[index]).run(shown, record, SAMPLES)
+
+        times = take_turns([lambda: go(0), lambda: go(1)], 9) / SAMPLES
+    for name, cost in zip(("without clock", "with clock"), np.median(times, axis=0), strict=True):
+        console.print(f"a sample of the loop, {name}: {1e9 * cost:.0f} ns (goal: 1000)")
+
+
+def timekeeping(console: Console, seconds: float) -> None:
+    """Print late samples at each rate, beside those of a loop in C that does nothing."""
+    with compiled((HERE / "nanosleep.c").read_text()) as bare:
+        for rate in RATES:
+            said = []
+            for words, (samples, late, worst) in (
+                ("C", _bare(bare, rate, seconds)), ("loop", _loop(rate, seconds))
+            ):  # fmt: skip
+                said.append(f"{words} {late} of {samples} late, worst {1e6 * worst:.0f} µs")
+            console.print(f"{rate / 1e3:.0f} kHz, {seconds:g} s each: {'; '.join(said)}")
+
+
+def _bare(program: Path, rate: float, seconds: float) -> tuple[int, int, float]:
+    words = [str(program), str(round(1e9 / rate)), str(seconds)]
+    done = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
+    return int(done[0]), int(done[1]), 1e-9 * int(done[2])
+
+
+def _loop(rate: float, seconds: float) -> tuple[int, int, float]:
+    servo = Servo(1.0 / rate, max_force=3.0)
+    hand = SpringHand(stiffness=300.0, damping=3.0, mass=0.05)
+    driver = simulated_driver(Cartesian(0.05), hand, servo, Still((0.0, 0.0, -1e-3)), 1.0)
+    surface = Surface(TEXTURE, "C", stiffness=300.0)
+    with ServoProcess(surface, driver, servo, PATIENT, duration=seconds) as loop:
+        while loop.poll() is Cause.GOING:
+            time.sleep(0.05)
+        counted = loop.statistics
+    return counted.samples, counted.late, counted.worst
+
+
+def run(console: Console, seconds: float = SECONDS) -> None:
+    """Print what the loop costs and how it keeps time."""
+    if shutil.which("gcc") is None:
+        console.print("not run: no gcc")
+        return
+    own_cost(console)
+    timekeeping(console, seconds)
+
+
+if __name__ == "__main__":
+    run(Console(width=100, highlight=False), float(sys.argv[1]) if sys.argv[1:] else SECONDS)
