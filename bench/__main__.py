@@ -11,6 +11,7 @@ from bench import (
     batches,
     cache,
     certificates,
+    export,
     kernels,
     nearest,
     recording,
@@ -29,6 +30,7 @@ PARTS: dict[str, Callable[[Console], None]] = {
     "simulation": simulation.run,
     "recording": recording.run,
     "servo": servo.run,
+    "export": export.run,
     "certificates": certificates.run,
     "startup": startup.run,
 }

@@ -71,13 +71,19 @@ def library(
     real = "float" if single else "double"
     for name, text in headers.items():
         (folder / f"{name}.h").write_text(text, encoding="utf-8")
-    source, made = folder / "all.c", folder / f"all_{len(list(folder.iterdir()))}.so"
+    source = folder / "all.c"
     parts = [
         _MANY + (_ENERGY if f"{name}_energy(" in text else "") for name, text in headers.items()
     ]
     texts = [part.format(name=name, real=real) for part, name in zip(parts, headers, strict=True)]
     source.write_text("".join(texts), encoding="utf-8")
-    run(compiler, *STRICT, *flags, "-shared", "-fPIC", source, "-o", made, "-lm")
+    return compiled(folder, compiler, source, *STRICT, *flags)
+
+
+def compiled(folder: Path, compiler: str, source: Path, *flags: str) -> ctypes.CDLL:
+    """Return a source compiled into a library."""
+    made = folder / f"all_{len(list(folder.iterdir()))}.so"
+    run(compiler, *flags, "-shared", "-fPIC", source, "-o", made, "-lm")
     return ctypes.CDLL(str(made))
 
 

@@ -1,0 +1,43 @@
+"""Fused products and sums would change the last bits; the header keeps them out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from tests.exported import COMPILERS, header, run, tool
+
+from asperity.surface import Surface
+from asperity.textures import Texture
+
+GNU = ("-std=gnu99", "-O2", "-mfma", "-S", "-o", "-")
+
+
+def _fused(compiler: str, text: str, folder: Path) -> int:
+    """Return how many fused operations a compiler makes of a header."""
+    (folder / "t.h").write_text(text)
+    (folder / "t.c").write_text(
+        '#include "t.h"\nvoid f(t_state *s, const double *p, double *f)\n'
+        "{ t_force(s, p, f); }\ndouble g(double a, double b) { return a * b; }\n"
+    )
+    return run(tool(compiler), *GNU, "t.c", cwd=folder).count("vfm")
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_nothing_is_fused(
+    compiler: str, make_texture: Callable[[str], Texture], tmp_path: Path
+) -> None:
+    text = header(Surface(make_texture("map"), "D"), "t")
+    assert _fused(compiler, text, tmp_path) == 0
+    without = text.replace('#pragma GCC optimize ("fp-contract=off")', "")
+    without = without.replace("#pragma STDC FP_CONTRACT OFF", "#pragma STDC FP_CONTRACT ON")
+    assert _fused(compiler, without, tmp_path) > 20
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_fast_mathematics_does_not_compile(compiler: str, wave: Texture, tmp_path: Path) -> None:
+    (tmp_path / "t.h").write_text(header(Surface(wave, "B"), "t"))
+    (tmp_path / "t.c").write_text('#include "t.h"\n')
+    with pytest.raises(RuntimeError, match="compile without -ffast-math"):
+        run(tool(compiler), "-ffast-math", "-c", "t.c", "-o", "t.o", cwd=tmp_path)
