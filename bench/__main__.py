@@ -19,6 +19,7 @@ from bench import (
     simulation,
     split,
     startup,
+    waiting,
 )
 
 PARTS: dict[str, Callable[[Console], None]] = {
@@ -33,6 +34,7 @@ PARTS: dict[str, Callable[[Console], None]] = {
     "export": export.run,
     "certificates": certificates.run,
     "startup": startup.run,
+    "waiting": waiting.run,
 }
 
 

@@ -13,7 +13,9 @@ import os
 import pickle
 import platform
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,6 +27,7 @@ ROOM = "answers"
 
 Answer = TypeVar("Answer")
 
+_ANEW: ContextVar[bool] = ContextVar("anew", default=False)
 _PACKAGE = Path(__file__).parent
 # What a number may follow from: code, and tables beside it.
 _SOURCES = (".py", ".toml")
@@ -39,7 +42,7 @@ def kept(name: str, content: str | None, make: Callable[[], Answer]) -> Answer:
             :func:`content_digest`; ``None`` where that is not known: nothing is kept then.
         make: works it out.
     """
-    package = None if content is None else package_digest()
+    package = None if content is None or _ANEW.get() else package_digest()
     if package is None:
         return make()
     key = f"{name}\n{content}\n{package}"
@@ -54,6 +57,16 @@ def kept(name: str, content: str | None, make: Callable[[], Answer]) -> Answer:
     answer = make()
     keep(ROOM, key, pickle.dumps(answer, protocol=5))
     return answer
+
+
+@contextmanager
+def anew() -> Iterator[None]:
+    """Work every answer out, and keep none; compiled code is taken from the cache all the same."""
+    token = _ANEW.set(True)
+    try:
+        yield
+    finally:
+        _ANEW.reset(token)
 
 
 def content_digest(*parts: Any) -> str:

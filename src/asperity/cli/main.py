@@ -36,6 +36,7 @@ COMMANDS = {
     "show": "Say a measured surface in numbers, step by step.",
     "simulate": "Run texture, device and hand in one loop.",
     "surfaces": "List the surfaces that can be asked for by name.",
+    "warm": "Compile the shipped laws ahead.",
 }
 """The commands with what each does; each is ``command`` in the module of its name."""
 

@@ -1,0 +1,42 @@
+"""``asperity warm``: what is compiled ahead is what a comparison loads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from asperity import cache
+from asperity.cli import warm
+from asperity.kernels import fuse
+from asperity.laws import LAWS
+
+
+def compiled() -> tuple[dict[Path, bytes], list[str]]:
+    """Return what is kept after a run in which nothing is loaded yet, and what was said."""
+    for loaded in (fuse.load_fused, fuse.fuse_surface, fuse.fuse_sampler, fuse.fuse_contact):
+        loaded.cache_clear()
+    said: list[str] = []
+    name = "sinusoids"
+    warm.compile_ahead((LAWS["W"],), {name: warm.small_textures()[name]}, said.append)
+    code = {one.path: one.path.read_bytes() for one in cache.entries() if one.room == "code"}
+    return code, said
+
+
+@pytest.mark.keeps_answers
+def test_what_is_compiled_is_kept_and_not_compiled_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
+    first, said = compiled()
+    assert len(first) >= 3
+    assert said == ["law W on sinusoids"]
+    assert compiled()[0] == first
+    for path in first:
+        path.unlink()
+    assert compiled()[0].keys() == first.keys()
+    assert {one.room for one in cache.entries()} == {"code"}  # no answer is taken or kept
+
+
+def test_there_is_a_texture_for_each_way_to_compute_heights() -> None:
+    assert len({texture.sampler for texture in warm.small_textures().values()}) == 5
