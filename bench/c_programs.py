@@ -34,9 +34,16 @@ def run(*command: str | Path, cwd: Path | None = None) -> str:
     return done.stdout
 
 
-def header(surface: Surface, name: str = "texture", precision: str = "double") -> str:
-    """Return the whole header of a surface."""
-    return c99_files(Order(surface, name, precision), name)[f"{name}.h"]
+def header(
+    surface: Surface, name: str = "texture", precision: str = "double", folder: Path | None = None
+) -> str:
+    """Return the header of a surface; large data are written beside it, into a folder."""
+    first, *others = c99_files(Order(surface, name, precision), name).items()
+    for file, text in others:
+        if folder is None:
+            raise ValueError(f"{file} stands beside the header: name a folder for it")
+        (folder / file).write_text(text, encoding="utf-8")
+    return first[1]
 
 
 _MANY = """
@@ -81,9 +88,10 @@ def library(
 
 
 def compiled(folder: Path, compiler: str, source: Path, *flags: str) -> ctypes.CDLL:
-    """Return a source compiled into a library."""
+    """Return a source compiled into a library, with the data that stand in its folder."""
     made = folder / f"all_{len(list(folder.iterdir()))}.so"
-    run(compiler, *flags, "-shared", "-fPIC", source, "-o", made, "-lm")
+    data = folder.glob("*_data.c")
+    run(compiler, *flags, "-shared", "-fPIC", source, *data, "-o", made, "-lm")
     return ctypes.CDLL(str(made))
 
 
