@@ -329,10 +329,14 @@ def test_a_margin_widens_the_extent_on_every_side() -> None:
     assert (np.abs(found.derivatives(coordinates) - texture.derivatives(xy)) < 1e-12 * scale).all()
 
 
-def test_four_phases_need_an_extent() -> None:
-    four = Fourier(np.ones(4), np.random.default_rng(1).normal(size=(4, 2)))
-    assert four.cells() is None
-    assert four.cells((1.0, 2.0)) is not None
+def test_more_than_four_phases_need_an_extent() -> None:
+    waves = np.random.default_rng(1).normal(size=(5, 2))
+    five, four = Fourier(np.ones(5), waves), Fourier(np.ones(4), waves[:4])
+    assert five.cells() is None
+    assert five.cells((1.0, 2.0)) is not None
+    torus = four.cells()
+    assert torus is not None
+    assert torus.dimensions == 4
 
 
 # --- waves that nearly repeat ---------------------------------------------------------------------

@@ -329,6 +329,31 @@ def test_four_phases_keep_the_safe_bound_and_an_extent_certifies() -> None:
         assert values.max() <= surface.stiffness * part.upper * (1.0 + 1e-12)
 
 
+@pytest.mark.parametrize("letter", "ABCFG")
+def test_four_independent_waves_are_certified_on_the_whole_plane(letter: str) -> None:
+    rng = np.random.default_rng(7)
+    texture = Fourier(6e-5 * rng.normal(size=4), 3e3 * rng.normal(size=(4, 2)), rng.normal(size=4))
+    assert len(texture.waves.lattice[0]) == 4
+    surface = Surface(texture, letter, max_depth=0.1e-3)
+    whole, part = (characteristic_number(surface, extent=side) for side in (None, (5e-3, 5e-3)))
+    check(surface, whole, "norm", 1e-3)
+    assert part.lower <= whole.upper <= safe_bound(surface, NORM) * (1.0 + 1e-12)
+    xy, depth = rng.uniform(-1.0, 1.0, (5000, 2)), surface.max_depth * rng.random(5000)
+    z = -depth if letter in "FG" else texture.height(xy) - depth
+    values = precise_norm(surface.jacobian(np.column_stack([xy, z])))
+    assert values.max() <= surface.stiffness * whole.upper * (1.0 + 1e-12)
+
+
+def test_four_independent_waves_at_the_work_limit_keep_the_safe_bound() -> None:
+    rng = np.random.default_rng(7)
+    texture = Fourier(6e-5 * rng.normal(size=4), 3e3 * rng.normal(size=(4, 2)), rng.normal(size=4))
+    surface = Surface(texture, "C", max_depth=0.1e-3)
+    bound = characteristic_number(surface, work_limit=1)
+    assert "work limit" in bound.note
+    assert bound.method == "certified"
+    assert characteristic_number(surface).lower <= bound.upper <= safe_bound(surface, NORM)
+
+
 def test_an_extent_of_a_sinusoid_is_looked_at_too() -> None:
     """Around a trough only: the steepest flank is outside."""
     wave = Sinusoid(0.8e-3, 4e-3, phase=-math.pi / 2)

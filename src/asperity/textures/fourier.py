@@ -26,7 +26,8 @@ _WAVES_OF_AN_ENDLESS_SUM = 16
 _CELL_LIMIT = 400_000
 _SAID = 8  # waves that its repr lists
 # Suprema are searched over at most this many independent phases.
-_LARGEST_TORUS = 3
+_LARGEST_TORUS = 4
+_LARGEST_TORUS_OF_HEIGHTS = 3
 
 
 class Fourier(Texture):
@@ -133,7 +134,7 @@ class Fourier(Texture):
         return exact_waves(list(zip(*columns, strict=True)))
 
     def cells(self, extent: tuple[float, float] | None = None, margin: float = 0.0) -> Cells | None:
-        """See :class:`Texture`; more than three independent phases need an extent."""
+        """See :class:`Texture`; more than four independent phases need an extent."""
         cells = WaveCells(self.waves, extent, margin)
         return cells if cells.dimensions <= _LARGEST_TORUS else None
 
@@ -224,7 +225,7 @@ class Fourier(Texture):
         total = float(np.abs(amplitudes).sum())
         _basis, multiples = self.waves.lattice
         rank = multiples.shape[1]
-        if rank == len(amplitudes) or rank > _LARGEST_TORUS:
+        if rank == len(amplitudes) or rank > _LARGEST_TORUS_OF_HEIGHTS:
             return total  # every phase is free, or more are than can be searched: a safe bound
         bend = float(np.abs(amplitudes) @ (multiples**2).sum(axis=1))
         start = min(4 * int(np.abs(multiples).max()) + 4, int(_CELL_LIMIT ** (1.0 / rank)))

@@ -35,7 +35,7 @@ Step = Callable[[float], float]
 def certified(surface: Surface, number: Number, search: Search) -> Bound:
     """Return a number of a surface by branch and bound, or by sampling where there is no proof.
 
-    Sampling remains for sums of more than three independent waves without an extent, for which
+    Sampling remains for sums of more than four independent waves without an extent, for which
     the safe bound stands as ``upper``, and for laws of your own that are written in pieces.
 
     Raises:
@@ -46,7 +46,7 @@ def certified(surface: Surface, number: Number, search: Search) -> Bound:
     if cells is None:
         problem, step = _problem(surface, surface.texture.sampling_cells(), number)
         found = sampled(problem)
-        text = "more than three independent waves: certified numbers need an extent"
+        text = "more than four independent waves: certified numbers need an extent"
         return _bound(surface, number, problem, found, safe_bound(surface, number), text)
     radius = _least_radius(surface, search)
     if surface.max_depth >= radius:
@@ -68,6 +68,7 @@ def certified(surface: Surface, number: Number, search: Search) -> Bound:
     text = f"branch and bound, {found.cells} cells"
     if not found.reached:
         text += "; the work limit was reached before the tolerance"
+        upper = min(upper, safe_bound(surface, number))
     bound = _bound(surface, number, problem, found, upper, text)
     if found.reached and bound.gap > 1.01 * search.gap(problem.cells) and bound.upper > _NOTHING:
         return replace(bound, note=f"{text}; the witness is only near the supremum")

@@ -39,7 +39,8 @@ def characteristic_number(
     Args:
         surface: the surface.
         tolerance: relative gap (upper - lower)/lower at which to stop; by default 1e-6 on
-            profiles and periodic sums, 1e-4 on sums of three independent waves, 1e-3 on maps.
+            profiles and periodic sums, 1e-4 on sums of three independent waves, 1e-3 on those of
+            four and on maps.
         work_limit: greatest number of cells to look at; if it is reached the bounds found by then
             are returned, and the note says so.
         extent: width and depth [m] of the part of the plane that counts, from the origin, for

@@ -70,7 +70,7 @@ def sharpest_crest(
     """Return the crest of least radius, certified; nothing for a surface without crests.
 
     Exact for a sinusoid; else by branch and bound to a relative tolerance of the curvature. A sum
-    of more than three independent waves is sampled unless an extent is given, which is then
+    of more than four independent waves is sampled unless an extent is given, which is then
     looked at with a margin on every side.
     """
     if texture.single_wave is not None and extent is None:

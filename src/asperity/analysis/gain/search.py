@@ -21,8 +21,8 @@ class Search:
 
     Attributes:
         tolerance: relative gap; ``None`` for 1e-6 on profiles and periodic sums, 1e-4 on sums of
-            three independent waves, 1e-3 on maps and wherever a depth or an anchor's state has
-            to be searched as well.
+            three independent waves, 1e-3 on those of four, on maps and wherever a depth or an
+            anchor's state has to be searched as well.
         work_limit: greatest number of cells.
         extent: width and depth [m] of the part of the plane that counts, for sums of waves.
     """

@@ -27,6 +27,8 @@ from asperity.textures.plane_waves import PlaneWaves
 
 # Sines per chunk.
 _SINES = 2_000_000
+# Of four coordinates more cells would take minutes, and tell little more.
+_MOST = {4: 1_000_000}
 # First samples of each wave of a profile.
 _PER_WAVE = 64
 _ODD = [i for i, name in enumerate(NAMES) if sum(ORDERS[name]) == 1]
@@ -61,6 +63,7 @@ class WaveCells(Cells):
         every = np.stack(list(self._weights.values()), axis=-1)
         self._even, self._odd = every[:, _EVEN], every[:, _ODD]
         self.dimensions = self._multiples.shape[1]
+        self.most = _MOST.get(self.dimensions)
         self.gap, self.cheap_gap = GAPS.get(self.dimensions, 1e-3), CHEAP_GAPS.get(self.dimensions)
 
     def start(self) -> tuple[Iterator[FloatArray], FloatArray]:
