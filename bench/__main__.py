@@ -19,6 +19,7 @@ from bench import (
     simulation,
     split,
     startup,
+    ticks,
     waiting,
 )
 
@@ -28,6 +29,7 @@ PARTS: dict[str, Callable[[Console], None]] = {
     "cache": cache.run,
     "nearest": nearest.run,
     "split": split.run,
+    "ticks": ticks.run,
     "simulation": simulation.run,
     "recording": recording.run,
     "servo": servo.run,

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from asperity.arguments import DEFAULT_STIFFNESS, MAX_DEPTH, STIFFNESS, Argument
 from asperity.checks import FloatArray, Points, array, positive
 from asperity.checks import points as read_points
+from asperity.contacts.memory import UNLIMITED, checked_memory, new_memory
 from asperity.derive.facts import LawFacts, clamped_facts
 from asperity.display import Plotted
 from asperity.errors import ParameterError, nearest_names
@@ -396,7 +397,13 @@ class Surface(Plotted):
         )
         return probes.answer(forces), probes.answer(jacobians)
 
-    def trace(self, path: ArrayLike) -> FloatArray:
+    @cached_property
+    def _path_loops(self) -> ModuleType:
+        from asperity.kernels.fuse import fuse_path
+
+        return fuse_path(self.law, self.texture.sampler, self.acting_clamp)
+
+    def trace(self, path: ArrayLike, memory: FloatArray | None = None) -> FloatArray:
         """Return the forces along a path, the law's state carried from point to point.
 
         The anchor of a law with state is set where contact begins, dragged so that the
@@ -405,6 +412,9 @@ class Surface(Plotted):
 
         Args:
             path: successive probe positions [m], shape (n, 3).
+            memory: what a search for nearest points remembers, of
+                :func:`asperity.contacts.memory.new_memory`, with the looks that a point of the path
+                may take; changed. Without it every answer is exact, as that of :meth:`force`.
 
         Returns:
             f [N], shape (n, 3).
@@ -413,10 +423,16 @@ class Surface(Plotted):
             ParameterError: for another shape, or positions that are not finite.
         """
         probes = array("path", path, (None, 3), "m")
-        if not self.law.stateful:
+        remembers = self.law.contact.remembers
+        if not (self.law.stateful or remembers):
             return self.force(probes)
-        out = np.empty((len(probes), 3))
-        self._loops.trace_batch(probes, out, self.texture.arguments, self.law_arguments)
+        kept = new_memory(UNLIMITED) if memory is None else checked_memory(memory)
+        out, told = np.empty((len(probes), 3)), np.empty((len(probes), 2))
+        arguments = (self.texture.arguments, self.law_arguments)
+        if remembers:
+            self._path_loops.path_batch(probes, out, told, kept, *arguments)
+        else:
+            self._loops.trace_batch(probes, out, *arguments)
         return out
 
     def _state(self, probes: Points, deflection: ArrayLike | None) -> tuple[Any, ...]:

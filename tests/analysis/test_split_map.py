@@ -112,12 +112,12 @@ def test_the_plain_solver_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> Non
     def curvature(x: float, y: float, _texture: object) -> tuple[float, ...]:
         return tuple(texture.derivatives(np.array([[x, y]]))[0].tolist())
 
-    def foot(x: float, y: float, z: float, _texture: object) -> tuple[float, ...]:
+    def foot_within(x: float, y: float, z: float, *_start: object) -> tuple[float, ...]:
         fx, fy, _h = texture.nearest([[x, y, z]])[0].tolist()
-        return fx, fy, *curvature(fx, fy, None)[:3]
+        return fx, fy, *curvature(fx, fy, None)[:3], 0.0, 1.0
 
     monkeypatch.setattr(conditions, "curvature", curvature)
-    monkeypatch.setattr(solver, "foot", foot)
+    monkeypatch.setattr(solver, "foot_within", foot_within)
     for module in (conditions, solver):
         monkeypatch.setattr(module, "height", lambda *place: curvature(*place)[0])
     surface = Surface(texture, "H", K, continuity=2.0)

@@ -10,6 +10,7 @@ import pytest
 from tests.own_modules import imported
 
 from asperity.checks import FloatArray
+from asperity.contacts.memory import new_memory
 from asperity.kernels import tick
 from asperity.kernels.fuse import fuse_on_texture
 from asperity.simulation import Cartesian, MovedHand, Servo, Strokes, simulate
@@ -29,11 +30,11 @@ from asperity.kernels.tick import first_state, servo_tick
 KERNELS = Kernels(requires=("first_state", "servo_tick"), loops=("device_batch",))
 
 
-def device_batch(positions, forces, settings, texture, law):
+def device_batch(positions, forces, settings, memory, texture, law):
     state = first_state(positions[0, 0], positions[0, 1], positions[0, 2], settings)
     for i in range(positions.shape[0]):
         state = servo_tick(
-            state, settings, positions[i, 0], positions[i, 1], positions[i, 2], texture, law
+            state, settings, positions[i, 0], positions[i, 1], positions[i, 2], memory, texture, law
         )
         forces[i, 0] = state.fx
         forces[i, 1] = state.fy
@@ -55,7 +56,8 @@ def commanded(device: ModuleType, surface: Surface, positions: FloatArray) -> Fl
     fused = fuse_on_texture(surface.law, surface.texture.sampler, "none", (device,), (tick,))
     forces = np.empty_like(positions)
     arguments = surface.texture.arguments, surface.law_arguments
-    state = fused.device_batch(positions, forces, SERVO.settings, *arguments)
+    memory = new_memory(surface.law.contact.looks)
+    state = fused.device_batch(positions, forces, SERVO.settings, memory, *arguments)
     assert isinstance(state, tick.ServoState)
     assert state[-3:] == tuple(forces[-1])
     return forces

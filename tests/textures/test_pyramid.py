@@ -13,7 +13,7 @@ Boxes = list[tuple[np.ndarray, slice, slice]]
 
 
 def boxes_of_map(texture: HeightMap) -> Boxes:
-    """Return the four numbers of every box, with the rows and columns of its cells."""
+    """Return the five numbers of every box, with the rows and columns of its cells."""
     values, levels = texture.arguments.nodes, texture.arguments.levels
     boxes = []
     for level, (start, rows, columns) in enumerate(levels):
@@ -49,13 +49,15 @@ def sampled_cells(texture: HeightMap, per_side: int) -> dict[str, np.ndarray]:
     angles = np.linspace(0.0, np.pi, 25)
     units = np.column_stack([np.cos(angles), np.sin(angles)])
     along = np.abs(np.einsum("nijk,ai,aj,ak->na", tensor, units, units, units)).max(axis=1)
-    bend = np.abs(np.linalg.eigvalsh(texture.hessian(xy))).max(axis=1)
+    curved = np.linalg.eigvalsh(texture.hessian(xy))
+    bend = np.abs(curved).max(axis=1)
     height = cells(texture.height(xy))
     return {
         "low": height.min(axis=2),
         "high": height.max(axis=2),
         "bend": cells(bend).max(axis=2),
         "twist": cells(along).max(axis=2),
+        "dent": cells(-curved[:, 0]).max(axis=2),
     }
 
 
@@ -73,11 +75,12 @@ def test_no_sample_of_a_map_leaves_the_bounds_of_its_boxes(name: str):
     cells = sampled_cells(texture, 9)
     px = texture.pitch[0]
     size = np.abs(texture.heights).max()
-    for (low, high, bend, twist), rows, columns in boxes_of_map(texture):
+    for (low, high, bend, twist, dent), rows, columns in boxes_of_map(texture):
         assert low <= cells["low"][rows, columns].min()
         assert high >= cells["high"][rows, columns].max()
         assert bend >= cells["bend"][rows, columns].max() * px - 1e-12 * size / px
         assert twist >= cells["twist"][rows, columns].max() * px**2 * (1 - 1e-6) - 1e-7 * size / px
+        assert bend >= dent >= max(cells["dent"][rows, columns].max() * px - 1e-12 * size / px, 0.0)
 
 
 @pytest.mark.parametrize("name", ["finite", "periodic", "steep"])
@@ -86,7 +89,7 @@ def test_the_bounds_of_a_map_are_not_wide(name: str):
     texture = MAPS[name]
     cells, px = sampled_cells(texture, 9), texture.pitch[0]
     used: list[list[float]] = []
-    for (low, high, bend, twist), rows, columns in boxes_of_map(texture)[:12]:
+    for (low, high, bend, twist, _dent), rows, columns in boxes_of_map(texture)[:12]:
         inner = np.ptp([cells["low"][rows, columns].min(), cells["high"][rows, columns].max()])
         used.append([inner / (high - low), cells["bend"][rows, columns].max() * px / bend,
                      cells["twist"][rows, columns].max() * px**2 / twist])  # fmt: skip
@@ -94,10 +97,10 @@ def test_the_bounds_of_a_map_are_not_wide(name: str):
 
 
 def finest(texture: HeightMap) -> np.ndarray:
-    """Return the numbers of the finest boxes, shape (rows, columns, 4)."""
+    """Return the numbers of the finest boxes, shape (rows, columns, 5)."""
     values, levels = texture.arguments.nodes, texture.arguments.levels
     _start, rows, columns = levels[0]
-    return np.asarray(values[: rows * columns].reshape(rows, columns, 4), dtype=np.float64)
+    return np.asarray(values[: rows * columns].reshape(rows, columns, 5), dtype=np.float64)
 
 
 def just_above(bound: np.ndarray, exact: np.ndarray | float, greatest: float) -> bool:
@@ -112,6 +115,8 @@ def test_bounds_of_a_paraboloid_are_exact():
     boxes = finest(texture)
     inner = boxes[18:22, 18:22]
     assert just_above(inner[..., 2], 6.0 * 1e-4, boxes[..., 2].max())
+    # As a crest it is bent along y alone.
+    assert just_above(inner[..., 4], 4.0 * 1e-4, boxes[..., 2].max())
     # Bernstein coefficients of a parabola over a cell: at its ends, and a third above or below.
     corner = 3.0 * x[36, 38] ** 2 - 2.0 * y[36, 38] ** 2
     assert corner <= inner[0, 0, 1] <= corner + 1e-8
@@ -149,16 +154,18 @@ def test_a_profile_stays_in_its_boxes(count: int, periodic: bool):
     xy = np.column_stack([x.ravel(), np.zeros(x.size)])
     height = texture.height(xy).reshape(cells, -1)
     second = np.abs(texture.hessian(xy)[:, 0, 0]).reshape(cells, -1).max(axis=1)
+    crest = (-texture.hessian(xy)[:, 0, 0]).reshape(cells, -1).max(axis=1)
     ends = texture.hessian(xy)[:, 0, 0].reshape(cells, -1)[:, [1, -2]]
     third = np.abs(ends[:, 1] - ends[:, 0]) / (30 * texture.pitch / 32)
     for level, (start, boxes) in enumerate(levels):
         for n in range(boxes):
-            low, high, bend, twist = values[start + n]
+            low, high, bend, twist, dent = values[start + n]
             part = slice(n << level, (n + 1) << level)
             assert low <= height[part].min()
             assert high >= height[part].max()
             assert bend >= second[part].max() * texture.pitch * (1 - 1e-12)
             assert twist >= third[part].max() * texture.pitch**2 * (1 - 1e-9)
+            assert dent >= max(crest[part].max() * texture.pitch * (1 - 1e-12), 0.0)
     # Of one cell they are exact: h'' is linear there, h''' constant.
     for column, exact in ((2, second * texture.pitch), (3, third * texture.pitch**2)):
         found = values[:cells, column].astype(np.float64)

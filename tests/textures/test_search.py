@@ -13,9 +13,11 @@ import pytest
 
 from asperity.contacts.nearest import line_search as line
 from asperity.contacts.nearest import plane_search as search
+from asperity.contacts.sampler import EXACT
 
 Cubic = np.ndarray  # coefficients of x^i y^j, i + j <= 3, shape (4, 4)
 LEVEL = (0.0, 0.0, 0.0)  # a probe below the origin
+LOOKS = (EXACT, 1e9)  # nothing that is nearer is dropped, and looks enough
 
 
 def value(c: Cubic, x: np.ndarray, y: np.ndarray, dx: int = 0, dy: int = 0) -> np.ndarray:
@@ -218,7 +220,9 @@ def test_a_box_is_closed_only_when_its_minima_are_known(monkeypatch: pytest.Monk
         wide = rng.choice([1.0, 4.0]) * rng.uniform(-1.0, 1.0, 2)
         probe = below(c, *(np.array([a, b]) * wide), rng.exponential())
         best = (9.0, 9.0, 1e9, 0.0, 0.0, 0.0)
-        after, open_ = search.judge(*probe, 0.0, 0.0, a, b, *bounds(c, a, b), best, c)
+        after, open_, _left = search.judge(
+            *probe, 0.0, 0.0, a, b, *bounds(c, a, b), best, *LOOKS, c
+        )
         if open_:
             continue
         closed += 1
@@ -260,10 +264,12 @@ def test_an_interval_is_closed_only_when_its_minima_are_known(
         bend, twist = max(abs(2 * c[2] + 6 * c[3] * r), abs(2 * c[2] - 6 * c[3] * r)), 6 * abs(c[3])
         if as_map:
             start = (9.0, 9.0, 1e9, 0.0, 0.0, 0.0)
-            after, open_ = search.judge(x, 0.0, z, 0.0, 0.0, r, 1e-3, bend, twist, start, c)
+            box = (0.0, 0.0, r, 1e-3, bend, twist)
+            after, open_, _left = search.judge(x, 0.0, z, *box, start, *LOOKS, c)
             value = after[2]
         else:
-            answer, open_ = line.judge(x, z, 0.0, r, bend, twist, (9.0, 1e9, 0.0, 0.0), c)
+            unknown = (9.0, 1e9, 0.0, 0.0)
+            answer, open_, _left = line.judge(x, z, 0.0, r, bend, twist, unknown, *LOOKS, c)
             value = answer[1]
         if open_:
             continue
@@ -285,14 +291,16 @@ def test_a_box_stays_open_when_the_minimum_lies_outside(monkeypatch: pytest.Monk
     monkeypatch.setattr(search, "curvature", profile_as_map)
     monkeypatch.setattr(line, "along", profile)
     flat, at = np.zeros(4), (0.0, 0.0)
-    monkeypatch.setattr(search, "descend", lambda *_: (*at, 0.5, 0.0, 0.0, 0.0))
-    monkeypatch.setattr(line, "descend", lambda *_: (at[0], 0.5, 0.0, 0.0))
-    unknown = (9.0, 9.0, 1e9, 0.0, 0.0, 0.0)
+    monkeypatch.setattr(search, "go_down", lambda *_: ((*at, 0.5, 0.0, 0.0, 0.0), 1.0))
+    monkeypatch.setattr(line, "go_down", lambda *_: ((at[0], 0.5, 0.0, 0.0), 1.0))
+    unknown = ((9.0, 9.0, 1e9, 0.0, 0.0, 0.0), *LOOKS)
+    unknown_line = ((9.0, 1e9, 0.0, 0.0), *LOOKS)
     for x, y in ((0.3, 0.0), (0.101, 0.0), (-0.101, 0.0), (0.0, 0.101), (0.0, -0.101), (0.1, 0.1)):
         at = x, y
-        best, open_ = search.judge(0.05, 0.0, -1.0, 0.0, 0.0, 0.1, 0.1, 0.0, 0.0, unknown, flat)
+        box = (0.0, 0.0, 0.1, 0.1, 0.0, 0.0)
+        best, open_, _left = search.judge(0.05, 0.0, -1.0, *box, *unknown, flat)
         assert (best[:2], open_) == (at, max(abs(x), abs(y)) > 0.1)
-        best, open_ = line.judge(0.05, -1.0, 0.0, 0.1, 0.0, 0.0, (9.0, 1e9, 0.0, 0.0), flat)
+        best, open_, _left = line.judge(0.05, -1.0, 0.0, 0.1, 0.0, 0.0, *unknown_line, flat)
         assert (best[0], open_) == (x, abs(x) > 0.1)
 
 
@@ -304,20 +312,20 @@ def test_a_descent_begins_at_the_best_point_in_the_box_or_by_newton(
     monkeypatch.setattr(line, "along", profile)
     starts: list[tuple[float, ...]] = []
 
-    def from_here(*arguments: float) -> tuple[float, ...]:
-        start = arguments[3:5] if len(arguments) == 6 else arguments[2:3]
+    def from_here(*arguments: float) -> tuple[tuple[float, ...], float]:
+        start = arguments[3:5] if len(arguments) == 7 else arguments[2:3]
         starts.append(start)
-        return *start, *[0.0] * (len(arguments) - 2)
+        return (*start, *[0.0] * (len(arguments) - 3)), 1.0
 
-    monkeypatch.setattr(search, "descend", from_here)
-    monkeypatch.setattr(line, "descend", from_here)
+    monkeypatch.setattr(search, "go_down", from_here)
+    monkeypatch.setattr(line, "go_down", from_here)
     flat, above = np.zeros(4), (0.52, 0.31)
     for x, y in itertools.product((0.45, -0.45, 0.61), (0.35, -0.35, 0.41)):
         known = (x, y) == (0.45, 0.35)
         best = (x, y, 1e9, 0.0, 0.0, 0.0)
-        search.judge(*above, -1.0, 0.5, 0.3, 0.1, 0.1, 0.0, 0.0, best, flat)
+        search.judge(*above, -1.0, 0.5, 0.3, 0.1, 0.1, 0.0, 0.0, best, *LOOKS, flat)
         assert starts.pop() == pytest.approx((x, y) if known else above, abs=1e-15)
-        line.judge(0.52, -1.0, 0.5, 0.1, 0.0, 0.0, (x, 1e9, 0.0, 0.0), flat)
+        line.judge(0.52, -1.0, 0.5, 0.1, 0.0, 0.0, (x, 1e9, 0.0, 0.0), *LOOKS, flat)
         assert starts.pop() == pytest.approx((0.45 if x == 0.45 else 0.52,), abs=1e-15)
 
 
@@ -330,8 +338,8 @@ def test_rounding_drops_no_level_point_on_the_border(monkeypatch: pytest.MonkeyP
         c[1, 0] = steep
         probe = below(c, a, b, rng.exponential())
         assert not hopeless(c, probe, a, b, np.inf)
-        unknown = (9.0, 1e99, 0.0, 0.0)
-        best, _open = line.judge(probe[0], probe[2], 0.0, a, 0.0, 0.0, unknown, c[:, 0])
+        unknown = ((9.0, 1e99, 0.0, 0.0), *LOOKS)
+        best, *_open = line.judge(probe[0], probe[2], 0.0, a, 0.0, 0.0, *unknown, c[:, 0])
         assert best[0] == pytest.approx(a, rel=1e-9)
 
 
@@ -343,7 +351,8 @@ def test_a_profile_interval_is_kept_if_it_can_be_level(monkeypatch: pytest.Monke
     limit = r + 0.5 * twist * gap * r * r
     for share, dropped in ((0.99, False), (1.04, True)):
         start = (9.0, 1e9, 0.0, 0.0)
-        best, open_ = line.judge(-share * limit, -gap, 0.0, r, twist * r, twist, start, c)
+        bounds_of = (twist * r, twist)
+        best, open_, _left = line.judge(-share * limit, -gap, 0.0, r, *bounds_of, start, *LOOKS, c)
         assert (best == start and not open_) == dropped
 
 
@@ -365,6 +374,24 @@ def test_a_descent_ends_at_a_local_minimum(monkeypatch: pytest.MonkeyPatch):
         x, phi, *_profile = line.descend(probe[0], probe[2], start[0], c[:, 0])
         assert abs(own.deriv()(x)) <= 1e-6 * own.deriv(2)(x)
         assert phi <= own(start[0])
+
+
+def test_a_descent_takes_no_more_looks_than_are_left(monkeypatch: pytest.MonkeyPatch):
+    """It counts them, and ends with the lowest point that it has seen."""
+    monkeypatch.setattr(search, "curvature", curvature)
+    monkeypatch.setattr(line, "along", profile)
+    c, probe = cubic(np.random.default_rng(48), 1.0), (0.3, -0.2, -1.0)
+    last = np.inf
+    for looks in range(1, 40):
+        best, left = search.go_down(*probe, 3.0, -2.0, float(looks), c)
+        assert left >= 0.0
+        assert best[2] <= last
+        last = best[2]
+        short, rest = line.go_down(0.3, -1.0, 3.0, float(looks), c[:, 0])
+        assert rest >= 0.0
+        assert short[1] >= line.descend(0.3, -1.0, 3.0, c[:, 0])[1]
+    assert left > 0.0
+    assert best == search.descend(*probe, 3.0, -2.0, c)
 
 
 def test_next_box_visits_every_box_once():

@@ -77,6 +77,12 @@ class Contact(ABC):
         clampable: whether a law on this contact may have its depth clamped.
         holds_anchor: whether a law on this contact may have state, an anchor that is held while
             there is contact.
+        remembers: whether the point is found sooner where the last one is known; see
+            :meth:`again_code`.
+        looks: evaluations of the surface that a tick of a servo may take where it remembers; the
+            time that it takes is in `make bench`.
+        gap_is_force: whether what a search leaves open when its looks are used up bounds the error
+            of the force over the stiffness; else it bounds how much nearer another point may be.
         parameters: names that a law on this contact must have among its own.
     """
 
@@ -88,6 +94,9 @@ class Contact(ABC):
     cost: ClassVar[float] = 1000.0
     clampable: ClassVar[bool] = False
     holds_anchor: ClassVar[bool] = False
+    remembers: ClassVar[bool] = False
+    looks: ClassVar[float] = 1.0
+    gap_is_force: ClassVar[bool] = False
     parameters: ClassVar[tuple[str, ...]] = ()
 
     def __str__(self) -> str:
@@ -179,6 +188,14 @@ class Contact(ABC):
         lines, condition = self.begin_code(frozenset())
         sampled_lines = self.sample_code(frozenset({"depth"}))
         return [*lines, f"if not {condition}:", "    return 0.0", *sampled_lines, "return depth"]
+
+    def again_code(self, wanted: frozenset[str]) -> list[str]:
+        """Return the lines of :meth:`sample_code` for a tick that follows on another.
+
+        Those of a contact that ``remembers`` use and renew ``memory``, the array of
+        :mod:`asperity.contacts.memory` as the last tick left it.
+        """
+        return self.sample_code(wanted)
 
     @abstractmethod
     def begin(self, texture: HeightField, xy: FloatArray) -> FloatArray:

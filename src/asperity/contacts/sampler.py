@@ -18,6 +18,15 @@ def sampled(wanted: frozenset[str], place: str) -> list[str]:
     return [f"h = height({place}, texture)"] if "h" in wanted else []
 
 
+# A search drops what is not nearer than the best, but for rounding; see ``search_plane``.
+EXACT = 1.0 - 1e-13
+# A box that is passed without a look at the surface costs so many looks.
+PASSED = 0.125
+
+# A point of the surface, X, Y, φ, h, h_x, h_y, and one of a profile, X, φ, h, h'.
+PlanePoint = tuple[float, float, float, float, float, float]
+LinePoint = tuple[float, float, float, float]
+
 OFFERED = {
     "height": "heights",
     "slope": "slopes",
@@ -46,6 +55,35 @@ def curvature(
 
 def foot(x: float, y: float, z: float, texture: object) -> tuple[float, float, float, float, float]:
     """Return X, Y of the globally nearest surface point [m], and h [m], h_x, h_y [1] there."""
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
+
+
+def foot_within(
+    x: float, y: float, z: float, start_x: float, start_y: float, budget: float, texture: object
+) -> tuple[float, float, float, float, float, float, float]:
+    """Return a foot as far as a budget of looks finds it: X, Y, h, h_x, h_y, the gap, the looks.
+
+    No point of the surface is nearer than this one by more than the gap [m]; it is 0 unless the
+    budget was used up. The search goes downhill from a start: near the foot, it is short.
+    """
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
+
+
+def search_plane(
+    x: float, y: float, z: float, best: PlanePoint, keep: float, left: float, texture: object
+) -> tuple[PlanePoint, float]:
+    """Return the best point after a search of all that can be nearer, and the looks left.
+
+    Dropped is what has nowhere less than ``keep`` times the square of the best's distance. If no
+    looks are left the search did not come to its end.
+    """
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
+
+
+def search_line(
+    x: float, z: float, best: LinePoint, keep: float, left: float, texture: object
+) -> tuple[LinePoint, float]:
+    """Do the same of a profile."""
     raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 

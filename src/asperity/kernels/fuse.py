@@ -105,6 +105,14 @@ def fuse_surface(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) ->
     return fuse_on_texture(law, sampler, clamp, asking, instead=(batch_sine,))
 
 
+@lru_cache(maxsize=256)
+def fuse_path(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) -> ModuleType:
+    """Return the compiled loop of a law along a path, ``path_batch``; as :func:`fuse_surface`."""
+    from asperity.kernels import path_loops
+
+    return fuse_on_texture(law, sampler, clamp, (path_loops,))
+
+
 def fuse_on_texture(
     law: Law,
     sampler: tuple[ModuleType, ...],

@@ -5,6 +5,8 @@ binds the calls of the loops to them. ``texture`` is the record of a texture kin
 :attr:`asperity.surface.Surface.law_arguments` says.
 """
 
+from asperity.checks import FloatArray
+
 Triple = tuple[float, float, float]
 Nine = tuple[float, float, float, float, float, float, float, float, float]
 
@@ -13,6 +15,14 @@ def probe_force(
     x: float, y: float, z: float, dx: float, dy: float, texture: object, law: object
 ) -> Triple:
     """Return the force [N]; (dx, dy) is the deflection of the anchor [m] of a law with state."""
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
+
+
+def probe_again(
+    x: float, y: float, z: float, dx: float, dy: float, memory: FloatArray, texture: object,
+    law: object,
+) -> Triple:  # fmt: skip
+    """Return the same of a law whose contact remembers, from what the last tick left."""
     raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
@@ -40,6 +50,17 @@ def probe_held(
     """Return the force [N] with the law's anchor carried on: where it is [m], whether held.
 
     A law with state holds its anchor while there is contact; others leave it as it is.
+    """
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
+
+
+def probe_tick(
+    x: float, y: float, z: float, ax: float, ay: float, held: bool, memory: FloatArray,
+    texture: object, law: object,
+) -> tuple[float, float, float, float, float, bool]:  # fmt: skip
+    """Return the same within the budget of ``memory``, what the contact remembers.
+
+    See :mod:`asperity.contacts.memory`; out of contact it stays as it is.
     """
     raise NotImplementedError  # the interface alone; the linker binds calls of it
 

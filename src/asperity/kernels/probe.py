@@ -66,22 +66,30 @@ class ProbePlan:
 def probe_source(plan: ProbePlan) -> str:
     """Return the functions of a probe point, as source."""
     parts = (_probe_force, _probe_jacobian, _probe_inside, _probe_depth, _probe_held)
-    return "\n\n\n".join(part(plan) for part in parts)
+    texts = [part(plan) for part in parts]
+    if plan.law.contact.remembers:
+        texts.append(_probe_force(plan, again=True))
+    texts.append(_probe_held(plan, again=True))
+    return "\n\n\n".join(texts)
 
 
 def _function(head: str, lines: Sequence[str]) -> str:
     return f"def {head}:\n{textwrap.indent(chr(10).join(lines), ' ' * 4)}\n"
 
 
-def _in_contact(plan: ProbePlan, wanted: frozenset[str], results: Sequence[str]) -> list[str]:
+def _in_contact(
+    plan: ProbePlan, wanted: frozenset[str], results: Sequence[str], again: bool = False
+) -> list[str]:
     """Return the lines that leave a function out of contact, and find what is wanted in it."""
-    lines, condition = plan.law.contact.begin_code(wanted)
+    contact = plan.law.contact
+    lines, condition = contact.begin_code(wanted)
     leave = [f"if not {condition}:", f"    return {', '.join(['0.0'] * len(results))}"]
-    return [plan.unpack, *lines, *leave, *plan.law.contact.sample_code(wanted)]
+    sample = contact.again_code(wanted) if again else contact.sample_code(wanted)
+    return [plan.unpack, *lines, *leave, *sample]
 
 
-def _probe_force(plan: ProbePlan) -> str:
-    lines = _in_contact(plan, plan.wanted("law_force"), _FORCE)
+def _probe_force(plan: ProbePlan, again: bool = False) -> str:
+    lines = _in_contact(plan, plan.wanted("law_force"), _FORCE, again)
     call = plan.call("law_force")
     if plan.clamp in {"whole", "backed"}:
         lines += ["depth = min(depth, clamp_depth)"]
@@ -91,9 +99,10 @@ def _probe_force(plan: ProbePlan) -> str:
         lines += [f"    fx, fy, _unclamped = {call}"]
     if plan.clamp == "backed":
         lines += ["if z < floor:", "    fz += k * (floor - z)"]
-    return _function(
-        "probe_force(x, y, z, dx, dy, texture, law)", [*lines, f"return {', '.join(_FORCE)}"]
-    )
+    lines.append(f"return {', '.join(_FORCE)}")
+    if again:
+        return _function("probe_again(x, y, z, dx, dy, memory, texture, law)", lines)
+    return _function("probe_force(x, y, z, dx, dy, texture, law)", lines)
 
 
 def _probe_jacobian(plan: ProbePlan) -> str:
@@ -125,12 +134,15 @@ def _probe_depth(plan: ProbePlan) -> str:
     return _function("probe_depth(x, y, z, texture)", plan.law.contact.depth_code())
 
 
-def _probe_held(plan: ProbePlan) -> str:
-    if plan.law.stateful:
-        lines = [plan.unpack, *_HELD.splitlines()]
+def _probe_held(plan: ProbePlan, again: bool = False) -> str:
+    lines = [plan.unpack, *_HELD.splitlines()] if plan.law.stateful else ["dx = dy = 0.0"]
+    if again and plan.law.contact.remembers:
+        lines.append("fx, fy, fz = probe_again(x, y, z, dx, dy, memory, texture, law)")
     else:
-        lines = ["fx, fy, fz = probe_force(x, y, z, 0.0, 0.0, texture, law)"]
+        lines.append("fx, fy, fz = probe_force(x, y, z, dx, dy, texture, law)")
     lines.append("return fx, fy, fz, ax, ay, held")
+    if again:
+        return _function("probe_tick(x, y, z, ax, ay, held, memory, texture, law)", lines)
     return _function("probe_held(x, y, z, ax, ay, held, texture, law)", lines)
 
 
@@ -141,7 +153,6 @@ if probe_inside(x, y, z, texture):
     held = True
 else:
     held = False
-fx, fy, fz = probe_force(x, y, z, dx, dy, texture, law)
 """
 
 

@@ -1,17 +1,19 @@
 """One tick of a servo: from the position that an encoder reads to the force that is commanded.
 
 A simulation calls it sample by sample, and so may the loop of a device. It keeps nothing: what is
-carried from tick to tick is a record that goes in and comes out.
+carried from tick to tick is a record that goes in and comes out, and the array of
+:mod:`asperity.contacts.memory`, which also holds a tick to a budget.
 """
 
 import math
 from typing import NamedTuple
 
+from asperity.checks import FloatArray
 from asperity.compiled import Kernels
-from asperity.kernels.law_functions import probe_held
+from asperity.kernels.law_functions import probe_tick
 
 KERNELS = Kernels(
-    provides=("first_state", "flushed", "flushed_state", "servo_tick"), requires=("probe_held",)
+    provides=("first_state", "flushed", "flushed_state", "servo_tick"), requires=("probe_tick",)
 )
 
 
@@ -116,7 +118,7 @@ def flushed_state(state: ServoState) -> ServoState:
 
 def servo_tick(
     state: ServoState, settings: ServoSettings, x: float, y: float, z: float,
-    texture: object, law: object,
+    memory: FloatArray, texture: object, law: object,
 ) -> ServoState:  # fmt: skip
     """Return the state after a tick; it holds the force that is commanded.
 
@@ -129,14 +131,15 @@ def servo_tick(
         x: position of the handle [m].
         y: likewise.
         z: likewise.
+        memory: of the contact; changed.
         texture: record of the texture.
         law: parameters of the law.
     """
     x = rounded(x, settings.position_step)
     y = rounded(y, settings.position_step)
     z = rounded(z, settings.position_step)
-    fx, fy, fz, ax, ay, held = probe_held(
-        x, y, z, state.anchor_x, state.anchor_y, state.held, texture, law
+    fx, fy, fz, ax, ay, held = probe_tick(
+        x, y, z, state.anchor_x, state.anchor_y, state.held, memory, texture, law
     )
     vx = state.vx
     vy = state.vy

@@ -17,8 +17,8 @@ KERNELS = Kernels(
 
 
 def replay_batch(
-    points: FloatArray, first: int, state: ServoState, settings: ServoSettings, texture: object,
-    law: object, out: FloatArray,
+    points: FloatArray, first: int, state: ServoState, settings: ServoSettings, memory: FloatArray,
+    texture: object, law: object, out: FloatArray,
 ) -> ServoState:  # fmt: skip
     """Write force [N], anchor of the law [m] and whether it is held, shape (n, 6); carry the state.
 
@@ -27,6 +27,7 @@ def replay_batch(
         first: number of the first sample.
         state: of the servo before it; none counts for sample 0.
         settings: of the servo.
+        memory: of the contact; changed.
         texture: record of the texture.
         law: parameters of the law.
         out: what is written.
@@ -37,7 +38,9 @@ def replay_batch(
         # As the loop does: see asperity.simulation.kernels.servo_loop.
         if (first + i) & 255 == 0:
             state = flushed_state(state)
-        state = servo_tick(state, settings, points[i, 0], points[i, 1], points[i, 2], texture, law)
+        state = servo_tick(
+            state, settings, points[i, 0], points[i, 1], points[i, 2], memory, texture, law
+        )
         out[i, 0] = state.fx
         out[i, 1] = state.fy
         out[i, 2] = state.fz

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from asperity.checks import FloatArray
+from asperity.contacts.memory import new_memory
 from asperity.content import formula_content, surface_content
 from asperity.display import Displayed
 from asperity.errors import ParameterError
@@ -183,12 +184,13 @@ def _replayed(
     point = [names.index(axis) for axis in "xyz"]
     compared = [0, *(names.index(name) for name in COMPARED)]
     loops, state, first = _loops(field.law, field.sampler, field.clamp), ServoState(), 0
+    memory = new_memory(field.law.contact.looks)
     for block in recording.blocks():
         _check_times(block[:, 0], first, settings.period)
         points = np.ascontiguousarray(block[:, point])
         out = np.empty((len(block), len(COMPARED)))
         arguments = field.texture, field.law_arguments
-        state = loops.replay_batch(points, first, state, settings, *arguments, out)
+        state = loops.replay_batch(points, first, state, settings, memory, *arguments, out)
         yield first, block[:, compared], out
         first += len(block)
 

@@ -49,9 +49,22 @@ def answer(setup: Setup, run: Run) -> str:
         said = f"{said}. The run stopped: it {run.stopped}"
     if not run.closes:
         said = f"{said}. The energy does not add up: believe no number of this run"
+    if run.short:
+        said = f"{said}. {uncertainty(run)}"
     if run.stopped:
         return f"{said}."
     return f"{said}. {unrest(setup, run)}."
+
+
+def uncertainty(run: Run) -> str:
+    """Return how far the forces can be wrong where the search had too little time."""
+    share = (
+        f"In {run.short} of {run.samples} samples the search for the nearest point was cut short"
+    )
+    if run.surface.law.contact.gap_is_force:
+        error = engineering(run.surface.stiffness * run.gap, "N", digits=2)
+        return f"{share}: the force was right to {error}"
+    return f"{share}: another point was nearer by {engineering(run.gap, 'm', digits=2)} at most"
 
 
 def unrest(setup: Setup, run: Run) -> str:

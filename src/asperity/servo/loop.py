@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from asperity.checks import FloatArray
+from asperity.contacts.memory import BUDGET, POINTS, UNLIMITED, new_memory
 from asperity.kernels.fuse import load_fused, source_on_texture
 from asperity.kernels.tick import ServoSettings, ServoState
 from asperity.servo.drivers.driver import Driver
@@ -37,6 +38,7 @@ class Rendered:
         law: parameters of the law.
         shallow: height above which the depth is within its limit wherever the probe is [m].
         depth: limit of the depth [m].
+        looks: evaluations of the surface that a tick may take.
     """
 
     source: str
@@ -44,6 +46,7 @@ class Rendered:
     law: tuple[float, ...]
     shallow: float
     depth: float
+    looks: float
 
 
 def render(surface: Surface, driver: Driver) -> Rendered:
@@ -62,8 +65,9 @@ def render(surface: Surface, driver: Driver) -> Rendered:
     crest = surface.law.contact.extremes(surface.texture)[1]
     shallow = -math.inf if everywhere else crest - surface.max_depth
     return Rendered(
-        source, surface.texture.arguments, surface.law_arguments, shallow, surface.max_depth
-    )
+        source, surface.texture.arguments, surface.law_arguments, shallow, surface.max_depth,
+        surface.law.contact.looks,
+    )  # fmt: skip
 
 
 def limits_of(
@@ -120,6 +124,7 @@ class Loop:
         self._settings: ServoSettings = servo.settings
         self._board, self._clock, self._blank = board, ticks, driver.blank()
         self.carried = Carried()
+        self._memory = new_memory(UNLIMITED)
 
     def load(self, shown: Rendered) -> None:
         """Compile the loop for a surface, or find it compiled; the device is left alone."""
@@ -144,6 +149,7 @@ class Loop:
     def forget(self) -> None:
         """Carry nothing of a law over to the next surface but where the handle is."""
         servo = self.carried.servo
+        self._memory[POINTS] = 0.0
         fresh = ServoState(servo.x, servo.y, servo.z, servo.vx, servo.vy, servo.vz)
         self.carried = self.carried._replace(servo=fresh)
 
@@ -151,8 +157,9 @@ class Loop:
         self, shown: Rendered, device: tuple[Any, ...], carried: Carried, last: int
     ) -> tuple[int, int, Carried]:
         limits = limits_of(self._servo, self._safety, self._reach, self._frame[:3, 3], shown)
+        self._memory[BUDGET] = shown.looks
         answer: tuple[int, int, Carried] = load_fused(shown.source).device_loop(
             carried, last, self._settings, limits, self._frame, self._clock, device, self._board,
-            shown.texture, shown.law,
+            self._memory, shown.texture, shown.law,
         )  # fmt: skip
         return answer

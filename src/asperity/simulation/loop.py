@@ -9,6 +9,7 @@ from types import ModuleType
 import numpy as np
 
 from asperity.checks import FloatArray
+from asperity.contacts.memory import SHORT, WORST, new_memory
 from asperity.errors import ParameterError
 from asperity.kernels.probe import ClampName
 from asperity.laws import Law
@@ -47,6 +48,12 @@ class Simulation:
         servo: the servo.
         start: position [m], shape (3,).
         velocity: [m/s], shape (3,).
+        looks: evaluations of the surface that a tick may take in its search for nearest points;
+            default: as many as the law's contact says. More of them take longer, and leave fewer
+            ticks whose answer is not certain.
+
+    Attributes:
+        memory: what that search remembers, see :mod:`asperity.contacts.memory`.
 
     Raises:
         ParameterError: for a delay of more than ``MOST_DELAY`` samples.
@@ -59,12 +66,14 @@ class Simulation:
         servo: Servo,
         start: FloatArray,
         velocity: FloatArray | None = None,
+        looks: float | None = None,
     ) -> None:
         if servo.delay > MOST_DELAY:
             raise ParameterError("delay", f"must be at most {MOST_DELAY} samples", servo.delay)
         self._plant, self._servo = plant, servo
         self.state = plant.state(start, np.zeros(3) if velocity is None else velocity)
         self.queue = np.zeros((servo.delay + 1, 3))
+        self.memory = new_memory(surface.law.contact.looks if looks is None else looks)
         self._loop, self._ledger = LoopState(), np.zeros(SUMS)
         self._before = 0.0
         clamp: ClampName = surface.clamp if surface.law.clampable else "none"
@@ -99,7 +108,7 @@ class Simulation:
         first = self.samples
         stop, self.rows, self._loop = self._loops.servo_batch(
             self.state, self.queue, self._loop, self._ledger, anchor, self._plant.record,
-            self._servo.settings, *self._arguments, table, every,
+            self._servo.settings, self.memory, *self._arguments, table, every,
         )  # fmt: skip
         self._anchor = anchor[self.samples - first].copy()
         return STOPS[int(stop)]
@@ -108,6 +117,11 @@ class Simulation:
     def sums(self) -> FloatArray:
         """Sums of the ledger since the beginning, see ``kernels/booking.py``."""
         return self._ledger
+
+    @property
+    def uncertain(self) -> tuple[int, float]:
+        """Ticks in which the search used up its looks, and the greatest gap that it left [m]."""
+        return int(self.memory[SHORT]), float(self.memory[WORST])
 
     def ledger(self) -> Ledger:
         """Return the energies since the beginning."""

@@ -120,6 +120,11 @@ class Run(Parts, Plotted):
         ending: what the last quarter shows, from all rows that were traced, kept or not; ``None``
             if none were.
         notes: what about the plant is guessed.
+        short: ticks in which the search for nearest points used up its looks, and took the best
+            point that it had found.
+        gap: the most that the search left open in one of them [m]: on the nearest contact, no
+            surface point was nearer than the one taken by more than this; on the split one, the
+            force was right to stiffness times this.
     """
 
     table: FloatArray
@@ -133,6 +138,8 @@ class Run(Parts, Plotted):
     path: str = ""
     ending: Ending | None = None
     notes: tuple[str, ...] = ()
+    short: int = 0
+    gap: float = 0.0
     columns = COLUMNS
 
     def __repr__(self) -> str:
@@ -163,7 +170,7 @@ class Run(Parts, Plotted):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data without the trace, SI units; None for what overflowed."""
-        names = ("duration", "samples", "period", "stopped", "state", "ledger")
+        names = ("duration", "samples", "period", "stopped", "state", "ledger", "short", "gap")
         own = record(self, *names, infinity=None)
         return own | {"trace": self.path or None, "notes": list(self.notes)}
 

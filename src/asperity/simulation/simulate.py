@@ -113,11 +113,12 @@ def simulate(
         stop = _go(simulation, anchor_from, samples, kept, ending, every, progress)
     finally:
         kept.close()
+    short, gap = simulation.uncertain
     return Run(
         kept.table(), simulation.state, simulation.samples, float(servo.period),
         simulation.ledger(), surface, stop, _place(stop, simulation.state, plant),
         path="" if isinstance(trace, bool) else os.fspath(trace),
-        ending=ending, notes=plant.notes,
+        ending=ending, notes=plant.notes, short=short, gap=gap,
     )  # fmt: skip
 
 

@@ -89,11 +89,12 @@ class Fourier(Texture):
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
-        from asperity.contacts.nearest import line_search as line
-        from asperity.contacts.nearest import plane_search as search
+        from asperity.contacts.nearest import line_search, line_within, plane_search, plane_within
         from asperity.textures.samplers import fourier, fourier_line, sine
 
-        return (fourier_line, fourier, line, sine) if self._parallel else (fourier, search, sine)
+        if self._parallel:
+            return fourier_line, fourier, line_search, line_within, sine
+        return fourier, plane_search, plane_within, sine
 
     @cached_property
     def arguments(self) -> FourierArguments:

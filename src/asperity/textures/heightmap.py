@@ -82,10 +82,10 @@ class HeightMap(Spline):
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
-        from asperity.contacts.nearest import plane_search as search
+        from asperity.contacts.nearest import plane_search, plane_within
         from asperity.textures.samplers import heightmap, spline
 
-        return heightmap, spline, search
+        return heightmap, spline, plane_search, plane_within
 
     @cached_property
     def arguments(self) -> HeightMapArguments:

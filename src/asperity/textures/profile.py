@@ -74,10 +74,10 @@ class Profile(Spline):
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
-        from asperity.contacts.nearest import line_search as line
+        from asperity.contacts.nearest import line_search, line_within
         from asperity.textures.samplers import profile, spline
 
-        return profile, spline, line
+        return profile, spline, line_search, line_within
 
     @cached_property
     def arguments(self) -> ProfileArguments:

@@ -1,9 +1,10 @@
 """Pyramids of certified bounds over the cells of a spline, for the search of nearest points.
 
 A box of the finest level has one cell of a profile, or two by two of a map; each further level
-has boxes of twice the side. A box knows four numbers, rounded outward to single precision: a lower
-and an upper bound of the height [m], a bound of the second derivatives times the pitch [1], and a
-bound of the third derivatives times the pitch squared [1].
+has boxes of twice the side. A box knows five numbers, rounded outward to single precision: a lower
+and an upper bound of the height [m], a bound of the second derivatives times the pitch [1], a bound
+of the third derivatives times the pitch squared [1], and one of the second derivatives times the
+pitch where they bend the surface like a crest: of the greatest eigenvalue of -Hess h, at least 0.
 """
 
 from __future__ import annotations
@@ -17,6 +18,9 @@ from asperity.checks import FloatArray
 _ROWS, _COLUMNS = 128, 512
 # Room for rounding: of a few operations in single precision, of what they work on.
 _ROOM = 1e-6
+
+# Of a box.
+NUMBERS = 5
 
 Single = NDArray[np.float32]
 Pyramid = tuple[Single, NDArray[np.int64]]
@@ -32,14 +36,15 @@ def line_pyramid(c: FloatArray, pitch: float) -> Pyramid:
         pitch: of the nodes [m].
 
     Returns:
-        The boxes of all levels, shape (boxes, 4), and for each level, from the finest on, the
+        The boxes of all levels, shape (boxes, 5), and for each level, from the finest on, the
         number of its first box and its number of boxes, shape (levels, 2).
     """
     middle, spread = _range(c)
     second = _largest(np.diff(c, 2), (1,), 1)
     third = _largest(np.diff(c, 3), (0,), 1)
+    dent = _falling(np.diff(c, 2), (1,), 1)
     low, high = _extent(c - middle, (3,), 1, spread)
-    return _levels(_outward(middle, [low, high, second / pitch, third / pitch]))
+    return _levels(_outward(middle, [low, high, second / pitch, third / pitch, dent / pitch]))
 
 
 def plane_pyramid(c: FloatArray, pitch: tuple[float, float]) -> Pyramid:
@@ -50,7 +55,7 @@ def plane_pyramid(c: FloatArray, pitch: tuple[float, float]) -> Pyramid:
         pitch: p_x, p_y [m]; the pitch in the bounds of derivatives is p_x.
 
     Returns:
-        The boxes of all levels, shape (boxes, 4), and for each level, from the finest on, the
+        The boxes of all levels, shape (boxes, 5), and for each level, from the finest on, the
         number of its first box and its numbers of rows and columns, shape (levels, 3).
     """
     middle, spread = _range(c)
@@ -68,7 +73,7 @@ def plane_pyramid(c: FloatArray, pitch: tuple[float, float]) -> Pyramid:
 
 
 def _plane_bounds(c: FloatArray, pitch: tuple[float, float], spread: float) -> list[FloatArray]:
-    """Return the four bounds of every two by two cells, the lower one negated."""
+    """Return the five bounds of every two by two cells, the lower one negated."""
     xx, yy, xy = np.diff(c, 2, axis=1), np.diff(c, 2, axis=0), np.diff(np.diff(c, axis=0), axis=1)
     aspect = pitch[0] / pitch[1]
     fxx, fyy = _largest(xx, (3, 1), 2), aspect**2 * _largest(yy, (1, 3), 2)
@@ -79,8 +84,16 @@ def _plane_bounds(c: FloatArray, pitch: tuple[float, float], spread: float) -> l
     twist += 3.0 * (aspect * _largest(np.diff(xx, axis=0), (2, 1), 2)) ** 2
     twist += 3.0 * (aspect**2 * _largest(np.diff(yy, axis=1), (1, 2), 2)) ** 2
     twist += (aspect**3 * _largest(np.diff(yy, axis=0), (0, 3), 2)) ** 2
+    # Gershgorin's discs of -Hess h.
+    dent = np.maximum(_falling(xx, (3, 1), 2), aspect**2 * _falling(yy, (1, 3), 2)) + fxy
     low, high = _extent(c, (3, 3), 2, spread)
-    return [low, high, bend / pitch[0], np.sqrt(twist) / pitch[0]]
+    return [
+        low,
+        high,
+        bend / pitch[0],
+        np.sqrt(twist) / pitch[0],
+        np.minimum(dent, bend) / pitch[0],
+    ]
 
 
 def _range(c: FloatArray) -> tuple[float, float]:
@@ -102,6 +115,15 @@ def _largest(c: FloatArray, degrees: tuple[int, ...], cells: int) -> FloatArray:
     parts = _bernstein(single, degrees, cells)
     found = _greatest([(np.abs(part), widths) for part, widths in parts], cells)
     return found + _ROOM * float(np.abs(single).max())
+
+
+def _falling(c: FloatArray, degrees: tuple[int, ...], cells: int) -> FloatArray:
+    """Return the greatest value of a negated spline over boxes of so many cells a side, or 0."""
+    single = c.astype(np.float32)
+    found = _greatest(
+        [(-part, widths) for part, widths in _bernstein(single, degrees, cells)], cells
+    )
+    return np.maximum(found, 0.0) + _ROOM * float(np.abs(single).max())
 
 
 def _extent(
@@ -163,15 +185,15 @@ def _windows(values: Single, axis: int, width: int, step: int) -> Single:
 
 def _outward(middle: float, bounds: list[FloatArray]) -> Single:
     """Return the bounds in single precision, rounded up; heights from zero on, not the middle."""
-    low, high, bend, twist = bounds
-    together = np.stack([low - middle, high + middle, bend, twist], axis=-1)
+    low, high, *derivatives = bounds
+    together = np.stack([low - middle, high + middle, *derivatives], axis=-1)
     return np.nextafter(together.astype(np.float32), np.float32(np.inf))
 
 
 def _levels(finest: Single) -> Pyramid:
     """Return all levels, each the greatest of two (by two) boxes of the one before."""
     level, shape = finest, finest.shape[:-1]
-    parts, starts = [finest.reshape(-1, 4)], [(0, *shape)]
+    parts, starts = [finest.reshape(-1, NUMBERS)], [(0, *shape)]
     while max(shape) > 1:
         for axis in range(len(shape)):
             odd = [(0, 0)] * level.ndim
@@ -179,7 +201,7 @@ def _levels(finest: Single) -> Pyramid:
             level = _pairs(np.pad(level, odd, mode="edge"), axis)
         shape = level.shape[:-1]
         starts.append((starts[-1][0] + len(parts[-1]), *shape))
-        parts.append(level.reshape(-1, 4))
+        parts.append(level.reshape(-1, NUMBERS))
     boxes = np.concatenate(parts)
     boxes[:, 0] *= -1.0
     return np.ascontiguousarray(boxes), np.array(starts, dtype=np.int64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from asperity.contacts.contact import Contact, ContactDerivatives, ExactHeight, HeightField
@@ -16,6 +17,8 @@ class Nearest(Contact):
 
     name = "nearest"
     cost = 100.0
+    remembers = True
+    looks = 400.0
 
     def derivatives(self) -> ContactDerivatives:
         """Return ∇depth = -n and, by the implicit function theorem, ∂(X, Y)/∂p = Q⁻¹ [I g].
@@ -48,14 +51,40 @@ class Nearest(Contact):
 
         return -unit_normal()
 
+    def kernels(self) -> tuple[ModuleType, ...]:
+        """The query that is asked tick after tick, and a search without a budget."""
+        from asperity.contacts.nearest import again, whole_within
+
+        return again, whole_within
+
     def begin_code(self, wanted: frozenset[str]) -> tuple[list[str], str]:
         """Below the height at the probe: no search out of contact."""
         return [], "height(x, y, texture) - z > 0.0"
 
     def sample_code(self, wanted: frozenset[str]) -> list[str]:
         """The search knows the slopes at the foot."""
+        return self._code("foot(x, y, z, texture)", wanted)
+
+    def again_code(self, wanted: frozenset[str]) -> list[str]:
+        """The search starts from the last foot, and has a budget."""
+        return self._code("foot_again(x, y, z, memory, texture)", wanted)
+
+    def depth_code(self) -> list[str]:
+        """The distance, of half as many looks as a tick: never too short, no limit is missed."""
+        lines, condition = self.begin_code(frozenset())
+        found = f"foot_within(x, y, z, x, y, {0.5 * self.looks}, texture)"
         return [
-            "foot_x, foot_y, h, hx, hy = foot(x, y, z, texture)",
+            *lines,
+            f"if not {condition}:",
+            "    return 0.0",
+            f"foot_x, foot_y, h, _hx, _hy, _gap, _looks = {found}",
+            "return math.sqrt((x - foot_x)**2 + (y - foot_y)**2 + (z - h)**2)",
+        ]
+
+    @staticmethod
+    def _code(call: str, wanted: frozenset[str]) -> list[str]:
+        return [
+            f"foot_x, foot_y, h, hx, hy = {call}",
             *sampled(wanted & {"hxx", "hxy", "hyy"}, "foot_x, foot_y"),
             "depth = math.sqrt((x - foot_x)**2 + (y - foot_y)**2 + (z - h)**2)",
         ]

@@ -1,4 +1,4 @@
-"""Certified search for the nearest point of a profile; see ``plane_search``.
+"""Certified search for the nearest point of a profile; see ``plane_search``, also for its looks.
 
 In one dimension: φ(X) = (X - x)² + (h(X) - z)², p = φ'/2, Q = φ''/2 = 1 + h'² + (h - z) h''. Over
 an interval of half-width r in which |h''| <= K and |h'''| <= T, Q changes by at most L r from its
@@ -8,25 +8,32 @@ value at the centre, L = 3 K max|h'| + T max|h - z|.
 import numpy as np
 
 from asperity.compiled import Kernels
+from asperity.contacts.sampler import LinePoint as Point
 from asperity.contacts.sampler import along
 
 KERNELS = Kernels(
-    provides=("descend", "judge", "next_part"),
+    provides=("descend", "go_down", "judge", "next_part"),
     requires=("along",),
-    called=("descend", "judge"),
+    called=("go_down", "judge"),
 )
-
-# A point of the profile: X, φ, h, h'.
-Point = tuple[float, float, float, float]
 
 
 def descend(x: float, z: float, start: float, texture: object) -> Point:
     """Return a local minimum of φ downhill from a start, to rounding."""
+    return go_down(x, z, start, 200.0, texture)[0]
+
+
+def go_down(x: float, z: float, start: float, left: float, texture: object) -> tuple[Point, float]:
+    """Return a local minimum of φ downhill from a start, to rounding, and the looks left.
+
+    If none are left it is the lowest point on the way; one look is always taken.
+    """
     best = (start, np.inf, 0.0, 0.0)
     at = start
     step = last = 0.0
     close = False
     for _ in range(200):
+        left -= 1.0
         h, h1, h2 = along(at, texture)
         gap = h - z
         new = (at - x) * (at - x) + gap * gap
@@ -39,7 +46,7 @@ def descend(x: float, z: float, start: float, texture: object) -> Point:
             step = -(at - x + gap * h1) / (q if convex else max(abs(q), 0.05 * square))
             size = step * step
             if size <= 1e-16 * new + rounding:
-                return at + step, new, h + h1 * step, h1 + h2 * step
+                return (at + step, new, h + h1 * step, h1 + h2 * step), left
             # φ alone resolves half the digits: from here on the steps must shrink instead.
             if close and size >= 0.6 * last:
                 break
@@ -49,15 +56,21 @@ def descend(x: float, z: float, start: float, texture: object) -> Point:
             step *= 0.5
             if step * step <= 1e-20 * best[1] + rounding:
                 break
+        if left <= 0.0:
+            break
         at = best[0] + step
-    return best
+    return best, left
 
 
 def judge(
     x: float, z: float, centre: float, r: float, bend: float, twist: float,
-    best: Point, texture: object,
-) -> tuple[Point, bool]:  # fmt: skip
-    """Return the best point after a look at one interval, and whether its halves need a look."""
+    best: Point, keep: float, left: float, texture: object,
+) -> tuple[Point, bool, float]:  # fmt: skip
+    """Return the best point after a look at one interval, whether its halves need one, looks left.
+
+    The interval is centre ± r [m], with K = bend [1/m] and T = twist [1/m²].
+    """
+    left -= 1.0
     h, h1, h2 = along(centre, texture)
     gap = h - z
     away = centre - x
@@ -68,20 +81,18 @@ def judge(
     change = (3.0 * steep * bend + (abs(gap) + steep * r) * twist) * r
     # Nowhere convex: no minimum. Or too far. The factors leave room for rounding.
     bound = away * away + gap * gap - 2.0 * abs(p) * r + (min(q, 0.0) - change / 3.0) * r * r
-    if q + change < -1e-6 * (1.0 + abs(q)) or bound >= best[1] * (1.0 - 1e-13):
-        return best, False
+    if q + change < -1e-6 * (1.0 + abs(q)) or bound >= best[1] * keep:
+        return best, False, left
     # The slope of φ at the centre is too great to vanish in the interval.
     if abs(p) > (abs(q) * (1.0 + 1e-6) + 0.5 * change + 1e-6) * r:
-        return best, False
+        return best, False, left
     if q <= change:
-        return best, True
+        return best, True, left
     start = best[0] if abs(best[0] - centre) <= r else centre - p / q
-    found = descend(x, z, start, texture)
+    found, left = go_down(x, z, start, left, texture)
     # Convex throughout the interval: a minimum in it is the only one.
     wide = abs(found[0] - centre) > r * (1.0 + 1e-9)
-    if found[1] < best[1]:
-        return found, wide
-    return best, wide
+    return (found if found[1] < best[1] else best), wide, left
 
 
 def next_part(level: int, side: float, i: int, top: int, u: float) -> tuple[int, float, int]:

@@ -7,6 +7,10 @@ Q differs from its value at the centre by at most L r, L = 3 K max|∇h| + T max
 formula at the centre decides most boxes at once.
 
 Boxes are quartered without a stack: the next one follows from the numbers of the last.
+
+A search counts its looks: a look is one evaluation of the surface, or eight boxes of the pyramid
+that are passed. It drops boxes in which φ is nowhere less than ``keep`` times the best, ``EXACT``
+for the nearest point itself, and ends early once ``left``, the looks that are left, is used up.
 """
 
 import math
@@ -14,16 +18,14 @@ import math
 import numpy as np
 
 from asperity.compiled import Kernels
+from asperity.contacts.sampler import PlanePoint as Point
 from asperity.contacts.sampler import curvature
 
 KERNELS = Kernels(
-    provides=("descend", "judge", "next_box"),
+    provides=("descend", "go_down", "judge", "next_box"),
     requires=("curvature",),
-    called=("descend", "judge", "newton_step"),
+    called=("go_down", "judge", "newton_step"),
 )
-
-# A point of the surface: X, Y, φ, h, h_x, h_y.
-Point = tuple[float, float, float, float, float, float]
 
 
 def eigenvalues(qxx: float, qxy: float, qyy: float) -> tuple[float, float]:
@@ -51,10 +53,21 @@ def newton_step(
 
 def descend(x: float, y: float, z: float, fx: float, fy: float, texture: object) -> Point:
     """Return a local minimum of φ downhill from a start, to rounding."""
+    return go_down(x, y, z, fx, fy, 200.0, texture)[0]
+
+
+def go_down(
+    x: float, y: float, z: float, fx: float, fy: float, left: float, texture: object
+) -> tuple[Point, float]:
+    """Return a local minimum of φ downhill from a start, to rounding, and the looks left.
+
+    If none are left it is the lowest point on the way; one look is always taken.
+    """
     best = (fx, fy, np.inf, 0.0, 0.0, 0.0)
     sx = sy = last = 0.0
     close = False
     for _ in range(200):
+        left -= 1.0
         h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, texture)
         gap = h - z
         dx = fx - x
@@ -70,7 +83,9 @@ def descend(x: float, y: float, z: float, fx: float, fy: float, texture: object)
             size = sx * sx + sy * sy
             if size <= 1e-16 * new + rounding:
                 h += hx * sx + hy * sy
-                return fx + sx, fy + sy, new, h, hx + hxx * sx + hxy * sy, hy + hxy * sx + hyy * sy
+                hx += hxx * sx + hxy * sy
+                hy += hxy * sx + hyy * sy
+                return (fx + sx, fy + sy, new, h, hx, hy), left
             # φ alone resolves half the digits: from here on the steps must shrink instead.
             if close and size >= 0.6 * last:
                 break
@@ -81,9 +96,11 @@ def descend(x: float, y: float, z: float, fx: float, fy: float, texture: object)
             sy *= 0.5
             if sx * sx + sy * sy <= 1e-20 * best[2] + rounding:
                 break
+        if left <= 0.0:
+            break
         fx = best[0] + sx
         fy = best[1] + sy
-    return best
+    return best, left
 
 
 def remainders(
@@ -144,12 +161,13 @@ def hopeless(
 
 def judge(
     x: float, y: float, z: float, cx: float, cy: float, a: float, b: float,
-    bend: float, twist: float, best: Point, texture: object,
-) -> tuple[Point, bool]:  # fmt: skip
-    """Return the best point after a look at one box, and whether its parts need a look.
+    bend: float, twist: float, best: Point, keep: float, left: float, texture: object,
+) -> tuple[Point, bool, float]:  # fmt: skip
+    """Return the best point after a look at one box, whether its parts need one, and looks left.
 
     The box is (cx, cy) ± (a, b) [m], with K = bend [1/m] and T = twist [1/m²].
     """
+    left -= 1.0
     h, hx, hy, hxx, hxy, hyy = curvature(cx, cy, texture)
     gap = h - z
     away = (cx - x, cy - y, gap)
@@ -158,11 +176,10 @@ def judge(
     r = math.sqrt(a * a + b * b)
     bent = math.sqrt(hxx * hxx + 2.0 * hxy * hxy + hyy * hyy)
     change, lift = remainders(r, gap, math.sqrt(hx * hx + hy * hy), bent, bend, twist)
-    enough = best[2] * (1.0 - 1e-13)
-    if hopeless(away, hx, hy, q, low, change, lift, a, b, enough):
-        return best, False
+    if hopeless(away, hx, hy, q, low, change, lift, a, b, best[2] * keep):
+        return best, False, left
     if low <= change:
-        return best, True
+        return best, True, left
     det = q[0] * q[2] - q[1] * q[1]
     sx = (q[1] * (away[1] + gap * hy) - q[2] * (away[0] + gap * hx)) / det
     sy = (q[1] * (away[0] + gap * hx) - q[0] * (away[1] + gap * hy)) / det
@@ -170,15 +187,13 @@ def judge(
     error = 1e-6 * r + 0.5 * change * r / low
     # Nor is it dropped where it is on the border itself, as on the mirror lines of a finite map.
     if abs(sx) > a + error or abs(sy) > b + error:
-        return best, False
+        return best, False, left
     known = abs(best[0] - cx) <= a and abs(best[1] - cy) <= b
     start_x = best[0] if known else cx + sx
     start_y = best[1] if known else cy + sy
-    found = descend(x, y, z, start_x, start_y, texture)
+    found, left = go_down(x, y, z, start_x, start_y, left, texture)
     outside = abs(found[0] - cx) > a * (1.0 + 1e-9) or abs(found[1] - cy) > b * (1.0 + 1e-9)
-    if found[2] < best[2]:
-        return found, outside
-    return best, outside
+    return (found if found[2] < best[2] else best), outside, left
 
 
 def next_box(

@@ -137,13 +137,15 @@ def split_moving(
     return True
 
 
-def split_follow(y: FloatArray, atoms: FloatArray, row: int, texture: object) -> bool:
-    """Move a foot to the stationary point near it that belongs to y; return success."""
+def split_follow(y: FloatArray, atoms: FloatArray, row: int, texture: object) -> tuple[bool, float]:
+    """Move a foot to the stationary point near it that belongs to y; return success and looks."""
     fx = atoms[row, 0]
     fy = atoms[row, 1]
     last = np.inf
     stalled = 0
+    looks = 0.0
     for _ in range(25):
+        looks += 1.0
         h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, texture)
         gap = h - y[2]
         px = fx - y[0] + gap * hx
@@ -153,7 +155,7 @@ def split_follow(y: FloatArray, atoms: FloatArray, row: int, texture: object) ->
         q22 = 1.0 + hy * hy + gap * hyy
         det = q11 * q22 - q12 * q12
         if det <= 0.0 or q11 + q22 <= 0.0:
-            return False
+            return False, looks
         sx = (q12 * py - q22 * px) / det
         sy = (q12 * px - q11 * py) / det
         fx += sx
@@ -167,4 +169,4 @@ def split_follow(y: FloatArray, atoms: FloatArray, row: int, texture: object) ->
     atoms[row, 0] = fx
     atoms[row, 1] = fy
     atoms[row, 2] = height(fx, fy, texture)
-    return True
+    return True, looks

@@ -18,21 +18,27 @@ class Split(Nearest):
 
     name = "split"
     cost = 1000.0
+    looks = 1200.0
+    gap_is_force = True
     single_valued = True
     given_by_depth = False
     parameters = ("continuity",)
 
     def kernels(self) -> tuple[ModuleType, ...]:
         """The general solver; a texture kind may offer ``split_contact`` and the like itself."""
-        from asperity.contacts.split import conditions, solver
+        from asperity.contacts.split import again, conditions, solver
 
-        return solver, conditions
+        return again, solver, conditions, *super().kernels()
 
     def exact_point(
         self, texture: HeightField, h: ExactHeight, p: list[Any]
     ) -> tuple[Any, ...] | None:
         """None: its definition is a supremum over space; the theorems on it are tested instead."""
         return None
+
+    def again_code(self, wanted: frozenset[str]) -> list[str]:
+        """The vector to the mean, from the atoms of the last tick on."""
+        return ["tx, ty, tz = split_again(x, y, z, continuity, memory, texture)"]
 
     def sample_code(self, wanted: frozenset[str]) -> list[str]:
         """The vector to the mean, with its derivative where that is wanted."""
@@ -42,12 +48,6 @@ class Split(Nearest):
             derivative = "tx, ty, tz, mxx, mxy, mxz, myy, myz, mzz"
             return [f"{derivative} = split_derivative(x, y, z, continuity, texture)"]
         return ["tx, ty, tz = split_contact(x, y, z, continuity, texture)"]
-
-    def depth_code(self) -> list[str]:
-        """The distance to the nearest point; the two contact points are about as far."""
-        lines, condition = self.begin_code(frozenset())
-        nearest = super().sample_code(frozenset({"depth"}))
-        return [*lines, f"if not {condition}:", "    return 0.0", *nearest, "return depth"]
 
     def derivatives(self) -> ContactDerivatives:
         """Nothing by depth or point: see :meth:`jacobian_part`."""

@@ -12,16 +12,26 @@ Fully-corrective Frank-Wolfe: ask for the nearest point of y, add it to the atom
 weights exactly, drop what has no weight, and let Newton's method on the conditions of optimality
 move the feet along with y. The last query certifies the gap between primal and dual.
 
+With a budget of looks the queries may leave a gap of their own: of y at most ``d`` from an atom, no
+point is nearer than d - g. The dual then is known to be at least what it is with d - g in the place
+of d, which adds (1 - μ) (d² - (d - g)²)/2 to the gap between primal and dual; what follows from the
+sum holds as it does without a budget. The bound of the force: by its weights, U is nowhere above a
+parabola m with second derivatives 1 that has the value U(p) + gap and the gradient p - z̄ at p, and
+above p it is nowhere below one with its own gradient f and second derivatives -c. So
+gap + (p - z̄ - f)·t + (1 + c) |t|²/2 >= 0 for all t, that is |p - z̄ - f| <= √(2 (1 + c) gap).
+
 Rows of ``atoms`` are x, y, z [m] and weight.
 """
 
+import math
 from typing import Any
 
 import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels, local_array
-from asperity.contacts.sampler import foot, height
+from asperity.contacts.memory import UNLIMITED
+from asperity.contacts.sampler import foot_within, height
 from asperity.contacts.split.conditions import (
     split_copy,
     split_farther,
@@ -34,10 +44,10 @@ from asperity.contacts.split.conditions import (
 )
 
 KERNELS = Kernels(
-    provides=("split_contact", "split_derivative", "split_energy"),
+    provides=("split_atoms", "split_contact", "split_derivative", "split_energy"),
     loops=("split_batch",),
     requires=(
-        "foot", "height", "split_copy", "split_farther", "split_follow", "split_moving",
+        "foot_within", "height", "split_copy", "split_farther", "split_follow", "split_moving",
         "split_projection", "split_solve", "split_system", "split_value",
     ),
     merged=(
@@ -47,18 +57,30 @@ KERNELS = Kernels(
 )  # fmt: skip
 
 
-def split_query(y: FloatArray, atoms: FloatArray, row: int, texture: object) -> None:
-    """Write the point of the free set nearest to y into a row of the atoms."""
+def split_query(
+    y: FloatArray, atoms: FloatArray, row: int, budget: float, texture: object
+) -> tuple[float, float]:
+    """Write the point of the free set nearest to y into a row of the atoms.
+
+    Returns:
+        How much nearer another one may be [m], and the looks that were taken.
+    """
     fx = y[0]
     fy = y[1]
     fz = y[2]
+    gap = 0.0
+    looks = 1.0
     if height(fx, fy, texture) > fz:
-        fx, fy, _h, _hx, _hy = foot(fx, fy, fz, texture)
+        # An atom is a good start: at the optimum it is a nearest point itself.
+        near_x = atoms[0, 0] if row > 0 else fx
+        near_y = atoms[0, 1] if row > 0 else fy
+        fx, fy, _h, _hx, _hy, gap, looks = foot_within(fx, fy, fz, near_x, near_y, budget, texture)
         fz = height(fx, fy, texture)
     atoms[row, 0] = fx
     atoms[row, 1] = fy
     atoms[row, 2] = fz
     atoms[row, 3] = 0.0
+    return gap, looks
 
 
 def split_subset(
@@ -146,13 +168,15 @@ def split_advance(atoms: FloatArray, count: int, y: FloatArray, a: FloatArray) -
 
 def split_polish(
     atoms: FloatArray, count: int, p: FloatArray, y: FloatArray, mu: float, a: FloatArray,
-    texture: object,
-) -> int:  # fmt: skip
+    budget: float, texture: object,
+) -> tuple[int, float]:  # fmt: skip
     """Make atoms, weights and y satisfy the conditions of optimality, by Newton's method.
 
     Returns:
-        How many atoms are left; 0 for failure.
+        How many atoms are left, 0 for failure, and the looks that were taken.
     """
+    nothing: Any = np.int64(0)
+    looks = 0.0
     scale = 0.0
     for d in range(3):
         scale += p[d] * p[d] + y[d] * y[d]
@@ -160,40 +184,48 @@ def split_polish(
     stalled = 0
     for _ in range(20):
         for i in range(count):
-            if not split_follow(y, atoms, i, texture):
-                return 0
+            found, taken = split_follow(y, atoms, i, texture)
+            looks += taken
+            if not found or looks > budget:
+                return nothing, looks
         split_system(atoms, count, p, y, mu, a)
         moving = split_moving(atoms, count, y, mu, a, texture)
+        looks += count
         if not (moving and split_solve(a, 3 + count, 4 + count)):
-            return 0
+            return nothing, looks
         left, size = split_advance(atoms, count, y, a)
         stalled += size >= 0.25 * last
         last = size
         if left == count and (stalled > 2 or size <= 1e-28 * scale):
-            return count
+            return count, looks
         count = left
-    return 0
+    return nothing, looks
 
 
 def split_try_polish(
     atoms: FloatArray, count: int, p: FloatArray, y: FloatArray, mu: float, a: FloatArray,
-    texture: object,
-) -> int:  # fmt: skip
-    """Polish; take everything back and return 0 if that does not lower the energy."""
+    budget: float, texture: object,
+) -> tuple[int, float]:  # fmt: skip
+    """Polish; take everything back and return 0 if that does not lower the energy.
+
+    Returns:
+        How many atoms are left, and the looks that were taken.
+    """
+    nothing: Any = np.int64(0)
     pull = local_array((3,))
     before = local_array((5, 4))
     split_copy(atoms, before, count)
     for d in range(3):
         before[4, d] = y[d]
     value = split_value(atoms, count, p, mu, pull)
-    left = split_polish(atoms, count, p, y, mu, a, texture)
+    left, looks = split_polish(atoms, count, p, y, mu, a, budget, texture)
     # Equal energies are the rule where the atoms have almost settled.
     if left > 0 and split_value(atoms, left, p, mu, pull) <= value * (1.0 + 1e-14):
-        return left
+        return left, looks
     split_copy(before, atoms, count)
     for d in range(3):
         y[d] = before[4, d]
-    return 0
+    return nothing, looks
 
 
 def split_single(atoms: FloatArray, y: FloatArray, texture: object) -> bool:
@@ -224,15 +256,81 @@ def split_gap(
     return max((1.0 - mu) * gap, 0.0), rounding
 
 
-def split_atoms(
-    x: float, y: float, z: float, continuity: float,
-    p: FloatArray, atoms: FloatArray, pull: FloatArray, texture: object,
+def split_settle(
+    atoms: FloatArray, count: int, p: FloatArray, y: FloatArray, pull: FloatArray,
+    continuity: float, a: FloatArray, budget: float, texture: object,
 ) -> tuple[int, float]:  # fmt: skip
-    """Write p (3,), the atoms of law H (5, 4) and z̄ - p, ``pull`` (3,), at a probe inside.
+    """Write y and z̄ - p, ``pull``, of atoms with weights; several are polished first if they can.
 
     Returns:
-        How many atoms, and the gap between primal and dual [m²]: the force is exact to
-        k √(2 (1 + c) gap).
+        How many atoms the polish left, 0 without one, and the looks that were taken.
+    """
+    solved: Any = np.int64(0)
+    looks = 0.0
+    mu = 1.0 / (1.0 + continuity)
+    split_value(atoms, count, p, mu, pull)
+    for d in range(3):
+        y[d] = p[d] - pull[d] / continuity
+    if count > 1:
+        solved, looks = split_try_polish(atoms, count, p, y, mu, a, budget, texture)
+    if solved > 0:
+        # From y, not from the weights: they are ill-conditioned where atoms meet.
+        for d in range(3):
+            pull[d] = continuity * (p[d] - y[d])
+    return solved, looks
+
+
+def split_start(
+    atoms: FloatArray, known: int, p: FloatArray, y: FloatArray, pull: FloatArray,
+    continuity: float, a: FloatArray, budget: float, texture: object,
+) -> tuple[int, int, float]:  # fmt: skip
+    """Write the atoms to begin with, y and z̄ - p: those of a probe nearby, moved, or one foot.
+
+    Returns:
+        How many atoms, how many of them are polished, and the looks that were taken.
+    """
+    first: Any = np.int64(0)
+    solved: Any = first
+    looks = 0.0
+    if known > 1:
+        solved, looks = split_settle(
+            atoms, known, p, y, pull, continuity, a, 0.25 * budget, texture
+        )
+        if solved > 0:
+            return solved, solved, looks
+    found = False
+    if known == 1:
+        found, looks = split_follow(p, atoms, first, texture)
+    if not found:
+        _gap, taken = split_query(p, atoms, first, budget, texture)
+        looks += taken
+    atoms[0, 3] = 1.0
+    one: Any = np.int64(1)
+    split_settle(atoms, one, p, y, pull, continuity, a, 0.0, texture)
+    return one, first, looks
+
+
+def split_atoms(
+    x: float, y: float, z: float, continuity: float, known: int, budget: float,
+    p: FloatArray, atoms: FloatArray, pull: FloatArray, texture: object,
+) -> tuple[int, float, float, bool]:  # fmt: skip
+    """Write p (3,), the atoms of law H (5, 4) and z̄ - p, ``pull`` (3,), at a probe inside.
+
+    Args:
+        x: of the probe [m].
+        y: likewise.
+        z: likewise.
+        continuity: c.
+        known: how many rows of ``atoms`` hold those of a probe nearby, with their weights.
+        budget: looks that may be taken, a quarter of them by a query.
+        p: result.
+        atoms: result.
+        pull: result.
+        texture: record of the texture.
+
+    Returns:
+        How many atoms, the gap between primal and dual [m²], the looks that were taken, and whether
+        the budget was not enough: the force is exact to k √(2 (1 + c) gap).
     """
     mu = 1.0 / (1.0 + continuity)
     a = local_array((7, 10))
@@ -241,33 +339,39 @@ def split_atoms(
     p[1] = y
     p[2] = z
     scale = abs(p[0]) + abs(p[1]) + abs(p[2])
-    first: Any = np.int64(0)
-    count: Any = np.int64(1)
-    split_query(p, atoms, first, texture)
-    atoms[0, 3] = 1.0
-    gap = np.inf
+    each = 0.25 * budget
     doubts = 0
+    count, solved, looks = split_start(atoms, known, p, at, pull, continuity, a, each, texture)
     for _ in range(60):
-        split_value(atoms, count, p, mu, pull)
-        for d in range(3):
-            at[d] = p[d] - pull[d] / continuity
-        polished = split_try_polish(atoms, count, p, at, mu, a, texture) if count > 1 else 0
-        if polished > 0:
-            count = polished
-            # From y, not from the weights: they are ill-conditioned where atoms meet.
-            for d in range(3):
-                pull[d] = continuity * (p[d] - at[d])
-        split_query(at, atoms, count, texture)
+        unsure, taken = split_query(at, atoms, count, each, texture)
+        looks += taken
         gap, rounding = split_gap(atoms, count, at, mu, scale)
-        if gap <= rounding:
+        nearest = gap <= rounding
+        gap += split_doubt(atoms, count, at, mu, unsure)
+        if nearest:
             doubts += 1
-            if polished > 0 or doubts > 6 or (count == 1 and split_single(atoms, at, texture)):
-                break
+            single = count == 1 and split_single(atoms, at, texture)
+            if solved > 0 or doubts > 6 or single or unsure > 0.0:
+                return count, gap, looks, unsure > 0.0
+        # What a round may take is kept in reserve.
+        if looks > 0.6 * budget:
+            return count, gap, looks, True
         left = split_weights(atoms, count + 1, p, mu, a)
         if left == 0:
             break  # rounding: no better weights are known than these
         count = left
-    return count, gap
+        solved, taken = split_settle(atoms, count, p, at, pull, continuity, a, 0.25 * each, texture)
+        looks += taken
+        count = solved if solved > 0 else count
+    return count, gap, looks, False
+
+
+def split_doubt(atoms: FloatArray, count: int, y: FloatArray, mu: float, gap: float) -> float:
+    """Return what the gap of a query [m] adds to that between primal and dual [m²]."""
+    square = 0.0
+    for d in range(3):
+        square += (atoms[count, d] - y[d]) ** 2
+    return (1.0 - mu) * gap * (math.sqrt(square) - 0.5 * gap)
 
 
 def split_contact(
@@ -277,7 +381,8 @@ def split_contact(
     atoms = local_array((5, 4))
     p = local_array((3,))
     pull = local_array((3,))
-    split_atoms(x, y, z, continuity, p, atoms, pull, texture)
+    none: Any = np.int64(0)
+    split_atoms(x, y, z, continuity, none, UNLIMITED, p, atoms, pull, texture)
     return pull[0], pull[1], pull[2]
 
 
@@ -288,7 +393,10 @@ def split_energy(
     atoms = local_array((5, 4))
     p = local_array((3,))
     pull = local_array((3,))
-    count, gap = split_atoms(x, y, z, continuity, p, atoms, pull, texture)
+    none: Any = np.int64(0)
+    count, gap, _looks, _short = split_atoms(
+        x, y, z, continuity, none, UNLIMITED, p, atoms, pull, texture
+    )
     return split_value(atoms, count, p, 1.0 / (1.0 + continuity), pull), count, gap
 
 
@@ -333,7 +441,10 @@ def split_derivative(
     p = local_array((3,))
     pull = local_array((3,))
     m = local_array((3, 3))
-    count, _gap = split_atoms(x, y, z, continuity, p, atoms, pull, texture)
+    none: Any = np.int64(0)
+    count, _gap, _looks, _short = split_atoms(
+        x, y, z, continuity, none, UNLIMITED, p, atoms, pull, texture
+    )
     split_response(p, continuity, atoms, count, pull, m, texture)
     return (
         pull[0], pull[1], pull[2], m[0, 0], 0.5 * (m[0, 1] + m[1, 0]), 0.5 * (m[0, 2] + m[2, 0]),

@@ -208,7 +208,7 @@ def guarded(
 
 def rendered(
     at: Carried, sensed: Sensed, leaving: bool, settings: ServoSettings, limits: Limits,
-    board: Board, texture: object, law: object,
+    board: Board, memory: FloatArray, texture: object, law: object,
 ) -> Carried:  # fmt: skip
     """Return what is carried on after the tick of a reading."""
     before = at.servo
@@ -216,7 +216,7 @@ def rendered(
         before = first_state(sensed.x, sensed.y, sensed.z, settings)
     if at.sample & 255 == 0:
         before = flushed_state(before)
-    servo = servo_tick(before, settings, sensed.x, sensed.y, sensed.z, texture, law)
+    servo = servo_tick(before, settings, sensed.x, sensed.y, sensed.z, memory, texture, law)
     share = next_share(at.share, leaving, limits.share)
     return guarded(at, before, servo, share, settings, limits, board)
 
@@ -309,7 +309,7 @@ def restarted(at: Carried, now: int) -> Carried:
 
 def device_loop(
     at: Carried, last: int, settings: ServoSettings, limits: Limits, frame: FloatArray,
-    clock: Clock, device: object, board: Board, texture: object, law: object,
+    clock: Clock, device: object, board: Board, memory: FloatArray, texture: object, law: object,
 ) -> tuple[int, int, Carried]:  # fmt: skip
     """Run samples until one is due that is not wanted, or something ends the loop.
 
@@ -324,6 +324,7 @@ def device_loop(
         clock: when samples are due.
         device: record of the driver.
         board: what is shared.
+        memory: of the contact; changed.
         texture: record of the texture.
         law: parameters of the law.
 
@@ -346,7 +347,7 @@ def device_loop(
         sensed = sense(place, frame, limits, device)
         cause, code, inside = sensed.cause, sensed.code, False
         if cause == GOING:
-            at = rendered(at, sensed, ends != GOING, settings, limits, board, texture, law)
+            at = rendered(at, sensed, ends != GOING, settings, limits, board, memory, texture, law)
             inside = probe_inside(at.servo.x, at.servo.y, at.servo.z, texture)
             cause = too_deep(at.servo, limits, board, texture)
             if not is_finite(at.fx, at.fy, at.fz):

@@ -105,8 +105,8 @@ def flush(values: FloatArray) -> None:
 
 def servo_batch(
     x: FloatArray, queue: FloatArray, state: LoopState, ledger: FloatArray, anchor: FloatArray,
-    plant: object, settings: ServoSettings, texture: object, law: object, trace: FloatArray,
-    every: int,
+    plant: object, settings: ServoSettings, memory: FloatArray, texture: object, law: object,
+    trace: FloatArray, every: int,
 ) -> tuple[int, int, LoopState]:  # fmt: skip
     """Run one sample for each row of the hand's anchor but the last.
 
@@ -118,6 +118,7 @@ def servo_batch(
         anchor: positions of the hand's anchor at the samples (k + 1, 3) [m].
         plant: record of the body.
         settings: of the servo.
+        memory: of the contact; changed.
         texture: record of the texture.
         law: parameters of the law.
         trace: rows of ``COLUMNS``, for the samples that are multiples of ``every``; none are
@@ -141,7 +142,7 @@ def servo_batch(
             flush(x)
             servo = flushed_state(servo)
         before = servo
-        servo = servo_tick(before, settings, x[0], x[1], x[2], texture, law)
+        servo = servo_tick(before, settings, x[0], x[1], x[2], memory, texture, law)
         book_command(ledger, before, servo)
         head, fx, fy, fz = wait_in_queue(queue, head, servo.fx, servo.fy, servo.fz)
         ax = anchor[sample, 0]

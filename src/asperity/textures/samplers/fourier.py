@@ -3,15 +3,19 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels
 from asperity.contacts.nearest.plane_search import descend, judge, next_box
+from asperity.contacts.sampler import EXACT, PASSED
+from asperity.contacts.sampler import PlanePoint as Point
 from asperity.textures.samplers.sine import cosine, sine
 
 KERNELS = Kernels(
-    provides=("curvature", "foot", "height", "slope"),
+    provides=("curvature", "foot", "height", "search_plane", "slope"),
     requires=("cosine", "descend", "judge", "next_box", "sine"),
-    called=("foot",),
+    called=("foot", "search_plane"),
 )
 
 
@@ -89,10 +93,21 @@ def foot(
 ) -> tuple[float, float, float, float, float]:
     """Return X, Y of the globally nearest surface point, and h, h_x, h_y there.
 
-    Downhill from the probe, a distance; only a square of that half-width, less what the heights
-    leave over, can hold a nearer point. It is quartered from the whole down.
+    Downhill from the probe, then whatever can be nearer.
     """
     best = descend(x, y, z, x, y, texture)
+    best, _left = search_plane(x, y, z, best, EXACT, np.inf, texture)
+    return best[0], best[1], best[3], best[4], best[5]
+
+
+def search_plane(
+    x: float, y: float, z: float, best: Point, keep: float, left: float, texture: FourierArguments
+) -> tuple[Point, float]:
+    """Return the best point after a search of all that can be nearer, and the looks left.
+
+    Only a square with the distance of the best as half-width, less what the heights leave over, can
+    hold a nearer point. It is quartered from the whole down.
+    """
     gap = max(texture.low - z, z - texture.high, 0.0)
     reach = math.sqrt(max(best[2] - gap * gap, 0.0))
     u = 0.5 + 0.5 * (best[0] - x) / max(reach, 1e-300)
@@ -100,18 +115,19 @@ def foot(
     level = 0 if reach > 0.0 else 1
     i = j = 0
     side = 1.0
-    while level <= 0:
+    while level <= 0 and left > 0.0:
+        left -= PASSED
         half = reach * side
         cx = (2 * j + 1) * half - reach
         cy = (2 * i + 1) * half - reach
         near_x = max(abs(cx) - half, 0.0)
         near_y = max(abs(cy) - half, 0.0)
-        deeper = near_x * near_x + near_y * near_y + gap * gap < best[2] * (1.0 - 1e-13)
+        deeper = near_x * near_x + near_y * near_y + gap * gap < best[2] * keep
         # In a box of several waves Taylor's formula says nothing.
         if deeper and half * texture.wave_number < 1.5:
-            best, deeper = judge(
+            best, deeper, left = judge(
                 x, y, z, x + cx, y + cy, half, half, texture.bend, texture.twist,
-                best, texture,
+                best, keep, left, texture,
             )  # fmt: skip
             deeper = deeper and level > -48
         if deeper:
@@ -121,4 +137,4 @@ def foot(
             j = 2 * j + (1 if u >= (2 * j + 1) * side else 0)
         else:
             level, side, i, j = next_box(level, side, i, j, 0, u, v)
-    return best[0], best[1], best[3], best[4], best[5]
+    return best, left

@@ -8,7 +8,10 @@ from numpy.typing import NDArray
 
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels
-from asperity.contacts.nearest.line_search import Point, descend, judge, next_part
+from asperity.contacts.nearest.line_search import descend, judge, next_part
+from asperity.contacts.nearest.line_within import line_within
+from asperity.contacts.sampler import EXACT, PASSED
+from asperity.contacts.sampler import LinePoint as Point
 from asperity.textures.samplers.spline import (
     Four,
     box_bounds,
@@ -24,13 +27,13 @@ from asperity.textures.samplers.spline import (
 )
 
 KERNELS = Kernels(
-    provides=("along", "curvature", "foot", "height", "slope"),
+    provides=("along", "curvature", "foot", "foot_within", "height", "search_line", "slope"),
     requires=(
-        "descend", "judge", "next_part",
+        "descend", "judge", "line_within", "next_part",
         "box_bounds", "cell_at", "dot4", "foreseeable", "nearest_copy", "reach_of", "tile_frame",
         "weights", "weights_first", "weights_second",
     ),
-    called=("foot", "search_tile", "search_tree"),
+    called=("foot", "search_line", "search_tile", "search_tree"),
 )  # fmt: skip
 
 
@@ -94,14 +97,34 @@ def foot(
 ) -> tuple[float, float, float, float, float]:
     """Return X, Y of the globally nearest surface point, and h, h_x, h_y there; Y = y.
 
-    Downhill from the probe, a distance; only points within it can be nearer. The line is tiled by
-    copies of the profile, every other one mirrored if it is finite; each is searched from the
-    coarsest intervals of the pyramid down.
+    Downhill from the probe, then whatever can be nearer.
     """
     best = descend(x, z, x, texture)
+    best, _left = search_line(x, z, best, EXACT, np.inf, texture)
+    return best[0], y, best[2], best[3], 0.0
+
+
+def foot_within(
+    x: float, y: float, z: float, start_x: float, start_y: float, budget: float,
+    texture: ProfileArguments,
+) -> tuple[float, float, float, float, float, float, float]:  # fmt: skip
+    """Return the foot as far as a budget of looks finds it; see ``contacts.sampler``."""
+    best, gap, looks = line_within(x, z, start_x, budget, texture)
+    return best[0], y, best[2], best[3], 0.0, gap, looks
+
+
+def search_line(
+    x: float, z: float, best: Point, keep: float, left: float, texture: ProfileArguments
+) -> tuple[Point, float]:
+    """Return the best point after a search of all copies of the profile, and the looks left.
+
+    Only points within the distance of the best can be nearer. The line is tiled by copies of the
+    profile, every other one mirrored if it is finite; each is searched from the coarsest intervals
+    of the pyramid down.
+    """
     cells = texture.c.size - 3
     middle = math.floor((x - texture.x0) * texture.ix / cells)
-    best = search_tile(x, z, middle, best, texture)
+    best, left = search_tile(x, z, middle, best, keep, left, texture)
     # Of the copies of a point only the nearest counts.
     reach = min(
         reach_of(z, best[1], texture.nodes), nearest_copy(cells / texture.ix, texture.periodic)
@@ -109,13 +132,15 @@ def foot(
     first = math.floor((x - reach - texture.x0) * texture.ix / cells)
     last = math.floor((x + reach - texture.x0) * texture.ix / cells)
     for tile in range(first, last + 1):
-        if tile != middle:
-            best = search_tile(x, z, tile, best, texture)
-    return best[0], y, best[2], best[3], 0.0
+        if tile != middle and left > 0.0:
+            best, left = search_tile(x, z, tile, best, keep, left, texture)
+    return best, left
 
 
-def search_tile(x: float, z: float, tile: int, best: Point, texture: ProfileArguments) -> Point:
-    """Return the best point after a search of one copy of the profile.
+def search_tile(
+    x: float, z: float, tile: int, best: Point, keep: float, left: float, texture: ProfileArguments
+) -> tuple[Point, float]:
+    """Return the best point after a search of one copy of the profile, and the looks left.
 
     Probe and best point are moved to where they are seen from the profile itself.
     """
@@ -130,16 +155,21 @@ def search_tile(x: float, z: float, tile: int, best: Point, texture: ProfileArgu
     while top < texture.levels.shape[0] - 1 and (high - low) >> top > 0:
         top += 1
     for i in range(low >> top, (high >> top) + 1):
-        found = search_tree(x, z, top, i, found, texture)
+        if left > 0.0:
+            found, left = search_tree(x, z, top, i, found, keep, left, texture)
     if found[1] < best[1]:
-        return turn * (found[0] - shift), found[1], found[2], turn * found[3]
-    return best
+        return (turn * (found[0] - shift), found[1], found[2], turn * found[3]), left
+    return best, left
 
 
 def search_tree(
-    x: float, z: float, top: int, i: int, best: Point, texture: ProfileArguments
-) -> Point:
-    """Return the best point after a search of interval i of level top, 2^top cells long."""
+    x: float, z: float, top: int, i: int, best: Point, keep: float, left: float,
+    texture: ProfileArguments,
+) -> tuple[Point, float]:  # fmt: skip
+    """Return the best point after a search of interval i of level top, and the looks left.
+
+    The interval is 2^top cells long.
+    """
     ix = texture.ix
     x0 = texture.x0
     cells = float(texture.c.size - 3)
@@ -148,7 +178,8 @@ def search_tree(
     level = top
     side = 2.0**top
     low = high = bend = twist = 0.0
-    while level <= top:
+    while level <= top and left > 0.0:
+        left -= PASSED
         start = i * side
         end = min(start + side, cells)
         deeper = start < end
@@ -157,11 +188,11 @@ def search_tree(
                 low, high, bend, twist = box_bounds(texture.nodes, texture.levels[level, 0] + i)
             near = max(start - u, u - end, 0.0) * pitch
             gap = max(low - z, z - high, 0.0)
-            deeper = near * near + gap * gap < best[1] * (1.0 - 1e-13)
+            deeper = near * near + gap * gap < best[1] * keep
         if deeper and (level <= 0 or foreseeable(z, low, high, bend, twist, side, ix)):
-            best, deeper = judge(
+            best, deeper, left = judge(
                 x, z, x0 + 0.5 * (start + end) * pitch, 0.5 * (end - start) * pitch,
-                bend * ix, twist * ix * ix, best, texture,
+                bend * ix, twist * ix * ix, best, keep, left, texture,
             )  # fmt: skip
             deeper = deeper and level > -20
         if deeper:
@@ -170,4 +201,4 @@ def search_tree(
             i = 2 * i + (1 if u >= (2 * i + 1) * side else 0)
         else:
             level, side, i = next_part(level, side, i, top, u)
-    return best
+    return best, left

@@ -14,11 +14,13 @@ is then k (c u/κ, A cos ψ - z), else law D's.
 
 import math
 
+from asperity.checks import FloatArray
 from asperity.compiled import Kernels
 from asperity.textures.samplers.sinusoid import SinusoidArguments, flank_root, foot
 
 KERNELS = Kernels(
-    provides=("split_contact", "split_derivative", "split_energy"), requires=("flank_root", "foot")
+    provides=("split_again", "split_contact", "split_derivative", "split_energy"),
+    requires=("flank_root", "foot"),
 )
 
 
@@ -53,6 +55,13 @@ def split_contact(
     split, psi = split_foot(abs(u), z, continuity, amplitude, k2 * amplitude)
     shift = continuity * u if split else math.copysign(psi - abs(u), u)
     return texture.kx * shift / k2, texture.ky * shift / k2, amplitude * math.cos(psi) - z
+
+
+def split_again(
+    x: float, y: float, z: float, continuity: float, memory: FloatArray, texture: SinusoidArguments
+) -> tuple[float, float, float]:
+    """Return the same tick after tick: nothing needs to be remembered."""
+    return split_contact(x, y, z, continuity, texture)
 
 
 def split_derivative(

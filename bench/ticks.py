@@ -1,0 +1,156 @@
+"""The longest tick of laws D and H on surfaces made to be slow, and what a stroke costs per tick.
+
+Each tick of an adversary begins with nothing remembered; its time is the least of a few turns, so
+that an interruption by something else does not count.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from time import perf_counter
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from asperity.checks import FloatArray
+from asperity.contacts.memory import new_memory
+from asperity.surface import Surface
+from asperity.textures import HeightMap
+from bench import cases
+from bench.timing import seconds, take_turns
+
+SIDE = 512
+PITCH = 50e-6
+SPEED, RATE = 0.1, 4000.0
+TICKS = 800
+# Goals, in µs.
+LONGEST = {"D": 50.0, "H": 150.0}
+PER_TICK = {"D": 0.5, "H": 2.5}
+PROBES = 40
+TURNS = 5
+Adversaries = dict[str, tuple[HeightMap, FloatArray]]
+
+
+def adversaries(side: int = SIDE) -> Adversaries:
+    """Return maps of so many nodes a side, each with a probe (1, 3) [m] that is hardest for it.
+
+    The probe is the centre of curvature of dome and grooves, and is deep below the others.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    rng = np.random.default_rng(cases.SEED)
+    centre = 0.5 * (side - 1) * PITCH
+    y, x = np.mgrid[:side, :side] * PITCH - centre
+    away = np.hypot(x, y)
+    noise = gaussian_filter(rng.standard_normal((side, side)), 6.0, mode="reflect")
+    steps = gaussian_filter(rng.standard_normal((side, side)), 12.0, mode="reflect")
+    needles = np.where(rng.random((side, side)) < 0.01, 1e-3, 0.0)
+    radius = 0.8 * side * PITCH
+    ring = 1e-3 / (2.0 * np.pi)
+    heights: dict[str, tuple[FloatArray, float]] = {
+        "noise": (0.1e-3 * noise / noise.std(), -1.5e-3),
+        "needles": (needles, -2e-3),
+        "plateaus": (0.3e-3 * np.round(steps / steps.std()), -2e-3),
+        "concentric grooves": (0.2e-3 * np.cos(away / ring), 0.2e-3 - ring**2 / 0.2e-3),
+        "dome": (np.sqrt(radius**2 - away**2) - radius, -radius),
+    }
+    return {
+        name: (HeightMap(values, PITCH), np.array([[centre, centre, z]]))
+        for name, (values, z) in heights.items()
+    }
+
+
+def run(console: Console) -> None:
+    """Print a row for each surface and law, and whether the goals are met."""
+    table = Table(box=None, pad_edge=False)
+    headings = (
+        "longest\ntick µs",
+        "looks",
+        "cut short",
+        "greatest\ngap µm",
+        "without a\nbudget µs",
+    )
+    for heading in ("law", "surface", *headings, "stroke\nµs a tick", "looks", "each alone\nµs"):
+        table.add_column(heading, justify="left" if heading in {"law", "surface"} else "right")
+    missed: list[str] = []
+    for name, (texture, centre) in adversaries().items():
+        for law in "DH":
+            surface = Surface(texture, law, cases.STIFFNESS)
+            longest, cells = _longest(surface, _probes(texture, centre))
+            each, more = _stroke(surface)
+            table.add_row(law, name, *cells, *more)
+            if longest > LONGEST[law]:
+                missed.append(f"{law} on {name}: {longest:.0f} µs")
+            if name == "noise" and each > PER_TICK[law]:
+                missed.append(f"{law} along a stroke: {each:.1f} µs")
+    console.print(
+        f"maps of {SIDE} x {SIDE}; ticks at 0.3 to 3 times max_depth and at centres of curvature;"
+        f"\nstrokes of {SPEED:g} m/s at {RATE:g} Hz at half of max_depth; gap of D: a point may be"
+        "\nnearer by so much, of H: error of the force over the stiffness"
+    )
+    console.print(table)
+    answer = "met" if not missed else f"MISSED: {'; '.join(missed)}"
+    goals = "longest tick D 50, H 150 µs; stroke on noise D 0.5, H 2.5 µs"
+    console.print(f"goals: {goals} -> {answer}", style="bold")
+
+
+def _probes(texture: HeightMap, centre: FloatArray) -> FloatArray:
+    rng = np.random.default_rng(cases.SEED + 5)
+    xy = rng.uniform(0.1, 0.9, (PROBES, 2)) * SIDE * PITCH
+    deep = Surface(texture).max_depth * rng.choice([0.3, 1.0, 1.0, 3.0], PROBES)
+    random = np.column_stack([xy, texture.height(xy) - deep])
+    near = centre + np.array([[0, 0, 0], [1e-7, 0, 0], [1e-4, 1e-5, 0], [0, 0, 0.5 * centre[0, 2]]])
+    return np.ascontiguousarray(np.concatenate([random, near]))
+
+
+def _longest(surface: Surface, probes: FloatArray) -> tuple[float, list[str]]:
+    """Return the longest tick [µs], and the cells that tell of it."""
+    loop, arguments = surface._path_loops.path_batch, _arguments(surface)
+    out, told = np.empty((1, 3)), np.empty((1, 2))
+    budget = surface.law.contact.looks
+    rows = []
+    for probe in probes:
+        point = probe[None].copy()
+
+        times = []
+        for _turn in range(TURNS):
+            times.append(seconds(partial(loop, point, out, told, new_memory(budget), *arguments)))
+        rows.append((min(times) * 1e6, told[0, 1], told[0, 0]))
+    times_, looks, gaps = np.array(rows).T
+    # Without a budget a tick at a centre of curvature may take seconds: of random probes only.
+    exact = []
+    for probe in probes[:PROBES]:
+        start = perf_counter()
+        surface._loops.force_batch(probe[None], out, *arguments)
+        exact.append((perf_counter() - start) * 1e6)
+    cells = [
+        f"{times_.max():.1f}", f"{looks.max():.0f}", f"{np.mean(gaps > 0.0):.0%}",
+        f"{gaps.max() * 1e6:.3g}", f"{max(exact):.0f}",
+    ]  # fmt: skip
+    return float(times_.max()), cells
+
+
+def _stroke(surface: Surface) -> tuple[float, list[str]]:
+    """Return what a tick of a stroke costs [µs], and the cells that tell of it."""
+    loop, arguments = surface._path_loops.path_batch, _arguments(surface)
+    way = SPEED / RATE * np.arange(TICKS)[:, None] * np.array([np.cos(0.3), np.sin(0.3)])
+    xy = np.array([0.1, 0.2]) * SIDE * PITCH + way
+    depth = 0.5 * surface.max_depth
+    path = np.ascontiguousarray(np.column_stack([xy, surface.texture.height(xy) - depth]))
+    out, told = np.empty_like(path), np.empty((TICKS, 2))
+    budget = surface.law.contact.looks
+
+    def ticks() -> None:
+        loop(path, out, told, new_memory(budget), *arguments)
+
+    def alone() -> None:
+        surface._loops.force_batch(path, out, *arguments)
+
+    times = np.median(take_turns([ticks, alone], TURNS), axis=0) / TICKS * 1e6
+    ticks()
+    return float(times[0]), [f"{times[0]:.2f}", f"{told[:, 1].mean():.1f}", f"{times[1]:.2f}"]
+
+
+def _arguments(surface: Surface) -> tuple[object, object]:
+    return surface.texture.arguments, surface.law_arguments
