@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.arguments import Argument
-from asperity.cli.options import file_options, file_values, options, own_code_option
+from asperity.cli.options import (
+    file_options,
+    file_values,
+    jobs_option,
+    options,
+    own_code_option,
+)
 from asperity.cli.output import Outputs, check_outputs, output_options
 from asperity.cli.progress import progress_bar, step_bar
 from asperity.errors import ParameterError, printable
@@ -51,6 +57,7 @@ _FORMAT = Argument(
 @options([_FORMAT], lambda argument: lambda text: argument.checked(argument.read(text)))
 @own_code_option
 @file_options
+@jobs_option
 @output_options("Write a report; - is standard output.")
 def command(
     names: tuple[str, ...],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import nullcontext
 from difflib import get_close_matches
 
 from asperity.errors import ParameterError
@@ -20,6 +21,7 @@ from asperity.paper import (  # noqa: F401 - each declares its claims
 )
 from asperity.paper.claim import DECLARED, Claim, Result
 from asperity.paper.experiments import findings  # noqa: F401 - declares its claims
+from asperity.processes import at_most, helped
 
 # What is called after each claim: its result, how many are done, of how many.
 Progress = Callable[[Result, int, int], None]
@@ -107,7 +109,7 @@ def reproduce_claims(
     Args:
         ids: which, see :func:`find_claims`; all by default.
         progress: called after each claim.
-        workers: processes to use; this one alone by default.
+        workers: processes to use; this one alone by default, on the command line one per core.
 
     Raises:
         ParameterError: for an unknown id, or a number of workers that is not positive.
@@ -125,10 +127,11 @@ def reproduce_claims(
     wanted = None if ids is None else {found.id for given in ids for found in find_claims(given)}
     names = [name for name in CLAIMS if wanted is None or name in wanted]
     results = []
-    for result in _computed(names, 1 if workers is None else int(workers)):
-        results.append(result)
-        if progress is not None:
-            progress(result, len(results), len(names))
+    with nullcontext() if workers is None else at_most(int(workers)):
+        for result in _computed(names):
+            results.append(result)
+            if progress is not None:
+                progress(result, len(results), len(names))
     return tuple(results)
 
 
@@ -136,17 +139,13 @@ def _run(name: str) -> Result:
     return CLAIMS[name].run()
 
 
-def _computed(names: list[str], workers: int) -> Iterator[Result]:
-    """Yield results in order, computed here or by other processes."""
-    if workers == 1 or len(names) < 2:
-        yield from map(_run, names)
-        return
-    from concurrent.futures import ProcessPoolExecutor
-    from multiprocessing import get_context
+def _computed(names: list[str]) -> Iterator[Result]:
+    """Yield results in order, computed here or ahead by other processes."""
+    with helped(_run_ahead, names) as turns:
+        for name, found in zip(names, turns, strict=True):
+            yield _run(name) if found is None else found
 
-    # A fresh process each: a fork would copy the threads of numerical libraries half. It knows the
-    # paper's own claims only; those that were added are computed here.
-    with ProcessPoolExecutor(min(workers, len(names)), get_context("spawn")) as pool:
-        started = {name: pool.submit(_run, name) for name in names if name in _OF_THE_PAPER}
-        for name in names:
-            yield started[name].result() if name in started else _run(name)
+
+def _run_ahead(name: str) -> Result | None:
+    """Compute a claim of the paper: another process knows none that were added here."""
+    return _run(name) if name in _OF_THE_PAPER else None
