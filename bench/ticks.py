@@ -120,6 +120,7 @@ def _longest(surface: Surface, probes: FloatArray) -> tuple[float, list[str]]:
     times_, looks, gaps = np.array(rows).T
     # Without a budget a tick at a centre of curvature may take seconds: of random probes only.
     exact = []
+    surface._loops.force_batch(probes[:1], out, *arguments)  # compiled, or loaded
     for probe in probes[:PROBES]:
         start = perf_counter()
         surface._loops.force_batch(probe[None], out, *arguments)

@@ -18,7 +18,7 @@ class Nearest(Contact):
     name = "nearest"
     cost = 100.0
     remembers = True
-    looks = 400.0
+    looks = 600.0
 
     def derivatives(self) -> ContactDerivatives:
         """Return ∇depth = -n and, by the implicit function theorem, ∂(X, Y)/∂p = Q⁻¹ [I g].

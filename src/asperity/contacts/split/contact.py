@@ -18,7 +18,7 @@ class Split(Nearest):
 
     name = "split"
     cost = 1000.0
-    looks = 1200.0
+    looks = 1800.0
     gap_is_force = True
     single_valued = True
     given_by_depth = False
