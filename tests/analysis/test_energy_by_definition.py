@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from asperity.analysis import loop_work
-from asperity.analysis.energy import columns, leak, merit, state_loops
+from asperity.analysis.energy import columns, leak, loops, merit, state_loops
 from asperity.analysis.energy.columns import Layer, comb, positive_interval
 from asperity.analysis.energy.continuity import _rounded_up
 from asperity.analysis.energy.leak import worst_loop
@@ -338,3 +338,8 @@ def test_three_digits_are_never_less() -> None:
     assert _rounded_up(1230.0) == 1230.0
     assert _rounded_up(1230.0 * (1.0 + 1e-9)) == 1240.0
     assert _rounded_up(0.0) == 0.0
+
+
+def test_a_way_over_a_plane_has_a_panel() -> None:
+    """Where the height never changes its course, with as many edges as there may be."""
+    assert [loops._panels(1e-3, np.inf, edges) for edges in (1, 10**6)] == [4, 1]

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
-from asperity.analysis.split.state import split_state
+from asperity.analysis.split.state import pop_through, split_state
 from asperity.errors import ParameterError
 from asperity.laws import Law
 from asperity.surface import Surface
@@ -376,3 +376,13 @@ def test_far_below_and_extreme_continuity(name: str) -> None:
 def test_state_is_of_the_split_contact_only() -> None:
     with pytest.raises(ParameterError, match="split contact"):
         split_state(Surface(TEXTURES["gentle"], "D"), [[0.0, 0.0, 0.0]])
+
+
+def test_a_probe_is_beyond_where_the_plate_can_pull_it_down() -> None:
+    """Deeper below the highest point than (1 - μ) t/2, 1 - μ = c/(1 + c), wherever it is."""
+    surface = Surface(Sinusoid(0.1e-3, PERIOD), "H", K, continuity=0.5)
+    plate = pop_through(surface, 2e-3)
+    assert plate.depth == pytest.approx(1e-3 / 3.0)
+    points = [[x, y, plate.highest - share * plate.depth]
+              for x, y in ((-5e-3, 0.0), (5e-3, -1.0)) for share in (0.999, 1.001)]  # fmt: skip
+    assert plate.beyond(points).tolist() == [False, True, False, True]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from itertools import pairwise
 
+import mpmath
 import numpy as np
 import pytest
 
 from asperity.checks import FloatArray
 from asperity.contacts import Contact
-from asperity.contacts.nearest import line_search, plane_search
+from asperity.contacts.nearest import line_search, line_within, plane_search
 from asperity.laws import LAWS
 from asperity.textures import Fourier
 
@@ -38,6 +39,21 @@ def test_inside_is_where_the_depth_is_positive(letter: str) -> None:
     on = np.column_stack([POINTS[:20, :2], begin[:20]])
     if letter == "W":
         assert not contact.inside(WAVES, on).any()
+
+
+def test_the_exact_foot_is_one_in_all_its_digits() -> None:
+    """Where ∇φ = 0, to far more digits than the kernels' own foot, from which it starts."""
+    with mpmath.workdps(60):
+        h, contact = WAVES.exact_height(), LAWS["D"].contact
+        for point in POINTS[:8]:
+            p = [mpmath.mpf(float(value)) for value in point]
+            found = contact.exact_point(WAVES, h, p)
+            assert found is not None
+            depth, x, y = found
+            gap = h(x, y, 0, 0) - p[2]
+            assert abs(x - p[0] + gap * h(x, y, 1, 0)) < 1e-50 * abs(depth)
+            assert abs(y - p[1] + gap * h(x, y, 0, 1)) < 1e-50 * abs(depth)
+            assert abs(depth**2 - (x - p[0]) ** 2 - (y - p[1]) ** 2 - gap**2) < 1e-60
 
 
 # --- descents -------------------------------------------------------------------------------------
@@ -145,6 +161,35 @@ def test_a_piece_right_below_the_probe_is_as_far_as_its_plane() -> None:
         lifted = plane_search.clearance(away, hx, hy, 0.1, 0.3 * far)
         assert lifted == pytest.approx(0.7 * far, rel=1e-12)
         assert plane_search.clearance(away, hx, hy, 0.1, 2.0 * far) == 0.0
+
+
+def test_a_box_is_as_far_as_taylor_s_formula_says() -> None:
+    """Above its middle only Q's change counts: φ ≥ φ₀ - 2∫(1 - t) t dt · change r²."""
+
+    def is_hopeless(enough: float) -> bool:
+        given = (0.0, 0.0, 1.0), 0.0, 0.0, (2.0, 0.0, 2.0)
+        return plane_search.hopeless(*given, 2.0, 0.6, 2.0, 0.3, 0.4, enough)
+
+    assert is_hopeless(0.95 * (1.0 - 1e-12))
+    assert not is_hopeless(0.95 * (1.0 + 1e-12))
+
+
+def test_a_search_out_of_looks_asks_for_less_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Unfinished it goes on with what is nearer by a share that falls to a quarter: d ≥ (1 - s) d₀.
+
+    So the squares that it searches with are (1 - s)².
+    """
+    kept: list[float] = []
+
+    def search_line(*given: object) -> tuple[tuple[float, ...], float]:
+        kept.append(float(given[3]))  # type: ignore[arg-type]  # the fourth is a number
+        return (0.0, 4.0, 0.0, 0.0), [0.0, 20.0, 10.0, 0.0][len(kept) - 1]
+
+    monkeypatch.setattr(line_within, "go_down", lambda *_given: ((0.0, 4.0, 0.0, 0.0), 50.0))
+    monkeypatch.setattr(line_within, "search_line", search_line)
+    best, gap, looks = line_within.line_within(0.0, 2.0, 0.0, 100.0, None)
+    np.testing.assert_allclose(kept[1:], [(1.0 - 0.25**n) ** 2 for n in (1, 2, 3)], rtol=1e-15)
+    assert (best[1], gap, looks) == (4.0, 2.0 / 16.0, 100.0)
 
 
 @pytest.mark.parametrize("u", [0.1, 3.3, 4.0, 7.9])

@@ -58,7 +58,7 @@ def disagreements(module: ModuleType) -> list[str]:
     kernels: Kernels = module.KERNELS
     defined, own, others = written(module)
     offered = {*kernels.provides, *kernels.loops}
-    faults = [f"requires {name}" for name in others ^ set(kernels.requires)]
+    faults = [f"requires {name}" for name in others ^ {*kernels.requires, *kernels.native}]
     faults += [f"offers {name}" for name in offered - defined]
     faults += [f"hides {name}" for name in defined - own - offered]
     hinted = {*kernels.called, *kernels.merged}

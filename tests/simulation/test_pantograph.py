@@ -29,8 +29,8 @@ from asperity.simulation import (
     sampled_plant,
     simulate,
 )
-from asperity.simulation.kernels.five_bar import bar_body
-from asperity.simulation.sampled_plant import bar_record
+from asperity.simulation.kernels.five_bar import bar_body, bar_friction, bar_rates
+from asperity.simulation.sampled_plant import _hand_record, bar_record
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
@@ -260,6 +260,16 @@ def test_brakes_of_a_textured_law_begin_at_the_texture() -> None:
         lost[letter] = run.ledger.lost
     assert lost["W"] == 0.0
     assert lost["C"] > 0.0
+
+
+def test_friction_of_no_limit_is_what_stops_the_handle() -> None:
+    """With it v + a t = 0 by the equations, damping, hand and speeds in both directions counted."""
+    bar, hand, span = bar_record(HEAVY), _hand_record(SPRING), 1e-3
+    x = np.array([0.004, 0.0, -0.005, 0.3, 0.0, -0.4])
+    given = (0.003, 0.006, 0.2, 0.25, 5.0)  # anchor, its speed, damping of the joints
+    fx, fz = bar_friction(x, 0.4, 1.1, *given, 1e9, span, bar, hand)
+    rates = bar_rates(x[0], x[2], x[3], x[5], 0.4 + fx, 1.1 + fz, *given, bar, hand)
+    np.testing.assert_allclose(np.array(rates[:2]) * span, -x[[3, 5]], rtol=1e-9)
 
 
 def test_it_stops_where_the_workspace_ends() -> None:
