@@ -17,6 +17,7 @@ from tests.servo.test_drivers import EXAMPLE, compiled
 
 from asperity.recording.recording import open_recording
 from asperity.recording.replay import replay
+from asperity.report.pictures.run_picture import recording_figure
 
 COMMAND = "run"
 Call = Callable[..., tuple[int, str, str]]
@@ -93,6 +94,14 @@ def test_a_recording_replays_bit_for_bit(
         assert replay(recording).same
     assert recording.rows == len(samples) >= 100
     assert np.abs(recording["applied z"]).max() > 0.01
+    # Motion, force, energy, path and phases, without the hand: a device does not know it.
+    drawn = [axes.get_lines() for axes in recording_figure(recording).axes]
+    assert [len(lines) for lines in drawn[3:]] == [1, 2, 2]
+    assert [line.get_label() for line in drawn[0]] == ["handle"]
+    (total,) = [line for line in drawn[2] if line.get_label() == "sum, exact"]
+    assert total.get_ydata()[-1] == 1e3 * recording["supplied"][-1]
+    assert (drawn[4][0].get_ydata() == 0.0).all()  # the hand is still where it begins
+    assert np.ptp(recording["z"]) == 0.0
     code, out, err = call(scene(), "--driver", f"replay:{path}", "--law", "W")
     if code == 0:
         assert "3D Systems Touch, replay: done" in out

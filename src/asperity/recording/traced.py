@@ -20,6 +20,10 @@ class Parts:
     columns: Columns
     table: FloatArray
 
+    def has(self, *names: str) -> bool:
+        """Return whether there are columns of all these names."""
+        return {*names} <= {name for name, _unit in self.columns}
+
     def part(self, *names: str) -> FloatArray:
         """Return columns by name, shape (k, names).
 

@@ -70,16 +70,17 @@ def _scan_axis(run: Parts) -> int:
 
 
 def _draw_motion(axes: Axes, run: Parts, height_at: Height, shown: slice) -> None:
-    time, place, anchor = run.time[shown], run.position[shown], run.anchor[shown]
+    time, place = run.time[shown], run.position[shown]
     height = height_at(place[:, :2])
     unit = style.length_unit(float(np.abs(np.append(place[:, 2], height)).max()))
     low = min(float(place[:, 2].min()), float(height.min())) * unit.scale
     axes.fill_between(time, height * unit.scale, low, color=style.BODY, lw=0.0, alpha=0.7)
     axes.plot(time, place[:, 2] * unit.scale, color=style.BLUE, lw=1.0, label="handle")
-    inside = np.abs(anchor[:, 2]).max() < 4.0 * max(np.abs(place[:, 2]).max(), 1e-9)
-    if inside:
-        axes.plot(time, anchor[:, 2] * unit.scale, color=style.SOFT, lw=0.8, ls="--", label="hand")
-    style.legend(axes)
+    if run.has("anchor z"):  # where the hand is, a device does not know
+        anchor = run.part("anchor z")[shown, 0]
+        if np.abs(anchor).max() < 4.0 * max(np.abs(place[:, 2]).max(), 1e-9):
+            axes.plot(time, anchor * unit.scale, color=style.SOFT, lw=0.8, ls="--", label="hand")
+            style.legend(axes)
     style.label(axes, "", f"z [{unit.name}]")
     style.entitle(axes, "Motion", "height of the handle over the surface below it")
 
@@ -102,12 +103,18 @@ def _draw_force(axes: Axes, run: Parts, shown: slice) -> None:
 
 
 def _draw_energy(axes: Axes, run: Parts, shown: slice) -> None:
-    supplied = run.energies["supplied"][shown] * 1e3
-    paper = run.energies["same_sample"][shown].sum(axis=1) * 1e3
-    for i in _moving(supplied):
-        axes.plot(run.time[shown], supplied[:, i], color=_COLOURS[i], lw=0.8, label=_AXES[i])
-    axes.plot(run.time[shown], supplied.sum(axis=1), color=style.INK, lw=1.4, label="sum, exact")
-    axes.plot(run.time[shown], paper, color=style.SOFT, lw=0.9, ls="--", label="the paper's sum")
+    time = run.time[shown]
+    if run.has("supplied x"):
+        energies = run.energies
+        supplied = energies["supplied"][shown] * 1e3
+        for i in _moving(supplied):
+            axes.plot(time, supplied[:, i], color=_COLOURS[i], lw=0.8, label=_AXES[i])
+        total, paper = supplied.sum(axis=1), energies["same_sample"][shown].sum(axis=1) * 1e3
+        axes.plot(time, total, color=style.INK, lw=1.4, label="sum, exact")
+        axes.plot(time, paper, color=style.SOFT, lw=0.9, ls="--", label="the paper's sum")
+    else:  # of a device: the sum alone
+        total = run.part("supplied")[shown, 0] * 1e3
+        axes.plot(time, total, color=style.INK, lw=1.4, label="sum, exact")
     style.zero_line(axes)
     style.legend(axes)
     style.label(axes, "time [s]", "energy [mJ]")
@@ -135,8 +142,16 @@ def _draw_path(axes: Axes, run: Parts, height_at: Height, shown: slice) -> None:
     style.entitle(axes, "Path", f"in the {_AXES[i]}-z plane")
 
 
+def _speed(run: Parts, i: int) -> FloatArray:
+    """Return the velocity along an axis; of a device, that of its positions."""
+    if run.has("vx", "vy", "vz"):
+        return run.velocity[:, i]
+    steps = np.diff(run.position[:, i]) / np.diff(run.time)
+    return np.append(steps[:1], steps)
+
+
 def _draw_phase(axes: Axes, run: Parts, i: int, shown: slice) -> None:
-    place, speed = run.position[shown, i], run.velocity[shown, i]
+    place, speed = run.position[shown, i], _speed(run, i)[shown]
     unit = style.length_unit(float(np.abs(place).max()))
     fast = style.length_unit(float(np.abs(speed).max()))
     last = len(place) - max(len(place) // 4, 1)
