@@ -194,7 +194,7 @@ def test_tolerance_and_work_limit_reach_the_search(rig: Device) -> None:
 
 def test_extent_narrows_the_bounds_of_a_sum_of_many_waves(rig: Device) -> None:
     vectors = [[9e3, 0], [0, 9e3 / 2**0.5], [9e3 / 3**0.5, 4e3], [-9e3 / 5**0.5, 9e3 / 7**0.5]]
-    waves = Fourier([1e-5] * 4, vectors)
+    waves = Fourier([1e-5] * 5, [*vectors, [3e3, -9e3 / 11**0.5]])
     patch = Surface(waves, "A")
     everywhere = analyze(patch, rig)
     assert everywhere.q.gap > 2e-3

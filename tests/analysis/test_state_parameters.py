@@ -20,8 +20,10 @@ from asperity.surface import Surface
 from asperity.textures import Fourier, Sinusoid
 
 WAVE = Sinusoid(amplitude=0.2e-3, period=1e-3)
-FOUR = Fourier(
-    [1e-4, 5e-5, 4e-5, 3e-5], [[3000.0, 0.0], [0.0, 5000.0], [1234.0, 777.0], [-500.0, 2222.0]]
+# More independent waves than are certified on the whole plane.
+FIVE = Fourier(
+    [1e-4, 5e-5, 4e-5, 3e-5, 2e-5],
+    [[3000.0, 0.0], [0.0, 5000.0], [1234.0, 777.0], [-500.0, 2222.0], [1777.0, -3210.0]],
 )
 RUBBING = {"friction": 4.0, "max_deflection": 1e-4, "modulation_depth": 0.6}
 
@@ -85,10 +87,10 @@ def test_it_does_not_matter_how_a_parameter_was_given() -> None:
 
 
 def test_the_safe_bound_knows_the_parameters() -> None:
-    surface = Surface(FOUR, "F", law_parameters=RUBBING)
+    surface = Surface(FIVE, "F", law_parameters=RUBBING)
     bound = characteristic_number(surface)
     assert bound.lower <= bound.upper == safe_bound(surface, NORM)
-    assert bound.upper > 2.0 * characteristic_number(Surface(FOUR, "F")).upper
+    assert bound.upper > 2.0 * characteristic_number(Surface(FIVE, "F")).upper
 
 
 def test_loops_of_a_law_of_one_s_own_drag_its_own_anchor() -> None:

@@ -186,8 +186,8 @@ def test_an_interrupt_inside_exec_ends_with_its_exit_code(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("module", ["click", "asperity.cli.compare", "numba", "numpy"])
-def test_an_interrupt_during_imports_ends_with_its_exit_code(module: str) -> None:
-    """The interrupt comes while a module is being imported, wherever that is."""
+def test_an_interrupt_during_imports_ends_with_its_exit_code(module: str, tmp_path: Path) -> None:
+    """The interrupt comes while a module is being imported, wherever that is; nothing is kept."""
     script = f"""
 import os, signal, sys
 class Interrupting:
@@ -201,6 +201,7 @@ main()
     done = subprocess.run(
         [sys.executable, "-c", script, "compare", "sinusoid:amplitude=0.8mm,period=1mm"],
         capture_output=True, text=True, check=False, timeout=120,
+        env=os.environ | {"ASPERITY_CACHE_DIR": str(tmp_path)},
     )  # fmt: skip
     assert done.returncode == 130
     assert one_line(done.stderr.strip()) == "asperity: interrupted"

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 import pytest
 
-from asperity.cli import main as program
+from asperity.cli.group import refuse_repeated
 from asperity.cli.main import COMMANDS, cli
 
 Call = Callable[..., tuple[int, str, str]]
@@ -86,11 +86,11 @@ def test_no_option_of_any_command_is_silently_the_last() -> None:
                 continue
             twice = [option.opts[-1], "1"][: 1 if option.is_flag else 2] * 2
             if option.multiple:
-                program.refuse_repeated(command, twice)
+                refuse_repeated(command, twice)
                 continue
             with pytest.raises(ValueError, match="is given twice"):
-                program.refuse_repeated(command, twice)
-            program.refuse_repeated(command, twice[: len(twice) // 2])
+                refuse_repeated(command, twice)
+            refuse_repeated(command, twice[: len(twice) // 2])
             checked += 1
     assert checked > 100
 

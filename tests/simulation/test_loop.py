@@ -21,6 +21,7 @@ from asperity.simulation import (
 from asperity.simulation.exact import body, exact_step
 from asperity.simulation.loop import Simulation
 from asperity.simulation.sampled_plant import SampledPlant, sampled_plant
+from asperity.simulation.trace import COLUMNS
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
 
@@ -169,14 +170,16 @@ def test_a_run_goes_on_where_the_last_one_stopped(letter: str) -> None:
     moved: SampledPlant = sampled_plant(BODY, HAND, servo)
     way = WAY.at(np.arange(201) * 1e-3)
     whole = Simulation(surface, moved, servo, np.zeros(3))
-    table = np.empty((200, 27))
+    table = np.empty((200, len(COLUMNS)))
     whole.run(way, table)
-    parts, pieces = Simulation(surface, moved, servo, np.zeros(3)), np.empty((200, 27))
+    parts, pieces = Simulation(surface, moved, servo, np.zeros(3)), np.empty_like(table)
     parts.run(way[:91], pieces[:90])
     parts.run(way[90:], pieces[90:])
     # Energies are summed in another order where a run is cut: not the trace up to the ledger.
     np.testing.assert_array_equal(pieces, table)
     assert parts.ledger() == whole.ledger()
+    with pytest.raises(ParameterError, match="trace must have rows of 30 numbers"):
+        whole.run(way, table[:, :27])
 
 
 def test_divergence_is_reported_and_the_trace_kept() -> None:

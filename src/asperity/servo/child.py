@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import pickle
 import signal
 import sys
@@ -54,7 +55,12 @@ def unpacked(modules: Modules, packed: bytes) -> Any:
             spec = importlib.util.spec_from_file_location(name, file)
             if spec is not None and spec.loader is not None:
                 sys.modules[name] = importlib.util.module_from_spec(spec)
-                spec.loader.exec_module(sys.modules[name])
+                # As where it was first read: files beside it may be imported by it.
+                sys.path.insert(0, os.path.dirname(file))
+                try:
+                    spec.loader.exec_module(sys.modules[name])
+                finally:
+                    sys.path.remove(os.path.dirname(file))
     return pickle.loads(packed)
 
 

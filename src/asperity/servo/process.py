@@ -236,14 +236,16 @@ class ServoProcess:
 
 def _packed(thing: object) -> tuple[Modules, bytes]:
     """Return a thing for another process, and the files of modules that it cannot import."""
-    files = {}
-    for name, module in list(sys.modules.items()):
-        if name.startswith("own_") and find_spec_of(name) is None:
-            files[name] = str(getattr(module, "__file__", ""))
     try:
-        return tuple(files.items()), pickle.dumps(thing)
+        packed = pickle.dumps(thing)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise AsperityError(f"cannot be sent to the loop's process: {error}") from None
+    files = {
+        name: str(getattr(module, "__file__", ""))
+        for name, module in list(sys.modules.items())
+        if name.startswith("own_") and name.encode() in packed and find_spec_of(name) is None
+    }
+    return tuple(files.items()), packed
 
 
 def find_spec_of(name: str) -> Any:

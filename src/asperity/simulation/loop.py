@@ -101,10 +101,16 @@ class Simulation:
 
         Returns:
             What stopped it before the end.
+
+        Raises:
+            ParameterError: for a trace whose rows are of another length.
         """
         if self.samples == 0:
             self._before = self.stored(anchor[0])
         table = np.empty((0, len(COLUMNS))) if trace is None else trace
+        if table.ndim != 2 or table.shape[1] != len(COLUMNS):
+            words = f"must have rows of {len(COLUMNS)} numbers, got shape"
+            raise ParameterError("trace", f"{words} {table.shape}")
         first = self.samples
         stop, self.rows, self._loop = self._loops.servo_batch(
             self.state, self.queue, self._loop, self._ledger, anchor, self._plant.record,
