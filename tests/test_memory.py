@@ -27,7 +27,7 @@ print("PEAK", int(line.split()[1]) * 1024, file=sys.stderr)
 """
 
 
-def _map(folder: Path, side: int, height: float) -> str:
+def _map(folder: Path, side: int, height: float = 20e-6) -> str:
     """Save a smooth map of an amplitude [m]; returns its path."""
     x = np.linspace(0.0, 8.0 * np.pi, side)
     path = folder / f"map{side}.npy"
