@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 import os
+import pickle
 import time
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from asperity import cache, kept, processes
 from asperity.analysis import compare
 from asperity.analysis.compare import answer_ahead
 from asperity.files import json_text
+from asperity.report.surfaces import listed_surfaces
 from asperity.textures import Sinusoid
+from asperity.textures.catalogue import CATALOGUE
 
 
 @pytest.fixture(autouse=True)
@@ -36,6 +40,20 @@ def started(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
     monkeypatch.setattr(processes._Board, "_start", noted)
     return found
+
+
+@pytest.fixture
+def heard(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """What helpers have answered."""
+    answers: list[Any] = []
+    asked = processes._asked
+
+    def noted(process: Any, question: Any) -> Any:
+        answers.append(asked(process, question))
+        return answers[-1]
+
+    monkeypatch.setattr(processes, "_asked", noted)
+    return answers
 
 
 def told(work: Any, tasks: list[Any], jobs: int, wait: float = 0.0) -> list[Any]:
@@ -105,7 +123,9 @@ WAVE = Sinusoid(0.31e-3, 1.3e-3)
 
 @pytest.mark.keeps_answers
 @pytest.mark.usefixtures("own_cache")
-def test_a_comparison_is_the_same_however_many_work_on_it(started: list[Any]) -> None:
+def test_a_comparison_is_the_same_however_many_work_on_it(
+    started: list[Any], heard: list[Any]
+) -> None:
     def answer() -> str:
         return json_text(compare(WAVE, laws="WACE", stiffness=700.0))
 
@@ -115,6 +135,17 @@ def test_a_comparison_is_the_same_however_many_work_on_it(started: list[Any]) ->
         assert answer() == alone
     assert len(started) == 1
     assert ended(started)
+    assert heard  # it was of use
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_every_surface_can_be_sent_to_a_helper(name: str) -> None:
+    texture = listed_surfaces([name])[0].texture
+    points = texture.domain.points(np.full((1, len(texture.domain.spans)), 0.3))
+    heights = texture.height(points)  # by now it holds compiled loops
+    sent = pickle.loads(pickle.dumps(texture))
+    assert sent.describe() == texture.describe()
+    assert (sent.height(points) == heights).all()
 
 
 @pytest.mark.keeps_answers

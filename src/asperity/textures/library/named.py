@@ -51,7 +51,12 @@ class NamedSurface(HeightMap):
             preparation=(f"{name} was drawn by rules with typical sizes, not measured",),
         )
         self.name = name
-        self.parameters: Mapping[str, Any] = MappingProxyType(dict(parameters))
+        self._parameters = dict(parameters)
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """Every parameter of the surface, SI units."""
+        return MappingProxyType(self._parameters)
 
     @property
     def cutoff(self) -> tuple[float, float]:
