@@ -10,7 +10,7 @@ from tests.report.pages import Reader, check_alone, check_alts, terminal
 import asperity as asp
 from asperity.devices import parse_device
 from asperity.report import comparison_table, html_text, print_comparison
-from asperity.report.comparison import described
+from asperity.report.comparison_columns import described
 from asperity.report.words.number_words import limit_text
 from asperity.textures.catalogue import CATALOGUE
 

@@ -21,7 +21,8 @@ from asperity.recording.recording import Recording
 from asperity.recording.replay import Replay
 from asperity.report import page
 from asperity.report.analysis import criteria_table, print_analysis, suprema_table
-from asperity.report.comparison import answers_table, described, print_comparison
+from asperity.report.comparison import answers_table, print_comparison
+from asperity.report.comparison_columns import described
 from asperity.report.devices import numbers_table
 from asperity.report.fragment import Fragment, fragment_html
 from asperity.report.limits import print_limits, six_table

@@ -14,7 +14,7 @@ from asperity.files import digest, json_text, whole_file, write_text
 from asperity.recording.recording import Recording
 from asperity.recording.replay import Replay
 from asperity.report import page, terminal
-from asperity.report.comparison import described
+from asperity.report.comparison_columns import described
 from asperity.report.page import Origin, Page, Row, Section, own_look, page_html, pictured
 from asperity.report.pictures.run_picture import recording_figure
 from asperity.report.run import run_caption

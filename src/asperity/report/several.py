@@ -10,7 +10,7 @@ from asperity.analysis.compare import Comparison
 from asperity.analysis.several import Comparisons
 from asperity.analysis.words.felt import millinewtons, tier_text
 from asperity.report import page, terminal
-from asperity.report.comparison import described, start_text
+from asperity.report.comparison_columns import described, start_text
 from asperity.report.stages import surface_sections
 from asperity.report.words.number_words import NONE, limit_text
 from asperity.units import engineering
