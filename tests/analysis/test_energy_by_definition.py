@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from asperity.analysis import loop_work
-from asperity.analysis.energy import columns, leak, loops, merit, state_loops
+from asperity.analysis.energy import anchor, columns, leak, loops, merit, state_loops
 from asperity.analysis.energy.columns import Layer, comb, positive_interval
 from asperity.analysis.energy.continuity import _rounded_up
 from asperity.analysis.energy.leak import worst_loop
 from asperity.checks import FloatArray
+from asperity.errors import InternalError
 from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Sinusoid
@@ -215,10 +216,91 @@ def test_the_outlines_of_either_sign_differ() -> None:
     assert "nearer than 0.3 mm" in found.description
 
 
+@pytest.mark.parametrize("letter", ["A", "E"])
+def test_what_an_outline_promises_is_the_curl_inside(letter: str) -> None:
+    """∬|∂f_t/∂z - ∂f_z/∂t| where it has one sign, down to max_depth from the surface, in E."""
+    texture = Sinusoid(0.1e-3, L)
+    surface = Surface(texture, letter, K, D)
+    line = texture.scan_line()
+    t = (np.arange(400) + 0.5) / 400 * line.length
+    z = np.arange(-0.6e-3, 0.1e-3, 2e-6)
+    x, height = (part.ravel() for part in np.meshgrid(t, z, indexing="ij"))
+    points = np.column_stack([line.start + x[:, None] * line.direction, height])
+    jacobian = surface.jacobian(points)
+    curl = jacobian[:, :2, 2] @ line.direction - jacobian[:, 2, :2] @ line.direction
+    if letter == "A":  # deeper by the slope than in E: the region is not the law's own
+        promises = columns.sampled_sides(surface, line)
+        depth = surface.law.contact.depth(texture, points)
+        curl = np.where(depth <= D, curl, 0.0)
+    else:
+        promises = tuple(one[0] for one in leak._nearest_outlines(surface, line))
+        feet = texture.nearest(points)
+        near = np.linalg.norm(feet - points, axis=1) <= D
+        curl = np.where(near & (height <= texture.height(points[:, :2])), curl, 0.0)
+    area = line.length / 400 * 2e-6
+    expected = [float(np.maximum(sign * curl, 0.0).sum()) * area for sign in (1.0, -1.0)]
+    assert sorted(promises) == pytest.approx(sorted(expected), rel=0.02)
+
+
+def test_a_leak_grows_with_the_stiffness_and_its_bound_is_rounded_up() -> None:
+    found = worst_loop(Surface(SAW, "A", K, D))
+    assert found.scaled(1.0) is found
+    for factor in (2.0, 0.3):
+        other = found.scaled(factor)
+        assert other.energy == found.energy * factor
+        assert found.thrust is not None
+        assert other.thrust == found.thrust * factor
+        assert other.upper_per_period == math.nextafter(found.upper_per_period * factor, math.inf)
+    nothing = worst_loop(Surface(SAW, "C", K, D)).scaled(3.0)
+    assert (nothing.energy, nothing.upper_per_period) == (0.0, 0.0)
+    assert worst_loop(FRICTION).scaled(2.0).thrust is None
+
+
+def test_a_loop_that_gains_more_than_is_proved_is_refused() -> None:
+    """By more than K Δ²/8 in depth, 1e-12 of each edge's work and the rounding of each force."""
+    surface, line = Surface(SAW, "A", K, D), SAW.scan_line()
+    vertices = columns.column_loop(surface, line, 1.0)
+    edges = np.linalg.norm(vertices - np.roll(vertices, -1, axis=0), axis=1)
+    steps = np.hypot(*(vertices[1:] - vertices[:-1])[:, :2].T).max()
+    bounds = columns.curl_integral(surface, line, SAW.bounds[1] * steps**2 / 8.0)
+    assert bounds is not None
+    force = max(float(np.linalg.norm(one)) for one in surface.force(vertices))
+    height = 1.0 + max(abs(part) for part in SAW.extremes) / D
+    error = len(edges) * 1e-12 + 2.0**-28 * height
+    most = max(high for _low, high in bounds) + error * force * float(edges.sum())
+    leak._refuse_contradiction(surface, line, vertices, most * (1.0 - 1e-12))
+    with pytest.raises(InternalError, match=f"a loop of {len(edges)} edges gains"):
+        leak._refuse_contradiction(surface, line, vertices, most * (1.0 + 1e-12))
+
+
+def test_a_loop_is_turned_the_way_it_gains() -> None:
+    surface = Surface(SAW, "A", K, D)
+    loop = columns.column_loop(surface, SAW.scan_line(), 1.0)
+    for vertices in (loop, loop[::-1]):
+        found, energy = leak.gaining(surface, np.ascontiguousarray(vertices))
+        assert energy > 0.0
+        assert loop_work(surface, found) == pytest.approx(energy, rel=1e-12)
+    empty, nothing = leak.gaining(surface, loop[:1])
+    assert (empty.shape, nothing) == ((0, 3), 0.0)
+
+
 # --- a law with state -----------------------------------------------------------------------------
 
 
 FRICTION = Surface(Sinusoid(0.4e-3, L), "F", K, D, max_deflection=0.5e-3)
+
+
+def test_an_edge_is_cut_at_every_crest_it_passes() -> None:
+    """Ten waves at half the amplitude: sin = 1/2 at 1/12 and 5/12 of each period."""
+    surface = Surface(Sinusoid(0.2e-3, L), "A", K, D)
+    for first, last in ((-5, 5), (3, 13)):
+        start, end = np.array([first * L, 0.0, 1e-4]), np.array([last * L, 0.0, 1e-4])
+        parts = anchor._contact_parts(surface, start, end, L)
+        cuts = [(n + part) * L for n in range(first, last) for part in (1 / 12, 5 / 12)]
+        assert [part[1][0] for part in parts[:-1]] == pytest.approx(cuts, abs=1e-12)
+        assert [part[0][0] for part in parts[1:]] == pytest.approx(cuts, abs=1e-12)
+        assert [inside for _a, _b, inside in parts] == [False, True] * 10 + [False]
+        np.testing.assert_array_equal((parts[0][0], parts[-1][1]), (start, end))
 
 
 def test_the_paths_of_friction_are_the_paper_s() -> None:

@@ -11,7 +11,13 @@ from tests.analysis.promises import MEASURES, as_sum
 
 from asperity.analysis import characteristic_number
 from asperity.analysis.bounds.branch_and_bound import supremum
-from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED
+from asperity.analysis.bounds.measures import (
+    CURL,
+    NORM,
+    ONE_SIDED,
+    precise_norm,
+    precise_one_sided,
+)
 from asperity.analysis.bounds.problems import LawProblem
 from asperity.analysis.gain import closed_forms as forms
 from asperity.analysis.gain.friction import (
@@ -22,6 +28,8 @@ from asperity.analysis.gain.friction import (
 from asperity.analysis.gain.god_object import gain_above_crest
 from asperity.analysis.gain.medial_axis import sharpest_crest
 from asperity.analysis.gain.theorems import safe_bound, theorem_of
+from asperity.enclosures.cells import Cells
+from asperity.enclosures.taylor import Taylor
 from asperity.surface import Surface
 from asperity.textures import Fourier, Profile, Sinusoid
 from asperity.textures.plane_waves import SingleWave
@@ -166,6 +174,65 @@ def test_law_f_by_cells_holds_at_the_worst_of_a_cell() -> None:
         values = np.stack([problem.values(centres + tick) for tick in ticks]).max(axis=0)
         assert (values <= upper).all()
         assert (upper <= values * (1.0 + 1e-4)).all()
+
+
+def test_law_f_s_number_is_that_of_the_surface_s_own_jacobian() -> None:
+    """At a place, with the deflection that is said to be the worst, and with no other."""
+    options: dict[str, Any] = {"friction": 0.7, "max_deflection": 0.3e-3, "modulation_depth": 0.6}
+    surface, deeper = (
+        Surface(LINES, "F", max_depth=depth, stiffness=1.0, **options) for depth in (4e-4, 5e-4)
+    )
+    cells = LINES.cells()
+    assert cells is not None
+    at = cells.samples(30)
+    for number, measure in (
+        (largest_singular_value, precise_norm),
+        (largest_symmetric_eigenvalue, precise_one_sided),
+    ):
+        problem = FrictionProblem(surface, cells, number)
+        values, (state,) = problem.values(at), problem.contacts(at)
+        assert not state.sliding
+        np.testing.assert_allclose(np.hypot(*state.deflection.T), 0.3e-3, rtol=1e-12)
+        xy = cells.plane(at)
+        points = np.column_stack([xy, -state.depth])  # F feels the plane z = 0
+        for sign, same in ((1.0, True), (-1.0, False)):
+            stuck = deeper.jacobian(points, sign * state.deflection, np.zeros(30, bool))
+            found = measure(stuck)
+            assert (found <= values * (1.0 + 1e-12)).all()
+            assert np.allclose(found, values, rtol=1e-9, atol=0.0) == same
+
+
+class Level(Cells):
+    """One cell of which the slopes are known to lie within errors, and nothing else varies."""
+
+    dimensions = 1
+
+    def models(self, _centres: Any, _half: Any, _names: Any) -> dict[str, Any]:
+        still = np.zeros((1, 1))
+        parts = {"h": (0.1e-3, 0.0), "hx": (0.0, 0.6), "hy": (0.0, 0.8)}
+        return {n: Taylor(np.array([c]), still, np.array([e])) for n, (c, e) in parts.items()}
+
+    start = samples = derivatives = plane = inside = models  # no part of what is asked
+
+
+def test_law_f_counts_all_that_is_unknown_of_the_slope() -> None:
+    """And rounds up: a bound is above the value at the worst of the cell."""
+    surface = Surface(LINES, "F", max_depth=50.0, friction=0.7, max_deflection=0.3e-3)
+    problem = FrictionProblem(surface, Level(), largest_singular_value)
+    worst = float(problem._entries(np.array([0.1e-3]), np.array([1.0]))[0])
+    bound = float(problem.at_most(np.zeros((1, 1)), np.ones(1), 0.0)[0])
+    assert worst * (1.0 + 1e-13) < bound < worst * (1.0 + 2e-12)
+
+
+def test_friction_that_is_the_same_everywhere_has_a_number() -> None:
+    """Without modulation every phase is as bad: a = μ D/(2 d_max), b = μ/2."""
+    surface = Surface(
+        WAVE, "F", max_depth=0.5e-3, friction=0.7, max_deflection=0.2e-3, modulation_depth=0.0
+    )
+    found = characteristic_number(surface)
+    exact = np.linalg.norm([[0.7 * 0.5 / 0.2 / 2.0, 0.35], [0.0, 1.0]], 2)
+    assert found.lower == pytest.approx(exact, rel=1e-12)
+    assert found.upper == pytest.approx(exact, rel=1e-5)
 
 
 # --- closed forms ---------------------------------------------------------------------------------
@@ -357,3 +424,29 @@ def test_law_h_is_law_d_where_nothing_splits() -> None:
             assert found.upper >= exact
             assert found.lower == pytest.approx(exact, rel=1e-4)
             assert ("too small" in found.note) == (exact < c * (1.0 - 1e-12))
+
+
+def test_law_h_just_below_the_split_is_law_d_just_above_it() -> None:
+    """A billionth deeper than the share the two feet are one but for rounding."""
+    for texture in (LINES, WAVE):
+        crest = sharpest_crest(texture)
+        assert crest is not None
+        surface = Surface(texture, "H", max_depth=0.6 * crest.radius * (1.0 + 1e-9), continuity=1.5)
+        found = characteristic_number(surface)
+        assert found.upper == pytest.approx(1.5, rel=1e-12)
+        assert found.lower >= 1.5 * (1.0 - 3e-6)
+
+
+def test_law_d_on_many_waves_has_the_bound_of_their_second_derivatives() -> None:
+    """Where no crest is certified: y = D K, K the sum of a |k|²; an extent gives the crest's."""
+    angles = np.arange(5.0)
+    vectors = (
+        6000.0
+        * np.column_stack([np.cos(angles), np.sin(angles)])
+        * [[1.0], [1.1], [0.9], [1.3], [0.7]]
+    )
+    many = Fourier(np.full(5, 0.02e-3), vectors, angles)
+    bend = 0.02e-3 * float((vectors**2).sum())
+    found = characteristic_number(Surface(many, "D", max_depth=0.7 / bend))
+    assert found.upper == pytest.approx(0.7 / 0.3, rel=1e-9)
+    assert found.method == "certified"

@@ -10,7 +10,7 @@ import pytest
 
 from asperity.checks import FloatArray
 from asperity.contacts import Contact
-from asperity.contacts.nearest import line_search, line_within, plane_search
+from asperity.contacts.nearest import line_search, line_within, plane_search, plane_within
 from asperity.laws import LAWS
 from asperity.textures import Fourier
 
@@ -39,6 +39,27 @@ def test_inside_is_where_the_depth_is_positive(letter: str) -> None:
     on = np.column_stack([POINTS[:20, :2], begin[:20]])
     if letter == "W":
         assert not contact.inside(WAVES, on).any()
+
+
+@pytest.mark.parametrize("letter", ["A", "D", "H", "W"])
+def test_the_depth_grows_on_the_way_inwards(letter: str) -> None:
+    """Straight down, or against the normal; from the surface by as much as one goes."""
+    from asperity.contacts.symbols import HX, HY
+
+    contact = LAWS[letter].contact
+    xy = POINTS[:20, :2]
+    derivatives = WAVES.derivatives(xy)
+    straight = letter in "AW"
+    for row in derivatives:
+        inward = contact.inward().subs({HX: row[1], HY: row[2]})
+        down = np.array([0.0, 0.0, -1.0] if straight else [row[1], row[2], -1.0])
+        expected = down / np.linalg.norm(down)
+        np.testing.assert_allclose(np.array(inward, float).ravel(), expected, rtol=1e-14)
+    if contact.given_by_depth:
+        probes = contact.probe(xy, np.full(20, 3e-6), derivatives)
+        np.testing.assert_allclose(contact.depth(WAVES, probes), 3e-6, rtol=1e-6)
+        above = contact.probe(xy, np.full(20, -3e-6), derivatives)
+        np.testing.assert_allclose(contact.depth(WAVES, above), -3e-6, rtol=1e-6)
 
 
 def test_the_exact_foot_is_one_in_all_its_digits() -> None:
@@ -190,6 +211,31 @@ def test_a_search_out_of_looks_asks_for_less_each_time(monkeypatch: pytest.Monke
     best, gap, looks = line_within.line_within(0.0, 2.0, 0.0, 100.0, None)
     np.testing.assert_allclose(kept[1:], [(1.0 - 0.25**n) ** 2 for n in (1, 2, 3)], rtol=1e-15)
     assert (best[1], gap, looks) == (4.0, 2.0 / 16.0, 100.0)
+
+
+def test_a_search_of_the_plane_asks_for_less_in_the_same_way(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Half of the looks for the foot itself; what is left of them goes to what follows."""
+    kept: list[tuple[float, float]] = []
+    foot = (0.1, 0.2, 4.0, 0.3, 0.4, 0.5)
+    left = [0.0, 20.0, 10.0, 0.0]
+
+    def search_plane(*given: object) -> tuple[tuple[float, ...], float]:
+        kept.append((float(given[4]), float(given[5])))  # type: ignore[arg-type]  # numbers
+        return foot, left[len(kept) - 1]
+
+    monkeypatch.setattr(plane_within, "go_down", lambda *given: (foot, given[5]))
+    monkeypatch.setattr(plane_within, "search_plane", search_plane)
+    found = plane_within.foot_within(0.0, 0.0, 2.0, 0.0, 0.0, 100.0, None)
+    shares = [(1.0 - 0.25**n) ** 2 for n in (1, 2, 3)]
+    np.testing.assert_allclose([keep for keep, _ in kept[1:]], shares, rtol=1e-15)
+    assert [looks for _, looks in kept] == [50.0, 50.0, 20.0, 10.0]
+    assert found == (0.1, 0.2, 0.3, 0.4, 0.5, 2.0 / 16.0, 100.0)
+    kept, left = [], [7.0]
+    found = plane_within.foot_within(0.0, 0.0, 2.0, 0.0, 0.0, 100.0, None)
+    assert found == (0.1, 0.2, 0.3, 0.4, 0.5, 0.0, 43.0)
+    assert len(kept) == 1
 
 
 @pytest.mark.parametrize("u", [0.1, 3.3, 4.0, 7.9])

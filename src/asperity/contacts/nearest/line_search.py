@@ -20,7 +20,7 @@ KERNELS = Kernels(
 
 def descend(x: float, z: float, start: float, texture: object) -> Point:
     """Return a local minimum of φ downhill from a start, to rounding."""
-    return go_down(x, z, start, 200.0, texture)[0]
+    return go_down(x, z, start, np.inf, texture)[0]
 
 
 def go_down(x: float, z: float, start: float, left: float, texture: object) -> tuple[Point, float]:

@@ -53,7 +53,7 @@ def newton_step(
 
 def descend(x: float, y: float, z: float, fx: float, fy: float, texture: object) -> Point:
     """Return a local minimum of φ downhill from a start, to rounding."""
-    return go_down(x, y, z, fx, fy, 200.0, texture)[0]
+    return go_down(x, y, z, fx, fy, np.inf, texture)[0]
 
 
 def go_down(
