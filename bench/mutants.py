@@ -117,7 +117,8 @@ ROOMS = {
     ),
     "split": Room(
         ("analysis/split", "contacts/split"),
-        ("tests/analysis/test_potential_grid.py", "tests/analysis/test_split.py",
+        ("tests/contacts/test_split_kernels.py",
+         "tests/analysis/test_potential_grid.py", "tests/analysis/test_split.py",
          "tests/analysis/test_split_map.py", "tests/analysis/test_split_definition.py",
          "tests/analysis/test_split_table.py", "tests/analysis/test_split_closed_form.py"),
     ),

@@ -92,11 +92,11 @@ def split_system(
             a[d, n] -= atoms[i, 3] * a[d, 3 + i]
         a[3, 3 + i] = 1.0
         a[3, n] -= atoms[i, 3]
-        if i > 0:
-            for d in range(3):
-                difference = atoms[0, d] - atoms[i, d]
-                a[3 + i, d] = difference
-                a[3 + i, n] += 0.5 * difference * (atoms[0, d] + atoms[i, d] - 2.0 * y[d])
+        # Of the first atom itself the difference is zero: its row is that of the sum.
+        for d in range(3):
+            difference = atoms[0, d] - atoms[i, d]
+            a[3 + i, d] = difference
+            a[3 + i, n] += 0.5 * difference * (atoms[0, d] + atoms[i, d] - 2.0 * y[d])
 
 
 def split_projection(
