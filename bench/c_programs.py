@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from asperity.contacts.memory import UNLIMITED, new_memory
 from asperity.export.c99 import c99_files
 from asperity.export.order import Order
-from asperity.kernels import anchored_loops, probe_loops
-from asperity.kernels.fuse import fuse_on_texture
+from asperity.kernels.fuse import fuse_path
 from asperity.surface import Surface
 from asperity.textures import Texture
 
@@ -35,10 +36,14 @@ def run(*command: str | Path, cwd: Path | None = None) -> str:
 
 
 def header(
-    surface: Surface, name: str = "texture", precision: str = "double", folder: Path | None = None
+    surface: Surface,
+    name: str = "texture",
+    precision: str = "double",
+    folder: Path | None = None,
+    looks: float | None = None,
 ) -> str:
     """Return the header of a surface; large data are written beside it, into a folder."""
-    first, *others = c99_files(Order(surface, name, precision), name).items()
+    first, *others = c99_files(Order(surface, name, precision, looks=looks), name).items()
     for file, text in others:
         if folder is None:
             raise ValueError(f"{file} stands beside the header: name a folder for it")
@@ -48,13 +53,14 @@ def header(
 
 _MANY = """
 #include "{name}.h"
-void {name}_many(const {real} *at, {real} *f, int64_t n);
-void {name}_many(const {real} *at, {real} *f, int64_t n)
+void {name}_many(const {real} *at, {real} *f, {real} *gap, int64_t n);
+void {name}_many(const {real} *at, {real} *f, {real} *gap, int64_t n)
 {{
     {name}_state state;
     {name}_reset(&state);
     for (int64_t i = 0; i < n; i++) {{
         {name}_force(&state, at + 3 * i, f + 3 * i);
+        gap[i] = {name}_gap(&state);
     }}
 }}
 """
@@ -95,12 +101,36 @@ def compiled(folder: Path, compiler: str, source: Path, *flags: str) -> ctypes.C
     return ctypes.CDLL(str(made))
 
 
-def forces(made: ctypes.CDLL, name: str, points: Any) -> Any:
-    """Return the forces along a path of probe positions, in their precision."""
-    out = np.empty_like(points)
-    given = [array.ctypes.data_as(ctypes.c_void_p) for array in (points, out)]
-    getattr(made, f"{name}_many")(*given, ctypes.c_int64(len(points)))
-    return out
+class Ticks(NamedTuple):
+    """Ticks along a path that are ready to run: nothing is looked up while they are timed.
+
+    Attributes:
+        run: runs them.
+        forces: result [N], (n, 3).
+        gaps: result [m], (n,).
+    """
+
+    run: Callable[[], object]
+    forces: Any
+    gaps: Any
+
+    def result(self) -> Any:
+        """Run them and return forces and gaps, (n, 4)."""
+        self.run()
+        return np.column_stack([self.forces, self.gaps])
+
+
+def program_ticks(made: ctypes.CDLL, name: str, points: Any) -> Ticks:
+    """Return ticks of a program along a path, in the precision of the path."""
+    arrays = points, np.empty_like(points), np.empty(len(points), points.dtype)
+    given = [array.ctypes.data_as(ctypes.c_void_p) for array in arrays]
+    run = partial(getattr(made, f"{name}_many"), *given, ctypes.c_int64(len(points)))
+    return Ticks(run, *arrays[1:])
+
+
+def ticks(made: ctypes.CDLL, name: str, points: Any) -> Any:
+    """Return forces [N] and gaps [m] along a path, (n, 4)."""
+    return program_ticks(made, name, points).result()
 
 
 def energies(made: ctypes.CDLL, name: str, points: Any) -> Any:
@@ -111,18 +141,21 @@ def energies(made: ctypes.CDLL, name: str, points: Any) -> Any:
     return out
 
 
-def kernel_forces(surface: Surface, points: Any) -> Any:
-    """Return the forces of the kernel of loops and simulations along a path of probe positions.
+def surface_ticks(surface: Surface, points: Any, looks: float | None = None) -> Ticks:
+    """Return ticks of the kernel of loops and simulations along a path.
 
     Batches have a sine of their own, :mod:`asperity.kernels.batch_sine`.
     """
-    law, clamp = surface.law, surface.acting_clamp
-    asked = anchored_loops if law.stateful else probe_loops
-    loops = fuse_on_texture(law, surface.texture.sampler, clamp, (asked,))
-    run = loops.trace_batch if law.stateful else loops.force_batch
-    out = np.empty((len(points), 3))
-    run(points, out, surface.texture.arguments, surface.law_arguments)
-    return out
+    law, out, told = surface.law, np.empty((len(points), 3)), np.empty((len(points), 2))
+    loops = fuse_path(law, surface.texture.sampler, surface.acting_clamp)
+    memory = new_memory(law.contact.looks if looks is None else min(looks, UNLIMITED))
+    arguments = memory, surface.texture.arguments, surface.law_arguments
+    return Ticks(partial(loops.path_batch, points, out, told, *arguments), out, told[:, 0])
+
+
+def kernel_ticks(surface: Surface, points: Any, looks: float | None = None) -> Any:
+    """Return the same of the kernel."""
+    return surface_ticks(surface, points, looks).result()
 
 
 def same_bits(first: Any, second: Any) -> Any:

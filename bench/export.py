@@ -1,8 +1,8 @@
 """Exported C: its speed against the kernel, its longest tick, its size on a microcontroller.
 
 ``python -m bench.export --ticks 10000000`` looks for the longest tick of that many, and
-``python -m bench.export --points 1000000`` compares that many forces of every law and texture kind
-with the kernel, bit by bit: hours, for the night.
+``python -m bench.export --points 1000000`` compares that many ticks of every law and texture kind
+with the kernel, bit by bit: minutes for each law with a search; ``--laws D`` takes one of them.
 """
 
 from __future__ import annotations
@@ -13,16 +13,15 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
-from typing import Any
+from time import perf_counter
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from asperity.kernels import anchored_loops
-from asperity.kernels.fuse import fuse_on_texture
+from asperity.contacts.memory import TAKEN
 from asperity.laws import LAWS
 from asperity.surface import Surface
 from asperity.textures import HeightMap
@@ -30,13 +29,14 @@ from bench import cases
 from bench.c_programs import (
     STRICT,
     compiled,
-    differing,
-    forces,
     header,
-    kernel_forces,
+    kernel_ticks,
     library,
     probes,
+    program_ticks,
     same_bits,
+    surface_ticks,
+    ticks,
 )
 from bench.firmware import firmware, missing_tool
 from bench.timing import median_ratio, seconds, take_turns
@@ -56,8 +56,8 @@ _CLOCK = """
 #define _POSIX_C_SOURCE 199309L
 #include <time.h>
 #include "{name}.h"
-void {name}_clocked(const double *at, double *took, int64_t n);
-void {name}_clocked(const double *at, double *took, int64_t n)
+void {name}_clocked(const double *at, double *took, double *looks, int64_t n);
+void {name}_clocked(const double *at, double *took, double *looks, int64_t n)
 {{
     double f[3];
     {name}_state state;
@@ -69,6 +69,7 @@ void {name}_clocked(const double *at, double *took, int64_t n)
         clock_gettime(CLOCK_MONOTONIC, &end);
         took[i] = 1e-9 * (double)(end.tv_nsec - begin.tv_nsec);
         took[i] += (double)(end.tv_sec - begin.tv_sec);
+        looks[i] = state.memory[{taken}];
     }}
 }}
 """
@@ -113,23 +114,13 @@ def _speed(console: Console, folder: Path) -> None:
 def _ratio(surface: Surface, folder: Path) -> tuple[float, float]:
     """Return the ratio of times, and the kernel's for a probe [s]."""
     made = library(folder, "gcc", {"t": header(surface, "t", folder=folder)}, *FLAGS)
-    at = cases.probes(surface.texture, 200)
-    each = seconds(partial(kernel_forces, surface, at)) / len(at)
-    each = min(each, seconds(partial(kernel_forces, surface, at)) / len(at))
+    few = surface_ticks(surface, cases.probes(surface.texture, 200)).run
+    each = min(seconds(few), seconds(few)) / 200
     count = int(np.clip(BATCH_SECONDS / each, 40, 100_000))
     at = cases.probes(surface.texture, count)
-    batches = [_kernel_batch(surface, at), partial(forces, made, "t", at)]
+    batches = [surface_ticks(surface, at).run, program_ticks(made, "t", at).run]
     times = take_turns(batches, ROUNDS)
     return median_ratio(times, 1, 0), float(np.median(times[:, 0])) / len(at)
-
-
-def _kernel_batch(surface: Surface, at: Any) -> Any:
-    """Return the kernel's own loop, bound: nothing is looked up while it is timed."""
-    law, clamp = surface.law, surface.acting_clamp
-    # The loop that carries a state, for every law, as the program does.
-    loops = fuse_on_texture(law, surface.texture.sampler, clamp, (anchored_loops,))
-    out = np.empty((len(at), 3))
-    return partial(loops.trace_batch, at, out, surface.texture.arguments, surface.law_arguments)
 
 
 def _ticks(console: Console, count: int) -> None:
@@ -140,30 +131,39 @@ def _ticks(console: Console, count: int) -> None:
     for letter in "DH":
         surface = Surface(texture, letter)
         with tempfile.TemporaryDirectory() as directory:
-            longest, mean, at = longest_tick(surface, Path(directory), count)
-        where = ", ".join(f"{1e6 * part:.3f}" for part in at)
-        words = f"{1e6 * longest:.0f} us at ({where}) um; mean {1e6 * mean:.1f} us"
-        console.print(f"law {letter}: {words}")
+            slow = longest_tick(surface, Path(directory), count)
+        where = ", ".join(f"{1e6 * part:.3f}" for part in slow.at)
+        words = f"{1e6 * slow.longest:.0f} us at ({where}) um; mean {1e6 * slow.mean:.1f} us"
+        budget = f"at most {slow.looks:.0f} of {surface.law.contact.looks:.0f} looks"
+        console.print(f"law {letter}: {words}; {budget}")
 
 
-def longest_tick(surface: Surface, folder: Path, count: int) -> tuple[float, float, Any]:
-    """Return the longest time of a tick and the mean [s], and the probe of the longest [m]."""
+class Longest(NamedTuple):
+    """The longest of many ticks [s], their mean [s], where it was [m], and the most looks."""
+
+    longest: float
+    mean: float
+    at: Any
+    looks: float
+
+
+def longest_tick(surface: Surface, folder: Path, count: int) -> Longest:
+    """Return the longest tick of many probes; each begins where the last one ended."""
     name = "t"
     (folder / f"{name}.h").write_text(header(surface, name, folder=folder), encoding="utf-8")
-
     source = folder / "clock.c"
-    source.write_text(_CLOCK.format(name=name), encoding="utf-8")
+    source.write_text(_CLOCK.format(name=name, taken=TAKEN), encoding="utf-8")
     made = compiled(folder, "gcc", source, *STRICT, "-O2")
     slowest: list[tuple[float, Any]] = []
-    total = 0.0
+    total = most = 0.0
     for at in _batches(surface, count):
-        took = _clocked(made, at)
-        total += float(took.sum())
+        took, looks = _clocked(made, at)
+        total, most = total + float(took.sum()), max(most, float(looks.max()))
         worst = np.argsort(took)[-AGAIN:]
-        again = np.min([_clocked(made, at[worst]) for _ in range(TIMES)], axis=0)
+        again = np.min([_clocked(made, at[worst])[0] for _ in range(TIMES)], axis=0)
         slowest.append((float(again.max()), at[worst[again.argmax()]]))
     longest, where = max(slowest, key=lambda pair: pair[0])
-    return longest, total / count, where
+    return Longest(longest, total / count, where, most)
 
 
 def _batches(surface: Surface, count: int) -> Iterator[Any]:
@@ -171,11 +171,12 @@ def _batches(surface: Surface, count: int) -> Iterator[Any]:
         yield probes(surface.texture, surface.max_depth, min(TICKS, count - start), seed)
 
 
-def _clocked(made: ctypes.CDLL, at: Any) -> Any:
-    at, took = np.ascontiguousarray(at), np.empty(len(at))
-    given = [array.ctypes.data_as(ctypes.c_void_p) for array in (at, took)]
+def _clocked(made: ctypes.CDLL, at: Any) -> tuple[Any, Any]:
+    """Return the times [s] and the looks of ticks."""
+    at, took, looks = np.ascontiguousarray(at), np.empty(len(at)), np.empty(len(at))
+    given = [array.ctypes.data_as(ctypes.c_void_p) for array in (at, took, looks)]
     made.t_clocked(*given, ctypes.c_int64(len(at)))
-    return took
+    return took, looks
 
 
 def _micro(console: Console) -> None:
@@ -197,23 +198,30 @@ def _micro(console: Console) -> None:
     console.print(table)
 
 
-def compare_bits(console: Console, count: int) -> int:
-    """Compare forces of every law and texture kind; return how many differ."""
+def compare_bits(console: Console, count: int, laws: str) -> int:
+    """Compare ticks of laws on every texture kind; return how many differ."""
     wrong = 0
     for kind, texture in cases.textures().items():
-        for letter in LAWS:
-            surface = Surface(texture, letter, clamp="backed")
-            with tempfile.TemporaryDirectory() as directory:
-                folder = Path(directory)
-                text = header(surface, "t", folder=folder)
-                made = library(folder, "gcc", {"t": text}, "-O2")
-                for at in _batches(surface, count):
-                    equal = same_bits(forces(made, "t", at), kernel_forces(surface, at))
-                    wrong += int((~equal).sum())
-                    if not equal.all():
-                        console.print(f"{kind}, {differing([letter], [equal])}")
-        console.print(f"{kind}: {count:,} probes for each law, {wrong} differ")
+        for letter in laws:
+            started = perf_counter()
+            differ, short = _differ(Surface(texture, letter, clamp="backed"), count)
+            wrong += differ
+            told = f"{count:,} ticks, {short:,} of them cut short; {differ} differ"
+            console.print(f"{letter} on {kind}: {told} ({perf_counter() - started:.0f} s)")
     return wrong
+
+
+def _differ(surface: Surface, count: int) -> tuple[int, int]:
+    """Return how many ticks differ in a bit of force or gap, and how many have a gap."""
+    differ = short = 0
+    with tempfile.TemporaryDirectory() as directory:
+        folder = Path(directory)
+        made = library(folder, "gcc", {"t": header(surface, "t", folder=folder)}, "-O2")
+        for at in _batches(surface, count):
+            found = ticks(made, "t", at)
+            differ += int((~same_bits(found, kernel_ticks(surface, at))).sum())
+            short += int((found[:, 3] > 0.0).sum())
+    return differ, short
 
 
 def main() -> int:
@@ -221,11 +229,12 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--ticks", type=int, default=0)
     parser.add_argument("--points", type=int, default=0)
+    parser.add_argument("--laws", default="".join(LAWS), help="of --points; default: all of them")
     asked = parser.parse_args()
     console = Console(width=100, highlight=False)
     if asked.ticks:
         _ticks(console, asked.ticks)
-    return int(bool(asked.points and compare_bits(console, asked.points)))
+    return int(bool(asked.points and compare_bits(console, asked.points, asked.laws)))
 
 
 if __name__ == "__main__":

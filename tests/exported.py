@@ -11,19 +11,20 @@ import pytest
 from bench import c_programs
 from bench.c_programs import (
     STRICT,
+    compiled,
     differing,
     energies,
-    forces,
     header,
-    kernel_forces,
+    kernel_ticks,
     probes,
     run,
     same_bits,
+    ticks,
 )
 
 __all__ = [
-    "COMPILERS", "STRICT", "differing", "energies", "forces", "header", "kernel_forces", "library",
-    "probes", "run", "same_bits", "tool",
+    "COMPILERS", "STRICT", "compiled", "differing", "energies", "header", "kernel_ticks", "library",
+    "probes", "run", "same_bits", "ticks", "tool",
 ]  # fmt: skip
 
 COMPILERS = ("gcc", "clang")

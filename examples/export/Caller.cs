@@ -12,11 +12,10 @@ using System.Runtime.InteropServices;
 
 public static class Texture
 {
-    [StructLayout(LayoutKind.Sequential)]
+    // As large as texture_state, 25 numbers; what is in it concerns the library alone.
+    [StructLayout(LayoutKind.Sequential, Size = 25 * sizeof(double))]
     public struct State
     {
-        public double AnchorX, AnchorY;
-        public int Held;
     }
 
     [DllImport("texture", CallingConvention = CallingConvention.Cdecl)]

@@ -9,13 +9,8 @@ import ctypes
 import sys
 
 Vector = ctypes.c_double * 3
-
-
-class State(ctypes.Structure):
-    """What is carried from tick to tick."""
-
-    _fields_ = [("anchor", ctypes.c_double * 2), ("held", ctypes.c_int)]
-
+# As large as texture_state; what is in it concerns the library alone.
+State = ctypes.c_double * 25
 
 texture = ctypes.CDLL(sys.argv[1])
 state, force = State(), Vector()

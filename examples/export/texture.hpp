@@ -29,6 +29,9 @@ public:
         return result;
     }
 
+    // How far from certain the last force is [m].
+    [[nodiscard]] double gap() const noexcept { return texture_gap(&state_); }
+
 private:
     texture_state state_;
 };

@@ -11,6 +11,7 @@ import pytest
 from tests.exported import STRICT, run, tool
 
 import asperity as asp
+from asperity.content import surface_content
 from asperity.export import c99
 
 Call = Callable[..., tuple[int, str, str]]
@@ -41,7 +42,7 @@ def test_one_header_gives_the_force(call: Call, tmp_path: Path) -> None:
     expected = surface.force([1e-4, 2e-4, -5e-5])
     assert [float.fromhex(part) for part in force] == pytest.approx(expected, rel=1e-14)
     text = target.read_text()
-    assert re.fullmatch("[0-9a-f]{64}", content)
+    assert content == surface_content(surface)  # as a recording has it
     assert "#define TEXTURE_STIFFNESS 500.0" in text
     assert "#define TEXTURE_MAX_DEPTH 0.0004" in text
     q = re.search(r"#define TEXTURE_Q_UPPER (\S+)", text)
@@ -66,6 +67,17 @@ def test_the_content_knows_the_force_and_not_the_name(call: Call, tmp_path: Path
         assert found is not None
         contents[name, law] = found[1]
     assert contents["texture", "B"] == contents["wall", "B"] != contents["texture", "A"]
+
+
+@pytest.mark.parametrize(
+    ("options", "looks"), [((), "600.0"), (("--looks", "90"), "90"), (("--exact",), "HUGE_VAL")]
+)
+def test_the_budget_of_a_search(
+    options: tuple[str, ...], looks: str, call: Call, tmp_path: Path
+) -> None:
+    target = tmp_path / "t.h"
+    assert call("export", WAVE, "--law", "D", *options, "-o", str(target))[0] == 0
+    assert f"#define TEXTURE_LOOKS {looks} " in target.read_text()
 
 
 def test_a_scene_with_its_law_and_clamp(call: Call, tmp_path: Path) -> None:
@@ -138,12 +150,15 @@ BAD = {
     ("-o", "no/such/folder/wall.h"): "output must lie in a folder that exists",
     ("--law", "Z"): "law",
     ("--largest", "soft"): "largest",
+    ("--looks", "0"): "looks must be positive, got 0",
+    ("--looks", "many"): "looks must be a number, got 'many'",
+    ("--exact", "--looks", "9"): "exact searches without a limit of looks: leave out --looks",
 }
 
 
 @pytest.mark.parametrize("options", BAD, ids=" ".join)
 def test_bad_input_is_one_line(
-    options: tuple[str, str], call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    options: tuple[str, ...], call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     where = () if options[0] == "-o" else ("-o", "wall.h")

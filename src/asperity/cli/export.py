@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from asperity.cli.options import (
 )
 from asperity.cli.output import check_output
 from asperity.cli.progress import step_bar
-from asperity.errors import printable
+from asperity.errors import ParameterError, printable
 
 if TYPE_CHECKING:
     from asperity.devices import Device
@@ -38,6 +39,10 @@ _LARGEST = Argument(
     "largest", "data that the program may hold", "B", default_words="64 MB", form="size",
     example="512kB",
 )  # fmt: skip
+_LOOKS = Argument(
+    "looks", "looks at the surface that a search may take in a tick",
+    default_words="600 for D and E, 1800 for H", form="integer", low=1, example="1000",
+)  # fmt: skip
 _CLAMP = Argument(
     "clamp",
     "what holds the depth at max_depth",
@@ -45,12 +50,13 @@ _CLAMP = Argument(
     form="text",
     choices=("none", "whole", "lateral", "backed"),
 )
-_EXPORT = (_LANG, _NAME, _PRECISION, _LARGEST)
+_EXPORT = (_LANG, _NAME, _PRECISION, _LARGEST, _LOOKS)
 
 
 @click.command("export")
 @click.argument("surface")
 @click.option("-o", "--output", metavar="PATH", required=True, help="The file to write, texture.h.")
+@click.option("--exact", is_flag=True, help="Search without a limit of looks.")
 @click.option("--shared", is_flag=True, help="Write a library: header, source and CMakeLists.txt.")
 @click.option("--force", is_flag=True, help="Replace files that are there.")
 @options(_EXPORT)
@@ -64,6 +70,7 @@ def command(
     output: str,
     device: Device | None,
     *,
+    exact: bool,
     shared: bool,
     force: bool,
     **values: Any,
@@ -78,12 +85,17 @@ def command(
     from asperity.export.writing import check_name, refuse_existing, write_files
 
     asked = given(values, _EXPORT)
+    if exact:
+        if "looks" in asked:
+            raise ParameterError("exact", "searches without a limit of looks: leave out --looks")
+        asked["looks"] = math.inf
     target, place = find_target(asked.pop("lang", "c99")), Path(output)
     check_name(place, target)
     check_output("output", output)
     if not force:
         refuse_existing(place, {place.name: ""})
-    Order.check(asked.get("name", "texture"), asked.get("precision", "double"))
+    names = asked.get("name", "texture"), asked.get("precision", "double")
+    Order.check(*names, asked.get("looks"))
 
     from asperity.analysis.analyze import STEPS, analyze
     from asperity.export.note import note_text

@@ -5,7 +5,6 @@ Maps that are small stand in the header as data, larger ones in a source beside 
 
 from __future__ import annotations
 
-import hashlib
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -13,6 +12,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
 
+from asperity.contacts.contact import Contact
+from asperity.contacts.memory import BUDGET, GAP, SIZE, UNLIMITED
+from asperity.content import surface_content
 from asperity.errors import ParameterError
 from asperity.export.expressions import real_literal
 from asperity.export.functions import Functions, surface_functions
@@ -23,6 +25,7 @@ FARTHEST = 1000.0
 """Positions farther from the origin along an axis get no force [m]: cells could not be counted."""
 IN_HEADER = 256 * 2**10
 """Bytes of data above which they stand in a source beside the header."""
+_UNLIMITED = "\n * Its search has no limit of looks: not for the loop."
 
 
 @lru_cache(maxsize=16)
@@ -59,15 +62,26 @@ class Parts:
     records: tuple[str, ...]
     functions: Functions
 
-    def public(self, link: str) -> str:
-        """Return the definitions of the public functions."""
-        words = self.words | {"link": link}
-        energy = filled(template("energy.c"), words) if self.functions.energy else ""
-        return filled(template("public.c"), words) + energy
+    def file(self, name: str, link: str, data: str) -> str:
+        """Return a template with words and code.
 
-    def inner(self) -> str:
-        """Return records and functions."""
-        return "\n".join([*self.records, self.functions.code])
+        Args:
+            name: of the template.
+            link: how the public functions are declared.
+            data: definitions or declarations of the arrays.
+        """
+        energy = bool(self.functions.energy)
+        contract, public = ["contract.h", "energy.h"], ["public.c", "energy.c"]
+        words = self.words | {"link": link}
+        words["guards"] = filled(template("guards.h"), words)
+        words["contract"] = _joined(contract[: 1 + energy], words)
+        public_code = _joined(public[: 1 + energy], words)
+        words["inside"] = "\n".join([data, *self.records, self.functions.code, public_code])
+        return filled(template(name), words)
+
+
+def _joined(names: Sequence[str], words: Mapping[str, str]) -> str:
+    return "".join(filled(template(name), words) for name in names)
 
 
 def c99_files(order: Order, stem: str) -> dict[str, str]:
@@ -89,18 +103,13 @@ def c99_files(order: Order, stem: str) -> dict[str, str]:
     arrays = tuple(store.array(place) for place in places)
     heads = tuple(store.head(place) for place in places)
     parts = Parts(_words(order, functions, stem), arrays, heads, tuple(records), functions)
-    content = "\n".join([*arrays, parts.inner(), parts.public("")])
-    # The same for every name.
-    content = re.sub(rf"\b({order.name}|{order.name.upper()})_", "_", content)
-    parts.words["content"] = hashlib.sha256(content.encode()).hexdigest()
     if order.shared:
         return _library(parts, stem)
     return _header(parts, stem, apart=size > IN_HEADER)
 
 
 def _words(order: Order, functions: Functions, stem: str) -> dict[str, str]:
-    surface, single = order.surface, order.single
-    q = repr(order.q_upper) if math.isfinite(order.q_upper) else "HUGE_VAL"
+    surface, single, law = order.surface, order.single, order.surface.law
     return {
         "name": order.name,
         "NAME": order.name.upper(),
@@ -108,47 +117,60 @@ def _words(order: Order, functions: Functions, stem: str) -> dict[str, str]:
         "real": "float" if single else "double",
         "abs": "fabsf" if single else "fabs",
         "far": real_literal(FARTHEST, single),
-        "held": functions.held,
-        "held_type": functions.held_type,
+        "tick": functions.tick,
+        "tick_type": functions.tick_type,
+        "memory": str(SIZE),
+        "at_budget": str(BUDGET),
+        "at_gap": str(GAP),
+        "budget": real_literal(min(order.budget, UNLIMITED), single),
+        "gap": _gap_words(law.contact),
+        "unlimited": _UNLIMITED if law.contact.remembers else "",
         "energy": functions.energy,
         "stiffness": repr(surface.stiffness),
         "max_depth": repr(surface.max_depth),
-        "q_upper": q,
+        "q_upper": _bound(order.q_upper),
+        "looks": _bound(order.budget),
+        "content": surface_content(surface),
         "note": block_comment(order.note),
     }
 
 
+def _gap_words(contact: Contact) -> str:
+    """Return what the gap of a search says, for the comment of ``texture_gap``."""
+    if not contact.remembers:
+        return "0, this law does not search."
+    if contact.gap_is_force:
+        said = "the exact one differs by at most k times this."
+    else:
+        said = "no point of the surface is nearer by more."
+    return f"{said}\n * 0 where the search came to its end within its looks."
+
+
+def _bound(value: float) -> str:
+    """Return a number as a constant of the contract."""
+    return repr(value) if math.isfinite(value) else "HUGE_VAL"
+
+
 def _header(parts: Parts, stem: str, *, apart: bool) -> dict[str, str]:
     """Return a header that holds everything, its arrays apart if they are large."""
-    words = dict(parts.words)
-    storage = "static " if not apart else ""
-    data = [f"{storage}{array}" for array in parts.arrays]
-    if apart:
-        declared = "".join(f"extern {head};\n" for head in parts.heads)
-        source = f"{words['note']}#include <stdint.h>\n\n{declared}\n" + "\n".join(data)
-        data = [filled(template("extern.h"), words | {"declared": declared})]
-    inside = ["\n".join(data), parts.inner(), parts.public("static inline")]
-    words["inside"] = "\n".join(inside)
-    files = {f"{stem}.h": filled(template("header.h"), words)}
-    return files | ({f"{stem}_data.c": source} if apart else {})
+    if not apart:
+        data = "\n".join(f"static {array}" for array in parts.arrays)
+        return {f"{stem}.h": parts.file("header.h", "static inline", data)}
+    declared = "".join(f"extern {head};\n" for head in parts.heads)
+    data = filled(template("extern.h"), parts.words | {"declared": declared})
+    head = f"{parts.words['note']}#include <stdint.h>\n\n{declared}\n"
+    return {
+        f"{stem}.h": parts.file("header.h", "static inline", data),
+        f"{stem}_data.c": head + "\n".join(parts.arrays),
+    }
 
 
 def _library(parts: Parts, stem: str) -> dict[str, str]:
     """Return header, source and CMake file of a library."""
-    words = dict(parts.words)
-    words["inside"] = "\n".join(
-        [*[f"static {array}" for array in parts.arrays], parts.inner(), parts.public(_api(words))]
-    )
-    words["declared"] = filled(template("energy_declared.h"), words) if words["energy"] else ""
-    return {
-        f"{stem}.h": filled(template("library.h"), words),
-        f"{stem}.c": filled(template("library.c"), words),
-        "CMakeLists.txt": filled(template("CMakeLists.txt"), words),
-    }
-
-
-def _api(words: Mapping[str, str]) -> str:
-    return f"{words['NAME']}_API"
+    data = "\n".join(f"static {array}" for array in parts.arrays)
+    names = {f"{stem}.h": "library.h", f"{stem}.c": "library.c", "CMakeLists.txt": "CMakeLists.txt"}
+    link = f"{parts.words['NAME']}_API"
+    return {file: parts.file(name, link, data) for file, name in names.items()}
 
 
 def _too_large(

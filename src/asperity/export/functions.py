@@ -5,17 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from asperity.contacts.memory import SIZE
 from asperity.errors import ParameterError
 from asperity.export.data import Store, store_of
 from asperity.export.energy import energy_units
 from asperity.export.program import Linked, Program
-from asperity.export.subset import BOOL, FLOAT, Kind
+from asperity.export.subset import BOOL, FLOAT, Kind, Work
 from asperity.kernels.fuse import law_units, link_on_texture
 from asperity.kernels.link import Unit, module_unit
 from asperity.surface import Surface
 
 # Names after the prefix that a program has besides its functions.
-_PUBLIC = frozenset(("state", "reset", "force", "energy", "surface", "law"))
+_PUBLIC = frozenset(("state", "reset", "force", "gap", "energy", "surface", "law"))
 
 
 @dataclass(frozen=True)
@@ -24,15 +25,15 @@ class Functions:
 
     Attributes:
         code: their definitions, with the types that they use.
-        held: name of the function that returns force and anchor.
-        held_type: C type of what it returns.
+        tick: name of the function that returns force and anchor.
+        tick_type: C type of what it returns.
         energy: name of the function that returns the energy; empty if there is none.
         store: the data.
     """
 
     code: str
-    held: str
-    held_type: str
+    tick: str
+    tick_type: str
     energy: str
     store: Store
 
@@ -49,9 +50,9 @@ def surface_functions(surface: Surface, prefix: str, *, single: bool) -> Functio
         ParameterError: for a law or a texture that cannot be expressed in C.
     """
     law, clamp = surface.law, surface.acting_clamp
-    probe = next(unit for unit in law_units(law, clamp) if "probe_held" in unit.texts)
+    probe = next(unit for unit in law_units(law, clamp) if "probe_tick" in unit.texts)
     energy = energy_units(law, clamp)
-    roots = [("probe_held", probe), *[("probe_energy", unit) for unit in energy[:1]]]
+    roots = [("probe_tick", probe), *[("probe_energy", unit) for unit in energy[:1]]]
     brought = [*map(module_unit, law.contact.kernels()), *energy]
     text = link_on_texture(law, surface.texture.sampler, clamp, roots, brought)
     if single:
@@ -60,12 +61,12 @@ def surface_functions(surface: Surface, prefix: str, *, single: bool) -> Functio
     store = store_of(surface, prefix, single=single)
     constants: tuple[Kind, Kind] = (store.texture, store.law)
     place = (FLOAT, FLOAT, FLOAT)
-    kinds = (*place, FLOAT, FLOAT, BOOL, *constants)
-    held = program.function("probe_held", kinds)
-    held_type = program.type_of(program.scope("probe_held", kinds).result)
+    kinds = (*place, FLOAT, FLOAT, BOOL, Work((SIZE,)), *constants)
+    tick = program.function("probe_tick", kinds)
+    tick_type = program.type_of(program.scope("probe_tick", kinds).result)
     stored = program.function("probe_energy", (*place, *constants)) if energy else ""
     code = "\n".join([*program.types, *program.helpers, *program.functions])
-    return Functions(code, held, held_type, stored, store)
+    return Functions(code, tick, tick_type, stored, store)
 
 
 def _refuse_iterations(surface: Surface, text: str, units: Sequence[Unit]) -> None:

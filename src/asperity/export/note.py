@@ -10,6 +10,7 @@ import asperity
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.words.surface import depths, most_gained
+from asperity.laws import Law
 from asperity.units import engineering
 
 _WIDTH = 92
@@ -29,7 +30,7 @@ def note_text(analysis: Analysis, file: str) -> str:
         [
             f"{file}: law {law}, by asperity {asperity.__version__}. Generated, do not edit.",
             "",
-            *_usage(surface.law.stateful),
+            *_usage(surface.law),
             "",
             said,
             "",
@@ -40,9 +41,13 @@ def note_text(analysis: Analysis, file: str) -> str:
     )
 
 
-def _usage(stateful: bool) -> list[str]:
+def _usage(law: Law) -> list[str]:
     """Return how the program is used."""
-    kept = "It keeps the anchor of friction" if stateful else "This law keeps nothing in it"
+    kept = "This law keeps nothing in it"
+    if law.contact.remembers:
+        kept = "It keeps where the last search ended"
+    if law.stateful:
+        kept = "It keeps the anchor of friction"
     return _wrapped(
         [
             "Positions [m] in the frame of the surface: z points out of the body, which is "

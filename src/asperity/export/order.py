@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import dataclass
 
+from asperity.checks import positive
 from asperity.errors import ParameterError
 from asperity.export.statements import is_taken
 from asperity.surface import Surface
@@ -27,9 +28,12 @@ class Order:
         note: what stands on top, plain text.
         q_upper: upper bound of the characteristic number.
         largest: bytes of data that the program may hold.
+        looks: evaluations of the surface that the search of a tick may take, infinite for the exact
+            answer at any price; default: as many as the law's contact says.
 
     Raises:
-        ParameterError: for a name that C does not take, or an unknown precision.
+        ParameterError: for a name that C does not take, an unknown precision, or looks that are not
+            positive.
     """
 
     surface: Surface
@@ -39,16 +43,17 @@ class Order:
     note: str = ""
     q_upper: float = math.inf
     largest: int = LARGEST
+    looks: float | None = None
 
     def __post_init__(self) -> None:
-        self.check(self.name, self.precision)
+        self.check(self.name, self.precision, self.looks)
 
     @staticmethod
-    def check(name: str, precision: str) -> None:
+    def check(name: str, precision: str, looks: float | None) -> None:
         """Refuse what cannot be ordered, before a surface is looked at.
 
         Raises:
-            ParameterError: for a name that C does not take, or an unknown precision.
+            ParameterError: see the class.
         """
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or "__" in name:
             words = "must be a C identifier: letters, digits and single _, a letter first"
@@ -58,6 +63,14 @@ class Order:
         if precision not in PRECISIONS:
             words = f"must be one of {', '.join(PRECISIONS)}"
             raise ParameterError("precision", words, precision)
+        if looks is not None and looks != math.inf:
+            positive("looks", looks)
+
+    @property
+    def budget(self) -> float:
+        """Evaluations of the surface that the search of a tick may take; 1 without a search."""
+        contact = self.surface.law.contact
+        return self.looks if self.looks is not None and contact.remembers else contact.looks
 
     @property
     def single(self) -> bool:

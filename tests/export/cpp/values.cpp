@@ -3,7 +3,8 @@
 
 #include "texture.hpp"
 
-static_assert(Texture::content.size() == 64 && Texture::stiffness == 800.0);
+static_assert(sizeof(texture_state) == 25 * sizeof(double)); // as C# and Python believe
+static_assert(Texture::content.size() == 12 && Texture::stiffness == 800.0);
 
 int main()
 {

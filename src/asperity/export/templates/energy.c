@@ -1,5 +1,4 @@
 
-/* Return the potential energy [J] at a position [m]: the force is minus its gradient. */
 @link@ @real@ @name@_energy(const @real@ position[3])
 {
     const @real@ x = position[0];

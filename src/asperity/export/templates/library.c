@@ -3,25 +3,5 @@
 #include <math.h>
 #include <stdint.h>
 
-#if defined(__FAST_MATH__)
-#error "compile without -ffast-math: the force would not be the one that was analysed"
-#endif
-#if (-1 >> 1) != -1
-#error "the shift of a negative integer must keep its sign"
-#endif
-/* A product and a sum that are rounded once (FMA) would change the last bits. */
-#if defined(__clang__)
-#pragma STDC FP_CONTRACT OFF
-#elif defined(__GNUC__)
-#pragma GCC optimize ("fp-contract=off")
-#elif defined(_MSC_VER)
-#pragma fp_contract (off)
-#endif
-/* Small functions: a call would cost more than they do. */
-#if defined(__GNUC__) && defined(__OPTIMIZE__) && !defined(__OPTIMIZE_SIZE__)
-#define @NAME@_INLINE static inline __attribute__((always_inline))
-#else
-#define @NAME@_INLINE static inline
-#endif
-
+@guards@
 @inside@

@@ -1,3 +1,0 @@
-
-/* Return the potential energy [J] at a position [m]: the force is minus its gradient. */
-@NAME@_API @real@ @name@_energy(const @real@ position[3]);
