@@ -152,6 +152,10 @@ def test_where_rounding_swamps_the_steps_a_descent_ends(monkeypatch: pytest.Monk
     gap = -(1.0 + h1 * h1) / h2 * (1.0 - 2.8691686721844097e-08)
     high.descend((gap * h1, gap * h1, 2.0 * h - gap), 0.0022611303330464334, monkeypatch)
     assert len(high.plane) < 30
+    slope = Looks(4188.6, 0.494, -0.5, -0.046, 0.055)
+    gap = (1.0 + 0.494**2) * 0.9999986
+    slope.descend((gap * 0.494, 0.0, 4188.6 - gap), -0.00032, monkeypatch)
+    assert len(slope.line) < 14
 
 
 def test_a_step_too_far_is_halved(monkeypatch: pytest.MonkeyPatch) -> None:
