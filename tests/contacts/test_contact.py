@@ -199,6 +199,58 @@ def test_a_box_is_as_far_as_taylor_s_formula_says() -> None:
     assert not is_hopeless(0.95 * (1.0 + 1e-12))
 
 
+@pytest.mark.parametrize("bend", [0.3, 1.4, 9.0])
+@pytest.mark.parametrize(
+    ("away", "slope", "turn", "r"),
+    [(0.0, 0.0, 0.2, 0.4), (0.3, 0.5, 1.3, 0.5), (-0.2, 0.1, 0.9, 0.1)],
+)
+def test_an_interval_is_dropped_just_where_taylor_s_formula_says(
+    away: float, slope: float, turn: float, r: float, bend: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """φ >= φ₀ - 2|p| r + (min(Q, 0) - L r/3) r², L = 3 K max|h'| + T max|h - z|, at h - z = -1."""
+    looks, twist = Looks(0.7, slope, 0.5 * turn), 0.8
+    monkeypatch.setattr(line_search, "along", looks.along)
+    p, q = away - slope, 1.0 + slope * slope - turn
+    most = min(bend, turn + twist * r)
+    steep = slope + most * r
+    change = (3.0 * most * steep + twist * (1.0 + steep * r)) * r
+    least = away**2 + 1.0 - 2.0 * abs(p) * r + (min(q, 0.0) - change / 3.0) * r * r
+    for keep in (1.0, 0.5):
+        for share, dropped in ((1.0 - 1e-9, True), (1.0 + 1e-9, False)):
+            best = (-9.0, least / keep * share, 0.0, 0.0)
+            found, further, left = line_search.judge(
+                -away, 1.7, 0.0, r, bend, twist, best, keep, 50.0, None
+            )
+            flat = abs(p) <= (abs(q) * (1.0 + 1e-6) + 0.5 * change + 1e-6) * r
+            convex = q + change >= 0.0
+            if dropped or not flat or not convex:
+                assert (found, further, left) == (best, False, 49.0)
+            else:
+                assert further or left < 49.0
+                assert further == (q <= change)
+
+
+def test_an_interval_is_dropped_where_its_slope_cannot_vanish(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Or where it is nowhere convex; the numbers leave room for rounding."""
+
+    def is_dropped(slope: float, turn: float, away: float, twist: float) -> bool:
+        looks = Looks(0.7, slope, 0.5 * turn)
+        monkeypatch.setattr(line_search, "along", looks.along)
+        best = (-9.0, 1e9, 0.0, 0.0)
+        given = (-away, 1.7, 0.0, 0.1, 50.0, twist, best, 1.0, 50.0, None)
+        _found, further, left = line_search.judge(*given)
+        return not further and left == 49.0
+
+    # Of a plane Q is 1 and does not change: the slope vanishes at a distance of |p|.
+    for away in (0.1 * (1.0 + 3e-6), 0.1 * (1.0 + 1e-6), -0.1 * (1.0 + 3e-6)):
+        assert is_dropped(0.0, 0.0, away, 0.0) == (abs(away) > 0.1 * (1.0 + 2e-6))
+    # Q = 1 - h'' from -1 up by 1: concave all over, but for a millionth.
+    for twist, dropped in ((1.0, True), (30.0, False)):
+        assert is_dropped(0.0, 2.0, 0.0, twist) == dropped
+
+
 def test_a_search_out_of_looks_asks_for_less_each_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Unfinished it goes on with what is nearer by a share that falls to a quarter: d ≥ (1 - s) d₀.
 
