@@ -14,13 +14,13 @@ from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
 from asperity.files import Record, record
 from asperity.laws.w_smooth_wall import LAW as SMOOTH_WALL
+from asperity.simulation.continued import Continued
 from asperity.simulation.ending import fed
 from asperity.simulation.hands import Hand, MovedHand
 from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Plant
 from asperity.simulation.run import Run, Stop
 from asperity.simulation.servo import Servo
-from asperity.simulation.simulate import simulate
 from asperity.surface import Surface
 
 Place = tuple[float, float, float]
@@ -137,12 +137,12 @@ def ends_in_cycle(
 ) -> tuple[bool, Run]:
     """Return whether a loop ends in a limit cycle, and the longest run of it.
 
-    One that ends restless is run again, 4 and 16 times as long, until it is steady. It is a cycle
+    One that ends restless goes on, to 4 and 16 times as long, until it is steady. It is a cycle
     if the texture then feeds it, see :func:`cycles`. A handle that leaves the workspace while it
     is fed counts as one.
 
     Args:
-        run_for: runs the loop for a duration [s].
+        run_for: runs the loop for a duration [s], each time a longer one.
         duration: of the first run [s].
         threshold: of :func:`restlessness` [m/s].
     """
@@ -170,12 +170,10 @@ def runner(
     start: FloatArray,
     velocity: ArrayLike | None,
     shift: FloatArray,
-) -> Callable[[float], Run]:
-    """Return what runs a loop for a duration [s], all of it shifted by an offset [m]."""
+) -> Continued:
+    """Return what runs a loop for longer and longer [s], all of it shifted by an offset [m]."""
     way = Shifted(motion, (float(shift[0]), float(shift[1]), float(shift[2])))
-    return lambda span: simulate(
-        surface, plant, hand, servo, way, span, start=start + shift, velocity=velocity
-    )
+    return Continued(surface, plant, hand, servo, way, start + shift, velocity)
 
 
 def offsets(surface: Surface, count: int) -> FloatArray:

@@ -34,6 +34,8 @@ FRICTION_PARTS = 4
 LEAST_SINE = 0.05
 # Greatest part of a time constant that one Runge-Kutta step covers: energy then closes to 1e-10.
 _LARGEST_PART = 0.01
+# Likewise of the method of order five that moves a pantograph: energy closes to 1e-11.
+_LARGEST_STEP = 0.05
 # Parts of a sample at most: a body that needs more is too fast for its period.
 _MOST_PARTS = 10_000
 # What is usual: of a body that cannot be computed, what is furthest from it is named.
@@ -198,7 +200,7 @@ def _pantograph(plant: Pantograph, hand: SpringHand | BandHand, period: float) -
     _parts(plant.friction, rate, period)  # refuses too many; how many there are depends on speed
     fewest = FRICTION_PARTS if plant.friction > 0.0 else 1
     record = five_bar.PantographPlant(
-        bar, _hand_record(hand), float(plant.friction), rate, fewest, float(period), _LARGEST_PART,
+        bar, _hand_record(hand), float(plant.friction), rate, fewest, float(period), _LARGEST_STEP,
         bool(plant.inside_only), LEAST_SINE,
     )  # fmt: skip
     return SampledPlant((five_bar, hand_kernels, booking), record, 6)

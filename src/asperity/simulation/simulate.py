@@ -98,12 +98,12 @@ def simulate(
         >>> run.samples, run.stopped, round(1e3 * float(run.state[2]), 6)
         (20000, '', -0.285714)
     """
-    _check(surface, plant, hand, servo, motion)
-    samples = _samples(positive("duration", duration, "s"), servo.period)
+    check_parts(surface, plant, hand, servo, motion)
+    samples = whole_samples(positive("duration", duration, "s"), servo.period)
     if isinstance(every, bool) or not isinstance(every, (int, np.integer)) or every < 1:
         raise ParameterError("every", "must be a whole number of samples, 1 or more", every)
     every = min(int(every), samples)
-    simulation = _begin(surface, plant, hand, servo, motion, start, velocity)
+    simulation = loop_of(surface, plant, hand, servo, motion, start, velocity)
     anchor_from = partial(_anchor, motion, servo.period, samples, plant)
     rows = -(-samples // every)
     said = partial(_said, surface, plant, hand, servo, motion, every, about or {})
@@ -116,7 +116,7 @@ def simulate(
     short, gap = simulation.uncertain
     return Run(
         kept.table(), simulation.state, simulation.samples, float(servo.period),
-        simulation.ledger(), surface, stop, _place(stop, simulation.state, plant),
+        simulation.ledger(), surface, stop, left_at(stop, simulation.state, plant),
         path="" if isinstance(trace, bool) else os.fspath(trace),
         ending=ending, notes=plant.notes, short=short, gap=gap,
     )  # fmt: skip
@@ -151,7 +151,12 @@ def simulate_many(jobs: Sequence[Mapping[str, Any]], workers: int | None = None)
         return list(pool.map(lambda job: simulate(**job), jobs))
 
 
-def _check(surface: Surface, plant: Plant, hand: Hand, servo: Servo, motion: Motion) -> None:
+def check_parts(surface: Surface, plant: Plant, hand: Hand, servo: Servo, motion: Motion) -> None:
+    """Refuse what is no part of a closed loop.
+
+    Raises:
+        ParameterError: for the first that is none.
+    """
     for name, value, kinds, words in (
         ("surface", surface, Surface, "a Surface"),
         ("plant", plant, (Cartesian, Pantograph), "a Cartesian or a Pantograph"),
@@ -163,7 +168,12 @@ def _check(surface: Surface, plant: Plant, hand: Hand, servo: Servo, motion: Mot
             raise ParameterError(name, f"must be {words}", value)
 
 
-def _samples(duration: float, period: float) -> int:
+def whole_samples(duration: float, period: float) -> int:
+    """Return how many samples a duration has [s].
+
+    Raises:
+        ParameterError: for one that has none, or more than can be.
+    """
     if not duration / period <= MOST_SAMPLES:
         limit = f"must be at most {MOST_SAMPLES:g} samples of {period:g} s"
         raise ParameterError("duration", limit, duration)
@@ -173,10 +183,11 @@ def _samples(duration: float, period: float) -> int:
     return samples
 
 
-def _begin(
+def loop_of(
     surface: Surface, plant: Plant, hand: Hand, servo: Servo, motion: Motion,
     start: ArrayLike | None, velocity: ArrayLike | None,
 ) -> Simulation:  # fmt: skip
+    """Return a loop before its first sample; see :func:`simulate`."""
     place, speed = begin(plant, hand, servo, motion, start, velocity)
     return Simulation(surface, sampled_plant(plant, hand, servo), servo, place, speed)
 
@@ -292,7 +303,7 @@ def left_workspace(plant: Pantograph, place: FloatArray) -> str:
     return ""
 
 
-def _place(stop: Stop, state: FloatArray, plant: Plant) -> str:
+def left_at(stop: Stop, state: FloatArray, plant: Plant) -> str:
     """Return where the handle of a pantograph left the workspace."""
     if stop is not Stop.LEFT or not isinstance(plant, Pantograph):
         return ""

@@ -52,6 +52,28 @@ class Bar(NamedTuple):
     joint_damping: float
 
 
+class Pull(NamedTuple):
+    """What pulls at the handle over a step.
+
+    Attributes:
+        fx: force [N].
+        fz: likewise.
+        ax: position of the hand's anchor at the beginning [m].
+        az: likewise.
+        ux: its velocity [m/s].
+        uz: likewise.
+        damping: of the joints [N m s].
+    """
+
+    fx: float
+    fz: float
+    ax: float
+    az: float
+    ux: float
+    uz: float
+    damping: float
+
+
 class PantographPlant(NamedTuple):
     """A pantograph that a hand holds.
 
@@ -88,18 +110,21 @@ def bar_arm(
     of the line from motor to handle, -1 to the left; ``inertia`` is I₁ + m₂ l₁²/3.
     """
     square = x * x + z * z
-    along = 0.5 * (square + near * near - far * far) / square
-    across = side * math.sqrt(near * near / square - along * along)
+    twice = square + near * near - far * far
+    root = math.sqrt(4.0 * near * near * square - twice * twice)  # 2 |D|² across
+    inverse = 1.0 / (square * root)  # one division for all
+    along = 0.5 * twice * root * inverse
+    across = 0.5 * side * root * root * inverse
     lx = along * x + across * z
     lz = along * z - across * x
-    over = 1.0 / (across * square)  # u · t = across |D|²
+    over = 2.0 * side * square * inverse  # u · t = across |D|²
     gx = (x - lx) * over
     gz = (z - lz) * over
     turn = gx * dx + gz * dz
     wx = dx + turn * lz
     wz = dz - turn * lx
     square_turn = turn * turn
-    gain = (wx * wx + wz * wz + square_turn * (along * square - near * near)) * over
+    gain = (wx * wx + wz * wz + square_turn * (0.5 * twice - near * near)) * over
     sixth = mass * (1.0 / 6.0)
     mxx = inertia * gx * gx + 2.0 * sixth * (1.0 - lz * gx)
     mxz = inertia * gx * gz + sixth * (lx * gx - lz * gz)
@@ -145,6 +170,21 @@ def bar_rates(
     return (mzz * rx - mxz * rz) * over, (mxx * rz - mxz * rx) * over, lost, power
 
 
+def bar_stage(
+    x: float, z: float, dx: float, dz: float, late: float, pull: Pull, bar: Bar, hand: HandRecord
+) -> tuple[float, float, float, float]:
+    """Rates as :func:`bar_rates`, a time after the beginning of the step [s]."""
+    fx, fz, ax, az, ux, uz, damping = pull
+    return bar_rates(
+        x, z, dx, dz, fx, fz, ax + late * ux, az + late * uz, ux, uz, damping, bar, hand
+    )
+
+
+def mean_of_five(one: float, three: float, four: float, five: float, six: float, h: float) -> float:
+    """Integral over a step h of a rate, of its values at the stages of :func:`bar_part`."""
+    return h / 90.0 * (7.0 * (one + six) + 32.0 * (three + five) + 12.0 * four)
+
+
 def bar_friction(
     x: FloatArray, fx: float, fz: float, ax: float, az: float, ux: float, uz: float,
     damping: float, friction: float, span: float, bar: Bar, hand: HandRecord,
@@ -168,48 +208,43 @@ def bar_friction(
 
 def bar_part(
     x: FloatArray, sx: float, sz: float, ax: float, az: float,
-    ux: float, uz: float, damping: float, span: float, bar: Bar, hand: HandRecord,
+    ux: float, uz: float, damping: float, h: float, bar: Bar, hand: HandRecord,
 ) -> tuple[float, float, float, float]:  # fmt: skip
-    """One step of the classical Runge-Kutta method; loss and hand's work are integrated along.
+    """One step h of Butcher's Runge-Kutta method of order five, its loss and work along with it.
 
     Returns the displacement in x and z [m], the loss and the work of the hand [J].
     """
-    half = 0.5 * span
-    px = x[0]
-    pz = x[2]
-    vx = x[3]
-    vz = x[5]
-    ax1, az1, lost1, hand1 = bar_rates(
-        px, pz, vx, vz, sx, sz, ax, az, ux, uz, damping, bar, hand
-    )  # fmt: skip
-    vx2 = vx + half * ax1
-    vz2 = vz + half * az1
-    mx = ax + half * ux
-    mz = az + half * uz
-    ax2, az2, lost2, hand2 = bar_rates(
-        px + half * vx, pz + half * vz, vx2, vz2, sx, sz, mx, mz, ux, uz, damping, bar, hand
-    )  # fmt: skip
-    vx3 = vx + half * ax2
-    vz3 = vz + half * az2
-    ax3, az3, lost3, hand3 = bar_rates(
-        px + half * vx2, pz + half * vz2, vx3, vz3, sx, sz, mx, mz, ux, uz, damping, bar, hand
-    )  # fmt: skip
-    vx4 = vx + span * ax3
-    vz4 = vz + span * az3
-    ax4, az4, lost4, hand4 = bar_rates(
-        px + span * vx3, pz + span * vz3, vx4, vz4, sx, sz, ax + span * ux, az + span * uz,
-        ux, uz, damping, bar, hand,
-    )  # fmt: skip
-    sixth = span / 6.0
-    dx = sixth * (vx + 2.0 * (vx2 + vx3) + vx4)
-    dz = sixth * (vz + 2.0 * (vz2 + vz3) + vz4)
-    x[0] = px + dx
-    x[2] = pz + dz
-    x[3] = vx + sixth * (ax1 + 2.0 * (ax2 + ax3) + ax4)
-    x[5] = vz + sixth * (az1 + 2.0 * (az2 + az3) + az4)
-    lost = sixth * (lost1 + 2.0 * (lost2 + lost3) + lost4)
-    work = sixth * (hand1 + 2.0 * (hand2 + hand3) + hand4)
-    return dx, dz, lost, work
+    pull = Pull(sx, sz, ax, az, ux, uz, damping)
+    x1, z1, vx1, vz1 = x[0], x[2], x[3], x[5]
+    ax1, az1, lost1, hand1 = bar_stage(x1, z1, vx1, vz1, 0.0, pull, bar, hand)
+    q = 0.25 * h
+    vx2, vz2 = vx1 + q * ax1, vz1 + q * az1
+    ax2, az2, _, _ = bar_stage(x1 + q * vx1, z1 + q * vz1, vx2, vz2, q, pull, bar, hand)
+    e = 0.125 * h
+    vx3, vz3 = vx1 + e * (ax1 + ax2), vz1 + e * (az1 + az2)
+    x3, z3 = x1 + e * (vx1 + vx2), z1 + e * (vz1 + vz2)
+    ax3, az3, lost3, hand3 = bar_stage(x3, z3, vx3, vz3, q, pull, bar, hand)
+    vx4, vz4 = vx1 + h * (ax3 - 0.5 * ax2), vz1 + h * (az3 - 0.5 * az2)
+    x4, z4 = x1 + h * (vx3 - 0.5 * vx2), z1 + h * (vz3 - 0.5 * vz2)
+    ax4, az4, lost4, hand4 = bar_stage(x4, z4, vx4, vz4, 2.0 * q, pull, bar, hand)
+    s = h / 16.0
+    vx5, vz5 = vx1 + s * (3.0 * ax1 + 9.0 * ax4), vz1 + s * (3.0 * az1 + 9.0 * az4)
+    x5, z5 = x1 + s * (3.0 * vx1 + 9.0 * vx4), z1 + s * (3.0 * vz1 + 9.0 * vz4)
+    ax5, az5, lost5, hand5 = bar_stage(x5, z5, vx5, vz5, 3.0 * q, pull, bar, hand)
+    s = h / 7.0
+    vx6 = vx1 + s * (2.0 * ax2 - 3.0 * ax1 + 12.0 * (ax3 - ax4) + 8.0 * ax5)
+    vz6 = vz1 + s * (2.0 * az2 - 3.0 * az1 + 12.0 * (az3 - az4) + 8.0 * az5)
+    x6 = x1 + s * (2.0 * vx2 - 3.0 * vx1 + 12.0 * (vx3 - vx4) + 8.0 * vx5)
+    z6 = z1 + s * (2.0 * vz2 - 3.0 * vz1 + 12.0 * (vz3 - vz4) + 8.0 * vz5)
+    ax6, az6, lost6, hand6 = bar_stage(x6, z6, vx6, vz6, h, pull, bar, hand)
+    dx = mean_of_five(vx1, vx3, vx4, vx5, vx6, h)
+    dz = mean_of_five(vz1, vz3, vz4, vz5, vz6, h)
+    x[0] = x1 + dx
+    x[2] = z1 + dz
+    x[3] = vx1 + mean_of_five(ax1, ax3, ax4, ax5, ax6, h)
+    x[5] = vz1 + mean_of_five(az1, az3, az4, az5, az6, h)
+    lost = mean_of_five(lost1, lost3, lost4, lost5, lost6, h)
+    return dx, dz, lost, mean_of_five(hand1, hand3, hand4, hand5, hand6, h)
 
 
 def bar_reached(x: float, z: float, least: float, bar: Bar) -> bool:

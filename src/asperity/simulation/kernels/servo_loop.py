@@ -138,7 +138,7 @@ def servo_batch(
     tracing = trace.shape[0] > 0
     stop = RAN
     for sample in range(samples):
-        if sample & 255 == 0:
+        if (done + sample) & 255 == 0:
             flush(x)
             servo = flushed_state(servo)
         before = servo
