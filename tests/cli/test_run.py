@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.servo.test_drivers import EXAMPLE, compiled
+from bench.fakes import compiled
+from tests.servo.test_drivers import EXAMPLE
 
 from asperity.recording.recording import open_recording
 from asperity.recording.replay import replay

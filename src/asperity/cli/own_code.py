@@ -56,6 +56,8 @@ def registries() -> tuple[Registry, ...]:
     from asperity.measured.reading import registry as readers
     from asperity.paper import registry
     from asperity.paper.claim import Claim
+    from asperity.servo.drivers import choice
+    from asperity.servo.drivers.driver import DriverKind
     from asperity.textures import catalogue
     from asperity.textures.texture import Kind
 
@@ -66,6 +68,7 @@ def registries() -> tuple[Registry, ...]:
         Registry(Claim, registry.register, registry.CLAIMS),
         # A criterion is a function: the file gives it its name by calling register.
         Registry(None, criteria.register, criteria.CRITERIA),
+        Registry(DriverKind, choice.register, choice.KINDS),
     )
 
 

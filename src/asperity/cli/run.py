@@ -43,7 +43,8 @@ _RUN = (
     "--driver",
     metavar="NAME",
     default=SIMULATED,
-    help="simulated, replay:run.mcap, forcedimension, or ./device.so.  [default: simulated]",
+    help="simulated, real (the one of the device's entry), haply, forcedimension, openhaptics,"
+    " ./device.so, or replay:run.mcap.  [default: simulated]",
 )
 @click.option(
     "--record",
@@ -135,7 +136,7 @@ def real_loop(setup: Setup, name: str, duration: float | None) -> ServoProcess:
     from asperity.servo.process import ServoProcess
 
     safety = setup.safety
-    driver = hardware_driver(name, safety.wall, safety.origin)
+    driver = hardware_driver(name, safety.wall, safety.origin, setup.device)
     tell(f"a real device, {setup.device.name}: a hand near its switch. If the loop dies:"
          f" {driver.when_lost}")  # fmt: skip
     return ServoProcess(

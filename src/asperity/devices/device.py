@@ -65,7 +65,7 @@ FIELD_TABLE: dict[str, Field] = {
 FIELDS: dict[str, str] = {name: field.unit for name, field in FIELD_TABLE.items()}
 """The unit in which asperity keeps each field."""
 
-WORDS = ("id", "name", "axes", "notes")
+WORDS = ("id", "name", "axes", "driver", "notes")
 """What a device file may say besides its numbers."""
 
 
@@ -159,6 +159,7 @@ class Device(Record, Displayed):
         name: full name.
         data: what is known, by field; see ``asperity.devices.FIELDS``.
         axes: where its own x, y and z point; empty if not known.
+        driver: what ``--driver real`` is on it, such as ``haply``; empty if none is known.
         notes: what else one must know, in sentences.
 
     Example:
@@ -170,13 +171,14 @@ class Device(Record, Displayed):
         [('14500 N/m', False)]
     """
 
-    written = "id name axes notes data"
+    written = "id name axes driver notes data"
 
     id: str
     name: str
     data: Mapping[str, Datum]
     axes: str = ""
     notes: tuple[str, ...] = ()
+    driver: str = ""
 
     def __repr__(self) -> str:
         return f"<Device {self.id}, {self.name}: {len(self.data)} numbers>"

@@ -93,14 +93,17 @@ def parse_device(content: Mapping[str, Any], default_id: str, *, from_file: bool
         _refuse_bare(content)
     identity = _text("device.id", content.get("id", default_id))
     name = _text("device.name", content.get("name", identity))
-    axes = _text("device.axes", content["axes"]) if "axes" in content else ""
+    axes, driver = (
+        _text(f"device.{word}", content[word]) if word in content else ""
+        for word in ("axes", "driver")
+    )
     notes = content.get("notes", [])
     if not isinstance(notes, (list, tuple)):
         raise ParameterError("device.notes", "must be a list of sentences", notes)
     sentences = tuple(_text("device.notes", note) for note in notes)
     data = {field: _datum(field, given) for field, given in content.items() if field in FIELD_TABLE}
     _check_forces(data)
-    return Device(identity, name, data, axes, sentences)
+    return Device(identity, name, data, axes, sentences, driver)
 
 
 def changed_device(device: Device, content: Mapping[str, Any]) -> Device:
@@ -119,7 +122,11 @@ def changed_device(device: Device, content: Mapping[str, Any]) -> Device:
         ('touch', 1500.0, 'given by the user')
     """
     changed = parse_device(content, device.id, from_file=True)
-    words = {name: getattr(changed, name) for name in ("name", "axes", "notes") if name in content}
+    words = {
+        name: getattr(changed, name)
+        for name in ("name", "axes", "driver", "notes")
+        if name in content
+    }
     data = {**device.data, **changed.data}
     _check_forces(data)
     return replace(device, data=data, **words)

@@ -13,6 +13,7 @@ _HEAD = """\
 id = "mine"
 name = "My device"
 # axes = "x to the right, y away from the user, z up"
+# driver = "./device.so"  # what `asperity run --driver real` is on it
 # notes = ["what else one must know, in sentences"]
 
 """

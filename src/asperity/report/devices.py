@@ -157,6 +157,8 @@ def _print_device(device: Device, console: Console) -> None:
     if device.axes:
         console.print()
         say(console, f"Axes: {device.axes}")
+    if device.driver:
+        say(console, f"Driver: {device.driver} (asperity run ... --driver real)")
     for note in device.notes:
         console.print()
         say(console, note)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, ClassVar
@@ -122,3 +122,22 @@ class Driver(ABC):
     def explain(self, code: int) -> str:
         """Return what a number means that the driver returned, in words."""
         return f"error {code}"
+
+
+@dataclass(frozen=True)
+class DriverKind:
+    """A driver of real devices that a word chooses, declared in the driver's file.
+
+    Attributes:
+        name: the word, which a colon may follow with more.
+        axes: where the device's x, y and z point, seen by the user: right, away, up.
+        unit: one unit of the device's positions [m].
+        make: returns a driver from what stands after the colon, and where the surface lies.
+        example: of the word with what may follow it.
+    """
+
+    name: str
+    axes: tuple[Vector, Vector, Vector]
+    unit: float
+    make: Callable[[str, Frame], Driver]
+    example: str

@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import ClassVar
 
 from asperity.errors import ParameterError
-from asperity.servo.drivers.driver import UNTURNED, Driver, Frame
+from asperity.servo.drivers.driver import RIGHT, TOWARDS, UNTURNED, UP, Driver, DriverKind, Frame
 from asperity.servo.drivers.library import functions, load_library
 from asperity.servo.kernels import force_dimension
 from asperity.servo.kernels.force_dimension import ForceDimensionDevice
@@ -102,3 +102,12 @@ def _library() -> ctypes.CDLL:
 def _said(library: ctypes.CDLL) -> str:
     library.dhdErrorGetLastStr.restype = ctypes.c_char_p
     return (library.dhdErrorGetLastStr() or b"no reason given").decode(errors="replace")
+
+
+def _numbered(text: str, frame: Frame) -> ForceDimensionDriver:
+    if text and not text.isdecimal():
+        raise ParameterError("driver", "must have a number after the colon, from 0", text)
+    return ForceDimensionDriver(int(text) if text else None, frame)
+
+
+KIND = DriverKind("forcedimension", (TOWARDS, RIGHT, UP), 1.0, _numbered, "forcedimension:1")

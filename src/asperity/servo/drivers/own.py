@@ -12,7 +12,7 @@ from types import ModuleType
 from typing import ClassVar
 
 from asperity.errors import ParameterError
-from asperity.servo.drivers.driver import UNTURNED, Driver, Frame
+from asperity.servo.drivers.driver import AWAY, RIGHT, UNTURNED, UP, Driver, DriverKind, Frame
 from asperity.servo.drivers.library import functions, load_library
 from asperity.servo.kernels import by_address
 from asperity.servo.kernels.by_address import AddressedDevice
@@ -68,3 +68,6 @@ class OwnDriver(Driver):
     def _library(self) -> ctypes.CDLL:
         # The system knows a library by its path only if that has a slash.
         return load_library([str(Path(self.path).resolve())], "", "it: compile your C file")
+
+
+KIND = DriverKind("own", (RIGHT, AWAY, UP), 1.0, OwnDriver, "own:./device.so")
