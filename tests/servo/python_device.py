@@ -71,6 +71,10 @@ class PythonClock:
         self._kept = _GETTIME(self._gettime), _SLEEP(self._sleep)
         self.record = Clock(*map(address, self._kept), np.zeros(2, np.int64))
 
+    def passes(self, time: int) -> None:
+        """Let time pass [ns]."""
+        self._now += time
+
     def _gettime(self, _clock: int, words: Any) -> int:
         words[0], words[1] = divmod(self._now, 10**9)
         return 0

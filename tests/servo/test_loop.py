@@ -229,6 +229,18 @@ def test_too_late_is_a_fault(go: Go, lateness: Any, cause: Cause, rows: int) -> 
     assert (done.forces[-1] == 0.0).all()
 
 
+def test_a_device_that_takes_too_long_is_a_fault(go: Go) -> None:
+    clock = PythonClock(lambda _k: 0)
+
+    def path(k: int) -> tuple[float, float, float]:
+        clock.passes(60_000_000 if k == 30 else 100_000)
+        return 0.0, 0.0, -1e-3
+
+    done = go(PythonDevice(path), 500, clock=clock)
+    assert (done.cause, done.shared.head) == (Cause.LATE, 31)
+    assert (done.forces[-1] == 0.0).all()
+
+
 def test_a_watcher_that_is_silent_is_a_fault(go: Go) -> None:
     device, safety = PythonDevice(pushing(1e-3)), Safety(silence=0.1)
     done = go(device, 500, safety=safety, clock=PythonClock(lambda _k: 0))

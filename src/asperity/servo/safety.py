@@ -30,7 +30,7 @@ class Safety(Record):
         max_slew: greatest change of the force [N/s]; ``None`` for from nothing to the greatest
             force in ``RISE``.
         misses: samples in a row that may be late: not done when the next one is due.
-        lateness: of one sample that is a fault [s].
+        lateness: of one sample that is a fault, from when it was due until it is done [s].
         silence: time without a heartbeat of the watching process that is a fault [s].
         beyond_depth: whether a probe deeper than the surface's ``max_depth`` is a "fault", or is
             counted and told, "warn". It never is under a clamp that holds at every depth.
