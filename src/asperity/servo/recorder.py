@@ -12,6 +12,7 @@ from asperity.recording.field import describe_field, field_files
 from asperity.recording.writer import RecordingWriter
 from asperity.servo.kernels.published import COLUMNS
 from asperity.servo.process import ServoProcess
+from asperity.servo.shared import Shared
 from asperity.simulation.servo import Servo
 from asperity.surface import Surface
 
@@ -21,7 +22,7 @@ class Recorder:
 
     Args:
         path: of the recording.
-        loop: that runs, or ran.
+        loop: that runs, or ran, or its rows.
         surface: what it renders.
         servo: of the loop.
         about: what the recording says of itself besides; plain data.
@@ -34,8 +35,8 @@ class Recorder:
     """
 
     def __init__(
-        self, path: str | os.PathLike[str], loop: ServoProcess, surface: Surface, servo: Servo,
-        about: Mapping[str, Any],
+        self, path: str | os.PathLike[str], loop: ServoProcess | Shared, surface: Surface,
+        servo: Servo, about: Mapping[str, Any],
     ) -> None:  # fmt: skip
         said = {"made_by": "run", "surface": describe_field(surface), "servo": plain(servo),
                 "every": 1, **about}  # fmt: skip
