@@ -228,6 +228,39 @@ def test_without_bounds_the_best_samples_are_climbed_from(monkeypatch: pytest.Mo
     assert (nothing.lower, nothing.at) == (2.5, None)
 
 
+@pytest.mark.parametrize("rises", [(), (0.0625,), (1.0, 0.25), (1.0,) * 60])
+def test_steps_of_a_climb(rises: tuple[float, ...]) -> None:
+    """From two half-widths on; a step that helped is tried twice as far, else a 512th of it.
+
+    Five sizes at once, each a quarter of the one before; until 1e-10, or fifty times.
+    """
+    problem, half, asked = Peaks(np.array([1.0])), 0.01, []
+
+    def values(points: FloatArray) -> FloatArray:
+        # Symmetric about where the climb has come to.
+        away = np.abs(points[:, 0] - points[:, 0].mean())
+        sizes = np.unique(np.round(away / away.max(), 6))
+        np.testing.assert_allclose(sizes, 4.0 ** np.arange(-4.0, 1.0), rtol=1e-3)
+        asked.append(away.max() / half)
+        found = np.zeros(len(points))
+        if len(asked) <= len(rises):
+            found[np.argmin(np.abs(away / away.max() - rises[len(asked) - 1]))] = len(asked)
+        return found
+
+    problem.values = values  # type: ignore[method-assign]  # what is asked is looked at
+    problem.cells.inside = lambda points: points  # type: ignore[method-assign]  # nothing is cut
+    expected, step = [], 2.0
+    for rise in rises[:50]:
+        expected.append(step)
+        step *= min(2.0 * rise, 1.0)
+    while step >= 1e-10 and len(expected) < 50:
+        expected.append(step)
+        step /= 512.0
+    best, _at = search.polish(problem, np.array([0.0]), np.array([half]), 0.0)
+    assert best == float(min(len(rises), 50))
+    np.testing.assert_allclose(asked, expected, rtol=1e-6)
+
+
 def test_the_highest_point_is_higher_than_all_around() -> None:
     for texture in (WAVE, WAVES):
         at = highest_point(texture)

@@ -267,6 +267,8 @@ def test_a_search_out_of_looks_asks_for_less_each_time(monkeypatch: pytest.Monke
     best, gap, looks = line_within.line_within(0.0, 2.0, 0.0, 100.0, None)
     np.testing.assert_allclose(kept[1:], [(1.0 - 0.25**n) ** 2 for n in (1, 2, 3)], rtol=1e-15)
     assert (best[1], gap, looks) == (4.0, 2.0 / 16.0, 100.0)
+    monkeypatch.setattr(line_within, "search_line", lambda *_given: ((0.0, 4.0, 0.0, 0.0), 7.0))
+    assert line_within.line_within(0.0, 2.0, 0.0, 100.0, None)[1:] == (0.0, 43.0)
 
 
 def test_a_search_of_the_plane_asks_for_less_in_the_same_way(
