@@ -175,6 +175,24 @@ def test_a_step_too_far_is_halved(monkeypatch: pytest.MonkeyPatch) -> None:
     assert halved >= 2
 
 
+def test_a_descent_is_the_same_at_any_scale(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In lengths shorter by a power of two each look is shorter by just that."""
+    cases: list[tuple[tuple[float, ...], tuple[float, float, float], float]] = [
+        ((0.0, 0.0, 0.0, 0.0, 1.0), (0.1, 0.2, 3.0), 0.45),
+        ((0.3, 0.5, -0.4, 0.2), (0.2, -0.1, -0.7), 0.9),
+        ((1.0, 0.3, -0.4999999, 0.02), (0.33, 0.33, -0.09), 0.05),
+    ]
+    for coefficients, probe, start in cases:
+        seen = []
+        for scale in (1.0, 2.0**-30, 2.0**30):
+            looks = Looks(*(c * scale ** (1 - n) for n, c in enumerate(coefficients)))
+            x, y, z = (scale * part for part in probe)
+            looks.descend((x, y, z), scale * start, monkeypatch)
+            seen.append(np.concatenate([looks.line, np.ravel(looks.plane)]) / scale)
+        np.testing.assert_array_equal(seen[1], seen[0])
+        np.testing.assert_array_equal(seen[2], seen[0])
+
+
 def test_a_piece_right_below_the_probe_is_as_far_as_its_plane() -> None:
     """On the normal through its middle: what rounding leaves aside is none, and no error."""
     rng = np.random.default_rng(5)
