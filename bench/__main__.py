@@ -18,7 +18,6 @@ from bench import (
     servo,
     simulation,
     split,
-    startup,
     ticks,
     waiting,
 )
@@ -35,7 +34,6 @@ PARTS: dict[str, Callable[[Console], None]] = {
     "servo": servo.run,
     "export": export.run,
     "certificates": certificates.run,
-    "startup": startup.run,
     "waiting": waiting.run,
 }
 
