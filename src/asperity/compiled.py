@@ -9,11 +9,15 @@ modules together by what they declare.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from asperity.checks import FloatArray
+
+LISTENERS: list[Callable[[str], None]] = []
+"""What is told the name of a loop before it is compiled: what is kept needs no compiling."""
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import io
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -101,3 +102,31 @@ def test_progress_is_shown_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -
         assert ("stroking" in stream.getvalue()) == shown
         assert ("left:" in stream.getvalue()) == shown
         assert ("second part" in stream.getvalue()) == shown
+
+
+@pytest.mark.parametrize("kept_before", [False, True])
+def test_a_first_run_says_that_it_compiles(
+    kept_before: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """How many loops, as they come, then what was being done; what is kept is not compiled."""
+    from asperity.compiled import LISTENERS
+    from asperity.kernels.fuse import _HEADER, _loaded, load_fused
+
+    loops = (
+        "@loop\ndef first(x):\n    return x + 1.0\n\n\n@loop\ndef other(x):\n    return 2.0 * x\n"
+    )
+    source = _HEADER.format(title="Two loops.") + loops
+    stream = _Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
+    _loaded.cache_clear()
+    if kept_before:
+        assert load_fused(source).first(1.0) + load_fused(source).other(1.0) == 4.0
+    _loaded.cache_clear()
+    with progress_bar("comparing") as told:
+        assert (load_fused(source).first(1.0), load_fused(source).other(1.0)) == (2.0, 2.0)
+        assert len(LISTENERS) == 1
+        shown = stream.getvalue()
+        told(0.5)
+    assert ("comparing: compiling loop 2, kept" in shown) != kept_before
+    assert LISTENERS == []

@@ -13,6 +13,8 @@ from itertools import count
 def progress_bar(words: str) -> Iterator[Callable[..., None]]:
     """Show what is being done, how much of it, and the time that is left.
 
+    What is compiled meanwhile is counted beside it: a first run takes longer, and says why.
+
     Args:
         words: what is being done.
 
@@ -34,6 +36,8 @@ def progress_bar(words: str) -> Iterator[Callable[..., None]]:
     )
     from rich.text import Text
 
+    from asperity.compiled import LISTENERS
+
     class Left(ProgressColumn):
         """The time that is left; rich's own says none before the third step."""
 
@@ -49,8 +53,22 @@ def progress_bar(words: str) -> Iterator[Callable[..., None]]:
         Left(),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(words, total=1.0)
-        yield lambda share, said=None: bar.update(task, completed=share, description=said)
+        task, loops = bar.add_task(words, total=1.0), count(1)
+        doing = [words]
+
+        def compiling(_loop: str) -> None:
+            said = f"{doing[0]}: compiling loop {next(loops)}, kept for next time"
+            bar.update(task, description=said, refresh=True)
+
+        def told(share: float, said: str | None = None) -> None:
+            doing[0] = said or doing[0]
+            bar.update(task, completed=share, description=doing[0])
+
+        LISTENERS.append(compiling)
+        try:
+            yield told
+        finally:
+            LISTENERS.remove(compiling)
 
 
 def time_left(elapsed: float, share: float) -> str:

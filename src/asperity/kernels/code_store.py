@@ -18,6 +18,7 @@ import numba
 from numba.core import caching, compiler, serialize
 
 from asperity.cache import cache_folder, keep, recall, set_aside
+from asperity.compiled import LISTENERS
 
 ROOM = "code"
 # Numba is untyped.
@@ -50,7 +51,14 @@ class CodeStore(caching._Cache):
         """Nothing: entries depend on all that is compiled, none is ever stale."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the compiled overload of a signature, or nothing."""
+        """Return the compiled overload of a signature, or nothing: then it is compiled."""
+        found = self._kept(sig, target_context)
+        if found is None:
+            for tell in LISTENERS:
+                tell(self._function.__name__)
+        return found
+
+    def _kept(self, sig: Any, target_context: Any) -> Any:
         target_context.refresh()
         key = self._key(sig, target_context.codegen())
         content = recall(ROOM, key)
