@@ -16,9 +16,11 @@ import pytest
 from bench.fakes import compiled
 from tests.servo.test_drivers import EXAMPLE
 
+import asperity as asp
 from asperity.recording.recording import open_recording
 from asperity.recording.replay import replay
 from asperity.report.pictures.run_picture import recording_figure
+from asperity.units import engineering
 
 COMMAND = "run"
 Call = Callable[..., tuple[int, str, str]]
@@ -78,6 +80,22 @@ def test_it_runs_and_says_what_it_did(call: Call, scene: Callable[..., str]) -> 
     assert "Law C, change of height, at 100 N/m" in out
     assert "Energy to the hand" in out
     assert max(map(len, out.splitlines())) <= 80
+
+
+def test_a_surface_alone_is_felt_as_a_comparison_recommends(call: Call, tmp_path: Path) -> None:
+    wave = "sinusoid:amplitude=0.1mm,period=2mm"
+    path = tmp_path / "run.mcap"
+    code, out, err = call(wave, "--device", "touch", "--law", "C", "--duration", "0.3s",
+                          "--set", "update_rate=500Hz", "--record", str(path))  # fmt: skip
+    assert code == 0, err
+    start = asp.compare(wave, device="touch", laws="C", clamp="backed").rows[0].start
+    words = " ".join(out.split())
+    assert f"Law C at {engineering(start, 'N/m')}, as asperity compare recommends" in words
+    assert "A simulated hand presses with" in words
+    assert open_recording(path).rows > 100
+    # What is given stays, and is judged.
+    code, _out, err = call(wave, "--device", "touch", "--law", "C", "--stiffness", "5000N/m")
+    assert (code, "stiffness is refused: 5000 N/m is above the limit" in err) == (2, True)
 
 
 def test_a_recording_replays_bit_for_bit(

@@ -62,7 +62,10 @@ def command(
     accept_risk: bool,
     **values: Any,
 ) -> None:
-    """Render SCENE (TOML) as time goes, on its device simulated, or by a driver on a real one.
+    """Render SURFACE as time goes, on its device simulated, or by a driver on a real one.
+
+    SURFACE is a scene (TOML), a texture with its arguments or a measured file; without a scene law
+    and stiffness are those that compare recommends, and a simulated hand strokes it for 10 s.
 
     The loop is a process of its own that reads, computes and writes at the device's rate, with
     limits on force, slew, depth, lateness and energy: section [servo] of the scene. Ctrl-C lets the
@@ -71,7 +74,9 @@ def command(
     check_outputs(json=outputs.json, record=record)
     # Its force is bounded, and what is said of it holds at every depth, if the law can be clamped.
     real = driver != SIMULATED
-    setup = read_setup(scene, values, duration, defaults={"clamp": "backed"}, simulated=not real)
+    setup = read_setup(
+        scene, values, duration, defaults={"clamp": "backed"}, simulated=not real, alone=True
+    )
     if real and not driver.startswith(REPLAY):
         setup = with_its_own_electronics(setup)
     if not accept_risk:

@@ -16,6 +16,7 @@ from asperity.errors import ParameterError
 from asperity.files import plain, record
 from asperity.laws import Law, find_law, shared_out
 from asperity.recording.replay import file_content
+from asperity.scene.alone import ALONE_DURATION, hand_alone, with_mass
 from asperity.scene.loading import Scene
 from asperity.scene.plant import default_servo, plant_of
 from asperity.scene.sections import DURATION, HANDS, MOTIONS, RUN, built, surface_keywords
@@ -120,6 +121,7 @@ def make_setup(
     duration: float | None = None,
     laws: Sequence[Law] = (),
     keeps_delay: bool = True,
+    alone: bool = False,
 ) -> Setup:
     """Return the closed loop of a scene.
 
@@ -131,20 +133,23 @@ def make_setup(
         duration: of the run [s]; comes before the scene's.
         laws: those that the loop will be changed to, which have parameters too.
         keeps_delay: whether the device's delay counts; not where the loop gets another one.
+        alone: whether a scene without hand and motion gets some, see :mod:`asperity.scene.alone`.
 
     Raises:
         ParameterError: for a section or a number that is missing, an unknown key (the nearest is
             offered), or a wrong value.
     """
+    merged = {**scene.surface, **(surface or {})}
+    run = read_arguments("run", scene.loop.get("run", {}), RUN)
+    if alone and not {"hand", "motion"} & scene.loop.keys():
+        return _alone(scene, merged, device, duration or run.get("duration"))
     for name in ("hand", "motion"):
         if name not in scene.loop:
             raise ParameterError("scene", f"needs a section [{name}] with a kind to be simulated")
-    merged = {**scene.surface, **(surface or {})}
     if "law" not in merged:
         raise ParameterError("law", "is missing: --law B, or a scene whose [surface] names one")
     hand = built("hand", scene.loop["hand"], HANDS, scene.folder)
     motion = built("motion", scene.loop["motion"], MOTIONS, scene.folder)
-    run = read_arguments("run", scene.loop.get("run", {}), RUN)
     guards = read_arguments("servo", scene.loop.get("servo", {}), safety.ARGUMENTS)
     chosen = device or scene.device or load_device(DEFAULT_DEVICE)
     needs_plant = not isinstance(hand, MovedHand)
@@ -167,6 +172,18 @@ def make_setup(
         assumptions=(*assumed, *said, *of_span, *_leaving(scene.texture, motion, span)),
         files=scene.files, safety=Safety(**guards), **run,
     )  # fmt: skip
+
+
+def _alone(
+    scene: Scene, surface: Mapping[str, Any], device: Device | None, duration: float | None
+) -> Setup:
+    """Return the closed loop of a scene without hand and motion, which get usual ones."""
+    chosen, assumed = with_mass(device or scene.device or load_device(DEFAULT_DEVICE))
+    span = ALONE_DURATION if duration is None else duration
+    hand, words = hand_alone(_surface(scene.texture, surface, ()), chosen, span)
+    whole = replace(scene, loop={**scene.loop, **hand})
+    setup = make_setup(whole, surface=surface, device=chosen, duration=span)
+    return replace(setup, assumptions=(words, *assumed, *setup.assumptions))
 
 
 def _surface(texture: Texture, values: Mapping[str, Any], laws: Sequence[Law]) -> Surface:
