@@ -150,6 +150,16 @@ def test_what_is_too_deep_can_be_told_only(go: Go) -> None:
     assert (done.cause, Statistics.of(done.shared.status).deep) == (Cause.FINISHED, 0)
 
 
+@pytest.mark.parametrize(("law", "cause"), [("H", Cause.FINISHED), ("W", Cause.FINISHED),
+                                           ("D", Cause.DEPTH)])  # fmt: skip
+def test_only_what_is_proved_at_any_depth_may_be_felt_there(go: Go, law: str, cause: Cause) -> None:
+    shallow = Surface(SURFACE.texture, law, 300.0, 2e-3)
+    assert go(PythonDevice(sinking), 80, surface=shallow).cause is cause
+    if law == "H":  # with more than 1 its number grows where the god-object splits
+        steep = Surface(SURFACE.texture, law, 300.0, 2e-3, continuity=2.0)
+        assert go(PythonDevice(sinking), 80, surface=steep).cause is Cause.DEPTH
+
+
 @given(
     seed=st.integers(0, 2**32 - 1), law=st.sampled_from("BCF"),
     stiffness=st.floats(10.0, 2e4), max_force=st.floats(0.1, 20.0), slew=st.floats(1.0, 1e5),

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+from asperity.devices import load_device
 from asperity.errors import ParameterError
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.fault import KEPT, Cause, DeviceFault
@@ -56,7 +57,7 @@ def test_it_renders_changes_and_stops_without_force(loop: ServoProcess) -> None:
     assert until(lambda: loop.shared.head > 300 and applied(loop)[2] > 0.3)
     pressed = loop.rows(loop.shared.head - 1)[0][-1, 3]
     before = loop.shared.head
-    loop.change(SURFACE.to_law("B").to_stiffness(150.0))
+    loop.change(SURFACE.to_law("B").to_stiffness(150.0), accept_risk=True)
     # The force goes before the surface is exchanged, and comes again.
     assert until(lambda: bool((loop.rows(before)[0][:, 10] == 0.0).any()))
     assert until(lambda: bool(loop.rows(loop.shared.head - 1)[0][-1, 10] == 1.0))
@@ -74,6 +75,17 @@ def test_a_law_that_the_texture_cannot_serve_leaves_the_loop_alone(loop: ServoPr
         loop.change(SURFACE.to_stiffness(-1.0))
     seen = loop.shared.head
     assert until(lambda: loop.shared.head > seen)
+
+
+def test_the_next_surface_is_judged_before_it_is_rendered(loop: ServoProcess) -> None:
+    with pytest.raises(ParameterError, match="device is not known to the loop"):
+        loop.change(SURFACE)
+    loop._device = load_device("touch")
+    with pytest.raises(ParameterError, match="2000 N/m is above the limit of 81.1 N"):
+        loop.change(SURFACE.to_stiffness(2000.0))
+    seen = loop.shared.head
+    loop.change(SURFACE.to_stiffness(50.0))
+    assert until(lambda: bool((loop.rows(seen)[0][:, 10] == 0.0).any()))
 
 
 def test_a_fault_carries_the_last_samples() -> None:

@@ -49,6 +49,23 @@ class Cause(Enum):
         return self.value > Cause.FINISHED.value
 
 
+_WORDS = {
+    Cause.NUMBER: "a position or a force is not a number",
+    Cause.WORKSPACE: "the handle was read outside its workspace",
+    Cause.DEPTH: "the probe is deeper than max_depth, for which the surface was analysed",
+    Cause.MISSES: "too many samples in a row were late",
+    Cause.LATE: "a sample was too late",
+    Cause.PARENT: "the program that watches the loop was not heard of",
+    Cause.SILENT: "the device does not answer",
+    Cause.DIED: "the process of the loop ended",
+}
+
+
+def words_of(cause: Cause) -> str:
+    """Return what was wrong, in words; a driver's own errors it says itself."""
+    return _WORDS[cause]
+
+
 class DeviceFault(AsperityError):  # noqa: N818 - the field's word for it
     """The loop was ended by what it found wrong; the force was made zero.
 

@@ -55,13 +55,15 @@ def render(surface: Surface, driver: Driver) -> Rendered:
     Raises:
         ParameterError: for a texture that lacks what the law asks of it.
     """
+    from asperity.analysis.gain.theorems import theorem_of
     from asperity.kernels import tick
 
     source = source_on_texture(
         surface.law, surface.texture.sampler, surface.acting_clamp, (loop,),
         (tick, clock, guard, *driver.kernels()),
     )  # fmt: skip
-    everywhere = surface.acting_clamp in _BOUNDED or not surface.feels_texture
+    held = surface.acting_clamp in _BOUNDED
+    everywhere = held or theorem_of(surface.law).at_any_depth(surface)
     crest = surface.law.contact.extremes(surface.texture)[1]
     shallow = -math.inf if everywhere else crest - surface.max_depth
     return Rendered(

@@ -13,11 +13,12 @@ from types import TracebackType
 from typing import Any, Self
 
 from asperity.checks import FloatArray
+from asperity.devices import Device
 from asperity.errors import AsperityError, ParameterError
 from asperity.servo.child import Job, Modules, serve
 from asperity.servo.drivers.driver import Driver
-from asperity.servo.fault import KEPT, Cause, DeviceFault
-from asperity.servo.loop import render
+from asperity.servo.fault import KEPT, Cause, DeviceFault, words_of
+from asperity.servo.loop import Rendered, render
 from asperity.servo.safety import Safety
 from asperity.servo.shared import Shared
 from asperity.servo.statistics import Statistics
@@ -29,28 +30,18 @@ LONGEST_START = 120.0
 _FOREVER = 2**62
 _LAST_WORDS = 2.0  # [s] that a process gets to say how it ended
 
-_WORDS = {
-    Cause.NUMBER: "a position or a force is not a number",
-    Cause.WORKSPACE: "the handle was read outside its workspace",
-    Cause.DEPTH: "the probe is deeper than max_depth, for which the surface was analysed",
-    Cause.MISSES: "too many samples in a row were late",
-    Cause.LATE: "a sample was too late",
-    Cause.PARENT: "the program that watches the loop was not heard of",
-    Cause.SILENT: "the device does not answer",
-    Cause.DIED: "the process of the loop ended",
-}
-
 
 class ServoProcess:
     """A surface on a device, rendered by a process of its own.
 
     Args:
-        surface: what is felt.
+        surface: what is felt, or what stands in its place, see ``servo.loop.Rendered``.
         driver: the device.
         servo: period, steps of position and force, greatest force, virtual damping.
         safety: limits.
         reach: of the handle from the device's origin [m]; a reading further away is a fault.
         duration: after which it ends [s]; ``None`` for not by itself.
+        device: whose limit counts for the surfaces of :meth:`change`.
 
     Raises:
         ParameterError: for a surface that cannot be rendered, or a device that moves and whose
@@ -63,15 +54,17 @@ class ServoProcess:
     """
 
     def __init__(
-        self, surface: Surface, driver: Driver, servo: Servo, safety: Safety | None = None,
-        reach: float = math.inf, duration: float | None = None,
+        self, surface: Surface | Rendered, driver: Driver, servo: Servo,
+        safety: Safety | None = None, reach: float = math.inf, duration: float | None = None,
+        device: Device | None = None,
     ) -> None:  # fmt: skip
         if driver.moving and not math.isfinite(servo.max_force):
             words = "is not known: a device that moves needs it, --set max_force=3N"
             raise ParameterError("max_force", words)
-        self._driver, self._safety = driver, safety or Safety()
+        self._driver, self._safety, self._device = driver, safety or Safety(), device
         last = _FOREVER if duration is None else round(duration / servo.period)
-        self._job = Job(render(surface, driver), driver, servo, self._safety, reach, last)
+        shown = surface if isinstance(surface, Rendered) else render(surface, driver)
+        self._job = Job(shown, driver, servo, self._safety, reach, last)
         self.shared = Shared(1.0 / servo.period)
         self.notes: tuple[str, ...] = ()
         self._cause, self._said = Cause.GOING, ""
@@ -148,7 +141,7 @@ class ServoProcess:
 
     def fault(self) -> DeviceFault:
         """Return the fault that ended the loop."""
-        words = self._said if self._cause is Cause.DEVICE else _WORDS[self._cause]
+        words = self._said if self._cause is Cause.DEVICE else words_of(self._cause)
         rows, _first = self.shared.rows(self.shared.head - KEPT)
         at = f" at {rows[-1, 0]:.4g} s" if len(rows) else ""
         end = f"{words}{at}; the force was made zero"
@@ -156,16 +149,42 @@ class ServoProcess:
             end = f"{words}{at}. {self._driver.when_lost}"
         return DeviceFault(self._cause, end, rows)
 
-    def change(self, surface: Surface) -> None:
+    def change(self, surface: Surface, *, accept_risk: bool = False) -> None:
         """Render another surface: the force goes, the surface is exchanged, the force comes.
 
-        It is compiled before, while the one that runs goes on.
+        It is analysed and compiled before, while the one that runs goes on. The law's force is
+        multiplied by a share that falls from 1 to 0, and rises from 0 to 1 with the next law, so
+        that at no time the stiffness is above that of either.
+
+        Args:
+            surface: the next one.
+            accept_risk: whether it is rendered at a stiffness above the analysed limit, too.
 
         Raises:
-            ParameterError: for a surface that cannot be rendered.
+            ParameterError: for a surface that cannot be rendered, or a stiffness above the limit;
+                without a device no limit is known.
             DeviceFault: if the loop has ended by one.
         """
-        modules, packed = _packed(render(surface, self._driver))
+        if not accept_risk:
+            self._refuse_risk(surface)
+        self.exchange(render(surface, self._driver))
+
+    def _refuse_risk(self, surface: Surface) -> None:
+        from asperity.servo.risk import risk
+
+        if self._device is None:
+            words = "is not known to the loop, so no limit is: ServoProcess(..., device=...)"
+            raise ParameterError("device", words)
+        if reason := risk(surface, self._device):
+            raise ParameterError("stiffness", f"is refused: {reason}; accept_risk=True renders it")
+
+    def exchange(self, shown: Rendered) -> None:
+        """Render something else, which nobody has analysed; see :meth:`change`.
+
+        Raises:
+            DeviceFault: if the loop has ended by one.
+        """
+        modules, packed = _packed(shown)
         self.poll()
         self._line.send((modules, packed))
         self._heard("loaded", LONGEST_START)

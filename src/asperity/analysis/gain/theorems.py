@@ -87,6 +87,8 @@ class Theorem:
             U(p + Δ) <= U(p) + ∇U · Δ + k|Δ|²/2 holds across jumps of the force too.
         knows_medial_axis: whether q is infinite exactly where the depth reaches the medial axis,
             at the onset.
+        at_any_depth: whether q and q⁺ of a surface, and the rules that rest on them, hold however
+            deep the probe is, not down to max_depth alone.
         held: by depth clamp, numbers that are nowhere greater where the clamp acts than above
             max_depth.
     """
@@ -100,6 +102,7 @@ class Theorem:
     on_every_foot: bool = False
     infimum: bool = False
     knows_medial_axis: bool = False
+    at_any_depth: Callable[[Surface], bool] = lambda _surface: False
     held: Mapping[ClampName, tuple[Number, ...]] = field(default_factory=dict)
 
 
@@ -140,6 +143,7 @@ THEOREMS: dict[Law, Theorem] = {
         constants={NORM: _UNIT, ONE_SIDED: Constant(1.0, "-J = k e_z e_zᵀ")},
         gain_above=lambda _surface, _height: 1.0,
         infimum=True,
+        at_any_depth=lambda _surface: True,
     ),
     LAWS["A"]: Theorem(
         on_a_wave={
@@ -210,6 +214,8 @@ THEOREMS: dict[Law, Theorem] = {
         own_way={NORM: split_number},
         gain_above=lambda surface, _height: max(1.0, surface.parameter("continuity")),
         infimum=True,
+        # With c <= 1 both are 1 by theorem; with more, q is c only where the god-object splits.
+        at_any_depth=lambda surface: surface.parameter("continuity") <= 1.0,
     ),
 }
 
