@@ -10,6 +10,7 @@ from rich.console import Console
 from bench import (
     batches,
     cache,
+    calibration,
     certificates,
     export,
     kernels,
@@ -18,6 +19,7 @@ from bench import (
     servo,
     simulation,
     split,
+    startup,
     ticks,
     waiting,
 )
@@ -32,8 +34,10 @@ PARTS: dict[str, Callable[[Console], None]] = {
     "simulation": simulation.run,
     "recording": recording.run,
     "servo": servo.run,
+    "calibration": calibration.run,
     "export": export.run,
     "certificates": certificates.run,
+    "startup": startup.run,
     "waiting": waiting.run,
 }
 

@@ -21,6 +21,7 @@ INTERNAL_ERROR = 70  # as sysexits.h has it
 COMMANDS = {
     "analyze": "Say all that is known of one law on a surface and a device.",
     "cache": "Say what is kept between runs, or delete it.",
+    "calibrate": "Measure a device: K₀, steps, delay, damping, friction.",
     "compare": "Compare the laws on a surface and a device.",
     "devices": "List devices, and the source of every number.",
     "export": "Write a surface with its law as a C program.",

@@ -11,7 +11,6 @@ import linecache
 import sys
 from collections.abc import Sequence
 from functools import lru_cache, partial
-from threading import Lock
 from types import ModuleType
 
 from asperity.contacts.sampler import OFFERED
@@ -122,7 +121,15 @@ def fuse_on_texture(
     further: tuple[ModuleType, ...] = (),
     instead: tuple[ModuleType, ...] = (),
 ) -> ModuleType:
-    """Return the module that :func:`source_on_texture` writes, compiled.
+    """Return the loops of modules compiled that ask a sampler, a law and further modules.
+
+    Args:
+        law: the law.
+        sampler: the modules whose functions make up the sampler.
+        clamp: the depth clamp.
+        asking: the modules with the loops.
+        further: what they ask besides.
+        instead: modules whose functions are taken instead of those of that name elsewhere.
 
     Raises:
         ParameterError: for a texture that lacks what is asked of it.
@@ -138,21 +145,7 @@ def source_on_texture(
     further: tuple[ModuleType, ...] = (),
     instead: tuple[ModuleType, ...] = (),
 ) -> str:
-    """Return the text of a module of loops that ask a sampler, a law and further modules.
-
-    Another process can load it, see :func:`load_fused`.
-
-    Args:
-        law: the law.
-        sampler: the modules whose functions make up the sampler.
-        clamp: the depth clamp.
-        asking: the modules with the loops.
-        further: what they ask besides.
-        instead: modules whose functions are taken instead of those of that name elsewhere.
-
-    Raises:
-        ParameterError: for a texture that lacks what is asked of it.
-    """
+    """Return the text of such a module, which another process can load; see above."""
     units = tuple(map(module_unit, asking))
     brought = (*units, *map(module_unit, (*law.contact.kernels(), *further)))
     first = tuple(map(module_unit, instead))
@@ -214,9 +207,14 @@ def reads_position(law: Law) -> bool:
 @lru_cache(maxsize=16)
 def fuse_module(module: ModuleType, *helpers: ModuleType) -> ModuleType:
     """Return a module whose loops are compiled, with what they call in it and in others."""
+    return load_fused(source_of_module(module, *helpers))
+
+
+def source_of_module(module: ModuleType, *helpers: ModuleType) -> str:
+    """Return the text of such a module, which another process can load."""
     unit = module_unit(module)
     source = link(loops_of(unit), (unit, *map(module_unit, helpers)))
-    return load_fused(_head(f"{module.__name__}.", source) + source)
+    return _head(f"{module.__name__}.", source) + source
 
 
 @lru_cache(maxsize=64)
@@ -254,20 +252,9 @@ def _head(title: str, source: str) -> str:
     return _HEADER.format(title=title) + (local if "local_array(" in source else "")
 
 
-_LOADING = Lock()
-
-
-def load_fused(source: str) -> ModuleType:
-    """Return a fused module, one and the same whichever thread asks.
-
-    The machine code of its loops is kept between runs.
-    """
-    with _LOADING:
-        return _loaded(source)
-
-
 @lru_cache(maxsize=256)
-def _loaded(source: str) -> ModuleType:
+def load_fused(source: str) -> ModuleType:
+    """Return a fused module; the machine code of its loops is kept between runs."""
     module = ModuleType(f"asperity_fused_{hashlib.sha256(source.encode()).hexdigest()[:32]}")
     module.__file__ = f"<{module.__name__}>"
     # For tracebacks, and for whoever wants to read what was compiled.

@@ -67,18 +67,21 @@ class SimulatedDriver(Driver):
 
 def simulated_driver(
     plant: Plant, hand: Hand, servo: Servo, motion: Motion, duration: float,
-    start: tuple[float, ...] | None = None, velocity: tuple[float, ...] | None = None,
+    start: tuple[float, ...] | None = None, velocity: tuple[float, ...] | None = None, *,
+    steps: bool = False,
 ) -> SimulatedDriver:  # fmt: skip
     """Return a simulated device.
 
     Args:
         plant: the device.
         hand: what holds it.
-        servo: whose period and delay count.
+        servo: whose period and delay count; with ``steps`` its steps, too.
         motion: of the hand's anchor, which stays where it is after the end.
         duration: for which the motion is laid out [s].
         start: of the handle [m]; default: where the motion begins.
         velocity: of the handle at the start [m/s]; default: at rest.
+        steps: whether the steps of position and force are the device's own, as those of a real one;
+            else they are the loop's, as in a simulation.
 
     Raises:
         ParameterError: see :func:`~asperity.simulation.simulate`; for a duration of more than
@@ -94,5 +97,7 @@ def simulated_driver(
     device = SimulatedDevice(
         made.state(place, speed), np.zeros((servo.delay + 1, 3)), np.zeros(2, np.int64),
         np.ascontiguousarray(anchor), np.zeros(SUMS), 1.0 / servo.period, made.record,
+        float(servo.position_resolution) if steps else 0.0,
+        float(servo.force_resolution) if steps else 0.0,
     )  # fmt: skip
     return SimulatedDriver(tuple(module.__name__ for module in made.modules), device)

@@ -1,5 +1,6 @@
 """A device that is simulated: delay, body and hand, one sample on for each force."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,8 @@ class SimulatedDevice(NamedTuple):
         ledger: sums of energies, see ``simulation.kernels.booking``.
         rate: 1/T [1/s].
         plant: record of the body.
+        position_step: in which its own encoders read [m]; 0 for none.
+        force_step: in which its own motors hold a force [N]; 0 for none.
     """
 
     x: FloatArray
@@ -36,23 +39,33 @@ class SimulatedDevice(NamedTuple):
     ledger: FloatArray
     rate: float
     plant: object
+    position_step: float = 0.0
+    force_step: float = 0.0
+
+
+def stepped(value: float, step: float) -> float:
+    """Return the nearest multiple of a step; the value itself for no step."""
+    return step * math.floor(value / step + 0.5) if step > 0.0 else value
 
 
 def device_read(place: FloatArray, device: SimulatedDevice) -> int:
-    """Write the true position of the handle [m]; see ``device_functions``."""
+    """Write the position of the handle [m], in steps if it has some; see ``device_functions``."""
     x = device.x
     if device.done[1] & 255 == 0:
         for i in range(x.shape[0]):
             x[i] = flushed(x[i])
     for i in range(3):
-        place[i] = x[i]
+        place[i] = stepped(x[i], device.position_step)
     return RAN
 
 
 def device_write(fx: float, fy: float, fz: float, inside: bool, device: SimulatedDevice) -> int:
     """Hold the force that is due [N] and move on by a sample; see ``device_functions``."""
     x = device.x
-    head, hx, hy, hz = wait_in_queue(device.queue, device.done[0], fx, fy, fz)
+    step = device.force_step
+    head, hx, hy, hz = wait_in_queue(
+        device.queue, device.done[0], stepped(fx, step), stepped(fy, step), stepped(fz, step)
+    )
     here = min(device.done[1], device.anchor.shape[0] - 1)
     there = min(here + 1, device.anchor.shape[0] - 1)
     ax = device.anchor[here, 0]
