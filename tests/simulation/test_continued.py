@@ -19,8 +19,17 @@ WAY = Strokes((0.0, 0.0, -0.5e-3), (4e-3, 1e-3, -0.5e-3), 0.05, count=2)
 LOOP = SURFACE, PLANT, HAND, SERVO, WAY
 
 
-def same(one: Run, other: Run) -> None:
-    np.testing.assert_array_equal(one.table, other.table)
+def same(one: Run, whole: Run) -> None:
+    """Compare a run that went on with a whole one."""
+    np.testing.assert_array_equal(one.table[:, :7], whole.table[:, :7])
+    energies, few = whole.energies, one.part("supplied", "taken")
+    np.testing.assert_allclose(few[:, 0], energies["supplied"].sum(axis=1), rtol=1e-12, atol=1e-18)
+    np.testing.assert_array_equal(few[:, 1], energies["lost"] - energies["friction"])
+    assert one.fed == whole.fed
+    alike(one, whole)
+
+
+def alike(one: Run, other: Run) -> None:
     np.testing.assert_array_equal(one.state, other.state)
     assert one.ledger == other.ledger
     assert (one.samples, one.stop, one.place) == (other.samples, other.stop, other.place)
@@ -31,11 +40,14 @@ def test_a_longer_run_goes_on_bit_for_bit() -> None:
     """Over parts that end within the 256 samples between flushes; what was returned stays."""
     run_for = Continued(*LOOP, start=(1e-4, 0.0, 1e-3), velocity=(0.0, 0.05, 0.0))
     runs = [run_for(span) for span in (0.3, 1.1, 1.1, 17.0)]
+    fed = set()
     for run in runs:
+        fed.add(run.fed)
         whole = simulate(*LOOP, run.duration, start=(1e-4, 0.0, 1e-3), velocity=(0.0, 0.05, 0.0))
         same(run, whole)
     assert [run.samples for run in runs] == [300, 1100, 1100, 17_000]
     assert not np.array_equal(runs[0].state, runs[1].state)
+    assert fed == {True, False}
 
 
 def test_next_to_nothing_is_made_nothing_at_the_same_samples() -> None:
@@ -54,7 +66,9 @@ def test_a_run_that_has_ended_does_not_go_on() -> None:
     first = run_for(1.0)
     assert first.stop is Stop.DIVERGED
     assert first.samples < 1000
-    same(run_for(4.0), first)
+    again = run_for(4.0)
+    alike(again, first)
+    np.testing.assert_array_equal(again.table, first.table)
 
 
 def test_what_fits_not_together_is_refused() -> None:

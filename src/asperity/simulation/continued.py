@@ -9,7 +9,7 @@ from asperity.checks import positive
 from asperity.simulation.hands import Hand
 from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Plant
-from asperity.simulation.run import Run, Stop
+from asperity.simulation.run import Stop, WatchedRun
 from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import (
     CHUNK,
@@ -19,15 +19,15 @@ from asperity.simulation.simulate import (
     loop_of,
     whole_samples,
 )
-from asperity.simulation.trace import COLUMNS
+from asperity.simulation.trace import WATCHED
 from asperity.surface import Surface
 
 
 class Continued:
     """A run that is asked for one duration after another, each at least as long as the last.
 
-    What it returns is bit for bit what :func:`~asperity.simulation.simulate` does, with the whole
-    trace; a longer duration only costs what is new of it.
+    What it returns is bit for bit what :func:`~asperity.simulation.simulate` does, with fewer
+    columns of the trace; a longer duration only costs what is new of it.
 
     Args:
         surface: as for :func:`~asperity.simulation.simulate`, like all that follows.
@@ -55,10 +55,10 @@ class Continued:
         check_parts(surface, plant, hand, servo, motion)
         self._parts = surface, plant, servo, motion
         self._loop = loop_of(surface, plant, hand, servo, motion, start, velocity)
-        self._table = np.empty((0, len(COLUMNS)))
+        self._table = np.empty((0, len(WATCHED)))
         self._rows, self._stop = 0, Stop.NOTHING
 
-    def __call__(self, duration: float) -> Run:
+    def __call__(self, duration: float) -> WatchedRun:
         """Return the run up to a time after its beginning [s].
 
         Raises:
@@ -66,7 +66,7 @@ class Continued:
         """
         surface, plant, servo, motion = self._parts
         samples = whole_samples(positive("duration", duration, "s"), servo.period)
-        table = np.empty((max(samples, self._rows), len(COLUMNS)))
+        table = np.empty((max(samples, self._rows), len(WATCHED)))
         table[: self._rows] = self._table[: self._rows]
         self._table = table
         while self._loop.samples < samples and not self._stop:
@@ -76,7 +76,7 @@ class Continued:
             self._stop = self._loop.run(anchor, table[self._rows :])
             self._rows += self._loop.rows
         short, gap = self._loop.uncertain
-        return Run(
+        return WatchedRun(
             table[: self._rows], self._loop.state.copy(), self._loop.samples, float(servo.period),
             self._loop.ledger(), surface, self._stop,
             left_at(self._stop, self._loop.state, plant), notes=plant.notes, short=short, gap=gap,

@@ -13,7 +13,7 @@ _VELOCITY = slice(_NAMES.index("vx"), _NAMES.index("vz") + 1)
 _SUPPLIED = slice(_NAMES.index("supplied x"), _NAMES.index("supplied z") + 1)
 _LOST, _FRICTION = _NAMES.index("lost"), _NAMES.index("friction")
 # Part of the loss that the texture supplies at least: amplitudes beat, so not all of it always.
-_FED = 0.2
+FED = 0.2
 
 
 class Ending:
@@ -68,4 +68,4 @@ def fed(first: FloatArray, last: FloatArray) -> bool:
     """Return whether the texture feeds the handle from one row of the trace to another."""
     supplied = (last[_SUPPLIED] - first[_SUPPLIED]).sum()
     taken = (last[_LOST] - first[_LOST]) - (last[_FRICTION] - first[_FRICTION])
-    return bool(supplied > _FED * taken)
+    return bool(supplied > FED * taken)

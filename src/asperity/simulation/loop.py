@@ -19,7 +19,7 @@ from asperity.simulation.kernels.servo_loop import LoopState
 from asperity.simulation.run import Ledger, Stop
 from asperity.simulation.sampled_plant import SampledPlant
 from asperity.simulation.servo import Servo
-from asperity.simulation.trace import COLUMNS
+from asperity.simulation.trace import COLUMNS, WATCHED
 from asperity.surface import Surface
 
 # Why the compiled loop stops, by its answer.
@@ -96,7 +96,8 @@ class Simulation:
         Args:
             anchor: positions of the hand's anchor at the samples [m], shape (k + 1, 3), contiguous;
                 it moves at constant velocity in between. The first row is where it is now.
-            trace: rows to write, shape (at least k/every + 1, columns); none for no trace.
+            trace: rows to write, shape (at least k/every + 1, columns), all columns or those of
+                ``WATCHED``; none for no trace.
             every: samples per row.
 
         Returns:
@@ -108,8 +109,8 @@ class Simulation:
         if self.samples == 0:
             self._before = self.stored(anchor[0])
         table = np.empty((0, len(COLUMNS))) if trace is None else trace
-        if table.ndim != 2 or table.shape[1] != len(COLUMNS):
-            words = f"must have rows of {len(COLUMNS)} numbers, got shape"
+        if table.ndim != 2 or table.shape[1] not in (len(COLUMNS), len(WATCHED)):
+            words = f"must have rows of {len(COLUMNS)} or {len(WATCHED)} numbers, got shape"
             raise ParameterError("trace", f"{words} {table.shape}")
         first = self.samples
         stop, self.rows, self._loop = self._loops.servo_batch(

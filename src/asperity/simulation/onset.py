@@ -15,7 +15,6 @@ from asperity.errors import ParameterError
 from asperity.files import Record, record
 from asperity.laws.w_smooth_wall import LAW as SMOOTH_WALL
 from asperity.simulation.continued import Continued
-from asperity.simulation.ending import fed
 from asperity.simulation.hands import Hand, MovedHand
 from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Plant
@@ -123,8 +122,7 @@ def cycles(run: Run, threshold: float = CYCLE_SPEED) -> bool:
     """
     if run.stop is Stop.DIVERGED:
         return True
-    first = run.table[-max(len(run.time) // 4, 2)]
-    return restlessness(run) > threshold and fed(first, run.table[-1])
+    return restlessness(run) > threshold and run.fed
 
 
 def calms_down(run: Run) -> bool:
