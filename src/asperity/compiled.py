@@ -18,6 +18,14 @@ from asperity.checks import FloatArray
 
 LISTENERS: list[Callable[[str], None]] = []
 """What is told the name of a loop before it is compiled: what is kept needs no compiling."""
+EPS = 2.0**-52
+"""Distance of 1 to the next number; that of ``float`` where a program is exported in it.
+
+Compiled functions end their iterations at multiples of it: whatever else ends at rounding is in
+digits of double precision, which ``float`` never reaches.
+"""
+ROOT_EPS = 2.0**-26
+"""Its square root: so well is a minimum known from its values alone."""
 
 
 @dataclass(frozen=True)

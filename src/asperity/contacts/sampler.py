@@ -18,8 +18,9 @@ def sampled(wanted: frozenset[str], place: str) -> list[str]:
     return [f"h = height({place}, texture)"] if "h" in wanted else []
 
 
-# A search drops what is not nearer than the best, but for rounding; see ``search_plane``.
-EXACT = 1.0 - 1e-13
+# A search drops what is not nearer than the best by so many units of rounding; see
+# ``search_plane``.
+SLACK = 450.0
 # A box that is passed without a look at the surface costs so many looks.
 PASSED = 0.125
 

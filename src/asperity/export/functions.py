@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from asperity.contacts.memory import SIZE
-from asperity.errors import ParameterError
 from asperity.export.data import Store, store_of
 from asperity.export.energy import energy_units
 from asperity.export.program import Linked, Program
 from asperity.export.subset import BOOL, FLOAT, Kind, Work
 from asperity.kernels.fuse import law_units, link_on_texture
-from asperity.kernels.link import Unit, module_unit
+from asperity.kernels.link import module_unit
 from asperity.surface import Surface
 
 # Names after the prefix that a program has besides its functions.
@@ -55,8 +53,6 @@ def surface_functions(surface: Surface, prefix: str, *, single: bool) -> Functio
     roots = [("probe_tick", probe), *[("probe_energy", unit) for unit in energy[:1]]]
     brought = [*map(module_unit, law.contact.kernels()), *energy]
     text = link_on_texture(law, surface.texture.sampler, clamp, roots, brought)
-    if single:
-        _refuse_iterations(surface, text, brought)
     program = Program(Linked(text), prefix, single=single, taken=_PUBLIC)
     store = store_of(surface, prefix, single=single)
     constants: tuple[Kind, Kind] = (store.texture, store.law)
@@ -67,11 +63,3 @@ def surface_functions(surface: Surface, prefix: str, *, single: bool) -> Functio
     stored = program.function("probe_energy", (*place, *constants)) if energy else ""
     code = "\n".join([*program.types, *program.helpers, *program.functions])
     return Functions(code, tick, tick_type, stored, store)
-
-
-def _refuse_iterations(surface: Surface, text: str, units: Sequence[Unit]) -> None:
-    """Refuse single precision where a solver iterates to the last digits of double precision."""
-    for unit in units:
-        if unit.kernels.iterates and any(part in text for part in unit.texts.values()):
-            words = f"must be double: law {surface.law} on this texture is found by iterations"
-            raise ParameterError("precision", f"{words} that end at rounding", "float")

@@ -30,6 +30,9 @@ from asperity.export.subset import (
     number_type,
 )
 
+_ROUNDINGS = {"EPS": 2.0**-23, "ROOT_EPS": 2.0**-11.5}
+"""What :mod:`asperity.compiled` says of double precision, in single precision."""
+
 
 @dataclass(frozen=True)
 class Linked:
@@ -87,7 +90,9 @@ class Program:
         self, linked: Linked, prefix: str, *, single: bool, taken: frozenset[str] = frozenset()
     ) -> None:
         self.linked, self.prefix, self.single = linked, prefix, single
-        self.numbers: Mapping[str, float] = linked.numbers
+        # What ends at rounding ends at that of the precision.
+        own = _ROUNDINGS if single else {}
+        self.numbers: Mapping[str, float] = linked.numbers | own
         self.records: Mapping[str, tuple[str, ...]] = linked.records
         self.types: list[str] = []
         self.helpers: list[str] = []

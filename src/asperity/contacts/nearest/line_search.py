@@ -7,7 +7,7 @@ value at the centre, L = 3 K max|h'| + T max|h - z|.
 
 import numpy as np
 
-from asperity.compiled import Kernels
+from asperity.compiled import EPS, ROOT_EPS, Kernels
 from asperity.contacts.sampler import LinePoint as Point
 from asperity.contacts.sampler import along
 
@@ -37,15 +37,15 @@ def go_down(x: float, z: float, start: float, left: float, texture: object) -> t
         h, h1, h2 = along(at, texture)
         gap = h - z
         new = (at - x) * (at - x) + gap * gap
-        rounding = 1e-31 * (at * at + h * h + z * z)
+        rounding = 2.0 * EPS * EPS * (at * at + h * h + z * z)
         if new <= best[1] or close:
             best = (at, new, h, h1)
             square = 1.0 + h1 * h1
             q = square + gap * h2
-            convex = q > 1e-9 * square
+            convex = q > 0.07 * ROOT_EPS * square
             step = -(at - x + gap * h1) / (q if convex else max(abs(q), 0.05 * square))
             size = step * step
-            if size <= 1e-16 * new + rounding:
+            if size <= 0.5 * EPS * new + rounding:
                 return (at + step, new, h + h1 * step, h1 + h2 * step), left
             # φ alone resolves half the digits: from here on the steps must shrink instead.
             if close and size >= 0.6 * last:
@@ -54,7 +54,7 @@ def go_down(x: float, z: float, start: float, left: float, texture: object) -> t
             last = size
         else:
             step *= 0.5
-            if step * step <= 1e-20 * best[1] + rounding:
+            if step * step <= 4e-5 * EPS * best[1] + rounding:
                 break
         if left <= 0.0:
             break
@@ -91,7 +91,7 @@ def judge(
     start = best[0] if abs(best[0] - centre) <= r else centre - p / q
     found, left = go_down(x, z, start, left, texture)
     # Convex throughout the interval: a minimum in it is the only one.
-    wide = abs(found[0] - centre) > r * (1.0 + 1e-9)
+    wide = abs(found[0] - centre) > r * (1.0 + 0.07 * ROOT_EPS)
     return (found if found[1] < best[1] else best), wide, left
 
 

@@ -2,9 +2,9 @@
 
 import math
 
-from asperity.compiled import Kernels
+from asperity.compiled import EPS, Kernels
 from asperity.contacts.nearest.line_search import go_down
-from asperity.contacts.sampler import EXACT, search_line
+from asperity.contacts.sampler import SLACK, search_line
 from asperity.contacts.sampler import LinePoint as Point
 
 KERNELS = Kernels(
@@ -17,11 +17,11 @@ def line_within(
 ) -> tuple[Point, float, float]:
     """Return the foot as far as a budget of looks finds it, the gap [m], and the looks taken."""
     best, left = go_down(x, z, start, 0.5 * budget, texture)
-    best, left = search_line(x, z, best, EXACT, left, texture)
+    best, left = search_line(x, z, best, 1.0 - SLACK * EPS, left, texture)
     share = 0.0 if left > 0.0 else 1.0
     left += 0.5 * budget
     # At most as many passes as there are digits; without an unfinished search, none.
-    while left > 0.0 and share > 1e-15:
+    while left > 0.0 and share > 4.0 * EPS:
         keep = 1.0 - 0.25 * share
         best, left = search_line(x, z, best, keep * keep, left, texture)
         if left > 0.0:

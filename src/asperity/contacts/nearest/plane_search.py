@@ -9,15 +9,16 @@ formula at the centre decides most boxes at once.
 Boxes are quartered without a stack: the next one follows from the numbers of the last.
 
 A search counts its looks: a look is one evaluation of the surface, or eight boxes of the pyramid
-that are passed. It drops boxes in which φ is nowhere less than ``keep`` times the best, ``EXACT``
-for the nearest point itself, and ends early once ``left``, the looks that are left, is used up.
+that are passed. It drops boxes in which φ is nowhere less than ``keep`` times the best, 1 less
+rounding for the nearest point itself, and ends early once ``left``, the looks that are left, is
+used up.
 """
 
 import math
 
 import numpy as np
 
-from asperity.compiled import Kernels
+from asperity.compiled import EPS, ROOT_EPS, Kernels
 from asperity.contacts.sampler import PlanePoint as Point
 from asperity.contacts.sampler import curvature
 
@@ -41,10 +42,10 @@ def newton_step(
 ) -> tuple[float, float, bool]:
     """Return a step down φ, Newton's where φ is convex, and whether it is."""
     low, high = eigenvalues(qxx, qxy, qyy)
-    convex = low > 1e-9 * high
+    convex = low > 0.07 * ROOT_EPS * high
     if not convex:
         # Raised so far that the steepest fall keeps its size, and nothing is flat.
-        shift = max(abs(low), 0.05 * abs(high), 1e-9) - low
+        shift = max(abs(low), 0.05 * abs(high), 0.07 * ROOT_EPS) - low
         qxx += shift
         qyy += shift
     det = qxx * qyy - qxy * qxy
@@ -73,7 +74,7 @@ def go_down(
         dx = fx - x
         dy = fy - y
         new = dx * dx + dy * dy + gap * gap
-        rounding = 1e-31 * (fx * fx + fy * fy + h * h + z * z)
+        rounding = 2.0 * EPS * EPS * (fx * fx + fy * fy + h * h + z * z)
         if new <= best[2] or close:
             best = (fx, fy, new, h, hx, hy)
             sx, sy, convex = newton_step(
@@ -81,7 +82,7 @@ def go_down(
                 1.0 + hx * hx + gap * hxx, hx * hy + gap * hxy, 1.0 + hy * hy + gap * hyy,
             )  # fmt: skip
             size = sx * sx + sy * sy
-            if size <= 1e-16 * new + rounding:
+            if size <= 0.5 * EPS * new + rounding:
                 h += hx * sx + hy * sy
                 hx += hxx * sx + hxy * sy
                 hy += hxy * sx + hyy * sy
@@ -94,7 +95,7 @@ def go_down(
         else:
             sx *= 0.5
             sy *= 0.5
-            if sx * sx + sy * sy <= 1e-20 * best[2] + rounding:
+            if sx * sx + sy * sy <= 4e-5 * EPS * best[2] + rounding:
                 break
         if left <= 0.0:
             break
@@ -192,7 +193,8 @@ def judge(
     start_x = best[0] if known else cx + sx
     start_y = best[1] if known else cy + sy
     found, left = go_down(x, y, z, start_x, start_y, left, texture)
-    outside = abs(found[0] - cx) > a * (1.0 + 1e-9) or abs(found[1] - cy) > b * (1.0 + 1e-9)
+    wide = 1.0 + 0.07 * ROOT_EPS
+    outside = abs(found[0] - cx) > a * wide or abs(found[1] - cy) > b * wide
     return (found if found[2] < best[2] else best), outside, left
 
 

@@ -10,9 +10,9 @@ to be kept.
 
 import math
 
-from asperity.compiled import Kernels
+from asperity.compiled import EPS, Kernels
 from asperity.contacts.nearest.plane_search import go_down
-from asperity.contacts.sampler import EXACT, search_plane
+from asperity.contacts.sampler import SLACK, search_plane
 
 KERNELS = Kernels(
     provides=("foot_within",), requires=("go_down", "search_plane"), called=("foot_within",)
@@ -24,11 +24,11 @@ def foot_within(
 ) -> tuple[float, float, float, float, float, float, float]:
     """Return the foot as far as a budget of looks finds it; see ``contacts.sampler``."""
     best, left = go_down(x, y, z, start_x, start_y, 0.5 * budget, texture)
-    best, left = search_plane(x, y, z, best, EXACT, left, texture)
+    best, left = search_plane(x, y, z, best, 1.0 - SLACK * EPS, left, texture)
     share = 0.0 if left > 0.0 else 1.0
     left += 0.5 * budget
     # At most as many passes as there are digits; without an unfinished search, none.
-    while left > 0.0 and share > 1e-15:
+    while left > 0.0 and share > 4.0 * EPS:
         keep = 1.0 - 0.25 * share
         best, left = search_plane(x, y, z, best, keep * keep, left, texture)
         if left > 0.0:

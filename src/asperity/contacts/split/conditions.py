@@ -7,7 +7,7 @@ sums and differences: near a crest the atoms are so close together that squares 
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.compiled import Kernels, local_array
+from asperity.compiled import EPS, Kernels, local_array
 from asperity.contacts.sampler import curvature, height
 
 KERNELS = Kernels(
@@ -164,7 +164,7 @@ def split_follow(y: FloatArray, atoms: FloatArray, row: int, texture: object) ->
         stalled += size >= 0.25 * last
         last = size
         # Near a centre of curvature the first steps need not shrink.
-        if stalled > 2 or size <= 1e-32 * (gap * gap + fx * fx + fy * fy):
+        if stalled > 2 or size <= 0.2 * EPS * EPS * (gap * gap + fx * fx + fy * fy):
             break
     atoms[row, 0] = fx
     atoms[row, 1] = fy

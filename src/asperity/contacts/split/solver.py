@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.compiled import Kernels, local_array
+from asperity.compiled import EPS, Kernels, local_array
 from asperity.contacts.memory import UNLIMITED
 from asperity.contacts.sampler import foot_within, height
 from asperity.contacts.split.conditions import (
@@ -196,7 +196,7 @@ def split_polish(
         left, size = split_advance(atoms, count, y, a)
         stalled += size >= 0.25 * last
         last = size
-        if left == count and (stalled > 2 or size <= 1e-28 * scale):
+        if left == count and (stalled > 2 or size <= 2000.0 * EPS * EPS * scale):
             return count, looks
         count = left
     return nothing, looks
@@ -220,7 +220,7 @@ def split_try_polish(
     value = split_value(atoms, count, p, mu, pull)
     left, looks = split_polish(atoms, count, p, y, mu, a, budget, texture)
     # Equal energies are the rule where the atoms have almost settled.
-    if left > 0 and split_value(atoms, left, p, mu, pull) <= value * (1.0 + 1e-14):
+    if left > 0 and split_value(atoms, left, p, mu, pull) <= value * (1.0 + 45.0 * EPS):
         return left, looks
     split_copy(before, atoms, count)
     for d in range(3):
@@ -252,7 +252,7 @@ def split_gap(
         gap += atoms[i, 3] * split_farther(atoms, i, count, y)
     for d in range(3):
         distance += abs(atoms[count, d] - y[d])
-    rounding = 4e-16 * (1.0 - mu) * distance * (distance + scale)
+    rounding = 2.0 * EPS * (1.0 - mu) * distance * (distance + scale)
     return max((1.0 - mu) * gap, 0.0), rounding
 
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from asperity.checks import FloatArray
-from asperity.compiled import Kernels
+from asperity.compiled import EPS, Kernels
 from asperity.contacts.nearest.plane_search import descend, judge, next_box
-from asperity.contacts.sampler import EXACT, PASSED
+from asperity.contacts.sampler import PASSED, SLACK
 from asperity.contacts.sampler import PlanePoint as Point
 from asperity.textures.samplers.sine import cosine, sine
 
@@ -96,7 +96,7 @@ def foot(
     Downhill from the probe, then whatever can be nearer.
     """
     best = descend(x, y, z, x, y, texture)
-    best, _left = search_plane(x, y, z, best, EXACT, np.inf, texture)
+    best, _left = search_plane(x, y, z, best, 1.0 - SLACK * EPS, np.inf, texture)
     return best[0], best[1], best[3], best[4], best[5]
 
 

@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 
-from asperity.compiled import Kernels
+from asperity.compiled import EPS, Kernels
 from asperity.contacts.nearest.line_search import descend, judge, next_part
 from asperity.contacts.nearest.line_within import line_within
-from asperity.contacts.sampler import EXACT, PASSED
+from asperity.contacts.sampler import PASSED, SLACK
 from asperity.contacts.sampler import LinePoint as Point
 from asperity.textures.samplers.fourier import FourierArguments
 
@@ -43,7 +43,7 @@ def foot(
     """
     t = x * texture.ux + y * texture.uy
     best = descend(t, z, t, texture)
-    best, _left = search_line(t, z, best, EXACT, np.inf, texture)
+    best, _left = search_line(t, z, best, 1.0 - SLACK * EPS, np.inf, texture)
     x += (best[0] - t) * texture.ux
     y += (best[0] - t) * texture.uy
     return x, y, best[2], best[3] * texture.ux, best[3] * texture.uy

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.checks import FloatArray
-from asperity.compiled import Kernels
+from asperity.compiled import EPS, Kernels
 from asperity.contacts.nearest.line_search import descend, judge, next_part
 from asperity.contacts.nearest.line_within import line_within
-from asperity.contacts.sampler import EXACT, PASSED
+from asperity.contacts.sampler import PASSED, SLACK
 from asperity.contacts.sampler import LinePoint as Point
 from asperity.textures.samplers.spline import (
     Four,
@@ -100,7 +100,7 @@ def foot(
     Downhill from the probe, then whatever can be nearer.
     """
     best = descend(x, z, x, texture)
-    best, _left = search_line(x, z, best, EXACT, np.inf, texture)
+    best, _left = search_line(x, z, best, 1.0 - SLACK * EPS, np.inf, texture)
     return best[0], y, best[2], best[3], 0.0
 
 

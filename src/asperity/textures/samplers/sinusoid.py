@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from asperity.compiled import Kernels
+from asperity.compiled import EPS, Kernels
 from asperity.textures.samplers.sine import cosine, sine
 
 KERNELS = Kernels(
@@ -131,7 +131,7 @@ def flank_root(
         new = psi - value / rate if rate > 0.0 else 0.5 * (low + high)
         if new < low or new > high:
             new = 0.5 * (low + high)
-        if abs(new - psi) <= 4e-16 * psi:
+        if abs(new - psi) <= 2.0 * EPS * psi:
             psi = new
             break
         psi = new

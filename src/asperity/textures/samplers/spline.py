@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.compiled import Kernels
+from asperity.compiled import ROOT_EPS, Kernels
 
 KERNELS = Kernels(
     provides=(
@@ -109,7 +109,7 @@ def nearest_copy(length: float, periodic: bool) -> float:
 
     Copies that are mirrored may all lie a length away; the factor leaves room for rounding.
     """
-    return length * (0.5 if periodic else 1.0) * (1.0 + 1e-9)
+    return length * (0.5 if periodic else 1.0) * (1.0 + 0.07 * ROOT_EPS)
 
 
 def foreseeable(
