@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from bench.fakes import compiled
 from tests.servo.test_drivers import EXAMPLE
 
 import asperity as asp
+from asperity.cli import run
 from asperity.recording.recording import open_recording
 from asperity.recording.replay import replay
 from asperity.report.pictures.run_picture import recording_figure
@@ -79,6 +81,8 @@ def test_it_runs_and_says_what_it_did(call: Call, scene: Callable[..., str]) -> 
     assert code == 0
     assert "Law C, change of height, at 100 N/m" in out
     assert "Energy to the hand" in out
+    assert "Began late:  50 % within" in out
+    assert "Period off:  50 % within" in out
     assert max(map(len, out.splitlines())) <= 80
 
 
@@ -153,6 +157,32 @@ def until(reached: Callable[[], bool], patience: float = 120.0) -> bool:
     while not reached() and time.monotonic() < end:
         time.sleep(0.02)
     return reached()
+
+
+def test_a_scene_that_is_changed_while_it_runs_counts_next_time(
+    call: Call, scene: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = scene()
+    watched = run.watched
+
+    def changing(*arguments: Any) -> Any:
+        Path(path).write_text(SCENE.replace("100 N/m", "50 N/m"))
+        return watched(*arguments)
+
+    monkeypatch.setattr(run, "watched", changing)
+    code, out, err = call(path, "--duration", "0.1s")
+    assert (code, "at 100 N/m" in out) == (0, True)
+    assert f"{path} was changed meanwhile" in err
+    monkeypatch.undo()
+    code, out, err = call(path, "--duration", "0.1s")
+    assert (code, "at 50 N/m" in out, "changed" in err) == (0, True, False)
+
+
+def test_a_way_that_the_device_lacks_is_refused(call: Call, scene: Callable[..., str]) -> None:
+    path = scene('["0 mm", "0 mm", "-2 mm"]', '["0 mm", "1 mm", "-2 mm"]')
+    code, _out, err = call(path, "--device", "pantograph", "--accept-risk")
+    assert code == 2
+    assert "a pantograph moves in the x-z plane" in err
 
 
 def test_a_stiffness_above_the_limit_is_refused(call: Call, scene: Callable[..., str]) -> None:

@@ -239,9 +239,14 @@ def test_by_the_clock_it_is_done_too_and_an_interrupt_ends_it_without_force() ->
             raise KeyboardInterrupt
 
     with ClockedBench(driver, LOOP, patient, 1.0, look) as bench:
-        rows = bench.do(excited(PUSHES, 300, push=0.5, span=20.0))
+        rows = bench.do(excited(PUSHES, 300, push=0.5, span=20.0, trip=1.0))
         assert (len(rows) > 250, set(rows[:, NUMBER])) == (True, {1.0})
         assert np.ptp(rows[:, 3]) > 1e-4
+        # After its time there is no force, until something else is asked for.
+        seen = bench.loop.shared.head
+        while bench.loop.shared.head < seen + 20:
+            bench.loop.poll()
+        assert (bench.loop.rows(seen + 10)[0][:, 7:10] == 0.0).all()
         rest = bench.do(excited(REST, 50, number=2.0, hold=0.0))
         assert (rest[:, 7:10] == 0.0).all()
         asked.append(1)

@@ -161,13 +161,15 @@ def test_only_what_is_proved_at_any_depth_may_be_felt_there(go: Go, law: str, ca
 
 
 @given(
-    seed=st.integers(0, 2**32 - 1), law=st.sampled_from("BCF"),
-    stiffness=st.floats(10.0, 2e4), max_force=st.floats(0.1, 20.0), slew=st.floats(1.0, 1e5),
+    seed=st.integers(0, 2**32 - 1),
+    changes=st.lists(st.tuples(st.sampled_from("WBCF"), st.floats(10.0, 2e4)), min_size=1,
+                     max_size=4),
+    max_force=st.floats(0.1, 20.0), slew=st.floats(1.0, 1e5),
     ramp=st.floats(0.0, 0.05), damping=st.floats(0.0, 5.0), virtual=st.floats(-1.0, 5.0),
 )  # fmt: skip
 @settings(max_examples=100, deadline=None)
 def test_no_force_is_above_its_limits(
-    seed: int, law: str, stiffness: float, max_force: float, slew: float, ramp: float,
+    seed: int, changes: list[tuple[str, float]], max_force: float, slew: float, ramp: float,
     damping: float, virtual: float,
 ) -> None:  # fmt: skip
     rng = np.random.default_rng(seed)
@@ -177,11 +179,12 @@ def test_no_force_is_above_its_limits(
     safety = Safety(ramp=ramp, max_slew=slew, beyond_depth="warn", passivity_damping=damping)
     shared = Shared(1e3)
     loop = Loop(device, servo, safety, 1e3, shared.board(), no_clock())
-    record, surface = device.open(), SURFACE.to_law(law).to_stiffness(stiffness)
-    shown = shown_of(SURFACE.to_law(law))
-    loop.run(replace(shown, law=surface.law_arguments), record, 40)
-    loop.forget()
-    loop.run(shown_of(SURFACE.to_law("W").to_stiffness(2e4)), record, 79)
+    record = device.open()
+    for index, (law, stiffness) in enumerate(changes, 1):
+        shown = shown_of(SURFACE.to_law(law))
+        arguments = SURFACE.to_law(law).to_stiffness(stiffness).law_arguments
+        loop.run(replace(shown, law=arguments), record, 80 * index // len(changes))
+        loop.forget()
     forces = np.array(device.forces)
     assert np.linalg.norm(forces, axis=1).max() <= max_force
     steps = np.linalg.norm(np.diff(forces, axis=0, prepend=np.zeros((1, 3))), axis=1)
@@ -223,6 +226,11 @@ def test_lateness_is_counted_and_judged(go: Go) -> None:
     # The samples that were left out are missing in the times, too.
     assert np.flatnonzero(np.diff(done.rows[:, 0]) > 1.5e-3).tolist() == [20]
     assert sum(counted.histogram) == counted.samples
+    # One period was long and the two after it short; the others were as they should be.
+    assert sum(counted.periods) == counted.samples - 1
+    assert (counted.periods[0], sum(counted.periods[19:])) == (counted.samples - 4, 3)
+    assert counted.jitter(0.9) == 1e-9
+    assert counted.jitter(1.0) == pytest.approx(2.0**22 * 1e-9)
 
 
 @pytest.mark.parametrize(

@@ -77,6 +77,7 @@ def command(
     setup = read_setup(
         scene, values, duration, defaults={"clamp": "backed"}, simulated=not real, alone=True
     )
+    read = setup.contents()
     if real and not driver.startswith(REPLAY):
         setup = with_its_own_electronics(setup)
     if not accept_risk:
@@ -94,6 +95,9 @@ def command(
             cause = watched(loop, asked, take)
         finally:
             loop.stop()
+    for path, now in setup.contents().items():
+        if read.get(path, now) != now:
+            tell(f"{path} was changed meanwhile; what was read at the start was rendered")
     data = {
         "schema": 1, "scene": setup, "driver": driver, "ended": cause.name.lower(),
         "notes": loop.notes, "statistics": loop.statistics,

@@ -80,12 +80,16 @@ class Setup:
 
     def about(self) -> dict[str, Any]:
         """Return what a recording says of the scene, besides its parts."""
-        contents = {str(path): file_content(path) for path in self.files}
         return {
             "device": {"id": self.device.id, "name": self.device.name},
             **record(self, "duration", "start", "velocity", "assumptions"),
-            "files": {name: content for name, content in contents.items() if content is not None},
+            "files": self.contents(),
         }
+
+    def contents(self) -> dict[str, str]:
+        """Return a hash of each file as it is now, of those that can be read."""
+        contents = {str(path): file_content(path) for path in self.files}
+        return {name: content for name, content in contents.items() if content is not None}
 
     def with_law(self, law: str | Law, stiffness: float | None = None) -> Setup:
         """Return the same loop with another law, and another stiffness [N/m] if one is given."""

@@ -13,6 +13,7 @@ from asperity.servo.kernels.published import (
     LATE,
     LATENESS,
     LENGTHS,
+    PERIODS,
     SKIPPED,
     SLEWS,
     WORST_LATE,
@@ -32,6 +33,8 @@ class Statistics(Record):
         slews: samples in which the slew was.
         deep: samples deeper than what was analysed.
         histogram: how many samples began less than 2ⁿ ns late, but not less than 2ⁿ⁻¹, by n.
+        periods: in the same way, by how much the time from one beginning to the next differed from
+            the period.
     """
 
     samples: int
@@ -42,27 +45,37 @@ class Statistics(Record):
     slews: int
     deep: int
     histogram: tuple[int, ...]
+    periods: tuple[int, ...]
 
     @classmethod
     def of(cls, status: Sequence[int]) -> Statistics:
         """Return what the words of a loop say; see ``kernels.published``."""
-        bins = tuple(status[LATENESS : LATENESS + BINS])
         return cls(
             status[HEAD], status[LATE], status[SKIPPED], 1e-9 * status[WORST_LATE],
-            status[LENGTHS], status[SLEWS], status[DEEP], bins,
+            status[LENGTHS], status[SLEWS], status[DEEP],
+            tuple(status[LATENESS : LATENESS + BINS]), tuple(status[PERIODS : PERIODS + BINS]),
         )  # fmt: skip
 
     def lateness(self, share: float) -> float:
         """Return a lateness [s] that a share of the samples keeps, from above, to a factor of 2.
 
         Example:
-            >>> words = [3, 0, 0, 900, 0, 0, 0, 0] + [0] * 9 + [2, 1] + [0] * 29
+            >>> words = [3, 0, 0, 900, 0, 0, 0, 0] + [0] * 9 + [2, 1] + [0] * 69
             >>> Statistics.of(words).lateness(0.5)
             5.12e-07
         """
-        wanted, seen = share * sum(self.histogram), 0
-        for exponent, count in enumerate(self.histogram):
-            seen += count
-            if seen >= wanted:
-                return min(2.0**exponent * 1e-9, max(self.worst, 1e-9))
-        return self.worst
+        return min(_kept(self.histogram, share), max(self.worst, 1e-9))
+
+    def jitter(self, share: float) -> float:
+        """Return by how much a share of the periods differ from T at most [s], likewise."""
+        return _kept(self.periods, share)
+
+
+def _kept(histogram: tuple[int, ...], share: float) -> float:
+    """Return the upper end of the bin up to which a share is counted [s]; 0 for none."""
+    wanted, seen = share * sum(histogram), 0
+    for exponent, count in enumerate(histogram):
+        seen += count
+        if count and seen >= wanted:
+            return 2.0**exponent * 1e-9
+    return 0.0

@@ -21,6 +21,7 @@ from asperity.servo.kernels.clock import Clock, clock_now, clock_wait
 from asperity.servo.kernels.device_functions import FINE, device_read, device_write
 from asperity.servo.kernels.guard import controlled, is_finite, limited_length, limited_slew
 from asperity.servo.kernels.published import (
+    BEGUN,
     BINS,
     DEEP,
     DEPTH,
@@ -36,6 +37,7 @@ from asperity.servo.kernels.published import (
     MISSES,
     NUMBER,
     PARENT,
+    PERIODS,
     SKIPPED,
     SLEWS,
     STOP,
@@ -235,19 +237,25 @@ def next_share(share: float, leaving: bool, step: float) -> float:
     return max(share - step, 0.0) if leaving else min(share + step, 1.0)
 
 
-def judged_time(late: int, done: int, at: Carried, limits: Limits, board: Board) -> int:
-    """Book how late a sample began and whether it ended after the next one was due; judge it.
+def counted(nanoseconds: int) -> int:
+    """Return the place of a time in a histogram: n for less than 2ⁿ ns, but not less than 2ⁿ⁻¹."""
+    _part, exponent = math.frexp(float(max(nanoseconds, 0)))
+    return min(exponent, BINS - 1)
 
-    What counts as too late is its end: a device that takes long to answer is late, too.
-    """
+
+def judged_time(late: int, done: int, at: Carried, limits: Limits, board: Board) -> int:
+    """Book how late a sample began and whether it ended after the next one was due; judge it."""
     status = board.status
-    _part, exponent = math.frexp(float(max(late, 0)))
-    status[LATENESS + min(exponent, BINS - 1)] += 1
+    begun = at.due + late
+    status[LATENESS + counted(late)] += 1
+    if status[HEAD] > 1:
+        status[PERIODS + counted(abs(begun - status[BEGUN] - limits.period))] += 1
+    status[BEGUN] = begun
     status[WORST_LATE] = max(status[WORST_LATE], late)
     if done > at.due + limits.period:
         status[LATE] += 1
         status[SKIPPED] += (done - at.due) // limits.period - 1
-    if done - at.due > limits.late:
+    if late > limits.late:
         return LATENESS_LIMIT
     if at.misses > limits.misses:
         return MISSES

@@ -15,10 +15,11 @@ from asperity.checks import FloatArray
 HEARTBEAT, STOP = 0, 1
 CONTROLS = 2
 # Words that the loop writes: rows, then counts since the start, then histograms.
-HEAD, LATE, SKIPPED, WORST_LATE, LENGTHS, SLEWS, DEEP = range(7)
-LATENESS = 8
+HEAD, LATE, SKIPPED, WORST_LATE, LENGTHS, SLEWS, DEEP, BEGUN = range(8)
 BINS = 40
-STATUS = LATENESS + BINS
+LATENESS = 8
+PERIODS = LATENESS + BINS
+STATUS = PERIODS + BINS
 
 COLUMNS = (
     ("time", "s"),
