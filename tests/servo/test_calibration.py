@@ -15,7 +15,13 @@ import asperity as asp
 from asperity.checks import FloatArray
 from asperity.devices import device_names, load_device
 from asperity.devices.writing import device_text
-from asperity.servo.calibration.bench import NUMBER, ClockedBench, InstantBench, axes_of
+from asperity.servo.calibration.bench import (
+    NUMBER,
+    ClockedBench,
+    InstantBench,
+    axes_of,
+    prepared,
+)
 from asperity.servo.calibration.calibrate import (
     Axis,
     Calibration,
@@ -32,11 +38,12 @@ from asperity.servo.calibration.identify import (
 )
 from asperity.servo.calibration.result import measured_device
 from asperity.servo.calibration.wall import WallOnset, find_wall, ringing
+from asperity.servo.drivers.choice import KINDS, hardware_driver
 from asperity.servo.drivers.driver import AWAY, RIGHT, TOWARDS, UP, frame_of
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.kernels.exciter import PUSHES, REST, WALL, Excitation
 from asperity.servo.safety import Safety
-from asperity.simulation import Cartesian, Servo, SpringHand, Still
+from asperity.simulation import Cartesian, Pantograph, Servo, SpringHand, Still
 
 SAFE = Safety(ramp=0.02, max_slew=3000.0)
 LOOP = Servo(1e-3, max_force=3.0)
@@ -214,6 +221,26 @@ def test_no_force_is_above_the_limits_and_a_cycle_is_not_fed() -> None:
     assert found.weakest.name == "x"
     # At no time the handle is far from where it was.
     assert max(np.abs(rows[:, 1:4]).max() for rows in kept.rows) < 0.02
+
+
+@pytest.mark.parametrize("name", [*KINDS, "pantograph"])
+def test_an_excitation_takes_the_place_of_a_law_with_every_driver(name: str) -> None:
+    if name == "pantograph":
+        whole = Pantograph(), SpringHand(), LOOP, ORIGIN
+        assert prepared(simulated_driver(*whole, 1e-3))(excited(REST, 1)).source
+    else:
+        text = "device.so" if name == "own" else name
+        driver = hardware_driver(text, "lying", (0.0, 0.0, 0.0))
+        assert prepared(driver)(excited(REST, 1)).source
+
+
+def test_an_axis_that_does_not_move_is_left_out() -> None:
+    own = Servo(1e-3, position_resolution=2e-5)
+    plant = Cartesian((0.08, 1e4, 0.08), 0.7)
+    driver = simulated_driver(plant, SpringHand(), own, ORIGIN, 1e-3, steps=True)
+    found = Calibrator(InstantBench(driver, LOOP, SAFE), SAFE.ramp).run()
+    assert [axis.name for axis in found.axes] == ["x", "z"]
+    assert found.unmoved == ("y",)
 
 
 def test_a_handle_that_does_not_move_cannot_be_measured() -> None:

@@ -21,7 +21,7 @@ REST, PUSHES, WALL = 0.0, 1.0, 2.0
 
 # Places in the memory of a contact, which there is none of here; POINTS is 0 at the beginning.
 CENTRE = FIRST
-COUNT, SEED, SIGN, LEFT, TRIPPED = range(FIRST + 3, FIRST + 8)
+COUNT, SEED, SIGN, REMAINING, TRIPPED = range(FIRST + 3, FIRST + 8)
 PLACE, SPEED = FIRST + 8, FIRST + 11
 
 
@@ -81,19 +81,19 @@ def begin(x: float, y: float, z: float, memory: FloatArray, law: Excitation) -> 
     memory[COUNT] = 0.0
     memory[SEED] = 1.0 + law.number
     memory[SIGN] = 1.0
-    memory[LEFT] = 0.0
+    memory[REMAINING] = 0.0
     memory[TRIPPED] = 0.0
     memory[POINTS] = 1.0
 
 
 def pushed(memory: FloatArray, law: Excitation) -> float:
     """Return the push of this sample [N]: to and fro, each for half to three halves of the span."""
-    if memory[LEFT] <= 0.0:
+    if memory[REMAINING] <= 0.0:
         memory[SIGN] = -memory[SIGN]
         # The least random numbers of Park and Miller: exact in double precision.
         memory[SEED] = (16807.0 * memory[SEED]) % 2147483647.0
-        memory[LEFT] = law.span * (0.5 + memory[SEED] / 2147483647.0)
-    memory[LEFT] -= 1.0
+        memory[REMAINING] = law.span * (0.5 + memory[SEED] / 2147483647.0)
+    memory[REMAINING] -= 1.0
     force: float = law.push * memory[SIGN]
     return force
 
