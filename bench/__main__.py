@@ -19,7 +19,6 @@ from bench import (
     servo,
     simulation,
     split,
-    startup,
     ticks,
     waiting,
 )
@@ -37,7 +36,6 @@ PARTS: dict[str, Callable[[Console], None]] = {
     "calibration": calibration.run,
     "export": export.run,
     "certificates": certificates.run,
-    "startup": startup.run,
     "waiting": waiting.run,
 }
 

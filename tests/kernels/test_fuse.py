@@ -23,9 +23,9 @@ Check = Callable[..., Any]
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An empty cache folder."""
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path / "cache"))
-    fuse.load_fused.cache_clear()
+    fuse._loaded.cache_clear()
     yield tmp_path / "cache"
-    fuse.load_fused.cache_clear()
+    fuse._loaded.cache_clear()
 
 
 LOOP = """
@@ -47,7 +47,7 @@ def test_a_second_load_compiles_nothing(cache: Path):
     assert first(3.0) == 6.0
     assert sum(first.stats.cache_misses.values()) == 1
     assert len([path for path in cache.rglob("*") if path.is_file()]) == 1
-    fuse.load_fused.cache_clear()
+    fuse._loaded.cache_clear()
     again = fuse.load_fused(LOOP).twice
     assert again(3.0) == 6.0
     assert not again.stats.cache_misses
@@ -60,7 +60,7 @@ def test_changed_code_is_compiled_anew_and_said(cache: Path):
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 16
     path.write_bytes(content)
-    fuse.load_fused.cache_clear()
+    fuse._loaded.cache_clear()
     checked._say.cache_clear()
     again = fuse.load_fused(LOOP).twice
     with pytest.warns(checked.CacheWarning, match="damaged entries"):
@@ -71,7 +71,7 @@ def test_changed_code_is_compiled_anew_and_said(cache: Path):
 @pytest.mark.usefixtures("cache")
 def test_code_of_another_build_is_compiled_anew(monkeypatch: pytest.MonkeyPatch):
     fuse.load_fused(LOOP).twice(3.0)
-    fuse.load_fused.cache_clear()
+    fuse._loaded.cache_clear()
     checked._say.cache_clear()
 
     def refuse(*_arguments: object) -> None:

@@ -11,6 +11,7 @@ import linecache
 import sys
 from collections.abc import Sequence
 from functools import lru_cache, partial
+from threading import Lock
 from types import ModuleType
 
 from asperity.contacts.sampler import OFFERED
@@ -121,15 +122,7 @@ def fuse_on_texture(
     further: tuple[ModuleType, ...] = (),
     instead: tuple[ModuleType, ...] = (),
 ) -> ModuleType:
-    """Return the loops of modules compiled that ask a sampler, a law and further modules.
-
-    Args:
-        law: the law.
-        sampler: the modules whose functions make up the sampler.
-        clamp: the depth clamp.
-        asking: the modules with the loops.
-        further: what they ask besides.
-        instead: modules whose functions are taken instead of those of that name elsewhere.
+    """Return the module that :func:`source_on_texture` writes, compiled.
 
     Raises:
         ParameterError: for a texture that lacks what is asked of it.
@@ -145,7 +138,21 @@ def source_on_texture(
     further: tuple[ModuleType, ...] = (),
     instead: tuple[ModuleType, ...] = (),
 ) -> str:
-    """Return the text of such a module, which another process can load; see above."""
+    """Return the text of a module of loops that ask a sampler, a law and further modules.
+
+    Another process can load it, see :func:`load_fused`.
+
+    Args:
+        law: the law.
+        sampler: the modules whose functions make up the sampler.
+        clamp: the depth clamp.
+        asking: the modules with the loops.
+        further: what they ask besides.
+        instead: modules whose functions are taken instead of those of that name elsewhere.
+
+    Raises:
+        ParameterError: for a texture that lacks what is asked of it.
+    """
     units = tuple(map(module_unit, asking))
     brought = (*units, *map(module_unit, (*law.contact.kernels(), *further)))
     first = tuple(map(module_unit, instead))
@@ -252,9 +259,20 @@ def _head(title: str, source: str) -> str:
     return _HEADER.format(title=title) + (local if "local_array(" in source else "")
 
 
-@lru_cache(maxsize=256)
+_LOADING = Lock()
+
+
 def load_fused(source: str) -> ModuleType:
-    """Return a fused module; the machine code of its loops is kept between runs."""
+    """Return a fused module, one and the same whichever thread asks.
+
+    The machine code of its loops is kept between runs.
+    """
+    with _LOADING:
+        return _loaded(source)
+
+
+@lru_cache(maxsize=256)
+def _loaded(source: str) -> ModuleType:
     module = ModuleType(f"asperity_fused_{hashlib.sha256(source.encode()).hexdigest()[:32]}")
     module.__file__ = f"<{module.__name__}>"
     # For tracebacks, and for whoever wants to read what was compiled.
