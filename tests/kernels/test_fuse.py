@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections import namedtuple
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -172,3 +173,24 @@ def test_a_law_that_looks_at_the_position_is_given_it(interpreted: Check):
     np.testing.assert_allclose(force[:, 2], 700.0 * depths * gain, rtol=1e-12)
     np.testing.assert_allclose(jacobian[:, 2], expected, rtol=1e-11)
     assert not jacobian[:, :2].any()
+
+
+RECORD = """
+from numba import njit
+from asperity.kernels.code_store import keep_code
+@keep_code(njit)
+def first(record):
+    return record.a + 0.0 * record.b
+"""
+
+
+@pytest.mark.usefixtures("cache")
+@pytest.mark.parametrize("fields", ["b a", "a b"])
+def test_code_for_a_record_of_other_fields_is_not_taken(fields: str):
+    """Of a name that is defined again, in the same order or in another."""
+    record = namedtuple("Record", "a b")
+    assert fuse.load_fused(RECORD).first(record(1.0, 2.0)) == 1.0
+    fuse._loaded.cache_clear()
+    other = namedtuple("Record", fields)
+    again = fuse.load_fused(RECORD).first
+    assert again(other(a=1.0, b=2.0)) == 1.0
