@@ -24,6 +24,7 @@ ROOM = "code"
 # Numba is untyped.
 _COMPILED: Any = compiler.CompileResult
 _serialize: Any = serialize.dumps
+_TUPLES: Any = types.BaseTuple
 
 
 class CodeStore(caching._Cache):
@@ -87,7 +88,7 @@ class CodeStore(caching._Cache):
 def _fields(kind: Any) -> tuple[Any, ...]:
     """Return the names in a record, in order: code knows them by their places."""
     names = tuple(getattr(kind, "fields", ()))
-    return (*names, *map(_fields, tuple(kind))) if isinstance(kind, types.BaseTuple) else names
+    return (*names, *map(_fields, kind.types)) if isinstance(kind, _TUPLES) else names
 
 
 def keep_code(decorator: Callable[..., Any]) -> Callable[..., Any]:
