@@ -18,6 +18,7 @@ from threading import Lock
 from types import ModuleType
 
 from asperity.contacts.sampler import OFFERED
+from asperity.derive.facts import law_facts
 from asperity.derive.shipped import generated_path
 from asperity.errors import ParameterError
 from asperity.kernels.link import (
@@ -105,11 +106,24 @@ def fuse_surface(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) ->
     Raises:
         ParameterError: for a texture that lacks what the law looks at.
     """
-    from asperity.kernels import anchored_loops, batch_sine, probe_loops
+    from asperity.kernels import anchored_loops, batch_sine, block_loops, probe_loops
 
+    blocks = tuple(m for m in sampler if "sample_block" in module_unit(m).kernels.provides)
+    if blocks and _samples_at_probe(law):
+        return fuse_on_texture(law, sampler, clamp, (block_loops,), instead=(batch_sine, *blocks))
     loops = anchored_loops if law.stateful else probe_loops
     asking = (loops, *law.contact.kernels())
     return fuse_on_texture(law, sampler, clamp, asking, instead=(batch_sine,))
+
+
+def _samples_at_probe(law: Law) -> bool:
+    """Return whether a law asks the texture for what it is above or below the probe, and no more.
+
+    Then points can be sampled before the law is asked.
+    """
+    contact = law.contact
+    asks = contact.begins_on_texture or law_facts(law).looks_at_surface
+    return asks and contact.above_probe and not (law.stateful or contact.kernels())
 
 
 @lru_cache(maxsize=256)

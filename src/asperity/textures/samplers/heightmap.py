@@ -27,7 +27,7 @@ from asperity.textures.samplers.spline import (
 )
 
 KERNELS = Kernels(
-    provides=("curvature", "foot", "height", "search_plane", "slope"),
+    provides=("cells_of", "curvature", "foot", "height", "search_plane", "slope"),
     requires=(
         "descend", "judge", "next_box",
         "box_bounds", "cell_at", "dot4", "foreseeable", "nearest_copy", "reach_of", "saddle_margin",
