@@ -13,7 +13,8 @@ from asperity.simulation.kernels.body_functions import DIVERGED, RAN, Held, adva
 from asperity.simulation.kernels.servo_loop import wait_in_queue
 
 KERNELS = Kernels(
-    provides=("device_read", "device_write"), requires=("advance_body", "flushed", "wait_in_queue")
+    provides=("anchor_step", "device_read", "device_write"),
+    requires=("advance_body", "flushed", "wait_in_queue"),
 )
 
 
@@ -24,7 +25,8 @@ class SimulatedDevice(NamedTuple):
         x: state of the body, position [m], velocity [m/s], more.
         queue: forces that wait (d + 1, 3) [N].
         done: where in the queue the newest force waits; samples that were done (2,).
-        anchor: positions of the hand's anchor at the samples (k, 3) [m]; then it stays.
+        anchor: positions of the hand's anchor at the samples (k, 3) [m]; then it stays. Or what
+            another ``anchor_step`` makes of it.
         ledger: sums of energies, see ``simulation.kernels.booking``.
         rate: 1/T [1/s].
         plant: record of the body.
@@ -59,6 +61,16 @@ def device_read(place: FloatArray, device: SimulatedDevice) -> int:
     return RAN
 
 
+def anchor_step(device: SimulatedDevice) -> tuple[float, float, float, float, float, float]:
+    """Return where the hand's anchor is in this sample, and in the next [m]."""
+    here = min(device.done[1], device.anchor.shape[0] - 1)
+    there = min(here + 1, device.anchor.shape[0] - 1)
+    return (
+        device.anchor[here, 0], device.anchor[here, 1], device.anchor[here, 2],
+        device.anchor[there, 0], device.anchor[there, 1], device.anchor[there, 2],
+    )  # fmt: skip
+
+
 def device_write(fx: float, fy: float, fz: float, inside: bool, device: SimulatedDevice) -> int:
     """Hold the force that is due [N] and move on by a sample; see ``device_functions``."""
     x = device.x
@@ -66,18 +78,11 @@ def device_write(fx: float, fy: float, fz: float, inside: bool, device: Simulate
     head, hx, hy, hz = wait_in_queue(
         device.queue, device.done[0], stepped(fx, step), stepped(fy, step), stepped(fz, step)
     )
-    here = min(device.done[1], device.anchor.shape[0] - 1)
-    there = min(here + 1, device.anchor.shape[0] - 1)
-    ax = device.anchor[here, 0]
-    ay = device.anchor[here, 1]
-    az = device.anchor[here, 2]
+    ax, ay, az, bx, by, bz = anchor_step(device)
+    rate = device.rate
     held = Held(
-        hx, hy, hz, ax, ay, az,
-        (device.anchor[there, 0] - ax) * device.rate,
-        (device.anchor[there, 1] - ay) * device.rate,
-        (device.anchor[there, 2] - az) * device.rate,
-        inside,
-    )  # fmt: skip
+        hx, hy, hz, ax, ay, az, (bx - ax) * rate, (by - ay) * rate, (bz - az) * rate, inside
+    )
     device.done[0] = head
     device.done[1] += 1
     stop = advance_body(x, device.ledger, held, device.plant)
