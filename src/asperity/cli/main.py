@@ -26,6 +26,7 @@ COMMANDS = {
     "devices": "List devices, and the source of every number.",
     "export": "Write a surface with its law as a C program.",
     "init": "Write a scene to begin with.",
+    "lab": "Watch, hear and steer a texture in a browser.",
     "limits": "Say whether a texture can be felt on a device.",
     "maps": "Write heights or normals for other tools.",
     "onset": "Find the stiffness at which limit cycles begin.",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from threading import Lock
 from types import ModuleType
 
 import numpy as np
@@ -25,6 +26,7 @@ from asperity.surface import Surface
 STOPS = tuple(Stop)
 # Forces that may wait: a second at a megahertz.
 MOST_DELAY = 1_000_000
+_LOCK = Lock()
 
 
 @lru_cache(maxsize=256)
@@ -75,7 +77,8 @@ class Simulation:
         self._loop, self._ledger = LoopState(), np.zeros(SUMS)
         self._before = 0.0
         clamp: ClampName = surface.clamp if surface.law.clampable else "none"
-        self._loops = _fused(surface.law, surface.texture.sampler, clamp, plant.modules)
+        with _LOCK:
+            self._loops = _fused(surface.law, surface.texture.sampler, clamp, plant.modules)
         self._arguments = surface.texture.arguments, surface.law_arguments
 
     @property

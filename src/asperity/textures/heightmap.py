@@ -83,9 +83,9 @@ class HeightMap(Spline):
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
         from asperity.contacts.nearest import plane_search, plane_within
-        from asperity.textures.samplers import heightmap, heightmap_block, spline
+        from asperity.textures.samplers import heightmap, spline
 
-        return heightmap, spline, plane_search, plane_within, heightmap_block
+        return heightmap, spline, plane_search, plane_within
 
     @cached_property
     def arguments(self) -> HeightMapArguments:

@@ -14,8 +14,7 @@ from asperity.contacts.sampler import along
 KERNELS = Kernels(
     provides=("descend", "go_down", "judge", "next_part"),
     requires=("along",),
-    called=("judge",),
-    shared=("go_down",),
+    called=("go_down", "judge"),
 )
 
 

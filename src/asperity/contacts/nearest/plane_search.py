@@ -25,8 +25,7 @@ from asperity.contacts.sampler import curvature
 KERNELS = Kernels(
     provides=("descend", "go_down", "judge", "next_box"),
     requires=("curvature",),
-    called=("judge", "newton_step"),
-    shared=("go_down",),
+    called=("go_down", "judge", "newton_step"),
 )
 
 

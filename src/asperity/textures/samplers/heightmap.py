@@ -27,14 +27,13 @@ from asperity.textures.samplers.spline import (
 )
 
 KERNELS = Kernels(
-    provides=("cells_of", "curvature", "foot", "height", "search_plane", "slope"),
+    provides=("curvature", "foot", "height", "search_plane", "slope"),
     requires=(
         "descend", "judge", "next_box",
         "box_bounds", "cell_at", "dot4", "foreseeable", "nearest_copy", "reach_of", "saddle_margin",
         "tile_frame", "weights", "weights_first", "weights_second",
     ),
-    called=("foot", "search_tile", "search_tree"),
-    shared=("search_plane",),
+    called=("foot", "search_plane", "search_tile", "search_tree"),
 )  # fmt: skip
 
 

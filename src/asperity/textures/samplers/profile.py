@@ -33,8 +33,7 @@ KERNELS = Kernels(
         "box_bounds", "cell_at", "dot4", "foreseeable", "nearest_copy", "reach_of", "tile_frame",
         "weights", "weights_first", "weights_second",
     ),
-    called=("foot", "search_tile", "search_tree"),
-    shared=("search_line",),
+    called=("foot", "search_line", "search_tile", "search_tree"),
 )  # fmt: skip
 
 

@@ -15,8 +15,6 @@ KERNELS = Kernels(
 )  # fmt: skip
 
 
-SIXTH = 1.0 / 6.0
-
 Four = tuple[float, float, float, float]
 
 
@@ -51,10 +49,10 @@ def weights(t: float) -> Four:
     tt = t * t
     rr = r * r
     return (
-        rr * r * SIXTH,
+        rr * r / 6.0,
         (2.0 / 3.0) - tt + 0.5 * tt * t,
         (2.0 / 3.0) - rr + 0.5 * rr * r,
-        tt * t * SIXTH,
+        tt * t / 6.0,
     )
 
 

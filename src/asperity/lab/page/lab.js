@@ -1,0 +1,325 @@
+// The page: what is heard from the lab is shown, and what is done here is said to it.
+
+import { Hand } from "./hand.js";
+import { Line } from "./line.js";
+import { Sound } from "./sound.js";
+import { Spectrum, Traces } from "./traces.js";
+import { Cut, Relief, isRelief, readTheme } from "./views.js";
+import { millimetres, quantity } from "./words.js";
+
+const $ = id => document.getElementById(id);
+const FED = 2e-6; // J above which the hand was fed, and not by a rounding
+const relief = new Relief($("relief")), cut = new Cut($("cut"));
+const traces = new Traces($("traces")), spectrum = new Spectrum($("spectrum")), sound = new Sound();
+
+let news = null, frame = null, base = 0, cleared = false, span = 8e-3, centre = [0, 0], looked = "", firstNews = true;
+let faults = 0;
+const waiting = []; // wishes of the pointer: number, and when they were made [ms]
+const latencies = [];
+
+const line = new Line({
+  hello(said) {
+    fill($("other"), said.laws.map(law => [law.letter, `${law.letter} ${law.name}`]), "A");
+    fill($("device"), said.devices.map(name => [name, name]));
+    $("textures").replaceChildren(...said.textures.map(name => new Option(name)));
+    $("letters").replaceChildren(...said.laws.map(law => {
+      const button = Object.assign(document.createElement("button"), { type: "button", textContent: law.letter });
+      button.setAttribute("role", "radio");
+      button.title = law.name;
+      button.dataset.words = `${law.name}. ${law.words}`;
+      button.onclick = () => change({ law: law.letter });
+      return button;
+    }));
+  },
+  news(said) {
+    const before = news;
+    news = said;
+    if (said.steers && !before?.steers) hand.sent = said.wishes;
+    if (before?.starts !== said.starts || before?.settings.law !== said.settings.law) clear();
+    if (!before && !frame) [hand.x, hand.y] = centre = [...said.middle];
+    if (firstNews && said.steers) fromAddress();
+    firstNews = false;
+    hand.high = said.high;
+    if (before && before.version !== said.version) looked = "";
+    show();
+  },
+  refused(said) { alarm(said.words); },
+  frame(said) {
+    frame = said;
+    const energy = said.newest[line.layout.columns.supplied];
+    if (cleared && !said.newest[line.layout.columns.inside]) { base = energy; cleared = false; }
+    traces.take(said, line.layout.columns);
+    spectrum.take(said.forces);
+    sound.take(said.forces, news?.rate ?? 1000);
+  },
+  picture(numbers) { (isRelief(numbers) ? relief : cut).take(numbers); },
+  lost(reason) {
+    firstNews = false;
+    news = null;
+    $("state").className = "stopped";
+    $("state").textContent = "connection lost";
+    alarm(reason ? `The lab has closed the connection: ${reason}. Trying again …`
+      : "The connection to the lab is lost. Is asperity lab still running? Trying again …");
+  },
+});
+
+const hand = new Hand((what, content) => {
+  const said = Boolean(news?.steers) && line.say(what, content);
+  if (said) waiting.push([hand.sent + 1, performance.now()]);
+  if (waiting.length > 500) waiting.shift();
+  return said;
+});
+
+function fill(select, pairs, chosen) {
+  const value = select.value || chosen;
+  select.replaceChildren(...pairs.map(([key, words]) => new Option(words, key, false, key === value)));
+}
+
+function change(wishes) { line.say("change", { wishes }); }
+function clear() { cleared = true; base = frame ? frame.newest[line.layout.columns.supplied] : 0; }
+
+function alarm(words) {
+  $("alarm").hidden = !words;
+  $("alarm").firstElementChild.textContent = words;
+}
+
+// --- what is known ------------------------------------------------------------------------------
+
+function show() {
+  const { settings, state, words, steers, free } = news;
+  $("surface").textContent = settings.texture;
+  $("state").className = state;
+  $("state").textContent = { running: `law ${settings.law} at ${news.rate.toFixed(0)} Hz`, stopped: "stopped",
+    starting: "starting", changing: "changing" }[state];
+  const told = state === "stopped" ? `The loop has stopped: ${words}` : !steers
+    ? "Another page steers; this one watches." : words;
+  alarm(told);
+  $("again").hidden = state !== "stopped" || !steers;
+  $("take").hidden = !free || steers;
+  for (const one of document.querySelectorAll(".panel :is(input, select, button)")) {
+    if (!["sound", "volume", "picture", "reset"].includes(one.id)) one.disabled = !steers;
+  }
+  for (const button of $("letters").children) {
+    const chosen = button.textContent === settings.law;
+    button.setAttribute("aria-checked", chosen);
+    if (chosen) $("law-words").textContent = button.dataset.words;
+  }
+  for (const name of ["texture", "device", "delay", "hand_stiffness", "hand_damping"]) put(name, settings[name]);
+  put("max_depth", (1e3 * settings.max_depth).toFixed(3).replace(/\.?0+$/, ""));
+  put("stiffness", 1000 * toSlider(settings.stiffness));
+  $("stiffness-value").textContent = quantity(settings.stiffness, "N/m");
+  $("press-value").textContent = quantity(hand.press, "m");
+  $("assumptions").replaceChildren(...news.assumptions.map(words =>
+    Object.assign(document.createElement("li"), { textContent: words })));
+  showLimit(settings);
+  if (steers && state === "running") toAddress(settings);
+}
+
+function put(name, value) {
+  const field = $(name);
+  if (document.activeElement !== field && value !== null) field.value = value;
+}
+
+// The slider is logarithmic: 10 to 10 000 N/m.
+const toSlider = stiffness => Math.max(0, Math.min(1, Math.log10(stiffness / 10) / 3));
+const fromSlider = value => Number((10 * 10 ** (3 * value / 1000)).toPrecision(3));
+
+function showLimit({ stiffness, law }) {
+  const { limit } = news, known = Number.isFinite(limit.stiffness);
+  $("limit").hidden = !known;
+  const words = $("limit-words");
+  words.classList.toggle("over", known && stiffness > limit.stiffness);
+  if (known) {
+    $("limit").style.left = `calc(0.5rem + ${toSlider(limit.stiffness)} * (100% - 1rem))`;
+    const side = stiffness > limit.stiffness ? "▲ above" : "below";
+    words.textContent = `${side} the limit of ${quantity(limit.stiffness, "N/m")} for law ${law} (${limit.basis})`;
+  } else {
+    words.textContent = "basis" in limit ? `No limit is known: ${limit.basis}` : "The limit is being computed …";
+  }
+}
+
+function fromAddress() {
+  const wishes = {};
+  for (const [name, text] of new URLSearchParams(location.hash.slice(1))) {
+    if (name in news.settings) wishes[name] = ["law", "texture", "device"].includes(name) ? text : Number(text);
+  }
+  if (Object.keys(wishes).length && Object.values(wishes).every(value => value === value)) change(wishes);
+}
+
+function toAddress(settings) {
+  const said = Object.entries(settings).filter(([, value]) => value !== null);
+  history.replaceState(null, "", `#${new URLSearchParams(said)}`);
+}
+
+// --- every picture of the screen ------------------------------------------------------------------
+
+function probeState() {
+  if (!frame) return null;
+  const at = line.layout.columns, value = name => frame.newest[at[name]];
+  return {
+    probe: [value("x"), value("y"), value("z")], god: frame.god, hand: frame.hand,
+    force: [value("applied x"), value("applied y"), value("applied z")], inside: value("inside") > 0,
+    energy: value("supplied") - base,
+  };
+}
+
+function boxes() {
+  const ratio = Math.max(0.15, $("cut").clientHeight / Math.max($("cut").clientWidth, 1));
+  const half = 0.5 * ratio * span, low = news ? 0.5 * (news.low + news.high) : 0;
+  return [centre[0] - span / 2, centre[0] + span / 2, low - half, low + half];
+}
+
+function look(state) {
+  if (!news) return;
+  if (state) {
+    const [x, y] = state.probe;
+    if (Math.abs(x - centre[0]) > 0.45 * span || Math.abs(y - centre[1]) > 0.45 * span) centre = [x, y];
+  }
+  const wanted = [...boxes(), state ? Math.round(state.probe[1] / 5e-5) * 5e-5 : 0];
+  const key = wanted.map(value => value.toPrecision(5)).join(" ");
+  if (key === looked) return;
+  looked = key;
+  line.say("cut", { box: wanted.slice(0, 4), y: wanted[4] });
+  line.say("relief", { x: centre[0], y: centre[1], size: span });
+}
+
+let slow = 0, drawn = 0; // when words, and traces, were last shown [ms]
+function paint(time) {
+  requestAnimationFrame(paint);
+  const state = probeState();
+  relief.draw(state);
+  cut.draw(state, boxes());
+  if (time - drawn > 40) { drawn = time; traces.draw(base); }
+  if (frame) while (waiting.length && waiting[0][0] <= frame.heard) {
+    latencies.push(performance.now() - waiting.shift()[1]);
+    if (latencies.length > 5000) latencies.shift();
+  }
+  if (time - slow < 150 || !state) return;
+  slow = time;
+  look(state);
+  tell(state);
+}
+
+/** Say in words what is seen. */
+function tell(state) {
+  const { probe, force, energy } = state, fed = energy > FED;
+  $("energy").textContent = quantity(energy, "J");
+  $("ledger").classList.toggle("fed", fed);
+  $("verdict").textContent = fed ? "⚠ the field has fed the hand" : "the hand was not fed";
+  const [f, amplitude] = spectrum.draw(news?.rate ?? 1000);
+  $("peak").textContent = amplitude > 1e-3 ? `strongest ${quantity(f, "Hz")}, ${quantity(amplitude, "N")}` : "quiet";
+  $("trace-note").textContent = `${frame.late} samples late, ${frame.skipped} left out`;
+  const size = Math.hypot(...force), place = probe.map(millimetres).join(", ");
+  $("readout").textContent = `probe ${place} mm · force ${quantity(size, "N")} · time ${frame.newest[0].toFixed(1)} s`;
+  $("relief-note").textContent = `heights × ${(relief.exaggeration ?? 1).toPrecision(2)} · hold down to press`;
+  const curl = cut.most > 1e-6 * (cut.strongest ?? 1) ? `curl up to ${quantity(cut.most, "N/m")}` : "no curl: no loop feeds the hand";
+  $("cut-note").textContent = cut.box ? `${curl} · wheel: zoom` : "being computed …";
+  const words = `Probe at ${place} millimetres, force ${quantity(size, "N")}${state.inside ? ", in contact" : ""}`;
+  $("relief").setAttribute("aria-label", `The surface in relief. ${words}`);
+  $("cut").setAttribute("aria-label", `A cut through the surface along x. ${words}. ${curl}`);
+  $("traces").setAttribute("aria-label", `Traces of five seconds. Energy given to the hand ${quantity(energy, "J")}`);
+  $("spectrum").setAttribute("aria-label", `Spectrum of the normal force: ${$("peak").textContent}`);
+}
+
+// --- what is done here ----------------------------------------------------------------------------
+
+function zoom(factor) { span = Math.max(5e-4, Math.min(0.06, span * factor)); }
+
+for (const [canvas, move] of [
+  [$("relief"), event => { [hand.x, hand.y] = relief.under(event.offsetX, event.offsetY); hand.z = null; }],
+  [$("cut"), event => { [hand.x, hand.z] = cut.under(event.offsetX, event.offsetY, boxes()); }],
+]) {
+  let last = "";
+  const follow = event => {
+    // A browser says "moved" after a change of the page, too: that takes nothing from the keys.
+    const place = [event.offsetX, event.offsetY, event.buttons, event.pressure].join();
+    if (place === last) return;
+    last = place;
+    if (hand.motion !== "pointer" || !relief.heights) return;
+    hand.pressed = event.buttons > 0;
+    hand.force = event.pointerType === "pen" ? 2 * event.pressure : 1;
+    move(event);
+    hand.wish();
+  };
+  canvas.onpointerdown = event => { canvas.setPointerCapture(event.pointerId); follow(event); };
+  canvas.onpointermove = canvas.onpointerup = follow;
+  canvas.onpointercancel = () => { hand.pressed = false; hand.wish(); };
+  canvas.addEventListener("wheel", event => { event.preventDefault(); zoom(1.15 ** Math.sign(event.deltaY)); }, { passive: false });
+}
+
+$("stiffness").oninput = event => { $("stiffness-value").textContent = quantity(fromSlider(event.target.value), "N/m"); };
+$("stiffness").onchange = event => change({ stiffness: fromSlider(event.target.value) });
+$("press").oninput = event => { hand.press = 1e-3 * event.target.value; $("press-value").textContent = quantity(hand.press, "m"); hand.wish(); };
+$("motion").onchange = event => { hand.motion = event.target.value; hand.wish(); };
+$("texture").onchange = event => change({ texture: event.target.value });
+$("device").onchange = event => change({ device: event.target.value });
+$("max_depth").onchange = event => change({ max_depth: 1e-3 * event.target.value });
+for (const name of ["delay", "hand_stiffness", "hand_damping"]) {
+  $(name).onchange = event => change({ [name]: Number(event.target.value) });
+}
+$("swap").onclick = () => {
+  const mine = news?.settings.law;
+  if (!mine) return;
+  change({ law: $("other").value });
+  $("other").value = mine;
+};
+$("reset").onclick = clear;
+$("again").onclick = () => change({});
+$("take").onclick = () => line.say("take");
+$("volume").oninput = event => sound.setVolume(Number(event.target.value));
+$("sound").onclick = async () => {
+  const on = await sound.toggle();
+  $("sound").setAttribute("aria-pressed", on);
+  $("sound").textContent = on ? "Sound off" : "Sound on";
+};
+$("picture").onclick = () => {
+  const parts = ["relief", "cut", "traces", "spectrum"].map($), width = Math.max(...parts.map(part => part.width));
+  const whole = Object.assign(document.createElement("canvas"), { width, height: parts.reduce((sum, part) => sum + part.height + 8, 0) });
+  const draw = whole.getContext("2d");
+  draw.fillStyle = readTheme().card;
+  draw.fillRect(0, 0, whole.width, whole.height);
+  let top = 0;
+  for (const part of parts) { draw.drawImage(part, 0, top); top += part.height + 8; }
+  whole.toBlob(blob => {
+    const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: "asperity-lab.png" });
+    link.click();
+    URL.revokeObjectURL(link.href);
+  });
+};
+
+const MOVES = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+const KEYS = {
+  " ": () => { hand.z = null; hand.force = 1; hand.latched = !hand.latched; hand.wish(); },
+  PageUp: () => { hand.z = Math.min(hand.height + span / 80, 0.01); hand.wish(); },
+  PageDown: () => { hand.z = Math.max(hand.height - span / 80, -0.01); hand.wish(); },
+  m: () => { hand.next(); $("motion").value = hand.motion; },
+  x: () => $("swap").click(), r: clear, s: () => $("sound").click(),
+  "+": () => zoom(1 / 1.15), "-": () => zoom(1.15),
+};
+
+addEventListener("keydown", event => {
+  const typing = event.target.closest("input:not([type=range]), select, textarea");
+  if (typing || event.ctrlKey || event.altKey || event.metaKey) return;
+  const { key } = event, letter = [...$("letters").children].find(one => one.textContent === key.toUpperCase());
+  const arrow = MOVES[key], ranged = event.target.matches("input[type=range]");
+  const pressing = event.target.closest("button, summary") && key === " ";
+  if (arrow && !ranged) {
+    hand.x += arrow[0] * span / 60;
+    hand.y += arrow[1] * span / 60;
+    hand.wish();
+  } else if (KEYS[key] && !pressing && !(ranged && key.startsWith("Page"))) KEYS[key]();
+  else if (letter) { if (news?.steers) letter.click(); } else return;
+  event.preventDefault();
+});
+
+addEventListener("error", () => faults++);
+addEventListener("unhandledrejection", () => faults++);
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readTheme);
+readTheme();
+requestAnimationFrame(paint);
+
+// For tests, and for whoever is curious in the console.
+globalThis.lab = {
+  get frame() { return frame; }, get news() { return news; }, get faults() { return faults; },
+  get ready() { return Boolean(relief.heights && cut.box); }, latencies, hand, probeState,
+};

@@ -1,0 +1,205 @@
+"""The server of the lab: the loop's frames to every page, and one page's wishes to the loop."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable, Coroutine
+from concurrent.futures import Executor
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+from websockets.asyncio.server import ServerConnection
+from websockets.exceptions import ConnectionClosed
+
+from asperity.devices import device_names
+from asperity.errors import ParameterError
+from asperity.files import plain
+from asperity.lab.access import MalformedError, Pace
+from asperity.lab.backdrop import Backdrop
+from asperity.lab.frames import frame, layout
+from asperity.lab.messages import Change, Look, Steer, Take, read_message
+from asperity.lab.session import Session
+from asperity.lab.stage import RANGES, Stage
+from asperity.laws import KNOWN_LAWS
+from asperity.servo.statistics import Statistics
+from asperity.textures.naming import KINDS
+
+EVERY = 5e-3
+"""[s] between two frames at least."""
+_LONGEST_SEND = 10.0  # [s] after which a page that takes nothing is let go
+_MOST_REASON = 120  # bytes that a closing frame holds, less its code
+
+
+class Page:
+    """A page that is connected.
+
+    Args:
+        line: its connection.
+
+    Attributes:
+        looks: pictures that it waits for, by kind: only the newest of each counts.
+        asked: is set when there is one.
+    """
+
+    def __init__(self, line: ServerConnection) -> None:
+        self.line = line
+        self.looks: dict[str, Look] = {}
+        self.asked = asyncio.Event()
+
+    async def say(self, what: str, **content: Any) -> None:
+        """Send words."""
+        with suppress(ConnectionClosed):
+            await self.line.send(json.dumps({"say": what, **plain(content)}))
+
+
+class Lab:
+    """A session and the pages that watch it.
+
+    Args:
+        stage: what is shown at first.
+        pictures: process for pictures, see ``workshop``.
+        limits: process for limits.
+    """
+
+    def __init__(self, stage: Stage, pictures: Executor, limits: Executor) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._pages: list[Page] = []
+        self._master: Page | None = None
+        self._changed = asyncio.Event()
+        self.session = Session(stage, self._tell)
+        self.backdrop = Backdrop(pictures, limits, self._announce)
+
+    def _tell(self) -> None:
+        """Hear of a change, in the session's thread."""
+        with suppress(RuntimeError):  # the server has ended
+            self._loop.call_soon_threadsafe(self._changed.set)
+
+    async def follow(self) -> None:
+        """Tell the pages what happens to the session, for ever."""
+        while True:
+            await self._changed.wait()
+            self._changed.clear()
+            if self.session.state == "running":
+                self.backdrop.show(self.session.stage.setup)
+            await self._announce()
+
+    async def welcome(self, line: ServerConnection) -> None:
+        """Serve a page until it goes."""
+        page = Page(line)
+        self._pages.append(page)
+        self._master = self._master or page
+        tasks: list[asyncio.Task[None]] = []
+        try:
+            await page.say("hello", **_hello())
+            await self._announce()
+            tasks = [
+                asyncio.create_task(_while_there(work, page))
+                for work in (self._frames, self._pictures)
+            ]
+            await self._listen(page)
+        except ConnectionClosed:
+            pass
+        finally:
+            for task in tasks:
+                task.cancel()
+            self._pages.remove(page)
+            if self._master is page:
+                self._master = None
+                await self._announce()
+
+    async def _listen(self, page: Page) -> None:
+        pace = Pace()
+        async for content in page.line:
+            try:
+                pace.count()
+                await self._obey(page, content)
+            except MalformedError as error:
+                await page.line.close(1008, str(error)[:_MOST_REASON])
+                return
+            except ParameterError as error:
+                await page.say("refused", words=str(error))
+
+    async def _obey(self, page: Page, content: str | bytes) -> None:
+        message = read_message(content)
+        if isinstance(message, Look):
+            page.looks[message.kind] = message
+            page.asked.set()
+        elif isinstance(message, Take):
+            if self._master is not None:
+                raise ParameterError("steering", "is done by a page: close that one first")
+            self._master = page
+            await self._announce()
+        elif self._master is not page:
+            raise ParameterError("steering", "is done by another page: this one watches")
+        elif isinstance(message, Steer):
+            self.session.wheel.steer(message.target, message.cosine, message.sine, message.speed)
+        elif isinstance(message, Change):
+            self.session.change(message.wishes)
+
+    async def _announce(self) -> None:
+        """Tell all pages how things stand."""
+        session, setup = self.session, self.session.stage.setup
+        low, high = map(float, setup.surface.texture.extremes)
+        news = {
+            "state": session.state, "words": session.words, "starts": session.starts,
+            "settings": session.stage.settings, "assumptions": setup.assumptions,
+            "free": self._master is None, "wishes": session.wheel.wishes,
+            "rate": 1.0 / setup.servo.period, "max_force": setup.servo.max_force,
+            "low": low, "high": high, "middle": session.stage.middle,
+            "limit": self.backdrop.limit, "version": self.backdrop.version,
+        }  # fmt: skip
+        for page in tuple(self._pages):
+            await page.say("news", steers=page is self._master, **news)
+
+    async def _frames(self, page: Page) -> None:
+        """Send the rows since the last frame, as fast as the page takes them."""
+        session, starts, seen = self.session, -1, 0
+        while True:
+            await asyncio.sleep(EVERY)
+            if session.shared is None:
+                continue
+            shared, heard = session.shared, session.wheel.heard
+            if session.starts != starts:
+                starts, seen = session.starts, max(shared.head - 1, 0)
+            rows, first = shared.rows(seen)
+            if not len(rows):
+                continue
+            seen = first + len(rows)
+            counted = Statistics.of(shared.status)
+            counts = {"heard": heard, "late": counted.late, "skipped": counted.skipped}
+            places = [self.backdrop.nearest(rows[-1, 1:4]), session.wheel.anchor]
+            async with asyncio.timeout(_LONGEST_SEND):
+                await page.line.send(frame(rows, first, counts, np.concatenate(places)))
+
+    async def _pictures(self, page: Page) -> None:
+        """Send the pictures that a page asks for."""
+        while True:
+            await page.asked.wait()
+            page.asked.clear()
+            for kind in tuple(page.looks):
+                if content := await self.backdrop.picture(page.looks.pop(kind)):
+                    await page.line.send(content)
+
+
+async def _while_there(work: Callable[[Page], Coroutine[Any, Any, None]], page: Page) -> None:
+    """Do something for a page until it goes, or takes nothing any more."""
+    try:
+        await work(page)
+    except ConnectionClosed:
+        return
+    except TimeoutError:
+        await page.line.close(1008, "the page does not take what it is sent")
+
+
+def _hello() -> dict[str, Any]:
+    laws = [
+        {"letter": law.letter, "name": law.name, "words": law.summary}
+        for law in KNOWN_LAWS.values()
+    ]
+    kinds = [name for name, kind in KINDS.items() if not kind.required]
+    return {
+        "layout": layout(), "laws": laws, "devices": device_names(), "textures": kinds,
+        "ranges": RANGES,
+    }  # fmt: skip

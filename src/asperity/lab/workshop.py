@@ -1,0 +1,112 @@
+"""Another process, which computes what the page shows around the loop: pictures and limits.
+
+They take from milliseconds to seconds, and compiling for them holds the interpreter: the process
+that sends the loop's frames must not wait for that.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from concurrent.futures import Executor, ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing.context import SpawnContext
+from typing import Any
+
+from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
+from asperity.analysis.passivity.allowed import allowed_stiffness
+from asperity.devices import Device
+from asperity.errors import AsperityError, ParameterError
+from asperity.lab.views import cut, relief
+from asperity.surface import Surface
+from asperity.textures.texture import Texture
+
+_SHOWN: dict[str, Surface] = {}
+# Behind the loop and the page, wherever they want to run.
+_NICENESS = 3
+
+
+def workshop() -> Executor:
+    """Return a process that waits for work, one piece at a time."""
+    return ProcessPoolExecutor(1, mp_context=SpawnContext(), initializer=_begin)
+
+
+def _begin() -> None:
+    # Ctrl-C goes to all processes of a terminal: the server decides how all ends.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if hasattr(os, "nice"):
+        os.nice(_NICENESS)
+
+
+@dataclass(frozen=True)
+class Sent:
+    """A surface on its way to the workshop, which knows the shipped laws by their letters.
+
+    Attributes:
+        texture: the texture.
+        law: letter of its law.
+        numbers: the other arguments of :class:`~asperity.surface.Surface`.
+    """
+
+    texture: Texture
+    law: str
+    numbers: dict[str, Any]
+
+    @classmethod
+    def of(cls, surface: Surface) -> Sent:
+        """Return a surface as it is sent."""
+        numbers = {name: getattr(surface, name) for name in ("stiffness", "max_depth", "clamp")}
+        parameters = dict(surface.law_parameters)
+        return cls(surface.texture, surface.law.letter, {**numbers, "law_parameters": parameters})
+
+    def surface(self) -> Surface:
+        """Return the surface.
+
+        Raises:
+            ParameterError: for a law of the user's own.
+        """
+        return Surface(self.texture, self.law, **self.numbers)
+
+
+def show(sent: Sent) -> bool:
+    """Take the surface that pictures are made of from now on, and compile what they need.
+
+    Returns:
+        Whether there will be pictures: not of a law of the user's own.
+    """
+    try:
+        surface = sent.surface()
+    except ParameterError:
+        return False
+    surface.texture.nearest([(0.0, 0.0, 0.0)])
+    _SHOWN["surface"] = surface
+    return True
+
+
+def picture(kind: str, numbers: tuple[float, ...]) -> bytes:
+    """Return a picture of the surface as a message; see ``views``.
+
+    Args:
+        kind: "relief" or "cut".
+        numbers: what it takes.
+    """
+    surface = _SHOWN["surface"]
+    if kind == "relief":
+        x, y, size = numbers
+        return relief(surface, x, y, size)
+    left, right, bottom, top, y = numbers
+    return cut(surface, (left, right, bottom, top, y))
+
+
+def limit(sent: Sent, device: Device) -> dict[str, Any]:
+    """Return up to which stiffness a device renders a surface, and by which criterion.
+
+    ``stiffness`` is [N/m], or nothing where no limit is known; ``q`` is the characteristic number.
+    """
+    try:
+        surface = sent.surface()
+        q = characteristic_number(surface)
+        allowed, _wall = allowed_stiffness(surface, device, q, one_sided_number(surface))
+    except AsperityError as error:
+        return {"stiffness": None, "basis": str(error), "q": None}
+    return {"stiffness": allowed.stiffness or None, "basis": allowed.basis, "q": q.value}

@@ -1,0 +1,190 @@
+"""The server without a browser: what it lets in, what it answers, and that the loop goes on."""
+
+from __future__ import annotations
+
+import json
+import socket
+from collections.abc import Callable
+from http.client import HTTPConnection
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.lab.started import Started
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from asperity.lab.access import MOST_BYTES
+from asperity.lab.frames import layout
+from asperity.lab.site import page_files
+
+LAYOUT = layout()
+STILL = {"cosine": [0, 0, 0], "sine": [0, 0, 0], "speed": 0}
+
+
+def joined(lab: Started, **more: Any) -> ClientConnection:
+    """Connect as the page does."""
+    options = {
+        "origin": f"http://{lab.host}",
+        "compression": None,
+        "max_size": None,
+        "proxy": None,
+        **more,
+    }
+    return connect(lab.address.replace("http", "ws") + "live", **options)
+
+
+def say(page: ClientConnection, what: str, **content: Any) -> None:
+    page.send(json.dumps({"do": what, **content}))
+
+
+def heard(page: ClientConnection, wanted: Callable[[Any], bool]) -> Any:
+    """Return the first message that is wanted: words as a dictionary, or numbers."""
+    while True:
+        content = page.recv(timeout=120)
+        message = json.loads(content) if isinstance(content, str) else np.frombuffer(content)
+        if wanted(message):
+            return message
+
+
+def news(**wanted: Any) -> Callable[[Any], bool]:
+    def fits(message: Any) -> bool:
+        if not isinstance(message, dict) or message["say"] != "news":
+            return False
+        known = {**message, **message["settings"]}
+        return all(known[name] == value for name, value in wanted.items())
+
+    return fits
+
+
+def refused(message: Any) -> bool:
+    return isinstance(message, dict) and message["say"] == "refused"
+
+
+def frames(message: Any) -> bool:
+    return isinstance(message, np.ndarray) and message[0] == 1.0
+
+
+def column(frame: Any, part: str, name: str) -> float:
+    return float(frame[LAYOUT[part] + LAYOUT["columns"][name]])
+
+
+def got(lab: Started, path: str, **headers: str) -> tuple[int, bytes, dict[str, str]]:
+    line = HTTPConnection(lab.host, timeout=60)
+    try:
+        line.request("GET", path, headers=headers)
+        answer = line.getresponse()
+        return answer.status, answer.read(), dict(answer.getheaders())
+    finally:
+        line.close()
+
+
+def test_the_page_comes_with_its_token_alone(lab: Started) -> None:
+    token = lab.address.split("/")[3]
+    status, content, headers = got(lab, f"/{token}/")
+    assert (status, content) == (200, page_files()["index.html"][1])
+    assert "default-src 'none'" in headers["Content-Security-Policy"]
+    assert got(lab, f"/{token}/lab.js")[0] == 200
+    for path in ("/", "/lab.js", "/wrong/", f"/{token}x/"):
+        assert got(lab, path)[0] == 403
+    assert got(lab, f"/{token}/", Host="evil.example")[0] == 403
+    for path in ("../server.py", "%2e%2e/server.py", "/etc/passwd", "nothing"):
+        assert got(lab, f"/{token}/{path}")[0] == 404
+
+
+def test_a_page_of_somebody_else_gets_no_live_connection(lab: Started) -> None:
+    for origin in ("http://evil.example", "null", None):
+        with pytest.raises(InvalidStatus, match="403"):
+            joined(lab, origin=origin)
+
+
+def test_it_listens_on_the_loopback_interface_alone(lab: Started) -> None:
+    port = int(lab.host.split(":")[1])
+    with socket.socket() as other:  # 127.0.0.2 is this machine, too, on another address
+        other.settimeout(5)
+        assert other.connect_ex(("127.0.0.2", port)) != 0
+
+
+def test_the_hand_is_steered_the_law_changes_and_the_loop_goes_on(lab: Started) -> None:
+    with joined(lab) as page:
+        first = heard(page, news(state="running"))
+        assert first["steers"]
+        assert first["settings"]["law"] == "C"
+        wish = first["wishes"] + 1
+        say(page, "steer", target=[1e-3, 0, -1e-3], **STILL)
+        frame = heard(page, lambda m: frames(m) and column(m, "newest", "applied z") > 0.1)
+        assert frame[LAYOUT["head"]["heard"]] == wish
+        assert column(frame, "greatest", "applied z") <= first["max_force"]
+        say(page, "change", wishes={"law": "W", "stiffness": 200.0})
+        changed = heard(page, news(state="running", law="W"))
+        assert changed["settings"]["stiffness"] == 200.0
+        assert changed["starts"] == first["starts"]
+        heard(page, lambda m: frames(m) and column(m, "newest", "share") == 1.0)
+        for wishes in ({"stiffness": 1e9}, {"colour": "red"}, {"law": "Q"}, {"texture": "/etc/x"},
+                       {"device": "x.toml"}, {"delay": -1}):  # fmt: skip
+            say(page, "change", wishes=wishes)
+            told = heard(page, lambda m: news(state="running")(m) and bool(m["words"]))
+            assert next(iter(wishes)) in told["words"]
+            assert told["settings"] == changed["settings"]
+        say(page, "steer", target=[9, 0, 0], **STILL)
+        assert "target" in heard(page, refused)["words"]
+
+
+def test_one_page_steers_and_others_watch(lab: Started) -> None:
+    with joined(lab) as first:
+        heard(first, news(steers=True))
+        with joined(lab) as second:
+            assert heard(second, news())["steers"] is False
+            heard(second, frames)
+            for what, content in (("steer", {"target": [0, 0, 0], **STILL}), ("take", {}),
+                                  ("change", {"wishes": {"law": "A"}})):  # fmt: skip
+                say(second, what, **content)
+                assert "steering" in heard(second, refused)["words"]
+            first.close()
+            heard(second, news(free=True))
+            say(second, "take")
+            heard(second, news(steers=True))
+
+
+@pytest.mark.parametrize(
+    ("content", "code"),
+    [("{}", 1008), (b"\x00\xff", 1008), ('{"do": "steer"}', 1008),
+     ('{"do": "take"}' + " " * MOST_BYTES, 1009)],
+)  # fmt: skip
+def test_a_malformed_frame_ends_the_connection_and_not_the_loop(
+    lab: Started, content: str | bytes, code: int
+) -> None:
+    with joined(lab) as page:
+        before = heard(page, frames)
+        page.send(content)
+        with pytest.raises(ConnectionClosed) as ended:
+            heard(page, lambda _message: False)
+    assert ended.value.rcvd is not None
+    assert ended.value.rcvd.code == code
+    assert ended.value.rcvd.reason
+    with joined(lab) as again:
+        assert heard(again, frames)[2] > before[2]
+
+
+def test_pictures_are_computed_elsewhere(lab: Started) -> None:
+    with joined(lab) as page:
+        version = heard(page, lambda m: news(state="running")(m) and m["version"] > 0)["version"]
+        assert version >= 1
+        say(page, "relief", x=0.0, y=0.0, size=0.008)
+        relief = heard(page, lambda m: isinstance(m, np.ndarray) and m[0] == 2.0)
+        heights = relief[5:].reshape(int(relief[1]), -1)
+        along = np.linspace(-4e-3, 4e-3, len(heights))
+        assert np.abs(heights[3] - 2e-4 * np.sin(2.0 * np.pi * along / 2e-3)).max() < 1e-12
+        say(page, "cut", box=[-1e-3, 1e-3, -1e-3, 1e-3], y=0.0)
+        cut = heard(page, lambda m: isinstance(m, np.ndarray) and m[0] == 3.0)
+        line, across, deep = map(int, cut[1:4])
+        assert len(cut) == 9 + line + 3 * across * deep
+        above = cut[9 + line :].reshape(3, deep, across)[:, -1]
+        assert (above == 0.0).all()
+
+
+def test_the_next_port_is_named_and_the_end_is_quiet(lab: Started) -> None:
+    port = lab.host.split(":")[1]
+    with pytest.raises(AssertionError, match=rf"port {port} cannot be had; \d+ is free"):
+        Started("--port", port)
+    assert lab.end() == (0, "")

@@ -1,0 +1,87 @@
+"""What is shown at first, and what the page may change of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from asperity.errors import ParameterError
+from asperity.lab.stage import SURFACE, Stage, make_stage
+from asperity.scene import load_scene
+from asperity.scene.template import scene_template
+
+
+@pytest.fixture(scope="module")
+def stage() -> Stage:
+    return make_stage(load_scene(SURFACE))
+
+
+@pytest.mark.parametrize(
+    "wishes",
+    [
+        {"law": "H"}, {"stiffness": 700.0}, {"max_depth": 1e-3},
+        {"texture": "grating:height=100um,period=3mm"}, {"law": "B", "stiffness": 50.0},
+    ],
+)  # fmt: skip
+def test_a_surface_changes_while_the_loop_runs(stage: Stage, wishes: dict[str, Any]) -> None:
+    changed = stage.changed(wishes)
+    assert not stage.restarts(changed)
+    assert {name: changed.settings[name] for name in wishes} == wishes
+
+
+@pytest.mark.parametrize(
+    "wishes",
+    [{"device": "premium-1.5"}, {"delay": 3}, {"hand_stiffness": 900.0}, {"hand_damping": 1.0}],
+)
+def test_device_delay_and_hand_take_another_loop(stage: Stage, wishes: dict[str, Any]) -> None:
+    changed = stage.changed({"law": "A", **wishes})
+    assert stage.restarts(changed)
+    assert changed.settings == {**stage.settings, "law": "A", **wishes}
+
+
+def test_several_wishes_come_together_in_any_order(stage: Stage) -> None:
+    one = stage.changed({"delay": 2, "device": "touch", "stiffness": 400.0})
+    other = stage.changed({"stiffness": 400.0, "device": "touch", "delay": 2})
+    assert one.settings == other.settings
+    assert one.settings["device"] == "touch"
+
+
+@pytest.mark.parametrize(
+    ("wishes", "words"),
+    [
+        ({"stiffness": 0.5}, "stiffness must be 1 to 20000"),
+        ({"stiffness": "many"}, "stiffness"),
+        ({"delay": 101}, "delay must be 0 to 100"),
+        ({"law": "Q"}, "law"),
+        ({"texture": "examples/demo.toml"}, "texture must be a kind"),
+        ({"texture": "/etc/passwd"}, "texture must be a kind"),
+        ({"texture": "file:path=/etc/passwd"}, "texture must be a kind"),
+        ({"device": "./mine.TOML"}, "device must be one of the catalogue"),
+        ({"colour": "red"}, "colour cannot be changed"),
+    ],
+)
+def test_what_cannot_be_is_refused(stage: Stage, wishes: dict[str, Any], words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        stage.changed(wishes)
+
+
+def test_a_scene_keeps_its_own_hand_and_law(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(scene_template())
+    shown = make_stage(load_scene(str(path)), str(path), {"stiffness": 123.0})
+    assert shown.settings["hand_stiffness"] == 300.0
+    assert shown.settings["stiffness"] == 123.0
+    assert shown.setup.servo.period == 1e-3
+    # Nobody is harmed, so what ends a real loop is only counted.
+    assert shown.setup.safety.beyond_depth == "warn"
+
+
+def test_a_surface_that_ends_is_felt_in_its_middle(tmp_path: Path) -> None:
+    from PIL import Image
+
+    path = tmp_path / "map.png"
+    Image.effect_noise((40, 30), 20.0).save(path)
+    scene = load_scene(str(path), {"pitch": 1e-4, "height_range": 1e-4})
+    assert make_stage(scene, str(path)).middle == pytest.approx((1.95e-3, 1.45e-3), abs=1e-4)
