@@ -14,11 +14,13 @@ from bench import (
     certificates,
     export,
     kernels,
+    lab,
     nearest,
     recording,
     servo,
     simulation,
     split,
+    startup,
     ticks,
     waiting,
 )
@@ -34,8 +36,10 @@ PARTS: dict[str, Callable[[Console], None]] = {
     "recording": recording.run,
     "servo": servo.run,
     "calibration": calibration.run,
+    "lab": lab.run,
     "export": export.run,
     "certificates": certificates.run,
+    "startup": startup.run,
     "waiting": waiting.run,
 }
 
