@@ -79,9 +79,9 @@ def own_cost(console: Console) -> None:
 def timekeeping(console: Console, seconds: float) -> None:
     """Print late samples at each rate, beside those of a loop in C that does nothing.
 
-    Both run at the same time, so that what else the machine does meets both.
+    Both run at the same time and on the same core, so that what else the machine does meets both.
     """
-    with compiled((HERE / "nanosleep.c").read_text()) as bare:
+    with compiled((HERE / "nanosleep.c").read_text()) as bare, one_core():
         for rate in RATES:
             words = [str(bare), str(round(1e9 / rate)), str(seconds)]
             counted, said = _loop(rate, seconds, words)
@@ -92,6 +92,17 @@ def timekeeping(console: Console, seconds: float) -> None:
                 f" {1e-3 * done[2]:.0f} µs; loop {counted.late} of {counted.samples}, worst"
                 f" {1e6 * counted.worst:.0f} µs; ratio {ratio:.2f} (goal: 1.1)"
             )
+
+
+@contextmanager
+def one_core() -> Iterator[None]:
+    """Keep this process, and those that it starts, on one core."""
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(cores)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, cores)
 
 
 def _loop(rate: float, seconds: float, beside: list[str]) -> tuple[Statistics, str]:

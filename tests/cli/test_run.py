@@ -89,16 +89,16 @@ def test_it_runs_and_says_what_it_did(call: Call, scene: Callable[..., str]) -> 
 def test_a_surface_alone_is_felt_as_a_comparison_recommends(call: Call, tmp_path: Path) -> None:
     wave = "sinusoid:amplitude=0.1mm,period=2mm"
     path = tmp_path / "run.mcap"
-    code, out, err = call(wave, "--device", "touch", "--law", "C", "--duration", "0.3s",
+    code, out, err = call(wave, "--device", "touch", "--law", "D", "--duration", "0.3s",
                           "--set", "update_rate=500Hz", "--record", str(path))  # fmt: skip
     assert code == 0, err
-    start = asp.compare(wave, device="touch", laws="C", clamp="backed").rows[0].start
+    start = asp.compare(wave, device="touch", laws="D", clamp="backed").rows[0].start
     words = " ".join(out.split())
-    assert f"Law C at {engineering(start, 'N/m')}, as asperity compare recommends" in words
-    assert "A simulated hand presses with" in words
+    assert f"Law D at {engineering(start, 'N/m')}, as asperity compare recommends" in words
+    assert "A simulated hand is pulled 160 µm deep" in words
     assert open_recording(path).rows > 100
     # What is given stays, and is judged.
-    code, _out, err = call(wave, "--device", "touch", "--law", "C", "--stiffness", "5000N/m")
+    code, _out, err = call(wave, "--device", "touch", "--law", "D", "--stiffness", "5000N/m")
     assert (code, "stiffness is refused: 5000 N/m is above the limit" in err) == (2, True)
 
 

@@ -17,9 +17,9 @@ from asperity.units import engineering
 ALONE_DURATION = 10.0
 """[s] for which a surface without a scene is felt, unless told otherwise."""
 _MASS = 0.1  # [kg] of a handle of which nobody says anything
-_HAND = {"stiffness": ["300 N/m", "300 N/m", "0 N/m"], "damping": "3 N*s/m", "mass": "50 g"}
+_SIDEWAYS, _HAND = "300 N/m", {"damping": "3 N*s/m", "mass": "50 g"}
 _STROKE, _SPEED = 10e-3, 0.05  # [m], [m/s]
-_DEEP = 0.5  # of max_depth, to which the hand presses
+_DEEP = 0.8  # of max_depth: no deeper the hand would go if there were no wall at all
 
 
 def with_mass(device: Device) -> tuple[Device, tuple[str, ...]]:
@@ -39,26 +39,29 @@ def hand_alone(
 ) -> tuple[dict[str, dict[str, Any]], str]:
     """Return sections [hand] and [motion] of a hand that strokes a surface, and what it does.
 
-    It presses with the force that takes the smooth wall to half of ``max_depth``, and goes to and
-    fro along the texture's scan line by 10 mm, at 50 mm/s, within a surface that ends.
+    A spring as stiff as the surface pulls it to a depth within ``max_depth``, so that it presses
+    about half as deep and stays in the depth that was analysed while the force comes in. It goes to
+    and fro along the texture's scan line by 10 mm, at 50 mm/s, within a surface that ends.
 
     Args:
         surface: which is felt.
         device: on which; a five-bar moves along x alone.
         duration: of the run [s].
     """
-    push = _DEEP * surface.stiffness * surface.max_depth
-    push = min(push, 0.3 * (device.value("max_force") or math.inf))
+    depth = _DEEP * surface.max_depth
+    height = surface.law.contact.extremes(surface.texture)[1] - depth
+    pull = min(surface.stiffness, 0.5 * (device.value("max_force") or math.inf) / depth)
     middle, way = _stroke(surface.texture, along_x=device.value(LINKS[0]) is not None)
-    ends = [[*(float(value) for value in middle + sign * way), 0.0] for sign in (-0.5, 0.5)]
+    ends = [[*(float(value) for value in middle + sign * way), height] for sign in (-0.5, 0.5)]
     length = float(np.hypot(*way))
     count = max(1, math.ceil(duration * _SPEED / length))
-    hand = {"kind": "spring", **_HAND, "force": ["0 N", "0 N", f"{-push!r} N"]}
+    hand = {"kind": "spring", **_HAND, "stiffness": [_SIDEWAYS, _SIDEWAYS, f"{pull!r} N/m"]}
     motion = {"kind": "strokes", "speed": f"{_SPEED} m/s", "count": count}
     for name, end in zip(("start", "end"), ends, strict=True):
         motion[name] = [f"{value!r} m" for value in end]
     words = (
-        f"A simulated hand presses with {engineering(push, 'N')} and strokes"
+        f"A simulated hand is pulled {engineering(depth, 'm')} deep by a spring of"
+        f" {engineering(pull, 'N/m')} and strokes"
         f" {engineering(length, 'm')} to and fro at {engineering(_SPEED, 'm/s')}"
     )
     return {"hand": hand, "motion": motion}, words
