@@ -20,7 +20,6 @@ from bench import (
     servo,
     simulation,
     split,
-    startup,
     ticks,
     waiting,
 )
@@ -39,7 +38,6 @@ PARTS: dict[str, Callable[[Console], None]] = {
     "lab": lab.run,
     "export": export.run,
     "certificates": certificates.run,
-    "startup": startup.run,
     "waiting": waiting.run,
 }
 

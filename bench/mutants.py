@@ -76,7 +76,8 @@ ROOMS = {
          "tests/kernels/test_interfaces.py", "tests/kernels/test_native.py",
          "tests/textures/test_sinusoid.py",
          "tests/test_surface.py", "tests/test_definition.py", "tests/test_cache.py",
-         "tests/kernels/test_batch_sine.py", "tests/analysis/test_taylor.py"),
+         "tests/kernels/test_batch_sine.py", "tests/kernels/test_block_loops.py",
+         "tests/analysis/test_taylor.py"),
     ),
     "passivity": Room(
         ("analysis/passivity", "analysis/judge_passivity.py"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -231,6 +232,50 @@ def test_an_entry_that_cannot_be_read_is_made_again() -> None:
     cache.keep(kept.ROOM, key, b"no pickle")
     assert kept.kept("letter", "content", lambda: "made") == "made"
     assert kept.kept("letter", "content", lambda: "again") == "made"
+
+
+def _full(*_arguments: Any, **_named: Any) -> None:
+    raise OSError(28, "No space left on device")
+
+
+def _read_only(*_arguments: Any, **_named: Any) -> None:
+    raise PermissionError(13, "Permission denied")
+
+
+def _flipped(content: bytes) -> bytes:
+    return content[:-1] + bytes([content[-1] ^ 16])
+
+
+def _of_another_build(_content: bytes) -> Any:
+    raise AttributeError("a class that this version does not have")
+
+
+@pytest.mark.parametrize("trouble", ["full", "read-only", "damaged", "another version"])
+def test_a_comparison_is_the_same_whatever_ails_its_cache(
+    trouble: str, folder: Path, fresh: Callable[[Kept], Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every number of every row comes all the same, and one note, however many entries it is."""
+    ask = lambda: json_text(compare(WAVE, laws="WAD"))  # noqa: E731 - asked again
+    right = fresh(ask)
+    if trouble in ("full", "read-only"):
+        broken = _full if trouble == "full" else _read_only
+        monkeypatch.setattr(cache, "whole_file", broken)
+    else:
+        assert ask() == right
+    entries = [path for path in folder.rglob("*") if path.is_file()]
+    assert bool(entries) == (trouble in ("damaged", "another version"))
+    if trouble == "damaged":
+        for path in entries:
+            path.write_bytes(_flipped(path.read_bytes()))
+    elif trouble == "another version":
+        monkeypatch.setattr(kept.pickle, "loads", _of_another_build)
+    cache._say.cache_clear()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        assert ask() == right
+    notes = [str(one.message) for one in said if one.category is cache.CacheWarning]
+    assert len(notes) == 1, notes
+    assert ("cannot be written" if trouble in ("full", "read-only") else "damaged") in notes[0]
 
 
 def test_what_has_no_content_is_refused() -> None:

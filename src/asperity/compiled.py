@@ -38,6 +38,8 @@ class Kernels:
         requires: functions that it calls and does not define.
         loops: functions for Python.
         called: functions that are too large to be copied to every place that calls them.
+        shared: functions that are as large, and compiled once for all modules that call them, each
+            with what it calls: see :func:`asperity.kernels.link.link_parts`.
         merged: functions that are made one with their caller before they compile, where something
             iterates: the compiler optimises everything again at each level of a chain of calls.
         native: functions of :mod:`asperity.kernels.native` that it calls.
@@ -49,6 +51,7 @@ class Kernels:
     requires: tuple[str, ...] = ()
     loops: tuple[str, ...] = ()
     called: tuple[str, ...] = ()
+    shared: tuple[str, ...] = ()
     merged: tuple[str, ...] = ()
     native: tuple[str, ...] = ()
     iterates: bool = False

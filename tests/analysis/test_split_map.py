@@ -12,7 +12,7 @@ import pytest
 
 import asperity as asp
 from asperity.analysis.split.state import split_state
-from asperity.contacts.split import conditions, solver
+from asperity.contacts.split import answers, conditions, solver
 from asperity.surface import Surface
 from asperity.textures.heightmap import HeightMap
 from asperity.textures.texture import Texture
@@ -126,7 +126,7 @@ def test_the_plain_solver_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> Non
     for p, force, jacobian in zip(
         points, surface.force(points), surface.jacobian(points), strict=True
     ):
-        *pull, xx, xy, xz, yy, yz, zz = solver.split_derivative(*p.tolist(), 2.0, None)
+        *pull, xx, xy, xz, yy, yz, zz = answers.split_derivative(*p.tolist(), 2.0, None)
         np.testing.assert_allclose(K * np.array(pull), force, rtol=0, atol=1e-12 * K)
         matrix = K * np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         np.testing.assert_allclose(matrix, jacobian, rtol=0, atol=1e-6 * K)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 import pytest
@@ -12,7 +15,7 @@ from tests.exported import STRICT, run, tool
 
 import asperity as asp
 from asperity.content import surface_content
-from asperity.export import c99
+from asperity.export import c99, writing
 
 Call = Callable[..., tuple[int, str, str]]
 WAVE = "sinusoid:amplitude=0.2mm,period=2mm"
@@ -54,7 +57,7 @@ def test_the_comment_says_what_it_is(call: Call, tmp_path: Path) -> None:
     call("export", WAVE, "--law", "C", "--device", "touch", "-o", str(tmp_path / "t.h"))
     said = (tmp_path / "t.h").read_text().split("#ifndef")[0]
     for words in ("f = k δ w", "closed form", "backed", "Touch", asp.__version__, "0 J per period",
-                  "every depth", "period = 0.002"):  # fmt: skip
+                  "every depth", "period = 0.002", "heights -200 µm to 200 µm"):  # fmt: skip
         assert words in said, words
 
 
@@ -122,6 +125,29 @@ def test_large_data_stand_beside_the_header(call: Call, large: Path, tmp_path: P
     assert code == 2
     assert err == f"asperity: output exists: {source}; --force replaces it\n"
     assert not target.exists()
+
+
+def test_a_full_disk_leaves_nothing(
+    call: Call, large: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The header alone would be there, and not compile."""
+    folder = tmp_path / "full"
+    folder.mkdir()
+    whole = writing.whole_file
+
+    @contextmanager
+    def short(path: Path) -> Iterator[IO[bytes]]:
+        with whole(path) as stream:
+            if path.suffix == ".c":
+                raise OSError(errno.ENOSPC, "No space left on device")
+            yield stream
+
+    monkeypatch.setattr(writing, "whole_file", short)
+    options = ("--pitch", "0.2mm", "--law", "B", "-o", str(folder / "m.h"))
+    code, _out, err = call("export", str(large), *options)
+    assert code == 2
+    assert err.startswith("asperity: output cannot be written: No space left on device")
+    assert not list(folder.iterdir())
 
 
 def test_too_much_data_says_what_fits(call: Call, large: Path, tmp_path: Path) -> None:

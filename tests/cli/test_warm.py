@@ -14,7 +14,7 @@ from asperity.laws import LAWS
 
 def compiled() -> tuple[dict[Path, bytes], list[str]]:
     """Return what is kept after a run in which nothing is loaded yet, and what was said."""
-    for loaded in (fuse.load_fused, fuse.fuse_surface, fuse.fuse_sampler, fuse.fuse_contact):
+    for loaded in (fuse._loaded, fuse.fuse_surface, fuse.fuse_sampler, fuse.fuse_contact):
         loaded.cache_clear()
     said: list[str] = []
     name = "sinusoids"

@@ -62,6 +62,25 @@ def test_the_depth_grows_on_the_way_inwards(letter: str) -> None:
         np.testing.assert_allclose(contact.depth(WAVES, above), -3e-6, rtol=1e-6)
 
 
+def test_how_large_and_how_far_aside_the_coordinates_of_a_contact_are() -> None:
+    """What the depth is a difference of, and where the point may lie."""
+    xy = np.array([0.3, -4.0])
+    for letter, size, aside in (
+        ("A", 0.7, 0.0),
+        ("W", 0.0, 0.0),
+        ("D", 4.7, 2e-3),
+        ("H", 4.7, 2e-3),
+    ):
+        contact = LAWS[letter].contact
+        assert contact.coordinate_size(xy, -0.7) == pytest.approx(size, rel=1e-15)
+        assert contact.margin(2e-3) == aside
+        assert contact.costly == (letter in "DH")
+    slopes = np.array([[0.5, 0.3, -0.4], [0.1, 0.0, 0.0]])
+    for letter, deep in (("A", [0.7, 0.3]), ("W", [0.2, 0.2]), ("D", [0.7 * 1.25**0.5, 0.3])):
+        found = LAWS[letter].contact.greatest_depth(-0.2, slopes)
+        np.testing.assert_allclose(found, deep, rtol=1e-14)
+
+
 def test_the_exact_foot_is_one_in_all_its_digits() -> None:
     """Where ∇φ = 0, to far more digits than the kernels' own foot, from which it starts."""
     with mpmath.workdps(60):

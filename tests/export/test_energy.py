@@ -51,10 +51,10 @@ def test_the_energy_of_a_texture_kind_of_its_own_solver(
     made = library(tmp_path, "gcc", {"h": header(surface, "h")}, "-O1")
     at = np.array([[1e-4, 2e-4, -3e-4], [3e-4, -2e-4, -1e-4], [0.0, 0.0, 5e-3]])
     split = np.empty((3, 3))
-    from asperity.contacts.split import conditions, solver
+    from asperity.contacts.split import answers, conditions, solver
     from asperity.kernels.fuse import fuse_on_texture
 
-    loops = fuse_on_texture(surface.law, texture.sampler, "none", (solver,), (conditions,))
+    loops = fuse_on_texture(surface.law, texture.sampler, "none", (answers,), (solver, conditions))
     loops.split_batch(at, split, surface.continuity, texture.arguments)
     np.testing.assert_array_equal(energies(made, "h", at), surface.stiffness * split[:, 0])
 

@@ -43,5 +43,7 @@ def test_float_throughout(make_texture: Callable[[str], Texture]) -> None:
     text = header(Surface(make_texture("map"), "D"), "t", "float")
     code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL).split("typedef struct t_state")[1]
     assert "double" not in code
+    assert "1.1920929e-07f" in code  # where iterations end
+    assert "2.220446e-16f" not in code
     assert not re.search(r"\b(sqrt|sin|cos|fabs|copysign)\(", code)
     assert not re.search(r"\d\.\d+(e-?\d+)?(?![\dfe])", code)

@@ -71,10 +71,10 @@ def test_an_angle_without_meaning_has_a_sine_between_the_crests(angle: float) ->
 def compiled_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """No kept code: code from the cache cannot be looked at."""
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
-    fuse.load_fused.cache_clear()
+    fuse._loaded.cache_clear()
     fuse.fuse_surface.cache_clear()
     yield
-    fuse.load_fused.cache_clear()
+    fuse._loaded.cache_clear()
     fuse.fuse_surface.cache_clear()
 
 

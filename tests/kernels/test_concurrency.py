@@ -15,6 +15,7 @@ import pytest
 
 from asperity.compiled import Kernels
 from asperity.kernels import link
+from asperity.kernels.fuse import load_fused
 
 _SCRIPT = """
 import json, multiprocessing, sys
@@ -78,3 +79,11 @@ def test_threads_that_ask_at_once_get_one_unit(monkeypatch: pytest.MonkeyPatch) 
         found = list(pool.map(link.module_unit, [module] * 8))
     assert {id(unit) for unit in found} == {id(link.module_unit(module))}
     assert list(found[0].texts) == ["height"]
+
+
+def test_threads_that_load_at_once_get_one_module() -> None:
+    """Of two with one name, kept code would belong to the one that was made last."""
+    source = "import time\n\ntime.sleep(0.05)  # the others come meanwhile\n"
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(load_fused, [source] * 8))
+    assert {id(module) for module in found} == {id(sys.modules[found[0].__name__])}

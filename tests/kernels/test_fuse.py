@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections import namedtuple
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -23,9 +24,9 @@ Check = Callable[..., Any]
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An empty cache folder."""
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path / "cache"))
-    fuse.load_fused.cache_clear()
+    fuse._loaded.cache_clear()
     yield tmp_path / "cache"
-    fuse.load_fused.cache_clear()
+    fuse._loaded.cache_clear()
 
 
 LOOP = """
@@ -47,7 +48,7 @@ def test_a_second_load_compiles_nothing(cache: Path):
     assert first(3.0) == 6.0
     assert sum(first.stats.cache_misses.values()) == 1
     assert len([path for path in cache.rglob("*") if path.is_file()]) == 1
-    fuse.load_fused.cache_clear()
+    fuse._loaded.cache_clear()
     again = fuse.load_fused(LOOP).twice
     assert again(3.0) == 6.0
     assert not again.stats.cache_misses
@@ -60,7 +61,7 @@ def test_changed_code_is_compiled_anew_and_said(cache: Path):
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 16
     path.write_bytes(content)
-    fuse.load_fused.cache_clear()
+    fuse._loaded.cache_clear()
     checked._say.cache_clear()
     again = fuse.load_fused(LOOP).twice
     with pytest.warns(checked.CacheWarning, match="damaged entries"):
@@ -71,7 +72,7 @@ def test_changed_code_is_compiled_anew_and_said(cache: Path):
 @pytest.mark.usefixtures("cache")
 def test_code_of_another_build_is_compiled_anew(monkeypatch: pytest.MonkeyPatch):
     fuse.load_fused(LOOP).twice(3.0)
-    fuse.load_fused.cache_clear()
+    fuse._loaded.cache_clear()
     checked._say.cache_clear()
 
     def refuse(*_arguments: object) -> None:
@@ -172,3 +173,24 @@ def test_a_law_that_looks_at_the_position_is_given_it(interpreted: Check):
     np.testing.assert_allclose(force[:, 2], 700.0 * depths * gain, rtol=1e-12)
     np.testing.assert_allclose(jacobian[:, 2], expected, rtol=1e-11)
     assert not jacobian[:, :2].any()
+
+
+RECORD = """
+from numba import njit
+from asperity.kernels.code_store import keep_code
+@keep_code(njit)
+def first(record):
+    return record.a + 0.0 * record.b
+"""
+
+
+@pytest.mark.usefixtures("cache")
+@pytest.mark.parametrize("fields", ["b a", "a b"])
+def test_code_for_a_record_of_other_fields_is_not_taken(fields: str):
+    """Of a name that is defined again, in the same order or in another."""
+    record = namedtuple("Record", "a b")
+    assert fuse.load_fused(RECORD).first(record(1.0, 2.0)) == 1.0
+    fuse._loaded.cache_clear()
+    other = namedtuple("Record", fields)
+    again = fuse.load_fused(RECORD).first
+    assert again(other(a=1.0, b=2.0)) == 1.0

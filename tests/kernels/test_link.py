@@ -61,7 +61,7 @@ def disagreements(module: ModuleType) -> list[str]:
     faults = [f"requires {name}" for name in others ^ {*kernels.requires, *kernels.native}]
     faults += [f"offers {name}" for name in offered - defined]
     faults += [f"hides {name}" for name in defined - own - offered]
-    hinted = {*kernels.called, *kernels.merged}
+    hinted = {*kernels.called, *kernels.shared, *kernels.merged}
     return faults + [f"hints {name}" for name in hinted - defined]
 
 

@@ -109,4 +109,7 @@ def command(
     order = Order(analysis.surface, note=note, q_upper=upper, shared=shared, **asked)
     files = write_files(place, target, order, force=force)
     click.echo(f"Written: {', '.join(printable(file) for file in files)}")
+    sources = [file.name for file in files if file.name.endswith("_data.c")]
+    if sources:
+        click.echo(f"To be compiled with the program: {printable(sources[0])}")
     click.echo(f"{order.name}_force() is law {analysis.surface.law}. {analysis.answer}")

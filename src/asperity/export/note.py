@@ -6,11 +6,14 @@ import math
 import sys
 import textwrap
 
+import numpy as np
+
 import asperity
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.words.surface import depths, most_gained
 from asperity.laws import Law
+from asperity.textures.texture import Texture
 from asperity.units import engineering
 
 _WIDTH = 92
@@ -62,6 +65,7 @@ def _facts(analysis: Analysis) -> list[str]:
     parameters = "".join(f", {name} = {value:g}" for name, value in surface.law_parameters.items())
     rows = {
         "surface": ", ".join(f"{k} = {_plain(v)}" for k, v in surface.texture.describe().items()),
+        "place": _place(surface.texture),
         "device": analysis.device.name,
         "stiffness": f"k = {engineering(surface.stiffness, 'N/m')}{parameters}",
         "region": f"{surface.texture.domain.description}, {depths(surface)}",
@@ -76,9 +80,26 @@ def _facts(analysis: Analysis) -> list[str]:
     return lines
 
 
+def _place(texture: Texture) -> str:
+    """Return where the surface is: its heights, and one copy of it in the plane."""
+    low, high = (engineering(height, "m") for height in texture.extremes)
+    parts = [f"heights {low} to {high}"]
+    if len(texture.domain.spans) > 1:
+        corners = texture.domain.points(np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]]))
+        for axis, values in zip("xy", corners.T, strict=True):
+            ends = (engineering(float(end), "m") for end in (values.min(), values.max()))
+            parts.append(f"{axis} {' to '.join(ends)}")
+    return ", ".join(parts)
+
+
 def _plain(value: object) -> str:
     """Return a value of a description in short: lists are long, and in the data."""
-    text = f"{value:g}" if isinstance(value, float) else str(value)
+    if isinstance(value, list):
+        return _cut(f"[{', '.join(map(_plain, value))}]")
+    return _cut(f"{value:g}" if isinstance(value, float) else str(value))
+
+
+def _cut(text: str) -> str:
     return text if len(text) <= _WIDTH else f"{text[:40]} ..."
 
 
@@ -93,6 +114,8 @@ def _clamp(analysis: Analysis) -> str:
 def _bound(bound: Bound) -> str:
     if math.isfinite(bound.upper):
         return f"between {bound.lower:.6g} and {bound.upper:.6g} ({bound.method})"
+    if math.isinf(bound.lower):
+        return f"unbounded ({bound.method})"
     return f"at least {bound.lower:.6g}, no upper bound ({bound.method})"
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from contextlib import ExitStack
 from pathlib import Path
 
 from asperity.errors import ParameterError, printable
 from asperity.export.order import Order
 from asperity.export.targets import Target
-from asperity.files import write_text
+from asperity.files import whole_file
 
 
 def refuse_existing(path: Path, names: Mapping[str, str]) -> None:
@@ -58,8 +59,11 @@ def write_files(
     if not force:
         refuse_existing(place, files)
     try:
-        for name, text in files.items():
-            write_text(place.parent / name, text)
+        with ExitStack() as written:
+            for name, text in files.items():
+                stream = written.enter_context(whole_file(place.parent / name))
+                stream.write(text.encode())
+                stream.flush()
     except OSError as error:
         raise ParameterError("output", f"cannot be written: {error.strerror}", str(path)) from None
     return [place.parent / name for name in files]

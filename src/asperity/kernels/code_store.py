@@ -15,7 +15,7 @@ from typing import Any
 
 import llvmlite  # type: ignore[import-untyped]  # it has no types
 import numba
-from numba.core import caching, compiler, serialize
+from numba.core import caching, compiler, serialize, types
 
 from asperity.cache import cache_folder, keep, recall, set_aside
 from asperity.compiled import LISTENERS
@@ -24,6 +24,7 @@ ROOM = "code"
 # Numba is untyped.
 _COMPILED: Any = compiler.CompileResult
 _serialize: Any = serialize.dumps
+_TUPLES: Any = types.BaseTuple
 
 
 class CodeStore(caching._Cache):
@@ -65,10 +66,12 @@ class CodeStore(caching._Cache):
         if content is None:
             return None
         try:
-            return _COMPILED._rebuild(target_context, *pickle.loads(content))
+            found = _COMPILED._rebuild(target_context, *pickle.loads(content))
         except Exception:  # whole, but of another build of Numba: whatever it raises, compile
             set_aside(ROOM, key)
             return None
+        # A record that was defined again has the same name: code for the former one is not its.
+        return found if tuple(found.signature.args) == tuple(sig) else None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled overload."""
@@ -77,8 +80,15 @@ class CodeStore(caching._Cache):
     def _key(self, sig: Any, codegen: Any) -> str:
         """Return all that the machine code depends on: source, types, processor, versions."""
         versions = (sys.version, numba.__version__, llvmlite.__version__, sys.byteorder)
-        said = (self._function.__module__, self._function.__name__, str(sig))
+        taken = (str(sig), *map(_fields, sig))
+        said = (self._function.__module__, self._function.__name__, taken)
         return repr((*said, codegen.magic_tuple(), *versions))
+
+
+def _fields(kind: Any) -> tuple[Any, ...]:
+    """Return the names in a record, in order: code knows them by their places."""
+    names = tuple(getattr(kind, "fields", ()))
+    return (*names, *map(_fields, kind.types)) if isinstance(kind, _TUPLES) else names
 
 
 def keep_code(decorator: Callable[..., Any]) -> Callable[..., Any]:

@@ -1,7 +1,9 @@
 """Compiled modules: law, texture sampler and loops fused into one source, then compiled.
 
 A fused module is made in memory and named after its content; the machine code of its loops is kept
-in the cache, :mod:`asperity.kernels.code_store`: a second process compiles nothing.
+in the cache, :mod:`asperity.kernels.code_store`: a second process compiles nothing. So is the code
+of large functions that many loops call, such as the search for a nearest point: each is a module of
+its own, compiled once for all laws on a kind of texture.
 """
 
 from __future__ import annotations
@@ -9,17 +11,21 @@ from __future__ import annotations
 import hashlib
 import linecache
 import sys
-from collections.abc import Sequence
-from functools import lru_cache, partial
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache, lru_cache, partial
+from threading import Lock
 from types import ModuleType
 
 from asperity.contacts.sampler import OFFERED
+from asperity.derive.facts import law_facts
 from asperity.derive.shipped import generated_path
 from asperity.errors import ParameterError
 from asperity.kernels.link import (
     MissingFunctionError,
     Unit,
     link,
+    link_parts,
     loops_of,
     module_unit,
     written_unit,
@@ -40,16 +46,18 @@ import numpy as np
 from numba import njit
 
 from asperity.kernels.code_store import keep_code
+from asperity.kernels.ingredients import IngredientCompiler
 
 # Nothing allocates, so nothing is counted: counting references to the arrays of a texture at every
 # call costs more than the arithmetic. Only the loops are called from Python; the others need no
 # wrapper, a fifth of the compile time.
 plain = dict(error_model="numpy", _nrt=False)
 internal = dict(**plain, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-scalar = njit(**internal)
-inlined = njit(**internal, forceinline=True)
+scalar = njit(**internal, pipeline_class=IngredientCompiler)
+inlined = njit(**internal, forceinline=True, pipeline_class=IngredientCompiler)
 merged = njit(error_model="numpy", inline="always")
 loop = keep_code(njit(**plain, nogil=True))
+shared = keep_code(njit(**internal))
 
 
 '''
@@ -98,11 +106,24 @@ def fuse_surface(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) ->
     Raises:
         ParameterError: for a texture that lacks what the law looks at.
     """
-    from asperity.kernels import anchored_loops, batch_sine, probe_loops
+    from asperity.kernels import anchored_loops, batch_sine, block_loops, probe_loops
 
+    blocks = tuple(m for m in sampler if "sample_block" in module_unit(m).kernels.provides)
+    if blocks and _samples_at_probe(law):
+        return fuse_on_texture(law, sampler, clamp, (block_loops,), instead=(batch_sine, *blocks))
     loops = anchored_loops if law.stateful else probe_loops
     asking = (loops, *law.contact.kernels())
     return fuse_on_texture(law, sampler, clamp, asking, instead=(batch_sine,))
+
+
+def _samples_at_probe(law: Law) -> bool:
+    """Return whether a law asks the texture for what it is above or below the probe, and no more.
+
+    Then points can be sampled before the law is asked.
+    """
+    contact = law.contact
+    asks = contact.begins_on_texture or law_facts(law).looks_at_surface
+    return asks and contact.above_probe and not (law.stateful or contact.kernels())
 
 
 @lru_cache(maxsize=256)
@@ -121,15 +142,7 @@ def fuse_on_texture(
     further: tuple[ModuleType, ...] = (),
     instead: tuple[ModuleType, ...] = (),
 ) -> ModuleType:
-    """Return the loops of modules compiled that ask a sampler, a law and further modules.
-
-    Args:
-        law: the law.
-        sampler: the modules whose functions make up the sampler.
-        clamp: the depth clamp.
-        asking: the modules with the loops.
-        further: what they ask besides.
-        instead: modules whose functions are taken instead of those of that name elsewhere.
+    """Return the module that :func:`source_on_texture` writes, compiled.
 
     Raises:
         ParameterError: for a texture that lacks what is asked of it.
@@ -145,12 +158,28 @@ def source_on_texture(
     further: tuple[ModuleType, ...] = (),
     instead: tuple[ModuleType, ...] = (),
 ) -> str:
-    """Return the text of such a module, which another process can load; see above."""
+    """Return the text of a module of loops that ask a sampler, a law and further modules.
+
+    Another process can load it, see :func:`load_fused`.
+
+    Args:
+        law: the law.
+        sampler: the modules whose functions make up the sampler.
+        clamp: the depth clamp.
+        asking: the modules with the loops.
+        further: what they ask besides.
+        instead: modules whose functions are taken instead of those of that name elsewhere.
+
+    Raises:
+        ParameterError: for a texture that lacks what is asked of it.
+    """
     units = tuple(map(module_unit, asking))
     brought = (*units, *map(module_unit, (*law.contact.kernels(), *further)))
     first = tuple(map(module_unit, instead))
-    source = link_on_texture(law, sampler, clamp, loops_of(*units), brought, first)
-    return _head(f"Law {law} on {sampler[0].__name__}.", source) + source
+    at_hand = _at_hand(law, sampler, clamp, brought, first)
+    title = f"Law {law} on {sampler[0].__name__}."
+    with _naming(law, sampler):
+        return _assembled(title, loops_of(*units), at_hand)
 
 
 def link_on_texture(
@@ -168,13 +197,29 @@ def link_on_texture(
     Raises:
         ParameterError: for a texture that lacks what is asked of it.
     """
-    modules = tuple(map(module_unit, sampler))
-    at_hand = dict.fromkeys((*instead, *modules, *law_units(law, clamp), *further))
+    with _naming(law, sampler):
+        return link(roots, _at_hand(law, sampler, clamp, further, instead))
+
+
+def _at_hand(
+    law: Law,
+    sampler: tuple[ModuleType, ...],
+    clamp: ClampName,
+    further: Sequence[Unit],
+    instead: Sequence[Unit],
+) -> tuple[Unit, ...]:
+    modules = map(module_unit, sampler)
+    return tuple(dict.fromkeys((*instead, *modules, *law_units(law, clamp), *further)))
+
+
+@contextmanager
+def _naming(law: Law, sampler: tuple[ModuleType, ...]) -> Iterator[None]:
+    """Say of a texture that lacks a function which it is and who needs it."""
     try:
-        return link(roots, tuple(at_hand))
+        yield
     except MissingFunctionError as missing:
         who = f"which law {law} on the {law.contact} contact needs"
-        raise _lacking(missing, modules, who) from None
+        raise _lacking(missing, tuple(map(module_unit, sampler)), who) from None
 
 
 def _lacking(missing: MissingFunctionError, modules: Sequence[Unit], who: str) -> ParameterError:
@@ -193,8 +238,8 @@ def fuse_contact(law: Law) -> ModuleType:
     plan = ProbePlan(law, kernel_source(law), "none")
     loop = module_unit(contact_loop)
     given = written_unit(f"law {law} at a contact", contact_source(plan))
-    source = link(loops_of(loop), (loop, given, *law_units(law, "none")))
-    return load_fused(_head(f"Law {law} at contacts.", source) + source)
+    at_hand = (loop, given, *law_units(law, "none"))
+    return load_fused(_assembled(f"Law {law} at contacts.", loops_of(loop), at_hand))
 
 
 @lru_cache(maxsize=256)
@@ -213,8 +258,8 @@ def fuse_module(module: ModuleType, *helpers: ModuleType) -> ModuleType:
 def source_of_module(module: ModuleType, *helpers: ModuleType) -> str:
     """Return the text of such a module, which another process can load."""
     unit = module_unit(module)
-    source = link(loops_of(unit), (unit, *map(module_unit, helpers)))
-    return _head(f"{module.__name__}.", source) + source
+    at_hand = (unit, *map(module_unit, helpers))
+    return _assembled(f"{module.__name__}.", loops_of(unit), at_hand)
 
 
 @lru_cache(maxsize=64)
@@ -237,8 +282,7 @@ def fuse_sampler(sampler: tuple[ModuleType, ...], *further: ModuleType) -> Modul
             served.append(loop)
         except MissingFunctionError as missing:
             refused[loop[0]] = _lacking(missing, modules, "which is asked of it")
-    source = link(served, at_hand)
-    module = load_fused(_head(f"Texture {sampler[0].__name__}.", source) + source)
+    module = load_fused(_assembled(f"Texture {sampler[0].__name__}.", served, at_hand))
     vars(module).update({name: partial(_refuse, error) for name, error in refused.items()})
     return module
 
@@ -247,18 +291,48 @@ def _refuse(error: ParameterError, *_arguments: object) -> None:
     raise error
 
 
+_NEXT = "\n# --- the next module ---\n"
+
+
+def _assembled(title: str, loops: Sequence[tuple[str, Unit]], at_hand: Sequence[Unit]) -> str:
+    """Return the texts of modules: those of shared functions, and after them the one of loops."""
+    texts: list[str] = []
+    homes: dict[str, str] = {}
+    for part in link_parts(loops, at_hand):
+        taken = "".join(f"from {homes[name]} import {name}\n" for name in part.borrows)
+        texts.append(_head(part.title or title, part.source) + taken + part.source)
+        homes[part.name] = _module_name(texts[-1])
+    return _NEXT.join(texts)
+
+
 def _head(title: str, source: str) -> str:
     local = "from asperity.kernels.stack_memory import local_array\n\n"
     return _HEADER.format(title=title) + (local if "local_array(" in source else "")
 
 
-@lru_cache(maxsize=256)
+def _module_name(text: str) -> str:
+    """Return the name of a module after its content, and so after that of what it borrows."""
+    return f"asperity_fused_{hashlib.sha256(text.encode()).hexdigest()[:32]}"
+
+
+_LOADING = Lock()
+
+
 def load_fused(source: str) -> ModuleType:
-    """Return a fused module; the machine code of its loops is kept between runs."""
-    module = ModuleType(f"asperity_fused_{hashlib.sha256(source.encode()).hexdigest()[:32]}")
+    """Return a fused module, one and the same whichever thread asks.
+
+    The machine code of its loops, and of what they borrow, is kept between runs.
+    """
+    with _LOADING:
+        return [_loaded(text) for text in source.split(_NEXT)][-1]
+
+
+@cache
+def _loaded(text: str) -> ModuleType:
+    module = ModuleType(_module_name(text))
     module.__file__ = f"<{module.__name__}>"
     # For tracebacks, and for whoever wants to read what was compiled.
-    linecache.cache[module.__file__] = (len(source), None, source.splitlines(True), module.__file__)
+    linecache.cache[module.__file__] = (len(text), None, text.splitlines(True), module.__file__)
     sys.modules[module.__name__] = module  # kept code names the module that it belongs to
-    exec(compile(source, module.__file__, "exec"), vars(module))
+    exec(compile(text, module.__file__, "exec"), vars(module))
     return module

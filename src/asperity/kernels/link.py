@@ -72,6 +72,8 @@ class Unit:
         kernels = self.kernels
         if name in kernels.loops:
             return "@loop"
+        if name in kernels.shared:
+            return "@shared"
         if iterates:
             return "@merged" if name in kernels.merged else "@scalar"
         return "@scalar" if name in kernels.called else "@inlined"
@@ -155,16 +157,84 @@ def link(loops: Sequence[tuple[str, Unit]], at_hand: Sequence[Unit]) -> str:
         MissingFunctionError: for a function that is required and not provided.
         ParameterError: for two functions of one name that are both needed.
     """
+    return _text(_needed(loops, at_hand, whole=True)[0], at_hand)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A piece of a program that is compiled on its own.
+
+    Attributes:
+        title: the function that it is made for, and its module; empty for the loops.
+        name: of that function.
+        source: its functions.
+        borrows: the functions of earlier parts that it calls.
+    """
+
+    title: str
+    name: str
+    source: str
+    borrows: tuple[str, ...]
+
+
+def link_parts(loops: Sequence[tuple[str, Unit]], at_hand: Sequence[Unit]) -> list[Part]:
+    """Return the same in parts: every shared function in one of its own, the loops in the last.
+
+    A part comes after those that it borrows from, and is the same text whoever borrows from it.
+
+    Raises:
+        MissingFunctionError: see :func:`link`.
+        ParameterError: see :func:`link`; for a shared function that calls itself by way of others.
+    """
+    owners: dict[str, Unit] = {}
+    parts: dict[str, Part] = {}
+
+    def add(roots: Sequence[tuple[str, Unit]], title: str, name: str) -> None:
+        taken, borrowed = _needed(roots, at_hand, whole=False)
+        for callee, unit in borrowed.items():
+            if callee not in owners:
+                owners[callee] = unit
+                add([(callee, unit)], f"Function {callee} of {unit.name}.", callee)
+            elif owners[callee] is not unit:
+                raise _two(callee, owners[callee], unit)
+            elif callee not in parts:  # it is under way
+                words = f"{unit.name}: the shared function {callee!r} calls itself"
+                raise ParameterError("sampler", words)
+        parts[name] = Part(title, name, _text(taken, at_hand), tuple(sorted(borrowed)))
+
+    add(loops, "", "")
+    return list(parts.values())
+
+
+def _needed(
+    roots: Sequence[tuple[str, Unit]], at_hand: Sequence[Unit], whole: bool
+) -> tuple[dict[str, Unit], dict[str, Unit]]:
+    """Return functions with their units: those that are needed here, and the shared ones."""
     taken: dict[str, Unit] = {}
-    waiting = list(loops)
+    borrowed: dict[str, Unit] = {}
+    waiting = list(roots)
     while waiting:
         name, unit = waiting.pop()
         known = taken.setdefault(name, unit)
         if known is not unit:
-            words = f"has two functions {name!r}, of {known.name} and of {unit.name}"
-            raise ParameterError("sampler", words)
-        called = [(callee, unit.owner(callee, at_hand)) for callee in unit.calls[name]]
-        waiting += [(callee, owner) for callee, owner in called if taken.get(callee) is not owner]
+            raise _two(name, known, unit)
+        for callee in unit.calls[name]:
+            owner = unit.owner(callee, at_hand)
+            if callee in owner.kernels.shared and not whole:
+                if borrowed.setdefault(callee, owner) is not owner:
+                    raise _two(callee, borrowed[callee], owner)
+            elif taken.get(callee) is not owner:
+                waiting.append((callee, owner))
+    return taken, borrowed
+
+
+def _two(name: str, one: Unit, other: Unit) -> ParameterError:
+    words = f"has two functions {name!r}, of {one.name} and of {other.name}"
+    return ParameterError("sampler", words)
+
+
+def _text(taken: Mapping[str, Unit], at_hand: Sequence[Unit]) -> str:
+    """Return functions with their decorators, after the records and numbers that they use."""
     iterates = any(unit.kernels.iterates for unit in taken.values())
     parts = [
         f"{unit.decorator(name, iterates)}\n{text}"
@@ -172,10 +242,10 @@ def link(loops: Sequence[tuple[str, Unit]], at_hand: Sequence[Unit]) -> str:
         for name, text in unit.texts.items()
         if taken.get(name) is unit
     ]
-    return "\n\n\n".join([_shared_lines(taken), *parts]) + "\n"
+    return "\n\n\n".join([_common_lines(taken), *parts]) + "\n"
 
 
-def _shared_lines(taken: Mapping[str, Unit]) -> str:
+def _common_lines(taken: Mapping[str, Unit]) -> str:
     """Return the lines that define records and numbers, each once."""
     lines: dict[str, str] = {}
     for name, unit in taken.items():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from threading import Lock
 from types import ModuleType
 
 import numpy as np
@@ -26,7 +25,6 @@ from asperity.surface import Surface
 STOPS = tuple(Stop)
 # Forces that may wait: a second at a megahertz.
 MOST_DELAY = 1_000_000
-_LOCK = Lock()
 
 
 @lru_cache(maxsize=256)
@@ -77,8 +75,7 @@ class Simulation:
         self._loop, self._ledger = LoopState(), np.zeros(SUMS)
         self._before = 0.0
         clamp: ClampName = surface.clamp if surface.law.clampable else "none"
-        with _LOCK:
-            self._loops = _fused(surface.law, surface.texture.sampler, clamp, plant.modules)
+        self._loops = _fused(surface.law, surface.texture.sampler, clamp, plant.modules)
         self._arguments = surface.texture.arguments, surface.law_arguments
 
     @property

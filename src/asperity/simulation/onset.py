@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from asperity.analysis.gain.answers import surface_content
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
-from asperity.files import Record, record
+from asperity.files import Record, json_text, record
+from asperity.kept import is_shipped, kept
 from asperity.laws.w_smooth_wall import LAW as SMOOTH_WALL
 from asperity.simulation.continued import Continued
 from asperity.simulation.hands import Hand, MovedHand
@@ -225,7 +227,7 @@ def find_onset(
             it, and goes up from one that is quiet, down from one that cycles. Where loops cycle
             above one stiffness only, the answer is the same, and a quarter of the runs is enough;
             a window of cycles farther down, below a stiffness that is quiet, is then passed over.
-        progress: called after every stiffness.
+        progress: called after every stiffness; not where the answer was kept from another run.
 
     Raises:
         ParameterError: for a handle that is moved, a motion that does not come to rest, or a wrong
@@ -241,18 +243,30 @@ def find_onset(
     shifts = offsets(surface, int(starts))
     begin = motion.at(np.zeros(1))[0] if start is None else array("start", start, (3,), "m")
 
-    tried = _Tried(
-        lambda stiffness, shift: ends_in_cycle(
-            runner(surface.to_stiffness(stiffness), plant, hand, servo, motion, begin, velocity,
-                   shift),
-            duration, limit,
-        ),
-        shifts, progress,
-    )  # fmt: skip
-    quiet, cycling = _bracket(tried.cycles, lowest, highest, width, near)
-    every, (low, high) = tried.all(quiet if math.isinf(cycling) else cycling)
-    return Onset(surface.law.letter, servo.delay, quiet, cycling, len(shifts), every, low, high,
-                 wall=surface.law is SMOOTH_WALL)  # fmt: skip
+    def search() -> Onset:
+        tried = _Tried(
+            lambda stiffness, shift: ends_in_cycle(
+                runner(surface.to_stiffness(stiffness), plant, hand, servo, motion, begin,
+                       velocity, shift),
+                duration, limit,
+            ),
+            shifts, progress,
+        )  # fmt: skip
+        quiet, cycling = _bracket(tried.cycles, lowest, highest, width, near)
+        every, (low, high) = tried.all(quiet if math.isinf(cycling) else cycling)
+        return Onset(surface.law.letter, servo.delay, quiet, cycling, len(shifts), every, low, high,
+                     wall=surface.law is SMOOTH_WALL)  # fmt: skip
+
+    numbers = tuple(begin), velocity, duration, starts, width, limit, lowest, highest, near
+    return kept("onset", _content(surface, (plant, hand, servo, motion), numbers), search)
+
+
+def _content(surface: Surface, parts: Sequence[Any], numbers: Sequence[Any]) -> str | None:
+    """Return a digest of all that an onset depends on; ``None`` where code of one's own counts."""
+    if not all(is_shipped(type(part)) for part in parts):
+        return None
+    given = [None if number is None else np.asarray(number).tolist() for number in numbers]
+    return surface_content(surface, json_text([*parts, given]))
 
 
 class _Tried:

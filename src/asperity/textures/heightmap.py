@@ -83,9 +83,9 @@ class HeightMap(Spline):
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
         from asperity.contacts.nearest import plane_search, plane_within
-        from asperity.textures.samplers import heightmap, spline
+        from asperity.textures.samplers import heightmap, heightmap_block, spline
 
-        return heightmap, spline, plane_search, plane_within
+        return heightmap, spline, plane_search, plane_within, heightmap_block
 
     @cached_property
     def arguments(self) -> HeightMapArguments:

@@ -14,7 +14,8 @@ from asperity.contacts.sampler import along
 KERNELS = Kernels(
     provides=("descend", "go_down", "judge", "next_part"),
     requires=("along",),
-    called=("go_down", "judge"),
+    called=("judge",),
+    shared=("go_down",),
 )
 
 

@@ -25,7 +25,8 @@ from asperity.contacts.sampler import curvature
 KERNELS = Kernels(
     provides=("descend", "go_down", "judge", "next_box"),
     requires=("curvature",),
-    called=("go_down", "judge", "newton_step"),
+    called=("judge", "newton_step"),
+    shared=("go_down",),
 )
 
 

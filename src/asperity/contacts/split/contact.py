@@ -26,9 +26,9 @@ class Split(Nearest):
 
     def kernels(self) -> tuple[ModuleType, ...]:
         """The general solver; a texture kind may offer ``split_contact`` and the like itself."""
-        from asperity.contacts.split import again, conditions, solver
+        from asperity.contacts.split import again, answers, conditions, solver
 
-        return again, solver, conditions, *super().kernels()
+        return again, answers, solver, conditions, *super().kernels()
 
     def exact_point(
         self, texture: HeightField, h: ExactHeight, p: list[Any]

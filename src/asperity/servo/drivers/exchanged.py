@@ -8,15 +8,28 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
 
+import numpy as np
+
 from asperity.errors import ParameterError
 from asperity.servo.drivers.driver import UNTURNED, Driver, Frame
 from asperity.servo.kernels import exchanged, slot
 from asperity.servo.kernels.exchanged import ExchangedDevice
-from asperity.servo.kernels.slot import PLACES, SILENT, STALE, Slot, new_slot
+from asperity.servo.kernels.slot import PATIENCE, PLACES, SILENT, STALE, WORDS, Slot
 from asperity.servo.loop import address, no_clock, system_clock
 
 OPENING = 2.0
 """[s] that a device may take for each answer before the loop runs."""
+
+
+def new_slot(patience: float = 0.0) -> Slot:
+    """Return an empty slot.
+
+    Args:
+        patience: that the thread has with a loop that holds a force [s].
+    """
+    words = np.zeros(WORDS, np.int64)
+    words[PATIENCE] = round(1e9 * patience)
+    return Slot(words, words.view(np.float64))
 
 
 @dataclass

@@ -14,11 +14,11 @@ from typing import Any, ClassVar
 
 from asperity.errors import ParameterError
 from asperity.servo.drivers.driver import AWAY, RIGHT, UP, DriverKind
-from asperity.servo.drivers.exchanged import OPENING, ExchangedDriver, wait_for_a_place
+from asperity.servo.drivers.exchanged import OPENING, ExchangedDriver, new_slot, wait_for_a_place
 from asperity.servo.drivers.haply_exchange import Exchange, states_of
 from asperity.servo.drivers.websocket import ProtocolError, WebSocket
 from asperity.servo.kernels.exchanged import ExchangedDevice
-from asperity.servo.kernels.slot import SILENT, STALE, new_slot
+from asperity.servo.kernels.slot import SILENT, STALE
 
 SERVICE = "ASPERITY_HAPLY"
 """Variable of the environment that may hold host and port of the service."""

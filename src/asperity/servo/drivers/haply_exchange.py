@@ -19,9 +19,10 @@ from types import ModuleType
 from typing import Any
 
 from asperity.kernels.fuse import fuse_module
+from asperity.servo.drivers.exchanged import new_slot
 from asperity.servo.drivers.websocket import WebSocket
 from asperity.servo.kernels import slot
-from asperity.servo.kernels.slot import PATIENCE, SILENT, Slot, new_slot
+from asperity.servo.kernels.slot import PATIENCE, SILENT, Slot
 from asperity.servo.priority import PRIORITY
 
 LOST, NO_STATE, GONE = 3, 4, 5

@@ -18,12 +18,12 @@ import numpy as np
 from asperity.errors import ParameterError
 from asperity.kernels.fuse import fuse_module
 from asperity.servo.drivers.driver import RIGHT, TOWARDS, UP, DriverKind, Frame, frame_of
-from asperity.servo.drivers.exchanged import ExchangedDriver, wait_for_a_place
+from asperity.servo.drivers.exchanged import ExchangedDriver, new_slot, wait_for_a_place
 from asperity.servo.drivers.library import functions, load_library
 from asperity.servo.kernels import open_haptics, slot
 from asperity.servo.kernels.exchanged import ExchangedDevice
 from asperity.servo.kernels.open_haptics import BEGIN, FRAMES, HANDLE, SELF
-from asperity.servo.kernels.slot import CODE, WORDS, Slot, new_slot
+from asperity.servo.kernels.slot import CODE, WORDS, Slot
 from asperity.servo.loop import system_clock
 
 AXES, MILLIMETRE = (RIGHT, UP, TOWARDS), 1e-3

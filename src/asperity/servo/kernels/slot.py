@@ -63,17 +63,6 @@ class Slot(NamedTuple):
     numbers: FloatArray
 
 
-def new_slot(patience: float = 0.0) -> Slot:
-    """Return an empty slot.
-
-    Args:
-        patience: that the thread has with a loop that holds a force [s].
-    """
-    words = np.zeros(WORDS, np.int64)
-    words[PATIENCE] = round(1e9 * patience)
-    return Slot(words, words.view(np.float64))
-
-
 def put_row(
     words: NDArray[np.int64], numbers: FloatArray, way: int, x: float, y: float, z: float, time: int
 ) -> None:

@@ -15,7 +15,8 @@ from asperity.textures.samplers.sine import cosine, sine
 KERNELS = Kernels(
     provides=("curvature", "foot", "height", "search_plane", "slope"),
     requires=("cosine", "descend", "judge", "next_box", "sine"),
-    called=("foot", "search_plane"),
+    called=("foot",),
+    shared=("search_plane",),
 )
 
 

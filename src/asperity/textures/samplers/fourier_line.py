@@ -17,7 +17,8 @@ from asperity.textures.samplers.fourier import FourierArguments
 KERNELS = Kernels(
     provides=("along", "foot", "foot_within", "search_line"),
     requires=("descend", "judge", "line_within", "next_part"),
-    called=("foot", "search_line"),
+    called=("foot",),
+    shared=("search_line",),
 )
 
 

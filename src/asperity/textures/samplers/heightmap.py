@@ -27,13 +27,14 @@ from asperity.textures.samplers.spline import (
 )
 
 KERNELS = Kernels(
-    provides=("curvature", "foot", "height", "search_plane", "slope"),
+    provides=("cells_of", "curvature", "foot", "height", "search_plane", "slope"),
     requires=(
         "descend", "judge", "next_box",
         "box_bounds", "cell_at", "dot4", "foreseeable", "nearest_copy", "reach_of", "saddle_margin",
         "tile_frame", "weights", "weights_first", "weights_second",
     ),
-    called=("foot", "search_plane", "search_tile", "search_tree"),
+    called=("foot", "search_tile", "search_tree"),
+    shared=("search_plane",),
 )  # fmt: skip
 
 

@@ -33,7 +33,8 @@ KERNELS = Kernels(
         "box_bounds", "cell_at", "dot4", "foreseeable", "nearest_copy", "reach_of", "tile_frame",
         "weights", "weights_first", "weights_second",
     ),
-    called=("foot", "search_line", "search_tile", "search_tree"),
+    called=("foot", "search_tile", "search_tree"),
+    shared=("search_line",),
 )  # fmt: skip
 
 

@@ -15,6 +15,8 @@ KERNELS = Kernels(
 )  # fmt: skip
 
 
+SIXTH = 1.0 / 6.0
+
 Four = tuple[float, float, float, float]
 
 
@@ -49,10 +51,10 @@ def weights(t: float) -> Four:
     tt = t * t
     rr = r * r
     return (
-        rr * r / 6.0,
+        rr * r * SIXTH,
         (2.0 / 3.0) - tt + 0.5 * tt * t,
         (2.0 / 3.0) - rr + 0.5 * rr * r,
-        tt * t / 6.0,
+        tt * t * SIXTH,
     )
 
 
