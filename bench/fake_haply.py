@@ -31,12 +31,12 @@ GARBAGE: dict[str, bytes] = {
 """Messages that are no state."""
 BROKEN: dict[str, bytes] = {
     "masked": b"\x81\x82abcdef",
-    "reserved bits": b"\xf1\x00",
     "unknown kind": b"\x83\x00",
     "endless": b"\x81\x7f\x7f\xff\xff\xff\xff\xff\xff\xff",
 }
 """Bytes that are no frame."""
-FAULTS = (*GARBAGE, *BROKEN, "closed", "good-bye", "half a frame", "mute", "nan", "far", "twice")
+FAULTS = (*GARBAGE, *BROKEN, "closed", "good-bye", "half a frame", "mute", "nan", "far", "twice",
+          "reserved bits")  # fmt: skip
 
 
 class FakeHaply:
@@ -123,7 +123,8 @@ class FakeHaply:
         if fault in {"nan", "far"}:
             states[0]["state"]["cursor_position"]["z"] = float("nan") if fault == "nan" else 1e3
             return frame(json.dumps({"inverse3": states}).encode())
-        others = {"good-bye": b"\x88\x02\x03\xe8", "half a frame": whole[:20], "mute": b""}
+        others = {"good-bye": b"\x88\x02\x03\xe8", "half a frame": whole[:20], "mute": b"",
+                  "reserved bits": bytes((whole[0] | 0x40,)) + whole[1:]}  # fmt: skip
         return {**BROKEN, **others, "twice": 2 * whole}.get(fault, whole)
 
     def _state(self, device: str, number: int) -> dict[str, Any]:

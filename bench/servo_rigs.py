@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Self
+from unittest.mock import patch
 
 import numpy as np
 
@@ -117,7 +118,7 @@ class Library(Rig):
         folder = Path(self.kept.enter_context(tempfile.TemporaryDirectory()))
         self._path, self._driver = str(compiled(HERE / source, folder)), driver
         if variable:
-            os.environ[variable] = self._path
+            self.kept.enter_context(patch.dict(os.environ, {variable: self._path}))
         self._library = ctypes.CDLL(self._path)
         self._library.fake_force.restype = ctypes.c_double
 
@@ -141,9 +142,9 @@ class Haply(Rig):
     def failing(self, fault: str, at: int) -> Iterator[Driver]:
         """Return the driver of a service that fails at a message."""
         with FakeHaply(fault=fault, at=at) as self._service:
-            os.environ[haply.SERVICE] = self._service.address
             silent = fault in {"mute", "half a frame"}
-            yield HaplyDriver(stale=0.02 if silent else 60.0, patience=60.0)
+            with patch.dict(os.environ, {haply.SERVICE: self._service.address}):
+                yield HaplyDriver(stale=0.02 if silent else 60.0, patience=60.0)
 
     def held(self, _record: Any) -> Force | None:
         """Return the last force that came."""

@@ -133,7 +133,7 @@ def law_c(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """The C function of the page, compiled."""
     compiler = shutil.which("cc")
     if compiler is None:
-        pytest.skip("needs a C compiler")
+        pytest.skip("not run: no C compiler here")
     folder = tmp_path_factory.mktemp("c")
     (source,) = re.findall(r"^```c\n(.*?)^```$", PAGE.read_text("utf-8"), re.M | re.S)
     (folder / "law_c.c").write_text(source, encoding="utf-8")
