@@ -26,10 +26,13 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_gallery.gen_gallery",
     "mathsvg",
+    "device_page",
     "docstrings",
     "runblock",
 ]
-exclude_patterns = ["_build", "_ext", "_generated", "README.md", "gallery/sg_execution_times.rst"]
+exclude_patterns = [
+    "_build", "_ext", "_generated", "README.md", "gallery/sg_execution_times.rst", "devices/_*.md",
+]  # fmt: skip
 suppress_warnings = ["config.cache"]
 
 # The formulas are drawn when the pages are built.

@@ -18,6 +18,7 @@ from typing import Any
 import pytest
 
 import asperity
+from asperity.devices import device_names
 from asperity.errors import AsperityError
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -54,6 +55,11 @@ def test_every_public_name_is_documented() -> None:
     documented = set(re.findall(r"^\.\. (?:auto\w+|py:\w+):: asperity\.(\w+)$", text, re.M))
     assert set(asperity.__all__) - documented == set()
     assert documented - set(asperity.__all__) == set()
+
+
+def test_every_device_has_a_page() -> None:
+    text = "\n".join(path.read_text("utf-8") for path in (DOCS / "devices").glob("*.md"))
+    assert sorted(re.findall(r"^```{device} (\S+)$", text, re.M)) == device_names()
 
 
 def _resolve(target: str) -> Any:

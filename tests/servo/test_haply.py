@@ -18,6 +18,7 @@ from asperity.errors import ParameterError
 from asperity.servo.drivers import exchanged, haply
 from asperity.servo.drivers.choice import hardware_driver
 from asperity.servo.drivers.haply import SERVICE, HaplyDriver
+from asperity.servo.drivers.haply_exchange import MOST_ASKED
 from asperity.servo.fault import Cause
 from asperity.servo.kernels.exchanged import ExchangedDevice
 from asperity.servo.kernels.slot import CODE, FORCES, HEADER, RING, ROW, SILENT, STALE
@@ -99,12 +100,28 @@ def test_a_loop_that_hangs_loses_its_force(start: Start) -> None:
         driver.close()
 
 
+def test_a_force_goes_even_where_nobody_answers(start: Start) -> None:
+    """Messages do not pile up before a service that is mute; that there is no force is said."""
+    with start(fault="mute", at=10) as service:
+        driver = patient()
+        record = driver.open()
+        hold(record, (0.0, 0.0, 1.5))
+        assert driver._exchange is not None
+        asked = driver._exchange._asked
+        assert until(lambda: len(asked) == MOST_ASKED)
+        time.sleep(0.02)
+        assert len(asked) == MOST_ASKED
+        hold(record, ZERO)
+        assert service.last() == ZERO
+        driver.close()
+
+
 def hold(record: ExchangedDevice, force: tuple[float, float, float]) -> None:
     """Be a loop that gives a force once."""
-    row = HEADER + ROW * RING
+    row = HEADER + ROW * (RING + record.words[FORCES])
     record.words[row] = time.monotonic_ns()
     record.numbers[row + 1 : row + 4] = force
-    record.words[FORCES] = 1
+    record.words[FORCES] += 1
 
 
 def until(reached: Callable[[], bool], patience: float = 30.0) -> bool:
