@@ -75,7 +75,7 @@ class FakeHaply:
         self._listening.close()
         self._thread.join(5.0)
 
-    def last(self, patience: float = 2.0) -> Force:
+    def last(self, patience: float = 30.0) -> Force:
         """Return the last force, once it is zero or nothing more comes."""
         end = time.monotonic() + patience
         while time.monotonic() < end and self.forces[-1][1] != (0.0, 0.0, 0.0):
@@ -106,7 +106,7 @@ class FakeHaply:
             (device,) = json.loads(message)["inverse3"]
             values = device["commands"]["set_cursor_force"]["values"]
             self.forces.append((time.monotonic_ns(), (values["x"], values["y"], values["z"])))
-            lasts = self.fault in {"nan", "far"} and number > self.at
+            lasts = self.fault in {"nan", "far", "mute"} and number > self.at
             fault = self.fault if number == self.at or lasts else ""
             silent = silent or fault in {"half a frame", "mute"}
             if fault == "closed":

@@ -16,12 +16,13 @@ enum { COMM_ERROR = 0x0302, BAD_HANDLE = 0x0104, ILLEGAL_BEGIN = 0x0400, ILLEGAL
 enum { NOTHING, ERROR, HANGS, NOT_A_NUMBER, FAR, NOT_CALIBRATED, NOT_OPENED };
 
 static double place[3], wanted[3], held[3];
-static int fault, at, in_frame, enabled, opened, stopping, running, forced;
+static int fault, at, in_frame, enabled, opened, started, forced;
+static volatile int stopping, running;
 static volatile int frames;
 static HDerror last_error;
 static Callback called;
 static void *data;
-static pthread_t scheduler;
+static pthread_t thread, scheduler;
 
 void fake_reset(int kind, int frame)
 {
@@ -48,6 +49,8 @@ static void fail(HDerror code) { last_error = code; }
 static void *schedule(void *unused)
 {
     (void)unused;
+    scheduler = pthread_self(); /* before the first callback, wherever the starting thread is */
+    running = 1;
     while (!stopping) {
         const struct timespec tick = {0, 1000000};
 
@@ -83,14 +86,14 @@ void hdUnschedule(unsigned long number) { if (number == 77) called = 0; }
 void hdStartScheduler(void)
 {
     stopping = 0;
-    running = !pthread_create(&scheduler, NULL, schedule, NULL);
+    started = !pthread_create(&thread, NULL, schedule, NULL);
 }
 void hdStopScheduler(void)
 {
     stopping = 1;
-    if (running)
-        pthread_join(scheduler, NULL);
-    running = 0;
+    if (started)
+        pthread_join(thread, NULL);
+    started = running = 0;
 }
 
 void hdBeginFrame(HHD device)

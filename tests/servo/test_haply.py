@@ -30,7 +30,9 @@ Start = Callable[..., FakeHaply]
 
 @pytest.fixture
 def start(monkeypatch: pytest.MonkeyPatch) -> Start:
-    """``start(...)``: a service that the driver finds."""
+    """``start(...)``: a service that the driver finds, and has time for on a busy machine."""
+    for module in (exchanged, haply):
+        monkeypatch.setattr(module, "OPENING", 30.0)
 
     def started(**order: Any) -> FakeHaply:
         service = FakeHaply(**order)
@@ -78,6 +80,12 @@ def test_whatever_fails_the_force_is_zero_and_the_next_start_works(
         assert run(patient(), 5, system_clock)[0] is Cause.FINISHED
 
 
+def test_the_last_word_reaches_a_service_that_is_slow(start: Start) -> None:
+    with start(fault="no JSON", at=10, late=0.03) as service:
+        assert run(patient(), 100_000, system_clock)[0] is Cause.DEVICE
+        assert service.last() == ZERO
+
+
 def test_a_state_is_as_old_as_the_question_that_it_answers(start: Start) -> None:
     """A service that answers in time, but questions of long ago, is stale."""
     with start(late=0.05):
@@ -102,15 +110,17 @@ def test_a_loop_that_hangs_loses_its_force(start: Start) -> None:
 
 def test_a_force_goes_even_where_nobody_answers(start: Start) -> None:
     """Messages do not pile up before a service that is mute; that there is no force is said."""
-    with start(fault="mute", at=10) as service:
+    with start() as service:
         driver = patient()
         record = driver.open()
         hold(record, (0.0, 0.0, 1.5))
-        assert driver._exchange is not None
-        asked = driver._exchange._asked
-        assert until(lambda: len(asked) == MOST_ASKED)
+        assert until(lambda: service.forces[-1][1] == (0.0, 0.0, 1.5))
+        service.at = len(service.forces) + 10
+        service.fault = "mute"
+        assert until(lambda: len(service.forces) >= service.at + MOST_ASKED)
+        heard = len(service.forces)
         time.sleep(0.02)
-        assert len(asked) == MOST_ASKED
+        assert len(service.forces) == heard
         hold(record, ZERO)
         assert service.last() == ZERO
         driver.close()
@@ -147,7 +157,8 @@ def until(reached: Callable[[], bool], patience: float = 30.0) -> bool:
 def test_a_start_that_cannot_be_says_what_to_do(
     start: Start, monkeypatch: pytest.MonkeyPatch, order: Any, device: str, said: str
 ) -> None:
-    monkeypatch.setattr(exchanged, "OPENING", 0.2)
+    if order.get("fault") == "mute":
+        monkeypatch.setattr(exchanged, "OPENING", 0.2)
     with start(**order), pytest.raises(ParameterError, match=said):
         HaplyDriver(device=device).open()
 

@@ -10,10 +10,13 @@ import base64
 import hashlib
 import os
 import socket
+import time
 from contextlib import suppress
 
 LONGEST = 1 << 20
 """Bytes of a message: a state has a few hundred."""
+GOOD_BYE = 0.5
+"""[s] that the other side has to close."""
 _SECRET = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"  # of the RFC, section 1.3
 _MORE, _TEXT, _CLOSE, _PING, _PONG = 0x0, 0x1, 0x8, 0x9, 0xA
 _LAST, _MASKED = 0x80, 0x80
@@ -87,9 +90,18 @@ class WebSocket:
         return messages
 
     def close(self) -> None:
-        """Say good-bye, and close."""
+        """Say good-bye, hear the other side out, and close.
+
+        A connection that is closed with answers on their way is reset, and what was sent last may
+        be lost: it is the force of zero.
+        """
+        end = time.monotonic() + GOOD_BYE
         with suppress(OSError):
             self._send(_CLOSE, b"\x03\xe8")  # 1000: done
+            self._line.shutdown(socket.SHUT_WR)
+            self._line.settimeout(GOOD_BYE)
+            while time.monotonic() < end and self._line.recv(1 << 16):
+                pass
         self._line.close()
 
     def _open(self, host: str) -> None:
