@@ -157,3 +157,12 @@ def test_bad_polygons(vertices: object) -> None:
     with pytest.raises(ParameterError) as caught:
         work("A", vertices)
     assert caught.value.argument == "vertices"
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-9, math.nan])
+def test_a_tolerance_that_nothing_reaches_is_refused(tolerance: float) -> None:
+    """Panels would be halved until memory ends."""
+    surface = Surface(Sinusoid(1e-4, 1e-3), "A")
+    with pytest.raises(ParameterError) as caught:
+        loop_work(surface, [[0.0, 0.0, -1e-4], [1e-4, 0.0, 0.0]], tolerance)
+    assert caught.value.argument == "tolerance"

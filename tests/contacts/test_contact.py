@@ -81,6 +81,15 @@ def test_how_large_and_how_far_aside_the_coordinates_of_a_contact_are() -> None:
         np.testing.assert_allclose(found, deep, rtol=1e-14)
 
 
+def test_a_limit_of_force_looks_half_as_often_as_a_tick() -> None:
+    """At the nearest point, from right below the probe; 600 looks are a tick's."""
+    assert LAWS["D"].contact.looks == 600.0
+    code = LAWS["D"].contact.depth_code()
+    assert code[-2].endswith("= foot_within(x, y, z, x, y, 300.0, texture)")
+    assert code[:2] == ["if not height(x, y, texture) - z > 0.0:", "    return 0.0"]
+    assert LAWS["A"].contact.depth_code()[-1] == "return depth"
+
+
 def test_the_exact_foot_is_one_in_all_its_digits() -> None:
     """Where ∇φ = 0, to far more digits than the kernels' own foot, from which it starts."""
     with mpmath.workdps(60):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.analysis.energy.anchor import Stretch, anchored_stretches
-from asperity.checks import FloatArray, array
+from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
 from asperity.surface import Surface
 from asperity.units import engineering
@@ -57,7 +57,8 @@ def loop_work(surface: Surface, vertices: ArrayLike, tolerance: float = DEFAULT_
         W [J].
 
     Raises:
-        ParameterError: for another shape, fewer than 2 vertices, or values that are not finite.
+        ParameterError: for another shape, fewer than 2 vertices, values that are not finite, or a
+            tolerance that is not positive.
 
     Reference:
         The paper's (12), (27), (29) and Fig. 3.
@@ -71,6 +72,7 @@ def loop_work(surface: Surface, vertices: ArrayLike, tolerance: float = DEFAULT_
         0.32
     """
     corners = array("vertices", vertices, (None, 3), "m")
+    tolerance = positive("tolerance", tolerance)
     if len(corners) < 2:
         raise ParameterError("vertices", "must be at least 2 points (n, 3) [m]", len(corners))
     ends = np.roll(corners, -1, axis=0)
