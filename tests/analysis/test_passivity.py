@@ -17,6 +17,7 @@ from asperity.analysis import characteristic_number, loop_work, one_sided_number
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import Leak, worst_loop
 from asperity.analysis.judge_passivity import passivity
+from asperity.analysis.passivity import criteria
 from asperity.analysis.passivity.criteria import Criterion
 from asperity.analysis.passivity.device_loop import make_loop
 from asperity.analysis.passivity.judgement import Passivity
@@ -120,6 +121,12 @@ def test_limits_are_the_greatest_floats_that_are_not_overstated(
     )
     above = Surface(WAVE, "W", math.nextafter(limit, math.inf))
     assert judge(above, rig, q=exactly(q), plus=exactly(1.0)).verdict != "passive"
+
+
+def test_a_bound_of_a_buzz_is_the_least_float_that_is_not_below() -> None:
+    for part in (Fraction(1, 3), Fraction(2, 3), Fraction(1, 10), Fraction(7, 8), Fraction(0)):
+        found = criteria._up(part)
+        assert Fraction(found) >= part > Fraction(math.nextafter(found, -math.inf))
 
 
 def test_between_the_bounds_of_a_number_nothing_is_claimed() -> None:
