@@ -88,6 +88,16 @@ def test_each_cure_cures(amplitude: float, fields: dict[str, str]) -> None:
             assert less.tier != "felt", cure
 
 
+def test_where_no_speed_helps_finer_steps_of_position_do() -> None:
+    """Steps of 1 mm on waves of 2 mm: no slower scan is named, and what is named cures."""
+    known = device(update_rate="1 kHz", position_resolution="1 mm")
+    (cure,) = (one for one in felt(1e-4, known).cures if one.kind != "magnify")
+    assert cure.kind == "position_resolution"
+    for value, tier in ((cure.value * (1.0 - 1e-9), True), (1.1 * cure.value, False)):
+        data = {**known.data, cure.kind: replace(known.data[cure.kind], value=value)}
+        assert (felt(1e-4, replace(known, data=data)).tier == "felt") is tier
+
+
 def test_waves_that_arrive_distorted_are_borderline_and_a_slower_scan_helps() -> None:
     """At 1 kHz and 0.1 m/s a wave of 0.3 mm has three updates: more than 2, less than 5."""
     known = device(update_rate="1 kHz")
