@@ -435,18 +435,3 @@ def test_law_h_just_below_the_split_is_law_d_just_above_it() -> None:
         found = characteristic_number(surface)
         assert found.upper == pytest.approx(1.5, rel=1e-12)
         assert found.lower >= 1.5 * (1.0 - 3e-6)
-
-
-def test_law_d_on_many_waves_has_the_bound_of_their_second_derivatives() -> None:
-    """Where no crest is certified: y = D K, K the sum of a |k|²; an extent gives the crest's."""
-    angles = np.arange(5.0)
-    vectors = (
-        6000.0
-        * np.column_stack([np.cos(angles), np.sin(angles)])
-        * [[1.0], [1.1], [0.9], [1.3], [0.7]]
-    )
-    many = Fourier(np.full(5, 0.02e-3), vectors, angles)
-    bend = 0.02e-3 * float((vectors**2).sum())
-    found = characteristic_number(Surface(many, "D", max_depth=0.7 / bend))
-    assert found.upper == pytest.approx(0.7 / 0.3, rel=1e-9)
-    assert found.method == "certified"

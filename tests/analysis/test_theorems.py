@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+import numpy as np
 import pytest
+from tests.analysis.test_gain_by_definition import LINES
 
 from asperity.analysis.bounds.measures import NORM
 from asperity.analysis.energy.continuity import continuity
@@ -14,11 +17,12 @@ from asperity.analysis.gain.characteristic import (
     curl_number,
     one_sided_number,
 )
+from asperity.analysis.gain.medial_axis import sharpest_crest
 from asperity.analysis.gain.theorems import Constant, Theorem, register_theorem, theorem_of
 from asperity.errors import ParameterError
 from asperity.laws import LAWS, Law
 from asperity.surface import Surface
-from asperity.textures import Sinusoid
+from asperity.textures import Fourier, Sinusoid
 
 STEEP = Sinusoid(amplitude=0.8e-3, period=1e-3)
 
@@ -86,3 +90,31 @@ def test_every_shipped_law_has_its_entry_and_none_can_be_replaced() -> None:
         assert theorem_of(law) != Theorem()
         with pytest.raises(ParameterError, match="has its theorem already"):
             register_theorem(law, Theorem())
+
+
+def test_law_d_on_many_waves_has_the_bound_of_their_second_derivatives() -> None:
+    """Where no crest is certified: y = D K, K the sum of a |k|²; an extent gives the crest's."""
+    angles = np.arange(5.0)
+    vectors = (
+        6000.0
+        * np.column_stack([np.cos(angles), np.sin(angles)])
+        * [[1.0], [1.1], [0.9], [1.3], [0.7]]
+    )
+    many = Fourier(np.full(5, 0.02e-3), vectors, angles)
+    bend = 0.02e-3 * float((vectors**2).sum())
+    found = characteristic_number(Surface(many, "D", max_depth=0.7 / bend))
+    assert found.upper == pytest.approx(0.7 / 0.3, rel=1e-9)
+    assert found.method == "certified"
+
+
+def test_law_d_down_to_the_very_onset_is_infinite() -> None:
+    """At the sharpest crest's radius, to the last bit; just above it is a number."""
+    crest = sharpest_crest(LINES)
+    assert crest is not None
+    for depth, infinite in ((crest.radius, True), (crest.radius * (1.0 - 1e-3), False)):
+        found = characteristic_number(Surface(LINES, "D", max_depth=depth))
+        assert (found.lower == math.inf) is infinite
+        assert found.method == "certified"
+        if infinite:
+            assert found.at == crest.centre
+            assert "onset" in found.note
