@@ -134,3 +134,8 @@ def test_a_plate_with_holes_is_refused(thickness: float) -> None:
 def test_a_plate_is_of_the_split_contact_only() -> None:
     with pytest.raises(ParameterError, match="split contact"):
         pop_through(Surface(TEXTURES["gentle"], "D"), 1e-3)
+
+
+def test_a_state_outside_is_of_no_points() -> None:
+    state = split_state(Surface(TEXTURES["gentle"], "H"), [[0.0, 0.0, 1e-3], [0.1e-3, 0.0, 2e-3]])
+    assert repr(state) == "<SplitState of 2 points, into 0 points at most>"

@@ -157,6 +157,14 @@ def test_a_foot_follows_its_point() -> None:
     h, hx, hy = curvature(0.1, 0.1, None)[:3]
     below = np.array([0.1 + 30.0 * hx, 0.1 + 30.0 * hy, h - 30.0])
     assert conditions.split_follow(below, atoms, 0, None) == (False, 1.0)
+    # Convex just above the first focal point, a saddle just below it.
+    a, b, c = QUADRIC[:3]
+    for depth in np.linspace(2.0, 4.0, 41):
+        q = np.eye(2) + np.outer((hx, hy), (hx, hy)) + depth * np.array([[a, b], [b, c]])
+        below = np.array([0.1 + depth * hx, 0.1 + depth * hy, h - depth])
+        atoms[0, :2] = 0.1, 0.1
+        minimum = bool(np.linalg.det(q) > 0.0)
+        assert conditions.split_follow(below, atoms, 0, None)[0] is minimum
 
 
 # --- weights --------------------------------------------------------------------------------------
