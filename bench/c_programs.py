@@ -60,7 +60,9 @@ void {name}_many(const {real} *at, {real} *f, {real} *gap, int64_t n)
     {name}_reset(&state);
     for (int64_t i = 0; i < n; i++) {{
         {name}_force(&state, at + 3 * i, f + 3 * i);
-        gap[i] = {name}_gap(&state);
+        if (gap) {{
+            gap[i] = {name}_gap(&state);
+        }}
     }}
 }}
 """
@@ -120,11 +122,13 @@ class Ticks(NamedTuple):
         return np.column_stack([self.forces, self.gaps])
 
 
-def program_ticks(made: ctypes.CDLL, name: str, points: Any) -> Ticks:
-    """Return ticks of a program along a path, in the precision of the path."""
+def program_ticks(made: ctypes.CDLL, name: str, points: Any, *, gaps: bool = True) -> Ticks:
+    """Return ticks of a program along a path, in its precision; a gap is a call of its own."""
     arrays = points, np.empty_like(points), np.empty(len(points), points.dtype)
-    given = [array.ctypes.data_as(ctypes.c_void_p) for array in arrays]
-    run = partial(getattr(made, f"{name}_many"), *given, ctypes.c_int64(len(points)))
+    given = [array.ctypes.data_as(ctypes.c_void_p) for array in arrays[: 2 + gaps]]
+    run = partial(
+        getattr(made, f"{name}_many"), *given, *[None] * (not gaps), ctypes.c_int64(len(points))
+    )
     return Ticks(run, *arrays[1:])
 
 

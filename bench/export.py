@@ -118,7 +118,7 @@ def _ratio(surface: Surface, folder: Path) -> tuple[float, float]:
     each = min(seconds(few), seconds(few)) / 200
     count = int(np.clip(BATCH_SECONDS / each, 40, 100_000))
     at = cases.probes(surface.texture, count)
-    batches = [surface_ticks(surface, at).run, program_ticks(made, "t", at).run]
+    batches = [surface_ticks(surface, at).run, program_ticks(made, "t", at, gaps=False).run]
     times = take_turns(batches, ROUNDS)
     return median_ratio(times, 1, 0), float(np.median(times[:, 0])) / len(at)
 
