@@ -62,7 +62,8 @@ def run(console: Console) -> None:
             *_comparisons(table, SINUSOID, "the demo", cache),
             *_comparisons(table, MEASURED, "a measured surface", cache),
             *_single(table, ONSET, "onset examples/press.toml, first", "", cache),
-            *_single(table, ONSET, "onset examples/press.toml again", "processor 12", cache),
+            *_single(table, CLOSER, "  all compiled, another width", "processor 12", cache),
+            *_single(table, CLOSER, "  the same again", "", cache),
             *_single(table, REPRODUCE, "reproduce, first", "processor 120", cache),
             *_single(table, REPRODUCE, "reproduce again", "processor 45", cache),
         ]
