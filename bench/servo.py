@@ -68,7 +68,7 @@ def own_cost(console: Console) -> None:
         clocks = no_clock(), system_clock()._replace(nanosleep=at_once)
 
         def go(index: int) -> None:
-            servo, board = Servo(1e-4, max_force=3.0), Shared(1e4).board()
+            servo, board = Servo(1e-4, max_force=3.0), Shared().board()
             Loop(driver, servo, PATIENT, 1.0, board, clocks[index]).run(shown, record, SAMPLES)
 
         times = take_turns([lambda: go(0), lambda: go(1)], 9) / SAMPLES

@@ -92,7 +92,7 @@ def _one(rig: Rig, fault: str, at: int, path: Path, said: Outcome) -> None:
         ramp=0.005, lateness=0.1, misses=10**6, silence=WATCHED if fault == UNWATCHED else 60.0
     )  # fmt: skip
     with rig.failing("" if fault in ANY else fault, at) as driver:
-        shared = Shared(1.0 / SERVO.period)
+        shared = Shared()
         loop = Loop(driver, SERVO, safety, 1.0, shared.board(), system_clock())
         shown = render(surface, driver)
         loop.load(shown)
@@ -135,7 +135,7 @@ def _same(recording: Recording, rows: np.ndarray) -> bool:
 def _starts(rig: Rig) -> bool:
     safety = Safety(ramp=0.0, lateness=60.0, misses=10**6, silence=60.0)
     with rig.failing("", 0) as driver:
-        loop = Loop(driver, SERVO, safety, 1.0, Shared(1e3).board(), system_clock())
+        loop = Loop(driver, SERVO, safety, 1.0, Shared().board(), system_clock())
         shown = render(SURFACE, driver)
         loop.load(shown)
         record = driver.open()

@@ -26,7 +26,7 @@ def go() -> Callable[..., SimpleNamespace]:
         clock: PythonClock | None = None, control: Callable[[Shared], None] = lambda _shared: None,
     ) -> SimpleNamespace:  # fmt: skip
         settings = servo or Servo(1e-3, max_force=3.0)
-        shared = Shared(1.0 / settings.period)
+        shared = Shared()
         ticks = no_clock() if clock is None else clock.record
         loop = Loop(device, settings, safety or Safety(), reach, shared.board(), ticks)
         control(shared)

@@ -61,7 +61,7 @@ def run(
     driver: Driver, samples: int, clock: Callable[[], Clock] = no_clock
 ) -> tuple[Cause, int, np.ndarray]:
     """Open, run, close as the loop's process does."""
-    shared = Shared(1e3)
+    shared = Shared()
     loop = Loop(driver, Servo(1e-3, max_force=3.0), AT_ONCE, 1.0, shared.board(), clock())
     loop.load(shown_by(type(driver)))
     record = driver.open()
@@ -89,7 +89,7 @@ def test_force_dimension_receives_the_force_of_its_frame(dhd: Any) -> None:
     driver = hardware_driver("forcedimension", "lying", (0.0, 0.0, 0.0))
     dhd.fake_place(-0.4e-3, 0.7e-3, -1e-3)
     record = driver.open()
-    loop = Loop(driver, Servo(1e-3), AT_ONCE, 1.0, Shared(1e3).board(), no_clock())
+    loop = Loop(driver, Servo(1e-3), AT_ONCE, 1.0, Shared().board(), no_clock())
     sent = []
     write = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_double] * 3, ctypes.c_byte)(
         lambda x, y, z, _number: sent.append((x, y, z)) or 0
@@ -121,7 +121,7 @@ def test_a_thousand_random_failures_of_libdhd_leave_no_force(dhd: Any) -> None:
         sample, fault = int(rng.integers(0, 10)), (READ_ONCE, WRITE_ONCE)[rng.integers(0, 2)]
         dhd.fake_reset(fault, sample)
         dhd.fake_place(0.0, 0.0, -rng.uniform(0.5e-3, 3e-3))
-        loop = Loop(driver, Servo(1e-3, max_force=3.0), AT_ONCE, 1.0, Shared(1e3).board(),
+        loop = Loop(driver, Servo(1e-3, max_force=3.0), AT_ONCE, 1.0, Shared().board(),
                     no_clock())  # fmt: skip
         cause, _code = loop.run(shown, driver.open(), 40)
         assert cause is Cause.DEVICE

@@ -70,7 +70,7 @@ def looped(surface: Surface, plant: Any, hand: Any, servo: Servo, motion: Any,
            duration: float) -> np.ndarray:  # fmt: skip
     """Return the rows of a loop on a simulated device, without a clock."""
     driver = simulated_driver(plant, hand, servo, motion, duration)
-    shared = Shared(1.0 / servo.period)
+    shared = Shared()
     loop = Loop(driver, servo, OPEN, math.inf, shared.board(), no_clock())
     cause, _code = loop.run(render(surface, driver), driver.open(), round(duration / servo.period))
     assert cause is Cause.FINISHED
@@ -177,7 +177,7 @@ def test_no_force_is_above_its_limits(
     device = PythonDevice(lambda k: way[min(k, 79)])
     servo = Servo(1e-3, max_force=max_force, virtual_damping=virtual, velocity_share=0.5)
     safety = Safety(ramp=ramp, max_slew=slew, beyond_depth="warn", passivity_damping=damping)
-    shared = Shared(1e3)
+    shared = Shared()
     loop = Loop(device, servo, safety, 1e3, shared.board(), no_clock())
     record = device.open()
     for index, (law, stiffness) in enumerate(changes, 1):

@@ -16,7 +16,7 @@ from asperity.errors import ParameterError
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.fault import KEPT, Cause, DeviceFault
 from asperity.servo.kernels.published import COLUMNS
-from asperity.servo.process import ServoProcess
+from asperity.servo.process import ServoProcess, Spare
 from asperity.servo.safety import Safety
 from asperity.simulation import Cartesian, Servo, SpringHand, Still
 from asperity.surface import Surface
@@ -29,10 +29,12 @@ SERVO = Servo(1e-3, max_force=3.0)
 PATIENT = Safety(ramp=0.02, lateness=60.0, misses=10**6, silence=30.0)
 
 
-def process(safety: Safety = PATIENT, motion: Still | None = None) -> ServoProcess:
+def process(
+    safety: Safety = PATIENT, motion: Still | None = None, spare: Spare | None = None
+) -> ServoProcess:
     still = motion or Still((0.0, 0.0, -1e-3))
     driver = simulated_driver(Cartesian(0.05, 1.0), HAND, SERVO, still, 1.0)
-    return ServoProcess(SURFACE, driver, SERVO, safety)
+    return ServoProcess(SURFACE, driver, SERVO, safety, spare=spare)
 
 
 @pytest.fixture
@@ -137,3 +139,19 @@ def test_a_device_that_moves_needs_its_greatest_force() -> None:
         patch.setattr(type(driver), "moving", True)
         with pytest.raises(ParameterError, match="max_force is not known"):
             ServoProcess(SURFACE, driver, Servo(1e-3, max_force=math.inf))
+
+
+def test_a_process_that_stands_ready_is_used_and_one_without_a_job_ends() -> None:
+    spare, idle = Spare(), Spare()
+    pid = spare.process.pid
+    with process(spare=spare) as loop:
+        assert loop.pid == pid
+        assert until(lambda: spare.shared.head > 10)
+    assert not spare.process.is_alive()
+    idle.line.close()  # as when whoever made it has died
+    idle.process.join(60.0)
+    assert idle.process.exitcode == 0
+    idle.end()
+    waiting = Spare()
+    waiting.end()
+    assert not waiting.process.is_alive()

@@ -23,7 +23,7 @@ from asperity.errors import ParameterError, tell
 if TYPE_CHECKING:
     from asperity.scene.setup import Setup
     from asperity.servo.fault import Cause
-    from asperity.servo.process import ServoProcess
+    from asperity.servo.process import ServoProcess, Spare
 
 SIMULATED = "simulated"
 REPLAY = "replay:"
@@ -72,6 +72,7 @@ def command(
     force go and ends it; a fault makes the force zero and ends with exit code 3.
     """
     check_outputs(json=outputs.json, record=record)
+    spare = click.get_current_context().with_resource(spare_process())
     # Its force is bounded, and what is said of it holds at every depth, if the law can be clamped.
     real = driver != SIMULATED
     setup = read_setup(
@@ -85,9 +86,9 @@ def command(
     from asperity.report.device_run import print_device_run
 
     if driver.startswith(REPLAY):
-        loop = replaying_loop(setup, driver.removeprefix(REPLAY), duration)
+        loop = replaying_loop(setup, driver.removeprefix(REPLAY), duration, spare)
     else:
-        loop = real_loop(setup, driver, duration) if real else simulated_loop(setup)
+        loop = real_loop(setup, driver, duration, spare) if real else simulated_loop(setup, spare)
     with interrupts() as asked, recorder(record, loop, setup) as take:
         with progress_bar("compiling the loop"):
             loop.start()
@@ -105,7 +106,7 @@ def command(
     outputs.write(data, lambda console: print_device_run(setup, loop, cause, record, console))
 
 
-def simulated_loop(setup: Setup) -> ServoProcess:
+def simulated_loop(setup: Setup, spare: Spare) -> ServoProcess:
     """Return a loop on the simulated device and hand of a scene."""
     from asperity.servo.drivers.simulated import simulated_driver
     from asperity.servo.process import ServoProcess
@@ -115,7 +116,9 @@ def simulated_loop(setup: Setup) -> ServoProcess:
         setup.velocity,
     )  # fmt: skip
     reach = setup.safety.reach_on(setup.device)
-    return ServoProcess(setup.surface, driver, setup.servo, setup.safety, reach, setup.duration)
+    return ServoProcess(
+        setup.surface, driver, setup.servo, setup.safety, reach, setup.duration, spare=spare
+    )
 
 
 def with_its_own_electronics(setup: Setup) -> Setup:
@@ -124,7 +127,7 @@ def with_its_own_electronics(setup: Setup) -> Setup:
     return replace(setup, servo=servo)
 
 
-def replaying_loop(setup: Setup, path: str, duration: float | None) -> ServoProcess:
+def replaying_loop(setup: Setup, path: str, duration: float | None, spare: Spare) -> ServoProcess:
     """Return a loop whose handle goes where it went in a recording."""
     from asperity.servo.drivers.replay import replay_driver
     from asperity.servo.process import ServoProcess
@@ -132,10 +135,10 @@ def replaying_loop(setup: Setup, path: str, duration: float | None) -> ServoProc
     driver = replay_driver(path, setup.servo.period)
     span = setup.servo.period * len(driver.points) if duration is None else duration
     reach = setup.safety.reach_on(setup.device)
-    return ServoProcess(setup.surface, driver, setup.servo, setup.safety, reach, span)
+    return ServoProcess(setup.surface, driver, setup.servo, setup.safety, reach, span, spare=spare)
 
 
-def real_loop(setup: Setup, name: str, duration: float | None) -> ServoProcess:
+def real_loop(setup: Setup, name: str, duration: float | None, spare: Spare) -> ServoProcess:
     """Return a loop on a real device.
 
     Raises:
@@ -149,7 +152,13 @@ def real_loop(setup: Setup, name: str, duration: float | None) -> ServoProcess:
     tell(f"a real device, {setup.device.name}: a hand near its switch. If the loop dies:"
          f" {driver.when_lost}")  # fmt: skip
     return ServoProcess(
-        setup.surface, driver, setup.servo, safety, safety.reach_on(setup.device), duration
+        setup.surface,
+        driver,
+        setup.servo,
+        safety,
+        safety.reach_on(setup.device),
+        duration,
+        spare=spare,
     )
 
 
@@ -165,6 +174,18 @@ def refuse_risk(setup: Setup) -> None:
         reason = risk(setup.surface, setup.device)
     if reason:
         raise ParameterError("stiffness", f"is refused: {reason}; --accept-risk renders it")
+
+
+@contextmanager
+def spare_process() -> Iterator[Spare]:
+    """Let the loop's process start while the surface is read and analysed."""
+    from asperity.servo.process import Spare
+
+    spare = Spare()
+    try:
+        yield spare
+    finally:
+        spare.end()
 
 
 @contextmanager

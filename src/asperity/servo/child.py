@@ -106,19 +106,22 @@ class _Serving:
                 self._line.send(("loaded", None))
 
 
-def serve(line: Connection, shared: Shared, modules: Modules, packed: bytes) -> None:
-    """Be the process of a loop.
+def serve(line: Connection, shared: Shared) -> None:
+    """Be the process of a loop: wait for the :class:`Job`, packed, and do it.
 
     Args:
-        line: what is said goes here, and the surfaces to come are heard from here.
+        line: what is said goes here; the job and the surfaces to come are heard from here.
         shared: rows and counts.
-        modules: see ``unpacked``.
-        packed: the :class:`Job`.
     """
     # Ctrl-C goes to all processes of a terminal: the watching one decides how the loop ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    importlib.import_module("numba")  # what takes longest of all, while the job is made ready
     try:
-        _Serving(line, shared, unpacked(modules, packed)).serve()
+        job = unpacked(*line.recv())
+    except EOFError:
+        return  # there is none
+    try:
+        _Serving(line, shared, job).serve()
     except AsperityError as error:
         line.send(("failed", str(error)))
     except BrokenPipeError:

@@ -31,6 +31,32 @@ _FOREVER = 2**62
 _LAST_WORDS = 2.0  # [s] that a process gets to say how it ended
 
 
+class Spare:
+    """A process that stands ready for a loop, made before it is known which: starting takes time.
+
+    Whoever makes one and has no loop for it says so by :meth:`end`.
+
+    Args:
+        shared: memory that it shares; its own if ``None``.
+    """
+
+    def __init__(self, shared: Shared | None = None) -> None:
+        context = SpawnContext()
+        self.shared = shared or Shared()
+        self.line, theirs = context.Pipe()
+        self.process = context.Process(target=serve, args=(theirs, self.shared), daemon=True)
+        self.process.start()
+        theirs.close()
+
+    def end(self, patience: float = 0.0) -> None:
+        """End it; what it does may take so long to come to an end [s]."""
+        self.line.close()
+        self.process.join(patience)
+        if self.process.is_alive():
+            self.process.kill()
+            self.process.join()
+
+
 class ServoProcess:
     """A surface on a device, rendered by a process of its own.
 
@@ -42,6 +68,7 @@ class ServoProcess:
         reach: of the handle from the device's origin [m]; a reading further away is a fault.
         duration: after which it ends [s]; ``None`` for not by itself.
         device: whose limit counts for the surfaces of :meth:`change`.
+        spare: the process to be used; its end is then this loop's. ``None`` for a new one.
 
     Raises:
         ParameterError: for a surface that cannot be rendered, or a device that moves and whose
@@ -56,7 +83,7 @@ class ServoProcess:
     def __init__(
         self, surface: Surface | Rendered, driver: Driver, servo: Servo,
         safety: Safety | None = None, reach: float = math.inf, duration: float | None = None,
-        device: Device | None = None,
+        device: Device | None = None, spare: Spare | None = None,
     ) -> None:  # fmt: skip
         if driver.moving and not math.isfinite(servo.max_force):
             words = "is not known: a device that moves needs it, --set max_force=3N"
@@ -65,7 +92,8 @@ class ServoProcess:
         last = _FOREVER if duration is None else round(duration / servo.period)
         shown = surface if isinstance(surface, Rendered) else render(surface, driver)
         self._job = Job(shown, driver, servo, self._safety, reach, last)
-        self.shared = Shared(1.0 / servo.period)
+        self._spare = spare
+        self.shared = Shared() if spare is None else spare.shared
         self.notes: tuple[str, ...] = ()
         self._cause, self._said = Cause.GOING, ""
         self._seen, self._since = 0, 0.0
@@ -82,14 +110,11 @@ class ServoProcess:
             ParameterError: for a device that cannot be opened.
             DeviceFault: if the process ends or hangs.
         """
-        context = SpawnContext()
-        self._line, theirs = context.Pipe()
-        arguments = (theirs, self.shared, *_packed(self._job))
-        self._process = context.Process(target=serve, args=arguments, daemon=True)
-        self._process.start()
-        theirs.close()
+        self._made = self._spare or Spare(self.shared)
+        self._line, self._process = self._made.line, self._made.process
         threading.Thread(target=self._beat, daemon=True).start()
         try:
+            self._line.send(_packed(self._job))
             self.notes = self._heard("ready", LONGEST_START)
         except BaseException:
             self._end()
@@ -204,12 +229,8 @@ class ServoProcess:
 
     def _end(self) -> None:
         """End the process, which has let go of the device unless it hangs."""
-        self._process.join(_LAST_WORDS)
-        if self._process.is_alive():
-            self._process.kill()
-            self._process.join()
         self._beating.set()
-        self._line.close()
+        self._made.end(_LAST_WORDS)
 
     def _beat(self) -> None:
         while not self._beating.wait(0.1 * self._safety.silence):

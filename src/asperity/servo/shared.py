@@ -19,8 +19,8 @@ from asperity.servo.kernels.published import (
     Board,
 )
 
-SECONDS = 4.0
-"""Of rows that are kept for whoever reads them."""
+ROWS = 40_000
+"""That are kept for whoever reads them: 4 s of the fastest loop."""
 
 
 class Shared:
@@ -28,14 +28,11 @@ class Shared:
 
     The loop writes a row into its place and then counts it. A reader copies the rows that are
     counted and looks at the count again: what was overwritten meanwhile it throws away.
-
-    Args:
-        rate: rows per second [1/s].
     """
 
-    def __init__(self, rate: float) -> None:
+    def __init__(self) -> None:
         context = SpawnContext()
-        self._rows = max(1024, int(SECONDS * rate))
+        self._rows = ROWS
         self._columns = len(COLUMNS)
         self._control: Any = context.RawArray(ctypes.c_int64, CONTROLS)
         self._status: Any = context.RawArray(ctypes.c_int64, STATUS)

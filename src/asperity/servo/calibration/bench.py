@@ -88,7 +88,7 @@ class InstantBench:
 
     def __init__(self, driver: Driver, servo: Servo, safety: Safety) -> None:
         self.servo, self.axes = servo, axes_of(driver.frame)
-        self._driver, self._shared = driver, Shared(1.0 / servo.period)
+        self._driver, self._shared = driver, Shared()
         alone = replace(safety, silence=_ALONE)  # nobody watches, and time is the loop's own
         self._loop = Loop(driver, servo, alone, math.inf, self._shared.board(), no_clock())
         self._device, self._render = driver.open(), prepared(driver)
