@@ -207,7 +207,8 @@ def jacobian_by_hand() -> Callable[..., np.ndarray]:
 def _run_source(source: str) -> SimpleNamespace:
     """Run a fused module as plain Python: the same text, nothing compiled."""
     head, without = "from __future__", ("@", "from numba", "from asperity_fused_")
-    lines = [line for line in source.splitlines() if not line.startswith((head, *without))]
+    text = source.replace("asperity.kernels.stack_memory", "asperity.compiled")  # plain memory
+    lines = [line for line in text.splitlines() if not line.startswith((head, *without))]
     lines.insert(0, f"{head} import annotations")
     lines = [line for line in lines if "njit(" not in line and "code_store" not in line]
     names: dict[str, Any] = {}

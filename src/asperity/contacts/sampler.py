@@ -5,7 +5,12 @@ them; the linker binds the calls of contacts and searches to them. ``texture`` i
 (NamedTuple) that the kind declares: whatever it holds, it is passed on whole.
 """
 
-from asperity.checks import FloatArray
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # NumPy takes its time, and help needs none
+    from asperity.checks import FloatArray
 
 _SECOND = frozenset(("hxx", "hxy", "hyy"))
 _FIRST = frozenset(("hx", "hy"))

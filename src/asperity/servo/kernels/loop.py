@@ -244,7 +244,10 @@ def counted(nanoseconds: int) -> int:
 
 
 def judged_time(late: int, done: int, at: Carried, limits: Limits, board: Board) -> int:
-    """Book how late a sample began and whether it ended after the next one was due; judge it."""
+    """Book how late a sample began and whether it ended after the next one was due; judge it.
+
+    What counts as too late is its end: a device that takes long to answer is late, too.
+    """
     status = board.status
     begun = at.due + late
     status[LATENESS + counted(late)] += 1
@@ -255,7 +258,7 @@ def judged_time(late: int, done: int, at: Carried, limits: Limits, board: Board)
     if done > at.due + limits.period:
         status[LATE] += 1
         status[SKIPPED] += (done - at.due) // limits.period - 1
-    if late > limits.late:
+    if done - at.due > limits.late:
         return LATENESS_LIMIT
     if at.misses > limits.misses:
         return MISSES
