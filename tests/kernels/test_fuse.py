@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import ast
+import sys
+import warnings
 from collections import namedtuple
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -184,13 +187,23 @@ def first(record):
 """
 
 
+def first_of(record: type, monkeypatch: pytest.MonkeyPatch) -> float:
+    """Return the first of its two numbers, by a loop that is loaded anew."""
+    home = ModuleType(record.__module__)
+    home.Record = record
+    fuse._loaded.cache_clear()
+    with monkeypatch.context() as patch, warnings.catch_warnings():
+        warnings.simplefilter("error")  # that kept code was damaged
+        patch.setitem(sys.modules, home.__name__, home)  # kept code finds it there by its name
+        return fuse.load_fused(RECORD).first(record(a=1.0, b=2.0))
+
+
 @pytest.mark.usefixtures("cache")
 @pytest.mark.parametrize("fields", ["b a", "a b"])
-def test_code_for_a_record_of_other_fields_is_not_taken(fields: str):
-    """Of a name that is defined again, in the same order or in another."""
-    record = namedtuple("Record", "a b")
-    assert fuse.load_fused(RECORD).first(record(1.0, 2.0)) == 1.0
-    fuse._loaded.cache_clear()
-    other = namedtuple("Record", fields)
-    again = fuse.load_fused(RECORD).first
-    assert again(other(a=1.0, b=2.0)) == 1.0
+@pytest.mark.parametrize("home", ["here", "elsewhere"])
+def test_code_for_another_record_is_not_taken(
+    fields: str, home: str, monkeypatch: pytest.MonkeyPatch
+):
+    """Of a name that is defined again, in the same order or another, there or elsewhere."""
+    assert first_of(namedtuple("Record", "a b", module="here"), monkeypatch) == 1.0
+    assert first_of(namedtuple("Record", fields, module=home), monkeypatch) == 1.0

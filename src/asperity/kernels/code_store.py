@@ -86,8 +86,10 @@ class CodeStore(caching._Cache):
 
 
 def _fields(kind: Any) -> tuple[Any, ...]:
-    """Return the names in a record, in order: code knows them by their places."""
+    """Return a record's module and the names in it, in order: code knows them by their places."""
     names = tuple(getattr(kind, "fields", ()))
+    if names:
+        names = (kind.instance_class.__module__, *names)
     return (*names, *map(_fields, kind.types)) if isinstance(kind, _TUPLES) else names
 
 
