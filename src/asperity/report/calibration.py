@@ -10,8 +10,7 @@ from asperity.report import page, terminal
 from asperity.report.page import Cell, Row
 from asperity.report.terminal import say
 from asperity.servo.calibration.calibrate import Axis, Calibration
-from asperity.servo.calibration.identify import Estimate
-from asperity.servo.calibration.result import resolution
+from asperity.servo.calibration.result import plus_minus, resolution
 from asperity.units import engineering
 
 _HEADINGS = ("axis", "wall held", "cycled at", "damping N·s/m", "friction mN", "mass g")
@@ -24,14 +23,15 @@ def print_calibration(device: Device, found: Calibration, path: str, console: Co
     rows = [Row([Cell(cell) for cell in _cells(axis)]) for axis in found.axes]
     console.print(terminal.table(page.Table(_HEADINGS, rows, range(1, len(_HEADINGS)))))
     fine = resolution(found)
-    step = "read exactly" if found.step is None else f"step {_pm(found.step, 1e6)} µm"
-    say(console, f"Positions: {step}; noise at rest {_pm(found.noise, 1e6)} µm; together as a"
-                 f" step of {engineering(fine.value, 'm')}")  # fmt: skip
+    step = "read exactly" if found.step is None else f"step {plus_minus(found.step, 1e6)} µm"
+    noise = plus_minus(found.noise, 1e6)
+    say(console, f"Positions: {step}; noise at rest {noise} µm; together as a step of"
+                 f" {engineering(fine.value, 'm')}")  # fmt: skip
     delay = found.delay
     others = ", ".join(map(str, delay.others))
     unsure = f", or {others}: not written" if others else ""
-    say(console, f"Rate: {_pm(found.rate)} Hz of fresh readings; delay: {delay.samples} samples"
-                 f"{unsure}")  # fmt: skip
+    say(console, f"Rate: {plus_minus(found.rate)} Hz of fresh readings; delay:"
+                 f" {delay.samples} samples{unsure}")  # fmt: skip
     weakest = found.weakest
     say(console, f"K₀: {engineering(weakest.wall.held, 'N/m')}, along {weakest.name}, where the"
                  " wall held least")  # fmt: skip
@@ -44,10 +44,6 @@ def _cells(axis: Axis) -> tuple[str, ...]:
     wall, motion = axis.wall, axis.motion
     cycled = "none" if wall.cycled is None else engineering(wall.cycled, "N/m")
     return (
-        axis.name, engineering(wall.held, "N/m"), cycled, _pm(motion.damping),
-        _pm(motion.friction, 1e3), _pm(motion.mass, 1e3),
+        axis.name, engineering(wall.held, "N/m"), cycled, plus_minus(motion.damping),
+        plus_minus(motion.friction, 1e3), plus_minus(motion.mass, 1e3),
     )  # fmt: skip
-
-
-def _pm(one: Estimate, scale: float = 1.0) -> str:
-    return f"{scale * one.value:.4g} ± {scale * one.uncertainty:.1g}"

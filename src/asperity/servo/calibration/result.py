@@ -120,6 +120,21 @@ def _pm(one: Estimate, unit: str) -> str:
 
     Example:
         >>> _pm(Estimate(0.05123, 0.0004), "kg")
-        '0.05123 ± 0.0004 kg'
+        '0.0512 ± 0.0004 kg'
     """
-    return f"{one.value:.4g} ± {one.uncertainty:.1g} {unit.replace('*', '·')}"
+    return f"{plus_minus(one)} {unit.replace('*', '·')}"
+
+
+def plus_minus(one: Estimate, scale: float = 1.0) -> str:
+    """Return a number with the digits that its uncertainty leaves, and that in one digit.
+
+    Example:
+        >>> plus_minus(Estimate(0.2107, 0.0712), 1e3), plus_minus(Estimate(5.5e-5, 0.0), 1e6)
+        ('210 ± 70', '55')
+    """
+    value, unsure = scale * one.value, scale * one.uncertainty
+    if unsure <= 1e-4 * abs(value):
+        return f"{value:.4g}"
+    digits = -math.floor(math.log10(unsure))
+    shown = max(0, digits)
+    return f"{round(value, digits):.{shown}f} ± {round(unsure, digits):.{shown}f}"
