@@ -155,3 +155,10 @@ def test_a_process_that_stands_ready_is_used_and_one_without_a_job_ends() -> Non
     waiting = Spare()
     waiting.end()
     assert not waiting.process.is_alive()
+
+
+def test_a_process_that_hangs_before_it_has_a_job_is_ended() -> None:
+    spare = Spare()
+    os.kill(int(spare.process.pid or 0), signal.SIGSTOP)
+    spare.end()
+    assert spare.process.exitcode == -signal.SIGKILL
