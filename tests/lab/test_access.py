@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from asperity.errors import ParameterError
 from asperity.lab.access import AT_ONCE, PER_SECOND, Door, MalformedError, Pace
 from asperity.lab.frames import FORCES, HEAD, MOST_FORCES, NAMES, frame, layout
-from asperity.lab.messages import Change, Look, Steer, Take, read_message
+from asperity.lab.messages import Change, Look, Seen, Steer, Take, read_message
 
 DOOR = Door(8137, "secret")
 OURS = "127.0.0.1:8137"
@@ -78,6 +78,7 @@ def test_what_our_page_says_is_understood() -> None:
     assert look == Look("cut", (-0.01, 0.01, -0.001, 0.001, 0.0))
     assert read_message(said(do="relief", x=0, y=0, size=0.01)) == Look("relief", (0.0, 0.0, 0.01))
     assert read_message(said(do="take")) == Take()
+    assert read_message(said(do="seen", frame=7)) == Seen(7.0)
 
 
 @pytest.mark.parametrize(
@@ -87,7 +88,8 @@ def test_what_our_page_says_is_understood() -> None:
         said(do="take", more=1), said(do="steer", target=[0, 0, 0]),
         said(do="relief", x="0", y=0, size=0.01), said(do="relief", x=True, y=0, size=0.01),
         said(do="change", wishes=[]), said(do="change", wishes={"law": ["B"]}),
-        said(do="cut", box=[0, 1, 2], y=0), '{"do": "relief", "x": NaN, "y": 0, "size": 0.01}',
+        said(do="cut", box=[0, 1, 2], y=0), said(do="seen", frame="7"), said(do="seen"),
+        '{"do": "relief", "x": NaN, "y": 0, "size": 0.01}',
         '{"do": "relief", "x": Infinity, "y": 0, "size": 0.01}', "[" * 4000,
         '{"do": "relief", "x": ' + "9" * 5000 + "}",
     ],
@@ -116,10 +118,10 @@ JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(
         st.sampled_from(["do", "target", "cosine", "sine", "speed", "wishes", "x", "y", "size",
-                         "box", "take", "steer"]), inner, max_size=5),
+                         "box", "take", "frame"]), inner, max_size=5),
     max_leaves=8,
 )  # fmt: skip
-KINDS = st.sampled_from(["steer", "change", "relief", "cut", "take"])
+KINDS = st.sampled_from(["steer", "change", "relief", "cut", "take", "seen"])
 
 
 @settings(max_examples=200, deadline=None)
@@ -128,7 +130,7 @@ def test_whatever_is_said_is_a_message_or_an_error_of_ours(content: object, kind
     if isinstance(content, dict):
         content = {**content, "do": kind}
     with suppress(MalformedError, ParameterError):
-        assert isinstance(read_message(json.dumps(content)), Steer | Change | Look | Take)
+        assert isinstance(read_message(json.dumps(content)), Steer | Change | Look | Take | Seen)
 
 
 def test_a_frame_keeps_the_extremes_between_two_pictures() -> None:
@@ -137,14 +139,16 @@ def test_a_frame_keeps_the_extremes_between_two_pictures() -> None:
     rows = np.zeros((50, len(NAMES)))
     place = NAMES.index("applied z")
     rows[:, place] = 0.3 * np.sin(2.0 * np.pi * 800.0 * time + 0.1)
-    numbers = np.frombuffer(frame(rows, 7, {"heard": 3, "late": 1, "skipped": 2}, np.arange(6.0)))
+    numbers = np.frombuffer(
+        frame(rows, 7, {"frame": 5, "heard": 3, "late": 1, "skipped": 2}, np.arange(6.0))
+    )
     named = layout()
     # The newest row alone would show nothing of it.
     assert abs(numbers[named["newest"] + place]) < 0.2
     assert numbers[named["least"] + place] == rows[:, place].min() < -0.29
     assert numbers[named["greatest"] + place] == rows[:, place].max() > 0.29
     head = [numbers[named["head"][name]] for name in HEAD]
-    assert head == [1.0, 50.0, 7.0, 3.0, 1.0, 2.0, 50.0]
+    assert head == [1.0, 5.0, 50.0, 7.0, 3.0, 1.0, 2.0, 50.0]
     forces = numbers[named["forces"] :].reshape(-1, 3)
     assert (forces == rows[:, FORCES]).all()
 
@@ -153,6 +157,7 @@ def test_a_page_that_was_slow_gets_the_newest_forces_and_all_extremes() -> None:
     rows = np.zeros((MOST_FORCES + 10, len(NAMES)))
     rows[0, NAMES.index("x")] = -5.0
     rows[:, FORCES.start] = np.arange(len(rows))
-    numbers = np.frombuffer(frame(rows, 0, {"heard": 0, "late": 0, "skipped": 0}, np.zeros(6)))
+    counts = {"frame": 1, "heard": 0, "late": 0, "skipped": 0}
+    numbers = np.frombuffer(frame(rows, 0, counts, np.zeros(6)))
     assert numbers[layout()["least"] + NAMES.index("x")] == -5.0
     assert numbers[layout()["forces"] :: 3].tolist() == list(range(10, len(rows)))

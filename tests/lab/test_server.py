@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 from http.client import HTTPConnection
 from typing import Any
 
@@ -16,6 +17,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from asperity.lab.access import MOST_BYTES
 from asperity.lab.frames import layout
+from asperity.lab.server import UNDER_WAY
 from asperity.lab.site import page_files
 
 LAYOUT = layout()
@@ -43,6 +45,8 @@ def heard(page: ClientConnection, wanted: Callable[[Any], bool]) -> Any:
     while True:
         content = page.recv(timeout=120)
         message = json.loads(content) if isinstance(content, str) else np.frombuffer(content)
+        if frames(message):
+            say(page, "seen", frame=message[1])
         if wanted(message):
             return message
 
@@ -149,6 +153,7 @@ def test_one_page_steers_and_others_watch(lab: Started) -> None:
 @pytest.mark.parametrize(
     ("content", "code"),
     [("{}", 1008), (b"\x00\xff", 1008), ('{"do": "steer"}', 1008),
+     ('{"do": "seen", "frame": 1e9}', 1008),
      ('{"do": "take"}' + " " * MOST_BYTES, 1009)],
 )  # fmt: skip
 def test_a_malformed_frame_ends_the_connection_and_not_the_loop(
@@ -163,7 +168,25 @@ def test_a_malformed_frame_ends_the_connection_and_not_the_loop(
     assert ended.value.rcvd.code == code
     assert ended.value.rcvd.reason
     with joined(lab) as again:
-        assert heard(again, frames)[2] > before[2]
+        first = LAYOUT["head"]["first"]
+        assert heard(again, frames)[first] > before[first]
+
+
+def test_a_page_that_paints_nothing_is_not_sent_what_will_be_old(lab: Started) -> None:
+    with joined(lab) as page:
+        heard(page, news(state="running"))
+        got = []
+        with suppress(TimeoutError):
+            while True:
+                content = page.recv(timeout=1.0)
+                got += [np.frombuffer(content)] if isinstance(content, bytes) else []
+        assert [frame[1] for frame in got] == list(range(1, UNDER_WAY + 1))
+        say(page, "seen", frame=UNDER_WAY)
+        # The next one is new, and holds the extremes of all that happened in between.
+        after = np.frombuffer(page.recv(timeout=60))
+        rows, first = LAYOUT["head"]["rows"], LAYOUT["head"]["first"]
+        assert after[first] == got[-1][first] + got[-1][rows]
+        assert after[rows] > 900
 
 
 def test_pictures_are_computed_elsewhere(lab: Started) -> None:

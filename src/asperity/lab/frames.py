@@ -20,7 +20,7 @@ STATE, RELIEF, CUT = 1.0, 2.0, 3.0
 
 NAMES = tuple(name for name, _unit in COLUMNS)
 FORCES = slice(NAMES.index("applied x"), NAMES.index("applied z") + 1)
-HEAD = ("kind", "rows", "first", "heard", "late", "skipped", "forces")
+HEAD = ("kind", "frame", "rows", "first", "heard", "late", "skipped", "forces")
 PLACES = ("god x", "god y", "god z", "hand x", "hand y", "hand z")
 MOST_FORCES = 2048
 """Rows whose forces go with a frame, the newest."""
@@ -44,7 +44,7 @@ def frame(rows: FloatArray, first: int, counts: Mapping[str, float], places: Flo
     Args:
         rows: at least one, as ``kernels.published.COLUMNS`` has them.
         first: number of the first of them.
-        counts: ``heard``, ``late`` and ``skipped``.
+        counts: ``frame`` (its number), ``heard``, ``late`` and ``skipped``.
         places: of god-object and hand (6,) [m].
     """
     forces = rows[-MOST_FORCES:, FORCES]

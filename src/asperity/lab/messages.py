@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -50,7 +51,14 @@ class Take:
     """Who watches wants to steer."""
 
 
-Message = Steer | Change | Look | Take
+@dataclass(frozen=True)
+class Seen:
+    """The newest frame that the page has painted, by its number."""
+
+    frame: float
+
+
+Message = Steer | Change | Look | Take | Seen
 
 
 def read_message(content: str | bytes) -> Message:
@@ -138,4 +146,5 @@ _READERS: dict[str, tuple[tuple[str, ...], Any]] = {
     "relief": (("x", "y", "size"), _relief),
     "cut": (("box", "y"), _cut),
     "take": ((), Take),
+    "seen": (("frame",), lambda frame: Seen(_number("frame", frame, 0.0, math.inf))),
 }

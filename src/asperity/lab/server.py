@@ -19,7 +19,7 @@ from asperity.files import plain
 from asperity.lab.access import MalformedError, Pace
 from asperity.lab.backdrop import Backdrop
 from asperity.lab.frames import frame, layout
-from asperity.lab.messages import Change, Look, Steer, Take, read_message
+from asperity.lab.messages import Change, Look, Seen, Steer, Take, read_message
 from asperity.lab.session import Session
 from asperity.lab.stage import RANGES, Stage
 from asperity.laws import KNOWN_LAWS
@@ -28,6 +28,8 @@ from asperity.textures.naming import KINDS
 
 EVERY = 5e-3
 """[s] between two frames at least."""
+UNDER_WAY = 8
+"""Frames that a page has not painted yet, at most: what waits for a slow one would be old."""
 _LONGEST_SEND = 10.0  # [s] after which a page that takes nothing is let go
 _MOST_REASON = 120  # bytes that a closing frame holds, less its code
 
@@ -41,12 +43,32 @@ class Page:
     Attributes:
         looks: pictures that it waits for, by kind: only the newest of each counts.
         asked: is set when there is one.
+        sent: number of the newest frame that it was sent.
     """
 
     def __init__(self, line: ServerConnection) -> None:
         self.line = line
         self.looks: dict[str, Look] = {}
         self.asked = asyncio.Event()
+        self.sent = self._seen = 0.0
+        self._taken = asyncio.Event()
+
+    def see(self, frame: float) -> None:
+        """Hear that a frame was painted.
+
+        Raises:
+            MalformedError: for one that was not sent.
+        """
+        if frame > self.sent:
+            raise MalformedError("no such frame was sent")
+        self._seen = frame
+        self._taken.set()
+
+    async def keeps_up(self) -> None:
+        """Wait until the page has painted all frames but the newest few."""
+        while self.sent - self._seen >= UNDER_WAY:
+            self._taken.clear()
+            await self._taken.wait()
 
     async def say(self, what: str, **content: Any) -> None:
         """Send words."""
@@ -126,6 +148,8 @@ class Lab:
         if isinstance(message, Look):
             page.looks[message.kind] = message
             page.asked.set()
+        elif isinstance(message, Seen):
+            page.see(message.frame)
         elif isinstance(message, Take):
             if self._master is not None:
                 raise ParameterError("steering", "is done by a page: close that one first")
@@ -158,6 +182,7 @@ class Lab:
         session, starts, seen = self.session, -1, 0
         while True:
             await asyncio.sleep(EVERY)
+            await page.keeps_up()
             if session.shared is None:
                 continue
             shared, heard = session.shared, session.wheel.heard
@@ -168,7 +193,11 @@ class Lab:
                 continue
             seen = first + len(rows)
             counted = Statistics.of(shared.status)
-            counts = {"heard": heard, "late": counted.late, "skipped": counted.skipped}
+            page.sent += 1
+            counts = {
+                "frame": page.sent, "heard": heard,
+                "late": counted.late, "skipped": counted.skipped,
+            }  # fmt: skip
             places = [self.backdrop.nearest(rows[-1, 1:4]), session.wheel.anchor]
             async with asyncio.timeout(_LONGEST_SEND):
                 await page.line.send(frame(rows, first, counts, np.concatenate(places)))

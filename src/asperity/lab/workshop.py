@@ -23,7 +23,7 @@ from asperity.textures.texture import Texture
 
 _SHOWN: dict[str, Surface] = {}
 # Behind the loop and the page, wherever they want to run.
-_NICENESS = 3
+_NICENESS = 10
 
 
 def workshop() -> Executor:

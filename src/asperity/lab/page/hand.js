@@ -48,13 +48,14 @@ export class Hand {
     return still;
   }
 
-  /** Say where the hand is wanted, now or as soon as it is time again. */
-  wish() {
+  /** Say where the hand is wanted, now or as soon as it is time again; since when it is wanted [ms]. */
+  wish(since = performance.now()) {
+    this.since = since;
     if (this.waiting) return;
     const wait = this.last + EVERY - performance.now();
     if (wait > 0) {
       this.waiting = true;
-      setTimeout(() => { this.waiting = false; this.wish(); }, wait);
+      setTimeout(() => { this.waiting = false; this.wish(this.since); }, wait);
       return;
     }
     this.last = performance.now();

@@ -2,9 +2,10 @@
 
 import { Hand } from "./hand.js";
 import { Line } from "./line.js";
+import { readTheme } from "./sheet.js";
 import { Sound } from "./sound.js";
 import { Spectrum, Traces } from "./traces.js";
-import { Cut, Relief, isRelief, readTheme } from "./views.js";
+import { Cut, Relief, isRelief } from "./views.js";
 import { millimetres, quantity } from "./words.js";
 
 const $ = id => document.getElementById(id);
@@ -12,10 +13,11 @@ const FED = 2e-6; // J above which the hand was fed, and not by a rounding
 const relief = new Relief($("relief")), cut = new Cut($("cut"));
 const traces = new Traces($("traces")), spectrum = new Spectrum($("spectrum")), sound = new Sound();
 
-let news = null, frame = null, base = 0, cleared = false, span = 8e-3, centre = [0, 0], looked = "", firstNews = true;
-let faults = 0;
-const waiting = []; // wishes of the pointer: number, and when they were made [ms]
-const latencies = [];
+let news = null, frame = null, base = 0, cleared = false, span = 8e-3, centre = [0, 0], firstNews = true;
+let faults = 0, seen = -1; // the newest frame that was painted
+let asked = {}; // pictures, by kind: which, since when, and when again [ms]
+const waiting = []; // wishes of the pointer: number, and since when [ms]
+const latencies = []; // from the pointer's event to the picture that shows its wish followed [ms]
 
 const line = new Line({
   hello(said) {
@@ -40,7 +42,6 @@ const line = new Line({
     if (firstNews && said.steers) fromAddress();
     firstNews = false;
     hand.high = said.high;
-    if (before && before.version !== said.version) looked = "";
     show();
   },
   refused(said) { alarm(said.words); },
@@ -51,11 +52,18 @@ const line = new Line({
     traces.take(said, line.layout.columns);
     spectrum.take(said.forces);
     sound.take(said.forces, news?.rate ?? 1000);
+    if (document.hidden) line.say("seen", { frame: said.number }); // nothing is painted
   },
-  picture(numbers) { (isRelief(numbers) ? relief : cut).take(numbers); },
+  picture(numbers) {
+    const view = isRelief(numbers) ? relief : cut, now = performance.now();
+    const wait = asked[view.name];
+    if (wait) wait.again = now + RESTS * (now - wait.since);
+    view.take(numbers);
+  },
   lost(reason) {
     firstNews = false;
     news = null;
+    asked = {};
     $("state").className = "stopped";
     $("state").textContent = "connection lost";
     alarm(reason ? `The lab has closed the connection: ${reason}. Trying again …`
@@ -65,7 +73,7 @@ const line = new Line({
 
 const hand = new Hand((what, content) => {
   const said = Boolean(news?.steers) && line.say(what, content);
-  if (said) waiting.push([hand.sent + 1, performance.now()]);
+  if (said) waiting.push([hand.sent + 1, hand.since]);
   if (waiting.length > 500) waiting.shift();
   return said;
 });
@@ -164,41 +172,59 @@ function probeState() {
 }
 
 function boxes() {
-  const ratio = Math.max(0.15, $("cut").clientHeight / Math.max($("cut").clientWidth, 1));
+  const ratio = Math.max(0.15, cut.sheet.height / cut.sheet.width);
   const half = 0.5 * ratio * span, low = news ? 0.5 * (news.low + news.high) : 0;
   return [centre[0] - span / 2, centre[0] + span / 2, low - half, low + half];
 }
 
+/** Ask for the pictures that have become others, each when the one before is there. */
 function look(state) {
   if (!news) return;
   if (state) {
     const [x, y] = state.probe;
     if (Math.abs(x - centre[0]) > 0.45 * span || Math.abs(y - centre[1]) > 0.45 * span) centre = [x, y];
   }
-  const wanted = [...boxes(), state ? Math.round(state.probe[1] / 5e-5) * 5e-5 : 0];
-  const key = wanted.map(value => value.toPrecision(5)).join(" ");
-  if (key === looked) return;
-  looked = key;
-  line.say("cut", { box: wanted.slice(0, 4), y: wanted[4] });
-  line.say("relief", { x: centre[0], y: centre[1], size: span });
+  ask("relief", { x: centre[0], y: centre[1], size: span });
+  ask("cut", { box: boxes(), y: state ? Math.round(state.probe[1] / 5e-5) * 5e-5 : 0 });
 }
 
-let slow = 0, drawn = 0; // when words, and traces, were last shown [ms]
+// The process that computes pictures gets about a tenth of a core: it rests as much longer as a picture took.
+const RESTS = 8;
+function ask(kind, content) {
+  const key = `${news.version} ${news.starts} ${JSON.stringify(content)}`, now = performance.now();
+  if (!news.version || asked[kind]?.key === key || now < (asked[kind]?.again ?? 0)) return;
+  if (line.say(kind, content)) asked[kind] = { key, since: now, again: Infinity };
+}
+
+// When words, the spectrum and traces were last shown, and a picture last asked for [ms].
+const last = { words: 0, traces: 0, look: 0 };
+function due(what, time, every) {
+  if (time - last[what] < every) return false;
+  last[what] = time;
+  return true;
+}
+
 function paint(time) {
   requestAnimationFrame(paint);
   const state = probeState();
+  if (frame && frame.number !== seen) {
+    seen = frame.number;
+    line.say("seen", { frame: seen });
+  }
   relief.draw(state);
   cut.draw(state, boxes());
-  if (time - drawn > 40) { drawn = time; traces.draw(base); }
-  if (frame) while (waiting.length && waiting[0][0] <= frame.heard) {
-    latencies.push(performance.now() - waiting.shift()[1]);
-    if (latencies.length > 5000) latencies.shift();
-  }
-  if (time - slow < 150 || !state) return;
-  slow = time;
-  look(state);
-  tell(state);
+  if (due("traces", time, 60)) traces.draw(base);
+  if (frame && waiting[0]?.[0] <= frame.heard) painted.port1.postMessage(frame.heard);
+  if (due("look", time, 200)) look(state);
+  if (state && due("words", time, 150)) tell(state);
 }
+
+// What is said here is heard when the browser has done with the picture.
+const painted = new MessageChannel();
+painted.port2.onmessage = ({ data: heard }) => {
+  while (waiting.length && waiting[0][0] <= heard) latencies.push(performance.now() - waiting.shift()[1]);
+  if (latencies.length > 5000) latencies.splice(0, latencies.length - 5000);
+};
 
 /** Say in words what is seen. */
 function tell(state) {
@@ -239,10 +265,12 @@ for (const [canvas, move] of [
     hand.pressed = event.buttons > 0;
     hand.force = event.pointerType === "pen" ? 2 * event.pressure : 1;
     move(event);
-    hand.wish();
+    hand.wish(event.timeStamp);
   };
   canvas.onpointerdown = event => { canvas.setPointerCapture(event.pointerId); follow(event); };
   canvas.onpointermove = canvas.onpointerup = follow;
+  // Said at once, where a browser says it; "moved" waits for the next picture.
+  canvas.addEventListener("pointerrawupdate", follow);
   canvas.onpointercancel = () => { hand.pressed = false; hand.wish(); };
   canvas.addEventListener("wheel", event => { event.preventDefault(); zoom(1.15 ** Math.sign(event.deltaY)); }, { passive: false });
 }

@@ -9,7 +9,7 @@ function readFrame(numbers, layout) {
   const at = name => numbers[head[name]], width = least - newest;
   const place = who => ["x", "y", "z"].map(axis => numbers[head[`${who} ${axis}`]]);
   return {
-    rows: at("rows"), first: at("first"), heard: at("heard"), late: at("late"), skipped: at("skipped"),
+    number: at("frame"), rows: at("rows"), first: at("first"), heard: at("heard"), late: at("late"), skipped: at("skipped"),
     god: place("god"), hand: place("hand"), newest: numbers.subarray(newest, newest + width),
     least: numbers.subarray(least, least + width), greatest: numbers.subarray(greatest, greatest + width),
     forces: numbers.subarray(forces, forces + 3 * at("forces")),

@@ -1,34 +1,12 @@
 // The surface in relief, and a cut under the probe with field and curl behind it.
 
+import { corners, paintRelief } from "./relief.js";
+import { Sheet, channels, colours } from "./sheet.js";
 import { quantity, roundStep } from "./words.js";
 
 const RELIEF = 2;
 const ARROW = 250; // pixels per newton, as long as that fits
 const LONGEST = 130; // pixels
-
-/** Fit a canvas to its place on the screen; return its context, and width and height in pixels. */
-export function fitted(canvas) {
-  const ratio = Math.min(window.devicePixelRatio || 1, 2);
-  const width = Math.round(canvas.clientWidth * ratio), height = Math.round(canvas.clientHeight * ratio);
-  if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-  const draw = canvas.getContext("2d");
-  draw.setTransform(ratio, 0, 0, ratio, 0, 0);
-  return [draw, canvas.clientWidth, canvas.clientHeight];
-}
-
-let theme = {};
-/** Read the colours of the page; again when it turns dark. */
-export function readTheme() {
-  const style = getComputedStyle(document.documentElement);
-  const names = ["ground", "card", "ink", "soft", "line", "blue", "orange", "green", "red", "low", "high", "plus",
-    "minus", "solid"];
-  theme = Object.fromEntries(names.map(name => [name, style.getPropertyValue(`--${name}`).trim()]));
-  return theme;
-}
-export const colours = () => theme;
-
-const channels = colour => [1, 3, 5].map(at => parseInt(colour.slice(at, at + 2), 16));
-const mixed = (one, other, share) => one.map((value, k) => Math.round(value + share * (other[k] - value)));
 
 function dot(draw, x, y, radius, fill, line) {
   draw.beginPath();
@@ -69,6 +47,7 @@ function drawnForce(force) {
 }
 
 function drawProbe(draw, place, state, up) {
+  const theme = colours();
   const { probe, god, hand, force, inside } = state;
   const at = place(probe), held = place(hand);
   draw.strokeStyle = theme.soft;
@@ -84,8 +63,10 @@ function drawProbe(draw, place, state, up) {
 }
 
 export class Relief {
+  name = "relief";
+
   constructor(canvas) {
-    this.canvas = canvas;
+    this.sheet = new Sheet(canvas);
     this.drawn = document.createElement("canvas");
     this.heights = null;
   }
@@ -96,15 +77,8 @@ export class Relief {
     this.key = "";
   }
 
-  /** Where things stand: a square that is seen from the front and above. */
-  frame(width, height) {
-    const skew = 0.16 * width, left = 0.03 * width, across = 0.94 * width - skew;
-    const rise = 0.1 * height, bottom = 0.97 * height - rise, deep = 0.97 * height - 2.3 * rise;
-    return { skew, left, across, bottom, deep, rise };
-  }
-
   place(width, height) {
-    const { skew, left, across, bottom, deep } = this.frame(width, height);
+    const { skew, left, across, bottom, deep } = corners(width, height);
     return ([x, y, z]) => {
       const u = (x - this.x) / this.size + 0.5, v = (y - this.y) / this.size + 0.5;
       return [left + u * across + v * skew, bottom - v * deep - z * this.lift];
@@ -113,16 +87,15 @@ export class Relief {
 
   /** Return x and y of the point of the plane z = 0 at a pixel. */
   under(px, py) {
-    const { skew, left, across, bottom, deep } = this.frame(this.canvas.clientWidth, this.canvas.clientHeight);
+    const { skew, left, across, bottom, deep } = corners(this.sheet.width, this.sheet.height);
     const v = (bottom - py) / deep, u = (px - left - v * skew) / across;
     return [this.x + (u - 0.5) * this.size, this.y + (v - 0.5) * this.size];
   }
 
   draw(state) {
-    const [draw, width, height] = fitted(this.canvas);
-    draw.clearRect(0, 0, width, height);
+    const [draw, width, height] = this.sheet.cleared();
     if (!this.heights) return;
-    const key = `${width} ${height} ${theme.low}`;
+    const key = `${width} ${height} ${colours().low}`;
     if (this.key !== key) this.paint(width, height);
     this.key = key;
     draw.drawImage(this.drawn, 0, 0, width, height);
@@ -133,38 +106,20 @@ export class Relief {
   }
 
   paint(width, height) {
-    const { side, heights, size } = this, step = size / (side - 1);
-    let most = 1e-9;
-    for (const z of heights) most = Math.max(most, Math.abs(z));
-    const { rise, across } = this.frame(width, height);
-    this.lift = Math.min(rise / most, 40 * across / size);
+    const most = this.heights.reduce((most, z) => Math.max(most, Math.abs(z)), 1e-9);
+    const { rise, across } = corners(width, height);
+    this.lift = Math.min(rise / most, 40 * across / this.size);
     this.lowest = 1.6 * most;
-    this.exaggeration = this.lift * size / across;
-    const ratio = this.canvas.width / width;
-    Object.assign(this.drawn, { width: this.canvas.width, height: this.canvas.height });
-    const draw = this.drawn.getContext("2d"), place = this.place(width, height);
-    draw.scale(ratio, ratio);
-    const [low, high] = [channels(theme.low), channels(theme.high)];
-    const z = (i, j) => heights[j * side + i];
-    const point = (i, j) => place([this.x + (i / (side - 1) - 0.5) * size, this.y + (j / (side - 1) - 0.5) * size, z(i, j)]);
-    for (let j = side - 2; j >= 0; j--) {
-      for (let i = 0; i < side - 1; i++) {
-        const sx = (z(i + 1, j) - z(i, j)) / step * this.exaggeration, sy = (z(i, j + 1) - z(i, j)) / step * this.exaggeration;
-        const shade = (0.55 * -sx + 0.25 * -sy + 0.8) / Math.hypot(sx, sy, 1) / 1.02;
-        draw.fillStyle = draw.strokeStyle = `rgb(${mixed(low, high, Math.min(1, Math.max(0, shade)))})`;
-        draw.lineWidth = 0.7;
-        draw.beginPath();
-        draw.moveTo(...point(i, j)); draw.lineTo(...point(i + 1, j));
-        draw.lineTo(...point(i + 1, j + 1)); draw.lineTo(...point(i, j + 1));
-        draw.closePath(); draw.fill(); draw.stroke();
-      }
-    }
+    this.exaggeration = this.lift * this.size / across;
+    paintRelief(this.drawn, this, width, height);
   }
 }
 
 export class Cut {
+  name = "cut";
+
   constructor(canvas) {
-    this.canvas = canvas;
+    this.sheet = new Sheet(canvas);
     this.field = document.createElement("canvas");
     this.still = document.createElement("canvas"); // all but probe, hand and force
     this.box = null;
@@ -185,14 +140,14 @@ export class Cut {
 
   /** Return x and z at a pixel, of the box that is wanted. */
   under(px, py, [left, right, bottom, top]) {
-    const share = py / this.canvas.clientHeight;
-    return [left + px / this.canvas.clientWidth * (right - left), top - share * (top - bottom)];
+    const { width, height } = this.sheet;
+    return [left + px / width * (right - left), top - py / height * (top - bottom)];
   }
 
   draw(state, wanted) {
-    const [draw, width, height] = fitted(this.canvas), [left, right, bottom, top] = wanted;
+    const [draw, width, height] = this.sheet.cleared(), [left, right, bottom, top] = wanted;
     const place = ([x, , z]) => [(x - left) / (right - left) * width, (top - z) / (top - bottom) * height];
-    const key = [width, height, theme.plus, ...wanted].join();
+    const key = [width, height, colours().plus, ...wanted].join();
     if (this.key !== key) this.paintStill(width, height, place, right - left);
     this.key = key;
     draw.drawImage(this.still, 0, 0, width, height);
@@ -200,10 +155,11 @@ export class Cut {
   }
 
   paintStill(width, height, place, span) {
-    Object.assign(this.still, { width: this.canvas.width, height: this.canvas.height });
+    const { canvas, ratio } = this.sheet;
+    Object.assign(this.still, { width: canvas.width, height: canvas.height });
     const draw = this.still.getContext("2d");
-    draw.scale(this.canvas.width / width, this.canvas.width / width);
-    draw.fillStyle = theme.ground;
+    draw.scale(ratio, ratio);
+    draw.fillStyle = colours().ground;
     draw.fillRect(0, 0, width, height);
     if (this.box) this.drawField(draw, place);
     this.drawScale(draw, width, height, span);
@@ -220,7 +176,7 @@ export class Cut {
     draw.save();
     outline();
     draw.lineTo(x1, y1); draw.lineTo(x0, y1); draw.closePath();
-    draw.fillStyle = theme.solid;
+    draw.fillStyle = colours().solid;
     draw.fill();
     draw.restore();
     draw.imageSmoothingEnabled = true;
@@ -229,7 +185,7 @@ export class Cut {
     draw.globalAlpha = 1;
     this.drawArrows(draw, place);
     outline();
-    draw.strokeStyle = theme.ink;
+    draw.strokeStyle = colours().ink;
     draw.lineWidth = 2;
     draw.stroke();
   }
@@ -237,7 +193,7 @@ export class Cut {
   drawArrows(draw, place) {
     if (this.strongest < 1e-6) return;
     const [left, right, bottom, top] = this.box, scale = 16 / this.strongest;
-    draw.strokeStyle = theme.blue;
+    draw.strokeStyle = colours().blue;
     draw.globalAlpha = 0.65;
     draw.lineWidth = 1.2;
     draw.beginPath();
@@ -257,7 +213,7 @@ export class Cut {
   paintField() {
     Object.assign(this.field, { width: this.across, height: this.deep });
     const draw = this.field.getContext("2d"), image = draw.createImageData(this.across, this.deep);
-    const [plus, minus] = [channels(theme.plus), channels(theme.minus)];
+    const [plus, minus] = [channels(colours().plus), channels(colours().minus)];
     this.curl.forEach((curl, k) => {
       const row = this.deep - 1 - Math.floor(k / this.across), at = 4 * (row * this.across + k % this.across);
       const share = this.most > 1e-6 * this.strongest ? Math.min(1, 2 * Math.abs(curl) / this.most) : 0;
@@ -268,7 +224,7 @@ export class Cut {
 
   drawScale(draw, width, height, span) {
     const step = roundStep(span, 6), length = step / span * width;
-    draw.strokeStyle = draw.fillStyle = theme.ink;
+    draw.strokeStyle = draw.fillStyle = colours().ink;
     draw.lineWidth = 2;
     draw.beginPath();
     draw.moveTo(12, height - 12); draw.lineTo(12 + length, height - 12);

@@ -1,0 +1,41 @@
+// What pictures are drawn on, and in which colours.
+
+/** A canvas and the size of its place, which is watched: to ask the page for it would cost a layout. */
+export class Sheet {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.draw = canvas.getContext("2d");
+    this.ratio = this.width = this.height = 1;
+    this.blank = true; // nothing is drawn on it
+    new ResizeObserver(([{ contentRect }]) => this.fit(contentRect.width, contentRect.height)).observe(canvas);
+  }
+
+  fit(width, height) {
+    this.ratio = Math.min(window.devicePixelRatio || 1, 2);
+    Object.assign(this, { width: Math.max(width, 1), height: Math.max(height, 1), blank: true });
+    this.canvas.width = Math.round(this.width * this.ratio);
+    this.canvas.height = Math.round(this.height * this.ratio);
+  }
+
+  /** Return the context, cleared, and width and height in pixels of the page. */
+  cleared() {
+    this.blank = false;
+    this.draw.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
+    this.draw.clearRect(0, 0, this.width, this.height);
+    return [this.draw, this.width, this.height];
+  }
+}
+
+let theme = {};
+/** Read the colours of the page; again when it turns dark. */
+export function readTheme() {
+  const style = getComputedStyle(document.documentElement);
+  const names = ["ground", "card", "ink", "soft", "line", "blue", "orange", "green", "red", "low", "high", "plus",
+    "minus", "solid"];
+  theme = Object.fromEntries(names.map(name => [name, style.getPropertyValue(`--${name}`).trim()]));
+  return theme;
+}
+export const colours = () => theme;
+
+/** Return red, green and blue of a colour as it is written in the style sheet. */
+export const channels = colour => [1, 3, 5].map(at => parseInt(colour.slice(at, at + 2), 16));
