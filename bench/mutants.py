@@ -81,7 +81,8 @@ ROOMS = {
     ),
     "passivity": Room(
         ("analysis/passivity", "analysis/judge_passivity.py"),
-        ("tests/analysis/test_passivity.py", "tests/analysis/test_wall_test.py",
+        ("tests/analysis/test_passivity_by_definition.py",
+         "tests/analysis/test_passivity.py", "tests/analysis/test_wall_test.py",
          "tests/analysis/test_passivity_theorems.py", "tests/seams/test_criterion.py",
          "tests/simulation/test_margins.py"),
     ),

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 from asperity.analysis.energy.merit import scan_height
 from asperity.analysis.limits import wave_force as module
-from asperity.analysis.limits.spectrum import spectrum
+from asperity.analysis.limits.spectrum import Spectrum, Wave, spectrum
 from asperity.analysis.limits.wave_force import scan_forces, wave_forces
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
@@ -116,6 +116,24 @@ def test_waves_longer_than_the_patch_push_as_the_longest_that_fits(
     found = force_of(texture, "A", stiffness=500.0, max_depth=1e-4)
     np.testing.assert_allclose(found, 500.0 * waves.amplitudes, rtol=1e-9)
     assert waves.wavelengths[0] > 24 * 2e-5
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_each_band_pushes_by_its_own_ratio(periodic: bool) -> None:
+    """For C the change of height counts; where there are no heights, the nearest band is asked."""
+    height = 1e-7 - 1e-4
+    x = np.arange(256) / 256
+    texture = HeightMap(
+        np.tile(1e-7 * np.sin(4 * np.pi * x) + 1e-8 * np.sin(32 * np.pi * x), (8, 1)),
+        5e-6, periodic=periodic,
+    )  # fmt: skip
+    surface = Surface(texture, "C", stiffness=500.0, max_depth=1e-4)
+    assert scan_height(surface) == pytest.approx(height, rel=1e-2)
+    lengths = np.array([256, 128, 50, 38, 16, 11]) * 5e-6
+    asked = Spectrum(tuple(Wave(float(length), 1.0, 0.1) for length in lengths), False, "told")
+    heard = lengths[[1, 1, 1, 4, 4, 4]]
+    expected = 500.0 * np.hypot(1.0, height * 2 * np.pi / heard)
+    np.testing.assert_allclose(wave_forces(surface, asked), expected, rtol=0.05)
 
 
 def test_a_profile_by_bands() -> None:

@@ -200,7 +200,7 @@ def _refuse_if_too_large(surface: Surface, grid: Grid, limit: int) -> None:
     if grid.bytes <= limit:
         return
     nodes = " x ".join(str(count) for count in grid.shape)
-    least = Grid.fit(surface, 1.0)
+    least = Grid.fit(surface, math.inf)
     if least.bytes > limit:
         fits = f"even the coarsest one takes {least.bytes} byte"
     else:
