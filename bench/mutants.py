@@ -72,7 +72,8 @@ ROOMS = {
     ),
     "kernels": Room(
         ("kernels",),
-        ("tests/kernels/test_link.py", "tests/kernels/test_fuse.py", "tests/kernels/test_tick.py",
+        ("tests/kernels/test_loops_by_definition.py",
+         "tests/kernels/test_link.py", "tests/kernels/test_fuse.py", "tests/kernels/test_tick.py",
          "tests/kernels/test_interfaces.py", "tests/kernels/test_native.py",
          "tests/textures/test_sinusoid.py",
          "tests/test_surface.py", "tests/test_definition.py", "tests/test_cache.py",
