@@ -89,7 +89,8 @@ ROOMS = {
     ),
     "limits": Room(
         ("analysis/limits", "analysis/check_limits.py"),
-        ("tests/analysis/test_limits.py", "tests/analysis/test_spectrum.py",
+        ("tests/analysis/test_limits_by_definition.py",
+         "tests/analysis/test_limits.py", "tests/analysis/test_spectrum.py",
          "tests/analysis/test_wave_force.py", "tests/analysis/test_felt.py",
          "tests/analysis/test_limits_words.py"),
     ),
