@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from asperity.analysis.split import potential_grid
+from asperity.analysis.split import potential_grid, potential_table
 from asperity.analysis.split.potential_grid import Grid, curvatures
 from asperity.kernels import fuse
 from asperity.surface import Surface
@@ -117,3 +117,60 @@ def test_a_map_that_ends_is_fitted_from_its_corner() -> None:
     np.testing.assert_allclose(found.start, texture.domain.origin)
     ends = found.start + np.array(found.cells) @ found.steps
     np.testing.assert_allclose(ends, texture.domain.origin + texture.domain.spans.sum(axis=0))
+
+
+# --- how fine a table is --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("most", [3_000, 40_000, 10**6])
+def test_the_finest_resolution_that_fits_is_found_to_three_digits(most: int) -> None:
+    """On a wave of 1 mm, and on one of 4 km, whose nodes are farther apart than 1 m."""
+    for size in (1.0, 4e6):
+        texture = Sinusoid(0.1e-3 * size, 1e-3 * size)
+        surface = Surface(texture, "H", max_depth=0.35e-3 * size)
+        found = potential_table._resolution_for(surface, most)
+        assert Grid.fit(surface, found).bytes <= most
+        assert Grid.fit(surface, found / 1.002).bytes > most
+
+
+def test_three_digits_are_never_finer() -> None:
+    for value in 10.0 ** np.random.default_rng(3).uniform(-8.0, 2.0, 300):
+        found = potential_table._rounded_up(value)
+        unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+        assert value <= found <= value + unit * (1.0 + 1e-9)
+        assert abs(found / unit - round(found / unit)) < 1e-6
+
+
+@pytest.mark.parametrize(("limit", "counted"), [(2**28, "waves"), (10_000, "bytes")])
+def test_the_default_is_64_nodes_a_wave_or_what_fits(limit: int, counted: str) -> None:
+    surface = Surface(WAVE, "H", max_depth=0.35e-3)
+    slope, bend = WAVE.bounds
+    found = potential_table._default_grid(surface, limit)
+    if counted == "waves":
+        finest = 2.0 * math.pi * slope / bend / 64
+        assert found.shape == Grid.fit(surface, finest).shape
+    else:
+        assert found.bytes <= limit < Grid.fit(surface, 0.99 * min(found.spacing)).bytes
+    # A million nodes of eight bytes, however much is allowed; a flat surface has no shortest wave.
+    flat = Surface(HeightMap(np.zeros((4, 5)), 1e-4), "H", max_depth=1e-4)
+    assert 7e6 < potential_table._default_grid(flat, 2**28).bytes <= 8e6
+
+
+def test_half_of_the_probes_are_near_the_surface() -> None:
+    """4096 within two nodes of it, as many all over; none below the floor, all over the table."""
+    texture = HeightMap(1e-5 * np.random.default_rng(0).normal(size=(9, 12)), 1e-4)
+    surface = Surface(texture, "H", max_depth=1e-4)
+    grid = Grid.fit(surface, 0.2e-4)
+    points = potential_table._probes(surface, grid)
+    assert points.shape == (8192, 3)
+    above = (points[:, 2] - texture.height(points[:, :2])) / grid.rise
+    assert np.abs(above[:4096]).max() <= 2.0 + 1e-9
+    assert above[:4096].min() < -1.99
+    assert above[:4096].max() > 1.99
+    assert points[:, 2].min() >= grid.floor
+    rest = points[4096:, 2]
+    assert rest.max() > texture.extremes[1] - 0.01 * np.ptp(rest)
+    assert rest.min() < grid.floor + 0.01 * np.ptp(rest)
+    parts = (points[:, :2] - texture.domain.origin) @ np.linalg.inv(texture.domain.spans)
+    assert 0.0 <= parts.min() < 0.01
+    assert 0.99 < parts.max() <= 1.0

@@ -131,6 +131,26 @@ def test_a_plate_with_holes_is_refused(thickness: float) -> None:
     assert caught.value.argument == "thickness"
 
 
+def test_a_plate_ends_where_it_is_as_thin_as_the_surface_is_high() -> None:
+    """And down to its depth, that depth included, the law is the plate's: numbers exact in bits."""
+    texture = Profile(np.array([0.0, 0.25, 0.0, 0.125]), 1.0)
+    surface = Surface(texture, "H", continuity=1.0, max_depth=1.0)
+    low, high = texture.extremes
+    with pytest.raises(ParameterError, match="peak-to-valley"):
+        pop_through(surface, high - low)
+    thin = pop_through(surface, math.nextafter(high - low, 1.0))
+    assert 0.0 < thin.barrier < 1e-20
+    plate = pop_through(surface, 1.0)
+    assert (plate.underside, plate.highest) == (high - 1.0, high)
+    assert plate.depth == 0.25
+    least = 1.0 - (high - low)
+    assert plate.barrier_god_object == pytest.approx(surface.stiffness * least**2 / 8.0, rel=1e-12)
+    assert plate.barrier == pytest.approx(0.5 * plate.barrier_god_object, rel=1e-12)
+    edge = high - plate.depth
+    probes = [[1.0, 0.0, edge], [1.0, 0.0, math.nextafter(edge, -1.0)], [1.0, 0.0, high]]
+    assert plate.beyond(probes).tolist() == [False, True, False]
+
+
 def test_a_plate_is_of_the_split_contact_only() -> None:
     with pytest.raises(ParameterError, match="split contact"):
         pop_through(Surface(TEXTURES["gentle"], "D"), 1e-3)

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from asperity.checks import FloatArray
-from asperity.contacts.split import conditions, hull, solver
+from asperity.contacts.memory import BUDGET, FIRST, GAP, POINTS, SHORT, SIZE, TAKEN, UNLIMITED
+from asperity.contacts.split import again, answers, conditions, hull, solver
 from asperity.contacts.split import spline as table
 
 RNG = np.random.default_rng(31)
@@ -303,3 +304,78 @@ def test_eigenvalues_and_pivots_agree_with_lapack() -> None:
     diagonal: Any = (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
     assert not hull.is_below(1.0, *diagonal)
     assert not hull.is_below(1.5, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
+
+
+# --- what is asked of the solver ------------------------------------------------------------------
+
+
+def solved(count: int, gap: float, *, short: bool) -> Any:
+    """Return a solver that finds random atoms, and notes what it was told."""
+    found, pull, told = some_atoms(max(count, 1)), RNG.normal(size=3), []
+
+    def split_atoms(x: float, y: float, z: float, *given: Any) -> Any:
+        continuity, known, budget, p, atoms, out, texture = given
+        told.append((x, y, z, continuity, int(known), budget, atoms[:known].copy(), texture))
+        p[:], atoms[:], out[:] = (x, y, z), found, pull
+        return count, gap, 17.0, short
+
+    return split_atoms, found, pull, told
+
+
+@pytest.mark.parametrize(("known", "count", "short"), [(0, 1, False), (2, 4, True), (4, 3, True)])
+def test_a_tick_goes_on_from_the_atoms_of_the_last(
+    known: int, count: int, short: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    split_atoms, found, pull, told = solved(count, 0.02, short=short)
+    monkeypatch.setattr(again, "split_atoms", split_atoms)
+    memory = np.arange(100.0, 100.0 + SIZE)
+    memory[[BUDGET, POINTS, SHORT]] = 55.0, known, 3.0
+    before = memory.copy()
+    assert again.split_again(0.1, 0.2, 0.3, 1.5, memory, "texture") == tuple(pull)
+    ((*numbers, atoms, texture),) = told
+    assert (numbers, texture) == ([0.1, 0.2, 0.3, 1.5, known, 55.0], "texture")
+    np.testing.assert_array_equal(atoms, before[FIRST : FIRST + 4 * known].reshape(known, 4))
+    assert (memory[POINTS], memory[TAKEN], memory[SHORT]) == (count, 17.0, 4.0 if short else 3.0)
+    kept = memory[FIRST : FIRST + 4 * count].reshape(count, 4)
+    np.testing.assert_array_equal(kept, found[:count])
+    np.testing.assert_array_equal(memory[FIRST + 4 * count :], before[FIRST + 4 * count :])
+    expected = math.sqrt(2.0 * 2.5 * 0.02) if short else 0.0
+    assert memory[GAP] == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_answers_are_those_of_the_atoms(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From nothing and without a budget; U of the atoms, and points outside have none."""
+    split_atoms, found, pull, told = solved(count, 0.02, short=False)
+    monkeypatch.setattr(answers, "split_atoms", split_atoms)
+    monkeypatch.setattr(answers, "height", height)
+    assert answers.split_contact(0.1, 0.2, -0.3, 1.5, None) == tuple(pull)
+    value, atoms, gap = answers.split_energy(0.1, 0.2, -0.3, 1.5, None)
+    weights = found[:count, 3]
+    away = found[:count, :3] - [0.1, 0.2, -0.3]
+    mean = weights @ away
+    spread = float((weights * ((away - mean) ** 2).sum(axis=1)).sum())
+    assert value == pytest.approx(0.5 * (float(mean @ mean) + 0.6 * spread), rel=1e-12)
+    assert (atoms, gap) == (count, 0.02)
+    assert all(one[:6] == (0.1, 0.2, -0.3, 1.5, 0, UNLIMITED) for one in told)
+    points = np.array([[0.1, 0.2, -0.3], [0.1, 0.2, 0.9], [0.1, 0.2, height(0.1, 0.2, None)]])
+    out = np.full((3, 3), np.nan)
+    answers.split_batch(points, out, 1.5, None)
+    np.testing.assert_allclose(out, [[value, count, gap], [0.0] * 3, [0.0] * 3], rtol=1e-12)
+
+
+def test_one_atom_moves_as_a_foot_does() -> None:
+    """∂(z̄ - p)/∂p is that of the foot less the probe's own; nothing where it is no minimum."""
+    y = np.array([0.2, -0.1, -0.5])
+    atoms, m = np.zeros((5, 4)), np.full((3, 3), np.nan)
+    atoms[0] = [*foot_of(y), 1.0]
+    pull = atoms[0, :3] - y
+    step = 1e-5
+    moved = [(foot_of(y + d) - foot_of(y - d)) / (2.0 * step) for d in step * np.eye(3)]
+    answers.split_response(y, 1.5, atoms, 1, pull, m, None)
+    np.testing.assert_allclose(m, np.column_stack(moved) - np.eye(3), rtol=1e-6, atol=1e-9)
+    h, hx, hy = curvature(0.1, 0.1, None)[:3]
+    below = np.array([0.1 + 30.0 * hx, 0.1 + 30.0 * hy, h - 30.0])
+    atoms[0] = [0.1, 0.1, h, 1.0]
+    answers.split_response(below, 1.5, atoms, 1, pull, m, None)
+    assert not m.any()

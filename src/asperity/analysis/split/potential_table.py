@@ -183,7 +183,7 @@ def _default_grid(surface: Surface, limit: int) -> Grid:
 
 def _resolution_for(surface: Surface, most_bytes: int) -> float:
     """Return the finest resolution [m] whose table is not larger, to three digits."""
-    coarse = 1.0
+    coarse = max(Grid.fit(surface, math.inf).spacing)
     while Grid.fit(surface, 0.5 * coarse).bytes <= most_bytes and coarse > 1e-12:
         coarse *= 0.5
     fine = 0.5 * coarse
