@@ -26,7 +26,7 @@ from asperity.analysis.gain.friction import (
     largest_symmetric_eigenvalue,
 )
 from asperity.analysis.gain.god_object import gain_above_crest
-from asperity.analysis.gain.medial_axis import sharpest_crest
+from asperity.analysis.gain.medial_axis import crest_curvature, sharpest_crest
 from asperity.analysis.gain.theorems import safe_bound, theorem_of
 from asperity.enclosures.cells import Cells
 from asperity.enclosures.taylor import Taylor
@@ -353,6 +353,15 @@ def test_the_phases_are_those_of_flank_and_trough() -> None:
 
 
 # --- crests ---------------------------------------------------------------------------------------
+
+
+def test_a_ball_is_as_sharp_everywhere() -> None:
+    """Where both curvatures are equal rounding must not make their difference a root of less."""
+    x, y = 0.7 * RNG.uniform(-1.0, 1.0, (2, 1000))
+    z = np.sqrt(1.0 - x * x - y * y)
+    ball = np.stack([z, -x / z, -y / z, -(1 - y * y) / z**3, -x * y / z**3, -(1 - x * x) / z**3], 1)
+    np.testing.assert_allclose(crest_curvature(ball), 1.0, rtol=1e-6)
+    np.testing.assert_allclose(crest_curvature(-ball), -1.0, rtol=1e-6)
 
 
 @pytest.mark.parametrize("direction", [(1.0, 0.0), (1.0, 2.0), (-3.0, 1.0)])
