@@ -10,7 +10,9 @@ import pytest
 
 from asperity.checks import FloatArray
 from asperity.contacts import Contact
-from asperity.contacts.nearest import line_search, line_within, plane_search, plane_within
+from asperity.contacts.memory import BUDGET, FIRST, GAP, SHORT, SIZE, TAKEN, WORST
+from asperity.contacts.memory import POINTS as KNOWN
+from asperity.contacts.nearest import again, line_search, line_within, plane_search, plane_within
 from asperity.laws import LAWS
 from asperity.textures import Fourier
 
@@ -359,3 +361,43 @@ def test_every_part_of_an_interval_is_looked_at_once(u: float) -> None:
     for first in (0, 2, 4, 6):
         nearer = min((first, first + 1), key=lambda part: abs(part + 0.5 - u))
         assert seen.index(nearer) < seen.index(2 * first + 1 - nearer)
+
+
+@pytest.mark.parametrize(
+    ("points", "last", "start"),
+    [
+        (0.0, (0.1, 0.2, 0.3), (1.0, 2.0)),  # of no tick before
+        (1.0, (1.0, 2.0, 2.0), (1.0, 2.0)),
+        (1.0, (3.0, 5.0, -11.0), (3.0, 5.0)),  # 7 away; the surface is 8 above
+        (1.0, (9.0, 2.0, -17.0), (1.0, 2.0)),  # 8 away too
+        (1.0, (1.0, 10.5, -17.0), (1.0, 2.0)),
+        (1.0, (1.5, 2.5, -9.0), (1.0, 2.0)),
+        (1.0, (1.5, 2.5, -16.5), (1.5, 2.5)),
+    ],
+)
+def test_a_tick_starts_at_the_last_foot_where_that_is_nearer(
+    points: float, last: FloatArray, start: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Than what is straight above; the foot that is found is where the next one starts."""
+    told: list[object] = []
+
+    def foot_within(*given: object) -> tuple[float, ...]:
+        told.append(given)
+        return 0.11, 0.12, 0.13, 0.14, 0.15, 0.5, 33.0
+
+    monkeypatch.setattr(again, "foot_within", foot_within)
+    monkeypatch.setattr(again, "height", lambda x, y, _texture: -13.0 + 2.0 * x + y)
+    memory = np.arange(50.0, 50.0 + SIZE)
+    memory[[KNOWN, FIRST, FIRST + 1, FIRST + 2, SHORT, WORST]] = points, *last, 4.0, 0.4
+    before = memory.copy()
+    found = again.foot_again(1.0, 2.0, -17.0, memory, "texture")
+    assert found == (0.11, 0.12, 0.13, 0.14, 0.15)
+    assert told == [(1.0, 2.0, -17.0, *start, before[BUDGET], "texture")]
+    changed = {KNOWN: 1.0, FIRST: 0.11, FIRST + 1: 0.12, FIRST + 2: 0.13, TAKEN: 33.0, GAP: 0.5,
+               SHORT: 5.0, WORST: 0.5}  # fmt: skip
+    for index, value in enumerate(before):
+        assert memory[index] == changed.get(index, value)
+    again.note_gap(memory, 0.25, 7.0)
+    assert (memory[SHORT], memory[WORST], memory[GAP], memory[TAKEN]) == (6.0, 0.5, 0.25, 7.0)
+    again.note_gap(memory, 0.0, 7.0)
+    assert (memory[SHORT], memory[WORST], memory[GAP]) == (6.0, 0.5, 0.0)
