@@ -128,7 +128,8 @@ ROOMS = {
     ),
     "simulation": Room(
         ("simulation",),
-        ("tests/simulation/test_prediction.py", "tests/simulation/test_onset_rules.py",
+        ("tests/simulation/test_loop_by_definition.py", "tests/simulation/test_prediction.py",
+         "tests/simulation/test_onset_rules.py",
          "tests/simulation/test_bodies_by_definition.py", "tests/simulation/test_hands.py",
          "tests/simulation/test_exact.py",
          "tests/simulation"),
