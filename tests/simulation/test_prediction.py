@@ -8,7 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asperity.simulation import BandHand, Cartesian, Pantograph, Resonance, Servo, SpringHand
+from asperity.analysis.bounds.bound import Bound
+from asperity.simulation import (
+    BandHand,
+    Cartesian,
+    Pantograph,
+    Resonance,
+    Servo,
+    SpringHand,
+    prediction,
+)
 from asperity.simulation.onset import Onset
 from asperity.simulation.prediction import least_damping, predict, with_wall
 from asperity.surface import Surface
@@ -160,3 +169,33 @@ def test_a_texture_s_top_is_where_the_brakes_end() -> None:
     box = (0.0, 0.0, -0.01), (0.0, 0.0, 0.5)
     assert said.damping == least_damping(plant, *box, None, high)
     assert said.damping != least_damping(plant, *box, None, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("q", "plus", "delay", "damping", "rule"),
+    [
+        (3.0, 2.0, 0, 5.0, 5.0 / PERIOD), (3.0, 2.0, 2, 5.0, 5.0 / PERIOD / 7.0),
+        (math.inf, 2.0, 2, 5.0, 5.0 / PERIOD / 5.0),  # below a medial axis: as if q were q⁺
+        (math.inf, 2.0, 0, 5.0, 5.0 / PERIOD), (3.0, 2.0, 2, 0.0, None), (0.0, 0.0, 2, 5.0, None),
+        (1e-4, 0.0, 1, 5.0, 5e7),
+    ],
+)  # fmt: skip
+def test_cycles_are_expected_where_the_delay_rule_ends(
+    q: float, plus: float, delay: int, damping: float, rule: float | None,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """Of a wave in z below 0.16 m, with the damping where the handle starts."""
+    told: list[object] = []
+
+    def least(*given: object) -> float:
+        told.append(given)
+        return damping
+
+    monkeypatch.setattr(prediction, "least_damping", least)
+    for name, value in (("characteristic_number", q), ("one_sided_number", plus)):
+        bound = Bound(value, value, "theorem")
+        monkeypatch.setattr(prediction, name, lambda *_given, bound=bound: bound)
+    servo, start, surface = Servo(PERIOD, delay=delay), (1.0, 2.0, 3.0), Surface(SHARP, "C")
+    found = prediction.expected(surface, PLANT, HAND, servo, start)
+    assert found == (rule if rule is None else pytest.approx(rule, rel=1e-12))
+    assert told == [(PLANT, start, start, HAND, pytest.approx(TOP))]

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +20,7 @@ from asperity.simulation import (
     SpringHand,
     Still,
     Strokes,
+    scan,
     scan_strokes,
     simulate,
 )
@@ -146,3 +150,60 @@ def test_a_slow_loop_gains_what_loop_work_says() -> None:
     run = simulate(surface, PLANT, MovedHand(), Servo(2e-6), way, float(times[-1]))
     expected = loop_work(surface, corners)
     assert run.ledger.total - run.ledger.sampling == pytest.approx(expected, rel=2e-4)
+
+
+# --- what a stroke is made of ---------------------------------------------------------------------
+
+
+def test_whole_turns_count_without_the_first_stroke() -> None:
+    for count, kept in ((1, 1), (2, 2), (3, 2), (4, 2), (5, 4), (6, 4), (7, 6)):
+        strokes = np.arange(count)
+        np.testing.assert_array_equal(scan._kept(strokes), strokes[count - kept :])
+
+
+def test_the_spread_is_that_of_turns() -> None:
+    assert scan._spread(np.array([1.0, 3.0, 7.0, 5.0])) == 2.0  # turns of 2 and 6
+    assert scan._spread(np.array([4.0])) == 0.0
+    assert scan._spread(np.array([1.0, 2.0, 6.0])) == pytest.approx(np.std([1.0, 2.0, 6.0]))
+
+
+def test_a_field_feeds_by_more_than_what_is_unsure() -> None:
+    none = (0.0, 0.0, 0.0)
+    plain = scan.Stroke("A", 1.0, 1.0, 1.0, (1.0, 2.0, 4.0), 0.75, 0.25, 0.5, none, 0.0, 0.0, "")
+    assert not plain.feeds
+    assert replace(plain, field=math.nextafter(0.75, 1.0)).feeds
+    assert plain.total == 7.0
+
+
+def test_work_along_a_path_by_simpson_and_by_trapezia() -> None:
+    """Of a force that is cubic along each piece the one is exact, the other is not."""
+
+    def trace(points: np.ndarray) -> np.ndarray:
+        x, y, z = points.T
+        return np.column_stack([x**3 + y, x * z, y**2 - 2.0 * z])
+
+    path = np.array([[0.0, 1.0, 2.0], [1.0, -1.0, 2.5], [1.5, 0.0, 0.0], [1.5, 0.0, 0.0]])
+    stub: Any = SimpleNamespace(trace=trace)
+    fine, coarse = scan.field_work(stub, path)
+    for i in range(3):
+        way = path[i + 1] - path[i]
+        s = np.linspace(0.0, 1.0, 20_001)
+        along = trace(path[i] + s[:, None] * way) @ way
+        exact = float(np.mean(0.5 * (along[1:] + along[:-1])))
+        assert fine[i] == pytest.approx(exact, rel=1e-7, abs=1e-15)
+        assert coarse[i] == pytest.approx(0.5 * (along[0] + along[-1]), rel=1e-14, abs=1e-15)
+
+
+def test_turns_that_do_not_close_are_unsure() -> None:
+    """Half of the mean distance of their ends times the force where they begin."""
+    position, force = np.zeros((9, 3)), np.zeros((9, 3))
+    position[:, 0] = [0.0, 5.0, 1.0, 6.0, 4.0, 9.0, 2.0, 7.0, 3.0]
+    force[:, 2] = np.arange(1.0, 10.0)
+    run: Any = SimpleNamespace(
+        position=position, state=np.array([8.0, 0, 0, 0, 0, 0]), applied=force
+    )
+    begins = np.array([0, 2, 4, 6, 8])
+    # Turns from samples 2 to 6 and from there to the end: 1 m at 3 N, 6 m at 7 N.
+    assert scan._not_closed(run, begins, 4) == pytest.approx(0.5 * (1.0 * 3.0 + 6.0 * 7.0) / 2.0)
+    assert scan._not_closed(run, begins, 2) == pytest.approx(0.5 * 6.0 * 7.0)
+    assert scan._not_closed(run, begins[:1], 1) == 0.0
