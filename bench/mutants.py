@@ -121,7 +121,8 @@ ROOMS = {
     ),
     "split": Room(
         ("analysis/split", "contacts/split"),
-        ("tests/contacts/test_split_kernels.py",
+        ("tests/contacts/test_split_kernels.py", "tests/contacts/test_split_hull.py",
+         "tests/contacts/test_split_solver.py",
          "tests/analysis/test_potential_grid.py", "tests/analysis/test_split.py",
          "tests/analysis/test_split_map.py", "tests/analysis/test_split_definition.py",
          "tests/analysis/test_split_table.py", "tests/analysis/test_split_closed_form.py"),

@@ -379,3 +379,19 @@ def test_one_atom_moves_as_a_foot_does() -> None:
     atoms[0] = [0.1, 0.1, h, 1.0]
     answers.split_response(below, 1.5, atoms, 1, pull, m, None)
     assert not m.any()
+
+
+def test_polishing_ends_with_its_looks_or_with_a_foot_that_is_lost() -> None:
+    """Two feet that are far from theirs: each follows in several looks, then both are moved."""
+    y, p, a = np.array([0.2, -0.1, -0.5]), np.array([0.2, -0.1, -0.9]), np.zeros((7, 10))
+    for budget in (0.0, 3.0, 5.0):
+        atoms = some_atoms(2)
+        atoms[:2, :2] = [[0.6, 0.3], [-0.4, -0.3]]
+        left, looks = solver.split_polish(atoms, 2, p, y.copy(), MU, a, budget, None)
+        assert left == 0
+        assert budget < looks <= budget + 8.0
+    h, hx, hy = curvature(0.1, 0.1, None)[:3]
+    below = np.array([0.1 + 30.0 * hx, 0.1 + 30.0 * hy, h - 30.0])
+    atoms = some_atoms(2)
+    atoms[0, :2] = 0.1, 0.1
+    assert solver.split_polish(atoms, 2, p, below, MU, a, UNLIMITED, None) == (0, 1.0)
