@@ -148,7 +148,7 @@ def test_a_frame_keeps_the_extremes_between_two_pictures() -> None:
     assert numbers[named["least"] + place] == rows[:, place].min() < -0.29
     assert numbers[named["greatest"] + place] == rows[:, place].max() > 0.29
     head = [numbers[named["head"][name]] for name in HEAD]
-    assert head == [1.0, 5.0, 50.0, 7.0, 3.0, 1.0, 2.0, 50.0]
+    assert head == [1.0, 5.0, 50.0, 7.0, 3.0, 1.0, 2.0, 50.0, 0.0, 0.0, 0.0, 0.0]
     forces = numbers[named["forces"] :].reshape(-1, 3)
     assert (forces == rows[:, FORCES]).all()
 

@@ -3,6 +3,10 @@
 A frame holds the newest row, and of each column the least and the greatest of all rows since the
 frame before: a buzz of 800 Hz between two frames shows as a band, never as a slow wave. The forces
 of all these rows follow, for the spectrum and for the ear. All numbers are doubles.
+
+``way`` and ``squares`` are the sums of |Δp| [m] and |Δp|² [m²] from row to row, by which steps and
+sampling can feed the hand; ``jump`` is the greatest change of the law's force from a row to the
+next [N], and ``moved`` how far the probe went with it [m].
 """
 
 from __future__ import annotations
@@ -20,7 +24,12 @@ STATE, RELIEF, CUT = 1.0, 2.0, 3.0
 
 NAMES = tuple(name for name, _unit in COLUMNS)
 FORCES = slice(NAMES.index("applied x"), NAMES.index("applied z") + 1)
-HEAD = ("kind", "frame", "rows", "first", "heard", "late", "skipped", "forces")
+_PLACE = slice(NAMES.index("x"), NAMES.index("z") + 1)
+_LAW = slice(NAMES.index("commanded x"), NAMES.index("commanded z") + 1)
+HEAD = (
+    "kind", "frame", "rows", "first", "heard", "late", "skipped", "forces", "way", "squares",
+    "jump", "moved",
+)  # fmt: skip
 PLACES = ("god x", "god y", "god z", "hand x", "hand y", "hand z")
 MOST_FORCES = 2048
 """Rows whose forces go with a frame, the newest."""
@@ -48,7 +57,23 @@ def frame(rows: FloatArray, first: int, counts: Mapping[str, float], places: Flo
         places: of god-object and hand (6,) [m].
     """
     forces = rows[-MOST_FORCES:, FORCES]
-    said = {"kind": STATE, "rows": len(rows), "first": first, "forces": len(forces), **counts}
+    said = {
+        "kind": STATE, "rows": len(rows), "first": first, "forces": len(forces), **counts,
+        **steps(rows),
+    }  # fmt: skip
     head = [float(said[name]) for name in HEAD]
     parts = (head, places, rows[-1], rows.min(axis=0), rows.max(axis=0), forces.ravel())
     return np.concatenate(parts).tobytes()
+
+
+def steps(rows: FloatArray) -> dict[str, float]:
+    """Return what happened from row to row: ``way``, ``squares``, ``jump``, ``moved``."""
+    if len(rows) < 2:
+        return {"way": 0.0, "squares": 0.0, "jump": 0.0, "moved": 0.0}
+    squares = np.square(np.diff(rows[:, _PLACE], axis=0)).sum(axis=1)
+    jumps = np.square(np.diff(rows[:, _LAW], axis=0)).sum(axis=1)
+    most = int(jumps.argmax())
+    return {
+        "way": float(np.sqrt(squares).sum()), "squares": float(squares.sum()),
+        "jump": float(jumps[most] ** 0.5), "moved": float(squares[most] ** 0.5),
+    }  # fmt: skip

@@ -171,6 +171,7 @@ class Lab:
             "settings": session.stage.settings, "assumptions": setup.assumptions,
             "free": self._master is None, "wishes": session.wheel.wishes,
             "rate": 1.0 / setup.servo.period, "max_force": setup.servo.max_force,
+            "step": setup.servo.position_resolution, "force_step": setup.servo.force_resolution,
             "low": low, "high": high, "middle": session.stage.middle,
             "limit": self.backdrop.limit, "version": self.backdrop.version,
         }  # fmt: skip

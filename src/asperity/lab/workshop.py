@@ -101,12 +101,16 @@ def picture(kind: str, numbers: tuple[float, ...]) -> bytes:
 def limit(sent: Sent, device: Device) -> dict[str, Any]:
     """Return up to which stiffness a device renders a surface, and by which criterion.
 
-    ``stiffness`` is [N/m], or nothing where no limit is known; ``q`` is the characteristic number.
+    ``stiffness`` is [N/m], or nothing where no limit is known; ``q`` is the characteristic number,
+    ``one_sided`` the one-sided one.
     """
     try:
         surface = sent.surface()
-        q = characteristic_number(surface)
-        allowed, _wall = allowed_stiffness(surface, device, q, one_sided_number(surface))
+        q, one_sided = characteristic_number(surface), one_sided_number(surface)
+        allowed, _wall = allowed_stiffness(surface, device, q, one_sided)
     except AsperityError as error:
-        return {"stiffness": None, "basis": str(error), "q": None}
-    return {"stiffness": allowed.stiffness or None, "basis": allowed.basis, "q": q.value}
+        return {"stiffness": None, "basis": str(error), "q": None, "one_sided": None}
+    return {
+        "stiffness": allowed.stiffness or None, "basis": allowed.basis, "q": q.value,
+        "one_sided": one_sided.value,
+    }  # fmt: skip

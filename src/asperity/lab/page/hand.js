@@ -19,6 +19,8 @@ export class Hand {
     this.motion = "pointer";
     this.high = 0;
     this.stroke = 4e-3;
+    this.loop = 5e-4; // m from the middle of a loop to its sides
+    this.turn = 20; // rad/s
     this.sent = 0;
     this.last = 0;
     this.waiting = false;
@@ -27,6 +29,18 @@ export class Hand {
   get height() {
     if (this.z !== null) return this.z;
     return this.pressed || this.latched ? -this.press * this.force : this.high + ABOVE;
+  }
+
+  /** What does it, as set() takes it. */
+  get kept() {
+    const { motion, x, y, press, stroke, loop, turn } = this;
+    return { motion, x, y, press, stroke, loop, turn, latched: false };
+  }
+
+  /** Do something else: fields of this object by name. */
+  set(wanted) {
+    Object.assign(this, { z: null, force: 1, pressed: false, ...wanted });
+    this.wish();
   }
 
   next() {
@@ -43,7 +57,7 @@ export class Hand {
     }
     if (this.motion === "loop") {
       const deep = 0.6 * this.press;
-      return { target: [x, y, -deep], cosine: [this.loop ?? 5e-4, 0, 0], sine: [0, 0, deep], speed: 20 };
+      return { target: [x, y, -deep], cosine: [this.loop, 0, 0], sine: [0, 0, deep], speed: this.turn };
     }
     return still;
   }

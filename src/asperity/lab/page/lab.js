@@ -1,19 +1,22 @@
 // The page: what is heard from the lab is shown, and what is done here is said to it.
 
+import { Ledger } from "./gauge.js";
 import { Hand } from "./hand.js";
 import { Line } from "./line.js";
 import { readTheme } from "./sheet.js";
 import { Sound } from "./sound.js";
+import { Tour } from "./tour.js";
+import { TourPanel } from "./tourpanel.js";
 import { Spectrum, Traces } from "./traces.js";
 import { Cut, Relief, isRelief } from "./views.js";
 import { millimetres, quantity } from "./words.js";
 
 const $ = id => document.getElementById(id);
-const FED = 2e-6; // J above which the hand was fed, and not by a rounding
 const relief = new Relief($("relief")), cut = new Cut($("cut"));
 const traces = new Traces($("traces")), spectrum = new Spectrum($("spectrum")), sound = new Sound();
+const ledger = new Ledger();
 
-let news = null, frame = null, base = 0, cleared = false, span = 8e-3, centre = [0, 0], firstNews = true;
+let news = null, frame = null, span = 8e-3, centre = [0, 0], firstNews = true;
 let faults = 0, seen = -1; // the newest frame that was painted
 let asked = {}; // pictures, by kind: which, since when, and when again [ms]
 const waiting = []; // wishes of the pointer: number, and since when [ms]
@@ -37,7 +40,8 @@ const line = new Line({
     const before = news;
     news = said;
     if (said.steers && !before?.steers) hand.sent = said.wishes;
-    if (before?.starts !== said.starts || before?.settings.law !== said.settings.law) clear();
+    if (before?.starts !== said.starts) traces.clear();
+    if (before?.starts !== said.starts || before?.settings.law !== said.settings.law) ledger.clear();
     if (!before && !frame) [hand.x, hand.y] = centre = [...said.middle];
     if (firstNews && said.steers) fromAddress();
     firstNews = false;
@@ -47,8 +51,8 @@ const line = new Line({
   refused(said) { alarm(said.words); },
   frame(said) {
     frame = said;
-    const energy = said.newest[line.layout.columns.supplied];
-    if (cleared && !said.newest[line.layout.columns.inside]) { base = energy; cleared = false; }
+    if (news) ledger.take(said, line.layout.columns, news);
+    tour.take(said, line.layout.columns);
     traces.take(said, line.layout.columns);
     spectrum.take(said.forces);
     sound.take(said.forces, news?.rate ?? 1000);
@@ -78,13 +82,14 @@ const hand = new Hand((what, content) => {
   return said;
 });
 
+const tour = new Tour({ change, hand, ledger, see(width) { span = width; }, get news() { return news; } }), panel = new TourPanel(tour);
+
 function fill(select, pairs, chosen) {
   const value = select.value || chosen;
   select.replaceChildren(...pairs.map(([key, words]) => new Option(words, key, false, key === value)));
 }
 
 function change(wishes) { line.say("change", { wishes }); }
-function clear() { cleared = true; base = frame ? frame.newest[line.layout.columns.supplied] : 0; }
 
 function alarm(words) {
   $("alarm").hidden = !words;
@@ -104,6 +109,7 @@ function show() {
   alarm(told);
   $("again").hidden = state !== "stopped" || !steers;
   $("take").hidden = !free || steers;
+  $("tour-begin").disabled = !steers;
   for (const one of document.querySelectorAll(".panel :is(input, select, button)")) {
     if (!["sound", "volume", "picture", "reset"].includes(one.id)) one.disabled = !steers;
   }
@@ -116,7 +122,6 @@ function show() {
   put("max_depth", (1e3 * settings.max_depth).toFixed(3).replace(/\.?0+$/, ""));
   put("stiffness", 1000 * toSlider(settings.stiffness));
   $("stiffness-value").textContent = quantity(settings.stiffness, "N/m");
-  $("press-value").textContent = quantity(hand.press, "m");
   $("assumptions").replaceChildren(...news.assumptions.map(words =>
     Object.assign(document.createElement("li"), { textContent: words })));
   showLimit(settings);
@@ -142,7 +147,7 @@ function showLimit({ stiffness, law }) {
     const side = stiffness > limit.stiffness ? "▲ above" : "below";
     words.textContent = `${side} the limit of ${quantity(limit.stiffness, "N/m")} for law ${law} (${limit.basis})`;
   } else {
-    words.textContent = "basis" in limit ? `No limit is known: ${limit.basis}` : "The limit is being computed …";
+    words.textContent = limit.q === "inf" ? `No limit: the force of law ${law} jumps` : "basis" in limit ? `No limit is known: ${limit.basis}` : "The limit is being computed …";
   }
 }
 
@@ -167,7 +172,7 @@ function probeState() {
   return {
     probe: [value("x"), value("y"), value("z")], god: frame.god, hand: frame.hand,
     force: [value("applied x"), value("applied y"), value("applied z")], inside: value("inside") > 0,
-    energy: value("supplied") - base,
+    energy: ledger.energy,
   };
 }
 
@@ -213,7 +218,7 @@ function paint(time) {
   }
   relief.draw(state);
   cut.draw(state, boxes());
-  if (due("traces", time, 60)) traces.draw(base);
+  if (due("traces", time, 60)) traces.draw(ledger.base);
   if (frame && waiting[0]?.[0] <= frame.heard) painted.port1.postMessage(frame.heard);
   if (due("look", time, 200)) look(state);
   if (state && due("words", time, 150)) tell(state);
@@ -228,10 +233,14 @@ painted.port2.onmessage = ({ data: heard }) => {
 
 /** Say in words what is seen. */
 function tell(state) {
-  const { probe, force, energy } = state, fed = energy > FED;
+  const { probe, force, energy } = state;
+  panel.draw();
+  put("motion", hand.motion);
+  put("press", 1e3 * hand.press);
+  $("press-value").textContent = quantity(hand.press, "m");
   $("energy").textContent = quantity(energy, "J");
-  $("ledger").classList.toggle("fed", fed);
-  $("verdict").textContent = fed ? "⚠ the field has fed the hand" : "the hand was not fed";
+  $("ledger").classList.toggle("fed", ledger.fed);
+  $("verdict").textContent = ledger.words;
   const [f, amplitude] = spectrum.draw(news?.rate ?? 1000);
   $("peak").textContent = amplitude > 1e-3 ? `strongest ${quantity(f, "Hz")}, ${quantity(amplitude, "N")}` : "quiet";
   $("trace-note").textContent = `${frame.late} samples late, ${frame.skipped} left out`;
@@ -277,7 +286,7 @@ for (const [canvas, move] of [
 
 $("stiffness").oninput = event => { $("stiffness-value").textContent = quantity(fromSlider(event.target.value), "N/m"); };
 $("stiffness").onchange = event => change({ stiffness: fromSlider(event.target.value) });
-$("press").oninput = event => { hand.press = 1e-3 * event.target.value; $("press-value").textContent = quantity(hand.press, "m"); hand.wish(); };
+$("press").oninput = event => { hand.press = 1e-3 * event.target.value; hand.wish(); };
 $("motion").onchange = event => { hand.motion = event.target.value; hand.wish(); };
 $("texture").onchange = event => change({ texture: event.target.value });
 $("device").onchange = event => change({ device: event.target.value });
@@ -291,7 +300,7 @@ $("swap").onclick = () => {
   change({ law: $("other").value });
   $("other").value = mine;
 };
-$("reset").onclick = clear;
+$("reset").onclick = () => ledger.clear();
 $("again").onclick = () => change({});
 $("take").onclick = () => line.say("take");
 $("volume").oninput = event => sound.setVolume(Number(event.target.value));
@@ -320,8 +329,10 @@ const KEYS = {
   " ": () => { hand.z = null; hand.force = 1; hand.latched = !hand.latched; hand.wish(); },
   PageUp: () => { hand.z = Math.min(hand.height + span / 80, 0.01); hand.wish(); },
   PageDown: () => { hand.z = Math.max(hand.height - span / 80, -0.01); hand.wish(); },
-  m: () => { hand.next(); $("motion").value = hand.motion; },
-  x: () => $("swap").click(), r: clear, s: () => $("sound").click(),
+  m: () => hand.next(),
+  x: () => $("swap").click(), r: () => ledger.clear(), s: () => $("sound").click(),
+  t: () => panel.toggle(), v: () => tour.on && $("tour-show").click(),
+  n: () => tour.on && $("tour-next").click(), p: () => tour.on && $("tour-back").click(),
   "+": () => zoom(1 / 1.15), "-": () => zoom(1.15),
 };
 
@@ -349,5 +360,5 @@ requestAnimationFrame(paint);
 // For tests, and for whoever is curious in the console.
 globalThis.lab = {
   get frame() { return frame; }, get news() { return news; }, get faults() { return faults; },
-  get ready() { return Boolean(relief.heights && cut.box); }, latencies, hand, probeState,
+  get ready() { return Boolean(relief.heights && cut.box); }, latencies, hand, tour, ledger, probeState,
 };

@@ -10,6 +10,7 @@ function readFrame(numbers, layout) {
   const place = who => ["x", "y", "z"].map(axis => numbers[head[`${who} ${axis}`]]);
   return {
     number: at("frame"), rows: at("rows"), first: at("first"), heard: at("heard"), late: at("late"), skipped: at("skipped"),
+    way: at("way"), squares: at("squares"), jump: at("jump"), moved: at("moved"),
     god: place("god"), hand: place("hand"), newest: numbers.subarray(newest, newest + width),
     least: numbers.subarray(least, least + width), greatest: numbers.subarray(greatest, greatest + width),
     forces: numbers.subarray(forces, forces + 3 * at("forces")),

@@ -37,6 +37,9 @@ export class Traces {
     this.newest = bin;
   }
 
+  /** Forget what was: the clock of another loop begins anew. */
+  clear() { this.frames = []; }
+
   draw(base) {
     const [draw, width, height] = this.sheet.cleared();
     if (!this.count) return;

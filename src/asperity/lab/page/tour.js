@@ -1,0 +1,189 @@
+// The guided tour: six steps, each of which finds by itself that what it tells of has happened.
+
+import { BUZZ, Gauge } from "./gauge.js";
+import { quantity } from "./words.js";
+
+const STAGE = { // of all steps: the same hand holds the same surface on the same device
+  texture: "sinusoid:amplitude=0.4mm,period=2mm", device: "omega.3", delay: 1, max_depth: 8e-4,
+  hand_stiffness: 800, hand_damping: 2.3,
+};
+const STROKED = 12e-3; // m, four strokes of the hand
+const LOOPED = 12e-3; // m, four loops: each is 2 mm wide, to and fro, partly in contact
+const LANDED = 1e-3; // m of way after which the energy of the landing is over
+const GIVEN = 1e-4; // J, enough to lift the handle of 100 g by a tenth of a millimetre
+const CLICKS = 3; // not one by chance
+const SOFTER = 0.5; // of the wall's: hands tell stiffnesses apart from about a quarter (Jones and Hunter, 1990)
+const HELD = 0.8; // of the stiffness that is set, felt in a trough
+
+const SEEN = 5e-3; // m of the surface: two periods and a half
+const TROUGH = -5e-4, FLANK = 0; // m
+const press = { motion: "pointer", x: TROUGH, press: 8e-4, latched: true };
+const pressFlank = { ...press, x: 1.3e-3, press: 1e-3 };
+const stroke = { motion: "stroke", x: FLANK, press: 8e-4, stroke: 1.5e-3, latched: false };
+const loop = { motion: "loop", x: FLANK, press: 5e-4, loop: 5e-4, turn: 8, latched: false };
+
+const below = ({ news }) => Number.isFinite(news.limit.stiffness) && news.settings.stiffness <= news.limit.stiffness;
+const above = ({ news }) => Number.isFinite(news.limit.stiffness) && news.settings.stiffness > 2 * news.limit.stiffness;
+const at = (value, goal, unit) => `${quantity(value, unit)} of ${quantity(goal, unit)}`;
+
+// What an act asks for, and what of it is seen: words, how much of it is done, and whether it has happened.
+const quiet = g => ({
+  words: `stroked ${at(g.gauge.way, STROKED, "m")}; the force swings by ${quantity(g.gauge.swing, "N")}`,
+  share: g.gauge.way / STROKED,
+  done: g.gauge.way >= STROKED && g.gauge.swing < BUZZ && !g.gauge.clicks && !g.ledger.fed && below(g),
+});
+const unfed = g => ({
+  words: `given ${quantity(g.ledger.energy, "J")}; at most ${quantity(g.ledger.sampled, "J")} by sampling; way ${at(g.gauge.way, LOOPED, "m")}`,
+  share: g.gauge.way / LOOPED, done: g.landed && g.gauge.way >= LOOPED && !g.ledger.fed && g.gauge.free,
+});
+const fed = g => ({
+  words: `given ${at(g.ledger.energy, GIVEN, "J")}; at most ${quantity(g.ledger.sampled, "J")} of it by sampling`,
+  share: g.ledger.energy / GIVEN, done: g.landed && g.ledger.fed && g.ledger.energy >= GIVEN,
+});
+const buzzes = g => ({
+  words: `the hand ${g.gauge.still ? "holds still" : "moves"}; the force swings by ${at(g.gauge.swing, BUZZ, "N")}`,
+  share: g.gauge.still ? g.gauge.swing / BUZZ : 0, done: g.gauge.still > 1 && g.gauge.swing > BUZZ && above(g),
+});
+const clicks = g => ({
+  words: `${g.gauge.clicks} of ${CLICKS} clicks`, share: g.gauge.clicks / CLICKS, done: g.gauge.clicks >= CLICKS,
+});
+const unclicked = g => ({
+  words: `stroked ${at(g.gauge.way, STROKED, "m")}; clicks: ${g.gauge.clicks}`, share: g.gauge.way / STROKED,
+  done: g.gauge.way >= STROKED && g.gauge.clicks === 0,
+});
+const firm = g => ({
+  words: `the hand ${g.gauge.still ? "holds still" : "moves"}; felt: ${quantity(g.gauge.felt, "N/m")}`,
+  share: g.gauge.still, done: g.gauge.felt >= HELD * g.news.settings.stiffness && below(g),
+  keep: g.gauge.felt,
+});
+const soft = g => ({
+  words: `felt: ${quantity(g.gauge.felt, "N/m")}; the wall: ${quantity(g.kept, "N/m")}`,
+  share: g.gauge.still, done: g.gauge.felt > 0 && g.gauge.felt < SOFTER * g.kept && below(g),
+});
+
+export const STEPS = [
+  {
+    title: "W is quiet", watch: "The traces: a flat force. The energy: not fed.",
+    why: "The smooth wall is the measure of all. It pushes straight up, as hard as the probe is deep: there is no texture, and no buzz.",
+    found: "The wall was stroked, and the force did not swing. Quiet, and dull.",
+    acts: [{ law: "W", stiffness: 1500, ask: "Stroke the wall: hold the pointer down on the surface and move it to and fro.", show: stroke, judge: quiet }],
+  }, {
+    title: "A feels alive", watch: "The energy that the hand was given: it climbs with every loop, and turns red.",
+    why: "Law A pushes straight up by the depth below the groove, without pushing sideways. Such a field has curl: who goes down on one flank and up on the other gets more work than he puts in.",
+    found: "The field has fed the hand, by more than sampling and steps explain. A body that gives energy feels alive.",
+    acts: [{ law: "A", stiffness: 1500, ask: "Go round in small loops on a slope: in the cut, move the pointer right, down, left and up again.", show: loop, judge: fed }],
+  }, {
+    title: "B buzzes above its limit", watch: "The mark at the stiffness, and the band in the force: it swings while the hand holds still.",
+    why: "Law B turns the force into the surface's normal. On a curved surface that makes it stiffer sideways than it is set: its limit is a third of the wall's, and here it is five times above.",
+    found: "The hand holds still, and the force swings by itself: a buzz.",
+    acts: [{ law: "B", stiffness: 8000, ask: "Press on a slope, and hold still.", show: pressFlank, judge: buzzes }],
+  }, {
+    title: "D clicks", watch: "The dot, the nearest point: it leaps from one flank to the other. The sideways force leaps with it.",
+    why: "Law D, the god-object, pulls to the nearest point of the surface. Below a crest two points are equally near, and a step to the side exchanges one for the other.",
+    found: "In a single sample the force has jumped by more than any stiffness explains: a click at each crest.",
+    acts: [{ law: "D", stiffness: 1000, ask: "Press deep, and stroke across the crests.", show: stroke, judge: clicks }],
+  }, {
+    title: "C is soft", watch: "The cut: how deep the same push sinks.",
+    why: "Law C has no curl and no jumps. But it gets steep where the surface is curved, and its limit is below a third of the wall's: within it, it is soft.",
+    found: "At its limit, law C yields more than twice as far as the wall.",
+    acts: [
+      { law: "W", stiffness: 4500, plane: true, ask: "First the wall, near its limit: press, and hold still.", show: press, judge: firm },
+      { law: "C", stiffness: 1350, ask: "Now law C, near its own limit: press in a trough, and hold still.", show: press, judge: soft },
+    ],
+  }, {
+    title: "H does none of it", watch: "All of it: no energy, no click, no buzz, and the wall's stiffness.",
+    why: "Law H splits the god-object: between two points that are equally near it pulls to a place between them. No curl, no jump, and its limit is the wall's own.",
+    found: "As stiff as the wall, it did not feed, did not click and did not buzz.",
+    acts: [
+      { law: "H", stiffness: 4500, ask: "Press in a trough, and hold still: it is as stiff as the wall, and does not buzz.", show: press, judge: firm },
+      { law: "H", stiffness: 1500, ask: "Go round in loops on a slope, as with law A.", show: loop, judge: unfed },
+      { law: "H", stiffness: 1500, ask: "Stroke deep across the crests, as with law D.", show: stroke, judge: unclicked },
+    ],
+  },
+];
+
+export class Tour {
+  /** @param host object with change(wishes), hand, ledger and news */
+  constructor(host) {
+    this.host = host;
+    this.gauge = new Gauge();
+    this.step = -1; // none
+    this.shows = false;
+    this.seen = STEPS.map(() => false);
+    this.before = null;
+  }
+
+  get on() { return this.step >= 0; }
+  get now() { return STEPS[this.step]; }
+  get act() { return this.now?.acts[Math.min(this.turn, this.now.acts.length - 1)]; }
+  get found() { return this.on && this.seen[this.step]; }
+
+  begin() {
+    if (!this.on) this.before = { settings: { ...this.host.news.settings }, hand: this.host.hand.kept };
+    this.seen.fill(false);
+    this.host.see(SEEN);
+    this.go(0);
+  }
+
+  end() {
+    if (!this.on) return;
+    this.step = -1;
+    this.show(false);
+    this.host.hand.set(this.before.hand);
+    const former = Object.entries(this.before.settings).filter(([name, value]) => value !== null && value !== this.host.news?.settings[name]);
+    if (former.length) this.host.change(Object.fromEntries(former));
+  }
+
+  go(step) {
+    if (step < 0 || step >= STEPS.length) return;
+    this.step = step;
+    this.seen[step] = false;
+    this.kept = 0;
+    this.start(0);
+  }
+
+  start(turn) {
+    this.turn = turn;
+    const { law, stiffness } = this.act, { settings } = this.host.news;
+    // One that takes another loop only if it must.
+    const wishes = Object.entries({ ...STAGE, law, stiffness }).filter(([name, value]) => settings[name] !== value);
+    if (wishes.length) this.host.change(Object.fromEntries(wishes));
+    this.host.hand.motion = "pointer";
+    this.host.hand.latched = false;
+    this.host.hand.wish();
+    this.gauge.begin();
+    this.host.ledger.clear();
+    this.free = this.landed = false;
+  }
+
+  /** Let the hand move by itself, or no more. */
+  show(on = !this.shows) {
+    this.shows = on && this.on;
+    if (this.on && !on) { this.host.hand.latched = false; this.host.hand.motion = "pointer"; this.host.hand.wish(); }
+    this.shown = false;
+  }
+
+  get ready() {
+    const { news } = this.host, { law, stiffness } = this.act;
+    return news?.state === "running" && Object.entries({ ...STAGE, law, stiffness }).every(([name, value]) => news.settings[name] === value);
+  }
+
+  take(frame, columns) {
+    if (!this.on) return;
+    this.result = null;
+    if (!this.ready) { this.gauge.begin(); this.shown = false; return; }
+    // Each act begins with the probe in the air: what was stored before counts for nothing.
+    if (!this.free) this.free = frame.newest[columns.inside] === 0;
+    if (!this.free) return;
+    if (this.shows && !this.shown) { this.shown = true; this.host.hand.set(this.act.show); }
+    this.gauge.take(frame, columns, this.host.news, this.act.plane);
+    if (!this.landed && this.gauge.way > LANDED) { this.landed = true; this.host.ledger.clear(); }
+    const { ledger, news } = this.host, landed = this.landed && !ledger.waits;
+    this.result = this.act.judge({ gauge: this.gauge, ledger, news, landed, kept: this.kept });
+    if (!this.result.done || this.found) return;
+    this.kept = this.result.keep ?? this.kept;
+    this.shown = false;
+    if (this.turn + 1 < this.now.acts.length) this.start(this.turn + 1);
+    else this.seen[this.step] = true;
+  }
+}

@@ -1,0 +1,60 @@
+"""The guided tour in a real browser: each step finds what it tells of, and nothing else."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import pytest
+from tests.lab.browser import Browser, needs_browser
+from tests.lab.started import Started
+
+TITLES = ("W is quiet", "A feels alive", "B buzzes above its limit", "D clicks", "C is soft",
+          "H does none of it")  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def page(lab: Started, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with Browser(lab.address, tmp_path_factory.mktemp("browser")) as browser:
+        browser.until("globalThis.lab?.frame && lab.ready")
+        yield browser
+
+
+def text(page: Browser, name: str) -> str:
+    return str(page.ask(f"document.getElementById('{name}').textContent"))
+
+
+@needs_browser
+def test_the_tour_shows_itself_to_its_end_by_keys(page: Browser) -> None:
+    former = page.ask("lab.news.settings")
+    page.press("t")
+    page.press("v")
+    for number, title in enumerate(TITLES, 1):
+        assert text(page, "tour-title") == title
+        page.until("lab.tour.found")
+        page.until("document.getElementById('tour').classList.contains('found')")
+        assert text(page, "tour-place").startswith(f"Step {number} of 6")
+        assert text(page, "tour-found").startswith("✓")
+        if number == 2:
+            assert "fed the hand" in text(page, "verdict")
+        if number == 3:
+            assert text(page, "limit-words").startswith("▲ above the limit")
+        page.press("n")
+    assert page.ask("document.getElementById('tour').hidden")
+    # As it was before.
+    page.until(
+        f"JSON.stringify(lab.news.settings) === `{json.dumps(former, separators=(',', ':'))}`"
+    )
+    assert page.said == []
+
+
+@needs_browser
+def test_what_is_not_there_is_not_found(page: Browser) -> None:
+    # The hand goes in the loops of the step on law A, on the wall.
+    page.press("t")
+    page.ask("lab.tour.go(1); lab.tour.act.law = 'W'; lab.tour.show(true); lab.tour.start(0)")
+    page.until("lab.tour.gauge.way > 8e-3")
+    assert text(page, "tour-title") == TITLES[1]
+    assert not page.ask("lab.tour.found")
+    assert not page.ask("lab.ledger.fed")
+    page.press("t")
