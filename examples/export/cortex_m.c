@@ -16,14 +16,16 @@
 #include "texture.h"
 
 static texture_state state;
-static float commanded[3];
+/* Registers of a board: counters that it changes, and what its PWM reads. */
+static volatile int counts[3] = {0, 0, -5};
+static volatile float commanded[3];
 
 /* The handle: metres in the frame of the surface, from the encoders' counts. */
-static void encoders(int count, float position[3])
+static void encoders(float position[3])
 {
-    position[0] = 10e-6f * (float)count;
-    position[1] = 0.0f;
-    position[2] = -0.05e-3f;
+    for (int i = 0; i < 3; i++) {
+        position[i] = 10e-6f * (float)counts[i];
+    }
 }
 
 static void motors(const float force[3])
@@ -33,10 +35,10 @@ static void motors(const float force[3])
     }
 }
 
-static void tick(int count)
+static void tick(void)
 {
     float position[3], force[3];
-    encoders(count, position);
+    encoders(position);
     texture_force(&state, position, force);
     motors(force);
 }
@@ -46,7 +48,8 @@ int main(int given, char **words)
     const int ticks = given > 1 ? atoi(words[1]) : 8;
     texture_reset(&state);
     for (int count = 0; count < ticks; count++) {
-        tick(25 * count);
+        counts[0] = 25 * count;
+        tick();
 #if !defined(SILENT)
         printf("%d %d %d uN\n", (int)(1e6f * commanded[0]), (int)(1e6f * commanded[1]),
                (int)(1e6f * commanded[2]));

@@ -11,28 +11,29 @@ from tests.exported import COMPILERS, header, run, tool
 from asperity.surface import Surface
 from asperity.textures import Texture
 
-GNU = ("-std=gnu99", "-O2", "-mfma", "-S", "-o", "-")
 
-
-def _fused(compiler: str, text: str, folder: Path) -> int:
+def _fused(compiler: str, language: str, text: str, folder: Path) -> int:
     """Return how many fused operations a compiler makes of a header."""
     (folder / "t.h").write_text(text)
     (folder / "t.c").write_text(
         '#include "t.h"\nvoid f(t_state *s, const double *p, double *f)\n'
         "{ t_force(s, p, f); }\ndouble g(double a, double b) { return a * b; }\n"
     )
-    return run(tool(compiler), *GNU, "t.c", cwd=folder).count("vfm")
+    kind = ("-x", "c++") if "++" in language else ()
+    flags = (*kind, f"-std={language}", "-O2", "-mfma", "-S", "-o", "-")
+    return run(tool(compiler), *flags, "t.c", cwd=folder).count("vfm")
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_nothing_is_fused(
     compiler: str, make_texture: Callable[[str], Texture], tmp_path: Path
 ) -> None:
-    text = header(Surface(make_texture("map"), "D"), "t")
-    assert _fused(compiler, text, tmp_path) == 0
+    text = header(Surface(make_texture("map"), "F"), "t")
+    for language in ("c99", "gnu99", "c++17", "gnu++17"):
+        assert _fused(compiler, language, text, tmp_path) == 0, language
     without = text.replace('#pragma GCC optimize ("fp-contract=off")', "")
     without = without.replace("#pragma STDC FP_CONTRACT OFF", "#pragma STDC FP_CONTRACT ON")
-    assert _fused(compiler, without, tmp_path) > 20
+    assert _fused(compiler, "gnu99", without, tmp_path) > 20
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)

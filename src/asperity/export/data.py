@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -117,7 +117,9 @@ def store_of(surface: Surface, prefix: str, *, single: bool) -> Store:
     values: dict[str, Any] = {}
     texture = _constants(f"{prefix}_surface", arguments._fields, arguments, prefix, values)
     names = (*SHARED_PARAMETERS, *surface.law.parameters)
-    law = _constants(f"{prefix}_law", names, surface.law_arguments, prefix, values)
+    numbers = [float(value) for value in surface.law_arguments]
+    law = _constants(f"{prefix}_law", names, numbers, prefix, values)
+    law = replace(law, reader=f"{prefix.upper()}_READ")
     return Store(prefix, single, texture, law, values)
 
 

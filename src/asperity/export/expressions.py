@@ -157,7 +157,7 @@ class Expressions:
             return self._constant(ast.Constant(REAL_CONSTANTS[node.attr]))
         kind = self.scope.sure(node.value)
         if isinstance(kind, Constants):
-            return Text(f"{kind.place}.{node.attr}", _PRIMARY)
+            return Text(kind.read(node.attr), _PRIMARY)
         if isinstance(kind, (Work, Data)):
             return self._make(Group((INT,) * len(kind.shape)), [str(n) for n in kind.shape])
         assert isinstance(kind, Group)  # nothing else has attributes in compiled functions

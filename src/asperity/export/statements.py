@@ -272,7 +272,7 @@ class Statements:
         kind = self.scope.sure(value)
         pairs = list(enumerate(targets))
         if isinstance(kind, Constants):
-            places = [f"{kind.place}.{name}" for name, _item in kind.fields]
+            places = [kind.read(name) for name, _item in kind.fields]
             items: Sequence[Kind] = [item for _name, item in kind.fields]
         else:
             assert isinstance(kind, Group)  # the scope let nothing else through

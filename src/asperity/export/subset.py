@@ -88,10 +88,17 @@ class Constants:
     Attributes:
         place: its name in the program.
         fields: its items by name.
+        reader: macro that reads a real number without the compiler knowing it; empty for none.
     """
 
     place: str
     fields: tuple[tuple[str, Kind], ...]
+    reader: str = ""
+
+    def read(self, name: str) -> str:
+        """Return the expression of a number."""
+        place = f"{self.place}.{name}"
+        return f"{self.reader}({place})" if self.reader else place
 
 
 @dataclass(frozen=True)

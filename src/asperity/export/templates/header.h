@@ -9,7 +9,7 @@
 @inside@
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT DEFAULT
-#elif defined(__GNUC__)
+#elif defined(@NAME@_UNFUSED)
 #pragma GCC pop_options
 #endif
 
