@@ -172,6 +172,38 @@ def test_what_others_record_is_shown_as_far_as_it_goes(
         assert (code, out, err.count("\n")) == (2, "", 1)
 
 
+def test_a_recording_without_a_whole_block_shows_no_numbers(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with asp.RecordingWriter(path, (("time", "s"), ("x", "m"))) as writer:
+        writer.append(np.zeros((2, 2)))
+    begin = asp.open_recording(path)._chunks[0].begin
+    path.write_bytes(path.read_bytes()[: begin + 20])
+    code, out, err = call("recording", "info", str(path))
+    assert (code, err) == (0, "")
+    assert out.startswith(
+        "0 rows, 0 s. It was not closed, and no whole block of samples is in it.\n"
+    )
+    assert "nan" not in out
+    code, out, _err = call("recording", "info", str(path), "--json", "-")
+    assert [column["least"] for column in json.loads(out)["columns"]] == [None, None]
+    with asp.RecordingWriter(path, (("time", "s"), ("x", "m"))):
+        pass
+    assert call("recording", "info", str(path))[1].startswith("0 rows, 0 s. Nothing was recorded.")
+
+
+def test_a_recording_of_a_later_format_is_refused(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with asp.RecordingWriter(path, (("time", "s"), ("x", "m"))) as writer:
+        writer.append(np.zeros((2, 2)))
+    path.write_bytes(path.read_bytes().replace(b"\x01\0\0\x001", b"\x01\0\0\x002", 1))
+    picture, table = str(tmp_path / "a.png"), str(tmp_path / "a.csv")
+    for verb, *to in (["info"], ["replay"], ["plot", "-o", picture], ["export", "-o", table]):
+        code, out, err = call("recording", verb, str(path), *to)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert "it is of format 2" in err
+    assert [one.name for one in tmp_path.iterdir()] == ["run.mcap"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

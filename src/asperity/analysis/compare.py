@@ -10,7 +10,7 @@ from typing import Any
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import merit
-from asperity.analysis.gain.answers import surface_content
+from asperity.analysis.gain.answers import content_but_stiffness
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.judge_passivity import passivity
 from asperity.analysis.limits.felt import DEFAULT_SPEED, texture_alone, texture_felt
@@ -249,7 +249,7 @@ class _Task:
 def _tasks(surfaces: Sequence[Surface], question: _Question) -> list[_Task | None]:
     """Return what can be answered ahead, law by law: what is kept."""
     return [
-        None if surface_content(surface) is None else _Task(
+        None if content_but_stiffness(surface) is None else _Task(
             surface.texture, surface.law.letter, surface.max_depth, surface.clamp,
             dict(surface.law_parameters), question.deep,
         )

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from asperity.analysis.compare import Comparison
-from asperity.analysis.gain.answers import surface_content
+from asperity.analysis.gain.answers import content_but_stiffness
 from asperity.analysis.words.felt import speed_text
 from asperity.files import json_text
 from asperity.kept import content_digest
@@ -178,7 +178,7 @@ def _picture(comparison: Comparison, name: str) -> page.Picture:
 
 def _content(comparison: Comparison) -> str | None:
     """Return a digest of all that a comparison's pictures show; ``None`` where it is not known."""
-    contents = [surface_content(row.surface) for row in comparison.rows]
+    contents = [content_but_stiffness(row.surface) for row in comparison.rows]
     known = [content for content in contents if content is not None]
     if len(known) < len(contents):
         return None

@@ -34,10 +34,17 @@ def answer(recording: Recording) -> str:
     if surface is not None:
         stiffness = engineering(float(surface["stiffness"]), "N/m")
         said += f": law {surface['law']} at {stiffness} on {described(surface['texture'])}"
+    return f"{said}. {_ending(recording)}".rstrip()
+
+
+def _ending(recording: Recording) -> str:
+    """Return in a sentence why samples may be missing; nothing if none is."""
     if recording.whole:
-        return f"{said}."
+        return "" if recording.rows else "Nothing was recorded."
+    if not recording.rows:
+        return "It was not closed, and no whole block of samples is in it."
     lost = f" ({recording.unread} bytes after it are no whole block)" if recording.unread else ""
-    return f"{said}. It was not closed: it ends with the last block that was written{lost}."
+    return f"It was not closed: it ends with the last block that was written{lost}."
 
 
 def _surface(about: Mapping[str, Any]) -> Mapping[str, Any] | None:
@@ -82,9 +89,9 @@ def facts(recording: Recording) -> list[tuple[str, str]]:
 
 
 def columns_table(recording: Recording, ranges: tuple[FloatArray, FloatArray]) -> page.Table:
-    """Return the columns with their least and greatest values."""
+    """Return the columns with their least and greatest values, which none has without rows."""
     rows = [
-        Row([name, f"{low:.6g}", f"{high:.6g}", unit])
+        Row([name, *(f"{one:.6g}" if recording.rows else "" for one in (low, high)), unit])
         for (name, unit), low, high in zip(recording.columns, *ranges, strict=True)
     ]
     return page.Table(["column", "least", "greatest", "unit"], rows, numbers=(1, 2))

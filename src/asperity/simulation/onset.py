@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.analysis.gain.answers import surface_content
+from asperity.analysis.gain.answers import content_but_stiffness
 from asperity.checks import FloatArray, array, positive
 from asperity.errors import ParameterError
 from asperity.files import Record, json_text, record
@@ -266,7 +266,7 @@ def _content(surface: Surface, parts: Sequence[Any], numbers: Sequence[Any]) -> 
     if not all(is_shipped(type(part)) for part in parts):
         return None
     given = [None if number is None else np.asarray(number).tolist() for number in numbers]
-    return surface_content(surface, json_text([*parts, given]))
+    return content_but_stiffness(surface, json_text([*parts, given]))
 
 
 class _Tried:

@@ -38,10 +38,10 @@ def kept_answer(name: str, surface: Surface, make: Callable[[], Answer], *furthe
         make: works it out.
         further: what else the answer depends on.
     """
-    return kept(name, surface_content(surface, *further), make)
+    return kept(name, content_but_stiffness(surface, *further), make)
 
 
-def surface_content(surface: Surface, *further: str) -> str | None:
+def content_but_stiffness(surface: Surface, *further: str) -> str | None:
     """Return a digest of all of a surface but its stiffness; ``None`` where that is not known."""
     texture = surface.texture.content
     if texture is None or not is_shipped_law(surface.law):
