@@ -11,6 +11,7 @@ from asperity.errors import ParameterError
 from asperity.lab.stage import SURFACE, Stage, make_stage
 from asperity.scene import load_scene
 from asperity.scene.template import scene_template
+from asperity.textures import Sinusoid
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +22,8 @@ def stage() -> Stage:
 @pytest.mark.parametrize(
     "wishes",
     [
-        {"law": "H"}, {"stiffness": 700.0}, {"max_depth": 1e-3},
+        {"law": "H"}, {"stiffness": 700.0}, {"max_depth": 1e-3}, {"continuity": 0.5, "law": "H"},
+        {"magnify_height": 2.0, "magnify": 3.0},
         {"texture": "grating:height=100um,period=3mm"}, {"law": "B", "stiffness": 50.0},
     ],
 )  # fmt: skip
@@ -29,6 +31,18 @@ def test_a_surface_changes_while_the_loop_runs(stage: Stage, wishes: dict[str, A
     changed = stage.changed(wishes)
     assert not stage.restarts(changed)
     assert {name: changed.settings[name] for name in wishes} == wishes
+
+
+def test_a_surface_is_magnified_and_comes_back(stage: Stage) -> None:
+    assert isinstance(plain := stage.setup.surface.texture, Sinusoid)
+    larger = stage.changed({"magnify": 3.0}).changed({"magnify_height": 2.0, "device": "omega.3"})
+    assert isinstance(shown := larger.setup.surface.texture, Sinusoid)
+    assert shown.period == pytest.approx(3.0 * plain.period)
+    assert shown.amplitude == pytest.approx(2.0 * plain.amplitude)
+    assert larger.changed({"magnify": 1.0}).setup.surface.texture is plain
+    other = stage.changed({"texture": "grating:height=100um,period=3mm", "magnify": 2.0})
+    assert other.settings["magnify"] == 2.0
+    assert other.changed({"texture": SURFACE, "magnify": 1.0}).setup.surface.texture is plain
 
 
 @pytest.mark.parametrize(
@@ -55,6 +69,9 @@ def test_several_wishes_come_together_in_any_order(stage: Stage) -> None:
         ({"stiffness": "many"}, "stiffness"),
         ({"delay": 101}, "delay must be 0 to 100"),
         ({"law": "Q"}, "law"),
+        ({"friction": 0.5}, "friction cannot be changed"),  # which law C does not have
+        ({"law": "F", "friction": -1.0}, "friction"),
+        ({"magnify": 0.0}, "magnify must be 0.01 to 1000"),
         ({"texture": "examples/demo.toml"}, "texture must be a kind"),
         ({"texture": "/etc/passwd"}, "texture must be a kind"),
         ({"texture": "file:path=/etc/passwd"}, "texture must be a kind"),
@@ -84,4 +101,8 @@ def test_a_surface_that_ends_is_felt_in_its_middle(tmp_path: Path) -> None:
     path = tmp_path / "map.png"
     Image.effect_noise((40, 30), 20.0).save(path)
     scene = load_scene(str(path), {"pitch": 1e-4, "height_range": 1e-4})
-    assert make_stage(scene, str(path)).middle == pytest.approx((1.95e-3, 1.45e-3), abs=1e-4)
+    stage = make_stage(scene, str(path))
+    assert stage.middle == pytest.approx((1.95e-3, 1.45e-3), abs=1e-4)
+    # The page may come back to the file of the start, which it cannot name otherwise.
+    away = stage.changed({"texture": SURFACE})
+    assert away.changed({"texture": str(path)}).setup.surface.texture is scene.texture

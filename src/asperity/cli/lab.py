@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import webbrowser
+from functools import partial
 from typing import Any
 
 import click
@@ -17,6 +18,7 @@ from asperity.cli.options import (
     options,
     surface_values,
 )
+from asperity.cli.own_code import learn, own_files
 from asperity.cli.progress import progress_bar
 from asperity.devices import load_device
 from asperity.errors import tell
@@ -57,4 +59,4 @@ def command(surface: str | None, port: int | None, no_browser: bool, **values: A
         if not no_browser and not webbrowser.open(address):
             tell("no browser was found: open the address in one of this machine's")
 
-    run_lab(stage, free_socket(port), ready)
+    run_lab(stage, free_socket(port), ready, partial(learn, own_files()))

@@ -98,6 +98,17 @@ def _restored(table: dict[str, Any]) -> Iterator[None]:
         table.update(before)
 
 
+def own_files() -> tuple[str, ...]:
+    """Return the files that were run."""
+    return tuple(dict.fromkeys(_FILES))
+
+
+def learn(files: tuple[str, ...]) -> None:
+    """Run files and register what they define, in a process that another command has started."""
+    for file in files:
+        _load(file, registries())
+
+
 def _load(file: str, places: tuple[Registry, ...]) -> None:
     before = sum(len(place.known) for place in places)
     source = _source(file)

@@ -57,8 +57,8 @@ class Backdrop:
             task.cancel()
 
     async def _prepare(self, surface: Surface) -> None:
-        shown = await _done(self._pictures, workshop.show, Sent.of(surface))
-        if shown and surface is self._wanted:
+        await _done(self._pictures, workshop.show, Sent.of(surface))
+        if surface is self._wanted:
             self._ready = surface
             self.version += 1
             await self._told()

@@ -225,7 +225,12 @@ async def _while_there(work: Callable[[Page], Coroutine[Any, Any, None]], page: 
 
 def _hello() -> dict[str, Any]:
     laws = [
-        {"letter": law.letter, "name": law.name, "words": law.summary}
+        {
+            "letter": law.letter,
+            "name": law.name,
+            "words": law.summary,
+            "parameters": [argument.to_dict() for argument in law.arguments.values()],
+        }
         for law in KNOWN_LAWS.values()
     ]
     kinds = [name for name, kind in KINDS.items() if not kind.required]

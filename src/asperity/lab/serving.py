@@ -52,18 +52,25 @@ def free_socket(port: int | None) -> socket.socket:
     raise ParameterError("port", "cannot be had, nor can the next ones", wanted)
 
 
-def run_lab(stage: Stage, bound: socket.socket, ready: Callable[[str], None]) -> None:
+def run_lab(
+    stage: Stage, bound: socket.socket, ready: Callable[[str], None],
+    learn: Callable[[], None] | None = None,
+) -> None:  # fmt: skip
     """Serve the lab until Ctrl-C.
 
     Args:
         stage: what is shown at first.
         bound: where it listens.
         ready: receives the address, once it answers.
+        learn: makes the user's own laws known in another process.
     """
-    asyncio.run(serve_lab(stage, bound, ready))
+    asyncio.run(serve_lab(stage, bound, ready, learn))
 
 
-async def serve_lab(stage: Stage, bound: socket.socket, ready: Callable[[str], None]) -> None:
+async def serve_lab(
+    stage: Stage, bound: socket.socket, ready: Callable[[str], None],
+    learn: Callable[[], None] | None = None,
+) -> None:  # fmt: skip
     """Serve the lab until a signal ends it, or the task is cancelled."""
     door = Door(bound.getsockname()[1])
     over = asyncio.Event()
@@ -71,7 +78,7 @@ async def serve_lab(stage: Stage, bound: socket.socket, ready: Callable[[str], N
         # Where the system or the thread cannot, Ctrl-C cancels the task.
         with suppress(NotImplementedError, RuntimeError, ValueError):
             asyncio.get_running_loop().add_signal_handler(number, over.set)
-    with workshop() as pictures, workshop() as limits:
+    with workshop(learn) as pictures, workshop(learn) as limits:
         lab = Lab(stage, pictures, limits)
         following = asyncio.create_task(lab.follow())
         try:

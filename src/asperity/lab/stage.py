@@ -16,7 +16,9 @@ from asperity.scene.loading import Scene, load_scene
 from asperity.scene.setup import Setup, make_setup
 from asperity.servo.safety import Safety
 from asperity.simulation import SpringHand
+from asperity.textures.drawn import prepare_texture
 from asperity.textures.naming import KINDS, specified
+from asperity.textures.texture import Texture
 
 SURFACE = "sinusoid:amplitude=0.2mm,period=2mm"
 """Shown if nothing is asked for."""
@@ -33,8 +35,10 @@ MOST_DELAY = 100
 RANGES: dict[str, tuple[float, float]] = {
     "stiffness": (1.0, 20_000.0), "max_depth": (1e-5, 5e-3), "delay": (0, MOST_DELAY),
     "hand_stiffness": (10.0, 3000.0), "hand_damping": (0.0, 30.0),
+    "magnify": (0.01, 1000.0), "magnify_height": (0.01, 1000.0),
 }  # fmt: skip
 """Least and greatest of what the page may ask for [SI]."""
+_FIRST = ("law", "magnify")  # others rest on them: a law has parameters, heights grow with the size
 
 
 @dataclass(frozen=True)
@@ -44,27 +48,40 @@ class Stage:
     Attributes:
         setup: surface, plant, hand, servo and limits of the loop.
         named: what the surface was asked for by.
+        plain: its texture, before it is magnified here.
+        magnified: factors of its size and of its height.
+        first: name and plain texture at the start, which may be of a file.
     """
 
     setup: Setup
     named: str
+    plain: Texture
+    first: tuple[str, Texture]
+    magnified: tuple[float, float] = (1.0, 1.0)
 
     def changed(self, wishes: Mapping[str, Any]) -> Stage:
         """Return the stage with some things changed.
 
         Args:
             wishes: by name: ``law`` (its letter), ``texture`` (a kind with its arguments, never a
-                file), ``device`` (of the catalogue), and those of ``RANGES``.
+                file but that of the start), ``device`` (of the catalogue), those of ``RANGES``, and
+                the parameters of the law.
 
         Raises:
             ParameterError: for an unknown name or a value that cannot be.
         """
         stage = self
-        for name, value in wishes.items():
+        for name, value in sorted(wishes.items(), key=lambda wish: wish[0] not in _FIRST):
             change = _CHANGES.get(name)
-            if change is None:
-                raise ParameterError(name, f"cannot be changed; {', '.join(_CHANGES)} can")
-            stage = change(stage, within(name, value) if name in RANGES else str(value))
+            if change is not None:
+                stage = change(stage, within(name, value) if name in RANGES else str(value))
+                continue
+            law = stage.setup.surface.law
+            if name not in law.arguments:
+                known = ", ".join((*_CHANGES, *law.arguments))
+                raise ParameterError(name, f"cannot be changed; {known} can")
+            surface = stage.setup.surface.to_law(law, {name: real(name, value)})
+            stage = replace(stage, setup=replace(stage.setup, surface=surface))
         return stage
 
     @property
@@ -78,6 +95,8 @@ class Stage:
             "device": setup.device.id, "delay": setup.servo.delay,
             "hand_stiffness": hand and hand.stiffness[0],
             "hand_damping": hand and hand.damping[0],
+            "magnify": self.magnified[0], "magnify_height": self.magnified[1],
+            **setup.surface.law_parameters,
         }  # fmt: skip
 
     @property
@@ -125,12 +144,23 @@ def _with_depth(stage: Stage, depth: float) -> Stage:
 
 
 def _with_texture(stage: Stage, text: str) -> Stage:
+    if text == stage.first[0]:
+        return _shown(replace(stage, named=text, plain=stage.first[1]))
     named = specified(text)
     if named is None or any(argument.name == "path" for argument in KINDS[named[0]].arguments):
         raise ParameterError("texture", "must be a kind: files are named at the start alone", text)
-    texture = load_scene(text).texture
-    surface = stage.setup.surface.to_texture(texture)
-    return replace(stage, setup=replace(stage.setup, surface=surface), named=text)
+    return _shown(replace(stage, named=text, plain=load_scene(text).texture))
+
+
+def _shown(stage: Stage) -> Stage:
+    """Return the stage with its texture magnified."""
+    size, height = stage.magnified
+    texture = stage.plain
+    if not size == height == 1.0:
+        texture = prepare_texture(texture, magnify=size, magnify_height=height)
+    return replace(
+        stage, setup=replace(stage.setup, surface=stage.setup.surface.to_texture(texture))
+    )
 
 
 def _with_device(stage: Stage, name: str) -> Stage:
@@ -139,7 +169,7 @@ def _with_device(stage: Stage, name: str) -> Stage:
     settings = stage.settings
     made = _made(Scene(stage.setup.surface.texture), load_device(name), stage.named)
     setup = replace(made.setup, surface=stage.setup.surface, hand=stage.setup.hand)
-    return _with_delay(replace(made, setup=setup), settings["delay"])
+    return _with_delay(replace(stage, setup=setup), settings["delay"])
 
 
 def _with_delay(stage: Stage, delay: float) -> Stage:
@@ -169,6 +199,10 @@ _CHANGES: dict[str, Any] = {
     "law": _with_law,
     "stiffness": _with_stiffness,
     "max_depth": _with_depth,
+    "magnify": lambda stage, value: _shown(replace(stage, magnified=(value, value))),
+    "magnify_height": lambda stage, value: _shown(
+        replace(stage, magnified=(stage.magnified[0], value))
+    ),
     "hand_stiffness": lambda stage, value: _with_hand(stage, stiffness=value),
     "hand_damping": lambda stage, value: _with_hand(stage, damping=value),
 }
@@ -207,4 +241,4 @@ def _made(
     setup = make_setup(replace(scene, loop=loop), surface={**first, **own}, device=complete)
     guards = {**vars(Safety()), **_PATIENT, "beyond_depth": "warn"}
     setup = replace(setup, safety=Safety(**guards), assumptions=(*said, *setup.assumptions))
-    return Stage(setup, named)
+    return Stage(setup, named, scene.texture, (named, scene.texture))

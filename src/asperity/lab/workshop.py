@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable
 from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing.context import SpawnContext
@@ -16,7 +17,7 @@ from typing import Any
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.passivity.allowed import allowed_stiffness
 from asperity.devices import Device
-from asperity.errors import AsperityError, ParameterError
+from asperity.errors import AsperityError
 from asperity.lab.views import cut, relief
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
@@ -26,21 +27,27 @@ _SHOWN: dict[str, Surface] = {}
 _NICENESS = 10
 
 
-def workshop() -> Executor:
-    """Return a process that waits for work, one piece at a time."""
-    return ProcessPoolExecutor(1, mp_context=SpawnContext(), initializer=_begin)
+def workshop(learn: Callable[[], None] | None = None) -> Executor:
+    """Return a process that waits for work, one piece at a time.
+
+    Args:
+        learn: is called in it first, so that it knows the user's own laws.
+    """
+    return ProcessPoolExecutor(1, mp_context=SpawnContext(), initializer=_begin, initargs=(learn,))
 
 
-def _begin() -> None:
+def _begin(learn: Callable[[], None] | None) -> None:
     # Ctrl-C goes to all processes of a terminal: the server decides how all ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(os, "nice"):
         os.nice(_NICENESS)
+    if learn is not None:
+        learn()
 
 
 @dataclass(frozen=True)
 class Sent:
-    """A surface on its way to the workshop, which knows the shipped laws by their letters.
+    """A surface on its way to the workshop, which knows laws by their letters.
 
     Attributes:
         texture: the texture.
@@ -60,27 +67,15 @@ class Sent:
         return cls(surface.texture, surface.law.letter, {**numbers, "law_parameters": parameters})
 
     def surface(self) -> Surface:
-        """Return the surface.
-
-        Raises:
-            ParameterError: for a law of the user's own.
-        """
+        """Return the surface."""
         return Surface(self.texture, self.law, **self.numbers)
 
 
-def show(sent: Sent) -> bool:
-    """Take the surface that pictures are made of from now on, and compile what they need.
-
-    Returns:
-        Whether there will be pictures: not of a law of the user's own.
-    """
-    try:
-        surface = sent.surface()
-    except ParameterError:
-        return False
+def show(sent: Sent) -> None:
+    """Take the surface that pictures are made of from now on, and compile what they need."""
+    surface = sent.surface()
     surface.texture.nearest([(0.0, 0.0, 0.0)])
     _SHOWN["surface"] = surface
-    return True
 
 
 def picture(kind: str, numbers: tuple[float, ...]) -> bytes:

@@ -12,11 +12,13 @@ import { Cut, Relief, isRelief } from "./views.js";
 import { millimetres, quantity } from "./words.js";
 
 const $ = id => document.getElementById(id);
+const NUMBERS = ["delay", "hand_stiffness", "hand_damping", "magnify", "magnify_height"]; // fields that say them as they are
 const relief = new Relief($("relief")), cut = new Cut($("cut"));
 const traces = new Traces($("traces")), spectrum = new Spectrum($("spectrum")), sound = new Sound();
 const ledger = new Ledger();
 
 let news = null, frame = null, span = 8e-3, centre = [0, 0], firstNews = true;
+let laws = []; // as the lab knows them, with their parameters
 let faults = 0, seen = -1; // the newest frame that was painted
 let asked = {}; // pictures, by kind: which, since when, and when again [ms]
 const waiting = []; // wishes of the pointer: number, and since when [ms]
@@ -24,6 +26,7 @@ const latencies = []; // from the pointer's event to the picture that shows its 
 
 const line = new Line({
   hello(said) {
+    laws = said.laws;
     fill($("other"), said.laws.map(law => [law.letter, `${law.letter} ${law.name}`]), "A");
     fill($("device"), said.devices.map(name => [name, name]));
     $("textures").replaceChildren(...said.textures.map(name => new Option(name)));
@@ -100,7 +103,9 @@ function alarm(words) {
 
 function show() {
   const { settings, state, words, steers, free } = news;
-  $("surface").textContent = settings.texture;
+  const [size, height] = [settings.magnify, settings.magnify_height].map(times => Number(times.toPrecision(3)));
+  const times = size === height ? `, × ${size}` : `, × ${size}, heights × ${height}`;
+  $("surface").textContent = settings.texture + (size === 1 && height === 1 ? "" : times);
   $("state").className = state;
   $("state").textContent = { running: `law ${settings.law} at ${news.rate.toFixed(0)} Hz`, stopped: "stopped",
     starting: "starting", changing: "changing" }[state];
@@ -118,7 +123,8 @@ function show() {
     button.setAttribute("aria-checked", chosen);
     if (chosen) $("law-words").textContent = button.dataset.words;
   }
-  for (const name of ["texture", "device", "delay", "hand_stiffness", "hand_damping"]) put(name, settings[name]);
+  for (const name of ["texture", "device", ...NUMBERS]) put(name, settings[name]);
+  showParameters(settings);
   put("max_depth", (1e3 * settings.max_depth).toFixed(3).replace(/\.?0+$/, ""));
   put("stiffness", 1000 * toSlider(settings.stiffness));
   $("stiffness-value").textContent = quantity(settings.stiffness, "N/m");
@@ -126,6 +132,21 @@ function show() {
     Object.assign(document.createElement("li"), { textContent: words })));
   showLimit(settings);
   if (steers && state === "running") toAddress(settings);
+}
+
+/** Fields for the parameters of the law, as its catalogue declares them. */
+function showParameters(settings) {
+  const { parameters } = laws.find(law => law.letter === settings.law);
+  if ($("parameters").dataset.law !== settings.law) {
+    $("parameters").dataset.law = settings.law;
+    $("parameters").replaceChildren(...parameters.flatMap(({ name, words, unit }) => {
+      const label = Object.assign(document.createElement("label"), { htmlFor: name, textContent: `${name.replaceAll("_", " ")}${unit && ` [${unit}]`}` });
+      const field = Object.assign(document.createElement("input"), { id: name, type: "number", step: "any", title: words });
+      field.onchange = () => change({ [name]: Number(field.value) });
+      return [label, field];
+    }));
+  }
+  for (const { name } of parameters) { put(name, settings[name]); $(name).disabled = !news.steers; }
 }
 
 function put(name, value) {
@@ -154,7 +175,7 @@ function showLimit({ stiffness, law }) {
 function fromAddress() {
   const wishes = {};
   for (const [name, text] of new URLSearchParams(location.hash.slice(1))) {
-    if (name in news.settings) wishes[name] = ["law", "texture", "device"].includes(name) ? text : Number(text);
+    if (name in news.settings || laws.some(law => law.parameters.some(one => one.name === name))) wishes[name] = ["law", "texture", "device"].includes(name) ? text : Number(text);
   }
   if (Object.keys(wishes).length && Object.values(wishes).every(value => value === value)) change(wishes);
 }
@@ -291,7 +312,7 @@ $("motion").onchange = event => { hand.motion = event.target.value; hand.wish();
 $("texture").onchange = event => change({ texture: event.target.value });
 $("device").onchange = event => change({ device: event.target.value });
 $("max_depth").onchange = event => change({ max_depth: 1e-3 * event.target.value });
-for (const name of ["delay", "hand_stiffness", "hand_damping"]) {
+for (const name of NUMBERS) {
   $(name).onchange = event => change({ [name]: Number(event.target.value) });
 }
 $("swap").onclick = () => {

@@ -6,6 +6,7 @@ import { quantity } from "./words.js";
 const STAGE = { // of all steps: the same hand holds the same surface on the same device
   texture: "sinusoid:amplitude=0.4mm,period=2mm", device: "omega.3", delay: 1, max_depth: 8e-4,
   hand_stiffness: 800, hand_damping: 2.3,
+  magnify: 1, magnify_height: 1,
 };
 const STROKED = 12e-3; // m, four strokes of the hand
 const LOOPED = 12e-3; // m, four loops: each is 2 mm wide, to and fro, partly in contact
@@ -15,6 +16,7 @@ const CLICKS = 3; // not one by chance
 const SOFTER = 0.5; // of the wall's: hands tell stiffnesses apart from about a quarter (Jones and Hunter, 1990)
 const HELD = 0.8; // of the stiffness that is set, felt in a trough
 
+const SPLIT = { continuity: 1 }; // with which the limit of H is the wall's
 const SEEN = 5e-3; // m of the surface: two periods and a half
 const TROUGH = -5e-4, FLANK = 0; // m
 const press = { motion: "pointer", x: TROUGH, press: 8e-4, latched: true };
@@ -95,9 +97,9 @@ export const STEPS = [
     why: "Law H splits the god-object: between two points that are equally near it pulls to a place between them. No curl, no jump, and its limit is the wall's own.",
     found: "As stiff as the wall, it did not feed, did not click and did not buzz.",
     acts: [
-      { law: "H", stiffness: 4500, ask: "Press in a trough, and hold still: it is as stiff as the wall, and does not buzz.", show: press, judge: firm },
-      { law: "H", stiffness: 1500, ask: "Go round in loops on a slope, as with law A.", show: loop, judge: unfed },
-      { law: "H", stiffness: 1500, ask: "Stroke deep across the crests, as with law D.", show: stroke, judge: unclicked },
+      { law: "H", stiffness: 4500, also: SPLIT, ask: "Press in a trough, and hold still: it is as stiff as the wall, and does not buzz.", show: press, judge: firm },
+      { law: "H", stiffness: 1500, also: SPLIT, ask: "Go round in loops on a slope, as with law A.", show: loop, judge: unfed },
+      { law: "H", stiffness: 1500, also: SPLIT, ask: "Stroke deep across the crests, as with law D.", show: stroke, judge: unclicked },
     ],
   },
 ];
@@ -116,6 +118,11 @@ export class Tour {
   get on() { return this.step >= 0; }
   get now() { return STEPS[this.step]; }
   get act() { return this.now?.acts[Math.min(this.turn, this.now.acts.length - 1)]; }
+  get wanted() {
+    const { law, stiffness, also } = this.act;
+    return { ...STAGE, law, stiffness, ...also };
+  }
+
   get found() { return this.on && this.seen[this.step]; }
 
   begin() {
@@ -144,9 +151,9 @@ export class Tour {
 
   start(turn) {
     this.turn = turn;
-    const { law, stiffness } = this.act, { settings } = this.host.news;
+    const { settings } = this.host.news;
     // One that takes another loop only if it must.
-    const wishes = Object.entries({ ...STAGE, law, stiffness }).filter(([name, value]) => settings[name] !== value);
+    const wishes = Object.entries(this.wanted).filter(([name, value]) => settings[name] !== value);
     if (wishes.length) this.host.change(Object.fromEntries(wishes));
     this.host.hand.motion = "pointer";
     this.host.hand.latched = false;
@@ -164,8 +171,8 @@ export class Tour {
   }
 
   get ready() {
-    const { news } = this.host, { law, stiffness } = this.act;
-    return news?.state === "running" && Object.entries({ ...STAGE, law, stiffness }).every(([name, value]) => news.settings[name] === value);
+    const { news } = this.host;
+    return news?.state === "running" && Object.entries(this.wanted).every(([name, value]) => news.settings[name] === value);
   }
 
   take(frame, columns) {
