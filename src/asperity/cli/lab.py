@@ -20,6 +20,7 @@ from asperity.cli.options import (
 )
 from asperity.cli.own_code import learn, own_files
 from asperity.cli.progress import progress_bar
+from asperity.cli.run import spare_process
 from asperity.devices import load_device
 from asperity.errors import tell
 
@@ -43,6 +44,8 @@ def command(surface: str | None, port: int | None, no_browser: bool, **values: A
     The pointer is the hand. The page is served to this machine alone, to whoever has the address;
     nothing comes from a network. Without SURFACE, a sinusoid. Ctrl-C ends it.
     """
+    # Started first: it takes long, and not from here.
+    spare = click.get_current_context().with_resource(spare_process())
     from asperity.lab.serving import free_socket, run_lab
     from asperity.lab.stage import DEVICE, SURFACE, make_stage
     from asperity.scene import load_scene
@@ -59,4 +62,4 @@ def command(surface: str | None, port: int | None, no_browser: bool, **values: A
         if not no_browser and not webbrowser.open(address):
             tell("no browser was found: open the address in one of this machine's")
 
-    run_lab(stage, free_socket(port), ready, partial(learn, own_files()))
+    run_lab(stage, free_socket(port), ready, partial(learn, own_files()), spare)

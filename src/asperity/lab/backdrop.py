@@ -46,15 +46,19 @@ class Backdrop:
         if setup.surface is self._wanted:
             return
         self._wanted, self.limit = setup.surface, {}
-        for work in (self._prepare(setup.surface), self._judge(setup)):
-            task = asyncio.create_task(work)
-            self._tasks.add(task)
-            task.add_done_callback(self._tasks.discard)
+        task = asyncio.create_task(self._make(setup))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
 
     def close(self) -> None:
         """Wait for nothing any more."""
         for task in self._tasks:
             task.cancel()
+
+    async def _make(self, setup: Setup) -> None:
+        """Make pictures ready first: they are waited for, and the limit takes longer."""
+        await self._prepare(setup.surface)
+        await self._judge(setup)
 
     async def _prepare(self, surface: Surface) -> None:
         await _done(self._pictures, workshop.show, Sent.of(surface))

@@ -23,6 +23,7 @@ from asperity.lab.messages import Change, Look, Seen, Steer, Take, read_message
 from asperity.lab.session import Session
 from asperity.lab.stage import RANGES, Stage
 from asperity.laws import KNOWN_LAWS
+from asperity.servo.process import Spare
 from asperity.servo.statistics import Statistics
 from asperity.textures.naming import KINDS
 
@@ -83,14 +84,17 @@ class Lab:
         stage: what is shown at first.
         pictures: process for pictures, see ``workshop``.
         limits: process for limits.
+        spare: the process of the first loop.
     """
 
-    def __init__(self, stage: Stage, pictures: Executor, limits: Executor) -> None:
+    def __init__(
+        self, stage: Stage, pictures: Executor, limits: Executor, spare: Spare | None = None
+    ) -> None:
         self._loop = asyncio.get_running_loop()
         self._pages: list[Page] = []
         self._master: Page | None = None
         self._changed = asyncio.Event()
-        self.session = Session(stage, self._tell)
+        self.session = Session(stage, self._tell, spare)
         self.backdrop = Backdrop(pictures, limits, self._announce)
 
     def _tell(self) -> None:
@@ -100,6 +104,7 @@ class Lab:
 
     async def follow(self) -> None:
         """Tell the pages what happens to the session, for ever."""
+        self.backdrop.show(self.session.stage.setup)
         while True:
             await self._changed.wait()
             self._changed.clear()

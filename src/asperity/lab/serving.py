@@ -17,6 +17,7 @@ from asperity.lab.server import Lab
 from asperity.lab.site import answer
 from asperity.lab.stage import Stage
 from asperity.lab.workshop import workshop
+from asperity.servo.process import Spare
 
 LOOPBACK = "127.0.0.1"
 PORT = 8137
@@ -54,7 +55,7 @@ def free_socket(port: int | None) -> socket.socket:
 
 def run_lab(
     stage: Stage, bound: socket.socket, ready: Callable[[str], None],
-    learn: Callable[[], None] | None = None,
+    learn: Callable[[], None] | None = None, spare: Spare | None = None,
 ) -> None:  # fmt: skip
     """Serve the lab until Ctrl-C.
 
@@ -63,13 +64,14 @@ def run_lab(
         bound: where it listens.
         ready: receives the address, once it answers.
         learn: makes the user's own laws known in another process.
+        spare: the process of the first loop.
     """
-    asyncio.run(serve_lab(stage, bound, ready, learn))
+    asyncio.run(serve_lab(stage, bound, ready, learn, spare))
 
 
 async def serve_lab(
     stage: Stage, bound: socket.socket, ready: Callable[[str], None],
-    learn: Callable[[], None] | None = None,
+    learn: Callable[[], None] | None = None, spare: Spare | None = None,
 ) -> None:  # fmt: skip
     """Serve the lab until a signal ends it, or the task is cancelled."""
     door = Door(bound.getsockname()[1])
@@ -79,7 +81,7 @@ async def serve_lab(
         with suppress(NotImplementedError, RuntimeError, ValueError):
             asyncio.get_running_loop().add_signal_handler(number, over.set)
     with workshop(learn) as pictures, workshop(learn) as limits:
-        lab = Lab(stage, pictures, limits)
+        lab = Lab(stage, pictures, limits, spare)
         following = asyncio.create_task(lab.follow())
         try:
             with lab.session:

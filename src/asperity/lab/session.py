@@ -11,7 +11,7 @@ from asperity.errors import AsperityError
 from asperity.lab.stage import Stage
 from asperity.servo.drivers.steered import Wheel, steered_driver
 from asperity.servo.fault import Cause
-from asperity.servo.process import ServoProcess
+from asperity.servo.process import ServoProcess, Spare
 from asperity.servo.shared import Shared
 
 LOOK = 0.05
@@ -31,6 +31,7 @@ class Session:
     Args:
         stage: what is shown.
         tell: is called when the state has changed, in that thread.
+        spare: the process of the first loop.
 
     Attributes:
         stage: what is shown now.
@@ -41,8 +42,8 @@ class Session:
         words: what there is to say of it.
     """
 
-    def __init__(self, stage: Stage, tell: Callable[[], None]) -> None:
-        self.stage, self._tell = stage, tell
+    def __init__(self, stage: Stage, tell: Callable[[], None], spare: Spare | None = None) -> None:
+        self.stage, self._tell, self._spare = stage, tell, spare
         highest = float(stage.setup.surface.texture.extremes[1])
         self.wheel = Wheel((*stage.middle, highest + ABOVE))
         self.shared: Shared | None = None
@@ -106,7 +107,8 @@ class Session:
         setup = stage.setup
         driver = steered_driver(setup.plant, setup.hand, setup.servo, self.wheel)
         reach = setup.safety.reach_on(setup.device)
-        loop = ServoProcess(setup.surface, driver, setup.servo, setup.safety, reach)
+        spare, self._spare = self._spare, None
+        loop = ServoProcess(setup.surface, driver, setup.servo, setup.safety, reach, spare=spare)
         loop.start()
         self._loop, self.shared, self.stage = loop, loop.shared, stage
         self.starts += 1

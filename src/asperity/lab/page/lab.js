@@ -219,7 +219,7 @@ const RESTS = 8;
 function ask(kind, content) {
   const key = `${news.version} ${news.starts} ${JSON.stringify(content)}`, now = performance.now();
   if (!news.version || asked[kind]?.key === key || now < (asked[kind]?.again ?? 0)) return;
-  if (line.say(kind, content)) asked[kind] = { key, since: now, again: Infinity };
+  if (line.say(kind, content)) asked[kind] = { key, version: news.version, since: now, again: Infinity };
 }
 
 // When words, the spectrum and traces were last shown, and a picture last asked for [ms].
@@ -381,5 +381,7 @@ requestAnimationFrame(paint);
 // For tests, and for whoever is curious in the console.
 globalThis.lab = {
   get frame() { return frame; }, get news() { return news; }, get faults() { return faults; },
-  get ready() { return Boolean(relief.heights && cut.box); }, latencies, hand, tour, ledger, probeState,
+  /** Whether both pictures are of the surface that is shown. */
+  get current() { return ["relief", "cut"].every(kind => asked[kind]?.again < Infinity && asked[kind].version === news?.version); },
+  get ready() { return Boolean(relief.heights && cut.box); }, latencies, hand, tour, ledger, probeState, relief, cut,
 };

@@ -151,10 +151,10 @@ export class Tour {
 
   start(turn) {
     this.turn = turn;
-    const { settings } = this.host.news;
-    // One that takes another loop only if it must.
-    const wishes = Object.entries(this.wanted).filter(([name, value]) => settings[name] !== value);
-    if (wishes.length) this.host.change(Object.fromEntries(wishes));
+    const { law, stiffness, ...stage } = this.wanted, { settings } = this.host.news;
+    // What takes another loop is asked for only if it must; law and stiffness always: what is known may be old.
+    const others = Object.entries(stage).filter(([name, value]) => settings[name] !== value);
+    this.host.change({ ...Object.fromEntries(others), law, stiffness });
     this.host.hand.motion = "pointer";
     this.host.hand.latched = false;
     this.host.hand.wish();
