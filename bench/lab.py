@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import sys
 import tempfile
@@ -15,12 +14,10 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 from tests.lab.browser import BROWSER, Browser
+from tests.lab.client import frames, head, heard, joined
 from tests.lab.started import Started
-from websockets.sync.client import ClientConnection, connect
-from websockets.typing import Origin
 
 from asperity.checks import FloatArray
-from asperity.lab.frames import layout
 from asperity.lab.site import page_files
 
 SECONDS = 20.0
@@ -69,27 +66,15 @@ def first_picture() -> float:
 
 def _wait(lab: Started) -> None:
     """Wait until the loop runs and what is computed beside it is ready."""
-    with _joined(lab) as line:
-        while True:
-            content = line.recv()
-            if isinstance(content, str) and json.loads(content).get("limit"):
-                return
-
-
-def _joined(lab: Started) -> ClientConnection:
-    """Return a connection as the page has it, for a ``with``."""
-    address = lab.address.replace("http", "ws") + "live"
-    return connect(address, origin=Origin(f"http://{lab.host}"), max_size=None, proxy=None)
+    with joined(lab) as line:
+        heard(line, lambda said: isinstance(said, dict) and bool(said.get("limit")))
 
 
 def _counts(lab: Started) -> FloatArray:
     """Return late samples and all, so far."""
-    head = layout()["head"]
-    with _joined(lab) as line:
-        while True:
-            content = line.recv()
-            if isinstance(content, bytes) and (frame := np.frombuffer(content))[0] == 1.0:
-                return np.array([frame[head["late"]], frame[head["first"]]])
+    with joined(lab) as line:
+        frame = heard(line, frames)
+        return np.array([head(frame, "late"), head(frame, "first")])
 
 
 def _late(lab: Started, seconds: float, page: Browser | None = None) -> FloatArray:

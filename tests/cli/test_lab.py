@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from socket import socket
+
 import pytest
 from click.testing import CliRunner
 
@@ -21,3 +24,20 @@ def test_bad_input_is_named(arguments: list[str], words: str) -> None:
     done = CliRunner().invoke(cli, ["lab", "--no-browser", *arguments])
     assert isinstance(done.exception, ParameterError | SurfaceFileError)
     assert words in str(done.exception)
+
+
+def test_without_a_browser_the_address_is_said(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def run_lab(
+        _stage: object, bound: socket, ready: Callable[[str], None], *_others: object
+    ) -> None:
+        bound.close()
+        ready("http://127.0.0.1:1/token/")
+
+    monkeypatch.setattr("asperity.lab.serving.run_lab", run_lab)
+    monkeypatch.setattr("webbrowser.open", lambda _address: False)
+    done = CliRunner().invoke(cli, ["lab", "--port", "0"])
+    assert done.exit_code == 0
+    assert "the lab is at http://127.0.0.1:1/token/" in done.output + capfd.readouterr().err
+    assert "no browser was found: open the address in one of this machine's" in done.output

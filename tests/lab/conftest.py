@@ -1,16 +1,34 @@
-"""What the tests of the lab share."""
+"""What the tests of the lab share: a lab and a browser, for they take long to start."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import pytest
+from tests.lab.browser import Browser
 from tests.lab.started import Started
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def lab() -> Iterator[Started]:
     """A lab that runs in a process of its own, as a user starts it."""
     started = Started()
     yield started
-    started.close()
+    assert started.end() == (0, "")
+
+
+@pytest.fixture(scope="package")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    with Browser("about:blank", tmp_path_factory.mktemp("browser")) as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def page(lab: Started, browser: Browser) -> Iterator[Browser]:
+    """The page in a browser, which steers; it is left when the module is done."""
+    browser.said.clear()
+    browser.resize(1280, 900)
+    browser.call("Page.navigate", url=lab.address)
+    browser.until("globalThis.lab?.frame && lab.ready")
+    yield browser
+    browser.call("Page.navigate", url="about:blank")

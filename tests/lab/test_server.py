@@ -2,75 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import socket
-from collections.abc import Callable
 from contextlib import suppress
 from http.client import HTTPConnection
-from typing import Any
 
 import numpy as np
 import pytest
+from tests.lab.client import STILL, column, frames, head, heard, joined, news, refused, say
 from tests.lab.started import Started
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.sync.client import ClientConnection, connect
 
 from asperity.lab.access import MOST_BYTES
-from asperity.lab.frames import layout
 from asperity.lab.server import UNDER_WAY
 from asperity.lab.site import page_files
-
-LAYOUT = layout()
-STILL = {"cosine": [0, 0, 0], "sine": [0, 0, 0], "speed": 0}
-
-
-def joined(lab: Started, **more: Any) -> ClientConnection:
-    """Connect as the page does."""
-    options = {
-        "origin": f"http://{lab.host}",
-        "compression": None,
-        "max_size": None,
-        "proxy": None,
-        **more,
-    }
-    return connect(lab.address.replace("http", "ws") + "live", **options)
-
-
-def say(page: ClientConnection, what: str, **content: Any) -> None:
-    page.send(json.dumps({"do": what, **content}))
-
-
-def heard(page: ClientConnection, wanted: Callable[[Any], bool]) -> Any:
-    """Return the first message that is wanted: words as a dictionary, or numbers."""
-    while True:
-        content = page.recv(timeout=120)
-        message = json.loads(content) if isinstance(content, str) else np.frombuffer(content)
-        if frames(message):
-            say(page, "seen", frame=message[1])
-        if wanted(message):
-            return message
-
-
-def news(**wanted: Any) -> Callable[[Any], bool]:
-    def fits(message: Any) -> bool:
-        if not isinstance(message, dict) or message["say"] != "news":
-            return False
-        known = {**message, **message["settings"]}
-        return all(known[name] == value for name, value in wanted.items())
-
-    return fits
-
-
-def refused(message: Any) -> bool:
-    return isinstance(message, dict) and message["say"] == "refused"
-
-
-def frames(message: Any) -> bool:
-    return isinstance(message, np.ndarray) and message[0] == 1.0
-
-
-def column(frame: Any, part: str, name: str) -> float:
-    return float(frame[LAYOUT[part] + LAYOUT["columns"][name]])
 
 
 def got(lab: Started, path: str, **headers: str) -> tuple[int, bytes, dict[str, str]]:
@@ -113,11 +57,10 @@ def test_the_hand_is_steered_the_law_changes_and_the_loop_goes_on(lab: Started) 
     with joined(lab) as page:
         first = heard(page, news(state="running"))
         assert first["steers"]
-        assert first["settings"]["law"] == "C"
         wish = first["wishes"] + 1
         say(page, "steer", target=[1e-3, 0, -1e-3], **STILL)
         frame = heard(page, lambda m: frames(m) and column(m, "newest", "applied z") > 0.1)
-        assert frame[LAYOUT["head"]["heard"]] == wish
+        assert head(frame, "heard") == wish
         assert column(frame, "greatest", "applied z") <= first["max_force"]
         say(page, "change", wishes={"law": "W", "stiffness": 200.0})
         changed = heard(page, news(state="running", law="W"))
@@ -168,8 +111,7 @@ def test_a_malformed_frame_ends_the_connection_and_not_the_loop(
     assert ended.value.rcvd.code == code
     assert ended.value.rcvd.reason
     with joined(lab) as again:
-        first = LAYOUT["head"]["first"]
-        assert heard(again, frames)[first] > before[first]
+        assert head(heard(again, frames), "first") > head(before, "first")
 
 
 def test_a_page_that_paints_nothing_is_not_sent_what_will_be_old(lab: Started) -> None:
@@ -180,13 +122,12 @@ def test_a_page_that_paints_nothing_is_not_sent_what_will_be_old(lab: Started) -
             while True:
                 content = page.recv(timeout=1.0)
                 got += [np.frombuffer(content)] if isinstance(content, bytes) else []
-        assert [frame[1] for frame in got] == list(range(1, UNDER_WAY + 1))
+        assert [head(frame, "frame") for frame in got] == list(range(1, UNDER_WAY + 1))
         say(page, "seen", frame=UNDER_WAY)
         # The next one is new, and holds the extremes of all that happened in between.
         after = np.frombuffer(page.recv(timeout=60))
-        rows, first = LAYOUT["head"]["rows"], LAYOUT["head"]["first"]
-        assert after[first] == got[-1][first] + got[-1][rows]
-        assert after[rows] > 900
+        assert head(after, "first") == head(got[-1], "first") + head(got[-1], "rows")
+        assert head(after, "rows") > 900
 
 
 def test_pictures_are_computed_elsewhere(lab: Started) -> None:
@@ -206,8 +147,7 @@ def test_pictures_are_computed_elsewhere(lab: Started) -> None:
         assert (above == 0.0).all()
 
 
-def test_the_next_port_is_named_and_the_end_is_quiet(lab: Started) -> None:
+def test_the_next_port_is_named(lab: Started) -> None:
     port = lab.host.split(":")[1]
     with pytest.raises(AssertionError, match=rf"port {port} cannot be had; \d+ is free"):
         Started("--port", port)
-    assert lab.end() == (0, "")

@@ -3,21 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 
-import pytest
 from tests.lab.browser import Browser, needs_browser
-from tests.lab.started import Started
 
 TITLES = ("W is quiet", "A feels alive", "B buzzes above its limit", "D clicks", "C is soft",
           "H does none of it")  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def page(lab: Started, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with Browser(lab.address, tmp_path_factory.mktemp("browser")) as browser:
-        browser.until("globalThis.lab?.frame && lab.ready")
-        yield browser
 
 
 def text(page: Browser, name: str) -> str:

@@ -1,0 +1,76 @@
+"""A page without a browser: what it hears and says."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from tests.lab.started import Started
+from websockets.sync.client import ClientConnection, connect
+
+from asperity.lab.frames import layout
+
+LAYOUT = layout()
+STILL = {"cosine": [0, 0, 0], "sine": [0, 0, 0], "speed": 0}
+
+
+def joined(lab: Started, **more: Any) -> ClientConnection:
+    """Connect as the page does, for a ``with``."""
+    options = {
+        "origin": f"http://{lab.host}",
+        "compression": None,
+        "max_size": None,
+        "proxy": None,
+        **more,
+    }
+    return connect(lab.address.replace("http", "ws") + "live", **options)
+
+
+def say(page: ClientConnection, what: str, **content: Any) -> None:
+    page.send(json.dumps({"do": what, **content}))
+
+
+def taken(page: ClientConnection) -> Any:
+    """Return the next message, words as a dictionary or numbers; a frame counts as painted."""
+    content = page.recv(timeout=120)
+    message = json.loads(content) if isinstance(content, str) else np.frombuffer(content)
+    if frames(message):
+        say(page, "seen", frame=head(message, "frame"))
+    return message
+
+
+def heard(page: ClientConnection, wanted: Callable[[Any], bool]) -> Any:
+    """Return the first message that is wanted."""
+    while not wanted(message := taken(page)):
+        pass
+    return message
+
+
+def news(**wanted: Any) -> Callable[[Any], bool]:
+    """Return what knows the message that things stand in some way."""
+
+    def fits(message: Any) -> bool:
+        if not isinstance(message, dict) or message["say"] != "news":
+            return False
+        known = {**message, **message["settings"]}
+        return all(known[name] == value for name, value in wanted.items())
+
+    return fits
+
+
+def refused(message: Any) -> bool:
+    return isinstance(message, dict) and message["say"] == "refused"
+
+
+def frames(message: Any) -> bool:
+    return isinstance(message, np.ndarray) and message[0] == 1.0
+
+
+def head(frame: Any, name: str) -> float:
+    return float(frame[LAYOUT["head"][name]])
+
+
+def column(frame: Any, part: str, name: str) -> float:
+    return float(frame[LAYOUT[part] + LAYOUT["columns"][name]])
