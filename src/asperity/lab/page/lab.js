@@ -331,13 +331,18 @@ $("sound").onclick = async () => {
   $("sound").textContent = on ? "Sound off" : "Sound on";
 };
 $("picture").onclick = () => {
-  const parts = ["relief", "cut", "traces", "spectrum"].map($), width = Math.max(...parts.map(part => part.width));
-  const whole = Object.assign(document.createElement("canvas"), { width, height: parts.reduce((sum, part) => sum + part.height + 8, 0) });
+  const parts = [relief, cut, traces, spectrum], sizes = parts.map(part => part.sheet.canvas);
+  const width = Math.max(...sizes.map(one => one.width)), height = sizes.reduce((sum, one) => sum + one.height + 8, 0);
+  const whole = Object.assign(document.createElement("canvas"), { width, height });
   const draw = whole.getContext("2d");
   draw.fillStyle = readTheme().card;
   draw.fillRect(0, 0, whole.width, whole.height);
   let top = 0;
-  for (const part of parts) { draw.drawImage(part, 0, top); top += part.height + 8; }
+  for (const { sheet, marker } of parts) {
+    draw.drawImage(sheet.canvas, 0, top);
+    marker?.copy(draw, 0, top);
+    top += sheet.canvas.height + 8;
+  }
   whole.toBlob(blob => {
     const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: "asperity-lab.png" });
     link.click();

@@ -6,6 +6,7 @@ export class Sheet {
     this.canvas = canvas;
     this.draw = canvas.getContext("2d");
     this.ratio = this.width = this.height = 1;
+    this.left = this.top = 0; // in what it is placed in
     this.blank = true; // nothing is drawn on it
     new ResizeObserver(([{ contentRect }]) => this.fit(contentRect.width, contentRect.height)).observe(canvas);
   }
@@ -13,6 +14,7 @@ export class Sheet {
   fit(width, height) {
     this.ratio = Math.min(window.devicePixelRatio || 1, 2);
     Object.assign(this, { width: Math.max(width, 1), height: Math.max(height, 1), blank: true });
+    Object.assign(this, { left: this.canvas.offsetLeft, top: this.canvas.offsetTop });
     this.canvas.width = Math.round(this.width * this.ratio);
     this.canvas.height = Math.round(this.height * this.ratio);
   }

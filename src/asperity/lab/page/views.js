@@ -1,72 +1,18 @@
 // The surface in relief, and a cut under the probe with field and curl behind it.
 
+import { Marker } from "./marker.js";
 import { corners, paintRelief } from "./relief.js";
 import { Sheet, channels, colours } from "./sheet.js";
 import { quantity, roundStep } from "./words.js";
 
 const RELIEF = 2;
-const ARROW = 250; // pixels per newton, as long as that fits
-const LONGEST = 130; // pixels
-
-function dot(draw, x, y, radius, fill, line) {
-  draw.beginPath();
-  draw.arc(x, y, radius, 0, 2 * Math.PI);
-  if (fill) { draw.fillStyle = fill; draw.fill(); }
-  if (line) { draw.strokeStyle = line; draw.lineWidth = 2.5; draw.stroke(); }
-}
-
-function arrow(draw, x, y, dx, dy, colour) {
-  const length = Math.hypot(dx, dy);
-  if (length < 2) return;
-  const [ux, uy] = [dx / length, dy / length], tip = Math.min(12, 0.5 * length);
-  draw.strokeStyle = draw.fillStyle = colour;
-  draw.lineWidth = 4;
-  draw.beginPath();
-  draw.moveTo(x, y);
-  draw.lineTo(x + dx - tip * ux, y + dy - tip * uy);
-  draw.stroke();
-  draw.beginPath();
-  draw.moveTo(x + dx, y + dy);
-  draw.lineTo(x + dx - tip * ux - 0.5 * tip * uy, y + dy - tip * uy + 0.5 * tip * ux);
-  draw.lineTo(x + dx - tip * ux + 0.5 * tip * uy, y + dy - tip * uy - 0.5 * tip * ux);
-  draw.fill();
-}
-
-function cross(draw, x, y, colour) {
-  draw.strokeStyle = colour;
-  draw.lineWidth = 2;
-  draw.beginPath();
-  draw.moveTo(x - 7, y); draw.lineTo(x + 7, y); draw.moveTo(x, y - 7); draw.lineTo(x, y + 7);
-  draw.stroke();
-}
-
-/** A force as it is drawn: in proportion, but never longer than fits. */
-function drawnForce(force) {
-  const size = Math.hypot(...force);
-  return size === 0 ? 0 : Math.min(ARROW, LONGEST / size);
-}
-
-function drawProbe(draw, place, state, up) {
-  const theme = colours();
-  const { probe, god, hand, force, inside } = state;
-  const at = place(probe), held = place(hand);
-  draw.strokeStyle = theme.soft;
-  draw.lineWidth = 1.5;
-  draw.setLineDash([4, 4]);
-  draw.beginPath(); draw.moveTo(...at); draw.lineTo(...held); draw.stroke();
-  draw.setLineDash([]);
-  cross(draw, ...held, theme.soft);
-  if (inside && god.every(Number.isFinite)) dot(draw, ...place(god), 5, theme.green, theme.card);
-  dot(draw, ...at, 8, theme.card, theme.ink);
-  const scale = drawnForce(force);
-  arrow(draw, ...at, ...up(force).map(value => value * scale), theme.red);
-}
 
 export class Relief {
   name = "relief";
 
   constructor(canvas) {
     this.sheet = new Sheet(canvas);
+    this.marker = new Marker(this.sheet);
     this.drawn = document.createElement("canvas");
     this.heights = null;
   }
@@ -93,25 +39,25 @@ export class Relief {
   }
 
   draw(state) {
-    const [draw, width, height] = this.sheet.cleared();
     if (!this.heights) return;
-    const key = `${width} ${height} ${colours().low}`;
-    if (this.key !== key) this.paint(width, height);
-    this.key = key;
-    draw.drawImage(this.drawn, 0, 0, width, height);
+    const { width, height } = this.sheet;
+    if (this.sheet.blank || this.key !== colours().low) this.paint();
     if (!state) return;
     // Heights are exaggerated: what is further below than the surface is high stays in the picture.
     const place = this.place(width, height), shown = ([x, y, z]) => place([x, y, Math.max(z, -this.lowest)]);
-    drawProbe(draw, shown, state, ([x, y, z]) => [x + 0.2 * y, -z - 0.5 * y]);
+    this.marker.show(shown, state, ([x, y, z]) => [x + 0.2 * y, -z - 0.5 * y]);
   }
 
-  paint(width, height) {
+  paint() {
+    const [draw, width, height] = this.sheet.cleared();
+    this.key = colours().low;
     const most = this.heights.reduce((most, z) => Math.max(most, Math.abs(z)), 1e-9);
     const { rise, across } = corners(width, height);
     this.lift = Math.min(rise / most, 40 * across / this.size);
     this.lowest = 1.6 * most;
     this.exaggeration = this.lift * this.size / across;
     paintRelief(this.drawn, this, width, height);
+    draw.drawImage(this.drawn, 0, 0, width, height);
   }
 }
 
@@ -120,8 +66,8 @@ export class Cut {
 
   constructor(canvas) {
     this.sheet = new Sheet(canvas);
+    this.marker = new Marker(this.sheet);
     this.field = document.createElement("canvas");
-    this.still = document.createElement("canvas"); // all but probe, hand and force
     this.box = null;
   }
 
@@ -145,20 +91,16 @@ export class Cut {
   }
 
   draw(state, wanted) {
-    const [draw, width, height] = this.sheet.cleared(), [left, right, bottom, top] = wanted;
+    const { width, height } = this.sheet, [left, right, bottom, top] = wanted;
     const place = ([x, , z]) => [(x - left) / (right - left) * width, (top - z) / (top - bottom) * height];
-    const key = [width, height, colours().plus, ...wanted].join();
-    if (this.key !== key) this.paintStill(width, height, place, right - left);
+    const key = [colours().plus, ...wanted].join();
+    if (this.sheet.blank || this.key !== key) this.paint(place, right - left);
     this.key = key;
-    draw.drawImage(this.still, 0, 0, width, height);
-    if (state) drawProbe(draw, place, state, ([x, , z]) => [x, -z]);
+    if (state) this.marker.show(place, state, ([x, , z]) => [x, -z]);
   }
 
-  paintStill(width, height, place, span) {
-    const { canvas, ratio } = this.sheet;
-    Object.assign(this.still, { width: canvas.width, height: canvas.height });
-    const draw = this.still.getContext("2d");
-    draw.scale(ratio, ratio);
+  paint(place, span) {
+    const [draw, width, height] = this.sheet.cleared();
     draw.fillStyle = colours().ground;
     draw.fillRect(0, 0, width, height);
     if (this.box) this.drawField(draw, place);
