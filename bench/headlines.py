@@ -25,7 +25,8 @@ from asperity.devices import Device, device_names, load_device
 from asperity.scene import load_scene
 from asperity.scene.plant import default_servo
 from asperity.simulation import Cartesian, Servo, SpringHand, Still
-from asperity.simulation.onset import ends_in_cycle, offsets, runner
+from asperity.simulation.kernels.body_functions import LANES
+from asperity.simulation.onset import end_in_cycles, offsets, together
 from asperity.surface import Surface
 from bench.margins import HANDS, pressing
 
@@ -85,19 +86,13 @@ def loops(device: Device, spec: str, found: Comparison, times: float = 1.0) -> l
 def _cycles(surface: Surface, plant: Cartesian, hand: SpringHand, servo: Servo) -> int:
     """Return how many starts end in a limit cycle."""
     begin = np.array([0.0, 0.0, surface.texture.extremes[1] + 0.2 * surface.max_depth])
+    shifts = offsets(surface, STARTS)
+    still = Still((0.0, 0.0, 0.0))
     found = 0
-    for shift in offsets(surface, STARTS):
-        run_for = runner(
-            surface,
-            plant,
-            hand,
-            servo,
-            Still((0.0, 0.0, 0.0)),
-            begin,
-            None,
-            shift,
-        )
-        found += ends_in_cycle(run_for, DURATION)[0]
+    for first in range(0, STARTS, LANES):
+        some = shifts[first : first + LANES]
+        runs_for = together(surface, plant, hand, servo, still, begin, None, some)
+        found += sum(ends for ends, _run in end_in_cycles(runs_for, len(some), DURATION))
     return found
 
 

@@ -45,13 +45,13 @@ def room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def runs(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The stiffnesses that are run."""
     seen: list[float] = []
-    run = onset.runner
+    run = onset.together
 
     def noted(surface: Surface, *rest: Any) -> Any:
         seen.append(surface.stiffness)
         return run(surface, *rest)
 
-    monkeypatch.setattr(onset, "runner", noted)
+    monkeypatch.setattr(onset, "together", noted)
     return seen
 
 

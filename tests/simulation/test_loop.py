@@ -178,7 +178,7 @@ def test_a_run_goes_on_where_the_last_one_stopped(letter: str) -> None:
     # Energies are summed in another order where a run is cut: not the trace up to the ledger.
     np.testing.assert_array_equal(pieces, table)
     assert parts.ledger() == whole.ledger()
-    with pytest.raises(ParameterError, match="trace must have rows of 30 or 9 numbers"):
+    with pytest.raises(ParameterError, match="trace must have rows of 30 numbers"):
         whole.run(way, table[:, :27])
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from asperity.checks import FloatArray
 from asperity.kernels.tick import ServoState
-from asperity.simulation.kernels import servo_loop
+from asperity.simulation.kernels import servo_loop, side_by_side
 from asperity.simulation.kernels.body_functions import DIVERGED, LEFT, RAN, Held
 from asperity.simulation.kernels.booking import FRICTION, LOST, SAME_SAMPLE, SAMPLING, SUMS
 from asperity.simulation.trace import COLUMNS, WATCHED
@@ -71,11 +71,12 @@ def test_a_row_is_what_its_columns_are_called(monkeypatch: pytest.MonkeyPatch) -
         np.testing.assert_array_equal(row[16:26], ledger[:10])
         assert row[26] == stored_energy(x, HELD.ax, HELD.ay, HELD.az, "plant")
         assert tuple(row[27:]) == (servo.anchor_x, servo.anchor_y, float(held))
-    few = np.full((2, len(WATCHED)), np.nan)
-    servo_loop.trace_row(few, 0, 0.25, x, SERVO, HELD, ledger, "plant")
+    few = np.full((2, 3, len(WATCHED)), np.nan)
+    side_by_side.watch(few, 1, 2, 0.25, np.stack([-x, x]), np.stack([-ledger, ledger]))
     expected = [0.25, *x[:6], ledger[:3].sum(), ledger[LOST] - ledger[FRICTION]]
-    np.testing.assert_allclose(few[0], expected, rtol=1e-15)
-    assert np.isnan(few[1]).all()
+    np.testing.assert_allclose(few[1, 2], expected, rtol=1e-15)
+    assert np.isnan(few[0]).all()
+    assert np.isnan(few[1, :2]).all()
 
 
 class Told:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -23,6 +22,7 @@ from asperity.simulation import (
     onset,
 )
 from asperity.simulation.ending import Ending
+from asperity.simulation.kernels.body_functions import LANES
 from asperity.simulation.onset import Onset, calms_down, cycles, ends_in_cycle, holds_still, offsets
 from asperity.simulation.run import Ledger, Run, Stop
 from asperity.simulation.trace import COLUMNS
@@ -220,24 +220,26 @@ def told(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
     """Starts cycle from 100 N/m on, and from 200 N/m all; they reach as far as they are stiff."""
     seen: list[tuple[float, float]] = []
 
-    def runner(surface: Surface, *rest: Any) -> Callable[[float], Any]:
-        shift = float(rest[-1][0])
-        seen.append((surface.stiffness, shift))
-        reach = np.array([[-shift, 0.0, -surface.stiffness], [shift, 0.0, surface.stiffness]])
-        return lambda _span: (surface.stiffness, shift, SimpleNamespace(position=reach))
+    def one(k: float, shift: float) -> tuple[bool, Any]:
+        seen.append((k, shift))
+        reach = np.array([[-shift, 0.0, -k], [shift, 0.0, k]])
+        return k >= (100.0 if shift > 1.4e-3 else 200.0), SimpleNamespace(position=reach)
 
-    def ends(run_for: Any, _duration: float, _threshold: float) -> tuple[bool, Any]:
-        stiffness, shift, run = run_for(0.0)
-        return stiffness >= (100.0 if shift > 1.4e-3 else 200.0), run
+    def together(surface: Surface, *rest: Any) -> Any:
+        return [one(surface.stiffness, float(shift)) for shift in rest[-1][:, 0]]
 
-    monkeypatch.setattr(onset, "runner", runner)
-    monkeypatch.setattr(onset, "ends_in_cycle", ends)
+    def end(told: Any, count: int, _duration: float, _threshold: float) -> Any:
+        assert len(told) == count <= LANES
+        return told
+
+    monkeypatch.setattr(onset, "together", together)
+    monkeypatch.setattr(onset, "end_in_cycles", end)
     return seen
 
 
-def search(**more: Any) -> Onset:
+def search(starts: int = 4, **more: Any) -> Onset:
     still = Still((0.0, 0.0, 0.0))
-    return find_onset(SURFACE, PLANT, HAND, SERVO, still, starts=4, **more)
+    return find_onset(SURFACE, PLANT, HAND, SERVO, still, starts=starts, **more)
 
 
 def test_one_start_that_cycles_is_enough(told: list[tuple[float, float]]) -> None:
@@ -260,6 +262,17 @@ def test_a_start_that_cycles_ends_its_stiffness(told: list[tuple[float, float]])
     told.clear()
     search(lowest=50.0, near=800.0)
     assert [shift for k, shift in told if k == 800.0] == [0.0]
+
+
+def test_the_start_that_cycled_last_is_tried_first(told: list[tuple[float, float]]) -> None:
+    """Alone, and the others as many at a time as go side by side."""
+    search(starts=24, lowest=75.0, near=75.0, tolerance=0.1)
+    tried = {k: [round(shift * 12e3) for j, shift in told if j == k] for k, _shift in told}
+    assert tried[75.0] == list(range(24))
+    assert tried[150.0] == list(range(24))  # the third group cycles: from 17 on
+    middle = math.sqrt(75.0 * 150.0)
+    first = told.index((middle, pytest.approx(17 / 12e3)))
+    assert told[first + 1][0] != middle
 
 
 @pytest.mark.usefixtures("told")

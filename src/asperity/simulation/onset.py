@@ -16,12 +16,13 @@ from asperity.errors import ParameterError
 from asperity.files import Record, json_text, record
 from asperity.kept import is_shipped, kept
 from asperity.laws.w_smooth_wall import LAW as SMOOTH_WALL
-from asperity.simulation.continued import Continued
 from asperity.simulation.hands import Hand, MovedHand
+from asperity.simulation.kernels.body_functions import LANES
 from asperity.simulation.motions import Motion
 from asperity.simulation.plants import Plant
 from asperity.simulation.run import Run, Stop
 from asperity.simulation.servo import Servo
+from asperity.simulation.together import Together
 from asperity.surface import Surface
 
 Place = tuple[float, float, float]
@@ -146,13 +147,37 @@ def ends_in_cycle(
         duration: of the first run [s].
         threshold: of :func:`restlessness` [m/s].
     """
+    (found,) = end_in_cycles(lambda span, _which: [run_for(span)], 1, duration, threshold)
+    return found
+
+
+def end_in_cycles(
+    runs_for: Callable[[float, list[int]], Sequence[Run]],
+    count: int,
+    duration: float,
+    threshold: float = CYCLE_SPEED,
+) -> list[tuple[bool, Run]]:
+    """Return the same of several loops that run together.
+
+    Args:
+        runs_for: runs some of them, by number, for a duration [s].
+        count: how many there are.
+        duration: see :func:`ends_in_cycle`.
+        threshold: likewise.
+    """
+    found: dict[int, Run] = {}
+    restless = list(range(count))
     for patience in PATIENCE:
-        run = run_for(patience * duration)
-        if run.stop or restlessness(run) <= threshold:
-            return cycles(run, threshold), run
-        if patience > 1.0 and not calms_down(run):
+        if not restless:
             break
-    return cycles(run, threshold), run
+        found.update(zip(restless, runs_for(patience * duration, restless), strict=True))
+        restless = [
+            index
+            for index in restless
+            if not (found[index].stop or restlessness(found[index]) <= threshold)
+            and (patience == 1.0 or calms_down(found[index]))
+        ]
+    return [(cycles(found[index], threshold), found[index]) for index in range(count)]
 
 
 def holds_still(motion: Motion, duration: float) -> bool:
@@ -161,7 +186,7 @@ def holds_still(motion: Motion, duration: float) -> bool:
     return bool(np.ptp(motion.at(times), axis=0).max() == 0.0)
 
 
-def runner(
+def together(
     surface: Surface,
     plant: Plant,
     hand: Hand,
@@ -169,11 +194,11 @@ def runner(
     motion: Motion,
     start: FloatArray,
     velocity: ArrayLike | None,
-    shift: FloatArray,
-) -> Continued:
-    """Return what runs a loop for longer and longer [s], all of it shifted by an offset [m]."""
-    way = Shifted(motion, (float(shift[0]), float(shift[1]), float(shift[2])))
-    return Continued(surface, plant, hand, servo, way, start + shift, velocity)
+    shifts: FloatArray,
+) -> Together:
+    """Return what runs a loop from several starts, all of it shifted by offsets [m], (n, 3)."""
+    ways = [Shifted(motion, _place(shift)) for shift in shifts]
+    return Together(surface, plant, hand, servo, ways, list(start + shifts), velocity)
 
 
 def offsets(surface: Surface, count: int) -> FloatArray:
@@ -244,14 +269,12 @@ def find_onset(
     begin = motion.at(np.zeros(1))[0] if start is None else array("start", start, (3,), "m")
 
     def search() -> Onset:
-        tried = _Tried(
-            lambda stiffness, shift: ends_in_cycle(
-                runner(surface.to_stiffness(stiffness), plant, hand, servo, motion, begin,
-                       velocity, shift),
-                duration, limit,
-            ),
-            shifts, progress,
-        )  # fmt: skip
+        def run(stiffness: float, some: FloatArray) -> list[tuple[bool, Run]]:
+            stiff = surface.to_stiffness(stiffness)
+            runs_for = together(stiff, plant, hand, servo, motion, begin, velocity, some)
+            return end_in_cycles(runs_for, len(some), duration, limit)
+
+        tried = _Tried(run, shifts, progress)
         quiet, cycling = _bracket(tried.cycles, lowest, highest, width, near)
         every, (low, high) = tried.all(quiet if math.isinf(cycling) else cycling)
         return Onset(surface.law.letter, servo.delay, quiet, cycling, len(shifts), every, low, high,
@@ -273,14 +296,15 @@ class _Tried:
     """What the starts came to at each stiffness, none run twice.
 
     Args:
-        run: returns whether a start, a shift [m], cycles at a stiffness [N/m], and its run.
-        shifts: of the starts [m], shape (n, 3).
+        run: returns of some starts, shifts (m, 3) [m], whether each cycles at a stiffness [N/m],
+            and its run.
+        shifts: of all starts [m], shape (n, 3).
         progress: called after every stiffness.
     """
 
     def __init__(
         self,
-        run: Callable[[float, FloatArray], tuple[bool, Run]],
+        run: Callable[[float, FloatArray], list[tuple[bool, Run]]],
         shifts: FloatArray,
         progress: Callable[[], None] | None,
     ) -> None:
@@ -291,29 +315,39 @@ class _Tried:
     def cycles(self, stiffness: float) -> bool:
         """Return whether any start cycles at a stiffness."""
         count = len(self.shifts)
-        found = False
-        for index in ((self.first + step) % count for step in range(count)):
-            found = self._start(stiffness, index)[0]
-            if found:
-                self.first = index
-                break
+        order = [(self.first + step) % count for step in range(count)]
+        some = order[:1]  # alone: if it cycles, nothing else is to be known
+        cycling: list[int] = []
+        while some and not cycling:
+            self._run(stiffness, some)
+            cycling = [index for index in some if self.known[stiffness, index][0]]
+            order = order[len(some) :]
+            some = order[:LANES]
+        if cycling:
+            self.first = cycling[0]
         self._told()
-        return found
+        return bool(cycling)
 
     def all(self, stiffness: float) -> tuple[int, tuple[Place, Place]]:
         """Return how many starts cycle at a stiffness, and the box [m] that they reached."""
-        found = [self._start(stiffness, index) for index in range(len(self.shifts))]
+        every = range(len(self.shifts))
+        self._run(stiffness, every)
+        found = [self.known[stiffness, index] for index in every]
         low = np.fmin.reduce([box[0] for _, box in found])
         high = np.fmax.reduce([box[1] for _, box in found])
         self._told()
         return sum(ended for ended, _ in found), (_place(low), _place(high))
 
-    def _start(self, stiffness: float, index: int) -> tuple[bool, FloatArray]:
-        if (stiffness, index) not in self.known:
-            ended, run = self.run(stiffness, self.shifts[index])
-            box = np.array([run.position.min(axis=0), run.position.max(axis=0)])
-            self.known[stiffness, index] = ended, box
-        return self.known[stiffness, index]
+    def _run(self, stiffness: float, starts: Sequence[int]) -> None:
+        """Run the starts that have not been run, as many at a time as go side by side."""
+        new = [index for index in starts if (stiffness, index) not in self.known]
+        for begin in range(0, len(new), LANES):
+            some = new[begin : begin + LANES]
+            for index, (ended, run) in zip(
+                some, self.run(stiffness, self.shifts[some]), strict=True
+            ):
+                box = np.array([run.position.min(axis=0), run.position.max(axis=0)])
+                self.known[stiffness, index] = ended, box
 
     def _told(self) -> None:
         if self.progress is not None:

@@ -16,6 +16,7 @@ from asperity.simulation.hands import BandHand, Hand, MovedHand, SpringHand
 from asperity.simulation.kernels import (
     axes,
     banded,
+    bar_lanes,
     booking,
     dense,
     five_bar,
@@ -203,7 +204,7 @@ def _pantograph(plant: Pantograph, hand: SpringHand | BandHand, period: float) -
         bar, _hand_record(hand), float(plant.friction), rate, fewest, float(period), _LARGEST_STEP,
         bool(plant.inside_only), LEAST_SINE,
     )  # fmt: skip
-    return SampledPlant((five_bar, hand_kernels, booking), record, 6)
+    return SampledPlant((five_bar, bar_lanes, hand_kernels, booking), record, 6)
 
 
 def bar_record(plant: Pantograph, held: float = 0.0) -> five_bar.Bar:

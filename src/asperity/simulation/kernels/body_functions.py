@@ -7,10 +7,17 @@ declares.
 
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from asperity.checks import FloatArray
 
 # What the loop says: it ran to the end, the state left all bounds, the body left its workspace.
 RAN, DIVERGED, LEFT = 0, 1, 2
+# Where it says so of several runs: in the row of each, with the samples behind it.
+STOP, SAMPLES = 0, 1
+# Runs that go side by side: so many numbers are worked on at a time.
+LANES = 8
 
 
 class Held(NamedTuple):
@@ -52,6 +59,21 @@ def advance_body(x: FloatArray, ledger: FloatArray, held: Held, plant: object) -
 
     Returns:
         ``RAN``, or ``LEFT`` if the body would leave its workspace: it then stays where it was.
+    """
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
+
+
+def advance_lanes(
+    x: FloatArray, ledger: FloatArray, held: FloatArray, told: NDArray[np.int64], plant: object
+) -> None:
+    """Move the bodies of at most ``LANES`` runs over one sample, as ``advance_body`` moves each.
+
+    Args:
+        x: states, a row a run; changed.
+        ledger: sums of each; added to.
+        held: what does not change, the fields of ``Held`` of each, ``inside`` as 1 or 0.
+        told: of each what stopped it, see ``STOP``; changed. Those that have stopped stay.
+        plant: what all bodies are made of.
     """
     raise NotImplementedError  # the interface alone; the linker binds calls of it
 

@@ -21,9 +21,11 @@ from asperity.simulation.kernels.booking import book_energies
 from asperity.simulation.kernels.hand import HandRecord, band_turns, hand_energy, hand_force
 
 KERNELS = Kernels(
-    provides=("advance_body", "stored_energy"),
+    provides=(
+        "advance_body", "bar_kink", "bar_parts", "bar_reached", "bar_step", "stored_energy",
+    ),
     requires=("band_turns", "book_energies", "hand_energy", "hand_force"),
-)
+)  # fmt: skip
 
 
 class Bar(NamedTuple):
@@ -181,7 +183,7 @@ def bar_stage(
 
 
 def mean_of_five(one: float, three: float, four: float, five: float, six: float, h: float) -> float:
-    """Integral over a step h of a rate, of its values at the stages of :func:`bar_part`."""
+    """Integral over a step h of a rate, of its values at the stages of :func:`bar_step`."""
     return h / 90.0 * (7.0 * (one + six) + 32.0 * (three + five) + 12.0 * four)
 
 
@@ -206,16 +208,14 @@ def bar_friction(
     return -friction * vx / speed, -friction * vz / speed
 
 
-def bar_part(
-    x: FloatArray, sx: float, sz: float, ax: float, az: float,
-    ux: float, uz: float, damping: float, h: float, bar: Bar, hand: HandRecord,
-) -> tuple[float, float, float, float]:  # fmt: skip
+def bar_step(
+    x1: float, z1: float, vx1: float, vz1: float, pull: Pull, h: float, bar: Bar, hand: HandRecord
+) -> tuple[float, float, float, float, float, float]:
     """One step h of Butcher's Runge-Kutta method of order five, its loss and work along with it.
 
-    Returns the displacement in x and z [m], the loss and the work of the hand [J].
+    Returns displacement [m] and change of velocity [m/s], in x and z, loss and work of the hand
+    [J].
     """
-    pull = Pull(sx, sz, ax, az, ux, uz, damping)
-    x1, z1, vx1, vz1 = x[0], x[2], x[3], x[5]
     ax1, az1, lost1, hand1 = bar_stage(x1, z1, vx1, vz1, 0.0, pull, bar, hand)
     q = 0.25 * h
     vx2, vz2 = vx1 + q * ax1, vz1 + q * az1
@@ -237,14 +237,14 @@ def bar_part(
     x6 = x1 + s * (2.0 * vx2 - 3.0 * vx1 + 12.0 * (vx3 - vx4) + 8.0 * vx5)
     z6 = z1 + s * (2.0 * vz2 - 3.0 * vz1 + 12.0 * (vz3 - vz4) + 8.0 * vz5)
     ax6, az6, lost6, hand6 = bar_stage(x6, z6, vx6, vz6, h, pull, bar, hand)
-    dx = mean_of_five(vx1, vx3, vx4, vx5, vx6, h)
-    dz = mean_of_five(vz1, vz3, vz4, vz5, vz6, h)
-    x[0] = x1 + dx
-    x[2] = z1 + dz
-    x[3] = vx1 + mean_of_five(ax1, ax3, ax4, ax5, ax6, h)
-    x[5] = vz1 + mean_of_five(az1, az3, az4, az5, az6, h)
-    lost = mean_of_five(lost1, lost3, lost4, lost5, lost6, h)
-    return dx, dz, lost, mean_of_five(hand1, hand3, hand4, hand5, hand6, h)
+    return (
+        mean_of_five(vx1, vx3, vx4, vx5, vx6, h),
+        mean_of_five(vz1, vz3, vz4, vz5, vz6, h),
+        mean_of_five(ax1, ax3, ax4, ax5, ax6, h),
+        mean_of_five(az1, az3, az4, az5, az6, h),
+        mean_of_five(lost1, lost3, lost4, lost5, lost6, h),
+        mean_of_five(hand1, hand3, hand4, hand5, hand6, h),
+    )
 
 
 def bar_reached(x: float, z: float, least: float, bar: Bar) -> bool:
@@ -266,11 +266,11 @@ def bar_parts(vx: float, vz: float, rate: float, span: float, bar: Bar) -> int:
 
 
 def bar_kink(
-    x: FloatArray, dx: float, dz: float, time: float, h: float, held: Held, hand: HandRecord
-) -> bool:
-    """Whether the band turned slack or taut in a step h of the handle, d, from a time on."""
-    sx = held.ax + time * held.ux - x[0]
-    sz = held.az + time * held.uz - x[2]
+    x: float, z: float, dx: float, dz: float, time: float, h: float, held: Held, hand: HandRecord
+) -> bool:  # fmt: skip
+    """Whether the band turned slack or taut in a step h of the handle, by d to (x, z)."""
+    sx = held.ax + time * held.ux - x
+    sz = held.az + time * held.uz - z
     return band_turns(sx + dx, 0.0, sz + dz, sx + h * held.ux, 0.0, sz + h * held.uz, hand)
 
 
@@ -289,11 +289,16 @@ def advance_body(x: FloatArray, ledger: FloatArray, held: Held, plant: Pantograp
         bz = az + time * uz
         sx, sz, tx, tz = x[0], x[2], x[3], x[5]
         gx, gz = bar_friction(x, fx, fz, bx, bz, ux, uz, damping, friction, h, bar, hand)
-        dx, dz, loss, pulled = bar_part(x, fx + gx, fz + gz, bx, bz, ux, uz, damping, h, bar, hand)
+        pull = Pull(fx + gx, fz + gz, bx, bz, ux, uz, damping)
+        dx, dz, dvx, dvz, loss, pulled = bar_step(sx, sz, tx, tz, pull, h, bar, hand)
+        x[0] = sx + dx
+        x[2] = sz + dz
+        x[3] = tx + dvx
+        x[5] = tz + dvz
         if not bar_reached(x[0], x[2], least, bar):
             x[0], x[2], x[3], x[5] = px, pz, vx, vz
             return LEFT
-        if fine == 0 and bar_kink(x, dx, dz, time, h, held, hand):
+        if fine == 0 and bar_kink(x[0], x[2], dx, dz, time, h, held, hand):
             x[0], x[2], x[3], x[5] = sx, sz, tx, tz
             fine = 256  # the force has a kink there: again, in small steps
             h = period / parts / 256.0

@@ -20,13 +20,10 @@ from asperity.simulation.kernels.body_functions import (
     advance_body,
     stored_energy,
 )
-from asperity.simulation.kernels.booking import FRICTION, LOST, SAME_SAMPLE, SAMPLING, SUPPLIED
-
-# Columns of a trace that has only what tells a limit cycle: see ``WATCHED``.
-FEW = 9
+from asperity.simulation.kernels.booking import SAME_SAMPLE, SAMPLING
 
 KERNELS = Kernels(
-    provides=("wait_in_queue",),
+    provides=("book_command", "flush", "wait_in_queue"),
     requires=(
         "advance_body", "first_state", "flushed", "flushed_state", "probe_inside", "servo_tick",
         "stored_energy",
@@ -79,14 +76,10 @@ def trace_row(
     trace: FloatArray, row: int, time: float, x: FloatArray, servo: ServoState, held: Held,
     ledger: FloatArray, plant: object,
 ) -> None:  # fmt: skip
-    """Write a row of the trace, see ``COLUMNS``, or ``WATCHED`` if it has so few columns."""
+    """Write a row of the trace, see ``COLUMNS``."""
     trace[row, 0] = time
     for i in range(6):
         trace[row, 1 + i] = x[i]
-    if trace.shape[1] == FEW:
-        trace[row, 7] = ledger[SUPPLIED] + ledger[SUPPLIED + 1] + ledger[SUPPLIED + 2]
-        trace[row, 8] = ledger[LOST] - ledger[FRICTION]
-        return
     trace[row, 7] = servo.fx
     trace[row, 8] = servo.fy
     trace[row, 9] = servo.fz
@@ -128,8 +121,8 @@ def servo_batch(
         memory: of the contact; changed.
         texture: record of the texture.
         law: parameters of the law.
-        trace: rows of ``COLUMNS`` or ``WATCHED``, for the samples that are multiples of ``every``;
-            none are written if it has none.
+        trace: rows of ``COLUMNS``, for the samples that are multiples of ``every``; none are
+            written if it has none.
         every: samples per row.
 
     Returns:
