@@ -25,7 +25,8 @@ def joined(lab: Started, **more: Any) -> ClientConnection:
         "proxy": None,
         **more,
     }
-    return connect(lab.address.replace("http", "ws") + "live", **options)
+    page: ClientConnection = connect(lab.address.replace("http", "ws") + "live", **options)
+    return page
 
 
 def say(page: ClientConnection, what: str, **content: Any) -> None:
