@@ -132,3 +132,24 @@ def test_the_cut_is_the_surface_under_the_probe(page: Browser) -> None:
 
     assert drawn(0.0) > 0.95
     assert drawn(4e-4) < 0.5
+
+
+@needs_browser
+def test_the_probe_is_where_the_loop_has_it(page: Browser) -> None:
+    box = page.ask("document.getElementById('cut').getBoundingClientRect().toJSON()")
+    for share in (0.3, 0.6):
+        page.mouse("mouseMoved", box["x"] + share * box["width"], box["y"] + 0.2 * box["height"])
+        page.until("lab.hand.sent > 0 && lab.hand.sent <= lab.frame.heard")
+        page.ask("new Promise(done => setTimeout(done, 600))")  # until it rests
+        got = shown(page, "cut")
+        high, wide = got.shape[:2]
+        left, right, bottom, top = page.ask("lab.cut.box")
+        x, _y, z = page.ask("lab.probeState().probe")
+        column, row = (x - left) / (right - left) * wide, (top - z) / (top - bottom) * high
+        assert abs(column - share * wide) < 20.0  # friction holds it back
+        turn = np.linspace(0.0, 2.0 * np.pi, 32, endpoint=False)
+        ring = got[
+            np.rint(row + 8.0 * np.sin(turn) - 0.5).astype(int),
+            np.rint(column + 8.0 * np.cos(turn) - 0.5).astype(int),
+        ]
+        assert np.abs(ring - colour(page, "ink")).mean() < 60.0

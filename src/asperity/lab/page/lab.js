@@ -49,6 +49,7 @@ const line = new Line({
     if (firstNews && said.steers) fromAddress();
     firstNews = false;
     hand.high = said.high;
+    last.look = -Infinity; // other pictures may be wanted now
     show();
   },
   refused(said) { alarm(said.words); },
