@@ -158,6 +158,12 @@ def test_lines_of_a_map_are_spread_over_it() -> None:
         for one in lines:
             assert (one.length, one.periodic) == (line.length, line.periodic)
             np.testing.assert_array_equal(one.direction, line.direction)
+    # Along y across is against x: the map lies on that side of the line alone.
+    along_y = leak.parallel_lines(
+        Surface(LUMPS, "A", K, 2e-5), leak.scan_line(Surface(LUMPS, "A", K, 2e-5), (0.0, 1.0))
+    )
+    starts = sorted(float(one.start[0] - LUMPS.domain.origin[0]) for one in along_y)
+    np.testing.assert_allclose(starts, (np.arange(33) + 0.5) / 33 * 16e-4, rtol=1e-9)
     profile = Surface(SAW, "A", K, D)
     assert len(leak.parallel_lines(profile, SAW.scan_line())) == 1
 
