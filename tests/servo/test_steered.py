@@ -15,6 +15,8 @@ from asperity.servo.kernels.steered import (
     EAGERNESS,
     FASTEST,
     HEARD,
+    KEPT,
+    PARTS,
     ROWS,
     TURN,
     anchor_step,
@@ -90,7 +92,7 @@ def test_what_is_no_place_is_refused_and_changes_nothing(wheel: Wheel, wrong: An
 
 def test_a_wheel_that_is_gone_is_said(wheel: Wheel) -> None:
     driver = steered_driver(Cartesian(0.05, 1.0), HAND, Servo(1e-3), wheel)
-    assert driver.device.anchor.shape == (ROWS, 3)
+    assert driver.device.anchor.shape == (ROWS + KEPT * PARTS, 3)
     wheel.close()
     with pytest.raises(ParameterError, match="nobody steers"):
         driver.open()

@@ -52,10 +52,11 @@ def command(surface: str | None, port: int | None, no_browser: bool, **values: A
 
     named = surface or SURFACE
     with progress_bar("reading the surface"):
-        scene = load_scene(named, file_values(values))
+        told = file_values(values)
+        scene = load_scene(named, told)
         device = values["device"] or scene.device or load_device(DEVICE)
         changed = values["settings"].changed(device)
-        stage = make_stage(scene, named, surface_values(values), changed)
+        stage = make_stage(scene, named, surface_values(values), changed, told)
 
     def ready(address: str) -> None:
         tell(f"the lab is at {address}")

@@ -58,7 +58,12 @@ class Seen:
     frame: float
 
 
-Message = Steer | Change | Look | Take | Seen
+@dataclass(frozen=True)
+class Save:
+    """The newest seconds shall be kept, see :mod:`asperity.lab.takes`."""
+
+
+Message = Steer | Change | Look | Take | Seen | Save
 
 
 def read_message(content: str | bytes) -> Message:
@@ -146,5 +151,6 @@ _READERS: dict[str, tuple[tuple[str, ...], Any]] = {
     "relief": (("x", "y", "size"), _relief),
     "cut": (("box", "y"), _cut),
     "take": ((), Take),
+    "save": ((), Save),
     "seen": (("frame",), lambda frame: Seen(_number("frame", frame, 0.0, math.inf))),
 }

@@ -19,8 +19,9 @@ from asperity.files import plain
 from asperity.lab.access import MalformedError, Pace
 from asperity.lab.backdrop import Backdrop
 from asperity.lab.frames import frame, layout
-from asperity.lab.messages import Change, Look, Seen, Steer, Take, read_message
+from asperity.lab.messages import Change, Look, Save, Seen, Steer, Take, read_message
 from asperity.lab.session import Session
+from asperity.lab.shelf import Shelf
 from asperity.lab.stage import RANGES, Stage
 from asperity.laws import KNOWN_LAWS
 from asperity.servo.process import Spare
@@ -96,6 +97,8 @@ class Lab:
         self._changed = asyncio.Event()
         self.session = Session(stage, self._tell, spare)
         self.backdrop = Backdrop(pictures, limits, self._announce)
+        self.shelf = Shelf()
+        self._saving: set[asyncio.Task[None]] = set()
 
     def _tell(self) -> None:
         """Hear of a change, in the session's thread."""
@@ -166,6 +169,17 @@ class Lab:
             self.session.wheel.steer(message.target, message.cosine, message.sine, message.speed)
         elif isinstance(message, Change):
             self.session.change(message.wishes)
+        elif isinstance(message, Save):
+            saving = asyncio.create_task(self._save(page))  # who steers goes on meanwhile
+            self._saving.add(saving)
+            saving.add_done_callback(self._saving.discard)
+
+    async def _save(self, page: Page) -> None:
+        """Keep the newest seconds."""
+        try:
+            await page.say("take", **await self.shelf.keep(self.session))
+        except ParameterError as error:
+            await page.say("refused", words=str(error))
 
     async def _announce(self) -> None:
         """Tell all pages how things stand."""

@@ -87,7 +87,7 @@ async def serve_lab(
             with lab.session:
                 async with serve(
                     lab.welcome, sock=bound, max_size=MOST_BYTES, compression=None,
-                    process_request=lambda _line, asked: answer(door, asked),
+                    process_request=lambda _line, asked: answer(door, asked, lab.shelf.files),
                 ):  # fmt: skip
                     ready(door.address)
                     await over.wait()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from http import HTTPStatus
 from importlib.resources import files
@@ -27,8 +28,14 @@ def page_files() -> dict[str, tuple[str, bytes]]:
     return {**found, "": found["index.html"]}
 
 
-def answer(door: Door, request: Request) -> Response | None:
-    """Return the answer to a request; ``None`` to let a live connection through."""
+def answer(door: Door, request: Request, kept: Mapping[str, tuple[str, bytes]]) -> Response | None:
+    """Return the answer to a request; ``None`` to let a live connection through.
+
+    Args:
+        door: who is let in.
+        request: what is asked for.
+        kept: type and content of files besides those of the page, by name.
+    """
     name = door.asked(request.path, request.headers.get_all("Host"))
     if name is None:
         return _said(HTTPStatus.FORBIDDEN, "This is not the address that asperity lab has printed.")
@@ -36,9 +43,10 @@ def answer(door: Door, request: Request) -> Response | None:
         if door.is_ours(request.headers.get_all("Origin")):
             return None
         return _said(HTTPStatus.FORBIDDEN, "Another page asks for the lab.")
-    if name not in page_files():
+    found = page_files().get(name) or kept.get(name)
+    if found is None:
         return _said(HTTPStatus.NOT_FOUND, "The lab has no such page.")
-    return _response(HTTPStatus.OK, *page_files()[name])
+    return _response(HTTPStatus.OK, *found)
 
 
 def _said(status: HTTPStatus, words: str) -> Response:

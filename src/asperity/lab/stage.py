@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from asperity.arguments import STIFFNESS
@@ -51,6 +51,7 @@ class Stage:
         plain: its texture, before it is magnified here.
         magnified: factors of its size and of its height.
         first: name and plain texture at the start, which may be of a file.
+        told: of the preparation of that file, by name [SI].
     """
 
     setup: Setup
@@ -58,6 +59,7 @@ class Stage:
     plain: Texture
     first: tuple[str, Texture]
     magnified: tuple[float, float] = (1.0, 1.0)
+    told: Mapping[str, Any] = field(default_factory=dict)
 
     def changed(self, wishes: Mapping[str, Any]) -> Stage:
         """Return the stage with some things changed.
@@ -210,7 +212,7 @@ _CHANGES: dict[str, Any] = {
 
 def make_stage(
     scene: Scene, named: str = SURFACE, surface: Mapping[str, Any] | None = None,
-    device: Device | None = None,
+    device: Device | None = None, told: Mapping[str, Any] | None = None,
 ) -> Stage:  # fmt: skip
     """Return what the lab shows at first.
 
@@ -219,11 +221,13 @@ def make_stage(
         named: by which it was asked for.
         surface: arguments of the surface that come before the scene's.
         device: comes before the scene's.
+        told: of the preparation of the texture, by name [SI].
 
     Raises:
         ParameterError: for what cannot be simulated.
     """
-    return _made(scene, device or scene.device or load_device(DEVICE), named, surface)
+    made = _made(scene, device or scene.device or load_device(DEVICE), named, surface)
+    return replace(made, told=dict(told or {}))
 
 
 def _made(

@@ -3,8 +3,11 @@
 import { Ledger } from "./gauge.js";
 import { Hand } from "./hand.js";
 import { Line } from "./line.js";
+import { download, pngOf, svgOf } from "./picture.js";
 import { readTheme } from "./sheet.js";
 import { Sound } from "./sound.js";
+import { Player } from "./takes.js";
+import { TakesPanel } from "./takespanel.js";
 import { Tour } from "./tour.js";
 import { TourPanel } from "./tourpanel.js";
 import { Spectrum, Traces } from "./traces.js";
@@ -53,13 +56,11 @@ const line = new Line({
     show();
   },
   refused(said) { alarm(said.words); },
+  take(said) { takes.add(said); },
   frame(said) {
-    frame = said;
-    if (news) ledger.take(said, line.layout.columns, news);
+    if (player.on) { line.say("seen", { frame: said.number }); return; } // what was is shown, not what is
     tour.take(said, line.layout.columns);
-    traces.take(said, line.layout.columns);
-    spectrum.take(said.forces);
-    sound.take(said.forces, news?.rate ?? 1000);
+    feel(said);
     if (document.hidden) line.say("seen", { frame: said.number }); // nothing is painted
   },
   picture(numbers) {
@@ -87,6 +88,24 @@ const hand = new Hand((what, content) => {
 });
 
 const tour = new Tour({ change, hand, ledger, see(width) { span = width; }, get news() { return news; } }), panel = new TourPanel(tour);
+
+const player = new Player({
+  frame(said) { feel({ ...said, number: seen }); },
+  clear() { traces.clear(); ledger.clear(); },
+});
+const takes = new TakesPanel({
+  player, change, save() { line.say("save"); },
+  get columns() { return line.layout.columns; }, get settings() { return news?.settings ?? {}; },
+});
+
+/** Show what a frame says, of now or of a take. */
+function feel(said) {
+  frame = said;
+  if (news) ledger.take(said, line.layout.columns, news);
+  traces.take(said, line.layout.columns);
+  spectrum.take(said.forces);
+  sound.take(said.forces, news?.rate ?? 1000);
+}
 
 function fill(select, pairs, chosen) {
   const value = select.value || chosen;
@@ -117,7 +136,7 @@ function show() {
   $("take").hidden = !free || steers;
   $("tour-begin").disabled = !steers;
   for (const one of document.querySelectorAll(".panel :is(input, select, button)")) {
-    if (!["sound", "volume", "picture", "reset"].includes(one.id)) one.disabled = !steers;
+    if (!["sound", "volume", "picture", "drawing", "reset"].includes(one.id)) one.disabled = !steers;
   }
   for (const button of $("letters").children) {
     const chosen = button.textContent === settings.law;
@@ -233,6 +252,7 @@ function due(what, time, every) {
 
 function paint(time) {
   requestAnimationFrame(paint);
+  player.tick(time);
   const state = probeState();
   if (frame && frame.number !== seen) {
     seen = frame.number;
@@ -257,6 +277,7 @@ painted.port2.onmessage = ({ data: heard }) => {
 function tell(state) {
   const { probe, force, energy } = state;
   panel.draw();
+  takes.draw();
   put("motion", hand.motion);
   put("press", 1e3 * hand.press);
   $("press-value").textContent = quantity(hand.press, "m");
@@ -331,25 +352,12 @@ $("sound").onclick = async () => {
   $("sound").setAttribute("aria-pressed", on);
   $("sound").textContent = on ? "Sound off" : "Sound on";
 };
-$("picture").onclick = () => {
-  const parts = [relief, cut, traces, spectrum], sizes = parts.map(part => part.sheet.canvas);
-  const width = Math.max(...sizes.map(one => one.width)), height = sizes.reduce((sum, one) => sum + one.height + 8, 0);
-  const whole = Object.assign(document.createElement("canvas"), { width, height });
-  const draw = whole.getContext("2d");
-  draw.fillStyle = readTheme().card;
-  draw.fillRect(0, 0, whole.width, whole.height);
-  let top = 0;
-  for (const { sheet, marker } of parts) {
-    draw.drawImage(sheet.canvas, 0, top);
-    marker?.copy(draw, 0, top);
-    top += sheet.canvas.height + 8;
-  }
-  whole.toBlob(blob => {
-    const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: "asperity-lab.png" });
-    link.click();
-    URL.revokeObjectURL(link.href);
-  });
-};
+const views = [
+  [relief, () => relief.draw(probeState())], [cut, () => cut.draw(probeState(), boxes())],
+  [traces, () => traces.draw(ledger.base)], [spectrum, () => spectrum.draw(news?.rate ?? 1000)],
+];
+$("picture").onclick = async () => download(await pngOf(views), "asperity-lab.png");
+$("drawing").onclick = () => download(new Blob([svgOf(views)], { type: "image/svg+xml" }), "asperity-lab.svg");
 
 const MOVES = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const KEYS = {
@@ -358,6 +366,7 @@ const KEYS = {
   PageDown: () => { hand.z = Math.max(hand.height - span / 80, -0.01); hand.wish(); },
   m: () => hand.next(),
   x: () => $("swap").click(), r: () => ledger.clear(), s: () => $("sound").click(),
+  k: () => $("save").click(), j: () => player.on && $("play").click(), l: () => player.on && $("live").click(),
   t: () => panel.toggle(), v: () => tour.on && $("tour-show").click(),
   n: () => tour.on && $("tour-next").click(), p: () => tour.on && $("tour-back").click(),
   "+": () => zoom(1 / 1.15), "-": () => zoom(1.15),
@@ -383,11 +392,10 @@ addEventListener("unhandledrejection", () => faults++);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readTheme);
 readTheme();
 requestAnimationFrame(paint);
-
 // For tests, and for whoever is curious in the console.
 globalThis.lab = {
   get frame() { return frame; }, get news() { return news; }, get faults() { return faults; },
   /** Whether both pictures are of the surface that is shown. */
   get current() { return ["relief", "cut"].every(kind => asked[kind]?.again < Infinity && asked[kind].version === news?.version); },
-  get ready() { return Boolean(relief.heights && cut.box); }, latencies, hand, tour, ledger, probeState, relief, cut,
+  get ready() { return Boolean(relief.heights && cut.box); }, latencies, hand, tour, ledger, player, probeState, relief, cut, svg: () => svgOf(views), png: () => pngOf(views),
 };

@@ -38,7 +38,7 @@ export class Traces {
   }
 
   /** Forget what was: the clock of another loop begins anew. */
-  clear() { this.frames = []; }
+  clear() { this.count = 0; this.newest = -1; }
 
   draw(base) {
     const [draw, width, height] = this.sheet.cleared();

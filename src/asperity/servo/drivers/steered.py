@@ -23,6 +23,8 @@ from asperity.servo.kernels.steered import (
     ASKED,
     COSINE,
     HEARD,
+    KEPT,
+    PARTS,
     ROWS,
     SINE,
     TARGET,
@@ -34,6 +36,7 @@ from asperity.simulation.motions import Still
 from asperity.simulation.plants import Plant
 from asperity.simulation.servo import Servo
 
+_LENGTH = ROWS + PARTS * KEPT
 _PLACE = "/dev/shm" if Path("/dev/shm").is_dir() else None
 
 
@@ -55,7 +58,7 @@ class Wheel:
         # A file that lies in memory where the system has a place for that.
         descriptor, self.name = tempfile.mkstemp(prefix="asperity-", dir=_PLACE)
         with open(descriptor, "wb") as file:
-            file.write(bytes(8 * 3 * ROWS))
+            file.write(bytes(8 * 3 * _LENGTH))
         self._table: FloatArray | None = table_of(self.name)
         self._table[TARGET] = self._table[ANCHOR] = place
 
@@ -112,6 +115,14 @@ class Wheel:
         """Where the anchor is (3,) [m]."""
         return np.array(self.table[ANCHOR])
 
+    @property
+    def track(self) -> FloatArray:
+        """Anchor [m], velocity [m/s] and position [m] of the newest samples (KEPT, 3, 3).
+
+        The k-th sample is at k modulo KEPT; the loop counts none twice and leaves none out.
+        """
+        return np.array(self.table[ROWS:]).reshape(KEPT, PARTS, 3)
+
     def close(self) -> None:
         """Let go of the memory; a loop that runs keeps its own hold on it."""
         if self._table is not None:
@@ -132,7 +143,7 @@ def table_of(name: str) -> FloatArray:
     Raises:
         FileNotFoundError: if nobody steers any more.
     """
-    return np.asarray(np.memmap(name, np.float64, "r+", shape=(ROWS, 3)))
+    return np.asarray(np.memmap(name, np.float64, "r+", shape=(_LENGTH, 3)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,5 +192,5 @@ def steered_driver(plant: Plant, hand: Hand, servo: Servo, wheel: Wheel) -> Stee
         raise ParameterError("hand", "must be a spring or a band: a pointer is no prescribed way")
     start = Still(tuple(wheel.anchor))
     made = simulated_driver(plant, hand, servo, start, servo.period)
-    blank = made.device._replace(anchor=np.zeros((ROWS, 3)))
+    blank = made.device._replace(anchor=np.zeros((_LENGTH, 3)))
     return SteeredDriver(made.modules, replace(made, device=blank).device, wheel.name)

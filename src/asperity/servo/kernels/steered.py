@@ -11,10 +11,12 @@ from asperity.servo.kernels.simulated import SimulatedDevice
 
 KERNELS = Kernels(provides=("anchor_step",))
 
-# Rows of the memory (ROWS, 3): whoever steers writes the first four, the loop the others. Asked
+# Rows of the memory (ROWS + KEPT * PARTS, 3): whoever steers writes the first four, the loop the
 # for is the point TARGET + COSINE cos(angle) + SINE sin(angle) [m].
 TARGET, COSINE, SINE, ASKED, ANCHOR, VELOCITY, HEARD = range(7)
 ROWS = 7
+# After these, of each of the newest samples: anchor [m], velocity [m/s] and position [m].
+KEPT, PARTS = 40_000, 3
 # In the row ASKED: speed of the angle [rad/s], and the number of the newest wish; in the row
 # HEARD: the angle [rad], and the number of the newest wish that the anchor follows.
 TURN, WISH = 0, 1
@@ -47,7 +49,11 @@ def anchor_step(device: SimulatedDevice) -> tuple[float, float, float, float, fl
     ax = at[ANCHOR, 0]
     ay = at[ANCHOR, 1]
     az = at[ANCHOR, 2]
+    kept = ROWS + PARTS * (device.done[1] % KEPT)
     for i in range(3):
+        at[kept, i] = at[ANCHOR, i]
+        at[kept + 1, i] = device.x[3 + i]
+        at[kept + 2, i] = device.x[i]
         at[VELOCITY, i] *= share
         at[ANCHOR, i] += step * at[VELOCITY, i]
     at[HEARD, TURN] = angle
