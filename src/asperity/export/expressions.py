@@ -69,7 +69,13 @@ _COMPARE: dict[type[ast.cmpop], tuple[str, int]] = {
 
 
 class Printing(Protocol):
-    """What the printer of a function asks of the program that it is printed into."""
+    """What the printer of a function asks of the program that it is printed into.
+
+    Attributes:
+        prefix: of every name.
+    """
+
+    prefix: str
 
     def real(self, value: float) -> str:
         """Return a real number as a literal."""

@@ -147,7 +147,10 @@ class Statements:
         return [f"return {self.say.as_kind(node.value, self.scope.result)};"]
 
     def _if(self, node: ast.If) -> list[str]:
-        lines = [f"if ({self.say.truth(node.test)}) {{", *_indented(self._block(node.body))]
+        test = self.say.truth(node.test)
+        if _gives_zeros(node.body[0]):
+            test = f"{self.program.prefix.upper()}_RARE({test})"
+        lines = [f"if ({test}) {{", *_indented(self._block(node.body))]
         if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
             first, *rest = self._if(node.orelse[0])
             return [*lines, f"}} else {first}", *rest]
@@ -354,6 +357,14 @@ _PRINTERS: dict[type[ast.stmt], Callable[[Statements, Any], list[str]]] = {
     ast.Return: Statements._return,
     ast.While: Statements._while,
 }
+
+
+def _gives_zeros(node: ast.stmt) -> bool:
+    """Return whether a statement returns zeros, as where nothing is touched."""
+    given = node.value if isinstance(node, ast.Return) else None
+    return isinstance(given, ast.Tuple) and all(
+        isinstance(item, ast.Constant) and item.value == 0.0 for item in given.elts
+    )
 
 
 def _indented(lines: Sequence[str]) -> list[str]:

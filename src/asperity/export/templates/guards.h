@@ -19,9 +19,14 @@
 #endif
 /* gcc makes a branch of the smaller of a number and a known one: a parameter is read instead. */
 #define @NAME@_READ(number) (*(const volatile @real@ *)&(number))
-/* Small functions: a call would cost more than they do. */
+/*
+ * Small functions: a call would cost more than they do. And where a probe touches nothing is rare:
+ * what is needed in contact shall not wait for it.
+ */
 #if defined(__GNUC__) && defined(__OPTIMIZE__) && !defined(__OPTIMIZE_SIZE__)
 #define @NAME@_INLINE static inline __attribute__((always_inline))
+#define @NAME@_RARE(test) __builtin_expect(!!(test), 0)
 #else
 #define @NAME@_INLINE static inline
+#define @NAME@_RARE(test) (test)
 #endif
