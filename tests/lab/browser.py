@@ -67,9 +67,15 @@ class Browser:
             pages = json.load(answer)
         return str(next(page for page in pages if page["type"] == "page")["webSocketDebuggerUrl"])
 
-    def call(self, method: str, **parameters: Any) -> Any:
+    def post(self, method: str, **parameters: Any) -> int:
+        """Say something, and wait for no answer; the number of what was said."""
         number = next(self._numbers)
         self._line.send(json.dumps({"id": number, "method": method, "params": parameters}))
+        return number
+
+    def call(self, method: str, **parameters: Any) -> Any:
+        """Say something, and return the answer."""
+        number = self.post(method, **parameters)
         while True:
             told = json.loads(self._line.recv(timeout=PATIENCE))
             if told.get("id") == number:
@@ -79,6 +85,8 @@ class Browser:
 
     def _note(self, told: dict[str, Any]) -> None:
         """Keep what goes wrong in the page."""
+        if "method" not in told:
+            return  # an answer that nobody waits for
         if told["method"] == "Runtime.exceptionThrown":
             self.said.append(str(told["params"]["exceptionDetails"]))
         elif told["method"] == "Log.entryAdded" and told["params"]["entry"]["level"] == "error":
