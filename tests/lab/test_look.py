@@ -97,6 +97,9 @@ def wave(page: Browser) -> Iterator[None]:
 @pytest.mark.parametrize("dark", [False, True])
 def test_the_relief_is_the_surface(page: Browser, dark: bool) -> None:
     page.resize(1280, 900, dark=dark)
+    # Painted in the colours of the day or of the night, and on the screen.
+    low = "getComputedStyle(document.documentElement).getPropertyValue('--low').trim()"
+    page.until(f"lab.relief.key === {low}")
     page.ask("new Promise(done => setTimeout(done, 300))")
     got = shown(page, "relief")
     high, wide = got.shape[:2]
