@@ -15,6 +15,7 @@ from types import MappingProxyType, ModuleType
 
 from asperity.compiled import Kernels
 from asperity.errors import ParameterError
+from asperity.kernels.parsing import tree_of
 
 # Anyone may call these; ``local_array`` is in the head of every linked text that does.
 _COMMON = frozenset([*dir(builtins), "local_array"])
@@ -84,7 +85,7 @@ def text_unit(
 ) -> Unit:
     """Return the unit of a source text, whose records and numbers are in a name space."""
     unit = Unit(name, kernels, {}, {}, {})
-    for node in ast.parse(source).body:
+    for node in tree_of(source).body:
         if isinstance(node, ast.FunctionDef):
             lines = _lines(node, space, kernels.native)
             unit.texts[node.name] = ast.get_source_segment(source, node) or ""

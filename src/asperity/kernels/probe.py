@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal, get_args
 
+from asperity.kernels.parsing import tree_of
 from asperity.laws.law import Law
 
 ClampName = Literal["none", "whole", "lateral", "backed"]
@@ -45,7 +46,7 @@ class ProbePlan:
         """The names of the arguments of each of the law's functions."""
         return {
             node.name: tuple(argument.arg for argument in node.args.args)
-            for node in ast.parse(self.source).body
+            for node in tree_of(self.source).body
             if isinstance(node, ast.FunctionDef)
         }
 
