@@ -11,13 +11,14 @@ import pytest
 
 from asperity.errors import ParameterError
 from asperity.lab.stage import Stage, make_stage
-from asperity.lab.takes import HAND, RECORDING, SCENE, Take, take
+from asperity.lab.takes import HAND, RECORDING, SCENE, Take, _stretch, take
 from asperity.recording.recording import open_recording
 from asperity.recording.replay import replay
 from asperity.scene import load_scene
 from asperity.scene.setup import make_setup
 from asperity.servo.drivers.steered import Wheel, steered_driver
 from asperity.servo.fault import Cause
+from asperity.servo.kernels.published import COLUMNS
 from asperity.servo.loop import Loop, no_clock, render
 from asperity.servo.shared import Shared
 
@@ -78,3 +79,13 @@ def test_it_begins_where_the_probe_is_free(stage: Stage, kept: Take) -> None:
     shared, wheel = felt(stage, 150)
     with wheel, pytest.raises(ParameterError, match="begins where the probe is free"):
         take(stage, shared, wheel)
+
+
+def test_what_was_on_its_way_when_the_probe_came_free_is_left_out() -> None:
+    rows = np.zeros((30, len(COLUMNS)))
+    names = [name for name, _unit in COLUMNS]
+    rows[5:25, names.index("share")] = 1.0  # it came before, and goes after
+    rows[3:9, names.index("inside")] = 1.0
+    # The last force, of row 8, waits for two samples, and is held for one more.
+    assert _stretch(rows, delay=2) == (12, 25)
+    assert _stretch(rows, delay=0) == (10, 25)
