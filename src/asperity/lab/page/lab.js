@@ -387,8 +387,7 @@ addEventListener("keydown", event => {
   event.preventDefault();
 });
 
-addEventListener("error", () => faults++);
-addEventListener("unhandledrejection", () => faults++);
+for (const what of ["error", "unhandledrejection"]) addEventListener(what, () => faults++);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", readTheme);
 readTheme();
 requestAnimationFrame(paint);
