@@ -160,6 +160,11 @@ def test_too_much_data_says_what_fits(call: Call, large: Path, tmp_path: Path) -
     assert int(found[1]) == 32 * 42 * 8
     assert 8 * int(found[2]) * int(found[3]) <= 8_000 * 1.1
     assert call("export", str(large), *options, found[1] + "B")[0] == 0
+    # With the tree of a search beside the heights it is still the map that is told.
+    code, _out, err = call("export", str(large), "--force", *options[:3], "D", *options[4:], "8kB")
+    found = re.search(r"at most (\d+) x (\d+) points", err)
+    assert found is not None
+    assert int(found[1]) / int(found[2]) == pytest.approx(32 / 42, rel=0.1)
 
 
 BAD = {

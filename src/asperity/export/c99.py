@@ -178,11 +178,13 @@ def _too_large(
 ) -> ParameterError:
     """Return the error of a program that would be too large; it says what resolution fits."""
     store = functions.store
-    shape = store.values[max(places, key=store.size)].shape
-    heights = max((store.values[p].shape for p in places), key=lambda s: math.prod(s[:2]))
-    flat = len(heights) > 1 and min(heights) > 4
+    # The heights are double; the tree that a search descends is not, and may be longer.
+    arrays = [store.values[place] for place in places]
+    doubles = [array for array in arrays if array.dtype.name == "float64"]
+    shape = max(doubles or arrays, key=lambda array: array.size).shape
+    flat = len(shape) > 1 and min(shape) > 4
     share = order.largest / size
-    fits = [int(n * (math.sqrt(share) if flat else share)) for n in (heights if flat else shape)]
+    fits = [int(n * (math.sqrt(share) if flat else share)) for n in shape]
     points = " x ".join(str(max(n, 1)) for n in fits[: 2 if flat else 1])
     words = f"must be at least {size} bytes, the data of this surface; at most {points} points fit"
     return ParameterError("largest", f"{words}: crop it, or prepare it with fewer", order.largest)
