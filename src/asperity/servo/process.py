@@ -75,6 +75,8 @@ class ServoProcess:
             greatest force is not known.
 
     Example:
+        Not run as a test: it starts a process on a device; ``tests/servo/test_process.py`` does.
+
         >>> with ServoProcess(surface, driver, Servo(1e-3)) as loop:  # doctest: +SKIP
         ...     while loop.poll() is Cause.GOING:
         ...         time.sleep(0.05)
