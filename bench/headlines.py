@@ -25,8 +25,7 @@ from asperity.devices import Device, device_names, load_device
 from asperity.scene import load_scene
 from asperity.scene.plant import default_servo
 from asperity.simulation import Cartesian, Servo, SpringHand, Still
-from asperity.simulation.kernels.body_functions import LANES
-from asperity.simulation.onset import end_in_cycles, offsets, together
+from asperity.simulation.onset import ends_of_starts, offsets
 from asperity.surface import Surface
 from bench.margins import HANDS, pressing
 
@@ -86,14 +85,9 @@ def loops(device: Device, spec: str, found: Comparison, times: float = 1.0) -> l
 def _cycles(surface: Surface, plant: Cartesian, hand: SpringHand, servo: Servo) -> int:
     """Return how many starts end in a limit cycle."""
     begin = np.array([0.0, 0.0, surface.texture.extremes[1] + 0.2 * surface.max_depth])
-    shifts = offsets(surface, STARTS)
-    still = Still((0.0, 0.0, 0.0))
-    found = 0
-    for first in range(0, STARTS, LANES):
-        some = shifts[first : first + LANES]
-        runs_for = together(surface, plant, hand, servo, still, begin, None, some)
-        found += sum(ends for ends, _run in end_in_cycles(runs_for, len(some), DURATION))
-    return found
+    still, shifts = Still((0.0, 0.0, 0.0)), offsets(surface, STARTS)
+    runs = ends_of_starts(surface, plant, hand, servo, still, begin, None, shifts, DURATION)
+    return sum(ends for ends, _run in runs)
 
 
 def main(times: float = 1.0) -> int:

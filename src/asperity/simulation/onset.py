@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -201,6 +201,28 @@ def together(
     return Together(surface, plant, hand, servo, ways, list(start + shifts), velocity)
 
 
+def ends_of_starts(
+    surface: Surface,
+    plant: Plant,
+    hand: Hand,
+    servo: Servo,
+    motion: Motion,
+    start: FloatArray,
+    velocity: ArrayLike | None,
+    shifts: FloatArray,
+    duration: float,
+    threshold: float = CYCLE_SPEED,
+) -> Iterator[tuple[bool, Run]]:
+    """Give of each start whether it ends in a limit cycle, and its run; see :func:`ends_in_cycle`.
+
+    As many run at a time as go side by side, so memory does not grow with the number of starts.
+    """
+    for first in range(0, len(shifts), LANES):
+        some = shifts[first : first + LANES]
+        runs_for = together(surface, plant, hand, servo, motion, start, velocity, some)
+        yield from end_in_cycles(runs_for, len(some), duration, threshold)
+
+
 def offsets(surface: Surface, count: int) -> FloatArray:
     """Return so many starting phases along the scan line [m], shape (count, 3).
 
@@ -269,10 +291,11 @@ def find_onset(
     begin = motion.at(np.zeros(1))[0] if start is None else array("start", start, (3,), "m")
 
     def search() -> Onset:
-        def run(stiffness: float, some: FloatArray) -> list[tuple[bool, Run]]:
-            stiff = surface.to_stiffness(stiffness)
-            runs_for = together(stiff, plant, hand, servo, motion, begin, velocity, some)
-            return end_in_cycles(runs_for, len(some), duration, limit)
+        def run(stiffness: float, some: FloatArray) -> Iterator[tuple[bool, Run]]:
+            return ends_of_starts(
+                surface.to_stiffness(stiffness), plant, hand, servo, motion, begin, velocity,
+                some, duration, limit,
+            )  # fmt: skip
 
         tried = _Tried(run, shifts, progress)
         quiet, cycling = _bracket(tried.cycles, lowest, highest, width, near)
@@ -304,7 +327,7 @@ class _Tried:
 
     def __init__(
         self,
-        run: Callable[[float, FloatArray], list[tuple[bool, Run]]],
+        run: Callable[[float, FloatArray], Iterator[tuple[bool, Run]]],
         shifts: FloatArray,
         progress: Callable[[], None] | None,
     ) -> None:
@@ -339,15 +362,11 @@ class _Tried:
         return sum(ended for ended, _ in found), (_place(low), _place(high))
 
     def _run(self, stiffness: float, starts: Sequence[int]) -> None:
-        """Run the starts that have not been run, as many at a time as go side by side."""
+        """Run the starts that have not been run."""
         new = [index for index in starts if (stiffness, index) not in self.known]
-        for begin in range(0, len(new), LANES):
-            some = new[begin : begin + LANES]
-            for index, (ended, run) in zip(
-                some, self.run(stiffness, self.shifts[some]), strict=True
-            ):
-                box = np.array([run.position.min(axis=0), run.position.max(axis=0)])
-                self.known[stiffness, index] = ended, box
+        for index, (ended, run) in zip(new, self.run(stiffness, self.shifts[new]), strict=True):
+            box = np.array([run.position.min(axis=0), run.position.max(axis=0)])
+            self.known[stiffness, index] = ended, box
 
     def _told(self) -> None:
         if self.progress is not None:

@@ -11,8 +11,7 @@ from asperity.checks import FloatArray
 from asperity.files import Record
 from asperity.paper.experiments.settings import FITTED, LAG, LETTERS, band_setup
 from asperity.scene.sweeps import onsets, side_by_side
-from asperity.simulation.kernels.body_functions import LANES
-from asperity.simulation.onset import end_in_cycles, offsets, together
+from asperity.simulation.onset import ends_of_starts, offsets
 from asperity.simulation.prediction import Prediction
 
 COUNTED_STARTS = 24
@@ -87,20 +86,17 @@ def count_cycles(law: str, divisor: float, delay: int = LAG, starts: int = COUNT
     """Return how many starts end in a limit cycle at 2000 N/m over a divisor."""
     setup = band_setup(law, _STIFFNESS / divisor, delay)
     begin = np.array(setup.start)
-    shifts = offsets(setup.surface, starts)
     found = slow = 0
     kept: FloatArray | None = None
-    for first in range(0, starts, LANES):
-        some = shifts[first : first + LANES]
-        runs_for = together(
-            setup.surface, setup.plant, setup.hand, setup.servo, setup.motion, begin, None, some
-        )
-        for ended, run in end_in_cycles(runs_for, len(some), setup.duration):
-            found += ended
-            slow += run.duration > setup.duration and not ended
-            if kept is None:
-                shown = slice(None, round(setup.duration / run.period), _EVERY)
-                kept = np.column_stack([run.time, run.position[:, 0], run.position[:, 2]])[shown]
+    for ended, run in ends_of_starts(
+        setup.surface, setup.plant, setup.hand, setup.servo, setup.motion, begin, None,
+        offsets(setup.surface, starts), setup.duration,
+    ):  # fmt: skip
+        found += ended
+        slow += run.duration > setup.duration and not ended
+        if kept is None:
+            shown = slice(None, round(setup.duration / run.period), _EVERY)
+            kept = np.column_stack([run.time, run.position[:, 0], run.position[:, 2]])[shown]
     assert kept is not None
     time, x, z = kept.T
     return Count(law, divisor, delay, starts, found, slow, time, x, z)
