@@ -24,6 +24,8 @@ from tests.own_modules import imported
 
 import asperity as asp
 from asperity.analysis import one_sided_number
+from asperity.analysis.bounds.branch_and_bound import supremum
+from asperity.analysis.bounds.problems import CrestProblem
 from asperity.analysis.gain.sources import source_digest
 from asperity.definition import exact_force, exact_jacobian
 from asperity.enclosures.cells import NAMES
@@ -239,6 +241,21 @@ def test_a_bound_of_third_derivatives_that_is_too_small_is_no_proof(own: ModuleT
         asp.characteristic_number(asp.Surface(wrong, "C", max_depth=DEPTH))
 
 
+def test_a_bound_that_is_attained_ends_the_search_for_the_sharpest_crest(texture: Any) -> None:
+    """Its tops have the greatest curvature that the kind claims: halving cells tells no more."""
+    cells = texture.cells()
+    found = supremum(CrestProblem(cells), 1e-4)
+    assert found.reached
+    assert found.lower == pytest.approx(A * WAVE**2, rel=1e-9)
+    assert found.lower <= found.upper <= A * WAVE**2 * (1.0 + 1e-8)
+    unaware = texture.cells()
+    unaware.bend = math.inf
+    rough = supremum(CrestProblem(unaware), 1e-2)
+    assert found.cells < 4096 < 50 * 4096 < rough.cells
+    assert rough.lower == pytest.approx(found.lower, rel=1e-9)
+    assert rough.upper > found.upper
+
+
 def test_a_changed_kind_has_another_certificate(texture: Any, tmp_path: Path) -> None:
     """Same name, same arguments: what its file claims counts."""
     changed = EXAMPLE.read_text(encoding="utf-8").replace("math.sqrt(8.0)", "2.9")
@@ -268,7 +285,7 @@ def test_python_has_everything(texture: Any) -> None:
     found = asp.analyze(surface, device="omega.3")
     json.dumps(found.to_dict(), allow_nan=False)
     assert "<svg" in html_text(found)
-    json.dumps(asp.limits(texture, device="omega.3").to_dict(), allow_nan=False)
+    json.dumps(asp.limits(texture, device="omega.3", law="C").to_dict(), allow_nan=False)
 
 
 def test_a_loop_gains_what_it_says(plain: Any) -> None:
@@ -318,7 +335,7 @@ def test_the_command_line_has_everything(answer: Answer, call: Call, tmp_path: P
     listed = answer("surfaces", "egg-box", *MODULE)["surfaces"]
     assert [one["specification"] for one in listed] == ["egg-box:amplitude=100um,period=2mm"]
     assert answer("analyze", SPECIFICATION, "--law", "C", *MODULE)["texture"]["kind"] == "egg-box"
-    assert answer("limits", SPECIFICATION, *MODULE)["texture"]["kind"] == "egg-box"
+    assert answer("limits", SPECIFICATION, "--law", "C", *MODULE)["texture"]["kind"] == "egg-box"
     code, _out, err = call("compare", "egg-box:amplitude=0.1mm", *MODULE)
     assert code == 2
     assert "period is missing: a egg-box needs amplitude, period" in err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 
@@ -29,12 +30,14 @@ class Cells(ABC):
         gap: the relative gap that is reached in reasonable time.
         cheap_gap: a smaller one that is worth a try.
         most: cells beyond which halving them tells little more; as many as asked for by default.
+        bend: proved bound of ‖Hess h‖₂ over all of them [1/m], where it is worth a look.
     """
 
     dimensions: int
     gap: float
     cheap_gap: float | None = None
     most: int | None = None
+    bend: float = math.inf
 
     @abstractmethod
     def start(self) -> tuple[Iterator[FloatArray], FloatArray]:

@@ -285,6 +285,10 @@ class CrestProblem(SurfaceProblem):
         # No third curvature: a zero is small enough never to be the greatest of a crest.
         super().__init__(cells, NAMES[1:], _shape_operator, ONE_SIDED, floor)
 
+    def at_most(self, centres: FloatArray, half: FloatArray, above: float) -> FloatArray:
+        """See :class:`Problem`: S = G⁻¹ H / s with G >= 1, s >= 1, so no curvature is above ‖H‖."""
+        return np.minimum(super().at_most(centres, half, above), self.cells.bend)
+
     def enough(self, best: float, tolerance: float) -> float:
         """See :class:`Problem`: y/(1 - y) within the tolerance, y = depth times curvature."""
         if self._depth is None:

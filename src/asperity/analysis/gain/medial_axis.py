@@ -80,7 +80,9 @@ def sharpest_crest(
     if cells is None:
         cells, found = sampled_supremum(texture, CrestProblem)
     else:
-        found = supremum(CrestProblem(cells), tolerance, work_limit, cells.cheap_gap)
+        # Cells that say nothing of a smaller gap reach their own in reasonable time, and no less.
+        gap = tolerance if cells.cheap_gap else max(tolerance, cells.gap)
+        found = supremum(CrestProblem(cells), gap, work_limit, cells.cheap_gap)
     if found.at is None:
         return None
     return _crest(texture, cells.plane(found.at[None])[0], found.upper)

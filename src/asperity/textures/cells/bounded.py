@@ -69,6 +69,7 @@ class BoundedCells(Cells):
     ) -> None:
         self._region, self._evaluate, self._bounds = region, derivatives, bounds
         self.dimensions = len(region.spans)
+        self.bend = bounds.bend * _ABOVE
         self.most = None if math.isfinite(bounds.twist) else _MOST_CELLS
         size = max(abs(bounds.low), abs(bounds.high))
         reach = float(np.hypot(*region.origin) + np.hypot(*region.spans.T).sum())
