@@ -14,7 +14,7 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.contacts.memory import new_memory
-from asperity.content import formula_content, surface_content
+from asperity.content import formula_content, numbers_content, surface_content
 from asperity.display import Displayed
 from asperity.errors import ParameterError
 from asperity.files import Record, open_input
@@ -24,6 +24,7 @@ from asperity.laws import Law
 from asperity.recording.field import FILE, Field, field_of, read_field
 from asperity.recording.recording import Recording
 from asperity.surface import Surface
+from asperity.textures.remade import remade_texture
 from asperity.textures.texture import Texture
 from asperity.version import __version__
 
@@ -104,7 +105,7 @@ def replay(recording: Recording, surface: Surface | None = None) -> Replay:
     found = _Comparison()
     for first, block, forces in _replayed(recording, field, settings):
         found.see(first, block, forces)
-    notes = (*_changes(recording, said, field), *_others(said, surface))
+    notes = (*changes(recording, field.law), *_others(said, surface))
     return Replay(
         str(recording.path), found.rows, found.differing, found.first, found.largest, notes
     )
@@ -124,6 +125,23 @@ def recorded_on(recording: Recording, texture: Texture) -> Surface:
         )  # fmt: skip
     except (KeyError, TypeError) as error:
         raise ParameterError("recording", f"names no whole surface: {error!r}") from None
+
+
+def recorded_texture(recording: Recording) -> Texture:
+    """Return the texture that a recording holds: its very numbers, no file is read again.
+
+    Raises:
+        ParameterError: if it holds none, or one that cannot be had here.
+    """
+    said = _surface_of(recording)
+    field = _field(recording, said)
+    described = said.get("texture")
+    described = described if isinstance(described, Mapping) else {}
+    texture = remade_texture(field.texture, field.sampler, described)
+    if texture is None or numbers_content(texture.arguments) != said.get("texture_content"):
+        words = f"has a texture of a kind of your own, {described.get('kind')}, that cannot be made"
+        raise ParameterError("recording", f"{words} again: describe() must name its arguments")
+    return texture
 
 
 def _surface_of(recording: Recording) -> Mapping[str, Any]:
@@ -232,11 +250,12 @@ class _Comparison:
             )  # fmt: skip
 
 
-def _changes(recording: Recording, said: Mapping[str, Any], field: Field) -> Iterator[str]:
-    """Yield what is not as it was when the recording was made."""
+def changes(recording: Recording, law: Law) -> Iterator[str]:
+    """Yield what is not as it was when the recording was made, in sentences."""
+    said = _surface_of(recording)
     if recording.version != __version__:
         yield f"Recorded by asperity {recording.version}; this is {__version__}."
-    if said.get("formula") != formula_content(field.law):
+    if said.get("formula") != formula_content(law):
         yield f"The formula of law {said.get('law')} is another one than it was."
     files = recording.about.get("files")
     for name, content in files.items() if isinstance(files, Mapping) else ():

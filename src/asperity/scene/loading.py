@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,10 +12,21 @@ from asperity.arguments import Argument, read_arguments
 from asperity.devices import Device, changed_device, load_device, parse_device
 from asperity.errors import ParameterError, nearest_names
 from asperity.files import read_toml
+from asperity.recording.recording import open_recording
+from asperity.recording.replay import recorded_texture
 from asperity.scene.sections import surface_arguments
-from asperity.textures.naming import KINDS, as_texture, build_texture, is_scene, specified
-from asperity.textures.texture import Texture
+from asperity.textures import naming
+from asperity.textures.naming import as_texture, build_texture, is_scene, specified
+from asperity.textures.texture import Kind, Texture
 
+RECORDED = Kind(
+    "recording",
+    "the surface that a recording holds",
+    lambda path: recorded_texture(open_recording(path)),
+    (Argument("path", "the recording, relative to the scene", form="path", required=True),),
+)
+KINDS: Mapping[str, Kind] = ChainMap({RECORDED.name: RECORDED}, *naming.KINDS.maps)
+"""What [texture] of a scene can be."""
 _ID = Argument("device.id", "device of the catalogue", form="text")
 LOOP_SECTIONS = ("hand", "motion", "run", "servo")
 SECTIONS = ("texture", "surface", "device", *LOOP_SECTIONS)
@@ -84,7 +96,7 @@ def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
     surface = read_arguments("surface", content.get("surface", {}), surface_arguments())
     device = _scene_device(content["device"]) if "device" in content else None
     loop = {name: content[name] for name in LOOP_SECTIONS if name in content}
-    built = build_texture(kind, texture, path.parent, extra)
+    built = build_texture(kind, texture, path.parent, extra, KINDS)
     files = [path.parent / texture["path"]] if "path" in texture else []
     return Scene(built, surface, device, loop, path.parent, (path, *files))
 

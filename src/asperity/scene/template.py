@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping
 from asperity.arguments import Argument
 from asperity.devices import device_names
 from asperity.measured.arguments import DRAWN
+from asperity.scene.loading import KINDS
 from asperity.scene.sections import HANDS, MOTIONS, RUN, Part, surface_arguments
 from asperity.servo import safety
-from asperity.textures.naming import KINDS
 from asperity.textures.texture import Kind
 
 _HEAD = """\

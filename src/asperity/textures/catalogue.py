@@ -44,7 +44,7 @@ CATALOGUE: dict[str, Kind] = {
 """All kinds and all named surfaces; what :func:`register` has added too."""
 
 # What else the command line and scenes take where a kind stands.
-_RESERVED = ("file",)
+_RESERVED = ("file", "recording")
 
 
 def register(kind: Kind) -> Kind:

@@ -30,7 +30,7 @@ _FILE = Kind(
     ),
 )
 
-KINDS: Mapping[str, Kind] = ChainMap({_FILE.name: _FILE}, CATALOGUE)
+KINDS: ChainMap[str, Kind] = ChainMap({_FILE.name: _FILE}, CATALOGUE)
 """What [texture] can be: a kind of the catalogue, as it stands now, or a file."""
 
 
@@ -110,6 +110,7 @@ def build_texture(
     arguments: Mapping[str, Any],
     folder: Path | None = None,
     values: Mapping[str, Any] | None = None,
+    kinds: Mapping[str, Kind] = KINDS,
 ) -> Texture:
     """Return a texture from its kind and its arguments as text or lists.
 
@@ -118,13 +119,14 @@ def build_texture(
         arguments: by name, of the kind and of its preparation.
         folder: to which a file is relative.
         values: of arguments of the preparation that were read [SI]; they come first.
+        kinds: what it can be.
 
     Raises:
         ParameterError: for an unknown kind or argument, one that is missing, or a wrong value.
     """
-    if kind not in KINDS:
-        raise ParameterError("surface", f"kind is unknown: {kind!r}; {nearest_names(kind, KINDS)}")
-    known = KINDS[kind]
+    if kind not in kinds:
+        raise ParameterError("surface", f"kind is unknown: {kind!r}; {nearest_names(kind, kinds)}")
+    known = kinds[kind]
     own = {argument.name for argument in known.arguments}
     preparing = () if kind == "file" else [one for one in DRAWN if one.name not in own]
     read = read_arguments(kind, arguments, (*known.arguments, *preparing), folder)
