@@ -75,7 +75,12 @@ class CodeStore(caching._Cache):
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled overload."""
-        keep(ROOM, self._key(sig, data.codegen), _serialize(data._reduce()))
+        *parts, environments = data._reduce()
+        # An ingredient may be of another module, which is not there where this code is loaded; as
+        # no compiled function asks for an environment, none is missed.
+        own = self._function.__module__
+        mine = tuple(one for one in environments if one.globals["__name__"] == own)
+        keep(ROOM, self._key(sig, data.codegen), _serialize((*parts, mine)))
 
     def _key(self, sig: Any, codegen: Any) -> str:
         """Return all that the machine code depends on: source, types, processor, versions."""

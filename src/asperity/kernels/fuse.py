@@ -329,10 +329,13 @@ def load_fused(source: str) -> ModuleType:
 
 @cache
 def _loaded(text: str) -> ModuleType:
+    from asperity.kernels.ingredients import share_ingredients  # it imports Numba
+
     module = ModuleType(_module_name(text))
     module.__file__ = f"<{module.__name__}>"
     # For tracebacks, and for whoever wants to read what was compiled.
     linecache.cache[module.__file__] = (len(text), None, text.splitlines(True), module.__file__)
     sys.modules[module.__name__] = module  # kept code names the module that it belongs to
     exec(compile(text, module.__file__, "exec"), vars(module))
+    share_ingredients(module)
     return module

@@ -3,19 +3,24 @@
 Of every function that Numba compiles it optimises the code, and makes machine code of it, with all
 that it calls, again at each level of a chain of calls. Only what Python calls needs that: the code
 of an ingredient is optimised once, in the loop that it ends up in.
+
+The functions of a texture are ingredients of every law on it: those that are the same in several
+modules, with all that they call, are lowered once.
 """
 
 from __future__ import annotations
 
+from types import FunctionType, ModuleType
 from typing import Any
 
 from numba import _dynfunc  # type: ignore[attr-defined]  # of compiled code
-from numba.core import codegen, compiler, compiler_machinery, typed_passes
+from numba.core import codegen, compiler, compiler_machinery, dispatcher, typed_passes
 
 # Numba is untyped.
 _Library: Any = codegen.JITCodeLibrary
 _Lowering: Any = typed_passes.NativeLowering
 _Compiler: Any = compiler.Compiler
+_Dispatcher: Any = dispatcher.Dispatcher
 _register: Any = compiler_machinery.register_pass
 
 
@@ -65,3 +70,45 @@ class IngredientCompiler(_Compiler):  # type: ignore[misc]  # see above
         ]
         manager.finalize()
         return [manager]
+
+
+_IDENTITIES: dict[tuple[object, ...], int] = {}
+_KNOWN: dict[int, Any] = {}
+
+
+def share_ingredients(module: ModuleType) -> None:
+    """Replace ingredients of a module by those of earlier ones that are the same.
+
+    They are where the code is, the options of the compiler, and all that the code names: numbers,
+    records, and functions that are themselves the same. Nothing is compiled yet: a function finds
+    what it calls in the module that it comes from.
+    """
+    names, found = vars(module), dict[FunctionType, int]()
+    for name, value in list(names.items()):
+        if _is_ingredient(value) and value.py_func.__globals__ is names:
+            names[name] = _KNOWN.setdefault(_identity(value, found), value)
+
+
+def _is_ingredient(value: object) -> bool:
+    return isinstance(value, _Dispatcher) and value._compiler.pipeline_class is IngredientCompiler
+
+
+def _identity(ingredient: Any, found: dict[FunctionType, int]) -> int:
+    """Return a number that two ingredients share if they are the same; ``found``: known ones."""
+    function: FunctionType = ingredient.py_func
+    if function not in found:
+        found[function] = id(function)  # one that calls itself is like no other
+        code, names = function.__code__, function.__globals__
+        said = (code.co_code, repr(code.co_consts), code.co_names, code.co_varnames)
+        options = repr(sorted(ingredient.targetoptions.items()))
+        named = tuple(_named(names.get(name), found) for name in code.co_names)
+        whole = (function.__name__, *said, repr(function.__defaults__), options, named)
+        found[function] = _IDENTITIES.setdefault(whole, len(_IDENTITIES))
+    return found[function]
+
+
+def _named(value: object, found: dict[FunctionType, int]) -> object:
+    """Return what tells values that code names apart; most objects by themselves."""
+    if _is_ingredient(value):
+        return "ingredient", _identity(value, found)
+    return repr(value) if isinstance(value, (int, float)) else id(value)
