@@ -42,10 +42,11 @@ def test_the_last_seconds_are_kept_and_shown_again(page: Browser) -> None:
     page.press("j")
     assert not page.ask("lab.player.playing")
     # By the slider, to the moment of the greatest force: it is what was felt.
-    page.ask("(() => { const at = document.getElementById('at'), { table } = lab.player;"
-             "const z = row => table.at(row)[table.columns['applied z']]; let most = 1;"
-             "for (let k = 1; k < table.rows; k++) if (z(k) > z(most)) most = k;"
-             "at.value = Math.ceil(1000 * most / table.rows);"
+    page.until("lab.player.reel.has(0, lab.player.reel.rows)")
+    page.ask("(() => { const at = document.getElementById('at'), { reel } = lab.player;"
+             "const z = row => reel.at(row)[reel.columns['applied z']]; let most = 1;"
+             "for (let k = 1; k < reel.rows; k++) if (z(k) > z(most)) most = k;"
+             "at.value = most + 1;"
              "at.dispatchEvent(new Event('input')); })()")  # fmt: skip
     assert page.ask("lab.probeState().force[2]") > 0.01
     assert page.ask("Number.isFinite(lab.frame.god[2])")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import webbrowser
 from functools import partial
-from typing import Any
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -22,7 +24,11 @@ from asperity.cli.own_code import learn, own_files
 from asperity.cli.progress import progress_bar
 from asperity.cli.run import spare_process
 from asperity.devices import load_device
-from asperity.errors import tell
+from asperity.errors import ParameterError, tell
+
+if TYPE_CHECKING:
+    from asperity.lab.reel import Reel
+    from asperity.lab.stage import Stage
 
 _LAB = (
     Argument("port", "of the page on this machine", "", form="integer", example="8137",
@@ -41,26 +47,40 @@ _LAB = (
 def command(surface: str | None, port: int | None, no_browser: bool, **values: Any) -> None:
     """Watch, hear and steer SURFACE in a browser: the loop of `asperity run`, simulated.
 
-    The pointer is the hand. The page is served to this machine alone, to whoever has the address;
-    nothing comes from a network. Without SURFACE, a sinusoid. Ctrl-C ends it.
+    The pointer is the hand. SURFACE may be a recording (.mcap, or an archive that the lab has
+    saved), which is shown again on its own surface. The page is served to this machine alone, to
+    whoever has the address; nothing comes from a network. Without SURFACE, a sinusoid. Ctrl-C ends
+    it.
     """
     # Started first: it takes long, and not from here.
     spare = click.get_current_context().with_resource(spare_process())
     from asperity.lab.serving import free_socket, run_lab
-    from asperity.lab.stage import DEVICE, SURFACE, make_stage
-    from asperity.scene import load_scene
+    from asperity.lab.stage import SURFACE
 
-    named = surface or SURFACE
-    with progress_bar("reading the surface"):
-        told = file_values(values)
-        scene = load_scene(named, told)
-        device = values["device"] or scene.device or load_device(DEVICE)
-        changed = values["settings"].changed(device)
-        stage = make_stage(scene, named, surface_values(values), changed, told)
+    stage, reel = _stage(surface or SURFACE, values)
 
     def ready(address: str) -> None:
         tell(f"the lab is at {address}")
         if not no_browser and not webbrowser.open(address):
             tell("no browser was found: open the address in one of this machine's")
 
-    run_lab(stage, free_socket(port), ready, partial(learn, own_files()), spare)
+    run_lab(stage, free_socket(port), ready, partial(learn, own_files()), spare, reel)
+
+
+def _stage(named: str, values: dict[str, Any]) -> tuple[Stage, Reel | None]:
+    """Return what is shown at first, and the rows of a recording."""
+    from asperity.lab.opened import open_recorded, recording_in
+    from asperity.lab.stage import DEVICE, make_stage
+    from asperity.scene import load_scene
+
+    folder = click.get_current_context().with_resource(TemporaryDirectory())
+    own, told, settings = surface_values(values), file_values(values), values["settings"]
+    if (path := recording_in(named, Path(folder))) is not None:
+        for name in told:
+            raise ParameterError(name, "means nothing for a recording, which holds its surface")
+        with progress_bar("reading the recording"):
+            return open_recorded(path, named, own, values["device"], settings.changed)
+    with progress_bar("reading the surface"):
+        scene = load_scene(named, told)
+        device = values["device"] or scene.device or load_device(DEVICE)
+        return make_stage(scene, named, own, settings.changed(device), told), None

@@ -212,7 +212,8 @@ def recorder(path: str | None, loop: ServoProcess, setup: Setup) -> Iterator[Cal
         return
     from asperity.servo.recorder import Recorder
 
-    with Recorder(path, loop, setup.surface, setup.servo, setup.about()) as kept:
+    about = setup.about(loop.driver)
+    with Recorder(path, loop, setup.surface, setup.servo, about) as kept:
         yield kept.take
     if kept.lost:
         tell(f"{kept.lost} rows are missing in the recording: this program was too slow")

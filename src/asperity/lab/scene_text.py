@@ -5,29 +5,30 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from asperity.arguments import Argument
 from asperity.checks import FloatArray
 from asperity.devices import Device, changed_device
 from asperity.devices.writing import device_text
-from asperity.files import plain, read_toml
+from asperity.files import read_toml
 from asperity.lab.stage import Stage
 from asperity.measured.arguments import FILE_ARGUMENTS
-from asperity.scene.sections import HANDS, RUN, SURFACE
+from asperity.scene.loading import RECORDED
+from asperity.scene.sections import HANDS, RUN, SURFACE, written
 from asperity.textures.naming import is_scene, specified
 
 
 def scene_text(
-    stage: Stage, way: str, duration: float, start: FloatArray, velocity: FloatArray
+    stage: Stage, way: str, held: str, duration: float, start: FloatArray, velocity: FloatArray
 ) -> str:
     """Return a scene (TOML) that moves the hand as it was moved.
 
     Args:
         stage: what was shown.
         way: file of the positions of the hand's anchor.
+        held: recording that holds the surface; empty if it is too large for one.
         duration: of the run [s].
         start: of the handle [m], shape (3,).
         velocity: of the handle at the start [m/s], shape (3,).
@@ -39,23 +40,31 @@ def scene_text(
     run = {"duration": duration, "start": list(start), "velocity": list(velocity),
            "velocity_share": setup.servo.velocity_share, **_bars(setup.plant)}  # fmt: skip
     sections = {
-        "texture": texture_section(stage),
+        "texture": texture_section(stage, held),
         "surface": {"law": surface.law.letter}
-        | _texts(numbers | dict(surface.law_parameters),
+        | written(numbers | dict(surface.law_parameters),
                  (*SURFACE, *surface.law.arguments.values())),
-        "hand": {"kind": hand["kind"]} | _texts(hand, HANDS[hand["kind"]].arguments),
+        "hand": {"kind": hand["kind"]} | written(hand, HANDS[hand["kind"]].arguments),
         "motion": {"kind": "path", "file": way},
-        "run": _texts(run, RUN),
+        "run": written(run, RUN),
     }  # fmt: skip
     parts = [f"[{name}]\n{_lines(values)}" for name, values in sections.items()]
     return "\n".join([*parts, _device(setup.device, setup.servo.delay)])
 
 
-def texture_section(stage: Stage) -> dict[str, Any]:
-    """Return the section [texture] of what the stage shows."""
+def texture_section(stage: Stage, held: str) -> dict[str, Any]:
+    """Return the section [texture] of what the stage shows.
+
+    A kind with its arguments is named. What was measured, prepared or magnified is taken from the
+    recording, to the last bit, wherever both are moved; only what is too large for it is named, by
+    the place where it is here.
+    """
+    plain = specified(stage.named) is not None and stage.magnified == (1.0, 1.0) and not stage.told
+    if held and not plain:
+        return {"kind": RECORDED.name, "path": held}
     section = source_section(stage.named)
     if stage.named == stage.first[0]:
-        section |= _texts(stage.told, FILE_ARGUMENTS)
+        section |= written(stage.told, FILE_ARGUMENTS)
     size, height = stage.magnified
     if not size == height == 1.0:
         before = float(section.get("magnify", 1.0))
@@ -79,24 +88,6 @@ def source_section(source: str) -> dict[str, Any]:
     if "path" in section:
         section["path"] = str((Path(source).parent / section["path"]).resolve())
     return section
-
-
-def _texts(values: Mapping[str, Any], arguments: Iterable[Argument]) -> dict[str, Any]:
-    """Return the values that the arguments declare, as a scene writes them, with their units."""
-    known = {argument.name: argument for argument in arguments}
-    return {
-        name: _text(plain(value), known[name].unit)
-        for name, value in values.items()
-        if name in known and value is not None
-    }
-
-
-def _text(value: Any, unit: str) -> Any:
-    if isinstance(value, list):
-        return [_text(part, unit) for part in value]
-    if isinstance(value, (bool, str)):
-        return value
-    return f"{value!r} {unit}" if unit else value
 
 
 def _bars(plant: Any) -> dict[str, Any]:

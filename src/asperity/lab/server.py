@@ -97,7 +97,7 @@ class Lab:
         self._changed = asyncio.Event()
         self.session = Session(stage, self._tell, spare)
         self.backdrop = Backdrop(pictures, limits, self._announce)
-        self.shelf = Shelf()
+        self.shelf = Shelf(self.session)
         self._saving: set[asyncio.Task[None]] = set()
 
     def _tell(self) -> None:
@@ -123,6 +123,8 @@ class Lab:
         tasks: list[asyncio.Task[None]] = []
         try:
             await page.say("hello", **_hello())
+            for said in self.shelf.told:
+                await page.say("take", **said)
             await self._announce()
             tasks = [
                 asyncio.create_task(_while_there(work, page))
@@ -177,7 +179,7 @@ class Lab:
     async def _save(self, page: Page) -> None:
         """Keep the newest seconds."""
         try:
-            await page.say("take", **await self.shelf.keep(self.session))
+            await page.say("take", **await self.shelf.keep())
         except ParameterError as error:
             await page.say("refused", words=str(error))
 

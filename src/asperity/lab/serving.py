@@ -8,11 +8,13 @@ import socket
 from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing import active_children
+from pathlib import Path
 
 from websockets.asyncio.server import serve
 
 from asperity.errors import ParameterError
 from asperity.lab.access import MOST_BYTES, Door
+from asperity.lab.reel import Reel
 from asperity.lab.server import Lab
 from asperity.lab.site import answer
 from asperity.lab.stage import Stage
@@ -56,6 +58,7 @@ def free_socket(port: int | None) -> socket.socket:
 def run_lab(
     stage: Stage, bound: socket.socket, ready: Callable[[str], None],
     learn: Callable[[], None] | None = None, spare: Spare | None = None,
+    reel: Reel | None = None,
 ) -> None:  # fmt: skip
     """Serve the lab until Ctrl-C.
 
@@ -65,13 +68,15 @@ def run_lab(
         ready: receives the address, once it answers.
         learn: makes the user's own laws known in another process.
         spare: the process of the first loop.
+        reel: rows that were recorded on what is shown at first, to be shown again.
     """
-    asyncio.run(serve_lab(stage, bound, ready, learn, spare))
+    asyncio.run(serve_lab(stage, bound, ready, learn, spare, reel))
 
 
 async def serve_lab(
     stage: Stage, bound: socket.socket, ready: Callable[[str], None],
     learn: Callable[[], None] | None = None, spare: Spare | None = None,
+    reel: Reel | None = None,
 ) -> None:  # fmt: skip
     """Serve the lab until a signal ends it, or the task is cancelled."""
     door = Door(bound.getsockname()[1])
@@ -82,12 +87,14 @@ async def serve_lab(
             asyncio.get_running_loop().add_signal_handler(number, over.set)
     with workshop(learn) as pictures, workshop(learn) as limits:
         lab = Lab(stage, pictures, limits, spare)
+        if reel is not None:
+            lab.shelf.lay("recording", reel, stage, Path(stage.named).name)
         following = asyncio.create_task(lab.follow())
         try:
             with lab.session:
                 async with serve(
                     lab.welcome, sock=bound, max_size=MOST_BYTES, compression=None,
-                    process_request=lambda _line, asked: answer(door, asked, lab.shelf.files),
+                    process_request=lambda _line, asked: answer(door, asked, lab.shelf.fetch),
                 ):  # fmt: skip
                     ready(door.address)
                     await over.wait()

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from asperity.errors import AsperityError
 from asperity.lab.stage import Stage
+from asperity.lab.stages import WISH, Stages
 from asperity.servo.drivers.steered import Wheel, steered_driver
 from asperity.servo.fault import Cause
 from asperity.servo.process import ServoProcess, Spare
@@ -35,6 +36,7 @@ class Session:
 
     Attributes:
         stage: what is shown now.
+        stages: others, to go to by name.
         wheel: what moves the hand.
         shared: rows of the loop; another one after each start.
         starts: how often the loop was started.
@@ -44,6 +46,7 @@ class Session:
 
     def __init__(self, stage: Stage, tell: Callable[[], None], spare: Spare | None = None) -> None:
         self.stage, self._tell, self._spare = stage, tell, spare
+        self.stages = Stages()
         highest = float(stage.setup.surface.texture.extremes[1])
         self.wheel = Wheel((*stage.middle, highest + ABOVE))
         self.shared: Shared | None = None
@@ -82,15 +85,21 @@ class Session:
             self._stop()
 
     def _asked(self) -> list[Mapping[str, Any]] | None:
-        """Return all that is asked for, made one wish, or none; ``None`` for the end."""
+        """Return all that is asked for, made few wishes, or none; ``None`` for the end."""
         try:
-            wishes = self._wishes.get(timeout=LOOK)
-            while wishes is not None and not self._wishes.empty():
-                more = self._wishes.get()
-                wishes = None if more is None else {**wishes, **more}
+            asked = [self._wishes.get(timeout=LOOK)]
         except Empty:
             return []
-        return None if wishes is None else [wishes]
+        while not self._wishes.empty():
+            asked.append(self._wishes.get())
+        merged: list[Mapping[str, Any]] = []
+        for wishes in asked:
+            if wishes is None:
+                return None
+            # What was wished before another stage was of the former one.
+            before = merged.pop() if merged and WISH not in wishes else {}
+            merged.append({**before, **wishes})
+        return merged
 
     def _guarded(self, work: Callable[..., None], *arguments: Any) -> None:
         """Do something; say what it found wrong."""
@@ -115,7 +124,10 @@ class Session:
         self._say("running", " ".join(loop.notes))
 
     def _go_to(self, wishes: Mapping[str, Any]) -> None:
-        stage = self.stage.changed(wishes)
+        stage = self.stages.changed(self.stage, wishes)
+        if stage is self.stage and self._loop is not None:
+            self._say("running")
+            return
         if self._loop is None or self.stage.restarts(stage):
             self._stop()
             self._start(stage)

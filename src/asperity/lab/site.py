@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Awaitable, Callable
 from functools import cache
 from http import HTTPStatus
 from importlib.resources import files
@@ -12,6 +12,7 @@ from websockets.http11 import Request, Response
 
 from asperity.lab.access import POLICY, Door
 
+Fetch = Callable[[str], Awaitable[tuple[str, bytes] | None]]
 LIVE = "live"
 """Name of the live connection, below the token."""
 _TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
@@ -28,13 +29,13 @@ def page_files() -> dict[str, tuple[str, bytes]]:
     return {**found, "": found["index.html"]}
 
 
-def answer(door: Door, request: Request, kept: Mapping[str, tuple[str, bytes]]) -> Response | None:
+async def answer(door: Door, request: Request, fetch: Fetch) -> Response | None:
     """Return the answer to a request; ``None`` to let a live connection through.
 
     Args:
         door: who is let in.
         request: what is asked for.
-        kept: type and content of files besides those of the page, by name.
+        fetch: returns type and content of a file besides those of the page, by its name.
     """
     name = door.asked(request.path, request.headers.get_all("Host"))
     if name is None:
@@ -43,7 +44,7 @@ def answer(door: Door, request: Request, kept: Mapping[str, tuple[str, bytes]]) 
         if door.is_ours(request.headers.get_all("Origin")):
             return None
         return _said(HTTPStatus.FORBIDDEN, "Another page asks for the lab.")
-    found = page_files().get(name) or kept.get(name)
+    found = page_files().get(name) or await fetch(name)
     if found is None:
         return _said(HTTPStatus.NOT_FOUND, "The lab has no such page.")
     return _response(HTTPStatus.OK, *found)

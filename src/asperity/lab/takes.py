@@ -14,11 +14,13 @@ import numpy as np
 from asperity.checks import FloatArray
 from asperity.errors import ParameterError
 from asperity.files import plain
+from asperity.lab.reel import ANCHOR, Reel, reel_of
 from asperity.lab.scene_text import scene_text
 from asperity.lab.stage import Stage
 from asperity.recording.field import describe_field, field_files
 from asperity.recording.writer import RecordingWriter
 from asperity.scene.sections import PATH_COLUMNS
+from asperity.scene.setup import SIMULATED
 from asperity.servo.drivers.steered import Wheel
 from asperity.servo.kernels.published import COLUMNS
 from asperity.servo.kernels.steered import KEPT
@@ -28,8 +30,6 @@ RECORDING, SCENE, HAND = "recording.mcap", "scene.toml", "hand.csv"
 """The files of a take: rows of the loop, what does it again, and how the hand moved."""
 MOST_ROWS = KEPT - 4000
 """Of a take, the newest: more may be overwritten while they are read."""
-SHOWN = 5e-3
-"""[s] from one nearest point to the next, where a take is shown."""
 
 _NAMES = [name for name, _unit in COLUMNS]
 _PLACE = slice(_NAMES.index("x"), _NAMES.index("z") + 1)
@@ -72,29 +72,24 @@ class Take:
         """Write recording, scene and the hand's way into a folder."""
         setup = self.stage.setup
         said = {"made_by": "run", "surface": describe_field(setup.surface),
-                "servo": plain(setup.servo), "every": 1, **setup.about()}  # fmt: skip
-        field = field_files(setup.surface)
-        with RecordingWriter(folder / RECORDING, COLUMNS, said, field) as writer:
-            writer.append(self.rows)
+                "servo": plain(setup.servo), "every": 1, **setup.about(SIMULATED)}  # fmt: skip
+        field, columns = field_files(setup.surface), (*COLUMNS, *ANCHOR)
+        with RecordingWriter(folder / RECORDING, columns, said, field) as writer:
+            writer.append(self._table)
         way = np.column_stack([self.rows[:, 0], self.anchors])
         np.savetxt(folder / HAND, way, "%.17g", ",", header=",".join(PATH_COLUMNS), comments="")
-        text = scene_text(self.stage, HAND, self.duration, self.rows[0, _PLACE], self.velocity)
+        begin = self.duration, self.rows[0, _PLACE], self.velocity
+        text = scene_text(self.stage, HAND, RECORDING if field else "", *begin)
         (folder / SCENE).write_text(text, "utf-8")
 
-    def shown(self) -> bytes:
-        """Return what the page shows of it: numbers of rows and of columns, then the table.
+    def reel(self) -> Reel:
+        """Return what the page shows of it."""
+        setup = self.stage.setup
+        return reel_of(self._table, setup.servo.period, setup.surface.texture)
 
-        Columns are those of the loop, then god-object and hand [m].
-        """
-        step = max(1, round(SHOWN / self.stage.setup.servo.period))
-        near = self.stage.setup.surface.texture.nearest(self.rows[::step, _PLACE])
-        near = np.repeat(near, step, axis=0)[: len(self.rows)]
-        table = np.column_stack([self.rows, near, self.anchors])
-        return np.concatenate([table.shape, table.ravel()]).tobytes()
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what the page says of it."""
-        return {"settings": self.stage.settings, "duration": self.duration}
+    @property
+    def _table(self) -> FloatArray:
+        return np.column_stack([self.rows, self.anchors])
 
 
 def take(stage: Stage, shared: Shared, wheel: Wheel) -> Take:

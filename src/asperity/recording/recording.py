@@ -7,10 +7,12 @@ import os
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.checks import FloatArray
 from asperity.display import Plotted
@@ -73,19 +75,48 @@ class Recording(Plotted):
         Raises:
             ParameterError: if the file is gone, or a block is damaged.
         """
-        seen = 0
         with _opened(self.path) as stream:
+            seen = 0
             for chunk in self._chunks:
-                stream.seek(chunk.rows_at)
-                data = stream.read(chunk.size)
-                if zlib.crc32(data) != chunk.checksum:
-                    raise _unreadable(self.path, f"the block after row {seen} is damaged")
-                try:
-                    table = values_of(data, len(self.columns))
-                except mcap.DamagedError as error:
-                    raise _unreadable(self.path, str(error)) from None
+                table = self._block(stream, chunk, seen)
                 seen += len(table)
                 yield table
+
+    def part(self, first: int, end: int) -> FloatArray:
+        """Return the rows from one to another, which is not among them; no others are read.
+
+        Raises:
+            ParameterError: see :meth:`blocks`.
+        """
+        first, end = max(first, 0), min(end, self.rows)
+        if first >= end:
+            return np.empty((0, len(self.columns)))
+        least, most = self._begins.searchsorted([first, end - 1], "right")
+        parts = []
+        with _opened(self.path) as stream:
+            for number in range(int(least) - 1, int(most)):
+                begin = int(self._begins[number])
+                table = self._block(stream, self._chunks[number], begin)
+                parts.append(table[max(first - begin, 0) : end - begin])
+        return np.concatenate(parts)
+
+    @cached_property
+    def _begins(self) -> NDArray[np.int64]:
+        """Number of the first row of each block."""
+        size = row_type(len(self.columns)).itemsize
+        ends = np.cumsum([chunk.size // size for chunk in self._chunks], dtype=np.int64)
+        return np.concatenate([np.zeros(1, np.int64), ends])[:-1]
+
+    def _block(self, stream: IO[bytes], chunk: mcap.Chunk, seen: int) -> FloatArray:
+        """Return the rows of a block, before which so many were."""
+        stream.seek(chunk.rows_at)
+        data = stream.read(chunk.size)
+        if zlib.crc32(data) != chunk.checksum:
+            raise _unreadable(self.path, f"the block after row {seen} is damaged")
+        try:
+            return values_of(data, len(self.columns))
+        except mcap.DamagedError as error:
+            raise _unreadable(self.path, str(error)) from None
 
     def table(self, most: int | None = None) -> FloatArray:
         """Return the rows, shape (rows, columns).

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 
 from asperity.arguments import MAX_DEPTH, STIFFNESS, Argument, read_arguments
 from asperity.errors import ParameterError, nearest_names
-from asperity.files import open_input
+from asperity.files import open_input, plain
 from asperity.laws import LAW_ARGUMENTS, Law, known_arguments
 from asperity.recording.recording import is_recording, open_recording
 from asperity.scene.plant import BRAKES
@@ -192,3 +192,26 @@ def built(section: str, given: Mapping[str, Any], kinds: Mapping[str, Part], fol
             needs = f"a {kind} needs a file of positions" if file else f"{kind} needs it"
             raise ParameterError(f"{section}.{argument.name}", f"is missing: {needs}")
     return part.make(**values)
+
+
+def written(values: Mapping[str, Any], arguments: Iterable[Argument]) -> dict[str, Any]:
+    """Return the values that the arguments declare, as a scene writes them, with their units.
+
+    Args:
+        values: by name [SI]; ``None`` for what is not said.
+        arguments: that may be among them.
+    """
+    known = {argument.name: argument for argument in arguments}
+    return {
+        name: _written(plain(value), known[name].unit)
+        for name, value in values.items()
+        if name in known and value is not None
+    }
+
+
+def _written(value: Any, unit: str) -> Any:
+    if isinstance(value, list):
+        return [_written(part, unit) for part in value]
+    if isinstance(value, (bool, str)):
+        return value
+    return f"{value!r} {unit}" if unit else value

@@ -12,6 +12,7 @@ import numpy as np
 from asperity.analysis.words.surface import law_parameters
 from asperity.arguments import read_arguments
 from asperity.devices import Device, load_device
+from asperity.devices.writing import device_text
 from asperity.errors import ParameterError
 from asperity.files import plain, record
 from asperity.laws import Law, find_law, shared_out
@@ -29,6 +30,8 @@ from asperity.units import engineering
 
 DEFAULT_DEVICE = "omega.3"
 DEFAULT_DURATION = 1.0
+SIMULATED = "simulated"
+"""Name of the driver that moves plant and hand of a simulation."""
 
 
 @dataclass(frozen=True)
@@ -78,12 +81,20 @@ class Setup:
             most_rows=most_rows, progress=progress, about=self.about(),
         )  # fmt: skip
 
-    def about(self) -> dict[str, Any]:
-        """Return what a recording says of the scene, besides its parts."""
+    def about(self, driver: str = "") -> dict[str, Any]:
+        """Return what a recording says of the scene, besides its parts.
+
+        Args:
+            driver: by whose name a loop runs that keeps time; what a simulated one moves is said.
+        """
+        device = self.device
+        simulated = {"plant": plain(self.plant), "hand": plain(self.hand)}
         return {
-            "device": {"id": self.device.id, "name": self.device.name},
+            "device": {"id": device.id, "name": device.name, "file": device_text(device)},
             **record(self, "duration", "start", "velocity", "assumptions"),
             "files": self.contents(),
+            **({"driver": driver} if driver else {}),
+            **(simulated if driver == SIMULATED else {}),
         }
 
     def contents(self) -> dict[str, str]:

@@ -12,10 +12,10 @@ const HOP = 0.1; // s: a probe that is in the air for less is still being presse
 
 /** The energy that the hand was given since the probe was last free, and how much of it sampling and steps explain. */
 export class Ledger {
-  constructor() { this.base = this.energy = this.sampled = 0; this.waits = false; this.last = 0; }
+  constructor() { this.clear(); this.waits = false; }
 
-  /** Count anew, from the next time that the probe is free. */
-  clear() { this.waits = true; this.base = this.last; this.energy = this.sampled = 0; }
+  /** Count anew, from the next time that the probe is free, until then from the next frame. */
+  clear() { this.waits = true; this.base = null; this.energy = this.sampled = 0; }
 
   /**
    * Take a frame. A field without curl, read in steps of the encoder, sampled, held and late by d samples,
@@ -24,15 +24,16 @@ export class Ledger {
    */
   take(frame, columns, news) {
     const { rows, way, squares, newest } = frame, { settings, limit, step, force_step: forceStep } = news;
-    this.last = newest[columns.supplied];
+    const given = newest[columns.supplied];
+    this.base ??= given;
     if (frame.greatest[columns.inside]) {
       const q = limit.q === "inf" ? Infinity : limit.q ?? 1, k = settings.stiffness, diagonal = 0.5 * Math.sqrt(3);
       const late = settings.delay ? settings.delay * q : 0, steps = step ? k * q * diagonal * step : 0;
       const bound = k * (0.5 * (limit.one_sided ?? 1) + late) * squares + (steps + diagonal * forceStep) * way;
       this.sampled += bound * rows / Math.max(rows - 1, 1); // the step from the frame before is like the others
     }
-    if (this.waits && !newest[columns.inside]) { this.waits = false; this.base = this.last; this.sampled = 0; }
-    this.energy = this.last - this.base;
+    if (this.waits && !newest[columns.inside]) { this.waits = false; this.base = given; this.sampled = 0; }
+    this.energy = given - this.base;
   }
 
   get fed() { return this.energy > Math.max(FED, this.sampled); }

@@ -91,12 +91,17 @@ const tour = new Tour({ change, hand, ledger, see(width) { span = width; }, get 
 
 const player = new Player({
   frame(said) { feel({ ...said, number: seen }); },
-  clear() { traces.clear(); ledger.clear(); },
+  clear() {
+    traces.clear(); ledger.clear();
+    for (const wait of Object.values(asked)) wait.again = wait.again < Infinity ? 0 : wait.again; // it is another place
+  },
 });
 const takes = new TakesPanel({
-  player, change, save() { line.say("save"); },
-  get columns() { return line.layout.columns; }, get settings() { return news?.settings ?? {}; },
+  player, change(wishes) { line.say("change", { wishes }); }, save() { line.say("save"); },
+  get columns() { return line.layout.columns; }, get version() { return news?.version; },
 });
+
+const rate = () => (player.on ? player.rate : news?.rate ?? 1000);
 
 /** Show what a frame says, of now or of a take. */
 function feel(said) {
@@ -104,7 +109,7 @@ function feel(said) {
   if (news) ledger.take(said, line.layout.columns, news);
   traces.take(said, line.layout.columns);
   spectrum.take(said.forces);
-  sound.take(said.forces, news?.rate ?? 1000);
+  sound.take(said.forces, rate());
 }
 
 function fill(select, pairs, chosen) {
@@ -112,7 +117,8 @@ function fill(select, pairs, chosen) {
   select.replaceChildren(...pairs.map(([key, words]) => new Option(words, key, false, key === value)));
 }
 
-function change(wishes) { line.say("change", { wishes }); }
+/** Ask for something else; behind a recording is what it was felt on, and nothing else. */
+function change(wishes) { takes.close(); line.say("change", { wishes }); }
 
 function alarm(words) {
   $("alarm").hidden = !words;
@@ -284,7 +290,7 @@ function tell(state) {
   $("energy").textContent = quantity(energy, "J");
   $("ledger").classList.toggle("fed", ledger.fed);
   $("verdict").textContent = ledger.words;
-  const [f, amplitude] = spectrum.draw(news?.rate ?? 1000);
+  const [f, amplitude] = spectrum.draw(rate());
   $("peak").textContent = amplitude > 1e-3 ? `strongest ${quantity(f, "Hz")}, ${quantity(amplitude, "N")}` : "quiet";
   $("trace-note").textContent = `${frame.late} samples late, ${frame.skipped} left out`;
   const size = Math.hypot(...force), place = probe.map(millimetres).join(", ");
@@ -354,7 +360,7 @@ $("sound").onclick = async () => {
 };
 const views = [
   [relief, () => relief.draw(probeState())], [cut, () => cut.draw(probeState(), boxes())],
-  [traces, () => traces.draw(ledger.base)], [spectrum, () => spectrum.draw(news?.rate ?? 1000)],
+  [traces, () => traces.draw(ledger.base)], [spectrum, () => spectrum.draw(rate())],
 ];
 $("picture").onclick = async () => download(await pngOf(views), "asperity-lab.png");
 $("drawing").onclick = () => download(new Blob([svgOf(views)], { type: "image/svg+xml" }), "asperity-lab.svg");

@@ -1,97 +1,89 @@
-// Takes: the last seconds that were kept, shown again at any moment, or as time goes.
+// Takes: what was recorded, shown again at any moment, or as time goes.
+
+import { Reel } from "./reel.js";
 
 const EVERY = 5e-3; // s of a frame that is made of a take
 const SHOWN = 5; // s before a moment that the traces show
-
-/** Rows of the loop, with god-object and hand, as the lab sends them. */
-class Table {
-  constructor(numbers, columns) {
-    [this.rows, this.width] = numbers;
-    this.numbers = numbers.subarray(2);
-    this.columns = columns;
-    this.period = this.at(1)[columns.time] - this.at(0)[columns.time];
-  }
-
-  at(row) { return this.numbers.subarray(row * this.width, (row + 1) * this.width); }
-
-  /** Return rows as a frame of the loop would say them. */
-  frame(first, end) {
-    const { columns } = this, count = Math.max(...Object.values(columns)) + 1, newest = this.at(end - 1);
-    const least = newest.slice(0, count), greatest = newest.slice(0, count), forces = new Float64Array(3 * (end - first));
-    const said = { way: 0, squares: 0, jump: 0, moved: 0 };
-    for (let row = first; row < end; row++) {
-      const now = this.at(row);
-      for (let k = 0; k < count; k++) {
-        least[k] = Math.min(least[k], now[k]);
-        greatest[k] = Math.max(greatest[k], now[k]);
-      }
-      forces.set(now.subarray(columns["applied x"], columns["applied x"] + 3), 3 * (row - first));
-      if (row > first) this.step(said, this.at(row - 1), now);
-    }
-    return { rows: end - first, first, heard: 0, late: 0, skipped: 0, ...said, newest, least, greatest, forces,
-      god: [...newest.subarray(count, count + 3)], hand: [...newest.subarray(count + 3, count + 6)] };
-  }
-
-  step(said, before, now) {
-    const way = Math.hypot(...["x", "y", "z"].map(axis => now[this.columns[axis]] - before[this.columns[axis]]));
-    const jump = Math.hypot(...["x", "y", "z"].map(axis => now[this.columns[`commanded ${axis}`]] - before[this.columns[`commanded ${axis}`]]));
-    said.way += way;
-    said.squares += way ** 2;
-    if (jump > said.jump) Object.assign(said, { jump, moved: way });
-  }
-}
+const MOST = 60000; // rows of that
+const BACK = 40000; // rows before these in which it is looked for where the probe was free
 
 export class Player {
   /** @param show object with frame(frame) and clear(), which forgets what was before */
   constructor(show) {
     this.show = show;
-    this.table = null;
-    this.row = 0;
+    this.reel = null;
+    this.row = 0; // until which it is shown
+    this.sought = null; // row that shall be shown as soon as it is held
     this.playing = false;
   }
 
-  get on() { return this.table !== null; }
-  get length() { return this.table.rows * this.table.period; }
-  get time() { return this.row * this.table.period; }
+  get on() { return this.reel !== null; }
+  get rate() { return 1 / this.reel.period; }
+  get length() { return this.reel.rows * this.reel.period; }
+  get share() { return (this.sought ?? this.row) / this.reel.rows; }
+  get time() { return (this.sought ?? this.row) * this.reel.period; }
+  get step() { return Math.max(1, Math.round(EVERY / this.reel.period)); }
 
-  open(numbers, columns) {
-    this.table = new Table(numbers, columns);
+  open(about, columns) {
+    this.reel = new Reel(about, columns);
     this.seek(0);
     this.playing = true;
+  }
+
+  close() { this.reel = null; this.playing = false; }
+
+  /** Show how things stood after a share of the rows, as soon as they are there. */
+  seek(share) {
+    this.sought = Math.max(Math.min(this.step, this.reel.rows), Math.min(this.reel.rows, Math.round(share * this.reel.rows)));
+    this.find();
+  }
+
+  find() {
+    const { reel, sought } = this, from = Math.max(0, sought - Math.min(MOST, Math.round(SHOWN / reel.period)));
+    if (!reel.has(from, sought)) return;
+    const free = this.freeBefore(from);
+    if (free === null) return;
+    this.sought = null;
+    this.row = free;
+    this.show.clear();
+    this.go(sought);
     this.then = performance.now();
   }
 
-  close() { this.table = null; this.playing = false; }
-
-  /** Show how things stood at a moment [s]. */
-  seek(time) {
-    const step = Math.max(1, Math.round(EVERY / this.table.period));
-    const end = Math.max(step, Math.min(this.table.rows, Math.round(time / this.table.period)));
-    this.show.clear();
-    this.row = Math.max(0, end - Math.round(SHOWN / this.table.period));
-    // Energy counts from where the probe is free.
-    while (this.row > 0 && this.table.at(this.row)[this.table.columns.inside]) this.row--;
-    this.go(end);
+  /** Return the row before another at which the probe was free, from where energy counts; null if it is not held yet. */
+  freeBefore(row) {
+    const { reel } = this, least = Math.max(0, row - BACK);
+    for (let free = row, held = Infinity; ; free--) {
+      if (free < held) {
+        if (!reel.has(free, free + 1)) return null;
+        held = Math.floor(free / reel.piece) * reel.piece;
+      }
+      if (free <= least || !reel.at(free)[reel.columns.inside]) return free;
+    }
   }
 
   /** Show all that comes until a row. */
   go(end) {
-    const step = Math.max(1, Math.round(EVERY / this.table.period));
     while (this.row < end) {
-      const next = Math.min(end, this.row + step);
-      this.show.frame(this.table.frame(this.row, next));
+      const next = Math.min(end, this.row + this.step);
+      this.show.frame(this.reel.frame(this.row, next));
       this.row = next;
     }
   }
 
   /** Play on, as the clock goes [ms]; from the beginning again after the end. */
   tick(now) {
-    if (!this.on || !this.playing) return;
-    const rows = Math.round(1e-3 * (now - this.then) / this.table.period);
+    if (!this.on) return;
+    if (this.sought !== null) { this.find(); return; }
+    if (!this.playing) return;
+    const { reel } = this, rows = Math.round(1e-3 * (now - this.then) / reel.period);
     if (rows < 1) return;
+    const end = Math.min(reel.rows, this.row + rows);
+    if (this.row >= reel.rows) { this.seek(0); return; }
     this.then = now;
-    if (this.row >= this.table.rows) this.seek(0);
-    else this.go(Math.min(this.table.rows, this.row + rows));
+    // What is not there yet is waited for; what comes then is asked for in time.
+    if (reel.has(this.row, end)) this.go(end);
+    reel.has(Math.min(end, reel.rows - 1), Math.min(reel.rows, end + Math.round(1 / reel.period)));
   }
 
   toggle() {
