@@ -6,7 +6,9 @@ import subprocess
 import sys
 from typing import Any
 
+import numpy as np
 import pytest
+from llvmlite import binding  # type: ignore[import-untyped]  # it has no types
 
 from asperity.kernels import fuse
 from asperity.laws import LAWS
@@ -133,3 +135,22 @@ def test_code_with_ingredients_of_another_module_is_kept_by_itself(
     both = said("BC")
     assert len(both) > 2  # it compiled
     assert said("C") == both[-1:]
+
+
+def test_loops_are_compiled_for_the_widest_registers(
+    tmp_path: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the processor has AVX-512, a loop over many points takes eight of them at a time."""
+    monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
+    text = """
+@loop
+def run(x, out):
+    for i in range(x.shape[0]):
+        out[i] = 2.0 * x[i] + 3.0
+"""
+    run, out = fuse.load_fused(HEAD + text).run, np.empty(64)
+    run(np.arange(64.0), out)
+    assert out.tolist() == [2.0 * x + 3.0 for x in range(64)]
+    (code,) = run.inspect_asm().values()
+    has = dict(binding.get_host_cpu_features())
+    assert ("zmm" in code) == has.get("avx512f", False)

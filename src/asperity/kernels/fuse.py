@@ -46,7 +46,7 @@ import numpy as np
 from numba import njit
 
 from asperity.kernels.code_store import keep_code
-from asperity.kernels.ingredients import IngredientCompiler
+from asperity.kernels.ingredients import IngredientCompiler, LoopCompiler
 
 # Nothing allocates, so nothing is counted: counting references to the arrays of a texture at every
 # call costs more than the arithmetic. Only the loops are called from Python; the others need no
@@ -56,7 +56,7 @@ internal = dict(**plain, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 scalar = njit(**internal, pipeline_class=IngredientCompiler)
 inlined = njit(**internal, forceinline=True, pipeline_class=IngredientCompiler)
 merged = njit(error_model="numpy", inline="always")
-loop = keep_code(njit(**plain, nogil=True))
+loop = keep_code(njit(**plain, nogil=True, pipeline_class=LoopCompiler))
 shared = keep_code(njit(**internal))
 
 

@@ -5,7 +5,8 @@ that it calls, again at each level of a chain of calls. Only what Python calls n
 of an ingredient is optimised once, in the loop that it ends up in.
 
 The functions of a texture are ingredients of every law on it: those that are the same in several
-modules, with all that they call, are lowered once.
+modules, with all that they call, are lowered once. The loop itself is compiled for the widest
+registers that the processor has.
 """
 
 from __future__ import annotations
@@ -57,19 +58,61 @@ class IngredientLowering(_Lowering):  # type: ignore[misc]  # see above
         return changed
 
 
-class IngredientCompiler(_Compiler):  # type: ignore[misc]  # see above
-    """Numba's compiler with that step: ``njit(pipeline_class=IngredientCompiler)``."""
+class Wide(_Library):  # type: ignore[misc]  # see above
+    """Code in registers as wide as the processor has.
+
+    For many processors the compiler takes half of AVX-512's, for the sake of programs that need
+    them now and then and would clock lower; a loop over many points needs nothing else.
+    """
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        """Add functions; llvmlite prints attributes that it does not know, too."""
+        for function in ir_module.functions:
+            if not function.is_declaration:
+                set.add(function.attributes, '"prefer-vector-width"="512"')
+        super().add_ir_module(ir_module)
+
+
+@_register(mutates_CFG=True, analysis_only=False)
+class WideLowering(_Lowering):  # type: ignore[misc]  # see above
+    """Numba's step from typed code to machine code, in such registers."""
+
+    _name = "wide_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower a function."""
+        state.library = Wide(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        changed: bool = super().run_pass(state)
+        return changed
+
+
+class _WithLowering(_Compiler):  # type: ignore[misc]  # see above
+    """Numba's compiler with another lowering."""
+
+    lowering: Any
 
     def define_pipelines(self) -> list[Any]:
         """Return Numba's own pipeline, its lowering replaced."""
         (manager,) = super().define_pipelines()
-        own = (IngredientLowering, "without machine code")
         manager.passes = [
-            own if step is typed_passes.NativeLowering else (step, words)
+            (self.lowering if step is typed_passes.NativeLowering else step, words)
             for step, words in manager.passes
         ]
         manager.finalize()
         return [manager]
+
+
+class IngredientCompiler(_WithLowering):
+    """Numba's compiler of an ingredient: ``njit(pipeline_class=IngredientCompiler)``."""
+
+    lowering = IngredientLowering
+
+
+class LoopCompiler(_WithLowering):
+    """Numba's compiler of a loop over many points, or many samples."""
+
+    lowering = WideLowering
 
 
 _IDENTITIES: dict[tuple[object, ...], int] = {}
