@@ -30,7 +30,11 @@ def test_without_a_browser_the_address_is_said(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     def run_lab(
-        _stage: object, bound: socket, ready: Callable[[str], None], *_others: object
+        _stage: object,
+        bound: socket,
+        ready: Callable[[str], None],
+        *_others: object,
+        **_more: object,
     ) -> None:
         bound.close()
         ready("http://127.0.0.1:1/token/")

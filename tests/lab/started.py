@@ -22,10 +22,11 @@ class Started:
             command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         assert self.process.stderr is not None
-        said = self.process.stderr.readline()
-        found = re.search(r"http://\S+", said)
-        if found is None:
-            raise AssertionError(said + self.process.communicate()[1])
+        said = ""
+        while (found := re.search(r"http://\S+", said)) is None:
+            if not (line := self.process.stderr.readline()):
+                raise AssertionError(said + self.process.communicate()[1])
+            said += line
         self.address = found[0]
 
     @property

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.arguments import Argument
+from asperity.cli.driver import SIMULATED
 from asperity.cli.options import device_option, options
 from asperity.cli.output import Outputs, check_outputs, output_options, write_output
 from asperity.cli.progress import progress_bar
-from asperity.cli.run import SIMULATED, interrupts
+from asperity.cli.run import interrupts
 from asperity.cli.settings import Settings, set_option
 from asperity.errors import ParameterError, tell
 

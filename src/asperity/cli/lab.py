@@ -11,6 +11,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.arguments import Argument
+from asperity.cli.driver import (
+    SIMULATED,
+    driven_setup,
+    driver_options,
+    named_driver,
+    refuse_risk,
+    spare_process,
+)
 from asperity.cli.options import (
     device_option,
     file_options,
@@ -22,12 +30,15 @@ from asperity.cli.options import (
 )
 from asperity.cli.own_code import learn, own_files
 from asperity.cli.progress import progress_bar
-from asperity.cli.run import spare_process
 from asperity.devices import load_device
 from asperity.errors import ParameterError, tell
 
 if TYPE_CHECKING:
     from asperity.lab.reel import Reel
+    from asperity.lab.stage import Stage
+
+if TYPE_CHECKING:
+    from asperity.lab.handle import Handle
     from asperity.lab.stage import Stage
 
 _LAB = (
@@ -38,37 +49,50 @@ _LAB = (
 
 @click.command("lab")
 @click.argument("surface", required=False)
-@law_option("First law.  [default: the scene's, else C]")
+@law_option("First law.  [default: the scene's, else C; with --driver as compare recommends]")
 @law_options()
 @file_options
-@device_option("Simulated.  [default: the scene's, else touch-x]")
+@device_option("Device.  [default: the scene's, else touch-x; with --driver omega.3]")
+@driver_options
 @options(_LAB)
 @click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
-def command(surface: str | None, port: int | None, no_browser: bool, **values: Any) -> None:
-    """Watch, hear and steer SURFACE in a browser: the loop of `asperity run`, simulated.
+def command(
+    surface: str | None, port: int | None, driver: str, *, accept_risk: bool, no_browser: bool,
+    **values: Any,
+) -> None:  # fmt: skip
+    """Watch, hear and steer SURFACE in a browser: the loop of `asperity run`.
 
-    The pointer is the hand. SURFACE may be a recording (.mcap, or an archive that the lab has
-    saved), which is shown again on its own surface. The page is served to this machine alone, to
-    whoever has the address; nothing comes from a network. Without SURFACE, a sinusoid. Ctrl-C ends
-    it.
+    On the simulated device the pointer is the hand. With --driver the page is the window on a real
+    one: whoever holds its handle feels, and the page starts, changes and ends it. SURFACE may be a
+    recording (.mcap, or an archive that the lab has saved), which is shown again on its own
+    surface. The page is served to this machine alone, to whoever has the address; nothing comes
+    from a network. Without SURFACE, a sinusoid. Ctrl-C ends it.
     """
     # Started first: it takes long, and not from here.
     spare = click.get_current_context().with_resource(spare_process())
     from asperity.lab.serving import free_socket, run_lab
     from asperity.lab.stage import SURFACE
 
-    stage, reel = _stage(surface or SURFACE, values)
+    named = surface or SURFACE
+    reel = handle = None
+    if driver == SIMULATED:
+        stage, reel = _stage(named, values)
+    else:
+        stage, handle = _held(named, values, driver, accept_risk=accept_risk)
 
     def ready(address: str) -> None:
         tell(f"the lab is at {address}")
         if not no_browser and not webbrowser.open(address):
             tell("no browser was found: open the address in one of this machine's")
 
-    run_lab(stage, free_socket(port), ready, partial(learn, own_files()), spare, reel)
+    run_lab(
+        stage, free_socket(port), ready, partial(learn, own_files()), spare, reel, handle,
+        accepts_risk=accept_risk,
+    )  # fmt: skip
 
 
 def _stage(named: str, values: dict[str, Any]) -> tuple[Stage, Reel | None]:
-    """Return what is shown at first, and the rows of a recording."""
+    """Return what is shown at first on the simulated device, and the rows of a recording."""
     from asperity.lab.opened import open_recorded, recording_in
     from asperity.lab.stage import DEVICE, make_stage
     from asperity.scene import load_scene
@@ -84,3 +108,24 @@ def _stage(named: str, values: dict[str, Any]) -> tuple[Stage, Reel | None]:
         scene = load_scene(named, told)
         device = values["device"] or scene.device or load_device(DEVICE)
         return make_stage(scene, named, own, settings.changed(device), told), None
+
+
+def _held(
+    named: str, values: dict[str, Any], name: str, *, accept_risk: bool
+) -> tuple[Stage, Handle]:
+    """Return what is shown on the device of a driver, and its handle.
+
+    Raises:
+        ParameterError: for a driver that is unknown, a device without a greatest force, or a
+            stiffness above the limit.
+    """
+    from asperity.lab.handle import make_handle
+    from asperity.lab.stage import held_stage
+    from asperity.servo.process import need_greatest_force
+
+    setup, own = driven_setup(named, values, name)
+    driver = named_driver(name, setup)
+    need_greatest_force(driver, setup.servo)
+    if not accept_risk:
+        refuse_risk(setup)
+    return held_stage(setup, own, named, file_values(values)), make_handle(driver, setup)

@@ -7,26 +7,32 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from asperity.arguments import Argument
+from asperity.cli.driver import (
+    CLAMPED,
+    SIMULATED,
+    driven_setup,
+    driver_options,
+    named_driver,
+    refuse_risk,
+    spare_process,
+)
 from asperity.cli.loop import loop_options, read_setup
 from asperity.cli.options import options
 from asperity.cli.output import Outputs, check_outputs, output_options
 from asperity.cli.progress import progress_bar
-from asperity.errors import ParameterError, tell
+from asperity.errors import tell
 
 if TYPE_CHECKING:
     from asperity.scene.setup import Setup
     from asperity.servo.fault import Cause
     from asperity.servo.process import ServoProcess, Spare
 
-SIMULATED = "simulated"
-REPLAY = "replay:"
 LOOK = 0.05
 """[s] between two looks at the loop."""
 
@@ -39,19 +45,12 @@ _RUN = (
 @click.command("run")
 @loop_options
 @options(_RUN)
-@click.option(
-    "--driver",
-    metavar="NAME",
-    default=SIMULATED,
-    help="simulated, real (the one of the device's entry), haply, forcedimension, openhaptics,"
-    " ./device.so, or replay:run.mcap.  [default: simulated]",
-)
+@driver_options
 @click.option(
     "--record",
     metavar="PATH",
     help="Record every sample as it comes, 'run.mcap': asperity recording reads it.",
 )
-@click.option("--accept-risk", is_flag=True, help="Render a stiffness above the analysed limit.")
 @output_options(None)
 def command(
     scene: str,
@@ -73,22 +72,19 @@ def command(
     """
     check_outputs(json=outputs.json, record=record)
     spare = click.get_current_context().with_resource(spare_process())
-    # Its force is bounded, and what is said of it holds at every depth, if the law can be clamped.
-    real = driver != SIMULATED
-    setup = read_setup(
-        scene, values, duration, defaults={"clamp": "backed"}, simulated=not real, alone=True
-    )
+    if driver == SIMULATED:
+        setup = read_setup(scene, values, duration, defaults=CLAMPED, alone=True)
+    else:
+        setup, _own = driven_setup(scene, values, driver, duration)
     read = setup.contents()
-    if real and not driver.startswith(REPLAY):
-        setup = with_its_own_electronics(setup)
     if not accept_risk:
         refuse_risk(setup)
     from asperity.report.device_run import print_device_run
 
-    if driver.startswith(REPLAY):
-        loop = replaying_loop(setup, driver.removeprefix(REPLAY), duration, spare)
+    if driver == SIMULATED:
+        loop = simulated_loop(setup, spare)
     else:
-        loop = real_loop(setup, driver, duration, spare) if real else simulated_loop(setup, spare)
+        loop = driven_loop(setup, driver, duration, spare)
     with interrupts() as asked, recorder(record, loop, setup) as take:
         with progress_bar("compiling the loop"):
             loop.start()
@@ -121,71 +117,21 @@ def simulated_loop(setup: Setup, spare: Spare) -> ServoProcess:
     )
 
 
-def with_its_own_electronics(setup: Setup) -> Setup:
-    """Return the same on a real device: there steps and delay are its own."""
-    servo = replace(setup.servo, delay=0, position_resolution=0.0, force_resolution=0.0)
-    return replace(setup, servo=servo)
-
-
-def replaying_loop(setup: Setup, path: str, duration: float | None, spare: Spare) -> ServoProcess:
-    """Return a loop whose handle goes where it went in a recording."""
-    from asperity.servo.drivers.replay import replay_driver
-    from asperity.servo.process import ServoProcess
-
-    driver = replay_driver(path, setup.servo.period)
-    span = setup.servo.period * len(driver.points) if duration is None else duration
-    reach = setup.safety.reach_on(setup.device)
-    return ServoProcess(setup.surface, driver, setup.servo, setup.safety, reach, span, spare=spare)
-
-
-def real_loop(setup: Setup, name: str, duration: float | None, spare: Spare) -> ServoProcess:
-    """Return a loop on a real device.
+def driven_loop(setup: Setup, name: str, duration: float | None, spare: Spare) -> ServoProcess:
+    """Return a loop on the device of a driver; without a duration a replay ends with its rows.
 
     Raises:
         ParameterError: for a driver that is unknown, or a device without a greatest force.
     """
-    from asperity.servo.drivers.choice import hardware_driver
     from asperity.servo.process import ServoProcess
 
-    safety = setup.safety
-    driver = hardware_driver(name, safety.wall, safety.origin, setup.device)
-    tell(f"a real device, {setup.device.name}: a hand near its switch. If the loop dies:"
-         f" {driver.when_lost}")  # fmt: skip
+    driver = named_driver(name, setup)
+    if duration is None and driver.readings is not None:
+        duration = setup.servo.period * driver.readings
     return ServoProcess(
-        setup.surface,
-        driver,
-        setup.servo,
-        safety,
-        safety.reach_on(setup.device),
-        duration,
-        spare=spare,
-    )
-
-
-def refuse_risk(setup: Setup) -> None:
-    """Refuse a stiffness above the analysed limit.
-
-    Raises:
-        ParameterError: with the reason.
-    """
-    from asperity.servo.risk import risk
-
-    with progress_bar("analysing the surface"):
-        reason = risk(setup.surface, setup.device)
-    if reason:
-        raise ParameterError("stiffness", f"is refused: {reason}; --accept-risk renders it")
-
-
-@contextmanager
-def spare_process() -> Iterator[Spare]:
-    """Let the loop's process start while the surface is read and analysed."""
-    from asperity.servo.process import Spare
-
-    spare = Spare()
-    try:
-        yield spare
-    finally:
-        spare.end()
+        setup.surface, driver, setup.servo, setup.safety, setup.safety.reach_on(setup.device),
+        duration, spare=spare,
+    )  # fmt: skip
 
 
 @contextmanager

@@ -33,7 +33,7 @@ class Steer:
 
 @dataclass(frozen=True)
 class Change:
-    """What of the stage shall be another; with nothing, a loop that has stopped starts."""
+    """What of the stage shall be another."""
 
     wishes: Mapping[str, Any] = field(default_factory=dict)
 
@@ -59,11 +59,21 @@ class Seen:
 
 
 @dataclass(frozen=True)
+class Start:
+    """A loop that has stopped shall start."""
+
+
+@dataclass(frozen=True)
+class Stop:
+    """The force shall go, and the loop end."""
+
+
+@dataclass(frozen=True)
 class Save:
     """The newest seconds shall be kept, see :mod:`asperity.lab.takes`."""
 
 
-Message = Steer | Change | Look | Take | Seen | Save
+Message = Steer | Change | Start | Stop | Look | Take | Seen | Save
 
 
 def read_message(content: str | bytes) -> Message:
@@ -151,6 +161,8 @@ _READERS: dict[str, tuple[tuple[str, ...], Any]] = {
     "relief": (("x", "y", "size"), _relief),
     "cut": (("box", "y"), _cut),
     "take": ((), Take),
+    "start": ((), Start),
+    "stop": ((), Stop),
     "save": ((), Save),
     "seen": (("frame",), lambda frame: Seen(_number("frame", frame, 0.0, math.inf))),
 }

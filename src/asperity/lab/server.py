@@ -5,33 +5,51 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable, Coroutine
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 import numpy as np
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
-from asperity.devices import device_names
+from asperity.devices import Device, device_names
 from asperity.errors import ParameterError
 from asperity.files import plain
+from asperity.lab import workshop
 from asperity.lab.access import MalformedError, Pace
 from asperity.lab.backdrop import Backdrop
 from asperity.lab.frames import frame, layout
-from asperity.lab.messages import Change, Look, Save, Seen, Steer, Take, read_message
+from asperity.lab.handle import Handle
+from asperity.lab.messages import (
+    Change,
+    Look,
+    Save,
+    Seen,
+    Start,
+    Steer,
+    Stop,
+    Take,
+    read_message,
+)
 from asperity.lab.session import Session
 from asperity.lab.shelf import Shelf
 from asperity.lab.stage import RANGES, Stage
+from asperity.lab.workshop import Sent
 from asperity.laws import KNOWN_LAWS
 from asperity.servo.process import Spare
 from asperity.servo.statistics import Statistics
+from asperity.surface import Surface
 from asperity.textures.naming import KINDS
 
 EVERY = 5e-3
 """[s] between two frames at least."""
 UNDER_WAY = 8
 """Frames that a page has not painted yet, at most: what waits for a slow one would be old."""
+AWAY = 3.0
+"""[s] without a word from the page that steers, after which the force of a real device goes."""
+_LOOK = 0.1  # [s] between two looks at that
 _LONGEST_SEND = 10.0  # [s] after which a page that takes nothing is let go
 _MOST_REASON = 120  # bytes that a closing frame holds, less its code
 
@@ -86,16 +104,22 @@ class Lab:
         pictures: process for pictures, see ``workshop``.
         limits: process for limits.
         spare: the process of the first loop.
+        handle: what somebody holds; ``None`` for the simulated device.
+        accepts_risk: whether a handle is given a stiffness above the limit.
     """
 
     def __init__(
-        self, stage: Stage, pictures: Executor, limits: Executor, spare: Spare | None = None
-    ) -> None:
+        self, stage: Stage, pictures: Executor, limits: Executor, spare: Spare | None = None,
+        handle: Handle | None = None, *, accepts_risk: bool = False,
+    ) -> None:  # fmt: skip
         self._loop = asyncio.get_running_loop()
         self._pages: list[Page] = []
         self._master: Page | None = None
         self._changed = asyncio.Event()
-        self.session = Session(stage, self._tell, spare)
+        self._heard = 0.0  # when the page that steers said something [s]
+        judged = handle is not None and not accepts_risk
+        judge = partial(_judge, limits) if judged else None
+        self.session = Session(stage, self._tell, spare, handle, judge)
         self.backdrop = Backdrop(pictures, limits, self._announce)
         self.shelf = Shelf(self.session)
         self._saving: set[asyncio.Task[None]] = set()
@@ -111,9 +135,19 @@ class Lab:
         while True:
             await self._changed.wait()
             self._changed.clear()
-            if self.session.state == "running":
+            if self.session.state in {"running", "stopped"}:
                 self.backdrop.show(self.session.stage.setup)
             await self._announce()
+
+    async def attend(self) -> None:
+        """Let the force of a real device go when no page is there any more to do so, for ever."""
+        handle = self.session.handle
+        while handle is not None and handle.driver.moving:
+            await asyncio.sleep(_LOOK)
+            if self.session.state in {"starting", "stopped"}:
+                self._heard = self._loop.time()  # a page has nothing to answer to
+            elif self.session.going and self._loop.time() - self._heard > AWAY:
+                self.session.halt("no page steers that could let the force go, so it went")
 
     async def welcome(self, line: ServerConnection) -> None:
         """Serve a page until it goes."""
@@ -155,6 +189,8 @@ class Lab:
 
     async def _obey(self, page: Page, content: str | bytes) -> None:
         message = read_message(content)
+        if self._master is page:
+            self._heard = self._loop.time()
         if isinstance(message, Look):
             page.looks[message.kind] = message
             page.asked.set()
@@ -168,9 +204,13 @@ class Lab:
         elif self._master is not page:
             raise ParameterError("steering", "is done by another page: this one watches")
         elif isinstance(message, Steer):
-            self.session.wheel.steer(message.target, message.cosine, message.sine, message.speed)
+            self.session.steer(message)
         elif isinstance(message, Change):
             self.session.change(message.wishes)
+        elif isinstance(message, Start):
+            self.session.start()
+        elif isinstance(message, Stop):
+            self.session.halt("you let the force go")
         elif isinstance(message, Save):
             saving = asyncio.create_task(self._save(page))  # who steers goes on meanwhile
             self._saving.add(saving)
@@ -187,12 +227,14 @@ class Lab:
         """Tell all pages how things stand."""
         session, setup = self.session, self.session.stage.setup
         low, high = map(float, setup.surface.texture.extremes)
+        steps = session.stage.electronics
         news = {
             "state": session.state, "words": session.words, "starts": session.starts,
             "settings": session.stage.settings, "assumptions": setup.assumptions,
-            "free": self._master is None, "wishes": session.wheel.wishes,
+            "free": self._master is None, "wishes": session.steered["wishes"],
+            "handle": session.handle,
             "rate": 1.0 / setup.servo.period, "max_force": setup.servo.max_force,
-            "step": setup.servo.position_resolution, "force_step": setup.servo.force_resolution,
+            "step": steps.position_resolution, "force_step": steps.force_resolution,
             "low": low, "high": high, "middle": session.stage.middle,
             "limit": self.backdrop.limit, "version": self.backdrop.version,
         }  # fmt: skip
@@ -207,7 +249,7 @@ class Lab:
             await page.keeps_up()
             if session.shared is None:
                 continue
-            shared, heard = session.shared, session.wheel.heard
+            shared, heard = session.shared, session.steered["heard"]
             if session.starts != starts:
                 starts, seen = session.starts, max(shared.head - 1, 0)
             rows, first = shared.rows(seen)
@@ -220,7 +262,7 @@ class Lab:
                 "frame": page.sent, "heard": heard,
                 "late": counted.late, "skipped": counted.skipped,
             }  # fmt: skip
-            places = [self.backdrop.nearest(rows[-1, 1:4]), session.wheel.anchor]
+            places = [self.backdrop.nearest(rows[-1, 1:4]), session.anchor]
             async with asyncio.timeout(_LONGEST_SEND):
                 await page.line.send(frame(rows, first, counts, np.concatenate(places)))
 
@@ -232,6 +274,11 @@ class Lab:
             for kind in tuple(page.looks):
                 if content := await self.backdrop.picture(page.looks.pop(kind)):
                     await page.line.send(content)
+
+
+def _judge(limits: Executor, surface: Surface, device: Device) -> Future[str]:
+    """Begin to find out why a surface is a risk on a device."""
+    return limits.submit(workshop.risky, Sent.of(surface), device)
 
 
 async def _while_there(work: Callable[[Page], Coroutine[Any, Any, None]], page: Page) -> None:

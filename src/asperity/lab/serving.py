@@ -14,6 +14,7 @@ from websockets.asyncio.server import serve
 
 from asperity.errors import ParameterError
 from asperity.lab.access import MOST_BYTES, Door
+from asperity.lab.handle import Handle
 from asperity.lab.reel import Reel
 from asperity.lab.server import Lab
 from asperity.lab.site import answer
@@ -58,7 +59,7 @@ def free_socket(port: int | None) -> socket.socket:
 def run_lab(
     stage: Stage, bound: socket.socket, ready: Callable[[str], None],
     learn: Callable[[], None] | None = None, spare: Spare | None = None,
-    reel: Reel | None = None,
+    reel: Reel | None = None, handle: Handle | None = None, *, accepts_risk: bool = False,
 ) -> None:  # fmt: skip
     """Serve the lab until Ctrl-C.
 
@@ -69,14 +70,17 @@ def run_lab(
         learn: makes the user's own laws known in another process.
         spare: the process of the first loop.
         reel: rows that were recorded on what is shown at first, to be shown again.
+        handle: what somebody holds; ``None`` for the simulated device.
+        accepts_risk: whether a handle is given a stiffness above the limit.
     """
-    asyncio.run(serve_lab(stage, bound, ready, learn, spare, reel))
+    serving = serve_lab(stage, bound, ready, learn, spare, reel, handle, accepts_risk=accepts_risk)
+    asyncio.run(serving)
 
 
 async def serve_lab(
     stage: Stage, bound: socket.socket, ready: Callable[[str], None],
     learn: Callable[[], None] | None = None, spare: Spare | None = None,
-    reel: Reel | None = None,
+    reel: Reel | None = None, handle: Handle | None = None, *, accepts_risk: bool = False,
 ) -> None:  # fmt: skip
     """Serve the lab until a signal ends it, or the task is cancelled."""
     door = Door(bound.getsockname()[1])
@@ -86,10 +90,10 @@ async def serve_lab(
         with suppress(NotImplementedError, RuntimeError, ValueError):
             asyncio.get_running_loop().add_signal_handler(number, over.set)
     with workshop(learn) as pictures, workshop(learn) as limits:
-        lab = Lab(stage, pictures, limits, spare)
+        lab = Lab(stage, pictures, limits, spare, handle, accepts_risk=accepts_risk)
         if reel is not None:
             lab.shelf.lay("recording", reel, stage, Path(stage.named).name)
-        following = asyncio.create_task(lab.follow())
+        tasks = [asyncio.create_task(work()) for work in (lab.follow, lab.attend)]
         try:
             with lab.session:
                 async with serve(
@@ -99,7 +103,8 @@ async def serve_lab(
                     ready(door.address)
                     await over.wait()
         finally:
-            following.cancel()
+            for task in tasks:
+                task.cancel()
             lab.backdrop.close()
             # The loop has ended: what is left computes pictures and limits, maybe for long.
             for child in active_children():

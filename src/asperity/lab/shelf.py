@@ -56,6 +56,8 @@ class Shelf:
         shared = session.shared
         if shared is None or session.state != "running":
             raise ParameterError("recording", "needs a loop that runs")
+        if session.wheel is None:
+            raise ParameterError("recording", "of a handle is written by asperity run --record")
         if self._busy:
             raise ParameterError("recording", "is being made already")
         self._busy = True

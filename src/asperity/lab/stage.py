@@ -15,7 +15,7 @@ from asperity.scene.alone import with_mass
 from asperity.scene.loading import Scene, load_scene
 from asperity.scene.setup import Setup, make_setup
 from asperity.servo.safety import Safety
-from asperity.simulation import SpringHand
+from asperity.simulation import Servo, SpringHand
 from asperity.textures.drawn import prepare_texture
 from asperity.textures.naming import KINDS, specified
 from asperity.textures.texture import Texture
@@ -38,6 +38,7 @@ RANGES: dict[str, tuple[float, float]] = {
     "magnify": (0.01, 1000.0), "magnify_height": (0.01, 1000.0),
 }  # fmt: skip
 """Least and greatest of what the page may ask for [SI]."""
+_SIMULATED = ("device", "delay", "hand_stiffness", "hand_damping")
 _FIRST = ("law", "magnify")  # others rest on them: a law has parameters, heights grow with the size
 
 
@@ -52,6 +53,7 @@ class Stage:
         magnified: factors of its size and of its height.
         first: name and plain texture at the start, which may be of a file.
         told: of the preparation of that file, by name [SI].
+        own: what the catalogue says of steps and delay of a real device, which has them itself.
     """
 
     setup: Setup
@@ -60,6 +62,7 @@ class Stage:
     first: tuple[str, Texture]
     magnified: tuple[float, float] = (1.0, 1.0)
     told: Mapping[str, Any] = field(default_factory=dict)
+    own: Servo | None = None
 
     def changed(self, wishes: Mapping[str, Any]) -> Stage:
         """Return the stage with some things changed.
@@ -74,6 +77,8 @@ class Stage:
         """
         stage = self
         for name, value in sorted(wishes.items(), key=lambda wish: wish[0] not in _FIRST):
+            if self.own is not None and name in _SIMULATED:
+                raise ParameterError(name, "is that of the real device, and of who holds it")
             change = _CHANGES.get(name)
             if change is not None:
                 stage = change(stage, within(name, value) if name in RANGES else str(value))
@@ -94,12 +99,17 @@ class Stage:
         return {
             "texture": self.named, "law": setup.surface.law.letter,
             "stiffness": setup.surface.stiffness, "max_depth": setup.surface.max_depth,
-            "device": setup.device.id, "delay": setup.servo.delay,
+            "device": setup.device.id, "delay": self.electronics.delay,
             "hand_stiffness": hand and hand.stiffness[0],
             "hand_damping": hand and hand.damping[0],
             "magnify": self.magnified[0], "magnify_height": self.magnified[1],
             **setup.surface.law_parameters,
         }  # fmt: skip
+
+    @property
+    def electronics(self) -> Servo:
+        """Steps and delay, which are the loop's on the simulated device."""
+        return self.own or self.setup.servo
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -228,6 +238,19 @@ def make_stage(
     """
     made = _made(scene, device or scene.device or load_device(DEVICE), named, surface)
     return replace(made, told=dict(told or {}))
+
+
+def held_stage(setup: Setup, own: Servo, named: str, told: Mapping[str, Any]) -> Stage:
+    """Return what the lab shows on a device that somebody holds.
+
+    Args:
+        setup: of the loop.
+        own: what the catalogue says of the electronics.
+        named: by which the surface was asked for.
+        told: of the preparation of the texture, by name [SI].
+    """
+    texture = setup.surface.texture
+    return Stage(setup, named, texture, (named, texture), told=dict(told), own=own)
 
 
 def _made(

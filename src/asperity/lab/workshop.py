@@ -19,6 +19,7 @@ from asperity.analysis.passivity.allowed import allowed_stiffness
 from asperity.devices import Device
 from asperity.errors import AsperityError
 from asperity.lab.views import cut, relief
+from asperity.servo.risk import risk
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -91,6 +92,11 @@ def picture(kind: str, numbers: tuple[float, ...]) -> bytes:
         return relief(surface, x, y, size)
     left, right, bottom, top, y = numbers
     return cut(surface, (left, right, bottom, top, y))
+
+
+def risky(sent: Sent, device: Device) -> str:
+    """Return why a surface is a risk on a device; empty if it is none."""
+    return risk(sent.surface(), device)
 
 
 def limit(sent: Sent, device: Device) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import pickle
 import sys
 import threading
 import time
+from contextlib import suppress
 from importlib.util import find_spec
 from multiprocessing.context import SpawnContext
 from types import TracebackType
@@ -28,6 +29,7 @@ from asperity.surface import Surface
 LONGEST_START = 120.0
 """[s] until the loop must run: compiling for the first time takes most of it."""
 _FOREVER = 2**62
+_TOO_LATE = "comes too late: the loop has ended"
 _LAST_WORDS = 2.0  # [s] that a process gets to say how it ended
 
 
@@ -87,9 +89,7 @@ class ServoProcess:
         safety: Safety | None = None, reach: float = math.inf, duration: float | None = None,
         device: Device | None = None, spare: Spare | None = None,
     ) -> None:  # fmt: skip
-        if driver.moving and not math.isfinite(servo.max_force):
-            words = "is not known: a device that moves needs it, --set max_force=3N"
-            raise ParameterError("max_force", words)
+        need_greatest_force(driver, servo)
         self._driver, self._safety, self._device = driver, safety or Safety(), device
         last = _FOREVER if duration is None else round(duration / servo.period)
         shown = surface if isinstance(surface, Rendered) else render(surface, driver)
@@ -209,11 +209,14 @@ class ServoProcess:
         """Render something else, which nobody has analysed; see :meth:`change`.
 
         Raises:
+            ParameterError: if it cannot be rendered, or the loop was ended.
             DeviceFault: if the loop has ended by one.
         """
-        modules, packed = _packed(shown)
-        self.poll()
-        self._line.send((modules, packed))
+        packed = _packed(shown)
+        if self.poll() is not Cause.GOING:
+            raise ParameterError("surface", _TOO_LATE)
+        with suppress(OSError):  # it has just ended, and said why
+            self._line.send(packed)
         self._heard("loaded", LONGEST_START)
 
     def rows(self, first: int) -> tuple[FloatArray, int]:
@@ -268,12 +271,24 @@ class ServoProcess:
                 if kind in {"failed", "refused"}:
                     raise ParameterError("device" if kind == "failed" else "surface", content)
                 self._take(message)
-                self.poll()
+                if self.poll() is not Cause.GOING:
+                    raise ParameterError("surface", _TOO_LATE)
         except (EOFError, OSError):
             self._cause = Cause.DIED
         else:
             self._cause = Cause.SILENT
         raise self.fault()
+
+
+def need_greatest_force(driver: Driver, servo: Servo) -> None:
+    """Refuse a device that moves and whose greatest force is not known.
+
+    Raises:
+        ParameterError: for one.
+    """
+    if driver.moving and not math.isfinite(servo.max_force):
+        words = "is not known: a device that moves needs it, --set max_force=3N"
+        raise ParameterError("max_force", words)
 
 
 def _packed(thing: object) -> tuple[Modules, bytes]:

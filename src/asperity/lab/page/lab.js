@@ -2,6 +2,7 @@
 
 import { Ledger } from "./gauge.js";
 import { Hand } from "./hand.js";
+import { Handle } from "./handle.js";
 import { Line } from "./line.js";
 import { download, pngOf, svgOf } from "./picture.js";
 import { readTheme } from "./sheet.js";
@@ -49,7 +50,7 @@ const line = new Line({
     if (before?.starts !== said.starts) traces.clear();
     if (before?.starts !== said.starts || before?.settings.law !== said.settings.law) ledger.clear();
     if (!before && !frame) [hand.x, hand.y] = centre = [...said.middle];
-    if (firstNews && said.steers) fromAddress();
+    if (firstNews && said.steers && !said.handle) fromAddress(); // an address moves no handle
     firstNews = false;
     hand.high = said.high;
     last.look = -Infinity; // other pictures may be wanted now
@@ -70,23 +71,24 @@ const line = new Line({
     view.take(numbers);
   },
   lost(reason) {
+    const goes = news?.handle ? " The force goes when no page steers." : "";
     firstNews = false;
     news = null;
     asked = {};
     $("state").className = "stopped";
     $("state").textContent = "connection lost";
-    alarm(reason ? `The lab has closed the connection: ${reason}. Trying again …`
-      : "The connection to the lab is lost. Is asperity lab still running? Trying again …");
+    alarm(`${reason ? `The lab has closed the connection: ${reason}.` : "The connection to the lab is lost. Is asperity lab still running?"}${goes} Trying again …`);
   },
 });
 
 const hand = new Hand((what, content) => {
-  const said = Boolean(news?.steers) && line.say(what, content);
+  const said = Boolean(news?.steers && !news.handle) && line.say(what, content);
   if (said) waiting.push([hand.sent + 1, hand.since]);
   if (waiting.length > 500) waiting.shift();
   return said;
 });
 
+const handle = new Handle(what => line.say(what));
 const tour = new Tour({ change, hand, ledger, see(width) { span = width; }, get news() { return news; } }), panel = new TourPanel(tour);
 
 const player = new Player({
@@ -138,7 +140,7 @@ function show() {
   const told = state === "stopped" ? `The loop has stopped: ${words}` : !steers
     ? "Another page steers; this one watches." : words;
   alarm(told);
-  $("again").hidden = state !== "stopped" || !steers;
+  handle.show(news);
   $("take").hidden = !free || steers;
   $("tour-begin").disabled = !steers;
   for (const one of document.querySelectorAll(".panel :is(input, select, button)")) {
@@ -157,7 +159,7 @@ function show() {
   $("assumptions").replaceChildren(...news.assumptions.map(words =>
     Object.assign(document.createElement("li"), { textContent: words })));
   showLimit(settings);
-  if (steers && state === "running") toAddress(settings);
+  if (steers && state === "running" && !news.handle) toAddress(settings);
 }
 
 /** Fields for the parameters of the law, as its catalogue declares them. */
@@ -295,7 +297,7 @@ function tell(state) {
   $("trace-note").textContent = `${frame.late} samples late, ${frame.skipped} left out`;
   const size = Math.hypot(...force), place = probe.map(millimetres).join(", ");
   $("readout").textContent = `probe ${place} mm · force ${quantity(size, "N")} · time ${frame.newest[0].toFixed(1)} s`;
-  $("relief-note").textContent = `heights × ${(relief.exaggeration ?? 1).toPrecision(2)} · hold down to press`;
+  $("relief-note").textContent = `heights × ${(relief.exaggeration ?? 1).toPrecision(2)} · ${handle.there ? "the handle is the hand" : "hold down to press"}`;
   const curl = cut.most > 1e-6 * (cut.strongest ?? 1) ? `curl up to ${quantity(cut.most, "N/m")}` : "no curl: no loop feeds the hand";
   $("cut-note").textContent = cut.box ? `${curl} · wheel: zoom` : "being computed …";
   const words = `Probe at ${place} millimetres, force ${quantity(size, "N")}${state.inside ? ", in contact" : ""}`;
@@ -319,7 +321,7 @@ for (const [canvas, move] of [
     const place = [event.offsetX, event.offsetY, event.buttons, event.pressure].join();
     if (place === last) return;
     last = place;
-    if (hand.motion !== "pointer" || !relief.heights) return;
+    if (hand.motion !== "pointer" || !relief.heights || handle.there) return;
     hand.pressed = event.buttons > 0;
     hand.force = event.pointerType === "pen" ? 2 * event.pressure : 1;
     move(event);
@@ -349,9 +351,7 @@ $("swap").onclick = () => {
   change({ law: $("other").value });
   $("other").value = mine;
 };
-$("reset").onclick = () => ledger.clear();
-$("again").onclick = () => change({});
-$("take").onclick = () => line.say("take");
+for (const [name, act] of [["reset", () => ledger.clear()], ["take", () => line.say("take")]]) $(name).onclick = act;
 $("volume").oninput = event => sound.setVolume(Number(event.target.value));
 $("sound").onclick = async () => {
   const on = await sound.toggle();
@@ -372,8 +372,8 @@ const KEYS = {
   PageDown: () => { hand.z = Math.max(hand.height - span / 80, -0.01); hand.wish(); },
   m: () => hand.next(),
   x: () => $("swap").click(), r: () => ledger.clear(), s: () => $("sound").click(),
-  k: () => $("save").click(), j: () => player.on && $("play").click(), l: () => player.on && $("live").click(),
-  t: () => panel.toggle(), v: () => tour.on && $("tour-show").click(),
+  k: () => handle.there || $("save").click(), j: () => player.on && $("play").click(), l: () => player.on && $("live").click(),
+  t: () => handle.there || panel.toggle(), v: () => tour.on && $("tour-show").click(),
   n: () => tour.on && $("tour-next").click(), p: () => tour.on && $("tour-back").click(),
   "+": () => zoom(1 / 1.15), "-": () => zoom(1.15),
 };

@@ -65,18 +65,18 @@ export class Marker {
 
   /** Draw a state where `place` says, with the force in the direction of the picture that `up` says. */
   show(place, { probe, god, hand, force, inside }, up) {
-    const theme = colours(), at = place(probe), held = place(hand), arm = drawnForce(force, up);
-    const parts = [at, held, at.map((value, k) => value + arm[k])];
-    if (inside && god.every(Number.isFinite)) parts.push(place(god));
+    const theme = colours(), at = place(probe), arm = drawnForce(force, up), known = point => point.every(Number.isFinite);
+    const held = known(hand) && place(hand), near = inside && known(god) && place(god);
+    const parts = [at, at.map((value, k) => value + arm[k]), held, near].filter(Boolean);
     const { draw } = this;
     if (!this.fit(parts)) return;
     draw.strokeStyle = theme.soft;
     draw.lineWidth = 1.5;
     draw.setLineDash([4, 4]);
-    draw.beginPath(); draw.moveTo(...at); draw.lineTo(...held); draw.stroke();
+    if (held) { draw.beginPath(); draw.moveTo(...at); draw.lineTo(...held); draw.stroke(); }
     draw.setLineDash([]);
-    cross(draw, ...held, theme.soft);
-    if (parts[3]) dot(draw, ...parts[3], 5, theme.green, theme.card);
+    if (held) cross(draw, ...held, theme.soft);
+    if (near) dot(draw, ...near, 5, theme.green, theme.card);
     dot(draw, ...at, 8, theme.card, theme.ink);
     arrow(draw, ...at, ...arm, theme.red);
   }

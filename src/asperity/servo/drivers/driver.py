@@ -99,6 +99,11 @@ class Driver(ABC):
         """Where the surface lies in the device's frame."""
         return UNTURNED
 
+    @property
+    def readings(self) -> int | None:
+        """How many readings there are; ``None`` for as many as are wanted."""
+        return None
+
     @abstractmethod
     def kernels(self) -> tuple[ModuleType, ...]:
         """Return the compiled modules: ``device_read`` and ``device_write``, and what they need."""

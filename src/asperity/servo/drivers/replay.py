@@ -31,6 +31,11 @@ class ReplayDriver(Driver):
 
     points: FloatArray
 
+    @property
+    def readings(self) -> int:
+        """How many positions there are."""
+        return len(self.points)
+
     def kernels(self) -> tuple[ModuleType, ...]:
         """Return what goes from row to row."""
         return (replayed,)
