@@ -142,6 +142,22 @@ def test_a_foot_within_the_budget_is_as_near_as_it_says(name: str):
     assert (said[:-2, 0] == 0.0).all()
 
 
+@pytest.mark.parametrize("name", ADVERSARIES)
+def test_no_budget_is_so_small_that_a_gap_is_claimed_wrongly(name: str):
+    """Where it ends on the way down, the point that is taken is no minimum."""
+    texture, probes = below(name)
+    surface = Surface(texture, "D", STIFFNESS)
+    xy = RNG.uniform(0.1, 0.9, (200, 2)) * SIDE * PITCH
+    depth = surface.max_depth * RNG.choice([0.1, 0.3, 1.0], 200)
+    more = np.column_stack([xy, texture.height(xy) - depth])
+    probes = np.ascontiguousarray(np.concatenate([probes[:-2], more]))
+    nearest = np.linalg.norm(surface.force(probes), axis=1) / STIFFNESS
+    for budget in (2.0, 5.0, 8.0, 12.0, 20.0):
+        force, said = told(surface, probes, budget, forgotten=True)
+        found = np.linalg.norm(force, axis=1) / STIFFNESS
+        assert (found - said[:, 0] <= nearest * (1.0 + 1e-9)).all()
+
+
 def test_without_its_gap_a_foot_would_be_claimed_wrongly():
     """The negative control: under a small budget some foot is farther than the nearest point."""
     wrong = []

@@ -83,9 +83,16 @@ class HeightMap(Spline):
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
         from asperity.contacts.nearest import plane_search, plane_within
-        from asperity.textures.samplers import heightmap, heightmap_block, spline
+        from asperity.textures.samplers import (
+            heightmap,
+            heightmap_block,
+            heightmap_search,
+            heightmap_window,
+            spline,
+        )
 
-        return heightmap, spline, plane_search, plane_within, heightmap_block
+        search = heightmap_search, heightmap_window, plane_search, plane_within
+        return heightmap, spline, *search, heightmap_block
 
     @cached_property
     def arguments(self) -> HeightMapArguments:

@@ -23,7 +23,7 @@ from asperity.contacts.sampler import PlanePoint as Point
 from asperity.contacts.sampler import curvature
 
 KERNELS = Kernels(
-    provides=("descend", "go_down", "judge", "next_box"),
+    provides=("descend", "eigenvalues", "go_down", "judge", "next_box"),
     requires=("curvature",),
     called=("judge", "newton_step"),
     shared=("go_down",),

@@ -9,7 +9,7 @@ from asperity.compiled import ROOT_EPS, Kernels
 
 KERNELS = Kernels(
     provides=(
-        "box_bounds", "cell_at", "dot4", "foreseeable", "nearest_copy", "reach_of", "saddle_margin",
+        "box_bounds", "cell_at", "dot4", "foreseeable", "nearest_copy", "reach_of",
         "tile_frame", "weights", "weights_first", "weights_second",
     )
 )  # fmt: skip
@@ -83,17 +83,6 @@ def tile_frame(
 def box_bounds(nodes: NDArray[np.float32], k: int) -> Four:
     """Return the least and greatest height and the bounds K and T of box k of the pyramid."""
     return float(nodes[k, 0]), float(nodes[k, 1]), float(nodes[k, 2]), float(nodes[k, 3])
-
-
-def saddle_margin(z: float, nodes: NDArray[np.float32], k: int, per_metre: float) -> float:
-    """Return a lower bound of the eigenvalues of Q (see ``plane_search``) in box k of the pyramid.
-
-    Q = I + ∇h ∇hᵀ + (h - z) Hess h: below the surface only crests lower them, above it only
-    troughs, which the bound of all second derivatives covers.
-    """
-    low, high, bend, _twist = box_bounds(nodes, k)
-    crests = max(high - z, 0.0) * float(nodes[k, 4])
-    return 1.0 - (crests + max(z - low, 0.0) * bend) * per_metre
 
 
 def reach_of(z: float, best: float, nodes: NDArray[np.float32]) -> float:
