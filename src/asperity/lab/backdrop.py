@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Callable, Coroutine
-from concurrent.futures import Executor
-from functools import partial
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -13,13 +14,22 @@ import numpy as np
 from asperity.checks import FloatArray
 from asperity.lab import workshop
 from asperity.lab.messages import Look
-from asperity.lab.workshop import Sent
+from asperity.lab.workshop import Sent, Workshop
 from asperity.scene.setup import Setup
 from asperity.surface import Surface
+
+MOST_ENDS, WITHIN = 3, 600.0
+"""How often in how many seconds the process that makes pictures may end, and another begins."""
+_AGAIN = "the process that makes the pictures has ended: another one begins"
+_NO_MORE = "there are no pictures of this surface: the process that makes them ended each time"
+_NO_LIMIT = "the process that computes it has ended, twice"
 
 
 class Backdrop:
     """Pictures and the limit of the surface that is shown, computed by other processes.
+
+    A process that ends is followed by another, which is shown the surface again; a surface that
+    ends each of them has no pictures, until another one is shown.
 
     Args:
         pictures: process for pictures.
@@ -29,24 +39,30 @@ class Backdrop:
     Attributes:
         limit: what :func:`asperity.lab.workshop.limit` returns; empty while it is computed.
         version: grows with each surface whose pictures can be had.
+        words: what there is to say of the pictures.
     """
 
     def __init__(
-        self, pictures: Executor, limits: Executor, told: Callable[[], Coroutine[Any, Any, None]]
+        self, pictures: Workshop, limits: Workshop, told: Callable[[], Coroutine[Any, Any, None]]
     ) -> None:
         self._pictures, self._limits, self._told = pictures, limits, told
         self._wanted: Surface | None = None
         self._ready: Surface | None = None
+        self._ends: list[float] = []
         self._tasks: set[asyncio.Task[None]] = set()
         self.limit: dict[str, Any] = {}
         self.version = 0
+        self.words = ""
 
     def show(self, setup: Setup) -> None:
         """Make ready for a surface on a device, unless it is shown already."""
         if setup.surface is self._wanted:
             return
-        self._wanted, self.limit = setup.surface, {}
-        task = asyncio.create_task(self._make(setup))
+        self._wanted, self.limit, self._ends, self.words = setup.surface, {}, [], ""
+        self._begin(self._make(setup))
+
+    def _begin(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
 
@@ -61,23 +77,49 @@ class Backdrop:
         await self._judge(setup)
 
     async def _prepare(self, surface: Surface) -> None:
-        await _done(self._pictures, workshop.show, Sent.of(surface))
+        while surface is self._wanted and len(self._ends) < MOST_ENDS:
+            try:
+                await _done(self._pictures, workshop.show, Sent.of(surface))
+            except BrokenProcessPool:
+                await self._ended(surface)
+                continue
+            if surface is self._wanted:
+                self._ready, self.words = surface, ""
+                self.version += 1
+                await self._told()
+            return
+
+    async def _ended(self, surface: Surface) -> None:
+        """Hear that the process has ended while it worked on a surface."""
+        self._ready = None
         if surface is self._wanted:
-            self._ready = surface
-            self.version += 1
+            now = time.monotonic()
+            self._ends = [when for when in self._ends if when > now - WITHIN] + [now]
+            self.words = _AGAIN if len(self._ends) < MOST_ENDS else _NO_MORE
             await self._told()
 
     async def _judge(self, setup: Setup) -> None:
-        limit = await _done(self._limits, workshop.limit, Sent.of(setup.surface), setup.device)
+        limit = {"stiffness": None, "basis": _NO_LIMIT, "q": None, "one_sided": None}
+        for _attempt in range(2):  # the process may have ended of something else
+            with suppress(BrokenProcessPool):
+                sent = Sent.of(setup.surface)
+                limit = await _done(self._limits, workshop.limit, sent, setup.device)
+                break
         if setup.surface is self._wanted:
             self.limit = limit
             await self._told()
 
     async def picture(self, look: Look) -> bytes:
-        """Return a picture as a message; empty before there is a surface."""
-        if self._ready is None:
+        """Return a picture as a message; empty while there is no surface that can be shown."""
+        surface = self._ready
+        if surface is None:
             return b""
-        answer: bytes = await _done(self._pictures, workshop.picture, look.kind, look.numbers)
+        answer = b""
+        with suppress(BrokenProcessPool):
+            answer = await _done(self._pictures, workshop.picture, look.kind, look.numbers)
+        if not answer and surface is self._ready:  # the first to hear that the process is another
+            await self._ended(surface)
+            self._begin(self._prepare(surface))
         return answer
 
     def nearest(self, point: FloatArray) -> FloatArray:
@@ -90,5 +132,5 @@ class Backdrop:
         return self._ready.texture.nearest(point)
 
 
-async def _done(where: Executor, work: Callable[..., Any], *arguments: Any) -> Any:
-    return await asyncio.get_running_loop().run_in_executor(where, partial(work, *arguments))
+async def _done(where: Workshop, work: Callable[..., Any], *arguments: Any) -> Any:
+    return await asyncio.wrap_future(where.submit(work, *arguments))

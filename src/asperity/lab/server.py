@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable, Coroutine
-from concurrent.futures import Executor, Future
+from concurrent.futures import Future
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -36,7 +36,7 @@ from asperity.lab.messages import (
 from asperity.lab.session import Session
 from asperity.lab.shelf import Shelf
 from asperity.lab.stage import RANGES, Stage
-from asperity.lab.workshop import Sent
+from asperity.lab.workshop import Sent, Workshop
 from asperity.laws import KNOWN_LAWS
 from asperity.servo.process import Spare
 from asperity.servo.statistics import Statistics
@@ -109,7 +109,7 @@ class Lab:
     """
 
     def __init__(
-        self, stage: Stage, pictures: Executor, limits: Executor, spare: Spare | None = None,
+        self, stage: Stage, pictures: Workshop, limits: Workshop, spare: Spare | None = None,
         handle: Handle | None = None, *, accepts_risk: bool = False,
     ) -> None:  # fmt: skip
         self._loop = asyncio.get_running_loop()
@@ -237,6 +237,7 @@ class Lab:
             "step": steps.position_resolution, "force_step": steps.force_resolution,
             "low": low, "high": high, "middle": session.stage.middle,
             "limit": self.backdrop.limit, "version": self.backdrop.version,
+            "pictures": self.backdrop.words,
         }  # fmt: skip
         for page in tuple(self._pages):
             await page.say("news", steers=page is self._master, **news)
@@ -272,11 +273,11 @@ class Lab:
             await page.asked.wait()
             page.asked.clear()
             for kind in tuple(page.looks):
-                if content := await self.backdrop.picture(page.looks.pop(kind)):
-                    await page.line.send(content)
+                content = await self.backdrop.picture(page.looks.pop(kind))
+                await (page.line.send(content) if content else page.say("later", kind=kind))
 
 
-def _judge(limits: Executor, surface: Surface, device: Device) -> Future[str]:
+def _judge(limits: Workshop, surface: Surface, device: Device) -> Future[str]:
     """Begin to find out why a surface is a risk on a device."""
     return limits.submit(workshop.risky, Sent.of(surface), device)
 

@@ -19,7 +19,7 @@ from asperity.lab.reel import Reel
 from asperity.lab.server import Lab
 from asperity.lab.site import answer
 from asperity.lab.stage import Stage
-from asperity.lab.workshop import workshop
+from asperity.lab.workshop import Workshop
 from asperity.servo.process import Spare
 
 LOOPBACK = "127.0.0.1"
@@ -89,7 +89,7 @@ async def serve_lab(
         # Where the system or the thread cannot, Ctrl-C cancels the task.
         with suppress(NotImplementedError, RuntimeError, ValueError):
             asyncio.get_running_loop().add_signal_handler(number, over.set)
-    with workshop(learn) as pictures, workshop(learn) as limits:
+    with Workshop(learn) as pictures, Workshop(learn) as limits:
         lab = Lab(stage, pictures, limits, spare, handle, accepts_risk=accepts_risk)
         if reel is not None:
             lab.shelf.lay("recording", reel, stage, Path(stage.named).name)

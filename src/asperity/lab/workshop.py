@@ -9,10 +9,12 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Callable
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.context import SpawnContext
-from typing import Any
+from typing import Any, Self
 
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.passivity.allowed import allowed_stiffness
@@ -28,13 +30,46 @@ _SHOWN: dict[str, Surface] = {}
 _NICENESS = 10
 
 
-def workshop(learn: Callable[[], None] | None = None) -> Executor:
-    """Return a process that waits for work, one piece at a time.
+class Workshop:
+    """A process that waits for work, one piece at a time; use it in a ``with``.
+
+    If it ends, of a crash in compiled code or for want of memory, whoever waits for it hears a
+    ``BrokenProcessPool``; what is asked for after that is done by another one, which knows nothing.
 
     Args:
         learn: is called in it first, so that it knows the user's own laws.
     """
-    return ProcessPoolExecutor(1, mp_context=SpawnContext(), initializer=_begin, initargs=(learn,))
+
+    def __init__(self, learn: Callable[[], None] | None = None) -> None:
+        self._learn = learn
+        self._pool = self._new()
+
+    def _new(self) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(
+            1, mp_context=SpawnContext(), initializer=_begin, initargs=(self._learn,)
+        )
+
+    def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Begin a piece of work."""
+        pool = self._pool
+        try:
+            answer = pool.submit(work, *arguments)
+        except BrokenProcessPool as error:
+            answer = Future()
+            answer.set_exception(error)
+        answer.add_done_callback(partial(self._mend, pool))
+        return answer
+
+    def _mend(self, pool: ProcessPoolExecutor, answer: Future[Any]) -> None:
+        ended = not answer.cancelled() and isinstance(answer.exception(), BrokenProcessPool)
+        if ended and self._pool is pool:
+            self._pool = self._new()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._pool.shutdown()
 
 
 def _begin(learn: Callable[[], None] | None) -> None:
@@ -80,13 +115,15 @@ def show(sent: Sent) -> None:
 
 
 def picture(kind: str, numbers: tuple[float, ...]) -> bytes:
-    """Return a picture of the surface as a message; see ``views``.
+    """Return a picture of the surface as a message, see ``views``; empty if none was shown.
 
     Args:
         kind: "relief" or "cut".
         numbers: what it takes.
     """
-    surface = _SHOWN["surface"]
+    surface = _SHOWN.get("surface")
+    if surface is None:
+        return b""
     if kind == "relief":
         x, y, size = numbers
         return relief(surface, x, y, size)

@@ -70,6 +70,8 @@ const line = new Line({
     if (wait) wait.again = now + RESTS * (now - wait.since);
     view.take(numbers);
   },
+  /** There is no such picture yet. */
+  later({ kind }) { if (asked[kind]) Object.assign(asked[kind], { key: "", version: -1, again: performance.now() + 500 }); },
   lost(reason) {
     const goes = news?.handle ? " The force goes when no page steers." : "";
     firstNews = false;
@@ -138,7 +140,7 @@ function show() {
   $("state").textContent = { running: `law ${settings.law} at ${news.rate.toFixed(0)} Hz`, stopped: "stopped",
     starting: "starting", changing: "changing" }[state];
   const told = state === "stopped" ? `The loop has stopped: ${words}` : !steers
-    ? "Another page steers; this one watches." : words;
+    ? "Another page steers; this one watches." : words || news.pictures;
   alarm(told);
   handle.show(news);
   $("take").hidden = !free || steers;
