@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import webbrowser
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -28,7 +29,7 @@ from asperity.cli.options import (
     options,
     surface_values,
 )
-from asperity.cli.own_code import learn, own_files
+from asperity.cli.own_code import learn, own_contents, own_files
 from asperity.cli.progress import progress_bar
 from asperity.devices import load_device
 from asperity.errors import ParameterError, tell
@@ -77,6 +78,7 @@ def command(
     reel = handle = None
     if driver == SIMULATED:
         stage, reel = _stage(named, values)
+        stage = replace(stage, code=own_contents())
     else:
         stage, handle = _held(named, values, driver, accept_risk=accept_risk)
 

@@ -103,6 +103,15 @@ def own_files() -> tuple[str, ...]:
     return tuple(dict.fromkeys(_FILES))
 
 
+def own_contents() -> dict[str, bytes]:
+    """Return what is in the files that were run, by names that can stand in one folder."""
+    contents: dict[str, bytes] = {}
+    for file in own_files():
+        name = Path(file).name
+        contents[name if name not in contents else f"{len(contents)}_{name}"] = _source(file)
+    return contents
+
+
 def learn(files: tuple[str, ...]) -> None:
     """Run files and register what they define, in a process that another command has started."""
     for file in files:

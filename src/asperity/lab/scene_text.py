@@ -49,7 +49,13 @@ def scene_text(
         "run": written(run, RUN),
     }  # fmt: skip
     parts = [f"[{name}]\n{_lines(values)}" for name, values in sections.items()]
-    return "\n".join([*parts, _device(setup.device, setup.servo.delay)])
+    return "\n".join([_head(stage), *parts, _device(setup.device, setup.servo.delay)])
+
+
+def _head(stage: Stage) -> str:
+    """Return what to type: a scene names no code, and the command line must."""
+    named = "".join(f" --law-module {name}" for name in stage.code)
+    return f"# In this folder: asperity simulate scene.toml{named}\n"
 
 
 def texture_section(stage: Stage, held: str) -> dict[str, Any]:
@@ -91,9 +97,9 @@ def source_section(source: str) -> dict[str, Any]:
 
 
 def _bars(plant: Any) -> dict[str, Any]:
-    """Return what a five-bar was told besides its device."""
+    """Return what a plant was told besides its device."""
     if not hasattr(plant, "inside_only"):
-        return {}
+        return {"resonance": True} if plant.resonance is not None else {}
     return {"centre": plant.centre, "brakes": "inside" if plant.inside_only else "always"}
 
 

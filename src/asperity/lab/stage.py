@@ -53,6 +53,7 @@ class Stage:
         magnified: factors of its size and of its height.
         first: name and plain texture at the start, which may be of a file.
         told: of the preparation of that file, by name [SI].
+        code: files of the user's own that it takes, by name.
         own: what the catalogue says of steps and delay of a real device, which has them itself.
     """
 
@@ -62,6 +63,7 @@ class Stage:
     first: tuple[str, Texture]
     magnified: tuple[float, float] = (1.0, 1.0)
     told: Mapping[str, Any] = field(default_factory=dict)
+    code: Mapping[str, bytes] = field(default_factory=dict)
     own: Servo | None = None
 
     def changed(self, wishes: Mapping[str, Any]) -> Stage:

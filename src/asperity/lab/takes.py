@@ -27,13 +27,15 @@ from asperity.servo.kernels.steered import KEPT
 from asperity.servo.shared import Shared
 
 RECORDING, SCENE, HAND = "recording.mcap", "scene.toml", "hand.csv"
-"""The files of a take: rows of the loop, what does it again, and how the hand moved."""
+"""The files of a take: rows of the loop, what does it again, and how the hand moved; besides these
+files of the user's own."""
 MOST_ROWS = KEPT - 4000
 """Of a take, the newest: more may be overwritten while they are read."""
 
 _NAMES = [name for name, _unit in COLUMNS]
 _PLACE = slice(_NAMES.index("x"), _NAMES.index("z") + 1)
 _FORCE = slice(_NAMES.index("commanded x"), _NAMES.index("applied z") + 1)
+_ANCHOR = slice(_NAMES.index("law anchor x"), _NAMES.index("law anchor y") + 1)
 _MOST_CHANGES = 10_000  # of the surface since the loop's start
 _SHORTEST = 0.2  # [s] that a take lasts at least
 
@@ -64,7 +66,7 @@ class Take:
         packed = io.BytesIO()
         with TemporaryDirectory() as folder, zipfile.ZipFile(packed, "w") as archive:
             self.write(Path(folder))
-            for name in (RECORDING, SCENE, HAND):
+            for name in (RECORDING, SCENE, HAND, *self.stage.code):
                 archive.write(Path(folder, name), name, zipfile.ZIP_DEFLATED, 1)
         return packed.getvalue()
 
@@ -81,6 +83,8 @@ class Take:
         begin = self.duration, self.rows[0, _PLACE], self.velocity
         text = scene_text(self.stage, HAND, RECORDING if field else "", *begin)
         (folder / SCENE).write_text(text, "utf-8")
+        for name, content in self.stage.code.items():
+            (folder / name).write_bytes(content)
 
     def reel(self) -> Reel:
         """Return what the page shows of it."""
@@ -110,6 +114,9 @@ def take(stage: Stage, shared: Shared, wheel: Wheel) -> Take:
     rows[:, 0] = np.arange(len(rows)) * stage.setup.servo.period
     supplied = _NAMES.index("supplied")
     rows[:, supplied] -= rows[0, supplied]
+    # What the law held before counts no more; who begins here has held nothing.
+    held = rows[:, _NAMES.index("law held")].argmax()
+    rows[: held or len(rows), _ANCHOR] = 0.0
     return Take(stage, rows, track[places, 0], track[places[0], 1])
 
 

@@ -1,0 +1,216 @@
+"""What is saved does the same again: on any surface, device and hand, wherever it is moved to."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from tests.own_modules import imported
+
+import asperity as asp
+from asperity.cli.own_code import learn, own_contents
+from asperity.files import plain
+from asperity.lab.stage import Stage, make_stage
+from asperity.lab.takes import HAND, RECORDING, SCENE, Take, take
+from asperity.laws import KNOWN_LAWS
+from asperity.recording import field
+from asperity.recording.recording import open_recording
+from asperity.scene import load_scene
+from asperity.scene.setup import Setup, make_setup
+from asperity.servo.drivers.steered import Wheel, steered_driver
+from asperity.servo.fault import Cause
+from asperity.servo.loop import Loop, no_clock, render
+from asperity.servo.shared import Shared
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SCENES = """
+[texture]
+kind = "sinusoid"
+amplitude = "0.2 mm"
+period = "2 mm"
+[surface]
+law = "C"
+stiffness = "300 N/m"
+[device]
+"""
+SPRING = (
+    '[hand]\nkind = "spring"\nstiffness = ["500 N/m", "400 N/m", "600 N/m"]\ndamping = "3 N*s/m"\n'
+)
+BAND = '[hand]\nkind = "band"\ntension = "0.2 N"\ndamping = "0.5 N*s/m"\n'
+MASS = 'id = "touch-x"\napparent_mass = "60 g"\n'
+FIVE = 'id = "pantograph"\njoint_damping = "4 mN*m*s"\nupdate_rate = "1 kHz"\n'
+PLACE = '[run]\ncentre = ["-10 mm", "95 mm"]\nbrakes = "always"\nvelocity_share = 0.4\n'
+KINDS = {
+    "kind": "sinusoid:amplitude=0.2mm,period=2mm", "knurl": "knurl",
+    "band": SCENES + MASS + BAND,
+    "five-bar": SCENES + FIVE + SPRING + PLACE, "five-bar and band": SCENES + FIVE + BAND,
+    "measured": "map.png",
+}  # fmt: skip
+LAST_BIT = 1e-15  # m or N: law H searches from where it was, and may end in another last bit
+
+
+def made(name: str, folder: Path) -> Stage:
+    """Return a stage by the name of what is special of it."""
+    text = KINDS[name]
+    if name == "measured":
+        Image.effect_noise((40, 30), 20.0).save(folder / text)
+        told = {"pitch": 2e-4, "height_range": 2e-4, "cutoff": 8e-4}
+        return make_stage(load_scene(str(folder / text), told), str(folder / text), told=told)
+    if "[" not in text:
+        return make_stage(load_scene(text), text)
+    (folder / "scene.toml").write_text(text)
+    return make_stage(load_scene(str(folder / "scene.toml")), str(folder / "scene.toml"))
+
+
+def felt(stage: Stage, samples: int = 900) -> Take:
+    """Let a hand go round, up, down into the surface and up, as fast as it can be computed."""
+    setup, shared = stage.setup, Shared()
+    x, y = stage.middle
+    low, high = setup.surface.texture.extremes
+    place = y if y else 0.0
+    wheel = Wheel((x + 1e-3, place, high + 6e-4))
+    middle = 0.5 * (low + high)
+    wheel.steer((x, place, middle), (1e-3, 0.0, 0.0), (0.0, 0.0, high - middle + 6e-4), 9.0)
+    driver = steered_driver(setup.plant, setup.hand, setup.servo, wheel)
+    with wheel:
+        loop = Loop(driver, setup.servo, setup.safety, 1.0, shared.board(), no_clock())
+        cause, _code = loop.run(render(setup.surface, driver), driver.open(), samples)
+        assert cause is Cause.FINISHED
+        return take(stage, shared, wheel)
+
+
+def unpacked(kept: Take, folder: Path) -> Path:
+    folder.mkdir()
+    zipfile.ZipFile(BytesIO(kept.archive())).extractall(folder)
+    return folder
+
+
+def again(folder: Path) -> Setup:
+    return make_setup(load_scene(str(folder / SCENE)))
+
+
+@pytest.mark.parametrize("magnified", [1.0, 1.7])
+@pytest.mark.parametrize("law", ["C", "H"])
+@pytest.mark.parametrize("name", KINDS)
+def test_the_scene_does_the_same_again(
+    tmp_path: Path, name: str, law: str, magnified: float
+) -> None:
+    folder = tmp_path / "here"
+    folder.mkdir()
+    stage = made(name, folder).changed({"law": law, "magnify": magnified, "delay": 1})
+    kept = felt(stage)
+    place = unpacked(kept, tmp_path / "there")
+    shutil.rmtree(folder)  # the archive was moved, and what was measured is gone
+    setup = again(place)
+    for part in ("servo", "plant", "hand"):
+        assert plain(getattr(setup, part)) == plain(getattr(stage.setup, part))
+    run = setup.simulate()
+    assert len(run.table) == len(kept.rows) > 600
+    most = LAST_BIT if law == "H" else 0.0
+    assert np.abs(run.position - kept.rows[:, 1:4]).max() <= most
+    assert np.abs(run.commanded - kept.rows[:, 4:7]).max() <= most
+    assert np.abs(kept.rows[:, 4:7]).max() > 0.05
+    found = asp.replay(open_recording(place / RECORDING))
+    assert found.largest <= most
+    assert found.same or law == "H"
+
+
+def test_what_a_law_held_before_is_not_in_it(tmp_path: Path) -> None:
+    kept = felt(made("kind", tmp_path).changed({"law": "F"}))
+    place = unpacked(kept, tmp_path / "there")
+    recording = open_recording(place / RECORDING)
+    assert asp.replay(recording).same
+    assert recording["law anchor x"].any()
+    assert np.abs(again(place).simulate().commanded - kept.rows[:, 4:7]).max() == 0.0
+
+
+def test_a_first_mode_is_in_the_scene(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(
+        SCENES + 'id = "omega.3"\nbandwidth = "200 Hz"\n' + SPRING + "[run]\nresonance = true\n"
+    )
+    stage = make_stage(load_scene(str(tmp_path / "scene.toml")), str(tmp_path / "scene.toml"))
+    kept = felt(stage, 4000)
+    setup = again(unpacked(kept, tmp_path / "there"))
+    assert plain(setup.plant) == plain(stage.setup.plant)
+    # How its two masses swing at the beginning is not: that dies out.
+    away = np.abs(setup.simulate().position - kept.rows[:, 1:4])
+    assert away.max() < 1e-5
+    assert away[-200:].max() < 1e-7
+
+
+def test_a_surface_that_is_too_large_is_named_by_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = felt(made("measured", tmp_path))
+    monkeypatch.setattr(field, "MOST_BYTES", 1000)
+    place = unpacked(kept, tmp_path / "there")
+    assert str(tmp_path / "map.png") in (place / SCENE).read_text()
+    run = again(place).simulate()
+    assert np.abs(run.commanded - kept.rows[:, 4:7]).max() == 0.0
+
+
+@pytest.fixture
+def own_law(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
+    """A law of the user's own, known as --law-module makes it known."""
+    known = dict(KNOWN_LAWS)
+    monkeypatch.setattr("asperity.cli.own_code._FILES", [])
+    learn((str(EXAMPLES / "own_law.py"),))
+    yield {letter: law for letter, law in KNOWN_LAWS.items() if letter not in known}
+    KNOWN_LAWS.clear()
+    KNOWN_LAWS.update(known)
+
+
+def test_a_law_of_ones_own_is_in_the_archive_and_named(
+    tmp_path: Path, own_law: dict[str, Any]
+) -> None:
+    (letter,) = own_law
+    stage = made("kind", tmp_path).changed({"law": letter})
+    kept = felt(replace(stage, code=own_contents()))
+    place = unpacked(kept, tmp_path / "there")
+    assert {path.name for path in place.iterdir()} == {RECORDING, SCENE, HAND, "own_law.py"}
+    assert (place / "own_law.py").read_bytes() == (EXAMPLES / "own_law.py").read_bytes()
+    first = (place / SCENE).read_text().splitlines()[0]
+    assert first == "# In this folder: asperity simulate scene.toml --law-module own_law.py"
+    run = again(place).simulate()
+    assert np.abs(run.commanded - kept.rows[:, 4:7]).max() == 0.0
+    assert np.abs(kept.rows[:, 4:7]).max() > 0.05
+    # As it is typed in another process; without the file the law is not known.
+    for words, code in ((first.partition("asperity ")[2].split(), 0), (["simulate", SCENE], 2)):
+        command = [sys.executable, "-m", "asperity", *words]
+        done = subprocess.run(command, cwd=place, capture_output=True, check=False, timeout=120)
+        assert done.returncode == code
+
+
+def test_files_of_one_name_stand_beside_each_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = []
+    for place in ("one", "two"):
+        (tmp_path / place).mkdir()
+        (tmp_path / place / "law.py").write_text(place)
+        files.append(str(tmp_path / place / "law.py"))
+    monkeypatch.setattr("asperity.cli.own_code._FILES", files)
+    assert own_contents() == {"law.py": b"one", "1_law.py": b"two"}
+
+
+def test_a_texture_of_ones_own_is_made_from_what_it_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "my_eggs.py").write_text((EXAMPLES / "own_texture.py").read_text())
+    with imported(tmp_path, "my_eggs") as own:
+        monkeypatch.setitem(asp.textures.catalogue.CATALOGUE, "egg-box", own.EGG_BOX)
+        stage = made("kind", tmp_path).changed({"texture": "egg-box:amplitude=0.1mm,period=2mm"})
+        for magnified in (1.0, 1.5):
+            kept = felt(stage.changed({"magnify": magnified}))
+            run = again(unpacked(kept, tmp_path / f"there {magnified}")).simulate()
+            assert np.abs(run.commanded - kept.rows[:, 4:7]).max() == 0.0
