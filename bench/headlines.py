@@ -26,6 +26,7 @@ from asperity.scene import load_scene
 from asperity.scene.plant import default_servo
 from asperity.simulation import Cartesian, Servo, SpringHand, Still
 from asperity.simulation.onset import ends_of_starts, offsets
+from asperity.simulation.together import Together
 from asperity.surface import Surface
 from bench.margins import HANDS, pressing
 
@@ -86,8 +87,9 @@ def _cycles(surface: Surface, plant: Cartesian, hand: SpringHand, servo: Servo) 
     """Return how many starts end in a limit cycle."""
     begin = np.array([0.0, 0.0, surface.texture.extremes[1] + 0.2 * surface.max_depth])
     still, shifts = Still((0.0, 0.0, 0.0)), offsets(surface, STARTS)
-    runs = ends_of_starts(surface, plant, hand, servo, still, begin, None, shifts, DURATION)
-    return sum(ends for ends, _run in runs)
+    loop = Together(surface, plant, hand, servo, still, begin)
+    runs = ends_of_starts(loop, surface.stiffness, servo, shifts, DURATION)
+    return sum(bool(run.verdict) for run in runs)
 
 
 def main(times: float = 1.0) -> int:

@@ -13,7 +13,7 @@ import os
 import pickle
 import platform
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import lru_cache
@@ -42,21 +42,43 @@ def kept(name: str, content: str | None, make: Callable[[], Answer]) -> Answer:
             :func:`content_digest`; ``None`` where that is not known: nothing is kept then.
         make: works it out.
     """
-    package = None if content is None or _ANEW.get() else package_digest()
-    if package is None:
-        return make()
-    key = f"{name}\n{content}\n{package}"
-    found = recall(ROOM, key)
-    if found is not None:
+    return kept_each(name, [content], lambda _which: iter([(0, make())]))[0]
+
+
+def kept_each(
+    name: str,
+    contents: Sequence[str | None],
+    make: Callable[[Sequence[int]], Iterator[tuple[int, Answer]]],
+) -> list[Answer]:
+    """Return several answers, those from disk that are there.
+
+    Args:
+        name: of what is asked; of all.
+        contents: of each, see :func:`kept`.
+        make: works out the others, by number, in any order; each is kept as soon as it is there.
+    """
+    keys = [_key(name, content) for content in contents]
+    answers: dict[int, Answer] = {}
+    for number, key in enumerate(keys):
+        found = None if key is None else recall(ROOM, key)
+        if key is None or found is None:
+            continue
         try:
-            answer: Answer = pickle.loads(found)
+            answers[number] = pickle.loads(found)
         except Exception:  # whole, but not for this Python: whatever it raises, it is made again
             set_aside(ROOM, key)
-        else:
-            return answer
-    answer = make()
-    keep(ROOM, key, pickle.dumps(answer, protocol=5))
-    return answer
+    missing = [number for number in range(len(keys)) if number not in answers]
+    for number, answer in make(missing) if missing else ():
+        answers[number] = answer
+        key = keys[number]
+        if key is not None:
+            keep(ROOM, key, pickle.dumps(answer, protocol=5))
+    return [answers[number] for number in range(len(keys))]
+
+
+def _key(name: str, content: str | None) -> str | None:
+    package = None if content is None or _ANEW.get() else package_digest()
+    return None if package is None else f"{name}\n{content}\n{package}"
 
 
 @contextmanager

@@ -6,11 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from tests.simulation.cycles_by_definition import Shifted, ends_in_cycle, restlessness
 
 from asperity.checks import FloatArray
 from asperity.errors import ParameterError
 from asperity.simulation import Cartesian, Resonance, Run, Servo, SpringHand, Still, simulate
-from asperity.simulation.onset import Onset, ends_in_cycle, find_onset, offsets, restlessness
+from asperity.simulation.onset import Onset, find_onset, offsets
 from asperity.simulation.prediction import predict
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
@@ -34,11 +35,10 @@ def test_damping_behind_a_resonance_is_no_damping_of_the_handle() -> None:
 def test_a_cycle_whose_two_last_quarters_differ_is_still_a_cycle() -> None:
     """F at 2000 N/m, lag 6: starts "calm down" at 2 s and go on at 220 mm/s for good."""
     from asperity.paper.experiments.settings import band_setup
-    from asperity.simulation.onset import Shifted
 
     setup = band_setup("F", 2000.0, 6)
     for shift in offsets(setup.surface, 24)[::2]:
-        way = Shifted(setup.motion, (float(shift[0]), float(shift[1]), float(shift[2])))
+        way = Shifted(setup.motion, shift)
         begin = np.array(setup.start) + shift
 
         def run_for(span: float, way: Shifted = way, begin: FloatArray = begin) -> Run:

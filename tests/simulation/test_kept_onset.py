@@ -12,8 +12,9 @@ import pytest
 
 from asperity import cache, kept
 from asperity.laws import Law
-from asperity.simulation import Cartesian, Servo, SpringHand, Still, find_onset, onset
+from asperity.simulation import Cartesian, Servo, SpringHand, Still, find_onset
 from asperity.simulation.onset import Onset
+from asperity.simulation.together import Together
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 
@@ -45,13 +46,13 @@ def room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def runs(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The stiffnesses that are run."""
     seen: list[float] = []
-    run = onset.together
+    start = Together.start
 
-    def noted(surface: Surface, *rest: Any) -> Any:
-        seen.append(surface.stiffness)
-        return run(surface, *rest)
+    def noted(loop: Together, stiffness: float, *rest: Any) -> Any:
+        seen.append(stiffness)
+        return start(loop, stiffness, *rest)
 
-    monkeypatch.setattr(onset, "together", noted)
+    monkeypatch.setattr(Together, "start", noted)
     return seen
 
 

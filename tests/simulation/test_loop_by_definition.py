@@ -13,7 +13,7 @@ from asperity.kernels.tick import ServoState
 from asperity.simulation.kernels import servo_loop, side_by_side
 from asperity.simulation.kernels.body_functions import DIVERGED, LEFT, RAN, Held
 from asperity.simulation.kernels.booking import FRICTION, LOST, SAME_SAMPLE, SAMPLING, SUMS
-from asperity.simulation.trace import COLUMNS, WATCHED
+from asperity.simulation.trace import COLUMNS
 
 RNG = np.random.default_rng(61)
 NAMES = [name for name, _unit in COLUMNS]
@@ -71,12 +71,29 @@ def test_a_row_is_what_its_columns_are_called(monkeypatch: pytest.MonkeyPatch) -
         np.testing.assert_array_equal(row[16:26], ledger[:10])
         assert row[26] == stored_energy(x, HELD.ax, HELD.ay, HELD.az, "plant")
         assert tuple(row[27:]) == (servo.anchor_x, servo.anchor_y, float(held))
-    few = np.full((2, 3, len(WATCHED)), np.nan)
-    side_by_side.watch(few, 1, 2, 0.25, np.stack([-x, x]), np.stack([-ledger, ledger]))
-    expected = [0.25, *x[:6], ledger[:3].sum(), ledger[LOST] - ledger[FRICTION]]
-    np.testing.assert_allclose(few[1, 2], expected, rtol=1e-15)
-    assert np.isnan(few[0]).all()
-    assert np.isnan(few[1, :2]).all()
+
+
+def test_what_is_seen_of_a_run() -> None:
+    """Where it got from the beginning on, and how the velocity varies since it was last seen."""
+    rows, ledgers = RNG.normal(size=(12, 6)), RNG.normal(size=(12, SUMS))
+    seen = np.full((2, side_by_side.SEEN), np.nan)
+    seen[1, side_by_side.LOW : side_by_side.ROWS] = [np.inf] * 3 + [-np.inf] * 3
+    for x, ledger in zip(rows[:5], ledgers, strict=False):
+        side_by_side.see(seen, 1, np.stack([-x, x]), np.stack([-ledger, ledger]))
+    seen[1, side_by_side.ROWS] = 0.0
+    for x, ledger in zip(rows[5:], ledgers[5:], strict=True):
+        side_by_side.see(seen, 1, np.stack([-x, x]), np.stack([-ledger, ledger]))
+    assert np.isnan(seen[0]).all()
+    low, high, (count,), base, total, squares, last = np.split(seen[1], [3, 6, 7, 10, 13, 16])
+    np.testing.assert_array_equal(low, rows[:, :3].min(axis=0))
+    np.testing.assert_array_equal(high, rows[:, :3].max(axis=0))
+    apart = rows[5:, 3:] - rows[5, 3:]
+    assert count == 7.0
+    np.testing.assert_array_equal(base, rows[5, 3:])
+    np.testing.assert_allclose(total, apart.sum(axis=0), rtol=1e-14)
+    np.testing.assert_allclose(squares, (apart**2).sum(axis=0), rtol=1e-14)
+    expected = [ledgers[-1, :3].sum(), ledgers[-1, LOST] - ledgers[-1, FRICTION]]
+    np.testing.assert_allclose(last, expected, rtol=1e-14)
 
 
 class Told:

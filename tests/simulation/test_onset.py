@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.simulation.cycles_by_definition import calms_down, cycles, restlessness
 
 from asperity.errors import ParameterError
 from asperity.simulation import (
@@ -23,7 +24,7 @@ from asperity.simulation import (
     find_onset,
     simulate,
 )
-from asperity.simulation.onset import Shifted, calms_down, cycles, offsets, restlessness
+from asperity.simulation.onset import offsets
 from asperity.simulation.prediction import expected, least_damping, predict, with_wall
 from asperity.surface import Surface
 from asperity.textures.sinusoid import Sinusoid
@@ -99,9 +100,6 @@ def test_starts_share_out_a_period() -> None:
     shifts = offsets(surface, 4)
     np.testing.assert_allclose(shifts[1], [0.3e-3, 0.4e-3, 0.0], atol=1e-18)
     assert np.all(shifts[0] == 0.0)
-    moved = Shifted(Strokes((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 1.0), (0.0, 2.0, 3.0))
-    np.testing.assert_array_equal(moved.at(np.array([0.5])), [[0.5, 2.0, 3.0]])
-    assert moved.to_dict()["motion"]["kind"] == "strokes"
 
 
 def test_restlessness_counts_the_last_quarter() -> None:

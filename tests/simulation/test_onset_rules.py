@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import random
-from types import SimpleNamespace
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -22,9 +22,12 @@ from asperity.simulation import (
     onset,
 )
 from asperity.simulation.ending import Ending
+from asperity.simulation.judging import CYCLE_SPEED, ends_in_cycle
 from asperity.simulation.kernels.body_functions import LANES
-from asperity.simulation.onset import Onset, calms_down, cycles, ends_in_cycle, holds_still, offsets
-from asperity.simulation.run import Ledger, Run, Stop
+from asperity.simulation.onset import Onset, find_onsets, holds_still, offsets
+from asperity.simulation.run import Stop
+from asperity.simulation.searching import bracket
+from asperity.simulation.together import Seen
 from asperity.simulation.trace import COLUMNS
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
@@ -33,103 +36,113 @@ NAMES = [name for name, _unit in COLUMNS]
 SURFACE = Surface(Sinusoid(0.2e-3, 2e-3), "A", max_depth=1e-3)
 
 
-def run_of(velocity: list[float], supplied: list[float], lost: float = 1.0, stop: str = "") -> Run:
-    """Return a run with velocities along x, the energy supplied, and what is lost each sample."""
-    table = np.zeros((len(velocity), len(COLUMNS)))
-    table[:, NAMES.index("vx")] = velocity
-    table[:, NAMES.index("supplied x")] = supplied
-    table[:, NAMES.index("lost")] = lost * np.arange(len(velocity))
-    ledger = Ledger((0.0,) * 3, (0.0,) * 3, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
-    return Run(table, np.zeros(6), len(velocity), 1e-3, ledger, SURFACE, Stop(stop))
+def judged(*seen: Seen, first: int = 16, threshold: float = 1.0) -> tuple[bool, list[int]]:
+    """Return what is judged of a run that is seen so, and after how many samples it is looked at.
+
+    Args:
+        seen: one after the other.
+        first: samples of the run before it is made longer.
+        threshold: see ``ends_in_cycle``.
+    """
+    judge = ends_in_cycle(lambda times: round(times * first), threshold)
+    goals = [next(judge)]
+    for number, one in enumerate(seen):
+        try:
+            goals.append(judge.send(one))
+        except StopIteration as end:
+            assert number == len(seen) - 1
+            return end.value, goals
+    raise AssertionError("it wants to see more")
 
 
-def lively(size: float = 1.0, share: float = 1.0, stop: str = "") -> Run:
-    """Return a run that swings to and fro in its last quarter, fed with a share of its loss."""
-    swing = [0.0] * 12 + [size, -size, size, -size]
-    return run_of(swing, [share * i for i in range(16)], stop=stop)
+def look(
+    restlessness: float = 0.0, supplied: float = 0.0, taken: float = 0.0, stop: str = "",
+    samples: int = 0,
+) -> Seen:  # fmt: skip
+    """Return a look at a run, with energies that were the same one sample before."""
+    energies = supplied, taken
+    return Seen(samples, Stop(stop), restlessness, energies, energies)
+
+
+def quarters(before: float, last: float, fed: bool = True) -> tuple[Seen, ...]:
+    """Return the three looks at a run: its first half, and its last two quarters."""
+    return look(99.0), look(before, 5.0, 5.0), look(last, 6.0 if fed else 5.0, 6.0)
+
+
+LIVELY = quarters(2.0, 2.0)
 
 
 @pytest.mark.parametrize(
-    ("run", "ends"),
+    ("seen", "ends"),
     [
-        (lively(), True),
-        (lively(share=0.0), False),  # restless, but on its own
-        (lively(size=0.0), False),  # fed, but at rest
-        (lively(size=0.0, share=0.0, stop="diverged"), True),
-        (lively(stop="left the workspace"), True),
-        (lively(share=0.0, stop="left the workspace"), False),
+        ((*LIVELY, *quarters(1.5, 1.5)), True),
+        ((*LIVELY, *quarters(1.5, 1.5, fed=False)), False),  # restless, but on its own
+        ((*LIVELY, *quarters(1.5, 0.5)), False),  # fed, but at rest
+        ((look(stop="diverged"),), True),
+        ((look(), look(), look(stop="diverged")), True),
     ],
 )
-def test_a_cycle_is_restless_and_fed_or_diverged(run: Run, ends: bool) -> None:
-    assert cycles(run, 0.5) is ends
+def test_a_cycle_is_restless_and_fed_or_diverged(seen: tuple[Seen, ...], ends: bool) -> None:
+    assert judged(*seen)[0] is ends
+
+
+@pytest.mark.parametrize(
+    ("seen", "ends"),
+    [
+        (LIVELY[1:], True),
+        (quarters(2.0, 2.0, fed=False)[1:], False),
+        ((look(9.0), look(1.0, 1.0, 1.0)), False),  # at the threshold
+    ],
+)
+def test_what_leaves_is_run_again_for_its_last_quarter(seen: tuple[Seen, ...], ends: bool) -> None:
+    """With the sample that the body could not follow."""
+    found, goals = judged(look(stop="left the workspace", samples=10), *seen)
+    assert (found, goals) == (ends, [8, 11 - 2, 11])
+
+
+def test_what_leaves_at_once_has_no_quarter() -> None:
+    assert judged(look(stop="left the workspace", samples=6)) == (False, [8])
+    with pytest.raises(AssertionError, match="see more"):
+        judged(look(stop="left the workspace", samples=7))
 
 
 def test_a_cycle_is_above_the_threshold() -> None:
-    assert not cycles(lively(size=0.5), 0.5)
-    assert cycles(lively(size=math.nextafter(0.5, 1.0)), 0.5)
-    assert onset.CYCLE_SPEED == 15e-3
+    assert judged(*quarters(2.0, 1.0)) == (False, [8, 12, 16])
+    assert judged(*LIVELY, *quarters(1.0, math.nextafter(1.0, 2.0)))[0]
+    assert CYCLE_SPEED == 15e-3
 
 
-def test_only_the_last_quarter_counts() -> None:
-    """What swung before, and what it was fed with before, does not."""
-    before = run_of([0.0] * 8 + [1.0, -1.0] * 2 + [0.0] * 4, [float(i) for i in range(16)])
-    assert not cycles(before, 0.5)
-    supplied = [100.0 * i for i in range(12)] + [1100.0] * 4
-    assert not cycles(run_of([0.0] * 12 + [1.0, -1.0] * 2, supplied), 0.5)
-    later = [0.0] * 12 + [1.0, 2.0, 3.0, 4.0]
-    assert cycles(run_of([0.0] * 12 + [1.0, -1.0] * 2, later), 0.5)
+@pytest.mark.parametrize(("supplied", "ends"), [(0.2, False), (0.21, True), (-1.0, False)])
+def test_what_is_fed_is_fed_a_fifth(supplied: float, ends: bool) -> None:
+    """Of what is taken in the last quarter, up to the last sample; what was before counts not."""
+    before = Seen(0, Stop.NOTHING, 2.0, (0.0, 3.0), (-7.0, -7.0))
+    last = Seen(0, Stop.NOTHING, 2.0, (99.0, 99.0), (supplied, 4.0))
+    assert judged(*LIVELY, look(), before, last)[0] is ends
 
 
-@pytest.mark.parametrize(
-    ("quarters", "stop", "calmer"),
-    [
-        ((1.0, 0.89), "", True),
-        ((1.0, 0.91), "", False),
-        ((1.0, 1.5), "", False),
-        ((1.0, 0.5), "left the workspace", False),
-        ((2.0, 1.8), "", False),  # a tenth exactly is not less
-    ],
-)
-def test_what_calms_down(quarters: tuple[float, float], stop: str, calmer: bool) -> None:
-    third, last = quarters
-    velocity = [9.0, -9.0] * 4 + [third, -third] * 2 + [last, -last] * 2
-    assert calms_down(run_of(velocity, [0.0] * 16, stop=stop)) is calmer
-
-
-class Told:
-    """Runs that are restless as told, in the order of their durations."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, *speeds: float, stop: str = "") -> None:
-        self.spans: list[float] = []
-        self.speeds, self.stop = list(speeds), stop
-        monkeypatch.setattr(onset, "restlessness", lambda run, quarter=3: run.speeds[quarter - 2])
-        monkeypatch.setattr(onset, "cycles", lambda run, threshold: run.speeds[1] > threshold)
-
-    def __call__(self, span: float) -> Any:
-        self.spans.append(span)
-        now = self.speeds[len(self.spans) - 1]
-        before = self.speeds[max(len(self.spans) - 2, 0)]
-        return SimpleNamespace(speeds=(before, now), stop=self.stop)
+@pytest.mark.parametrize("rows", range(16, 24))
+def test_quarters_are_those_of_numpy(rows: int) -> None:
+    sizes = [len(part) for part in np.array_split(np.zeros(rows), 4)]
+    _found, goals = judged(*quarters(0.0, 0.0), first=rows)
+    assert goals == [sum(sizes[:2]), sum(sizes[:3]), rows]
 
 
 @pytest.mark.parametrize(
-    ("speeds", "stop", "spans", "ends"),
+    ("speeds", "spans", "ends"),
     [
-        ((1.0,), "", (0.5,), False),  # at the threshold: at rest
-        ((1.1, 1.0), "", (0.5, 2.0), False),
-        ((1.1, 1.1), "", (0.5, 2.0), True),  # steady: it need not go on
-        ((2.0, 1.5, 1.2), "", (0.5, 2.0, 8.0), True),  # calmer each time, to the last
-        ((2.0, 1.5, 0.9), "", (0.5, 2.0, 8.0), False),
-        ((9.0,), "diverged", (0.5,), True),
+        (((1.0, 1.0),), (16,), False),  # at the threshold: at rest
+        (((1.0, 1.1), (1.1, 1.0)), (16, 64), False),
+        (((1.0, 1.1), (1.1, 1.1)), (16, 64), True),  # steady: it need not go on
+        (((9.0, 2.0), (2.0, 1.79), (2.0, 1.79)), (16, 64, 256), True),  # calmer, to the last
+        (((9.0, 2.0), (2.0, 1.8)), (16, 64), True),  # a tenth exactly is not less
+        (((9.0, 2.0), (2.0, 1.5), (1.2, 0.9)), (16, 64, 256), False),
     ],
 )
 def test_a_restless_run_is_made_longer(
-    monkeypatch: pytest.MonkeyPatch, speeds: tuple[float, ...], stop: str,
-    spans: tuple[float, ...], ends: bool,
-) -> None:  # fmt: skip
-    told = Told(monkeypatch, *speeds, stop=stop)
-    found, _run = ends_in_cycle(told, 0.5, 1.0)
-    assert (found, tuple(told.spans)) == (ends, spans)
+    speeds: tuple[tuple[float, float], ...], spans: tuple[int, ...], ends: bool
+) -> None:
+    found, goals = judged(*(seen for pair in speeds for seen in quarters(*pair)))
+    assert (found, tuple(goals[2::3])) == (ends, spans)
 
 
 def test_the_value_of_a_bracket() -> None:
@@ -141,38 +154,50 @@ def test_the_value_of_a_bracket() -> None:
     assert value(4.0, math.inf) == math.inf
 
 
-def bracket(onset_at: float, low: float, high: float, width: float) -> tuple[Any, list[float]]:
+def answered(path: Any, cycling_at: Callable[[float], bool]) -> tuple[float, float]:
+    """Return the bracket of a search that is told where loops cycle."""
+    stiffness = next(path)
+    while True:
+        try:
+            stiffness = path.send(cycling_at(stiffness))
+        except StopIteration as end:
+            return end.value  # type: ignore[no-any-return]  # that of a generator
+
+
+def found_bracket(
+    onset_at: float, low: float, high: float, width: float
+) -> tuple[Any, list[float]]:
     tried: list[float] = []
 
     def cycling_at(stiffness: float) -> bool:
         tried.append(stiffness)
         return stiffness >= onset_at
 
-    return onset._bracket(cycling_at, low, high, width), tried
+    return answered(bracket(low, high, width), cycling_at), tried
 
 
 def test_the_search_goes_up_in_doubles_and_halves_the_ratio() -> None:
-    found, tried = bracket(9.0, 1.0, 1000.0, 0.5)
+    found, tried = found_bracket(9.0, 1.0, 1000.0, 0.5)
     assert tried == pytest.approx([1.0, 2.0, 4.0, 8.0, 16.0, math.sqrt(128.0)])
     assert found == (8.0, pytest.approx(math.sqrt(128.0)))
-    quiet, cycling = bracket(9.0, 1.0, 1000.0, 1e-6)[0]
+    quiet, cycling = found_bracket(9.0, 1.0, 1000.0, 1e-6)[0]
     assert quiet < 9.0 <= cycling <= quiet * (1.0 + 1e-6)
 
 
 def test_a_bracket_as_wide_as_asked_is_narrow_enough() -> None:
-    found, tried = bracket(9.0, 1.0, 1000.0, 1.0)
+    found, tried = found_bracket(9.0, 1.0, 1000.0, 1.0)
     assert (found, len(tried)) == ((8.0, 16.0), 5)
 
 
 def test_the_highest_stiffness_is_tried_and_none_above() -> None:
-    assert bracket(1e9, 1.0, 10.0, 0.1) == ((10.0, math.inf), [1.0, 2.0, 4.0, 8.0, 10.0])
-    assert bracket(1e9, 1.0, 8.0, 0.1) == ((8.0, math.inf), [1.0, 2.0, 4.0, 8.0])
-    found, tried = bracket(9.5, 1.0, 10.0, 2.0)
+    assert found_bracket(1e9, 1.0, 10.0, 0.1) == ((10.0, math.inf), [1.0, 2.0, 4.0, 8.0, 10.0])
+    assert found_bracket(1e9, 1.0, 8.0, 0.1) == ((8.0, math.inf), [1.0, 2.0, 4.0, 8.0])
+    found, tried = found_bracket(9.5, 1.0, 10.0, 2.0)
     assert (found, tried[-1]) == ((8.0, 10.0), 10.0)
 
 
 def test_what_cycles_at_once_has_no_quiet_end() -> None:
-    assert bracket(0.5, 1.0, 10.0, 0.1) == ((0.0, 1.0), [1.0])
+    assert found_bracket(0.5, 1.0, 10.0, 0.1) == ((0.0, 1.0), [1.0])
 
 
 @pytest.mark.parametrize("seed", range(60))
@@ -182,14 +207,14 @@ def test_from_near_the_same_bracket_is_found_with_fewer_questions(seed: int) -> 
     near = onset_at * 2.0 ** draw.uniform(-3.0, 3.0)
     ends = (10.0 ** draw.uniform(0.0, 1.0), 10.0 ** draw.uniform(4.5, 5.0))
     width = 10.0 ** draw.uniform(-3.0, 0.0)
-    climbed, all_tried = bracket(onset_at, *ends, width)
+    climbed, all_tried = found_bracket(onset_at, *ends, width)
     tried: list[float] = []
 
     def cycling_at(stiffness: float) -> bool:
         tried.append(stiffness)
         return stiffness >= onset_at
 
-    assert onset._bracket(cycling_at, *ends, width, near) == climbed
+    assert answered(bracket(*ends, width, near), cycling_at) == climbed
     assert len(tried) == len(set(tried)) <= len(all_tried) + 3
     assert set(tried) - set(all_tried) <= {k for k in tried if k >= onset_at or k == ends[1]}
 
@@ -198,14 +223,14 @@ def test_from_near_a_window_farther_down_is_passed_over() -> None:
     def cycling_at(stiffness: float) -> bool:
         return 3.0 <= stiffness < 9.0 or stiffness >= 700.0
 
-    assert onset._bracket(cycling_at, 1.0, 1e6, 1.0) == (2.0, 4.0)
-    assert onset._bracket(cycling_at, 1.0, 1e6, 1.0, 300.0) == (512.0, 1024.0)
-    assert onset._bracket(cycling_at, 1.0, 1e6, 1.0, 8.5) == (2.0, 4.0)
+    assert answered(bracket(1.0, 1e6, 1.0), cycling_at) == (2.0, 4.0)
+    assert answered(bracket(1.0, 1e6, 1.0, 300.0), cycling_at) == (512.0, 1024.0)
+    assert answered(bracket(1.0, 1e6, 1.0, 8.5), cycling_at) == (2.0, 4.0)
 
 
 @pytest.mark.parametrize("near", [0.0, -1.0, 1e-9, 1e9])
 def test_wherever_it_is_expected_the_onset_is_found(near: float) -> None:
-    assert onset._bracket(lambda k: k >= 9.0, 1.0, 1000.0, 1.0, near) == (8.0, 16.0)
+    assert answered(bracket(1.0, 1000.0, 1.0, near), lambda k: k >= 9.0) == (8.0, 16.0)
 
 
 # --- the whole search, on runs that are told ------------------------------------------------------
@@ -215,26 +240,45 @@ PLANT, SERVO = Cartesian(0.05, 3.0), Servo(1e-3)
 HAND = SpringHand((100.0, 100.0, 0.0), 1.0, 0.0, (0.0, 0.0, -1.0))
 
 
+class ToldStart:
+    """A start that is known when it has been run so many times."""
+
+    def __init__(self, stiffness: float, delay: int, shift: float, times: int) -> None:
+        self.stiffness, self.delay, self.shift, self.times = stiffness, delay, shift, times
+        self.verdict: bool | None = None
+        self.box = np.array([[-shift, 0.0, -stiffness], [shift, 0.0, stiffness]])
+
+
+class ToldLoop:
+    """Starts cycle from 100 N/m on, and from 200 N/m all; they reach as far as they are stiff."""
+
+    def __init__(self, at_once: bool = False, times: int = 1) -> None:
+        self.at_once, self.times = at_once, times
+        self.seen: list[tuple[float, float]] = []
+        self.together: list[list[ToldStart]] = []
+
+    def start(self, stiffness: float, delay: int, shift: FloatArray, _judge: Any) -> ToldStart:
+        return ToldStart(stiffness, delay, float(shift[0]), self.times)
+
+    def run(self, starts: list[ToldStart]) -> None:
+        assert 1 <= len(starts) <= LANES
+        assert len(set(map(id, starts))) == len(starts)
+        self.together.append(starts)
+        for start in starts:
+            assert start.verdict is None
+            start.times -= 1
+            if start.times == 0:
+                self.seen.append((start.stiffness, start.shift))
+                known = 100.0 if start.shift > 1.4e-3 else 200.0
+                start.verdict = start.stiffness * (1 + start.delay) >= known
+
+
 @pytest.fixture
 def told(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, float]]:
-    """Starts cycle from 100 N/m on, and from 200 N/m all; they reach as far as they are stiff."""
-    seen: list[tuple[float, float]] = []
-
-    def one(k: float, shift: float) -> tuple[bool, Any]:
-        seen.append((k, shift))
-        reach = np.array([[-shift, 0.0, -k], [shift, 0.0, k]])
-        return k >= (100.0 if shift > 1.4e-3 else 200.0), SimpleNamespace(position=reach)
-
-    def together(surface: Surface, *rest: Any) -> Any:
-        return [one(surface.stiffness, float(shift)) for shift in rest[-1][:, 0]]
-
-    def end(told: Any, count: int, _duration: float, _threshold: float) -> Any:
-        assert len(told) == count <= LANES
-        return told
-
-    monkeypatch.setattr(onset, "together", together)
-    monkeypatch.setattr(onset, "end_in_cycles", end)
-    return seen
+    """The stiffnesses and shifts that are run."""
+    loop = ToldLoop()
+    monkeypatch.setattr(onset, "Together", lambda *_parts: loop)
+    return loop.seen
 
 
 def search(starts: int = 4, **more: Any) -> Onset:
@@ -273,6 +317,30 @@ def test_the_start_that_cycled_last_is_tried_first(told: list[tuple[float, float
     middle = math.sqrt(75.0 * 150.0)
     first = told.index((middle, pytest.approx(17 / 12e3)))
     assert told[first + 1][0] != middle
+
+
+@pytest.mark.parametrize("at_once", [False, True])
+def test_delays_are_looked_for_together(monkeypatch: pytest.MonkeyPatch, at_once: bool) -> None:
+    """Whatever else runs beside it, an onset is the one that is found alone."""
+    still, delays, nears = Still((0.0, 0.0, 0.0)), (0, 1, 4), (None, 300.0, 20.0)
+    monkeypatch.setattr(onset, "Together", lambda *_parts: ToldLoop())
+    alone = [
+        find_onset(SURFACE, PLANT, HAND, Servo(1e-3, d), still, starts=24, near=near)
+        for d, near in zip(delays, nears, strict=True)
+    ]
+    loop = ToldLoop(at_once, times=3)
+    monkeypatch.setattr(onset, "Together", lambda *_parts: loop)
+    done: list[int] = []
+    found = find_onsets(
+        SURFACE, PLANT, HAND, SERVO, still, delays, nears, starts=24, told=lambda: done.append(1)
+    )
+    assert found == alone
+    assert len(done) == 3
+    assert len({one.cycling for one in found}) == 3
+    first, *_ = loop.together
+    # One start of each at first; where bodies move at once, others fill the lanes.
+    assert sorted(start.delay for start in first if start.shift == 0.0) == list(delays)
+    assert len(first) == (LANES if at_once else 3)
 
 
 @pytest.mark.usefixtures("told")

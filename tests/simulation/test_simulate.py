@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.simulation.cycles_by_definition import cycles, restlessness
 from tests.traced import traced_peak
 
 from asperity.errors import ParameterError
@@ -31,7 +32,7 @@ from asperity.simulation import (
     simulate,
     simulate_many,
 )
-from asperity.simulation.onset import CYCLE_SPEED, cycles, restlessness
+from asperity.simulation.judging import CYCLE_SPEED
 from asperity.simulation.run import reread
 from asperity.simulation.trace import HEADER, MemoryTrace
 from asperity.surface import Surface

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.simulation import cycles_by_definition as definition
 
 from asperity.errors import ParameterError
 from asperity.simulation import (
@@ -18,9 +21,10 @@ from asperity.simulation import (
     Strokes,
     simulate,
 )
+from asperity.simulation.judging import ends_in_cycle
 from asperity.simulation.kernels.body_functions import LANES
 from asperity.simulation.run import Run, Stop
-from asperity.simulation.together import Together
+from asperity.simulation.together import Judge, Seen, Start, Together
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 
@@ -31,68 +35,135 @@ WAY = Strokes((0.0, 0.0, -0.5e-3), (4e-3, 1e-3, -0.5e-3), 0.05, count=2)
 LOOP = SURFACE, PLANT, HAND, SERVO
 
 
-def same(one: Run, whole: Run) -> None:
-    """Compare a run that went on with a whole one."""
-    np.testing.assert_array_equal(one.table[:, :7], whole.table[:, :7])
-    energies, few = whole.energies, one.part("supplied", "taken")
-    np.testing.assert_allclose(few[:, 0], energies["supplied"].sum(axis=1), rtol=1e-12, atol=1e-18)
-    np.testing.assert_array_equal(few[:, 1], energies["lost"] - energies["friction"])
-    assert one.fed == whole.fed
-    alike(one, whole)
+class Watcher:
+    """Sees a run after so many samples each, and writes down what it sees.
+
+    Args:
+        goals: in rising order.
+    """
+
+    def __init__(self, *goals: int) -> None:
+        self.goals = goals
+        self.seen: list[Seen] = []
+
+    def judge(self) -> Judge:
+        for goal in self.goals:
+            self.seen.append((yield goal))
+            if self.seen[-1].stop:
+                break
+        return True
 
 
-def alike(one: Run, other: Run) -> None:
-    np.testing.assert_array_equal(one.state, other.state)
-    assert one.ledger == other.ledger
-    assert (one.samples, one.stop, one.place) == (other.samples, other.stop, other.place)
-    assert (one.short, one.gap) == (other.short, other.gap)
+def run_all(loop: Together, starts: Sequence[Start]) -> None:
+    while some := [start for start in starts if start.verdict is None]:
+        loop.run(some)
 
 
-def test_longer_runs_go_on_bit_for_bit() -> None:
-    """Over parts that end within the 256 samples between flushes; what was returned stays."""
-    starts = [(1e-4, 0.0, 1e-3), (3e-4, 1e-4, 0.0)]
-    runs_for = Together(*LOOP, [WAY, WAY], starts, velocity=(0.0, 0.05, 0.0))
-    spans = (0.3, 1.1, 1.1, 17.0)
-    found = [runs_for(span) for span in spans]
-    fed = set()
-    for runs in found:
-        for run, start in zip(runs, starts, strict=True):
-            fed.add(run.fed)
-            same(run, simulate(*LOOP, WAY, run.duration, start=start, velocity=(0.0, 0.05, 0.0)))
-    assert [runs[1].samples for runs in found] == [300, 1100, 1100, 17_000]
-    assert not np.array_equal(found[0][0].state, found[1][0].state)
-    assert fed == {True, False}
+def alone(
+    parts: Any, start: Start, begin: Any, velocity: Any, samples: int, motion: Any = WAY
+) -> Run:
+    """Return the same run by itself, with its whole trace."""
+    surface, plant, hand, servo = parts
+    own = replace(servo, delay=start.delay)
+    way = definition.Shifted(motion, start.offset)
+    return simulate(
+        surface.to_stiffness(start.stiffness), plant, hand, own, way, samples * servo.period,
+        start=np.array(begin) + start.offset, velocity=velocity,
+    )  # fmt: skip
+
+
+def same(start: Start, watcher: Watcher, run: Run) -> None:
+    """Compare a run that was seen with its trace: states bit for bit, spreads to rounding."""
+    np.testing.assert_array_equal(start.state, run.state)
+    np.testing.assert_array_equal(start.box, [run.position.min(axis=0), run.position.max(axis=0)])
+    assert (start.samples, watcher.seen[-1].stop) == (run.samples, run.stop)
+    assert start.memory[4] == run.short
+    supplied = run.energies["supplied"].sum(axis=1)
+    taken = run.energies["lost"] - run.energies["friction"]
+    first = 0
+    for seen in watcher.seen:
+        last = len(run.table) if seen.stop else seen.samples
+        part = run.velocity[first:last]
+        rounding = 1e-7 * np.abs(part - part[0]).max()
+        assert seen.restlessness == pytest.approx(part.std(axis=0).sum(), rel=1e-9, abs=rounding)
+        assert seen.last == pytest.approx((supplied[last - 1], taken[last - 1]), rel=1e-12)
+        if last < len(run.table):
+            assert seen.energies == pytest.approx((supplied[last], taken[last]), rel=1e-12)
+        first = last
+
+
+def test_runs_of_other_stiffness_and_delay_go_on_bit_for_bit() -> None:
+    """Over parts that end within the 256 samples between flushes, wherever the others are."""
+    begin, velocity = (1e-4, 0.0, 1e-3), (0.0, 0.05, 0.0)
+    loop = Together(*LOOP, WAY, begin, velocity)
+    plans = [(300, 1100, 17_000), (7, 8, 900), (40_000,), (1, 2, 3, 20_011)]
+    watchers = [Watcher(*goals) for goals in plans]
+    starts = [
+        loop.start(500.0 * (i + 1), i, np.array([3e-4 * i, 1e-4 * i, 0.0]), watcher.judge())
+        for i, watcher in enumerate(watchers)
+    ]
+    loop.run(starts[1:3])  # the others begin later
+    run_all(loop, starts)
+    for start, watcher, goals in zip(starts, watchers, plans, strict=True):
+        same(start, watcher, alone(LOOP, start, begin, velocity, goals[-1]))
+        assert [seen.samples for seen in watcher.seen] == list(goals)
+    # Whoever takes another stiffness or delay for its own gets another state.
+    wrong = alone(LOOP, starts[2], begin, velocity, 40_000)
+    for start in starts[0], starts[3]:
+        assert not np.array_equal(start.state, wrong.state)
 
 
 def test_next_to_nothing_is_made_nothing_at_the_same_samples() -> None:
     """A handle that fades away freely: which sample makes it nothing does not depend on parts."""
-    loop = SURFACE, Cartesian(0.05, 40.0), SpringHand(), Servo(1e-3)
-    still = Still((0.0, 0.0, 1.0))
-    runs_for = Together(*loop, [still], [(0.0, 0.0, 1.0)], velocity=(1.0, 0.0, 0.0))
-    runs_for(0.1)
-    (run,) = runs_for(0.6)
-    same(run, simulate(*loop, still, 0.6, start=(0.0, 0.0, 1.0), velocity=(1.0, 0.0, 0.0)))
+    parts = SURFACE, Cartesian(0.05, 40.0), SpringHand(), Servo(1e-3)
+    still, begin, velocity = Still((0.0, 0.0, 1.0)), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+    loop = Together(*parts, still, begin, velocity)
+    watcher = Watcher(100, 171, 600)
+    start = loop.start(900.0, 0, np.zeros(3), watcher.judge())
+    run_all(loop, [start])
+    run = alone(parts, start, begin, velocity, 600, still)
+    same(start, watcher, run)
     assert run.table[-1, 4] == 0.0 < run.table[170, 4] < 1e-50
 
 
 def test_a_run_that_has_ended_does_not_go_on() -> None:
     servo = Servo(1e-3, virtual_damping=-400.0)
-    runs_for = Together(SURFACE, PLANT, HAND, servo, [WAY], [None], velocity=(0.0, 0.0, -1.0))
-    (first,) = runs_for(1.0)
-    assert first.stop is Stop.DIVERGED
-    assert first.samples < 1000
-    (again,) = runs_for(4.0)
-    alike(again, first)
-    np.testing.assert_array_equal(again.table, first.table)
+    loop = Together(SURFACE, PLANT, HAND, servo, WAY, None, (0.0, 0.0, -1.0))
+    watchers = Watcher(1000, 4000), Watcher(1000)
+    starts = [loop.start(900.0, 0, np.array([0.0, 0.0, z]), w.judge())
+              for z, w in zip((0.0, 1.0), watchers, strict=True)]  # fmt: skip
+    run_all(loop, starts)
+    (seen,) = watchers[0].seen
+    assert seen.stop is Stop.DIVERGED
+    assert starts[0].samples < 1000
+    run = alone(
+        (SURFACE, PLANT, HAND, servo), starts[0], WAY.at(np.zeros(1))[0], (0.0, 0.0, -1.0), 1000
+    )
+    same(starts[0], watchers[0], run)
+
+
+def test_a_goal_that_is_behind_begins_anew() -> None:
+    loop = Together(*LOOP, WAY)
+    back, ahead = Watcher(700, 350, 900), Watcher(350, 900)
+    starts = [loop.start(900.0, 1, np.zeros(3), one.judge()) for one in (back, ahead)]
+    run_all(loop, starts)
+    assert back.seen[1:] == ahead.seen
+    np.testing.assert_array_equal(starts[0].state, starts[1].state)
+    np.testing.assert_array_equal(starts[0].box, starts[1].box)
 
 
 def test_what_fits_not_together_is_refused() -> None:
     with pytest.raises(ParameterError, match="plant must be"):
-        Together(SURFACE, HAND, HAND, SERVO, [WAY], [None])  # type: ignore[arg-type]  # the point
-    with pytest.raises(ParameterError, match="duration"):
-        Together(*LOOP, [WAY], [None])(0.0)
+        Together(SURFACE, HAND, HAND, SERVO, WAY)  # type: ignore[arg-type]  # the point
+    bars = Together(SURFACE, Pantograph(), HAND, SERVO, STILL)
+    with pytest.raises(ParameterError, match="workspace"):
+        bars.start(900.0, 0, np.array([0.0, 0.0, 9.0]), Watcher(1).judge())
+    loop = Together(*LOOP, WAY)
+    with pytest.raises(ParameterError, match="delay must be at most"):
+        loop.start(900.0, 1_000_001, np.zeros(3), Watcher(1).judge())
+    starts = [loop.start(900.0, 0, np.zeros(3), Watcher(1).judge()) for _ in range(LANES + 1)]
     with pytest.raises(ParameterError, match=f"at most {LANES}"):
-        Together(*LOOP, [WAY] * (LANES + 1), [None] * (LANES + 1))
+        loop.run(starts)
 
 
 # --- a pantograph, whose handles move on together -------------------------------------------------
@@ -100,7 +171,7 @@ def test_what_fits_not_together_is_refused() -> None:
 
 BAND = BandHand(200.0, 3.0, 0.08, 0.02)
 STILL = Still((0.0, 0.0, 0.0))
-STARTS = np.array([(1e-4 * i, 0.0, 4e-3 - 1e-3 * i) for i in range(LANES)])
+OFFSETS = np.array([(1e-4 * i, 0.0, 4e-3 - 1e-3 * i) for i in range(LANES)])
 AT_THE_END = SpringHand(0.0, 0.1, 0.0, (0.0, 0.0, 1.0))
 
 
@@ -121,14 +192,52 @@ def test_handles_that_move_together_move_as_alone(
     plant: Pantograph, hand: Any, velocity: Any, above: float, period: float
 ) -> None:
     surface = Surface(Sinusoid(0.8e-3, 1e-3), "W", stiffness=900.0)
-    loop = surface, plant, hand, Servo(period, delay=2, position_resolution=15e-6)
-    starts = list(STARTS + np.array([0.0, 0.0, above]))
-    runs_for = Together(*loop, [STILL] * LANES, starts, velocity=velocity)
-    some = runs_for(0.05, [0, 2, 5])
-    every = runs_for(0.05), runs_for(0.12, [1, 2, 7])
-    for runs, which, span in (
-        (some, [0, 2, 5], 0.05), (every[0], range(LANES), 0.05), (every[1], [1, 2, 7], 0.12),
-    ):  # fmt: skip
-        for run, number in zip(runs, which, strict=True):
-            alone = simulate(*loop, STILL, span, start=starts[number], velocity=velocity)
-            same(run, alone)
+    parts = surface, plant, hand, Servo(period, position_resolution=15e-6)
+    begin = (0.0, 0.0, above)
+    loop = Together(*parts, STILL, begin, velocity)
+    goals = [(round(0.05 / period), round((0.12 if i in {1, 2, 7} else 0.06) / period))
+             for i in range(LANES)]  # fmt: skip
+    watchers = [Watcher(*each) for each in goals]
+    starts = [
+        loop.start(900.0 + 10.0 * i, i % 3, OFFSETS[i], watcher.judge())
+        for i, watcher in enumerate(watchers)
+    ]
+    loop.run([starts[i] for i in (0, 2, 5)])
+    run_all(loop, starts)
+    for start, watcher, (_, last) in zip(starts, watchers, goals, strict=True):
+        run = alone(parts, start, begin, velocity, last, STILL)
+        same(start, watcher, run)
+        assert (run.stop is Stop.LEFT) == (hand is AT_THE_END)
+
+
+@pytest.mark.parametrize("law", ["W", "C", "D"])
+def test_verdicts_are_those_of_whole_traces(law: str) -> None:
+    """Stiffnesses about the onset, where runs are made longer, and beyond, where they leave."""
+    surface = Surface(Sinusoid(0.8e-3, 1e-3), law, max_depth=1e-3)
+    parts = surface, Pantograph(centre=(0.0375, 0.1)), BAND, Servo(1e-4, position_resolution=15e-6)
+    begin, span = (0.0, 0.0, 4e-3), 0.25
+    loop = Together(*parts, STILL, begin)
+    middle = {"W": 5600.0, "C": 11.5, "D": 4000.0}[law]
+    lengths, stops = set(), set()
+    for factor in (0.9, 0.98, 1.04, 8.0):
+        starts = [
+            loop.start(
+                middle * factor, 2, np.array([shift, 0.0, 0.0]),
+                ends_in_cycle(lambda times: round(times * span / 1e-4)),
+            )
+            for shift in (0.0, 0.3e-3, 0.6e-3)
+        ]  # fmt: skip
+        run_all(loop, starts)
+        for start in starts:
+
+            def run_for(duration: float, start: Start = start) -> Run:
+                return alone(parts, start, begin, None, round(duration / 1e-4), STILL)
+
+            ends, run = definition.ends_in_cycle(run_for, span)
+            assert (start.verdict, start.samples) == (ends, run.samples)
+            box = [run.position.min(axis=0), run.position.max(axis=0)]
+            np.testing.assert_array_equal(start.box, box)
+            lengths.add(start.samples)
+            stops.add(run.stop)
+    assert len(lengths) > 1
+    assert (Stop.LEFT in stops) == (law != "C")

@@ -13,7 +13,7 @@ from asperity.report.run import FOOTER, facts_of_loop
 from asperity.report.terminal import say
 from asperity.report.words.number_words import INFINITE, NONE
 from asperity.scene.setup import Setup
-from asperity.simulation.onset import CYCLE_SPEED
+from asperity.simulation.judging import CYCLE_SPEED
 from asperity.simulation.prediction import Prediction
 from asperity.units import engineering
 

@@ -12,7 +12,8 @@ from asperity.report.terminal import say
 from asperity.report.words.number_words import law_title
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
-from asperity.simulation.onset import CYCLE_SPEED, holds_still
+from asperity.simulation.judging import CYCLE_SPEED
+from asperity.simulation.onset import holds_still
 from asperity.surface import Surface
 from asperity.units import engineering
 

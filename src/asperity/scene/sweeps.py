@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -13,7 +14,7 @@ from asperity.errors import ParameterError
 from asperity.scene.setup import Setup
 from asperity.simulation.hands import SpringHand
 from asperity.simulation.motions import Strokes
-from asperity.simulation.onset import LOWEST, Onset, find_onset
+from asperity.simulation.onset import LOWEST, Onset, find_onsets
 from asperity.simulation.prediction import Prediction, expected, predict, with_wall
 from asperity.simulation.scan import Stroke, scan_strokes
 
@@ -58,28 +59,36 @@ def onsets(
         ParameterError: for a hand that does not come to rest, see
             :func:`~asperity.simulation.find_onset`.
     """
-
-    def one(law: str, delay: int) -> Onset:
-        loop = setup.with_law(law).with_delay(delay)
-        begin = loop.motion.at(np.zeros(1))[0] if loop.start is None else loop.start
-        near = expected(loop.surface, loop.plant, loop.hand, loop.servo, begin)
-        found = find_onset(
-            loop.surface, loop.plant, loop.hand, loop.servo, loop.motion, start=loop.start,
-            velocity=loop.velocity, duration=loop.duration, starts=starts, tolerance=tolerance,
-            lowest=lowest, near=near,
-        )  # fmt: skip
-        if progress is not None:
-            progress()
-        return found
-
     jobs = [(law, delay) for law in laws for delay in delays]
-    found = side_by_side(one, jobs)
+    several = side_by_side(
+        partial(_law_onsets, setup, delays, starts, tolerance, lowest, progress),
+        [(law,) for law in laws],
+    )
+    found = [onset for some in several for onset in some]
     return tuple(
         predict(
             setup.with_law(law).surface, setup.plant, setup.hand, setup.with_delay(delay).servo,
             onset, with_wall(found, delay),
         )
         for (law, delay), onset in zip(jobs, found, strict=True)
+    )  # fmt: skip
+
+
+def _law_onsets(
+    setup: Setup, delays: Sequence[int], starts: int, tolerance: float, lowest: float,
+    progress: Callable[[], None] | None, law: str,
+) -> list[Onset]:  # fmt: skip
+    """Return the onsets of a law for every delay; see :func:`onsets`."""
+    loop = setup.with_law(law)
+    begin = loop.motion.at(np.zeros(1))[0] if loop.start is None else loop.start
+    nears = [
+        expected(loop.surface, loop.plant, loop.hand, loop.with_delay(delay).servo, begin)
+        for delay in delays
+    ]
+    return find_onsets(
+        loop.surface, loop.plant, loop.hand, loop.servo, loop.motion, delays, nears,
+        start=loop.start, velocity=loop.velocity, duration=loop.duration, starts=starts,
+        tolerance=tolerance, lowest=lowest, told=progress,
     )  # fmt: skip
 
 

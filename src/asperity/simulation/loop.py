@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 from types import ModuleType
 
@@ -12,10 +11,8 @@ from asperity.checks import FloatArray
 from asperity.contacts.memory import SHORT, WORST, new_memory
 from asperity.errors import ParameterError
 from asperity.kernels.probe import ClampName
-from asperity.kernels.tick import ServoState
 from asperity.laws import Law
-from asperity.simulation.kernels import one_by_one, servo_loop, side_by_side
-from asperity.simulation.kernels.body_functions import SAMPLES, STOP
+from asperity.simulation.kernels import servo_loop
 from asperity.simulation.kernels.booking import SUMS
 from asperity.simulation.kernels.servo_loop import LoopState
 from asperity.simulation.run import Ledger, Stop
@@ -40,15 +37,15 @@ def _fused(
     return fuse_on_texture(law, sampler, clamp, (servo_loop,), (tick, *body))
 
 
-@lru_cache(maxsize=256)
-def _fused_lanes(
-    law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName, body: tuple[ModuleType, ...]
-) -> ModuleType:
-    from asperity.kernels import tick
-    from asperity.kernels.fuse import fuse_on_texture
+def checked_delay(delay: int) -> int:
+    """Return a delay [samples].
 
-    further = (tick, servo_loop, *body, one_by_one)
-    return fuse_on_texture(law, sampler, clamp, (side_by_side,), further)
+    Raises:
+        ParameterError: for one of more than ``MOST_DELAY``.
+    """
+    if delay > MOST_DELAY:
+        raise ParameterError("delay", f"must be at most {MOST_DELAY} samples", delay)
+    return delay
 
 
 class Simulation:
@@ -80,11 +77,9 @@ class Simulation:
         velocity: FloatArray | None = None,
         looks: float | None = None,
     ) -> None:
-        if servo.delay > MOST_DELAY:
-            raise ParameterError("delay", f"must be at most {MOST_DELAY} samples", servo.delay)
         self._plant, self._servo = plant, servo
         self.state = plant.state(start, np.zeros(3) if velocity is None else velocity)
-        self.queue = np.zeros((servo.delay + 1, 3))
+        self.queue = np.zeros((checked_delay(servo.delay) + 1, 3))
         self.memory = new_memory(surface.law.contact.looks if looks is None else looks)
         self._loop, self._ledger = LoopState(), np.zeros(SUMS)
         self._before = 0.0
@@ -146,50 +141,3 @@ class Simulation:
     def ledger(self) -> Ledger:
         """Return the energies since the beginning."""
         return Ledger.of(self._ledger, self._before, self.stored(self._anchor))
-
-
-def run_together(
-    loops: Sequence[Simulation], going: Sequence[bool], anchors: FloatArray, tables: FloatArray
-) -> list[Stop]:
-    """Run several loops over the same samples, each as :meth:`Simulation.run` does, bit for bit.
-
-    Args:
-        loops: at most ``LANES``, of the same surface, body and servo.
-        going: which of them run; they have come equally far.
-        anchors: positions of the hands' anchors at the samples [m], shape (n, k + 1, 3).
-        tables: traces with the columns of ``WATCHED``, shape (n, samples, 9); the rows of these
-            samples are written.
-
-    Returns:
-        What stopped each before the end.
-    """
-    names = ("state", "queue", "memory", "_ledger")
-    state, queue, memory, ledger = (
-        np.array([getattr(loop, name) for loop in loops]) for name in names
-    )
-    carried = np.array([loop._loop.servo for loop in loops], dtype=np.float64)
-    told = np.array(
-        [[0 if go else -1, loop.samples] for loop, go in zip(loops, going, strict=True)]
-    )
-    run = [i for i, go in enumerate(going) if go]
-    first = loops[run[0]]
-    done = first.samples
-    for i in run:
-        if done == 0:
-            loops[i]._before = loops[i].stored(anchors[i, 0])
-    _fused_lanes(*first._code).servo_lanes(
-        state, queue, carried, done, ledger, anchors, first._plant.record,
-        first._servo.settings, memory, *first._arguments, tables, told,
-    )  # fmt: skip
-    stops = [STOPS[max(int(stop), 0)] for stop in told[:, STOP]]
-    for i in run:
-        loop = loops[i]
-        for name, rows in zip(names, (state, queue, memory, ledger), strict=True):
-            getattr(loop, name)[:] = rows[i]
-        samples = int(told[i, SAMPLES])
-        loop.rows = samples - done + (stops[i] is Stop.LEFT)
-        loop._anchor = anchors[i, samples - done].copy()
-        numbers = dict(zip(ServoState._fields, map(float, carried[i]), strict=True))
-        held = numbers.pop("held") > 0.0
-        loop._loop = LoopState(ServoState(**numbers, held=held), samples % len(loop.queue), samples)
-    return stops

@@ -15,8 +15,8 @@ from asperity.display import Plotted
 from asperity.files import plain, record
 from asperity.recording.recording import open_recording
 from asperity.recording.traced import Parts
-from asperity.simulation.ending import FED, Ending, fed
-from asperity.simulation.trace import COLUMNS, WATCHED, is_text
+from asperity.simulation.ending import Ending, fed
+from asperity.simulation.trace import COLUMNS, is_text
 from asperity.surface import Surface
 
 MOST_ROWS = 20_000
@@ -178,18 +178,6 @@ class Run(Parts, Plotted):
         names = ("duration", "samples", "period", "stopped", "state", "ledger", "short", "gap")
         own = record(self, *names, infinity=None)
         return own | {"trace": self.path or None, "notes": list(self.notes)}
-
-
-class WatchedRun(Run):
-    """A run whose trace has only what tells a limit cycle, see ``WATCHED``."""
-
-    columns = WATCHED
-
-    @property
-    def fed(self) -> bool:
-        """As of a whole trace."""
-        supplied, taken = self.table[-1, 7:] - self.table[-max(len(self.time) // 4, 2), 7:]
-        return bool(supplied > FED * taken)
 
 
 def reread(run: Run, most: int = MOST_ROWS) -> Run:

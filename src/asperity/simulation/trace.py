@@ -29,12 +29,6 @@ COLUMNS = (
 )
 """Columns of the trace with their units."""
 
-WATCHED = (*COLUMNS[:7], ("supplied", "J"), ("taken", "J"))
-"""What tells a limit cycle: the motion, what the texture supplies, what damping and friction take.
-
-A third of the columns, and no energy is worked out for them: a quarter of the time of a sample.
-"""
-
 HEADER = ",".join(f"{name} [{unit}]" for name, unit in COLUMNS)
 _TEXT, _RECORDING = (".csv", ".txt"), (".mcap", "")
 _ROW = ",".join(["%.12g"] * len(COLUMNS)) + "\n"

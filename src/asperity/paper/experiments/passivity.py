@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -13,6 +14,7 @@ from asperity.paper.experiments.settings import FITTED, LAG, LETTERS, band_setup
 from asperity.scene.sweeps import onsets, side_by_side
 from asperity.simulation.onset import ends_of_starts, offsets
 from asperity.simulation.prediction import Prediction
+from asperity.simulation.together import Judge, Together
 
 COUNTED_STARTS = 24
 STARTS = 8
@@ -33,7 +35,7 @@ class Count(Record):
         divisor: of the stiffness of 2000 N/m.
         delay: in samples.
         starts: how many there were.
-        cycles: how many ended in a steady cycle, see ``ends_in_cycle``.
+        cycles: how many ended in a steady cycle, see ``simulation/judging.py``.
         slow: how many were restless after 0.5 s, but came to rest by 2 or 8 s.
         time: of the first start's trace [s], shape (n,).
         x: of the handle [m], shape (n,).
@@ -85,21 +87,28 @@ class PassivityExperiment(Record):
 def count_cycles(law: str, divisor: float, delay: int = LAG, starts: int = COUNTED_STARTS) -> Count:
     """Return how many starts end in a limit cycle at 2000 N/m over a divisor."""
     setup = band_setup(law, _STIFFNESS / divisor, delay)
-    begin = np.array(setup.start)
-    found = slow = 0
-    kept: FloatArray | None = None
-    for ended, run in ends_of_starts(
-        setup.surface, setup.plant, setup.hand, setup.servo, setup.motion, begin, None,
-        offsets(setup.surface, starts), setup.duration,
-    ):  # fmt: skip
-        found += ended
-        slow += run.duration > setup.duration and not ended
-        if kept is None:
-            shown = slice(None, round(setup.duration / run.period), _EVERY)
-            kept = np.column_stack([run.time, run.position[:, 0], run.position[:, 2]])[shown]
-    assert kept is not None
-    time, x, z = kept.T
-    return Count(law, divisor, delay, starts, found, slow, time, x, z)
+    servo, duration = setup.servo, setup.duration
+    loop = Together(setup.surface, setup.plant, setup.hand, servo, setup.motion, setup.start)
+    stiffness, shifts = setup.surface.stiffness, offsets(setup.surface, starts)
+    runs = ends_of_starts(loop, stiffness, servo, shifts, duration)
+    cycling = sum(bool(run.verdict) for run in runs)
+    slow = sum(run.samples * servo.period > duration and not run.verdict for run in runs)
+    shown = range(0, round(duration / servo.period), _EVERY)
+    first = loop.start(stiffness, delay, shifts[0], _seen_at(shown[1:]))
+    path = [first.state[[0, 2]].copy()]
+    while first.verdict is None:
+        loop.run([first])
+        path.append(first.state[[0, 2]].copy())
+    time = np.array(shown) * servo.period
+    return Count(law, divisor, delay, starts, cycling, slow, time, *np.array(path).T)
+
+
+def _seen_at(goals: Sequence[int]) -> Judge:
+    """See a run after so many samples each, as far as it goes, and judge nothing."""
+    for goal in goals:
+        if (yield goal).stop:
+            break
+    return False
 
 
 @lru_cache(maxsize=64)

@@ -1,7 +1,8 @@
 """The closed loop of several runs at once: the same surface, body and servo from other starts.
 
-Sample by sample every run ticks, and then all bodies move on together: see ``advance_lanes``. What
-a run does is what it does alone, bit for bit.
+Their stiffnesses and delays may differ, and how far they have come. Sample by sample every run
+ticks, and then all bodies move on together: see ``advance_lanes``. What a run does is what it does
+alone, bit for bit. No trace is written: what tells a limit cycle are a few sums.
 """
 
 import numpy as np
@@ -26,15 +27,20 @@ from asperity.simulation.kernels.body_functions import (
     advance_lanes,
 )
 from asperity.simulation.kernels.booking import FRICTION, LOST, SUPPLIED
-from asperity.simulation.kernels.servo_loop import book_command, flush, wait_in_queue
+from asperity.simulation.kernels.servo_loop import flush
 
 # Numbers of a servo's state.
 CARRIED = 12
+# Beside ``STOP`` and ``SAMPLES``: samples that a force waits.
+DELAY = 2
+# What is seen of a run, a row a run: the least and the greatest position so far; since ``ROWS`` was
+# made 0 the number of samples, the first velocity, and the sums of what velocities differ from it,
+# and of the squares; what the texture had supplied and what was taken before the last sample.
+LOW, HIGH, ROWS, BASE, SUM, SQUARE, LAST, SEEN = 0, 3, 6, 7, 10, 13, 16, 18
 
 KERNELS = Kernels(
     requires=(
-        "advance_lanes", "book_command", "first_state", "flush", "flushed_state", "probe_inside",
-        "servo_tick", "wait_in_queue",
+        "advance_lanes", "first_state", "flush", "flushed_state", "probe_inside", "servo_tick",
     ),
     loops=("servo_lanes",),
 )  # fmt: skip
@@ -67,92 +73,99 @@ def carry_state(carried: FloatArray, lane: int, servo: ServoState) -> None:
 
 
 def servo_lanes(
-    x: FloatArray, queue: FloatArray, carried: FloatArray, done: int, ledger: FloatArray,
-    anchor: FloatArray, plant: object, settings: ServoSettings, memory: FloatArray,
-    texture: object, law: object, trace: FloatArray, told: NDArray[np.int64],
+    x: FloatArray, queue: FloatArray, carried: FloatArray, ledger: FloatArray, way: FloatArray,
+    offset: FloatArray, span: int, plant: object, settings: ServoSettings, memory: FloatArray,
+    texture: object, law: tuple[float, ...], stiffness: FloatArray, seen: FloatArray,
+    told: NDArray[np.int64],
 ) -> None:  # fmt: skip
-    """Run one sample of each of n runs for each row of the hands' anchors but the last.
+    """Run each of n runs over so many samples.
 
     Args:
         x: states of the bodies, see ``servo_batch``, a row a run; changed, like all that follow.
-        queue: forces that wait (n, d + 1, 3) [N].
+        queue: forces that wait (n, at least the longest delay + 1, 3) [N].
         carried: states of the servos (n, 12).
-        done: samples that those that run have behind them.
-        ledger: sums (n, sums).
-        anchor: positions of the hands' anchors at the samples (n, k + 1, 3) [m]; not changed.
+        ledger: sums (n, sums); those that follow from readings and commands stay as they are.
+        way: positions of the hand's anchor at samples (k, 3) [m], up to the last of any run;
+            neither changed, like all that follow but ``memory``, ``seen`` and ``told``.
+        offset: by which it is shifted in each run (n, 3) [m].
+        span: samples that are run.
         plant: record of the body.
         settings: of the servo.
         memory: of the contacts (n, 22).
         texture: record of the texture.
-        law: parameters of the law.
-        trace: rows of ``WATCHED`` of all samples, (n, at least done + k, 9).
-        told: what stopped each run, and its samples, (n, 2); only those run that say ``RAN``.
+        law: parameters of the law but the first.
+        stiffness: the first, of each run (n,) [N/m].
+        seen: what is seen of each run (n, ``SEEN``).
+        told: what stopped each run, its samples, and its delay (n, 3); only those run that say
+            ``RAN``.
     """
     held = local_array((LANES, 10))
     runs = x.shape[0]
-    samples = anchor.shape[1] - 1
     rate = 1.0 / settings.period
     for run in range(runs):
-        if done == 0 and told[run, STOP] == RAN:
+        if told[run, SAMPLES] == 0 and told[run, STOP] == RAN:
             carry_state(carried, run, first_state(x[run, 0], x[run, 1], x[run, 2], settings))
-    for sample in range(samples):
+    for _sample in range(span):
         going = False
-        now = done + sample
         for run in range(runs):
             if told[run, STOP] != RAN:
                 continue
             going = True
             before = carried_state(carried, run)
+            now = told[run, SAMPLES]
             if now & 255 == 0:
                 flush(x[run])
                 before = flushed_state(before)
+            own = (stiffness[run],) + law[1:]  # noqa: RUF005 - no stars in compiled functions
             servo = servo_tick(
-                before, settings, x[run, 0], x[run, 1], x[run, 2], memory[run], texture, law
+                before, settings, x[run, 0], x[run, 1], x[run, 2], memory[run], texture, own
             )
             carry_state(carried, run, servo)
-            book_command(ledger[run], before, servo)
-            _head, fx, fy, fz = wait_in_queue(
-                queue[run], now % queue.shape[1], servo.fx, servo.fy, servo.fz
-            )
-            ax = anchor[run, sample, 0]
-            ay = anchor[run, sample, 1]
-            az = anchor[run, sample, 2]
-            held[run, 0] = fx
-            held[run, 1] = fy
-            held[run, 2] = fz
-            held[run, 3] = ax
-            held[run, 4] = ay
-            held[run, 5] = az
-            held[run, 6] = (anchor[run, sample + 1, 0] - ax) * rate
-            held[run, 7] = (anchor[run, sample + 1, 1] - ay) * rate
-            held[run, 8] = (anchor[run, sample + 1, 2] - az) * rate
+            size = told[run, DELAY] + 1
+            head = now % size
+            queue[run, head, 0] = servo.fx
+            queue[run, head, 1] = servo.fy
+            queue[run, head, 2] = servo.fz
+            head = head + 1 if head + 1 < size else 0
+            held[run, 0] = queue[run, head, 0]
+            held[run, 1] = queue[run, head, 1]
+            held[run, 2] = queue[run, head, 2]
+            for i in range(3):
+                here = way[now, i] + offset[run, i]
+                held[run, 3 + i] = here
+                held[run, 6 + i] = (way[now + 1, i] + offset[run, i] - here) * rate
             held[run, 9] = 1.0 if probe_inside(servo.x, servo.y, servo.z, texture) else 0.0
-            watch(trace, run, now, now * settings.period, x, ledger)
+            see(seen, run, x, ledger)
         if not going:
             break
         advance_lanes(x, ledger, held, told, plant)
         for run in range(runs):
-            end_sample(x, told, run, now)
+            end_sample(x, told, run)
 
 
-def watch(
-    trace: FloatArray, run: int, row: int, time: float, x: FloatArray, ledger: FloatArray
-) -> None:
-    """Write a row of ``WATCHED``."""
-    trace[run, row, 0] = time
-    for i in range(6):
-        trace[run, row, 1 + i] = x[run, i]
-    trace[run, row, 7] = (
-        ledger[run, SUPPLIED] + ledger[run, SUPPLIED + 1] + ledger[run, SUPPLIED + 2]
-    )
-    trace[run, row, 8] = ledger[run, LOST] - ledger[run, FRICTION]
+def see(seen: FloatArray, run: int, x: FloatArray, ledger: FloatArray) -> None:
+    """Take the state of a run before a sample into account; see ``SEEN``."""
+    first = seen[run, ROWS] == 0.0
+    seen[run, ROWS] += 1.0
+    for i in range(3):
+        seen[run, LOW + i] = min(seen[run, LOW + i], x[run, i])
+        seen[run, HIGH + i] = max(seen[run, HIGH + i], x[run, i])
+        if first:
+            seen[run, BASE + i] = x[run, 3 + i]
+            seen[run, SUM + i] = 0.0
+            seen[run, SQUARE + i] = 0.0
+        apart = x[run, 3 + i] - seen[run, BASE + i]
+        seen[run, SUM + i] += apart
+        seen[run, SQUARE + i] += apart * apart
+    seen[run, LAST] = ledger[run, SUPPLIED] + ledger[run, SUPPLIED + 1] + ledger[run, SUPPLIED + 2]
+    seen[run, LAST + 1] = ledger[run, LOST] - ledger[run, FRICTION]
 
 
-def end_sample(x: FloatArray, told: NDArray[np.int64], run: int, now: int) -> None:
+def end_sample(x: FloatArray, told: NDArray[np.int64], run: int) -> None:
     """Count a sample of a run that goes on; one that leaves all bounds is stopped after it."""
     if told[run, STOP] != RAN:
         return
-    told[run, SAMPLES] = now + 1
+    told[run, SAMPLES] += 1
     size = 0.0
     for i in range(6):
         size += abs(x[run, i])
