@@ -114,7 +114,11 @@ def _seen_at(goals: Sequence[int]) -> Judge:
 @lru_cache(maxsize=64)
 def passivity_onsets(laws: str, delay: int, starts: int) -> tuple[Prediction, ...]:
     """Return the onsets of laws at a delay, W among them, beside what the criteria allow."""
-    return onsets(band_setup("W"), laws, (delay,), starts=starts, tolerance=0.05, lowest=50.0)
+    return _onsets(laws, (delay,), starts)
+
+
+def _onsets(laws: str, delays: tuple[int, ...], starts: int) -> tuple[Prediction, ...]:
+    return onsets(band_setup("W"), laws, delays, starts=starts, tolerance=0.05, lowest=50.0)
 
 
 def passivity_experiment(
@@ -128,7 +132,4 @@ def passivity_experiment(
         starts: of the onsets; the counts have 24.
     """
     counts = side_by_side(count_cycles, (*PANELS, *NEW))
-    found = [passivity_onsets(laws, delay, starts) for delay in delays]
-    return PassivityExperiment(
-        counts, tuple(one for row in zip(*found, strict=True) for one in row)
-    )
+    return PassivityExperiment(counts, _onsets(laws, delays, starts))
