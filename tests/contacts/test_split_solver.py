@@ -131,17 +131,27 @@ def test_y_follows_from_the_mean_or_the_mean_from_y(
         (0, True, ["query", "settle 1"], (1, 0, 9.0)),
         (1, True, ["follow", "settle 1"], (1, 0, 4.0)),
         (1, False, ["follow", "query", "settle 1"], (1, 0, 13.0)),
-        (3, True, ["settle 3"], (2, 2, 6.0)),
-        (3, False, ["settle 3", "query", "settle 1"], (1, 0, 15.0)),
-        (2, True, ["settle 2"], (2, 2, 6.0)),
+        (3, True, ["weights 3", "settle 3"], (2, 2, 6.0)),
+        (3, False, ["weights 3", "settle 3", "query", "settle 1"], (1, 0, 15.0)),
+        (2, True, ["weights 2", "settle 2"], (2, 2, 6.0)),
     ],
 )
 def test_a_search_begins_with_what_is_known(
     known: int, works: bool, asked: list[str], answer: tuple[float, ...],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    """Atoms of a probe nearby, moved; one foot that follows; else the nearest point."""
+    """Atoms of a probe nearby, moved; one foot that follows; else the nearest point.
+
+    Several have the weights that are best where they are, if all are positive: here, those of two.
+    """
     told: list[str] = []
+
+    def subset(given: Any, count: int, mask: int, p: Any, mu: float, *rest: Any) -> int:
+        told.append(f"weights {count}")
+        assert (mask, mu, tuple(p)) == (2**count - 1, 1.0 / (1.0 + C), tuple(P))
+        rest[1][:] = given[:4]
+        rest[1][:count, 3] = 0.5
+        return count if count == 2 else 0
 
     def settle(_atoms: Any, count: int, p: Any, _y: Any, _pull: Any, c: float, *rest: Any) -> Any:
         told.append(f"settle {int(count)}")
@@ -159,10 +169,11 @@ def test_a_search_begins_with_what_is_known(
         assert (tuple(p), row, budget) == (tuple(P), 0, 40.0)
         return 0.0, 9.0
 
-    for name, function in (("settle", settle), ("follow", follow), ("query", query)):
+    asking = (("settle", settle), ("follow", follow), ("query", query), ("subset", subset))
+    for name, function in asking:
         monkeypatch.setattr(solver, f"split_{name}", function)
     atoms, y, pull = some_atoms(4), np.zeros(3), np.zeros(3)
-    weight = atoms[0, 3]
+    weight = 0.5 if known == 2 else atoms[0, 3]
     a = np.zeros((7, 10))
     found = solver.split_start(atoms, known, P, y, pull, C, a, 40.0, "texture")
     assert found == answer

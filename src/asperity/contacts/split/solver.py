@@ -282,6 +282,9 @@ def split_start(
 ) -> tuple[int, int, float]:  # fmt: skip
     """Write the atoms to begin with, y and z̄ - p: those of a probe nearby, moved, or one foot.
 
+    Their old weights would take y off the place to which all are equally near, and Newton's method
+    with it: first come those that are best while the atoms stay.
+
     Returns:
         How many atoms, how many of them are polished, and the looks that were taken.
     """
@@ -289,6 +292,11 @@ def split_start(
     solved: Any = first
     looks = 0.0
     if known > 1:
+        trial = local_array((4, 4))
+        every: Any = (1 << known) - 1
+        mu = 1.0 / (1.0 + continuity)
+        if split_subset(atoms, known, every, p, mu, a, trial, y) == known:
+            split_copy(trial, atoms, known)
         solved, looks = split_settle(
             atoms, known, p, y, pull, continuity, a, 0.25 * budget, texture
         )
