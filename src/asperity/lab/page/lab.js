@@ -91,7 +91,7 @@ const hand = new Hand((what, content) => {
 });
 
 const handle = new Handle(what => line.say(what));
-const tour = new Tour({ change, hand, ledger, see(width) { span = width; }, get news() { return news; } }), panel = new TourPanel(tour);
+const tour = new Tour({ change, hand, ledger, get span() { return span; }, set span(width) { span = width; }, get news() { return news; } }), panel = new TourPanel(tour);
 
 const player = new Player({
   frame(said) { feel({ ...said, number: seen }); },
@@ -401,7 +401,7 @@ readTheme();
 requestAnimationFrame(paint);
 // For tests, and for whoever is curious in the console.
 globalThis.lab = {
-  get frame() { return frame; }, get news() { return news; }, get faults() { return faults; },
+  get span() { return span; }, get frame() { return frame; }, get news() { return news; }, get faults() { return faults; },
   /** Whether both pictures are of the surface that is shown. */
   get current() { return ["relief", "cut"].every(kind => asked[kind]?.again < Infinity && asked[kind].version === news?.version); },
   get ready() { return Boolean(relief.heights && cut.box); }, latencies, hand, tour, ledger, player, probeState, relief, cut, svg: () => svgOf(views), png: () => pngOf(views),

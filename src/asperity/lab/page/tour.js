@@ -105,7 +105,7 @@ export const STEPS = [
 ];
 
 export class Tour {
-  /** @param host object with change(wishes), hand, ledger and news */
+  /** @param host object with change(wishes), hand, ledger, news and span, the width of what is seen */
   constructor(host) {
     this.host = host;
     this.gauge = new Gauge();
@@ -126,9 +126,11 @@ export class Tour {
   get found() { return this.on && this.seen[this.step]; }
 
   begin() {
-    if (!this.on) this.before = { settings: { ...this.host.news.settings }, hand: this.host.hand.kept };
+    if (!this.on) this.before = { span: this.host.span, hand: this.host.hand.kept };
     this.seen.fill(false);
-    this.host.see(SEEN);
+    this.host.span = SEEN;
+    // The lab keeps what is shown, and sets up what the steps begin with, whatever hand there was.
+    this.host.change({ stage: "tour", ...STAGE });
     this.go(0);
   }
 
@@ -136,9 +138,9 @@ export class Tour {
     if (!this.on) return;
     this.step = -1;
     this.show(false);
+    this.host.span = this.before.span;
     this.host.hand.set(this.before.hand);
-    const former = Object.entries(this.before.settings).filter(([name, value]) => value !== null && value !== this.host.news?.settings[name]);
-    if (former.length) this.host.change(Object.fromEntries(former));
+    this.host.change({ stage: "back" });
   }
 
   go(step) {
@@ -152,8 +154,8 @@ export class Tour {
   start(turn) {
     this.turn = turn;
     const { law, stiffness, ...stage } = this.wanted, { settings } = this.host.news;
-    // What takes another loop is asked for only if it must; law and stiffness always: what is known may be old.
-    const others = Object.entries(stage).filter(([name, value]) => settings[name] !== value);
+    // What takes another loop is asked for only if it must; what a step sets always: what is known may be old.
+    const others = Object.entries(stage).filter(([name, value]) => !(name in STAGE) || settings[name] !== value);
     this.host.change({ ...Object.fromEntries(others), law, stiffness });
     this.host.hand.motion = "pointer";
     this.host.hand.latched = false;
