@@ -55,6 +55,14 @@ def test_device_delay_and_hand_take_another_loop(stage: Stage, wishes: dict[str,
     assert changed.settings == {**stage.settings, "law": "A", **wishes}
 
 
+def test_the_limit_is_asked_for_with_the_delay_that_was_chosen(stage: Stage) -> None:
+    assert stage.judged is stage.setup.device
+    late = stage.changed({"delay": 4})
+    assert late.judged.value("delay_samples") == 4.0
+    assert late.setup.device.value("delay_samples") is None
+    assert late.changed({"delay": 0}).judged is stage.setup.device
+
+
 def test_several_wishes_come_together_in_any_order(stage: Stage) -> None:
     one = stage.changed({"delay": 2, "device": "touch", "stiffness": 400.0})
     other = stage.changed({"stiffness": 400.0, "device": "touch", "delay": 2})

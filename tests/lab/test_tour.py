@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 
+import pytest
 from tests.lab.browser import Browser, needs_browser
 
 TITLES = ("W is quiet", "A feels alive", "B buzzes above its limit", "D clicks", "C is soft",
@@ -12,6 +14,20 @@ TITLES = ("W is quiet", "A feels alive", "B buzzes above its limit", "D clicks",
 
 def text(page: Browser, name: str) -> str:
     return str(page.ask(f"document.getElementById('{name}').textContent"))
+
+
+def numbers_are_what_is_measured(page: Browser, number: int) -> None:
+    """Whether a step tells of limits as they are, and of what was felt."""
+    limits, told = page.ask("lab.tour.limits"), text(page, "tour-why")
+    law = {3: "B", 5: "C"}[number]
+    assert f"{1e-3 * limits[law]:.2f} kN/m, {100 * limits[law] / limits['W']:.0f} %" in told
+    if number == 3:
+        assert f"set to 8.00 kN/m, {8000 / limits[law]:.1f} times that" in told
+        return
+    times = float(re.search(r"yields ([\d.]+) times", text(page, "tour-found"))[1])  # type: ignore[index]  # it is there
+    wall, soft = page.ask("[lab.tour.kept, lab.tour.gauge.felt]")
+    assert times > 2
+    assert times == pytest.approx(wall / soft, rel=0.06)
 
 
 @needs_browser
@@ -29,6 +45,9 @@ def test_the_tour_shows_itself_to_its_end_by_keys(page: Browser) -> None:
             assert "fed the hand" in text(page, "verdict")
         if number == 3:
             assert text(page, "limit-words").startswith("▲ above the limit")
+            assert text(page, "limit-words").endswith(": smooth-wall rule (quiet against buzz)")
+        if number in (3, 5):
+            numbers_are_what_is_measured(page, number)
         page.press("n")
     assert page.ask("document.getElementById('tour').hidden")
     # As it was before.

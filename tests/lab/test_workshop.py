@@ -14,7 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import asperity as asp
+from asperity.analysis.passivity.criteria import CRITERIA
 from asperity.cli.own_code import learn
+from asperity.devices import load_device
 from asperity.lab import workshop
 from asperity.lab.backdrop import MOST_ENDS, Backdrop
 from asperity.lab.messages import Look
@@ -73,7 +76,7 @@ def test_another_process_follows_one_that_was_killed(setup: Setup) -> None:
     async def scenario(pictures: Workshop, limits: Workshop) -> None:
         said: list[str] = []
         backdrop = Backdrop(pictures, limits, lambda: asyncio.sleep(0.0))
-        backdrop.show(setup)
+        backdrop.show(setup.surface, setup.device)
         await reached(said, backdrop, 1)
         before = await backdrop.picture(LOOK)
         assert not any(said)
@@ -86,7 +89,8 @@ def test_another_process_follows_one_that_was_killed(setup: Setup) -> None:
         assert "has ended: another one begins" in said[-1]
         assert backdrop.words == ""
         assert await backdrop.picture(LOOK) == before
-        backdrop.show(setup.with_law("W"))  # whose limit is asked of the other one that was killed
+        # Its limit is asked of the other one that was killed.
+        backdrop.show(setup.with_law("W").surface, setup.device)
         while not backdrop.limit:
             await asyncio.sleep(0.01)
         assert backdrop.limit["stiffness"] > 0.0
@@ -99,7 +103,7 @@ def test_a_surface_that_ends_each_process_is_given_up(setup: Setup) -> None:
     async def scenario(pictures: Deadly, limits: Workshop) -> None:
         pictures.deaths = 10
         backdrop = Backdrop(pictures, limits, lambda: asyncio.sleep(0.0))
-        backdrop.show(setup)
+        backdrop.show(setup.surface, setup.device)
         while "ended each time" not in backdrop.words:
             await asyncio.sleep(0.01)
         await asyncio.sleep(0.5)
@@ -107,10 +111,33 @@ def test_a_surface_that_ends_each_process_is_given_up(setup: Setup) -> None:
         assert await backdrop.picture(LOOK) == b""
         # Another surface begins anew.
         pictures.deaths = MOST_ENDS + 1
-        backdrop.show(setup.with_law("W"))
+        backdrop.show(setup.with_law("W").surface, setup.device)
         await reached([], backdrop, 1)
         assert backdrop.words == ""
         assert len(await backdrop.picture(LOOK)) > 1000
 
     with Deadly() as pictures, Workshop() as limits:
+        asyncio.run(asyncio.wait_for(scenario(pictures, limits), 240.0))
+
+
+def test_another_device_has_another_limit_of_the_same_pictures(setup: Setup) -> None:
+    async def scenario(pictures: Workshop, limits: Workshop) -> None:
+        found = []
+        backdrop = Backdrop(pictures, limits, lambda: asyncio.sleep(0.0))
+        for name in ("touch-x", "omega.3", "omega.3", "touch-x"):
+            backdrop.show(setup.surface, load_device(name))
+            while not backdrop.limit:
+                await asyncio.sleep(0.01)
+            found.append(backdrop.limit)
+        assert backdrop.version == 1
+        assert found[1] is found[2]
+        assert found[0] == found[3]
+        assert found[0]["stiffness"] < 0.5 * found[1]["stiffness"]
+        # By the name that the analysis prints.
+        assert {limit["criterion"] for limit in found} <= {*CRITERIA}
+        analysis = asp.analyze(setup.surface, device="omega.3")
+        names = [one.name for one in analysis.passivity.criteria]
+        assert found[1]["criterion"] in names
+
+    with Workshop() as pictures, Workshop() as limits:
         asyncio.run(asyncio.wait_for(scenario(pictures, limits), 240.0))

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from asperity.checks import FloatArray
+from asperity.devices import Device
 from asperity.lab import workshop
 from asperity.lab.messages import Look
 from asperity.lab.workshop import Sent, Workshop
-from asperity.scene.setup import Setup
 from asperity.surface import Surface
 
 MOST_ENDS, WITHIN = 3, 600.0
@@ -47,6 +47,7 @@ class Backdrop:
     ) -> None:
         self._pictures, self._limits, self._told = pictures, limits, told
         self._wanted: Surface | None = None
+        self._device: Device | None = None
         self._ready: Surface | None = None
         self._ends: list[float] = []
         self._tasks: set[asyncio.Task[None]] = set()
@@ -54,12 +55,17 @@ class Backdrop:
         self.version = 0
         self.words = ""
 
-    def show(self, setup: Setup) -> None:
+    def show(self, surface: Surface, device: Device) -> None:
         """Make ready for a surface on a device, unless it is shown already."""
-        if setup.surface is self._wanted:
+        if surface is self._wanted and device == self._device:
             return
-        self._wanted, self.limit, self._ends, self.words = setup.surface, {}, [], ""
-        self._begin(self._make(setup))
+        former, self.limit = self._wanted, {}
+        self._wanted, self._device = surface, device
+        if surface is former:
+            self._begin(self._judge(surface, device))
+            return
+        self._ends, self.words = [], ""
+        self._begin(self._make(surface, device))
 
     def _begin(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.create_task(work)
@@ -71,10 +77,10 @@ class Backdrop:
         for task in self._tasks:
             task.cancel()
 
-    async def _make(self, setup: Setup) -> None:
+    async def _make(self, surface: Surface, device: Device) -> None:
         """Make pictures ready first: they are waited for, and the limit takes longer."""
-        await self._prepare(setup.surface)
-        await self._judge(setup)
+        await self._prepare(surface)
+        await self._judge(surface, device)
 
     async def _prepare(self, surface: Surface) -> None:
         while surface is self._wanted and len(self._ends) < MOST_ENDS:
@@ -98,14 +104,13 @@ class Backdrop:
             self.words = _AGAIN if len(self._ends) < MOST_ENDS else _NO_MORE
             await self._told()
 
-    async def _judge(self, setup: Setup) -> None:
+    async def _judge(self, surface: Surface, device: Device) -> None:
         limit = {"stiffness": None, "basis": _NO_LIMIT, "q": None, "one_sided": None}
         for _attempt in range(2):  # the process may have ended of something else
             with suppress(BrokenProcessPool):
-                sent = Sent.of(setup.surface)
-                limit = await _done(self._limits, workshop.limit, sent, setup.device)
+                limit = await _done(self._limits, workshop.limit, Sent.of(surface), device)
                 break
-        if setup.surface is self._wanted:
+        if surface is self._wanted and device == self._device:
             self.limit = limit
             await self._told()
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from asperity.checks import FloatArray
-from asperity.devices import Device, changed_device
+from asperity.devices import Device
 from asperity.devices.writing import device_text
 from asperity.files import read_toml
 from asperity.lab.stage import Stage
@@ -49,7 +49,7 @@ def scene_text(
         "run": written(run, RUN),
     }  # fmt: skip
     parts = [f"[{name}]\n{_lines(values)}" for name, values in sections.items()]
-    return "\n".join([_head(stage), *parts, _device(setup.device, setup.servo.delay)])
+    return "\n".join([_head(stage), *parts, _device(stage.judged)])
 
 
 def _head(stage: Stage) -> str:
@@ -103,11 +103,9 @@ def _bars(plant: Any) -> dict[str, Any]:
     return {"centre": plant.centre, "brakes": "inside" if plant.inside_only else "always"}
 
 
-def _device(device: Device, delay: int) -> str:
-    """Return the section [device] with all of its fields, and the delay that was chosen."""
-    words = {"value": float(delay), "unit": "1", "source": "chosen in the lab"}
-    late = changed_device(device, {"delay_samples": words})
-    text = re.sub(r"^(\[+)", r"\1device.", device_text(late), flags=re.MULTILINE)
+def _device(device: Device) -> str:
+    """Return the section [device] with all of its fields."""
+    text = re.sub(r"^(\[+)", r"\1device.", device_text(device), flags=re.MULTILINE)
     return "[device]\n" + re.sub(r"^id = .*\n", "", text)
 
 

@@ -129,14 +129,18 @@ class Lab:
         with suppress(RuntimeError):  # the server has ended
             self._loop.call_soon_threadsafe(self._changed.set)
 
+    def _show(self) -> None:
+        stage = self.session.stage
+        self.backdrop.show(stage.setup.surface, stage.judged)
+
     async def follow(self) -> None:
         """Tell the pages what happens to the session, for ever."""
-        self.backdrop.show(self.session.stage.setup)
+        self._show()
         while True:
             await self._changed.wait()
             self._changed.clear()
             if self.session.state in {"running", "stopped"}:
-                self.backdrop.show(self.session.stage.setup)
+                self._show()
             await self._announce()
 
     async def attend(self) -> None:

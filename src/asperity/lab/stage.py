@@ -8,7 +8,7 @@ from typing import Any
 
 from asperity.arguments import STIFFNESS
 from asperity.checks import real
-from asperity.devices import Device, load_device
+from asperity.devices import Device, changed_device, load_device
 from asperity.errors import ParameterError
 from asperity.laws import find_law
 from asperity.scene.alone import with_mass
@@ -112,6 +112,15 @@ class Stage:
     def electronics(self) -> Servo:
         """Steps and delay, which are the loop's on the simulated device."""
         return self.own or self.setup.servo
+
+    @property
+    def judged(self) -> Device:
+        """The device on which the limit counts, with the delay that was chosen."""
+        device, delay = self.setup.device, self.setup.servo.delay
+        if self.own is not None or delay == (device.value("delay_samples") or 0):
+            return device
+        words = {"value": float(delay), "unit": "1", "source": "chosen in the lab"}
+        return changed_device(device, {"delay_samples": words})
 
     @property
     def middle(self) -> tuple[float, float]:

@@ -139,7 +139,9 @@ def risky(sent: Sent, device: Device) -> str:
 def limit(sent: Sent, device: Device) -> dict[str, Any]:
     """Return up to which stiffness a device renders a surface, and by which criterion.
 
-    ``stiffness`` is [N/m], or nothing where no limit is known; ``q`` is the characteristic number,
+    ``stiffness`` is [N/m], or nothing where no limit is known; ``criterion`` is the name of the one
+    that gives it, and ``basis`` how well that is known, see
+    :class:`~asperity.analysis.passivity.judgement.Allowed`; ``q`` is the characteristic number,
     ``one_sided`` the one-sided one.
     """
     try:
@@ -149,6 +151,7 @@ def limit(sent: Sent, device: Device) -> dict[str, Any]:
     except AsperityError as error:
         return {"stiffness": None, "basis": str(error), "q": None, "one_sided": None}
     return {
-        "stiffness": allowed.stiffness or None, "basis": allowed.basis, "q": q.value,
+        "stiffness": allowed.stiffness or None, "basis": allowed.basis,
+        "criterion": allowed.criterion, "q": q.value,
         "one_sided": one_sided.value,
     }  # fmt: skip

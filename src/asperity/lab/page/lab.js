@@ -196,9 +196,9 @@ function showLimit({ stiffness, law }) {
   if (known) {
     $("limit").style.left = `calc(0.5rem + ${toSlider(limit.stiffness)} * (100% - 1rem))`;
     const side = stiffness > limit.stiffness ? "▲ above" : "below";
-    words.textContent = `${side} the limit of ${quantity(limit.stiffness, "N/m")} for law ${law} (${limit.basis})`;
+    words.textContent = `${side} the limit of ${quantity(limit.stiffness, "N/m")} for law ${law}: ${limit.criterion} (${limit.basis})`;
   } else {
-    words.textContent = limit.q === "inf" ? `No limit: the force of law ${law} jumps` : "basis" in limit ? `No limit is known: ${limit.basis}` : "The limit is being computed …";
+    words.textContent = limit.q === "inf" ? `No limit: the force of law ${law} jumps` : "basis" in limit ? `No limit is known${limit.basis === "none" ? "" : `: ${limit.basis}`}` : "The limit is being computed …";
   }
 }
 

@@ -12,8 +12,9 @@ const STROKED = 12e-3; // m, four strokes of the hand
 const LOOPED = 12e-3; // m, four loops: each is 2 mm wide, to and fro, partly in contact
 const LANDED = 1e-3; // m of way after which the energy of the landing is over
 const GIVEN = 1e-4; // J, enough to lift the handle of 100 g by a tenth of a millimetre
+const BUZZING = 8000; // N/m
 const CLICKS = 3; // not one by chance
-const SOFTER = 0.5; // of the wall's: hands tell stiffnesses apart from about a quarter (Jones and Hunter, 1990)
+const SOFTER = 0.5; // of the wall's: hands tell compliances apart from about 22 % (Tan, Durlach, Beauregard and Srinivasan, 1995)
 const HELD = 0.8; // of the stiffness that is set, felt in a trough
 
 const SPLIT = { continuity: 1 }; // with which the limit of H is the wall's
@@ -26,6 +27,8 @@ const loop = { motion: "loop", x: FLANK, press: 5e-4, loop: 5e-4, turn: 8, latch
 
 const below = ({ news }) => Number.isFinite(news.limit.stiffness) && news.settings.stiffness <= news.limit.stiffness;
 const above = ({ news }) => Number.isFinite(news.limit.stiffness) && news.settings.stiffness > 2 * news.limit.stiffness;
+const times = (value, of) => (value / of).toPrecision(2).replace(/\.0$/, "");
+const percent = (value, of) => `${(100 * value / of).toFixed(0)} %`;
 const at = (value, goal, unit) => `${quantity(value, unit)} of ${quantity(goal, unit)}`;
 
 // What an act asks for, and what of it is seen: words, how much of it is done, and whether it has happened.
@@ -60,7 +63,7 @@ const firm = g => ({
 });
 const soft = g => ({
   words: `felt: ${quantity(g.gauge.felt, "N/m")}; the wall: ${quantity(g.kept, "N/m")}`,
-  share: g.gauge.still, done: g.gauge.felt > 0 && g.gauge.felt < SOFTER * g.kept && below(g),
+  share: g.gauge.still, done: g.gauge.felt > 0 && g.gauge.felt < SOFTER * g.kept && below(g), seen: times(g.kept, g.gauge.felt),
 });
 
 export const STEPS = [
@@ -76,9 +79,9 @@ export const STEPS = [
     acts: [{ law: "A", stiffness: 1500, ask: "Go round in small loops on a slope: in the cut, move the pointer right, down, left and up again.", show: loop, judge: fed }],
   }, {
     title: "B buzzes above its limit", watch: "The mark at the stiffness, and the band in the force: it swings while the hand holds still.",
-    why: "Law B turns the force into the surface's normal. On a curved surface that makes it stiffer sideways than it is set: its limit is a third of the wall's, and here it is five times above.",
+    why: ({ B, W }) => `Law B turns the force into the surface's normal. On a curved surface that makes it stiffer sideways than it is set: its limit is ${!B ? "below the wall's" : `${quantity(B, "N/m")}${W ? `, ${percent(B, W)} of the wall's` : ""}`}, and here it is set to ${quantity(BUZZING, "N/m")}${B ? `, ${times(BUZZING, B)} times that` : ""}.`,
     found: "The hand holds still, and the force swings by itself: a buzz.",
-    acts: [{ law: "B", stiffness: 8000, ask: "Press on a slope, and hold still.", show: pressFlank, judge: buzzes }],
+    acts: [{ law: "B", stiffness: BUZZING, ask: "Press on a slope, and hold still.", show: pressFlank, judge: buzzes }],
   }, {
     title: "D clicks", watch: "The dot, the nearest point: it leaps from one flank to the other. The sideways force leaps with it.",
     why: "Law D, the god-object, pulls to the nearest point of the surface. Below a crest two points are equally near, and a step to the side exchanges one for the other.",
@@ -86,8 +89,8 @@ export const STEPS = [
     acts: [{ law: "D", stiffness: 1000, ask: "Press deep, and stroke across the crests.", show: stroke, judge: clicks }],
   }, {
     title: "C is soft", watch: "The cut: how deep the same push sinks.",
-    why: "Law C has no curl and no jumps. But it gets steep where the surface is curved, and its limit is below a third of the wall's: within it, it is soft.",
-    found: "At its limit, law C yields more than twice as far as the wall.",
+    why: ({ C, W }) => `Law C has no curl and no jumps. But it gets steep where the surface is curved, and its limit is ${C && W ? `${quantity(C, "N/m")}, ${percent(C, W)} of the wall's` : "below the wall's"}: within it, it is soft.`,
+    found: seen => `Near its limit, law C yields ${seen} times as far as the wall.`,
     acts: [
       { law: "W", stiffness: 4500, plane: true, ask: "First the wall, near its limit: press, and hold still.", show: press, judge: firm },
       { law: "C", stiffness: 1350, ask: "Now law C, near its own limit: press in a trough, and hold still.", show: press, judge: soft },
@@ -104,6 +107,9 @@ export const STEPS = [
   },
 ];
 
+/** Return words, of numbers that were seen where they tell of any. */
+const said = (words, seen) => (typeof words === "function" ? words(seen) : words);
+
 export class Tour {
   /** @param host object with change(wishes), hand, ledger, news and span, the width of what is seen */
   constructor(host) {
@@ -113,6 +119,7 @@ export class Tour {
     this.shows = false;
     this.seen = STEPS.map(() => false);
     this.before = null;
+    this.limits = {}; // of laws on this stage, as they were heard [N/m]
   }
 
   get on() { return this.step >= 0; }
@@ -122,6 +129,10 @@ export class Tour {
     const { law, stiffness, also } = this.act;
     return { ...STAGE, law, stiffness, ...also };
   }
+
+  /** What the step tells: of limits, once they are known, and what was measured. */
+  get why() { return said(this.now.why, this.limits); }
+  get told() { return said(this.now.found, this.measured); }
 
   get found() { return this.on && this.seen[this.step]; }
 
@@ -181,6 +192,8 @@ export class Tour {
     if (!this.on) return;
     this.result = null;
     if (!this.ready) { this.gauge.begin(); this.shown = false; return; }
+    const { settings, limit } = this.host.news;
+    if (limit.stiffness) this.limits[settings.law] = limit.stiffness;
     // Each act begins with the probe in the air: what was stored before counts for nothing.
     if (!this.free) this.free = frame.newest[columns.inside] === 0;
     if (!this.free) return;
@@ -191,6 +204,7 @@ export class Tour {
     this.result = this.act.judge({ gauge: this.gauge, ledger, news, landed, kept: this.kept });
     if (!this.result.done || this.found) return;
     this.kept = this.result.keep ?? this.kept;
+    this.measured = this.result.seen;
     this.shown = false;
     if (this.turn + 1 < this.now.acts.length) this.start(this.turn + 1);
     else this.seen[this.step] = true;

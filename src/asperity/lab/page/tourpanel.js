@@ -32,12 +32,12 @@ export class TourPanel {
     panel.hidden = !tour.on;
     $("begin").setAttribute("aria-pressed", tour.on);
     if (!tour.on) { this.drawn = ""; return; }
-    const { title, why, watch, found } = tour.now, last = tour.step + 1 === STEPS.length;
+    const { title, watch } = tour.now, last = tour.step + 1 === STEPS.length;
     panel.classList.toggle("found", tour.found);
     const told = {
       place: `Step ${tour.step + 1} of ${STEPS.length} ${tour.seen.map(seen => (seen ? "●" : "○")).join(" ")}`,
-      title, why, watch, ask: tour.act.ask, words: tour.result?.words ?? "getting ready …",
-      found: tour.found ? `✓ ${found}` : "", next: last ? "Finish" : "Next",
+      title, why: tour.why, watch, ask: tour.act.ask, words: tour.result?.words ?? "getting ready …",
+      found: tour.found ? `✓ ${tour.told}` : "", next: last ? "Finish" : "Next",
     };
     for (const [name, words] of Object.entries(told)) if ($(name).textContent !== words) $(name).textContent = words;
     const done = tour.turn / tour.now.acts.length, share = Math.min(tour.result?.share ?? 0, 1) / tour.now.acts.length;
