@@ -17,7 +17,11 @@ from asperity import cache, kept, processes
 from asperity.analysis import compare
 from asperity.analysis.compare import answer_ahead
 from asperity.files import json_text
+from asperity.paper.experiments.settings import band_setup
+from asperity.report.html import html_text
+from asperity.report.page import Picture
 from asperity.report.surfaces import listed_surfaces
+from asperity.scene import sweeps
 from asperity.textures import Sinusoid
 from asperity.textures.catalogue import CATALOGUE
 
@@ -136,6 +140,40 @@ def test_a_comparison_is_the_same_however_many_work_on_it(
     assert len(started) == 1
     assert ended(started)
     assert heard  # it was of use
+
+
+@pytest.mark.keeps_answers
+@pytest.mark.usefixtures("own_cache")
+def test_a_report_is_the_same_however_many_draw_it(
+    monkeypatch: pytest.MonkeyPatch, heard: list[Any]
+) -> None:
+    result = compare(WAVE, laws="WA", stiffness=700.0)
+    alone = html_text(result)
+    cache.clear()
+    with processes.at_most(2):
+        assert html_text(result) == alone
+    assert any(isinstance(answer, Picture) for answer in heard)  # it was of use
+    drawing = import_module("asperity.report.comparison")
+    monkeypatch.setattr(drawing, "_picture", lambda *_task: None)
+    assert html_text(result) == alone  # what a helper drew is kept
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_onsets_are_the_same_however_many_work_on_them(
+    monkeypatch: pytest.MonkeyPatch, workers: int
+) -> None:
+    monkeypatch.setattr(sweeps, "cores", lambda: workers)
+    told: list[int] = []
+    found = sweeps.onsets(
+        band_setup("W"), "WAC", (0, 3), starts=2, lowest=5.0, progress=lambda: told.append(1)
+    )
+    by_law = [f"{one.onset.law}{one.onset.delay}" for one in found]
+    assert by_law == ["W0", "W3", "A0", "A3", "C0", "C3"]
+    assert len(told) == 6
+    for one in found[::5]:
+        setup = band_setup(one.onset.law)
+        alone = sweeps.onsets(setup, one.onset.law, (one.onset.delay,), starts=2, lowest=5.0)
+        assert alone[0].onset == one.onset
 
 
 @pytest.mark.parametrize("name", CATALOGUE)

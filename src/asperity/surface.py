@@ -54,6 +54,19 @@ def _merged(law: Law, given: dict[str, float], own: dict[str, float]) -> dict[st
     return given
 
 
+def _received(
+    kind: type[Surface], texture: Texture, law: str | Law, stiffness: float, max_depth: float,
+    clamp: ClampName, given: dict[str, float],
+) -> Surface:  # fmt: skip
+    """Return a surface that another process has sent."""
+    result = object.__new__(kind)
+    result._set(
+        texture=texture, law=find_law(law), stiffness=stiffness, max_depth=max_depth, clamp=clamp,
+        _given=given,
+    )  # fmt: skip
+    return result
+
+
 def _truths(probes: Points, sliding: ArrayLike | None) -> NDArray[np.bool_]:
     """Return which anchors are dragged."""
     if sliding is None:
@@ -164,6 +177,12 @@ class Surface(Plotted):
         result = object.__new__(type(self))
         result._set(**{name: getattr(self, name) for name in names} | values)
         return result
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Say how another process makes the same one: a shipped law goes by its letter."""
+        law = self.law.letter if LAWS.get(self.law.letter) is self.law else self.law
+        place = self.stiffness, self.max_depth, self.clamp
+        return _received, (type(self), self.texture, law, *place, dict(self._given))
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(

@@ -26,7 +26,6 @@ from asperity.devices import Device, load_device
 from asperity.display import Plotted, Reported
 from asperity.errors import ParameterError
 from asperity.files import plain, record
-from asperity.kernels.probe import ClampName
 from asperity.laws import LAWS, Law, find_laws, shared_out
 from asperity.processes import helped
 from asperity.surface import Surface
@@ -234,44 +233,26 @@ def _refuse_unknown(device: Device) -> None:
         raise ParameterError("device", f"{device.id} {needs} that held, to its file; or {others}")
 
 
-@dataclass(frozen=True)
-class _Task:
-    """A shipped law on a shipped texture, for a process that answers ahead."""
-
-    texture: Texture
-    law: str
-    max_depth: float
-    clamp: ClampName
-    law_parameters: dict[str, float]
-    deep: bool
-
-
-def _tasks(surfaces: Sequence[Surface], question: _Question) -> list[_Task | None]:
+def _tasks(surfaces: Sequence[Surface], question: _Question) -> list[tuple[Surface, bool] | None]:
     """Return what can be answered ahead, law by law: what is kept."""
     return [
-        None if content_but_stiffness(surface) is None else _Task(
-            surface.texture, surface.law.letter, surface.max_depth, surface.clamp,
-            dict(surface.law_parameters), question.deep,
-        )
+        None if content_but_stiffness(surface) is None else (surface, question.deep)
         for surface in surfaces
-    ]  # fmt: skip
+    ]
 
 
-def answer_ahead(task: _Task | None) -> None:
+def answer_ahead(task: tuple[Surface, bool] | None) -> None:
     """Work out, and keep, what of a row costs time: all that does not depend on the device."""
     if task is None:
         return
-    surface = Surface(
-        task.texture, task.law, max_depth=task.max_depth, clamp=task.clamp,
-        law_parameters=task.law_parameters,
-    )  # fmt: skip
+    surface, deep = task
     q = characteristic_number(surface)
     one_sided_number(surface)
     merit(surface)
     worst_loop(surface)
     continuity(surface, q)
     part = surface.texture.texture_part()
-    alone = texture_alone(surface, part, deep=task.deep)
+    alone = texture_alone(surface, part, deep=deep)
     merit(alone)
     wave_forces(alone, spectrum(part.texture))
 

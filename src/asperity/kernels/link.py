@@ -85,10 +85,13 @@ def text_unit(
 ) -> Unit:
     """Return the unit of a source text, whose records and numbers are in a name space."""
     unit = Unit(name, kernels, {}, {}, {})
+    rows = source.split("\n")  # once: ast.get_source_segment splits it for every function
     for node in tree_of(source).body:
         if isinstance(node, ast.FunctionDef):
             lines = _lines(node, space, kernels.native)
-            unit.texts[node.name] = ast.get_source_segment(source, node) or ""
+            text = rows[node.lineno - 1 : node.end_lineno]
+            text[-1] = text[-1].encode()[: node.end_col_offset].decode()
+            unit.texts[node.name] = "\n".join(text)
             unit.lines[node.name] = lines
             unit.calls[node.name] = tuple(sorted(_calls(node) - lines.keys()))
     return unit

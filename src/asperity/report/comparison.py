@@ -14,6 +14,7 @@ from asperity.analysis.gain.answers import content_but_stiffness
 from asperity.analysis.words.felt import speed_text
 from asperity.files import json_text
 from asperity.kept import content_digest
+from asperity.processes import helped
 from asperity.report import page, terminal
 from asperity.report.comparison_columns import (
     FULL,
@@ -160,14 +161,24 @@ def _laws(comparison: Comparison) -> list[page.Section]:
 def _pictures(comparison: Comparison) -> list[page.Section]:
     depth, stiffness = engineering(comparison.max_depth, "m"), _asked(comparison)
     content = _content(comparison)
-    return [
-        page.Section(
-            title,
-            [page.kept_picture(name, content, partial(_picture, comparison, name))],
-            words.format(depth=depth, stiffness=stiffness),
-        )
-        for name, (title, words) in _CAPTIONS.items()
-    ]
+    sections = []
+    with helped(_drawn_ahead, [(comparison, name) for name in _CAPTIONS]) as turns:
+        for (name, (title, words)), ahead in zip(_CAPTIONS.items(), turns, strict=True):
+            drawn = partial(_picture, comparison, name) if ahead is None else partial(_same, ahead)
+            shown = page.kept_picture(name, content, drawn)
+            caption = words.format(depth=depth, stiffness=stiffness)
+            sections.append(page.Section(title, [shown], caption))
+    return sections
+
+
+def _same(picture: page.Picture) -> page.Picture:
+    return picture
+
+
+def _drawn_ahead(task: tuple[Comparison, str]) -> page.Picture:
+    """Return a picture that another process draws; who asked for it keeps it."""
+    with page.own_look():
+        return _picture(*task)
 
 
 def _picture(comparison: Comparison, name: str) -> page.Picture:

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from asperity.errors import ParameterError
+from asperity.processes import cores
 from asperity.scene.setup import Setup
 from asperity.simulation.hands import SpringHand
 from asperity.simulation.motions import Strokes
@@ -18,7 +19,6 @@ from asperity.simulation.onset import LOWEST, Onset, find_onsets
 from asperity.simulation.prediction import Prediction, expected, predict, with_wall
 from asperity.simulation.scan import Stroke, scan_strokes
 
-_WORKERS = 2
 DEFAULT_SPEEDS = (0.02, 0.05, 0.1, 0.2)  # m/s
 DEFAULT_STROKES = 5
 
@@ -30,7 +30,7 @@ def side_by_side(
     function: Callable[..., Found], jobs: Iterable[tuple[Any, ...]]
 ) -> tuple[Found, ...]:
     """Return what a function makes of the arguments of each job, computed at the same time."""
-    with ThreadPoolExecutor(_WORKERS) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         return tuple(pool.map(lambda job: function(*job), jobs))
 
 
