@@ -9,7 +9,13 @@ from asperity.contacts.nearest.plane_search import descend, judge, next_box
 from asperity.contacts.sampler import PASSED, SLACK
 from asperity.contacts.sampler import PlanePoint as Point
 from asperity.textures.samplers.heightmap import HeightMapArguments, cells_of
-from asperity.textures.samplers.heightmap_window import Window, is_empty, narrowed
+from asperity.textures.samplers.heightmap_window import (
+    Window,
+    cells_within,
+    is_empty,
+    is_open,
+    narrowed,
+)
 from asperity.textures.samplers.spline import (
     box_bounds,
     foreseeable,
@@ -21,12 +27,19 @@ from asperity.textures.samplers.spline import (
 KERNELS = Kernels(
     provides=("foot", "search_plane"),
     requires=(
-        "cells_of", "descend", "judge", "next_box", "is_empty", "narrowed",
+        "cells_of", "cells_within", "descend", "is_empty", "is_open", "judge",
+        "narrowed", "next_box",
         "box_bounds", "foreseeable", "nearest_copy", "reach_of", "tile_frame",
     ),
-    called=("foot", "search_tile", "search_tree"),
+    called=("foot", "search_block", "search_tile", "search_tree"),
     shared=("search_plane",),
 )  # fmt: skip
+
+# A window of so few cells is searched cell by cell, four by four of them first.
+FEW_CELLS = 600
+# So many looks take the coefficients of four by four cells, and those of one.
+BLOCK = 0.75
+CELL = 0.4
 
 
 def foot(
@@ -100,8 +113,30 @@ def search_tile(
     )  # fmt: skip
     if is_empty(window):
         return best, left
+    found, left = search_window(x, y, z, found, window, keep, left, texture)
+    if found[2] >= best[2]:
+        return best, left
+    return (
+        turn_x * (found[0] - shift_x), turn_y * (found[1] - shift_y), found[2],
+        found[3], turn_x * found[4], turn_y * found[5],
+    ), left  # fmt: skip
+
+
+def search_window(
+    x: float, y: float, z: float, best: Point, window: Window, keep: float, left: float,
+    texture: HeightMapArguments,
+) -> tuple[Point, float]:  # fmt: skip
+    """Return the best point after a search of a window, and the looks left.
+
+    Cell by cell if they are few, else from the level on of which it has at most two by two boxes.
+    """
     west, east, south, north = window
-    # From the level on of which the window has at most two by two boxes.
+    if (east - west + 1) * (north - south + 1) <= FEW_CELLS:
+        for i in range(south, north + 1, 4):
+            for j in range(west, east + 1, 4):
+                if left > 0.0:
+                    best, left = search_block(x, y, z, i, j, best, window, keep, left, texture)
+        return best, left
     top = 1
     span = ((east >> 1) - (west >> 1)) | ((north >> 1) - (south >> 1))
     while top < texture.levels.shape[0] and span >> (top - 1) > 0:
@@ -109,13 +144,28 @@ def search_tile(
     for i in range(south >> top, (north >> top) + 1):
         for j in range(west >> top, (east >> top) + 1):
             if left > 0.0:
-                found, left = search_tree(x, y, z, top, i, j, found, window, keep, left, texture)
-    if found[2] >= best[2]:
-        return best, left
-    return (
-        turn_x * (found[0] - shift_x), turn_y * (found[1] - shift_y), found[2],
-        found[3], turn_x * found[4], turn_y * found[5],
-    ), left  # fmt: skip
+                best, left = search_tree(x, y, z, top, i, j, best, window, keep, left, texture)
+    return best, left
+
+
+def search_block(
+    x: float, y: float, z: float, i: int, j: int, best: Point, window: Window, keep: float,
+    left: float, texture: HeightMapArguments,
+) -> tuple[Point, float]:  # fmt: skip
+    """Return the best point after a search of four by four cells of a window, from (i, j) on."""
+    block = (j, min(j + 3, window[1]), i, min(i + 3, window[3]))
+    middle = texture.c[min(i + 3, window[3] + 2), min(j + 3, window[1] + 2)] - z
+    west, east, south, north = cells_within(x, y, z, middle, best[2] * keep, block, texture)
+    left -= BLOCK
+    for row in range(south, north + 1):
+        for column in range(west, east + 1):
+            if left > 0.0:
+                left -= CELL
+                if is_open(x, y, z, best[2] * keep, row, column, texture):
+                    best, left = search_tree(
+                        x, y, z, 0, row, column, best, window, keep, left, texture
+                    )
+    return best, left
 
 
 def search_tree(
@@ -136,7 +186,9 @@ def search_tree(
     v = (y - y0) * texture.iy
     level = top
     side = 2.0**top
-    low = high = bend = twist = 0.0
+    low, high, bend, twist = box_bounds(
+        texture.nodes, texture.levels[0, 0] + (i >> 1) * texture.levels[0, 2] + (j >> 1)
+    )  # what counts in cells and their parts, if those are what the search begins with
     while level <= top and left > 0.0:
         left -= PASSED
         i_end = min((i + 1) * side, texture.c.shape[0] - 3.0)

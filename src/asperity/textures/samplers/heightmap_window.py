@@ -17,17 +17,19 @@ first.
 
 import math
 
+import numpy as np
+
 from asperity.compiled import EPS, Kernels, local_array
 from asperity.contacts.nearest.plane_search import eigenvalues
 from asperity.contacts.sampler import PASSED
 from asperity.contacts.sampler import PlanePoint as Point
 from asperity.textures.samplers.heightmap import HeightMapArguments, curvature
-from asperity.textures.samplers.spline import box_bounds
+from asperity.textures.samplers.spline import Four, box_bounds
 
 KERNELS = Kernels(
-    provides=("is_empty", "narrowed"),
+    provides=("cells_within", "is_empty", "is_open", "narrowed"),
     requires=("box_bounds", "curvature", "eigenvalues"),
-    called=("boxes_within", "cells_within", "rises"),
+    called=("boxes_within", "cells_within", "is_open", "rises"),
 )
 
 # Cells a side of a window that is looked at as boxes, and boxes a side, at first and at most.
@@ -144,6 +146,48 @@ def cells_within(
                     first_j = min(first_j, west + m)
                     last_j = max(last_j, west + m)
     return max(west, first_j - 3), min(east, last_j), max(south, first_i - 3), min(north, last_i)
+
+
+def bernstein(a: float, b: float, c: float, d: float) -> Four:
+    """Return the Bernstein coefficients of a cubic spline on a cell, times six."""
+    return a + 4.0 * b + c, 4.0 * b + 2.0 * c, 2.0 * b + 4.0 * c, b + 4.0 * c + d
+
+
+def square_on(t: float) -> Four:
+    """Return the Bernstein coefficients of (s - t)² on 0 <= s <= 1, as a cubic."""
+    return t * t, t * (t - 2.0 / 3.0), t * (t - 4.0 / 3.0) + 1.0 / 3.0, (1.0 - t) * (1.0 - t)
+
+
+def is_open(
+    x: float, y: float, z: float, enough: float, i: int, j: int, texture: HeightMapArguments
+) -> bool:
+    """Return whether a Bernstein coefficient of ψ on cell (i, j) is less than enough.
+
+    They bound ψ more closely than those of the spline; g is the height amid the cell.
+    """
+    c = texture.c
+    amid = c[i + 1, j + 1] + c[i + 1, j + 2] + c[i + 2, j + 1] + c[i + 2, j + 2]
+    gap = 0.25 * float(amid) - z
+    px = 1.0 / texture.ix
+    py = 1.0 / texture.iy
+    along_x = square_on((x - texture.x0) * texture.ix - j)
+    along_y = square_on((y - texture.y0) * texture.iy - i)
+    rows = (
+        bernstein(c[i, j] - z, c[i, j + 1] - z, c[i, j + 2] - z, c[i, j + 3] - z),
+        bernstein(c[i + 1, j] - z, c[i + 1, j + 1] - z, c[i + 1, j + 2] - z, c[i + 1, j + 3] - z),
+        bernstein(c[i + 2, j] - z, c[i + 2, j + 1] - z, c[i + 2, j + 2] - z, c[i + 2, j + 3] - z),
+        bernstein(c[i + 3, j] - z, c[i + 3, j + 1] - z, c[i + 3, j + 2] - z, c[i + 3, j + 3] - z),
+    )
+    twice = gap / 18.0
+    least = np.inf
+    for m in range(4):
+        part = bernstein(rows[0][m], rows[1][m], rows[2][m], rows[3][m])
+        lowest = min(
+            twice * part[0] + along_y[0] * py * py, twice * part[1] + along_y[1] * py * py,
+            twice * part[2] + along_y[2] * py * py, twice * part[3] + along_y[3] * py * py,
+        )  # fmt: skip
+        least = min(least, lowest + along_x[m] * px * px)
+    return least - gap * gap < enough
 
 
 def rises(
