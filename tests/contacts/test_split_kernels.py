@@ -149,15 +149,21 @@ def test_a_foot_follows_its_point() -> None:
         atoms = np.zeros((5, 4))
         atoms[1, :3] = foot_of(y)
         y = y + shift * np.array([1.0, -1.0, 0.5])
-        found, looks = conditions.split_follow(y, atoms, 1, None)
+        found, looks = conditions.split_follow(y, atoms, 1, 25, None)
         assert found
         assert 1.0 <= looks <= (2.0 if shift == 0.0 else 8.0)
         np.testing.assert_allclose(atoms[1, :3], foot_of(y), rtol=1e-10)
         assert not atoms[0].any()
+    away = []
+    for most in (1, 2, 3):
+        atoms[1, :3] = foot_of(np.array([0.2, -0.1, -0.5]))
+        assert conditions.split_follow(y, atoms, 1, most, None) == (True, float(most))
+        away.append(float(np.linalg.norm(atoms[1, :3] - foot_of(y))))
+    assert 0.03 > away[0] > 3.0 * away[1] > 9.0 * away[2] > 0.0
     atoms[0, :2] = 0.1, 0.1
     h, hx, hy = curvature(0.1, 0.1, None)[:3]
     below = np.array([0.1 + 30.0 * hx, 0.1 + 30.0 * hy, h - 30.0])
-    assert conditions.split_follow(below, atoms, 0, None) == (False, 1.0)
+    assert conditions.split_follow(below, atoms, 0, 25, None) == (False, 1.0)
     # Convex just above the first focal point, a saddle just below it.
     a, b, c = QUADRIC[:3]
     for depth in np.linspace(2.0, 4.0, 41):
@@ -165,7 +171,7 @@ def test_a_foot_follows_its_point() -> None:
         below = np.array([0.1 + depth * hx, 0.1 + depth * hy, h - depth])
         atoms[0, :2] = 0.1, 0.1
         minimum = bool(np.linalg.det(q) > 0.0)
-        assert conditions.split_follow(below, atoms, 0, None)[0] is minimum
+        assert conditions.split_follow(below, atoms, 0, 25, None)[0] is minimum
 
 
 # --- weights --------------------------------------------------------------------------------------

@@ -159,9 +159,9 @@ def test_a_search_begins_with_what_is_known(
         assert rest[1:] == (10.0 if count > 1 else 0.0, "texture")
         return (2 if works else 0, 6.0) if count > 1 else (0, 50.0)
 
-    def follow(p: Any, _atoms: Any, row: int, _texture: Any) -> Any:
+    def follow(p: Any, _atoms: Any, row: int, most: int, _texture: Any) -> Any:
         told.append("follow")
-        assert (tuple(p), row) == (tuple(P), 0)
+        assert (tuple(p), row, most) == (tuple(P), 0, 25)
         return works, 4.0
 
     def query(p: Any, _atoms: Any, row: int, budget: float, _texture: Any) -> Any:

@@ -137,14 +137,20 @@ def split_moving(
     return True
 
 
-def split_follow(y: FloatArray, atoms: FloatArray, row: int, texture: object) -> tuple[bool, float]:
-    """Move a foot to the stationary point near it that belongs to y; return success and looks."""
+def split_follow(
+    y: FloatArray, atoms: FloatArray, row: int, most: int, texture: object
+) -> tuple[bool, float]:
+    """Move a foot towards the stationary point near it that belongs to y, by Newton's method.
+
+    Returns:
+        Whether it is near a minimum, and the looks that were taken: as many as steps at most.
+    """
     fx = atoms[row, 0]
     fy = atoms[row, 1]
     last = np.inf
     stalled = 0
     looks = 0.0
-    for _ in range(25):
+    for _ in range(most):
         looks += 1.0
         h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, texture)
         gap = h - y[2]

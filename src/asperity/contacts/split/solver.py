@@ -52,6 +52,9 @@ KERNELS = Kernels(
     iterates=True,
 )  # fmt: skip
 
+# Of a foot by Newton's method before the atoms are solved for together; more do not pay.
+STEPS = 2
+
 
 def split_query(
     y: FloatArray, atoms: FloatArray, row: int, budget: float, texture: object
@@ -178,9 +181,10 @@ def split_polish(
         scale += p[d] * p[d] + y[d] * y[d]
     last = np.inf
     stalled = 0
-    for _ in range(20):
+    most: Any = np.int64(STEPS)
+    for _ in range(25):
         for i in range(count):
-            found, taken = split_follow(y, atoms, i, texture)
+            found, taken = split_follow(y, atoms, i, most, texture)
             looks += taken
             if not found or looks > budget:
                 return nothing, looks
@@ -303,8 +307,9 @@ def split_start(
         if solved > 0:
             return solved, solved, looks
     found = False
+    to_end: Any = np.int64(25)
     if known == 1:
-        found, looks = split_follow(p, atoms, first, texture)
+        found, looks = split_follow(p, atoms, first, to_end, texture)
     if not found:
         _gap, taken = split_query(p, atoms, first, budget, texture)
         looks += taken
