@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import random
 from io import BytesIO
 
 import numpy as np
 import pytest
 from PIL import Image
 from tests.lab.browser import Browser, needs_browser
+from tests.lab.started import Started
 
 from asperity.lab.site import page_files
 
 MOST_BYTES = 1_000_000
-ACTIONS = 150
 
 
 def test_the_page_is_small_and_comes_from_here_alone() -> None:
@@ -89,36 +88,6 @@ def test_it_fits_every_screen(page: Browser, width: int, dark: bool) -> None:
 
 
 @needs_browser
-def test_whatever_is_done_nothing_breaks(page: Browser) -> None:
-    page.resize(1280, 900)
-    chance = random.Random(7)
-    keys = ["w", "a", "c", "x", "m", "r", " ", "+", "-", "ArrowLeft", "ArrowUp", "PageUp",
-            "PageDown", "Tab", "Escape"]  # fmt: skip
-    page.ask("lab.most = 0; lab.watch = setInterval(() => { const at = lab.frame.greatest;"
-             "const low = lab.frame.least; for (const k of [7, 8, 9])"
-             "lab.most = Math.max(lab.most, at[k], -low[k]); }, 4)")  # fmt: skip
-    for _ in range(ACTIONS):
-        view, act = chance.choice(["relief", "cut"]), chance.random()
-        place = inside(page, view, chance.random(), chance.random())
-        if act < 0.3:
-            page.press(chance.choice(keys))
-        elif act < 0.7:
-            page.mouse("mouseMoved", *place, chance.choice([0, 1]))
-        elif act < 0.8:
-            page.mouse(chance.choice(["mousePressed", "mouseReleased"]), *place, 1)
-        elif act < 0.9:
-            page.mouse("mouseWheel", *place, deltaX=0, deltaY=chance.choice([-100, 100]))
-        else:
-            x, y = chance.uniform(0, 1280), chance.uniform(0, 900)
-            page.mouse("mouseMoved", x, y)
-    page.until("lab.news?.state == 'running'")
-    page.ask("clearInterval(lab.watch)")
-    assert page.ask("lab.faults") == 0
-    assert page.said == []
-    assert 0.0 < page.ask("lab.most") <= page.ask("lab.news.max_force") * (1 + 1e-9)
-
-
-@needs_browser
 def test_a_lost_connection_is_said_and_comes_back(page: Browser) -> None:
     # What no page of ours sends.
     page.ask("lab.hand.say('steer', {})")
@@ -128,3 +97,55 @@ def test_a_lost_connection_is_said_and_comes_back(page: Browser) -> None:
     page.until("lab.news?.steers && lab.news.state == 'running'")
     numbers = page.ask("lab.frame.first")
     page.until(f"lab.frame.first > {numbers} && lab.frame.number < 1e4")
+
+
+@needs_browser
+def test_without_shared_memory_all_comes_as_messages(page: Browser, lab: Started) -> None:
+    assert page.ask("lab.line.reads")
+    script = "Object.defineProperty(globalThis, 'crossOriginIsolated', {value: false})"
+    added = page.call("Page.addScriptToEvaluateOnNewDocument", source=script)
+    try:
+        page.call("Page.navigate", url="about:blank")
+        page.call("Page.navigate", url=lab.address)
+        page.until("globalThis.lab?.frame && lab.ready && lab.news.state == 'running'")
+        assert not page.ask("lab.line.reads")
+        numbers = page.ask("lab.frame.number")
+        page.until(f"lab.frame.number > {numbers} + 100")
+    finally:
+        page.call("Page.removeScriptToEvaluateOnNewDocument", **added)
+    assert page.ask("lab.faults") == 0
+
+
+# The thread's own source, and what reads its memory, one after the other: what is said, and heard.
+_THROUGH_MEMORY = """((size, count) => {
+  const [TOLD, socket] = ((postMessage, WebSocket) => {
+    let onmessage; %s; return [TOLD, () => socket];
+  })(() => {}, class {});
+  const shared = { places: new SharedArrayBuffer(8), ring: new SharedArrayBuffer(8 * size) };
+  const said = [], heard = [], written = one => (typeof one === "string" ? one : [...one].join());
+  const line = Object.assign(Object.create(Object.getPrototypeOf(lab.line)), {
+    reads: true, places: new Int32Array(shared.places), ring: new Float64Array(shared.ring),
+    take(data) { heard.push(written(typeof data === "string" ? data : new Float64Array(data))); },
+  });
+  TOLD.memory(shared); TOLD.open(""); TOLD.reads(true);
+  const come = one => { said.push(written(one)); socket().onmessage({ data: one.buffer ?? one }); };
+  for (let k = 0; k < count; k++) {
+    const long = k * 7 %% 31;
+    const numbers = Float64Array.from({ length: long + 1 }, (_, j) => k + j / 64);
+    come(k %% 3 ? numbers : "é€".repeat(long) + k);
+    if (k %% 5 === 4) line.look();
+  }
+  const late = count - heard.length;
+  while (heard.length < said.length && said.length < 3 * count) { come("more"); line.look(); }
+  return [late, heard.length, said.length, heard.every((one, k) => one === said[k])];
+})"""
+
+
+@needs_browser
+def test_what_comes_through_the_memory_is_whole_and_in_its_order(page: Browser) -> None:
+    through = _THROUGH_MEMORY % page_files()["post.js"][1].decode()
+    # Memory that holds the longest twice, and is often full; memory with room.
+    for size in (150, 1000):
+        late, heard, said, same = page.ask(f"{through}({size}, 400)")
+        assert (heard == said, same) == (True, True)
+        assert (late > 20) is (size == 150)

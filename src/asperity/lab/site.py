@@ -59,5 +59,7 @@ def _response(status: HTTPStatus, kind: str, content: bytes) -> Response:
         "Content-Type": kind, "Content-Length": str(len(content)), "Cache-Control": "no-store",
         "Content-Security-Policy": POLICY, "Referrer-Policy": "no-referrer",
         "X-Content-Type-Options": "nosniff", "Connection": "close",
+        # The page shares memory with its thread, which no page of others may reach.
+        "Cross-Origin-Opener-Policy": "same-origin", "Cross-Origin-Embedder-Policy": "require-corp",
     }  # fmt: skip
     return Response(status.value, status.phrase, Headers(headers), content)

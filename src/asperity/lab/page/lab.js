@@ -3,6 +3,7 @@
 import { Ledger } from "./gauge.js";
 import { Hand } from "./hand.js";
 import { Handle } from "./handle.js";
+import { Latency } from "./latency.js";
 import { Line } from "./line.js";
 import { download, pngOf, svgOf } from "./picture.js";
 import { readTheme } from "./sheet.js";
@@ -25,8 +26,7 @@ let news = null, frame = null, span = 8e-3, centre = [0, 0], firstNews = true;
 let laws = []; // as the lab knows them, with their parameters
 let faults = 0, seen = -1; // the newest frame that was painted
 let asked = {}; // pictures, by kind: which, since when, and when again [ms]
-const waiting = []; // wishes of the pointer: number, and since when [ms]
-const latencies = []; // from the pointer's event to the picture that shows its wish followed [ms]
+const latency = new Latency();
 
 const line = new Line({
   hello(said) {
@@ -85,8 +85,7 @@ const line = new Line({
 
 const hand = new Hand((what, content) => {
   const said = Boolean(news?.steers && !news.handle) && line.say(what, content);
-  if (said) waiting.push([hand.sent + 1, hand.since]);
-  if (waiting.length > 500) waiting.shift();
+  if (said) latency.wish(hand.sent + 1, hand.since);
   return said;
 });
 
@@ -262,6 +261,8 @@ function due(what, time, every) {
 
 function paint(time) {
   requestAnimationFrame(paint);
+  latency.painted();
+  line.look();
   player.tick(time);
   const state = probeState();
   if (frame && frame.number !== seen) {
@@ -271,17 +272,10 @@ function paint(time) {
   relief.draw(state);
   cut.draw(state, boxes());
   if (due("traces", time, 60)) traces.draw(ledger.base);
-  if (frame && waiting[0]?.[0] <= frame.heard) painted.port1.postMessage(frame.heard);
+  latency.paints(frame?.heard ?? 0);
   if (due("look", time, 200)) look(state);
   if (state && due("words", time, 150)) tell(state);
 }
-
-// What is said here is heard when the browser has done with the picture.
-const painted = new MessageChannel();
-painted.port2.onmessage = ({ data: heard }) => {
-  while (waiting.length && waiting[0][0] <= heard) latencies.push(performance.now() - waiting.shift()[1]);
-  if (latencies.length > 5000) latencies.splice(0, latencies.length - 5000);
-};
 
 /** Say in words what is seen. */
 function tell(state) {
@@ -401,8 +395,8 @@ readTheme();
 requestAnimationFrame(paint);
 // For tests, and for whoever is curious in the console.
 globalThis.lab = {
-  get span() { return span; }, get frame() { return frame; }, get news() { return news; }, get faults() { return faults; },
+  line, get span() { return span; }, get frame() { return frame; }, get news() { return news; }, get faults() { return faults; },
   /** Whether both pictures are of the surface that is shown. */
   get current() { return ["relief", "cut"].every(kind => asked[kind]?.again < Infinity && asked[kind].version === news?.version); },
-  get ready() { return Boolean(relief.heights && cut.box); }, latencies, hand, tour, ledger, player, probeState, relief, cut, svg: () => svgOf(views), png: () => pngOf(views),
+  get ready() { return Boolean(relief.heights && cut.box); }, latencies: latency.all, hand, tour, ledger, player, probeState, relief, cut, svg: () => svgOf(views), png: () => pngOf(views),
 };

@@ -2,6 +2,9 @@
 
 const STATE = 1;
 const AGAIN = 1000; // ms until the next attempt
+const MEMORY = 1 << 18; // numbers: more than all frames that are under way, and words
+
+const letters = new TextDecoder("utf-16le");
 
 /** Return what a frame holds, by the layout that the server has named. */
 function readFrame(numbers, layout) {
@@ -22,7 +25,19 @@ export class Line {
   constructor(hear) {
     this.hear = hear;
     this.layout = null;
-    this.wishes = 0;
+    this.there = false;
+    this.reads = false; // from memory; else what comes is a message
+    this.post = new Worker("post.js");
+    this.post.onmessage = ({ data }) => this.told(data);
+    // Where memory cannot be shared, and while nothing is painted, all comes as messages.
+    if (globalThis.crossOriginIsolated) {
+      const places = new SharedArrayBuffer(8), ring = new SharedArrayBuffer(8 * MEMORY);
+      [this.places, this.ring] = [new Int32Array(places), new Float64Array(ring)];
+      this.tell("memory", { places, ring });
+    }
+    const visible = () => this.tell("reads", !document.hidden);
+    document.addEventListener("visibilitychange", visible);
+    visible();
     this.open();
   }
 
@@ -30,13 +45,34 @@ export class Line {
     const address = new URL("live", location.href);
     address.protocol = "ws:";
     address.hash = "";
-    this.socket = new WebSocket(address);
-    this.socket.binaryType = "arraybuffer";
-    this.socket.onmessage = event => this.take(event.data);
-    this.socket.onclose = event => {
-      this.hear.lost(event.reason);
-      setTimeout(() => this.open(), AGAIN);
-    };
+    this.tell("open", String(address));
+  }
+
+  tell(what, content) { this.post.postMessage([what, content]); }
+
+  told({ data, opened, closed, reads }) {
+    this.look(); // what was written before comes before
+    if (reads !== undefined) this.reads = reads;
+    if (opened) this.there = true;
+    if (data !== undefined) this.take(data);
+    if (closed === undefined) return;
+    this.there = false;
+    this.hear.lost(closed);
+    setTimeout(() => this.open(), AGAIN);
+  }
+
+  /** Take what has come into the memory. */
+  look() {
+    if (!this.reads) return;
+    const { places, ring } = this, end = Atomics.load(places, 0);
+    for (let at = Atomics.load(places, 1); at !== end; Atomics.store(places, 1, at)) {
+      const length = ring[at];
+      if (!length) { at = 0; continue; }
+      const numbers = ring.slice(at + 2, at + 2 + length), text = ring[at + 1];
+      at += length + 2;
+      Atomics.store(places, 1, at); // before what may fail
+      this.take(text ? letters.decode(Uint16Array.from(numbers)) : numbers.buffer);
+    }
   }
 
   take(data) {
@@ -53,8 +89,8 @@ export class Line {
 
   /** Say something, if somebody listens; whether it was said. */
   say(what, content = {}) {
-    if (this.socket.readyState !== WebSocket.OPEN) return false;
-    this.socket.send(JSON.stringify({ do: what, ...content }));
+    if (!this.there) return false;
+    this.tell("say", JSON.stringify({ do: what, ...content }));
     return true;
   }
 }
