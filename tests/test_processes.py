@@ -6,8 +6,10 @@ import math
 import os
 import pickle
 import time
+from concurrent.futures import CancelledError
 from importlib import import_module
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -174,6 +176,33 @@ def test_onsets_are_the_same_however_many_work_on_them(
         setup = band_setup(one.onset.law)
         alone = sweeps.onsets(setup, one.onset.law, (one.onset.delay,), starts=2, lowest=5.0)
         assert alone[0].onset == one.onset
+
+
+def test_threads_hear_that_nobody_waits_any_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sweeps, "cores", lambda: 2)
+    begun, over, heard = Event(), Event(), []
+
+    def work(number: int) -> None:
+        if number == 0:
+            begun.wait(60.0)
+            raise KeyboardInterrupt
+        begun.set()
+        heard.append(over.wait(10.0))
+
+    with pytest.raises(KeyboardInterrupt):
+        sweeps.side_by_side(work, [(0,), (1,)], over)
+    assert heard == [True]
+
+
+def test_a_law_is_left_after_a_stiffness_when_nobody_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    found: list[int] = []
+    over = Event()
+    monkeypatch.setattr(sweeps, "side_by_side", lambda work, jobs, _over: [work(*jobs[0])])
+    monkeypatch.setattr(sweeps, "Event", lambda: over)
+    over.set()
+    with pytest.raises(CancelledError):
+        sweeps.onsets(band_setup("W"), "W", (0, 1), starts=2, progress=lambda: found.append(1))
+    assert not found
 
 
 @pytest.mark.parametrize("name", CATALOGUE)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
+from threading import Event
 from typing import Any, TypeVar
 
 import numpy as np
@@ -27,11 +28,21 @@ Found = TypeVar("Found")
 
 
 def side_by_side(
-    function: Callable[..., Found], jobs: Iterable[tuple[Any, ...]]
+    function: Callable[..., Found], jobs: Iterable[tuple[Any, ...]], over: Event | None = None
 ) -> tuple[Found, ...]:
-    """Return what a function makes of the arguments of each job, computed at the same time."""
+    """Return what a function makes of the arguments of each job, computed at the same time.
+
+    Args:
+        function: called in threads.
+        jobs: its arguments.
+        over: set when nobody waits for what is still computed: after an interrupt or an error.
+    """
     with ThreadPoolExecutor(cores()) as pool:
-        return tuple(pool.map(lambda job: function(*job), jobs))
+        try:
+            return tuple(pool.map(lambda job: function(*job), jobs))
+        finally:  # before the pool waits for its threads
+            if over is not None:
+                over.set()
 
 
 def onsets(
@@ -59,10 +70,11 @@ def onsets(
         ParameterError: for a hand that does not come to rest, see
             :func:`~asperity.simulation.find_onset`.
     """
-    jobs = [(law, delay) for law in laws for delay in delays]
+    jobs, over = [(law, delay) for law in laws for delay in delays], Event()
     several = side_by_side(
-        partial(_law_onsets, setup, delays, starts, tolerance, lowest, progress),
+        partial(_law_onsets, setup, delays, starts, tolerance, lowest, progress, over),
         [(law,) for law in laws],
+        over,
     )
     found = [onset for some in several for onset in some]
     return tuple(
@@ -76,9 +88,14 @@ def onsets(
 
 def _law_onsets(
     setup: Setup, delays: Sequence[int], starts: int, tolerance: float, lowest: float,
-    progress: Callable[[], None] | None, law: str,
+    progress: Callable[[], None] | None, over: Event, law: str,
 ) -> list[Onset]:  # fmt: skip
     """Return the onsets of a law for every delay; see :func:`onsets`."""
+
+    def go_on() -> None:
+        if over.is_set():
+            raise CancelledError
+
     loop = setup.with_law(law)
     begin = loop.motion.at(np.zeros(1))[0] if loop.start is None else loop.start
     nears = [
@@ -88,7 +105,7 @@ def _law_onsets(
     return find_onsets(
         loop.surface, loop.plant, loop.hand, loop.servo, loop.motion, delays, nears,
         start=loop.start, velocity=loop.velocity, duration=loop.duration, starts=starts,
-        tolerance=tolerance, lowest=lowest, told=progress,
+        tolerance=tolerance, lowest=lowest, progress=go_on, told=progress,
     )  # fmt: skip
 
 
