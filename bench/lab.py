@@ -1,11 +1,18 @@
 """The lab: from pointer to picture, what the page costs the loop, and how long until it is there.
 
 ``python -m bench.lab 5`` for 5 s with a page instead of 40. Needs chromium.
+
+Late samples are counted in turns: alone, with a page, and with a process that takes as much of the
+processor as the browser did, and no more. Each difference has the chance that it would be as large
+or larger if it meant nothing: that of the sums with their signs thrown at random.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
+import os
+import subprocess
 import sys
 import tempfile
 import time
@@ -26,6 +33,14 @@ PAIRS = 8
 BLANK = "about:blank"
 MAP = ("noise:rms=20um,size=10.24mm,pitch=10um", "--law", "H", "--set", "update_rate=10kHz")
 """Law H on a map of 1024 x 1024 heights at 10 kHz."""
+# Spins for a share of each picture of the screen.
+_SPINS = """
+import sys, time
+while True:
+    begun = time.perf_counter()
+    while time.perf_counter() < begun + float(sys.argv[1]) / 60: pass
+    time.sleep(max(0.0, begun + 1 / 60 - time.perf_counter()))
+"""
 _LIVE = "globalThis.lab?.frame && lab.news?.state == 'running'"
 
 
@@ -54,11 +69,17 @@ def run(console: Console, seconds: float = SECONDS) -> None:
             lab.close()
     middle, most = np.quantile(waits, [0.5, 0.99])
     console.print(f"lab: pointer to picture {middle:.0f} ms, 99 % {most:.0f} ms, of {len(waits)}")
-    alone, watched = 1e6 * np.median(shares, axis=0)
+    alone, watched, spun = 1e6 * np.median(shares, axis=0)
     console.print(
-        f"lab: of a million samples {alone:.0f} are late without a page, {watched:.0f} with it;"
-        f" median of differences {1e6 * np.median(np.diff(shares)):+.0f}, of {len(shares)} pairs"
+        f"lab: of a million samples {alone:.0f} are late alone, {watched:.0f} with a page,"
+        f" {spun:.0f} with a process that takes as much of the processor; medians of {len(shares)}"
     )
+    for words, one, other in (("a page less alone", 1, 0), ("a page less that process", 1, 2)):
+        differences = 1e6 * (shares[:, one] - shares[:, other])
+        console.print(
+            f"lab: {words}: {differences.mean():+.0f} of a million on average, by chance"
+            f" {100 * by_chance(differences):.0f} % of the time"
+        )
 
 
 def first_picture(page: Browser) -> float:
@@ -74,19 +95,56 @@ def first_picture(page: Browser) -> float:
         lab.close()
 
 
+def by_chance(differences: FloatArray) -> float:
+    """Return how often a sum is as large or larger if each difference could have either sign."""
+    signs = np.array(list(itertools.product((1.0, -1.0), repeat=len(differences))))
+    sums = signs @ differences
+    return float(np.mean(sums >= differences.sum() * (1.0 - 1e-12)))
+
+
 def _pairs(lab: Started, page: Browser, seconds: float) -> tuple[FloatArray, FloatArray]:
-    """Return latencies [ms], and shares of late samples without and with a page (pairs, 2)."""
+    """Return latencies [ms], and shares of late samples in turns (PAIRS, 3).
+
+    Without a page, with it, and with a process that takes as much of the processor.
+    """
     waits: list[float] = []
     shares = []
-    for _ in range(PAIRS):
-        alone = _late(lab, seconds / PAIRS)
+    for number in range(PAIRS):
+        span = seconds / PAIRS
         page.call("Page.navigate", url=lab.address)
         page.until(f"{_LIVE} && lab.ready")
-        watched = _late(lab, seconds / PAIRS, page)
+        before, begun = _taken(page.process), time.monotonic()
+        watched = _late(lab, span, page)
+        taken = (_taken(page.process) - before) / (time.monotonic() - begun)
         waits += page.ask("lab.latencies")
         page.call("Page.navigate", url=BLANK)
-        shares.append((alone, watched))
+        # Neither of the others always comes first.
+        alone = _late(lab, span) if number % 2 else math.nan
+        spun = _late_beside(lab, span, taken)
+        shares.append((alone if number % 2 else _late(lab, span), watched, spun))
     return np.array(waits), np.array(shares)
+
+
+def _taken(process: int) -> float:
+    """Return the time of the processor that a process and all below it have taken [s]."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    ticks = int(fields[11]) + int(fields[12])
+    children = [(one / "children").read_text() for one in Path(f"/proc/{process}/task").iterdir()]
+    below = sum(_taken(int(child)) for text in children for child in text.split())
+    return ticks / os.sysconf("SC_CLK_TCK") + below
+
+
+def _late_beside(lab: Started, seconds: float, share: float) -> float:
+    """Return the share of late samples beside processes that take a share of the processor."""
+    each = share / 2.0
+    spinning = [subprocess.Popen([sys.executable, "-c", _SPINS, f"{each:.4f}"]) for _ in range(2)]
+    try:
+        time.sleep(0.5)
+        return _late(lab, seconds)
+    finally:
+        for one in spinning:
+            one.kill()
+            one.wait()
 
 
 def _wait(lab: Started) -> None:

@@ -67,6 +67,11 @@ class Browser:
             pages = json.load(answer)
         return str(next(page for page in pages if page["type"] == "page")["webSocketDebuggerUrl"])
 
+    @property
+    def process(self) -> int:
+        """Of the browser, below which all its others are."""
+        return self._process.pid
+
     def post(self, method: str, **parameters: Any) -> int:
         """Say something, and wait for no answer; the number of what was said."""
         number = next(self._numbers)
