@@ -376,3 +376,26 @@ def test_what_cannot_be_rendered_is_said_before_the_page(folder: Path) -> None:
     for words, more in cases.items():
         with pytest.raises(AssertionError, match=words):
             Started(str(folder / "scene.toml"), *more).close()
+
+
+def test_a_recording_moves_the_handle_and_ends_with_its_rows(folder: Path) -> None:
+    scene = folder / "replayed.toml"
+    hand = '[hand]\nkind = "spring"\nstiffness = "800 N/m"\ndamping = "5 N*s/m"\nmass = "50 g"\n'
+    still = (
+        '[motion]\nkind = "still"\npoint = ["0 mm", "0 mm", "-0.3 mm"]\n[run]\nduration = "1.5 s"\n'
+    )
+    scene.write_text(SCENE + hand + still)
+    setup = make_setup(load_scene(str(scene)))
+    setup.simulate(trace=str(folder / "run.mcap"))
+    started = Started(str(scene), "--law", "W", "--driver", f"replay:{folder / 'run.mcap'}")
+    with joined(started) as line:
+        assert "A recording moves the handle" in heard(line, news())["handle"]["where"]
+        for _ in range(2):
+            say(line, "start")
+            heard(line, news(state="running", law="W"))
+            heard(line, lambda m: frames(m) and column(m, "newest", "inside") == 1.0)
+            heard(
+                line,
+                news(state="stopped", words="the recording is at its end; Start begins it again"),
+            )
+    assert started.end()[0] == 0
