@@ -33,6 +33,8 @@ KERNELS = Kernels(
     ),
     called=("foot", "search_block", "search_tile", "search_tree"),
     shared=("search_plane",),
+    merged=("search_block", "search_window"),
+    iterates=True,
 )  # fmt: skip
 
 # A window of so few cells is searched cell by cell, four by four of them first.

@@ -29,7 +29,7 @@ from asperity.textures.samplers.spline import Four, box_bounds
 KERNELS = Kernels(
     provides=("cells_within", "is_empty", "is_open", "narrowed"),
     requires=("box_bounds", "curvature", "eigenvalues"),
-    called=("boxes_within", "cells_within", "is_open", "rises"),
+    merged=("boxes_within", "narrowed", "rises"),
 )
 
 # Cells a side of a window that is looked at as boxes, and boxes a side, at first and at most.
@@ -170,23 +170,23 @@ def is_open(
     gap = 0.25 * float(amid) - z
     px = 1.0 / texture.ix
     py = 1.0 / texture.iy
-    along_x = square_on((x - texture.x0) * texture.ix - j)
-    along_y = square_on((y - texture.y0) * texture.iy - i)
-    rows = (
-        bernstein(c[i, j] - z, c[i, j + 1] - z, c[i, j + 2] - z, c[i, j + 3] - z),
-        bernstein(c[i + 1, j] - z, c[i + 1, j + 1] - z, c[i + 1, j + 2] - z, c[i + 1, j + 3] - z),
-        bernstein(c[i + 2, j] - z, c[i + 2, j + 1] - z, c[i + 2, j + 2] - z, c[i + 2, j + 3] - z),
-        bernstein(c[i + 3, j] - z, c[i + 3, j + 1] - z, c[i + 3, j + 2] - z, c[i + 3, j + 3] - z),
-    )
+    rows = local_array((4, 4))
+    for m in range(4):
+        rows[m, 0], rows[m, 1], rows[m, 2], rows[m, 3] = bernstein(
+            c[i + m, j] - z, c[i + m, j + 1] - z, c[i + m, j + 2] - z, c[i + m, j + 3] - z
+        )
+    along = local_array((4,))
+    along[0], along[1], along[2], along[3] = square_on((x - texture.x0) * texture.ix - j)
+    v0, v1, v2, v3 = square_on((y - texture.y0) * texture.iy - i)
     twice = gap / 18.0
     least = np.inf
     for m in range(4):
-        part = bernstein(rows[0][m], rows[1][m], rows[2][m], rows[3][m])
+        b0, b1, b2, b3 = bernstein(rows[0, m], rows[1, m], rows[2, m], rows[3, m])
         lowest = min(
-            twice * part[0] + along_y[0] * py * py, twice * part[1] + along_y[1] * py * py,
-            twice * part[2] + along_y[2] * py * py, twice * part[3] + along_y[3] * py * py,
+            twice * b0 + v0 * py * py, twice * b1 + v1 * py * py,
+            twice * b2 + v2 * py * py, twice * b3 + v3 * py * py,
         )  # fmt: skip
-        least = min(least, lowest + along_x[m] * px * px)
+        least = min(least, lowest + along[m] * px * px)
     return least - gap * gap < enough
 
 
