@@ -156,3 +156,43 @@ def test_the_probe_is_where_the_loop_has_it(page: Browser) -> None:
             np.rint(column + 8.0 * np.cos(turn) - 0.5).astype(int),
         ]
         assert np.abs(ring - colour(page, "ink")).mean() < 60.0
+
+
+@needs_browser
+@pytest.mark.parametrize("size", [(1280, 900), (3840, 2160)])
+def test_the_hand_is_where_the_pointer_is_however_large_all_is_drawn(
+    page: Browser, size: tuple[int, int]
+) -> None:
+    page.resize(*size)
+    page.until(
+        f"lab.cut.sheet.unit {'>' if size[0] > 2000 else '=='} 1 && lab.cut.sheet.blank === false"
+    )
+    box = page.ask("document.getElementById('cut').getBoundingClientRect().toJSON()")
+    # In the page the picture has its place, pixel for pixel.
+    wide, drawn = page.ask("[lab.cut.sheet.width * lab.cut.sheet.unit, lab.cut.sheet.canvas.width]")
+    assert wide == pytest.approx(box["width"], abs=1e-3)
+    assert drawn == round(box["width"])
+    for across, down in ((0.3, 0.2), (0.7, 0.4)):
+        px, py = round(box["x"] + across * box["width"]), round(box["y"] + down * box["height"])
+        page.mouse("mouseMoved", px, py)
+        left, right, bottom, top = page.ask("lab.boxes()")
+        x = left + (px - box["x"]) / box["width"] * (right - left)
+        z = top - (py - box["y"]) / box["height"] * (top - bottom)
+        assert page.ask("[lab.hand.x, lab.hand.z]") == pytest.approx(
+            (x, z), abs=(right - left) / 900
+        )
+        # The hand comes there, and its cross is drawn at the pointer.
+        page.until(
+            "Math.hypot(lab.frame.hand[0] - lab.hand.x, lab.frame.hand[2] - lab.hand.z) < 1e-5"
+        )
+        drawn_at = page.ask(
+            "(() => { const mark = lab.cut.marker, box = mark.canvas.getBoundingClientRect();"
+            "const [x, , z] = lab.frame.hand, [l, r, b, t] = lab.boxes(), s = lab.cut.sheet;"
+            "const u = (x - l) / (r - l) * s.width - mark.left;"
+            "const v = (t - z) / (t - b) * s.height - mark.top;"
+            "return [box.x + u * s.unit, box.y + v * s.unit, box.width / mark.width]; })()"
+        )
+        assert drawn_at[:2] == pytest.approx((px, py), abs=2.0)
+        assert drawn_at[2] == pytest.approx(page.ask("lab.cut.sheet.unit"), rel=1e-3)
+    page.resize(1280, 900)
+    page.ask("lab.hand.z = null; lab.hand.wish()")

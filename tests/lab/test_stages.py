@@ -149,4 +149,9 @@ def test_the_tour_is_shown_with_a_band_and_gives_it_back(toured: Browser) -> Non
     assert page.ask("lab.news.settings") == former
     assert page.ask("lab.span") == pytest.approx(span)
     assert saved_scene(page) == before
+    # A band has no such number: nothing of the tour's stands in the field.
+    field = page.ask(
+        "(({ value, disabled }) => [value, disabled])(document.getElementById('hand_stiffness'))"
+    )
+    assert field == ["", True]
     assert page.said == []

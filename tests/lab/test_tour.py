@@ -20,7 +20,7 @@ def numbers_are_what_is_measured(page: Browser, number: int) -> None:
     """Whether a step tells of limits as they are, and of what was felt."""
     limits, told = page.ask("lab.tour.limits"), text(page, "tour-why")
     law = {3: "B", 5: "C"}[number]
-    assert f"{1e-3 * limits[law]:.2f} kN/m, {100 * limits[law] / limits['W']:.0f} %" in told
+    assert f"{1e-3 * limits[law]:.2f} kN/m, {100 * limits[law] / limits['W']:.0f}\u00a0%" in told
     if number == 3:
         assert f"set to 8.00 kN/m, {8000 / limits[law]:.1f} times that" in told
         return
@@ -60,6 +60,7 @@ def test_the_tour_shows_itself_to_its_end_by_keys(page: Browser) -> None:
 @needs_browser
 def test_what_is_not_there_is_not_found(page: Browser) -> None:
     # The hand goes in the loops of the step on law A, on the wall.
+    starts = page.ask("lab.news.starts")
     page.press("t")
     page.ask("lab.tour.go(1); lab.tour.act.law = 'W'; lab.tour.show(true); lab.tour.start(0)")
     page.until("lab.tour.gauge.way > 8e-3")
@@ -67,3 +68,4 @@ def test_what_is_not_there_is_not_found(page: Browser) -> None:
     assert not page.ask("lab.tour.found")
     assert not page.ask("lab.ledger.fed")
     page.press("t")
+    page.until(f"lab.news.starts === {starts} + 2 && lab.news.state === 'running'")

@@ -81,7 +81,7 @@ def recorded_reel(recording: Recording, surface: Surface) -> Reel:
     """Return the rows of a recording, all of which are read once, and looked at.
 
     What a recording does not hold is made: whether the probe was inside, of its place and the
-    surface; the energy given, of its parts; where no hand was recorded, the hand is at the probe.
+    surface; and the energy given, of its parts. Where no hand was recorded, its place is no number.
 
     Args:
         recording: of a run or a simulation.
@@ -153,7 +153,7 @@ class _Arranged:
         made = {
             "share": np.ones(len(rows)),
             "supplied": rows[:, self.places(tuple(self._parts))].sum(axis=1),
-            **{f"anchor {axis}": place[:, k] for k, axis in enumerate("xyz")},
+            **{f"anchor {axis}": np.full(len(rows), np.nan) for axis in "xyz"},
         }
         if "inside" not in self._names:
             made["inside"] = self._inside(place).astype(float)

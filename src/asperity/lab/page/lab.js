@@ -4,6 +4,7 @@ import { Ledger } from "./gauge.js";
 import { Hand } from "./hand.js";
 import { Handle } from "./handle.js";
 import { Latency } from "./latency.js";
+import { fromSlider, showLimit, toSlider } from "./limit.js";
 import { Line } from "./line.js";
 import { download, pngOf, svgOf } from "./picture.js";
 import { readTheme } from "./sheet.js";
@@ -134,7 +135,8 @@ function show() {
   const { settings, state, words, steers, free } = news;
   const [size, height] = [settings.magnify, settings.magnify_height].map(times => Number(times.toPrecision(3)));
   const times = size === height ? `, × ${size}` : `, × ${size}, heights × ${height}`;
-  $("surface").textContent = settings.texture + (size === 1 && height === 1 ? "" : times);
+  $("surface").title = settings.texture;
+  $("surface").textContent = settings.texture.split(/[\\/]/).at(-1) + (size === 1 && height === 1 ? "" : times);
   $("state").className = state;
   $("state").textContent = { running: `law ${settings.law} at ${news.rate.toFixed(0)} Hz`, stopped: "stopped",
     starting: "starting", changing: "changing" }[state];
@@ -159,7 +161,7 @@ function show() {
   $("stiffness-value").textContent = quantity(settings.stiffness, "N/m");
   $("assumptions").replaceChildren(...news.assumptions.map(words =>
     Object.assign(document.createElement("li"), { textContent: words })));
-  showLimit(settings);
+  showLimit(settings, news.limit);
   if (steers && state === "running" && !news.handle) toAddress(settings);
 }
 
@@ -180,25 +182,8 @@ function showParameters(settings) {
 
 function put(name, value) {
   const field = $(name);
-  if (document.activeElement !== field && value !== null) field.value = value;
-}
-
-// The slider is logarithmic: 10 to 10 000 N/m.
-const toSlider = stiffness => Math.max(0, Math.min(1, Math.log10(stiffness / 10) / 3));
-const fromSlider = value => Number((10 * 10 ** (3 * value / 1000)).toPrecision(3));
-
-function showLimit({ stiffness, law }) {
-  const { limit } = news, known = Number.isFinite(limit.stiffness);
-  $("limit").hidden = !known;
-  const words = $("limit-words");
-  words.classList.toggle("over", known && stiffness > limit.stiffness);
-  if (known) {
-    $("limit").style.left = `calc(0.5rem + ${toSlider(limit.stiffness)} * (100% - 1rem))`;
-    const side = stiffness > limit.stiffness ? "▲ above" : "below";
-    words.textContent = `${side} the limit of ${quantity(limit.stiffness, "N/m")} for law ${law}: ${limit.criterion} (${limit.basis})`;
-  } else {
-    words.textContent = limit.q === "inf" ? `No limit: the force of law ${law} jumps` : "basis" in limit ? `No limit is known${limit.basis === "none" ? "" : `: ${limit.basis}`}` : "The limit is being computed …";
-  }
+  if (document.activeElement !== field) field.value = value ?? ""; // nothing of a hand that is a band
+  field.disabled ||= value === null;
 }
 
 function fromAddress() {
@@ -395,7 +380,7 @@ readTheme();
 requestAnimationFrame(paint);
 // For tests, and for whoever is curious in the console.
 globalThis.lab = {
-  line, get span() { return span; }, get frame() { return frame; }, get news() { return news; }, get faults() { return faults; },
+  line, boxes, get span() { return span; }, get frame() { return frame; }, get news() { return news; }, get faults() { return faults; },
   /** Whether both pictures are of the surface that is shown. */
   get current() { return ["relief", "cut"].every(kind => asked[kind]?.again < Infinity && asked[kind].version === news?.version); },
   get ready() { return Boolean(relief.heights && cut.box); }, latencies: latency.all, hand, tour, ledger, player, probeState, relief, cut, svg: () => svgOf(views), png: () => pngOf(views),

@@ -3,7 +3,7 @@
 import { colours } from "./sheet.js";
 
 const ARROW = 250; // pixels per newton, as long as that fits
-const LONGEST = 130; // pixels
+const LONGEST = 130, SHARE = 0.45; // pixels, and of what is there to the side and in height
 const EDGE = 12; // pixels around what is drawn
 const STEP = 64; // pixels by which the picture grows: another size takes another memory
 
@@ -40,8 +40,9 @@ function cross(draw, x, y, colour) {
 }
 
 /** A force as it is drawn: in proportion, but never longer than fits. */
-function drawnForce(force, up) {
-  const size = Math.hypot(...force), scale = size === 0 ? 0 : Math.min(ARROW, LONGEST / size);
+function drawnForce(force, up, { width, height }) {
+  const longest = Math.min(LONGEST, SHARE * Math.min(width, height));
+  const size = Math.hypot(...force), scale = size === 0 ? 0 : Math.min(ARROW, longest / size);
   return up(force).map(value => value * scale);
 }
 
@@ -65,7 +66,7 @@ export class Marker {
 
   /** Draw a state where `place` says, with the force in the direction of the picture that `up` says. */
   show(place, { probe, god, hand, force, inside }, up) {
-    const theme = colours(), at = place(probe), arm = drawnForce(force, up), known = point => point.every(Number.isFinite);
+    const theme = colours(), at = place(probe), arm = drawnForce(force, up, this.sheet), known = point => point.every(Number.isFinite);
     const held = known(hand) && place(hand), near = inside && known(god) && place(god);
     const parts = [at, at.map((value, k) => value + arm[k]), held, near].filter(Boolean);
     const { draw } = this;
@@ -83,7 +84,7 @@ export class Marker {
 
   /** Lie, cleared, over some points as far as they are in the picture; whether any is. */
   fit(parts) {
-    const { sheet, canvas } = this, { ratio } = sheet;
+    const { sheet, canvas } = this, { ratio, unit } = sheet;
     const [left, width] = stretch(parts.map(([x]) => x), sheet.width), [top, height] = stretch(parts.map(([, y]) => y), sheet.height);
     const there = width > 0 && height > 0;
     canvas.hidden = !there;
@@ -91,10 +92,10 @@ export class Marker {
     if (this.width !== width || this.height !== height || this.ratio !== ratio) {
       Object.assign(this, { width, height, ratio });
       Object.assign(canvas, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
-      Object.assign(canvas.style, { width: `${width}px`, height: `${height}px` });
+      Object.assign(canvas.style, { width: `${width * unit}px`, height: `${height * unit}px` });
     }
     Object.assign(this, { left, top });
-    canvas.style.transform = `translate(${sheet.left + left}px, ${sheet.top + top}px)`;
+    canvas.style.transform = `translate(${sheet.left + left * unit}px, ${sheet.top + top * unit}px)`;
     this.draw.setTransform(ratio, 0, 0, ratio, -left * ratio, -top * ratio);
     this.draw.clearRect(left, top, width, height);
     return true;

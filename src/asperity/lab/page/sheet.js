@@ -1,25 +1,34 @@
 // What pictures are drawn on, and in which colours.
 
-/** A canvas and the size of its place, which is watched: to ask the page for it would cost a layout. */
+const TEXT = 17; // px of the page's text where a picture is drawn as it is
+
+/**
+ * A canvas and the size of its place, which is watched: to ask the page for it would cost a layout.
+ *
+ * Where the page's text is larger, so is all that is drawn: width and height count in units, each so many pixels of the
+ * page, and nothing who draws need know.
+ */
 export class Sheet {
   constructor(canvas) {
     this.canvas = canvas;
     this.draw = canvas.getContext("2d");
-    this.ratio = this.width = this.height = 1;
+    this.ratio = this.unit = this.width = this.height = 1;
     this.left = this.top = 0; // in what it is placed in
     this.blank = true; // nothing is drawn on it
     new ResizeObserver(([{ contentRect }]) => this.fit(contentRect.width, contentRect.height)).observe(canvas);
   }
 
   fit(width, height) {
-    this.ratio = Math.min(window.devicePixelRatio || 1, 2);
-    Object.assign(this, { width: Math.max(width, 1), height: Math.max(height, 1), blank: true });
+    const text = parseFloat(getComputedStyle(document.documentElement).fontSize);
+    this.unit = Math.max(1, Math.round(10 * text / TEXT) / 10);
+    this.ratio = Math.min(window.devicePixelRatio || 1, 2) * this.unit;
+    Object.assign(this, { width: Math.max(width / this.unit, 1), height: Math.max(height / this.unit, 1), blank: true });
     Object.assign(this, { left: this.canvas.offsetLeft, top: this.canvas.offsetTop });
     this.canvas.width = Math.round(this.width * this.ratio);
     this.canvas.height = Math.round(this.height * this.ratio);
   }
 
-  /** Return the context, cleared, and width and height in pixels of the page. */
+  /** Return the context, cleared, and width and height in units. */
   cleared() {
     this.blank = false;
     this.draw.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);

@@ -28,7 +28,7 @@ const loop = { motion: "loop", x: FLANK, press: 5e-4, loop: 5e-4, turn: 8, latch
 const below = ({ news }) => Number.isFinite(news.limit.stiffness) && news.settings.stiffness <= news.limit.stiffness;
 const above = ({ news }) => Number.isFinite(news.limit.stiffness) && news.settings.stiffness > 2 * news.limit.stiffness;
 const times = (value, of) => (value / of).toPrecision(2).replace(/\.0$/, "");
-const percent = (value, of) => `${(100 * value / of).toFixed(0)} %`;
+const percent = (value, of) => `${(100 * value / of).toFixed(0)}\u00a0%`;
 const at = (value, goal, unit) => `${quantity(value, unit)} of ${quantity(goal, unit)}`;
 
 // What an act asks for, and what of it is seen: words, how much of it is done, and whether it has happened.
@@ -141,6 +141,7 @@ export class Tour {
     this.seen.fill(false);
     this.host.span = SEEN;
     // The lab keeps what is shown, and sets up what the steps begin with, whatever hand there was.
+    this.since = this.host.news.starts;
     this.host.change({ stage: "tour", ...STAGE });
     this.go(0);
   }
@@ -164,9 +165,10 @@ export class Tour {
 
   start(turn) {
     this.turn = turn;
-    const { law, stiffness, ...stage } = this.wanted, { settings } = this.host.news;
-    // What takes another loop is asked for only if it must; what a step sets always: what is known may be old.
-    const others = Object.entries(stage).filter(([name, value]) => !(name in STAGE) || settings[name] !== value);
+    const { law, stiffness, ...stage } = this.wanted, { settings, starts } = this.host.news;
+    // What takes another loop is asked for only if it must, and not while it is on its way; what a step sets, always.
+    const known = starts !== this.since;
+    const others = Object.entries(stage).filter(([name, value]) => !(name in STAGE) || known && settings[name] !== value);
     this.host.change({ ...Object.fromEntries(others), law, stiffness });
     this.host.hand.motion = "pointer";
     this.host.hand.latched = false;

@@ -31,10 +31,10 @@ export class Relief {
     };
   }
 
-  /** Return x and y of the point of the plane z = 0 at a pixel. */
+  /** Return x and y of the point of the plane z = 0 at a pixel of the page. */
   under(px, py) {
-    const { skew, left, across, bottom, deep } = corners(this.sheet.width, this.sheet.height);
-    const v = (bottom - py) / deep, u = (px - left - v * skew) / across;
+    const { width, height, unit } = this.sheet, { skew, left, across, bottom, deep } = corners(width, height);
+    const v = (bottom - py / unit) / deep, u = (px / unit - left - v * skew) / across;
     return [this.x + (u - 0.5) * this.size, this.y + (v - 0.5) * this.size];
   }
 
@@ -84,10 +84,10 @@ export class Cut {
     this.strongest = this.fx.reduce((most, value, k) => Math.max(most, Math.hypot(value, this.fz[k])), 0);
   }
 
-  /** Return x and z at a pixel, of the box that is wanted. */
+  /** Return x and z at a pixel of the page, of the box that is wanted. */
   under(px, py, [left, right, bottom, top]) {
-    const { width, height } = this.sheet;
-    return [left + px / width * (right - left), top - py / height * (top - bottom)];
+    const { width, height, unit } = this.sheet;
+    return [left + px / unit / width * (right - left), top - py / unit / height * (top - bottom)];
   }
 
   draw(state, wanted) {
