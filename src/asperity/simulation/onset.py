@@ -144,11 +144,12 @@ def find_onset(
         motion: of the hand's anchor; it must be at rest in the second half of the run.
         start: of the handle [m], shape (3,); default: where the motion begins.
         velocity: of the handle at the start [m/s], shape (3,); default: none.
-        duration: of a run [s]; one that is restless at its end is run again, up to 16 times as
+        duration: of a run [s]; one that is restless at its end goes on, up to 16 times as
             long.
         starts: phases of the texture at which the handle starts.
         tolerance: the bracket's width over its lower end.
-        threshold: :func:`restlessness` that counts as a limit cycle [m/s].
+        threshold: of the standard deviations of the velocity, summed over the axes, that count as a
+            limit cycle [m/s].
         lowest: stiffness from which the search goes up [N/m]; one that does not hold the hand's
             force lets the handle sink to where the law's numbers no longer hold.
         highest: stiffness to which the search goes [N/m].
