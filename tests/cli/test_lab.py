@@ -26,6 +26,13 @@ def test_bad_input_is_named(arguments: list[str], words: str) -> None:
     assert words in str(done.exception)
 
 
+@pytest.mark.parametrize("name", ["real", "replay:other.mcap"])
+def test_a_recording_is_shown_on_the_simulated_device_alone(name: str) -> None:
+    done = CliRunner().invoke(cli, ["lab", "--no-browser", "run.mcap", "--driver", name])
+    assert isinstance(done.exception, ParameterError)
+    assert "driver cannot show run.mcap again, a recording" in str(done.exception)
+
+
 def test_without_a_browser_the_address_is_said(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -13,6 +13,7 @@ import click
 
 from asperity.arguments import Argument
 from asperity.cli.driver import (
+    REPLAY,
     SIMULATED,
     driven_setup,
     driver_options,
@@ -35,11 +36,8 @@ from asperity.devices import load_device
 from asperity.errors import ParameterError, tell
 
 if TYPE_CHECKING:
-    from asperity.lab.reel import Reel
-    from asperity.lab.stage import Stage
-
-if TYPE_CHECKING:
     from asperity.lab.handle import Handle
+    from asperity.lab.reel import Reel
     from asperity.lab.stage import Stage
 
 _LAB = (
@@ -99,9 +97,8 @@ def _stage(named: str, values: dict[str, Any]) -> tuple[Stage, Reel | None]:
     from asperity.lab.stage import DEVICE, make_stage
     from asperity.scene import load_scene
 
-    folder = click.get_current_context().with_resource(TemporaryDirectory())
     own, told, settings = surface_values(values), file_values(values), values["settings"]
-    if (path := recording_in(named, Path(folder))) is not None:
+    if (path := recording_in(named, _folder())) is not None:
         for name in told:
             raise ParameterError(name, "means nothing for a recording, which holds its surface")
         with progress_bar("reading the recording"):
@@ -112,19 +109,28 @@ def _stage(named: str, values: dict[str, Any]) -> tuple[Stage, Reel | None]:
         return make_stage(scene, named, own, settings.changed(device), told), None
 
 
+def _folder() -> Path:
+    """Return a folder that is there until the command ends."""
+    return Path(click.get_current_context().with_resource(TemporaryDirectory()))
+
+
 def _held(
     named: str, values: dict[str, Any], name: str, *, accept_risk: bool
 ) -> tuple[Stage, Handle]:
     """Return what is shown on the device of a driver, and its handle.
 
     Raises:
-        ParameterError: for a driver that is unknown, a device without a greatest force, or a
-            stiffness above the limit.
+        ParameterError: for a driver that is unknown, a device without a greatest force, a
+            stiffness above the limit, or a recording.
     """
     from asperity.lab.handle import make_handle
+    from asperity.lab.opened import recording_in
     from asperity.lab.stage import held_stage
     from asperity.servo.process import need_greatest_force
 
+    if recording_in(named, _folder()) is not None:
+        words = f"cannot show {named} again, a recording: leave it out, or name a surface and"
+        raise ParameterError("driver", f"{words} --driver {REPLAY}run.mcap, to feel it on that way")
     setup, own = driven_setup(named, values, name)
     driver = named_driver(name, setup)
     need_greatest_force(driver, setup.servo)
