@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import time
 from collections.abc import Callable, Coroutine
 from concurrent.futures import Future
 from contextlib import suppress
@@ -49,6 +50,7 @@ UNDER_WAY = 8
 """Frames that a page has not painted yet, at most: what waits for a slow one would be old."""
 AWAY = 3.0
 """[s] without a word from the page that steers, after which the force of a real device goes."""
+_SHORT = 5e-4  # [s] for which others can wait: the clock of asyncio goes in milliseconds
 _LOOK = 0.1  # [s] between two looks at that
 _LONGEST_SEND = 10.0  # [s] after which a page that takes nothing is let go
 _MOST_REASON = 120  # bytes that a closing frame holds, less its code
@@ -63,13 +65,14 @@ class Page:
     Attributes:
         looks: pictures that it waits for, by kind: only the newest of each counts.
         asked: is set when there is one.
+        steered: is set when it has moved the hand.
         sent: number of the newest frame that it was sent.
     """
 
     def __init__(self, line: ServerConnection) -> None:
         self.line = line
         self.looks: dict[str, Look] = {}
-        self.asked = asyncio.Event()
+        self.asked, self.steered = asyncio.Event(), asyncio.Event()
         self.sent = self._seen = 0.0
         self._taken = asyncio.Event()
 
@@ -209,6 +212,7 @@ class Lab:
             raise ParameterError("steering", "is done by another page: this one watches")
         elif isinstance(message, Steer):
             self.session.steer(message)
+            page.steered.set()
         elif isinstance(message, Change):
             self.session.change(message.wishes)
         elif isinstance(message, Start):
@@ -246,11 +250,25 @@ class Lab:
         for page in tuple(self._pages):
             await page.say("news", steers=page is self._master, **news)
 
+    async def _follows(self) -> None:
+        """Wait until the loop has followed the newest wish: two samples."""
+        span = 2.0 * self.session.stage.setup.servo.period
+        if span <= _SHORT:
+            await asyncio.sleep(0.0)
+            time.sleep(span)
+        else:
+            await asyncio.sleep(span)
+
     async def _frames(self, page: Page) -> None:
-        """Send the rows since the last frame, as fast as the page takes them."""
+        """Send the rows since the last frame, after a wish at once, as fast as the page goes."""
         session, starts, seen = self.session, -1, 0
         while True:
-            await asyncio.sleep(EVERY)
+            with suppress(TimeoutError):
+                async with asyncio.timeout(EVERY):
+                    await page.steered.wait()
+            if page.steered.is_set():
+                page.steered.clear()
+                await self._follows()
             await page.keeps_up()
             if session.shared is None:
                 continue

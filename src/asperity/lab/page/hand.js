@@ -3,7 +3,7 @@
 const ABOVE = 5e-4; // m over the highest point while it does not press
 const REACH = 0.09; // m that the hand goes from the middle
 const MOTIONS = ["pointer", "stroke", "loop"];
-const EVERY = 4; // ms between two wishes at least
+const EVERY = 5; // ms between two wishes at least
 
 const held = (value, most) => Math.max(-most, Math.min(most, value));
 
