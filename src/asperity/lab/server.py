@@ -44,8 +44,9 @@ from asperity.servo.statistics import Statistics
 from asperity.surface import Surface
 from asperity.textures.naming import KINDS
 
-EVERY = 5e-3
-"""[s] between two frames at least."""
+EVERY = 1e-2
+"""[s] between two frames, but where the hand is moved: more of them only take the processor from
+those that are waited for."""
 UNDER_WAY = 8
 """Frames that a page has not painted yet, at most: what waits for a slow one would be old."""
 AWAY = 3.0
