@@ -44,6 +44,8 @@ from asperity.servo.statistics import Statistics
 from asperity.surface import Surface
 from asperity.textures.naming import KINDS
 
+LEAST = 5e-3
+"""[s] between two frames at least, whatever a page wishes."""
 EVERY = 1e-2
 """[s] between two frames, but where the hand is moved: more of them only take the processor from
 those that are waited for."""
@@ -264,8 +266,9 @@ class Lab:
         """Send the rows since the last frame, after a wish at once, as fast as the page goes."""
         session, starts, seen = self.session, -1, 0
         while True:
+            await asyncio.sleep(LEAST)
             with suppress(TimeoutError):
-                async with asyncio.timeout(EVERY):
+                async with asyncio.timeout(EVERY - LEAST):
                     await page.steered.wait()
             if page.steered.is_set():
                 page.steered.clear()
