@@ -5,18 +5,19 @@ from __future__ import annotations
 import os
 import signal
 import socket
+import time
 from contextlib import suppress
 from http.client import HTTPConnection
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.lab.client import STILL, column, frames, head, heard, joined, news, refused, say
+from tests.lab.client import STILL, column, frames, head, heard, joined, news, refused, say, taken
 from tests.lab.started import Started
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from asperity.lab.access import MOST_BYTES
-from asperity.lab.server import UNDER_WAY
+from asperity.lab.server import LEAST, UNDER_WAY
 from asperity.lab.site import page_files
 
 
@@ -54,6 +55,18 @@ def test_it_listens_on_the_loopback_interface_alone(lab: Started) -> None:
     with socket.socket() as other:  # 127.0.0.2 is this machine, too, on another address
         other.settimeout(5)
         assert other.connect_ex(("127.0.0.2", port)) != 0
+
+
+def test_a_page_that_wishes_at_every_frame_gets_no_more_of_them(lab: Started) -> None:
+    """A wish is followed by a frame at once, but frames are 5 ms apart."""
+    with joined(lab) as page:
+        heard(page, frames)
+        begun, count = time.monotonic(), 0
+        while time.monotonic() < begun + 1.0:
+            if frames(taken(page)):
+                count += 1
+                say(page, "steer", target=[0.0, 0.0, 1e-3], **STILL)
+        assert 20 < count / (time.monotonic() - begun) <= 1.02 / LEAST
 
 
 def test_the_hand_is_steered_the_law_changes_and_the_loop_goes_on(lab: Started) -> None:
