@@ -105,6 +105,16 @@ class Points:
         shape = (width,) if self.single else (self.count, width)
         return array(name, value, shape, unit).reshape(self.count, width)
 
+    def truths(self, name: str, value: ArrayLike | None) -> NDArray[np.bool_]:
+        """Return truth values that were given beside the points, shape (n,); False if none were."""
+        if value is None:
+            return np.zeros(self.count, dtype=bool)
+        given = np.asarray(value)
+        if given.shape != (() if self.single else (self.count,)) or given.dtype != bool:
+            wanted = "one truth value" if self.single else f"{self.count} truth values"
+            raise ParameterError(name, f"must be {wanted}", value)
+        return np.ascontiguousarray(given).reshape(self.count)
+
 
 def points(name: str, value: ArrayLike, width: int, unit: str) -> Points:
     """Return points, shape (n, width), or (width,) for one; whoever takes points calls this.

@@ -8,7 +8,7 @@ from types import MappingProxyType, ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from asperity.arguments import DEFAULT_STIFFNESS, MAX_DEPTH, STIFFNESS, Argument
 from asperity.checks import FloatArray, Points, array, positive
@@ -18,7 +18,7 @@ from asperity.derive.facts import LawFacts, clamped_facts
 from asperity.display import Plotted
 from asperity.errors import ParameterError, nearest_names
 from asperity.kernels.probe import CLAMPS, ClampName
-from asperity.laws import LAW_ARGUMENTS, LAWS, Law, find_law
+from asperity.laws import KNOWN_LAWS, LAW_ARGUMENTS, LAWS, Law, find_law
 from asperity.textures.naming import TextureLike, as_texture
 from asperity.textures.texture import Texture
 
@@ -65,18 +65,6 @@ def _received(
         _given=given,
     )  # fmt: skip
     return result
-
-
-def _truths(probes: Points, sliding: ArrayLike | None) -> NDArray[np.bool_]:
-    """Return which anchors are dragged."""
-    if sliding is None:
-        return np.zeros(probes.count, dtype=bool)
-    given = np.asarray(sliding)
-    wanted = () if probes.single else (probes.count,)
-    if given.shape != wanted or given.dtype != bool:
-        truths = "one truth value" if probes.single else f"{probes.count} truth values"
-        raise ParameterError("sliding", f"must be {truths}", sliding)
-    return np.ascontiguousarray(given).reshape(probes.count)
 
 
 class Surface(Plotted):
@@ -179,8 +167,11 @@ class Surface(Plotted):
         return result
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Say how another process makes the same one: a shipped law goes by its letter."""
-        law = self.law.letter if LAWS.get(self.law.letter) is self.law else self.law
+        """Say how another process makes the same one: a law that is known goes by its letter.
+
+        A law of the user's own is found there if that process has learned it.
+        """
+        law = self.law.letter if KNOWN_LAWS.get(self.law.letter) is self.law else self.law
         place = self.stiffness, self.max_depth, self.clamp
         return _received, (type(self), self.texture, law, *place, dict(self._given))
 
@@ -407,7 +398,7 @@ class Surface(Plotted):
         probes = read_points("points", points, 3, "m")
         state = self._state(probes, deflection)
         if self.law.stateful:
-            state = (*state, _truths(probes, sliding))
+            state = (*state, probes.truths("sliding", sliding))
         elif sliding is not None:
             raise ParameterError("sliding", f"is meaningless for law {self.law}, without state")
         forces, jacobians = np.empty((probes.count, 3)), np.empty((probes.count, 3, 3))

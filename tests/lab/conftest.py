@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.lab.browser import Browser
 from tests.lab.started import Started
+
+from asperity.cli.own_code import learn
+from asperity.laws import KNOWN_LAWS
+
+OWN_LAW = str(Path(__file__).parents[2] / "examples" / "own_law.py")
 
 
 @pytest.fixture(scope="package")
@@ -32,3 +39,14 @@ def page(lab: Started, browser: Browser) -> Iterator[Browser]:
     browser.until("globalThis.lab?.frame && lab.ready")
     yield browser
     browser.call("Page.navigate", url="about:blank")
+
+
+@pytest.fixture
+def own_law(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
+    """A law of the user's own, known as --law-module makes it known."""
+    known = dict(KNOWN_LAWS)
+    monkeypatch.setattr("asperity.cli.own_code._FILES", [])
+    learn((OWN_LAW,))
+    yield {letter: law for letter, law in KNOWN_LAWS.items() if letter not in known}
+    KNOWN_LAWS.clear()
+    KNOWN_LAWS.update(known)

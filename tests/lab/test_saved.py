@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Iterator
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -18,11 +17,10 @@ from PIL import Image
 from tests.own_modules import imported
 
 import asperity as asp
-from asperity.cli.own_code import learn, own_contents
+from asperity.cli.own_code import own_contents
 from asperity.files import plain
 from asperity.lab.stage import Stage, make_stage
 from asperity.lab.takes import HAND, RECORDING, SCENE, Take, take
-from asperity.laws import KNOWN_LAWS
 from asperity.recording import field
 from asperity.recording.recording import open_recording
 from asperity.scene import load_scene
@@ -157,17 +155,6 @@ def test_a_surface_that_is_too_large_is_named_by_its_place(
     assert str(tmp_path / "map.png") in (place / SCENE).read_text()
     run = again(place).simulate()
     assert np.abs(run.commanded - kept.rows[:, 4:7]).max() == 0.0
-
-
-@pytest.fixture
-def own_law(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
-    """A law of the user's own, known as --law-module makes it known."""
-    known = dict(KNOWN_LAWS)
-    monkeypatch.setattr("asperity.cli.own_code._FILES", [])
-    learn((str(EXAMPLES / "own_law.py"),))
-    yield {letter: law for letter, law in KNOWN_LAWS.items() if letter not in known}
-    KNOWN_LAWS.clear()
-    KNOWN_LAWS.update(known)
 
 
 def test_a_law_of_ones_own_is_in_the_archive_and_named(

@@ -8,11 +8,11 @@ import signal
 from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.lab.conftest import OWN_LAW
 
 import asperity as asp
 from asperity.analysis.passivity.criteria import CRITERIA
@@ -22,19 +22,17 @@ from asperity.lab import workshop
 from asperity.lab.backdrop import MOST_ENDS, Backdrop
 from asperity.lab.messages import Look
 from asperity.lab.stage import make_stage
-from asperity.lab.workshop import Sent, Workshop
+from asperity.lab.workshop import Workshop
 from asperity.scene import load_scene
 from asperity.scene.setup import Setup
 from asperity.textures import Sinusoid
 
-OWN = str(Path(__file__).parents[2] / "examples" / "own_law.py")
 
-
-def test_a_law_of_the_users_own_is_shown() -> None:
-    numbers = {"stiffness": 100.0, "max_depth": 3e-4, "clamp": "none", "law_parameters": {}}
-    sent = Sent(Sinusoid(0.1e-3, 2e-3), "S", numbers)
-    with Workshop(partial(learn, (OWN,))) as other:
-        other.submit(workshop.show, sent).result()
+def test_a_law_of_the_users_own_is_shown(own_law: dict[str, Any]) -> None:
+    (letter,) = own_law
+    surface = asp.Surface(Sinusoid(0.1e-3, 2e-3), letter, stiffness=100.0, max_depth=3e-4)
+    with Workshop(partial(learn, (OWN_LAW,))) as other:
+        other.submit(workshop.show, surface).result()
         relief = np.frombuffer(other.submit(workshop.picture, "relief", (0.0, 0.0, 8e-3)).result())
     assert relief[0] == 2.0
     assert np.abs(relief[5:]).max() > 0.9e-4

@@ -15,7 +15,7 @@ from asperity.checks import FloatArray
 from asperity.devices import Device
 from asperity.lab import workshop
 from asperity.lab.messages import Look
-from asperity.lab.workshop import Sent, Workshop
+from asperity.lab.workshop import Workshop
 from asperity.surface import Surface
 
 MOST_ENDS, WITHIN = 3, 600.0
@@ -85,7 +85,7 @@ class Backdrop:
     async def _prepare(self, surface: Surface) -> None:
         while surface is self._wanted and len(self._ends) < MOST_ENDS:
             try:
-                await _done(self._pictures, workshop.show, Sent.of(surface))
+                await _done(self._pictures, workshop.show, surface)
             except BrokenProcessPool:
                 await self._ended(surface)
                 continue
@@ -108,7 +108,7 @@ class Backdrop:
         limit = {"stiffness": None, "basis": _NO_LIMIT, "q": None, "one_sided": None}
         for _attempt in range(2):  # the process may have ended of something else
             with suppress(BrokenProcessPool):
-                limit = await _done(self._limits, workshop.limit, Sent.of(surface), device)
+                limit = await _done(self._limits, workshop.limit, surface, device)
                 break
         if surface is self._wanted and device == self._device:
             self.limit = limit

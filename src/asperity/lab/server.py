@@ -18,7 +18,6 @@ from websockets.exceptions import ConnectionClosed
 from asperity.devices import Device, device_names
 from asperity.errors import ParameterError
 from asperity.files import plain
-from asperity.lab import workshop
 from asperity.lab.access import MalformedError, Pace
 from asperity.lab.backdrop import Backdrop
 from asperity.lab.frames import frame, layout
@@ -37,9 +36,10 @@ from asperity.lab.messages import (
 from asperity.lab.session import Session
 from asperity.lab.shelf import Shelf
 from asperity.lab.stage import RANGES, Stage
-from asperity.lab.workshop import Sent, Workshop
+from asperity.lab.workshop import Workshop
 from asperity.laws import KNOWN_LAWS
 from asperity.servo.process import Spare
+from asperity.servo.risk import risk
 from asperity.servo.statistics import Statistics
 from asperity.surface import Surface
 from asperity.textures.naming import KINDS
@@ -305,7 +305,7 @@ class Lab:
 
 def _judge(limits: Workshop, surface: Surface, device: Device) -> Future[str]:
     """Begin to find out why a surface is a risk on a device."""
-    return limits.submit(workshop.risky, Sent.of(surface), device)
+    return limits.submit(risk, surface, device)
 
 
 async def _while_there(work: Callable[[Page], Coroutine[Any, Any, None]], page: Page) -> None:

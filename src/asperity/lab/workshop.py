@@ -11,7 +11,6 @@ import signal
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
 from functools import partial
 from multiprocessing.context import SpawnContext
 from typing import Any, Self
@@ -21,9 +20,7 @@ from asperity.analysis.passivity.allowed import allowed_stiffness
 from asperity.devices import Device
 from asperity.errors import AsperityError
 from asperity.lab.views import cut, relief
-from asperity.servo.risk import risk
 from asperity.surface import Surface
-from asperity.textures.texture import Texture
 
 _SHOWN: dict[str, Surface] = {}
 # Behind the loop and the page, wherever they want to run.
@@ -81,35 +78,8 @@ def _begin(learn: Callable[[], None] | None) -> None:
         learn()
 
 
-@dataclass(frozen=True)
-class Sent:
-    """A surface on its way to the workshop, which knows laws by their letters.
-
-    Attributes:
-        texture: the texture.
-        law: letter of its law.
-        numbers: the other arguments of :class:`~asperity.surface.Surface`.
-    """
-
-    texture: Texture
-    law: str
-    numbers: dict[str, Any]
-
-    @classmethod
-    def of(cls, surface: Surface) -> Sent:
-        """Return a surface as it is sent."""
-        numbers = {name: getattr(surface, name) for name in ("stiffness", "max_depth", "clamp")}
-        parameters = dict(surface.law_parameters)
-        return cls(surface.texture, surface.law.letter, {**numbers, "law_parameters": parameters})
-
-    def surface(self) -> Surface:
-        """Return the surface."""
-        return Surface(self.texture, self.law, **self.numbers)
-
-
-def show(sent: Sent) -> None:
+def show(surface: Surface) -> None:
     """Take the surface that pictures are made of from now on, and compile what they need."""
-    surface = sent.surface()
     surface.texture.nearest([(0.0, 0.0, 0.0)])
     _SHOWN["surface"] = surface
 
@@ -131,12 +101,7 @@ def picture(kind: str, numbers: tuple[float, ...]) -> bytes:
     return cut(surface, (left, right, bottom, top, y))
 
 
-def risky(sent: Sent, device: Device) -> str:
-    """Return why a surface is a risk on a device; empty if it is none."""
-    return risk(sent.surface(), device)
-
-
-def limit(sent: Sent, device: Device) -> dict[str, Any]:
+def limit(surface: Surface, device: Device) -> dict[str, Any]:
     """Return up to which stiffness a device renders a surface, and by which criterion.
 
     ``stiffness`` is [N/m], or nothing where no limit is known; ``criterion`` is the name of the one
@@ -145,7 +110,6 @@ def limit(sent: Sent, device: Device) -> dict[str, Any]:
     ``one_sided`` the one-sided one.
     """
     try:
-        surface = sent.surface()
         q, one_sided = characteristic_number(surface), one_sided_number(surface)
         allowed, _wall = allowed_stiffness(surface, device, q, one_sided)
     except AsperityError as error:
