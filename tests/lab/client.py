@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -42,10 +43,11 @@ def taken(page: ClientConnection) -> Any:
     return message
 
 
-def heard(page: ClientConnection, wanted: Callable[[Any], bool]) -> Any:
-    """Return the first message that is wanted."""
+def heard(page: ClientConnection, wanted: Callable[[Any], bool], within: float = 120.0) -> Any:
+    """Return the first message that is wanted; others, frames that never end, may come before."""
+    end = time.monotonic() + within
     while not wanted(message := taken(page)):
-        pass
+        assert time.monotonic() < end, f"not heard within {within:.0f} s"
     return message
 
 
