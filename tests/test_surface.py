@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -11,7 +10,6 @@ import numpy as np
 import pytest
 
 from asperity.errors import ParameterError
-from asperity.laws import KNOWN_LAWS, Law
 from asperity.surface import Surface
 from asperity.textures import Sinusoid, Texture
 
@@ -437,25 +435,3 @@ def test_an_empty_path_has_an_empty_trace(wave: Sinusoid):
         assert surface.trace(np.zeros((0, 3))).shape == (0, 3)
         assert surface.force(np.zeros((0, 3))).shape == (0, 3)
         assert surface.jacobian(np.zeros((0, 3))).shape == (0, 3, 3)
-
-
-@pytest.mark.parametrize("law", "WCFH")
-def test_a_surface_can_be_sent_to_another_process(
-    law: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What was given for other laws goes along; a law of one's own goes where it is known."""
-    surface = Surface(Sinusoid(0.3e-3, 1.1e-3), law, 345.6, 0.7e-3, friction=0.4, continuity=2.0)
-    points = np.array([[0.1e-3, 0.0, 0.0], [0.4e-3, 0.2e-3, -0.2e-3]])
-    before = surface.force(points)
-    sent = pickle.loads(pickle.dumps(surface))
-    np.testing.assert_array_equal(sent.force(points), before)
-    assert repr(sent) == repr(surface)
-    assert sent.law is surface.law
-    assert sent.law_parameters == surface.law_parameters
-    assert sent.to_law("F").law_parameters["friction"] == 0.4
-    assert sent.to_law("H").law_parameters["continuity"] == 2.0
-    own = Law("U", "own", "vertical", lambda c: c.k * c.depth * c.e_z)
-    with pytest.raises((TypeError, AttributeError, pickle.PicklingError)):
-        pickle.dumps(surface.to_law(own))
-    monkeypatch.setitem(KNOWN_LAWS, "U", own)
-    assert pickle.loads(pickle.dumps(surface.to_law(own))).law is own

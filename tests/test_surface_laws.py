@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 from asperity.contacts.symbols import ContactSymbols
 from asperity.definition import exact_force
 from asperity.errors import LawError, ParameterError
-from asperity.laws import LAWS, Law
+from asperity.laws import KNOWN_LAWS, LAWS, Law
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 
@@ -287,3 +288,28 @@ def test_the_representation_says_what_it_is(wave: Sinusoid):
     text = repr(Surface(wave, "B", stiffness=500.0, max_depth=D, clamp="backed"))
     for part in ("Sinusoid(", "law='B'", "stiffness=500.0", "max_depth=0.0002", "clamp='backed'"):
         assert part in text
+
+
+# --- sent to another process ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", "WCFH")
+def test_a_surface_can_be_sent_to_another_process(
+    law: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was given for other laws goes along; a law of one's own goes where it is known."""
+    surface = Surface(Sinusoid(0.3e-3, 1.1e-3), law, 345.6, 0.7e-3, friction=0.4, continuity=2.0)
+    points = np.array([[0.1e-3, 0.0, 0.0], [0.4e-3, 0.2e-3, -0.2e-3]])
+    before = surface.force(points)
+    sent = pickle.loads(pickle.dumps(surface))
+    np.testing.assert_array_equal(sent.force(points), before)
+    assert repr(sent) == repr(surface)
+    assert sent.law is surface.law
+    assert sent.law_parameters == surface.law_parameters
+    assert sent.to_law("F").law_parameters["friction"] == 0.4
+    assert sent.to_law("H").law_parameters["continuity"] == 2.0
+    own = Law("U", "own", "vertical", lambda c: c.k * c.depth * c.e_z)
+    with pytest.raises((TypeError, AttributeError, pickle.PicklingError)):
+        pickle.dumps(surface.to_law(own))
+    monkeypatch.setitem(KNOWN_LAWS, "U", own)
+    assert pickle.loads(pickle.dumps(surface.to_law(own))).law is own

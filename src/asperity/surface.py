@@ -42,18 +42,6 @@ def default_max_depth(texture: Texture) -> float:
     return min(height, LARGEST_DEFAULT_DEPTH) if height > 0.0 else LARGEST_DEFAULT_DEPTH
 
 
-def _merged(law: Law, given: dict[str, float], own: dict[str, float]) -> dict[str, float]:
-    """Return the values that were given for parameters of laws, each from one place only."""
-    for name, value in own.items():
-        if name not in law.arguments:
-            hint = nearest_names(name, law.arguments) if law.arguments else "it has none"
-            raise ParameterError("law_parameters", f"names {name!r}; law {law}: {hint}")
-        if name in given:
-            raise ParameterError(name, "is given twice, by keyword and in law_parameters", value)
-        given[name] = law.arguments[name].checked(value)
-    return given
-
-
 def _received(
     kind: type[Surface], texture: Texture, law: str | Law, stiffness: float, max_depth: float,
     clamp: ClampName, given: dict[str, float],
@@ -136,6 +124,11 @@ class Surface(Plotted):
             for name, value in keywords.items()
             if value is not None
         }
+        named = own.checked(law_parameters or {})
+        for name in given.keys() & named.keys():
+            raise ParameterError(
+                name, "is given twice, by keyword and in law_parameters", named[name]
+            )
         if clamp not in CLAMPS:
             raise ParameterError("clamp", f"must be one of {', '.join(CLAMPS)}", clamp)
         depth = default_max_depth(made) if max_depth is None else MAX_DEPTH.checked(max_depth)
@@ -145,7 +138,7 @@ class Surface(Plotted):
             stiffness=STIFFNESS.checked(stiffness),
             max_depth=depth,
             clamp=clamp,
-            _given=_merged(own, given, dict(law_parameters or {})),
+            _given=given | named,
         )
 
     def _set(self, **values: Any) -> None:
@@ -231,7 +224,7 @@ class Surface(Plotted):
             ParameterError: for an unknown law, or a value that cannot be used.
         """
         other = find_law(law)
-        given = _merged(other, {}, dict(law_parameters or {}))
+        given = other.checked(law_parameters or {})
         return self._changed(law=other, _given={**self._given, **given})
 
     def parameter(self, name: str) -> float:

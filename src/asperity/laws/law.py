@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from asperity.arguments import Argument
 from asperity.contacts import CONTACTS, Contact
-from asperity.errors import LawError, nearest_names
+from asperity.errors import LawError, ParameterError, nearest_names
 
 __all__ = ["ContactSymbols", "ForceFormula", "Law"]
 
@@ -111,6 +111,23 @@ class Law:
             )
         if not callable(self.force):
             raise LawError(f"law {self.letter}: force must be a function of the contact symbols")
+
+    def checked(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return values for parameters of this law [SI].
+
+        Raises:
+            ParameterError: for a parameter that it does not declare, or a value out of bounds.
+
+        Example:
+            >>> from asperity.laws import find_law
+            >>> find_law("F").checked({"friction": 0.5})
+            {'friction': 0.5}
+        """
+        for name in values:
+            if name not in self.arguments:
+                hint = nearest_names(name, self.arguments) if self.arguments else "it has none"
+                raise ParameterError("law_parameters", f"names {name!r}; law {self}: {hint}")
+        return {name: self.arguments[name].checked(value) for name, value in values.items()}
 
     def __str__(self) -> str:
         return f"{self.letter} ({self.name})"
