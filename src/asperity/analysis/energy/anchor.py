@@ -86,7 +86,7 @@ def _contact_parts(
     inside = contact.inside(surface.texture, points(s))
     turns = np.flatnonzero(inside[1:] != inside[:-1])
     low, high = s[turns], s[turns + 1]
-    for _ in range(_HALVINGS):
+    for _ in range(_HALVINGS if len(turns) else 0):
         middle = 0.5 * (low + high)
         same = contact.inside(surface.texture, points(middle)) == inside[turns]
         low, high = np.where(same, middle, low), np.where(same, high, middle)
