@@ -16,7 +16,7 @@ from rich.table import Table
 from asperity.checks import FloatArray
 from asperity.contacts.memory import new_memory
 from asperity.surface import Surface
-from asperity.textures import HeightMap
+from asperity.textures import Fourier, HeightMap, Texture
 from bench import cases
 from bench.timing import seconds, take_turns
 
@@ -29,6 +29,7 @@ LONGEST = {"D": 50.0, "H": 150.0}
 PER_TICK = {"D": 0.5, "H": 2.5}
 PROBES = 40
 TURNS = 5
+WAVES = 32
 Adversaries = dict[str, tuple[HeightMap, FloatArray]]
 
 
@@ -61,6 +62,14 @@ def adversaries(side: int = SIDE) -> Adversaries:
     }
 
 
+def many_waves() -> tuple[Fourier, FloatArray]:
+    """Return a sum of waves of all directions, and a probe (1, 3) [m] far below it."""
+    rng = np.random.default_rng(cases.SEED)
+    length, turn = 2.0 * np.pi / 1e-3 * rng.uniform(0.3, 1.5, WAVES), rng.uniform(0.0, 7.0, WAVES)
+    vectors = length[:, None] * np.column_stack([np.cos(turn), np.sin(turn)])
+    return Fourier(np.full(WAVES, 4e-5), vectors, turn), np.array([[0.0, 0.0, -1e-2]])
+
+
 def run(console: Console) -> None:
     """Print a row for each surface and law, and whether the goals are met."""
     table = Table(box=None, pad_edge=False)
@@ -74,7 +83,9 @@ def run(console: Console) -> None:
     for heading in ("law", "surface", *headings, "stroke\nµs a tick", "looks", "each alone\nµs"):
         table.add_column(heading, justify="left" if heading in {"law", "surface"} else "right")
     missed: list[str] = []
-    for name, (texture, centre) in adversaries().items():
+    surfaces: dict[str, tuple[Texture, FloatArray]] = {**adversaries()}
+    surfaces[f"{WAVES} waves"] = many_waves()
+    for name, (texture, centre) in surfaces.items():
         for law in "DH":
             surface = Surface(texture, law, cases.STIFFNESS)
             longest, cells = _longest(surface, _probes(texture, centre))
@@ -85,7 +96,8 @@ def run(console: Console) -> None:
             if name == "noise" and each > PER_TICK[law]:
                 missed.append(f"{law} along a stroke: {each:.1f} µs")
     console.print(
-        f"maps of {SIDE} x {SIDE}; ticks at 0.3 to 3 times max_depth and at centres of curvature;"
+        f"maps of {SIDE} x {SIDE} and a sum of {WAVES} waves;"
+        "\nticks at 0.3 to 3 times max_depth and at centres of curvature;"
         f"\nstrokes of {SPEED:g} m/s at {RATE:g} Hz at half of max_depth; gap of D: a point may be"
         "\nnearer by so much, of H: error of the force over the stiffness"
     )
@@ -95,7 +107,7 @@ def run(console: Console) -> None:
     console.print(f"goals: {goals} -> {answer}", style="bold")
 
 
-def _probes(texture: HeightMap, centre: FloatArray) -> FloatArray:
+def _probes(texture: Texture, centre: FloatArray) -> FloatArray:
     rng = np.random.default_rng(cases.SEED + 5)
     xy = rng.uniform(0.1, 0.9, (PROBES, 2)) * SIDE * PITCH
     deep = Surface(texture).max_depth * rng.choice([0.3, 1.0, 1.0, 3.0], PROBES)

@@ -158,6 +158,31 @@ def test_no_budget_is_so_small_that_a_gap_is_claimed_wrongly(name: str):
         assert (found - said[:, 0] <= nearest * (1.0 + 1e-9)).all()
 
 
+@pytest.mark.parametrize("law", ["D", "H"])
+@pytest.mark.parametrize("direction", [(0.0, 8e3), (3e3, 0.0)], ids=["plane", "line"])
+def test_a_look_at_many_waves_costs_as_many_more(law: str, direction: tuple[float, float]):
+    """The same surface, each of its two waves written as 40: the time of a tick stays bounded."""
+    vectors = [[6e3, 0.0], direction]
+    few = Fourier([90e-6, 60e-6], vectors)
+    many = Fourier(np.repeat([90e-6 / 40, 60e-6 / 40], 40), np.repeat(vectors, 40, axis=0))
+    one, other = (Surface(texture, law, STIFFNESS, max_depth=1e-3) for texture in (few, many))
+    xy = RNG.uniform(0.0, EXTENT, (60, 2))
+    probes = np.column_stack([xy, few.height(xy) - RNG.uniform(2e-4, 2e-2, 60)])
+    exact, budget = one.force(probes), one.law.contact.looks
+    _force, free = told(one, probes, UNLIMITED, forgotten=True)
+    force, said = told(other, probes, budget, forgotten=True)
+    cost = 32.0  # 0.4 of each wave
+    assert (said[:, 1] <= budget + 3.0 * cost).all()
+    unsure = said[:, 0] > 0.0
+    # More than so many evaluations would have been late.
+    assert unsure[free[:, 1] > 2.0 * budget / cost].all()
+    assert unsure.mean() > 0.2
+    error = np.linalg.norm(force - exact, axis=1) / STIFFNESS
+    distance = np.abs(np.linalg.norm(force, axis=1) - np.linalg.norm(exact, axis=1)) / STIFFNESS
+    wrong = distance if law == "D" else error
+    assert (wrong <= said[:, 0] + 1e-6 * EXTENT).all()
+
+
 def test_without_its_gap_a_foot_would_be_claimed_wrongly():
     """The negative control: under a small budget some foot is farther than the nearest point."""
     wrong = []

@@ -34,6 +34,8 @@ def height(x: float, y: float, texture: object) -> float:
 def surface(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(conditions, "curvature", curvature)
     monkeypatch.setattr(conditions, "height", height)
+    monkeypatch.setattr(conditions, "look_cost", lambda _texture: 1.0)
+    monkeypatch.setattr(solver, "look_cost", lambda _texture: 1.0)
 
 
 def some_atoms(count: int) -> FloatArray:

@@ -41,6 +41,7 @@ def test_a_query_writes_the_nearest_free_point(row: int, monkeypatch: pytest.Mon
         return 0.7, 0.8, 9.0, 9.0, 9.0, 0.05, 21.0
 
     monkeypatch.setattr(solver, "foot_within", foot_within)
+    monkeypatch.setattr(solver, "look_cost", lambda _texture: 1.0)
     for height, free in ((-0.5, True), (-0.4, False)):
         monkeypatch.setattr(solver, "height", lambda x, y, _t, h=height: h + (x - 0.3) - (y + 0.2))
         atoms = some_atoms(4)

@@ -81,6 +81,14 @@ def foot_within(
     raise NotImplementedError  # the interface alone; the linker binds calls of it
 
 
+def look_cost(texture: object) -> float:
+    """Return the looks that one evaluation of the surface counts as: its time over that of a map.
+
+    Budgets are of time. Searches bring 1 along, for kinds that do not provide it.
+    """
+    raise NotImplementedError  # the interface alone; the linker binds calls of it
+
+
 def search_plane(
     x: float, y: float, z: float, best: PlanePoint, keep: float, left: float, texture: object
 ) -> tuple[PlanePoint, float]:

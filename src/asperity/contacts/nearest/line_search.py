@@ -12,11 +12,16 @@ from asperity.contacts.sampler import LinePoint as Point
 from asperity.contacts.sampler import along
 
 KERNELS = Kernels(
-    provides=("descend", "go_down", "judge", "next_part"),
+    provides=("descend", "go_down", "judge", "look_cost", "next_part"),
     requires=("along",),
     called=("judge",),
     shared=("go_down",),
 )
+
+
+def look_cost(texture: object) -> float:
+    """Return 1: see ``contacts.sampler``; a kind that takes longer provides its own."""
+    return 1.0
 
 
 def descend(x: float, z: float, start: float, texture: object) -> Point:
@@ -33,8 +38,9 @@ def go_down(x: float, z: float, start: float, left: float, texture: object) -> t
     at = start
     step = last = 0.0
     close = False
+    cost = look_cost(texture)
     for _ in range(200):
-        left -= 1.0
+        left -= cost
         h, h1, h2 = along(at, texture)
         gap = h - z
         new = (at - x) * (at - x) + gap * gap
@@ -71,7 +77,7 @@ def judge(
 
     The interval is centre ± r [m], with K = bend [1/m] and T = twist [1/m²].
     """
-    left -= 1.0
+    left -= look_cost(texture)
     h, h1, h2 = along(centre, texture)
     gap = h - z
     away = centre - x

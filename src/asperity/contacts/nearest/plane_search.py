@@ -8,10 +8,10 @@ formula at the centre decides most boxes at once.
 
 Boxes are quartered without a stack: the next one follows from the numbers of the last.
 
-A search counts its looks: a look is one evaluation of the surface, or eight boxes of the pyramid
-that are passed. It drops boxes in which φ is nowhere less than ``keep`` times the best, 1 less
-rounding for the nearest point itself, and ends early once ``left``, the looks that are left, is
-used up.
+A search counts its looks: a look is one evaluation of the surface, of a sum of many waves several
+(``look_cost``), or eight boxes of the pyramid that are passed. It drops boxes in which φ is nowhere
+less than ``keep`` times the best, 1 less rounding for the nearest point itself, and ends early once
+``left``, the looks that are left, is used up.
 """
 
 import math
@@ -23,11 +23,16 @@ from asperity.contacts.sampler import PlanePoint as Point
 from asperity.contacts.sampler import curvature
 
 KERNELS = Kernels(
-    provides=("descend", "eigenvalues", "go_down", "judge", "next_box"),
+    provides=("descend", "eigenvalues", "go_down", "judge", "look_cost", "next_box"),
     requires=("curvature",),
     called=("judge", "newton_step"),
     shared=("go_down",),
 )
+
+
+def look_cost(texture: object) -> float:
+    """Return 1: see ``contacts.sampler``; a kind that takes longer provides its own."""
+    return 1.0
 
 
 def eigenvalues(qxx: float, qxy: float, qyy: float) -> tuple[float, float]:
@@ -68,8 +73,9 @@ def go_down(
     best = (fx, fy, np.inf, 0.0, 0.0, 0.0)
     sx = sy = last = 0.0
     close = False
+    cost = look_cost(texture)
     for _ in range(200):
-        left -= 1.0
+        left -= cost
         h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, texture)
         gap = h - z
         dx = fx - x
@@ -169,7 +175,7 @@ def judge(
 
     The box is (cx, cy) ± (a, b) [m], with K = bend [1/m] and T = twist [1/m²].
     """
-    left -= 1.0
+    left -= look_cost(texture)
     h, hx, hy, hxx, hxy, hyy = curvature(cx, cy, texture)
     gap = h - z
     away = (cx - x, cy - y, gap)

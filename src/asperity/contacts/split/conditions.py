@@ -8,14 +8,14 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.compiled import EPS, Kernels, local_array
-from asperity.contacts.sampler import curvature, height
+from asperity.contacts.sampler import curvature, height, look_cost
 
 KERNELS = Kernels(
     provides=(
         "split_copy", "split_farther", "split_follow", "split_moving", "split_projection",
         "split_solve", "split_system", "split_value",
     ),
-    requires=("curvature", "height"),
+    requires=("curvature", "height", "look_cost"),
     iterates=True,
 )  # fmt: skip
 
@@ -143,15 +143,16 @@ def split_follow(
     """Move a foot towards the stationary point near it that belongs to y, by Newton's method.
 
     Returns:
-        Whether it is near a minimum, and the looks that were taken: as many as steps at most.
+        Whether it is near a minimum, and the looks that were taken, one per step.
     """
     fx = atoms[row, 0]
     fy = atoms[row, 1]
     last = np.inf
     stalled = 0
     looks = 0.0
+    cost = look_cost(texture)
     for _ in range(most):
-        looks += 1.0
+        looks += cost
         h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, texture)
         gap = h - y[2]
         px = fx - y[0] + gap * hx

@@ -30,7 +30,7 @@ import numpy as np
 
 from asperity.checks import FloatArray
 from asperity.compiled import EPS, Kernels, local_array
-from asperity.contacts.sampler import foot_within, height
+from asperity.contacts.sampler import foot_within, height, look_cost
 from asperity.contacts.split.conditions import (
     split_copy,
     split_farther,
@@ -45,8 +45,8 @@ from asperity.contacts.split.conditions import (
 KERNELS = Kernels(
     provides=("split_atoms",),
     requires=(
-        "foot_within", "height", "split_copy", "split_farther", "split_follow", "split_moving",
-        "split_projection", "split_solve", "split_system", "split_value",
+        "foot_within", "height", "look_cost", "split_copy", "split_farther", "split_follow",
+        "split_moving", "split_projection", "split_solve", "split_system", "split_value",
     ),
     merged=("split_polish", "split_try_polish"),
     iterates=True,
@@ -68,7 +68,7 @@ def split_query(
     fy = y[1]
     fz = y[2]
     gap = 0.0
-    looks = 1.0
+    looks = look_cost(texture)
     if height(fx, fy, texture) > fz:
         # An atom is a good start: at the optimum it is a nearest point itself.
         near_x = atoms[0, 0] if row > 0 else fx
@@ -190,7 +190,7 @@ def split_polish(
                 return nothing, looks
         split_system(atoms, count, p, y, mu, a)
         moving = split_moving(atoms, count, y, mu, a, texture)
-        looks += count
+        looks += count * look_cost(texture)
         if not (moving and split_solve(a, 3 + count, 4 + count)):
             return nothing, looks
         left, size = split_advance(atoms, count, y, a)

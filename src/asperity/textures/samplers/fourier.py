@@ -13,11 +13,15 @@ from asperity.contacts.sampler import PlanePoint as Point
 from asperity.textures.samplers.sine import cosine, sine
 
 KERNELS = Kernels(
-    provides=("curvature", "foot", "height", "search_plane", "slope"),
+    provides=("curvature", "foot", "height", "look_cost", "search_plane", "slope"),
     requires=("cosine", "descend", "judge", "next_box", "sine"),
     called=("foot",),
     shared=("search_plane",),
 )
+
+
+# Looks that a wave takes, by its time.
+WAVE = 0.4
 
 
 class FourierArguments(NamedTuple):
@@ -48,6 +52,11 @@ class FourierArguments(NamedTuple):
     wave_number: float
     ux: float
     uy: float
+
+
+def look_cost(texture: FourierArguments) -> float:
+    """Return the looks that all waves take; two need no more than a map."""
+    return max(1.0, WAVE * texture.amplitudes.size)
 
 
 def height(x: float, y: float, texture: FourierArguments) -> float:
