@@ -15,6 +15,7 @@ import pytest
 
 from asperity import kept
 from asperity.kernels import fuse
+from asperity.kernels.link import COMMON
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 
@@ -207,7 +208,9 @@ def jacobian_by_hand() -> Callable[..., np.ndarray]:
 def _run_source(source: str) -> SimpleNamespace:
     """Run a fused module as plain Python: the same text, nothing compiled."""
     head, without = "from __future__", ("@", "from numba", "from asperity_fused_")
-    text = source.replace("asperity.kernels.stack_memory", "asperity.compiled")  # plain memory
+    text = source
+    for home in COMMON.values():
+        text = text.replace(f"from {home} ", "from asperity.compiled ")  # Python's own versions
     lines = [line for line in text.splitlines() if not line.startswith((head, *without))]
     lines.insert(0, f"{head} import annotations")
     lines = [line for line in lines if "njit(" not in line and "code_store" not in line]

@@ -2,6 +2,9 @@
    n, texture, k, force) as in reference.c; n is a multiple of eight. Built with gcc
    -std=gnu11 -O3 -march=native -fno-math-errno -shared -fPIC (gnu11: it may fuse products and sums). */
 #include <string.h>
+#ifdef __AVX512F__
+#include <immintrin.h>
+#endif
 
 #include "textures.h"
 
@@ -31,6 +34,17 @@ static inline vec choose(mask where, vec a, vec b)
     return (vec)((where & (mask)a) | (~where & (mask)b));
 }
 
+#ifdef __AVX512F__
+static inline vec root(vec x)
+{
+    return (vec)_mm512_sqrt_pd((__m512d)x);
+}
+
+static inline vec down(vec x)
+{
+    return (vec)_mm512_roundscale_pd((__m512d)x, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
+}
+#else
 static inline vec root(vec x)
 {
     for (int i = 0; i < 8; i++)
@@ -43,6 +57,7 @@ static inline vec down(vec x)
     const vec cut = __builtin_convertvector(__builtin_convertvector(x, mask), vec);
     return cut - choose(cut > x, all(1.0), all(0.0));
 }
+#endif
 
 struct point {
     vec x, y, z;
@@ -76,6 +91,11 @@ struct slopes {
     vec h, hx, hy;
 };
 
+static inline struct sinusoid sinusoid_known(const struct sinusoid *t)
+{
+    return *t;
+}
+
 /* Sine and cosine: reduction to |r| <= pi/4, Taylor's polynomials of degree 15 and 16, quadrants. */
 static inline __attribute__((always_inline)) struct slopes sinusoid_at(const struct sinusoid *t, vec x, vec y)
 {
@@ -108,15 +128,36 @@ static inline __attribute__((always_inline)) struct slopes sinusoid_at(const str
     return (struct slopes){.h = t->a * sine, .hx = t->kx * slope, .hy = t->ky * slope};
 }
 
+/* An axis, with a division that gcc would leave in the loop. */
+struct axis {
+    double cells, length, turns;
+};
+
+struct vec_heightmap {
+    struct heightmap m;
+    struct axis x, y;
+};
+
+static inline struct axis axis_of(long cells, long periodic)
+{
+    const double length = (periodic ? 1.0 : 2.0) * (double)cells;
+    return (struct axis){.cells = (double)cells, .length = length, .turns = 1.0 / length};
+}
+
+static inline struct vec_heightmap heightmap_known(const struct heightmap *m)
+{
+    return (struct vec_heightmap){*m, axis_of(m->nx, m->periodic), axis_of(m->ny, m->periodic)};
+}
+
 struct vec_place {
     vec cell, t, sign;
 };
 
-static inline struct vec_place vec_locate(vec u, double cells, long periodic)
+static inline struct vec_place vec_locate(vec u, const struct axis *axis, long periodic)
 {
-    const double length = (periodic ? 1.0 : 2.0) * cells;
+    const double cells = axis->cells, length = axis->length;
     struct vec_place p = {.sign = all(1.0)};
-    u -= length * down(u * (1.0 / length));
+    u -= length * down(u * axis->turns);
     if (!periodic) {
         const mask back = u > cells;
         u = choose(back, length - u, u);
@@ -164,10 +205,11 @@ static inline void neighbours(const double *c, const long *at, vec out[4])
     out[3] = __builtin_shuffle(ba, ed, (mask){2, 3, 10, 11, 6, 7, 14, 15});
 }
 
-static inline __attribute__((always_inline)) struct slopes heightmap_at(const struct heightmap *m, vec x, vec y)
+static inline __attribute__((always_inline)) struct slopes heightmap_at(const struct vec_heightmap *k, vec x, vec y)
 {
-    const struct vec_place u = vec_locate((x - m->x0) * m->ix, (double)m->nx, m->periodic);
-    const struct vec_place v = vec_locate((y - m->y0) * m->iy, (double)m->ny, m->periodic);
+    const struct heightmap *m = &k->m;
+    const struct vec_place u = vec_locate((x - m->x0) * m->ix, &k->x, m->periodic);
+    const struct vec_place v = vec_locate((y - m->y0) * m->iy, &k->y, m->periodic);
     const long stride = m->nx + 3;
     const mask at = __builtin_convertvector(v.cell * (double)stride + u.cell, mask);
     vec w[4], w1[4], g[4], g1[4], c[4];
@@ -191,7 +233,7 @@ static inline __attribute__((always_inline)) struct slopes heightmap_at(const st
     void name##_##kind##_force(const double *restrict p, long n, const struct kind *given, \
                                double k, double *restrict f)                               \
     {                                                                                      \
-        const struct kind texture = *given;                                                \
+        const __auto_type texture = kind##_known(given);                                   \
         for (const double *end = p + 3 * n; p != end; p += 24, f += 24) {                  \
             const struct point q = rows(p);                                                \
             const struct slopes s = kind##_at(&texture, q.x, q.y);                         \

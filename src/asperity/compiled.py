@@ -43,6 +43,8 @@ class Kernels:
         merged: functions that are made one with their caller before they compile, where something
             iterates: the compiler optimises everything again at each level of a chain of calls.
         native: functions of :mod:`asperity.kernels.native` that it calls.
+        in_blocks: whether its functions take the place of those of their names in loops over blocks
+            of points; see :mod:`asperity.kernels.block_loops`.
         iterates: whether iterations run in it that are so long that copies of functions only
             compile more slowly.
     """
@@ -54,6 +56,7 @@ class Kernels:
     shared: tuple[str, ...] = ()
     merged: tuple[str, ...] = ()
     native: tuple[str, ...] = ()
+    in_blocks: bool = False
     iterates: bool = False
 
 
@@ -64,3 +67,13 @@ def local_array(shape: tuple[int, ...]) -> FloatArray:
     :mod:`asperity.kernels.stack_memory`. Hand it down, never up.
     """
     return np.empty(shape)
+
+
+def multiply_add(a: float, b: float, c: float) -> float:
+    """Return a b + c; compiled it is rounded once where the processor can, in batches alone."""
+    return a * b + c
+
+
+def number_at(array: FloatArray, at: int) -> float:
+    """Return a number of an array by its place in memory, which a program must know is in it."""
+    return float(array.reshape(-1)[at])

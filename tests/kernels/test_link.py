@@ -21,7 +21,15 @@ import asperity
 from asperity.compiled import Kernels
 from asperity.errors import ParameterError
 from asperity.kernels import fuse
-from asperity.kernels.link import MissingFunctionError, Unit, link, loops_of, module_unit, text_unit
+from asperity.kernels.link import (
+    COMMON,
+    MissingFunctionError,
+    Unit,
+    link,
+    loops_of,
+    module_unit,
+    text_unit,
+)
 from asperity.laws import LAWS
 from asperity.textures import Sinusoid
 
@@ -48,7 +56,7 @@ def written(module: ModuleType) -> tuple[set[str], set[str], set[str]]:
         for node in ast.walk(tree)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
     }
-    known = {"local_array", *dir(__builtins__), *__builtins__}
+    known = {*COMMON, *dir(__builtins__), *__builtins__}
     records = {name for name, value in vars(module).items() if isinstance(value, type)}
     return defined, called & defined, called - defined - known - records
 

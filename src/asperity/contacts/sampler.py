@@ -7,11 +7,6 @@ them; the linker binds the calls of contacts and searches to them. ``texture`` i
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:  # NumPy takes its time, and help needs none
-    from asperity.checks import FloatArray
-
 _SECOND = frozenset(("hxx", "hxy", "hyy"))
 _FIRST = frozenset(("hx", "hy"))
 
@@ -34,10 +29,6 @@ PASSED = 0.125
 # A point of the surface, X, Y, φ, h, h_x, h_y, and one of a profile, X, φ, h, h'.
 PlanePoint = tuple[float, float, float, float, float, float]
 LinePoint = tuple[float, float, float, float]
-
-# Points that are sampled together, and rows of numbers that a kind may keep of them.
-BLOCK = 32
-BLOCK_ROWS = 22
 
 OFFERED = {
     "height": "heights",
@@ -109,21 +100,4 @@ def search_line(
 
 def along(x: float, texture: object) -> tuple[float, float, float]:
     """Return h [m], h' [1], h'' [1/m] along a line: of kinds whose heights vary along it only."""
-    raise NotImplementedError  # the interface alone; the linker binds calls of it
-
-
-def sample_block(where: FloatArray, count: int, known: FloatArray, texture: object) -> None:
-    """Write what is to be known of points, of kinds that sample several at once.
-
-    Args:
-        where: x, y, z [m] of the points, (3, BLOCK).
-        count: how many points.
-        known: result, (BLOCK_ROWS, BLOCK).
-        texture: record of the texture.
-    """
-    raise NotImplementedError  # the interface alone; the linker binds calls of it
-
-
-def block_point(known: FloatArray, k: int, texture: object) -> object:
-    """Return the record that ``height``, ``slope`` and ``curvature`` of the kind's blocks take."""
     raise NotImplementedError  # the interface alone; the linker binds calls of it

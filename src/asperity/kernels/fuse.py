@@ -22,6 +22,7 @@ from asperity.derive.facts import law_facts
 from asperity.derive.shipped import generated_path
 from asperity.errors import ParameterError
 from asperity.kernels.link import (
+    COMMON,
     MissingFunctionError,
     Unit,
     link,
@@ -108,7 +109,7 @@ def fuse_surface(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) ->
     """
     from asperity.kernels import anchored_loops, batch_sine, block_loops, probe_loops
 
-    blocks = tuple(m for m in sampler if "sample_block" in module_unit(m).kernels.provides)
+    blocks = tuple(m for m in sampler if module_unit(m).kernels.in_blocks)
     if blocks and _samples_at_probe(law):
         return fuse_on_texture(law, sampler, clamp, (block_loops,), instead=(batch_sine, *blocks))
     loops = anchored_loops if law.stateful else probe_loops
@@ -306,8 +307,8 @@ def _assembled(title: str, loops: Sequence[tuple[str, Unit]], at_hand: Sequence[
 
 
 def _head(title: str, source: str) -> str:
-    local = "from asperity.kernels.stack_memory import local_array\n\n"
-    return _HEADER.format(title=title) + (local if "local_array(" in source else "")
+    used = [f"from {home} import {name}\n" for name, home in COMMON.items() if f"{name}(" in source]
+    return _HEADER.format(title=title) + "".join([*used, "\n"] if used else [])
 
 
 def _module_name(text: str) -> str:

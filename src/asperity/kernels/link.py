@@ -17,8 +17,13 @@ from asperity.compiled import Kernels
 from asperity.errors import ParameterError
 from asperity.kernels.parsing import tree_of
 
-# Anyone may call these; ``local_array`` is in the head of every linked text that does.
-_COMMON = frozenset([*dir(builtins), "local_array"])
+# Anyone may call these and what is built in; they are in the head of every linked text that does.
+COMMON = {
+    "local_array": "asperity.kernels.stack_memory",
+    "multiply_add": "asperity.kernels.lanes",
+    "number_at": "asperity.kernels.lanes",
+}
+_ANYONES = COMMON.keys() | frozenset(dir(builtins))
 
 
 class MissingFunctionError(ParameterError):
@@ -100,7 +105,7 @@ def text_unit(
 def _calls(function: ast.FunctionDef) -> frozenset[str]:
     nodes = ast.walk(function)
     calls = [node.func for node in nodes if isinstance(node, ast.Call)]
-    return frozenset(call.id for call in calls if isinstance(call, ast.Name)) - _COMMON
+    return frozenset(call.id for call in calls if isinstance(call, ast.Name)) - _ANYONES
 
 
 def _lines(

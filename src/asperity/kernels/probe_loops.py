@@ -3,10 +3,10 @@
 from asperity.checks import FloatArray
 from asperity.compiled import Kernels
 from asperity.kernels.law_functions import probe_force, probe_jacobian
-from asperity.kernels.storing import store_force, store_jacobian
+from asperity.kernels.storing import store_force, store_jacobian, take_point
 
 KERNELS = Kernels(
-    requires=("probe_force", "probe_jacobian", "store_force", "store_jacobian"),
+    requires=("probe_force", "probe_jacobian", "store_force", "store_jacobian", "take_point"),
     loops=("force_batch", "jacobian_batch"),
 )
 
@@ -16,8 +16,8 @@ def force_batch(points: FloatArray, out: FloatArray, texture: object, law: objec
     if points.shape[1] != 3 or out.shape[1] != 3:
         return  # never; with known lengths of rows many points go at once
     for i in range(points.shape[0]):
-        force = probe_force(points[i, 0], points[i, 1], points[i, 2], 0.0, 0.0, texture, law)
-        store_force(out, i, force)
+        x, y, z = take_point(points, i)
+        store_force(out, i, probe_force(x, y, z, 0.0, 0.0, texture, law))
 
 
 def jacobian_batch(
@@ -27,7 +27,6 @@ def jacobian_batch(
     if points.shape[1] != 3 or force.shape[1] != 3 or jacobian.shape[1:] != (3, 3):
         return  # see force_batch
     for i in range(points.shape[0]):
-        values = probe_jacobian(
-            points[i, 0], points[i, 1], points[i, 2], 0.0, 0.0, 1.0, 0.0, 1.0, texture, law
-        )
+        x, y, z = take_point(points, i)
+        values = probe_jacobian(x, y, z, 0.0, 0.0, 1.0, 0.0, 1.0, texture, law)
         store_jacobian(force, jacobian, i, values)

@@ -1,10 +1,21 @@
-"""Results of one point into the arrays of all."""
+"""One point from the array of all, and its results into theirs."""
 
 from asperity.checks import FloatArray
-from asperity.compiled import Kernels
+from asperity.compiled import Kernels, multiply_add
 from asperity.kernels.law_functions import Nine, Triple
 
-KERNELS = Kernels(provides=("store_force", "store_jacobian"))
+KERNELS = Kernels(provides=("store_force", "store_jacobian", "take_point"))
+
+
+def take_point(points: FloatArray, i: int) -> Triple:
+    """Return x, y, z of a row of (n, 3).
+
+    All are looked at, by adding nothing: numbers that the law needs of some points alone would be
+    gathered one by one.
+    """
+    x = points[i, 0]
+    y = points[i, 1]
+    return x, y, multiply_add(0.0, y, multiply_add(0.0, x, points[i, 2]))
 
 
 def store_force(out: FloatArray, i: int, force: Triple) -> None:

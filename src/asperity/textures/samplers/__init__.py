@@ -10,6 +10,7 @@ Every sampler has the same four functions, the arguments of the texture at the e
 They are plain Python: the tests call them as they are, and the kernels are these same functions
 compiled. A kind that calls ``sine`` and ``cosine`` of :mod:`asperity.textures.samplers.sine`, with
 that module in its sampler, has them exchanged for polynomials in batches:
-:mod:`asperity.kernels.batch_sine`. Functions never raise; positions are finite because the public
-edge checked them.
+:mod:`asperity.kernels.batch_sine`. A map has others for batches altogether
+(``Kernels(in_blocks=True)``). Functions never raise; positions are finite because the public edge
+checked them.
 """
