@@ -21,9 +21,9 @@ ROOM, KEY, CONTENT = "room", "key of the entry", b"content" * 20
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setitem(cache._unseen, "left", 0)
-    cache._say.cache_clear()
+    cache._told.clear()
     yield tmp_path / "cache"
-    cache._say.cache_clear()
+    cache._told.clear()
 
 
 def entry(folder: Path) -> Path:
@@ -169,13 +169,47 @@ def test_nobody_else_may_write_into_a_new_folder(folder: Path):
     assert cache.recall(ROOM, KEY) == CONTENT
 
 
+@pytest.mark.parametrize("trouble", ["loop", "device", "no permission"])
+def test_a_folder_that_cannot_be_used_at_all_is_said_once(
+    trouble: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+):
+    if trouble == "loop":
+        folder.symlink_to(folder)
+    elif trouble == "device":
+        monkeypatch.setenv("ASPERITY_CACHE_DIR", os.devnull)
+    else:
+        for name in ("open_input", "whole_file"):
+            monkeypatch.setattr(cache, name, _refuse)  # root may open whatever it wants
+        (folder / ROOM).mkdir(parents=True)
+    with pytest.warns(cache.CacheWarning) as said:
+        found = [(cache.recall(ROOM, key), cache.keep(ROOM, key, CONTENT)) for key in "ab"]
+    assert found == [(None, None)] * 2
+    assert len(said) == 1
+
+
+def test_without_a_home_the_cache_is_among_the_temporary_files(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    """As in a container that runs under a number without a name."""
+
+    def nobody(_name: str) -> Path:
+        raise RuntimeError("could not determine the home directory")
+
+    monkeypatch.delenv("ASPERITY_CACHE_DIR")
+    monkeypatch.setattr("platformdirs.user_cache_path", nobody)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    cache.keep(ROOM, KEY, CONTENT)
+    assert cache.recall(ROOM, KEY) == CONTENT
+    assert cache.cache_folder() == tmp_path / f"asperity-{os.getuid()}"
+
+
+def _refuse(*_arguments: object, **_named: object) -> None:
+    raise PermissionError(13, "Permission denied")
+
+
 def test_a_read_only_folder_serves_what_it_has(monkeypatch: pytest.MonkeyPatch):
     cache.keep(ROOM, KEY, CONTENT)
-
-    def refuse(*_arguments: object, **_named: object) -> None:
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(cache, "whole_file", refuse)  # root may write wherever it wants
+    monkeypatch.setattr(cache, "whole_file", _refuse)  # root may write wherever it wants
     with pytest.warns(cache.CacheWarning, match="cannot be written .Permission denied"):
         cache.keep(ROOM, "another", CONTENT)
     assert cache.recall(ROOM, KEY) == CONTENT

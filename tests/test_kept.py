@@ -269,7 +269,7 @@ def test_a_comparison_is_the_same_whatever_ails_its_cache(
             path.write_bytes(_flipped(path.read_bytes()))
     elif trouble == "another version":
         monkeypatch.setattr(kept.pickle, "loads", _of_another_build)
-    cache._say.cache_clear()
+    cache._told.clear()
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         assert ask() == right

@@ -20,7 +20,6 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 from asperity.errors import ParameterError
@@ -52,7 +51,10 @@ def cache_folder() -> Path:
         return Path(chosen)
     from platformdirs import user_cache_path
 
-    return user_cache_path("asperity")
+    try:
+        return user_cache_path("asperity")
+    except RuntimeError:  # a user without a name and a home, as in a container
+        return Path(tempfile.gettempdir(), f"asperity-{os.getuid()}")
 
 
 def size_limit() -> int:
@@ -150,7 +152,7 @@ def recall(room: str, key: str) -> bytes | None:
         if isinstance(error, OSError) and error.errno == errno.EINVAL:  # a folder, a pipe
             set_aside(room, key)
         else:
-            _say(f"the cache {cache_folder()} cannot be read ({_reason(error)}): {_AGAIN}")
+            _say_of_folder(f"cannot be read ({_reason(error)}): {_AGAIN}")
         return None
     if whole[:_HEAD] == _MAGIC + _digest(key, whole[_HEAD:]):
         with suppress(OSError):  # in a folder that can only be read nothing goes
@@ -171,7 +173,7 @@ def keep(room: str, key: str, content: bytes) -> None:
                 stream.write(_MAGIC + _digest(key, content) + content)
             _stay_small(_HEAD + len(content))
     except (OSError, ValueError) as error:
-        _say(f"the cache {cache_folder()} cannot be written ({_reason(error)}): {_AGAIN}")
+        _say_of_folder(f"cannot be written ({_reason(error)}): {_AGAIN}")
 
 
 def set_aside(room: str, key: str) -> None:
@@ -230,10 +232,19 @@ def _reason(error: OSError | ValueError) -> str:
     return getattr(error, "strerror", None) or str(error)
 
 
-@lru_cache(maxsize=32)
-def _say(message: str) -> None:
-    """Say something once in a process."""
-    warnings.warn(message, CacheWarning, stacklevel=2)
+_told: set[str] = set()
+
+
+def _say(message: str, about: str = "") -> None:
+    """Say something once in a process; of several that are about the same, the first alone."""
+    if (about or message) not in _told:
+        _told.add(about or message)
+        warnings.warn(message, CacheWarning, stacklevel=2)
+
+
+def _say_of_folder(trouble: str, room: Path | None = None) -> None:
+    """Say what ails the folder: what cannot be read can seldom be written either."""
+    _say(f"the cache {room or cache_folder()} {trouble}", str(cache_folder()))
 
 
 def _trusted(folder: Path) -> bool:
@@ -245,7 +256,7 @@ def _trusted(folder: Path) -> bool:
     reason = _why_not(folder.stat())
     if reason:
         advice = "set ASPERITY_CACHE_DIR to a folder of your own"
-        _say(f"the cache {folder} is not used: {reason}; {advice}")
+        _say_of_folder(f"is not used: {reason}; {advice}", folder)
     return not reason
 
 

@@ -256,7 +256,7 @@ def test_a_changed_certificate_is_made_anew(kept: Path, damage: Callable[[bytes]
     (path,) = kept.iterdir()
     assert damage(path.read_bytes()) != path.read_bytes()
     path.write_bytes(damage(path.read_bytes()))
-    cache._say.cache_clear()
+    cache._told.clear()
     with pytest.warns(cache.CacheWarning, match="damaged"):
         assert maker.asked(surface()) == BOUND
     assert maker.made == 2

@@ -18,7 +18,7 @@ DEMO = ("compare", "sinusoid:amplitude=0.31mm,period=1.1mm", "--laws", "W")
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path / "cache"))
     monkeypatch.setenv("ASPERITY_CACHE_SIZE", "500MB")
-    cache._say.cache_clear()
+    cache._told.clear()
     return tmp_path / "cache"
 
 

@@ -65,7 +65,7 @@ def test_changed_code_is_compiled_anew_and_said(cache: Path):
     content[len(content) // 2] ^= 16
     path.write_bytes(content)
     fuse._loaded.cache_clear()
-    checked._say.cache_clear()
+    checked._told.clear()
     again = fuse.load_fused(LOOP).twice
     with pytest.warns(checked.CacheWarning, match="damaged entries"):
         assert again(3.0) == 6.0
@@ -76,7 +76,7 @@ def test_changed_code_is_compiled_anew_and_said(cache: Path):
 def test_code_of_another_build_is_compiled_anew(monkeypatch: pytest.MonkeyPatch):
     fuse.load_fused(LOOP).twice(3.0)
     fuse._loaded.cache_clear()
-    checked._say.cache_clear()
+    checked._told.clear()
 
     def refuse(*_arguments: object) -> None:
         raise TypeError("of another build")
