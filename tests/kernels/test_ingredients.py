@@ -140,17 +140,27 @@ def test_code_with_ingredients_of_another_module_is_kept_by_itself(
 def test_loops_are_compiled_for_the_widest_registers(
     tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where the processor has AVX-512, a loop over many points takes eight of them at a time."""
+    """Where the processor has AVX-512, a loop over many points takes eight of them at a time.
+
+    So does what loops share.
+    """
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
     text = """
+@shared
+def fill(x, out):
+    for i in range(x.shape[0]):
+        out[i] = 2.0 * x[i]
+
 @loop
 def run(x, out):
+    fill(x, out)
     for i in range(x.shape[0]):
-        out[i] = 2.0 * x[i] + 3.0
+        out[i] += 3.0
 """
-    run, out = fuse.load_fused(HEAD + text).run, np.empty(64)
-    run(np.arange(64.0), out)
+    module, out = fuse.load_fused(HEAD + text), np.empty(64)
+    module.run(np.arange(64.0), out)
     assert out.tolist() == [2.0 * x + 3.0 for x in range(64)]
-    (code,) = run.inspect_asm().values()
-    has = dict(binding.get_host_cpu_features())
-    assert ("zmm" in code) == has.get("avx512f", False)
+    has = dict(binding.get_host_cpu_features()).get("avx512f", False)
+    for function in (module.fill, module.run):
+        (code,) = function.inspect_asm().values()
+        assert ("zmm" in code) == has

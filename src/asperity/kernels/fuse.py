@@ -58,7 +58,7 @@ scalar = njit(**internal, pipeline_class=IngredientCompiler)
 inlined = njit(**internal, forceinline=True, pipeline_class=IngredientCompiler)
 merged = njit(error_model="numpy", inline="always")
 loop = keep_code(njit(**plain, nogil=True, pipeline_class=LoopCompiler))
-shared = keep_code(njit(**internal))
+shared = keep_code(njit(**internal, pipeline_class=LoopCompiler))
 
 
 '''

@@ -5,8 +5,8 @@ that it calls, again at each level of a chain of calls. Only what Python calls n
 of an ingredient is optimised once, in the loop that it ends up in.
 
 The functions of a texture are ingredients of every law on it: those that are the same in several
-modules, with all that they call, are lowered once. The loop itself is compiled for the widest
-registers that the processor has.
+modules, with all that they call, are lowered once. The loop itself, and what loops share, is
+compiled for the widest registers that the processor has.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class IngredientCompiler(_WithLowering):
 
 
 class LoopCompiler(_WithLowering):
-    """Numba's compiler of a loop over many points, or many samples."""
+    """Numba's compiler of a loop over many points, or many samples, and of what loops share."""
 
     lowering = WideLowering
 

@@ -33,9 +33,13 @@ KERNELS = Kernels(
 
 
 def step_lanes(x: FloatArray, held: FloatArray, moved: FloatArray, plant: PantographPlant) -> None:
-    """Write what :func:`bar_step` returns for each run over a whole sample, a column a run."""
+    """Write what :func:`bar_step` returns for each run over a whole sample, a column a run.
+
+    And the place where it ends, and 1 where that is all there is to it, 0 where not.
+    """
     given = local_array((11, LANES))
-    joint, h = plant.bar.joint_damping, plant.period
+    bar, hand, _friction, rate, fewest, period, share, _inside_only, least = plant
+    joint = bar.joint_damping
     for lane in range(LANES):
         # A lane without a run does the last one again.
         run = min(lane, x.shape[0] - 1)
@@ -55,16 +59,22 @@ def step_lanes(x: FloatArray, held: FloatArray, moved: FloatArray, plant: Pantog
             given[4, lane], given[5, lane], given[6, lane], given[7, lane], given[8, lane],
             given[9, lane], given[10, lane],
         )  # fmt: skip
-        dx, dz, dvx, dvz, lost, work = bar_step(
-            given[0, lane], given[1, lane], given[2, lane], given[3, lane], pull, h,
-            plant.bar, plant.hand,
-        )  # fmt: skip
+        x0, z0, vx, vz = given[0, lane], given[1, lane], given[2, lane], given[3, lane]
+        dx, dz, dvx, dvz, lost, work = bar_step(x0, z0, vx, vz, pull, period, bar, hand)
+        px = x0 + dx
+        pz = z0 + dz
+        parts = max(fewest, bar_parts(vx, vz, rate, period / share, bar))
+        plain = parts == 1 and bar_reached(px, pz, least, bar)
+        plain = plain and not bar_kink(px, pz, dx, dz, 0.0, period, pull, hand)
         moved[0, lane] = dx
         moved[1, lane] = dz
         moved[2, lane] = dvx
         moved[3, lane] = dvz
         moved[4, lane] = lost
         moved[5, lane] = work
+        moved[6, lane] = px
+        moved[7, lane] = pz
+        moved[8, lane] = 1.0 if plain else 0.0
 
 
 def advance_lanes(
@@ -75,26 +85,19 @@ def advance_lanes(
     plant: PantographPlant,
 ) -> None:
     """Move the handles over one sample; see ``body_functions``."""
-    bar, hand, _friction, rate, fewest, period, share, _inside_only, least = plant
-    moved = local_array((6, LANES))
+    moved = local_array((9, LANES))
     step_lanes(x, held, moved, plant)
     for run in range(x.shape[0]):
         if told[run, STOP] != RAN:
             continue
         one = held_of(held, run)
-        dx = moved[0, run]
-        dz = moved[1, run]
-        px = x[run, 0] + dx
-        pz = x[run, 2] + dz
-        parts = max(fewest, bar_parts(x[run, 3], x[run, 5], rate, period / share, bar))
-        plain = parts == 1 and bar_reached(px, pz, least, bar)
-        if plain and not bar_kink(px, pz, dx, dz, 0.0, period, one, hand):
-            x[run, 0] = px
-            x[run, 2] = pz
+        if moved[8, run] > 0.0:
+            x[run, 0] = moved[6, run]
+            x[run, 2] = moved[7, run]
             x[run, 3] += moved[2, run]
             x[run, 5] += moved[3, run]
-            book_energies(
-                ledger[run], one.fx * dx, 0.0, one.fz * dz, moved[4, run], moved[5, run], 0.0
-            )
+            wx = one.fx * moved[0, run]
+            wz = one.fz * moved[1, run]
+            book_energies(ledger[run], wx, 0.0, wz, moved[4, run], moved[5, run], 0.0)
         else:
             told[run, STOP] = advance_body(x[run], ledger[run], one, plant)

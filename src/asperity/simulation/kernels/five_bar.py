@@ -266,7 +266,8 @@ def bar_parts(vx: float, vz: float, rate: float, span: float, bar: Bar) -> int:
 
 
 def bar_kink(
-    x: float, z: float, dx: float, dz: float, time: float, h: float, held: Held, hand: HandRecord
+    x: float, z: float, dx: float, dz: float, time: float, h: float, held: Held | Pull,
+    hand: HandRecord,
 ) -> bool:  # fmt: skip
     """Whether the band turned slack or taut in a step h of the handle, by d to (x, z)."""
     sx = held.ax + time * held.ux - x
