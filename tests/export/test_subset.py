@@ -77,6 +77,8 @@ def arrays(n, x):
         for j in range(4):
             work[i, j] = x * i - j
     fill(work, n)
+    half = 0.5 * x
+    work[1, 0], work[2, 1] = shifted(half)
     total = 0.0
     for i in range(work.shape[0]):
         for j in range(work.size // 3):
@@ -87,6 +89,10 @@ def arrays(n, x):
 def fill(work, n):
     for i in range(3):
         work[i, n % 4] *= SCALE
+
+
+def shifted(x):
+    return x - 1.0, x + 3.0
 
 
 SCALE = 2.5

@@ -14,7 +14,6 @@ from asperity.textures.pyramid import plane_pyramid
 from asperity.textures.samplers import heightmap
 from asperity.textures.samplers import heightmap_window as window
 from asperity.textures.samplers.heightmap import HeightMapArguments
-from asperity.textures.samplers.spline import weights
 
 PITCH = (50e-6, 70e-6)
 Point = tuple[float, float, float, float, float, float]
@@ -90,31 +89,6 @@ def test_no_point_is_lost_with_what_is_left_out(way: str) -> None:
     assert lost > 5
 
 
-def test_no_point_is_lost_with_a_cell_that_is_not_open() -> None:
-    """Many a cell is closed that the coefficients of the spline leave open."""
-    rng = np.random.default_rng(54)
-    closed, more, lost = 0, 0, 0
-    for seed in range(3):
-        texture = rough(seed, 90e-6)
-        for probe in probes(texture, rng, 20):
-            phi = squares(texture, probe)
-            enough = float(phi.min()) * rng.uniform(0.9, 1.3)
-            x, y, z = map(float, probe)
-            for i, j in np.argwhere(phi < 1.5 * enough).tolist():
-                if not window.is_open(x, y, z, enough, i, j, texture.arguments):
-                    assert phi[i, j] >= enough
-                    closed += 1
-                    cell = (j, j, i, i)
-                    g = float(texture.height(probe[None, :2])[0]) - z
-                    left = window.cells_within(x, y, z, g, enough, cell, texture.arguments)
-                    more += not window.is_empty(left)
-                if not window.is_open(x, y, z, 0.97 * enough, i, j, texture.arguments):
-                    lost += phi[i, j] < enough
-    assert closed > 500
-    assert more > 100
-    assert lost > 10
-
-
 def minimum(probe: FloatArray, start: FloatArray, texture: HeightMapArguments) -> Point:
     """Return a local minimum of φ downhill from a start."""
     return plane_search.descend(*map(float, probe), *map(float, start), texture)
@@ -182,27 +156,6 @@ def test_in_the_cell_above_a_probe_a_flat_map_is_nearest() -> None:
     west, east, south, north = left
     assert west <= 10 <= east
     assert south <= 9 <= north
-
-
-def test_bernstein_coefficients_are_those_of_the_spline_and_of_the_square() -> None:
-    rng = np.random.default_rng(55)
-    c, t = rng.normal(size=4), 0.37
-    for s in np.linspace(0.0, 1.0, 6):
-        basis = [math.comb(3, m) * s**m * (1.0 - s) ** (3 - m) for m in range(4)]
-        spline = float(np.dot(weights(s), c))
-        assert np.dot(basis, window.bernstein(*c)) / 6.0 == pytest.approx(spline, abs=1e-14)
-        assert np.dot(basis, window.square_on(t)) == pytest.approx((s - t) ** 2, abs=1e-14)
-
-
-@pytest.mark.parametrize(("i", "j"), [(9, 10), (9, 13), (14, 10), (7, 6)])
-def test_a_cell_of_a_flat_map_is_open_exactly_if_it_is_near_enough(i: int, j: int) -> None:
-    x, y, g = 10.5, 9.5, 3.0
-    phi = g**2 + max(abs(j + 0.5 - x) - 0.5, 0.0) ** 2 + max(abs(i + 0.5 - y) - 0.5, 0.0) ** 2
-    given = made(np.full((23, 23), 0.7))
-    assert window.is_open(x, y, 0.7 - g, phi + 1e-9, i, j, given)
-    if (i, j) != (9, 10):
-        beside = phi if i != 9 and j != 10 else phi - 0.1
-        assert not window.is_open(x, y, 0.7 - g, beside - 1e-9, i, j, given)
 
 
 def test_one_coefficient_counts_in_sixteen_cells() -> None:

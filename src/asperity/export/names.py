@@ -66,7 +66,7 @@ def live_names(scope: Scope) -> set[str]:
             for node in ast.walk(scope.node)
             if isinstance(node, (ast.Assign, ast.AugAssign, ast.AnnAssign))
             and not any(name in live for name in stored_in(node))
-            and all(isinstance(target, (ast.Name, ast.Tuple)) for target in _targets(node))
+            and all(map(_only_names, _targets(node)))
             and not any(_acting(scope, node))
         }
         if more <= idle:
@@ -82,6 +82,13 @@ def _acting(scope: Scope, node: ast.stmt) -> Iterator[bool]:
 
 def _targets(node: ast.Assign | ast.AugAssign | ast.AnnAssign) -> Sequence[ast.expr]:
     return node.targets if isinstance(node, ast.Assign) else [node.target]
+
+
+def _only_names(target: ast.expr) -> bool:
+    """Return whether a target is of names alone: what is written to an array is used elsewhere."""
+    if isinstance(target, ast.Tuple):
+        return all(map(_only_names, target.elts))
+    return isinstance(target, ast.Name)
 
 
 def _loads(node: ast.AST, idle: set[int]) -> Iterator[str]:

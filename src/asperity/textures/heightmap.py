@@ -86,12 +86,13 @@ class HeightMap(Spline):
         from asperity.textures.samplers import (
             heightmap,
             heightmap_block,
+            heightmap_cells,
             heightmap_search,
             heightmap_window,
             spline,
         )
 
-        search = heightmap_search, heightmap_window, plane_search, plane_within
+        search = heightmap_search, heightmap_window, heightmap_cells, plane_search, plane_within
         return heightmap, spline, *search, heightmap_block
 
     @cached_property

@@ -170,8 +170,9 @@ def split_follow(
         size = sx * sx + sy * sy
         stalled += size >= 0.25 * last
         last = size
-        # Near a centre of curvature the first steps need not shrink.
-        if stalled > 2 or size <= 0.2 * EPS * EPS * (gap * gap + fx * fx + fy * fy):
+        rounding = 0.2 * EPS * EPS * (fx * fx + fy * fy)
+        # Near a centre of curvature the first steps need not shrink; else the next is the square.
+        if stalled > 2 or size <= 0.5 * EPS * gap * gap + rounding:
             break
     atoms[row, 0] = fx
     atoms[row, 1] = fy

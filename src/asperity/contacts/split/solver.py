@@ -363,7 +363,7 @@ def split_atoms(
             if solved > 0 or doubts > 6 or single or unsure > 0.0:
                 return count, gap, looks, unsure > 0.0
         # What a round may take is kept in reserve.
-        if looks > 0.6 * budget:
+        if looks >= 0.5 * budget:
             return count, gap, looks, True
         left = split_weights(atoms, count + 1, p, mu, a)
         if left == 0:

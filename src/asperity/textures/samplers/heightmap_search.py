@@ -4,18 +4,19 @@ import math
 
 import numpy as np
 
-from asperity.compiled import EPS, Kernels
-from asperity.contacts.nearest.plane_search import descend, judge, next_box
+from asperity.compiled import EPS, Kernels, local_array
+from asperity.contacts.nearest.plane_search import descend, go_down, judge, next_box
 from asperity.contacts.sampler import PASSED, SLACK
 from asperity.contacts.sampler import PlanePoint as Point
 from asperity.textures.samplers.heightmap import HeightMapArguments, cells_of
-from asperity.textures.samplers.heightmap_window import (
-    Window,
-    cells_within,
-    is_empty,
-    is_open,
-    narrowed,
+from asperity.textures.samplers.heightmap_cells import (
+    Basin,
+    basin_at,
+    is_near,
+    least_in_row,
+    rises_in,
 )
+from asperity.textures.samplers.heightmap_window import Window, is_empty, narrowed
 from asperity.textures.samplers.spline import (
     box_bounds,
     foreseeable,
@@ -27,21 +28,26 @@ from asperity.textures.samplers.spline import (
 KERNELS = Kernels(
     provides=("foot", "search_plane"),
     requires=(
-        "cells_of", "cells_within", "descend", "is_empty", "is_open", "judge",
-        "narrowed", "next_box",
+        "basin_at", "cells_of", "descend", "go_down", "is_empty", "is_near", "judge",
+        "least_in_row", "narrowed", "next_box", "rises_in",
         "box_bounds", "foreseeable", "nearest_copy", "reach_of", "tile_frame",
     ),
-    called=("foot", "search_block", "search_tile", "search_tree"),
+    called=("foot", "search_cell", "search_tile", "search_tree"),
     shared=("search_plane",),
-    merged=("search_block", "search_window"),
+    merged=("search_rows", "search_window"),
     iterates=True,
 )  # fmt: skip
 
-# A window of so few cells is searched cell by cell, four by four of them first.
-FEW_CELLS = 600
-# So many looks take the coefficients of four by four cells, and those of one.
-BLOCK = 0.75
-CELL = 0.4
+# A window of so few cells, and so few along x, is searched cell by cell.
+FEW_CELLS = 1000
+NARROW = 64
+# So many looks take the coefficients of a row, of each cell in it, and those of one that is cut.
+ROW = 0.4
+CELL = 0.075
+CUT = 2.0
+# Cells from a minimum in which ψ may rise from it, and in which there is hardly another one.
+NEAR = 2.5
+BESIDE = 1.0
 
 
 def foot(
@@ -133,12 +139,8 @@ def search_window(
     Cell by cell if they are few, else from the level on of which it has at most two by two boxes.
     """
     west, east, south, north = window
-    if (east - west + 1) * (north - south + 1) <= FEW_CELLS:
-        for i in range(south, north + 1, 4):
-            for j in range(west, east + 1, 4):
-                if left > 0.0:
-                    best, left = search_block(x, y, z, i, j, best, window, keep, left, texture)
-        return best, left
+    if (east - west + 1) * (north - south + 1) <= FEW_CELLS and east - west < NARROW:
+        return search_rows(x, y, z, best, window, keep, left, texture)
     top = 1
     span = ((east >> 1) - (west >> 1)) | ((north >> 1) - (south >> 1))
     while top < texture.levels.shape[0] and span >> (top - 1) > 0:
@@ -150,24 +152,63 @@ def search_window(
     return best, left
 
 
-def search_block(
-    x: float, y: float, z: float, i: int, j: int, best: Point, window: Window, keep: float,
-    left: float, texture: HeightMapArguments,
+def search_rows(
+    x: float, y: float, z: float, best: Point, window: Window, keep: float, left: float,
+    texture: HeightMapArguments,
 ) -> tuple[Point, float]:  # fmt: skip
-    """Return the best point after a search of four by four cells of a window, from (i, j) on."""
-    block = (j, min(j + 3, window[1]), i, min(i + 3, window[3]))
-    middle = texture.c[min(i + 3, window[3] + 2), min(j + 3, window[1] + 2)] - z
-    west, east, south, north = cells_within(x, y, z, middle, best[2] * keep, block, texture)
-    left -= BLOCK
-    for row in range(south, north + 1):
-        for column in range(west, east + 1):
-            if left > 0.0:
-                left -= CELL
-                if is_open(x, y, z, best[2] * keep, row, column, texture):
-                    best, left = search_tree(
-                        x, y, z, 0, row, column, best, window, keep, left, texture
+    """Return the best point after a search of the open cells of a window, and the looks left."""
+    west, east, south, north = window
+    least = local_array((64,))
+    # Whole registers, as far as there are cells.
+    nx, _ny = cells_of(texture.c)
+    count = min((east - west + 8) & -8, nx)
+    first = min(west, nx - count)
+    near = basin_at(z, best, texture)
+    other = near
+    cost = ROW + CELL * count
+    for i in range(south, north + 1):
+        left = left - cost if left > cost else 0.0
+        if left > 0.0:
+            least_in_row(x, y, z, i, first, count, least, texture)
+            for j in range(west, east + 1):
+                if left > 0.0 and least[j - first] < best[2] * keep:
+                    best, near, other, left = search_cell(
+                        x, y, z, i, j, best, near, other, window, keep, left, texture
                     )
     return best, left
+
+
+def search_cell(
+    x: float, y: float, z: float, i: int, j: int, best: Point, near: Basin, other: Basin,
+    window: Window, keep: float, left: float, texture: HeightMapArguments,
+) -> tuple[Point, Basin, Basin, float]:  # fmt: skip
+    """Return the best point after a search of an open cell, two minima, and the looks left.
+
+    Mostly φ rises there from one of them: the best point, and the one that was found last.
+    """
+    if is_near(near, i, j, NEAR):
+        left -= CUT
+        if rises_in(x, y, z, best[2] * keep, near, i, j, texture):
+            return best, near, other, left
+    if left > 0.0 and is_near(other, i, j, NEAR):
+        left -= CUT
+        if rises_in(x, y, z, best[2] * keep, other, i, j, texture):
+            return best, near, other, left
+    if left > 0.0 and not (is_near(near, i, j, BESIDE) or is_near(other, i, j, BESIDE)):
+        start_x = texture.x0 + (j + 0.5) / texture.ix
+        start_y = texture.y0 + (i + 0.5) / texture.iy
+        found, left = go_down(x, y, z, start_x, start_y, left - 1.0, texture)
+        other = basin_at(z, found, texture)
+        if found[2] < best[2]:
+            best = found
+            near = other
+        if left > 0.0 and is_near(other, i, j, NEAR):
+            left -= CUT
+            if rises_in(x, y, z, best[2] * keep, other, i, j, texture):
+                return best, near, other, left
+    if left > 0.0:
+        best, left = search_tree(x, y, z, 0, i, j, best, window, keep, left, texture)
+    return best, near, other, left
 
 
 def search_tree(

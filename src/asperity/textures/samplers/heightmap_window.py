@@ -24,10 +24,10 @@ from asperity.contacts.nearest.plane_search import eigenvalues
 from asperity.contacts.sampler import PASSED
 from asperity.contacts.sampler import PlanePoint as Point
 from asperity.textures.samplers.heightmap import HeightMapArguments, curvature
-from asperity.textures.samplers.spline import Four, box_bounds
+from asperity.textures.samplers.spline import box_bounds
 
 KERNELS = Kernels(
-    provides=("cells_within", "is_empty", "is_open", "narrowed"),
+    provides=("cells_within", "is_empty", "narrowed"),
     requires=("box_bounds", "curvature", "eigenvalues"),
     merged=("boxes_within", "narrowed", "rises"),
 )
@@ -122,12 +122,15 @@ def cells_within(
     north = window[3]
     columns = local_array((64,))
     c = texture.c
-    count = east - west + 4
+    used = east - west + 4
+    count = min((used + 7) & -8, c.shape[1] - west)  # whole registers, as far as there are numbers
     px = 1.0 / texture.ix
     py = 1.0 / texture.iy
     for m in range(count):
         away = west + m - 1 - (x - texture.x0) * texture.ix
         columns[m] = (away * away - 1.0 / 3.0) * px * px
+    for m in range(used, count):
+        columns[m] = np.inf
     first_i = north + 4
     first_j = east + 4
     last_i = last_j = -1
@@ -146,48 +149,6 @@ def cells_within(
                     first_j = min(first_j, west + m)
                     last_j = max(last_j, west + m)
     return max(west, first_j - 3), min(east, last_j), max(south, first_i - 3), min(north, last_i)
-
-
-def bernstein(a: float, b: float, c: float, d: float) -> Four:
-    """Return the Bernstein coefficients of a cubic spline on a cell, times six."""
-    return a + 4.0 * b + c, 4.0 * b + 2.0 * c, 2.0 * b + 4.0 * c, b + 4.0 * c + d
-
-
-def square_on(t: float) -> Four:
-    """Return the Bernstein coefficients of (s - t)² on 0 <= s <= 1, as a cubic."""
-    return t * t, t * (t - 2.0 / 3.0), t * (t - 4.0 / 3.0) + 1.0 / 3.0, (1.0 - t) * (1.0 - t)
-
-
-def is_open(
-    x: float, y: float, z: float, enough: float, i: int, j: int, texture: HeightMapArguments
-) -> bool:
-    """Return whether a Bernstein coefficient of ψ on cell (i, j) is less than enough.
-
-    They bound ψ more closely than those of the spline; g is the height amid the cell.
-    """
-    c = texture.c
-    amid = c[i + 1, j + 1] + c[i + 1, j + 2] + c[i + 2, j + 1] + c[i + 2, j + 2]
-    gap = 0.25 * float(amid) - z
-    px = 1.0 / texture.ix
-    py = 1.0 / texture.iy
-    rows = local_array((4, 4))
-    for m in range(4):
-        rows[m, 0], rows[m, 1], rows[m, 2], rows[m, 3] = bernstein(
-            c[i + m, j] - z, c[i + m, j + 1] - z, c[i + m, j + 2] - z, c[i + m, j + 3] - z
-        )
-    along = local_array((4,))
-    along[0], along[1], along[2], along[3] = square_on((x - texture.x0) * texture.ix - j)
-    v0, v1, v2, v3 = square_on((y - texture.y0) * texture.iy - i)
-    twice = gap / 18.0
-    least = np.inf
-    for m in range(4):
-        b0, b1, b2, b3 = bernstein(rows[0, m], rows[1, m], rows[2, m], rows[3, m])
-        lowest = min(
-            twice * b0 + v0 * py * py, twice * b1 + v1 * py * py,
-            twice * b2 + v2 * py * py, twice * b3 + v3 * py * py,
-        )  # fmt: skip
-        least = min(least, lowest + along[m] * px * px)
-    return least - gap * gap < enough
 
 
 def rises(

@@ -1,0 +1,148 @@
+"""Cells that are closed hold no nearer point, and hardly more could be closed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from tests.textures.test_window import CENTRE, _bound, cubic, made, minimum, probes, rough, squares
+
+from asperity.checks import FloatArray
+from asperity.textures.samplers import heightmap
+from asperity.textures.samplers import heightmap_cells as cells
+from asperity.textures.samplers import heightmap_window as window
+from asperity.textures.samplers.heightmap import HeightMapArguments
+from asperity.textures.samplers.spline import weights
+
+__all__ = ["_bound"]  # a fixture, used by itself
+
+
+def basis(s: float) -> list[float]:
+    return [math.comb(3, m) * s**m * (1.0 - s) ** (3 - m) for m in range(4)]
+
+
+def test_coefficients_are_those_of_the_spline_the_square_and_the_parts() -> None:
+    rng = np.random.default_rng(55)
+    c, t = rng.normal(size=4), 0.37
+    parts = cells.cut_at(t, *c)
+    for s in np.linspace(0.0, 1.0, 6):
+        spline = float(np.dot(weights(s), c))
+        assert np.dot(basis(s), cells.bernstein(*c)) / 6.0 == pytest.approx(spline, abs=1e-14)
+        assert np.dot(basis(s), cells.square_on(t)) == pytest.approx((s - t) ** 2, abs=1e-14)
+        for part, place in ((parts[:4], t * s), (parts[3:], t + (1.0 - t) * s)):
+            whole = np.dot(basis(place), c)
+            assert np.dot(basis(s), part) == pytest.approx(whole, abs=1e-14)
+
+
+def least(probe: FloatArray, i: int, j: int, texture: HeightMapArguments) -> float:
+    """Return the least coefficient in a cell, asked for in the middle of eight."""
+    x, y, z = map(float, probe)
+    first = min(max(j - 4, 0), heightmap.cells_of(texture.c)[0] - 8)
+    row = np.empty(8)
+    cells.least_in_row(x, y, z, i, first, 8, row, texture)
+    return float(row[j - first])
+
+
+def test_no_point_is_lost_with_a_cell_that_is_not_open() -> None:
+    """Many a cell is closed that the coefficients of the spline leave open."""
+    rng = np.random.default_rng(54)
+    closed, more, lost = 0, 0, 0
+    for seed in range(3):
+        texture = rough(seed, 90e-6)
+        for probe in probes(texture, rng, 20):
+            phi = squares(texture, probe)
+            enough = float(phi.min()) * rng.uniform(0.9, 1.3)
+            x, y, z = map(float, probe)
+            for i, j in np.argwhere(phi < 1.5 * enough).tolist():
+                bound = least(probe, i, j, texture.arguments)
+                if bound >= enough:
+                    assert phi[i, j] >= enough
+                    closed += 1
+                    cell = (j, j, i, i)
+                    g = float(texture.height(probe[None, :2])[0]) - z
+                    left = window.cells_within(x, y, z, g, enough, cell, texture.arguments)
+                    more += not window.is_empty(left)
+                lost += bound >= 0.97 * enough and phi[i, j] < enough
+    assert closed > 500
+    assert more > 100
+    assert lost > 10
+
+
+@pytest.mark.parametrize(("i", "j"), [(9, 10), (9, 13), (14, 10), (7, 6)])
+def test_the_bound_of_a_cell_of_a_flat_map_is_its_distance(i: int, j: int) -> None:
+    x, y, g = 10.5, 9.5, 3.0
+    phi = g**2 + max(abs(j + 0.5 - x) - 0.5, 0.0) ** 2 + max(abs(i + 0.5 - y) - 0.5, 0.0) ** 2
+    found = least(np.array([x, y, 0.7 - g]), i, j, made(np.full((23, 23), 0.7)))
+    if i == 9:
+        assert phi - 1.0 / 6.0 - 1e-12 <= found < phi  # along y the probe is amid the cell
+    else:
+        assert found == pytest.approx(phi - (1.0 / 12.0 if j == 10 else 0.0), abs=1e-12)
+
+
+# --- about a minimum ------------------------------------------------------------------------------
+
+
+def test_where_a_minimum_is_risen_from_nothing_is_nearer() -> None:
+    """Cells that are open else are closed; the negative control takes no square away."""
+    rng = np.random.default_rng(56)
+    claims, opened, wrong = 0, 0, 0
+    for seed in range(4):
+        texture = rough(seed, 90e-6)
+        given = texture.arguments
+        nx, ny = heightmap.cells_of(given.c)
+        for probe in probes(texture, rng, 40):
+            x, y, z = map(float, probe)
+            foot = minimum(probe, probe[:2] + rng.normal(0.0, 2e-4, 2), given)
+            basin = cells.basin_at(z, foot, given)
+            # A mixed derivative that is taken away twice, and no square with it.
+            blind = (*basin[:3], 0.0, 2.0 * basin[4], 0.0)
+            phi = squares(texture, probe)
+            for i in range(max(int(basin[1]) - 2, 0), min(int(basin[1]) + 3, ny)):
+                for j in range(max(int(basin[0]) - 2, 0), min(int(basin[0]) + 3, nx)):
+                    enough = foot[2] * (1.0 - 1e-13)
+                    nearer = phi[i, j] < enough
+                    if cells.rises_in(x, y, z, enough, basin, i, j, given):
+                        assert not nearer
+                        claims += 1
+                        opened += least(probe, i, j, given) < enough
+                    wrong += nearer and cells.rises_in(x, y, z, enough, blind, i, j, given)
+    assert claims > 1000
+    assert opened > 200
+    assert wrong > 3
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("share", [0.98, 1.02])
+def test_a_minimum_is_told_from_a_saddle(sign: float, share: float) -> None:
+    """H = s t twist: ψ rises along both axes, and falls between them if g twist is more than 1."""
+    g = 5.0
+    u, v = np.arange(-1, 22) - CENTRE[0], np.arange(-1, 22) - CENTRE[1]
+    given = made(sign * share / g * np.outer(v, u))
+    foot = (*CENTRE, g * g, 0.0, 0.0, 0.0)
+    basin = cells.basin_at(-g, foot, given)
+    enough = g * g * (1.0 - 1e-13)
+    assert cells.rises_in(*CENTRE, -g, enough, basin, 9, 10, given) == (share < 1.0)
+    # The negative control takes less than a square away.
+    less = (*basin[:3], 0.9 * basin[3], basin[4], 0.9 * basin[5])
+    assert cells.rises_in(*CENTRE, -g, enough, less, 9, 10, given)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("cells_off", [-2, -1, 0, 1, 2])
+def test_a_rise_ends_where_third_derivatives_end_it(
+    turned: bool, sign: float, cells_off: int
+) -> None:
+    """ψ = (1 - g b) t² - g c t³/3 is 0 again at 3 (1 - g b)/g c: here, at the end of a cell."""
+    g, b = 5.0, 0.08
+    first = (10, 9)[turned] + cells_off - CENTRE[turned]
+    end = first + 1.0 if cells_off >= 0 else first
+    for share, rises in ((1.01, True), (0.99, False)):
+        c = 3.0 * (1.0 - g * b) / (g * share * end)
+        given = cubic(turned, -sign * b, -sign * c)
+        foot = (*CENTRE, g * g, 0.0, 0.0, 0.0)
+        basin = cells.basin_at(-sign * g, foot, given)
+        i, j = (9 + cells_off, 10) if turned else (9, 10 + cells_off)
+        enough = g * g * (1.0 - 1e-13)
+        assert cells.rises_in(*CENTRE, -sign * g, enough, basin, i, j, given) == rises
