@@ -226,6 +226,21 @@ def test_another_package_keeps_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (ask(), ask()) == ("c", "d")
 
 
+@pytest.mark.parametrize("library", ["numpy", "scipy", "numba", "llvmlite"])
+def test_another_version_of_a_library_has_its_own_answers(
+    library: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    digest = kept.package_digest.__wrapped__
+    before, version = digest(), kept.version
+    assert digest() == before
+    if library in ("numpy", "scipy"):
+        monkeypatch.setattr(f"{library}.__version__", "another")
+    else:
+        other = lambda name: "another" if name == library else version(name)  # noqa: E731
+        monkeypatch.setattr(kept, "version", other)
+    assert digest() != before
+
+
 @pytest.mark.filterwarnings("ignore::asperity.cache.CacheWarning")
 def test_an_entry_that_cannot_be_read_is_made_again() -> None:
     key = f"letter\ncontent\n{kept.package_digest()}"

@@ -1,8 +1,8 @@
 """Answers that are kept between runs by their content, so that none is worked out twice.
 
 An answer is kept under all that it depends on: what was asked, of which numbers and heights, and
-the digest of this package, of NumPy and of SciPy. Only what follows from code of this package is
-kept: what code of one's own does is not known, and is worked out each time. Entries are checked,
+the digest of this package, of NumPy, SciPy and Numba. Only what follows from code of this package
+is kept: what code of one's own does is not known, and is worked out each time. Entries are checked,
 see :mod:`asperity.cache`, and hold no more than numbers, texts and arrays.
 """
 
@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import lru_cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -124,7 +125,7 @@ def is_shipped(kind: type) -> bool:
 
 @lru_cache(maxsize=1)
 def package_digest() -> str | None:
-    """Return a digest of this package, of Python, NumPy, SciPy and the kind of processor.
+    """Return a digest of this package, of Python, NumPy, SciPy, Numba and the kind of processor.
 
     ``None`` where the package's files are not to be found.
     """
@@ -142,6 +143,8 @@ def package_digest() -> str | None:
                 said = f"{path.relative_to(_PACKAGE).as_posix()} {len(content)}\n"
                 digest.update(said.encode() + content)
                 count += 1
-    versions = (sys.version, np.__version__, scipy.__version__, platform.machine(), sys.byteorder)
-    digest.update(repr(versions).encode())
+    # Numba is slow to import; what it compiles is LLVM's.
+    libraries = np.__version__, scipy.__version__, version("numba"), version("llvmlite")
+    machine = sys.version, platform.machine(), sys.byteorder
+    digest.update(repr((libraries, machine)).encode())
     return digest.hexdigest() if count else None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import os
 import shutil
@@ -202,25 +201,24 @@ def used_by(name: str) -> bool:
     return module in used_modules(keeping._makers(surface()))
 
 
-def test_what_a_theorem_of_one_s_own_computes_with_counts(tmp_path: Path) -> None:
-    own, path = law(1.5), tmp_path / "my_proof.py"
-    path.write_text("def most(surface):\n    return 7.0\n")
-    spec = importlib.util.spec_from_file_location("my_proof", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["my_proof"] = module
-    try:
-        spec.loader.exec_module(module)
-        without = keeping._key(surface(own), "norm", Search())
-        register_theorem(own, Theorem(norm_at_most=module.most))
-        first = keeping._key(surface(own), "norm", Search())
-        path.write_text("def most(surface):\n    return 7.5\n")
-        assert len({without, first, keeping._key(surface(own), "norm", Search())}) == 3
-        path.unlink()  # as typed into a session: what it says is not known
-        assert keeping._key(surface(own), "norm", Search()) is None
-    finally:
-        del sys.modules["my_proof"]
+class Mine(HeightMap):
+    """A kind of one's own: what its bounds follow from is not known."""
+
+
+@pytest.mark.usefixtures("kept")
+def test_where_code_of_one_s_own_has_a_part_nothing_is_kept() -> None:
+    """It may read a number in another file, which then changes."""
+    maker, own = Maker(), law(1.5)
+    most = [7.0]
+    for _ in range(2):
+        maker.asked(surface(own))  # a formula is known whole
+    assert maker.made == 1
+    register_theorem(own, Theorem(norm_at_most=lambda _surface: most[0]))
+    for asked in (surface(own), surface(like=Mine(HEIGHTS, 3e-4))):
+        before = maker.made
+        maker.asked(asked)
+        maker.asked(asked)
+        assert maker.made == before + 2
 
 
 @pytest.mark.usefixtures("kept")

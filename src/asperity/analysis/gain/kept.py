@@ -2,7 +2,9 @@
 
 The key is a digest of the texture's kind and arguments, the law's kernel and facts, all parameters,
 the search, and the source of the modules that make a certificate: whatever of these changes, it is
-made anew. One that was changed on disk is not believed, see :mod:`asperity.cache`.
+made anew. Where code of one's own has a part, as in a texture kind or a theorem, nothing is kept:
+what it reads and imports is not known. One that was changed on disk is not believed, see
+:mod:`asperity.cache`.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ import numpy as np
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.gain.answers import is_shipped_law
 from asperity.analysis.gain.search import Search
-from asperity.analysis.gain.sources import source_digest
+from asperity.analysis.gain.sources import is_own, source_digest
 from asperity.analysis.gain.theorems import theorem_of
 from asperity.cache import keep, recall
 from asperity.files import json_text, record
@@ -55,7 +57,8 @@ def kept(surface: Surface, name: str, search: Search, make: Callable[[], Bound])
 def _key(surface: Surface, name: str, search: Search) -> str | None:
     """Return what a certificate depends on as a digest; ``None`` where it is not known."""
     law = surface.law
-    source = source_digest(_makers(surface))
+    makers = _makers(surface)
+    source = source_digest(makers) if all(map(is_own, makers)) else None
     if source is None:
         return None
     # Of a shipped law the stiffness is a factor; one of one's own may depend on it in any way.

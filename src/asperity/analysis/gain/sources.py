@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import hashlib
-import sys
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -17,9 +16,8 @@ _BESIDE = frozenset({"asperity.textures.naming"})
 def used_modules(roots: Iterable[str]) -> frozenset[str]:
     """Return the modules that the roots import, directly or not, functions included.
 
-    Of a module of one's own only what it imports of this package is followed; what finds a texture
-    by its name is not. What a package imports in its ``__init__`` counts only where a name of the
-    package itself is asked for.
+    What finds a texture by its name is not followed. What a package imports in its ``__init__``
+    counts only where a name of the package itself is asked for.
     """
     found: set[str] = set()
     left = list(roots)
@@ -35,7 +33,7 @@ def used_modules(roots: Iterable[str]) -> frozenset[str]:
 def source_digest(roots: Iterable[str]) -> str | None:
     """Return a digest of the files of the roots and of all that they import.
 
-    ``None`` if the file of a root is not known, as in an interactive session.
+    ``None`` if a file is not to be found.
     """
     digest = hashlib.sha256()
     for module in sorted(used_modules(roots)):
@@ -48,12 +46,8 @@ def source_digest(roots: Iterable[str]) -> str | None:
 
 
 def _file(module: str) -> Path | None:
-    parts = module.split(".")
-    if parts[0] == _PACKAGE.name:
-        base = _PACKAGE.joinpath(*parts[1:])
-        choice = [base.with_suffix(".py"), base / "__init__.py"]
-    else:
-        choice = [Path(getattr(sys.modules.get(module), "__file__", None) or "")]
+    base = _PACKAGE.joinpath(*module.split(".")[1:])
+    choice = base.with_suffix(".py"), base / "__init__.py"
     return next((file for file in choice if file.is_file()), None)
 
 
@@ -66,12 +60,13 @@ def _imported(file: Path, changed: int) -> tuple[str, ...]:  # noqa: ARG001 - a 
 
 def _names(node: ast.AST) -> Iterator[str]:
     if isinstance(node, ast.Import):
-        yield from (name.name for name in node.names if _is_own(name.name))
-    elif isinstance(node, ast.ImportFrom) and _is_own(node.module or ""):
+        yield from (name.name for name in node.names if is_own(name.name))
+    elif isinstance(node, ast.ImportFrom) and is_own(node.module or ""):
         for name in node.names:
             inner = f"{node.module}.{name.name}"
             yield inner if _file(inner) else str(node.module)
 
 
-def _is_own(module: str) -> bool:
+def is_own(module: str) -> bool:
+    """Return whether a module, by its name, belongs to this package."""
     return module.partition(".")[0] == _PACKAGE.name
