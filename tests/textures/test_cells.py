@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
-from tests.textures.test_window import CENTRE, _bound, cubic, made, minimum, probes, rough, squares
+from tests.textures.test_window import (
+    CENTRE,
+    PITCH,
+    _bound,
+    cubic,
+    made,
+    minimum,
+    probes,
+    rough,
+    squares,
+)
 
 from asperity.checks import FloatArray
 from asperity.textures.samplers import heightmap
@@ -110,6 +121,56 @@ def test_where_a_minimum_is_risen_from_nothing_is_nearer() -> None:
     assert claims > 1000
     assert opened > 200
     assert wrong > 3
+
+
+def test_what_is_taken_away_is_a_square() -> None:
+    """It takes all of the mixed derivative, and the same shares of both others."""
+    given = rough(6, 90e-6).arguments
+    px, py = 1.0 / given.ix, 1.0 / given.iy
+    x, y, g = 1.7e-3, -1.1e-3, 0.03e-3
+    h, _hx, _hy, hxx, hxy, hyy = heightmap.curvature(x, y, given)
+
+    def close(value: float) -> object:
+        return pytest.approx(value, rel=1e-9, abs=0.0)
+
+    for z, signed in ((h - g, g), (h + g, -g)):
+        u, v, gap, e, b, f = cells.basin_at(z, (x, y, g * g, h, 0.0, 0.0), given)
+        assert u == close((x - given.x0) / px)
+        assert v == close((y - given.y0) / py)
+        assert gap == close(signed)
+        assert b == close(2.0 * signed * hxy * px * py)
+        assert e * f == close(0.25 * b * b)
+        alike = (1.0 + signed * hxx) / (1.0 + signed * hyy)
+        assert e / px**2 == close(f / py**2 * alike)
+
+
+def test_a_rise_is_told_by_the_coefficients_of_the_parts() -> None:
+    """Each part of the cell on its own, from 16 of its values; whatever is taken away."""
+    rng = np.random.default_rng(57)
+    texture = rough(7, 90e-6)
+    given = texture.arguments
+    pitch = np.array(PITCH)
+    fit = np.linalg.inv([basis(s) for s in np.linspace(0.0, 1.0, 4)])
+    for _ in range(40):
+        i, j = map(int, rng.integers(0, (24, 37)))
+        at = np.array([j, i]) + rng.uniform(-0.5, 1.5, 2)
+        probe = np.append(texture.origin + (at + rng.normal(0.0, 3.0, 2)) * pitch, -0.3e-3)
+        gap, (e, b, f) = 0.3e-3 * rng.uniform(0.8, 1.2), 1e-9 * rng.normal(size=3)
+        cuts = [(0.0, cut, 1.0) for cut in np.clip(at - (j, i), 0.0, 1.0)]
+        least = np.inf
+        for west, east in itertools.pairwise(cuts[0]):
+            for south, north in itertools.pairwise(cuts[1]):
+                xs, ys = j + np.linspace(west, east, 4), i + np.linspace(south, north, 4)
+                cell = np.stack(np.meshgrid(xs, ys), axis=-1)
+                xy = texture.origin + cell * pitch
+                h = texture.height(xy.reshape(-1, 2)).reshape(4, 4) - probe[2]
+                du, dv = np.moveaxis(cell - at, -1, 0)
+                psi = ((xy - probe[:2]) ** 2).sum(axis=-1) + 2.0 * gap * h - gap**2
+                parts = fit @ (psi - e * du**2 - b * du * dv - f * dv**2) @ fit.T
+                least = min(least, parts.min())
+        for enough, rises in ((least - 1e-13, True), (least + 1e-13, False)):
+            asked = (*map(float, probe), enough, (*at, gap, e, b, f), i, j, given)
+            assert cells.rises_in(*asked) == rises
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
