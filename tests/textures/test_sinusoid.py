@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
+import mpmath as mp
 import numpy as np
 import pytest
 
 from asperity.errors import ParameterError
 from asperity.textures import Sinusoid
+from asperity.textures.samplers import sinusoid
 
 Check = Callable[..., Any]
 
@@ -132,3 +136,44 @@ def test_shapes_of_the_answers(wave: Sinusoid):
     assert shapes == [(5,), (5, 2), (5, 2, 2)]
     assert wave.nearest(np.zeros((5, 3), dtype=int)).shape == (5, 3)
     assert wave.height(np.zeros((0, 2))).shape == (0,)
+
+
+def missed(psi: float, u: float, z: float, amplitude: float, bend: float) -> float:
+    """Return the condition of a foot at ψ, in 60 digits, over what rounding makes of it."""
+    with mp.workdps(60):
+        p, steep, high = mp.mpf(psi), mp.sin(psi), amplitude * mp.cos(psi)
+        value = p - mp.mpf(u) - bend * steep * (high - mp.mpf(z))
+        rate = abs(1 + bend * (amplitude * steep**2 - mp.cos(p) * (high - z)))
+        terms = p + u + abs(bend * steep) * (abs(high) + abs(z))
+        return float(abs(value) / (2.0**-52 * (terms + (rate + bend * (amplitude + abs(z))) * p)))
+
+
+def test_a_flank_has_its_root_to_rounding_after_few_looks(monkeypatch: pytest.MonkeyPatch):
+    """Probes at, below and far below flat and steep sinusoids, at crests, flanks and troughs."""
+    looks = [0]
+
+    def sine(angle: float) -> float:
+        looks[0] += 1
+        return math.sin(angle)
+
+    counted = SimpleNamespace(**vars(math) | {"sin": sine})
+    monkeypatch.setattr(sinusoid, "math", counted)
+    draw, counts, off = random.Random(5), [], []
+    for _ in range(4000):
+        amplitude = 10.0 ** draw.uniform(-6.0, -2.5)
+        k = 2.0 * math.pi / 10.0 ** draw.uniform(-4.0, -2.0)
+        u = draw.choice([draw.uniform(0.0, math.pi), 10.0 ** draw.uniform(-16.0, 0.0)])
+        below = draw.choice([10.0 ** draw.uniform(-16.0, 0.0), 5.0 * draw.random(), 1e3])
+        depth, bend = below * amplitude, k * k * amplitude
+        z, high = amplitude * math.cos(u) - depth, min(math.pi, u + k * depth)
+        looks[0] = 0
+        psi, c, s = sinusoid.flank_root(1.0, u, high, z, amplitude, bend)
+        counts.append(looks[0])
+        assert u <= psi <= math.pi
+        assert missed(psi, u, z, amplitude, bend) < 1.0
+        assert abs(c - math.cos(psi)) <= 2.0**-51
+        assert abs(s - math.sin(psi)) <= 2.0**-51
+        off.append(missed(psi * (1.0 + 2.0**-48), u, z, amplitude, bend))
+    assert np.median(off) > 2.0  # so a root that is wrong by 16 roundings is seen
+    assert np.mean(counts) < 2.5
+    assert max(counts) < 16

@@ -75,18 +75,18 @@ def foot(
     ky = texture.ky
     k2 = kx * kx + ky * ky
     angle = kx * x + ky * y + texture.phase
+    depth = texture.amplitude * math.sin(angle) - z
     if texture.amplitude < 0.0:
         angle += math.pi
     over = 1.0
-    if z > amplitude * math.sin(angle):
+    if depth < 0.0:
         angle += math.pi
         over = -1.0
     turns = angle / (2.0 * math.pi) - 0.25
     u = 2.0 * math.pi * (turns - math.floor(turns + 0.5))  # angle from the nearest crest
     side = 1.0 if u >= 0.0 else -1.0
     u = abs(u)
-    depth = amplitude * math.cos(u) - over * z
-    high = min(math.pi, u + math.sqrt(k2) * max(depth, 0.0))
+    high = min(math.pi, u + math.sqrt(k2) * abs(depth))
     psi, c, s = flank_root(1.0, u, high, over * z, amplitude, k2 * amplitude)
     shift = side * (psi - u) / k2
     rate = -over * side * amplitude * s
@@ -113,9 +113,11 @@ def flank_root(
             low = middle
         else:
             high = middle
-    # From the right end: there Newton falls monotonically to the root of a convex function.
+    # From the right end: there Newton falls monotonically to the root of a convex function. Halley
+    # is quicker, and sometimes falls too far.
     psi = high
     c = s = 0.0
+    third = bend * (8.0 * amplitude + abs(z)) / 6.0  # no third derivative is greater, over 6
     for _ in range(100):
         s = math.sin(psi)
         c = math.cos(psi)
@@ -128,11 +130,25 @@ def flank_root(
         else:
             low = psi
         rate = share + bend * (amplitude * s * s - c * gap)
-        new = psi - value / rate if rate > 0.0 else 0.5 * (low + high)
-        if new < low or new > high:
+        curve = 0.5 * bend * s * (4.0 * amplitude * c - z)
+        square = rate * rate
+        over = square - value * curve
+        step = -value * rate / over
+        size = abs(step)
+        if size <= min(1e-4, 0.25 * psi) and rate > 0.0 and over > 0.5 * square:
+            left = size * size * size * (curve * curve + third * rate)
+            if left <= EPS * psi * square:
+                # The error left is below rounding. Sine and cosine go along, as polynomials.
+                psi = min(max(psi + step, low), high)
+                half = 0.5 * step
+                turned = c - step * (s + half * (c - step * s / 3.0))
+                return psi, turned, s + step * (c - half * (s + step * c / 3.0))
+        new = psi + step
+        if rate > 0.0 and (new < low or new > high):
+            new = psi - value / rate
+        if not (rate > 0.0 and low <= new <= high):
             new = 0.5 * (low + high)
-        if abs(new - psi) <= 2.0 * EPS * psi:
-            psi = new
+        if new == psi:
             break
         psi = new
     return psi, c, s

@@ -33,16 +33,17 @@ def split_phase(x: float, y: float, texture: SinusoidArguments) -> float:
 
 def split_foot(
     u: float, z: float, continuity: float, amplitude: float, bend: float
-) -> tuple[bool, float]:
-    """Return whether the god-object is split at |u|, and the phase of its feet, or of its foot."""
+) -> tuple[bool, float, float, float]:
+    """Return whether the god-object is split at |u|; phase ψ of its feet or foot, cos ψ, sin ψ."""
     mu = 1.0 / (1.0 + continuity)
     share = continuity * mu
     # No foot is farther from the crest than the trough; none is split above this height.
     if u < mu * math.pi and bend * (amplitude - z) > share:
-        psi = flank_root(share, 0.0, math.pi, z, amplitude, bend)[0]
+        psi, c, s = flank_root(share, 0.0, math.pi, z, amplitude, bend)
         if u < mu * psi:
-            return True, psi
-    return False, flank_root(1.0, u, math.pi, z, amplitude, bend)[0]
+            return True, psi, c, s
+    psi, c, s = flank_root(1.0, u, math.pi, z, amplitude, bend)
+    return False, psi, c, s
 
 
 def split_contact(
@@ -52,9 +53,9 @@ def split_contact(
     amplitude = abs(texture.amplitude)
     k2 = texture.kx * texture.kx + texture.ky * texture.ky
     u = split_phase(x, y, texture)
-    split, psi = split_foot(abs(u), z, continuity, amplitude, k2 * amplitude)
+    split, psi, c, _s = split_foot(abs(u), z, continuity, amplitude, k2 * amplitude)
     shift = continuity * u if split else math.copysign(psi - abs(u), u)
-    return texture.kx * shift / k2, texture.ky * shift / k2, amplitude * math.cos(psi) - z
+    return texture.kx * shift / k2, texture.ky * shift / k2, amplitude * c - z
 
 
 def split_again(
@@ -72,9 +73,7 @@ def split_derivative(
     k2 = texture.kx * texture.kx + texture.ky * texture.ky
     wave = math.sqrt(k2)
     u = split_phase(x, y, texture)
-    split, psi = split_foot(abs(u), z, continuity, amplitude, k2 * amplitude)
-    s = math.sin(psi)
-    c = math.cos(psi)
+    split, psi, c, s = split_foot(abs(u), z, continuity, amplitude, k2 * amplitude)
     gap = amplitude * c - z
     if split:
         share = continuity / (1.0 + continuity)
@@ -111,10 +110,10 @@ def split_energy(
     k2 = texture.kx * texture.kx + texture.ky * texture.ky
     share = continuity / (1.0 + continuity)
     u = split_phase(x, y, texture)
-    split, psi = split_foot(abs(u), z, continuity, amplitude, k2 * amplitude)
+    split, psi, c, _s = split_foot(abs(u), z, continuity, amplitude, k2 * amplitude)
     angle = psi if split else math.copysign(psi, u)
     shift = continuity * u if split else angle - u
-    h = amplitude * math.cos(psi)
+    h = amplitude * c
     # Variance of the atoms ±ψ around their mean (1 + c) u.
     mean = (1.0 + continuity) * u
     spread = (psi - mean) * (psi + mean) / k2 if split else 0.0
