@@ -18,6 +18,7 @@ import pytest
 from asperity import cache, kept, processes
 from asperity.analysis import compare
 from asperity.analysis.compare import answer_ahead
+from asperity.compiled import LISTENERS
 from asperity.files import json_text
 from asperity.paper.experiments.settings import band_setup
 from asperity.report.html import html_text
@@ -94,6 +95,22 @@ def test_no_helper_for_what_is_done_at_once(
     monkeypatch.setattr(processes, "PATIENCE", 30.0)
     assert told(math.sqrt, [1.0] * 5, 2) == [None] * 5
     assert started == []
+
+
+def test_what_compiles_needs_a_helper_soon(
+    monkeypatch: pytest.MonkeyPatch, started: list[Any]
+) -> None:
+    monkeypatch.setattr(processes, "PATIENCE", 30.0)
+    with processes.at_most(2), processes.helped(math.sqrt, [1.0] * 5) as turns:
+        next(turns)
+        (tell,) = LISTENERS
+        tell("force_batch")
+        before = time.monotonic()
+        while not started:
+            assert time.monotonic() - before < 20.0
+            time.sleep(0.01)
+    assert LISTENERS == []
+    assert ended(started)
 
 
 def test_what_a_helper_cannot_do_is_done_here(started: list[Any]) -> None:

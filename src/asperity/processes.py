@@ -3,8 +3,8 @@
 Results never depend on how many there are: whoever shares work out does it all in order, as if
 alone, and a helper only works a task out before its turn comes. What a helper finds is handed back,
 or kept in the cache, see :mod:`asperity.kept`; whatever goes wrong with one, a task is then done
-here. Helpers begin after a moment: what is answered at once needs none, and starts none. From
-Python nothing is shared out unless asked for, by :func:`at_most`.
+here. Helpers begin after a moment, or when something compiles: what is answered at once needs none,
+and starts none. From Python nothing is shared out unless asked for, by :func:`at_most`.
 
 Threads would not do: Numba compiles under one lock. A fork would copy threads of numerical
 libraries half, and what multiprocessing starts imports the user's script again.
@@ -25,7 +25,7 @@ from contextvars import ContextVar
 from typing import IO, Any
 
 PATIENCE = 1.0
-"""Time [s] after which helpers begin; their own start takes about as long."""
+"""Time [s] after which helpers begin at the latest; their own start takes about as long."""
 
 _JOBS: ContextVar[int] = ContextVar("jobs", default=1)
 
@@ -64,13 +64,17 @@ def helped(work: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Iterato
     if count < 1:
         yield iter([None] * len(tasks))
         return
+    from asperity.compiled import LISTENERS
+
     board = _Board(work, tasks)
+    LISTENERS.append(board.compiling)
     helpers = [threading.Thread(target=board.help, args=(PATIENCE,)) for _ in range(count)]
     for helper in helpers:
         helper.start()
     try:
         yield board.turns()
     finally:  # after an interrupt too: no process is left behind
+        LISTENERS.remove(board.compiling)
         board.stop()
         for helper in helpers:
             helper.join()
@@ -84,7 +88,7 @@ class _Board:
         self.left = deque(range(len(tasks)))
         self.done = [threading.Event() for _ in tasks]
         self.found: list[Any] = [None] * len(tasks)
-        self.over = threading.Event()
+        self.due, self.over = threading.Event(), threading.Event()
         self.processes: list[subprocess.Popen[bytes]] = []
 
     def turns(self) -> Iterator[Any]:
@@ -101,8 +105,7 @@ class _Board:
 
     def help(self, patience: float) -> None:
         """Have a process of its own do the last task that is left, until there is none."""
-        if self.over.wait(patience):
-            return
+        self.due.wait(patience)
         process = None
         while not self.over.is_set():
             try:
@@ -120,9 +123,14 @@ class _Board:
         if process is not None:
             _end(process)
 
+    def compiling(self, _name: str) -> None:
+        """Let helpers begin: what must be compiled is not answered at once."""
+        self.due.set()
+
     def stop(self) -> None:
         """Let no helper take or finish anything any more."""
         self.over.set()
+        self.due.set()
         for process in self.processes:
             process.kill()
 

@@ -161,10 +161,7 @@ class _AxisMatrices:
 
 def _product(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the products of matrices (p, q, n) and (q, r, n)."""
-    total = a[:, 0, None] * b[0]
-    for k in range(1, a.shape[1]):
-        total += a[:, k, None] * b[k]
-    return np.asarray(total)
+    return np.asarray(np.einsum("pqn,qrn->prn", a, b))
 
 
 def _subdivision(degree: int, left: FloatArray, right: FloatArray) -> FloatArray:
