@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from tests.textures.test_window import (
 from asperity.checks import FloatArray
 from asperity.textures.samplers import heightmap
 from asperity.textures.samplers import heightmap_cells as cells
+from asperity.textures.samplers import heightmap_search as search
 from asperity.textures.samplers import heightmap_window as window
 from asperity.textures.samplers.heightmap import HeightMapArguments
 from asperity.textures.samplers.spline import weights
@@ -207,3 +209,67 @@ def test_a_rise_ends_where_third_derivatives_end_it(
         i, j = (9 + cells_off, 10) if turned else (9, 10 + cells_off)
         enough = g * g * (1.0 - 1e-13)
         assert cells.rises_in(*CENTRE, -sign * g, enough, basin, i, j, given) == rises
+
+
+# --- how they are asked ---------------------------------------------------------------------------
+
+KEEP = 1.0 - 1e-13
+FOUND = (0.0, 0.0, 2.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("wide", [3, 7, 8, 9, 64, 70])
+def test_rows_are_whole_registers_within_the_map(
+    wide: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All cells of the window that are open are searched, and no others."""
+    given = made(np.zeros((8, wide + 3)))
+    rows: list[int] = []
+    opened: list[tuple[int, int]] = []
+
+    def least_in_row(*asked: Any) -> None:
+        i, first, count, row = asked[3:7]
+        assert 0 <= first <= first + count <= wide
+        assert count % 8 == 0 or count == wide
+        rows.append(i)
+        row[:] = np.nan
+        row[:count] = np.where(np.arange(first, first + count) % 3 == 0, 1.0, 3.0)
+
+    def search_cell(*asked: Any) -> Any:
+        opened.append(asked[3:5])
+        return asked[5], asked[6], asked[7], asked[10]
+
+    monkeypatch.setattr(search, "least_in_row", least_in_row)
+    monkeypatch.setattr(search, "search_cell", search_cell)
+    monkeypatch.setattr(search, "basin_at", lambda *_asked: (0.0,) * 6)
+    monkeypatch.setattr(search, "local_array", np.empty)
+    for west, east in ((0, 0), (0, min(wide, 64) - 1), (wide - 3, wide - 1), (wide // 2, wide - 1)):
+        rows, opened = [], []
+        window_ = (west, east, 1, 3)
+        search.search_rows(0.0, 0.0, -1.0, FOUND, window_, KEEP, 1e3, given)
+        assert rows == [1, 2, 3]
+        assert opened == [(i, j) for i in rows for j in range(west, east + 1) if j % 3 == 0]
+
+
+@pytest.mark.parametrize("nearer", [True, False])
+def test_a_cell_is_closed_if_the_best_point_of_all_is_no_farther(
+    nearer: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The best that is known when it is asked: also the one that was just found."""
+    asked: list[float] = []
+
+    def rises_in(_x: float, _y: float, _z: float, enough: float, *_rest: Any) -> bool:
+        asked.append(enough)
+        return len(asked) == 3
+
+    found = (*FOUND[:2], 1.5 if nearer else 2.5, *FOUND[3:])
+    monkeypatch.setattr(search, "rises_in", rises_in)
+    monkeypatch.setattr(search, "go_down", lambda *_asked: (found, 50.0))
+    monkeypatch.setattr(search, "basin_at", lambda *_asked: (5.5, 5.5, 0.0, 0.0, 0.0, 0.0))
+    beyond = (7.9, 5.5, 0.0, 0.0, 0.0, 0.0)  # near enough to rise from, too far to be the reason
+    given = made(np.zeros((23, 23)))
+    best, near, other, left = search.search_cell(
+        0.0, 0.0, -1.0, 5, 5, FOUND, beyond, beyond, (0, 19, 0, 19), KEEP, 60.0, given
+    )
+    assert asked == [2.0 * KEEP, 2.0 * KEEP, (1.5 if nearer else 2.0) * KEEP]
+    assert best == (found if nearer else FOUND)
+    assert (near[0], other[0], left) == (5.5 if nearer else 7.9, 5.5, 50.0 - search.CUT)
