@@ -156,10 +156,10 @@ def test_the_value_of_a_bracket() -> None:
 
 def answered(path: Any, cycling_at: Callable[[float], bool]) -> tuple[float, float]:
     """Return the bracket of a search that is told where loops cycle."""
-    stiffness, _whole = next(path)
+    stiffness = next(path)
     while True:
         try:
-            stiffness, _whole = path.send(cycling_at(stiffness))
+            stiffness = path.send(cycling_at(stiffness))
         except StopIteration as end:
             return end.value  # type: ignore[no-any-return]  # that of a generator
 

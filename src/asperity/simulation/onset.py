@@ -42,8 +42,8 @@ class Onset(Record):
     Attributes:
         law: letter of the law.
         delay: whole samples.
-        quiet: the greatest stiffness tried from all starts, below ``cycling``, at which none ended
-            in a limit cycle [N/m]; 0 if even the lowest one cycled.
+        quiet: the greatest stiffness tried, below ``cycling``, at which no start ended in a limit
+            cycle [N/m]; 0 if even the lowest one cycled.
         cycling: the least stiffness tried at which one did [N/m]; infinite if none up to the
             highest did. The onset of these starts lies between the two, unless it is not monotone:
             of stiffnesses that are a factor of 2 apart, see :func:`find_onset`, the first pair was
@@ -52,7 +52,7 @@ class Onset(Record):
             cycled), per axis [m].
         high: greatest position reached there [m].
         wall: whether the law is the smooth wall.
-        starts: how many starts were tried at both of them.
+        starts: how many starts were tried at each stiffness.
         cycles: how many of them ended in a limit cycle at ``cycling``.
     """
 
@@ -158,8 +158,6 @@ def find_onset(
             it, and goes up from one that is quiet, down from one that cycles. Where loops cycle
             above one stiffness only, the answer is the same, and a quarter of the runs is enough;
             a window of cycles farther down, below a stiffness that is quiet, is then passed over.
-            So is one inside a bracket that is halved where two starts come to rest: both ends of
-            the bracket that is returned, and all that is climbed over, are tried from all.
         progress: called after every stiffness; not where the answer was kept from another run.
 
     Raises:
@@ -216,7 +214,7 @@ def find_onsets(
         def search(delay: int, near: float | None) -> Search:
             return Search(
                 lambda k, i: loop.start(k, delay, shifts[i], ends_in_cycle(samples, limit)),
-                len(shifts), lambda: bracket(lowest, highest, width, near), loop.at_once, progress,
+                len(shifts), bracket(lowest, highest, width, near), loop.at_once, progress,
             )  # fmt: skip
 
         def onset_of(delay: int, found: Found) -> Onset:

@@ -14,12 +14,6 @@ from asperity.simulation.kernels.body_functions import LANES
 from asperity.simulation.together import Start, Together
 
 _COARSE = 2.0  # factor from one stiffness to the next while the onset is looked for
-# Starts of which all must be quiet for a stiffness to be believed to be, until the end.
-SOUNDED = 2
-
-Path = Generator[tuple[float, bool], bool, tuple[float, float]]
-"""Yields a stiffness and whether all starts are to be known there, is sent whether any of them
-cycles, and returns the greatest stiffness found quiet and the least found cycling [N/m]."""
 
 
 class Found(NamedTuple):
@@ -60,18 +54,10 @@ def run_searches(loop: Together, searches: Mapping[int, Search]) -> Iterator[int
 class Search:
     """What the starts came to at each stiffness, none run twice, and which are to be run next.
 
-    Most stiffnesses of a search are quiet, and each from all starts, only to say on which side of
-    them the onset lies. Where the path asks for no more they are sounded: believed to be quiet as
-    soon as ``SOUNDED`` starts are, those first that cycled elsewhere. The quiet end of the bracket
-    is looked at from all starts before it is believed; if one of them cycles, the path is taken
-    anew with what is known. So the two ends are facts, and where loops cycle above one stiffness
-    only they are those that are found with all starts everywhere. What is known of one start waits
-    for those before it: which others run beside them, and how fast, changes no answer.
-
     Args:
         start: returns the run of a start, by number, at a stiffness [N/m].
         count: of starts.
-        path: returns a path such as :func:`bracket`.
+        path: yields stiffnesses, is sent whether any start cycles there, and returns the bracket.
         ahead: whether starts run that may not be needed, where there is room for them.
         progress: called after every stiffness.
     """
@@ -80,7 +66,7 @@ class Search:
         self,
         start: Callable[[float, int], Start],
         count: int,
-        path: Callable[[], Path],
+        path: Generator[float, bool, tuple[float, float]],
         ahead: bool,
         progress: Callable[[], None] | None,
     ) -> None:
@@ -88,15 +74,14 @@ class Search:
         self._ahead, self._progress = ahead, progress
         self._known: dict[tuple[float, int], tuple[bool, FloatArray]] = {}
         self._going: dict[tuple[float, int], Start] = {}
-        self._answers: dict[float, bool] = {}  # of all starts, or of one that cycles
-        self._sounded: set[float] = set()
         self._first = 0  # the start that cycled last: the likeliest to do so again
         self._bracket: tuple[float, float] | None = None
-        self._ask()
+        self._stiffness = next(path)
 
     def wanted(self) -> list[tuple[int, Start]]:
         """Return starts that are to go on, and how little urgent each is, 0 or 1."""
-        keys = [(self._stiffness, i) for i in self._numbers()]
+        order = [(self._first + step) % self._count for step in range(self._count)]
+        keys = [(self._stiffness, i) for i in order]
         new = list(islice((key for key in keys if key not in self._known), LANES))
         # One alone at first: if it cycles, nothing else is to be known.
         alone = self._bracket is None and new[0] == keys[0]
@@ -114,15 +99,22 @@ class Search:
                 self._known[key] = start.verdict, start.box
                 del self._going[key]
         while self._bracket is None:
-            cycles = self._cycles_here()
-            if cycles is None:
+            found = self._here()
+            cycling = [i for i, (ended, _box) in found.items() if ended]
+            if not cycling and len(found) < self._count:
                 return False
-            if cycles or self._whole:
-                self._answers[self._stiffness] = cycles
-            else:
-                self._sounded.add(self._stiffness)
+            if cycling:
+                self._first = cycling[0]
+                # Those that have not come so far may be wanted here in the end, and nowhere else.
+                here = self._stiffness
+                self._going = {key: one for key, one in self._going.items() if key[0] == here}
             self._told()
-            self._ask()
+            try:
+                self._stiffness = self._path.send(bool(cycling))
+            except StopIteration as end:
+                self._bracket = end.value
+                quiet, least = end.value
+                self._stiffness = quiet if math.isinf(least) else least
         if len(self._here()) < self._count:
             return False
         self._told()
@@ -136,44 +128,10 @@ class Search:
         high = np.fmax.reduce([box[1] for _, box in ends])
         return Found(*self._bracket, sum(ended for ended, _ in ends), low, high)
 
-    def _ask(self) -> None:
-        """Take the path as far as answers are known: to a stiffness that is to be looked at."""
-        path = self._path()
-        self._stiffness, self._whole = next(path)
-        try:
-            while self._stiffness in self._answers or (
-                self._stiffness in self._sounded and not self._whole
-            ):
-                cycles = self._answers.get(self._stiffness, False)
-                self._stiffness, self._whole = path.send(cycles)
-        except StopIteration as end:
-            quiet, least = end.value
-            self._stiffness, self._whole = quiet, True
-            if quiet == 0.0 or quiet in self._answers:
-                self._bracket = quiet, least
-                self._stiffness = quiet if math.isinf(least) else least
-
-    def _numbers(self) -> list[int]:
-        """Return the starts that are asked for at the stiffness, in the order in which they are."""
-        asked = self._count if self._whole else min(SOUNDED, self._count)
-        return [(self._first + step) % self._count for step in range(asked)]
-
-    def _cycles_here(self) -> bool | None:
-        """Return whether one of those starts cycles; ``None`` while it is not known."""
-        for i in self._numbers():
-            if (self._stiffness, i) not in self._known:
-                return None
-            if self._known[self._stiffness, i][0]:
-                self._first = i
-                # At what is stiffer nothing more is to be known.
-                here = self._stiffness
-                self._going = {key: one for key, one in self._going.items() if key[0] <= here}
-                return True
-        return False
-
     def _here(self) -> dict[int, tuple[bool, FloatArray]]:
         """Return what the starts came to at the stiffness."""
-        every = {i: self._known.get((self._stiffness, i)) for i in range(self._count)}
+        numbers = [(self._first + step) % self._count for step in range(self._count)]
+        every = {i: self._known.get((self._stiffness, i)) for i in numbers}
         return {i: one for i, one in every.items() if one is not None}
 
     def _told(self) -> None:
@@ -181,30 +139,32 @@ class Search:
             self._progress()
 
 
-def bracket(lowest: float, highest: float, width: float, near: float | None = None) -> Path:
-    """Go upwards from the lowest stiffness in steps of a factor of 2 until something cycles.
+def bracket(
+    lowest: float, highest: float, width: float, near: float | None = None
+) -> Generator[float, bool, tuple[float, float]]:
+    """Return the greatest stiffness found quiet and the least found cycling [N/m].
 
-    Then bisection; with ``near``, from the step nearest to it, downwards first if that one cycles.
-    Of what is gone past on the way up all starts are to be known: nothing that cycles there is
-    climbed over.
+    Yields stiffnesses, and is sent whether any start cycles there: upwards from the lowest in steps
+    of a factor of 2 until something does, then bisection; with ``near``, from the step nearest to
+    it, downwards first if that one cycles.
     """
     steps = _steps(lowest, highest)
     index = 0
     if near is not None and near > 0.0:
         index = int(np.argmin(np.abs(np.log(steps) - math.log(near))))
-    if (yield steps[index], True):
-        while index > 0 and (yield steps[index - 1], False):
+    if (yield steps[index]):
+        while index > 0 and (yield steps[index - 1]):
             index -= 1
     else:
         index += 1
-        while index < len(steps) and not (yield steps[index], True):
+        while index < len(steps) and not (yield steps[index]):
             index += 1
         if index == len(steps):
             return steps[-1], math.inf
     quiet, cycling = (steps[index - 1] if index else 0.0), steps[index]
     while quiet > 0.0 and cycling > quiet * (1.0 + width):
         middle = math.sqrt(quiet * cycling)
-        if (yield middle, False):
+        if (yield middle):
             cycling = middle
         else:
             quiet = middle
