@@ -101,8 +101,8 @@ def least_damping(
     (x0, _, z0), (x1, _, z1) = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     grid = [
         np.array([x, 0.0, z])
-        for x in np.linspace(x0, x1, 9)
-        for z in np.linspace(z0, min(z1, max(z0, top)), 9)
+        for x in np.unique(np.linspace(x0, x1, 9))  # of a box without width each place once
+        for z in np.unique(np.linspace(z0, min(z1, max(z0, top)), 9))
     ]
     # Corners of the box that the arms do not reach are places where it was not.
     places = [plant.centre + p[[0, 2]] for p in grid if not left_workspace(plant, p)]

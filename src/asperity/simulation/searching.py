@@ -74,12 +74,18 @@ class Search:
         self._ahead, self._progress = ahead, progress
         self._known: dict[tuple[float, int], tuple[bool, FloatArray]] = {}
         self._going: dict[tuple[float, int], Start] = {}
+        self._wanted: list[tuple[int, Start]] | None = None  # the same until a start has ended
         self._first = 0  # the start that cycled last: the likeliest to do so again
         self._bracket: tuple[float, float] | None = None
         self._stiffness = next(path)
 
     def wanted(self) -> list[tuple[int, Start]]:
         """Return starts that are to go on, and how little urgent each is, 0 or 1."""
+        if self._wanted is None:
+            self._wanted = self._next()
+        return self._wanted
+
+    def _next(self) -> list[tuple[int, Start]]:
         order = [(self._first + step) % self._count for step in range(self._count)]
         keys = [(self._stiffness, i) for i in order]
         new = list(islice((key for key in keys if key not in self._known), LANES))
@@ -94,10 +100,13 @@ class Search:
 
     def ended(self) -> bool:
         """Take in what is known of the starts, and return whether there is nothing more to know."""
-        for key, start in list(self._going.items()):
-            if start.verdict is not None:
-                self._known[key] = start.verdict, start.box
-                del self._going[key]
+        ended = [key for key, start in self._going.items() if start.verdict is not None]
+        if not ended:
+            return False
+        for key in ended:
+            start = self._going.pop(key)
+            self._known[key] = bool(start.verdict), start.box
+        self._wanted = None
         while self._bracket is None:
             found = self._here()
             cycling = [i for i, (ended, _box) in found.items() if ended]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from types import ModuleType
 
 import numpy as np
@@ -194,6 +194,13 @@ class Together:
         """Whether several bodies take hardly longer than one."""
         return bar_lanes in self._body.modules
 
+    @cached_property
+    def _compiled(self) -> ModuleType:
+        surface = self._surface
+        return _fused(
+            surface.law, surface.texture.sampler, surface.acting_clamp, self._body.modules
+        )
+
     def start(self, stiffness: float, delay: int, offset: FloatArray, judge: Judge) -> Start:
         """Return a run before its first sample.
 
@@ -232,8 +239,7 @@ class Together:
             np.array([getattr(start, name) for start in starts]) for name in names
         ]
         surface = self._surface
-        code = surface.law, surface.texture.sampler, surface.acting_clamp, self._body.modules
-        _fused(*code).servo_lanes(
+        self._compiled.servo_lanes(
             state, queues, carried, ledger, way, np.array([start.offset for start in starts]), span,
             self._body.record, self._servo.settings, memory, surface.texture.arguments,
             surface.law_arguments, np.array([start.stiffness for start in starts]), seen, told,
