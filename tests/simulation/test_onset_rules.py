@@ -269,8 +269,11 @@ class ToldLoop:
             start.times -= 1
             if start.times == 0:
                 self.seen.append((start.stiffness, start.shift))
-                known = 100.0 if start.shift > 1.4e-3 else 200.0
-                start.verdict = start.stiffness * (1 + start.delay) >= known
+                start.verdict = self.cycles(start)
+
+    def cycles(self, start: ToldStart) -> bool:
+        known = 100.0 if start.shift > 1.4e-3 else 200.0
+        return start.stiffness * (1 + start.delay) >= known
 
 
 @pytest.fixture
@@ -317,6 +320,25 @@ def test_the_start_that_cycled_last_is_tried_first(told: list[tuple[float, float
     middle = math.sqrt(75.0 * 150.0)
     first = told.index((middle, pytest.approx(17 / 12e3)))
     assert told[first + 1][0] != middle
+
+
+class Windowed(ToldLoop):
+    """One start cycles about 566 N/m, too; the others, as it does, from 700 N/m on only."""
+
+    def cycles(self, start: ToldStart) -> bool:
+        alone = start.shift > 1.4e-3 and 560.0 <= start.stiffness < 570.0
+        return alone or start.stiffness >= 700.0
+
+
+@pytest.mark.parametrize("at_once", [False, True])
+def test_a_window_of_one_start_is_found_where_a_bracket_is_halved(
+    monkeypatch: pytest.MonkeyPatch, at_once: bool
+) -> None:
+    """Every stiffness that says where the search goes on is tried from all starts."""
+    monkeypatch.setattr(onset, "Together", lambda *_parts: Windowed(at_once))
+    found = search(lowest=100.0, near=400.0, tolerance=0.05)  # 400, 800, and between them 566
+    assert found.quiet < 560.0 <= found.cycling < 570.0
+    assert found.cycles == 1
 
 
 @pytest.mark.parametrize("at_once", [False, True])
