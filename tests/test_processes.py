@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import os
 import pickle
+import subprocess
+import sys
 import time
 from concurrent.futures import CancelledError
 from importlib import import_module
@@ -254,3 +256,21 @@ def test_a_law_that_is_answered_ahead_asks_for_nothing_more(
     monkeypatch.setattr(kept, "keep", lambda _room, key, _content: made.append(key))
     compare(WAVE, laws="D")
     assert made == []
+
+
+_THREADS = """
+import os, sys
+import asperity.__main__ as program
+program._open_streams()
+assert "numpy" not in sys.modules
+print(*(os.environ[name] for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")))
+"""
+
+
+def test_a_command_has_one_thread_of_linear_algebra_as_its_helpers_have() -> None:
+    """Whatever is asked for: a form fitted to a map is another in the last digit with two."""
+    done = subprocess.run(
+        [sys.executable, "-c", _THREADS], capture_output=True, text=True, check=True,
+        env=os.environ | {"OPENBLAS_NUM_THREADS": "7"},
+    )  # fmt: skip
+    assert done.stdout.split() == ["1", "1"]

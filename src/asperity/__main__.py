@@ -90,6 +90,8 @@ def _open_streams() -> None:
         stream.reconfigure(errors="asperity")  # type: ignore[union-attr]  # both are text files
     # Pictures go to files: no window system is asked for, whatever the environment says.
     os.environ["MPLBACKEND"] = "agg"
+    # Sums of linear algebra depend on its threads in the last digit: here as in helpers it has one.
+    os.environ |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     sys.unraisablehook = lambda _what: None  # an interrupt in a finalizer is told by the exit code
 
 
