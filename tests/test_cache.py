@@ -6,6 +6,10 @@ import os
 import pickle
 import random
 import stat
+import subprocess
+import sys
+import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -286,3 +290,72 @@ def test_without_the_cache_nothing_is_taken_or_left(folder: Path):
     assert not elsewhere.exists()
     assert cache.cache_folder() == folder
     assert cache.recall(ROOM, KEY) == CONTENT
+
+
+# --- whose turn it is -----------------------------------------------------------------------------
+
+MAKER = """
+import sys, time
+from asperity import cache
+cache.my_turn("room", "key of the entry")
+print("mine", flush=True)
+sys.stdin.readline()
+cache.keep("room", "key of the entry", b"made by another")
+cache.turn_is_over("room", "key of the entry")
+sys.stdin.readline()
+"""
+
+
+@pytest.fixture
+def maker() -> Iterator[subprocess.Popen[str]]:
+    """A process that makes the entry, keeps it after a line, and ends after another."""
+    with subprocess.Popen(
+        [sys.executable, "-c", MAKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "mine\n"
+        yield process
+        process.kill()
+
+
+def go_on(process: subprocess.Popen[str]) -> None:
+    assert process.stdin is not None
+    process.stdin.write("\n")
+    process.stdin.flush()
+
+
+def test_one_process_makes_an_entry_and_the_other_finds_it(maker: subprocess.Popen[str]):
+    assert not cache.my_turn(ROOM, KEY + " of something else")
+    later = threading.Timer(0.3, go_on, [maker])
+    later.start()
+    assert cache.my_turn(ROOM, KEY)
+    assert cache.recall(ROOM, KEY) == b"made by another"
+    assert not cache.my_turn(ROOM, KEY)  # of its own turn no process waits for the end
+    later.join()
+
+
+def test_the_turn_of_a_process_that_dies_is_over(maker: subprocess.Popen[str]):
+    threading.Timer(0.3, maker.kill).start()
+    assert cache.my_turn(ROOM, KEY)
+    assert cache.recall(ROOM, KEY) is None
+
+
+@pytest.mark.usefixtures("maker")
+def test_who_hangs_is_not_waited_for_long(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(cache, "PATIENCE", 0.2)
+    assert not cache.my_turn(ROOM, KEY)
+
+
+@pytest.mark.usefixtures("maker")
+@pytest.mark.parametrize("size", ["", "0"])
+def test_where_nothing_can_be_kept_nobody_waits(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, size: str
+):
+    """With a size of nothing, or where the file of turns cannot be."""
+    monkeypatch.setenv("ASPERITY_CACHE_SIZE", size)
+    if not size:
+        monkeypatch.setenv("ASPERITY_CACHE_DIR", str(folder / "elsewhere"))
+        (folder / "elsewhere" / ROOM / ".turns").mkdir(parents=True)
+    begin = time.monotonic()
+    assert not cache.my_turn(ROOM, KEY)
+    assert time.monotonic() - begin < 10.0

@@ -16,6 +16,7 @@ import os
 import re
 import stat
 import tempfile
+import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -24,6 +25,11 @@ from pathlib import Path
 
 from asperity.errors import ParameterError
 from asperity.files import open_input, whole_file
+
+try:
+    import fcntl
+except ImportError:  # Windows: what two processes need at once, both make
+    fcntl = None  # type: ignore[assignment]
 
 _MAGIC = b"asperity cache 1\n"
 _DIGEST = 32
@@ -38,6 +44,10 @@ DEFAULT_SIZE = 2 * 10**9
 _LARGEST = 8
 """One entry may have this part of the limit, so that none drives out all others."""
 _KEPT_OF_FULL = 0.75
+PATIENCE = 60.0
+"""Time [s] for which a process waits for what another one makes."""
+_LOOK = 0.02  # [s] between two looks at that
+_TURNS = ".turns"
 
 
 class CacheWarning(UserWarning):
@@ -174,6 +184,64 @@ def keep(room: str, key: str, content: bytes) -> None:
             _stay_small(_HEAD + len(content))
     except (OSError, ValueError) as error:
         _say_of_folder(f"cannot be written ({_reason(error)}): {_AGAIN}")
+
+
+def my_turn(room: str, key: str) -> bool:
+    """Wait while another process makes the content of a key; then it is this one's to make.
+
+    Returns:
+        Whether another one was waited for: it may have kept the content meanwhile.
+    """
+    begin = time.monotonic()
+    waited = False
+    while not _claimed(room, key):
+        if time.monotonic() > begin + PATIENCE:
+            return False  # it hangs, or was interrupted: its work is done twice
+        waited = True
+        time.sleep(_LOOK)
+    return waited
+
+
+def turn_is_over(room: str, key: str) -> None:
+    """Let others make the content of a key, or find it."""
+    _claimed(room, key, over=True)
+
+
+def _claimed(room: str, key: str, over: bool = False) -> bool:
+    """Return whether no other process makes a content: it locks a byte of a file, one for each key.
+
+    However a process ends, its locks end with it. Where nothing can be locked, all is free.
+    """
+    if fcntl is None or not size_limit():
+        return True
+    try:
+        file = _turns_file(cache_folder() / room)
+    except (OSError, ValueError):
+        return True
+    wanted = fcntl.LOCK_UN if over else fcntl.LOCK_EX | fcntl.LOCK_NB
+    try:
+        fcntl.lockf(file, wanted, 1, int(_name(key)[:12], 16))
+    except (BlockingIOError, PermissionError):
+        return False
+    except OSError:  # a file system without locks
+        return True
+    return True
+
+
+# Of one folder: its file stays open, for locks go with the first of a process's that is closed.
+_turns: dict[Path, int] = {}
+
+
+def _turns_file(folder: Path) -> int:
+    if folder not in _turns:
+        if not (_made(folder) and _trusted(folder)):
+            raise ValueError(folder)
+        file = os.open(folder / _TURNS, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        for former in _turns.values():
+            os.close(former)
+        _turns.clear()
+        _turns[folder] = file
+    return _turns[folder]
 
 
 def set_aside(room: str, key: str) -> None:

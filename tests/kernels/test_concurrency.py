@@ -59,9 +59,46 @@ def test_all_who_begin_at_once_have_the_same_bits(how: str, count: int, tmp_path
     alone = answers("threads", 1, tmp_path)
     together = answers(how, count, tmp_path)
     assert together == alone * count
-    kept = [path.name for path in (tmp_path / f"cache-{how}").rglob("*") if path.is_file()]
+    kept = {path.name for path in (tmp_path / f"cache-{how}").rglob("*") if path.is_file()}
+    kept.discard(".turns")
     assert kept
     assert all(len(name) == 40 for name in kept)  # entries only: nothing damaged, nothing half
+
+
+_COMPILING = """
+import sys
+from asperity import Sinusoid, Surface
+from asperity.compiled import LISTENERS
+
+LISTENERS.append(print)
+surface = Surface(Sinusoid(0.1e-3, 2e-3), "C")
+surface.force([[0.0, 0.0, 0.0]])  # NumPy, Numba and what they need
+print("ready", flush=True)
+sys.stdin.readline()
+surface.to_law("D").jacobian([[0.0, 0.0, 0.0]])
+"""
+
+
+def test_two_processes_compile_nothing_twice(tmp_path: Path) -> None:
+    def begun(cache: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-c", _COMPILING], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            text=True, env=os.environ | {"ASPERITY_CACHE_DIR": str(tmp_path / cache)},
+        )  # fmt: skip
+
+    def compiled(cache: str, count: int) -> list[str]:
+        processes = [begun(cache) for _ in range(count)]
+        for process in processes:
+            assert process.stdout is not None
+            while process.stdout.readline() != "ready\n":
+                pass
+        for process in processes:  # at once
+            assert process.stdin is not None
+            process.stdin.write("\n")
+            process.stdin.flush()
+        return [name for one in processes for name in one.communicate(timeout=200)[0].split()]
+
+    assert sorted(compiled("two", 2)) == sorted(compiled("one", 1)) != []
 
 
 def test_threads_that_ask_at_once_get_one_unit(monkeypatch: pytest.MonkeyPatch) -> None:

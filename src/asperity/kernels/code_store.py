@@ -2,7 +2,8 @@
 
 Numba's own cache unpickles an index and code without looking: one flipped bit is a crash at every
 start, a planted file is run. Here a kept overload is one entry of :mod:`asperity.cache`, checked
-before anything is unpickled, and there is no index.
+before anything is unpickled, and there is no index. Of two processes that need the same code at
+once one compiles it, and the other waits for that.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import llvmlite  # type: ignore[import-untyped]  # it has no types
 import numba
 from numba.core import caching, compiler, serialize, types
 
-from asperity.cache import cache_folder, keep, recall, set_aside
+from asperity.cache import cache_folder, keep, my_turn, recall, set_aside, turn_is_over
 from asperity.compiled import LISTENERS
 
 ROOM = "code"
@@ -53,15 +54,19 @@ class CodeStore(caching._Cache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled overload of a signature, or nothing: then it is compiled."""
-        found = self._kept(sig, target_context)
+        key = self._key(sig, target_context.codegen())
+        found = self._kept(key, sig, target_context)
+        if found is None and my_turn(ROOM, key):
+            found = self._kept(key, sig, target_context)
+            if found is not None:
+                turn_is_over(ROOM, key)
         if found is None:
             for tell in LISTENERS:
                 tell(self._function.__name__)
         return found
 
-    def _kept(self, sig: Any, target_context: Any) -> Any:
+    def _kept(self, key: str, sig: Any, target_context: Any) -> Any:
         target_context.refresh()
-        key = self._key(sig, target_context.codegen())
         content = recall(ROOM, key)
         if content is None:
             return None
@@ -80,7 +85,9 @@ class CodeStore(caching._Cache):
         # no compiled function asks for an environment, none is missed.
         own = self._function.__module__
         mine = tuple(one for one in environments if one.globals["__name__"] == own)
-        keep(ROOM, self._key(sig, data.codegen), _serialize((*parts, mine)))
+        key = self._key(sig, data.codegen)
+        keep(ROOM, key, _serialize((*parts, mine)))
+        turn_is_over(ROOM, key)
 
     def _key(self, sig: Any, codegen: Any) -> str:
         """Return all that the machine code depends on: source, types, processor, versions."""
