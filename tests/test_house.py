@@ -261,7 +261,7 @@ def test_other_questions_are_not_counted(text: str) -> None:
 
 # --- size, annotations, documentation ------------------------------------------------------------
 
-LINES_AT_MOST = 42_210
+LINES_AT_MOST = 42_350
 """Lines of code, without docstrings, comments, blanks and generated files: to be lowered with what
 is taken out, and raised only with a capability that is worth it."""
 
