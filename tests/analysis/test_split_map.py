@@ -120,6 +120,7 @@ def test_the_plain_solver_finds_the_same(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(solver, "foot_within", foot_within)
     for module in (conditions, solver):
         monkeypatch.setattr(module, "height", lambda *place: curvature(*place)[0])
+        monkeypatch.setattr(module, "look_cost", lambda _texture: 1.0)
     surface = Surface(texture, "H", K, continuity=2.0)
     points = _probes(texture, 40, seed=9)
     assert set(split_state(surface, points).atoms) > {1, 2}

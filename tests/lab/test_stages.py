@@ -141,7 +141,7 @@ def test_the_tour_is_shown_with_a_band_and_gives_it_back(toured: Browser) -> Non
     for _step in range(2):
         page.until("lab.tour.found")
         page.press("n")
-    assert page.ask("document.getElementById('alarm').hidden")
+    page.until("document.getElementById('alarm').hidden")  # once the next law has compiled
     assert page.ask("lab.news.settings.hand_stiffness") == 800
     page.press("t")
     page.until(f"lab.news.settings.device === '{former['device']}'")
