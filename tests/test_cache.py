@@ -298,6 +298,7 @@ MAKER = """
 import sys, time
 from asperity import cache
 cache.my_turn("room", "key of the entry")
+cache.my_turn("room", "another")
 print("mine", flush=True)
 sys.stdin.readline()
 cache.keep("room", "key of the entry", b"made by another")
@@ -344,6 +345,10 @@ def test_the_turn_of_a_process_that_dies_is_over(maker: subprocess.Popen[str]):
 def test_who_hangs_is_not_waited_for_long(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(cache, "PATIENCE", 0.2)
     assert not cache.my_turn(ROOM, KEY)
+    monkeypatch.setattr(cache, "PATIENCE", 12.0)
+    begin = time.monotonic()
+    assert not cache.my_turn(ROOM, "another")  # nor for anything else that it may hold
+    assert time.monotonic() - begin < 10.0
 
 
 @pytest.mark.usefixtures("maker")

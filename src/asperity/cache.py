@@ -44,8 +44,8 @@ DEFAULT_SIZE = 2 * 10**9
 _LARGEST = 8
 """One entry may have this part of the limit, so that none drives out all others."""
 _KEPT_OF_FULL = 0.75
-PATIENCE = 60.0
-"""Time [s] for which a process waits for what another one makes."""
+PATIENCE = 30.0
+"""Time [s] for which a process waits for what another one makes, before it waits no more."""
 _LOOK = 0.02  # [s] between two looks at that
 _TURNS = ".turns"
 
@@ -194,9 +194,10 @@ def my_turn(room: str, key: str) -> bool:
     """
     begin = time.monotonic()
     waited = False
-    while not _claimed(room, key):
-        if time.monotonic() > begin + PATIENCE:
-            return False  # it hangs, or was interrupted: its work is done twice
+    while cache_folder() / room not in _hanging and not _claimed(room, key):
+        if time.monotonic() > begin + PATIENCE:  # it hangs, or is suspended: work is done twice
+            _hanging.add(cache_folder() / room)
+            return False
         waited = True
         time.sleep(_LOOK)
     return waited
@@ -230,6 +231,8 @@ def _claimed(room: str, key: str, over: bool = False) -> bool:
 
 # Of one folder: its file stays open, for locks go with the first of a process's that is closed.
 _turns: dict[Path, int] = {}
+# Who hangs may hold several.
+_hanging: set[Path] = set()
 
 
 def _turns_file(folder: Path) -> int:

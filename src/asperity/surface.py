@@ -42,19 +42,6 @@ def default_max_depth(texture: Texture) -> float:
     return min(height, LARGEST_DEFAULT_DEPTH) if height > 0.0 else LARGEST_DEFAULT_DEPTH
 
 
-def _received(
-    kind: type[Surface], texture: Texture, law: str | Law, stiffness: float, max_depth: float,
-    clamp: ClampName, given: dict[str, float],
-) -> Surface:  # fmt: skip
-    """Return a surface that another process has sent."""
-    result = object.__new__(kind)
-    result._set(
-        texture=texture, law=find_law(law), stiffness=stiffness, max_depth=max_depth, clamp=clamp,
-        _given=given,
-    )  # fmt: skip
-    return result
-
-
 class Surface(Plotted):
     """A textured surface as a force field: the body is z < h(x, y), z points out of it.
 
@@ -152,21 +139,26 @@ class Surface(Plotted):
             positive("max_deflection", parameters["max_deflection"], "m")
         self.__dict__.update(values, law_parameters=MappingProxyType(parameters))
 
+    def _chosen(self) -> dict[str, Any]:
+        names = ("texture", "law", "stiffness", "max_depth", "clamp", "_given")
+        return {name: getattr(self, name) for name in names}
+
     def _changed(self, **values: Any) -> Surface:
         """Return a surface that differs in these values only; nothing derived is taken along."""
-        names = ("texture", "law", "stiffness", "max_depth", "clamp", "_given")
         result = object.__new__(type(self))
-        result._set(**{name: getattr(self, name) for name in names} | values)
+        result._set(**self._chosen() | values)
         return result
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Say how another process makes the same one: a law that is known goes by its letter.
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what another process makes the same one of: a law that is known is its letter.
 
         A law of the user's own is found there if that process has learned it.
         """
-        law = self.law.letter if KNOWN_LAWS.get(self.law.letter) is self.law else self.law
-        place = self.stiffness, self.max_depth, self.clamp
-        return _received, (type(self), self.texture, law, *place, dict(self._given))
+        known = KNOWN_LAWS.get(self.law.letter) is self.law
+        return self._chosen() | {"law": self.law.letter if known else self.law}
+
+    def __setstate__(self, values: dict[str, Any]) -> None:
+        self._set(**values | {"law": find_law(values["law"])})
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(
