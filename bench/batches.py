@@ -36,7 +36,7 @@ def run(console: Console) -> None:
             for law in LAWS:
                 kernel = cases.kernel(known[kind], law, cases.probes(known[kind], POINTS))
                 other = reference.reference(library, kernel)
-                reference.check(kernel, other, ("run_force",))
+                reference.check_agreement(kernel, other, ("run_force",))
                 times = take_turns([kernel.run_force, other.run_force], ROUNDS)
                 ns = [f"{t:.1f}" for t in np.median(times, axis=0) / POINTS * 1e9]
                 ratio = median_ratio(times, 0, 1)

@@ -11,17 +11,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from asperity.contacts.memory import UNLIMITED, new_memory
+from asperity.contacts.warm_start import UNLIMITED, new_warm_start
 from asperity.export.c99 import c99_files
-from asperity.export.order import Order
-from asperity.kernels.fuse import fuse_path
+from asperity.export.export_request import ExportRequest
+from asperity.kernels.fuse import fuse_on_texture
+from asperity.kernels.loops import path_loop
 from asperity.surface import Surface
 from asperity.textures import Texture
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 
 
-def run(*command: str | Path, cwd: Path | None = None) -> str:
+def run_command(*command: str | Path, cwd: Path | None = None) -> str:
     """Run a program that must succeed and return what it says.
 
     Raises:
@@ -40,10 +41,12 @@ def header(
     name: str = "texture",
     precision: str = "double",
     folder: Path | None = None,
-    looks: float | None = None,
+    max_evaluations: float | None = None,
 ) -> str:
     """Return the header of a surface; large data are written beside it, into a folder."""
-    first, *others = c99_files(Order(surface, name, precision, looks=looks), name).items()
+    first, *others = c99_files(
+        ExportRequest(surface, name, precision, max_evaluations=max_evaluations), name
+    ).items()
     for file, text in others:
         if folder is None:
             raise ValueError(f"{file} stands beside the header: name a folder for it")
@@ -92,22 +95,22 @@ def library(
     ]
     texts = [part.format(name=name, real=real) for part, name in zip(parts, headers, strict=True)]
     source.write_text("".join(texts), encoding="utf-8")
-    return compiled(folder, compiler, source, *STRICT, *flags)
+    return compile_library(folder, compiler, source, *STRICT, *flags)
 
 
-def compiled(folder: Path, compiler: str, source: Path, *flags: str) -> ctypes.CDLL:
-    """Return a source compiled into a library, with the data that stand in its folder."""
-    made = folder / f"all_{len(list(folder.iterdir()))}.so"
+def compile_library(folder: Path, compiler: str, source: Path, *flags: str) -> ctypes.CDLL:
+    """Compile a source and the data files of its folder into a library."""
+    library = folder / f"all_{len(list(folder.iterdir()))}.so"
     data = folder.glob("*_data.c")
-    run(compiler, *flags, "-shared", "-fPIC", source, *data, "-o", made, "-lm")
-    return ctypes.CDLL(str(made))
+    run_command(compiler, *flags, "-shared", "-fPIC", source, *data, "-o", library, "-lm")
+    return ctypes.CDLL(str(library))
 
 
 class Ticks(NamedTuple):
-    """Ticks along a path that are ready to run: nothing is looked up while they are timed.
+    """Ticks along a path, prepared so that only their execution is timed.
 
     Attributes:
-        run: runs them.
+        run: runs the ticks.
         forces: result [N], (n, 3).
         gaps: result [m], (n,).
     """
@@ -117,49 +120,51 @@ class Ticks(NamedTuple):
     gaps: Any
 
     def result(self) -> Any:
-        """Run them and return forces and gaps, (n, 4)."""
+        """Run the ticks and return forces and gaps, shape (n, 4)."""
         self.run()
         return np.column_stack([self.forces, self.gaps])
 
 
-def program_ticks(made: ctypes.CDLL, name: str, points: Any, *, gaps: bool = True) -> Ticks:
+def program_ticks(program: ctypes.CDLL, name: str, points: Any, *, gaps: bool = True) -> Ticks:
     """Return ticks of a program along a path, in its precision; a gap is a call of its own."""
     arrays = points, np.empty_like(points), np.empty(len(points), points.dtype)
     given = [array.ctypes.data_as(ctypes.c_void_p) for array in arrays[: 2 + gaps]]
     run = partial(
-        getattr(made, f"{name}_many"), *given, *[None] * (not gaps), ctypes.c_int64(len(points))
+        getattr(program, f"{name}_many"), *given, *[None] * (not gaps), ctypes.c_int64(len(points))
     )
     return Ticks(run, *arrays[1:])
 
 
-def ticks(made: ctypes.CDLL, name: str, points: Any) -> Any:
+def ticks(program: ctypes.CDLL, name: str, points: Any) -> Any:
     """Return forces [N] and gaps [m] along a path, (n, 4)."""
-    return program_ticks(made, name, points).result()
+    return program_ticks(program, name, points).result()
 
 
-def energies(made: ctypes.CDLL, name: str, points: Any) -> Any:
+def energies(program: ctypes.CDLL, name: str, points: Any) -> Any:
     """Return the potential energies at probe positions."""
     out = np.empty(len(points), points.dtype)
     given = [array.ctypes.data_as(ctypes.c_void_p) for array in (points, out)]
-    getattr(made, f"{name}_energies")(*given, ctypes.c_int64(len(points)))
+    getattr(program, f"{name}_energies")(*given, ctypes.c_int64(len(points)))
     return out
 
 
-def surface_ticks(surface: Surface, points: Any, looks: float | None = None) -> Ticks:
+def surface_ticks(surface: Surface, points: Any, max_evaluations: float | None = None) -> Ticks:
     """Return ticks of the kernel of loops and simulations along a path.
 
     Batches have a sine of their own, :mod:`asperity.kernels.batch_sine`.
     """
     law, out, told = surface.law, np.empty((len(points), 3)), np.empty((len(points), 2))
-    loops = fuse_path(law, surface.texture.sampler, surface.acting_clamp)
-    memory = new_memory(law.contact.looks if looks is None else min(looks, UNLIMITED))
+    loops = fuse_on_texture(law, surface.texture.sampler, surface.effective_clamp, (path_loop,))
+    memory = new_warm_start(
+        law.contact.max_evaluations if max_evaluations is None else min(max_evaluations, UNLIMITED)
+    )
     arguments = memory, surface.texture.arguments, surface.law_arguments
     return Ticks(partial(loops.path_batch, points, out, told, *arguments), out, told[:, 0])
 
 
-def kernel_ticks(surface: Surface, points: Any, looks: float | None = None) -> Any:
+def kernel_ticks(surface: Surface, points: Any, max_evaluations: float | None = None) -> Any:
     """Return the same of the kernel."""
-    return surface_ticks(surface, points, looks).result()
+    return surface_ticks(surface, points, max_evaluations).result()
 
 
 def same_bits(first: Any, second: Any) -> Any:
@@ -182,7 +187,7 @@ def probes(texture: Texture, depth: float, count: int, seed: int) -> Any:
         wide = wide + rng.normal(size=(4 * n, 1)) * 1e-3 * np.array([-spans[0][1], spans[0][0]])
     reach = float(np.hypot(*spans[0]))
     near = reach * 10.0 ** rng.uniform(-12, -2, (n, 2)) * rng.choice([-1.0, 1.0], (n, 2))
-    crests = _climbed(texture, wide[n : 2 * n]) + near
+    crests = _move_uphill(texture, wide[n : 2 * n]) + near
     steps = rng.integers(-4, 9, (n, len(spans))) / rng.choice([1, 2, 6, 8], (n, 1))
     borders = domain.points(steps) + near
     xy = np.ascontiguousarray(np.vstack([wide[:n], crests, borders, wide[3 * n :]]))
@@ -193,7 +198,7 @@ def probes(texture: Texture, depth: float, count: int, seed: int) -> Any:
     return np.ascontiguousarray(points[rng.permutation(4 * n)])
 
 
-def _climbed(texture: Texture, xy: Any) -> Any:
+def _move_uphill(texture: Texture, xy: Any) -> Any:
     """Return points moved towards the nearest crests."""
     bend = max(texture.bounds[1], 1e-30)
     for _ in range(60):
@@ -201,7 +206,7 @@ def _climbed(texture: Texture, xy: Any) -> Any:
     return xy
 
 
-def differing(names: Iterable[str], equal: Sequence[Any]) -> str:
+def list_differing(names: Iterable[str], equal: Sequence[Any]) -> str:
     """Return how many points differ, by name, of those of which any do."""
     counts = {name: int((~one).sum()) for name, one in zip(names, equal, strict=True)}
     return ", ".join(f"{name}: {count}" for name, count in counts.items() if count)

@@ -34,9 +34,9 @@ def run(console: Console) -> None:
     """Print both times, and whether the second process left the cache as it was."""
     with tempfile.TemporaryDirectory() as directory:
         cache = Path(directory)
-        first = _process(cache)
+        first = _run_process(cache)
         filled = _files(cache)
-        second = _process(cache)
+        second = _run_process(cache)
         touched = _changes(filled, _files(cache))
     console.print("imports + Surface(sinusoid, law).force of laws B, C, D in a fresh process")
     for name, answer in (("empty cache", first), ("filled cache", second)):
@@ -52,7 +52,7 @@ def run(console: Console) -> None:
         console.print("  no compile in the second: names and modification times all unchanged")
 
 
-def _process(cache: Path) -> dict[str, Any]:
+def _run_process(cache: Path) -> dict[str, Any]:
     environment = os.environ | {"ASPERITY_CACHE_DIR": str(cache)}
     command = [sys.executable, "-c", _SCRIPT]
     answer = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)

@@ -30,12 +30,13 @@ from statistics import median
 from rich.console import Console
 from rich.progress import track
 
-from bench.damage import mutated
+from bench.damage import mutate
 
 _CHILD = """
 import sys
 import numpy as np
-from asperity import HeightMap, Surface, cache, characteristic_number
+from asperity import HeightMap, Surface, characteristic_number
+from asperity.core import cache
 if "--unchecked" in sys.argv:
     class Anything(bytes):
         def __radd__(self, _magic): return self
@@ -77,9 +78,9 @@ def run(count: int, unchecked: bool, console: Console) -> bool:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         filled = folder / "filled"
-        modules = _answer(filled, _CHILD + _MODULES).splitlines()[-1]
-        expected = _answer(filled)
-        warm = [_spent(filled, unchecked) for unchecked in (False, True) * _STARTS]
+        modules = _compute_in_process(filled, _CHILD + _MODULES).splitlines()[-1]
+        expected = _compute_in_process(filled)
+        warm = [_cpu_time(filled, unchecked) for unchecked in (False, True) * _STARTS]
         _FORKS.set_forkserver_preload(modules.split())
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             rounds = pool.map(lambda seed: _round(folder, filled, expected, seed, unchecked),
@@ -92,11 +93,11 @@ def run(count: int, unchecked: bool, console: Console) -> bool:
         f"warm start, processor time, median of {_STARTS} in turns:"
         f" {ratio:.3f} x that without a check"
     )
-    harm = sum(number for words, number in found.items() if words not in HARMLESS)
+    harm = sum(number for words, number in found.items() if words not in HARMLESS_OUTCOMES)
     return bool(harm) == unchecked
 
 
-HARMLESS = ("made again", "not noticed, not needed")
+HARMLESS_OUTCOMES = ("made again", "not noticed, not needed")
 
 
 def _round(folder: Path, filled: Path, expected: str, seed: int, unchecked: bool) -> str:
@@ -104,9 +105,9 @@ def _round(folder: Path, filled: Path, expected: str, seed: int, unchecked: bool
     cache, planted = folder / f"cache{seed}", folder / f"planted{seed}"
     shutil.copytree(filled, cache)
     for _ in range(draw.choice((1, 1, 2, 5))):
-        _damage(cache, draw, planted)
-    output, errors, status = _forked(cache, folder / f"said{seed}", unchecked)
-    _removed(cache)
+        _damage_cache(cache, draw, planted)
+    output, errors, status = _compute_in_fork(cache, folder / f"said{seed}", unchecked)
+    _remove_cache(cache)
     if status is None:
         return "HANGS"
     if planted.exists():
@@ -117,10 +118,10 @@ def _round(folder: Path, filled: Path, expected: str, seed: int, unchecked: bool
         return "TRACEBACK"
     if output != expected:
         return "CHANGED NUMBER"
-    return HARMLESS[0] if "the cache" in errors else HARMLESS[1]
+    return HARMLESS_OUTCOMES[0] if "the cache" in errors else HARMLESS_OUTCOMES[1]
 
 
-def _damage(cache: Path, draw: random.Random, planted: Path) -> None:
+def _damage_cache(cache: Path, draw: random.Random, planted: Path) -> None:
     files = sorted(path for path in cache.rglob("*") if path.is_file())
     if not files:
         return
@@ -128,7 +129,7 @@ def _damage(cache: Path, draw: random.Random, planted: Path) -> None:
     content = path.read_bytes()
     kind = draw.randrange(11)
     if kind < 3:
-        path.write_bytes(mutated(content, draw))
+        path.write_bytes(mutate(content, draw))
     elif kind == 3:  # one bit, anywhere
         bits = bytearray(content or b" ")
         bits[draw.randrange(len(bits))] ^= 1 << draw.randrange(8)
@@ -152,30 +153,32 @@ def _damage(cache: Path, draw: random.Random, planted: Path) -> None:
         draw.choice((path, path.parent, cache)).chmod(draw.choice((0o000, 0o444, 0o555, 0o777)))
 
 
-def _forked(cache: Path, said: Path, unchecked: bool) -> tuple[str, str, int | None]:
+def _compute_in_fork(
+    cache: Path, output_folder: Path, unchecked: bool
+) -> tuple[str, str, int | None]:
     """Return output, errors and exit code of a fork; None for one that does not end."""
-    said.mkdir()
-    process = _FORKS.Process(target=_compute, args=(cache, said, unchecked))
+    output_folder.mkdir()
+    process = _FORKS.Process(target=_compute, args=(cache, output_folder, unchecked))
     process.start()
     process.join(_SECONDS)
     status = process.exitcode
     process.kill()
-    output, errors = [(said / name).read_text() for name in ("output", "errors")]
-    shutil.rmtree(said)
+    output, errors = [(output_folder / name).read_text() for name in ("output", "errors")]
+    shutil.rmtree(output_folder)
     return output, errors, status
 
 
-def _compute(cache: Path, said: Path, unchecked: bool) -> None:
+def _compute(cache: Path, output_folder: Path, unchecked: bool) -> None:
     """Be the fork: run the program, its output and errors in files."""
     for number, name in ((1, "output"), (2, "errors")):
-        os.dup2(os.open(said / name, os.O_WRONLY | os.O_CREAT), number)
+        os.dup2(os.open(output_folder / name, os.O_WRONLY | os.O_CREAT), number)
     os.environ["ASPERITY_CACHE_DIR"] = str(cache)
     sys.argv = ["-c", *(["--unchecked"] if unchecked else [])]
     exec(_CHILD, {})
     atexit._run_exitfuncs()  # as a process that is no fork does: temporary folders go
 
 
-def _answer(cache: Path, program: str = _CHILD, *options: str) -> str:
+def _compute_in_process(cache: Path, program: str = _CHILD, *options: str) -> str:
     done = subprocess.run(
         [sys.executable, "-c", program, *options],
         capture_output=True, text=True, check=True, timeout=_SECONDS,
@@ -184,15 +187,15 @@ def _answer(cache: Path, program: str = _CHILD, *options: str) -> str:
     return done.stdout
 
 
-def _spent(cache: Path, unchecked: bool) -> float:
+def _cpu_time(cache: Path, unchecked: bool) -> float:
     """Return the processor time of a start with a filled cache [s]."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    _answer(cache, _CHILD, *(["--unchecked"] if unchecked else []))
+    _compute_in_process(cache, _CHILD, *(["--unchecked"] if unchecked else []))
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-def _removed(cache: Path) -> None:
+def _remove_cache(cache: Path) -> None:
     for path in (cache, *cache.iterdir()):
         path.chmod(0o700)
     shutil.rmtree(cache)

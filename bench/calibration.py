@@ -19,11 +19,16 @@ import numpy as np
 from rich.console import Console
 from scipy.linalg import expm
 
-from asperity.servo.calibration.bench import InstantBench
-from asperity.servo.calibration.calibrate import WALL_SHARE, WALL_STEP, Calibration, Calibrator
+from asperity.servo.calibration.calibrator import (
+    MAX_WALL_STEP,
+    WALL_FORCE_FRACTION,
+    Calibration,
+    Calibrator,
+)
+from asperity.servo.calibration.test_rig import UnclockedRig
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.safety import Safety
-from asperity.simulation import Cartesian, Servo, SpringHand, Still
+from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
 
 FORCE = 3.0  # [N]
 RAMP = 0.02  # [s]
@@ -31,7 +36,7 @@ K0_WITHIN, OTHERS_WITHIN = 0.1, 0.05
 
 
 @dataclass(frozen=True)
-class Drawn:
+class RandomDevice:
     """A device, with all that is true of it.
 
     Attributes:
@@ -50,18 +55,18 @@ class Drawn:
     damping: tuple[float, float, float]
     friction: float
 
-    def wall(self, axis: int) -> float:
+    def wall_stiffness(self, axis: int) -> float:
         """Return K₀ along an axis [N/m]."""
         mass, damping = self.mass[axis], self.damping[axis]
         smooth = wall_limit(mass, damping, self.period, self.delay)
-        speed = kick(smooth) * math.sqrt(smooth / mass)
+        speed = initial_amplitude(smooth) * math.sqrt(smooth / mass)
         rubbing = 4.0 * self.friction / (math.pi * speed)
         return wall_limit(mass, damping + rubbing, self.period, self.delay)
 
 
-def kick(stiffness: float) -> float:
+def initial_amplitude(stiffness: float) -> float:
     """Return the amplitude with which an oscillation at a wall begins [m]."""
-    return min(WALL_STEP, WALL_SHARE * FORCE / stiffness)
+    return min(MAX_WALL_STEP, WALL_FORCE_FRACTION * FORCE / stiffness)
 
 
 def wall_limit(mass: float, damping: float, period: float, delay: int) -> float:
@@ -96,7 +101,9 @@ def wall_limit(mass: float, damping: float, period: float, delay: int) -> float:
     return low
 
 
-def draw(rng: np.random.Generator, rates: tuple[float, float] = (1e3, 1e4)) -> Drawn:
+def random_device(
+    rng: np.random.Generator, rates: tuple[float, float] = (1e3, 1e4)
+) -> RandomDevice:
     """Return a random device.
 
     Args:
@@ -109,40 +116,45 @@ def draw(rng: np.random.Generator, rates: tuple[float, float] = (1e3, 1e4)) -> D
     # A wall of this stiffness is about to cycle, so that K₀ is that of devices that there are.
     stiffness = np.exp(rng.uniform(math.log(300.0), math.log(4000.0), 3))
     damping = stiffness * period * (0.5 + delay)
-    speed = np.array([kick(one) for one in stiffness]) * np.sqrt(stiffness / mass)
+    speed = np.array([initial_amplitude(one) for one in stiffness]) * np.sqrt(stiffness / mass)
     # Friction that takes up to a fifth of what the damping takes, where it matters most.
     friction = rng.uniform(0.0, 0.2) * math.pi / 4.0 * float((damping * speed).min())
     step = math.exp(rng.uniform(math.log(5e-6), math.log(30e-6)))
     x, y, z = map(float, mass)
     bx, by, bz = map(float, damping)
-    return Drawn(period, delay, step, (x, y, z), (bx, by, bz), friction)
+    return RandomDevice(period, delay, step, (x, y, z), (bx, by, bz), friction)
 
 
-def calibrated(device: Drawn) -> Calibration:
+def calibrate_device(device: RandomDevice) -> Calibration:
     """Return what a calibration says of a device."""
     own = Servo(device.period, delay=device.delay, position_resolution=device.step)
     plant = Cartesian(device.mass, device.damping, friction=device.friction)
-    still = Still((0.0, 0.0, 0.0))
-    driver = simulated_driver(plant, SpringHand(), own, still, device.period, steps=True)
+    still = Stationary((0.0, 0.0, 0.0))
+    driver = simulated_driver(
+        plant, SpringHand(), own, still, device.period, device_resolution=True
+    )
     loop = Servo(device.period, max_force=FORCE)
-    bench = InstantBench(driver, loop, Safety(ramp=RAMP, max_slew=1e3 * FORCE))
+    bench = UnclockedRig(driver, loop, Safety(ramp=RAMP, max_slew=1e3 * FORCE))
     return Calibrator(bench, RAMP).run()
 
 
-def misses(device: Drawn, found: Calibration) -> list[str]:
+def list_misses(device: RandomDevice, found: Calibration) -> list[str]:
     """Return what is further from the truth than the goals allow."""
     said = []
-    if found.delay.samples != device.delay or found.delay.others:
-        said.append(f"delay {found.delay.samples}, others {found.delay.others}")
-    if found.step is None or abs(found.step.value / device.step - 1.0) > OTHERS_WITHIN:
+    if found.delay.samples != device.delay or found.delay.alternatives:
+        said.append(f"delay {found.delay.samples}, others {found.delay.alternatives}")
+    if (
+        found.position_step is None
+        or abs(found.position_step.value / device.step - 1.0) > OTHERS_WITHIN
+    ):
         said.append("resolution")
-    if abs(found.rate.value * device.period - 1.0) > OTHERS_WITHIN:
+    if abs(found.update_rate.value * device.period - 1.0) > OTHERS_WITHIN:
         said.append("period")
     if len(found.axes) != 3:
         said.append("axes")
     for axis in found.axes:
-        true = device.wall("xyz".index(axis.name))
-        if not abs(axis.wall.held / true - 1.0) <= K0_WITHIN:
+        true = device.wall_stiffness("xyz".index(axis.name))
+        if not abs(axis.wall.stable_stiffness / true - 1.0) <= K0_WITHIN:
             said.append(f"K₀ along {axis.name}")
     return said
 
@@ -153,23 +165,30 @@ def run(console: Console, count: int = 10, seed: int = 1) -> None:
     console.print("K₀ found over true, by axis; b, m and F_c: greatest error over the axes")
     missed = 0
     for _ in range(count):
-        device, start = draw(rng), time.perf_counter()
-        found = calibrated(device)
+        device, start = random_device(rng), time.perf_counter()
+        found = calibrate_device(device)
         took = time.perf_counter() - start
-        walls = [axis.wall.held / device.wall("xyz".index(axis.name)) for axis in found.axes]
+        walls = [
+            axis.wall.stable_stiffness / device.wall_stiffness("xyz".index(axis.name))
+            for axis in found.axes
+        ]
         off = [
-            max(abs(getattr(axis.motion, name).value / true - 1.0)
+            max(abs(getattr(axis.dynamics, name).value / true - 1.0)
                 for axis, true in zip(found.axes, trues, strict=True))
             for name, trues in (("damping", device.damping), ("mass", device.mass))
         ]  # fmt: skip
-        rub = max(abs(axis.motion.friction.value - device.friction) for axis in found.axes)
-        wrong = misses(device, found)
+        rub = max(abs(axis.dynamics.friction.value - device.friction) for axis in found.axes)
+        wrong = list_misses(device, found)
         missed += bool(wrong)
-        step = math.nan if found.step is None else found.step.value / device.step - 1.0
+        step = (
+            math.nan
+            if found.position_step is None
+            else found.position_step.value / device.step - 1.0
+        )
         console.print(
             f"{1e-3 / device.period:5.2f} kHz, d {device.delay} found {found.delay.samples},"
             f" step {1e6 * device.step:4.1f} µm {step:+.1%}, period"
-            f" {1.0 / (found.rate.value * device.period) - 1.0:+.1%}, K₀"
+            f" {1.0 / (found.update_rate.value * device.period) - 1.0:+.1%}, K₀"
             f" {' '.join(f'{wall:.3f}' for wall in walls)}, b {off[0]:.1%}, m {off[1]:.2%},"
             f" F_c ± {1e3 * rub:.1f} mN, {took:.1f} s{'  MISSED: ' if wrong else ''}"
             f"{', '.join(wrong)}"

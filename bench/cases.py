@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid
 from asperity.textures.texture import Texture

@@ -23,13 +23,13 @@ from rich.table import Table
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.bounds.measures import NORM
-from asperity.analysis.gain.certificate import certified
+from asperity.analysis.gain.certificate import certify
 from asperity.analysis.gain.characteristic import characteristic_number
-from asperity.analysis.gain.search import Search
-from asperity.checks import FloatArray
+from asperity.analysis.gain.search_options import SearchOptions
+from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Sinusoid
-from bench.random_surfaces import Trial, trial
+from bench.random_surfaces import Trial, run_trial
 from bench.timing import Batch, median_ratio, seconds, take_turns
 
 GAP = 1e-6
@@ -123,7 +123,7 @@ def _evolution(surface: Surface, q: float) -> Batch | None:
     return None
 
 
-def _repeated(surface: Surface) -> Batch:
+def _repeat_batch(surface: Surface) -> Batch:
     """Return many certified numbers: one takes less than the clock and the caches need."""
 
     def batch() -> None:
@@ -142,7 +142,7 @@ def _against_scipy(console: Console) -> None:
     for letter in LAWS:
         surface = _surface(letter)
         bound = characteristic_number(surface, tolerance=GAP)
-        contestants: list[Batch] = [_repeated(surface)]
+        contestants: list[Batch] = [_repeat_batch(surface)]
         q = bound.lower
         # SciPy's own number of samples, and as few as find q, which nobody knows beforehand.
         found = [_shgo(surface, q, 128), _shgo(surface, q, 8), _evolution(surface, q)]
@@ -179,7 +179,7 @@ def rough_map(side: int) -> HeightMap:
 
 def _certify(surface: Surface) -> Bound:
     """Certify without the certificates that are kept on disk."""
-    return certified(surface, NORM, Search())
+    return certify(surface, NORM, SearchOptions())
 
 
 def _maps(console: Console) -> None:
@@ -231,9 +231,9 @@ def _waves(console: Console) -> None:
         cells = []
         for letter in MAP_LAWS:
             surface = Surface(independent_waves(count), letter, max_depth=0.1e-3)
-            search = Search(WAVE_GAP, extent=extent)
+            search = SearchOptions(WAVE_GAP, extent=extent)
             start = time.perf_counter()
-            bound = certified(surface, NORM, search)
+            bound = certify(surface, NORM, search)
             slowest = max(slowest, taken := time.perf_counter() - start)
             widest = max(widest, bound.gap)
             cells.append(f"{taken:.2f}: {bound.gap:.1e}")
@@ -297,16 +297,16 @@ def random_trials(console: Console, count: int, first: int = 0) -> int:
     counts: Counter[str] = Counter()
     worst = Trial(0, "", "", "", Bound(0.0, 0.0, "theorem"), 0, -1.0, 0.0)
     for seed in range(first, first + count):
-        found = trial(seed)
+        found = run_trial(seed)
         counts["trials"] += 1
         counts["points"] += found.points
         counts[found.bound.method] += 1
         counts["at the work limit"] += "work limit" in found.bound.note
-        counts["wrong"] += not found.right
-        counts["idle"] += not found.tight
+        counts["wrong"] += not found.is_correct
+        counts["idle"] += not found.is_tight
         if np.isfinite(found.excess):
             worst = max(worst, found, key=lambda t: t.excess)
-        if not (found.right and found.tight) and said < 20:
+        if not (found.is_correct and found.is_tight) and said < 20:
             said += 1
             console.print(found, style="bold")
         if counts["trials"] % 250 == 0:

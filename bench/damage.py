@@ -7,7 +7,7 @@ import random
 _WORDS = (b"0", b"-1", b"65535", b"4294967296", b"1e308", b"nan", b"inf", b"\0", b"<", b",", b" ")
 
 
-def mutated(content: bytes, rng: random.Random) -> bytes:
+def mutate(content: bytes, rng: random.Random) -> bytes:
     """Damage a file in one to four places: bits, bytes, numbers, cuts, copies, other text."""
     data = bytearray(content)
     for _ in range(rng.choice((1, 1, 2, 4))):
@@ -15,11 +15,11 @@ def mutated(content: bytes, rng: random.Random) -> bytes:
             break
         # Half of the damage goes where headers are.
         at = rng.randrange(min(len(data), 512) if rng.random() < 0.5 else len(data))
-        _damage(data, at, rng)
+        _damage_once(data, at, rng)
     return bytes(data)
 
 
-def _damage(data: bytearray, at: int, rng: random.Random) -> None:
+def _damage_once(data: bytearray, at: int, rng: random.Random) -> None:
     length = rng.choice((1, 2, 4, 16, 64))
     kind = rng.randrange(8)
     if kind == 0:

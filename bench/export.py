@@ -21,14 +21,14 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from asperity.contacts.memory import TAKEN
+from asperity.contacts.warm_start import EVALUATIONS
 from asperity.laws import LAWS
 from asperity.surface import Surface
 from asperity.textures import HeightMap
 from bench import cases
 from bench.c_programs import (
     STRICT,
-    compiled,
+    compile_library,
     header,
     kernel_ticks,
     library,
@@ -38,12 +38,12 @@ from bench.c_programs import (
     surface_ticks,
     ticks,
 )
-from bench.firmware import firmware, missing_tool
+from bench.firmware import build_firmware, missing_tool
 from bench.timing import median_ratio, seconds, take_turns
 
 GOAL = 1.1
 # A kernel that is faster takes several probes at once; no tick of a loop does [s].
-TOGETHER = 5e-9
+MEAN_OVERHEAD = 5e-9
 ROUNDS = 151
 BATCH_SECONDS = 0.005
 FLAGS = ("-O3", "-march=native")
@@ -90,7 +90,7 @@ def _speed(console: Console, folder: Path) -> None:
     console.print(
         f"Time of exported C over that of the kernel, median of {ROUNDS} rounds in turns; gcc "
         f"{' '.join(FLAGS)}, as Numba compiles for the machine that it runs on; ns of the kernel. "
-        f"Where that is below {1e9 * TOGETHER:.0f} ns it takes several probes at once: not counted."
+        f"Where that is below {1e9 * MEAN_OVERHEAD:.0f} ns several are taken at once: not counted."
     )
     table = Table(box=None, pad_edge=False)
     table.add_column("texture")
@@ -101,7 +101,7 @@ def _speed(console: Console, folder: Path) -> None:
         cells = []
         for letter in LAWS:
             ratio, own = _ratio(Surface(texture, letter, clamp="backed"), folder)
-            if own > TOGETHER:
+            if own > MEAN_OVERHEAD:
                 ratios.append(ratio)
             cells.append(f"{ratio:.2f} {1e9 * own:.0f}")
         table.add_row(kind, *cells)
@@ -127,43 +127,45 @@ def _ticks(console: Console, count: int) -> None:
     """Print the longest tick of laws with a search on a large map."""
     rng = np.random.default_rng(7)
     texture = HeightMap(2e-6 * rng.normal(size=(SIDE, SIDE)), 10e-6)
-    console.print(f"Longest tick of {count:,} probes on a {SIDE} x {SIDE} map, gcc -O2:")
+    console.print(f"LongestTick tick of {count:,} probes on a {SIDE} x {SIDE} map, gcc -O2:")
     for letter in "DH":
         surface = Surface(texture, letter)
         with tempfile.TemporaryDirectory() as directory:
             slow = longest_tick(surface, Path(directory), count)
         where = ", ".join(f"{1e6 * part:.3f}" for part in slow.at)
         words = f"{1e6 * slow.longest:.0f} us at ({where}) um; mean {1e6 * slow.mean:.1f} us"
-        budget = f"at most {slow.looks:.0f} of {surface.law.contact.looks:.0f} looks"
+        budget = (
+            f"at most {slow.evaluations:.0f} of {surface.law.contact.max_evaluations:.0f} looks"
+        )
         console.print(f"law {letter}: {words}; {budget}")
 
 
-class Longest(NamedTuple):
+class LongestTick(NamedTuple):
     """The longest of many ticks [s], their mean [s], where it was [m], and the most looks."""
 
     longest: float
     mean: float
     at: Any
-    looks: float
+    evaluations: float
 
 
-def longest_tick(surface: Surface, folder: Path, count: int) -> Longest:
+def longest_tick(surface: Surface, folder: Path, count: int) -> LongestTick:
     """Return the longest tick of many probes; each begins where the last one ended."""
     name = "t"
     (folder / f"{name}.h").write_text(header(surface, name, folder=folder), encoding="utf-8")
     source = folder / "clock.c"
-    source.write_text(_CLOCK.format(name=name, taken=TAKEN), encoding="utf-8")
-    made = compiled(folder, "gcc", source, *STRICT, "-O2")
+    source.write_text(_CLOCK.format(name=name, taken=EVALUATIONS), encoding="utf-8")
+    made = compile_library(folder, "gcc", source, *STRICT, "-O2")
     slowest: list[tuple[float, Any]] = []
     total = most = 0.0
     for at in _batches(surface, count):
-        took, looks = _clocked(made, at)
+        took, looks = _time_ticks(made, at)
         total, most = total + float(took.sum()), max(most, float(looks.max()))
         worst = np.argsort(took)[-AGAIN:]
-        again = np.min([_clocked(made, at[worst])[0] for _ in range(TIMES)], axis=0)
+        again = np.min([_time_ticks(made, at[worst])[0] for _ in range(TIMES)], axis=0)
         slowest.append((float(again.max()), at[worst[again.argmax()]]))
     longest, where = max(slowest, key=lambda pair: pair[0])
-    return Longest(longest, total / count, where, most)
+    return LongestTick(longest, total / count, where, most)
 
 
 def _batches(surface: Surface, count: int) -> Iterator[Any]:
@@ -171,11 +173,11 @@ def _batches(surface: Surface, count: int) -> Iterator[Any]:
         yield probes(surface.texture, surface.max_depth, min(TICKS, count - start), seed)
 
 
-def _clocked(made: ctypes.CDLL, at: Any) -> tuple[Any, Any]:
+def _time_ticks(program: ctypes.CDLL, at: Any) -> tuple[Any, Any]:
     """Return the times [s] and the looks of ticks."""
     at, took, looks = np.ascontiguousarray(at), np.empty(len(at)), np.empty(len(at))
     given = [array.ctypes.data_as(ctypes.c_void_p) for array in (at, took, looks)]
-    made.t_clocked(*given, ctypes.c_int64(len(at)))
+    program.t_clocked(*given, ctypes.c_int64(len(at)))
     return took, looks
 
 
@@ -191,7 +193,7 @@ def _micro(console: Console) -> None:
     for kind, texture in cases.textures().items():
         for letter in "CFD":
             with tempfile.TemporaryDirectory() as directory:
-                one = firmware(Surface(texture, letter, clamp="backed"), Path(directory))
+                one = build_firmware(Surface(texture, letter, clamp="backed"), Path(directory))
             table.add_row(
                 f"{letter}, {kind}", str(one.flash), str(one.ram), f"{one.instructions:.0f}"
             )
@@ -204,14 +206,14 @@ def compare_bits(console: Console, count: int, laws: str) -> int:
     for kind, texture in cases.textures().items():
         for letter in laws:
             started = perf_counter()
-            differ, short = _differ(Surface(texture, letter, clamp="backed"), count)
+            differ, short = _count_differences(Surface(texture, letter, clamp="backed"), count)
             wrong += differ
             told = f"{count:,} ticks, {short:,} of them cut short; {differ} differ"
             console.print(f"{letter} on {kind}: {told} ({perf_counter() - started:.0f} s)")
     return wrong
 
 
-def _differ(surface: Surface, count: int) -> tuple[int, int]:
+def _count_differences(surface: Surface, count: int) -> tuple[int, int]:
     """Return how many ticks differ in a bit of force or gap, and how many have a gap."""
     differ = short = 0
     with tempfile.TemporaryDirectory() as directory:

@@ -75,7 +75,7 @@ class FakeHaply:
         self._listening.close()
         self._thread.join(5.0)
 
-    def last(self, patience: float = 30.0) -> Force:
+    def last_force(self, patience: float = 30.0) -> Force:
         """Return the last force, once it is zero or nothing more comes."""
         end = time.monotonic() + patience
         while time.monotonic() < end and self.forces[-1][1] != (0.0, 0.0, 0.0):
@@ -97,7 +97,9 @@ class FakeHaply:
             head += stream.readline()
         key = head.split(b"Sec-WebSocket-Key: ")[1].split(b"\r\n")[0]
         answer = base64.b64encode(hashlib.sha1(key + _SECRET).digest())
-        upgrade = b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\n"
+        upgrade = (
+            b"HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        )
         line.sendall(upgrade + b"Sec-WebSocket-Accept: " + answer + b"\r\n\r\n")
         hello = {"session_id": 7, "inverse3": [self._state(one, 0) for one in self.devices]}
         line.sendall(frame(json.dumps(hello).encode() if self.hello is None else self.hello))

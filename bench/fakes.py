@@ -9,7 +9,7 @@ from pathlib import Path
 FLAGS = ("-O2", "-Wall", "-Wextra", "-Werror", "-std=c99", "-shared", "-fPIC", "-pthread")
 
 
-def compiled(source: Path, folder: Path) -> Path:
+def compile_library(source: Path, folder: Path) -> Path:
     """Compile a file of C to a shared library in a folder; return its path."""
     library = folder / f"{source.stem}.so"
     compiler = shutil.which("gcc") or shutil.which("cc")

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from asperity.export.c99 import c99_files
-from asperity.export.order import Order
+from asperity.export.export_request import ExportRequest
 from asperity.surface import Surface
 
 SKETCH = Path(__file__).parents[1] / "examples" / "export" / "cortex_m.c"
@@ -38,13 +38,13 @@ class Firmware:
             program around it.
         ram: bytes of variables, but for the stack.
         instructions: executed in a tick, the mean of many.
-        said: what the sketch printed.
+        output: what the sketch printed.
     """
 
     flash: int
     ram: int
     instructions: float
-    said: str
+    output: str
 
 
 def _run(*command: str | Path) -> str:
@@ -52,9 +52,9 @@ def _run(*command: str | Path) -> str:
     return subprocess.run(words, check=True, capture_output=True, text=True).stdout
 
 
-def firmware(surface: Surface, folder: Path) -> Firmware:
+def build_firmware(surface: Surface, folder: Path) -> Firmware:
     """Build the sketch of a surface, and run it."""
-    order = Order(surface, precision="float")
+    order = ExportRequest(surface, precision="float")
     for name, text in c99_files(order, "texture").items():
         (folder / name).write_text(text, encoding="utf-8")
     sources = [SKETCH, *folder.glob("texture_data.c")]
@@ -66,14 +66,14 @@ def firmware(surface: Surface, folder: Path) -> Firmware:
     )
     _run(TOOLS[0], *given, folder / "empty.c", "-o", empty)
     size, nothing = (_sizes(one) for one in (whole, empty))
-    shown = _runnable(folder, sources, "shown")
-    silent = _runnable(folder, sources, "silent", "-DSILENT")
-    few, many = (_executed(folder, silent, ticks) for ticks in (50, 150))
+    shown = _build_runnable(folder, sources, "shown")
+    silent = _build_runnable(folder, sources, "silent", "-DSILENT")
+    few, many = (_count_instructions(folder, silent, ticks) for ticks in (50, 150))
     return Firmware(
         flash=size[0] - nothing[0],
         ram=size[1] - nothing[1],
         instructions=(many - few) / 100.0,
-        said=_run(TOOLS[3], "-cpu", "cortex-a15", shown, "8"),
+        output=_run(TOOLS[3], "-cpu", "cortex-a15", shown, "8"),
     )
 
 
@@ -83,7 +83,7 @@ def _sizes(program: Path) -> tuple[int, int]:
     return text + data, data + bss
 
 
-def _runnable(folder: Path, sources: list[Path], name: str, *flags: str) -> Path:
+def _build_runnable(folder: Path, sources: list[Path], name: str, *flags: str) -> Path:
     """Return a program of the microcontroller's object code that QEMU's user mode runs."""
     objects = []
     for source in sources:
@@ -96,7 +96,7 @@ def _runnable(folder: Path, sources: list[Path], name: str, *flags: str) -> Path
     return program
 
 
-def _executed(folder: Path, program: Path, ticks: int) -> int:
+def _count_instructions(folder: Path, program: Path, ticks: int) -> int:
     """Return how many instructions a run takes."""
     log = folder / "executed.log"
     traced = ("-singlestep", "-d", "exec,nochain", "-D", log, "-cpu", "cortex-a15")

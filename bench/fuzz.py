@@ -3,9 +3,8 @@
 Every reader gets count mutated files (10 000 by default) from a fixed seed. A worker process
 reads them with 1 GB of memory and 20 s of the processor for each; anything but a surface or one of
 asperity's own errors is counted as "other", and so is a file for which the memory did not do.
-Readers that work in a process of their own get a fork of the worker, whose libraries are loaded
-already and which reads many files, each with the limits that it always has; what these stopped is
-counted as "stopped", and as refused.
+Isolated readers run in a fork of the worker, which has imported the libraries and reads many files,
+each with the usual limits; a file that exceeds them is counted as "stopped" and as refused.
 """
 
 from __future__ import annotations
@@ -30,14 +29,14 @@ from rich.console import Console
 from rich.table import Table
 
 from bench import fuzz_seeds
-from bench.damage import mutated
+from bench.damage import mutate
 
 COUNT = 10_000
 MEMORY = 2**30  # [bytes] of data that a worker may hold, its own start included
 SECONDS = 20  # of the processor, for one file
 _PATIENCE = 6  # times as long by the clock
-_STOPPED = ("to be read, the limit", "ends its reader with")
-_SHOWN = 3  # faults of a reader that are printed
+_LIMIT_MESSAGES = ("to be read, the limit", "ends its reader with")
+_MAX_PRINTED = 3  # faults of a reader that are printed
 
 
 class _TooSlowError(Exception):
@@ -46,7 +45,7 @@ class _TooSlowError(Exception):
 
 def outcomes(reader: str, count: int, folder: Path) -> Iterator[tuple[str, str]]:
     """Read mutated files in this process: ("read" | "refused" | "other", what) for each."""
-    from asperity.errors import AsperityError
+    from asperity.core.errors import AsperityError
     from asperity.measured.reading import read_surface
 
     seed = fuzz_seeds.SEEDS[reader](folder)
@@ -55,31 +54,35 @@ def outcomes(reader: str, count: int, folder: Path) -> Iterator[tuple[str, str]]
     for trial in range(count):
         rng = random.Random(f"{reader} {trial}")
         whole = rng.choice(seed)
-        content = fuzz_seeds.repaired(reader, whole, mutated(whole, rng), rng)
+        content = fuzz_seeds.repair_checksums(reader, whole, mutate(whole, rng), rng)
         path.write_bytes(content)
         try:
-            _allow(SECONDS)
+            _set_time_limit(SECONDS)
             raw = read_surface(path, **options)
-            _allow(0)
+            _set_time_limit(0)
         except AsperityError as error:
-            yield _judged(str(error))
+            yield _classify_message(str(error))
         except BaseException as error:  # the very thing that is looked for
             if isinstance(error, KeyboardInterrupt):
                 raise
             yield "other", f"trial {trial}: {type(error).__name__}: {error}"
         else:
-            yield ("read", "") if _sound(raw) else ("other", f"trial {trial}: unsound surface")
+            yield (
+                ("read", "")
+                if _is_valid_surface(raw)
+                else ("other", f"trial {trial}: unsound surface")
+            )
         finally:
-            _allow(0)
+            _set_time_limit(0)
 
 
-def _allow(seconds: int) -> None:
+def _set_time_limit(seconds: int) -> None:
     """Allow what follows so much time of this process, and some more by the clock; 0 ends it."""
     signal.setitimer(signal.ITIMER_PROF, seconds)
     signal.alarm(_PATIENCE * seconds)
 
 
-def _judged(message: str) -> tuple[str, str]:
+def _classify_message(message: str) -> tuple[str, str]:
     if "not enough memory" in message:
         return "other", message
     if "\n" in message or not message:
@@ -87,7 +90,7 @@ def _judged(message: str) -> tuple[str, str]:
     return "refused", message
 
 
-def _sound(raw: Any) -> bool:
+def _is_valid_surface(raw: Any) -> bool:
     """A surface whose numbers can be used: no infinity, a positive pitch."""
     import numpy as np
 
@@ -96,10 +99,11 @@ def _sound(raw: Any) -> bool:
     return raw.pitch is None or all(p > 0 and np.isfinite(p) for p in raw.pitch)
 
 
-def work(readers: Sequence[str], count: int) -> None:
+def run_worker(readers: Sequence[str], count: int) -> None:
     """Be the worker: print one JSON object a line for each reader."""
-    from asperity.measured.reading import child, registry
-    from bench.fuzz_child import Reading
+    from asperity.measured.reading import isolation
+    from asperity.measured.reading import readers as registry
+    from bench.fuzz_child import ReadingWorker
 
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     warnings.simplefilter("error")  # a warning on the terminal is no clear error either
@@ -108,8 +112,8 @@ def work(readers: Sequence[str], count: int) -> None:
     # What is installed stays so: looking it up took half the time of a file.
     vars(registry).update(entry_points=functools.cache(entry_points))
     for reader in readers:
-        with Reading() as reading:
-            child.start = reading.start
+        with ReadingWorker() as reading:
+            isolation.run_subprocess = reading.start
             totals = _totals(reader, count)
         # A fork begins with what the worker has.
         peak = max(_peak(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)
@@ -123,8 +127,10 @@ def _totals(reader: str, count: int) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         for outcome, what in outcomes(reader, count, Path(folder)):
             totals[outcome] += 1
-            totals["stopped"] += outcome == "refused" and any(word in what for word in _STOPPED)
-            if outcome == "other" and len(faults) < _SHOWN:
+            totals["stopped"] += outcome == "refused" and any(
+                word in what for word in _LIMIT_MESSAGES
+            )
+            if outcome == "other" and len(faults) < _MAX_PRINTED:
                 faults.append(what[:300])
     return {**totals, "faults": faults, "seconds": time.monotonic() - start}
 
@@ -196,10 +202,10 @@ _ROOT = Path(__file__).parent.parent
 
 def main(arguments: Sequence[str]) -> int:
     if arguments[:1] == ["--worker"]:
-        work(arguments[2:], int(arguments[1]))
+        run_worker(arguments[2:], int(arguments[1]))
         return 0
     counts = [int(word) for word in arguments if word.isdecimal()]
-    readers = [word for word in arguments if not word.isdecimal()] or fuzz_seeds.available()
+    readers = [word for word in arguments if not word.isdecimal()] or fuzz_seeds.available_readers()
     unknown = [reader for reader in readers if reader not in fuzz_seeds.SEEDS]
     if unknown:
         known = ", ".join(fuzz_seeds.SEEDS)

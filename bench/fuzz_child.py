@@ -1,4 +1,4 @@
-"""A reading child that stays: it does what ``child.start`` does, without a start for each file."""
+"""A subprocess that runs readers on many files, in place of one subprocess for each file."""
 
 from __future__ import annotations
 
@@ -6,37 +6,37 @@ import contextlib
 import importlib
 import io
 import multiprocessing
+import pickle
 import time
 import warnings
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkProcess
 from typing import IO, Any, Self
 
-from asperity.measured.reading import ReadingOptions, SurfaceFile, child
+from asperity.measured.reading import ReadingOptions, SurfaceFile, isolation
 
 LIBRARIES = ("SurfaceTopography.IO", "trimesh", "tifffile")
-FILES = 500  # of one child: what a library keeps of one file should not limit many others
+FILES = 500  # files read by one process: libraries may hold memory after each file
 _FORK = multiprocessing.get_context("fork")
 
 
-class Reading:
+class ReadingWorker:
     """A fork of this process that reads one file after the other.
 
-    Each file has the limits that a file always has. What stops the child, or needs more memory than
-    there is, costs a new one.
+    Each file has the usual limits. The fork is replaced after a file that exceeds them.
     """
 
-    _left: int  # files until it is replaced
+    _left: int  # files until the process is replaced
     _pipe: Connection
     _process: ForkProcess
 
     def __enter__(self) -> Self:
-        """Load what the readers need, which every child then has."""
+        """Import the libraries of the readers, which every fork then has."""
         for library in LIBRARIES:
             with contextlib.suppress(ModuleNotFoundError), warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 importlib.import_module(library)
-        self._begin()
+        self._start_process()
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -48,16 +48,16 @@ class Reading:
         file: SurfaceFile,
         options: ReadingOptions,
         limits: tuple[float, int],
-        answer: IO[bytes],
+        output: IO[bytes],
     ) -> int:
-        """Do what ``child.start`` does."""
+        """Replace ``isolation.run_subprocess``."""
         if self._left == 0:
             self._end()
-            self._begin()
+            self._start_process()
         self._left -= 1
         try:
-            self._pipe.send((read.__module__, read.__name__, file, options, limits))
-            said = self._pipe.recv_bytes()
+            self._pipe.send((read, file, options, limits))
+            result = self._pipe.recv_bytes()
         except EOFError:
             self._left = 0
             self._process.join()
@@ -65,12 +65,12 @@ class Reading:
         except BaseException:  # the time is over
             self._left = 0
             raise
-        if said.startswith(b'{"memory"'):
+        if isinstance(pickle.loads(result), MemoryError):
             self._left = 0
-        answer.write(said)
+        output.write(result)
         return 0
 
-    def _begin(self) -> None:
+    def _start_process(self) -> None:
         self._left = FILES
         self._pipe, there = _FORK.Pipe()
         self._process = _FORK.Process(target=_serve, args=(self._pipe, there), daemon=True)
@@ -84,12 +84,11 @@ class Reading:
 
 
 def _serve(parents: Connection, pipe: Connection) -> None:
-    parents.close()  # or this process would not see it end
+    parents.close()  # otherwise this process would not see the parent's end close
     with contextlib.suppress(EOFError):
         while True:
-            module, name, file, options, (seconds, memory) = pipe.recv()
-            read = getattr(importlib.import_module(module), name).__wrapped__
-            child.limit(time.process_time() + seconds, memory)
-            answer = io.BytesIO()
-            child.serve(read, file, options, answer)
-            pipe.send_bytes(answer.getvalue())
+            read, file, options, (seconds, memory) = pipe.recv()
+            isolation.set_limits(time.process_time() + seconds, memory)
+            output = io.BytesIO()
+            isolation.write_result(read, file, options, output)
+            pipe.send_bytes(output.getvalue())

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.damage import mutated
+from bench.damage import mutate
 
 ROOT = Path(__file__).parent.parent
-_WRITERS = ROOT / "tests" / "measured"
+_WRITERS = ROOT / "tests" / "measured" / "writers"
 _DATA = ROOT.parent / "shared" / "data"
 _PNG_HEAD = 8
 
@@ -109,8 +109,7 @@ def _pictures() -> list[NDArray[Any]]:
 
 
 def _png(folder: Path) -> Seeds:
-    from asperity.export.maps import height_png, normal_png
-    from asperity.export.sampled import sample_map
+    from asperity.export.surface_maps import height_png, normal_png, sample_map
     from asperity.textures import HeightMap
 
     writer = _writer("image_writer")
@@ -255,7 +254,7 @@ _MARKS = (
 )
 
 
-def _marks(_: Path) -> Seeds:
+def _special_columns(_: Path) -> Seeds:
     """No files at all: the first bytes of instruments' formats, then whatever comes."""
     rng = random.Random("marks")
     return [mark + rng.randbytes(800 - len(mark)) for mark in _MARKS] + [
@@ -297,7 +296,7 @@ SEEDS: dict[str, Callable[[Path], Seeds]] = {
     "hdf5": _hdf5,
     "matlab": _matlab,
     "gwyddion": _gwyddion,
-    "marks": _marks,
+    "marks": _special_columns,
     "archive": _archive,
 }
 OPTIONS: dict[str, dict[str, Any]] = {
@@ -305,7 +304,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
 } | {"uneven": {"unit": "m", "resample": 0.5}}
 
 
-def available() -> list[str]:
+def available_readers() -> list[str]:
     """Return the readers that can be fuzzed here: the FRT file is not part of the project."""
     extra = ("frt", "hdf5", "matlab", "gwyddion", "marks")
     there = importlib.util.find_spec("SurfaceTopography") is not None
@@ -316,7 +315,7 @@ def available() -> list[str]:
     ]
 
 
-def repaired(reader: str, whole: bytes, content: bytes, rng: random.Random) -> bytes:
+def repair_checksums(reader: str, whole: bytes, content: bytes, rng: random.Random) -> bytes:
     """Repair, for half of the files, the checksums that would stop the damage at the door.
 
     Args:
@@ -326,13 +325,13 @@ def repaired(reader: str, whole: bytes, content: bytes, rng: random.Random) -> b
         rng: what decides.
     """
     if reader == "png" and rng.random() < 0.5:
-        return _checked_png(content)
+        return _repair_png(content)
     if reader == "x3p" and rng.random() < 0.5:
-        return _rezipped(whole, rng)
+        return _rezip(whole, rng)
     return content
 
 
-def _checked_png(content: bytes) -> bytes:
+def _repair_png(content: bytes) -> bytes:
     out, at = content[:_PNG_HEAD], _PNG_HEAD
     while at + 8 <= len(content):
         (length,) = struct.unpack_from(">I", content, at)
@@ -342,12 +341,12 @@ def _checked_png(content: bytes) -> bytes:
     return out
 
 
-def _rezipped(content: bytes, rng: random.Random) -> bytes:
+def _rezip(content: bytes, rng: random.Random) -> bytes:
     """Damage a member inside a sound archive."""
     stream = io.BytesIO()
     with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(stream, "w") as new:
         victim = "main.xml" if rng.random() < 0.8 else rng.choice(old.namelist())
         for name in old.namelist():
             member = old.read(name)
-            new.writestr(name, mutated(member, rng) if name == victim else member)
+            new.writestr(name, mutate(member, rng) if name == victim else member)
     return stream.getvalue()

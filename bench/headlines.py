@@ -23,12 +23,12 @@ from rich.progress import track
 from asperity.analysis.compare import Comparison, compare
 from asperity.devices import Device, device_names, load_device
 from asperity.scene import load_scene
-from asperity.scene.plant import default_servo
-from asperity.simulation import Cartesian, Servo, SpringHand, Still
-from asperity.simulation.onset import ends_of_starts, offsets
-from asperity.simulation.together import Together
+from asperity.scene.scene_defaults import make_servo
+from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
+from asperity.simulation.batch import BatchSimulation
+from asperity.simulation.limit_cycles.onset import run_starts, start_offsets
 from asperity.surface import Surface
-from bench.margins import HANDS, pressing
+from bench.margins import HANDS, press_with
 
 SURFACES = (
     "sinusoid:amplitude=20um,period=1mm", "sinusoid:amplitude=50um,period=0.3mm",
@@ -45,7 +45,7 @@ PRESS = 0.25  # of stiffness times max_depth
 
 
 @dataclass(frozen=True)
-class Loop:
+class HeadlineLoop:
     """One loop, with what became of it."""
 
     device: str
@@ -58,27 +58,31 @@ class Loop:
     wall_cycles: bool
 
 
-def loops(device: Device, spec: str, found: Comparison, times: float = 1.0) -> list[Loop]:
+def simulate_loops(
+    device: Device, spec: str, comparison: Comparison, stiffness_factor: float = 1.0
+) -> list[HeadlineLoop]:
     """Return what becomes of the recommended law on a device, at so many times its start."""
-    row, test = found.recommended_row, device.wall_test
+    row, test = comparison.recommended_row, device.wall_test
     if row is None or test is None:
         return []
-    surface = row.surface.to_stiffness(times * row.start)
+    surface = row.surface.to_stiffness(stiffness_factor * row.recommended_stiffness)
     result = []
     for delay, (name, hand) in product(DELAYS, HANDS.items()):
-        servo, _said = default_servo(device, keeps_delay=False)
+        servo, _said = make_servo(device, uses_delay=False)
         servo = Servo(
             servo.period, delay, servo.position_resolution, servo.force_resolution, servo.max_force
         )
         damping = test.value * (0.5 + delay) * servo.period
         plant = Cartesian(device.value("apparent_mass") or MASS, damping)
-        held = pressing(hand, PRESS * surface.stiffness * surface.max_depth)
+        held = press_with(hand, PRESS * surface.stiffness * surface.max_depth)
         count = _cycles(surface, plant, held, servo)
         wall = surface.to_law("W")
         walls = [wall.to_stiffness(k) for k in (surface.stiffness, test.value)] if count else []
         too = any(_cycles(one, plant, held, servo) for one in walls)
         result.append(
-            Loop(device.id, spec, delay, name, row.law.letter, surface.stiffness, count, too)
+            HeadlineLoop(
+                device.id, spec, delay, name, row.law.letter, surface.stiffness, count, too
+            )
         )
     return result
 
@@ -86,19 +90,21 @@ def loops(device: Device, spec: str, found: Comparison, times: float = 1.0) -> l
 def _cycles(surface: Surface, plant: Cartesian, hand: SpringHand, servo: Servo) -> int:
     """Return how many starts end in a limit cycle."""
     begin = np.array([0.0, 0.0, surface.texture.extremes[1] + 0.2 * surface.max_depth])
-    still, shifts = Still((0.0, 0.0, 0.0)), offsets(surface, STARTS)
-    loop = Together(surface, plant, hand, servo, still, begin)
-    runs = ends_of_starts(loop, surface.stiffness, servo, shifts, DURATION)
+    still, shifts = Stationary((0.0, 0.0, 0.0)), start_offsets(surface, STARTS)
+    loop = BatchSimulation(surface, plant, hand, servo, still, begin)
+    runs = run_starts(loop, surface.stiffness, servo, shifts, DURATION)
     return sum(bool(run.verdict) for run in runs)
 
 
-def main(times: float = 1.0) -> int:
+def main(stiffness_factor: float = 1.0) -> int:
     """Print how many loops cycle, and which; return whether it is not as it must be."""
     console = Console(width=100, highlight=False)
     known = [device for device in map(load_device, device_names()) if device.wall_test is not None]
-    done: list[Loop] = []
+    done: list[HeadlineLoop] = []
     for device, spec in track(list(product(known, SURFACES)), "devices", console=console):
-        done += loops(device, spec, compare(load_scene(spec).texture, device, LAWS), times)
+        done += simulate_loops(
+            device, spec, compare(load_scene(spec).texture, device, LAWS), stiffness_factor
+        )
     cycling = [loop for loop in done if loop.cycles]
     missed = [loop for loop in cycling if not loop.wall_cycles]
     for loop in missed:
@@ -107,11 +113,12 @@ def main(times: float = 1.0) -> int:
             f"from {loop.cycles} of {STARTS} starts; delay {loop.delay}, {loop.hand}"
         )
     console.print(
-        f"{len(known)} devices x {len(SURFACES)} surfaces: {len(done)} loops at {times:g} x the "
+        f"{len(known)} devices x {len(SURFACES)} surfaces: "
+        f"{len(done)} loops at {stiffness_factor:g} x the "
         f"recommended start, {len(cycling)} of them cycle, {len(cycling) - len(missed)} of these "
         f"with the smooth wall: {len(missed)} misses"
     )
-    return int(bool(missed) if times <= 1.0 else not cycling)
+    return int(bool(missed) if stiffness_factor <= 1.0 else not cycling)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 from bench import cases, reference
@@ -83,10 +83,10 @@ def _measure(libraries: Sequence[ctypes.CDLL], console: Console) -> list[Row]:
         if libraries and kind in reference.KINDS and law in reference.LAWS:
             kernel = cases.kernel(known[kind], law, points[kind])
             others = [reference.reference(library, kernel) for library in libraries]
-            worst = max([worst, *(reference.check(kernel, other) for other in others)])
+            worst = max([worst, *(reference.check_agreement(kernel, other) for other in others)])
             timings = [_against_c(kernel, others, name) for name in RUNS.values()]
         else:
-            timings = [_alone(known[kind], law, points[kind], name) for name in RUNS.values()]
+            timings = [_time_alone(known[kind], law, points[kind], name) for name in RUNS.values()]
         rows.append((kind, law, timings))
     if libraries:
         console.print(f"C and asperity agree to {worst:.1e} (norm-wise, all compared kernels)")
@@ -100,7 +100,7 @@ def _against_c(kernel: cases.Kernel, others: Sequence[reference.Reference], name
     return Timing(own, c, median_ratio(times, 0, 1), median_ratio(times, 0, 2))
 
 
-def _alone(texture: Texture, law: str, points: FloatArray, name: str) -> Timing:
+def _time_alone(texture: Texture, law: str, points: FloatArray, name: str) -> Timing:
     getattr(cases.kernel(texture, law, points[:1]), name)()  # compiled, or loaded
     few = cases.kernel(texture, law, points[:200])
     each = seconds(getattr(few, name)) / 200

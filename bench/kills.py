@@ -72,7 +72,7 @@ _OUTPUTS = {"out.csv", "out.mcap"}
 _INPUTS = {"map.npy", "scene.toml", "still.toml"}
 
 
-def furnish(folder: Path) -> None:
+def write_inputs(folder: Path) -> None:
     """Put the inputs of the commands into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     heights = 2e-5 * np.random.default_rng(3).normal(size=(48, 48))
@@ -90,9 +90,9 @@ def start(command: str, folder: Path, cache: Path) -> subprocess.Popen[bytes]:
     )  # fmt: skip
 
 
-def disturbed(command: str, folder: Path, cache: Path, after: float, by: int) -> list[str]:
+def disturb_command(command: str, folder: Path, cache: Path, after: float, by: int) -> list[str]:
     """Run a command, disturb it after a while [s], and return what is wrong then."""
-    furnish(folder)
+    write_inputs(folder)
     process = start(command, folder, cache)
     try:
         output, errors = process.communicate(timeout=after)
@@ -106,17 +106,17 @@ def disturbed(command: str, folder: Path, cache: Path, after: float, by: int) ->
     wrong = []
     if b"Traceback" in errors + output:
         wrong.append(f"traceback: {errors.decode()[-300:]}")
-    if _group_lives(process.pid):
+    if _is_group_alive(process.pid):
         os.killpg(process.pid, signal.SIGKILL)
         wrong.append("a process is left")
     left = {path.name for path in folder.iterdir()} - _INPUTS
     if left - _OUTPUTS:
         wrong.append(f"files are left: {sorted(left)}")
-    wrong += ["half a file" for name in left & _OUTPUTS if not _whole(folder / name, command)]
+    wrong += ["half a file" for name in left & _OUTPUTS if not _is_complete(folder / name, command)]
     return wrong
 
 
-def _group_lives(group: int) -> bool:
+def _is_group_alive(group: int) -> bool:
     try:
         os.killpg(group, 0)
     except ProcessLookupError:
@@ -124,7 +124,7 @@ def _group_lives(group: int) -> bool:
     return True
 
 
-def _whole(path: Path, command: str) -> bool:
+def _is_complete(path: Path, command: str) -> bool:
     """Return whether an output is whole; a trace is written row by row, its last may be short."""
     if path.suffix == ".mcap":
         return is_recording(path) and open_recording(path).table().shape[1] > 1
@@ -138,8 +138,8 @@ def _whole(path: Path, command: str) -> bool:
         return {"heights", "steps"} <= set(archive.files)
 
 
-def _answer(command: str, folder: Path, cache: Path) -> tuple[int, bytes]:
-    furnish(folder)
+def _run_to_end(command: str, folder: Path, cache: Path) -> tuple[int, bytes]:
+    write_inputs(folder)
     process = start(command, folder, cache)
     process.communicate(timeout=300)
     written = b"".join(path.read_bytes() for name in _OUTPUTS if (path := folder / name).exists())
@@ -155,7 +155,7 @@ def run(count: int, console: Console, seed: int = 0) -> Counter[str]:
         expected, times = {}, {}
         for index, command in enumerate(COMMANDS):
             begin = time.perf_counter()
-            expected[command] = _answer(command, root / f"first{index}", root / "cache")
+            expected[command] = _run_to_end(command, root / f"first{index}", root / "cache")
             times[command] = time.perf_counter() - begin
         for index in track(range(count), "disturbing", console=console, transient=True):
             command = draw.choice(COMMANDS)
@@ -164,9 +164,9 @@ def run(count: int, console: Console, seed: int = 0) -> Counter[str]:
             cache = root / ("cache" if draw.random() < 0.75 else f"cache{index}")
             after = draw.uniform(0.1, times[command])
             after = max(after, _EARLIEST) if by == signal.SIGINT else after
-            faults.update(disturbed(command, folder, cache, after, by))
+            faults.update(disturb_command(command, folder, cache, after, by))
             if index % 10 == 9 and "html" not in command:
-                again = _answer(command, root / f"again{index}", cache)
+                again = _run_to_end(command, root / f"again{index}", cache)
                 faults["another answer afterwards"] += again != expected[command]
             shutil.rmtree(folder)
         stray = [path for path in (root / "cache").rglob("*") if ".tmp" in path.name]
@@ -195,7 +195,7 @@ def _full_disk(
         return ["NOT RUN: a disk could not be mounted"]
     try:
         command = draw.choice(COMMANDS[2:4])
-        furnish(disk / "here")
+        write_inputs(disk / "here")
         process = start(command, disk / "here", disk / "cache")
         _, errors = process.communicate(timeout=300)
         out = disk / "here" / "out.csv"

@@ -24,8 +24,8 @@ from tests.lab.browser import BROWSER, Browser
 from tests.lab.client import frames, head, heard, joined
 from tests.lab.started import Started
 
-from asperity.checks import FloatArray
-from asperity.lab.site import page_files
+from asperity.core.checks import FloatArray
+from asperity.lab.access import page_files
 
 SECONDS = 40.0
 """With a page, and as much without."""
@@ -78,7 +78,7 @@ def run(console: Console, seconds: float = SECONDS) -> None:
         differences = 1e6 * (shares[:, one] - shares[:, other])
         console.print(
             f"lab: {words}: {differences.mean():+.0f} of a million on average, by chance"
-            f" {100 * by_chance(differences):.0f} % of the time"
+            f" {100 * chance_lag(differences):.0f} % of the time"
         )
 
 
@@ -95,7 +95,7 @@ def first_picture(page: Browser) -> float:
         lab.close()
 
 
-def by_chance(differences: FloatArray) -> float:
+def chance_lag(differences: FloatArray) -> float:
     """Return how often a sum is as large or larger if each difference could have either sign."""
     signs = np.array(list(itertools.product((1.0, -1.0), repeat=len(differences))))
     sums = signs @ differences
@@ -113,34 +113,34 @@ def _pairs(lab: Started, page: Browser, seconds: float) -> tuple[FloatArray, Flo
         span = seconds / PAIRS
         page.call("Page.navigate", url=lab.address)
         page.until(f"{_LIVE} && lab.ready")
-        before, begun = _taken(page.process), time.monotonic()
-        watched = _late(lab, span, page)
-        taken = (_taken(page.process) - before) / (time.monotonic() - begun)
+        before, begun = _cpu_time(page.process), time.monotonic()
+        watched = _late_share(lab, span, page)
+        taken = (_cpu_time(page.process) - before) / (time.monotonic() - begun)
         waits += page.ask("lab.latencies")
         page.call("Page.navigate", url=BLANK)
         # Neither of the others always comes first.
-        alone = _late(lab, span) if number % 2 else math.nan
-        spun = _late_beside(lab, span, taken)
-        shares.append((alone if number % 2 else _late(lab, span), watched, spun))
+        alone = _late_share(lab, span) if number % 2 else math.nan
+        spun = _late_share_beside_load(lab, span, taken)
+        shares.append((alone if number % 2 else _late_share(lab, span), watched, spun))
     return np.array(waits), np.array(shares)
 
 
-def _taken(process: int) -> float:
+def _cpu_time(process: int) -> float:
     """Return the time of the processor that a process and all below it have taken [s]."""
     fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     ticks = int(fields[11]) + int(fields[12])
     children = [(one / "children").read_text() for one in Path(f"/proc/{process}/task").iterdir()]
-    below = sum(_taken(int(child)) for text in children for child in text.split())
+    below = sum(_cpu_time(int(child)) for text in children for child in text.split())
     return ticks / os.sysconf("SC_CLK_TCK") + below
 
 
-def _late_beside(lab: Started, seconds: float, share: float) -> float:
+def _late_share_beside_load(lab: Started, seconds: float, share: float) -> float:
     """Return the share of late samples beside processes that take a share of the processor."""
     each = share / 2.0
     spinning = [subprocess.Popen([sys.executable, "-c", _SPINS, f"{each:.4f}"]) for _ in range(2)]
     try:
         time.sleep(0.5)
-        return _late(lab, seconds)
+        return _late_share(lab, seconds)
     finally:
         for one in spinning:
             one.kill()
@@ -160,7 +160,7 @@ def _counts(lab: Started) -> FloatArray:
         return np.array([head(frame, "late"), head(frame, "first")])
 
 
-def _late(lab: Started, seconds: float, page: Browser | None = None) -> float:
+def _late_share(lab: Started, seconds: float, page: Browser | None = None) -> float:
     """Return the share of late samples of some seconds, in which the pointer of a page moves."""
     before, end = _counts(lab), time.monotonic() + seconds
     while time.monotonic() < end:

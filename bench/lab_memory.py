@@ -34,10 +34,10 @@ def run(console: Console, minutes: float = MINUTES) -> None:
         begun = time.monotonic()
         laws = itertools.cycle(_LAWS)
         while (now := (time.monotonic() - begun) / 60.0) < minutes:
-            _visit(lab, laws)
+            _use_page(lab, laws)
             if now > min(WARM, 0.5 * minutes):
                 seen.append((now, _memory(lab.process.pid)))
-                console.print(f"lab: {now:.1f} min: {_words(seen[-1][1])}")
+                console.print(f"lab: {now:.1f} min: {_format_sizes(seen[-1][1])}")
     finally:
         lab.close()
     server = lab.process.pid
@@ -50,11 +50,11 @@ def run(console: Console, minutes: float = MINUTES) -> None:
     )
 
 
-def _visit(lab: Started, laws: Iterator[str]) -> None:
+def _use_page(lab: Started, laws: Iterator[str]) -> None:
     """Be a page for a while."""
     with joined(lab) as page:
         end, looked = time.monotonic() + STAYS, 0.0
-        say(page, "change", wishes={"law": next(laws), "stiffness": 300.0})
+        say(page, "change", changes={"law": next(laws), "stiffness": 300.0})
         while (now := time.monotonic()) < end:
             if frames(taken(page)):
                 turn = 2.0 * math.pi * now
@@ -76,7 +76,7 @@ def _memory(server: int) -> dict[int, float]:
     }
 
 
-def _words(sizes: dict[int, float]) -> str:
+def _format_sizes(sizes: dict[int, float]) -> str:
     server, *others = sizes.values()
     return f"server {server:.1f} MB, its processes {', '.join(f'{one:.0f}' for one in others)} MB"
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rich.console import Console
 from tests.lab.browser import BROWSER, Browser
-from tests.lab.monkey import Monkey
+from tests.lab.page.monkey import Monkey
 from tests.lab.started import Started
 
 ACTIONS, SEED = 1000, 7

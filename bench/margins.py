@@ -24,10 +24,10 @@ from rich.table import Table
 
 from asperity.analysis import characteristic_number
 from asperity.devices.five_bar import handle_damping
-from asperity.paper.experiments.settings import band_setup
-from asperity.paper.plane import PASSIVITY
+from asperity.paper.experiments.experiment_setups import band_setup
+from asperity.paper.planar_cases import PASSIVITY
 from asperity.scene.setup import Setup
-from asperity.scene.sweeps import onsets, side_by_side
+from asperity.scene.sweeps import map_threads, sweep_onsets
 from asperity.simulation import Cartesian, Pantograph, Plant, SpringHand
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
@@ -65,12 +65,12 @@ Case = tuple[float, float, str, str, int]
 
 
 @dataclass(frozen=True)
-class Found:
+class MarginResult:
     """The least ratio of a law: where it held, over K₀/q.
 
     Attributes:
         ratio: with K₀ along the wall's normal.
-        lightest: the least with K₀ along the lightest direction.
+        lightest_ratio: the least with K₀ along the lightest direction.
         loop: of the least ratio, as the next two.
         surface: its texture.
         delay: in samples.
@@ -79,7 +79,7 @@ class Found:
     """
 
     ratio: float
-    lightest: float
+    lightest_ratio: float
     loop: str
     surface: str
     delay: int
@@ -87,44 +87,46 @@ class Found:
     count: int
 
 
-def setup(loop: str, surface: str) -> Setup:
+def make_case(loop: str, surface: str) -> Setup:
     """Return a loop of the table, with the smooth wall."""
     plant, hand = LOOPS[loop]
     texture = SURFACES[surface]
     wall = Surface(texture, "W", 1000.0, PASSIVITY.depth)
     start = (0.0, 0.0, texture.peak_to_valley)
     return replace(
-        band_setup("W"), surface=wall, plant=plant, hand=pressing(hand, 2.0), start=start,
+        band_setup("W"), surface=wall, plant=plant, hand=press_with(hand, 2.0), start=start,
         duration=0.25,
     )  # fmt: skip
 
 
-def pressing(hand: SpringHand, force: float) -> SpringHand:
+def press_with(hand: SpringHand, force: float) -> SpringHand:
     """Return the hand with a force [N] into the surface."""
     return SpringHand(hand.stiffness, hand.damping, hand.mass, (0.0, 0.0, -force))
 
 
-def measure(laws: str, console: Console) -> dict[str, Found]:
+def measure(laws: str, console: Console) -> dict[str, MarginResult]:
     """Return the least ratio of each law over all loops, surfaces and delays."""
     cases = [(loop, surface, delay) for loop in LOOPS for surface in SURFACES for delay in DELAYS]
     found: dict[str, list[Case]] = {law: [] for law in laws}
     for loop, surface, delay in track(cases, "loops", console=console):
-        case = setup(loop, surface)
+        case = make_case(loop, surface)
         wall = wall_onset(case, delay)
 
         def ratio(law: str, case: Setup = case, delay: int = delay, wall: float = wall) -> float:
             return ratio_to_wall(case.with_law(law), delay, wall)
 
         some = [law for law in laws if math.isfinite(_number(case.with_law(law)))]
-        for law, share in zip(some, side_by_side(ratio, [(law,) for law in some]), strict=True):
-            found[law].append((share, share / lightest(loop), loop, surface, delay))
+        for law, share in zip(some, map_threads(ratio, [(law,) for law in some]), strict=True):
+            found[law].append((share, share / lightest_direction_ratio(loop), loop, surface, delay))
             console.print(f"{loop}; {surface}; d = {delay}; {law}: {share:.3f}")
-    return {law: _least(ratios) for law, ratios in found.items()}
+    return {law: _worst_case(ratios) for law, ratios in found.items()}
 
 
 def wall_onset(case: Setup, delay: int) -> float:
     """Return the greatest stiffness at which the smooth wall held in a loop [N/m]."""
-    (smooth,) = onsets(case, "W", (delay,), starts=STARTS, tolerance=TOLERANCE, lowest=LOWEST)
+    (smooth,) = sweep_onsets(
+        case, "W", (delay,), n_phases=STARTS, tolerance=TOLERANCE, min_stiffness=LOWEST
+    )
     return smooth.onset.quiet
 
 
@@ -144,43 +146,52 @@ def ratio_to_wall(case: Setup, delay: int, wall: float) -> float:
     allowed = wall / _number(case)
     assert isinstance(case.hand, SpringHand)
     for share in PRESSES:
-        hand = pressing(case.hand, share * allowed * surface.max_depth)
-        (found,) = onsets(
-            replace(case, hand=hand), surface.law.letter, (delay,), starts=STARTS,
-            tolerance=TOLERANCE, lowest=share * allowed,
+        hand = press_with(case.hand, share * allowed * surface.max_depth)
+        (found,) = sweep_onsets(
+            replace(case, hand=hand), surface.law.letter, (delay,), n_phases=STARTS,
+            tolerance=TOLERANCE, min_stiffness=share * allowed,
         )  # fmt: skip
         if found.onset.quiet:
             break
     return found.onset.quiet / allowed
 
 
-def lightest(loop: str) -> float:
+def lightest_direction_ratio(loop: str) -> float:
     """Return the damping of the lightest direction as a share of that along the wall's normal."""
     plant = LOOPS[loop][0]
-    if not isinstance(plant, Pantograph):
+    if isinstance(plant, Cartesian):
         return float(np.linalg.eigvalsh(plant.damping)[0] / plant.damping[2, 2])
+    assert isinstance(plant, Pantograph)
     damping = handle_damping(plant.linkage, plant.joint_damping, np.array(plant.centre))
     return float(np.linalg.eigvalsh(damping)[0] / damping[1, 1])
 
 
-def _least(cases: list[Case]) -> Found:
+def _worst_case(cases: list[Case]) -> MarginResult:
     ratio, _, loop, surface, delay = min(cases)
     below = sum(one[0] < 1.0 for one in cases)
-    return Found(ratio, min(one[1] for one in cases), loop, surface, delay, below, len(cases))
+    return MarginResult(
+        ratio, min(one[1] for one in cases), loop, surface, delay, below, len(cases)
+    )
 
 
-def table(found: dict[str, Found]) -> Table:
+def table(found: dict[str, MarginResult]) -> Table:
     """Return what was found, one row per law."""
     shown = Table("law", "least", "along lightest", "loop", "surface", "d", "below 1", "of")
     for law, one in found.items():
         shown.add_row(
-            law, f"{one.ratio:.3f}", f"{one.lightest:.3f}", one.loop, one.surface, str(one.delay),
-            str(one.below), str(one.count),
-        )  # fmt: skip
+            law,
+            f"{one.ratio:.3f}",
+            f"{one.lightest_ratio:.3f}",
+            one.loop,
+            one.surface,
+            str(one.delay),
+            str(one.below),
+            str(one.count),
+        )
     return shown
 
 
-def write(found: dict[str, Found], path: Path = TARGET) -> None:
+def write_margins(found: dict[str, MarginResult], path: Path = TARGET) -> None:
     """Write the factors, rounded down, at most 1, with where each was found."""
     lines = [
         "# Written by `python -m bench.margins`: how far below K₀/q a law began to cycle in",
@@ -190,15 +201,15 @@ def write(found: dict[str, Found], path: Path = TARGET) -> None:
     ]
     for law, one in found.items():
         lines += [
-            "", f"[{law}]", f"factor = {factor(one.ratio):.2f}",
-            f"along_lightest = {factor(one.lightest):.2f}", f'loop = "{one.loop}"',
+            "", f"[{law}]", f"factor = {round_down_factor(one.ratio):.2f}",
+            f"along_lightest = {round_down_factor(one.lightest_ratio):.2f}", f'loop = "{one.loop}"',
             f'surface = "{one.surface}"', f"delay = {one.delay}", f"below = {one.below}",
             f"cases = {one.count}",
         ]  # fmt: skip
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def factor(ratio: float) -> float:
+def round_down_factor(ratio: float) -> float:
     """Return a ratio as it is used: rounded down to hundredths, at most 1."""
     return math.floor(100.0 * min(ratio, 1.0)) / 100.0
 
@@ -212,7 +223,7 @@ def main(arguments: list[str]) -> int:
     found = measure(laws, console)
     console.print(table(found))
     if laws == LAWS[1:]:
-        write(found)
+        write_margins(found)
     return 0
 
 

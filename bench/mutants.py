@@ -1,9 +1,9 @@
-"""Do the tests notice when the code is wrong? A seeded sample of mutants, room by room.
+"""Mutation testing: a seeded sample of mutants for each part of the code.
 
 ``make mutants`` copies the project, lets Cosmic Ray plan its mutations of a room, draws a sample of
-them with a seed, and runs the tests that stand for that room against each. A mutant that no test
-kills is printed with its difference, unless ``bench/mutants_explained.toml`` says why it changes
-nothing. It takes minutes per room, so it is no part of the tests.
+them with a seed, and runs the tests of that room against each. A mutant that no test kills is
+printed with its difference, unless ``bench/mutants_explained.toml`` explains why it is equivalent.
+It takes minutes per room, so it is not part of the tests.
 
     python bench/mutants.py [--count 20] [--seed 1] [--keep FOLDER] [ROOM ...]
 
@@ -26,19 +26,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-# Cosmic Ray is not installed where types are checked, and ships none.
-from cosmic_ray.work_db import WorkDB, use_db  # type: ignore[import-not-found]  # as said
-from cosmic_ray.work_item import (  # type: ignore[import-not-found]  # as said
-    TestOutcome,
-    WorkerOutcome,
-    WorkResult,
-)
+# Cosmic Ray is not installed where types are checked, and has no type information.
+from cosmic_ray.work_db import WorkDB, use_db  # type: ignore[import-not-found] # see above
+from cosmic_ray.work_item import TestOutcome, WorkerOutcome, WorkResult  # type: ignore[import-not-found] # see above
 
 ROOT = Path(__file__).resolve().parents[1]
 EXPLAINED = ROOT / "bench" / "mutants_explained.toml"
 TIMEOUT = 600.0  # [s] for the tests of one mutant; one that hangs is killed
-# What says something about the code: exchanged operators, comparisons, signs, truth values, numbers
-# that are off by one, loops that never run. Not: types, operators that fail at once.
+# Informative mutations: exchanged operators, comparisons, signs, truth values, numbers
+# that are off by one, loops that never run. Excluded: types, operators that fail at once.
 _OPERATORS = re.compile(
     r"core/(ReplaceBinaryOperator_(Add_Sub|Sub_Add|Mul_Div|Div_Mul|Pow_Mul)"
     r"|ReplaceComparisonOperator_(Lt_LtE|LtE_Lt|Gt_GtE|GtE_Gt|Lt_GtE|Gt_LtE|Eq_NotEq|NotEq_Eq"
@@ -51,11 +47,11 @@ _OPERATORS = re.compile(
 
 @dataclass(frozen=True)
 class Room:
-    """A part of the code, and the tests that stand for it.
+    """A part of the code and its tests.
 
     Attributes:
         code: files or folders below ``src/asperity``.
-        tests: what pytest is given.
+        tests: arguments of pytest.
     """
 
     code: tuple[str, ...]
@@ -65,74 +61,85 @@ class Room:
 ROOMS = {
     "derive": Room(("derive",), ("tests/laws", "tests/derive")),
     "contacts": Room(
-        ("contacts/contact.py", "contacts/nearest", "contacts/nominal.py", "contacts/sampler.py",
-         "contacts/symbols.py", "contacts/vertical.py"),
-        ("tests/contacts", "tests/textures/test_nearest.py", "tests/textures/test_search.py",
-         "tests/test_definition.py", "tests/derive", "tests/laws", "tests/seams/test_contact.py"),
+        ("contacts/contact.py", "contacts/closest", "contacts/height_contacts.py",
+         "contacts/sampler_interface.py",
+         "contacts/symbols.py", "contacts/warm_start.py"),
+        ("tests/contacts",
+         "tests/test_reference.py", "tests/derive", "tests/laws",
+         "tests/seams/test_user_contact.py"),
     ),
     "kernels": Room(
         ("kernels",),
         ("tests/kernels/test_loops_by_definition.py",
          "tests/kernels/test_link.py", "tests/kernels/test_fuse.py", "tests/kernels/test_tick.py",
          "tests/kernels/test_interfaces.py", "tests/kernels/test_native.py",
-         "tests/textures/test_sinusoid.py",
-         "tests/test_surface.py", "tests/test_definition.py", "tests/test_cache.py",
+         "tests/textures/kinds/test_sinusoid.py",
+         "tests/test_surface.py", "tests/test_reference.py", "tests/core/test_cache.py",
          "tests/kernels/test_batch_sine.py", "tests/kernels/test_block_loops.py",
-         "tests/analysis/test_taylor.py"),
+         "tests/enclosures/test_taylor.py"),
     ),
     "passivity": Room(
-        ("analysis/passivity", "analysis/judge_passivity.py"),
-        ("tests/analysis/test_passivity_by_definition.py",
-         "tests/analysis/test_passivity.py", "tests/analysis/test_wall_test.py",
-         "tests/analysis/test_passivity_theorems.py", "tests/seams/test_criterion.py",
-         "tests/simulation/test_margins.py"),
+        ("analysis/passivity", "analysis/assess_passivity.py"),
+        ("tests/analysis/passivity/test_passivity_by_definition.py",
+         "tests/analysis/passivity/test_passivity.py",
+         "tests/analysis/passivity/test_wall_test_criterion.py",
+         "tests/analysis/passivity/test_passivity_theorems.py",
+         "tests/seams/test_user_criterion.py",
+         "tests/analysis/passivity/test_margins.py"),
     ),
     "limits": Room(
         ("analysis/limits", "analysis/check_limits.py"),
-        ("tests/analysis/test_limits_by_definition.py",
-         "tests/analysis/test_limits.py", "tests/analysis/test_spectrum.py",
-         "tests/analysis/test_wave_force.py", "tests/analysis/test_felt.py",
-         "tests/analysis/test_limits_words.py"),
+        ("tests/analysis/limits/test_limits_by_definition.py",
+         "tests/analysis/limits/test_limits.py", "tests/analysis/limits/test_spectrum.py",
+         "tests/analysis/limits/test_wave_force.py", "tests/analysis/limits/test_perceptibility.py",
+         "tests/analysis/sentences/test_limit_sentences.py"),
     ),
     "bounds": Room(
         ("analysis/bounds",),
-        ("tests/analysis/test_branch_and_bound.py", "tests/analysis/test_bounds_by_definition.py",
-         "tests/analysis/test_gain_by_definition.py", "tests/analysis/test_contradictions.py",
-         "tests/analysis/test_merit.py", "tests/analysis/test_clamps.py",
-         "tests/analysis/test_taylor.py", "tests/analysis/test_certified.py",
-         "tests/analysis/test_certified_laws.py"),
+        ("tests/analysis/bounds/test_branch_and_bound.py",
+         "tests/analysis/bounds/test_bounds_by_definition.py",
+         "tests/analysis/gain/test_gain_by_definition.py",
+         "tests/analysis/bounds/test_contradictions.py",
+         "tests/analysis/energy/test_merit.py", "tests/analysis/gain/test_clamps.py",
+         "tests/enclosures/test_taylor.py", "tests/analysis/gain/test_certified.py",
+         "tests/analysis/gain/test_certified_laws.py"),
     ),
     "gain": Room(
         ("analysis/gain",),
-        ("tests/analysis/test_gain_by_definition.py", "tests/analysis/test_theorems.py",
-         "tests/analysis/test_bounds_by_definition.py", "tests/analysis/test_branch_and_bound.py",
-         "tests/analysis/test_closed_forms.py", "tests/analysis/test_kept.py",
-         "tests/analysis/test_clamps.py", "tests/analysis/test_certified.py",
-         "tests/analysis/test_certified_laws.py"),
+        ("tests/analysis/gain/test_gain_by_definition.py", "tests/analysis/gain/test_theorems.py",
+         "tests/analysis/bounds/test_bounds_by_definition.py",
+         "tests/analysis/bounds/test_branch_and_bound.py",
+         "tests/analysis/gain/test_closed_forms.py",
+         "tests/analysis/gain/test_surface_cache.py",
+         "tests/analysis/gain/test_clamps.py", "tests/analysis/gain/test_certified.py",
+         "tests/analysis/gain/test_certified_laws.py"),
     ),
     "energy": Room(
         ("analysis/energy",),
-        ("tests/analysis/test_anchor.py", "tests/analysis/test_sag.py",
-         "tests/analysis/test_thrust.py", "tests/analysis/test_loops.py",
-         "tests/analysis/test_energy_by_definition.py",
-         "tests/analysis/test_merit.py", "tests/analysis/test_leak.py",
-         "tests/analysis/test_continuity.py", "tests/analysis/test_ridges.py",
-         "tests/analysis/test_contradictions.py"),
+        ("tests/analysis/energy/test_anchor.py", "tests/analysis/energy/test_curl_integral.py",
+         "tests/analysis/energy/test_thrust.py", "tests/analysis/energy/test_loops.py",
+         "tests/analysis/energy/test_energy_by_definition.py",
+         "tests/analysis/energy/test_merit.py", "tests/analysis/energy/test_leak.py",
+         "tests/analysis/energy/test_continuity.py", "tests/analysis/energy/test_ridges.py",
+         "tests/analysis/bounds/test_contradictions.py"),
     ),
     "split": Room(
         ("analysis/split", "contacts/split"),
-        ("tests/contacts/test_split_kernels.py", "tests/contacts/test_split_hull.py",
-         "tests/contacts/test_split_solver.py",
-         "tests/analysis/test_potential_grid.py", "tests/analysis/test_split.py",
-         "tests/analysis/test_split_map.py", "tests/analysis/test_split_definition.py",
-         "tests/analysis/test_split_table.py", "tests/analysis/test_split_closed_form.py"),
+        ("tests/contacts/split/test_split_kernels.py", "tests/contacts/split/test_split_hull.py",
+         "tests/contacts/split/test_split_solver.py",
+         "tests/analysis/split/test_potential_grid.py", "tests/analysis/split/test_split.py",
+         "tests/analysis/split/test_split_map.py", "tests/analysis/split/test_split_definition.py",
+         "tests/analysis/split/test_split_table.py",
+         "tests/analysis/split/test_split_closed_form.py"),
     ),
     "simulation": Room(
         ("simulation",),
-        ("tests/simulation/test_loop_by_definition.py", "tests/simulation/test_prediction.py",
-         "tests/simulation/test_onset_rules.py",
-         "tests/simulation/test_bodies_by_definition.py", "tests/simulation/test_hands.py",
-         "tests/simulation/test_exact.py",
+        ("tests/simulation/test_simulation_loop_by_definition.py",
+         "tests/simulation/onset/test_prediction.py",
+         "tests/simulation/onset/test_onset_rules.py",
+         "tests/simulation/plants/test_bodies_by_definition.py",
+         "tests/simulation/plants/test_hands.py",
+         "tests/simulation/plants/test_exact.py",
          "tests/simulation"),
     ),
 }  # fmt: skip
@@ -140,11 +147,11 @@ ROOMS = {
 
 @dataclass(frozen=True)
 class Mutant:
-    """What became of one change of the code.
+    """The outcome of one mutation.
 
     Attributes:
         module: path below ``src/asperity``.
-        change: the lines that were taken out and put in, without their numbers.
+        change: the removed and added lines, without their numbers.
         survived: whether no test failed.
     """
 
@@ -153,8 +160,8 @@ class Mutant:
     survived: bool
 
 
-def copied(folder: Path) -> Path:
-    """Copy what git knows of the project, with ``../shared`` beside it if there is one."""
+def copy_tree(folder: Path) -> Path:
+    """Copy the files known to git, and link ``../shared`` if it exists."""
     tree = folder / "tree"
     known = subprocess.run(
         ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
@@ -169,8 +176,8 @@ def copied(folder: Path) -> Path:
     return tree
 
 
-def planned(tree: Path, name: str, room: Room, python: str) -> tuple[Path, Path]:
-    """Write a room's configuration, let Cosmic Ray plan; return configuration and session."""
+def plan_mutants(tree: Path, name: str, room: Room, python: str) -> tuple[Path, Path]:
+    """Plan the mutants of a room; return the paths of configuration and session."""
     modules = [f"src/asperity/{part}" for part in room.code]
     tests = f"{python} -m pytest -x -q -p no:xdist -p no:cacheprovider {' '.join(room.tests)}"
     lines = [
@@ -195,18 +202,20 @@ def _cosmic_ray(tree: Path, *arguments: str) -> None:
     subprocess.run(command, cwd=tree, check=True, env=environment)
 
 
-def draw(session: Path, count: int, seed: int) -> int:
-    """Keep a sample of the planned mutants; return how many there are to choose from."""
+def select_mutants(session: Path, count: int, seed: int) -> int:
+    """Select a sample of the planned mutants; return the number to choose from."""
     with use_db(str(session), WorkDB.Mode.open) as work:
         items = sorted(work.work_items, key=lambda item: _order(item.mutations[0]))
-        useful = [item for item in items if _says_something(session.parent, item.mutations[0])]
-        kept = {item.job_id for item in random.Random(seed).sample(useful, min(count, len(useful)))}
-        rest = [item.job_id for item in items if item.job_id not in kept]
+        useful = [item for item in items if _is_effective(session.parent, item.mutations[0])]
+        sample = {
+            item.job_id for item in random.Random(seed).sample(useful, min(count, len(useful)))
+        }
+        rest = [item.job_id for item in items if item.job_id not in sample]
         work.set_multiple_results(rest, WorkResult(WorkerOutcome.SKIPPED))
     return len(useful)
 
 
-def _says_something(tree: Path, mutation: Any) -> bool:
+def _is_effective(tree: Path, mutation: Any) -> bool:
     """Return whether a mutation is of a kind that tests can notice, and not of a decorator."""
     line = (tree / mutation.module_path).read_text("utf-8").splitlines()[mutation.start_pos[0] - 1]
     return bool(_OPERATORS.fullmatch(mutation.operator_name)) and not line.lstrip().startswith("@")
@@ -217,8 +226,8 @@ def _order(mutation: object) -> tuple[str, ...]:
     return tuple(str(getattr(mutation, field)) for field in fields)
 
 
-def outcomes(session: Path) -> list[Mutant]:
-    """Return what became of the sample."""
+def read_outcomes(session: Path) -> list[Mutant]:
+    """Return the outcomes of the sample."""
     found = []
     with use_db(str(session), WorkDB.Mode.open) as work:
         modules = {item.job_id: item.mutations[0].module_path for item in work.work_items}
@@ -234,8 +243,8 @@ def outcomes(session: Path) -> list[Mutant]:
     return found
 
 
-def explained() -> dict[tuple[str, str], str]:
-    """Return why mutants change nothing, by module and change."""
+def load_explanations() -> dict[tuple[str, str], str]:
+    """Return the reasons for which mutants are equivalent, by module and change."""
     if not EXPLAINED.exists():
         return {}
     entries = tomllib.loads(EXPLAINED.read_text("utf-8")).get("mutant", [])
@@ -243,24 +252,24 @@ def explained() -> dict[tuple[str, str], str]:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Run the rooms that are named, or all; 1 if a survivor is not explained."""
+    """Run the given rooms or all; return 1 if a survivor is not explained."""
     parser = argparse.ArgumentParser(description="a seeded sample of mutants, room by room")
     parser.add_argument("rooms", nargs="*", choices=[*ROOMS, []], help="default: all")
     parser.add_argument("--count", type=int, default=20, help="mutants of each room")
     parser.add_argument("--seed", type=int, default=1, help="of the sample")
     parser.add_argument("--python", default=sys.executable, help="runs the tests")
-    parser.add_argument("--keep", type=Path, help="folder that is kept, to look at")
+    parser.add_argument("--keep", type=Path, help="folder to keep for inspection")
     given = parser.parse_args(arguments)
     folder = given.keep or Path(tempfile.mkdtemp(prefix="mutants-"))
-    reasons, total, killed, equivalent, unexplained = explained(), 0, 0, 0, []
+    reasons, total, killed, equivalent, unexplained = load_explanations(), 0, 0, 0, []
     try:
-        tree = copied(folder)
+        tree = copy_tree(folder)
         for name in given.rooms or ROOMS:
-            config, session = planned(tree, name, ROOMS[name], given.python)
+            config, session = plan_mutants(tree, name, ROOMS[name], given.python)
             _cosmic_ray(tree, "baseline", config.name)
-            choice = draw(session, given.count, given.seed)
+            choice = select_mutants(session, given.count, given.seed)
             _cosmic_ray(tree, "exec", config.name, session.name)
-            mutants = outcomes(session)
+            mutants = read_outcomes(session)
             alive = [one for one in mutants if one.survived]
             same = [one for one in alive if (one.module, one.change) in reasons]
             print(

@@ -17,11 +17,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
 from asperity.textures import Fourier, HeightMap, Noise, Profile
 from asperity.textures.texture import Texture
 from bench import cases, peers
-from bench.nearest_exhaustive import extent_of
+from bench.nearest_exhaustive import texture_extent
 from bench.timing import Batch, median_ratio, seconds, take_turns
 
 ROUNDS = 7
@@ -69,7 +69,7 @@ def run(console: Console) -> None:
     missed: list[str] = []
     memory = []
     for subject in _subjects():
-        tree = _plant(subject)
+        tree = _build_tree(subject)
         size = sum(getattr(argument, "nbytes", 0) for argument in subject.texture.arguments)
         memory.append(f"{subject.name}: asperity {size / 1e6:.3g} MB; tree {tree.describe()}")
         for depth in subject.depths:
@@ -103,11 +103,11 @@ def _subjects() -> list[Subject]:
             continue
         depths = {f"{share:.0%}": share * texture.peak_to_valley for share in SHARES}
         limits = dict.fromkeys(depths, PROFILE_LIMIT) if texture.is_profile else {}
-        subjects.append(Subject(name, texture, _fine(texture), depths, limits))
+        subjects.append(Subject(name, texture, _grid_spacing(texture), depths, limits))
     return subjects
 
 
-def _fine(texture: Texture) -> float:
+def _grid_spacing(texture: Texture) -> float:
     """Return the pitch of a profile, or a 40th of the shortest wave [m]."""
     if isinstance(texture, Profile):
         return texture.pitch
@@ -147,11 +147,11 @@ class Tree:
         return f"{size}, built in {self.build:.1f} s"
 
 
-def _plant(subject: Subject) -> Tree:
+def _build_tree(subject: Subject) -> Tree:
     """Return the tree of a surface: its domain, and as far beyond as the deepest probe reaches."""
     from scipy.spatial import cKDTree
 
-    before = _resident()
+    before = _resident_memory()
     texture, step = subject.texture, TREE_STEP * subject.pitch
     reach = max(subject.depths.values())
     domain, axes = texture.domain, np.eye(2)
@@ -167,19 +167,19 @@ def _plant(subject: Subject) -> Tree:
     del flat
     start = perf_counter()
     tree = cKDTree(points)
-    return Tree(axes, points, tree, _resident() - before, perf_counter() - start)
+    return Tree(axes, points, tree, _resident_memory() - before, perf_counter() - start)
 
 
-def _resident() -> float:
+def _resident_memory() -> float:
     """Return the resident memory of this process [bytes]; 0 where it cannot be told."""
     status = Path("/proc/self/statm")
     return float(status.read_text().split()[1]) * 4096.0 if status.exists() else 0.0
 
 
-def _row(subject: Subject, depth: str, tree: Tree) -> tuple[list[str], list[str]]:
+def _row(subject: Subject, depth_name: str, tree: Tree) -> tuple[list[str], list[str]]:
     """Return the cells of a row after its names, and the goals that it misses."""
     texture = subject.texture
-    points = _as_many_as_fit(texture, cases.probes(texture, MOST, subject.depths[depth]))
+    points = _limit_points(texture, cases.probes(texture, MOST, subject.depths[depth_name]))
     loop, arguments = texture._loops.nearest_batch, texture.arguments
     feet, out = np.empty((len(points), 2)), np.empty((len(points), 2))
     god = cases.kernel(texture, "D", points)
@@ -200,18 +200,18 @@ def _row(subject: Subject, depth: str, tree: Tree) -> tuple[list[str], list[str]
     best = _distances(texture, points, feet)
     for n, method in enumerate(methods, start=2):
         method()
-        wrong = _distances(texture, points, out) - best > WRONG * extent_of(texture)
+        wrong = _distances(texture, points, out) - best > WRONG * texture_extent(texture)
         share = f"{100 * wrong.mean():.2g} %"
         cells += [f"{medians[n]:.2f}", f"{median_ratio(times, n, 0):.1f}", share]
     faults = []
-    if medians[0] > subject.limits.get(depth, np.inf):
-        faults.append(f"{subject.name} {depth} {medians[0]:.2f} µs")
+    if medians[0] > subject.limits.get(depth_name, np.inf):
+        faults.append(f"{subject.name} {depth_name} {medians[0]:.2f} µs")
     if ratio > FORCE_LIMIT:
-        faults.append(f"D on {subject.name} {depth} {ratio:.2f}")
+        faults.append(f"D on {subject.name} {depth_name} {ratio:.2f}")
     return cells, faults
 
 
-def _as_many_as_fit(texture: Texture, points: FloatArray) -> FloatArray:
+def _limit_points(texture: Texture, points: FloatArray) -> FloatArray:
     """Return as many of the probes as take a batch's time."""
     loop, arguments = texture._loops.nearest_batch, texture.arguments
     feet = np.empty((LEAST, 2))
@@ -234,8 +234,8 @@ def _last_proxies(texture: Texture, points: FloatArray, pitch: float) -> FloatAr
     return np.ascontiguousarray(texture.nearest(points + aside)[:, :2])
 
 
-def _distances(texture: Texture, points: FloatArray, feet: FloatArray) -> FloatArray:
-    away = np.column_stack([feet, texture.height(feet)]) - points
+def _distances(texture: Texture, points: FloatArray, closest_points: FloatArray) -> FloatArray:
+    away = np.column_stack([closest_points, texture.height(closest_points)]) - points
     return np.asarray(np.linalg.norm(away, axis=1))
 
 

@@ -20,15 +20,15 @@ from numba import njit
 from rich.console import Console
 from rich.table import Table
 
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid
-from asperity.textures.loading import load_texture
-from asperity.textures.noise import Noise, NoiseProfile
+from asperity.textures.kinds.noise import Noise, NoiseProfile
 from asperity.textures.texture import Texture
+from asperity.textures.texture_loading import load_texture
 
 COUNT = 100_000
 REAL = Path(__file__).parent.parent.parent / "shared" / "data" / "sample-land.x3p"
-KEPT = 8  # candidates for each probe
+CANDIDATES = 8  # candidates for each probe
 TOLERANCE = 1e-12  # of the extent
 _POLISH = 60  # steps, most of them needed by a few candidates only
 _SEED = 20240801
@@ -67,7 +67,7 @@ def _fourier(waves: Any, amplitudes: Any, step: float, depth: float) -> Case:
     return Case(Fourier(amplitudes, 2.0 * np.pi / 1e-3 * np.array(waves), phases), step, depth)
 
 
-def _bullet() -> Case:
+def _bullet_case() -> Case:
     """Return a third of a measured surface, 300 x 256 points, magnified 20 times."""
     whole = load_texture(REAL, magnify=20.0, cutoff=20e-6)
     assert isinstance(whole, HeightMap)
@@ -94,7 +94,7 @@ CASES: dict[str, Callable[[], Case]] = {
     "triangle": lambda: _wave(lambda t: np.abs(2.0 * t - 1.0)),
     "square": lambda: _wave(lambda t: (t < 0.5).astype(float)),
     "sawtooth": lambda: _wave(lambda t: t),
-    "bullet land, magnified": _bullet,
+    "bullet land, magnified": _bullet_case,
 }
 
 
@@ -108,7 +108,7 @@ def probes(case: Case, count: int, seed: int = _SEED) -> FloatArray:
     return np.ascontiguousarray(np.column_stack([xy, case.texture.height(xy) - depth]))
 
 
-def exhaustive(case: Case, points: FloatArray) -> FloatArray:
+def search_exhaustively(case: Case, points: FloatArray) -> FloatArray:
     """Return the distance of each probe from the surface [m]."""
     texture = case.texture
     axes = np.eye(2)
@@ -127,7 +127,7 @@ def exhaustive(case: Case, points: FloatArray) -> FloatArray:
     local = np.zeros((len(points), 3))
     local[:, : len(axes)] = (along - [tick[0] for tick in ticks]) / case.step
     local[:, 2] = points[:, 2]
-    kept = np.full((len(points), KEPT, 2), -1, dtype=np.int64)
+    kept = np.full((len(points), CANDIDATES, 2), -1, dtype=np.int64)
     lowest_minima(local, reach, grid, case.step, kept)
     probe, which = np.nonzero(kept[:, :, 0] >= 0)
     chosen = kept[probe, which][:, : len(axes)]
@@ -140,7 +140,7 @@ def exhaustive(case: Case, points: FloatArray) -> FloatArray:
 
 
 @njit
-def lowest_minima(points: Any, reach: Any, grid: Any, step: float, kept: Any) -> None:
+def lowest_minima(points: Any, reach: Any, grid: Any, step: float, indices: Any) -> None:
     """Write the samples (column, row) at the lowest local minima of the distance.
 
     Args:
@@ -148,10 +148,10 @@ def lowest_minima(points: Any, reach: Any, grid: Any, step: float, kept: Any) ->
         reach: how far to look [m], shape (n,).
         grid: heights [m], shape (rows, columns); one row for a profile.
         step: distance of the samples [m].
-        kept: result, shape (n, k, 2); as it was where there are fewer.
+        indices: result, shape (n, k, 2); as it was where there are fewer.
     """
     rows, columns = grid.shape
-    values = np.empty(kept.shape[1])
+    values = np.empty(indices.shape[1])
     for n in range(len(points)):
         u, v, z = points[n]
         values[:] = np.inf
@@ -170,11 +170,11 @@ def lowest_minima(points: Any, reach: Any, grid: Any, step: float, kept: Any) ->
                     k = len(values) - 1
                     while k > 0 and values[k - 1] > value:
                         values[k] = values[k - 1]
-                        kept[n, k] = kept[n, k - 1]
+                        indices[n, k] = indices[n, k - 1]
                         k -= 1
                     values[k] = value
-                    kept[n, k, 0] = j
-                    kept[n, k, 1] = i
+                    indices[n, k, 0] = j
+                    indices[n, k, 1] = i
 
 
 def local_minima(
@@ -230,7 +230,7 @@ def distances(texture: Texture, points: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.norm(texture.nearest(points) - points, axis=1))
 
 
-def extent_of(texture: Texture) -> float:
+def texture_extent(texture: Texture) -> float:
     """Return the length of the first span of the domain [m]."""
     return float(np.hypot(*texture.domain.spans[0]))
 
@@ -255,8 +255,8 @@ def run(console: Console, count: int = COUNT, kinds: list[str] | None = None) ->
             continue
         start, case = perf_counter(), CASES[kind]()
         texture, points = case.texture, probes(CASES[kind](), count)
-        extent = extent_of(texture)
-        found, best = distances(texture, points), exhaustive(case, points)
+        extent = texture_extent(texture)
+        found, best = distances(texture, points), search_exhaustively(case, points)
         local = local_minima(texture, points, points[:, :2].copy(), case.step)
         excess = (found - best) / extent
         wrong = int((np.abs(excess) > TOLERANCE).sum())

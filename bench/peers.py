@@ -6,13 +6,11 @@ probe's x, y and a third point beside the two, ended when the squared distances 
 agree to 1e-4.
 """
 
-from asperity.checks import FloatArray
-from asperity.compiled import Kernels
-from asperity.contacts.sampler import curvature, height
+from asperity.contacts.sampler_interface import sample_height, sample_hessian
+from asperity.core.checks import FloatArray
+from asperity.core.compiled import Kernels
 
-KERNELS = Kernels(
-    requires=("curvature", "height"), loops=("peer_polish_batch", "peer_simplex_batch")
-)
+KERNELS = Kernels(loops=("peer_polish_batch", "peer_simplex_batch"))
 
 Corner = tuple[float, float, float]
 
@@ -22,7 +20,7 @@ def peer_polish(
 ) -> tuple[float, float]:
     """Return where Newton's method leads from a start near a minimum of the distance."""
     for _ in range(30):
-        h, hx, hy, hxx, hxy, hyy = curvature(fx, fy, texture)
+        h, hx, hy, hxx, hxy, hyy = sample_hessian(fx, fy, texture)
         px = fx - x + (h - z) * hx
         py = fy - y + (h - z) * hy
         qxx = 1.0 + hx * hx + (h - z) * hxx
@@ -52,7 +50,7 @@ def peer_polish_batch(
 
 def peer_corner(x: float, y: float, z: float, fx: float, fy: float, texture: object) -> Corner:
     """Return a corner of the simplex: a point and its squared distance from the probe."""
-    gap = height(fx, fy, texture) - z
+    gap = sample_height(fx, fy, texture) - z
     return fx, fy, (fx - x) * (fx - x) + (fy - y) * (fy - y) + gap * gap
 
 

@@ -22,11 +22,11 @@ from rich.console import Console
 from rich.progress import track
 
 from asperity.analysis import characteristic_number, one_sided_number
+from asperity.analysis.assess_passivity import passivity
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.judge_passivity import passivity
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
 from asperity.devices import parse_device
-from asperity.simulation import Cartesian, Run, Servo, SpringHand, Still, simulate_many
+from asperity.simulation import Cartesian, Run, Servo, SpringHand, Stationary, simulate_many
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 
@@ -50,11 +50,11 @@ class Scene:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SceneOutcome:
     """What became of a scene.
 
     Attributes:
-        counted: whether it stayed in the region for which the numbers hold, and touched.
+        is_valid: whether it stayed in the region for which the numbers hold, and touched.
         excess: greatest value over time of the texture's work less the damping's loss, as a share
             of the exchanged energy.
         cycles: whether it still moves as much in the last quarter as in the one before, and the
@@ -63,7 +63,7 @@ class Outcome:
         share: greatest value over time of the texture's work over the damping's loss.
     """
 
-    counted: bool
+    is_valid: bool
     excess: float
     cycles: bool
     share: float
@@ -112,13 +112,15 @@ def _scene(rng: np.random.Generator, factor: tuple[float, float] | None) -> Scen
         wall = plant.damping[2, 2] / ((delay + 0.5) * period)
         stiffness = share * wall / numbers[1].upper
     else:
-        allowed = passivity(unit, parse_device(rig, "drawn"), *numbers, worst_loop(unit)).allowed
+        allowed = passivity(
+            unit, parse_device(rig, "drawn"), *numbers, worst_loop(unit)
+        ).stability_limit
         stiffness = share * (allowed.stiffness or 0.0)
     surface = Surface(texture, law, stiffness, depth)
     judged = passivity(surface, parse_device(rig, "drawn"), *numbers, worst_loop(surface))
     job = {
         "surface": surface, "plant": plant, "hand": _hand(rng, surface, depth),
-        "servo": Servo(period, delay=delay), "motion": Still((0.0, 0.0, 0.0)),
+        "servo": Servo(period, delay=delay), "motion": Stationary((0.0, 0.0, 0.0)),
         "duration": SAMPLES * period,
         "start": (0.0, 0.0, texture.amplitude + float(rng.uniform(0.0, 0.5e-3))),
         "velocity": depth / period * 0.02 * rng.normal(size=3) * [1.0, 1.0, 0.5],
@@ -145,7 +147,7 @@ def _hand(rng: np.random.Generator, surface: Surface, depth: float) -> SpringHan
     return SpringHand(spring, mass=mass, force=(*(0.3 * press * rng.normal(size=2)), -press))
 
 
-def outcome(scene: Scene, run: Run) -> Outcome:
+def outcome(scene: Scene, run: Run) -> SceneOutcome:
     """Return what became of a scene."""
     surface: Surface = scene.job["surface"]
     places = run.position
@@ -159,10 +161,10 @@ def outcome(scene: Scene, run: Run) -> Outcome:
     quarter = len(places) // 4
     before, last = (_rms(run.velocity[-i * quarter :][:quarter]) for i in (2, 1))
     fed, lost = work[-1] - work[-quarter], loss[-1] - loss[-quarter]
-    return Outcome(
+    return SceneOutcome(
         bool(within and depths.max() > 0.0),
         float((work - loss).max()) / run.ledger.exchanged,
-        bool(run.stopped or (last > 1e-4 and last > 0.98 * before and fed > 0.5 * lost)),
+        bool(run.stop_message or (last > 1e-4 and last > 0.98 * before and fed > 0.5 * lost)),
         float((work[loss > 0.0] / loss[loss > 0.0]).max()),
     )
 
@@ -171,25 +173,25 @@ def _rms(velocity: FloatArray) -> float:
     return float(np.sqrt((velocity**2).sum(axis=1).mean()))
 
 
-def outcomes(some: list[Scene]) -> list[Outcome]:
+def outcomes(batch: list[Scene]) -> list[SceneOutcome]:
     """Return what becomes of some scenes; what seems to cycle is looked at eight times as long."""
-    runs = simulate_many([scene.job for scene in some])
-    found = [outcome(scene, run) for scene, run in zip(some, runs, strict=True)]
-    seeming = [i for i, each in enumerate(found) if each.cycles and not runs[i].stopped]
-    longer = [{**some[i].job, "duration": 8.0 * some[i].job["duration"]} for i in seeming]
+    runs = simulate_many([scene.job for scene in batch])
+    found = [outcome(scene, run) for scene, run in zip(batch, runs, strict=True)]
+    seeming = [i for i, each in enumerate(found) if each.cycles and not runs[i].stop_message]
+    longer = [{**batch[i].job, "duration": 8.0 * batch[i].job["duration"]} for i in seeming]
     for i, run in zip(seeming, simulate_many(longer) if longer else [], strict=True):
-        lasting = outcome(some[i], run)
+        lasting = outcome(batch[i], run)
         found[i] = replace(found[i], cycles=lasting.cycles)
     return found
 
 
 def delay_rule(count: int, seed: int, console: Console) -> int:
     """Print how many scenes cycle that are called passive, and the negative controls; 1 if any."""
-    found: list[Outcome] = []
+    found: list[SceneOutcome] = []
     for first in track(range(0, count, 200), "random scenes", console=console, transient=True):
         some = list(scenes(min(200, count - first), seed + first))
         found += outcomes([scene for scene in some if scene.passive])
-    counted = [each for each in found if each.counted]
+    counted = [each for each in found if each.is_valid]
     broken = [each for each in counted if each.excess > ROUNDING or each.cycles]
     console.print(
         f"{count} random scenes, {len(found)} called passive, {len(counted)} of them in contact "

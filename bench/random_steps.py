@@ -18,11 +18,11 @@ from rich.console import Console
 from rich.progress import track
 
 from asperity.analysis import characteristic_number, one_sided_number
+from asperity.analysis.assess_passivity import passivity
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.judge_passivity import passivity
-from asperity.analysis.passivity.criteria import DELAY, STEPS
+from asperity.analysis.passivity.criteria import DELAY, QUANTIZATION
 from asperity.devices import parse_device
-from asperity.simulation import Cartesian, Run, Servo, SpringHand, Still, simulate_many
+from asperity.simulation import Cartesian, Run, Servo, SpringHand, Stationary, simulate_many
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 
@@ -34,7 +34,7 @@ _AT_ONCE = 200
 
 
 @dataclass(frozen=True)
-class Scene:
+class QuantisedScene:
     """A scene with what the program says of it.
 
     Attributes:
@@ -50,21 +50,21 @@ class Scene:
     depth: float
 
 
-def scenes(count: int, seed: int, *, halved: bool = False) -> Iterator[Scene]:
+def scenes(count: int, seed: int, *, is_halved: bool = False) -> Iterator[QuantisedScene]:
     """Yield random scenes.
 
     Args:
         count: how many.
         seed: of the draw.
-        halved: whether the program is told half of the position step, with a friction that would
+        is_halved: whether the program is told half of the position step, with a friction that would
             just silence what half of it may cause.
     """
     rng = np.random.default_rng(seed)
     for _ in range(count):
-        yield _scene(rng, halved=halved)
+        yield _scene(rng, is_halved=is_halved)
 
 
-def _scene(rng: np.random.Generator, *, halved: bool) -> Scene:
+def _scene(rng: np.random.Generator, *, is_halved: bool) -> QuantisedScene:
     law, delay = LAWS[rng.integers(len(LAWS))], int(rng.integers(4))
     period = float(10.0 ** rng.uniform(-4.0, -3.0))
     damping = float(rng.uniform(0.5, 5.0))
@@ -81,11 +81,11 @@ def _scene(rng: np.random.Generator, *, halved: bool) -> Scene:
     along = np.sqrt(3.0)
     phi = 0.5 * along * (k * numbers[0].upper * step + force_step)
     friction = phi * float(rng.choice([0.0, rng.uniform(0.5, 0.99), rng.uniform(1.01, 1.5)]))
-    if halved:
+    if is_halved:
         force_step, friction = 0.0, 0.505 * 0.5 * along * k * numbers[0].upper * step
     rig = {
         "damping": damping, "update_rate": 1.0 / period, "delay_samples": delay,
-        "position_resolution": 0.5 * step if halved else step, "force_resolution": force_step,
+        "position_resolution": 0.5 * step if is_halved else step, "force_resolution": force_step,
         "least_friction": friction,
     }  # fmt: skip
     known = {name: value for name, value in rig.items() if value}
@@ -106,63 +106,63 @@ def _scene(rng: np.random.Generator, *, halved: bool) -> Scene:
         "servo": Servo(
             period, delay=delay, position_resolution=step, force_resolution=force_step
         ),
-        "motion": Still((0.0, 0.0, 0.0)), "duration": SAMPLES * period,
+        "motion": Stationary((0.0, 0.0, 0.0)), "duration": SAMPLES * period,
         "start": (0.0, 0.0, texture.amplitude + float(rng.uniform(0.0, 0.3e-3))),
         "velocity": 0.02 * depth / period * rng.normal(size=3),
     }  # fmt: skip
-    silent = bool(judged.criterion(STEPS).holds)
+    silent = bool(judged.criterion(QUANTIZATION).holds)
     bound = 0.0 if silent or judged.buzz is None else judged.buzz.speed
     # C's numbers hold down to its depth, those of W and H at any.
-    return Scene(job, silent, bound, depth if law == "C" else np.inf)
+    return QuantisedScene(job, silent, bound, depth if law == "C" else np.inf)
 
 
-def speed(run: Run) -> float:
+def tail_speed(run: Run) -> float:
     """Return the RMS speed, by way per sample, of the last quarter of a run [m/s]."""
     places = run.position[-(len(run.position) // 4) :]
     steps = np.diff(places, axis=0)
     return float(np.sqrt(np.square(steps).sum(axis=1).mean()) / run.period)
 
 
-def creeps(run: Run) -> bool:
+def is_creeping(run: Run) -> bool:
     """Return whether the last quarter goes somewhere, so that it does not repeat itself.
 
     A hand that is pulled aside, whose friction a faint trembling loosens, creeps home for long: its
     way from beginning to end is a good part of the way that it went. That of a buzz is not.
     """
     places = run.position[-(len(run.position) // 4) :]
-    way = speed(run) * run.period * (len(places) - 1)
+    way = tail_speed(run) * run.period * (len(places) - 1)
     return float(np.linalg.norm(places[-1] - places[0])) > 0.3 * way
 
 
-def _deepest(scene: Scene, run: Run) -> float:
+def _deepest(scene: QuantisedScene, run: Run) -> float:
     """Return the depth that is reached below the texture, or the plane of the smooth wall [m]."""
     texture, places = scene.job["surface"].texture, run.position
-    if not scene.job["surface"].feels_texture:
+    if not scene.job["surface"].depends_on_texture:
         return float(-places[:, 2].min())
     return float((texture.height(places[:, :2]) - places[:, 2]).max())
 
 
-def shares(some: list[Scene]) -> list[float]:
+def shares(batch: list[QuantisedScene]) -> list[float]:
     """Return speed over bound, for scenes that stay where their numbers hold.
 
     A silent scene counts as 0 if it comes to rest, else as infinite. What is above its bound is run
     longer: it may only not have settled; and one that then still creeps counts as 0.
     """
-    runs = simulate_many([scene.job for scene in some])
+    runs = simulate_many([scene.job for scene in batch])
     found = []
-    for scene, run in zip(some, runs, strict=True):
-        if run.stopped or not 0.0 < _deepest(scene, run) <= scene.depth:
+    for scene, run in zip(batch, runs, strict=True):
+        if run.stop_message or not 0.0 < _deepest(scene, run) <= scene.depth:
             continue  # not where the numbers hold, or still on its way to the surface
-        share = _share(scene, speed(run))
+        share = _share(scene, tail_speed(run))
         if share > 1.0:
             longer = {**scene.job, "duration": LONGER * scene.job["duration"]}
             (lasting,) = simulate_many([longer])
-            share = 0.0 if creeps(lasting) else _share(scene, speed(lasting))
+            share = 0.0 if is_creeping(lasting) else _share(scene, tail_speed(lasting))
         found.append(share)
     return found
 
 
-def _share(scene: Scene, moving: float) -> float:
+def _share(scene: QuantisedScene, moving: float) -> float:
     if moving <= STILL:
         return 0.0
     return moving / scene.speed if scene.speed > 0.0 else np.inf
@@ -182,7 +182,7 @@ def steps_rule(count: int, seed: int, console: Console) -> int:
         f"within the depth of their numbers: {above} above the bound or not at rest; "
         f"{sum(share > 0.0 for share in found)} buzz, at most at {max(found):.3f} of the bound"
     )
-    control = shares(list(scenes(min(count, 1000), seed, halved=True)))
+    control = shares(list(scenes(min(count, 1000), seed, is_halved=True)))
     broken = sum(share > 1.0 for share in control)
     console.print(f"control, half of ε: {broken} of {len(control)} are above the bound")
     return int(above > 0 or broken == 0)

@@ -14,15 +14,15 @@ import numpy as np
 import sympy as sp
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.bounds.measures import curl, precise_norm, precise_one_sided
-from asperity.analysis.gain.answers import at_unit_stiffness
+from asperity.analysis.bounds.measures import curl_norm, precise_norm, precise_one_sided
 from asperity.analysis.gain.characteristic import (
     characteristic_number,
     curl_number,
     one_sided_number,
 )
-from asperity.checks import FloatArray
+from asperity.analysis.gain.surface_cache import at_unit_stiffness
 from asperity.contacts.symbols import ContactSymbols
+from asperity.core.checks import FloatArray
 from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid
@@ -34,7 +34,7 @@ Number = Callable[..., Bound]
 NUMBERS: dict[str, tuple[Number, Callable[[FloatArray], FloatArray]]] = {
     "q": (characteristic_number, precise_norm),
     "q+": (one_sided_number, precise_one_sided),
-    "curl": (curl_number, curl),
+    "curl": (curl_number, curl_norm),
 }
 # What rounding may add to a number that is evaluated, and to one that is attained.
 EXCESS = 1e-12
@@ -236,10 +236,7 @@ def random_surface(rng: Generator, letters: str = SHIPPED) -> tuple[str, Surface
 
 
 def random_contacts(
-    rng: Generator,
-    surface: Surface,
-    count: int,
-    around: tuple[float, float] | None = None,
+    rng: Generator, surface: Surface, count: int, around: tuple[float, float] | None = None
 ) -> Contacts:
     """Return contacts spread over the working region, or around a point of the plane.
 
@@ -321,28 +318,28 @@ class Trial:
     missed: float
 
     @property
-    def right(self) -> bool:
+    def is_correct(self) -> bool:
         """Whether nothing exceeds ``upper`` and ``lower`` is attained."""
         ordered = self.bound.lower <= self.bound.upper
         return ordered and self.excess <= EXCESS and self.missed <= EXCESS
 
     @property
-    def tight(self) -> bool:
+    def is_tight(self) -> bool:
         """Whether the gap is the one promised, or the note says why not."""
         bound = self.bound
         said = any(word in bound.note for word in ("limit", "extent", "only near", "medial axis"))
         idle = not np.isfinite(bound.upper) or bound.upper < 1e-8
-        return said or idle or bound.gap <= 1.01 * self.promised
+        return said or idle or bound.gap <= 1.01 * self.promised_gap
 
     @property
-    def promised(self) -> float:
+    def promised_gap(self) -> float:
         """The relative gap that is promised for this kind of texture and law."""
         if self.kind == "map" or self.law in OWN:
             return 1e-3
         return 1e-4 if self.kind == "three phases" else 1e-6
 
 
-def trial(seed: int, letters: str = SHIPPED, points: int = 200) -> Trial:
+def run_trial(seed: int, letters: str = SHIPPED, points: int = 200) -> Trial:
     """Certify a number of a random surface and evaluate it at random contacts."""
     rng = np.random.default_rng(seed)
     kind, surface = random_surface(rng, letters)
@@ -354,12 +351,14 @@ def trial(seed: int, letters: str = SHIPPED, points: int = 200) -> Trial:
     values = measure(contacts.jacobians(surface))
     most = float(values.max(initial=0.0)) if not np.isnan(values).any() else np.inf
     excess = most / bound.upper - 1.0 if bound.upper > 0.0 else most
-    missed = _missed(surface, bound, measure)
+    missed = _witness_error(surface, bound, measure)
     count = len(contacts.points)
     return Trial(seed, kind, surface.law.letter, name, bound, count, excess, missed)
 
 
-def _missed(surface: Surface, bound: Bound, measure: Callable[[FloatArray], FloatArray]) -> float:
+def _witness_error(
+    surface: Surface, bound: Bound, measure: Callable[[FloatArray], FloatArray]
+) -> float:
     if bound.at is None or not np.isfinite(bound.lower) or bound.lower == 0.0:
         return 0.0
     state: tuple[Any, ...] = ()

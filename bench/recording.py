@@ -11,10 +11,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
 from asperity.recording.recording import open_recording
 from asperity.recording.writer import RecordingWriter
-from asperity.simulation.trace import COLUMNS, FileTrace, TextTrace
+from asperity.simulation.trace import COLUMNS, RecordingTrace, TextTrace
 from bench.timing import median_ratio, take_turns
 
 GOAL_CORE = 0.05
@@ -61,11 +61,11 @@ def _share(path: Path, rows: FloatArray, block: int) -> float:
 
 def _per_row(console: Console, folder: Path) -> None:
     rows = _rows(16_384)  # as many as a simulation hands on at once
-    recording, text = FileTrace(folder / "a.mcap"), TextTrace(folder / "a.csv")
+    recording, text = RecordingTrace(folder / "a.mcap"), TextTrace(folder / "a.csv")
 
-    def keep(trace: FileTrace | TextTrace) -> None:
-        trace.room(len(rows))[: len(rows)] = rows
-        trace.keep(len(rows))
+    def keep(trace: RecordingTrace | TextTrace) -> None:
+        trace.buffer(len(rows))[: len(rows)] = rows
+        trace.commit(len(rows))
 
     try:
         times = take_turns([partial(keep, recording), partial(keep, text)], ROUNDS)

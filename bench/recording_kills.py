@@ -21,8 +21,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.console import Console
 
-from asperity.checks import FloatArray
-from asperity.errors import ParameterError
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError
 from asperity.recording.recording import open_recording
 from asperity.recording.writer import RecordingWriter
 
@@ -36,7 +36,7 @@ _CONTEXT = multiprocessing.get_context("forkserver")
 _COLUMNS = (("time", "s"), ("clock", "s"), *((f"c{i}", "N") for i in range(28)))
 
 
-class _Child(NamedTuple):
+class _RecordingProcess(NamedTuple):
     process: BaseProcess
     path: Path
     begun: Any
@@ -48,7 +48,7 @@ def run(count: int, console: Console, seed: int = 0) -> Counter[str]:
     """Print what so many kills did; return how often each fault was seen."""
     _CONTEXT.set_forkserver_preload(["asperity.recording.recording", "asperity.recording.writer"])
     draw, faults, lost = random.Random(seed), Counter[str](), [0.0]
-    waiting: deque[_Child] = deque()
+    waiting: deque[_RecordingProcess] = deque()
     with tempfile.TemporaryDirectory() as folder:
         for index in range(count):
             waiting.append(_start(Path(folder) / f"{index}.mcap", draw))
@@ -65,13 +65,13 @@ def run(count: int, console: Console, seed: int = 0) -> Counter[str]:
     return found
 
 
-def _start(path: Path, draw: random.Random) -> _Child:
+def _start(path: Path, draw: random.Random) -> _RecordingProcess:
     now, begun = time.monotonic(), _CONTEXT.Value("d", 0.0)
     kill_at = now + draw.uniform(0.0, LONGEST)
     closes_at = now + draw.uniform(0.0, 2.0 * LONGEST)
     process = _CONTEXT.Process(target=_record, args=(path, begun, closes_at), daemon=True)
     process.start()
-    return _Child(process, path, begun, kill_at, closes_at)
+    return _RecordingProcess(process, path, begun, kill_at, closes_at)
 
 
 def _record(path: Path, began: Any, closes_at: float) -> None:
@@ -97,7 +97,7 @@ def _rows(first: int) -> FloatArray:
     return table
 
 
-def _end(child: _Child) -> tuple[str, float]:
+def _end(child: _RecordingProcess) -> tuple[str, float]:
     """Kill a process when it is due; return what is wrong then, and what was lost [s]."""
     time.sleep(max(child.kill_at - time.monotonic(), 0.0))
     killed = time.monotonic()

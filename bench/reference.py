@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
 from asperity.textures import HeightMap, Sinusoid
 from asperity.textures.texture import Texture
 from bench.cases import Kernel
@@ -116,7 +116,7 @@ def reference(library: ctypes.CDLL, kernel: Kernel) -> Reference:
 RUNS = ("run_force", "run_jacobian")
 
 
-def check(kernel: Kernel, other: Reference, runs: Sequence[str] = RUNS) -> float:
+def check_agreement(kernel: Kernel, other: Reference, runs: Sequence[str] = RUNS) -> float:
     """Return the greatest difference, norm-wise; forces relative to k max(|h|, |z|).
 
     Raises:

@@ -19,15 +19,20 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from asperity.servo.drivers.own import OwnDriver
+from asperity.servo.driver_loop import (
+    DriverLoop,
+    build_program,
+    function_address,
+    no_clock,
+    system_clock,
+)
+from asperity.servo.drivers.library import LibraryDriver
 from asperity.servo.drivers.simulated import simulated_driver
-from asperity.servo.fault import Cause
-from asperity.servo.loop import Loop, address, no_clock, render, system_clock
+from asperity.servo.fault import EndReason
+from asperity.servo.loop_memory import LoopMemory, LoopStatistics
 from asperity.servo.process import ServoProcess
 from asperity.servo.safety import Safety
-from asperity.servo.shared import Shared
-from asperity.servo.statistics import Statistics
-from asperity.simulation import Cartesian, Servo, SpringHand, Still
+from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 from bench.timing import take_turns
@@ -50,7 +55,7 @@ int at_once(int clock, int how, const void *due, void *rest)
 
 
 @contextmanager
-def compiled(text: str, *flags: str) -> Iterator[Path]:
+def compile_source(text: str, *flags: str) -> Iterator[Path]:
     """Compile C; yield the result."""
     with tempfile.TemporaryDirectory() as folder:
         source, made = Path(folder) / "source.c", Path(folder) / "made.so"
@@ -59,17 +64,19 @@ def compiled(text: str, *flags: str) -> Iterator[Path]:
         yield made
 
 
-def own_cost(console: Console) -> None:
+def loop_overhead(console: Console) -> None:
     """Print what a sample costs besides device, law and waiting, with and without the clock."""
-    with compiled(_NOTHING, "-shared", "-fPIC") as path:
-        driver = OwnDriver(str(path))
-        shown, record = render(Surface(TEXTURE, "W", stiffness=300.0), driver), driver.open()
-        at_once = address(ctypes.CDLL(str(path)).at_once)
+    with compile_source(_NOTHING, "-shared", "-fPIC") as path:
+        driver = LibraryDriver(str(path))
+        shown, record = build_program(Surface(TEXTURE, "W", stiffness=300.0), driver), driver.open()
+        at_once = function_address(ctypes.CDLL(str(path)).at_once)
         clocks = no_clock(), system_clock()._replace(nanosleep=at_once)
 
         def go(index: int) -> None:
-            servo, board = Servo(1e-4, max_force=3.0), Shared().board()
-            Loop(driver, servo, PATIENT, 1.0, board, clocks[index]).run(shown, record, SAMPLES)
+            servo, board = Servo(1e-4, max_force=3.0), LoopMemory().block()
+            DriverLoop(driver, servo, PATIENT, 1.0, board, clocks[index]).run(
+                shown, record, SAMPLES
+            )
 
         times = take_turns([lambda: go(0), lambda: go(1)], 9) / SAMPLES
     for name, cost in zip(("without clock", "with clock"), np.median(times, axis=0), strict=True):
@@ -81,7 +88,7 @@ def timekeeping(console: Console, seconds: float) -> None:
 
     Both run at the same time and on the same core, so that what else the machine does meets both.
     """
-    with compiled((HERE / "nanosleep.c").read_text()) as bare, one_core():
+    with compile_source((HERE / "nanosleep.c").read_text()) as bare, one_core():
         for rate in RATES:
             words = [str(bare), str(round(1e9 / rate)), str(seconds)]
             counted, said = _loop(rate, seconds, words)
@@ -90,7 +97,7 @@ def timekeeping(console: Console, seconds: float) -> None:
             console.print(
                 f"{rate / 1e3:.0f} kHz, {seconds:g} s: C {done[1]} of {done[0]} late, worst"
                 f" {1e-3 * done[2]:.0f} µs; loop {counted.late} of {counted.samples}, worst"
-                f" {1e6 * counted.worst:.0f} µs; ratio {ratio:.2f} (goal: 1.1)"
+                f" {1e6 * counted.max_lateness:.0f} µs; ratio {ratio:.2f} (goal: 1.1)"
             )
 
 
@@ -105,15 +112,15 @@ def one_core() -> Iterator[None]:
         os.sched_setaffinity(0, cores)
 
 
-def _loop(rate: float, seconds: float, beside: list[str]) -> tuple[Statistics, str]:
+def _loop(rate: float, seconds: float, beside: list[str]) -> tuple[LoopStatistics, str]:
     """Return what a loop counted, and what a program said that ran at the same time."""
     servo = Servo(1.0 / rate, max_force=3.0)
     hand = SpringHand(stiffness=300.0, damping=3.0, mass=0.05)
-    driver = simulated_driver(Cartesian(0.05), hand, servo, Still((0.0, 0.0, -1e-3)), 1.0)
+    driver = simulated_driver(Cartesian(0.05), hand, servo, Stationary((0.0, 0.0, -1e-3)), 1.0)
     surface = Surface(TEXTURE, "C", stiffness=300.0)
     with ServoProcess(surface, driver, servo, PATIENT, duration=seconds) as loop:
         with subprocess.Popen(beside, stdout=subprocess.PIPE, text=True) as other:
-            while loop.poll() is Cause.GOING:
+            while loop.poll() is EndReason.RUNNING:
                 time.sleep(0.05)
             said = other.communicate()[0]
         return loop.statistics, said
@@ -141,7 +148,7 @@ def run(console: Console, seconds: float = SECONDS) -> None:
     if shutil.which("gcc") is None:
         console.print("not run: no gcc")
         return
-    own_cost(console)
+    loop_overhead(console)
     first_force(console)
     timekeeping(console, seconds)
 

@@ -22,19 +22,19 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from asperity.errors import AsperityError
+from asperity.core.errors import AsperityError
+from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.recording import Recording, open_recording
-from asperity.servo.fault import Cause
-from asperity.servo.kernels.published import COLUMNS
-from asperity.servo.loop import Loop, render, system_clock
+from asperity.servo.driver_loop import DriverLoop, build_program, system_clock
+from asperity.servo.fault import EndReason
+from asperity.servo.loop_memory import LoopMemory
+from asperity.servo.loop_recorder import LoopRecorder
 from asperity.servo.process import ServoProcess
-from asperity.servo.recorder import Recorder
 from asperity.servo.safety import Safety
-from asperity.servo.shared import Shared
 from asperity.simulation import Servo
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
-from bench.servo_rigs import RIGS, Force, Rig
+from bench.servo_rigs import RIGS, DriverRig, Force
 
 COUNT, KILLS = 1000, 5
 SERVO = Servo(1e-3, max_force=3.0)
@@ -53,114 +53,117 @@ _TOOK = [name for name, _unit in COLUMNS].index("took")
 
 
 @dataclass
-class Outcome:
+class FaultOutcome:
     """What faults of a driver did.
 
     Attributes:
         causes: how often each pair of fault and cause was seen.
         wrong: what must not be, in words.
-        took: from the beginning of the sample in which it was found to its force of zero [s].
-        reached: from the end of the loop to a device that holds no force [s].
-        pushed: how many came while a force was held.
+        reaction_times: time from the sample of detection to its force of zero [s].
+        release_times: from the end of the loop to a device that holds no force [s].
+        under_force: how many came while a force was held.
     """
 
     causes: Counter[str] = field(default_factory=Counter)
     wrong: list[str] = field(default_factory=list)
-    took: list[float] = field(default_factory=list)
-    reached: list[float] = field(default_factory=list)
-    pushed: int = 0
+    reaction_times: list[float] = field(default_factory=list)
+    release_times: list[float] = field(default_factory=list)
+    under_force: int = 0
 
 
-def faults(rig: Rig, count: int, seed: int = 0) -> Outcome:
+def inject_faults(rig: DriverRig, count: int, seed: int = 0) -> FaultOutcome:
     """Return what so many faults of a driver did."""
-    draw, said = random.Random(seed), Outcome()
+    draw, said = random.Random(seed), FaultOutcome()
     with tempfile.TemporaryDirectory() as folder:
         for index in range(count):
             fault = draw.choice((*rig.faults, *ANY))
             at = draw.randint(*AT)
             try:
-                _one(rig, fault, at, Path(folder) / "run.mcap", said)
+                _inject_fault(rig, fault, at, Path(folder) / "run.mcap", said)
             except AsperityError as error:
                 said.wrong.append(f"{index}: {fault} at {at}: {error}")
     return said
 
 
-def _one(rig: Rig, fault: str, at: int, path: Path, said: Outcome) -> None:
+def _inject_fault(rig: DriverRig, fault: str, at: int, path: Path, outcome: FaultOutcome) -> None:
     """Let a driver fail, look at what it did, and start it again."""
     surface = SURFACE.to_depth(0.2e-3) if fault == DEEP else SURFACE
     safety = Safety(
         ramp=0.005, lateness=0.1, misses=10**6, silence=WATCHED if fault == UNWATCHED else 60.0
     )  # fmt: skip
-    with rig.failing("" if fault in ANY else fault, at) as driver:
-        shared = Shared()
-        loop = Loop(driver, SERVO, safety, 1.0, shared.board(), system_clock())
-        shown = render(surface, driver)
-        loop.load(shown)
+    with rig.failing_driver("" if fault in ANY else fault, at) as driver:
+        shared = LoopMemory()
+        loop = DriverLoop(driver, SERVO, safety, 1.0, shared.block(), system_clock())
+        shown = build_program(surface, driver)
+        loop.compile(shown)
         record = driver.open()
         try:
-            with Recorder(path, shared, surface, SERVO, {}):
+            with LoopRecorder(path, shared, surface, SERVO, {}):
                 cause, _code = loop.run(shown, record, SAMPLES)
-                held, reached = _far(rig, record, time.monotonic())
+                held, reached = _measure_release(rig, record, time.monotonic())
         finally:
             driver.close()
-        closed = rig.held(record)
-    said.causes[f"{fault}: {cause.name.lower()}"] += 1
+        closed = rig.held_force(record)
+    outcome.causes[f"{fault}: {cause.name.lower()}"] += 1
     rows, _first = shared.rows(0)
-    said.took.append(float(rows[-1, _TOOK]))
-    said.pushed += bool(rows[:-1, _APPLIED].any())
+    outcome.reaction_times.append(float(rows[-1, _TOOK]))
+    outcome.under_force += bool(rows[:-1, _APPLIED].any())
     if fault not in rig.deaf:
-        said.reached.append(reached)
+        outcome.release_times.append(reached)
     wrong = {
         "no fault": not cause.is_fault,
         f"the device holds {held}": any(held or ()) and fault not in rig.deaf,
         f"the device holds {closed} when it is closed": any(closed or ()),
-        "the recording is not the run": not _same(open_recording(path), rows),
-        "the next start failed": not _starts(rig),
+        "the recording is not the run": not _is_recording_complete(open_recording(path), rows),
+        "the next start failed": not _can_restart(rig),
     }
-    said.wrong += [f"{fault} at {at}: {words}" for words, is_so in wrong.items() if is_so]
+    outcome.wrong += [f"{fault} at {at}: {words}" for words, is_so in wrong.items() if is_so]
 
 
-def _far(rig: Rig, record: Any, ended: float) -> tuple[Force | None, float]:
+def _measure_release(rig: DriverRig, record: Any, ended: float) -> tuple[Force | None, float]:
     """Return the force that the device holds, once it is zero or a second is over, and when."""
-    while any((held := rig.held(record)) or ()) and time.monotonic() - ended < 1.0:
+    while any((held := rig.held_force(record)) or ()) and time.monotonic() - ended < 1.0:
         time.sleep(1e-4)
     return held, time.monotonic() - ended
 
 
-def _same(recording: Recording, rows: np.ndarray) -> bool:
+def _is_recording_complete(recording: Recording, rows: np.ndarray) -> bool:
     table = np.column_stack([recording[name] for name, _unit in COLUMNS])
-    return recording.whole and np.array_equal(table, rows, equal_nan=True)
+    return recording.is_complete and np.array_equal(table, rows, equal_nan=True)
 
 
-def _starts(rig: Rig) -> bool:
+def _can_restart(rig: DriverRig) -> bool:
     safety = Safety(ramp=0.0, lateness=60.0, misses=10**6, silence=60.0)
-    with rig.failing("", 0) as driver:
-        loop = Loop(driver, SERVO, safety, 1.0, Shared().board(), system_clock())
-        shown = render(SURFACE, driver)
-        loop.load(shown)
+    with rig.failing_driver("", 0) as driver:
+        loop = DriverLoop(driver, SERVO, safety, 1.0, LoopMemory().block(), system_clock())
+        shown = build_program(SURFACE, driver)
+        loop.compile(shown)
         record = driver.open()
         try:
-            return loop.run(shown, record, 5)[0] is Cause.FINISHED
+            return loop.run(shown, record, 5)[0] is EndReason.FINISHED
         finally:
             driver.close()
 
 
-def kills(rig: Rig, count: int, seed: int = 0) -> tuple[Counter[str], list[str]]:
+def kill_processes(rig: DriverRig, count: int, seed: int = 0) -> tuple[Counter[str], list[str]]:
     """Return how loops ended whose processes were killed, and what must not be."""
     draw, ends, wrong = random.Random(seed), Counter[str](), list[str]()
     safety = Safety(ramp=0.005, lateness=60.0, misses=10**6, silence=2.0)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.mcap"
         for index in range(count):
-            with rig.failing("", 0) as driver, ServoProcess(SURFACE, driver, SERVO, safety) as loop:
-                with Recorder(path, loop, SURFACE, SERVO, {}) as recorder:
+            with (
+                rig.failing_driver("", 0) as driver,
+                ServoProcess(SURFACE, driver, SERVO, safety) as loop,
+            ):
+                with LoopRecorder(path, loop, SURFACE, SERVO, {}) as recorder:
                     time.sleep(draw.uniform(0.02, 0.2))
                     os.kill(loop.pid, draw.choice((9, 11, 15, 19)))
                     ends[_end(loop)] += 1
-                rows = loop.shared.head - recorder.lost
+                rows = loop.memory.row_count - recorder.lost_rows
             if open_recording(path).rows != rows:
                 wrong.append(f"{index}: the recording is not the run")
-            if not _starts(rig):
+            if not _can_restart(rig):
                 wrong.append(f"{index}: the next start failed")
     return ends, wrong
 
@@ -184,13 +187,14 @@ def run(count: int, names: Sequence[str], console: Console) -> int:
             continue
         begun = time.monotonic()
         with rig() as made:
-            said = faults(made, count)
+            said = inject_faults(made, count)
             seconds = time.monotonic() - begun
-            ends, killed = kills(made, KILLS)
+            ends, killed = kill_processes(made, KILLS)
         wrong = [*said.wrong, *killed]
-        took, reached = 1e3 * np.array(said.took), 1e3 * np.array(said.reached)
+        took, reached = 1e3 * np.array(said.reaction_times), 1e3 * np.array(said.release_times)
         console.print(
-            f"{name}: {count} faults of {len(said.causes)} kinds in {seconds:.0f} s, {said.pushed}"
+            f"{name}: {count} faults of {len(said.causes)} kinds in {seconds:.0f} s, "
+            f"{said.under_force}"
             f" of them under force, and {KILLS} kills: {len(wrong)} wrong. The sample of the fault"
             f" took {np.median(took):.3f} ms (worst {took.max():.2f}; more than its period"
             f" {np.count_nonzero(took > 1.0)}). The device held no force"

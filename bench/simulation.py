@@ -19,7 +19,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
 from asperity.simulation import (
     BandHand,
     Cartesian,
@@ -30,9 +30,8 @@ from asperity.simulation import (
     simulate,
     simulate_many,
 )
-from asperity.simulation.loop import Simulation
-from asperity.simulation.plants import Plant
-from asperity.simulation.sampled_plant import sampled_plant
+from asperity.simulation.closed_loop import Simulation
+from asperity.simulation.sampled_plant import Plant, sampled_plant
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 from bench.random_scenes import delay_rule
@@ -69,7 +68,7 @@ class _Loop(ctypes.Structure):
 
 
 @dataclass
-class _Own:
+class _AsperityLoop:
     """The compiled loop of asperity, going on from call to call."""
 
     law: str
@@ -90,11 +89,11 @@ class _Own:
     @property
     def values(self) -> FloatArray:
         """State and sums."""
-        return np.concatenate([self.simulation.state, self.simulation.sums])
+        return np.concatenate([self.simulation.state, self.simulation.ledger_sums])
 
 
 @dataclass
-class _InC:
+class _CLoop:
     """The same in C."""
 
     library: ctypes.CDLL
@@ -111,7 +110,7 @@ class _InC:
         numbers = sampled_plant(self.plant, _HAND, _SERVO).record
         if isinstance(self.plant, Pantograph):
             bar, hand, _friction, rate, fewest, period, share, inside, least = numbers
-            held = [hand.band, *hand.stiffness, *hand.damping, *hand.force]
+            held = [hand.is_band, *hand.stiffness, *hand.damping, *hand.force]
             tail = [hand.length, hand.rest_length, rate, period, share, least, 0.0, 0.0]
             self._numbers: Any = np.array([*bar, *held, *tail], dtype=np.float64)
             self._numbers[-2:].view(np.int64)[:] = fewest, inside
@@ -161,7 +160,7 @@ def _against_c(console: Console) -> None:
         shared = ctypes.CDLL(str(library))
         for name, plant in _PLANTS.items():
             for law in "WA":
-                own, other = _Own(law, plant, anchor), _InC(shared, law, plant, anchor)
+                own, other = _AsperityLoop(law, plant, anchor), _CLoop(shared, law, plant, anchor)
                 _check(own, other, name, law)
                 times = take_turns([own.run, other.run], ROUNDS)
                 each = np.median(times, axis=0) / SAMPLES * 1e9
@@ -174,7 +173,7 @@ def _against_c(console: Console) -> None:
     console.print("-> met" if not missed else f"-> MISSED by {missed}", style="bold")
 
 
-def _check(own: _Own, other: _InC, name: str, law: str) -> None:
+def _check(own: _AsperityLoop, other: _CLoop, name: str, law: str) -> None:
     """Compare state and sums after one way; chaos has no time to grow in it.
 
     Raises:

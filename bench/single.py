@@ -22,7 +22,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from asperity.contacts.sampler import SLACK
+from asperity.contacts.sampler_interface import ROUNDING_SLACK
 from asperity.laws import LAWS
 from asperity.surface import Surface
 from bench import cases
@@ -33,7 +33,7 @@ PROBES = 2000
 EPS = float(np.finfo(np.float32).eps)
 
 
-class Single(NamedTuple):
+class SinglePrecisionError(NamedTuple):
     """Probes by what their force is; the largest error of those not near, over k max(|h|, |z|)."""
 
     near: int
@@ -44,20 +44,22 @@ class Single(NamedTuple):
     worst: float
 
 
-def single(surface: Surface, count: int = PROBES, seed: int = 3) -> Single:
+def measure_single_precision(
+    surface: Surface, count: int = PROBES, seed: int = 3
+) -> SinglePrecisionError:
     """Return how exported C in single precision compares with that in double, searched exactly."""
     at = probes(surface.texture, surface.max_depth, count, seed).astype(np.float32)
     with tempfile.TemporaryDirectory() as directory:
         double, found = (
             _forces(surface, Path(directory), precision) for precision in ("double", "float")
         )
-        return _compared(surface, at.astype(float), double, found(at).astype(float))
+        return _compare_forces(surface, at.astype(float), double, found(at).astype(float))
 
 
 def _forces(surface: Surface, folder: Path, precision: str) -> Any:
     """Return a function from positions to forces."""
     name = precision[0]
-    text = header(surface, name, precision, folder, looks=np.inf)
+    text = header(surface, name, precision, folder, max_evaluations=np.inf)
     made = library(
         folder, "gcc", {name: text}, "-O1", "-Wdouble-promotion", single=precision == "float"
     )
@@ -68,30 +70,32 @@ def _first_three(made: Any, name: str, at: Any) -> Any:
     return ticks(made, name, np.ascontiguousarray(at))[:, :3]
 
 
-def _compared(surface: Surface, at: Any, double: Any, found: Any) -> Single:
+def _compare_forces(surface: Surface, at: Any, double: Any, found: Any) -> SinglePrecisionError:
     exact, k = double(at), surface.stiffness
     h = surface.texture.height(np.ascontiguousarray(at[:, :2]))
     size = k * np.maximum(np.abs(h), np.abs(at[:, 2]))
     error = np.abs(found - exact).max(axis=1)
     near = error <= NEAR * size
-    position = error <= NEAR * size + _moved(at, h, double, exact)
+    position = error <= NEAR * size + _position_rounding_error(at, h, double, exact)
     length, whole = (np.linalg.norm(force, axis=1) for force in (found, exact))
     contact = surface.law.contact
     tie = np.abs(length - whole) <= NEAR * size
     solver = np.zeros(len(at), bool)
-    if contact.gap_is_force:
+    if contact.bounds_force_error:
         tie, solver = solver, error <= k * _resolution(surface, at, np.abs(exact / k).sum(axis=1))
-    elif not contact.remembers:
+    elif not contact.has_warm_start:
         tie = solver
     left = np.ones(len(at), bool)
     counts = []
     for witness in (near, position, tie, solver, left):
         counts.append(int((witness & left).sum()))
         left &= ~witness
-    return Single._make([*counts, float(np.max(error[~near] / size[~near], initial=0.0))])
+    return SinglePrecisionError._make(
+        [*counts, float(np.max(error[~near] / size[~near], initial=0.0))]
+    )
 
 
-def _moved(at: Any, h: Any, double: Any, exact: Any) -> Any:
+def _position_rounding_error(at: Any, h: Any, double: Any, exact: Any) -> Any:
     """Return what the force changes by along the path moved by roundings of its coordinates."""
     across = 4.0 * float(np.spacing(np.float32(np.abs(at[:, :2]).max())))
     up = 4.0 * float(np.spacing(np.float32(max(np.abs(at[:, 2]).max(), np.abs(h).max()))))
@@ -108,7 +112,7 @@ def _resolution(surface: Surface, at: Any, pull: Any) -> Any:
     """
     c = surface.continuity
     away = pull * (1.0 + 1.0 / c)
-    rounding = 2.0 * away * (away + np.abs(at).sum(axis=1)) + 0.5 * SLACK * away**2
+    rounding = 2.0 * away * (away + np.abs(at).sum(axis=1)) + 0.5 * ROUNDING_SLACK * away**2
     return np.sqrt(2.0 * (1.0 + c) * EPS * c / (1.0 + c) * rounding)
 
 
@@ -119,7 +123,7 @@ def run(console: Console) -> None:
         table.add_column(heading, justify="left" if heading[0] == "l" else "right")
     for kind, texture in cases.textures().items():
         for law in LAWS:
-            one = single(Surface(texture, law, clamp="backed"))
+            one = measure_single_precision(Surface(texture, law, clamp="backed"))
             shares = [f"{100.0 * part / PROBES:.2f} %" for part in one[:5]]
             table.add_row(f"{law}, {kind}", *shares, f"{one.worst:.1e}")
     console.print(f"float against double, {PROBES:,} probes for each law and texture kind:")

@@ -19,9 +19,9 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from asperity.analysis.split.potential_table import tabulate
-from asperity.analysis.split.state import split_state
-from asperity.checks import FloatArray
+from asperity.analysis.split.baked_field import bake
+from asperity.analysis.split.split_state import split_state
+from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Profile, Sinusoid, load_texture
 from asperity.textures.texture import Texture
@@ -117,12 +117,12 @@ def _table_times() -> list[tuple[str, float]]:
     for name, texture in textures.items():
         surface = Surface(texture, "H", STIFFNESS, max_depth=0.3e-3)
         start = perf_counter()
-        table = tabulate(surface, 1e-5 if texture.is_profile else 3e-5)
+        table = bake(surface, 1e-5 if texture.is_profile else 3e-5)
         built = perf_counter() - start
         xy = texture.domain.points(rng.uniform(size=(100_000, len(texture.domain.spans))))
         z = rng.uniform(table.floor, texture.extremes[0], len(xy))
         points, out = np.column_stack([xy, z]), np.empty((len(xy), 3))
-        batch = partial(table._loops.table_force_batch, points, out, STIFFNESS, table._table)
+        batch = partial(table._loops.table_force_batch, points, out, STIFFNESS, table._coefficients)
         runs = take_turns([batch], ROUNDS)
         size = " x ".join(str(count) for count in table.shape)
         what = f"{name}: {size} nodes, {table.bytes / 1e6:.1f} MB, built in {built:.1f} s, "
@@ -134,7 +134,7 @@ def _table_times() -> list[tuple[str, float]]:
 # --- the search -----------------------------------------------------------------------------------
 
 
-def searched() -> dict[str, Texture]:
+def search_textures() -> dict[str, Texture]:
     """Return the textures on which the Lipschitz constant is to hold."""
     t = np.arange(20) / 20
     shapes = {"triangle": np.abs(2 * t - 1), "square": np.where(t < 0.5, 1.0, 0.0), "sawtooth": t}
@@ -171,7 +171,7 @@ def _pairs(texture: Texture, count: int, seed: int) -> tuple[FloatArray, FloatAr
     return a, b
 
 
-def _worst(surfaces: Sequence[Surface], count: int, seed: int) -> FloatArray:
+def _worst_ratios(surfaces: Sequence[Surface], count: int, seed: int) -> FloatArray:
     """Return for each surface the largest |Δf| - k max(1, c) |Δp| (1 + 1e-6) over k l, l = 1 mm.
 
     And the largest |Δf|/(k max(1, c) |Δp|) of pairs that are not too close, shape (2, n).
@@ -188,15 +188,15 @@ def _worst(surfaces: Sequence[Surface], count: int, seed: int) -> FloatArray:
     return result
 
 
-def _searched_part(
+def _search_part(
     surfaces: Sequence[Surface], pairs: int, console: Console, title: str
 ) -> FloatArray:
-    """Return what :func:`_worst` finds in so many pairs, searched in threads."""
+    """Return what :func:`_worst_ratios` finds in so many pairs, searched in threads."""
     for surface in surfaces:
         surface.force(np.zeros((1, 3)))  # compiled before there are threads
     sizes = [min(PAIRS_AT_ONCE, pairs - first) for first in range(0, pairs, PAIRS_AT_ONCE)]
     with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
-        found = pool.map(partial(_worst, surfaces), sizes, range(len(sizes)))
+        found = pool.map(partial(_worst_ratios, surfaces), sizes, range(len(sizes)))
         watched = track(found, title, len(sizes), console=console, transient=True)
         return np.asarray(np.max(np.stack(list(watched)), axis=0))
 
@@ -207,10 +207,10 @@ def search(console: Console, pairs: int) -> bool:
     for heading in ("texture", "c", "H: |Δf|/(kc|Δp|)", "H: excess", "D: excess", "C: excess"):
         table.add_column(heading, justify="left" if heading == "texture" else "right")
     sound = True
-    for name, texture in searched().items():
+    for name, texture in search_textures().items():
         for c in (1.0, 4.0):
             surfaces = [Surface(texture, law, STIFFNESS, continuity=c) for law in "HDC"]
-            excess, ratio = _searched_part(surfaces, pairs, console, f"{name}, c = {c:g}")
+            excess, ratio = _search_part(surfaces, pairs, console, f"{name}, c = {c:g}")
             sound = sound and bool(excess[0] <= TOLERANCE)
             cells = [f"{ratio[0]:.7f}", *(f"{value:.1e}" for value in excess)]
             table.add_row(name, f"{c:g}", *cells)

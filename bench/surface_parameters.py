@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from asperity.checks import FloatArray
-from asperity.measured.correlation import correlation
-from asperity.measured.parameters import parameters
+from asperity.core.checks import FloatArray
+from asperity.measured.parameters import compute_parameters, correlation_parameters
 from asperity.measured.reading import read_surface
 
 MICRO = 1e-6
@@ -38,12 +37,12 @@ def surfaces(paths: list[str]) -> Iterator[tuple[str, FloatArray, tuple[float, f
             yield path.split("/")[-1], filled, (raw.pitch[0], raw.pitch[1])
 
 
-def ours(heights: FloatArray, pitch: tuple[float, float]) -> dict[str, Any]:
-    length, ratio = correlation(heights, pitch)
-    return {**parameters(heights, pitch), "Sal": length, "Str": ratio}
+def asperity_parameters(heights: FloatArray, pitch: tuple[float, float]) -> dict[str, Any]:
+    length, ratio = correlation_parameters(heights, pitch)
+    return {**compute_parameters(heights, pitch), "Sal": length, "Str": ratio}
 
 
-def of_surfalize(heights: FloatArray, pitch: tuple[float, float]) -> dict[str, Any]:
+def surfalize_parameters(heights: FloatArray, pitch: tuple[float, float]) -> dict[str, Any]:
     from surfalize import Surface
 
     surface = Surface(heights / MICRO, pitch[0] / MICRO, pitch[1] / MICRO)
@@ -55,7 +54,9 @@ def of_surfalize(heights: FloatArray, pitch: tuple[float, float]) -> dict[str, A
     return found
 
 
-def of_surface_topography(heights: FloatArray, pitch: tuple[float, float]) -> dict[str, Any]:
+def surface_topography_parameters(
+    heights: FloatArray, pitch: tuple[float, float]
+) -> dict[str, Any]:
     from SurfaceTopography import Topography
 
     z = (heights - heights.mean()).T
@@ -66,11 +67,11 @@ def of_surface_topography(heights: FloatArray, pitch: tuple[float, float]) -> di
 
 def main() -> None:
     others: dict[str, Callable[..., dict[str, Any]]] = {
-        "surfalize": of_surfalize,
-        "SurfaceTopography": of_surface_topography,
+        "surfalize": surfalize_parameters,
+        "SurfaceTopography": surface_topography_parameters,
     }
     for name, heights, pitch in surfaces(sys.argv[1:]):
-        columns = {"ours": ours(heights, pitch)}
+        columns = {"ours": asperity_parameters(heights, pitch)}
         for library, measure in others.items():
             try:
                 columns[library] = measure(heights, pitch)

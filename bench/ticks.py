@@ -13,8 +13,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from asperity.checks import FloatArray
-from asperity.contacts.memory import new_memory
+from asperity.contacts.warm_start import new_warm_start
+from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Texture
 from bench import cases
@@ -33,7 +33,7 @@ WAVES = 32
 Adversaries = dict[str, tuple[HeightMap, FloatArray]]
 
 
-def adversaries(side: int = SIDE) -> Adversaries:
+def adversarial_textures(side: int = SIDE) -> Adversaries:
     """Return maps of so many nodes a side, each with a probe (1, 3) [m] that is hardest for it.
 
     The probe is the centre of curvature of dome and grooves, and is deep below the others.
@@ -83,7 +83,7 @@ def run(console: Console) -> None:
     for heading in ("law", "surface", *headings, "stroke\nµs a tick", "looks", "each alone\nµs"):
         table.add_column(heading, justify="left" if heading in {"law", "surface"} else "right")
     missed: list[str] = []
-    surfaces: dict[str, tuple[Texture, FloatArray]] = {**adversaries()}
+    surfaces: dict[str, tuple[Texture, FloatArray]] = {**adversarial_textures()}
     surfaces[f"{WAVES} waves"] = many_waves()
     for name, (texture, centre) in surfaces.items():
         for law in "DH":
@@ -120,14 +120,16 @@ def _longest(surface: Surface, probes: FloatArray) -> tuple[float, list[str]]:
     """Return the longest tick [µs], and the cells that tell of it."""
     loop, arguments = surface._path_loops.path_batch, _arguments(surface)
     out, told = np.empty((1, 3)), np.empty((1, 2))
-    budget = surface.law.contact.looks
+    budget = surface.law.contact.max_evaluations
     rows = []
     for probe in probes:
         point = probe[None].copy()
 
         times = []
         for _turn in range(TURNS):
-            times.append(seconds(partial(loop, point, out, told, new_memory(budget), *arguments)))
+            times.append(
+                seconds(partial(loop, point, out, told, new_warm_start(budget), *arguments))
+            )
         rows.append((min(times) * 1e6, told[0, 1], told[0, 0]))
     times_, looks, gaps = np.array(rows).T
     # Without a budget a tick at a centre of curvature may take seconds: of random probes only.
@@ -152,10 +154,10 @@ def _stroke(surface: Surface) -> tuple[float, list[str]]:
     depth = 0.5 * surface.max_depth
     path = np.ascontiguousarray(np.column_stack([xy, surface.texture.height(xy) - depth]))
     out, told = np.empty_like(path), np.empty((TICKS, 2))
-    budget = surface.law.contact.looks
+    budget = surface.law.contact.max_evaluations
 
     def ticks() -> None:
-        loop(path, out, told, new_memory(budget), *arguments)
+        loop(path, out, told, new_warm_start(budget), *arguments)
 
     def alone() -> None:
         surface._loops.force_batch(path, out, *arguments)

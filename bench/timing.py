@@ -7,7 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
 
 Batch = Callable[[], object]
 

@@ -62,29 +62,29 @@ def run(console: Console) -> None:
             cache.mkdir(mode=0o700)
         demo, sinusoid, measured, onset, paper = caches
         missing = [
-            *_single(table, HELP, "--help", "", demo),
-            *_comparisons(table, DEMO, "the demo", demo),
-            *_comparisons(table, SINUSOID, "a sinusoid", sinusoid),
-            *_comparisons(table, MEASURED, "a measured surface", measured),
-            *_single(table, ONSET, "onset examples/press.toml, first", "", onset),
-            *_single(table, CLOSER, "  all compiled, another width", "processor 12", onset),
-            *_single(table, CLOSER, "  the same again", "", onset),
-            *_single(table, REPRODUCE, "reproduce, first", "wall 120", paper),
-            *_single(table, REPRODUCE, "reproduce again", "processor 45", paper),
+            *_time_single(table, HELP, "--help", "", demo),
+            *_time_comparisons(table, DEMO, "the demo", demo),
+            *_time_comparisons(table, SINUSOID, "a sinusoid", sinusoid),
+            *_time_comparisons(table, MEASURED, "a measured surface", measured),
+            *_time_single(table, ONSET, "onset examples/press.toml, first", "", onset),
+            *_time_single(table, CLOSER, "  all compiled, another width", "processor 12", onset),
+            *_time_single(table, CLOSER, "  the same again", "", onset),
+            *_time_single(table, REPRODUCE, "reproduce, first", "wall 120", paper),
+            *_time_single(table, REPRODUCE, "reproduce again", "processor 45", paper),
         ]
     console.print(table)
     for line in missing:
         console.print(line, soft_wrap=True)
 
 
-def _comparisons(table: Table, words: tuple[str, ...], name: str, cache: Path) -> list[str]:
+def _time_comparisons(table: Table, words: tuple[str, ...], name: str, cache: Path) -> list[str]:
     """Add the rows of one surface: first, again, changed, with a report."""
     html = ("--html", str(cache.parent / "report.html"))
     try:
-        first = _timed(words, cache)
-        _timed((*words, *html), cache)
+        first = _time_command(words, cache)
+        _time_command((*words, *html), cache)
         found = np.array([
-            [_timed((*words, *more), cache).processor for more in ((), CHANGED, html)]
+            [_time_command((*words, *more), cache).processor for more in ((), CHANGED, html)]
             for _ in range(ROUNDS)
         ])  # fmt: skip
     except _NotRunError as reason:
@@ -104,18 +104,18 @@ def _comparisons(table: Table, words: tuple[str, ...], name: str, cache: Path) -
     return []
 
 
-def _single(
+def _time_single(
     table: Table, words: tuple[str, ...], name: str, goal: str, cache: Path
 ) -> Sequence[str]:
     try:
-        taken = _timed(words, cache)
+        taken = _time_command(words, cache)
     except _NotRunError as reason:
         return [f"{name}: not run: {reason}"]
     table.add_row(name, f"{taken.processor:.2f}", f"{taken.wall:.2f}", "", goal)
     return []
 
 
-def _timed(words: tuple[str, ...], cache: Path) -> Times:
+def _time_command(words: tuple[str, ...], cache: Path) -> Times:
     """Return what a command took.
 
     Raises:

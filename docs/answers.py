@@ -1,11 +1,9 @@
-"""Answers that a page keeps as text are those that its commands print.
+"""Update the output of commands in README: ``python docs/answers.py``.
 
-The pages of the documentation run their blocks when they are built ({run} and {shell}); README is
-read as it is, so its answers are kept. In a ``console`` block a line ``$ asperity ...`` (or with
-``.venv/bin/`` before it) that is followed by output is run, 88 columns wide. A last line ``...``
-stands for the paragraphs that are left out.
-
-``python docs/answers.py`` writes the answers of README.md anew; tests/test_answers.py compares.
+The pages of the documentation run their blocks when they are built; README contains its output as
+text. In a ``console`` block, a line ``$ asperity ...`` (or ``$ .venv/bin/asperity ...``) that is
+followed by output is run, 88 columns wide. A last line ``...`` stands for omitted paragraphs.
+tests/docs/test_readme.py compares.
 """
 
 from __future__ import annotations
@@ -24,31 +22,31 @@ _CONSOLE = re.compile(r"(?<=^```console\n)(.*?)(?=^```$)", re.M | re.S)
 _COMMAND = re.compile(r"\$ (?:\.venv/bin/)?(asperity .*)")
 
 
-def answered(page: str) -> str:
+def update_page(page: str) -> str:
     """Return a page with the answers that its commands give now.
 
     Raises:
         RuntimeError: if one of the commands ends with an exit code.
     """
-    return _CONSOLE.sub(lambda block: _answered_block(block[1]), page)
+    return _CONSOLE.sub(lambda block: _update_block(block[1]), page)
 
 
-def _answered_block(block: str) -> str:
+def _update_block(block: str) -> str:
     parts = re.split(r"^(?=\$ )", block, flags=re.M)
-    return "".join(_answered_command(part) for part in parts)
+    return "".join(_update_command(part) for part in parts)
 
 
-def _answered_command(part: str) -> str:
-    line, _, shown = part.partition("\n")
+def _update_command(part: str) -> str:
+    line, _, output = part.partition("\n")
     command = _COMMAND.fullmatch(line)
-    if command is None or not shown.strip():
+    if command is None or not output.strip():
         return part
-    paragraphs = shown.strip().split("\n\n")
-    kept = len(paragraphs) - 1 if paragraphs[-1] == "..." else None
-    return f"{line}\n{first_paragraphs(printed(command[1]), kept)}\n"
+    paragraphs = output.strip().split("\n\n")
+    count = len(paragraphs) - 1 if paragraphs[-1] == "..." else None
+    return f"{line}\n{first_paragraphs(capture_output(command[1]), count)}\n"
 
 
-def printed(command: str) -> str:
+def capture_output(command: str) -> str:
     """Return what ``asperity ...`` prints, run in an empty folder.
 
     Raises:
@@ -62,4 +60,4 @@ def printed(command: str) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(answered(PAGE.read_text("utf-8")), encoding="utf-8")
+    PAGE.write_text(update_page(PAGE.read_text("utf-8")), encoding="utf-8")

@@ -89,14 +89,14 @@ def source_digest() -> str:
 # Pages and gallery are run again when the code has changed, and only then.
 code_digest = source_digest()
 _digest_file = HERE / "_generated" / "code-digest"
-_changed = not _digest_file.exists() or _digest_file.read_text("utf-8") != code_digest
+_is_code_changed = not _digest_file.exists() or _digest_file.read_text("utf-8") != code_digest
 _digest_file.parent.mkdir(exist_ok=True)
 
 sphinx_gallery_conf: dict[str, Any] = {
     "examples_dirs": ["../examples/gallery"],
     "gallery_dirs": ["gallery"],
     "filename_pattern": r"\.py$",
-    "run_stale_examples": _changed,
+    "run_stale_examples": _is_code_changed,
     "image_scrapers": ("gallery_figures",),
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,
@@ -112,7 +112,7 @@ sphinx_gallery_conf: dict[str, Any] = {
 }
 
 
-def _remember(app: Any, exception: Exception | None) -> None:
+def _write_digest(app: Any, exception: Exception | None) -> None:
     if exception is None and app.builder.format == "html":
         _digest_file.write_text(code_digest, encoding="utf-8")
 
@@ -120,4 +120,4 @@ def _remember(app: Any, exception: Exception | None) -> None:
 def setup(app: Any) -> None:
     """Make the pages depend on the code of the package."""
     app.add_config_value("code_digest", "", "env", types=(str,))
-    app.connect("build-finished", _remember)
+    app.connect("build-finished", _write_digest)

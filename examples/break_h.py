@@ -24,7 +24,7 @@ from rich.progress import track
 from rich.table import Table
 
 import asperity as asp
-from asperity.analysis.split.state import split_state
+from asperity.analysis.split.split_state import split_state
 from asperity.textures.texture import Texture
 
 K, L = 1000.0, 1e-3
@@ -186,11 +186,11 @@ def loops(case: Case) -> Statement:
 def equals_god_object(case: Case) -> Statement:
     """Return the distance to law D wherever going on by 1/c keeps the nearest point."""
     statement = Statement("H is D up to the stated fraction [k mm]", 1e-9)
-    feet = case.texture.nearest(case.points)
+    closest = case.texture.nearest(case.points)
     single = case.law("D").force(case.points)
     for c in (0.5, 2.0):
-        beyond = case.texture.nearest(case.points - (feet - case.points) / c)
-        stays = norm(beyond - feet) < 1e-10
+        beyond = case.texture.nearest(case.points - (closest - case.points) / c)
+        stays = norm(beyond - closest) < 1e-10
         for law in "HDC":
             force = case.law(law, c).force(case.points)
             statement.record(law, norm(force - single)[stays].max() / (K * L))
@@ -234,13 +234,13 @@ def across_ridges(case: Case) -> tuple[FloatArray, FloatArray]:
     """Return pairs, a picometre apart and farther, between which the nearest point jumps."""
     low = case.points
     high = low + case.rng.normal(size=low.shape) * [0.2 * case.size, 0.2 * case.size, 0.0]
-    foot_low, foot_high = case.texture.nearest(low), case.texture.nearest(high)
+    closest_low, closest_high = case.texture.nearest(low), case.texture.nearest(high)
     for _ in range(28):
         middle = 0.5 * (low + high)
-        foot = case.texture.nearest(middle)
-        left = (norm(foot - foot_low) < norm(foot - foot_high))[:, None]
-        low, foot_low = np.where(left, middle, low), np.where(left, foot, foot_low)
-        high, foot_high = np.where(left, high, middle), np.where(left, foot_high, foot)
+        closest = case.texture.nearest(middle)
+        left = (norm(closest - closest_low) < norm(closest - closest_high))[:, None]
+        low, closest_low = np.where(left, middle, low), np.where(left, closest, closest_low)
+        high, closest_high = np.where(left, high, middle), np.where(left, closest_high, closest)
     return low, high
 
 
@@ -257,8 +257,8 @@ def largest_energy(case: Case) -> Statement:
     """Return by how much an energy exceeds U_1, the largest of all laws with q ≤ 1."""
     statement = Statement("no law with q ≤ 1 stores more energy than H(1) [U]", 1e-9)
     largest = case.energy()
-    slope, bend = case.texture.bounds
-    gain = 1.0 + slope**2 + float(case.depth.max()) * bend  # of C, a safe bound
+    slope, curvature = case.texture.bounds
+    gain = 1.0 + slope**2 + float(case.depth.max()) * curvature  # of C, a safe bound
     for candidate in (case.energy(0.3), case.energy(0.7), 0.5 * case.depth**2 / gain):
         statement.record("H", np.max((candidate - largest) / largest))
     statement.record("D", np.max((case.phi - largest) / largest))

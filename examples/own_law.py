@@ -1,13 +1,13 @@
-"""A ninth law in ten lines, and everything that follows from it.
+"""A user-defined law in ten lines, and what asperity derives from it.
 
 Run it: ``python examples/own_law.py``. The law below is C with a spring that stiffens with depth,
 f = -∇(k δ⁴/(4 D²)): it is written as mathematics, and its Jacobian, the proof that it is
 conservative, its compiled kernel and its row in the comparison are derived. The commands take it
-too: ``asperity compare cloth: --law-module examples/own_law.py --set reference_depth=0.2mm``.
+too: ``asperity compare cloth --plugin examples/own_law.py --set reference_depth=0.2mm``.
 """
 
 import asperity as asp
-from asperity.arguments import Argument
+from asperity.core.arguments import Argument
 from asperity.derive.curl import curl_verdict
 from asperity.derive.jacobian import derive
 from asperity.derive.python_source import law_source
@@ -20,7 +20,11 @@ STIFFENING = asp.Law(
     summary="gradient of the energy k δ⁴/(4 D²)",
     parameters={
         "reference_depth": Argument(
-            "reference_depth", "depth at which it is as stiff as k", "m", 0.3e-3, positive=True
+            "reference_depth",
+            "depth at which it is as stiff as k",
+            "m",
+            0.3e-3,
+            must_be_positive=True,
         )
     },
 )

@@ -1,62 +1,64 @@
-"""A texture kind with a sampler of its own, and everything that follows from it.
+"""A user-defined texture kind with its own sampler, and everything that follows from it.
 
-Run it: ``python examples/own_texture.py``, or name it on the command line,
+Run it: ``python examples/own_texture.py``, or use it on the command line,
 
-    asperity compare egg-box:amplitude=0.1mm,period=2mm --law-module examples/own_texture.py
+    asperity compare egg-box:amplitude=0.1mm,period=2mm --plugin examples/own_texture.py
 
 The egg-box h = A cos(2πx/l) cos(2πy/l) below is one file: scalar functions that Numba compiles
-together with a law, a class that says what is proved of them, and a name with arguments.
+together with a law, a class that states proved bounds, and a name with arguments.
 """
 
 import math
 import sys
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 import asperity as asp
-from asperity.arguments import Argument
-from asperity.compiled import Kernels
-from asperity.contacts.nearest import plane_search
-from asperity.contacts.nearest.plane_search import descend
+from asperity.contacts.closest import plane_search
+from asperity.contacts.closest.plane_search import descend
+from asperity.core.arguments import Argument
+from asperity.core.compiled import Kernels
 from asperity.textures import Domain, ScanLine, Texture
 from asperity.textures.catalogue import register
-from asperity.textures.texture import Kind
+from asperity.textures.texture import TextureKind
 
 # --- the sampler: plain Python that Numba compiles ------------------------------------------------
 
-KERNELS = Kernels(provides=("height", "slope", "curvature", "foot"), requires=("descend",))
+KERNELS = Kernels(provides=("sample_height", "sample_gradient", "sample_hessian", "closest_point"))
 
 
 class Egg(NamedTuple):
-    """What the functions receive of a texture: A [m] and k [rad/m]."""
+    """Record passed to the functions below: A [m] and k [rad/m]."""
 
     a: float
     k: float
 
 
-def height(x: float, y: float, egg: Egg) -> float:
+def sample_height(x: float, y: float, egg: Egg) -> float:
     """Return h [m]."""
     return egg.a * math.cos(egg.k * x) * math.cos(egg.k * y)
 
 
-def slope(x: float, y: float, egg: Egg) -> tuple[float, float, float]:
+def sample_gradient(x: float, y: float, egg: Egg) -> tuple[float, float, float]:
     """Return h [m], h_x, h_y [1]."""
     a, k = egg
     cx, cy, sx, sy = math.cos(k * x), math.cos(k * y), math.sin(k * x), math.sin(k * y)
     return a * cx * cy, -a * k * sx * cy, -a * k * cx * sy
 
 
-def curvature(x: float, y: float, egg: Egg) -> tuple[float, float, float, float, float, float]:
+def sample_hessian(x: float, y: float, egg: Egg) -> tuple[float, float, float, float, float, float]:
     """Return h [m], h_x, h_y [1], h_xx, h_xy, h_yy [1/m]."""
     a, k = egg
-    h, hx, hy = slope(x, y, egg)
+    h, hx, hy = sample_gradient(x, y, egg)
     return h, hx, hy, -k * k * h, a * k * k * math.sin(k * x) * math.sin(k * y), -k * k * h
 
 
-def foot(x: float, y: float, z: float, egg: Egg) -> tuple[float, float, float, float, float]:
-    """Return X, Y of the nearest surface point, and h, h_x, h_y there: the best of 25 descents."""
+def closest_point(
+    x: float, y: float, z: float, egg: Egg
+) -> tuple[float, float, float, float, float]:
+    """Return X, Y of the closest surface point, and h, h_x, h_y there: the best of 25 descents."""
     best = descend(x, y, z, x, y, egg)
     step = 0.5 * math.sqrt(best[2])
     for i in range(-2, 3):
@@ -67,7 +69,7 @@ def foot(x: float, y: float, z: float, egg: Egg) -> tuple[float, float, float, f
     return best[0], best[1], best[3], best[4], best[5]
 
 
-# --- the kind: what is proved ---------------------------------------------------------------------
+# --- the kind: proved bounds ---------------------------------------------------------------------
 
 
 class EggBox(Texture):
@@ -79,6 +81,10 @@ class EggBox(Texture):
     """
 
     kind = "egg-box"
+    constructor_arguments = (
+        Argument("amplitude", "half of the peak-to-valley height", "m", required=True),
+        Argument("period", "from bump to bump", "m", required=True),
+    )
 
     def __init__(self, amplitude: float, period: float) -> None:
         self.amplitude, self.period = amplitude, period
@@ -105,8 +111,8 @@ class EggBox(Texture):
         return self.amplitude * self._k, self.amplitude * self._k**2
 
     @property
-    def twist(self) -> float:
-        """Not needed, but numbers get sharper: h is the mean of two waves A cos(k (x ± y))."""
+    def third_derivative_bound(self) -> float:
+        """Optional, for tighter bounds: h is the mean of two waves A cos(k (x ± y))."""
         return math.sqrt(8.0) * self.amplitude * self._k**3
 
     @property
@@ -118,27 +124,20 @@ class EggBox(Texture):
         """Along x over the bumps."""
         return ScanLine(np.zeros(2), np.array([1.0, 0.0]), self.period, periodic=True)
 
-    def describe(self) -> dict[str, Any]:
-        """See :class:`Texture`."""
-        return {"kind": self.kind, "amplitude": self.amplitude, "period": self.period}
-
 
 # --- its name: for commands and scenes ------------------------------------------------------------
 
-EGG_BOX = Kind(
+EGG_BOX = TextureKind(
     "egg-box",
     "bumps and dimples on a square lattice",
     EggBox,
-    (
-        Argument("amplitude", "half of the peak-to-valley height", "m", required=True),
-        Argument("period", "from bump to bump", "m", required=True),
-    ),
+    EggBox.constructor_arguments,
     example={"amplitude": 0.1e-3, "period": 2e-3},
 )
 
 
 def main() -> None:
-    """Show what follows from the kind."""
+    """Compare the laws on the new kind."""
     register(EGG_BOX)
     texture = EggBox(amplitude=0.1e-3, period=2e-3)
     for row in asp.compare(texture, laws="WACE").rows:

@@ -1,11 +1,9 @@
-"""What the core tests share: generic textures, laws by hand, plain kernels, differences.
-
-Every fixture here is a function or a texture; the numbers of the tests stay in the tests.
-"""
+"""Shared fixtures: generic textures, laws by hand, interpreted kernels, finite differences."""
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -13,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity import kept
+from asperity.core import cache
 from asperity.kernels import fuse
-from asperity.kernels.link import COMMON
+from asperity.kernels.link import INTRINSIC_MODULES
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 
@@ -45,21 +43,26 @@ TEXTURES: dict[str, Callable[[], Texture]] = {
 }
 
 
-@pytest.fixture(autouse=True)
-def fresh_answers(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Answers are worked out, whatever an earlier run has kept: a test may break the code.
+def pytest_configure(config: pytest.Config) -> None:
+    """Use a cache of the test suite, in ``.pytest_cache``, instead of the user's cache."""
+    if config.cache is not None and "ASPERITY_CACHE_DIR" not in os.environ:
+        os.environ["ASPERITY_CACHE_DIR"] = str(config.cache.mkdir("asperity"))
 
-    A test of what is kept says so: ``@pytest.mark.keeps_answers``.
+
+@pytest.fixture(autouse=True)
+def uncached_results(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Results are computed without the cache, since a test may change the code.
+
+    Tests of the cache have the marker ``@pytest.mark.keeps_answers``.
     """
     if request.node.get_closest_marker("keeps_answers") is None:
-        monkeypatch.setattr(kept, "recall", lambda _room, _key: None)
-        monkeypatch.setattr(kept, "keep", lambda _room, _key, _content: None)
+        monkeypatch.setattr(cache, "_result_key", lambda _name, _content: None)
 
 
 @pytest.fixture(autouse=True)
 def one_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Commands share nothing out: the tests themselves run side by side."""
-    monkeypatch.setattr("asperity.cli.options.cores", lambda: 1)
+    """Commands start no workers: the tests themselves run in parallel."""
+    monkeypatch.setattr("asperity.cli.options.available_cores", lambda: 1)
 
 
 @pytest.fixture(params=list(TEXTURES))
@@ -209,8 +212,10 @@ def _run_source(source: str) -> SimpleNamespace:
     """Run a fused module as plain Python: the same text, nothing compiled."""
     head, without = "from __future__", ("@", "from numba", "from asperity_fused_")
     text = source
-    for home in COMMON.values():
-        text = text.replace(f"from {home} ", "from asperity.compiled ")  # Python's own versions
+    for home in INTRINSIC_MODULES.values():
+        text = text.replace(
+            f"from {home} ", "from asperity.core.compiled "
+        )  # Python's own versions
     lines = [line for line in text.splitlines() if not line.startswith((head, *without))]
     lines.insert(0, f"{head} import annotations")
     lines = [line for line in lines if "njit(" not in line and "code_store" not in line]

@@ -19,8 +19,8 @@ def surface(law: str) -> asp.Surface:
     return asp.Surface(STEEP, law)
 
 
-def table() -> asp.TabulatedSurface:
-    return asp.tabulate(surface("H"), resolution=40e-6)
+def table() -> asp.BakedField:
+    return asp.bake(surface("H"), resolution=40e-6)
 
 
 TAKERS: dict[str, tuple[Callable[[], Callable[[Any], Any]], tuple[float, ...]]] = {
@@ -63,7 +63,7 @@ def test_one_point_is_the_only_row(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TAKERS)
-def test_no_points_are_no_answers(name: str) -> None:
+def test_no_points_give_empty_results(name: str) -> None:
     made, point = TAKERS[name]
     for answer in together(made()(np.empty((0, len(point))))):
         assert len(answer) == 0
@@ -73,11 +73,11 @@ def test_no_points_are_no_answers(name: str) -> None:
 @pytest.mark.parametrize(
     "wrong", [lambda p: [[p]], lambda p: p[:-1], lambda p: (*p, 0.0), lambda _: []]
 )
-def test_other_shapes_name_both(name: str, wrong: Callable[[Any], Any]) -> None:
+def test_errors_name_both_shapes(name: str, wrong: Callable[[Any], Any]) -> None:
     made, point = TAKERS[name]
     width = len(point)
-    said = rf"must have shape \(n, {width}\), or \({width},\) for one point \[m\]"
-    with pytest.raises(asp.ParameterError, match=said):
+    message = rf"must have shape \(n, {width}\), or \({width},\) for one point \[m\]"
+    with pytest.raises(asp.ParameterError, match=message):
         made()(wrong(point))
 
 
@@ -94,7 +94,7 @@ def test_the_state_beside_one_point_has_no_first_axis_either() -> None:
     assert not np.array_equal(law_f.force(PROBE), one)
 
 
-def test_a_state_of_another_form_is_refused() -> None:
+def test_a_state_of_another_shape_is_an_error() -> None:
     law_f = surface("F")
     with pytest.raises(asp.ParameterError, match=r"deflection must have shape \(2,\) \[m\]"):
         law_f.force(PROBE, [PULLED])
@@ -108,7 +108,7 @@ def test_a_state_of_another_form_is_refused() -> None:
         law_f.force(PROBE, (1.0, 0.0))
 
 
-def test_a_point_that_is_not_finite_is_named() -> None:
+def test_the_error_names_the_point_that_is_not_finite() -> None:
     with pytest.raises(asp.ParameterError, match=r"must be finite \[m\]; the value at \[0, 2\]"):
         surface("C").force((0.0, 0.0, np.nan))
 
@@ -132,17 +132,17 @@ def test_one_point_that_is_not_finite_is_refused(
         surface("C").force(form(row))
 
 
-def test_infinities_that_cancel_are_refused() -> None:
+def test_infinities_that_cancel_are_an_error() -> None:
     with pytest.raises(asp.ParameterError, match="finite"):
         surface("C").force(np.array([np.inf, -np.inf, 0.0]))
 
 
-def test_numbers_whose_sum_is_beyond_all_numbers_are_points() -> None:
+def test_numbers_whose_sum_overflows_are_valid() -> None:
     far = np.array([1.7e308, 1.7e308, -1e-3])
     assert surface("W").force(far)[2] > 0.0
 
 
-def test_every_third_number_of_an_array_is_a_point_like_any_other() -> None:
+def test_strided_points_are_valid() -> None:
     spread = np.repeat(PROBE, 3)[::3]
     assert not spread.flags.c_contiguous
     assert np.array_equal(surface("C").force(spread), surface("C").force(PROBE))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.errors import ParameterError
+from asperity.core.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures import Sinusoid, Texture
 
@@ -49,7 +49,7 @@ def test_inside_there_is_a_force_from_the_first_nanometre(
 
 
 @pytest.mark.parametrize("letter", NOMINAL)
-def test_a_nominal_law_does_not_feel_the_height(letter: str, wave: Sinusoid):
+def test_a_nominal_law_does_not_depend_on_the_height(letter: str, wave: Sinusoid):
     crest = wave.domain.points(np.array([[0.25 - 0.7 / (2 * math.pi)]]))
     below_the_crest = np.column_stack([crest, [0.1e-3]])
     assert wave.height(crest)[0] == pytest.approx(0.4e-3)
@@ -297,8 +297,8 @@ def test_which_clamp_keeps_change_of_height_conservative(
     assert (turning < 1e-6).all() if conservative else (turning > 10.0).all()
 
 
-def test_the_backing_wall_leaves_no_hole(wave: Sinusoid, scatter: Check):
-    """Whole alone saturates at k D: a strong hand falls through."""
+def test_the_backing_wall_stops_a_strong_hand(wave: Sinusoid, scatter: Check):
+    """The clamp whole alone saturates at k D: a strong hand breaks through."""
     xy = scatter(wave, 10, seed=11)
     points = np.column_stack([xy, np.full(10, -5e-3)])
     whole = Surface(wave, "B", max_depth=D, clamp="whole").force(points)
@@ -350,7 +350,7 @@ def test_a_law_without_state_takes_none(letter: str, wave: Sinusoid):
 
 
 class Anchor:
-    """Stick and slip, told slowly: a thread of fixed length drags the anchor."""
+    """Stick and slip, step by step: a thread of fixed length drags the anchor."""
 
     def __init__(self, length: float) -> None:
         self.length = length
@@ -369,7 +369,7 @@ class Anchor:
 
 
 def wandering_path(count: int, seed: int) -> np.ndarray:
-    """Return a walk that drags, reverses, leaves the surface and comes back."""
+    """Return a path that slides, reverses, leaves the surface and returns."""
     rng = np.random.default_rng(seed)
     steps = (
         rng.normal(size=(count, 2)) * 0.15e-3 + 0.05e-3 * np.sin(np.arange(count) / 40.0)[:, None]
@@ -378,7 +378,7 @@ def wandering_path(count: int, seed: int) -> np.ndarray:
     return np.column_stack([np.cumsum(steps, axis=0), heights])
 
 
-def test_a_trace_of_friction_carries_its_anchor(
+def test_a_trace_of_friction_propagates_the_anchor(
     make_texture: Check, plain: Check, force_by_hand: Check
 ):
     texture = make_texture("fourier")
@@ -415,7 +415,7 @@ def test_the_anchor_is_released_when_contact_is_lost(wave: Sinusoid):
     assert friction[4] < 0.0
 
 
-def test_every_trace_begins_released(wave: Sinusoid):
+def test_every_trace_starts_released(wave: Sinusoid):
     surface = Surface(wave, "F")
     path = np.array([[0.0, 0.0, -1e-4], [0.3e-3, 0.0, -1e-4]])
     np.testing.assert_array_equal(surface.trace(path), surface.trace(path))

@@ -1,4 +1,4 @@
-"""A surface of every law, shipped or one's own, against its definition; and what it refuses."""
+"""Surfaces of shipped and user-defined laws against the reference, and invalid arguments."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from asperity.contacts.symbols import ContactSymbols
-from asperity.definition import exact_force
-from asperity.errors import LawError, ParameterError
-from asperity.laws import KNOWN_LAWS, LAWS, Law
+from asperity.core.errors import LawError, ParameterError
+from asperity.laws import LAWS, REGISTERED_LAWS, Law
+from asperity.reference import exact_force
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture
 
@@ -39,7 +39,7 @@ anywhere = st.tuples(*2 * [st.floats(-1.5, 2.5)], st.floats(-0.5, 2.0))
 
 
 @pytest.mark.parametrize(("name", "letter"), COMBINATIONS)
-def test_compiled_plain_and_exact_are_one(
+def test_compiled_plain_and_reference_values_agree(
     name: str, letter: str, make_texture: Check, plain: Check
 ):
     compiled = Surface(make_texture(name), letter)
@@ -68,14 +68,14 @@ def test_compiled_plain_and_exact_are_one(
     holds()
 
 
-# --- laws of one's own ----------------------------------------------------------------------------
+# --- user-defined laws --------------------------------------------------------------------------
 
 
 def own_law(contact: Any, force: Callable[[ContactSymbols], Any], **options: Any) -> Law:
     return Law("V", "own", contact, force, **options)
 
 
-def test_a_law_of_ones_own_with_a_parameter(wave: Sinusoid, inside: Check, plain: Check):
+def test_a_user_defined_law_with_a_parameter(wave: Sinusoid, inside: Check, plain: Check):
     law = own_law(
         "vertical",
         lambda c: c.k * c.depth * (1 + c.parameter("hardening") * c.depth) * c.normal,
@@ -102,7 +102,7 @@ def test_the_relative_height_runs_from_minus_one_to_one(contact: Any, wave: Sinu
 
 @pytest.mark.parametrize("contact", ["nominal", "vertical"])
 @pytest.mark.parametrize("clamp", ["whole", "lateral"])
-def test_a_clamped_law_of_ones_own_has_its_derivative(
+def test_a_clamped_user_defined_law_has_its_derivative(
     contact: Any, clamp: Any, make_texture: Check, inside: Check, plain: Check, differences: Check
 ):
     texture = make_texture("fourier")
@@ -115,7 +115,7 @@ def test_a_clamped_law_of_ones_own_has_its_derivative(
 
 @pytest.mark.parametrize("contact", ["vertical", "nearest", "split"])
 def test_a_law_with_state_is_on_the_nominal_contact(contact: Any):
-    """Its anchor is held while z < 0: elsewhere contact would mean something else."""
+    """Its anchor is held while z < 0, which is contact on the nominal contact only."""
     with pytest.raises(LawError, match="nominal contact"):
         own_law(contact, lambda c: c.k * c.e_z, stateful=True)
 
@@ -126,7 +126,7 @@ def test_a_law_on_the_nearest_contact_is_not_clamped(contact: Any):
         own_law(contact, lambda c: c.k * c.e_z, clampable=True)
 
 
-def test_a_default_of_ones_own_law_is_its_own(wave: Sinusoid):
+def test_a_default_of_a_user_defined_law(wave: Sinusoid):
     law = own_law(
         "nominal",
         lambda c: c.k * c.depth * c.parameter("friction") * c.e_z,
@@ -135,7 +135,7 @@ def test_a_default_of_ones_own_law_is_its_own(wave: Sinusoid):
     assert Surface(wave, law).law_parameters == {"friction": 0.3}
 
 
-def test_a_law_of_ones_own_may_reuse_a_letter(wave: Sinusoid, plain: Check):
+def test_a_user_defined_law_may_reuse_a_letter(wave: Sinusoid, plain: Check):
     law = Law("C", "not-the-shipped-one", "nominal", lambda c: 2 * c.k * c.depth * c.e_z)
     force = plain(Surface(wave, law)).force([[0.0, 0.0, -1e-3]])
     np.testing.assert_allclose(force, [[0.0, 0.0, 2.0]])
@@ -206,7 +206,7 @@ def test_arguments_that_cannot_be_used(argument: str, value: Any, wave: Sinusoid
 
 
 @pytest.mark.parametrize("value", [0.0, 1.0])
-def test_the_ends_of_the_modulation_depth_are_allowed(value: float, wave: Sinusoid):
+def test_the_limits_of_the_modulation_depth_are_valid(value: float, wave: Sinusoid):
     assert Surface(wave, "F", modulation_depth=value).modulation_depth == value
     assert Surface(wave, "F", friction=0.0).friction == 0.0
 
@@ -284,7 +284,7 @@ def test_state_that_cannot_be_used(argument: str, value: Any, wave: Sinusoid):
     assert caught.value.argument == argument
 
 
-def test_the_representation_says_what_it_is(wave: Sinusoid):
+def test_the_representation_of_a_surface(wave: Sinusoid):
     text = repr(Surface(wave, "B", stiffness=500.0, max_depth=D, clamp="backed"))
     for part in ("Sinusoid(", "law='B'", "stiffness=500.0", "max_depth=0.0002", "clamp='backed'"):
         assert part in text
@@ -297,7 +297,7 @@ def test_the_representation_says_what_it_is(wave: Sinusoid):
 def test_a_surface_can_be_sent_to_another_process(
     law: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What was given for other laws goes along; a law of one's own goes where it is known."""
+    """Values given for other laws are pickled; a user-defined law must be registered."""
     surface = Surface(Sinusoid(0.3e-3, 1.1e-3), law, 345.6, 0.7e-3, friction=0.4, continuity=2.0)
     points = np.array([[0.1e-3, 0.0, 0.0], [0.4e-3, 0.2e-3, -0.2e-3]])
     before = surface.force(points)
@@ -311,5 +311,5 @@ def test_a_surface_can_be_sent_to_another_process(
     own = Law("U", "own", "vertical", lambda c: c.k * c.depth * c.e_z)
     with pytest.raises((TypeError, AttributeError, pickle.PicklingError)):
         pickle.dumps(surface.to_law(own))
-    monkeypatch.setitem(KNOWN_LAWS, "U", own)
+    monkeypatch.setitem(REGISTERED_LAWS, "U", own)
     assert pickle.loads(pickle.dumps(surface.to_law(own))).law is own

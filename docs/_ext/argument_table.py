@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from asperity.arguments import Argument
+from asperity.core.arguments import Argument
 
 _HEAD = ["key", "unit", "default", "what it is"]
 _OPTION_HEAD = ["key", "option", "unit", "default", "what it is"]
@@ -19,15 +19,15 @@ def argument_table(arguments: Iterable[Argument], *, options: bool = False) -> l
     """
     rows = [list(_OPTION_HEAD if options else _HEAD)]
     for argument in arguments:
-        row = [argument.name, argument.unit, argument.default_text, words_of(argument)]
+        row = [argument.name, argument.unit, argument.default_text, describe_argument(argument)]
         if options:
             row.insert(1, f"--{argument.name.replace('_', '-')}")
         rows.append(row)
     return rows
 
 
-def words_of(argument: Argument) -> str:
+def describe_argument(argument: Argument) -> str:
     """Return what an argument is, with the choice for a word and an example."""
     choice = f": {', '.join(argument.choices)}" if argument.choices else ""
     example = f", such as {argument.example}" if argument.example else ""
-    return argument.words + choice + example
+    return argument.description + choice + example

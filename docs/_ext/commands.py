@@ -25,7 +25,7 @@ def execute(source: str, names: dict[str, Any], expect_error: bool = False) -> t
     Raises:
         RuntimeError: if an expected error does not happen.
     """
-    from asperity.errors import AsperityError
+    from asperity.core.errors import AsperityError
 
     tree = ast.parse(source)
     last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None

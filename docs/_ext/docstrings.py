@@ -8,14 +8,14 @@ from typing import Any
 from sphinx.application import Sphinx
 
 # Literals and roles stay as they are; everything between them is escaped.
-_KEPT = re.compile(r"(``.*?``|:[\w:]+:`.*?`|`[^`]+`_?)")
+_VERBATIM = re.compile(r"(``.*?``|:[\w:]+:`.*?`|`[^`]+`_?)")
 _ALIAS = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")
 _TRAILING = re.compile(r"(?<=\w)_(?=\W|$)")
 
 
-def escaped(line: str) -> str:
+def escape_markup(line: str) -> str:
     """Return a line of a docstring without accidental markup."""
-    parts = _KEPT.split(line)
+    parts = _VERBATIM.split(line)
     for index in range(0, len(parts), 2):
         part = parts[index].replace("|", r"\|")
         part = re.sub(r"(?<!\\)\*(?=\S)", r"\*", part)
@@ -31,7 +31,7 @@ def _process(
         prompt = line.lstrip().startswith(">>>")
         inside = prompt or (inside and bool(line.strip()))
         if not inside and not line.lstrip().startswith((".. ", ":")):
-            lines[index] = escaped(line)
+            lines[index] = escape_markup(line)
 
 
 def _short_types(

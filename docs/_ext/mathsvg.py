@@ -20,8 +20,8 @@ _SIZE = 100.0  # units of the drawing per em
 _LINE_GAP = 0.55  # between the lines of one formula [em]
 _SCALE = 1.06  # STIX letters are a little smaller than the text face
 _LOGGER = logging.getLogger(__name__)
-# Commands that authors expect and mathtext spells otherwise.
-_SPELLED = {
+# LaTeX commands with another name in mathtext.
+_SUBSTITUTIONS = {
     r"\tfrac": r"\frac",
     r"\lVert": r"\Vert",
     r"\rVert": r"\Vert",
@@ -43,13 +43,13 @@ class Line:
     descent: float
 
 
-def mathtext(latex: str) -> str:
-    """Return the formula as mathtext understands it."""
-    return re.sub(r"\\[A-Za-z]+", lambda m: _SPELLED.get(m[0], m[0]), " ".join(latex.split()))
+def to_mathtext(latex: str) -> str:
+    """Return the formula in the syntax of mathtext."""
+    return re.sub(r"\\[A-Za-z]+", lambda m: _SUBSTITUTIONS.get(m[0], m[0]), " ".join(latex.split()))
 
 
 @lru_cache(maxsize=2048)
-def line_of(latex: str) -> Line:
+def render_line(latex: str) -> Line:
     """Return one line of a formula as an SVG path.
 
     Raises:
@@ -61,7 +61,7 @@ def line_of(latex: str) -> Line:
 
     with mpl.rc_context({"mathtext.fontset": "stix"}):
         tool, face = TextToPath(), FontProperties(size=_SIZE)
-        text = f"${mathtext(latex)}$"
+        text = f"${to_mathtext(latex)}$"
         vertices, codes = tool.get_text_path(face, text, ismath=True)
         width, height, descent = tool.get_text_width_height_descent(text, face, ismath=True)
         scale = _SIZE / tool.FONT_SCALE
@@ -85,13 +85,13 @@ def _path(vertices: Any, codes: Any, scale: float) -> str:
     return " ".join(parts)
 
 
-def svg_of(latex: str, css_class: str) -> str:
+def render_svg(latex: str, css_class: str) -> str:
     """Return a formula as inline SVG that takes the colour of the text around it."""
-    lines = [line_of(part.strip()) for part in latex.split(r"\\") if part.strip()]
-    drawn, y = [], 0.0
+    lines = [render_line(part.strip()) for part in latex.split(r"\\") if part.strip()]
+    paths, y = [], 0.0
     for index, line in enumerate(lines):
         y += (line.height if index else 0.0) + (_LINE_GAP if index else 0.0)
-        drawn.append(f'<path transform="translate(0 {y * _SIZE:.1f})" d="{line.path}"/>')
+        paths.append(f'<path transform="translate(0 {y * _SIZE:.1f})" d="{line.path}"/>')
         y += line.descent
     top, bottom = lines[0].height + 0.04, y + 0.04
     width, height = max(line.width for line in lines) + 0.06, top + bottom
@@ -103,14 +103,14 @@ def svg_of(latex: str, css_class: str) -> str:
     )
     return (
         f'<svg class="{css_class}" role="img" aria-label="{label}" viewBox="{box}" '
-        f'style="{style}" fill="currentColor">{"".join(drawn)}</svg>'
+        f'style="{style}" fill="currentColor">{"".join(paths)}</svg>'
     )
 
 
 def _safe_svg(node: nodes.Element, css_class: str) -> str:
     latex = node.astext()
     try:
-        return svg_of(latex, css_class)
+        return render_svg(latex, css_class)
     except ValueError as error:
         _LOGGER.warning("formula %r: %s", latex, str(error).splitlines()[-1], location=node)
         return f"<code>{html.escape(latex)}</code>"

@@ -49,7 +49,7 @@ class _Block(SphinxDirective):
     def page(self) -> Page:
         return _PAGES.setdefault(self.env.docname, Page())
 
-    def failed(self, error: Exception) -> list[nodes.Node]:
+    def report_failure(self, error: Exception) -> list[nodes.Node]:
         text = f"{type(error).__name__}: {error}"
         return [self.state_machine.reporter.error(f"block failed: {text}", line=self.lineno)]
 
@@ -77,14 +77,14 @@ class Run(_Block):
             with contextlib.chdir(page.folder):
                 printed, value = execute(source, page.names, "error" in self.options)
         except Exception as error:  # the page says which block failed, the build goes on
-            return self.failed(error)
+            return self.report_failure(error)
         result: list[nodes.Node] = []
         if "hide-code" not in self.options:
             result.append(self.literal(source, "python"))
         if printed.strip():
             result.append(self.literal(printed.rstrip(), "text", "output"))
         if "table" in self.options:
-            result.append(table_of(value))
+            result.append(make_table(value))
         if "figure" in self.options:
             result.append(self.picture(page, value))
         return result
@@ -121,17 +121,17 @@ class Shell(_Block):
             try:
                 code, text = run_command(line.removeprefix("$").strip(), page.folder)
             except Exception as error:  # a traceback of the command is a fault of the page
-                return self.failed(error)
+                return self.report_failure(error)
             if code != self.options.get("exit", 0):
-                return self.failed(RuntimeError(f"{line}: exit code {code}: {text[-300:]}"))
+                return self.report_failure(RuntimeError(f"{line}: exit code {code}: {text[-300:]}"))
             result.append(self.literal(line, "console"))
             if text.strip() and "quiet" not in self.options:
-                shown = first_paragraphs(text.strip(), self.options.get("first"))
-                result.append(self.literal(shown, "text", "output"))
+                visible = first_paragraphs(text.strip(), self.options.get("first"))
+                result.append(self.literal(visible, "text", "output"))
         return result
 
 
-def table_of(rows: Sequence[Sequence[str]]) -> nodes.table:
+def make_table(rows: Sequence[Sequence[str]]) -> nodes.table:
     """Return a table whose first row is the head."""
     group = nodes.tgroup(cols=len(rows[0]))
     group += [nodes.colspec(colwidth=1) for _ in rows[0]]
@@ -148,7 +148,7 @@ def table_of(rows: Sequence[Sequence[str]]) -> nodes.table:
     return nodes.table("", group, classes=["numbers"])
 
 
-def _forget(_app: Sphinx, _env: Any, docname: str) -> None:
+def _purge_page(_app: Sphinx, _env: Any, docname: str) -> None:
     _PAGES.pop(docname, None)
 
 
@@ -157,5 +157,5 @@ def setup(app: Sphinx) -> dict[str, Any]:
     run: type[Directive] = Run
     app.add_directive("run", run)
     app.add_directive("shell", Shell)
-    app.connect("env-purge-doc", _forget)
+    app.connect("env-purge-doc", _purge_page)
     return {"version": "1", "parallel_read_safe": False, "parallel_write_safe": True}

@@ -1,4 +1,4 @@
-"""Haptic textures for the device you have: which law, at which stiffness, what goes wrong.
+"""Choose a haptic texture law and its stiffness for your device, and know what will go wrong.
 
 Public names are imported when they are first used: starting up costs no SymPy, no SciPy, no
 Numba and no matplotlib.
@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from asperity.errors import AsperityError as AsperityError
-from asperity.errors import LawError as LawError
-from asperity.errors import ParameterError as ParameterError
-from asperity.errors import SurfaceFileError as SurfaceFileError
-from asperity.version import __version__ as __version__
+from asperity.core import display as _display
+from asperity.core.errors import AsperityError as AsperityError
+from asperity.core.errors import LawError as LawError
+from asperity.core.errors import ParameterError as ParameterError
+from asperity.core.errors import SurfaceFileError as SurfaceFileError
+from asperity.core.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from asperity.analysis import Bound as Bound
@@ -27,15 +28,15 @@ if TYPE_CHECKING:
     from asperity.analysis import worst_loop as worst_loop
     from asperity.analysis.analysis_result import Analysis as Analysis
     from asperity.analysis.analyze import analyze as analyze
+    from asperity.analysis.assess_passivity import passivity as passivity
     from asperity.analysis.check_limits import limits as limits
-    from asperity.analysis.judge_passivity import passivity as passivity
     from asperity.analysis.limits.limit_result import Limits as Limits
-    from asperity.analysis.split.potential_table import TabulatedSurface as TabulatedSurface
-    from asperity.analysis.split.potential_table import tabulate as tabulate
-    from asperity.analysis.split.state import PopThrough as PopThrough
-    from asperity.analysis.split.state import SplitState as SplitState
-    from asperity.analysis.split.state import pop_through as pop_through
-    from asperity.analysis.split.state import split_state as split_state
+    from asperity.analysis.split.baked_field import BakedField as BakedField
+    from asperity.analysis.split.baked_field import bake as bake
+    from asperity.analysis.split.split_state import PopThrough as PopThrough
+    from asperity.analysis.split.split_state import SplitState as SplitState
+    from asperity.analysis.split.split_state import pop_through as pop_through
+    from asperity.analysis.split.split_state import split_state as split_state
     from asperity.devices import Device as Device
     from asperity.devices import load_device as load_device
     from asperity.laws import Law as Law
@@ -56,7 +57,7 @@ if TYPE_CHECKING:
     from asperity.textures import named_surface as named_surface
     from asperity.textures import surface_names as surface_names
 
-_NAMES = {
+_PUBLIC_NAMES = {
     "asperity.analysis": (
         "Bound Comparison Leak Passivity characteristic_number "
         "compare curl_number loop_work one_sided_number worst_loop"
@@ -64,10 +65,10 @@ _NAMES = {
     "asperity.analysis.analysis_result": "Analysis",
     "asperity.analysis.analyze": "analyze",
     "asperity.analysis.check_limits": "limits",
-    "asperity.analysis.judge_passivity": "passivity",
+    "asperity.analysis.assess_passivity": "passivity",
     "asperity.analysis.limits.limit_result": "Limits",
-    "asperity.analysis.split.potential_table": "TabulatedSurface tabulate",
-    "asperity.analysis.split.state": "PopThrough SplitState pop_through split_state",
+    "asperity.analysis.split.baked_field": "BakedField bake",
+    "asperity.analysis.split.split_state": "PopThrough SplitState pop_through split_state",
     "asperity.devices": "Device load_device",
     "asperity.laws": "Law",
     "asperity.recording.recording": "Recording open_recording",
@@ -81,19 +82,28 @@ _NAMES = {
 }
 """Where the public names live."""
 
-_HOMES = {name: home for home, names in _NAMES.items() for name in names.split()}
+_MODULE_OF_NAME = {name: home for home, names in _PUBLIC_NAMES.items() for name in names.split()}
 
-__all__ = list(_HOMES)
+__all__ = list(_MODULE_OF_NAME)
 __all__ += ["AsperityError", "LawError", "ParameterError", "SurfaceFileError", "__version__"]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in _MODULE_OF_NAME:
         raise AttributeError(f"module 'asperity' has no attribute {name!r}")
     import importlib
 
-    return getattr(importlib.import_module(_HOMES[name]), name)
+    return getattr(importlib.import_module(_MODULE_OF_NAME[name]), name)
 
 
 def __dir__() -> list[str]:
     return __all__
+
+
+def _load_report() -> Any:
+    from asperity import report  # at the first use: it imports every room of the package
+
+    return report
+
+
+_display.set_renderer(_load_report)

@@ -1,4 +1,4 @@
-"""The program ``asperity`` as the system sees it: streams, interrupts, exit codes."""
+"""The program ``asperity``: standard streams, interrupts and exit codes."""
 
 from __future__ import annotations
 
@@ -10,37 +10,38 @@ from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
-from asperity.errors import tell
+from asperity.core.errors import print_message
+from asperity.core.processes import SINGLE_THREADED
 
-INTERRUPTED = 130  # 128 + SIGINT, as shells have it
-INPUT_OUTPUT = 74  # as sysexits.h has it
+INTERRUPTED = 130  # 128 + SIGINT, as in shells
+IO_ERROR = 74  # as in sysexits.h
 INTERNAL_ERROR = 70  # likewise
 BROKEN_PIPE = 141  # 128 + SIGPIPE
 _TRACEBACK = "ASPERITY_TRACEBACK"
-_AGAIN = 1.0  # [s] until an interrupt that has not arrived is raised again
+_REPEAT_INTERVAL = 1.0  # [s] after which an interrupt is raised again
 
-_interrupts: list[int] = []
+_received_signals: list[int] = []
 
 
 def main() -> NoReturn:
-    """Run the command line; every end has an exit code and at most one line on standard error."""
+    """Run the command line; every error is an exit code and one line on standard error."""
     status = INTERRUPTED
     with suppress(KeyboardInterrupt):
-        signal.signal(signal.SIGINT, _interrupt)
+        signal.signal(signal.SIGINT, _handle_interrupt)
         status = _run()
-    _end_interrupts()
-    if _interrupts:
-        tell("interrupted")
-    # An interrupt that came through an exec() of text is remembered: run by -m, Python would then
-    # end by the signal, not by the exit code. Any other exec() makes it forget.
+    _ignore_interrupts()
+    if _received_signals:
+        print_message("interrupted")
+    # Run with -m, Python ends by the signal instead of the exit code after an interrupt inside an
+    # exec() of source text, such as that of a plugin. A later exec() clears that state.
     exec("")
-    sys.exit(INTERRUPTED if _interrupts else _flushed(status))
+    sys.exit(INTERRUPTED if _received_signals else _flush_output(status))
 
 
 def _run() -> int:
     try:
-        _open_streams()
-        # Imported here, so that an interrupt while it loads ends like any other.
+        _prepare_streams()
+        # Imported here, so that an interrupt during the import is handled too.
         from asperity.cli.main import main as command_line
 
         command_line()
@@ -48,80 +49,75 @@ def _run() -> int:
         return end.code if isinstance(end.code, int) else int(end.code is not None)
     except KeyboardInterrupt:
         raise
-    except BaseException as error:  # whatever it is: it is said in one line
-        return _said(error)
+    except BaseException as error:  # any error is reported in one line
+        return _report_error(error)
     return 0
 
 
-def _interrupt(number: int, _frame: FrameType | None) -> None:
-    """Interrupt; the second time at once, and never is it forgotten.
+def _handle_interrupt(number: int, _frame: FrameType | None) -> None:
+    """Raise KeyboardInterrupt; a second interrupt ends the program at once.
 
-    Code that is called back from C may swallow the exception: it is raised again until it arrives
-    at :func:`main`.
+    The exception is raised repeatedly until it arrives in :func:`main`, since code that is called
+    back from C may swallow it.
     """
     if number == signal.SIGINT:
-        _interrupts.append(number)
-        if len(_interrupts) > 1:
+        _received_signals.append(number)
+        if len(_received_signals) > 1:
             os._exit(INTERRUPTED)
-        if hasattr(signal, "setitimer"):  # Windows has none: there the exit code alone says it
-            signal.signal(signal.SIGALRM, _interrupt)
-            signal.setitimer(signal.ITIMER_REAL, _AGAIN, _AGAIN)
+        if hasattr(signal, "setitimer"):  # not on Windows
+            signal.signal(signal.SIGALRM, _handle_interrupt)
+            signal.setitimer(signal.ITIMER_REAL, _REPEAT_INTERVAL, _REPEAT_INTERVAL)
     raise KeyboardInterrupt
 
 
-def _end_interrupts() -> None:
-    """Let no interrupt come any more: what is written is whole, and the exit code is known."""
+def _ignore_interrupts() -> None:
     if hasattr(signal, "setitimer"):
         signal.setitimer(signal.ITIMER_REAL, 0.0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _open_streams() -> None:
-    """Let the standard streams take whatever is written, closed ones included."""
+def _prepare_streams() -> None:
+    """Make the standard streams accept any output, including closed streams."""
     for descriptor in range(3):
         try:
             os.fstat(descriptor)
-        except OSError:  # closed: else the next file that is opened would be standard output
+        except OSError:  # closed: the next file to be opened would become this stream
             os.open(os.devnull, os.O_RDWR)
     sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - to the end
     sys.stderr = sys.stderr or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 - likewise
-    codecs.register_error("asperity", _plain_signs)
+    codecs.register_error("asperity", _replace_unencodable)
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="asperity")  # type: ignore[union-attr]  # both are text files
-    # Pictures go to files: no window system is asked for, whatever the environment says.
-    os.environ["MPLBACKEND"] = "agg"
-    # Sums of linear algebra depend on its threads in the last digit: here as in helpers it has one.
-    os.environ |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    sys.unraisablehook = lambda _what: None  # an interrupt in a finalizer is told by the exit code
+    os.environ |= {"MPLBACKEND": "agg"} | SINGLE_THREADED  # figures go to files
+    sys.unraisablehook = lambda _error: (
+        None
+    )  # an interrupt in a finalizer: the exit code reports it
 
 
-_SIGNS = str.maketrans({
-    "µ": "u", "μ": "u", "·": ".", "×": "x", "−": "-", "–": "-", "—": "-", "…": "...", "≤": "<=",
-    "≥": ">=", "≈": "~", "∞": "inf", "°": " deg", "→": "->", "∂": "d", "√": "sqrt", "⁺": "+",
-    "σ": "sigma", "φ": "phi", "δ": "delta", "κ": "kappa", "λ": "lambda", "∇": "grad ", "•": "*",
-    "“": '"', "”": '"', "‘": "'", "’": "'", "π": "pi", "ω": "omega", "Δ": "Delta", "ε": "eps",
-    "█": "#", "▇": "#", "▆": "#", "▅": "=", "▄": "=", "▃": "-", "▂": "_", "▁": "_", "║": "|",
-    "─": "-", "━": "=", "│": "|", "┃": "|",
+# Characters of the output without an ASCII equivalent in NFKD.
+_ASCII_REPLACEMENTS = str.maketrans({
+    "µ": "u", "×": "x", "−": "-", "–": "-", "≤": "<=", "≥": ">=", "∞": "inf", "°": " deg",
+    "·": ".", "→": "->", "σ": "sigma", "⁺": "+",
 })  # fmt: skip
 
 
-def _plain_signs(error: UnicodeError) -> tuple[str, int]:
-    """Write signs that an encoding lacks as the like of them that it has."""
+def _replace_unencodable(error: UnicodeError) -> tuple[str, int]:
+    """Replace characters that the encoding of a stream does not have."""
     from unicodedata import normalize
 
     if not isinstance(error, UnicodeEncodeError):
         raise error
-    text = error.object[error.start : error.end].translate(_SIGNS)
+    text = error.object[error.start : error.end].translate(_ASCII_REPLACEMENTS)
     return normalize("NFKD", text).encode("ascii", "ignore").decode() or "?", error.end
 
 
-def _said(error: BaseException) -> int:
-    """Say what has gone wrong, and return the exit code."""
+def _report_error(error: BaseException) -> int:
+    """Print a message about an unexpected error, and return the exit code."""
     if isinstance(error, BrokenPipeError):
-        return BROKEN_PIPE  # whoever read the output has enough
+        return BROKEN_PIPE  # the reader of the output has ended
     if isinstance(error, OSError) and error.filename is None:
-        tell(f"output cannot be written: {error.strerror or error}")
-        return INPUT_OUTPUT
+        print_message(f"output cannot be written: {error.strerror or error}")
+        return IO_ERROR
     if os.environ.get(_TRACEBACK):
         sys.__excepthook__(type(error), error, error.__traceback__)
         return INTERNAL_ERROR
@@ -130,29 +126,29 @@ def _said(error: BaseException) -> int:
 
     import asperity
 
-    tell(
-        f"a fault of asperity's own, at {shlex.join(['asperity', *sys.argv[1:]])!r}:"
-        f" {type(error).__name__}: {' '.join(str(error).split())} ({_place(error)});"
+    print_message(
+        f"internal error in {shlex.join(['asperity', *sys.argv[1:]])!r}:"
+        f" {type(error).__name__}: {' '.join(str(error).split())} ({_error_location(error)});"
         f" asperity {asperity.__version__}, Python {platform.python_version()},"
-        f" {platform.system()}. Please report this line; {_TRACEBACK}=1 shows all of it"
+        f" {platform.system()}. Please report this line; {_TRACEBACK}=1 shows the traceback"
     )
     return INTERNAL_ERROR
 
 
-def _place(error: BaseException) -> str:
+def _error_location(error: BaseException) -> str:
     frame = error.__traceback__
     while frame is not None and frame.tb_next is not None:
         frame = frame.tb_next
     return f"{frame.tb_frame.f_code.co_filename}, line {frame.tb_lineno}" if frame else "nowhere"
 
 
-def _flushed(status: int) -> int:
-    """Return the exit code, or another where standard output does not take its last lines."""
+def _flush_output(status: int) -> int:
+    """Flush standard output, and return the exit code."""
     try:
         sys.stdout.flush()
     except (OSError, ValueError) as error:
-        status = status or _said(error)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for the flush at Python's own end
+        status = status or _report_error(error)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for the flush when Python ends
     return status
 
 

@@ -10,49 +10,71 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.arguments import DEFAULT_STIFFNESS, MAX_DEPTH, STIFFNESS, Argument
-from asperity.checks import FloatArray, Points, array, positive
-from asperity.checks import points as read_points
-from asperity.contacts.memory import UNLIMITED, checked_memory, new_memory
+from asperity.clamps import CLAMPS, NONE, Clamp, find_clamp
+from asperity.contacts.warm_start import UNLIMITED, check_warm_start, new_warm_start
+from asperity.core.arguments import DEFAULT_STIFFNESS, MAX_DEPTH, STIFFNESS, Argument
+from asperity.core.cache import content_digest
+from asperity.core.checks import FloatArray, Points, check_array, check_points, check_positive
+from asperity.core.display import Plottable
+from asperity.core.errors import ParameterError, suggest_names
 from asperity.derive.facts import LawFacts, clamped_facts
-from asperity.display import Plotted
-from asperity.errors import ParameterError, nearest_names
-from asperity.kernels.probe import CLAMPS, ClampName
-from asperity.laws import KNOWN_LAWS, LAW_ARGUMENTS, LAWS, Law, find_law
-from asperity.textures.naming import TextureLike, as_texture
+from asperity.laws import LAWS, REGISTERED_LAWS, SHIPPED_LAW_ARGUMENTS, Law, find_law
+from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture
 
-# max_depth unless given: the peak-to-valley height of the texture, at most this [m].
-LARGEST_DEFAULT_DEPTH = 1e-3
+MAX_DEFAULT_DEPTH = 1e-3
+"""Upper limit of the default of max_depth [m]."""
 
 LAW = Argument("law", "letter or name of the law", default="C", form="text")
 CLAMP = Argument(
-    "clamp", "what holds the depth at max_depth", default="none", form="text", choices=CLAMPS
+    "clamp",
+    "how the force is limited below max_depth",
+    default=NONE.name,
+    form="text",
+    choices=tuple(CLAMPS),
 )
 
 DEFAULT_PARAMETERS = {
     name: default for law in LAWS.values() for name, default in law.parameters.items()
 }
-"""The defaults of the shipped laws' parameters."""
+"""Defaults of the parameters of the shipped laws."""
+
+
+_Optional = ArrayLike | None
 
 
 def default_max_depth(texture: Texture) -> float:
     """Return the peak-to-valley height of the texture, at most 1 mm [m]."""
     height = texture.peak_to_valley
-    return min(height, LARGEST_DEFAULT_DEPTH) if height > 0.0 else LARGEST_DEFAULT_DEPTH
+    return min(height, MAX_DEFAULT_DEPTH) if height > 0.0 else MAX_DEFAULT_DEPTH
 
 
-class Surface(Plotted):
+def _depth_or(max_depth: float | None, default: float) -> float:
+    return default if max_depth is None else MAX_DEPTH.validate(max_depth)
+
+
+def _law_parameter(name: str, text: str) -> property:
+    """Return a property: the value of this law, otherwise the one that ``to_law`` passes on."""
+
+    def value(self: Surface) -> float:
+        given = {**DEFAULT_PARAMETERS, **self._explicit_parameters, **self.law_parameters}
+        return given[name]
+
+    return property(value, doc=text)
+
+
+class Surface(Plottable):
     """A textured surface as a force field: the body is z < h(x, y), z points out of it.
 
     Args:
-        texture: the height function, or what names it on the command line: "sandpaper:grit=P60",
-            "cloth", the path of a measured file; see :func:`~asperity.textures.naming.as_texture`.
-        law: letter, name, or a :class:`~asperity.laws.Law` of your own.
+        texture: the height function, or its specification as on the command line
+            ("sandpaper:grit=P60", "cloth", the path of a measured file); see
+            :func:`~asperity.textures.catalogue.as_texture`.
+        law: letter, name, or a user-defined :class:`~asperity.laws.Law`.
         stiffness: k [N/m] of the smooth wall.
-        max_depth: D [m], the depth to which the surface is meant to be pressed; it bounds the
-            working region of the analysis and is where a clamp acts. Default: the peak-to-valley
-            height of the texture, at most 1 mm.
+        max_depth: D [m], the greatest intended penetration depth; it bounds the working region of
+            the analysis, and clamps act there. Default: the peak-to-valley height of the texture,
+            at most 1 mm.
         friction: μ of law F; default 0.8.
         max_deflection: d_max [m] of law F, the greatest deflection of the anchor; default 1 mm.
         modulation_depth: a_m of law F, in [0, 1]; default 0.8.
@@ -61,17 +83,18 @@ class Surface(Plotted):
             with a backing wall k (z_b - z) e_z below z_b = min h - max_depth, or -max_depth for
             laws on the nominal contact). Laws W, D, E and H are never clamped.
         continuity: c of law H, positive: its characteristic number is max(1, c); default 1.
-        law_parameters: values for the parameters that the law declares, a law of your own
-            included; the four keywords above are a convenience for those of the shipped laws.
+        law_parameters: values for the parameters that the law declares, also a user-defined law;
+            the keywords friction, max_deflection, modulation_depth and continuity are shorthands
+            for those of the shipped laws.
 
-    A surface is frozen. ``law_parameters`` of the result are the parameters of its law, complete
-    with their defaults: kernels and certificates read them there and nowhere else.
+    A surface is immutable. Its attribute ``law_parameters`` holds all parameters of its law,
+    defaults included; kernels and certificates read them from there.
 
     Raises:
         ParameterError: for a value that cannot be used; it names the argument.
 
     Example:
-        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
         >>> surface = Surface(Sinusoid(amplitude=0.8e-3, period=1e-3), law="A", stiffness=500.0)
         >>> surface.force([[0.25e-3, 0.0, 0.0], [0.25e-3, 0.0, 1e-3]])
         array([[0. , 0. , 0.4],
@@ -82,9 +105,9 @@ class Surface(Plotted):
     law: Law
     stiffness: float
     max_depth: float
-    clamp: ClampName
+    clamp: str
     law_parameters: Mapping[str, float]
-    _given: Mapping[str, float]
+    _explicit_parameters: Mapping[str, float]
 
     def __init__(
         self,
@@ -95,78 +118,67 @@ class Surface(Plotted):
         friction: float | None = None,
         max_deflection: float | None = None,
         modulation_depth: float | None = None,
-        clamp: ClampName = "none",
+        clamp: str = NONE.name,
         continuity: float | None = None,
         law_parameters: Mapping[str, float] | None = None,
     ) -> None:
-        own, made = find_law(law), as_texture(texture)
+        law, texture = find_law(law), as_texture(texture)
+        names = ("friction", "max_deflection", "modulation_depth", "continuity")
+        values = (friction, max_deflection, modulation_depth, continuity)
         keywords = {
-            "friction": friction,
-            "max_deflection": max_deflection,
-            "modulation_depth": modulation_depth,
-            "continuity": continuity,
-        }
-        given = {
-            name: LAW_ARGUMENTS[name].checked(value)
-            for name, value in keywords.items()
+            name: SHIPPED_LAW_ARGUMENTS[name].validate(value)
+            for name, value in zip(names, values, strict=True)
             if value is not None
         }
-        named = own.checked(law_parameters or {})
-        for name in given.keys() & named.keys():
-            raise ParameterError(
-                name, "is given twice, by keyword and in law_parameters", named[name]
-            )
-        if clamp not in CLAMPS:
-            raise ParameterError("clamp", f"must be one of {', '.join(CLAMPS)}", clamp)
-        depth = default_max_depth(made) if max_depth is None else MAX_DEPTH.checked(max_depth)
-        self._set(
-            texture=made,
-            law=own,
-            stiffness=STIFFNESS.checked(stiffness),
-            max_depth=depth,
-            clamp=clamp,
-            _given=given | named,
+        named = law.check_parameters(law_parameters or {})
+        for name in keywords.keys() & named.keys():
+            reason = "is given twice, by keyword and in law_parameters"
+            raise ParameterError(name, reason, named[name])
+        self.__setstate__(
+            {
+                "texture": texture,
+                "law": law,
+                "stiffness": STIFFNESS.validate(stiffness),
+                "max_depth": _depth_or(max_depth, default_max_depth(texture)),
+                "clamp": find_clamp(clamp).name,
+                "_explicit_parameters": keywords | named,
+            }
         )
 
-    def _set(self, **values: Any) -> None:
-        """Fill a new surface, the parameters of its law completed with the law's defaults."""
-        law, given = values["law"], values["_given"]
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state to pickle; a registered law is stored as its letter.
+
+        The process that unpickles a user-defined law must have registered it.
+        """
+        names = ("texture", "law", "stiffness", "max_depth", "clamp", "_explicit_parameters")
+        state = {name: getattr(self, name) for name in names}
+        registered = REGISTERED_LAWS.get(self.law.letter) is self.law
+        return state | ({"law": self.law.letter} if registered else {})
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Set all attributes; parameters that are not given get the defaults of the law."""
+        law, given = find_law(state["law"]), state["_explicit_parameters"]
         parameters = {
-            name: argument.checked(given[name]) if name in given else float(law.parameters[name])
+            name: argument.validate(given[name]) if name in given else float(law.parameters[name])
             for name, argument in law.arguments.items()
         }
-        if law.stateful and "max_deflection" in parameters:  # the derivation asks for it
-            positive("max_deflection", parameters["max_deflection"], "m")
-        self.__dict__.update(values, law_parameters=MappingProxyType(parameters))
+        if law.stateful and "max_deflection" in parameters:  # the derivation requires it
+            check_positive("max_deflection", parameters["max_deflection"], "m")
+        vars(self).update(state, law=law, law_parameters=MappingProxyType(parameters))
 
-    def _chosen(self) -> dict[str, Any]:
-        names = ("texture", "law", "stiffness", "max_depth", "clamp", "_given")
-        return {name: getattr(self, name) for name in names}
-
-    def _changed(self, **values: Any) -> Surface:
-        """Return a surface that differs in these values only; nothing derived is taken along."""
+    def _replace(self, **values: Any) -> Surface:
+        """Return a copy with other values; derived attributes are computed again."""
         result = object.__new__(type(self))
-        result._set(**self._chosen() | values)
+        result.__setstate__(self.__getstate__() | {"law": self.law} | values)
         return result
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what another process makes the same one of: a law that is known is its letter.
-
-        A law of the user's own is found there if that process has learned it.
-        """
-        known = KNOWN_LAWS.get(self.law.letter) is self.law
-        return self._chosen() | {"law": self.law.letter if known else self.law}
-
-    def __setstate__(self, values: dict[str, Any]) -> None:
-        self._set(**values | {"law": find_law(values["law"])})
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(
-            f"a surface is not changed: {name} belongs to a new one, "
-            "by to_law, to_stiffness, to_depth or Surface(...)"
+            f"Surface is immutable, cannot set {name}: use to_law, to_stiffness, to_depth, "
+            "to_texture or Surface(...)"
         )
 
-    __delattr__ = None  # type: ignore[assignment]  # nothing of a surface is taken away
+    __delattr__ = None  # type: ignore[assignment]  # immutable
 
     def __repr__(self) -> str:
         return (
@@ -175,38 +187,39 @@ class Surface(Plotted):
         )
 
     def to_depth(self, max_depth: float) -> Surface:
-        """Return the same surface for another max_depth [m].
+        """Return a copy with another max_depth [m].
 
         Raises:
             ParameterError: for a depth that is not positive.
         """
-        return self._changed(max_depth=MAX_DEPTH.checked(max_depth))
+        return self._replace(max_depth=MAX_DEPTH.validate(max_depth))
 
     def to_texture(self, texture: TextureLike, max_depth: float | None = None) -> Surface:
-        """Return the same law, stiffness and depth on another texture.
+        """Return a copy with another texture.
 
         Args:
-            texture: the other one, or what names it.
-            max_depth: [m], if it is to change too.
+            texture: the texture, or a text or path that names it.
+            max_depth: [m]; unchanged by default.
 
         Raises:
             ParameterError: for a depth that is not positive.
         """
-        depth = self.max_depth if max_depth is None else MAX_DEPTH.checked(max_depth)
-        return self._changed(texture=as_texture(texture), max_depth=depth)
+        depth = _depth_or(max_depth, self.max_depth)
+        return self._replace(texture=as_texture(texture), max_depth=depth)
 
     def to_stiffness(self, stiffness: float) -> Surface:
-        """Return the same surface with another stiffness [N/m].
+        """Return a copy with another stiffness [N/m].
 
         Raises:
             ParameterError: for a stiffness that is not positive.
         """
-        return self._changed(stiffness=STIFFNESS.checked(stiffness))
+        return self._replace(stiffness=STIFFNESS.validate(stiffness))
 
     def to_law(self, law: str | Law, law_parameters: Mapping[str, float] | None = None) -> Surface:
-        """Return the same texture with another law, everything else as it is.
+        """Return a copy with another law.
 
-        Values that were given for parameters go along, also those that only the other law has.
+        Parameter values given for this surface are passed on, also those that only the other law
+        declares.
 
         Args:
             law: the other law.
@@ -216,71 +229,47 @@ class Surface(Plotted):
             ParameterError: for an unknown law, or a value that cannot be used.
         """
         other = find_law(law)
-        given = other.checked(law_parameters or {})
-        return self._changed(law=other, _given={**self._given, **given})
+        given = other.check_parameters(law_parameters or {})
+        return self._replace(law=other, _explicit_parameters={**self._explicit_parameters, **given})
 
     def parameter(self, name: str) -> float:
-        """Return the value in effect of a parameter of the law.
+        """Return the value of a parameter of the law.
 
         Raises:
             ParameterError: for a name that the law does not declare.
         """
         if name not in self.law_parameters:
-            hint = nearest_names(name, self.law_parameters) if self.law_parameters else "none"
+            hint = suggest_names(name, self.law_parameters) if self.law_parameters else "none"
             raise ParameterError("name", f"is no parameter of law {self.law}: {name!r}; {hint}")
         return self.law_parameters[name]
 
-    def _in_effect(self, name: str) -> float:
-        """Return a shipped law's parameter: the law's own, else as given for other laws."""
-        if name in self.law_parameters:
-            return self.law_parameters[name]
-        return self._given.get(name, DEFAULT_PARAMETERS[name])
+    friction = _law_parameter("friction", "μ [1] of law F.")
+    max_deflection = _law_parameter("max_deflection", "d_max [m] of law F.")
+    modulation_depth = _law_parameter("modulation_depth", "a_m [1] of law F.")
+    continuity = _law_parameter("continuity", "c [1] of law H.")
 
     @property
-    def friction(self) -> float:
-        """μ [1] of law F: this surface's own, else the one that :meth:`to_law` hands on."""
-        return self._in_effect("friction")
-
-    @property
-    def max_deflection(self) -> float:
-        """d_max [m] of law F; see :attr:`friction`."""
-        return self._in_effect("max_deflection")
-
-    @property
-    def modulation_depth(self) -> float:
-        """a_m [1] of law F; see :attr:`friction`."""
-        return self._in_effect("modulation_depth")
-
-    @property
-    def continuity(self) -> float:
-        """C [1] of law H; see :attr:`friction`."""
-        return self._in_effect("continuity")
-
-    @property
-    def acting_clamp(self) -> ClampName:
-        """The clamp that changes the force: ``"none"`` for a law that is never clamped."""
-        return self.clamp if self.law.clampable else "none"
+    def effective_clamp(self) -> Clamp:
+        """The clamp that acts on the force; ``NONE`` for a law that is never clamped."""
+        return CLAMPS[self.clamp] if self.law.clampable else NONE
 
     @property
     def facts(self) -> LawFacts:
-        """What the symbols say of the force that is rendered, of law and clamp together."""
-        return clamped_facts(self.law, self.acting_clamp)
+        """Symbolic facts about the clamped law."""
+        return clamped_facts(self.law, self.effective_clamp)
 
     @property
-    def feels_texture(self) -> bool:
-        """Whether the texture has a part in the force; the smooth wall alone has none.
-
-        Such a force may act in any direction, and change with the position in any.
-        """
-        return self.law.contact.begins_on_texture or self.facts.looks_at_surface
+    def depends_on_texture(self) -> bool:
+        """Whether the force depends on the texture; that of the smooth wall does not."""
+        return self.law.contact.begins_on_texture or self.facts.depends_on_surface
 
     @property
     def clamped_depth(self) -> float:
-        """The depth [m] at which the probe is below z_b wherever it is; max_depth without a clamp.
+        """Depth [m] at which the probe is below z_b everywhere; max_depth without a clamp.
 
-        What holds for a field under a clamp is stated down to there at least.
+        Statements about a clamped field hold at least down to this depth.
         """
-        if self.acting_clamp == "none":
+        if not self.effective_clamp.changes_force:
             return self.max_depth
         low, high = self.law.contact.extremes(self.texture)
         return self.max_depth + (high - low)
@@ -292,10 +281,10 @@ class Surface(Plotted):
 
     @cached_property
     def law_arguments(self) -> tuple[float, ...]:
-        """What the kernels receive of the law: see ``asperity.kernels.probe``."""
+        """Arguments of the law's kernels: see ``asperity.kernels.law_codegen``."""
         from asperity.kernels.fuse import kernel_source
 
-        # The extremes of a map cost time: only for a law that looks at the relative height.
+        # The extremes of a map take time to compute: only for laws that use the relative height.
         relative = "h_mid" in kernel_source(self.law)
         low, high = self.texture.extremes if relative else (-1.0, 1.0)
         half = 0.5 * (high - low)
@@ -304,26 +293,38 @@ class Surface(Plotted):
             0.5 * (low + high),
             half if half > 0.0 else 1.0,  # a flat texture modulates nothing
             self.max_depth,
-            self.floor if self.clamp == "backed" else 0.0,
+            self.floor if CLAMPS[self.clamp].has_backing_wall else 0.0,
             *self.law_parameters.values(),
         )
+
+    @property
+    def digest(self) -> str:
+        """Digest of everything that the force depends on: texture, law, parameters and clamp.
+
+        Example:
+            >>> from asperity.textures.kinds.sinusoid import Sinusoid
+            >>> surface = Surface(Sinusoid(amplitude=0.2e-3, period=2e-3), "B")
+            >>> surface.digest == surface.to_stiffness(1001.0).digest
+            False
+        """
+        from asperity.kernels.fuse import kernel_source
+
+        texture = type(self.texture.arguments).__name__, *map(np.asarray, self.texture.arguments)
+        law = self.law.letter, kernel_source(self.law), self.effective_clamp.name
+        return content_digest(texture, law, np.array(self.law_arguments))[:16]
 
     @cached_property
     def _loops(self) -> ModuleType:
         from asperity.kernels.fuse import fuse_surface
 
-        return fuse_surface(self.law, self.texture.sampler, self.acting_clamp)
-
-    @cached_property
-    def _force_batch(self) -> Any:  # Numba is untyped
-        return self._loops.force_batch
+        return fuse_surface(self.law, self.texture.sampler, self.effective_clamp)
 
     def force(self, points: ArrayLike, deflection: ArrayLike | None = None) -> FloatArray:
-        """Return the force on the probe (what the device applies to the hand).
+        """Return the force on the probe, which the device applies to the hand.
 
         Args:
-            points: probe positions p [m], shape (n, 3), or (3,) for one: then all here and in the
-                answer is without the first axis.
+            points: probe positions p [m], shape (n, 3), or (3,) for one; other arguments and the
+                result then lack the first axis too.
             deflection: tangential deflection d of the anchor [m], shape (n, 2), for laws with
                 state; zero by default.
 
@@ -337,20 +338,16 @@ class Surface(Plotted):
         Reference:
             The paper's Table I, with the corrections named in each law.
         """
-        probes = read_points("points", points, 3, "m")
+        probes = check_points("points", points, 3, "m")
         out = np.empty(probes.rows.shape)
-        texture, law = self.texture.arguments, self.law_arguments
-        if deflection is None and not self.law.stateful:
-            self._force_batch(probes.rows, out, texture, law)
-        else:
-            self._force_batch(probes.rows, *self._state(probes, deflection), out, texture, law)
-        return out[0] if probes.single else out
+        state = self._anchor_state(probes, deflection)
+        self._loops.force_batch(
+            probes.rows, *state, out, self.texture.arguments, self.law_arguments
+        )
+        return out[0] if probes.is_single else out
 
     def jacobian(
-        self,
-        points: ArrayLike,
-        deflection: ArrayLike | None = None,
-        sliding: ArrayLike | None = None,
+        self, points: ArrayLike, deflection: _Optional = None, sliding: _Optional = None
     ) -> FloatArray:
         """Return the exact Jacobian of the force.
 
@@ -359,8 +356,8 @@ class Surface(Plotted):
         Args:
             points: see :meth:`force`.
             deflection: see :meth:`force`.
-            sliding: whether the anchor is dragged, shape (n,), for laws with state; the
-                derivative of the deflection is then I - u uᵀ, u = d/|d|. False by default.
+            sliding: whether the anchor slides, shape (n,), for laws with state; the derivative of
+                the deflection is then I - u uᵀ, u = d/|d|. False by default.
 
         Returns:
             J [N/m], shape (n, 3, 3).
@@ -369,47 +366,44 @@ class Surface(Plotted):
             ParameterError: see :meth:`force`.
 
         Reference:
-            The paper's (7), (15), (18), (20), (23); B and G, for which it has none, are exact.
+            The paper's (7), (15), (18), (20), (23); it has none for B and G.
         """
         return self.force_and_jacobian(points, deflection, sliding)[1]
 
     def force_and_jacobian(
-        self,
-        points: ArrayLike,
-        deflection: ArrayLike | None = None,
-        sliding: ArrayLike | None = None,
+        self, points: ArrayLike, deflection: _Optional = None, sliding: _Optional = None
     ) -> tuple[FloatArray, FloatArray]:
-        """Return both f [N], (n, 3), and J [N/m], (n, 3, 3), for the price of :meth:`jacobian`."""
-        probes = read_points("points", points, 3, "m")
-        state = self._state(probes, deflection)
+        """Return f [N], (n, 3), and J [N/m], (n, 3, 3), at the cost of :meth:`jacobian` alone."""
+        probes = check_points("points", points, 3, "m")
+        state = self._anchor_state(probes, deflection)
         if self.law.stateful:
-            state = (*state, probes.truths("sliding", sliding))
+            state = (*state, probes.check_flags_per_point("sliding", sliding))
         elif sliding is not None:
             raise ParameterError("sliding", f"is meaningless for law {self.law}, without state")
         forces, jacobians = np.empty((probes.count, 3)), np.empty((probes.count, 3, 3))
         self._loops.jacobian_batch(
             probes.rows, *state, forces, jacobians, self.texture.arguments, self.law_arguments
         )
-        return probes.answer(forces), probes.answer(jacobians)
+        return probes.restore_shape(forces), probes.restore_shape(jacobians)
 
     @cached_property
     def _path_loops(self) -> ModuleType:
         from asperity.kernels.fuse import fuse_path
 
-        return fuse_path(self.law, self.texture.sampler, self.acting_clamp)
+        return fuse_path(self.law, self.texture.sampler, self.effective_clamp)
 
-    def trace(self, path: ArrayLike, memory: FloatArray | None = None) -> FloatArray:
-        """Return the forces along a path, the law's state carried from point to point.
+    def trace(self, path: ArrayLike, warm_start: FloatArray | None = None) -> FloatArray:
+        """Return the forces along a path, with the state of the law propagated along it.
 
-        The anchor of a law with state is set where contact begins, dragged so that the
-        deflection never exceeds max_deflection, and released where contact is lost; it is
-        released before the first point.
+        The anchor of a law with state is set where contact begins, slides so that the deflection
+        never exceeds max_deflection, and is released where contact ends. It is released before the
+        first point.
 
         Args:
             path: successive probe positions [m], shape (n, 3).
-            memory: what a search for nearest points remembers, of
-                :func:`asperity.contacts.memory.new_memory`, with the looks that a point of the path
-                may take; changed. Without it every answer is exact, as that of :meth:`force`.
+            warm_start: warm start of the closest-point search, with its evaluation budget per
+                point, from :func:`asperity.contacts.warm_start.new_warm_start`; updated in place.
+                By default every search is exact, as in :meth:`force`.
 
         Returns:
             f [N], shape (n, 3).
@@ -417,29 +411,25 @@ class Surface(Plotted):
         Raises:
             ParameterError: for another shape, or positions that are not finite.
         """
-        probes = array("path", path, (None, 3), "m")
-        remembers = self.law.contact.remembers
-        if not (self.law.stateful or remembers):
+        probes = check_array("path", path, (None, 3), "m")
+        if not (self.law.stateful or self.law.contact.has_warm_start):
             return self.force(probes)
-        kept = new_memory(UNLIMITED) if memory is None else checked_memory(memory)
-        out, told = np.empty((len(probes), 3)), np.empty((len(probes), 2))
+        state = new_warm_start(UNLIMITED) if warm_start is None else check_warm_start(warm_start)
+        out, diagnostics = np.empty((len(probes), 3)), np.empty((len(probes), 2))
         arguments = (self.texture.arguments, self.law_arguments)
-        if remembers:
-            self._path_loops.path_batch(probes, out, told, kept, *arguments)
-        else:
-            self._loops.trace_batch(probes, out, *arguments)
+        self._path_loops.path_batch(probes, out, diagnostics, state, *arguments)
         return out
 
-    def _state(self, probes: Points, deflection: ArrayLike | None) -> tuple[Any, ...]:
+    def _anchor_state(self, probes: Points, deflection: ArrayLike | None) -> tuple[Any, ...]:
         if not self.law.stateful:
             if deflection is not None:
                 raise ParameterError("deflection", f"is meaningless for law {self.law}, stateless")
             return ()
         if deflection is None:
             return (np.zeros((probes.count, 2)),)
-        given = probes.beside("deflection", deflection, 2, "m")
+        given = probes.check_array_per_point("deflection", deflection, 2, "m")
         longest = float(np.hypot(given[:, 0], given[:, 1]).max(initial=0.0))
-        # Rounding of a deflection of exactly that length is forgiven.
+        # Tolerate the rounding of a deflection of exactly that length.
         if longest > self.max_deflection * (1.0 + 1e-12):
             limit = f"must not be longer than max_deflection = {self.max_deflection} m"
             raise ParameterError("deflection", limit, longest)

@@ -16,7 +16,7 @@ import pytest
 
 from asperity.analysis.check_limits import limits
 from asperity.analysis.compare import Comparison, compare
-from asperity.analysis.row import LawRow
+from asperity.analysis.comparison_result import LawRow
 from asperity.devices import Device, load_device
 from asperity.scene import load_scene
 from asperity.textures import Sinusoid, load_texture
@@ -77,17 +77,17 @@ def test_a_surface_of_the_library(spec: str, name: str) -> None:
     assert headline(result) == OTHERS[spec, name]
 
 
-def test_what_limits_calls_not_felt_is_never_recommended() -> None:
+def test_a_law_not_felt_by_limits_is_never_recommended() -> None:
     """Limits asks about the law that the comparison of all laws recommends."""
     for amplitude, period, name, expected in cases()[::9]:
-        asked = limits(Sinusoid(amplitude, period), name)
+        request = limits(Sinusoid(amplitude, period), name)
         wanted = "not felt" if expected == "-" else "borderline" if "?" in expected else "felt"
-        assert asked.felt.tier == wanted
+        assert request.perceptibility.tier == wanted
 
 
 def tier_by_hand(row: LawRow, device: Device, amplitude: float, period: float) -> str:
     """Return the tier by the rule above, from forces on a scan."""
-    surface = row.surface.to_stiffness(row.start)
+    surface = row.surface.to_stiffness(row.recommended_stiffness)
     x = (np.arange(4000) + 0.5) / 4000 * period
     height = amplitude - surface.max_depth
     force = surface.force(np.column_stack([x, 0.0 * x, np.full(4000, height)]))
@@ -135,5 +135,7 @@ def test_a_measured_surface(name: str, magnify: float, device: str, expected: st
     assert headline(result) == expected
     row = result.recommended_row or result.nearest_row
     assert row is not None
-    assert row.felt is not None
-    assert row.felt.nesting is not None  # form and waviness were told from texture
+    assert row.perceptibility is not None
+    assert (
+        row.perceptibility.nesting_index is not None
+    )  # form and waviness were separated from texture

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from tests.servo.test_drivers import EXAMPLE, compiled
+from tests.servo.drivers.test_drivers import EXAMPLE, compile_library
 
-from asperity.cli.calibrate import usual_force
+from asperity.cli.device_commands import default_force
+from asperity.core.errors import ParameterError
 from asperity.devices import load_device
-from asperity.errors import ParameterError
 
 COMMAND = "calibrate"
 Call = Callable[..., tuple[int, str, str]]
@@ -35,14 +35,14 @@ def test_a_simulated_device_is_measured_and_written(call: Call, tmp_path: Path) 
 
 
 def test_what_cannot_be_measured_is_refused(call: Call, tmp_path: Path) -> None:
-    library, mine = compiled(EXAMPLE, tmp_path), str(tmp_path / "mine.toml")
+    library, mine = compile_library(EXAMPLE, tmp_path), str(tmp_path / "mine.toml")
     for options, words in (
         (["--device", "touch", "-o", "mine.json"], "output must be a device file"),
         (["-o", mine], "device is missing"),
         (["--device", "touch", "-o", mine, "--force", "9N"], "force must be at most"),
-        (["--device", "touch", "--driver", str(library), "-o", mine], "--yes begins"),
+        (["--device", "touch", "--driver", str(library), "-o", mine], "--yes starts it"),
         (["--device", "pantograph", "--driver", str(library), "-o", mine, "--yes"],
-         "max_force is not known"),
+         "max_force is unknown"),
         (["--device", "touch", "--driver", "forcedimension", "-o", mine, "--yes"],
          "install the SDK"),
     ):  # fmt: skip
@@ -53,8 +53,8 @@ def test_what_cannot_be_measured_is_refused(call: Call, tmp_path: Path) -> None:
 
 
 def test_the_usual_force_is_a_part_of_what_the_device_can() -> None:
-    assert usual_force(load_device("omega.3"), real=True) == 3.0
-    assert usual_force(load_device("touch"), real=True) == 0.88
-    assert usual_force(load_device("falcon"), real=True) == pytest.approx(8.0 / 3.0)
-    with pytest.raises(ParameterError, match="max_force is not known"):
-        usual_force(load_device("pantograph"), real=True)
+    assert default_force(load_device("omega.3"), real=True) == 3.0
+    assert default_force(load_device("touch"), real=True) == 0.88
+    assert default_force(load_device("falcon"), real=True) == pytest.approx(8.0 / 3.0)
+    with pytest.raises(ParameterError, match="max_force is unknown"):
+        default_force(load_device("pantograph"), real=True)

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from asperity.cli.main import cli
-from asperity.errors import ParameterError, SurfaceFileError
+from asperity.core.errors import ParameterError, SurfaceFileError
 
 
 @pytest.mark.parametrize(
@@ -30,7 +30,7 @@ def test_bad_input_is_named(arguments: list[str], words: str) -> None:
 def test_a_recording_is_shown_on_the_simulated_device_alone(name: str) -> None:
     done = CliRunner().invoke(cli, ["lab", "--no-browser", "run.mcap", "--driver", name])
     assert isinstance(done.exception, ParameterError)
-    assert "driver cannot show run.mcap again, a recording" in str(done.exception)
+    assert "driver cannot play back the recording run.mcap: leave it out" in str(done.exception)
 
 
 def test_without_a_browser_the_address_is_said(
@@ -46,9 +46,9 @@ def test_without_a_browser_the_address_is_said(
         bound.close()
         ready("http://127.0.0.1:1/token/")
 
-    monkeypatch.setattr("asperity.lab.serving.run_lab", run_lab)
+    monkeypatch.setattr("asperity.lab.launch.run_lab", run_lab)
     monkeypatch.setattr("webbrowser.open", lambda _address: False)
     done = CliRunner().invoke(cli, ["lab", "--port", "0"])
     assert done.exit_code == 0
     assert "the lab is at http://127.0.0.1:1/token/" in done.output + capfd.readouterr().err
-    assert "no browser was found: open the address in one of this machine's" in done.output
+    assert "no browser was found: open the address in a browser of this machine" in done.output

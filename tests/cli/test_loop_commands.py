@@ -67,7 +67,7 @@ def test_simulate_prints_the_ledger(call: Call, still: str) -> None:
     assert "Law A at 400 N/m" in out
     assert "comes to rest" in out
     assert "texture, exact" in out
-    closes = re.search(r"closes to (\S+) of", " ".join(out.split()))
+    closes = re.search(r"Residual: (\S+) of", " ".join(out.split()))
     assert closes is not None
     assert float(closes[1]) < 1e-9
     assert max(map(len, out.splitlines())) <= 80
@@ -102,7 +102,7 @@ def test_simulate_writes_json_and_html(call: Call, strokes: str, tmp_path: Path)
     assert text.count("<svg") == 1
     check_alts(check_alone(text), text)
     assert "://" not in re.sub(r"data:[^\"]*", "", text)
-    assert "Where the energy went" in text
+    assert "Energy ledger" in text
 
 
 def test_the_trace_has_columns_with_units(call: Call, still: str, tmp_path: Path) -> None:
@@ -129,7 +129,7 @@ def test_a_run_is_recorded_and_replayed(call: Call, still: str, tmp_path: Path) 
     assert out.startswith("800 rows, 200 ms at 4 kHz: law A at 400 N/m on sinusoid")
     assert re.search(r"commanded z +[-0-9.]+ +[0-9.]+ +N", out)
     assert call("recording", "replay", path)[:2] == (
-        0, "All 800 rows come out the same, bit for bit.\n",
+        0, "All 800 rows are reproduced bit for bit.\n",
     )  # fmt: skip
     Path(still).write_text(Path(still).read_text(encoding="utf-8") + "\n", encoding="utf-8")
     code, out, _err = call(
@@ -176,12 +176,12 @@ def test_a_recording_without_a_whole_block_shows_no_numbers(call: Call, tmp_path
     path = tmp_path / "run.mcap"
     with asp.RecordingWriter(path, (("time", "s"), ("x", "m"))) as writer:
         writer.append(np.zeros((2, 2)))
-    begin = asp.open_recording(path)._chunks[0].begin
+    begin = asp.open_recording(path)._chunks[0].start
     path.write_bytes(path.read_bytes()[: begin + 20])
     code, out, err = call("recording", "info", str(path))
     assert (code, err) == (0, "")
     assert out.startswith(
-        "0 rows, 0 s. It was not closed, and no whole block of samples is in it.\n"
+        "0 rows, 0 s. The recording was not closed, and contains no complete block.\n"
     )
     assert "nan" not in out
     code, out, _err = call("recording", "info", str(path), "--json", "-")
@@ -207,7 +207,7 @@ def test_a_recording_of_a_later_format_is_refused(call: Call, tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["info", "{still}"], "it is no recording"),
+        (["info", "{still}"], "it is not an MCAP recording"),
         (["info", "."], "not a regular file"),
         (["replay", "missing.mcap"], "No such file"),
         (["export", "{run}", "-o", "a.xls"], "must end in .csv, .mat, .parquet"),
@@ -299,18 +299,18 @@ BAD = [
     (["onset", "{still}", "--delays", "1e20"], "delay must be at most"),
     (["simulate", "{still}", "--device", "omega.3"], "apparent_mass is not known"),
     (["simulate", "{still}", "--law", "Z"], "law"),
-    (["simulate", "{still}", "--friction", "0.3"], "law A does not take it; taken by law F"),
-    (["onset", "{still}", "--laws", "WF", "--set", "continuity=2"], "taken by law H"),
+    (["simulate", "{still}", "--friction", "0.3"], "law A does not take it; law F does"),
+    (["onset", "{still}", "--laws", "WF", "--set", "continuity=2"], "law H does"),
     (["onset", "{strokes}"], "must be at rest"),
     (["onset", "{still}", "--delays", "1.5"], "delays must be a whole number"),
     (["onset", "{still}", "--delays", "-1"], "delay must be a whole number"),
     (["onset", "{still}", "--starts", "0"], "starts must be a whole number"),
     (["onset", "{still}", "--laws", "WW"], "twice"),
-    (["onset", "{still}", "--starts", "1;9"], "starts must be a single one"),
+    (["onset", "{still}", "--starts", "1;9"], "starts must be a single value"),
     (["onset", "{still}", "--starts", "1e12"], "starts must be a whole number, 1 to"),
     (["onset", "{still}", "--tolerance", "1e-18"], "tolerance must be at least"),
     (["onset", "{still}", "--lowest", "1e7N/m"], "lowest must be below the highest"),
-    (["onset", "{still}", "--stiffness", "100N/m"], "stiffness is what onset looks for"),
+    (["onset", "{still}", "--stiffness", "100N/m"], "stiffness is the result of onset"),
     (["onset", "{still}", "--duration", "0.5ms"], "duration must be at least 16 samples"),
     (["scan", "{still}"], "motion must be"),
     (["scan", "{strokes}", "--speeds", "fast"], "speeds must be a quantity"),
@@ -347,7 +347,7 @@ def test_a_run_that_overflows_is_written_as_json(call: Call, still: str) -> None
     code, out, err = call("simulate", still, "--json", "-")
     assert (code, err) == (0, "")
     run = json.loads(out)["run"]
-    assert run["stopped"] == "diverged"
+    assert run["stop_message"] == "diverged"
     assert run["ledger"]["stored_before"] is None
     assert run["state"][1] == 0.0
 

@@ -14,14 +14,17 @@ from click.testing import CliRunner
 
 import asperity as asp
 from asperity.analysis.check_limits import DEFAULT_SAMPLES, DEFAULT_SPEED
-from asperity.arguments import MAX_DEPTH, SPEED, Argument
-from asperity.cli import analyze, compare, limits, onset
+from asperity.cli import analysis_commands as analyze
+from asperity.cli import analysis_commands as compare
+from asperity.cli import analysis_commands as limits
+from asperity.cli import simulation_commands as onset
 from asperity.cli.main import COMMANDS, cli
-from asperity.cli.options import LAW_OPTIONS, help_of
-from asperity.cli.progress import progress_bar, step_bar
+from asperity.cli.options import LAW_OPTIONS, option_help
+from asperity.cli.output import progress_bar, step_bar
+from asperity.core.arguments import MAX_DEPTH, SPEED, Argument
 from asperity.laws import LAWS
-from asperity.measured.arguments import FILE_ARGUMENTS
-from asperity.scene.sweeps import onsets
+from asperity.measured.file_arguments import FILE_ARGUMENTS
+from asperity.scene.sweeps import sweep_onsets
 
 READ_A_SURFACE = ["analyze", "compare", "limits", "onset", "scan", "simulate"]
 
@@ -31,13 +34,15 @@ def test_every_declared_argument_is_an_option_with_its_help(command: str) -> Non
     result = CliRunner().invoke(cli, [command, "--help"], env={"COLUMNS": "100"})
     assert result.exit_code == 0
     said = " ".join(result.output.split())
-    depths = [compare._DEPTHS] if command == "compare" else [MAX_DEPTH]  # several there
+    depths = [compare._MAX_DEPTHS] if command == "compare" else [MAX_DEPTH]  # several there
     for argument in (*depths, *LAW_OPTIONS[2:], *FILE_ARGUMENTS):
         assert f"--{argument.name.replace('_', '-')} " in said
         # Lines are broken at hyphens, too.
-        assert "".join(help_of(argument).split()) in said.replace(" ", "")
-    for option in ("--stiffness", "--set", "--law-module", "--device"):
+        assert "".join(option_help(argument).split()) in said.replace(" ", "")
+    for option in ("--set", "--plugin, --law-module", "--device"):
         assert f"{option} " in said
+    assert ("--stiffness " in said) is (command != "onset")  # which finds it
+    assert ("--law " in said) is (command not in {"compare", "onset", "scan"})  # several there
 
 
 def test_every_parameter_of_a_shipped_law_is_an_option() -> None:
@@ -46,7 +51,7 @@ def test_every_parameter_of_a_shipped_law_is_an_option() -> None:
 
 
 def test_defaults_in_the_help_are_those_of_the_functions() -> None:
-    for command, function in ((limits, asp.limits), (onset, onsets), (analyze, asp.analyze)):
+    for command, function in ((limits, asp.limits), (onset, sweep_onsets), (analyze, asp.analyze)):
         known = inspect.signature(function).parameters
         options = [one for one in vars(command).values() if isinstance(one, tuple) and one]
         arguments = [one for group in options for one in group if isinstance(one, Argument)]
@@ -55,8 +60,8 @@ def test_defaults_in_the_help_are_those_of_the_functions() -> None:
             default = known[argument.name].default if argument.name in known else None
             if argument.default is not None and default is not None:
                 assert argument.default == default, argument.name
-    assert {one.default for one in limits._SAMPLES} == {DEFAULT_SAMPLES}
-    assert SPEED.default_words == f"{DEFAULT_SPEED:g} m/s"
+    assert {one.default for one in limits._SAMPLING} == {DEFAULT_SAMPLES}
+    assert SPEED.default_description == f"{DEFAULT_SPEED:g} m/s"
 
 
 def test_help_loads_nothing_heavy() -> None:
@@ -76,11 +81,14 @@ def test_help_loads_nothing_heavy() -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_the_list_of_commands_says_what_each_does() -> None:
-    said = CliRunner().invoke(cli, ["--help"], env={"COLUMNS": "100"}).output
-    for name, words in COMMANDS.items():
-        assert f"  {name} " in said
-        assert words in said
+def test_the_help_lists_every_command_with_its_summary() -> None:
+    text = CliRunner().invoke(cli, ["--help"], env={"COLUMNS": "100"}).output
+    for name, (_module, summary) in COMMANDS.items():
+        assert f"  {name} " in text
+        assert summary in text
+    for command in ("compare", "recording"):
+        short = CliRunner().invoke(cli, [command, "-h"])
+        assert (short.exit_code, short.output.split()[2]) == (0, command)
     wrong = CliRunner().invoke(cli, ["campare"])
     assert (wrong.exit_code, "No such command 'campare'" in wrong.output) == (2, True)
 
@@ -109,8 +117,8 @@ def test_a_first_run_says_that_it_compiles(
     kept_before: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """How many loops, as they come, then what was being done; what is kept is not compiled."""
-    from asperity.compiled import LISTENERS
-    from asperity.kernels.fuse import _HEADER, _loaded, load_fused
+    from asperity.core.compiled import COMPILE_CALLBACKS
+    from asperity.kernels.fuse import _HEADER, _load_module, load_fused
 
     loops = (
         "@loop\ndef first(x):\n    return x + 1.0\n\n\n@loop\ndef other(x):\n    return 2.0 * x\n"
@@ -119,14 +127,14 @@ def test_a_first_run_says_that_it_compiles(
     stream = _Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
-    _loaded.cache_clear()
+    _load_module.cache_clear()
     if kept_before:
         assert load_fused(source).first(1.0) + load_fused(source).other(1.0) == 4.0
-    _loaded.cache_clear()
+    _load_module.cache_clear()
     with progress_bar("comparing") as told:
         assert (load_fused(source).first(1.0), load_fused(source).other(1.0)) == (2.0, 2.0)
-        assert len(LISTENERS) == 1
+        assert len(COMPILE_CALLBACKS) == 1
         shown = stream.getvalue()
         told(0.5)
-    assert ("comparing: compiling loop 2, kept" in shown) != kept_before
-    assert LISTENERS == []
+    assert ("comparing: compiling loop 2, cached" in shown) != kept_before
+    assert COMPILE_CALLBACKS == []

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from asperity.cli.output import check_output, check_outputs, write_output
-from asperity.errors import ParameterError
+from asperity.core.errors import ParameterError
 
 
 def test_a_file_is_replaced_and_nothing_else_is_left(tmp_path: Path) -> None:

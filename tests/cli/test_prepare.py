@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from asperity.scene import load_scene
-from asperity.textures import HeightMap, load_texture, loading
+from asperity.textures import HeightMap, load_texture
+from asperity.textures import texture_loading as loading
 
 Call = Callable[..., tuple[int, str, str]]
 
@@ -117,7 +118,7 @@ def test_compare_and_scenes_take_it(call: Call, source: str, tmp_path: Path) -> 
     (tmp_path / "scene.toml").write_text('[texture]\nkind = "file"\npath = "surface.npz"\n')
     texture = load_scene(str(tmp_path / "scene.toml")).texture
     assert isinstance(texture, HeightMap)
-    assert texture.filled is not None
+    assert texture.filled_mask is not None
 
 
 def test_scenes_prepare(source: str, tmp_path: Path) -> None:
@@ -223,5 +224,5 @@ def test_a_real_surface(call: Call, tmp_path: Path) -> None:
     texture = load_texture(target)
     assert isinstance(texture, HeightMap)
     assert texture.periodic
-    assert texture.filled is not None
-    assert 0.1 < texture.filled.mean() < 0.2
+    assert texture.filled_mask is not None
+    assert 0.1 < texture.filled_mask.mean() < 0.2

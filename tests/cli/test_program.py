@@ -185,7 +185,7 @@ def test_an_interrupt_inside_exec_ends_with_its_exit_code(tmp_path: Path) -> Non
     assert (done.returncode, done.stderr) == (130, "asperity: interrupted\n")
 
 
-@pytest.mark.parametrize("module", ["click", "asperity.cli.compare", "numba", "numpy"])
+@pytest.mark.parametrize("module", ["click", "asperity.cli.analysis_commands", "numba", "numpy"])
 def test_an_interrupt_during_imports_ends_with_its_exit_code(module: str, tmp_path: Path) -> None:
     """The interrupt comes while a module is being imported, wherever that is; nothing is kept."""
     script = f"""

@@ -11,7 +11,7 @@ import pytest
 from rich.cells import cell_len
 from tests.report.pages import check_alone, check_alts
 
-from asperity.paper import CLAIMS, VERDICTS, claim
+from asperity.paper import CLAIMS, VERDICTS, get_claim
 
 Call = Callable[..., tuple[int, str, str]]
 FEW = ("eq-12", "eq-44", "table-1-A", "remark-3", "limit-4", "sentence-V.A-qF")
@@ -27,7 +27,7 @@ def only(*names: str) -> list[str]:
 def test_one_claim_shows_its_evidence(call: Call) -> None:
     code, out, err = call("--claim", "eq-12")
     assert (code, err) == (0, "")
-    result = claim("eq-12").run()
+    result = get_claim("eq-12").run()
     text = " ".join(out.split())
     assert " ".join(result.statement.split()) in text
     assert result.verdict in text
@@ -126,11 +126,14 @@ BAD = [
     (["--magnify", "20"], "applies to a measured surface"),
     (["--format", "png"], "give --figures DIR"),
     (["--figures", "new", "--format", "pdf"], "format is unknown: 'pdf'"),
-    (["--figures", "new", "--claim", "eq-44"], "nothing is drawn of eq-44, but of fig-2"),
+    (
+        ["--figures", "new", "--claim", "eq-44"],
+        "figures are not available for eq-44, but for fig-2",
+    ),
     (["--figures", "new", "--claim", "eq-99"], "did you mean"),
     (["--figures", "/dev/null"], "must be a folder, not a file"),
     (["--figures", "/dev/null/figures"], "must be a folder, not a file"),
-    (["--figures", "a\0b"], "cannot be made"),
+    (["--figures", "a\0b"], "figures cannot be created"),
 ]
 
 
@@ -149,11 +152,11 @@ def test_bad_input_is_one_line(
 def test_the_whole_table_fits_a_terminal(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its experiments are small stand-ins; the whole is run by hand and takes minutes."""
     import asperity.paper.experiments as home
-    from asperity.paper.experiments import run as runner
-    from asperity.paper.experiments.beyond import BeyondExperiment
-    from asperity.paper.experiments.bump import bump_experiment
-    from asperity.paper.experiments.passivity import passivity_experiment
-    from asperity.paper.experiments.scanning import scanning_experiment
+    from asperity.paper.experiments import experiment_suite as runner
+    from asperity.paper.experiments.bump_runs import bump_experiment
+    from asperity.paper.experiments.cycle_counts import passivity_experiment
+    from asperity.paper.experiments.device_onsets import DeviceExperiment
+    from asperity.paper.experiments.stroke_energies import scanning_experiment
 
     def small(measured: object = None, progress: object = None) -> runner.Experiments:
         assert measured is None
@@ -162,7 +165,7 @@ def test_the_whole_table_fits_a_terminal(call: Call, monkeypatch: pytest.MonkeyP
             passivity_experiment("W", (0,), starts=1),
             scanning_experiment("A"),
             bump_experiment("AD"),
-            BeyondExperiment((), ("falcon",)),
+            DeviceExperiment((), ("falcon",)),
         )
 
     monkeypatch.setattr(home, "run_experiments", small)

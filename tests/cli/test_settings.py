@@ -9,8 +9,7 @@ from pathlib import Path
 import click
 import pytest
 
-from asperity.cli.group import refuse_repeated
-from asperity.cli.main import COMMANDS, cli
+from asperity.cli.main import COMMANDS, check_not_repeated, cli
 
 Call = Callable[..., tuple[int, str, str]]
 SPEC = "sinusoid:amplitude=0.2mm,period=2mm"
@@ -86,11 +85,11 @@ def test_no_option_of_any_command_is_silently_the_last() -> None:
                 continue
             twice = [option.opts[-1], "1"][: 1 if option.is_flag else 2] * 2
             if option.multiple:
-                refuse_repeated(command, twice)
+                check_not_repeated(command, twice)
                 continue
             with pytest.raises(ValueError, match="is given twice"):
-                refuse_repeated(command, twice)
-            refuse_repeated(command, twice[: len(twice) // 2])
+                check_not_repeated(command, twice)
+            check_not_repeated(command, twice[: len(twice) // 2])
             checked += 1
     assert checked > 100
 
@@ -117,11 +116,8 @@ def test_a_surface_by_its_name_alone(
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        (
-            "sandpapr",
-            "no file, and no surface that is known by name: 'sandpapr'; did you mean",
-        ),
-        ("file", "is no file"),
+        ("sandpapr", "neither a file nor a named surface: 'sandpapr'; did you mean"),
+        ("file", "neither a file nor a named surface"),
         ("sinusoid", "amplitude is missing: a sinusoid needs amplitude, period"),
     ],
 )

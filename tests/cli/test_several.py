@@ -13,11 +13,12 @@ import pytest
 from rich.console import Console
 
 import asperity as asp
-from asperity.analysis.several import compare_several
+from asperity.analysis.compare_devices import compare_devices
 from asperity.cli.main import main
-from asperity.errors import ParameterError
-from asperity.report.several import print_comparisons
-from asperity.units import engineering
+from asperity.core.errors import ParameterError
+from asperity.core.units import format_quantity
+from asperity.report.comparison_report import comparisons_page
+from asperity.report.terminal import print_page
 
 Call = Callable[..., tuple[int, str, str]]
 SPEC = "sinusoid:amplitude=0.2mm,period=2mm"
@@ -45,7 +46,7 @@ def test_devices_and_depths_are_one_table(call: Call) -> None:
     found = json.loads(out)
     cases = [(one["device"]["id"], one["max_depth"]) for one in found["comparisons"]]
     assert cases == [("touch", 1e-4), ("touch", 3e-4), ("inverse3", 1e-4), ("inverse3", 3e-4)]
-    assert found["lacking"] == []
+    assert found["missing_data"] == []
 
 
 def test_each_case_is_what_it_is_alone(call: Call) -> None:
@@ -110,22 +111,25 @@ def test_devices_of_which_none_has_a_wall(call: Call, tmp_path: Path) -> None:
     code, out, err = call(SPEC, "--device", both)
     assert (code, err.count("\n")) == (2, 1)
     assert out.count("K₀ missing") == 2
-    assert 'a: nobody says which smooth wall it held; measure it, and add max_stiffness = "' in err
+    assert (
+        'a: the stiffest smooth wall that held is unknown; measure it, and add max_stiffness = "'
+        in err
+    )
     code, out, err = call(SPEC, "--device", str(tmp_path / "a.toml"))
     assert (code, out, err.count("\n")) == (2, "", 1)
     code, out, _err = call(SPEC, "--device", both, "--json", "-")
     assert code == 2
-    assert [one["device"] for one in json.loads(out)["lacking"]] == ["a", "b"]
+    assert [one["device"] for one in json.loads(out)["missing_data"]] == ["a", "b"]
 
 
 def test_the_line_to_add_is_enough(tmp_path: Path) -> None:
     texture = asp.Sinusoid(2e-4, 2e-3)
     path = tmp_path / "bare.toml"
     path.write_text(BARE)
-    (missing,) = compare_several(texture, [path], laws="W").lacking
-    path.write_text(BARE + missing.add.replace("...", "900") + "\n")
-    found = compare_several(texture, [path], laws="W")
-    assert found.lacking == ()
+    (missing,) = compare_devices(texture, [path], laws="W").missing_data
+    path.write_text(BARE + missing.hint.replace("...", "900") + "\n")
+    found = compare_devices(texture, [path], laws="W")
+    assert found.missing_data == ()
     assert found.comparisons[0].device.max_stiffness == 900.0
 
 
@@ -145,7 +149,7 @@ WRONG = [
     (["--max-depth", "0.1mm; 0.5"], "max_depth needs a unit: write 0.5mm"),
     (["--max-depth", "0.1mm; -1mm"], "max_depth must be positive"),
     (["--max-depth", ";"], "max_depth must be"),
-    (["--max-depth", "0.1mm; 100um"], "max_depth names one depth twice"),
+    (["--max-depth", "0.1mm; 100um"], "max_depth contains a depth twice"),
 ]
 
 
@@ -162,14 +166,14 @@ def test_other_commands_take_one_device(
     monkeypatch.setattr(sys, "argv", ["asperity", "limits", SPEC, "--device", "touch,inverse3"])
     with pytest.raises(SystemExit, match="2"):
         main()
-    assert "device must be a single one here: compare takes several" in capsys.readouterr().err
+    assert "device must be a single device: only compare takes several" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("width", [40, 60, 200])
 def test_a_narrow_table_leaves_out_columns_and_cuts_nothing(width: int) -> None:
-    found = compare_several(asp.Sinusoid(2e-4, 2e-3), ["touch", "2diy"], [1e-4, 2e-4], "WC")
+    found = compare_devices(asp.Sinusoid(2e-4, 2e-3), ["touch", "2diy"], [1e-4, 2e-4], "WC")
     text = io.StringIO()
-    print_comparisons(found, Console(file=text, width=width, highlight=False))
+    print_page(comparisons_page(found), Console(file=text, width=width, highlight=False))
     said = text.getvalue()
     assert "…" not in said
     assert max(map(len, said.splitlines())) <= width
@@ -180,10 +184,10 @@ def test_a_narrow_table_leaves_out_columns_and_cuts_nothing(width: int) -> None:
 
 def test_the_answer_names_the_best_case_and_counts_the_others() -> None:
     coarse, fine = asp.Sinusoid(2e-4, 2e-3), asp.Sinusoid(1e-7, 2e-3)
-    found = compare_several(coarse, ["touch", "omega.3", "2diy"], [1e-4, 4e-4], "WC")
+    found = compare_devices(coarse, ["touch", "omega.3", "2diy"], [1e-4, 4e-4], "WC")
     felt = [one for one in found.comparisons if one.recommended]
-    best = max(felt, key=lambda one: one.recommended_row.shown_force)
-    start = engineering(best.recommended_row.start, "N/m")
+    best = max(felt, key=lambda one: one.recommended_row.resolved_force)
+    start = format_quantity(best.recommended_row.recommended_stiffness, "N/m")
     assert best.max_depth == 4e-4
     assert found.recommendation.startswith(
         f"Best on the Force Dimension omega.3, pressed to 400 µm: law C from {start}, felt, "
@@ -192,12 +196,12 @@ def test_the_answer_names_the_best_case_and_counts_the_others() -> None:
         "Of 4 cases: felt in 2, not felt in 2. No smooth wall is known to have held on 2diy."
     )
     assert found.to_dict()["recommendation"] == found.recommendation
-    (none,) = compare_several(fine, ["touch"], laws="C").comparisons
+    (none,) = compare_devices(fine, ["touch"], laws="C").comparisons
     assert not none.recommended
-    assert compare_several(fine, ["touch"], laws="C").recommendation == "Of 1 case: not felt in 1."
-    assert compare_several(fine, ["2diy"], laws="C").recommendation.startswith("No smooth wall")
+    assert compare_devices(fine, ["touch"], laws="C").recommendation == "Of 1 case: not felt in 1."
+    assert compare_devices(fine, ["2diy"], laws="C").recommendation.startswith("No smooth wall")
 
 
 def test_no_device_is_an_error() -> None:
     with pytest.raises(ParameterError, match="device must be one or several"):
-        compare_several(asp.Sinusoid(2e-4, 2e-3), [])
+        compare_devices(asp.Sinusoid(2e-4, 2e-3), [])

@@ -13,9 +13,9 @@ from tests.report.pages import check_alone, check_alts
 
 import asperity as asp
 from asperity.report import html_text
-from asperity.report.page import Section, Words, add_section
-from asperity.report.stages import surface_sections
-from asperity.textures.shown import Shown
+from asperity.report.measured_report import measured_sections
+from asperity.report.page import Paragraph, Section, add_section
+from asperity.textures.measurement_summary import MeasurementSummary
 
 Call = Callable[..., tuple[int, str, str]]
 PLAIN = ["--pitch", "2um", "--unit", "m"]
@@ -101,8 +101,9 @@ def test_the_page_shows_before_after_and_taken_away(
     assert f"Report: {page}" in out.replace("\n", "")
     text = page.read_text(encoding="utf-8")
     for words in (
-        "After each step", "Levelled", "S-filter 8 µm", "L-filter 80 µm", "What of it is texture",
-        "ISO 25178-2:2021, 4.4.3", "what the step took",
+        "After each step", "Levelled", "S-filter 8 µm", "L-filter 80 µm", "Form, waviness and "
+        "texture",
+        "ISO 25178-2:2021, 4.4.3", "what the step removed",
     ):  # fmt: skip
         assert words in text
     assert text.count("<svg") == 3
@@ -151,18 +152,18 @@ def test_a_texture_is_no_file(call: Call) -> None:
 
 def test_reports_of_measured_surfaces_have_the_section(source: str) -> None:
     texture = asp.load_texture(source, pitch=2e-6, unit="m", magnify=20)
-    (section,) = surface_sections(texture)
+    (section,) = measured_sections(texture)
     table = section.blocks[0]
     assert [row.cells[0].text for row in table.rows][-1] == "magnified"  # type: ignore[union-attr]  # a table of cells
-    assert surface_sections(asp.Sinusoid(1e-4, 1e-3)) == []
+    assert measured_sections(asp.Sinusoid(1e-4, 1e-3)) == []
     text = html_text(asp.compare(texture, laws="W"))
-    assert "The surface in numbers" in text
+    assert "Surface parameters" in text
 
 
 def test_a_section_of_ones_own(call: Call, source: str, tmp_path: Path) -> None:
-    def own(shown: Shown) -> Section:
-        return Section("Mine", [Words(f"of {shown.source}")])
+    def own(shown: MeasurementSummary) -> Section:
+        return Section("Mine", [Paragraph(f"of {shown.source}")])
 
-    add_section(Shown, own)
+    add_section(MeasurementSummary, own)
     call("show", source, *PLAIN, "--html", str(tmp_path / "page.html"))
     assert "of map.npy" in (tmp_path / "page.html").read_text(encoding="utf-8")

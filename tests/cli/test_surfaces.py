@@ -14,28 +14,28 @@ from click.testing import CliRunner, Result
 from PIL import Image
 from tests.report.pages import check_alone, check_alts
 
-from asperity.cli.surfaces import command
-from asperity.errors import ParameterError
-from asperity.report.page import page_html
-from asperity.report.pictures.surface_picture import gallery_figure
+from asperity.cli.surface_commands import surfaces_command
+from asperity.core.errors import ParameterError
+from asperity.core.units import parse_quantity
+from asperity.report.html import render_page
+from asperity.report.pictures.surface_pictures import gallery_figure
 from asperity.report.pictures.svg import svg_text
-from asperity.report.surfaces import listed_surfaces, surfaces_page
-from asperity.scene import KINDS, load_scene
+from asperity.report.surface_gallery import find_surfaces, surfaces_page
+from asperity.scene import TEXTURE_KINDS, load_scene
 from asperity.textures import Sinusoid
 from asperity.textures.catalogue import CATALOGUE
 from asperity.textures.library import LIBRARY
-from asperity.units import quantity
 
 
 def call(*arguments: str) -> Result:
-    return CliRunner().invoke(command, arguments, env={"COLUMNS": "80"})
+    return CliRunner().invoke(surfaces_command, arguments, env={"COLUMNS": "80"})
 
 
 def content_of(*arguments: str) -> dict[str, dict]:
     result = call(*arguments, "--json", "-")
     assert result.exit_code == 0
     data = json.loads(result.output)
-    assert data["schema"] == 1
+    assert data["schema"] == 2
     return {one["name"]: one for one in data["surfaces"]}
 
 
@@ -82,13 +82,13 @@ def test_the_json_says_everything():
     assert paper["arguments"][0]["choices"][0] == "P60"
     assert content["sinusoid"]["peak_to_valley"] == pytest.approx(0.8e-3)
     assert content["noise"]["arguments"][0] == {
-        "name": "rms", "words": "root mean square height", "unit": "m", "default": None,
-        "default_words": "", "form": "quantity", "required": True, "choices": [],
+        "name": "rms", "description": "root mean square height", "unit": "m", "default": None,
+        "default_description": "", "form": "quantity", "required": True, "choices": [],
     }  # fmt: skip
 
 
 def test_the_specification_makes_the_texture():
-    for listed in listed_surfaces():
+    for listed in find_surfaces():
         kind, _, rest = listed.specification.partition(":")
         assert kind == listed.kind.name
         given = dict(part.split("=") for part in rest.split(",") if part)
@@ -96,23 +96,23 @@ def test_the_specification_makes_the_texture():
         arguments = {one.name: one for one in listed.kind.arguments}
         for name, text in given.items():
             if arguments[name].form == "quantity":
-                value = quantity(name, text, arguments[name].unit)
+                value = parse_quantity(name, text, arguments[name].unit)
                 assert value == pytest.approx(listed.kind.example[name], rel=1e-12)
 
 
 def test_scenes_read_the_whole_catalogue():
-    assert set(CATALOGUE) <= set(KINDS)
+    assert set(CATALOGUE) <= set(TEXTURE_KINDS)
 
 
 @pytest.mark.parametrize("name", list(CATALOGUE))
 def test_other_commands_take_the_specification(name: str):
-    listed = listed_surfaces([name])[0]
+    listed = find_surfaces([name])[0]
     assert load_scene(listed.specification).texture.describe() == listed.texture.describe()
 
 
 def test_every_required_argument_is_in_the_example():
     for kind in CATALOGUE.values():
-        assert {one.name for one in kind.required} <= set(kind.example)
+        assert {one.name for one in kind.required_arguments} <= set(kind.example)
         assert set(kind.example) <= {one.name for one in kind.arguments}
 
 
@@ -120,7 +120,7 @@ def test_the_page_is_whole_and_needs_no_network(tmp_path: Path):
     path = tmp_path / "surfaces.html"
     result = call("--html", str(path))
     assert result.exit_code == 0
-    assert "Pictures:" in result.stdout
+    assert "Figures:" in result.stdout
     assert [one.name for one in tmp_path.iterdir()] == ["surfaces.html"]
     page = path.read_text("utf-8")
     assert page.lower().startswith("<!doctype html>")
@@ -130,7 +130,9 @@ def test_the_page_is_whole_and_needs_no_network(tmp_path: Path):
     check_alts(reader, page)
     assert len(reader.alts) == len(CATALOGUE)
     maps = [link for link in reader.loaded if len(link) > 1000]
-    assert len(maps) == sum(not kind.make(**kind.example).is_profile for kind in CATALOGUE.values())
+    assert len(maps) == sum(
+        not kind.factory(**kind.example).is_profile for kind in CATALOGUE.values()
+    )
     for encoded in maps:
         image = np.asarray(Image.open(io.BytesIO(base64.b64decode(encoded.split(",")[1]))))
         assert image.shape[1] > 200
@@ -149,7 +151,7 @@ def test_pictures_of_different_surfaces_differ_and_of_the_same_do_not():
 
 
 def test_a_page_of_few():
-    page = page_html(surfaces_page(listed_surfaces(["knurl"])))
+    page = render_page(surfaces_page(find_surfaces(["knurl"])))
     assert page.count("<svg") == 1
     assert "Kinds of textures" not in page
 

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from asperity.arguments import read_arguments
-from asperity.devices import FIELDS, load_device
-from asperity.devices.template import device_template
+from asperity.core.arguments import parse_arguments
+from asperity.devices import FIELD_UNITS, load_device
+from asperity.devices.device_file import device_template
 from asperity.scene import load_scene
-from asperity.scene.sections import RUN
+from asperity.scene.scene_template import scene_template
+from asperity.scene.sections import RUN_ARGUMENTS
 from asperity.scene.setup import make_setup
-from asperity.scene.template import scene_template
 
 Call = Callable[..., tuple[int, str, str]]
 COMMENT = re.compile(r"# (?=[a-z_]+ = )")
@@ -32,11 +32,11 @@ def test_the_device_template_is_read_as_it_stands(call: Call, tmp_path: Path) ->
 
 
 def test_every_line_of_the_device_template_is_read(tmp_path: Path) -> None:
-    fields, table = device_template().split("\n# Of each number")
+    fields, table = device_template().split("\n# A number may have")
     path = tmp_path / "mine.toml"
     path.write_text("".join(COMMENT.sub("", line) for line in fields.splitlines(keepends=True)))
     device = load_device(path)
-    assert set(device.data) == set(FIELDS)
+    assert set(device.data) == set(FIELD_UNITS)
     assert (device.axes[:2], len(device.notes)) == ("x ", 1)
     lines = [line.removeprefix("# ") for line in table.splitlines()[1:]]
     path.write_text("\n".join(lines))
@@ -47,7 +47,7 @@ def test_every_line_of_the_device_template_is_read(tmp_path: Path) -> None:
 
 
 def test_the_device_template_names_every_unit() -> None:
-    for name, unit in FIELDS.items():
+    for name, unit in FIELD_UNITS.items():
         line = next(line for line in device_template().splitlines() if f"# {name} = " in line)
         assert unit == "1" or line.endswith(f"[{unit}]")
 
@@ -56,7 +56,7 @@ def test_the_device_template_stands_alone(call: Call) -> None:
     for more in (["touch"], ["--json", "-"]):
         code, out, err = call("devices", "--template", *more)
         assert (code, out) == (2, "")
-        assert "goes with nothing else" in err
+        assert "accepts no other arguments" in err
 
 
 def test_the_scene_that_is_written_runs(call: Call, tmp_path: Path) -> None:
@@ -66,7 +66,7 @@ def test_the_scene_that_is_written_runs(call: Call, tmp_path: Path) -> None:
     assert f"asperity simulate {path}" in out
     code, out, err = call("simulate", str(path), "--duration", "50ms", "--json", "-")
     assert (code, err) == (0, "")
-    assert json.loads(out)["run"]["stopped"] in (None, "")
+    assert json.loads(out)["run"]["stop_message"] in (None, "")
     code, out, err = call("limits", str(path), "--json", "-")
     assert (code, json.loads(out)["device"]["id"]) == (0, "touch")
 
@@ -98,7 +98,7 @@ def test_every_comment_of_the_scene_is_read(tmp_path: Path, line: str) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(scene_template().replace(line, COMMENT.sub("", line)), encoding="utf-8")
     scene = load_scene(str(path))
-    assert read_arguments("run", scene.loop["run"], RUN) is not None
+    assert parse_arguments("run", scene.loop["run"], RUN_ARGUMENTS) is not None
     # A mass has no five-bar's plane, and no mode of a bandwidth that is not known.
     if not line.startswith(("# centre", "# resonance", "# brakes")):
         assert make_setup(scene).device.id == "touch"
@@ -109,5 +109,5 @@ def test_the_scene_says_all_that_scenes_may_say() -> None:
         "".join(COMMENT.sub("", one + "\n") for one in scene_template().split("\n"))
     )
     assert list(sections) == ["texture", "surface", "device", "hand", "motion", "run", "servo"]
-    assert {argument.name for argument in RUN} == set(sections["run"])
+    assert {argument.name for argument in RUN_ARGUMENTS} == set(sections["run"])
     assert len(LINES) > 15

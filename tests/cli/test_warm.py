@@ -6,20 +6,22 @@ from pathlib import Path
 
 import pytest
 
-from asperity import cache
-from asperity.cli import warm
+from asperity.cli import setup_commands as warm
+from asperity.core import cache
 from asperity.kernels import fuse
 from asperity.laws import LAWS
 
 
 def compiled() -> tuple[dict[Path, bytes], list[str]]:
     """Return what is kept after a run in which nothing is loaded yet, and what was said."""
-    for loaded in (fuse._loaded, fuse.fuse_surface, fuse.fuse_sampler, fuse.fuse_contact):
+    for loaded in (fuse._load_module, fuse.fuse_surface, fuse.fuse_sampler, fuse.fuse_contact):
         loaded.cache_clear()
     said: list[str] = []
     name = "sinusoids"
-    warm.compile_ahead((LAWS["W"],), {name: warm.small_textures()[name]}, said.append)
-    code = {one.path: one.path.read_bytes() for one in cache.entries() if one.room == "code"}
+    warm.precompile((LAWS["W"],), {name: warm.sample_textures()[name]}, said.append)
+    code = {
+        one.path: one.path.read_bytes() for one in cache.list_entries() if one.namespace == "code"
+    }
     return code, said
 
 
@@ -35,8 +37,8 @@ def test_what_is_compiled_is_kept_and_not_compiled_again(
     for path in first:
         path.unlink()
     assert compiled()[0].keys() == first.keys()
-    assert {one.room for one in cache.entries()} == {"code"}  # no answer is taken or kept
+    assert {one.namespace for one in cache.list_entries()} == {"code"}  # no answer is taken or kept
 
 
 def test_there_is_a_texture_for_each_way_to_compute_heights() -> None:
-    assert len({texture.sampler for texture in warm.small_textures().values()}) == 5
+    assert len({texture.sampler for texture in warm.sample_textures().values()}) == 5

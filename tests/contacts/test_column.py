@@ -17,7 +17,7 @@ PROBES = np.array([[0.11e-3, 0.23e-3, -0.12e-3], [0.71e-3, -0.34e-3, -0.09e-3]])
 @pytest.mark.parametrize("probe", PROBES)
 def test_depth_grows_along_it_by_the_way_gone(name: str, probe: np.ndarray) -> None:
     contact = CONTACTS[name]
-    place, below = contact.column(HILLS, probe)
+    place, below = contact.depth_axis(HILLS, probe)
     depth = contact.depth(HILLS, probe[None])[0]
     assert depth > 0.0
     assert np.linalg.norm(below) == pytest.approx(1.0, abs=1e-12)
@@ -29,13 +29,15 @@ def test_depth_grows_along_it_by_the_way_gone(name: str, probe: np.ndarray) -> N
 
 
 def test_the_columns_of_contacts_are_told_apart() -> None:
-    below = {name: contact.column(HILLS, PROBES[0])[1] for name, contact in CONTACTS.items()}
+    below = {name: contact.depth_axis(HILLS, PROBES[0])[1] for name, contact in CONTACTS.items()}
     assert below["vertical"][2] == -1.0
     assert abs(below["nearest"][2]) < 0.999
 
 
 def test_what_takes_a_search_costs_more_than_a_height() -> None:
-    costs = {name: CONTACTS[name].cost for name in ("nominal", "vertical", "nearest", "split")}
+    costs = {
+        name: CONTACTS[name].relative_cost for name in ("nominal", "vertical", "nearest", "split")
+    }
     assert costs["nominal"] == costs["vertical"] == 1.0
     assert costs["vertical"] < costs["nearest"] < costs["split"]
-    assert [CONTACTS[name].costly for name in costs] == [False, False, True, True]
+    assert [CONTACTS[name].requires_search for name in costs] == [False, False, True, True]

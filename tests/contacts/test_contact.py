@@ -8,11 +8,22 @@ import mpmath
 import numpy as np
 import pytest
 
-from asperity.checks import FloatArray
 from asperity.contacts import Contact
-from asperity.contacts.memory import BUDGET, FIRST, GAP, SHORT, SIZE, TAKEN, WORST
-from asperity.contacts.memory import POINTS as KNOWN
-from asperity.contacts.nearest import again, line_search, line_within, plane_search, plane_within
+from asperity.contacts.closest import closest_warm as again
+from asperity.contacts.closest import line_budget as line_within
+from asperity.contacts.closest import line_search, plane_search
+from asperity.contacts.closest import plane_budget as plane_within
+from asperity.contacts.warm_start import (
+    BUDGET,
+    ERROR_BOUND,
+    EVALUATIONS,
+    FIRST_POINT,
+    MAX_ERROR_BOUND,
+    TRUNCATED_TICKS,
+    WARM_START_SIZE,
+)
+from asperity.contacts.warm_start import POINT_COUNT as KNOWN
+from asperity.core.checks import FloatArray
 from asperity.laws import LAWS
 from asperity.textures import Fourier
 
@@ -22,25 +33,25 @@ POINTS = np.random.default_rng(3).uniform(-4e-4, 4e-4, (200, 3))
 
 def test_a_contact_promises_nothing_unless_it_says_so() -> None:
     assert not Contact.single_valued
-    assert not Contact.above_probe
+    assert not Contact.is_above_probe
     assert not Contact.clampable
-    assert not Contact.holds_anchor
+    assert not Contact.supports_state
     assert Contact.begins_on_texture
-    assert Contact.given_by_depth
-    assert (Contact.cost, Contact.parameters) == (1000.0, ())
+    assert Contact.is_determined_by_depth
+    assert (Contact.relative_cost, Contact.parameters) == (1000.0, ())
 
 
 @pytest.mark.parametrize("letter", ["A", "D", "H", "W"])
 def test_inside_is_where_the_depth_is_positive(letter: str) -> None:
     """On the texture's side of where contact begins, and not on it."""
     contact = LAWS[letter].contact
-    begin = contact.begin(WAVES, POINTS[:, :2])
-    inside = contact.inside(WAVES, POINTS)
+    begin = contact.contact_height(WAVES, POINTS[:, :2])
+    inside = contact.is_in_contact(WAVES, POINTS)
     np.testing.assert_array_equal(inside, POINTS[:, 2] < begin)
     assert 20 < inside.sum() < 180
     on = np.column_stack([POINTS[:20, :2], begin[:20]])
     if letter == "W":
-        assert not contact.inside(WAVES, on).any()
+        assert not contact.is_in_contact(WAVES, on).any()
 
 
 @pytest.mark.parametrize("letter", ["A", "D", "H", "W"])
@@ -53,14 +64,14 @@ def test_the_depth_grows_on_the_way_inwards(letter: str) -> None:
     derivatives = WAVES.derivatives(xy)
     straight = letter in "AW"
     for row in derivatives:
-        inward = contact.inward().subs({HX: row[1], HY: row[2]})
+        inward = contact.inward_direction().subs({HX: row[1], HY: row[2]})
         down = np.array([0.0, 0.0, -1.0] if straight else [row[1], row[2], -1.0])
         expected = down / np.linalg.norm(down)
         np.testing.assert_allclose(np.array(inward, float).ravel(), expected, rtol=1e-14)
-    if contact.given_by_depth:
-        probes = contact.probe(xy, np.full(20, 3e-6), derivatives)
+    if contact.is_determined_by_depth:
+        probes = contact.probe_positions(xy, np.full(20, 3e-6), derivatives)
         np.testing.assert_allclose(contact.depth(WAVES, probes), 3e-6, rtol=1e-6)
-        above = contact.probe(xy, np.full(20, -3e-6), derivatives)
+        above = contact.probe_positions(xy, np.full(20, -3e-6), derivatives)
         np.testing.assert_allclose(contact.depth(WAVES, above), -3e-6, rtol=1e-6)
 
 
@@ -74,21 +85,21 @@ def test_how_large_and_how_far_aside_the_coordinates_of_a_contact_are() -> None:
         ("H", 4.7, 2e-3),
     ):
         contact = LAWS[letter].contact
-        assert contact.coordinate_size(xy, -0.7) == pytest.approx(size, rel=1e-15)
-        assert contact.margin(2e-3) == aside
-        assert contact.costly == (letter in "DH")
+        assert contact.coordinate_scale(xy, -0.7) == pytest.approx(size, rel=1e-15)
+        assert contact.lateral_reach(2e-3) == aside
+        assert contact.requires_search == (letter in "DH")
     slopes = np.array([[0.5, 0.3, -0.4], [0.1, 0.0, 0.0]])
     for letter, deep in (("A", [0.7, 0.3]), ("W", [0.2, 0.2]), ("D", [0.7 * 1.25**0.5, 0.3])):
-        found = LAWS[letter].contact.greatest_depth(-0.2, slopes)
+        found = LAWS[letter].contact.depth_at_height(-0.2, slopes)
         np.testing.assert_allclose(found, deep, rtol=1e-14)
 
 
 def test_a_limit_of_force_looks_half_as_often_as_a_tick() -> None:
     """At the nearest point, from right below the probe; 600 looks are a tick's."""
-    assert LAWS["D"].contact.looks == 600.0
+    assert LAWS["D"].contact.max_evaluations == 600.0
     code = LAWS["D"].contact.depth_code()
-    assert code[-2].endswith("= foot_within(x, y, z, x, y, 300.0, texture)")
-    assert code[:2] == ["if not height(x, y, texture) - z > 0.0:", "    return 0.0"]
+    assert code[-2].endswith("= closest_point_within_budget(x, y, z, x, y, 300.0, texture)")
+    assert code[:2] == ["if not sample_height(x, y, texture) - z > 0.0:", "    return 0.0"]
     assert LAWS["A"].contact.depth_code()[-1] == "return depth"
 
 
@@ -98,7 +109,7 @@ def test_the_exact_foot_is_one_in_all_its_digits() -> None:
         h, contact = WAVES.exact_height(), LAWS["D"].contact
         for point in POINTS[:8]:
             p = [mpmath.mpf(float(value)) for value in point]
-            found = contact.exact_point(WAVES, h, p)
+            found = contact.exact_contact(WAVES, h, p)
             assert found is not None
             depth, x, y = found
             gap = h(x, y, 0, 0) - p[2]
@@ -137,8 +148,8 @@ class Looks:
         self, probe: tuple[float, float, float], start: float, monkeypatch: pytest.MonkeyPatch
     ) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """Descend along a line and in the plane; return both ends."""
-        monkeypatch.setattr(line_search, "along", self.along)
-        monkeypatch.setattr(plane_search, "curvature", self.curvature)
+        monkeypatch.setattr(line_search, "sample_profile", self.along)
+        monkeypatch.setattr(plane_search, "sample_hessian", self.curvature)
         x, y, z = probe
         on_line = line_search.descend(x, z, start, None)
         return on_line, plane_search.descend(x, y, z, start, 0.7 * start, None)
@@ -229,11 +240,11 @@ def test_a_piece_right_below_the_probe_is_as_far_as_its_plane() -> None:
     for hx, hy, depth in rng.normal(size=(300, 3)):
         away = (-hx * depth, -hy * depth, depth)
         far = abs(depth) * np.sqrt(1.0 + hx * hx + hy * hy)
-        found = plane_search.clearance(away, hx, hy, 0.1, 0.0)
+        found = plane_search.distance_lower_bound(away, hx, hy, 0.1, 0.0)
         assert found == pytest.approx(far, rel=1e-12)
-        lifted = plane_search.clearance(away, hx, hy, 0.1, 0.3 * far)
+        lifted = plane_search.distance_lower_bound(away, hx, hy, 0.1, 0.3 * far)
         assert lifted == pytest.approx(0.7 * far, rel=1e-12)
-        assert plane_search.clearance(away, hx, hy, 0.1, 2.0 * far) == 0.0
+        assert plane_search.distance_lower_bound(away, hx, hy, 0.1, 2.0 * far) == 0.0
 
 
 def test_a_box_is_as_far_as_taylor_s_formula_says() -> None:
@@ -241,7 +252,7 @@ def test_a_box_is_as_far_as_taylor_s_formula_says() -> None:
 
     def is_hopeless(enough: float) -> bool:
         given = (0.0, 0.0, 1.0), 0.0, 0.0, (2.0, 0.0, 2.0)
-        return plane_search.hopeless(*given, 2.0, 0.6, 2.0, 0.3, 0.4, enough)
+        return plane_search.can_prune(*given, 2.0, 0.6, 2.0, 0.3, 0.4, enough)
 
     assert is_hopeless(0.95 * (1.0 - 1e-12))
     assert not is_hopeless(0.95 * (1.0 + 1e-12))
@@ -257,7 +268,7 @@ def test_an_interval_is_dropped_just_where_taylor_s_formula_says(
 ) -> None:
     """φ >= φ₀ - 2|p| r + (min(Q, 0) - L r/3) r², L = 3 K max|h'| + T max|h - z|, at h - z = -1."""
     looks, twist = Looks(0.7, slope, 0.5 * turn), 0.8
-    monkeypatch.setattr(line_search, "along", looks.along)
+    monkeypatch.setattr(line_search, "sample_profile", looks.along)
     p, q = away - slope, 1.0 + slope * slope - turn
     most = min(bend, turn + twist * r)
     steep = slope + most * r
@@ -266,7 +277,7 @@ def test_an_interval_is_dropped_just_where_taylor_s_formula_says(
     for keep in (1.0, 0.5):
         for share, dropped in ((1.0 - 1e-9, True), (1.0 + 1e-9, False)):
             best = (-9.0, least / keep * share, 0.0, 0.0)
-            found, further, left = line_search.judge(
+            found, further, left = line_search.evaluate_box(
                 -away, 1.7, 0.0, r, bend, twist, best, keep, 50.0, None
             )
             flat = abs(p) <= (abs(q) * (1.0 + 1e-6) + 0.5 * change + 1e-6) * r
@@ -285,10 +296,10 @@ def test_an_interval_is_dropped_where_its_slope_cannot_vanish(
 
     def is_dropped(slope: float, turn: float, away: float, twist: float) -> bool:
         looks = Looks(0.7, slope, 0.5 * turn)
-        monkeypatch.setattr(line_search, "along", looks.along)
+        monkeypatch.setattr(line_search, "sample_profile", looks.along)
         best = (-9.0, 1e9, 0.0, 0.0)
         given = (-away, 1.7, 0.0, 0.1, 50.0, twist, best, 1.0, 50.0, None)
-        _found, further, left = line_search.judge(*given)
+        _found, further, left = line_search.evaluate_box(*given)
         return not further and left == 49.0
 
     # Of a plane Q is 1 and does not change: the slope vanishes at a distance of |p|.
@@ -310,13 +321,15 @@ def test_a_search_out_of_looks_asks_for_less_each_time(monkeypatch: pytest.Monke
         kept.append(float(given[3]))  # type: ignore[arg-type]  # the fourth is a number
         return (0.0, 4.0, 0.0, 0.0), [0.0, 20.0, 10.0, 0.0][len(kept) - 1]
 
-    monkeypatch.setattr(line_within, "go_down", lambda *_given: ((0.0, 4.0, 0.0, 0.0), 50.0))
+    monkeypatch.setattr(
+        line_within, "descend_within_budget", lambda *_given: ((0.0, 4.0, 0.0, 0.0), 50.0)
+    )
     monkeypatch.setattr(line_within, "search_line", search_line)
-    best, gap, looks = line_within.line_within(0.0, 2.0, 0.0, 100.0, None)
+    best, gap, looks = line_within.search_line_within_budget(0.0, 2.0, 0.0, 100.0, None)
     np.testing.assert_allclose(kept[1:], [(1.0 - 0.25**n) ** 2 for n in (1, 2, 3)], rtol=1e-15)
     assert (best[1], gap, looks) == (4.0, 2.0 / 16.0, 100.0)
     monkeypatch.setattr(line_within, "search_line", lambda *_given: ((0.0, 4.0, 0.0, 0.0), 7.0))
-    assert line_within.line_within(0.0, 2.0, 0.0, 100.0, None)[1:] == (0.0, 43.0)
+    assert line_within.search_line_within_budget(0.0, 2.0, 0.0, 100.0, None)[1:] == (0.0, 43.0)
 
 
 def test_a_search_of_the_plane_asks_for_less_in_the_same_way(
@@ -331,15 +344,15 @@ def test_a_search_of_the_plane_asks_for_less_in_the_same_way(
         kept.append((float(given[4]), float(given[5])))  # type: ignore[arg-type]  # numbers
         return foot, left[len(kept) - 1]
 
-    monkeypatch.setattr(plane_within, "go_down", lambda *given: (foot, given[5]))
+    monkeypatch.setattr(plane_within, "descend_within_budget", lambda *given: (foot, given[5]))
     monkeypatch.setattr(plane_within, "search_plane", search_plane)
-    found = plane_within.foot_within(0.0, 0.0, 2.0, 0.0, 0.0, 100.0, None)
+    found = plane_within.closest_point_within_budget(0.0, 0.0, 2.0, 0.0, 0.0, 100.0, None)
     shares = [(1.0 - 0.25**n) ** 2 for n in (1, 2, 3)]
     np.testing.assert_allclose([keep for keep, _ in kept[1:]], shares, rtol=1e-15)
     assert [looks for _, looks in kept] == [50.0, 50.0, 20.0, 10.0]
     assert found == (0.1, 0.2, 0.3, 0.4, 0.5, 2.0 / 16.0, 100.0)
     kept, left = [], [7.0]
-    found = plane_within.foot_within(0.0, 0.0, 2.0, 0.0, 0.0, 100.0, None)
+    found = plane_within.closest_point_within_budget(0.0, 0.0, 2.0, 0.0, 0.0, 100.0, None)
     assert found == (0.1, 0.2, 0.3, 0.4, 0.5, 0.0, 43.0)
     assert len(kept) == 1
 
@@ -352,7 +365,7 @@ def test_every_part_of_an_interval_is_looked_at_once(u: float) -> None:
     while level <= 3:
         if level == 0:
             seen.append(i)
-            level, side, i = line_search.next_part(0, 1.0, i, 3, u)
+            level, side, i = line_search.next_interval(0, 1.0, i, 3, u)
         else:
             level, side = level - 1, 0.5 * side
             i = 2 * i + int(u >= (2 * i + 1) * side)
@@ -385,19 +398,38 @@ def test_a_tick_starts_at_the_last_foot_where_that_is_nearer(
         told.append(given)
         return 0.11, 0.12, 0.13, 0.14, 0.15, 0.5, 33.0
 
-    monkeypatch.setattr(again, "foot_within", foot_within)
-    monkeypatch.setattr(again, "height", lambda x, y, _texture: -13.0 + 2.0 * x + y)
-    memory = np.arange(50.0, 50.0 + SIZE)
-    memory[[KNOWN, FIRST, FIRST + 1, FIRST + 2, SHORT, WORST]] = points, *last, 4.0, 0.4
+    monkeypatch.setattr(again, "closest_point_within_budget", foot_within)
+    monkeypatch.setattr(again, "sample_height", lambda x, y, _texture: -13.0 + 2.0 * x + y)
+    memory = np.arange(50.0, 50.0 + WARM_START_SIZE)
+    memory[
+        [KNOWN, FIRST_POINT, FIRST_POINT + 1, FIRST_POINT + 2, TRUNCATED_TICKS, MAX_ERROR_BOUND]
+    ] = points, *last, 4.0, 0.4
     before = memory.copy()
-    found = again.foot_again(1.0, 2.0, -17.0, memory, "texture")
+    found = again.closest_point_warm(1.0, 2.0, -17.0, memory, "texture")
     assert found == (0.11, 0.12, 0.13, 0.14, 0.15)
     assert told == [(1.0, 2.0, -17.0, *start, before[BUDGET], "texture")]
-    changed = {KNOWN: 1.0, FIRST: 0.11, FIRST + 1: 0.12, FIRST + 2: 0.13, TAKEN: 33.0, GAP: 0.5,
-               SHORT: 5.0, WORST: 0.5}  # fmt: skip
+    changed = {
+        KNOWN: 1.0,
+        FIRST_POINT: 0.11,
+        FIRST_POINT + 1: 0.12,
+        FIRST_POINT + 2: 0.13,
+        EVALUATIONS: 33.0,
+        ERROR_BOUND: 0.5,
+        TRUNCATED_TICKS: 5.0,
+        MAX_ERROR_BOUND: 0.5,
+    }
     for index, value in enumerate(before):
         assert memory[index] == changed.get(index, value)
-    again.note_gap(memory, 0.25, 7.0)
-    assert (memory[SHORT], memory[WORST], memory[GAP], memory[TAKEN]) == (6.0, 0.5, 0.25, 7.0)
-    again.note_gap(memory, 0.0, 7.0)
-    assert (memory[SHORT], memory[WORST], memory[GAP]) == (6.0, 0.5, 0.0)
+    again.record_error_bound(memory, 0.25, 7.0)
+    assert (
+        memory[TRUNCATED_TICKS],
+        memory[MAX_ERROR_BOUND],
+        memory[ERROR_BOUND],
+        memory[EVALUATIONS],
+    ) == (6.0, 0.5, 0.25, 7.0)
+    again.record_error_bound(memory, 0.0, 7.0)
+    assert (memory[TRUNCATED_TICKS], memory[MAX_ERROR_BOUND], memory[ERROR_BOUND]) == (
+        6.0,
+        0.5,
+        0.0,
+    )

@@ -62,8 +62,7 @@ CONSERVATIVE: dict[str, Law] = {
     "C by its parts": law("vertical", lambda c: scaled_slopes(c, 1)),
     # U = k δ₀² h/2: the height is felt through the wall.
     "graded wall": law(
-        "nominal",
-        lambda c: c.k * (c.depth * c.h * c.e_z - c.depth**2 / 2 * c.tangential(c.slope)),
+        "nominal", lambda c: c.k * (c.depth * c.h * c.e_z - c.depth**2 / 2 * c.tangential(c.slope))
     ),
     "nothing": law("nominal", lambda c: 0 * c.e_z),
 }
@@ -80,8 +79,7 @@ NOT_CONSERVATIVE: dict[str, Law] = {
     ),
     "D weighted by the tilt": law("nearest", lambda c: c.k * c.depth * c.normal[2] * c.normal),
     "graded wall of the wrong sign": law(
-        "nominal",
-        lambda c: c.k * (c.depth * c.h * c.e_z + c.depth**2 / 2 * c.tangential(c.slope)),
+        "nominal", lambda c: c.k * (c.depth * c.h * c.e_z + c.depth**2 / 2 * c.tangential(c.slope))
     ),
     # Curl-free inside, but a closed path may enter at one place and leave at another.
     "lateral force at once": law("nominal", lambda c: c.k * c.tangential(c.slope)),

@@ -8,6 +8,7 @@ import sys
 import pytest
 import sympy as sp
 
+from asperity.clamps import LATERAL
 from asperity.derive.facts import clamped_facts, derive_facts, law_facts
 from asperity.laws import LAWS, Law
 
@@ -20,8 +21,8 @@ LOOKING = "BCDFG"
 def test_the_facts_of_the_shipped_laws(letter: str):
     facts = law_facts(LAWS[letter])
     assert facts.conservative == (letter in CONSERVATIVE)
-    assert facts.begins_at_zero
-    assert facts.looks_at_surface == (letter in LOOKING)
+    assert facts.vanishes_at_contact
+    assert facts.depends_on_surface == (letter in LOOKING)
     assert facts.affine_in_depth == (letter != "D")
     assert (facts.curl == ("0", "0", "0")) == (letter in CONSERVATIVE)
 
@@ -36,10 +37,10 @@ def test_facts_of_a_law_of_ones_own_are_derived():
     facts = law_facts(square)
     assert facts.conservative
     assert not facts.affine_in_depth
-    assert facts.looks_at_surface
+    assert facts.depends_on_surface
     jumping = Law("J", "jump", "nominal", lambda c: (c.depth + 1) * c.position[0] * c.e_z)
     facts = law_facts(jumping)
-    assert not facts.begins_at_zero
+    assert not facts.vanishes_at_contact
     assert not facts.affine_in_depth  # the position is no constant along the depth
 
 
@@ -56,9 +57,9 @@ def test_clamps_under_which_a_law_is_conservative():
     clamps = {letter: law_facts(LAWS[letter]).conservative_clamps for letter in LAWS}
     assert clamps.pop("C") == ("whole", "backed")
     assert set(clamps.values()) == {()}
-    assert clamped_facts(LAWS["C"], "lateral").reason.startswith("below max_depth the lateral")
+    assert clamped_facts(LAWS["C"], LATERAL).reason.startswith("below max_depth the lateral")
     # What is never clamped does not change.
-    assert clamped_facts(LAWS["H"], "lateral") is law_facts(LAWS["H"])
+    assert clamped_facts(LAWS["H"], LATERAL) is law_facts(LAWS["H"])
 
 
 def test_shipped_facts_need_no_sympy():

@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 
 from asperity.contacts.symbols import DEPTH, POSITION, K
-from asperity.derive.jacobian import derive, explicit
+from asperity.derive.jacobian import derive, expand_definitions
 from asperity.laws import LAWS, Law
 
 LETTERS = "WABCDEFG"
@@ -64,7 +64,7 @@ def patches() -> list[Patch]:
 
 def symbolic_jacobian(law: Law, values: dict[str, float]) -> np.ndarray:
     derivation = derive(law)
-    matrix = explicit(derivation, derivation.jacobian)
+    matrix = expand_definitions(derivation, derivation.jacobian)
     symbols = sorted(matrix.free_symbols, key=str)
     result = sp.lambdify(symbols, matrix, "numpy")(*[values[str(s)] for s in symbols])
     return np.array(result, dtype=float)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import keyword
 import math
 from collections.abc import Callable
 from typing import Any
@@ -11,13 +13,16 @@ import pytest
 import sympy as sp
 
 from asperity.analysis import characteristic_number
-from asperity.contacts.symbols import HXX, ContactSymbols
+from asperity.clamps import BACKED, NONE
+from asperity.contacts.symbols import ARGUMENT_ORDER, HXX, ContactSymbols
+from asperity.core.errors import LawError
 from asperity.derive.jacobian import derive, symbolic_force
 from asperity.derive.python_source import law_source
-from asperity.errors import LawError
-from asperity.laws import Law
+from asperity.kernels.fuse import source_on_texture
+from asperity.kernels.loops import path_loop, stateful_loops
+from asperity.laws import LAWS, Law
 from asperity.surface import Surface
-from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.kinds.sinusoid import Sinusoid
 
 Formula = Callable[[ContactSymbols], Any]
 
@@ -104,26 +109,69 @@ def test_deflection_is_offered_to_a_law_with_state():
 RESERVED = ["x", "depth", "h", "hx", "hyy", "dx", "sxy", "k", "h_mid", "h_half"]
 
 
-@pytest.mark.parametrize("name", [*RESERVED, "two words", "1st", ""])
-def test_a_parameter_with_a_reserved_name(name: str):
+@pytest.mark.parametrize("name", RESERVED)
+def test_a_parameter_cannot_have_the_name_of_a_contact_symbol(name: str):
     own = law(lambda c: c.k * c.depth * c.e_z, parameters={name: 1.0})
-    with pytest.raises(LawError, match="cannot be the name of a parameter"):
+    reason = f"called '{name}': formulas on the vertical contact have another symbol of that name"
+    with pytest.raises(LawError, match=reason):
         law_source(own)
 
 
-# Names that the kernels themselves use, or that Python keeps for itself.
-COLLIDING = ["s", "fx", "j00", "floor", "clamp_depth", "texture", "math", "min", "slope", "lambda"]
-
-
-@pytest.mark.parametrize("name", COLLIDING)
-def test_a_parameter_that_would_collide_with_the_kernels(name: str):
-    own = law(
-        lambda c: c.parameter(name) * c.k * c.depth * c.normal,
-        parameters={name: 1.0},
-        clampable=True,
-    )
-    with pytest.raises(LawError, match="cannot be the name of a parameter"):
+@pytest.mark.parametrize("name", ["two words", "1st", ""])
+def test_a_parameter_needs_the_name_of_a_variable(name: str):
+    own = law(lambda c: c.k * c.depth * c.e_z, parameters={name: 1.0})
+    with pytest.raises(LawError, match="needs a name like a variable's"):
         law_source(own)
+
+
+def test_symbols_of_a_contact_s_derivative_are_reserved_on_that_contact_only():
+    def own(contact: str) -> Law:
+        return law(lambda c: c.k * c.depth * c.e_z, contact=contact, parameters={"q11": 1.0})
+
+    assert "def law_force" in law_source(own("vertical"))
+    with pytest.raises(LawError, match="formulas on the nearest contact have another symbol"):
+        law_source(own("nearest"))
+
+
+def names_in_code(text: str) -> set[str]:
+    """All names of functions, arguments, variables and modules in a source text."""
+    nodes = list(ast.walk(ast.parse(text)))
+    functions = [node for node in nodes if isinstance(node, ast.FunctionDef)]
+    names = {node.id for node in nodes if isinstance(node, ast.Name)}
+    arguments = {a.arg for f in functions for a in f.args.args}
+    return names | arguments | {f.name for f in functions}
+
+
+def test_a_parameter_may_have_the_name_of_anything_in_compiled_code():
+    """All at once: every name in the fused modules of two laws, and Python's own words."""
+    wave = Sinusoid(amplitude=1e-4, period=1e-3)
+    texts = []
+    for letter in "BHF":
+        shipped = LAWS[letter]
+        modules = (stateful_loops, path_loop, *shipped.contact.kernels())
+        clamp = BACKED if shipped.clampable else NONE
+        texts.append(source_on_texture(shipped, wave.sampler, clamp, modules))
+    found = set().union(*map(names_in_code, texts)) | {
+        *keyword.kwlist,
+        "weights",
+        "below",
+        "double",
+    }
+    assert found >= {"gap", "count", "weights", "below", "law_force", "probe_force", "texture"}
+    taken = {str(symbol) for symbol in ARGUMENT_ORDER}
+    names = sorted(name for name in found - taken if name.isidentifier())
+    assert len(names) > 150
+
+    def force(c: ContactSymbols) -> Any:
+        return sum(c.parameter(name) for name in names) * c.k * c.depth * c.normal
+
+    plain = Surface(wave, "B", clamp="backed")
+    own = law(force, parameters=dict.fromkeys(names, 1.0 / len(names)), clampable=True)
+    points = np.array([[1e-4, 0.0, -1e-5], [3e-4, 2e-4, -5e-4]])
+    expected = plain.force_and_jacobian(points)
+    found_values = Surface(wave, own, clamp="backed").force_and_jacobian(points)
+    for value, right in zip(found_values, expected, strict=True):
+        np.testing.assert_allclose(value, right, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("value", [sp.nan, sp.oo, sp.zoo, sp.I], ids=str)

@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 
 from asperity.contacts.symbols import ARGUMENT_ORDER
-from asperity.derive.jacobian import derive, explicit
+from asperity.derive.jacobian import derive, expand_definitions
 from asperity.derive.python_source import law_source
 from asperity.laws import LAWS, Law
 
@@ -38,12 +38,12 @@ def arguments(law: Law, function: str) -> list[str]:
 
 
 def call(law: Law, function: str) -> np.ndarray:
-    values = [VALUES[name] for name in arguments(law, function)]
+    values = [VALUES[name.removeprefix("param_")] for name in arguments(law, function)]
     return np.array(functions(law)[function](*values))
 
 
 def exact(law: Law, matrix: Any) -> np.ndarray:
-    matrix = explicit(derive(law), matrix)
+    matrix = expand_definitions(derive(law), matrix)
     numbers = {symbol: sp.Rational(VALUES[str(symbol)]) for symbol in matrix.free_symbols}
     return np.array(matrix.subs(numbers).evalf(30), dtype=float).ravel()
 
@@ -72,7 +72,10 @@ def test_only_a_clampable_law_has_a_saturated_jacobian(law: Law):
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=str)
 def test_arguments_keep_their_order_and_are_all_used(law: Law):
-    order = [*(str(symbol) for symbol in ARGUMENT_ORDER), *law.parameters]
+    order = [
+        *(str(symbol) for symbol in ARGUMENT_ORDER),
+        *(f"param_{name}" for name in law.parameters),
+    ]
     for function in ("law_force", "law_jacobian"):
         taken = arguments(law, function)
         assert taken == sorted(taken, key=order.index)

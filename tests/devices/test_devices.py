@@ -6,9 +6,9 @@ import math
 
 import pytest
 
+from asperity.core.errors import ParameterError
 from asperity.devices import (
-    FIELD_TABLE,
-    FIELDS,
+    FIELD_UNITS,
     Datum,
     Device,
     device_names,
@@ -16,7 +16,6 @@ from asperity.devices import (
     parse_device,
 )  # fmt: skip
 from asperity.devices.five_bar import FiveBar, handle_damping
-from asperity.errors import ParameterError
 
 # What was read (True) or is remembered (False), written down apart from the catalogue.
 KNOWN: dict[str, dict[str, list[tuple[float, bool]]]] = {
@@ -147,7 +146,7 @@ def test_every_number_has_a_unit_and_a_source() -> None:
     assert len(every) > 80
     for device, field, datum in every:
         place = f"{device.id}.{field}"
-        assert datum.unit == FIELDS[field], place
+        assert datum.unit == FIELD_UNITS[field], place
         assert len(datum.source) > 10, place
         assert math.isfinite(datum.value), place
         # What is remembered is never called verified, and what is not verified says why.
@@ -261,9 +260,9 @@ def test_values_for_reading(value: float, unit: str, text: str) -> None:
 
 def test_every_field_can_be_given() -> None:
     content = {
-        field: {"value": 1, "unit": kind.unit, "source": "s"} for field, kind in FIELD_TABLE.items()
+        field: {"value": 1, "unit": unit, "source": "s"} for field, unit in FIELD_UNITS.items()
     }
     device = parse_device(content, "whole")
     assert {field: datum.value for field, datum in device.data.items()} == dict.fromkeys(
-        FIELDS, 1.0
+        FIELD_UNITS, 1.0
     )

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from asperity.core.errors import ParameterError
 from asperity.devices.five_bar import FiveBar, handle_damping, joint_angles, joint_rates
-from asperity.errors import ParameterError
 
 # Generic lengths and places: nothing is symmetric.
 LINKAGE = FiveBar(proximal=0.061, distal=0.078, base=0.027)

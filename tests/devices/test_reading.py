@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from asperity.core.errors import ParameterError
 from asperity.devices import load_device, parse_device
-from asperity.errors import ParameterError
 
 
 def test_device_file(tmp_path: Path) -> None:
@@ -59,10 +59,6 @@ def test_a_mark_of_the_encoding_does_no_harm(tmp_path: Path, mark: bytes) -> Non
         ({"base_distance": 0}, "base_distance", 0.0),
         ({"damping": "0.5 N*s/m"}, "damping", 0.5),
         ({"damping": {"value": 0.5, "unit": "N s/mm"}}, "damping", 500.0),
-        # A unit that is said twice must be the same unit, however written.
-        ({"max_force": {"value": "12 N", "unit": "N"}}, "max_force", 12.0),
-        ({"max_force": {"value": "12 N", "unit": "newton"}}, "max_force", 12.0),
-        ({"max_stiffness": {"value": "5 N/mm", "unit": "kN/m"}}, "max_stiffness", 5000.0),
         ({"max_stiffness": {"value": "5", "unit": "N/mm"}}, "max_stiffness", 5000.0),
         ({"position_resolution": {"value": 55, "unit": "um"}}, "position_resolution", 5.5e-5),
     ],
@@ -71,24 +67,17 @@ def test_values_that_are_allowed(content: dict[str, object], field: str, value: 
     assert parse_device(content, "mine").value(field) == value
 
 
-CONTRADICTIONS = [
-    ("max_force", "12 N", "mm"),
-    ("max_stiffness", "5 N/mm", "N/m"),
-    ("max_stiffness", "5000 N/m", "N/mm"),
-    ("position_resolution", "10 um", "m"),
-    ("update_rate", "1 kHz", "Hz"),
-    ("apparent_mass", "45 g", "kg"),
-    ("max_force", "12 N", "no unit at all"),
-]
-
-
-@pytest.mark.parametrize(("field", "value", "unit"), CONTRADICTIONS)
-def test_contradictory_units_are_refused(field: str, value: str, unit: str) -> None:
-    with pytest.raises(ParameterError, match="contradict each other") as caught:
+@pytest.mark.parametrize(
+    ("field", "value", "unit"),
+    [
+        ("max_force", "12 N", "N"),
+        ("max_stiffness", "5 N/mm", "N/m"),
+        ("position_resolution", "10 um", "m"),
+    ],
+)
+def test_a_unit_given_twice_is_refused(field: str, value: str, unit: str) -> None:
+    with pytest.raises(ParameterError, match=f"device.{field} must be a number, got '{value}'"):
         parse_device({field: {"value": value, "unit": unit}}, "mine")
-    assert f"device.{field}" in str(caught.value)
-    assert value in str(caught.value)
-    assert unit in str(caught.value)
 
 
 WRONG = [
@@ -137,12 +126,12 @@ WRONG = [
     ({"update_rate": 0}, r"update_rate must be positive"),
     ({"update_rate": "0 kHz"}, r"update_rate must be positive"),
     ({"friction": -0.1}, "must not be negative"),
-    ({"delay_samples": -1}, "must not be negative"),
+    ({"delay_samples": -1}, "whole number, 0 or more"),
     ({"delay_samples": 1.5}, "whole number"),
     ({"delay_samples": "1 ms"}, "must be a number"),
     ({"delay_samples": {"value": 1, "unit": "ms"}}, "plain number"),
     ({"delay_samples": True}, "must be a number"),
-    ({"encoder_counts": 0}, "must be positive"),
+    ({"encoder_counts": 0}, "whole number, 1 or more"),
     ({"virtual_damping": math.inf}, "must be finite"),
     ({"max_force": "3 N", "continuous_force": "4 N"}, "must not be greater than max_force, 3 N"),
     ({"id": 5}, r"device\.id must be text"),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from asperity.core.errors import ParameterError
 from asperity.devices import Datum, Device, WallTest, load_device, parse_device
-from asperity.errors import ParameterError
 
 FULL = {
     "value": "1.8 N/mm", "directions": ["x", "z", "x"], "cycled": "2 N/mm", "update_rate": "1 kHz",

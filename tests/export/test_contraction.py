@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from tests.exported import COMPILERS, header, run, tool
+from tests.helpers.c_programs import COMPILERS, header, run_command, tool
 
 from asperity.surface import Surface
 from asperity.textures import Texture
@@ -21,7 +21,7 @@ def _fused(compiler: str, language: str, text: str, folder: Path) -> int:
     )
     kind = ("-x", "c++") if "++" in language else ()
     flags = (*kind, f"-std={language}", "-O2", "-mfma", "-S", "-o", "-")
-    return run(tool(compiler), *flags, "t.c", cwd=folder).count("vfm")
+    return run_command(tool(compiler), *flags, "t.c", cwd=folder).count("vfm")
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
@@ -41,4 +41,4 @@ def test_fast_mathematics_does_not_compile(compiler: str, wave: Texture, tmp_pat
     (tmp_path / "t.h").write_text(header(Surface(wave, "B"), "t"))
     (tmp_path / "t.c").write_text('#include "t.h"\n')
     with pytest.raises(RuntimeError, match="compile without -ffast-math"):
-        run(tool(compiler), "-ffast-math", "-c", "t.c", "-o", "t.o", cwd=tmp_path)
+        run_command(tool(compiler), "-ffast-math", "-c", "t.c", "-o", "t.o", cwd=tmp_path)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.exported import energies, header, library, ticks
+from tests.helpers.c_programs import energies, header, library, ticks
 
-from asperity.kernels.probe import ClampName
+from asperity.clamps import NONE
 from asperity.laws import LAWS, Law
 from asperity.surface import Surface
 from asperity.textures import Texture
@@ -19,11 +19,11 @@ WITH_POTENTIAL = "WCDH"
 
 @pytest.mark.parametrize("clamp", ["none", "backed"])
 def test_the_force_is_minus_its_gradient(
-    clamp: ClampName, make_texture: Callable[[str], Texture], tmp_path: Path
+    clamp: str, make_texture: Callable[[str], Texture], tmp_path: Path
 ) -> None:
     texture = make_texture("map")
     surfaces = {x: Surface(texture, x, max_depth=2e-4, clamp=clamp) for x in WITH_POTENTIAL}
-    headers = {x: header(s, x, looks=np.inf) for x, s in surfaces.items()}
+    headers = {x: header(s, x, max_evaluations=np.inf) for x, s in surfaces.items()}
     made = library(tmp_path, "gcc", headers, "-O1")
     rng = np.random.default_rng(4)
     xy = texture.domain.points(rng.uniform(0.1, 0.9, (150, 2)))
@@ -52,10 +52,12 @@ def test_the_energy_of_a_texture_kind_of_its_own_solver(
     made = library(tmp_path, "gcc", {"h": header(surface, "h")}, "-O1")
     at = np.array([[1e-4, 2e-4, -3e-4], [3e-4, -2e-4, -1e-4], [0.0, 0.0, 5e-3]])
     split = np.empty((3, 3))
-    from asperity.contacts.split import answers, conditions, solver
+    from asperity.contacts.split import optimality as conditions
+    from asperity.contacts.split import solver
+    from asperity.contacts.split import split_evaluation as answers
     from asperity.kernels.fuse import fuse_on_texture
 
-    loops = fuse_on_texture(surface.law, texture.sampler, "none", (answers,), (solver, conditions))
+    loops = fuse_on_texture(surface.law, texture.sampler, NONE, (answers, solver, conditions))
     loops.split_batch(at, split, surface.continuity, texture.arguments)
     np.testing.assert_array_equal(energies(made, "h", at), surface.stiffness * split[:, 0])
 

@@ -12,17 +12,18 @@ import tifffile
 from PIL import Image
 
 import asperity as asp
-from asperity.errors import ParameterError
-from asperity.export.maps import (
+from asperity.core.errors import ParameterError
+from asperity.export.surface_maps import (
     CONVENTIONS,
     HEIGHT_MAPS,
-    height_step,
+    SampledMap,
+    height_resolution,
     normal_error,
     normal_png,
+    sample_map,
 )
-from asperity.export.sampled import SampledMap, sample_map
 from asperity.measured.reading import read_surface
-from asperity.report.maps import shading_words
+from asperity.report.sentences.map_text import describe_shading
 
 RNG = np.random.default_rng(4)
 ROUGH = asp.HeightMap(2e-5 * RNG.normal(size=(24, 37)) + 3e-3, (1.3e-5, 2.9e-5), origin=(1e-3, 0.0))
@@ -47,10 +48,12 @@ def test_heights_read_back_within_the_stated_step(
     # Rounding of the last bits comes on top of the step.
     room = 1e-15 * float(np.abs(sampled.heights).max())
     apart = np.abs(raw.heights - sampled.heights).max()
-    assert apart <= height_step(sampled, suffix) * (1.0 + 1e-6) + room
+    assert apart <= height_resolution(sampled, suffix) * (1.0 + 1e-6) + room
     assert raw.pitch == pytest.approx(sampled.spacing, rel=1e-15 if suffix != ".tif" else 1e-7)
     if suffix != ".x3p" and texture is not FLAT:
-        assert apart > 0.2 * height_step(sampled, suffix)  # and no closer: the step is the step
+        assert apart > 0.2 * height_resolution(
+            sampled, suffix
+        )  # and no closer: the step is the step
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS)
@@ -76,11 +79,11 @@ def test_gltf_bytes_are_those_of_the_specification() -> None:
     """Red [0, 255] is x [-1, 1]; green is up the picture; blue is out of it."""
     up = np.array([[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]])
     rule = CONVENTIONS["gltf"]
-    pixels = rule.encoded(up)
+    pixels = rule.encode(up)
     assert pixels[0, :, 0].tolist() == [128, 255, 128, 0]
     assert pixels[0, :, 1].tolist() == [255, 128, 128, 128]  # -y points up the picture
     assert pixels[0, :, 2].tolist() == [128, 128, 255, 128]
-    np.testing.assert_allclose(rule.decoded(pixels), up, atol=0.01)
+    np.testing.assert_allclose(rule.decode(pixels), up, atol=0.01)
 
 
 def test_chai3d_reads_the_normals() -> None:
@@ -92,7 +95,7 @@ def test_chai3d_reads_the_normals() -> None:
     read /= np.sqrt((read**2).sum(axis=-1))[..., None]
     wanted = (sampled.normals * (1.0, -1.0, 1.0))[::-1]  # along u and v, v = 1 - y / height
     assert np.abs(read - wanted).max() < 0.008
-    flat = CONVENTIONS["chai3d"].encoded(np.array([[[0.0, 0.0, 1.0]]]))
+    flat = CONVENTIONS["chai3d"].encode(np.array([[[0.0, 0.0, 1.0]]]))
     assert flat.tolist() == [[[128, 128, 255]]]
 
 
@@ -100,7 +103,7 @@ def test_chai3d_reads_the_normals() -> None:
 def test_the_error_of_8_bits_is_reached_and_never_passed(convention: str) -> None:
     sampled = sample_map(WAVES)
     rule = CONVENTIONS[convention]
-    read = rule.decoded(rule.encoded(sampled.normals))
+    read = rule.decode(rule.encode(sampled.normals))
     cosine = np.clip((read * sampled.normals).sum(axis=-1), -1.0, 1.0)
     assert np.arccos(cosine).max() == pytest.approx(normal_error(sampled, convention), rel=1e-3)
     assert 1e-3 < normal_error(sampled, convention) < 1e-2
@@ -119,13 +122,16 @@ def test_normals_are_those_of_the_surface() -> None:
 
 
 def test_what_is_sampled_is_said() -> None:
-    assert sample_map(ROUGH).words == "the extent of the map, 37 x 24 points, 13 µm x 29 µm apart"
+    assert (
+        sample_map(ROUGH).description
+        == "the extent of the map, 37 x 24 points, 13 µm x 29 µm apart"
+    )
     np.testing.assert_allclose(sample_map(ROUGH).heights, ROUGH.heights, rtol=1e-12)
-    assert sample_map(WAVE).words == "one period, 16 x 16 points, 125 µm apart"
-    assert sample_map(WAVE).repeats
+    assert sample_map(WAVE).description == "one period, 16 x 16 points, 125 µm apart"
+    assert sample_map(WAVE).is_periodic
     own = sample_map(WAVE, extent=(3e-3, 2e-3), spacing=1e-4)
     assert (own.heights.shape, own.size) == ((20, 30), pytest.approx((3e-3, 2e-3)))
-    assert not own.repeats
+    assert not own.is_periodic
     half = sample_map(ROUGH, spacing=(2.6e-5, 2.9e-5))
     assert half.heights.shape == (23, 18)
 
@@ -149,7 +155,7 @@ def test_other_libraries_read_the_files() -> None:
     sampled = sample_map(ROUGH)
     with Image.open(io.BytesIO(HEIGHT_MAPS[".png"](sampled))) as image:
         grey = np.asarray(image)
-        assert image.info["Description"].startswith("Heights; x goes to the right, y down")
+        assert image.info["Description"].startswith("Heights; x to the right, y down")
     assert (grey.min(), grey.max(), grey.dtype.itemsize >= 2) == (0, 65535, True)
     with tifffile.TiffFile(io.BytesIO(HEIGHT_MAPS[".tif"](sampled))) as file:
         assert file.is_imagej
@@ -164,7 +170,7 @@ def test_other_libraries_read_the_files() -> None:
     ],
 )  # fmt: skip
 def test_a_size_that_is_none_is_not_taken(chunk: bytes) -> None:
-    from asperity.measured.reading.png_scale import png_scale
+    from asperity.measured.reading.images.image_scale import png_scale
 
     assert png_scale({b"sCAL": chunk}, 16).pitch is None
 
@@ -176,20 +182,20 @@ def test_a_size_that_is_none_is_not_taken(chunk: bytes) -> None:
     ],
 )  # fmt: skip
 def test_a_calibration_that_is_none_is_not_taken(rest: bytes) -> None:
-    from asperity.measured.reading.png_scale import png_scale
+    from asperity.measured.reading.images.image_scale import png_scale
 
     head = b"a\0" + struct.pack(">iiBB", 0, 65535, 0, 2)
     found = png_scale({b"pCAL": head + rest}, 16)
-    assert (found.unit, found.factor, found.offset) == (None, 1.0, 0.0)
+    assert (found.metres_per_value, found.factor, found.offset) == (None, 1.0, 0.0)
     good = png_scale({b"pCAL": head + b"mm\x001\x0065.535"}, 16)
-    assert (good.unit, good.factor, good.offset) == (1e-3, pytest.approx(1e-3), 1.0)
+    assert (good.metres_per_value, good.factor, good.offset) == (1e-3, pytest.approx(1e-3), 1.0)
 
 
 def test_what_shading_costs_is_law_g() -> None:
     surface = asp.Surface(WAVE, "G", stiffness=500.0)
-    said = shading_words(WAVE, 500.0)
-    assert said.startswith("A force that is turned by them is law G. At 500 N/m")
-    assert f"up to {asp.characteristic_number(surface).value:.3g} times the wall's" in said
+    said = describe_shading(WAVE, 500.0)
+    assert said.startswith("A force along these normals is law G. At 500 N/m")
+    assert f"up to {asp.characteristic_number(surface).value:.3g} times that of the wall" in said
     assert asp.worst_loop(surface).energy > 0.0
     assert "a loop gains" in said
 

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bench.firmware import firmware, missing_tool
-from tests.exported import COMPILERS, STRICT, kernel_ticks, run, tool
+from bench.firmware import build_firmware, missing_tool
+from tests.helpers.c_programs import COMPILERS, STRICT, kernel_ticks, run_command, tool
 
 import asperity as asp
-from asperity.export.order import Order
-from asperity.export.targets import find_target
-from asperity.export.writing import write_files
+from asperity.export.export_request import ExportRequest
+from asperity.export.targets import find_target, write_files
 
 CPP = Path(__file__).parent / "cpp"
 EXAMPLES = Path(__file__).parents[2] / "examples" / "export"
@@ -24,7 +23,7 @@ def exported(folder: Path, law: str = "C", name: str = "texture.h", **options: A
     """Write an exported program into a folder and return the folder."""
     surface = asp.Surface(asp.Sinusoid(0.1e-3, 2e-3), law, 800.0, clamp="backed")
     q = asp.characteristic_number(surface).upper
-    order = Order(surface, q_upper=q, **options)
+    order = ExportRequest(surface, q_upper=q, **options)
     write_files(folder / name, find_target("c99"), order, force=False)
     return folder
 
@@ -33,8 +32,8 @@ def exported(folder: Path, law: str = "C", name: str = "texture.h", **options: A
 def test_a_servo_loop(compiler: str, tmp_path: Path) -> None:
     folder = exported(tmp_path)
     flags = (*STRICT, "-O2", f"-I{folder}", EXAMPLES / "loop.c", "-o", folder / "loop", "-lm")
-    run(tool(compiler), *flags)
-    head, *lines = run(folder / "loop").splitlines()
+    run_command(tool(compiler), *flags)
+    head, *lines = run_command(folder / "loop").splitlines()
     assert head.startswith("k = 800 N/m, q <= 1.09")
     assert len(lines) == 8
     # The handle lies on the waves, pressed down by 0.15 N, and is pulled over them.
@@ -63,34 +62,34 @@ def test_c_plus_plus(compiler: str, law: str, tmp_path: Path) -> None:
     folder = exported(tmp_path, law)
     strict = ("-std=c++17", *STRICT[1:], "-O2", *(f"-I{path}" for path in (folder, EXAMPLES, CPP)))
     for name in ("scene", "values"):
-        run(tool(compiler), *strict, CPP / f"{name}.cpp", "-o", folder / name, "-lm")
-        assert hexed(run(folder / name)) == expected(law)
+        run_command(tool(compiler), *strict, CPP / f"{name}.cpp", "-o", folder / name, "-lm")
+        assert hexed(run_command(folder / name)) == expected(law)
 
 
 @pytest.fixture
 def shared(tmp_path: Path) -> Path:
     """An exported library, built by CMake: the folder of the library."""
-    folder = exported(tmp_path, shared=True)
+    folder = exported(tmp_path, as_library=True)
     build = folder / "build"
-    run(tool("cmake"), "-S", folder, "-B", build)
-    run(tool("cmake"), "--build", build)
+    run_command(tool("cmake"), "-S", folder, "-B", build)
+    run_command(tool("cmake"), "--build", build)
     return build
 
 
 def test_a_library_called_from_python(shared: Path) -> None:
-    said = run(sys.executable, EXAMPLES / "caller.py", shared / "libtexture.so")
+    said = run_command(sys.executable, EXAMPLES / "caller.py", shared / "libtexture.so")
     assert hexed(said) == expected()
 
 
 def test_a_library_called_from_c_sharp(shared: Path) -> None:
     program = shared / "Caller.exe"
-    run(tool("mcs"), EXAMPLES / "Caller.cs", f"-out:{program}")
-    said = run(tool("env"), f"LD_LIBRARY_PATH={shared}", tool("mono"), program)
+    run_command(tool("mcs"), EXAMPLES / "Caller.cs", f"-out:{program}")
+    said = run_command(tool("env"), f"LD_LIBRARY_PATH={shared}", tool("mono"), program)
     assert [[float(part) for part in line.split()] for line in said.splitlines()] == expected()
 
 
 def test_a_library_shows_its_contract_only(shared: Path) -> None:
-    shown = run(tool("nm"), "-D", "--defined-only", shared / "libtexture.so").split()
+    shown = run_command(tool("nm"), "-D", "--defined-only", shared / "libtexture.so").split()
     assert {name for name in shown if name.startswith("texture")} == {
         "texture_reset", "texture_force", "texture_gap", "texture_energy",
     }  # fmt: skip
@@ -101,9 +100,9 @@ def test_a_microcontroller(tmp_path: Path) -> None:
     if lacking is not None:
         pytest.skip(f"not run: no {lacking} here")
     surface = asp.Surface(asp.Sinusoid(0.1e-3, 2e-3), "C", 800.0, clamp="backed")
-    built = firmware(surface, tmp_path)
+    built = build_firmware(surface, tmp_path)
     at = np.column_stack([250e-6 * np.arange(8), np.zeros(8), np.full(8, -0.05e-3)])
-    said = [[int(part) for part in line.split()[:3]] for line in built.said.splitlines()]
+    said = [[int(part) for part in line.split()[:3]] for line in built.output.splitlines()]
     np.testing.assert_allclose(said, 1e6 * surface.force(at), atol=2.0)
     assert 400 < built.flash < 16_000
     assert 12 <= built.ram < 1_000

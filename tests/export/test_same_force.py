@@ -8,22 +8,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.exported import (
+from tests.helpers.c_programs import (
     COMPILERS,
-    differing,
     header,
     kernel_ticks,
     library,
+    list_differing,
     probes,
     same_bits,
     ticks,
 )
 
-from asperity.kernels.probe import CLAMPS
+from asperity.clamps import CLAMPS
 from asperity.laws import LAWS, Law
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Sinusoid, Texture
-from asperity.textures.naming import as_texture
+from asperity.textures.catalogue import as_texture
 
 # Laws for each: all are maps, and a search is compared on the roughest and on plateaus.
 LIBRARY = {
@@ -35,7 +35,13 @@ SAME_MACHINE = platform.machine() == "x86_64"
 
 def _count(law: Law) -> int:
     """Return how many probes: fewer where each takes a long search."""
-    return 20_000 if not law.contact.costly else 2_000 if law.contact.cost < 1000 else 400
+    return (
+        20_000
+        if not law.contact.requires_search
+        else 2_000
+        if law.contact.relative_cost < 1000
+        else 400
+    )
 
 
 def _check(folder: Path, surfaces: dict[str, Surface], *flags: str) -> None:
@@ -48,7 +54,7 @@ def _check(folder: Path, surfaces: dict[str, Surface], *flags: str) -> None:
     for compiler in COMPILERS:
         made = library(folder, compiler, headers, *(flags or ("-O1",)))
         equal = [_agree(surfaces[n], paths[n], ticks(made, n, paths[n]), kernel[n]) for n in paths]
-        assert not differing(surfaces, equal), compiler
+        assert not list_differing(surfaces, equal), compiler
     assert all(np.any(tick[:, :3] != 0.0) for tick in kernel.values())
 
 
@@ -73,9 +79,7 @@ def test_library_textures(name: str, tmp_path: Path) -> None:
 def test_every_clamp(make_texture: Callable[[str], Texture], tmp_path: Path) -> None:
     texture = make_texture("map")
     surfaces = {
-        f"{x}_{clamp}": Surface(texture, x, clamp=clamp)  # type: ignore[arg-type]  # names of clamps
-        for x in "BCGF"
-        for clamp in CLAMPS
+        f"{x}_{clamp}": Surface(texture, x, clamp=clamp) for x in "BCGF" for clamp in CLAMPS
     }
     _check(tmp_path, surfaces)
 

@@ -8,7 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.exported import COMPILERS, STRICT, header, kernel_ticks, probes, run, tool
+from tests.helpers.c_programs import (
+    COMPILERS,
+    STRICT,
+    header,
+    kernel_ticks,
+    probes,
+    run_command,
+    tool,
+)
 
 from asperity.surface import Surface
 from asperity.textures import Texture
@@ -59,9 +67,9 @@ def test_nothing_is_undefined(
         inside = kernel_ticks(surface, np.ascontiguousarray(at[:-3]))[:, :3]
         digest.update(np.vstack([inside, np.zeros((3, 3))]).tobytes())
     (tmp_path / "main.c").write_text(_program(list(LAWS)))
-    run(tool(compiler), *STRICT, *CLEAN, "main.c", "-o", "main", "-lm", cwd=tmp_path)
+    run_command(tool(compiler), *STRICT, *CLEAN, "main.c", "-o", "main", "-lm", cwd=tmp_path)
     (tmp_path / "run.sh").write_text("./main > forces.bin\n")
-    run(tool("sh"), "run.sh", cwd=tmp_path)
+    run_command(tool("sh"), "run.sh", cwd=tmp_path)
     said = (tmp_path / "forces.bin").read_bytes()
     assert hashlib.sha256(said).hexdigest() == digest.hexdigest()
 
@@ -75,6 +83,6 @@ def test_what_is_undefined_is_noticed(
     (tmp_path / "B.h").write_text(text.replace("B_data_c[i][j + 3]", "B_data_c[i][j + 300]"))
     np.array([[0.0, 0.0, -1e-4]]).tofile(tmp_path / "B.bin")
     (tmp_path / "main.c").write_text(_program(["B"]))
-    run(tool(compiler), *STRICT, *CLEAN, "main.c", "-o", "main", "-lm", cwd=tmp_path)
+    run_command(tool(compiler), *STRICT, *CLEAN, "main.c", "-o", "main", "-lm", cwd=tmp_path)
     with pytest.raises(RuntimeError, match=r"out of bounds|overflow"):
-        run(tmp_path / "main", cwd=tmp_path)
+        run_command(tmp_path / "main", cwd=tmp_path)

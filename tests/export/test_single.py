@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 from bench import single as bench_single
-from bench.single import single
-from tests.exported import header
+from bench.single import measure_single_precision
+from tests.helpers.c_programs import header
 
 from asperity.laws import LAWS
 from asperity.surface import Surface
@@ -21,7 +21,9 @@ def test_close_to_the_force_in_double(kind: str, make_texture: Callable[[str], T
     """Within 1e-5, or where rounding of the position, a tie or the solver says why not."""
     for letter in LAWS:
         surface = Surface(make_texture(kind), letter, clamp="backed")
-        found = single(surface, 200 if surface.law.contact.costly else 1000)
+        found = measure_single_precision(
+            surface, 200 if surface.law.contact.requires_search else 1000
+        )
         assert found.unexplained == 0, letter
         assert found.near + found.position >= 0.94 * sum(found[:5]), letter
 
@@ -36,7 +38,7 @@ def test_another_force_is_not_explained(
         return right(made, name, at) * (1.0002 if name == "f" else 1.0)
 
     monkeypatch.setattr(bench_single, "ticks", wrong)
-    assert single(surface, 200).unexplained > 100
+    assert measure_single_precision(surface, 200).unexplained > 100
 
 
 def test_float_throughout(make_texture: Callable[[str], Texture]) -> None:

@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from asperity import Sinusoid, Surface
-from asperity.kernels import batch_sine, fuse, probe_loops
+from asperity.clamps import NONE
+from asperity.kernels import batch_sine, fuse
+from asperity.kernels.loops import point_loops as probe_loops
 from asperity.laws import LAWS
 
 ERROR = 6e-16
@@ -89,10 +91,10 @@ def test_an_angle_without_meaning_has_a_sine_between_the_crests(angle: float) ->
 def compiled_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """No kept code: code from the cache cannot be looked at."""
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
-    fuse._loaded.cache_clear()
+    fuse._load_module.cache_clear()
     fuse.fuse_surface.cache_clear()
     yield
-    fuse._loaded.cache_clear()
+    fuse._load_module.cache_clear()
     fuse.fuse_surface.cache_clear()
 
 
@@ -111,7 +113,7 @@ def test_a_batch_on_a_wave_goes_many_points_at_once(letter: str) -> None:
     text = code(surface, surface._loops.force_batch)
     assert "fmul <" in text
     assert not re.search(LIBRARY, text)
-    single = fuse.fuse_on_texture(LAWS[letter], surface.texture.sampler, "none", (probe_loops,))
+    single = fuse.fuse_on_texture(LAWS[letter], surface.texture.sampler, NONE, (probe_loops,))
     assert re.search(LIBRARY, code(surface, single.force_batch))
 
 
@@ -119,7 +121,7 @@ def test_batch_and_single_points_agree() -> None:
     surface = Surface(Sinusoid(amplitude=0.4e-3, period=1e-3, phase=0.2, direction=(0.6, 0.8)), "B")
     points = np.random.default_rng(5).uniform(-0.1, 0.1, (4099, 3))
     points[:, 2] = np.random.default_rng(6).uniform(-1e-3, 0.5e-3, 4099)
-    single = fuse.fuse_on_texture(surface.law, surface.texture.sampler, "none", (probe_loops,))
+    single = fuse.fuse_on_texture(surface.law, surface.texture.sampler, NONE, (probe_loops,))
     out = np.empty_like(points)
     single.force_batch(points, out, surface.texture.arguments, surface.law_arguments)
     difference = np.abs(surface.force(points) - out).max()

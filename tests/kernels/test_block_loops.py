@@ -12,13 +12,15 @@ import pytest
 from llvmlite import binding  # type: ignore[import-untyped]  # it has no types
 
 from asperity import HeightMap, Sinusoid, Surface
-from asperity.checks import FloatArray
-from asperity.contacts.memory import new_memory
-from asperity.definition import exact_force
-from asperity.kernels import block_loops, fuse
-from asperity.kernels.block_loops import BLOCK
+from asperity.contacts.warm_start import new_warm_start
+from asperity.core.checks import FloatArray
+from asperity.kernels import fuse
+from asperity.kernels.loops import block_loops
+from asperity.kernels.loops.block_loops import BLOCK
 from asperity.laws import LAWS
-from asperity.textures.samplers import heightmap, heightmap_block
+from asperity.reference import exact_force
+from asperity.textures.spline import heightmap_block_sampler as heightmap_block
+from asperity.textures.spline import heightmap_sampler as heightmap
 from asperity.textures.texture import Texture
 
 PITCH = (40e-6, 70e-6)
@@ -41,15 +43,18 @@ def places(texture: HeightMap, count: int) -> FloatArray:
 
 
 @pytest.mark.parametrize("periodic", [False, True])
-def test_a_block_samples_what_the_map_does(periodic: bool) -> None:
+def test_a_block_samples_what_the_map_does(periodic: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     texture = a_map(periodic)
-    for x, y, _z in places(texture, BLOCK):
-        exact = np.array(heightmap.curvature(x, y, texture.arguments))
-        size = np.abs(exact) + np.array([1e-4, 1.0, 1.0, 1e4, 1e4, 1e4])
-        found = heightmap_block.curvature(x, y, texture.arguments)
-        assert np.all(np.abs(found - exact) <= 1e-13 * size)
-        assert heightmap_block.slope(x, y, texture.arguments) == found[:3]
-        assert heightmap_block.height(x, y, texture.arguments) == found[0]
+    points = places(texture, BLOCK)[:, :2]
+    exact = np.array([heightmap.sample_hessian(x, y, texture.arguments) for x, y in points])
+    size = np.abs(exact) + np.array([1e-4, 1.0, 1.0, 1e4, 1e4, 1e4])
+    for name in heightmap_block.KERNELS.provides:
+        monkeypatch.setattr(heightmap, name, getattr(heightmap_block, name))
+    found = [heightmap.sample_hessian(x, y, texture.arguments) for x, y in points]
+    assert np.all(np.abs(found - exact) <= 1e-13 * size)
+    for (x, y), values in zip(points, found, strict=True):
+        assert heightmap.sample_gradient(x, y, texture.arguments) == values[:3]
+        assert heightmap.sample_height(x, y, texture.arguments) == values[0]
 
 
 @pytest.mark.parametrize("law", ["A", "B"])
@@ -60,7 +65,7 @@ def test_forces_of_blocks_are_those_of_single_points(law: str) -> None:
         points = places(surface.texture, count)
         alone, told = np.empty((count, 3)), np.empty((count, 2))
         arguments = (surface.texture.arguments, surface.law_arguments)
-        surface._path_loops.path_batch(points, alone, told, new_memory(1.0), *arguments)
+        surface._path_loops.path_batch(points, alone, told, new_warm_start(1.0), *arguments)
         assert count == 1 or np.abs(alone).max() > 0.0
         np.testing.assert_allclose(surface.force(points), alone, rtol=1e-12, atol=1e-12)
         force = np.full((count, 3), np.nan)
@@ -118,10 +123,10 @@ def test_a_law_that_asks_elsewhere_is_not_given_blocks() -> None:
 def compiled_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """No kept code: code from the cache cannot be looked at."""
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
-    for known in (fuse._loaded, fuse.fuse_surface, fuse.fuse_path):
+    for known in (fuse._load_module, fuse.fuse_surface, fuse.fuse_path):
         known.cache_clear()
     yield
-    for known in (fuse._loaded, fuse.fuse_surface, fuse.fuse_path):
+    for known in (fuse._load_module, fuse.fuse_surface, fuse.fuse_path):
         known.cache_clear()
 
 
@@ -138,8 +143,10 @@ def test_batches_go_many_at_a_time_and_fuse_and_scalar_loops_do_not(
     (text,) = surface._loops.force_batch.inspect_llvm().values()
     assert re.search(r"<\d+ x double> @llvm\.fmuladd", text)
     assert texture is not WAVE or "gather" not in text  # points are loaded side by side
-    surface._path_loops.path_batch(points, out, np.empty((1, 2)), new_memory(1.0), *arguments)
+    surface._path_loops.path_batch(points, out, np.empty((1, 2)), new_warm_start(1.0), *arguments)
     has = dict(binding.get_host_cpu_features()).get("fma", False)
-    for loop, fuses in ((surface._loops.force_batch, has), (surface._path_loops.path_batch, False)):
+    # A path without a warm start uses the sine of batches, which fuses; nothing else does.
+    path = (surface._path_loops.path_batch, has and texture is WAVE)
+    for loop, fuses in ((surface._loops.force_batch, has), path):
         (code,) = loop.inspect_asm().values()
         assert bool(re.search(r"\bvfn?m(add|sub)", code)) == fuses

@@ -13,7 +13,7 @@ from types import ModuleType
 
 import pytest
 
-from asperity.compiled import Kernels
+from asperity.core.compiled import Kernels
 from asperity.kernels import link
 from asperity.kernels.fuse import load_fused
 
@@ -68,9 +68,9 @@ def test_all_who_begin_at_once_have_the_same_bits(how: str, count: int, tmp_path
 _COMPILING = """
 import sys
 from asperity import Sinusoid, Surface
-from asperity.compiled import LISTENERS
+from asperity.core.compiled import COMPILE_CALLBACKS
 
-LISTENERS.append(print)
+COMPILE_CALLBACKS.append(print)
 surface = Surface(Sinusoid(0.1e-3, 2e-3), "C")
 surface.force([[0.0, 0.0, 0.0]])  # NumPy, Numba and what they need
 print("ready", flush=True)
@@ -104,18 +104,18 @@ def test_two_processes_compile_nothing_twice(tmp_path: Path) -> None:
 def test_threads_that_ask_at_once_get_one_unit(monkeypatch: pytest.MonkeyPatch) -> None:
     """The linker tells units by identity: two of one module would leave loops out."""
     module = ModuleType("at_once")
-    vars(module)["KERNELS"] = Kernels(provides=("height",))
+    vars(module)["KERNELS"] = Kernels(provides=("total",))
     meeting = threading.Barrier(8, timeout=30)
 
     def source(_module: ModuleType) -> str:
         meeting.wait()  # all have found that there is none yet
-        return "def height(x, y):\n    return x + y\n"
+        return "def total(x, y):\n    return x + y\n"
 
     monkeypatch.setattr(link.inspect, "getsource", source)
     with ThreadPoolExecutor(8) as pool:
-        found = list(pool.map(link.module_unit, [module] * 8))
-    assert {id(unit) for unit in found} == {id(link.module_unit(module))}
-    assert list(found[0].texts) == ["height"]
+        found = list(pool.map(link.unit_from_module, [module] * 8))
+    assert {id(unit) for unit in found} == {id(link.unit_from_module(module))}
+    assert list(found[0].sources) == ["total"]
 
 
 def test_threads_that_load_at_once_get_one_module() -> None:

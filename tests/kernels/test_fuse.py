@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import ast
-import sys
-import warnings
-from collections import namedtuple
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
 
-from asperity import cache as checked
-from asperity.kernels import code_store, fuse
-from asperity.kernels.probe import CLAMPS
+from asperity.clamps import BACKED, CLAMPS, Clamp
+from asperity.core import cache as checked
+from asperity.kernels import fuse
+from asperity.kernels import numba_internals as code_store
 from asperity.laws import LAWS, Law
 from asperity.textures import Texture
 
@@ -27,15 +24,15 @@ Check = Callable[..., Any]
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An empty cache folder."""
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path / "cache"))
-    fuse._loaded.cache_clear()
+    fuse._load_module.cache_clear()
     yield tmp_path / "cache"
-    fuse._loaded.cache_clear()
+    fuse._load_module.cache_clear()
 
 
 LOOP = """
 from numba import njit
-from asperity.kernels.code_store import keep_code
-@keep_code(njit(nogil=True))
+from asperity.kernels.numba_internals import cache_machine_code
+@cache_machine_code(njit(nogil=True))
 def twice(x):
     return 2.0 * x
 """
@@ -51,7 +48,7 @@ def test_a_second_load_compiles_nothing(cache: Path):
     assert first(3.0) == 6.0
     assert sum(first.stats.cache_misses.values()) == 1
     assert len(list(cache.rglob("*/[!.]*"))) == 1
-    fuse._loaded.cache_clear()
+    fuse._load_module.cache_clear()
     again = fuse.load_fused(LOOP).twice
     assert again(3.0) == 6.0
     assert not again.stats.cache_misses
@@ -64,8 +61,8 @@ def test_changed_code_is_compiled_anew_and_said(cache: Path):
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 16
     path.write_bytes(content)
-    fuse._loaded.cache_clear()
-    checked._told.clear()
+    fuse._load_module.cache_clear()
+    checked._warned.clear()
     again = fuse.load_fused(LOOP).twice
     with pytest.warns(checked.CacheWarning, match="damaged entries"):
         assert again(3.0) == 6.0
@@ -75,34 +72,34 @@ def test_changed_code_is_compiled_anew_and_said(cache: Path):
 @pytest.mark.usefixtures("cache")
 def test_code_of_another_build_is_compiled_anew(monkeypatch: pytest.MonkeyPatch):
     fuse.load_fused(LOOP).twice(3.0)
-    fuse._loaded.cache_clear()
-    checked._told.clear()
+    fuse._load_module.cache_clear()
+    checked._warned.clear()
 
     def refuse(*_arguments: object) -> None:
         raise TypeError("of another build")
 
-    monkeypatch.setattr(code_store._COMPILED, "_rebuild", refuse)
+    monkeypatch.setattr(code_store._CompileResult, "_rebuild", refuse)
     with pytest.warns(checked.CacheWarning):
         assert fuse.load_fused(LOOP).twice(3.0) == 6.0
 
 
 @pytest.mark.parametrize("texture", ["map"], indirect=True)
-@pytest.mark.parametrize("clamp", CLAMPS)
-def test_a_fused_module_clamps_only_as_asked(clamp: Any, texture: Texture, interpreted: Check):
+@pytest.mark.parametrize("clamp", CLAMPS.values(), ids=str)
+def test_a_fused_module_clamps_only_as_asked(clamp: Clamp, texture: Texture, interpreted: Check):
     module = interpreted(lambda: fuse.fuse_surface(LAWS["B"], texture.sampler, clamp))
     body = module.fused_source.split("def probe_force")[1]
-    assert ("min(depth, clamp_depth)" in body) == (clamp in {"whole", "backed"})
-    assert ("z < floor" in body) == (clamp == "backed")
+    assert ("min(depth, clamp_depth)" in body) == clamp.holds_whole_force
+    assert ("z < floor" in body) == clamp.has_backing_wall
 
 
 def test_every_function_is_compiled_and_named_once(texture: Texture, interpreted: Check):
-    module = interpreted(lambda: fuse.fuse_surface(LAWS["F"], texture.sampler, "backed"))
+    module = interpreted(lambda: fuse.fuse_surface(LAWS["F"], texture.sampler, BACKED))
     body = ast.parse(module.fused_source).body
     functions = [node for node in body if isinstance(node, ast.FunctionDef)]
     names = [function.name for function in functions]
     assert len(names) == len(set(names))
-    assert {"slope", "law_force", "trace_batch"} <= set(names)
-    assert {"curvature", "foot"}.isdisjoint(names)  # only what is needed is taken
+    assert {"sample_gradient", "law_force", "jacobian_batch"} <= set(names)
+    assert {"sample_hessian", "closest_point"}.isdisjoint(names)  # only what is needed is taken
     for function in functions:
         decorator = function.decorator_list[0]
         assert isinstance(decorator, ast.Name)
@@ -160,8 +157,8 @@ def test_a_law_that_looks_at_the_position_is_given_it(interpreted: Check):
     """The force k depth (1 + a · p) e_z, each coordinate of the probe with a weight of its own."""
     a = np.array([300.0, -200.0, 500.0])
     law = Law("P", "placed", "vertical", lambda c: c.k * c.depth * (1 + c.position.dot(a)) * c.e_z)
-    assert fuse.reads_position(law)
-    assert not fuse.reads_position(LAWS["A"])
+    assert fuse.uses_position(law)
+    assert not fuse.uses_position(LAWS["A"])
     rng = np.random.default_rng(43)
     points, depths, derivatives = rng.normal(size=(5, 3)), rng.random(5), rng.normal(size=(5, 6))
     force, jacobian = np.empty((5, 3)), np.empty((5, 3, 3))
@@ -176,34 +173,3 @@ def test_a_law_that_looks_at_the_position_is_given_it(interpreted: Check):
     np.testing.assert_allclose(force[:, 2], 700.0 * depths * gain, rtol=1e-12)
     np.testing.assert_allclose(jacobian[:, 2], expected, rtol=1e-11)
     assert not jacobian[:, :2].any()
-
-
-RECORD = """
-from numba import njit
-from asperity.kernels.code_store import keep_code
-@keep_code(njit)
-def first(record):
-    return record.a + 0.0 * record.b
-"""
-
-
-def first_of(record: type, monkeypatch: pytest.MonkeyPatch) -> float:
-    """Return the first of its two numbers, by a loop that is loaded anew."""
-    home = ModuleType(record.__module__)
-    home.Record = record
-    fuse._loaded.cache_clear()
-    with monkeypatch.context() as patch, warnings.catch_warnings():
-        warnings.simplefilter("error")  # that kept code was damaged
-        patch.setitem(sys.modules, home.__name__, home)  # kept code finds it there by its name
-        return fuse.load_fused(RECORD).first(record(a=1.0, b=2.0))
-
-
-@pytest.mark.usefixtures("cache")
-@pytest.mark.parametrize("fields", ["b a", "a b"])
-@pytest.mark.parametrize("home", ["here", "elsewhere"])
-def test_code_for_another_record_is_not_taken(
-    fields: str, home: str, monkeypatch: pytest.MonkeyPatch
-):
-    """Of a name that is defined again, in the same order or another, there or elsewhere."""
-    assert first_of(namedtuple("Record", "a b", module="here"), monkeypatch) == 1.0
-    assert first_of(namedtuple("Record", fields, module=home), monkeypatch) == 1.0

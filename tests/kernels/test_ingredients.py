@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from llvmlite import binding  # type: ignore[import-untyped]  # it has no types
 
+from asperity.clamps import BACKED
 from asperity.kernels import fuse
 from asperity.laws import LAWS
 from asperity.textures import Sinusoid
 
-HEAD = fuse._head("A test.", "")
+HEAD = fuse._module_header("A test.", "")
 BELOW = """
 @scalar
 def below(x):
@@ -105,17 +106,17 @@ def run(n):
 
 def test_laws_on_a_texture_share_its_functions() -> None:
     sampler = Sinusoid(1e-4, 1e-3).sampler
-    one, two = (fuse.fuse_path(LAWS[letter], sampler, "backed") for letter in "BC")
-    assert one.slope is two.slope
+    one, two = (fuse.fuse_path(LAWS[letter], sampler, BACKED) for letter in "BC")
+    assert one.sample_gradient is two.sample_gradient
     assert one.path_batch is not two.path_batch
 
 
 KEPT = """
 import sys
 from asperity import Surface
-from asperity.compiled import LISTENERS
+from asperity.core.compiled import COMPILE_CALLBACKS
 from asperity.textures import Sinusoid
-LISTENERS.append(print)
+COMPILE_CALLBACKS.append(print)
 for law in sys.argv[1]:
     surface = Surface(Sinusoid(1e-4, 1e-3), law)
     print(surface.force_and_jacobian([(0.0, 0.0, -1e-4)])[1].tobytes().hex())

@@ -8,6 +8,7 @@ import inspect
 import linecache
 import pkgutil
 import sys
+from collections import namedtuple
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -18,17 +19,18 @@ import numpy as np
 import pytest
 
 import asperity
-from asperity.compiled import Kernels
-from asperity.errors import ParameterError
+from asperity.clamps import NONE
+from asperity.core.compiled import Kernels
+from asperity.core.errors import ParameterError
 from asperity.kernels import fuse
 from asperity.kernels.link import (
-    COMMON,
+    INTRINSIC_MODULES,
     MissingFunctionError,
-    Unit,
+    SourceUnit,
     link,
     loops_of,
-    module_unit,
-    text_unit,
+    unit_from_module,
+    unit_from_source,
 )
 from asperity.laws import LAWS
 from asperity.textures import Sinusoid
@@ -56,7 +58,7 @@ def written(module: ModuleType) -> tuple[set[str], set[str], set[str]]:
         for node in ast.walk(tree)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
     }
-    known = {*COMMON, *dir(__builtins__), *__builtins__}
+    known = {*INTRINSIC_MODULES, *dir(__builtins__), *__builtins__}
     records = {name for name, value in vars(module).items() if isinstance(value, type)}
     return defined, called & defined, called - defined - known - records
 
@@ -66,10 +68,11 @@ def disagreements(module: ModuleType) -> list[str]:
     kernels: Kernels = module.KERNELS
     defined, own, others = written(module)
     offered = {*kernels.provides, *kernels.loops}
-    faults = [f"requires {name}" for name in others ^ {*kernels.requires, *kernels.native}]
+    faults = [f"calls {name}" for name in others - vars(module).keys()]
+    faults += [f"binds {name}" for name in {*kernels.native} - others]
     faults += [f"offers {name}" for name in offered - defined]
     faults += [f"hides {name}" for name in defined - own - offered]
-    hinted = {*kernels.called, *kernels.shared, *kernels.merged}
+    hinted = {*kernels.not_inlined, *kernels.shared, *kernels.merged}
     return faults + [f"hints {name}" for name in hinted - defined]
 
 
@@ -80,16 +83,17 @@ def test_what_a_module_declares_is_what_it_does(module: ModuleType) -> None:
 
 def test_all_samplers_and_searches_declare_themselves() -> None:
     names = {module.__name__.removeprefix("asperity.") for module in MODULES}
-    assert names >= {"textures.samplers.sinusoid", "contacts.split.solver", "kernels.sampler_loops"}
+    assert names >= {"textures.kinds.sinusoid_sampler", "contacts.split.solver"}
+    assert "kernels.loops.sampler_loops" in names
     assert len(names) > 15
 
 
 FAULTS = {
-    "requires b": "KERNELS = Kernels(provides=('a',))\ndef a(x): return b(x)",
-    "requires c": "KERNELS = Kernels(provides=('a',), requires=('c',))\ndef a(x): return x",
+    "calls b": "KERNELS = Kernels(provides=('a',))\ndef a(x): return b(x)",
+    "binds c": "KERNELS = Kernels(provides=('a',), native=('c',))\ndef a(x): return x",
     "offers b": "KERNELS = Kernels(provides=('a', 'b'))\ndef a(x): return x",
     "hides b": "KERNELS = Kernels(provides=('a',))\ndef a(x): return x\ndef b(x): return x",
-    "hints c": "KERNELS = Kernels(provides=('a',), called=('c',))\ndef a(x): return x",
+    "hints c": "KERNELS = Kernels(provides=('a',), not_inlined=('c',))\ndef a(x): return x",
 }
 
 
@@ -101,7 +105,7 @@ def user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Make]:
 
     def make(text: str) -> ModuleType:
         names.append(f"users_module_{len(names)}_{abs(hash(text))}")
-        text = "from asperity.compiled import Kernels\n" + text
+        text = "from asperity.core.compiled import Kernels\n" + text
         (tmp_path / f"{names[-1]}.py").write_text(text, encoding="utf-8")
         return importlib.import_module(names[-1])
 
@@ -122,12 +126,12 @@ ONE = "def one(x): return helper(x)\ndef helper(x): return 1\ndef idle(x): retur
 TWO = "def one(x): return 2"
 
 
-def unit(name: str, text: str, **kernels: Any) -> Unit:
-    return text_unit(name, text, Kernels(**kernels))
+def unit(name: str, text: str, **kernels: Any) -> SourceUnit:
+    return unit_from_source(name, text, Kernels(**kernels))
 
 
-def result(*at_hand: Unit) -> int:
-    loop = unit("loop", LOOP, requires=("one",), loops=("run_batch",))
+def result(*at_hand: SourceUnit) -> int:
+    loop = unit("loop", LOOP, loops=("run_batch",))
     text = link(loops_of(loop), (*at_hand, loop))
     space: dict[str, object] = {name: lambda f: f for name in ("loop", "inlined", "scalar")}
     exec(text, space)
@@ -152,9 +156,9 @@ def test_what_a_module_keeps_to_itself_is_its_own() -> None:
 
 def test_two_needed_functions_of_one_name_are_an_error() -> None:
     one = unit("m1", "def one(x): return two(x) + helper(x)\ndef helper(x): return 1",
-               provides=("one",), requires=("two",))  # fmt: skip
+               provides=("one",))  # fmt: skip
     two = unit("m2", "def two(x): return helper(x)\ndef helper(x): return 2", provides=("two",))
-    with pytest.raises(ParameterError, match="two functions 'helper', of m"):
+    with pytest.raises(ParameterError, match="function 'helper' is defined by both m"):
         result(one, two)
 
 
@@ -162,13 +166,13 @@ def test_what_is_required_and_missing_is_named() -> None:
     with pytest.raises(MissingFunctionError, match="provide 'one', which loop requires"):
         result()
     secret = unit("m1", "def one(x): return other(x)", provides=("one",))
-    with pytest.raises(ParameterError, match="m1 calls 'other', which it neither defines nor"):
+    with pytest.raises(MissingFunctionError, match="provide 'other', which m1 requires"):
         result(secret)
 
 
 def test_a_module_without_a_declaration_is_refused() -> None:
     with pytest.raises(ParameterError, match="test_link must declare KERNELS"):
-        module_unit(sys.modules[__name__])
+        unit_from_module(sys.modules[__name__])
 
 
 def decorators(text: str) -> dict[str, str]:
@@ -185,30 +189,33 @@ def test_hints_are_followed(iterates: bool, expected: str) -> None:
     text = "def run(x): return a(x) + b(x) + c(x)\n" + "".join(
         f"def {name}(x): return x\n" for name in "abc"
     )
-    one = unit("m", text, loops=("run",), called=("b",), merged=("c",), iterates=iterates)
+    one = unit("m", text, loops=("run",), not_inlined=("b",), merged=("c",), iterates=iterates)
     found = decorators(link(loops_of(one), (one,)))
     assert found == dict(zip(["run", "a", "b", "c"], ["@loop", *expected.split()], strict=True))
 
 
 # --- textures -------------------------------------------------------------------------------------
 
-FLAT = """KERNELS = Kernels(provides=("height", "slope"))
-def height(x, y, texture): return 0.1 * x
-def slope(x, y, texture): return 0.1 * x, 0.1, 0.0
+FLAT = """KERNELS = Kernels(provides=("sample_height", "sample_gradient"))
+def sample_height(x, y, texture): return 0.1 * x
+def sample_gradient(x, y, texture): return 0.1 * x, 0.1, 0.0
 """
 
 
 def test_a_texture_serves_the_laws_that_need_no_more_than_it_offers(user: Make) -> None:
     """A needs slopes; B second derivatives, E nearest points, and both say so."""
     sampler = (user(FLAT),)
-    fuse.fuse_surface(LAWS["A"], sampler, "none")
-    what = r"texture must offer second derivatives \(a sampler function 'curvature'\), which law B"
-    with pytest.raises(ParameterError, match=rf"{what}.*users_module.* offers height, slope"):
-        fuse.fuse_surface(LAWS["B"], sampler, "none")
-    with pytest.raises(ParameterError, match=r"texture must offer nearest points.*law E"):
-        fuse.fuse_surface(LAWS["E"], sampler, "none")
-    with pytest.raises(ParameterError, match=r"texture must offer second derivatives.*law H"):
-        fuse.fuse_surface(LAWS["H"], sampler, "none")
+    fuse.fuse_surface(LAWS["A"], sampler, NONE)
+    what = (
+        r"texture lacks the sampler function 'sample_hessian' \(second derivatives\), required by"
+    )
+    provided = "provides sample_gradient, sample_height"
+    with pytest.raises(ParameterError, match=rf"{what} law B.*users_module.* {provided}"):
+        fuse.fuse_surface(LAWS["B"], sampler, NONE)
+    with pytest.raises(ParameterError, match=r"texture lacks .*closest points.*law E"):
+        fuse.fuse_surface(LAWS["E"], sampler, NONE)
+    with pytest.raises(ParameterError, match=r"texture lacks .*second derivatives.*law H"):
+        fuse.fuse_surface(LAWS["H"], sampler, NONE)
 
 
 def test_loops_over_a_texture_are_those_that_it_can_serve(user: Make) -> None:
@@ -216,15 +223,15 @@ def test_loops_over_a_texture_are_those_that_it_can_serve(user: Make) -> None:
     out = np.empty((1, 1))
     loops.height_batch(np.array([[2.0, 0.0]]), out, ())
     assert out[0, 0] == 0.2
-    with pytest.raises(ParameterError, match="texture must offer second derivatives"):
+    with pytest.raises(ParameterError, match=r"texture lacks .*second derivatives"):
         loops.curvature_batch(np.zeros((1, 2)), np.empty((1, 6)), ())
 
 
 def test_the_closed_form_of_a_sinusoid_comes_before_the_general_split() -> None:
-    split = fuse.fuse_surface(LAWS["H"], Sinusoid(1e-3, 1e-3).sampler, "none")
+    split = fuse.fuse_surface(LAWS["H"], Sinusoid(1e-3, 1e-3).sampler, NONE)
     text = "".join(linecache.getlines(split.__file__ or ""))
-    assert "def split_foot" in text
-    assert "def split_polish" not in text
+    assert "def split_contact" in text
+    assert "def split_newton" not in text
 
 
 # --- records and numbers --------------------------------------------------------------------------
@@ -248,11 +255,22 @@ def test_records_and_numbers_of_a_module_come_along(user: Make) -> None:
     assert isinstance(loops.run_batch(3.0), module.Pair)
 
 
+def test_the_fields_of_a_record_are_part_of_the_text() -> None:
+    """Machine code accesses fields by position: other fields of the same record need other code."""
+    text = "def run_batch(x): return Pair(x, x).a"
+    lines = set()
+    for fields in ("a b", "b a", "a b c"):
+        space = {"Pair": namedtuple("Pair", fields, module="home")}
+        lines.add(unit_from_source("m", text, Kernels(), space).definitions["run_batch"]["Pair"])
+    assert len(lines) == 3
+    assert "from home import Pair  # a b" in lines
+
+
 def test_a_number_of_two_values_is_an_error(user: Make) -> None:
-    one = module_unit(
+    one = unit_from_module(
         user("LIMIT = 1\nKERNELS = Kernels(('one',))\ndef one(x): return LIMIT + two(x)")
     )
-    two = module_unit(user("LIMIT = 2\nKERNELS = Kernels(('two',))\ndef two(x): return LIMIT"))
-    one = replace(one, kernels=Kernels(("one",), ("two",), ("one",)))
+    two = unit_from_module(user("LIMIT = 2\nKERNELS = Kernels(('two',))\ndef two(x): return LIMIT"))
+    one = replace(one, kernels=Kernels(("one",), loops=("one",)))
     with pytest.raises(ParameterError, match=r"defines 'LIMIT' in two ways: 'LIMIT = [12]' and"):
         link(loops_of(one), (one, two))

@@ -8,19 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.contacts.memory import GAP, TAKEN
-from asperity.kernels import (
-    anchor,
-    anchored_loops,
-    block_loops,
-    contact_loop,
-    path_loops,
-    probe_loops,
-    sampler_loops,
-    storing,
-    tick,
-)
-from asperity.kernels.block_loops import BLOCK
+from asperity.contacts.warm_start import ERROR_BOUND, EVALUATIONS
+from asperity.kernels import friction_anchor as anchor
+from asperity.kernels import point_access as storing
+from asperity.kernels import tick
+from asperity.kernels.loops import block_loops, contact_loop, sampler_loops
+from asperity.kernels.loops import path_loop as path_loops
+from asperity.kernels.loops import point_loops as probe_loops
+from asperity.kernels.loops import stateful_loops as anchored_loops
+from asperity.kernels.loops.block_loops import BLOCK
 
 COUNT = 2 * BLOCK + 3
 RNG = np.random.default_rng(12)
@@ -105,9 +101,14 @@ def test_a_path_carries_what_the_law_remembers(monkeypatch: pytest.MonkeyPatch) 
 
     def probe_tick(x: float, y: float, z: float, *rest: Any) -> Any:
         ax, ay, held, memory, texture, parameters = rest
-        assert (memory[GAP], memory[TAKEN], texture, parameters) == (0.0, 0.0, TEXTURE, LAW)
+        assert (memory[ERROR_BOUND], memory[EVALUATIONS], texture, parameters) == (
+            0.0,
+            0.0,
+            TEXTURE,
+            LAW,
+        )
         told.append((ax, ay, held))
-        memory[GAP], memory[TAKEN] = x, y
+        memory[ERROR_BOUND], memory[EVALUATIONS] = x, y
         return x + y, y + z, z + x, 2.0 * x, 3.0 * y, True
 
     monkeypatch.setattr(path_loops, "probe_tick", probe_tick)
@@ -117,15 +118,6 @@ def test_a_path_carries_what_the_law_remembers(monkeypatch: pytest.MonkeyPatch) 
     np.testing.assert_array_equal(out, np.column_stack([x + y, y + z, z + x]))
     np.testing.assert_array_equal(seen, POINTS[:, :2])
     before = [(0.0, 0.0, False), *((2.0 * a, 3.0 * b, True) for a, b, _c in POINTS[:-1])]
-    assert told == before
-    told.clear()
-
-    def probe_held(*given: Any) -> Any:
-        return probe_tick(*given[:6], np.zeros(20), *given[6:])
-
-    monkeypatch.setattr(anchored_loops, "probe_held", probe_held)
-    anchored_loops.trace_batch(POINTS, out, TEXTURE, LAW)
-    np.testing.assert_array_equal(out, np.column_stack([x + y, y + z, z + x]))
     assert told == before
 
 
@@ -143,8 +135,13 @@ def test_contacts_that_are_given_are_told_in_order(monkeypatch: pytest.MonkeyPat
 
 
 def test_samplers_are_asked_point_by_point(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, count, coordinates in (("height", 1, 2), ("slope", 3, 2), ("curvature", 6, 2),
-                                     ("foot", 5, 3)):  # fmt: skip
+    cases = {
+        "sample_height": ("height", 1, 2),
+        "sample_gradient": ("slope", 3, 2),
+        "sample_hessian": ("curvature", 6, 2),
+        "closest_point": ("nearest", 5, 3),
+    }
+    for name, (batch, count, coordinates) in cases.items():
 
         def sampler(*given: Any, count: int = count) -> Any:
             assert given[-1] is TEXTURE
@@ -152,8 +149,7 @@ def test_samplers_are_asked_point_by_point(monkeypatch: pytest.MonkeyPatch) -> N
             return found if count > 1 else found[0]
 
         monkeypatch.setattr(sampler_loops, name, sampler)
-        batch = "nearest" if name == "foot" else name
-        kept = 2 if name == "foot" else count
+        kept = 2 if name == "closest_point" else count
         out = np.full((COUNT, kept), np.nan)
         getattr(sampler_loops, f"{batch}_batch")(POINTS, out, TEXTURE)
         expected = [answer(count, *point[:coordinates])[:kept] for point in POINTS]
@@ -199,20 +195,20 @@ def test_positions_and_forces_are_rounded_to_steps() -> None:
         (-0.76, 0.5, -1.0),
         (0.74, 0.0, 0.74),
     ):
-        assert tick.rounded(value, step) == expected
-    assert tick.rounded_force(1.3, -2.8, 0.6, 0.0, 1.0) == (1.3, -2.8, 0.6)
-    assert tick.rounded_force(1.3, -2.8, 0.6, 0.5, 99.0) == (1.5, -3.0, 0.5)
+        assert tick.quantize(value, step) == expected
+    assert tick.quantize_force(1.3, -2.8, 0.6, 0.0, 1.0) == (1.3, -2.8, 0.6)
+    assert tick.quantize_force(1.3, -2.8, 0.6, 0.5, 99.0) == (1.5, -3.0, 0.5)
     # 1.5² + 3² + 0.5² = 11.5 is not longer than that, but for the last bits.
-    assert tick.rounded_force(1.3, -2.8, 0.6, 0.5, 11.5) == (1.5, -3.0, 0.5)
-    assert tick.rounded_force(1.3, -2.8, 0.6, 0.5, 11.5 * (1.0 - 0.9e-12)) == (1.5, -3.0, 0.5)
-    assert tick.rounded_force(1.3, -2.8, 0.6, 0.5, 11.5 * (1.0 - 1.1e-12)) == (1.0, -2.5, 0.5)
+    assert tick.quantize_force(1.3, -2.8, 0.6, 0.5, 11.5) == (1.5, -3.0, 0.5)
+    assert tick.quantize_force(1.3, -2.8, 0.6, 0.5, 11.5 * (1.0 - 0.9e-12)) == (1.5, -3.0, 0.5)
+    assert tick.quantize_force(1.3, -2.8, 0.6, 0.5, 11.5 * (1.0 - 1.1e-12)) == (1.0, -2.5, 0.5)
 
 
 def test_next_to_nothing_is_nothing() -> None:
     state = tick.ServoState(*[1e-60 * (-1.0) ** k for k in range(8)], True, 1e-60, -1e-60, 1e-60)
-    assert tick.flushed_state(state) == state
+    assert tick.flush_subnormal_state(state) == state
     small = tick.ServoState(*[0.9e-60] * 8, True, *[-0.9e-60] * 3)
-    assert tick.flushed_state(small) == tick.ServoState(held=True)
+    assert tick.flush_subnormal_state(small) == tick.ServoState(held=True)
 
 
 def test_a_tick_reads_asks_damps_limits_and_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -239,6 +235,6 @@ def test_a_tick_reads_asks_damps_limits_and_rounds(monkeypatch: pytest.MonkeyPat
     assert damped[3:6] == velocity
     force = (3.0 - 2.0 * velocity[0], -4.0 - 2.0 * velocity[1], 12.0 - 2.0 * velocity[2])
     assert damped[9:] == force
-    fresh = tick.first_state(0.6, -1.1, 2.1, settings(position_step=0.5))
+    fresh = tick.initial_servo_state(0.6, -1.1, 2.1, settings(position_step=0.5))
     assert fresh == (0.5, -1.0, 2.0, 0, 0, 0, 0, 0, False, 0, 0, 0)
     assert math.isclose(float(np.linalg.norm(after(max_force=1e-3)[9:])), 1e-3)

@@ -8,7 +8,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from asperity.kernels.native import call_address, load_acquire, store_release
+from asperity.kernels.intrinsics import call_address, load_acquire, store_release
 
 
 def test_a_function_by_address_is_given_arrays_numbers_and_truth_values() -> None:

@@ -8,7 +8,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 
 from asperity.kernels import link
-from asperity.kernels.parsing import tree_of
+from asperity.kernels.link import parse_source
 
 
 def test_threads_parse_at_the_same_time() -> None:
@@ -23,7 +23,7 @@ def test_threads_parse_at_the_same_time() -> None:
     sys.setswitchinterval(1e-6)
     try:
         with ThreadPoolExecutor(4) as pool:
-            trees = list(pool.map(tree_of, [text] * 200))
+            trees = list(pool.map(parse_source, [text] * 200))
     finally:
         sys.setswitchinterval(often)
         gc.set_threshold(*thresholds)

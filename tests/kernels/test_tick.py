@@ -7,13 +7,14 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from tests.own_modules import imported
+from tests.helpers.user_modules import imported
 
-from asperity.checks import FloatArray
-from asperity.contacts.memory import new_memory
+from asperity.clamps import NONE
+from asperity.contacts.warm_start import new_warm_start
+from asperity.core.checks import FloatArray
 from asperity.kernels import tick
 from asperity.kernels.fuse import fuse_on_texture
-from asperity.simulation import Cartesian, MovedHand, Servo, Strokes, simulate
+from asperity.simulation import Cartesian, PrescribedHand, Servo, Strokes, simulate
 from asperity.surface import Surface
 from asperity.textures import HeightMap, Sinusoid
 
@@ -24,14 +25,14 @@ SERVO = Servo(
 WAY = Strokes((0.1e-3, 0.0, -0.05e-3), (7e-3, 3e-3, -0.25e-3), speed=0.05, count=3)
 
 DEVICE = """
-from asperity.compiled import Kernels
-from asperity.kernels.tick import first_state, servo_tick
+from asperity.core.compiled import Kernels
+from asperity.kernels.tick import initial_servo_state, servo_tick
 
-KERNELS = Kernels(requires=("first_state", "servo_tick"), loops=("device_batch",))
+KERNELS = Kernels(loops=("device_batch",))
 
 
 def device_batch(positions, forces, settings, memory, texture, law):
-    state = first_state(positions[0, 0], positions[0, 1], positions[0, 2], settings)
+    state = initial_servo_state(positions[0, 0], positions[0, 1], positions[0, 2], settings)
     for i in range(positions.shape[0]):
         state = servo_tick(
             state, settings, positions[i, 0], positions[i, 1], positions[i, 2], memory, texture, law
@@ -53,10 +54,10 @@ def device(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
 
 def commanded(device: ModuleType, surface: Surface, positions: FloatArray) -> FloatArray:
     """The forces of the device's loop at the positions of a handle."""
-    fused = fuse_on_texture(surface.law, surface.texture.sampler, "none", (device,), (tick,))
+    fused = fuse_on_texture(surface.law, surface.texture.sampler, NONE, (device, tick))
     forces = np.empty_like(positions)
     arguments = surface.texture.arguments, surface.law_arguments
-    memory = new_memory(surface.law.contact.looks)
+    memory = new_warm_start(surface.law.contact.max_evaluations)
     state = fused.device_batch(positions, forces, SERVO.settings, memory, *arguments)
     assert isinstance(state, tick.ServoState)
     assert state[-3:] == tuple(forces[-1])
@@ -69,7 +70,7 @@ def test_a_device_s_loop_commands_what_the_simulation_does(device: ModuleType, l
     heights = 1e-4 * np.random.default_rng(3).normal(size=(8, 9))
     texture = HeightMap(heights, 0.5e-3) if letter == "D" else Sinusoid(0.2e-3, 2e-3)
     surface = Surface(texture, letter, 900.0)
-    run = simulate(surface, Cartesian(0.05), MovedHand(), SERVO, WAY, 0.3)
+    run = simulate(surface, Cartesian(0.05), PrescribedHand(), SERVO, WAY, 0.3)
     forces = commanded(device, surface, np.ascontiguousarray(run.position))
     np.testing.assert_array_equal(forces, run.commanded)
     lengths = np.linalg.norm(forces, axis=1)
@@ -94,5 +95,10 @@ def test_each_setting_matters(device: ModuleType) -> None:
 
 
 def test_a_state_that_nothing_is_said_of_rests_at_the_origin() -> None:
-    assert tick.ServoState() == tick.first_state(0.0, 0.0, 0.0, SERVO.settings)
-    assert tick.first_state(1.2e-5, -1e-6, 3.7e-6, SERVO.settings)[:4] == (1e-5, 0.0, 5e-6, 0.0)
+    assert tick.ServoState() == tick.initial_servo_state(0.0, 0.0, 0.0, SERVO.settings)
+    assert tick.initial_servo_state(1.2e-5, -1e-6, 3.7e-6, SERVO.settings)[:4] == (
+        1e-5,
+        0.0,
+        5e-6,
+        0.0,
+    )

@@ -11,9 +11,9 @@ import numpy as np
 from tests.lab.started import Started
 from websockets.sync.client import ClientConnection, connect
 
-from asperity.lab.frames import layout
+from asperity.lab.frames import frame_layout
 
-LAYOUT = layout()
+LAYOUT = frame_layout()
 STILL = {"cosine": [0, 0, 0], "sine": [0, 0, 0], "speed": 0}
 
 

@@ -10,8 +10,8 @@ import pytest
 from tests.lab.browser import Browser
 from tests.lab.started import Started
 
-from asperity.cli.own_code import learn
-from asperity.laws import KNOWN_LAWS
+from asperity.cli.plugins import load_plugin_files
+from asperity.laws import REGISTERED_LAWS
 
 OWN_LAW = str(Path(__file__).parents[2] / "examples" / "own_law.py")
 
@@ -43,10 +43,10 @@ def page(lab: Started, browser: Browser) -> Iterator[Browser]:
 
 @pytest.fixture
 def own_law(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
-    """A law of the user's own, known as --law-module makes it known."""
-    known = dict(KNOWN_LAWS)
-    monkeypatch.setattr("asperity.cli.own_code._FILES", [])
-    learn((OWN_LAW,))
-    yield {letter: law for letter, law in KNOWN_LAWS.items() if letter not in known}
-    KNOWN_LAWS.clear()
-    KNOWN_LAWS.update(known)
+    """A law of the user's own, known as --plugin makes it known."""
+    known = dict(REGISTERED_LAWS)
+    monkeypatch.setattr("asperity.cli.plugins._LOADED_FILES", [])
+    load_plugin_files((OWN_LAW,))
+    yield {letter: law for letter, law in REGISTERED_LAWS.items() if letter not in known}
+    REGISTERED_LAWS.clear()
+    REGISTERED_LAWS.update(known)

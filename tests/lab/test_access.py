@@ -10,12 +10,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from asperity.errors import ParameterError
-from asperity.lab.access import AT_ONCE, PER_SECOND, Door, MalformedError, Pace
-from asperity.lab.frames import FORCES, HEAD, MOST_FORCES, NAMES, frame, layout
-from asperity.lab.messages import Change, Look, Seen, Steer, Take, read_message
+from asperity.core.errors import ParameterError
+from asperity.lab.access import (
+    MAX_MESSAGE_BURST,
+    MAX_MESSAGE_RATE,
+    AccessToken,
+    MalformedMessageError,
+    RateLimit,
+)
+from asperity.lab.frames import (
+    COLUMN_NAMES,
+    FORCE_COLUMNS,
+    HEADER,
+    MAX_FORCE_ROWS,
+    encode_frame,
+    frame_layout,
+)
+from asperity.lab.messages import Message, SteerRequest, ViewRequest, parse_message
 
-DOOR = Door(8137, "secret")
+DOOR = AccessToken(8137, "secret")
 OURS = "127.0.0.1:8137"
 
 
@@ -37,32 +50,32 @@ OURS = "127.0.0.1:8137"
     ],
 )
 def test_who_knows_address_and_token_is_let_in(path: str, hosts: list[str], name: str) -> None:
-    assert DOOR.asked(path, hosts) == name
+    assert DOOR.authorize(path, hosts) == name
 
 
 def test_a_live_connection_is_for_our_page_alone() -> None:
-    assert DOOR.is_ours([f"http://{OURS}"])
+    assert DOOR.is_same_origin([f"http://{OURS}"])
     for other in ([], ["null"], ["http://evil.example"], [f"https://{OURS}"],
                   [f"http://{OURS}", "http://evil.example"], ["http://127.0.0.1"]):  # fmt: skip
-        assert not DOOR.is_ours(other)
+        assert not DOOR.is_same_origin(other)
 
 
 def test_each_door_has_a_token_of_its_own() -> None:
-    one, other = Door(1), Door(1)
-    assert one.token != other.token
-    assert len(one.token) >= 20
-    assert one.address == f"http://127.0.0.1:1/{one.token}/"
+    one, other = AccessToken(1), AccessToken(1)
+    assert one.secret != other.secret
+    assert len(one.secret) >= 20
+    assert one.url == f"http://127.0.0.1:1/{one.secret}/"
 
 
 def test_too_many_messages_are_too_many() -> None:
-    pace = Pace(now=0.0)
-    for _ in range(int(AT_ONCE)):
-        pace.count(now=0.0)
-    with pytest.raises(MalformedError, match="500 messages per second"):
-        pace.count(now=0.0)
-    steady = Pace(now=0.0)
+    pace = RateLimit(now=0.0)
+    for _ in range(int(MAX_MESSAGE_BURST)):
+        pace.consume(now=0.0)
+    with pytest.raises(MalformedMessageError, match="500 messages per second"):
+        pace.consume(now=0.0)
+    steady = RateLimit(now=0.0)
     for k in range(5000):
-        steady.count(now=k / PER_SECOND)
+        steady.consume(now=k / MAX_MESSAGE_RATE)
 
 
 def said(**message: object) -> str:
@@ -71,14 +84,16 @@ def said(**message: object) -> str:
 
 def test_what_our_page_says_is_understood() -> None:
     three = [1e-3, 0, -2e-3]
-    steer = read_message(said(do="steer", target=three, cosine=three, sine=three, speed=2))
-    assert steer == Steer((1e-3, 0.0, -2e-3), (1e-3, 0.0, -2e-3), (1e-3, 0.0, -2e-3), 2.0)
-    assert read_message(said(do="change", wishes={"law": "B"})) == Change({"law": "B"})
-    look = read_message(said(do="cut", box=[-0.01, 0.01, -0.001, 0.001], y=0.0))
-    assert look == Look("cut", (-0.01, 0.01, -0.001, 0.001, 0.0))
-    assert read_message(said(do="relief", x=0, y=0, size=0.01)) == Look("relief", (0.0, 0.0, 0.01))
-    assert read_message(said(do="take")) == Take()
-    assert read_message(said(do="seen", frame=7)) == Seen(7.0)
+    steer = parse_message(said(do="steer", target=three, cosine=three, sine=three, speed=2))
+    assert steer.content == SteerRequest(*[(1e-3, 0.0, -2e-3)] * 3, 2.0)
+    assert parse_message(said(do="change", changes={"law": "B"})) == Message("change", {"law": "B"})
+    look = parse_message(said(do="cut", box=[-0.01, 0.01, -0.001, 0.001], y=0.0))
+    assert look.content == ViewRequest("cut", (-0.01, 0.01, -0.001, 0.001, 0.0))
+    assert parse_message(said(do="relief", x=0, y=0, size=0.01)).content == ViewRequest(
+        "relief", (0.0, 0.0, 0.01)
+    )
+    assert parse_message(said(do="take")) == Message("take")
+    assert parse_message(said(do="seen", frame=7)) == Message("seen", 7.0)
 
 
 @pytest.mark.parametrize(
@@ -87,7 +102,7 @@ def test_what_our_page_says_is_understood() -> None:
         b"\x00\x01", "", "{", "[]", "7", "null", "{}", said(do="fly"), said(do=["take"]),
         said(do="take", more=1), said(do="steer", target=[0, 0, 0]),
         said(do="relief", x="0", y=0, size=0.01), said(do="relief", x=True, y=0, size=0.01),
-        said(do="change", wishes=[]), said(do="change", wishes={"law": ["B"]}),
+        said(do="change", changes=[]), said(do="change", changes={"law": ["B"]}),
         said(do="cut", box=[0, 1, 2], y=0), said(do="seen", frame="7"), said(do="seen"),
         '{"do": "relief", "x": NaN, "y": 0, "size": 0.01}',
         '{"do": "relief", "x": Infinity, "y": 0, "size": 0.01}', "[" * 4000,
@@ -95,8 +110,8 @@ def test_what_our_page_says_is_understood() -> None:
     ],
 )  # fmt: skip
 def test_what_no_page_of_ours_says_is_malformed(content: str | bytes) -> None:
-    with pytest.raises(MalformedError):
-        read_message(content)
+    with pytest.raises(MalformedMessageError):
+        parse_message(content)
 
 
 @pytest.mark.parametrize(
@@ -111,13 +126,13 @@ def test_what_no_page_of_ours_says_is_malformed(content: str | bytes) -> None:
 )  # fmt: skip
 def test_a_number_out_of_its_range_is_refused(content: str) -> None:
     with pytest.raises(ParameterError):
-        read_message(content)
+        parse_message(content)
 
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(
-        st.sampled_from(["do", "target", "cosine", "sine", "speed", "wishes", "x", "y", "size",
+        st.sampled_from(["do", "target", "cosine", "sine", "speed", "changes", "x", "y", "size",
                          "box", "take", "frame"]), inner, max_size=5),
     max_leaves=8,
 )  # fmt: skip
@@ -129,35 +144,37 @@ KINDS = st.sampled_from(["steer", "change", "relief", "cut", "take", "seen"])
 def test_whatever_is_said_is_a_message_or_an_error_of_ours(content: object, kind: str) -> None:
     if isinstance(content, dict):
         content = {**content, "do": kind}
-    with suppress(MalformedError, ParameterError):
-        assert isinstance(read_message(json.dumps(content)), Steer | Change | Look | Take | Seen)
+    with suppress(MalformedMessageError, ParameterError):
+        assert isinstance(parse_message(json.dumps(content)), Message)
 
 
 def test_a_frame_keeps_the_extremes_between_two_pictures() -> None:
     # A buzz of 800 Hz at 10 kHz, in frames of 50 samples: four whole periods in each.
     time = np.arange(50) / 10e3
-    rows = np.zeros((50, len(NAMES)))
-    place = NAMES.index("applied z")
+    rows = np.zeros((50, len(COLUMN_NAMES)))
+    place = COLUMN_NAMES.index("applied z")
     rows[:, place] = 0.3 * np.sin(2.0 * np.pi * 800.0 * time + 0.1)
     numbers = np.frombuffer(
-        frame(rows, 7, {"frame": 5, "heard": 3, "late": 1, "skipped": 2}, np.arange(6.0))
+        encode_frame(
+            rows, 7, {"frame": 5, "acknowledged": 3, "late": 1, "skipped": 2}, np.arange(6.0)
+        )
     )
-    named = layout()
+    named = frame_layout()
     # The newest row alone would show nothing of it.
     assert abs(numbers[named["newest"] + place]) < 0.2
     assert numbers[named["least"] + place] == rows[:, place].min() < -0.29
     assert numbers[named["greatest"] + place] == rows[:, place].max() > 0.29
-    head = [numbers[named["head"][name]] for name in HEAD]
+    head = [numbers[named["head"][name]] for name in HEADER]
     assert head == [1.0, 5.0, 50.0, 7.0, 3.0, 1.0, 2.0, 50.0, 0.0, 0.0, 0.0, 0.0]
     forces = numbers[named["forces"] :].reshape(-1, 3)
-    assert (forces == rows[:, FORCES]).all()
+    assert (forces == rows[:, FORCE_COLUMNS]).all()
 
 
 def test_a_page_that_was_slow_gets_the_newest_forces_and_all_extremes() -> None:
-    rows = np.zeros((MOST_FORCES + 10, len(NAMES)))
-    rows[0, NAMES.index("x")] = -5.0
-    rows[:, FORCES.start] = np.arange(len(rows))
-    counts = {"frame": 1, "heard": 0, "late": 0, "skipped": 0}
-    numbers = np.frombuffer(frame(rows, 0, counts, np.zeros(6)))
-    assert numbers[layout()["least"] + NAMES.index("x")] == -5.0
-    assert numbers[layout()["forces"] :: 3].tolist() == list(range(10, len(rows)))
+    rows = np.zeros((MAX_FORCE_ROWS + 10, len(COLUMN_NAMES)))
+    rows[0, COLUMN_NAMES.index("x")] = -5.0
+    rows[:, FORCE_COLUMNS.start] = np.arange(len(rows))
+    counts = {"frame": 1, "acknowledged": 0, "late": 0, "skipped": 0}
+    numbers = np.frombuffer(encode_frame(rows, 0, counts, np.zeros(6)))
+    assert numbers[frame_layout()["least"] + COLUMN_NAMES.index("x")] == -5.0
+    assert numbers[frame_layout()["forces"] :: 3].tolist() == list(range(10, len(rows)))

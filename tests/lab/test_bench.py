@@ -7,19 +7,19 @@ import time
 
 import numpy as np
 import pytest
-from bench.lab import _taken, by_chance
+from bench.lab import _cpu_time, chance_lag
 
 
 def test_a_difference_is_told_from_chance() -> None:
-    assert by_chance(np.array([1.0, 2.0, 3.0])) == 0.125
-    assert by_chance(np.array([3.0, -1.0])) == 0.5
+    assert chance_lag(np.array([1.0, 2.0, 3.0])) == 0.125
+    assert chance_lag(np.array([3.0, -1.0])) == 0.5
     # A cost that is there in each of eight pairs is found; one that comes and goes is not.
-    assert by_chance(np.full(8, 100.0)) == 1.0 / 256.0
-    assert by_chance(np.array([5.0, -5.0, 4.0, -4.0, 3.0, -3.0])) > 0.5
+    assert chance_lag(np.full(8, 100.0)) == 1.0 / 256.0
+    assert chance_lag(np.array([5.0, -5.0, 4.0, -4.0, 3.0, -3.0])) > 0.5
 
 
 def test_time_of_the_processor_is_counted() -> None:
-    before, begun = _taken(os.getpid()), time.process_time()
+    before, begun = _cpu_time(os.getpid()), time.process_time()
     while time.process_time() < begun + 0.2:
         pass
-    assert _taken(os.getpid()) - before == pytest.approx(0.2, abs=0.05)
+    assert _cpu_time(os.getpid()) - before == pytest.approx(0.2, abs=0.05)

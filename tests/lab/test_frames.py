@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from asperity.lab.frames import NAMES, steps
+from asperity.lab.frames import COLUMN_NAMES, step_statistics
 
 
 def rows(**columns: list[float]) -> np.ndarray:
-    table = np.zeros((len(next(iter(columns.values()))), len(NAMES)))
+    table = np.zeros((len(next(iter(columns.values()))), len(COLUMN_NAMES)))
     for name, values in columns.items():
-        table[:, NAMES.index(name.replace("_", " "))] = values
+        table[:, COLUMN_NAMES.index(name.replace("_", " "))] = values
     return table
 
 
 def test_the_greatest_jump_is_found_with_the_way_that_goes_with_it() -> None:
     table = rows(x=[0.0, 3e-3, 3e-3], z=[0.0, 4e-3, 3e-3], commanded_x=[0.0, 1.0, 1.0],
                  commanded_z=[0.0, 0.0, -2.0])  # fmt: skip
-    found = steps(table)
+    found = step_statistics(table)
     assert found == pytest.approx({"way": 6e-3, "squares": 26e-6, "jump": 2.0, "moved": 1e-3})
-    assert steps(table[:1]) == {"way": 0.0, "squares": 0.0, "jump": 0.0, "moved": 0.0}
+    assert step_statistics(table[:1]) == {"way": 0.0, "squares": 0.0, "jump": 0.0, "moved": 0.0}

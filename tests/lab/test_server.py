@@ -16,9 +16,8 @@ from tests.lab.client import STILL, column, frames, head, heard, joined, news, r
 from tests.lab.started import Started
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from asperity.lab.access import MOST_BYTES
-from asperity.lab.server import LEAST, UNDER_WAY
-from asperity.lab.site import page_files
+from asperity.lab.access import MAX_MESSAGE_BYTES, page_files
+from asperity.lab.server import MAX_PENDING_FRAMES, MIN_FRAME_INTERVAL
 
 
 def got(lab: Started, path: str, **headers: str) -> tuple[int, bytes, dict[str, str]]:
@@ -66,28 +65,28 @@ def test_a_page_that_wishes_at_every_frame_gets_no_more_of_them(lab: Started) ->
             if frames(taken(page)):
                 count += 1
                 say(page, "steer", target=[0.0, 0.0, 1e-3], **STILL)
-        assert 20 < count / (time.monotonic() - begun) <= 1.02 / LEAST
+        assert 20 < count / (time.monotonic() - begun) <= 1.02 / MIN_FRAME_INTERVAL
 
 
 def test_the_hand_is_steered_the_law_changes_and_the_loop_goes_on(lab: Started) -> None:
     with joined(lab) as page:
         first = heard(page, news(state="running"))
         assert first["steers"]
-        wish = first["wishes"] + 1
+        wish = first["requested"] + 1
         say(page, "steer", target=[1e-3, 0, -1e-3], **STILL)
         frame = heard(page, lambda m: frames(m) and column(m, "newest", "applied z") > 0.1)
-        assert head(frame, "heard") == wish
+        assert head(frame, "acknowledged") == wish
         assert column(frame, "greatest", "applied z") <= first["max_force"]
-        say(page, "change", wishes={"law": "W", "stiffness": 200.0})
+        say(page, "change", changes={"law": "W", "stiffness": 200.0})
         changed = heard(page, news(state="running", law="W"))
         assert changed["settings"]["stiffness"] == 200.0
         assert changed["starts"] == first["starts"]
         heard(page, lambda m: frames(m) and column(m, "newest", "share") == 1.0)
-        for wishes in ({"stiffness": 1e9}, {"colour": "red"}, {"law": "Q"}, {"texture": "/etc/x"},
+        for changes in ({"stiffness": 1e9}, {"colour": "red"}, {"law": "Q"}, {"texture": "/etc/x"},
                        {"device": "x.toml"}, {"delay": -1}):  # fmt: skip
-            say(page, "change", wishes=wishes)
+            say(page, "change", changes=changes)
             told = heard(page, lambda m: news(state="running")(m) and bool(m["words"]))
-            assert next(iter(wishes)) in told["words"]
+            assert next(iter(changes)) in told["words"]
             assert told["settings"] == changed["settings"]
         say(page, "steer", target=[9, 0, 0], **STILL)
         assert "target" in heard(page, refused)["words"]
@@ -100,7 +99,7 @@ def test_one_page_steers_and_others_watch(lab: Started) -> None:
             assert heard(second, news())["steers"] is False
             heard(second, frames)
             for what, content in (("steer", {"target": [0, 0, 0], **STILL}), ("take", {}),
-                                  ("change", {"wishes": {"law": "A"}})):  # fmt: skip
+                                  ("change", {"changes": {"law": "A"}})):  # fmt: skip
                 say(second, what, **content)
                 assert "steering" in heard(second, refused)["words"]
             first.close()
@@ -113,7 +112,7 @@ def test_one_page_steers_and_others_watch(lab: Started) -> None:
     ("content", "code"),
     [("{}", 1008), (b"\x00\xff", 1008), ('{"do": "steer"}', 1008),
      ('{"do": "seen", "frame": 1e9}', 1008),
-     ('{"do": "take"}' + " " * MOST_BYTES, 1009)],
+     ('{"do": "take"}' + " " * MAX_MESSAGE_BYTES, 1009)],
 )  # fmt: skip
 def test_a_malformed_frame_ends_the_connection_and_not_the_loop(
     lab: Started, content: str | bytes, code: int
@@ -138,8 +137,8 @@ def test_a_page_that_paints_nothing_is_not_sent_what_will_be_old(lab: Started) -
             while True:
                 content = page.recv(timeout=1.0)
                 got += [np.frombuffer(content)] if isinstance(content, bytes) else []
-        assert [head(frame, "frame") for frame in got] == list(range(1, UNDER_WAY + 1))
-        say(page, "seen", frame=UNDER_WAY)
+        assert [head(frame, "frame") for frame in got] == list(range(1, MAX_PENDING_FRAMES + 1))
+        say(page, "seen", frame=MAX_PENDING_FRAMES)
         # The next one is new, and holds the extremes of all that happened in between.
         after = np.frombuffer(page.recv(timeout=60))
         assert head(after, "first") == head(got[-1], "first") + head(got[-1], "rows")
@@ -178,9 +177,8 @@ def test_pictures_come_again_when_their_process_was_killed(lab: Started) -> None
         for one in niced(lab):
             os.kill(one, signal.SIGKILL)
         say(page, "relief", **look)
-        assert (
-            "another one begins" in heard(page, lambda m: news()(m) and m["pictures"])["pictures"]
-        )
+        told = heard(page, lambda m: news()(m) and m["pictures"])
+        assert "has crashed and is restarted" in told["pictures"]
         assert (
             heard(page, lambda m: isinstance(m, dict) and m["say"] == "later")["kind"] == "relief"
         )
@@ -192,5 +190,5 @@ def test_pictures_come_again_when_their_process_was_killed(lab: Started) -> None
 
 def test_the_next_port_is_named(lab: Started) -> None:
     port = lab.host.split(":")[1]
-    with pytest.raises(AssertionError, match=rf"port {port} cannot be had; \d+ is free"):
+    with pytest.raises(AssertionError, match=rf"port {port} is not available; \d+ is free"):
         Started("--port", port)

@@ -154,7 +154,7 @@ def test_a_page_that_watches_says_so_and_takes_over(page: Browser, lab: Started)
         page.call("Page.navigate", url=lab.address)
         page.until("globalThis.lab?.news && !lab.news.steers")
         words = "document.getElementById('alarm').innerText"
-        assert "Another page steers; this one watches." in page.ask(words)
+        assert "Another page has control; this page is read-only." in page.ask(words)
         assert page.ask("document.getElementById('stiffness').disabled")
         assert page.ask("document.getElementById('take').hidden")
         page.until("lab.frame")

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from asperity.contacts.symbols import ContactSymbols
-from asperity.errors import LawError
+from asperity.core.errors import LawError
 from asperity.laws import LAWS, Law
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from asperity.errors import ParameterError
+from asperity.core.errors import ParameterError
 from asperity.laws import LAWS, Law, find_law, find_laws
 
 NAMES = {

@@ -44,8 +44,8 @@ def holed(heights: NDArray[np.float64]) -> NDArray[np.float64]:
 def solver(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Send every hole to one of the two solvers, with many levels of multigrid."""
     if request.param == "multigrid":
-        monkeypatch.setattr(filling, "_DIRECT", 0)
-        monkeypatch.setattr(filling, "_COARSEST", 4)
+        monkeypatch.setattr(filling, "_DIRECT_LIMIT", 0)
+        monkeypatch.setattr(filling, "_COARSEST_SIZE", 4)
 
 
 @pytest.mark.usefixtures("solver")
@@ -104,7 +104,7 @@ def test_multigrid_needs_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
         return solve(matrix, right, callback=count, **options)
 
     monkeypatch.setattr(scipy.sparse.linalg, "cg", counting)
-    monkeypatch.setattr(filling, "_DIRECT", 0)
+    monkeypatch.setattr(filling, "_DIRECT_LIMIT", 0)
     heights = np.random.default_rng(5).standard_normal((300, 301))
     ragged = np.hypot(*np.meshgrid(np.arange(301) - 120, np.arange(300) - 170)) < 90
     ragged[0:120, 150] = ragged[230:300, 10:200] = True  # a slit, and a bay at the outer border
@@ -120,19 +120,18 @@ def test_interpolation_keeps_a_constant() -> None:
     """Where everything is unknown, as at the outer border, of even and odd counts."""
     for shape in ((9, 12), (8, 7), (5, 5)):
         points = np.arange(shape[0] * shape[1])
-        missing = np.ones(shape, dtype=bool)
-        matrix, _ = filling._laplace(np.full(shape, np.nan), missing, points, (1.0, 2.0), 0.0)
+        matrix, _ = filling._laplace_system(np.full(shape, np.nan), points, (1.0, 2.0), 0.0)
         for side in ((3, 3), (3, 1), (1, 3)):
             where = (points // shape[1], points % shape[1])
             inverse = 1.0 / matrix.diagonal()
-            spread, coarse = filling._interpolation(matrix, inverse, where, side)
+            spread, coarse = filling._build_interpolation(matrix, inverse, where, side)
             assert len(coarse[0]) == -(-shape[0] // side[0]) * -(-shape[1] // side[1])
             np.testing.assert_allclose(spread @ np.ones(len(coarse[0])), 1.0)
 
 
 def test_groups_are_whole_holes_and_all_of_them() -> None:
     missing = np.random.default_rng(8).random((200, 210)) < 0.4
-    groups = list(filling._groups(missing))
+    groups = list(filling._hole_groups(missing))
     np.testing.assert_array_equal(np.sort(np.concatenate(groups)), np.flatnonzero(missing))
 
 
@@ -140,8 +139,8 @@ def test_holes_are_independent_of_their_grouping(monkeypatch: pytest.MonkeyPatch
     heights = bumpy(60, 70)
     heights[np.random.default_rng(9).random(heights.shape) < 0.2] = np.nan
     together = fill_harmonic(heights, (P, 2 * P))
-    monkeypatch.setattr(filling, "_DIRECT", 40)
-    groups = list(filling._groups(np.isnan(heights)))
+    monkeypatch.setattr(filling, "_DIRECT_LIMIT", 40)
+    groups = list(filling._hole_groups(np.isnan(heights)))
     assert len(groups) > 10
     apart = fill_harmonic(heights, (P, 2 * P))
     np.testing.assert_allclose(apart, together, atol=1e-12 * np.ptp(together))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.errors import ParameterError
+from asperity.core.errors import ParameterError
 from asperity.measured import form as module
 from asperity.measured.form import fit_form, subtract_form
 from asperity.measured.preparation import prepare
@@ -34,7 +34,7 @@ def test_fit_is_that_of_least_squares(degree: int, holes: bool) -> None:
     valid = ~np.isnan(heights)
     basis = monomials(heights.shape, degree)
     best, *_ = np.linalg.lstsq(basis[valid], heights[valid], rcond=None)
-    got = fit_form(heights, degree).rows(slice(None))
+    got = fit_form(heights, degree).evaluate_rows(slice(None))
     np.testing.assert_allclose(got, basis @ best, atol=1e-10)
 
 
@@ -58,7 +58,9 @@ def test_profile(degree: int) -> None:
     heights[20:50] = np.nan
     valid = ~np.isnan(heights)
     expected = np.polyval(np.polyfit(x[valid], heights[valid], degree), x)
-    np.testing.assert_allclose(fit_form(heights, degree).rows(slice(None)), expected, atol=1e-9)
+    np.testing.assert_allclose(
+        fit_form(heights, degree).evaluate_rows(slice(None)), expected, atol=1e-9
+    )
 
 
 def test_fit_is_good_to_rounding_where_the_basis_is_far_from_orthogonal() -> None:
@@ -67,7 +69,7 @@ def test_fit_is_good_to_rounding_where_the_basis_is_far_from_orthogonal() -> Non
     heights[180:] = np.nan
     x = np.linspace(-1, 1, 300)
     fitted = np.polynomial.Chebyshev.fit(x[:180], heights[:180], 6)  # by singular values
-    got = fit_form(heights, 6).rows(slice(None))[:180]
+    got = fit_form(heights, 6).evaluate_rows(slice(None))[:180]
     assert np.max(np.abs(got - fitted(x[:180]))) < 1e-13
 
 

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.errors import SurfaceFileError
-from asperity.measured.history import Stage, stages_of
-from asperity.measured.preparation import magnified, prepare
-from asperity.measured.prepared import load_prepared, save_prepared
+from asperity.core.errors import SurfaceFileError
+from asperity.measured.preparation import magnify_surface, prepare
+from asperity.measured.prepared import PreparationStage, load_prepared, parse_stages, save_prepared
 from asperity.measured.reading import RawSurface
-from asperity.textures.loading import texture_of
+from asperity.textures.texture_loading import texture_from_prepared
 
 MICRO = 1e-6
 
@@ -32,7 +31,7 @@ def surface(hole: bool = True) -> RawSurface:
     return RawSurface(heights, (5e-6, 5e-6), "made", ())
 
 
-def names(stages: tuple[Stage, ...]) -> list[str]:
+def names(stages: tuple[PreparationStage, ...]) -> list[str]:
     return [stage.name for stage in stages]
 
 
@@ -49,7 +48,7 @@ def test_every_step_is_written_down() -> None:
     assert names(prepare(surface(), height_range=1e-3, form=2, max_missing=0.5).history)[:2] == [
         "as read", "form removed",
     ]  # fmt: skip
-    assert texture_of(ready).history == ready.history
+    assert texture_from_prepared(ready).history == ready.history
 
 
 def test_what_each_filter_took() -> None:
@@ -101,11 +100,11 @@ def test_a_profile_is_primary_until_its_waviness_is_gone() -> None:
 def test_a_watcher_sees_before_and_after() -> None:
     seen: list[tuple[str, float | None]] = []
 
-    def watch(stage: Stage, pitch: Any, after: Any, before: Any) -> None:
+    def watch(stage: PreparationStage, pitch: Any, after: Any, before: Any) -> None:
         assert pitch == (5e-6, 5e-6)
         seen.append((stage.name, None if before is None else float(np.nanstd(before - after))))
 
-    ready = prepare(surface(), watch=watch)
+    ready = prepare(surface(), on_stage=watch)
     assert seen == [
         (stage.name, None if stage.removed is None else pytest.approx(stage.removed.rms, rel=1e-9))
         for stage in ready.history
@@ -121,7 +120,7 @@ def test_the_history_is_saved(tmp_path: Path) -> None:
         save_prepared(tmp_path / "ready.npz", ready, source)
         again = load_prepared(tmp_path / "ready.npz")
         assert again.history == ready.history
-    assert names(magnified(again, 2.0).history)[-1] == "magnified"
+    assert names(magnify_surface(again, 2.0).history)[-1] == "magnified"
 
 
 def test_a_file_of_old_has_no_history(tmp_path: Path) -> None:
@@ -133,7 +132,7 @@ def test_a_file_of_old_has_no_history(tmp_path: Path) -> None:
     np.savez(tmp_path / "old.npz", **old)
     again = load_prepared(tmp_path / "old.npz")
     assert again.history == ()
-    assert magnified(again, 2.0).history == ()
+    assert magnify_surface(again, 2.0).history == ()
     for wrong in ("[", "{}", '[{"name": "x"}]', '[{"name": "x", "values": {"Q": 1}}]', "[1]"):
         np.savez(tmp_path / "bad.npz", **old, history=np.array(wrong))
         if wrong == "{}":
@@ -145,4 +144,4 @@ def test_a_file_of_old_has_no_history(tmp_path: Path) -> None:
 
 def test_stages_survive_json() -> None:
     stages = prepare(surface(), l_cutoff=1e-4).history
-    assert stages_of([stage.to_dict() for stage in stages]) == stages
+    assert parse_stages([stage.to_dict() for stage in stages]) == stages

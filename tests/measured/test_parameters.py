@@ -10,8 +10,14 @@ import pytest
 from scipy.special import ellipe
 
 from asperity.measured import parameters as module
-from asperity.measured.correlation import _autocorrelation, correlation
-from asperity.measured.parameters import AREAL, PROFILE, declared, parameters
+from asperity.measured.parameters import (
+    AREAL_PARAMETERS,
+    PROFILE_PARAMETERS,
+    _autocorrelation,
+    compute_parameters,
+    correlation_parameters,
+    find_parameter,
+)
 
 MICRO = 1e-6
 
@@ -38,7 +44,7 @@ def test_a_sinusoid(slope: float) -> None:
     """Sq = A/√2, Ssk = 0, Sku = 3/2 exactly for whole periods; Sa = 2A/π to the sampling."""
     samples = 400
     heights, pitch = sinusoid(samples, slope)
-    found = parameters(heights + 3e-4, pitch)
+    found = compute_parameters(heights + 3e-4, pitch)
     amplitude = slope * 100e-6 / (2 * np.pi)
     assert found["Sq"] == pytest.approx(amplitude / math.sqrt(2), rel=1e-11)
     assert found["Ssk"] == pytest.approx(0.0, abs=1e-9)
@@ -55,7 +61,7 @@ def test_a_sinusoid(slope: float) -> None:
 def test_slope_and_area_of_a_sinusoid(samples: int, slope: float) -> None:
     """Sdq is that of the chords; Sdr = 2/π √(1+s²) E(s²/(1+s²)) - 1 to the sampling."""
     heights, pitch = sinusoid(samples, slope)
-    found = parameters(np.pad(heights, ((0, 0), (0, 1)), mode="wrap"), pitch)
+    found = compute_parameters(np.pad(heights, ((0, 0), (0, 1)), mode="wrap"), pitch)
     assert found["Sdq"] == pytest.approx(slopes_of(samples, slope), rel=1e-10)
     square = slope**2
     exact = 2 / math.pi * math.sqrt(1 + square) * ellipe(square / (1 + square)) - 1
@@ -69,7 +75,7 @@ def test_slope_and_area_of_a_sinusoid(samples: int, slope: float) -> None:
 def test_a_crossed_sinusoid_has_the_moments_of_a_product() -> None:
     """⟨(cos cos)⁴⟩/⟨(cos cos)²⟩² = (3/8)² / (1/4)² = 9/4."""
     x = 2 * np.pi * np.arange(60) / 60
-    found = parameters(MICRO * np.outer(np.cos(x), np.cos(x + 0.2)), (1e-6, 1e-6))
+    found = compute_parameters(MICRO * np.outer(np.cos(x), np.cos(x + 0.2)), (1e-6, 1e-6))
     assert found["Sku"] == pytest.approx(9 / 4, rel=1e-11)
     assert found["Sq"] == pytest.approx(MICRO / 2, rel=1e-11)
 
@@ -79,7 +85,7 @@ def test_a_grating_of_two_levels(duty: float) -> None:
     """Sa = 2 d(1-d) H, Sq = √(d(1-d)) H, Ssk = (1-2d)/√(d(1-d)), Sku = 1/(d(1-d)) - 3."""
     n, high = 200, 5 * MICRO
     line = np.where(np.arange(n) < duty * n, high, 0.0)
-    found = parameters(np.tile(line, (4, 3)), (1e-6, 1e-6))
+    found = compute_parameters(np.tile(line, (4, 3)), (1e-6, 1e-6))
     share = duty * (1 - duty)
     assert found["Sa"] == pytest.approx(2 * share * high, rel=1e-12)
     assert found["Sq"] == pytest.approx(math.sqrt(share) * high, rel=1e-12)
@@ -94,11 +100,11 @@ def test_a_ramp_has_the_area_of_its_plane() -> None:
     """The mean of a facet's two halves is exact for a plane: no direction is preferred."""
     y, x = np.mgrid[:30, :50] * 1e-6
     for a, b in ((0.3, -0.7), (1e-6, 2e-6), (0.0, 5.0)):
-        found = parameters(a * x + b * 2 * y, (1e-6, 2e-6))
+        found = compute_parameters(a * x + b * 2 * y, (1e-6, 2e-6))
         square = a * a + b * b
         assert found["Sdq"] == pytest.approx(math.sqrt(square), rel=1e-9)
         assert found["Sdr"] == pytest.approx(square / (1 + math.sqrt(1 + square)), rel=1e-9)
-    step = parameters(x, (1e-6, 1e-6))
+    step = compute_parameters(x, (1e-6, 1e-6))
     assert step["Sa"] == pytest.approx(50e-6 / 4, rel=1e-9)
     n = 50  # the variance of n equally spaced values
     assert step["Sq"] == pytest.approx(1e-6 * math.sqrt((n * n - 1) / 12), rel=1e-9)
@@ -107,7 +113,7 @@ def test_a_ramp_has_the_area_of_its_plane() -> None:
 def test_gaussian_noise() -> None:
     """Sa = √(2/π) Sq, Ssk = 0, Sku = 3, Sdq² = 2 · 2 Sq²/p², each within four standard errors."""
     n, sigma, p = 512, 2 * MICRO, 1e-6
-    found = parameters(sigma * np.random.default_rng(4).standard_normal((n, n)), (p, p))
+    found = compute_parameters(sigma * np.random.default_rng(4).standard_normal((n, n)), (p, p))
     root = n  # of the number of samples
     assert found["Sq"] == pytest.approx(sigma, rel=4 / (math.sqrt(2) * root))
     assert found["Sa"] == pytest.approx(math.sqrt(2 / math.pi) * sigma, rel=4 * 0.756 / root)
@@ -122,7 +128,7 @@ def test_holes_are_left_out() -> None:
     holed = heights.copy()
     holed[20:30, 5:9] = np.nan
     holed[0, 0] = np.nan
-    found, known = parameters(holed, (1e-6, 1e-6)), holed[~np.isnan(holed)]
+    found, known = compute_parameters(holed, (1e-6, 1e-6)), holed[~np.isnan(holed)]
     assert found["Sq"] == pytest.approx(known.std(), rel=1e-12)
     assert found["Sz"] == pytest.approx(np.ptp(known), rel=1e-12)
     # Facets only where all four corners are known.
@@ -130,30 +136,30 @@ def test_holes_are_left_out() -> None:
     along, across = np.diff(holed, axis=1) / 1e-6, np.diff(holed, axis=0) / 1e-6
     squares = along[:-1] ** 2 + along[1:] ** 2 + across[:, :-1] ** 2 + across[:, 1:] ** 2
     assert found["Sdq"] == pytest.approx(math.sqrt(0.5 * squares[known_cells].mean()), rel=1e-12)
-    assert found["Sdq"] != parameters(heights, (1e-6, 1e-6))["Sdq"]
+    assert found["Sdq"] != compute_parameters(heights, (1e-6, 1e-6))["Sdq"]
 
 
 def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     heights = MICRO * np.random.default_rng(3).standard_normal((61, 70))
-    whole = parameters(heights, (1e-6, 2e-6))
+    whole = compute_parameters(heights, (1e-6, 2e-6))
     monkeypatch.setattr(module, "_BLOCK", 200)
-    assert parameters(heights, (1e-6, 2e-6)) == pytest.approx(whole, rel=1e-11)
+    assert compute_parameters(heights, (1e-6, 2e-6)) == pytest.approx(whole, rel=1e-11)
 
 
 def test_what_a_flat_or_holed_surface_has_not() -> None:
-    flat = parameters(np.full((5, 6), 0.1), (1e-6, 1e-6))
+    flat = compute_parameters(np.full((5, 6), 0.1), (1e-6, 1e-6))
     assert (flat["Sq"], flat["Sz"], flat["Sdr"]) == (0.0, 0.0, 0.0)
     assert (flat["Ssk"], flat["Sku"]) == (None, None)
     board = np.indices((8, 8)).sum(axis=0) % 2 * np.where(np.indices((8, 8)).sum(0) % 2, 1, np.nan)
-    assert parameters(board, (1e-6, 1e-6))["Sdq"] is None  # no cell has four corners
-    line = parameters(np.array([0.0, 1.0, 3.0, 6.0]), (1e-6,))
+    assert compute_parameters(board, (1e-6, 1e-6))["Sdq"] is None  # no cell has four corners
+    line = compute_parameters(np.array([0.0, 1.0, 3.0, 6.0]), (1e-6,))
     assert line["PSm"] is None
 
 
 def test_extreme_heights_do_not_overflow() -> None:
     wave = np.tile(np.sin(2 * np.pi * np.arange(40) / 40), (4, 1))
     for scale in (1e-120, 1e150):
-        assert parameters(scale * wave, (1e-6, 1e-6))["Sku"] == pytest.approx(1.5, rel=1e-9)
+        assert compute_parameters(scale * wave, (1e-6, 1e-6))["Sku"] == pytest.approx(1.5, rel=1e-9)
 
 
 # --- profiles -------------------------------------------------------------------------------------
@@ -162,9 +168,9 @@ def test_extreme_heights_do_not_overflow() -> None:
 def test_a_profile_of_a_sinusoid() -> None:
     heights, pitch = sinusoid(400)
     line = np.pad(heights[0], (0, 1), mode="wrap")
-    found = parameters(line, pitch[:1])
+    found = compute_parameters(line, pitch[:1])
     amplitude = 0.5 * 100e-6 / (2 * np.pi)
-    assert set(found) == {f"P{one.symbol}" for one in PROFILE}
+    assert set(found) == {f"P{one.symbol}" for one in PROFILE_PARAMETERS}
     assert found["Pt"] == found["Pz"]
     assert found["Pdq"] == pytest.approx(slopes_of(400, 0.5), rel=1e-10)
     # Crossings by straight lines between samples: good to the curvature of a sine near its zero.
@@ -177,13 +183,15 @@ def test_sections_are_as_long_as_the_nesting_index() -> None:
     line = np.zeros(501)
     line[50::100] = MICRO * np.arange(1, 6)
     mean = line.mean()
-    found = parameters(line, (2e-6,), nesting=200e-6)
+    found = compute_parameters(line, (2e-6,), nesting=200e-6)
     assert found["Rp"] == pytest.approx(3 * MICRO - mean, rel=1e-9)
     assert found["Rv"] == pytest.approx(mean, rel=1e-9)
     assert found["Rz"] == pytest.approx(3 * MICRO, rel=1e-9)
     assert found["Rt"] == pytest.approx(5 * MICRO, rel=1e-9)
-    assert parameters(line, (2e-6,))["Pp"] == pytest.approx(5 * MICRO - mean, rel=1e-9)
-    assert parameters(line, (2e-6,), nesting=1.0)["Rz"] == pytest.approx(5 * MICRO, rel=1e-9)
+    assert compute_parameters(line, (2e-6,))["Pp"] == pytest.approx(5 * MICRO - mean, rel=1e-9)
+    assert compute_parameters(line, (2e-6,), nesting=1.0)["Rz"] == pytest.approx(
+        5 * MICRO, rel=1e-9
+    )
 
 
 def test_noise_on_the_mean_line_makes_no_profile_element() -> None:
@@ -191,10 +199,10 @@ def test_noise_on_the_mean_line_makes_no_profile_element() -> None:
     x = np.arange(2001) * 1e-6
     wave = MICRO * np.sin(2 * np.pi * x / 200e-6)
     zigzag = 0.04 * MICRO * np.where(np.arange(2001) % 2, 1.0, -1.0)
-    noisy = parameters(wave + zigzag, (1e-6,))["PSm"]
+    noisy = compute_parameters(wave + zigzag, (1e-6,))["PSm"]
     assert noisy is not None
     assert noisy == pytest.approx(200e-6, rel=0.01)
-    coarse = parameters(wave + 10 * zigzag, (1e-6,))["PSm"]
+    coarse = compute_parameters(wave + 10 * zigzag, (1e-6,))["PSm"]
     assert coarse is not None
     assert coarse < noisy / 2  # of 14 % of Rz it does
 
@@ -205,7 +213,7 @@ def test_crossings_lie_between_the_samples() -> None:
     wave = MICRO * np.sin(2 * np.pi * (x - 1.1e-6) / 7.3e-6)
     # A chord misses the zero of a sine by at most u²/(9 √3) of a sample's length, u = 2π/7.3.
     chord = (2 * np.pi / 7.3) ** 2 / (9 * math.sqrt(3)) * 1e-6
-    spacing = module._spacing(wave, 1e-6, 0.1 * MICRO)
+    spacing = module._element_spacing(wave, 1e-6, 0.1 * MICRO)
     assert spacing == pytest.approx(7.3e-6, abs=2 * chord)
 
 
@@ -213,16 +221,16 @@ def test_a_gap_does_not_shorten_the_spacing() -> None:
     x = np.arange(2001) * 1e-6
     wave = MICRO * np.sin(2 * np.pi * x / 200e-6 + 0.3)
     wave[1000:1030] = np.nan
-    assert parameters(wave, (1e-6,))["PSm"] == pytest.approx(200e-6, rel=1e-3)
+    assert compute_parameters(wave, (1e-6,))["PSm"] == pytest.approx(200e-6, rel=1e-3)
 
 
 def test_every_symbol_is_declared_once() -> None:
-    symbols = [one.symbol for one in AREAL] + [one.symbol for one in PROFILE]
+    symbols = [one.symbol for one in AREAL_PARAMETERS] + [one.symbol for one in PROFILE_PARAMETERS]
     assert len(set(symbols)) == len(symbols)
-    assert declared("Sq").unit == "m"
-    assert declared("RSm") is declared("PSm")
+    assert find_parameter("Sq").unit == "m"
+    assert find_parameter("RSm") is find_parameter("PSm")
     with pytest.raises(KeyError):
-        declared("Q")
+        find_parameter("Q")
 
 
 # --- autocorrelation ------------------------------------------------------------------------------
@@ -232,7 +240,7 @@ def test_correlation_of_a_grating_has_a_lay() -> None:
     """cos(2π t/λ) = 0.2 at t = 0.218 λ across; along the grooves it never falls."""
     x = np.arange(400)
     heights = MICRO * np.tile(np.cos(2 * np.pi * x / 20), (50, 1))
-    length, ratio = correlation(heights, (1e-6, 2e-6))
+    length, ratio = correlation_parameters(heights, (1e-6, 2e-6))
     assert ratio is None
     # Between samples the correlation is read along chords: 1 - cos(π/n) too low, n = 20.
     expected = math.acos(0.2) / (2 * math.pi) * 20e-6
@@ -246,12 +254,12 @@ def test_correlation_of_gaussian_noise(stretch: float) -> None:
 
     wide, noise = 8.0, np.random.default_rng(6).standard_normal((900, 900))
     heights = smooth(noise, (wide / 2, stretch * wide / 2), mode="wrap")
-    length, ratio = correlation(heights, (1e-6, 1e-6))
+    length, ratio = correlation_parameters(heights, (1e-6, 1e-6))
     # Some 900²/(10² stretch) patches that know nothing of each other: 1 to 2 % of their mean.
     assert length == pytest.approx(math.sqrt(math.log(5)) * wide * 1e-6, rel=0.06)
     assert ratio == pytest.approx(1 / stretch, rel=0.12)
     heights[100:300, 200:400] = np.nan  # holes are left out, not taken for zeros
-    assert correlation(heights, (1e-6, 1e-6))[0] == pytest.approx(length, rel=0.03)
+    assert correlation_parameters(heights, (1e-6, 1e-6))[0] == pytest.approx(length, rel=0.03)
 
 
 def test_the_correlation_is_the_mean_over_all_known_pairs() -> None:
@@ -267,4 +275,4 @@ def test_the_correlation_is_the_mean_over_all_known_pairs() -> None:
 
 
 def test_no_correlation_of_a_plane() -> None:
-    assert correlation(np.zeros((20, 20)), (1e-6, 1e-6)) == (None, None)
+    assert correlation_parameters(np.zeros((20, 20)), (1e-6, 1e-6)) == (None, None)

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.errors import ParameterError
-from asperity.measured.plausible import STEEPEST, check_heights, mean_slope
-from asperity.measured.preparation import prepare
+from asperity.core.errors import ParameterError
+from asperity.measured.preparation import MAX_MEAN_SLOPE, check_plausible, mean_slope, prepare
 from asperity.measured.reading import RawSurface, read_surface
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
@@ -33,7 +32,7 @@ def test_a_relief_of_metres_at_a_pitch_of_micrometres_is_asked_about() -> None:
     assert said.startswith("height_range must be given: heights that span 5.9 m at a pitch of 2.5")
     assert f"mean slope of {slope:.3g}" in said
     assert "in um: unit='um' (--unit um)" in said
-    assert "if it is so: height_range=5.9 (--height-range 5.9m)" in said
+    assert "if they are right: height_range=5.9 (--height-range 5.9m)" in said
 
 
 def test_it_is_so() -> None:
@@ -46,7 +45,7 @@ def test_a_file_that_names_its_unit_is_scaled() -> None:
     """Where the file names a unit, --unit is refused: its height is what can be said."""
     heights = GROUND * 0.02 / np.ptp(GROUND)
     with pytest.raises(ParameterError, match=r"in um: height_range=2e-08 \(--height-range 0\.02um"):
-        check_heights(raw(GROUND, has_units=True), heights, (1e-6, 1e-6))
+        check_plausible(raw(GROUND, has_units=True), heights, (1e-6, 1e-6))
 
 
 @pytest.mark.parametrize("wrong", [1e3, 1e6, 1e9])
@@ -67,16 +66,16 @@ def test_heights_of_many_metres_in_no_unit_are_asked_about() -> None:
 def test_heights_near_the_largest_float_are_steep() -> None:
     heights = np.resize([0.0, 1.5e308], 40)
     with pytest.raises(ParameterError, match="mean slope of inf"):
-        check_heights(raw(heights), heights, (1e-6,))
+        check_plausible(raw(heights), heights, (1e-6,))
 
 
 def test_the_limit_is_the_mean_slope_of_the_steeper_axis() -> None:
-    saw = np.resize([0.0, 1.0], (6, 8)) * 1e-6 * STEEPEST
+    saw = np.resize([0.0, 1.0], (6, 8)) * 1e-6 * MAX_MEAN_SLOPE
     for heights in (saw, saw.T):
-        check_heights(raw(heights), heights, (1.001e-6, 1.001e-6))
+        check_plausible(raw(heights), heights, (1.001e-6, 1.001e-6))
         with pytest.raises(ParameterError, match="mean slope of 10"):
-            check_heights(raw(heights), heights, (0.999e-6, 0.999e-6))
-    assert math.degrees(math.atan(STEEPEST)) == pytest.approx(84.3, abs=0.05)
+            check_plausible(raw(heights), heights, (0.999e-6, 0.999e-6))
+    assert math.degrees(math.atan(MAX_MEAN_SLOPE)) == pytest.approx(84.3, abs=0.05)
 
 
 def test_missing_points_and_plains_have_no_slope() -> None:
@@ -99,7 +98,7 @@ def test_real_surfaces_are_far_from_the_limit(name: str) -> None:
     surface = read_surface(DATA / name)
     assert surface.pitch is not None
     slope = mean_slope(surface.heights, surface.pitch)
-    assert 1e-4 < slope < STEEPEST / 30
-    check_heights(surface, surface.heights, surface.pitch)
+    assert 1e-4 < slope < MAX_MEAN_SLOPE / 30
+    check_plausible(surface, surface.heights, surface.pitch)
     with pytest.raises(ParameterError, match="height_range"):
-        check_heights(surface, surface.heights * 1e6, surface.pitch)
+        check_plausible(surface, surface.heights * 1e6, surface.pitch)

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from asperity.errors import ParameterError
+from asperity.core.errors import ParameterError
 from asperity.measured.filling import fill_in_place
-from asperity.measured.preparation import ALPHA, gaussian_filter, prepare
+from asperity.measured.filters import ALPHA, gaussian_filter
+from asperity.measured.preparation import magnify_surface, prepare
+from asperity.measured.prepared import PreparedSurface
 from asperity.measured.reading import RawSurface
 from asperity.textures import load_texture
 
@@ -96,8 +98,8 @@ def test_a_hole_at_the_border_continues_the_form(form: int) -> None:
     prepared = prepare(surface(heights), form=form, cutoff=4 * P)
     assert np.max(np.abs(prepared.heights)) < 3e-3 * P
     assert np.ptp(shape) > 1.0 * P
-    assert prepared.filled is not None
-    np.testing.assert_array_equal(prepared.filled, np.isnan(heights))
+    assert prepared.filled_mask is not None
+    np.testing.assert_array_equal(prepared.filled_mask, np.isnan(heights))
 
 
 def test_levelling_of_a_profile() -> None:
@@ -225,14 +227,14 @@ def test_input_is_not_changed() -> None:
     [
         ({"magnify": 0.0}, "magnify must be positive"),
         ({"magnify": -2.0}, "magnify must be positive"),
-        ({"magnify": np.nan}, "magnify must be positive"),
-        ({"magnify_height": np.inf}, "magnify_height must be positive"),
+        ({"magnify": np.nan}, "magnify must be finite"),
+        ({"magnify_height": np.inf}, "magnify_height must be finite"),
         ({"cutoff": 0.0}, "cutoff must be positive"),
-        ({"cutoff": np.nan}, "cutoff must be positive"),
+        ({"cutoff": np.nan}, "cutoff must be finite"),
         ({"cutoff": 3.9e-6}, "cutoff must be at least two samples, 4 µm"),
         ({"cutoff": 1e-4}, "cutoff must be at most the surface's length, 78 µm"),
         ({"pitch": 0.0}, "pitch must be positive"),
-        ({"pitch": (1e-6, np.nan)}, "pitch must be positive"),
+        ({"pitch": (1e-6, np.nan)}, "pitch must be finite"),
         ({"pitch": (1e-6, 1e-6, 1e-6)}, "pitch must be one number or"),
         ({"height_range": -1.0}, "height_range must be positive"),
     ],
@@ -245,7 +247,7 @@ def test_arguments_that_are_refused(arguments: dict[str, Any], match: str) -> No
 
 def test_magnification_beyond_all_bounds() -> None:
     with pytest.raises(ParameterError, match="magnify makes the surface too large"):
-        prepare(surface(1e12 * bumpy(), pitch=(1e6, 2e6)), magnify=1e306, magnify_height=1e306)
+        magnify_surface(PreparedSurface(np.full((4, 4), 1e300), (1.0, 1.0), ()), 1e10)
 
 
 def test_limits_of_the_cutoff_are_accepted() -> None:
@@ -284,8 +286,8 @@ def test_more_than_a_quarter_missing_needs_consent() -> None:
     with pytest.raises(ParameterError, match=r"misses 27.3% .* at most 27.0% can be filled"):
         prepare(surface(heights), max_missing=0.27)
     allowed = prepare(surface(heights), max_missing=0.28)
-    assert allowed.filled is not None
-    assert allowed.filled.sum() == 109
+    assert allowed.filled_mask is not None
+    assert allowed.filled_mask.sum() == 109
     for wrong in (0.0, 1.0, -0.1, 28.0, np.nan, "0.3"):
         with pytest.raises(ParameterError, match="max_missing must lie between 0 and 1"):
             prepare(surface(heights), max_missing=wrong)  # partly text

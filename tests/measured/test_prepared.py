@@ -1,4 +1,4 @@
-"""Prepared surfaces are kept whole, taken as they are, and damaged ones are refused."""
+"""Prepared surfaces: saving, loading, and refusal of damaged files."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.errors import ParameterError, SurfaceFileError
-from asperity.measured.prepared import Prepared, is_prepared, load_prepared, save_prepared
+from asperity.core.errors import ParameterError, SurfaceFileError
+from asperity.measured.prepared import PreparedSurface, is_prepared, load_prepared, save_prepared
 from asperity.textures import HeightMap, Profile, load_texture
-from asperity.textures.loading import prepare_file, texture_of
+from asperity.textures.texture_loading import prepare_file, texture_from_prepared
 
 PITCH = (2e-6, 3e-6)
 
@@ -38,12 +38,12 @@ def saved(source: Path) -> Path:
     return path
 
 
-def same(a: Prepared, b: Prepared) -> None:
+def same(a: PreparedSurface, b: PreparedSurface) -> None:
     np.testing.assert_array_equal(a.heights, b.heights)
     assert (a.pitch, a.steps, a.periodic) == (b.pitch, b.steps, b.periodic)
-    assert (a.filled is None) == (b.filled is None)
-    if a.filled is not None:
-        np.testing.assert_array_equal(a.filled, b.filled)
+    assert (a.filled_mask is None) == (b.filled_mask is None)
+    if a.filled_mask is not None:
+        np.testing.assert_array_equal(a.filled_mask, b.filled_mask)
 
 
 @pytest.mark.parametrize(
@@ -55,14 +55,16 @@ def test_round_trip(source: Path, arguments: dict[str, Any]) -> None:
     save_prepared(path, prepared, source)
     assert is_prepared(path)
     same(load_prepared(path), prepared)
-    assert prepared.filled is not None
-    assert prepared.filled.sum() == (15 if "periodic" not in arguments else prepared.filled.sum())
+    assert prepared.filled_mask is not None
+    assert prepared.filled_mask.sum() == (
+        15 if "periodic" not in arguments else prepared.filled_mask.sum()
+    )
 
 
 def test_round_trip_of_a_profile_without_holes(tmp_path: Path) -> None:
     np.save(tmp_path / "line.npy", 1e-6 * np.sin(np.arange(50.0)))
     prepared = prepare_file(tmp_path / "line.npy", pitch=1e-6)
-    assert prepared.filled is None
+    assert prepared.filled_mask is None
     save_prepared(tmp_path / "line.npz", prepared, tmp_path / "line.npy")
     same(load_prepared(tmp_path / "line.npz"), prepared)
     assert isinstance(load_texture(tmp_path / "line.npz"), Profile)
@@ -83,8 +85,8 @@ def test_texture_is_the_same_from_both(saved: Path, source: Path) -> None:
     np.testing.assert_array_equal(kept.coefficients, direct.coefficients)
     assert kept.preparation == direct.preparation
     assert kept.pitch == direct.pitch
-    assert kept.filled is not None
-    np.testing.assert_array_equal(kept.filled, np.isnan(bumpy()))
+    assert kept.filled_mask is not None
+    np.testing.assert_array_equal(kept.filled_mask, np.isnan(bumpy()))
 
 
 def test_content_counts_and_not_the_name(saved: Path) -> None:
@@ -203,7 +205,7 @@ LYING = b"\x93NUMPY\x01\x00v\x00" + (
         ({"heights": np.zeros((3, 40)), "filled": np.zeros((3, 40), bool)}, "must be float64"),
         ({"heights": np.zeros(())}, "must be float64"),
         ({"heights": np.zeros((30, 40), complex)}, "heights is damaged"),
-        ({"heights": LYING}, "heights is damaged"),
+        ({"heights": LYING}, "damaged prepared surface"),
         ({"heights": b"no array"}, "damaged prepared surface"),
         ({"pitch": np.array([1e-6])}, "pitch must be 2 positive lengths"),
         ({"pitch": np.array([1e-6, -1e-6])}, "pitch must be 2 positive lengths"),
@@ -224,13 +226,20 @@ def test_python_objects_are_never_loaded(saved: Path) -> None:
     with np.load(saved) as file:
         members = {name: file[name] for name in file.files}
     np.savez(path, **(members | {"steps": np.array([{"a": 1}], dtype=object)}))
-    with pytest.raises(SurfaceFileError, match="steps is damaged"):
+    with pytest.raises(SurfaceFileError, match="damaged prepared surface"):
         load_texture(path)
 
 
-def test_compressed_files_are_refused(saved: Path) -> None:
-    with pytest.raises(SurfaceFileError, match="is compressed; asperity writes it plain"):
-        load_texture(rewritten(saved, zipfile.ZIP_DEFLATED))
+def test_compressed_files_are_read(saved: Path) -> None:
+    same(load_prepared(rewritten(saved, zipfile.ZIP_DEFLATED)), load_prepared(saved))
+
+
+def test_archives_that_unpack_to_too_much_are_refused(
+    saved: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("asperity.measured.prepared._MAX_BYTES", 1000)
+    with pytest.raises(SurfaceFileError, match=r"unpacks to .* bytes; at most 1000 are read"):
+        load_prepared(saved)
 
 
 def test_an_unchanged_copy_is_accepted(saved: Path) -> None:
@@ -276,12 +285,14 @@ def test_files_that_are_no_prepared_surface(tmp_path: Path, source: Path) -> Non
 def test_masks_of_textures() -> None:
     mask = np.zeros((5, 6), bool)
     mask[1, 2] = True
-    texture = HeightMap(np.zeros((5, 6)), 1e-3, filled=mask)
-    assert texture.filled is not None
-    assert np.argwhere(texture.filled).tolist() == [[1, 2]]
-    assert HeightMap(np.zeros((5, 6)), 1e-3).filled is None
-    assert Profile(np.zeros(5), 1e-3, filled=mask[0, :5]).filled is not None
+    texture = HeightMap(np.zeros((5, 6)), 1e-3, filled_mask=mask)
+    assert texture.filled_mask is not None
+    assert np.argwhere(texture.filled_mask).tolist() == [[1, 2]]
+    assert HeightMap(np.zeros((5, 6)), 1e-3).filled_mask is None
+    assert Profile(np.zeros(5), 1e-3, filled_mask=mask[0, :5]).filled_mask is not None
     for wrong in (mask.T, np.zeros((5, 6)), [True]):
-        with pytest.raises(ParameterError, match="filled must be true or false for each height"):
-            HeightMap(np.zeros((5, 6)), 1e-3, filled=wrong)
-    assert texture_of(Prepared(np.zeros((4, 4)), (1.0, 1.0), ())).filled is None
+        with pytest.raises(ParameterError, match="filled_mask must be true or false"):
+            HeightMap(np.zeros((5, 6)), 1e-3, filled_mask=wrong)
+    assert (
+        texture_from_prepared(PreparedSurface(np.zeros((4, 4)), (1.0, 1.0), ())).filled_mask is None
+    )

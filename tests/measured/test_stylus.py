@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.checks import FloatArray
-from asperity.errors import ParameterError
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError
 from asperity.measured import stylus
 from asperity.measured.preparation import prepare
 from asperity.measured.reading import RawSurface
@@ -145,8 +145,8 @@ def test_preparation_says_what_the_tip_did() -> None:
     [
         (0.0, "must be positive"),
         (-1e-6, "must be positive"),
-        (np.nan, "must be positive and finite"),
-        (np.inf, "must be positive and finite"),
+        (np.nan, "must be finite"),
+        (np.inf, "must be finite"),
         (4e-5, "must be at most the surface's shorter side, 30 µm"),
     ],
 )
@@ -157,6 +157,6 @@ def test_radii_that_are_refused(radius: float, match: str) -> None:
 
 
 def test_too_much_work_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stylus, "_MOST_COMPARISONS", 1e4)
+    monkeypatch.setattr(stylus, "_MAX_COMPARISONS", 1e4)
     with pytest.raises(ParameterError, match=r"tip_radius needs .* comparisons at each of 744"):
         dilate(rough(), PITCH, 1e-5)

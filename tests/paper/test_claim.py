@@ -8,33 +8,39 @@ import math
 import numpy as np
 import pytest
 
-from asperity.errors import ParameterError
+from asperity.core.errors import ParameterError
 from asperity.paper.claim import (
     VERDICTS,
     Check,
     Claim,
-    decide,
-    judge,
+    check_statement,
+    check_values,
+    combine_checks,
     relative_error,
-    settle,
 )
 
 
 def test_what_agrees_holds_whatever_the_correction() -> None:
-    check = judge("x", printed=[1.0, 2.0], corrected=[5.0, 5.0], truth=[1.0, 2.0], correction="c")
+    check = check_values(
+        "x", printed=[1.0, 2.0], corrected=[5.0, 5.0], reference=[1.0, 2.0], correction="c"
+    )
     assert check.verdict == "holds"
     assert check.correction == ""
 
 
 def test_a_wrong_formula_with_a_right_correction() -> None:
-    check = judge("x", printed=[1.0, 2.1], corrected=[1.0, 2.0], truth=[1.0, 2.0], correction="c")
+    check = check_values(
+        "x", printed=[1.0, 2.1], corrected=[1.0, 2.0], reference=[1.0, 2.0], correction="c"
+    )
     assert (check.verdict, check.correction) == ("holds with correction", "c")
     assert check.numbers["x, error as printed"] == pytest.approx(0.05)
 
 
 @pytest.mark.parametrize("corrected", [None, [1.0, 2.2]])
 def test_a_wrong_formula_without_a_right_correction(corrected: list[float] | None) -> None:
-    check = judge("x", printed=[1.0, 2.1], corrected=corrected, truth=[1.0, 2.0], correction="c")
+    check = check_values(
+        "x", printed=[1.0, 2.1], corrected=corrected, reference=[1.0, 2.0], correction="c"
+    )
     assert check.verdict == "does not hold"
     # A correction that is wrong itself is not passed on as one.
     assert check.correction == ("c" if corrected is None else "")
@@ -42,12 +48,15 @@ def test_a_wrong_formula_without_a_right_correction(corrected: list[float] | Non
 
 def test_the_tolerance_is_the_border() -> None:
     for off, verdict in ((0.9e-9, "holds"), (1.1e-9, "does not hold")):
-        assert judge("x", printed=[0.0, 2.0 * (1.0 + off)], truth=[0.0, 2.0]).verdict == verdict
+        assert (
+            check_values("x", printed=[0.0, 2.0 * (1.0 + off)], reference=[0.0, 2.0]).verdict
+            == verdict
+        )
 
 
 @pytest.mark.parametrize("truth", [math.nan, [1.0, math.nan], []])
 def test_without_truth_nothing_is_decided(truth: object) -> None:
-    assert judge("x", printed=truth, truth=truth).verdict == "undecided"
+    assert check_values("x", printed=truth, reference=truth).verdict == "undecided"
 
 
 @pytest.mark.parametrize(
@@ -71,13 +80,19 @@ def test_errors_are_relative_to_the_largest_entry(
 
 
 def test_statements() -> None:
-    assert decide("s", printed=True).verdict == "holds"
-    assert decide("s", printed=np.bool_(False), corrected=True, correction="c").correction == "c"
-    assert decide("s", printed=False, corrected=False, correction="c").verdict == "does not hold"
-    assert decide("s", printed=False, corrected=False, correction="c").correction == ""
-    assert decide("s", printed=False, correction="c").correction == "c"
-    assert decide("s", printed=None).verdict == "undecided"
-    known = decide("s", printed=True, numbers={"a b": 1.0}, c_d=2.0).numbers
+    assert check_statement("s", printed=True).verdict == "holds"
+    assert (
+        check_statement("s", printed=np.bool_(False), corrected=True, correction="c").correction
+        == "c"
+    )
+    assert (
+        check_statement("s", printed=False, corrected=False, correction="c").verdict
+        == "does not hold"
+    )
+    assert check_statement("s", printed=False, corrected=False, correction="c").correction == ""
+    assert check_statement("s", printed=False, correction="c").correction == "c"
+    assert check_statement("s", printed=None).verdict == "undecided"
+    known = check_statement("s", printed=True, numbers={"a b": 1.0}, c_d=2.0).numbers
     assert known == {"a b": 1.0, "c d": 2.0}
 
 
@@ -95,7 +110,7 @@ def test_a_claim_is_as_good_as_its_weakest_part(parts: tuple[str, ...], whole: s
         Check(verdict, verdict[:1], {str(i): 1.0}, f"c{i}" if "cor" in verdict else "", verdict)
         for i, verdict in enumerate(parts)
     ]
-    found = settle(*checks)
+    found = combine_checks(*checks)
     assert found.verdict == whole
     assert len(found.numbers) == len(parts)
     assert found.fitted == "; ".join(dict.fromkeys(parts))

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from asperity.errors import ParameterError
-from asperity.paper import CLAIMS, VERDICTS, Result, claim, reproduce_claims
-from asperity.paper.experiments import FINDINGS, findings
-from asperity.paper.experiments.settings import TWO_WAYS
-from asperity.paper.registry import find_claims
+from asperity.core.errors import ParameterError
+from asperity.paper import CLAIMS, VERDICTS, Result, get_claim, reproduce_claims
+from asperity.paper.claim_registry import find_claims
+from asperity.paper.experiments import SIMULATED_CLAIM_IDS, simulated_claims
+from asperity.paper.experiments.experiment_setups import BUMP_SUMMARY
 
-SIMULATED = set(FINDINGS)
+SIMULATED = set(SIMULATED_CLAIM_IDS)
 
 # As printed, by the law's definition, an identity, or a sum that gives what is printed.
 HOLDS = """
@@ -42,7 +42,7 @@ CORRECTED = {
     "table-1-E": "negative inside",  # as printed it pulls inwards
     "table-1-F": "d_max",  # lacks the deflection
     "table-1-C": "plus sign",
-    "remark-2": "K on h''",  # a Lipschitz bound says nothing of h''
+    "remark-2": "K on h''",  # a Lipschitz bound does not bound h''
     "remark-3": "whole force",
     "eq-9": "max over",  # a ratio of the greatest equals a value at each place
     "eq-10": "l/2",
@@ -220,7 +220,7 @@ def test_other_processes_give_the_same(results: dict[str, Result]) -> None:
 @pytest.mark.parametrize("given", ["eq-45", "table-3", "Eq-12", "", 12])
 def test_an_unknown_claim_is_refused(given: Any) -> None:
     with pytest.raises(ParameterError, match="claim is unknown"):
-        claim(given)
+        get_claim(given)
 
 
 def test_the_nearest_claims_are_offered() -> None:
@@ -240,6 +240,6 @@ def test_ids_as_one_text_are_refused() -> None:
 
 
 def test_simulated_claims_come_from_the_experiments(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(findings, "_bumps", lambda _law: ())
-    found = claim("sentence-V.C-A").run().evidence
-    assert (found.numbers, found.fitted) == ({}, TWO_WAYS)
+    monkeypatch.setattr(simulated_claims, "_simulated_bumps", lambda _law: ())
+    found = get_claim("sentence-V.C-A").run().evidence
+    assert (found.numbers, found.fitted) == ({}, BUMP_SUMMARY)

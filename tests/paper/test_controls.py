@@ -1,4 +1,4 @@
-"""Negative controls: with something else computed, or printed, the verdicts change."""
+"""Negative controls: other formulas, kernels or printed values change the verdicts."""
 
 from __future__ import annotations
 
@@ -9,35 +9,42 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.paper.perturbations import replace_name
 
-import asperity.definition
-from asperity.analysis.energy.loops import loop_work
+import asperity.reference
+from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.laws import find_law
-from asperity.paper import (
-    claim,
-    claims_appendix,
-    claims_god_object,
-    claims_limits,
-    claims_passivity,
+from asperity.paper import CLAIMS, Claim, get_claim
+from asperity.paper.claims import appendices as claims_appendix
+from asperity.paper.claims import design_limits as claims_limits
+from asperity.paper.claims import passivity_condition as claims_passivity
+from asperity.paper.claims.formula_claims import FormulaRow
+from asperity.paper.claims.friction_law import (
+    PAPER_CASE,
+    matrix_norm,
+    random_friction_cases,
+    sticking_entries,
 )
-from asperity.paper.changes import other
-from asperity.paper.claims_friction import PAPER, norm_of, random_rubs, stick_entries
-from asperity.paper.plane import foot_of, foot_rates, spots
+from asperity.paper.planar_cases import (
+    closest_point_derivatives,
+    find_closest_point,
+    generic_probes,
+)
 
 
 def changed_everywhere(monkeypatch: pytest.MonkeyPatch, name: str, changed: object) -> None:
-    """Let every module of the paper's claims have something else under a name."""
+    """Replace a name in every module of the paper's claims."""
     for module, content in sys.modules.items():
         if module.startswith("asperity.paper.") and hasattr(content, name):
             monkeypatch.setattr(content, name, changed)
 
 
-# A part in a million of the law's formula is seen.
+# A relative change of 1e-6 of a law's formula is detected.
 _CHANGED = 1.0 + 1e-6
-_ANOTHER = other(
+_ANOTHER = replace_name(
     "definitions of laws times 1 + 1e-6", "symbolic_force",
-    lambda was: lambda law: _CHANGED * was(law), asperity.definition,
+    lambda was: lambda law: _CHANGED * was(law), asperity.reference,
 )  # fmt: skip
 
 
@@ -47,9 +54,9 @@ _ANOTHER = other(
      "eq-22", "eq-28", "eq-38", "eq-39", "eq-44", "table-1-A", "table-1-BG", "table-1-F"],
 )  # fmt: skip
 def test_another_law_flips_the_verdict(name: str) -> None:
-    assert claim(name).run().verdict in {"holds", "holds with correction"}
-    with _ANOTHER.made():
-        assert claim(name).run().verdict == "does not hold"
+    assert get_claim(name).run().verdict in {"holds", "holds with correction"}
+    with _ANOTHER.apply():
+        assert get_claim(name).run().verdict == "does not hold"
 
 
 @pytest.mark.parametrize("name", ["eq-12", "sentence-IV.A-energy", "eq-27"])
@@ -58,7 +65,7 @@ def test_another_work_flips_the_verdict(name: str, monkeypatch: pytest.MonkeyPat
         return _CHANGED * loop_work(*arguments)
 
     changed_everywhere(monkeypatch, "loop_work", changed)
-    assert claim(name).run().verdict == "does not hold"
+    assert get_claim(name).run().verdict == "does not hold"
 
 
 @pytest.mark.parametrize(
@@ -77,15 +84,30 @@ def test_another_number_flips_the_verdict(
         return replace(found, lower=times * found.lower, upper=times * found.upper)
 
     changed_everywhere(monkeypatch, "characteristic_number", changed)
-    assert claim(name).run().verdict == "does not hold"
+    assert get_claim(name).run().verdict == "does not hold"
 
 
 def test_what_is_printed_right_holds(monkeypatch: pytest.MonkeyPatch) -> None:
     for number in (4, 5):
-        monkeypatch.setitem(claims_limits.PRINTED, number, claims_limits.CORRECTED[number])
-    monkeypatch.setattr(claims_appendix, "flat_jacobian", claims_god_object.bent_jacobian)
-    for name in ("limit-4", "limit-5", "eq-44"):
-        assert claim(name).run().verdict == "holds"
+        monkeypatch.setitem(
+            claims_limits.PRINTED_LIMITS, number, claims_limits.CORRECTED_LIMITS[number]
+        )
+    for name in ("limit-4", "limit-5"):
+        assert get_claim(name).run().verdict == "holds"
+
+
+def test_a_formula_printed_correctly_holds() -> None:
+    """With the corrected formula in the place of the printed one, all rows hold."""
+    rows = [one.compute.__self__ for one in CLAIMS.values() if _is_row(one)]
+    corrected = [row for row in rows if row.corrected]
+    assert len(corrected) >= 12
+    for row in corrected:
+        assert replace(row, printed=row.corrected).check().verdict == "holds"
+        assert replace(row, corrected=row.printed).check().verdict == "does not hold"
+
+
+def _is_row(claim: Claim) -> bool:
+    return isinstance(getattr(claim.compute, "__self__", None), FormulaRow)
 
 
 @pytest.mark.parametrize(
@@ -100,51 +122,59 @@ def test_what_is_printed_right_holds(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_limit_printed_wrong_does_not_hold(
     number: int, sides: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(claims_limits.PRINTED, number, sides)
-    assert claim(f"limit-{number}").run().verdict == "does not hold"
+    monkeypatch.setitem(claims_limits.PRINTED_LIMITS, number, sides)
+    assert get_claim(f"limit-{number}").run().verdict == "does not hold"
 
 
 def test_a_third_limit_that_differed_would_count(monkeypatch: pytest.MonkeyPatch) -> None:
     other = lambda v: (v["alpha"] * (v["delta"] + v["v"] * v["T"]) / v["l"], 1.0)  # noqa: E731 - one
-    monkeypatch.setitem(claims_limits.PRINTED, 3, other)
-    assert "in 0 of 4000" not in claim("limit-3").run().evidence.summary
+    monkeypatch.setitem(claims_limits.PRINTED_LIMITS, 3, other)
+    assert "in 0 of 4000" not in get_claim("limit-3").run().evidence.summary
 
 
 def test_a_fast_loop_would_not_contradict_the_corollary(monkeypatch: pytest.MonkeyPatch) -> None:
     """At 1 m/s damping absorbs the loop: the counter-example is one of slow motion."""
-    monkeypatch.setattr(claims_passivity, "_SLOW", 1.0)
-    assert claim("eq-1").run().verdict == "holds"
-    assert claim("eq-2").run().verdict == "holds"
+    monkeypatch.setattr(claims_passivity, "_SLOW_SPEED", 1.0)
+    assert get_claim("eq-1").run().verdict == "holds"
+    assert get_claim("eq-2").run().verdict == "holds"
 
 
 def test_motions_on_c_gain_where_damping_is_too_small() -> None:
     """Sharp: a quarter of (1) without delay, three quarters with one sample of it."""
-    assert claims_passivity._quiet(0, 31, 0.26) < 0.0 < claims_passivity._quiet(0, 31, 0.24)
-    assert claims_passivity._quiet(1, 32, 0.78) < 0.0 < claims_passivity._quiet(1, 32, 0.72)
+    assert (
+        claims_passivity._max_random_gain(0, 31, 0.26)
+        < 0.0
+        < claims_passivity._max_random_gain(0, 31, 0.24)
+    )
+    assert (
+        claims_passivity._max_random_gain(1, 32, 0.78)
+        < 0.0
+        < claims_passivity._max_random_gain(1, 32, 0.72)
+    )
 
 
 def test_an_appendix_with_all_terms_right_holds(monkeypatch: pytest.MonkeyPatch) -> None:
-    original = claims_appendix.expansion
+    original = claims_appendix.expand_bound
     monkeypatch.setattr(
-        claims_appendix, "expansion", lambda r, **_asked: original(r, as_printed=False)
+        claims_appendix, "expand_bound", lambda r, **_given: original(r, as_printed=False)
     )
-    assert claim("eq-31").run().verdict == "holds"
+    assert get_claim("eq-31").run().verdict == "holds"
 
 
 def test_the_expansion_needs_each_of_its_corrections() -> None:
     """The corrected expression is the norm by its characteristic polynomial."""
-    for r in [PAPER, *random_rubs(5, 99)]:
-        a, b = stick_entries(r)
+    for r in [PAPER_CASE, *random_friction_cases(5, 99)]:
+        a, b = sticking_entries(r)
         t = 1.0 + a * a + b * b
         eigenvalue = np.roots([1.0, -t, a * a]).real.max()
-        assert claims_appendix.expansion(r, as_printed=False) ** 2 == pytest.approx(eigenvalue)
-        assert norm_of(a, b) ** 2 == pytest.approx(eigenvalue)
-        assert claims_appendix.expansion(r, as_printed=True) ** 2 != pytest.approx(eigenvalue)
+        assert claims_appendix.expand_bound(r, as_printed=False) ** 2 == pytest.approx(eigenvalue)
+        assert matrix_norm(a, b) ** 2 == pytest.approx(eigenvalue)
+        assert claims_appendix.expand_bound(r, as_printed=True) ** 2 != pytest.approx(eigenvalue)
 
 
 def test_number_of_the_papers_friction_by_brute_force() -> None:
     """Over x, d and both phases, from the matrix itself."""
-    draw, r, best = np.random.default_rng(1), PAPER, 0.0
+    draw, r, best = np.random.default_rng(1), PAPER_CASE, 0.0
     wave = 2.0 * np.pi / r.period
     for x, share in zip(
         draw.uniform(0.0, r.period, 20_000), draw.uniform(-1, 1, 20_000), strict=True
@@ -152,37 +182,39 @@ def test_number_of_the_papers_friction_by_brute_force() -> None:
         h, slope = r.amplitude * np.sin(wave * x), r.amplitude * wave * np.cos(wave * x)
         for rate, d in ((1.0, share), (0.0, np.sign(share))):
             a = r.friction * r.depth * ((1 - h) * rate / r.deflection - slope * d)
-            best = max(best, norm_of(a, r.friction * (1 - h) * d))
-    assert best <= claims_appendix.true_number(r) * (1.0 + 1e-9)
-    assert best == pytest.approx(claims_appendix.true_number(r), rel=0.01)
+            best = max(best, matrix_norm(a, r.friction * (1 - h) * d))
+    assert best <= claims_appendix.max_norm_ratio(r) * (1.0 + 1e-9)
+    assert best == pytest.approx(claims_appendix.max_norm_ratio(r), rel=0.01)
 
 
 def test_generic_probes_are_generic() -> None:
     """No slope, curvature or depth is small: an error in any of them shows."""
     for law in "ABCDEFG":
-        for spot in spots(law):
+        for spot in generic_probes(law):
             assert abs(spot.slope) > 1e-2
-            assert abs(spot.bend) > 10.0
+            assert abs(spot.second_derivative) > 10.0
             assert spot.force()[1] > 0.0
             assert find_law(law).letter == spot.surface.law.letter
 
 
-def test_feet_are_the_nearest_points() -> None:
-    for spot in spots("D", 6):
-        foot = [float(value) for value in foot_of(spot.surface, spot.x, spot.z)]
+def test_closest_points_are_the_nearest() -> None:
+    for spot in generic_probes("D", 6):
+        closest = [float(value) for value in find_closest_point(spot.surface, spot.x, spot.z)]
         known = spot.surface.texture.nearest([[spot.x, 0.0, spot.z]])[0]
-        assert foot == pytest.approx([known[0], known[2]], rel=1e-9)
+        assert closest == pytest.approx([known[0], known[2]], rel=1e-9)
         profile = spot.profile()
         for near in np.linspace(-1e-3, 1e-3, 101):
-            other = np.hypot(spot.x - foot[0] - near, spot.z - float(profile(foot[0] + near, 0)))
+            other = np.hypot(
+                spot.x - closest[0] - near, spot.z - float(profile(closest[0] + near, 0))
+            )
             assert other >= spot.distance * (1.0 - 1e-12)
 
 
-def test_derivatives_of_feet_by_coarser_differences() -> None:
-    for found in foot_rates(3):
-        spot, step = found.spot, 1e-8
+def test_derivatives_of_closest_points_by_coarser_differences() -> None:
+    for found in closest_point_derivatives(3):
+        spot, step = found.probe, 1e-8
         for name, move in (("x", (step, 0.0)), ("z", (0.0, step))):
-            ahead = foot_of(spot.surface, spot.x + move[0], spot.z + move[1])
-            behind = foot_of(spot.surface, spot.x - move[0], spot.z - move[1])
+            ahead = find_closest_point(spot.surface, spot.x + move[0], spot.z + move[1])
+            behind = find_closest_point(spot.surface, spot.x - move[0], spot.z - move[1])
             rates = [float(a - b) / (2.0 * step) for a, b in zip(ahead, behind, strict=True)]
-            assert rates == pytest.approx([found.rate("x", name), found.rate("z", name)], rel=1e-4)
+            assert rates == pytest.approx(found.derivatives[:, "xz".index(name)], rel=1e-4)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from asperity.paper.figures import ForceField, LoopEnergy, force_fields, loop_energies
-from asperity.paper.plane import LAWS, SCANNING
+from asperity.paper.planar_cases import PAPER_LAWS, SCANNING
 
 
 @pytest.fixture(scope="module")
@@ -27,11 +27,10 @@ def _profile(x: np.ndarray) -> np.ndarray:
 
 
 def test_figure_2_has_a_panel_for_each_law(fields: dict[str, ForceField]) -> None:
-    assert "".join(fields) == LAWS
-    for law, panel in fields.items():
+    assert "".join(fields) == PAPER_LAWS
+    for panel in fields.values():
         assert panel.points.shape == panel.forces.shape
         assert panel.points.shape[-1] == 2
-        assert panel.measured_from == ("wall" if law in "FG" else "texture")
         assert panel.height == pytest.approx(_profile(panel.x))
         json.dumps(panel.to_dict(), allow_nan=False)
 
@@ -60,12 +59,12 @@ def test_what_tells_the_laws_apart(fields: dict[str, ForceField]) -> None:
 
 def test_figure_3_ends_with_the_energy_of_the_loop(loops: dict[str, LoopEnergy]) -> None:
     for panel in loops.values():
-        assert panel.way.shape == panel.work.shape
-        assert panel.work[0] == panel.way[0] == 0.0
+        assert panel.arc_length.shape == panel.work.shape
+        assert panel.work[0] == panel.arc_length[0] == 0.0
         scale = np.abs(panel.work).max()
         assert panel.work[-1] == pytest.approx(panel.energy, abs=1e-4 * scale)
         edges = panel.vertices - np.roll(panel.vertices, 1, axis=0)
-        assert panel.way[-1] == pytest.approx(np.hypot(*edges.T).sum())
+        assert panel.arc_length[-1] == pytest.approx(np.hypot(*edges.T).sum())
         json.dumps(panel.to_dict(), allow_nan=False)
 
 

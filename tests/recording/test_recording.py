@@ -26,11 +26,11 @@ from mcap_ros2.decoder import DecoderFactory
 from rich.console import Console
 
 import asperity as asp
-from asperity.errors import ParameterError
-from asperity.files import write_text
+from asperity.core.errors import ParameterError
+from asperity.core.files import write_text
 from asperity.recording import mcap, writer
 from asperity.recording.recording import Recording, is_recording, open_recording
-from asperity.recording.rows import row_type, schema_columns, schema_text
+from asperity.recording.row_encoding import row_type, schema_columns, schema_text
 from asperity.recording.writer import RecordingWriter
 
 COLUMNS = (("time", "s"), ("x", "m"), ("applied x", "N"), ("law held", "1"))
@@ -70,10 +70,15 @@ def test_every_bit_comes_back(tmp_path: Path, block: int) -> None:
     table = rows_of(9001 if block > 1 else 301)
     found = open_recording(written(tmp_path / "run.mcap", table, block))
     assert_same(found.table(), table)
-    assert (found.rows, found.columns, found.whole, found.unread) == (len(table), COLUMNS, True, 0)
-    assert found.about == {"law": "B"}
-    assert found.attached("a.bin") == b"abc"
-    assert found.attached("b.bin") is None
+    assert (found.rows, found.columns, found.is_complete, found.unread_bytes) == (
+        len(table),
+        COLUMNS,
+        True,
+        0,
+    )
+    assert found.metadata == {"law": "B"}
+    assert found.attachment("a.bin") == b"abc"
+    assert found.attachment("b.bin") is None
     assert found.duration == pytest.approx(table[-1, 0])
     assert_same(found["applied x"], np.ascontiguousarray(table[:, 2]))
     assert sum(map(len, found.blocks())) == found.rows
@@ -127,7 +132,7 @@ def test_the_index_leads_where_it_says(tmp_path: Path) -> None:
         assert (chunk.message_start_time, chunk.message_end_time) == (times[0], times[-1])
     # The footer: where the summary begins, and its checksum.
     start, _offsets, checksum = struct.unpack_from("<QQI", data, len(data) - 28)
-    assert data[start] == mcap.Op.SCHEMA
+    assert data[start] == mcap.Opcode.SCHEMA
     assert checksum == zlib.crc32(data[start:-12])
 
 
@@ -147,8 +152,8 @@ def test_cut_anywhere_it_opens(tmp_path: Path) -> None:
         found = open_recording(cut)
         assert_same(found.table(), table[: found.rows])
         assert found.rows >= 10 * ((size - begin) // (10 * (ROW + 16) + 200))
-        assert found.whole or found.rows in {0, 10, 20, 30, 40}
-        assert "not closed" in repr(found) or found.whole
+        assert found.is_complete or found.rows in {0, 10, 20, 30, 40}
+        assert "not closed" in repr(found) or found.is_complete
         seen.add(found.rows)
     assert seen == {0, 10, 20, 30, 40}
     for size in range(1, begin, 3):
@@ -164,8 +169,8 @@ def test_a_block_that_power_has_spoiled_is_left_out(tmp_path: Path) -> None:
     data[-20_000:] = bytes(20_000)  # the index of the last block, and the end of its rows
     path.write_bytes(data)
     found = open_recording(path)
-    assert (found.rows, found.whole) == (8192, False)
-    assert found.unread > 20_000
+    assert (found.rows, found.is_complete) == (8192, False)
+    assert found.unread_bytes > 20_000
     assert_same(found.table(), table[:8192])
 
 
@@ -218,7 +223,7 @@ def test_a_disk_without_room_is_said(tmp_path: Path) -> None:
 _FULL = """
 import resource, signal, sys
 import numpy as np
-from asperity.errors import ParameterError
+from asperity.core.errors import ParameterError
 from asperity.recording.writer import RecordingWriter
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
@@ -246,7 +251,7 @@ def test_a_disk_that_fills_up_leaves_whole_blocks(tmp_path: Path) -> None:
     found = open_recording(path)
     words = "path cannot be written any further (File too large): 4096 rows are in"
     assert said.startswith(words)
-    assert (found.rows, found.unread) == (4096, 0)
+    assert (found.rows, found.unread_bytes) == (4096, 0)
     assert_same(found.table(), np.arange(40_000.0).reshape(-1, 2)[:4096])
 
 
@@ -291,7 +296,10 @@ BAD: dict[str, tuple[Callable[[Path], object], str]] = {
     "missing": (lambda path: path.exists(), "No such file"),
     "empty": (lambda path: path.write_bytes(b""), "it is empty"),
     "a folder": (a_folder, "not a regular file"),
-    "a picture": (lambda path: path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(99)), "no recording"),
+    "a picture": (
+        lambda path: path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(99)),
+        "not an MCAP recording",
+    ),
     "magic alone": (lambda path: path.write_bytes(mcap.MAGIC), "ends before its first row"),
     "of others": (of_others, "it was not written by asperity"),
     "later": (later, "of format 2, of asperity .*; this asperity reads format 1"),
@@ -347,7 +355,7 @@ def test_columns_and_schema_are_one(tmp_path: Path) -> None:
 
 def test_killed_at_any_moment_it_loses_less_than_a_second() -> None:
     """Processes that record and are killed: a small number of what the benchmark does."""
-    assert writer.LONGEST_WAIT <= 0.5
+    assert writer.MAX_WAIT <= 0.5
     assert recording_kills.run(8, Console(quiet=True)) == {}
 
 

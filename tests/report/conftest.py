@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from asperity.paper.experiments.beyond import BeyondExperiment, device_onset
-from asperity.paper.experiments.bump import bump_experiment
-from asperity.paper.experiments.passivity import passivity_experiment
-from asperity.paper.experiments.run import Experiments
-from asperity.paper.experiments.scanning import scanning_experiment
+from asperity.paper.experiments.bump_runs import bump_experiment
+from asperity.paper.experiments.cycle_counts import passivity_experiment
+from asperity.paper.experiments.device_onsets import DeviceExperiment, device_onset
+from asperity.paper.experiments.experiment_suite import Experiments
+from asperity.paper.experiments.stroke_energies import scanning_experiment
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 
@@ -21,5 +21,5 @@ def found() -> Experiments:
         passivity_experiment("WH", (0,), starts=2),
         scanning_experiment("A"),
         bump_experiment("AD"),
-        BeyondExperiment((device_onset("touch", "sinusoid", surface),), ("falcon",)),
+        DeviceExperiment((device_onset("touch", "sinusoid", surface),), ("falcon",)),
     )

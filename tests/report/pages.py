@@ -7,11 +7,13 @@ import hashlib
 import io
 import json
 import re
-from collections.abc import Callable
 from html.parser import HTMLParser
 from typing import Any
 
 from rich.console import Console
+
+from asperity.report.page import Page
+from asperity.report.terminal import print_page
 
 
 class Reader(HTMLParser):
@@ -110,8 +112,8 @@ def check_alts(reader: Reader, page: str) -> None:
             assert name.endswith("]") or name in {"strength T", "support S"}, name
 
 
-def terminal(show: Callable[..., None], *arguments: Any, width: int, **how: Any) -> str:
-    """Return what a function prints on a console of a width."""
-    console = Console(width=width, file=io.StringIO(), force_terminal=False)
-    show(*arguments, console, **how)
-    return console.file.getvalue()
+def terminal(page: Page, width: int) -> str:
+    """Return a page as printed on a console of a width."""
+    file = io.StringIO()
+    print_page(page, Console(width=width, file=file, force_terminal=False, highlight=False))
+    return file.getvalue()

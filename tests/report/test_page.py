@@ -3,43 +3,42 @@
 from __future__ import annotations
 
 import pytest
+from matplotlib.figure import Figure
 from tests.report.pages import Reader, check_alone
 
 from asperity.report import html_text
+from asperity.report.html import Origin, render_page
 from asperity.report.page import (
+    BulletList,
     Cards,
     Cell,
-    Definitions,
-    Items,
-    Origin,
+    DefinitionList,
     Page,
+    Paragraph,
     Picture,
     Row,
     Section,
     Table,
-    Words,
-    assumed,
-    page_html,
+    assumption_sections,
 )
 
 HOSTILE = '<script>alert("1")</script>'
-DOT = '<svg viewBox="0 0 9 9"><circle r="1"/></svg>'
 
 
 def page(*sections: Section) -> Reader:
-    return check_alone(page_html(Page("title", "answer", [("name", "value")], sections)))
+    return check_alone(render_page(Page("title", "answer", [("name", "value")], sections)))
 
 
 def everything(words: str) -> list[Section]:
     """Return one of each block, with the words everywhere."""
-    cell = Cell(words, "no", note=words, below=words, summary=words, details=[(words, words)])
-    table = Table((words, "n"), [Row([words, cell], "best", id="row")], numbers=(1,))
+    cell = Cell(words, "no", note=words, subtext=words, summary=words, details=[(words, words)])
+    table = Table((words, "n"), [Row([words, cell], "best", id="row")], numeric_columns=(1,))
     blocks = [
-        Words(words), Words(words, "code"), Words(words, "mono"), Items([words]),
-        Definitions([(words, words)]), Picture(DOT, words), table,
+        Paragraph(words), Paragraph(words, "code"), Paragraph(words, "mono"), BulletList([words]),
+        DefinitionList([(words, words)]), Picture(Figure((1.0, 1.0)), words), table,
         Cards([Section(words, [table], level=3, id="card")]),
     ]  # fmt: skip
-    return [Section(words, blocks, words, [words]), *assumed([words], table)]
+    return [Section(words, blocks, words, [words]), *assumption_sections([words], table)]
 
 
 def test_every_word_of_every_block_is_on_the_page() -> None:
@@ -54,7 +53,7 @@ def test_every_word_of_every_block_is_on_the_page() -> None:
 
 
 def test_nothing_is_taken_for_html() -> None:
-    text = page_html(Page(HOSTILE, HOSTILE, [(HOSTILE, HOSTILE)], everything(HOSTILE), HOSTILE))
+    text = render_page(Page(HOSTILE, HOSTILE, [(HOSTILE, HOSTILE)], everything(HOSTILE), HOSTILE))
     assert HOSTILE not in text
     assert Reader(text).tags.count("script") == 2  # the page's own, and the picture's numbers
     check_alone(text)
@@ -62,23 +61,23 @@ def test_nothing_is_taken_for_html() -> None:
 
 
 def test_a_command_is_text() -> None:
-    page_ = page_html(Page("title", "answer", [], []), Origin(f"asperity '{HOSTILE}'", "abc"))
+    page_ = render_page(Page("title", "answer", [], []), Origin(f"asperity '{HOSTILE}'", "abc"))
     assert HOSTILE not in page_
     assert "content abc" in check_alone(page_).text
 
 
 def test_a_page_can_be_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
-    text = page_html(Page("title", "answer", [], []))
+    text = render_page(Page("title", "answer", [], []))
     assert "1970-01-02" in text
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "soon")
-    assert "1970" not in page_html(Page("title", "answer", [], []))
+    assert "1970" not in render_page(Page("title", "answer", [], []))
 
 
 def test_nothing_assumed_is_no_section() -> None:
-    assert assumed([]) == []
+    assert assumption_sections([]) == []
 
 
 def test_no_report_for_anything_else() -> None:
-    with pytest.raises(TypeError, match="no report is known for a int"):
+    with pytest.raises(TypeError, match="a int has no report"):
         html_text(3)  # that is the point

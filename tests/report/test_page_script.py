@@ -20,7 +20,8 @@ from tests.report.pages import Reader
 
 import asperity as asp
 from asperity.report import html_text
-from asperity.report.page import Page, page_html, pictured
+from asperity.report.html import render_page
+from asperity.report.page import Page, picture_section
 from asperity.report.pictures import style
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
@@ -198,7 +199,9 @@ def three_scales() -> Figure:
 @needs_browser
 def test_points_lie_where_they_are_drawn_on_every_scale(tmp_path: Path) -> None:
     figure = three_scales()
-    text = page_html(Page("title", "answer", [], [pictured("One", figure, "Three lines.")]))
+    text = render_page(
+        Page("title", "answer", [], [picture_section("One", figure, "Three lines.")])
+    )
     script = """
     const panels = JSON.parse(document.querySelector("figure script").textContent);
     return panels.map((one) => one.series[0].x.map((x, i) => place(one, x, one.series[0].y[i])));

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.errors import ParameterError
+from asperity.core.errors import ParameterError
 from asperity.scene import load_scene
 from asperity.textures import Fourier, HeightMap, Sinusoid
 

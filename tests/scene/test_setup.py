@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asperity.errors import ParameterError
+from asperity.core.errors import ParameterError
 from asperity.scene import load_scene
 from asperity.scene.setup import Setup, make_setup
-from asperity.simulation import BandHand, Cartesian, MovedHand, Pantograph, SpringHand, Strokes
+from asperity.simulation import BandHand, Cartesian, Pantograph, PrescribedHand, SpringHand, Strokes
 
 HEAD = """
 [texture]
@@ -81,7 +81,7 @@ def test_a_moved_hand_needs_no_mass(tmp_path: Path) -> None:
         'end = ["3 mm", "0 mm", "-0.2 mm"]\nspeed = "30 mm/s"\ncount = 2\n'
     )
     setup = scene(tmp_path, '[device]\nid = "omega.3"\n', '[hand]\nkind = "moved"\n', strokes)
-    assert setup.hand == MovedHand()
+    assert setup.hand == PrescribedHand()
     assert isinstance(setup.motion, Strokes)
     assert setup.duration == pytest.approx(0.2)
     run = setup.simulate()
@@ -132,7 +132,7 @@ BAD = [
     ((MASS, SPRING.replace("300 N/m", "300 N"), STILL), r"stiffness must be a quantity"),
     ((MASS, SPRING.replace("300", "-300"), STILL), r"stiffness must not be negative"),
     ((MASS, SPRING, '[motion]\nkind = "still"\n'), r"motion.point is missing"),
-    ((MASS, SPRING, STILL.replace('"0 mm", ', "", 1)), r"three quantities"),
+    ((MASS, SPRING, STILL.replace('"0 mm", ', "", 1)), r"3 quantities"),
     ((MASS, SPRING, '[motion]\nkind = "path"\n'), r"needs a file"),
     ((MASS, SPRING, '[motion]\nkind = "path"\nfile = "no.csv"\n'), r"cannot be read"),
     ((MASS, SPRING, STILL, '[run]\nduraton = "1 s"\n'), r"did you mean 'duration'"),

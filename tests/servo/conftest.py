@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from tests.servo.python_device import SURFACE, PythonClock, PythonDevice, shown_of
 
-from asperity.servo.loop import Loop, no_clock
+from asperity.servo.driver_loop import DriverLoop, no_clock
+from asperity.servo.loop_memory import LoopMemory
 from asperity.servo.safety import Safety
-from asperity.servo.shared import Shared
 from asperity.simulation import Servo
 from asperity.surface import Surface
 
@@ -21,14 +21,20 @@ def go() -> Callable[..., SimpleNamespace]:
     """``go(device, samples, ...)``: a loop on it, run; cause, code, forces and rows."""
 
     def run(
-        device: PythonDevice, samples: int, servo: Servo | None = None,
-        safety: Safety | None = None, *, surface: Surface = SURFACE, reach: float = 1.0,
-        clock: PythonClock | None = None, control: Callable[[Shared], None] = lambda _shared: None,
-    ) -> SimpleNamespace:  # fmt: skip
+        device: PythonDevice,
+        samples: int,
+        servo: Servo | None = None,
+        safety: Safety | None = None,
+        *,
+        surface: Surface = SURFACE,
+        reach: float = 1.0,
+        clock: PythonClock | None = None,
+        control: Callable[[LoopMemory], None] = lambda _shared: None,
+    ) -> SimpleNamespace:
         settings = servo or Servo(1e-3, max_force=3.0)
-        shared = Shared()
+        shared = LoopMemory()
         ticks = no_clock() if clock is None else clock.record
-        loop = Loop(device, settings, safety or Safety(), reach, shared.board(), ticks)
+        loop = DriverLoop(device, settings, safety or Safety(), reach, shared.block(), ticks)
         control(shared)
         cause, code = loop.run(shown_of(surface), device.open(), samples)
         rows, first = shared.rows(0)

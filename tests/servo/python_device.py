@@ -11,11 +11,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from asperity.loop.clock import Clock
+from asperity.servo.driver_loop import LoopProgram, build_program, function_address
 from asperity.servo.drivers.driver import Driver
-from asperity.servo.kernels import by_address
-from asperity.servo.kernels.by_address import AddressedDevice
-from asperity.servo.kernels.clock import Clock
-from asperity.servo.loop import Rendered, address, render
+from asperity.servo.kernels import library_device as by_address
+from asperity.servo.kernels.library_device import LibraryDevice
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 
@@ -35,7 +35,7 @@ class PythonDevice(Driver):
     """
 
     name: ClassVar[str] = "python"
-    when_lost: ClassVar[str] = "Nothing."
+    loss_notice: ClassVar[str] = "Nothing."
 
     path: Callable[[int], Any]
     codes: dict[tuple[str, int], int] = field(default_factory=dict)
@@ -52,15 +52,15 @@ class PythonDevice(Driver):
         self.forces.append((force[0], force[1], force[2]))
         return self.codes.get(("write", len(self.forces) - 1), 0)
 
-    def kernels(self) -> tuple[ModuleType, ...]:
+    def kernel_modules(self) -> tuple[ModuleType, ...]:
         return (by_address,)
 
-    def blank(self) -> AddressedDevice:
-        return AddressedDevice(0, 0)
+    def placeholder_record(self) -> LibraryDevice:
+        return LibraryDevice(0, 0)
 
-    def open(self) -> AddressedDevice:
+    def open(self) -> LibraryDevice:
         self._kept = _READ(self._read), _WRITE(self._write)
-        return AddressedDevice(*map(address, self._kept))
+        return LibraryDevice(*map(function_address, self._kept))
 
 
 class PythonClock:
@@ -69,7 +69,7 @@ class PythonClock:
     def __init__(self, lateness: Callable[[int], int]) -> None:
         self._lateness, self._now, self._waits = lateness, 10**9, 0
         self._kept = _GETTIME(self._gettime), _SLEEP(self._sleep)
-        self.record = Clock(*map(address, self._kept), np.zeros(2, np.int64))
+        self.record = Clock(*map(function_address, self._kept), np.zeros(2, np.int64))
 
     def passes(self, time: int) -> None:
         """Let time pass [ns]."""
@@ -92,6 +92,6 @@ SURFACE = Surface(
 
 
 @cache
-def shown_of(surface: Surface) -> Rendered:
+def shown_of(surface: Surface) -> LoopProgram:
     """Return a surface as the loop of a :class:`PythonDevice` takes it."""
-    return render(surface, PythonDevice(lambda _k: (0.0, 0.0, 0.0)))
+    return build_program(surface, PythonDevice(lambda _k: (0.0, 0.0, 0.0)))

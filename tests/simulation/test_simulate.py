@@ -12,31 +12,31 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.simulation.cycles_by_definition import cycles, restlessness
-from tests.traced import traced_peak
+from tests.helpers.allocations import traced_peak
+from tests.simulation.onset.limit_cycle_definition import cycles, restlessness
 
-from asperity.errors import ParameterError
+from asperity.core.errors import ParameterError
 from asperity.simulation import (
     BandHand,
     Cartesian,
     LinkMasses,
-    MovedHand,
     Pantograph,
-    Path,
+    PrescribedHand,
     Resonance,
     Run,
     Servo,
     SpringHand,
-    Still,
+    Stationary,
     Strokes,
+    Waypoints,
     simulate,
     simulate_many,
 )
-from asperity.simulation.judging import CYCLE_SPEED
-from asperity.simulation.run import reread
-from asperity.simulation.trace import HEADER, MemoryTrace
+from asperity.simulation.limit_cycles.onset_search import CYCLE_SPEED
+from asperity.simulation.run import load_trace
+from asperity.simulation.trace import HEADER, DecimatedTrace
 from asperity.surface import Surface
-from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.kinds.sinusoid import Sinusoid
 
 WAVE = Sinusoid(amplitude=0.3e-3, period=2e-3, phase=0.3)
 WALL = Surface(WAVE, "W", 500.0)
@@ -87,8 +87,8 @@ def test_rows_are_thinned_out_evenly(
     monkeypatch: pytest.MonkeyPatch, most: int, chunk: int
 ) -> None:
     module = importlib.import_module("asperity.simulation.simulate")  # the name is the function's
-    monkeypatch.setattr(module, "CHUNK", chunk)
-    whole, thin = run_of(), run_of(most_rows=most)
+    monkeypatch.setattr(module, "CHUNK_SAMPLES", chunk)
+    whole, thin = run_of(), run_of(max_rows=most)
     rows = whole.table[:: -(-400 // most)] if most else whole.table[:0]
     assert len(thin.table) == len(rows) <= most
     assert thin.ledger == whole.ledger
@@ -97,30 +97,30 @@ def test_rows_are_thinned_out_evenly(
 
 @pytest.mark.parametrize("every", [1, 3, 20])
 def test_the_ending_is_that_of_all_rows(every: int) -> None:
-    rest: dict[str, Any] = {"motion": Still((0.0, 0.0, -1e-3)), "velocity": (0.3, 0.0, 0.0)}
-    whole, none = run_of(**rest, every=every), run_of(**rest, every=every, most_rows=0)
-    assert whole.ending is not None
-    assert none.ending is not None
-    assert none.ending.known
-    assert none.ending.restlessness == whole.ending.restlessness
-    assert whole.ending.restlessness == pytest.approx(restlessness(whole), rel=1e-12)
-    assert whole.ending.restlessness > 1e-9  # the handle swings
-    assert (whole.ending.restlessness > CYCLE_SPEED and whole.ending.fed) == cycles(whole)
+    rest: dict[str, Any] = {"motion": Stationary((0.0, 0.0, -1e-3)), "velocity": (0.3, 0.0, 0.0)}
+    whole, none = run_of(**rest, every=every), run_of(**rest, every=every, max_rows=0)
+    assert whole.tail is not None
+    assert none.tail is not None
+    assert none.tail.is_complete
+    assert none.tail.velocity_spread == whole.tail.velocity_spread
+    assert whole.tail.velocity_spread == pytest.approx(restlessness(whole), rel=1e-12)
+    assert whole.tail.velocity_spread > 1e-9  # the handle swings
+    assert (whole.tail.velocity_spread > CYCLE_SPEED and whole.tail.gains_energy) == cycles(whole)
 
 
 def test_a_run_without_enough_rows_has_no_known_ending() -> None:
-    few = run_of(every=200, most_rows=0).ending
+    few = run_of(every=200, max_rows=0).tail
     assert few is not None
-    assert not few.known
-    assert run_of(trace=False).ending is None
-    with pytest.raises(ParameterError, match="most_rows must be a whole number"):
-        run_of(most_rows=-1)
+    assert not few.is_complete
+    assert run_of(trace=False).tail is None
+    with pytest.raises(ParameterError, match="max_rows must be a whole number"):
+        run_of(max_rows=-1)
 
 
 def test_memory_without_rows_is_flat_in_the_duration() -> None:
     def peak(duration: float) -> int:
-        still = Still((0.0, 0.0, -1e-3))
-        return traced_peak(lambda: run_of(duration=duration, motion=still, most_rows=0))
+        still = Stationary((0.0, 0.0, -1e-3))
+        return traced_peak(lambda: run_of(duration=duration, motion=still, max_rows=0))
 
     peak(20.0)
     assert peak(400.0) < 1.05 * peak(40.0)  # 86 MB if it kept the rows
@@ -129,7 +129,7 @@ def test_memory_without_rows_is_flat_in_the_duration() -> None:
 def test_chunks_leave_no_seam(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = run_of(every=3)
     module = importlib.import_module("asperity.simulation.simulate")  # the name is the function's
-    monkeypatch.setattr(module, "CHUNK", 17)
+    monkeypatch.setattr(module, "CHUNK_SAMPLES", 17)
     told: list[float] = []
     pieces = run_of(every=3, progress=told.append)
     # The sums are added to in another order.
@@ -164,7 +164,7 @@ def test_a_file_that_cannot_be_written_is_named(tmp_path: FilePath) -> None:
 _FULL_DISK = """
 import resource, signal, sys
 sys.path[:0] = {paths!r}
-from asperity.errors import ParameterError
+from asperity.core.errors import ParameterError
 from tests_job import job
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))
@@ -176,12 +176,12 @@ except ParameterError as error:
 """
 
 _JOB = """
-from asperity.simulation import Cartesian, Servo, SpringHand, Still
+from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
 from asperity.surface import Surface
-from asperity.textures.sinusoid import Sinusoid
+from asperity.textures.kinds.sinusoid import Sinusoid
 job = dict(
     surface=Surface(Sinusoid(3e-4, 2e-3), "W", 500.0), plant=Cartesian(0.05, 1.0),
-    hand=SpringHand(100.0), servo=Servo(1e-4), motion=Still((0.0, 0.0, -1e-3)), duration=10.0,
+    hand=SpringHand(100.0), servo=Servo(1e-4), motion=Stationary((0.0, 0.0, -1e-3)), duration=10.0,
 )
 """
 
@@ -247,38 +247,40 @@ def test_a_run_is_plain_data() -> None:
     plain = json.loads(json.dumps(run.to_dict()))
     assert plain["notes"][0].startswith("Link masses of the pantograph are a guess")
     assert plain["samples"] == 10
-    for part in (JOB["plant"], Pantograph(), HAND, BandHand(), MovedHand(), WAY, Servo(1e-3)):
+    for part in (JOB["plant"], Pantograph(), HAND, BandHand(), PrescribedHand(), WAY, Servo(1e-3)):
         json.dumps(part.to_dict(), allow_nan=False)
-    json.dumps(Path([0.0], [[0.0, 0.0, 0.0]]).to_dict())
+    json.dumps(Waypoints([0.0], [[0.0, 0.0, 0.0]]).to_dict())
     json.dumps(Cartesian(resonance=Resonance(400.0)).to_dict())
 
 
 def test_at_rest_nothing_becomes_subnormal() -> None:
     """Long after the last stroke velocities have decayed to nothing, not to 1e-310."""
-    run = run_of(motion=Still((0.0, 0.0, 0.05)), start=(1e-3, 0.0, 0.05), duration=40.0, every=100)
+    run = run_of(
+        motion=Stationary((0.0, 0.0, 0.05)), start=(1e-3, 0.0, 0.05), duration=40.0, every=100
+    )
     tiny = np.abs(run.table[:, 1:7])
     assert not ((tiny > 0.0) & (tiny < 1e-150)).any()
 
 
 def test_a_ledger_that_does_not_close_is_said() -> None:
-    assert run_of().closes
+    assert run_of().is_energy_balanced
     # Friction holds the handle: all that is exchanged is the last bits of what a band stores.
     held = run_of(
         plant=Cartesian(0.05, 1.0, friction=5.0), hand=BandHand(),
-        motion=Still((0.0, 0.0, 0.01)), start=(0.0, 0.0, 1e-3),
+        motion=Stationary((0.0, 0.0, 0.01)), start=(0.0, 0.0, 1e-3),
     )  # fmt: skip
     assert abs(held.ledger.closure) > 1e-9 * held.ledger.exchanged
-    assert held.ledger.exchanged < 1e-15 * held.ledger.before
-    assert held.closes
+    assert held.ledger.exchanged < 1e-15 * held.ledger.stored_before
+    assert held.is_energy_balanced
     stiff = run_of(hand=SpringHand(1e12))  # thousands of its radians to a sample
     assert abs(stiff.ledger.closure) > 1e-9 * stiff.ledger.exchanged
-    assert not stiff.closes
+    assert not stiff.is_energy_balanced
 
 
 @pytest.mark.parametrize("rows", [10**15, 10**18])
 def test_a_trace_beyond_all_memory_is_refused(rows: int) -> None:
     with pytest.raises(ParameterError, match=f"trace needs memory for {rows} rows"):
-        MemoryTrace(rows)
+        DecimatedTrace(rows, None)
 
 
 BAD: list[tuple[dict[str, Any], str]] = [
@@ -297,7 +299,10 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"trace": 3}, "trace must be"),
     ({"start": (0.0, 0.0)}, "start must have shape"),
     ({"velocity": (0.0, 0.0, np.nan)}, "velocity must be finite"),
-    ({"hand": MovedHand(), "start": (0.0, 0.0, 1.0)}, "start is where the motion begins"),
+    (
+        {"hand": PrescribedHand(), "start": (0.0, 0.0, 1.0)},
+        "start must be the start of a prescribed motion",
+    ),
     ({"hand": BandHand(), "plant": Cartesian(resonance=Resonance(400.0))}, "resonance is not"),
 ]
 
@@ -318,7 +323,7 @@ WRONG: list[tuple[Any, tuple[Any, ...], dict[str, Any], str]] = [
     (Cartesian, (0.1,), {"friction": np.nan}, "friction"),
     (Cartesian, (0.1,), {"resonance": 400.0}, "resonance"),
     (Resonance, (0.0,), {}, "frequency"),
-    (Resonance, (400.0,), {"share": 1.0}, "share"),
+    (Resonance, (400.0,), {"mass_fraction": 1.0}, "mass_fraction"),
     (Pantograph, (), {"joint_damping": -1e-3}, "joint_damping"),
     (Pantograph, (), {"friction": -1.0}, "friction"),
     (Pantograph, (), {"centre": (0.0, 0.2)}, "point must be reached"),
@@ -332,15 +337,15 @@ WRONG: list[tuple[Any, tuple[Any, ...], dict[str, Any], str]] = [
     (BandHand, (200.0, 17.0), {}, "tension must be less than stiffness"),
     (BandHand, (), {"damping": -0.1}, "damping"),
     (BandHand, (0.0,), {}, "stiffness"),
-    (Still, ((0.0, 0.0),), {}, "point"),
+    (Stationary, ((0.0, 0.0),), {}, "point"),
     (Strokes, ((0, 0, 0), (0, 0, 0), 1.0), {}, "end"),
     (Strokes, ((0, 0, 0), (1, 0, 0), 0.0), {}, "speed"),
     (Strokes, ((-1e308, 0, 0), (1e308, 0, 0), 1.0), {}, "end must be at a finite distance"),
     (Strokes, ((0, 0, 0), (1, 0, 0), 1e-320), {}, "speed must be at least"),
     (Strokes, ((0, 0, 0), (1e-300, 0, 0), 1e30), {}, "speed must make"),
     (Strokes, ((0, 0, 0), (1, 0, 0), 1.0, 1.5), {}, "count"),
-    (Path, ([0.0, 0.0], np.zeros((2, 3))), {}, "times"),
-    (Path, ([0.0], np.zeros((2, 3))), {}, "points"),
+    (Waypoints, ([0.0, 0.0], np.zeros((2, 3))), {}, "times"),
+    (Waypoints, ([0.0], np.zeros((2, 3))), {}, "points"),
 ]
 
 
@@ -358,8 +363,8 @@ def test_a_written_trace_is_read_back_thinned_out_evenly(
     tmp_path: FilePath, most: int, name: str
 ) -> None:
     surface_to_end = (WALL, Cartesian(0.1, 1.0), SpringHand(100.0, 2.0), Servo(1e-3))
-    ask = partial(simulate, *surface_to_end, Still((0.0, 0.0, -1e-3)), 0.04)
-    whole, read = ask().table, reread(ask(trace=tmp_path / name), most).table
+    ask = partial(simulate, *surface_to_end, Stationary((0.0, 0.0, -1e-3)), 0.04)
+    whole, read = ask().table, load_trace(ask(trace=tmp_path / name), most).table
     step = -(-len(whole) // most)
     assert len(read) <= most
     np.testing.assert_allclose(read, whole[::step], rtol=1e-11)

@@ -12,7 +12,7 @@ import pytest
 
 from asperity.analysis.analyze import analyze
 from asperity.analysis.compare import compare
-from asperity.errors import ParameterError
+from asperity.core.errors import ParameterError
 from asperity.scene import load_scene
 from asperity.surface import Surface
 from asperity.textures.catalogue import CATALOGUE
@@ -43,7 +43,7 @@ def _specifications() -> Iterator[str]:
 # Heights of 1e30 m overflow here and there: what counts is that it ends.
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("specification", list(_specifications()))
-def test_extreme_arguments_end_soon(specification: str) -> None:
+def test_extreme_arguments_end_within_seconds(specification: str) -> None:
     begin, before = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with suppress(ParameterError):
         compare(load_scene(specification).texture, laws="A")
@@ -51,14 +51,14 @@ def test_extreme_arguments_end_soon(specification: str) -> None:
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 1_000_000  # kilobytes
 
 
-def test_a_wave_too_steep_for_a_loop_is_named() -> None:
+def test_a_wave_too_steep_for_a_loop_is_an_error() -> None:
     with pytest.raises(ParameterError, match=r"too steep for its leak.*amplitude.*period"):
         compare(load_scene(WAVES[0]).texture, laws="A")
     with pytest.raises(ParameterError, match="amplitudes and wavevectors make a curvature"):
         load_scene("fourier:amplitudes=1e30m,wavevectors=1e30 0 rad/m")
 
 
-def test_analysis_of_a_radius_below_all_digits() -> None:
+def test_analysis_of_a_radius_below_double_precision() -> None:
     """A crest of 1 m has a radius of 25e-21 m; an anchor is dragged over a million waves."""
     wave = load_scene(WAVES[0]).texture
     assert analyze(Surface(wave, "D")).q.upper == math.inf

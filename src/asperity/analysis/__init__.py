@@ -1,18 +1,18 @@
-"""A surface (and a device) in, a frozen result out."""
+"""Analysis: frozen results from a surface and a device."""
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.compare import Comparison, compare
+from asperity.analysis.comparison_result import LawRow
 from asperity.analysis.energy.continuity import Continuity, Jump
 from asperity.analysis.energy.leak import Leak, worst_loop
-from asperity.analysis.energy.loops import loop_work
+from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.characteristic import (
     characteristic_number,
     curl_number,
     one_sided_number,
 )
 from asperity.analysis.passivity.criteria import Criterion
-from asperity.analysis.passivity.judgement import Passivity
-from asperity.analysis.row import LawRow
+from asperity.analysis.passivity.verdict import Passivity
 
 __all__ = [
     "Bound",

@@ -1,4 +1,4 @@
-"""What is known of one law on one surface and one device."""
+"""The analysis of one law on one surface and one device."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import Continuity
 from asperity.analysis.energy.leak import Leak
 from asperity.analysis.energy.merit import Merit
-from asperity.analysis.passivity.judgement import Passivity
+from asperity.analysis.passivity.verdict import Passivity
+from asperity.core.display import Plottable, Reportable
+from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.devices import Device
-from asperity.display import Plotted, Reported
-from asperity.files import plain, record
 from asperity.surface import Surface
 
-SCHEMA = 1
+SCHEMA = 2
 
 
 @dataclass(frozen=True)
-class Analysis(Plotted, Reported):
-    """What is known of one law on one surface and one device.
+class Analysis(Plottable, Reportable):
+    """Results of one law on one surface and one device.
 
     Attributes:
         surface: the surface, with its law, stiffness and depth.
@@ -30,14 +30,14 @@ class Analysis(Plotted, Reported):
         one_sided: one-sided number q⁺ [1].
         curl: sup |curl f|/k [1]; ``None`` for a law with state, whose force is no field.
         conservative: whether the work around every closed path is zero.
-        conservative_reason: one sentence.
+        conservative_reason: the reason, in one sentence.
         leak: the worst simple loop, in a vertical plane.
         continuity: whether the force jumps inside the working region, and where.
-        passivity: what each criterion says of the device, and which one decides.
+        passivity: every criterion on the device, and the deciding one.
         merit: strength and support on a straight scan.
         answer: the verdict in one sentence.
-        assumptions: defaults that were used, device data that are not verified, the steps of
-            preparing the surface, in sentences.
+        assumptions: used defaults, unverified device data and preparation steps of the surface,
+            in sentences.
     """
 
     surface: Surface
@@ -51,8 +51,8 @@ class Analysis(Plotted, Reported):
     continuity: Continuity
     passivity: Passivity
     merit: Merit
-    answer: str
-    assumptions: tuple[str, ...]
+    answer: str = ""
+    assumptions: tuple[str, ...] = ()
 
     @property
     def curl_density(self) -> Bound | None:
@@ -79,14 +79,16 @@ class Analysis(Plotted, Reported):
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number; infinity is the string "inf"."""
         surface = self.surface
+        fields = (
+            "device q one_sided curl curl_density conservative conservative_reason leak v_star "
+            "continuity passivity merit assumptions"
+        )
         return {
             "schema": SCHEMA,
             "answer": self.answer,
-            "texture": plain(surface.texture.describe()),
+            "texture": to_plain_data(surface.texture.describe()),
             "law": surface.law.letter,
             "law_name": surface.law.name,
-            **record(surface, "law_parameters", "clamp", "stiffness", "max_depth"),
-            **record(self, "device", "q", "one_sided", "curl", "curl_density", "conservative"),
-            **record(self, "conservative_reason", "leak", "v_star", "continuity", "passivity"),
-            **record(self, "merit", "assumptions"),
+            **attributes_to_dict(surface, "law_parameters", "clamp", "stiffness", "max_depth"),
+            **attributes_to_dict(self, *fields.split()),
         }

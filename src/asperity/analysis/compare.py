@@ -1,4 +1,4 @@
-"""The main job: the paper's Table II for your surface on your device."""
+"""Comparison of the laws on one surface and one device: the paper's Table II."""
 
 from __future__ import annotations
 
@@ -7,32 +7,37 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from asperity.analysis.assess_passivity import passivity
+from asperity.analysis.bounds.measures import NORM, ONE_SIDED
+from asperity.analysis.comparison_result import LawRow, recommend
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.energy.merit import merit
-from asperity.analysis.gain.answers import content_but_stiffness
-from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
-from asperity.analysis.judge_passivity import passivity
-from asperity.analysis.limits.felt import DEFAULT_SPEED, texture_alone, texture_felt
-from asperity.analysis.limits.spectrum import spectrum
-from asperity.analysis.limits.wave_force import wave_forces
-from asperity.analysis.passivity.margin import at_start, start
-from asperity.analysis.recommendation import recommend
-from asperity.analysis.row import LawRow
-from asperity.analysis.words.comparison import assumptions, recommendation, verdict
-from asperity.arguments import DEFAULT_STIFFNESS
-from asperity.checks import positive
+from asperity.analysis.energy.merit import merit as compute_merit
+from asperity.analysis.gain.characteristic import cached_number
+from asperity.analysis.gain.surface_cache import is_shipped_law, surface_content
+from asperity.analysis.limits.perceptibility import DEFAULT_SPEED, assess_perceptibility
+from asperity.analysis.passivity.recommended_stiffness import (
+    at_recommended_stiffness,
+    recommend_stiffness,
+)
+from asperity.analysis.sentences.comparison_sentences import (
+    comparison_assumptions,
+    recommendation_text,
+    row_verdict,
+)
+from asperity.core.arguments import DEFAULT_STIFFNESS
+from asperity.core.checks import check_positive
+from asperity.core.display import Plottable, Reportable
+from asperity.core.errors import ParameterError
+from asperity.core.files import attributes_to_dict, to_plain_data
+from asperity.core.processes import precompute
 from asperity.devices import Device, load_device
-from asperity.display import Plotted, Reported
-from asperity.errors import ParameterError
-from asperity.files import plain, record
-from asperity.laws import LAWS, Law, find_laws, shared_out
-from asperity.processes import helped
+from asperity.laws import LAWS, Law, distribute_parameters, find_laws
 from asperity.surface import Surface
-from asperity.textures.naming import TextureLike, as_texture
+from asperity.textures.catalogue import TextureLike, as_texture
 from asperity.textures.texture import Texture, TexturePart
 
-SCHEMA = 1
+SCHEMA = 2
 DEFAULT_DEVICE = "omega.3"
 ALL_LAWS = "".join(LAWS)
 
@@ -40,22 +45,22 @@ Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Comparison(Plotted, Reported):
+class Comparison(Plottable, Reportable):
     """The laws compared on one surface and one device.
 
     Attributes:
         texture: the texture.
         device: the device.
-        stiffness: the stiffness that was asked for [N/m]; ``None`` if each law was taken at its
-            own, the one to begin with.
-        max_depth: the depth to which the surface is pressed [m].
-        speed: of the scan on which the texture is to be felt [m/s].
-        rows: one per law, in the order asked for.
-        recommended_row: of the recommended law; ``None`` if none can be recommended.
-        nearest_row: where nothing is felt, of the law that comes nearest to it; else ``None``.
+        stiffness: the given stiffness [N/m]; ``None`` if each law is taken at its recommended
+            stiffness.
+        max_depth: depth to which the surface is pressed [m].
+        speed: speed of the scan for which perceptibility is assessed [m/s].
+        rows: one per law, in the given order.
+        recommended_row: row of the recommended law; ``None`` if none can be recommended.
+        nearest_row: where no texture is felt, row of the law that comes nearest; else ``None``.
         recommendation: the recommendation with its reason, in words.
-        assumptions: what was assumed, in sentences: defaults, unverified device data, the steps
-            of preparing the surface, regions and resolutions of sampling.
+        assumptions: assumptions, in sentences: defaults, unverified device data, the preparation
+            steps of the surface, regions and resolutions of sampling.
     """
 
     texture: Texture
@@ -84,17 +89,17 @@ class Comparison(Plotted, Reported):
 
     def __repr__(self) -> str:
         row = self.recommended_row
-        said = "none recommended" if row is None else f"{row!r} recommended"
-        return f"<Comparison of {len(self.rows)} laws on {self.device.id}: {said}>"
+        outcome = "none recommended" if row is None else f"{row!r} recommended"
+        return f"<Comparison of {len(self.rows)} laws on {self.device.id}: {outcome}>"
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""
         return {
             "schema": SCHEMA,
             "texture": self.texture.describe(),
-            **record(self, "device", "stiffness", "max_depth", "speed"),
-            "laws": plain(self.rows),
-            **record(self, "recommended", "recommendation", "assumptions"),
+            **attributes_to_dict(self, "device", "stiffness", "max_depth", "speed"),
+            "laws": to_plain_data(self.rows),
+            **attributes_to_dict(self, "recommended", "recommendation", "assumptions"),
         }
 
 
@@ -110,26 +115,26 @@ def compare(
     law_parameters: Mapping[str, float] | None = None,
     **surface_arguments: Any,
 ) -> Comparison:
-    """Return which laws render a surface on a device, at which stiffness, and what goes wrong.
+    """Compare laws on a surface and a device: stability, perceptibility and artefacts.
 
-    For every law: q and q⁺, up to which stiffness the device may render it and how well that is
-    known (:func:`~asperity.analysis.judge_passivity.passivity`), whether the field is conservative
-    and what its worst loop gains, whether the force is continuous, strength and support, and a
-    verdict. First of all: whether its texture is felt, at the stiffness to begin with
-    (:func:`~asperity.analysis.limits.felt.texture_felt`).
+    For every law: the perceptibility of its texture at the recommended stiffness
+    (:func:`~asperity.analysis.limits.perceptibility.assess_perceptibility`); q and q⁺; the
+    stability limit and its basis (:func:`~asperity.analysis.assess_passivity.passivity`); whether
+    the field is conservative, and the energy gained on its worst loop; whether the force is
+    continuous; strength and support; and a verdict.
 
     Args:
         texture: the surface, or what names it on the command line: "sandpaper:grit=P60", "cloth",
-            the path of a measured file; see :func:`~asperity.textures.naming.as_texture`.
+            the path of a measured file; see :func:`~asperity.textures.catalogue.as_texture`.
         device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`.
-        laws: letters or names, or laws of your own.
-        stiffness: the stiffness that you ask about [N/m]; by default each law's own, the one to
-            begin with on this device.
-        max_depth: the depth to which the surface is pressed [m]; by default its peak-to-valley
+        laws: letters or names, or user-defined laws.
+        stiffness: stiffness of all laws [N/m]; by default the recommended stiffness of each law
+            on this device.
+        max_depth: depth to which the surface is pressed [m]; by default its peak-to-valley
             height, at most 1 mm.
-        speed: of the scan on which the texture is to be felt [m/s]; 0.1 by default.
+        speed: speed of the scan for which perceptibility is assessed [m/s]; 0.1 by default.
         progress: called with the letter of each law before it is analysed.
-        law_parameters: values of laws' parameters by name; each goes to the laws that declare it.
+        law_parameters: parameters of laws by name; each goes to the laws that declare it.
         **surface_arguments: further arguments of :class:`~asperity.surface.Surface`.
 
     Raises:
@@ -141,154 +146,151 @@ def compare(
         >>> [f"{row.law.letter} {row.safe_stiffness:.0f} N/m" for row in result.rows]
         ['W 5000 N/m', 'A 976 N/m']
     """
-    chosen = find_laws(list(laws) if not isinstance(laws, str) else laws)
-    known_device = load_device(device)
-    asked = None if stiffness is None else positive("stiffness", stiffness, "N/m")
-    brisk = DEFAULT_SPEED if speed is None else positive("speed", speed, "m/s")
-    _refuse_unknown(known_device)
-    shares = shared_out(law_parameters or {}, chosen)
-    made = as_texture(texture)
+    laws = find_laws(list(laws) if not isinstance(laws, str) else laws)
+    device = load_device(device)
+    if stiffness is not None:
+        stiffness = check_positive("stiffness", stiffness, "N/m")
+    scan_speed = DEFAULT_SPEED if speed is None else check_positive("speed", speed, "m/s")
+    _require_device_data(device)
+    parameters = distribute_parameters(law_parameters or {}, laws)
+    texture = as_texture(texture)
+    surface_arguments |= {"stiffness": stiffness or DEFAULT_STIFFNESS, "max_depth": max_depth}
     surfaces = [
-        Surface(made, law, asked or DEFAULT_STIFFNESS, max_depth, law_parameters=own,
-                **surface_arguments)
-        for law, own in zip(chosen, shares, strict=True)
-    ]  # fmt: skip
-    question = _Question(known_device, asked, brisk, made.texture_part(), max_depth is not None)
+        Surface(texture, law, law_parameters=own, **surface_arguments)
+        for law, own in zip(laws, parameters, strict=True)
+    ]
+    part, explicit_depth = texture.texture_part(), max_depth is not None
+    query = _ComparisonQuery(device, stiffness, scan_speed, part, explicit_depth)
     rows = []
-    with helped(answer_ahead, _tasks(surfaces, question)) as turns:
-        for surface, _ in zip(surfaces, turns, strict=True):
+    with precompute(precompute_row, _precompute_tasks(surfaces, query)) as precomputed:
+        for surface, _ in zip(surfaces, precomputed, strict=True):
             if progress is not None:
                 progress(surface.law.letter)
-            rows.append(_row(surface, question))
-    found = recommend(rows)
-    defaults = {"max_depth": max_depth is None, "speed": speed is None}
+            rows.append(_compute_row(surface, query))
+    recommended = recommend(rows)
+    defaults = {"max_depth": not explicit_depth, "speed": speed is None}
     return Comparison(
-        texture=made,
-        device=known_device,
-        stiffness=asked,
+        texture=texture,
+        device=device,
+        stiffness=stiffness,
         max_depth=surfaces[0].max_depth,
-        speed=brisk,
+        speed=scan_speed,
         rows=tuple(rows),
-        recommended_row=found.row,
-        nearest_row=found.nearest,
-        recommendation=recommendation(found, known_device),
-        assumptions=assumptions(rows, question.part, known_device, defaults),
+        recommended_row=recommended.row,
+        nearest_row=recommended.nearest,
+        recommendation=recommendation_text(recommended, device),
+        assumptions=comparison_assumptions(rows, part, device, defaults),
     )
 
 
-def line_to_add(device: Device) -> str:
-    """Return the line that a device's file lacks to compare laws on it; empty if it lacks none.
+def missing_data_hint(device: Device) -> str:
+    """Return the line missing from a device file to compare laws on it; empty if none is missing.
 
     Example:
-        >>> line_to_add(load_device("touch")), line_to_add(load_device("2diy"))
+        >>> missing_data_hint(load_device("touch")), missing_data_hint(load_device("2diy"))
         ('', 'max_stiffness = "... N/m"')
     """
-    proof = ("damping", "update_rate", "delay_samples")
-    proved = all(device.value(field) is not None for field in proof)
-    return "" if device.wall_test is not None or proved else 'max_stiffness = "... N/m"'
+    fields = ("damping", "update_rate", "delay_samples")
+    is_provable = all(device.value(field) is not None for field in fields)
+    return "" if device.wall_test is not None or is_provable else 'max_stiffness = "... N/m"'
 
 
-def law_to_ask_about(
+def recommended_law(
     texture: TextureLike,
     device: str | os.PathLike[str] | Device = DEFAULT_DEVICE,
     max_depth: float | None = None,
     **arguments: Any,
 ) -> Law:
-    """Return the law that a comparison recommends; where nothing is felt, the one that is nearest.
+    """Return the law recommended by a comparison; where no texture is felt, the nearest to it.
 
     Args:
         texture: the surface.
         device: see :func:`compare`.
         max_depth: see :func:`compare`.
-        **arguments: further ones of :func:`compare`.
+        **arguments: further arguments of :func:`compare`.
 
     Raises:
-        ParameterError: where no law is better than another, since none is known to do.
+        ParameterError: if no law has a known stable stiffness.
     """
-    found = compare(texture, device, max_depth=max_depth, **arguments)
-    row = found.recommended_row or found.nearest_row
+    result = compare(texture, device, max_depth=max_depth, **arguments)
+    row = result.recommended_row or result.nearest_row
     if row is None:
-        raise ParameterError(
-            "law", f"is missing, and none can be recommended: {found.recommendation}"
-        )
+        reason = f"is missing, and none can be recommended: {result.recommendation}"
+        raise ParameterError("law", reason)
     return row.law
 
 
 @dataclass(frozen=True)
-class _Question:
-    """What is asked of every law."""
+class _ComparisonQuery:
+    """The conditions under which every law is analysed."""
 
     device: Device
     stiffness: float | None
     speed: float
     part: TexturePart
-    deep: bool
+    explicit_depth: bool
 
 
-def _refuse_unknown(device: Device) -> None:
-    """Refuse a device of which no stiffness of any law could follow."""
-    if line := line_to_add(device):
+def _require_device_data(device: Device) -> None:
+    """Refuse a device whose data give no stiffness limit for any law."""
+    if hint := missing_data_hint(device):
         others = "damping, update_rate and delay_samples"
-        needs = f"needs max_stiffness to compare laws: add {line}, the stiffest smooth wall"
+        needs = f"needs max_stiffness to compare laws: add {hint}, the stiffest smooth wall"
         raise ParameterError("device", f"{device.id} {needs} that held, to its file; or {others}")
 
 
-def _tasks(surfaces: Sequence[Surface], question: _Question) -> list[tuple[Surface, bool] | None]:
-    """Return what can be answered ahead, law by law: what is kept."""
+Task = tuple[Surface, _ComparisonQuery]
+
+
+def _precompute_tasks(surfaces: Sequence[Surface], query: _ComparisonQuery) -> list[Task | None]:
+    """Return one task per law; ``None`` for a law whose results are not shared by the cache."""
     return [
-        None if content_but_stiffness(surface) is None else (surface, question.deep)
+        (surface, query)
+        if is_shipped_law(surface.law) and surface_content(surface) is not None
+        else None
         for surface in surfaces
     ]
 
 
-def answer_ahead(task: tuple[Surface, bool] | None) -> None:
-    """Work out, and keep, what of a row costs time: all that does not depend on the device."""
-    if task is None:
-        return
-    surface, deep = task
-    q = characteristic_number(surface)
-    one_sided_number(surface)
-    merit(surface)
-    worst_loop(surface)
-    continuity(surface, q)
-    part = surface.texture.texture_part()
-    alone = texture_alone(surface, part, deep=deep)
-    merit(alone)
-    wave_forces(alone, spectrum(part.texture))
+def precompute_row(task: Task | None) -> None:
+    """Compute a row in a worker process, which leaves its numbers in the cache."""
+    if task is not None:
+        _compute_row(*task)
 
 
-def _row(surface: Surface, question: _Question) -> LawRow:
-    device = question.device
-    q, one_sided = characteristic_number(surface), one_sided_number(surface)
-    begin = start(surface, device, q, one_sided)
-    if question.stiffness is None:
-        surface = at_start(surface, device, begin)
-    facts = surface.facts
-    scan, leak = merit(surface), worst_loop(surface)
-    smooth = continuity(surface, q)
-    felt = None
-    if begin.stiffness:
-        felt = texture_felt(
-            surface.to_stiffness(begin.stiffness), device, question.part,
-            rms=scan.ripple * begin.stiffness, speed=question.speed, deep=question.deep,
-        )  # fmt: skip
+def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
+    device = query.device
+    q, one_sided = cached_number(surface, NORM), cached_number(surface, ONE_SIDED)
+    recommended = recommend_stiffness(surface, device, q, one_sided)
+    if query.stiffness is None:
+        surface = at_recommended_stiffness(surface, device, recommended)
+    leak, merit, force = worst_loop(surface), compute_merit(surface), continuity(surface, q)
+    perceptibility = None
+    if recommended.stiffness:
+        perceptibility = assess_perceptibility(
+            surface.to_stiffness(recommended.stiffness),
+            device,
+            query.part,
+            rms=merit.ripple * recommended.stiffness,
+            speed=query.speed,
+            explicit_depth=query.explicit_depth,
+        )
     row = LawRow(
         surface=surface,
         q=q,
         one_sided=one_sided,
         passivity=passivity(surface, device, q, one_sided, leak),
-        margin=begin.margin,
-        start=begin.stiffness,
-        felt=felt,
-        conservative=facts.conservative,
-        conservative_reason=facts.reason,
+        margin=recommended.margin,
+        recommended_stiffness=recommended.stiffness,
+        perceptibility=perceptibility,
+        conservative=surface.facts.conservative,
+        conservative_reason=surface.facts.reason,
         leak=leak,
-        continuous=smooth.continuous,
-        continuous_reason=smooth.reason,
-        strength=scan.strength,
-        support=scan.support,
-        contact_lost=scan.contact_lost,
-        ripple=scan.ripple,
-        verdict="",
+        continuous=force.continuous,
+        continuous_reason=force.reason,
+        strength=merit.strength,
+        support=merit.support,
+        contact_lost=merit.contact_lost,
+        ripple=merit.ripple,
     )
-    return replace(row, verdict=verdict(row))
+    return replace(row, verdict=row_verdict(row))

@@ -1,4 +1,4 @@
-"""The command ``asperity``."""
+"""The command ``asperity``: its list of commands and the report of errors."""
 
 from __future__ import annotations
 
@@ -10,41 +10,86 @@ from typing import Any, NoReturn
 import click
 
 import asperity
-from asperity.cache import CacheWarning, size_limit
-from asperity.cli.group import Group
-from asperity.cli.own_code import own_fault
-from asperity.errors import AsperityError, InternalError, tell
+from asperity.cli.plugins import plugin_error_text
+from asperity.core.cache import CacheWarning, size_limit
+from asperity.core.errors import AsperityError, InternalError, ParameterError, print_message
+
+
+def check_not_repeated(
+    command: click.Command, arguments: list[str], group: click.Context | None = None
+) -> None:
+    """Check that no option is given twice, which click accepts silently.
+
+    Args:
+        command: the command.
+        arguments: its arguments.
+        group: context of the group, whose settings the command inherits.
+
+    Raises:
+        ParameterError: for an option that is given twice and may not be repeated.
+    """
+    # With resilient parsing other errors are left to the parsing of the command itself.
+    with click.Context(command, parent=group, resilient_parsing=True) as trial:
+        _, _, parsed = command.make_parser(trial).parse_args(list(arguments))
+    for option in parsed:
+        if isinstance(option, click.Option) and not option.multiple and parsed.count(option) > 1:
+            several = "; several values are one text, 'a; b'" if option.metavar == "LIST" else ""
+            flag = max(option.opts, key=len)
+            raise ParameterError(flag.lstrip("-"), f"is given twice: give {flag} once{several}")
+
+
+class StrictGroup(click.Group):
+    """Group of commands that refuses repeated options."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command after a check for repeated options."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if command is not None:
+            check_not_repeated(command, rest, ctx)
+        return name, command, rest
+
 
 BAD_INPUT = 2
 INTERNAL_ERROR = 70  # as sysexits.h has it
 
 COMMANDS = {
-    "analyze": "Say all that is known of one law on a surface and a device.",
-    "cache": "Say what is kept between runs, or delete it.",
-    "calibrate": "Measure a device: K₀, steps, delay, damping, friction.",
-    "compare": "Compare the laws on a surface and a device.",
-    "devices": "List devices, and the source of every number.",
-    "export": "Write a surface with its law as a C program.",
-    "init": "Write a scene to begin with.",
-    "lab": "Watch, hear and steer a texture in a browser.",
-    "limits": "Say whether a texture can be felt on a device.",
-    "maps": "Write heights or normals for other tools.",
-    "onset": "Find the stiffness at which limit cycles begin.",
-    "prepare": "Prepare a measured surface and save it.",
-    "recording": "Say, draw, export or replay what a loop did.",
-    "reproduce": "Redo the paper and judge each of its statements.",
-    "run": "Render a surface on a device, or a simulated one, as time goes.",
-    "scan": "Energy per stroke, against speed and depth.",
-    "show": "Say a measured surface in numbers, step by step.",
-    "simulate": "Run texture, device and hand in one loop.",
-    "surfaces": "List the surfaces that can be asked for by name.",
-    "warm": "Compile the shipped laws ahead.",
+    "analyze": ("analysis_commands", "Analyze one law on a surface and a device."),
+    "cache": ("setup_commands", "Show or clear the cache."),
+    "calibrate": (
+        "device_commands",
+        "Calibrate a device: stiffest wall, resolution, delay, damping.",
+    ),
+    "compare": (
+        "analysis_commands",
+        "Compare all laws on a surface and recommend one with its stiffness.",
+    ),
+    "devices": ("device_commands", "List devices and the source of each value."),
+    "export": ("export_commands", "Export a surface and its law as C code."),
+    "init": ("setup_commands", "Write a template scene file."),
+    "lab": ("servo_commands", "Run a texture interactively in a browser."),
+    "limits": ("analysis_commands", "Report which wavelengths are perceptible on a device."),
+    "maps": ("export_commands", "Write a height map or a normal map."),
+    "onset": (
+        "simulation_commands",
+        "Find the stiffness at which limit cycles begin, by simulation.",
+    ),
+    "prepare": ("surface_commands", "Prepare a measured surface and write it to a file."),
+    "recording": ("recording_commands", "Show, plot, export or replay a recording."),
+    "reproduce": ("paper_commands", "Report which claims of the paper hold, with their evidence."),
+    "run": ("servo_commands", "Run a surface in real time on a simulated or real device."),
+    "scan": ("simulation_commands", "Simulate strokes and report their energy by speed and depth."),
+    "show": ("surface_commands", "Report roughness parameters after each preparation step."),
+    "simulate": ("simulation_commands", "Simulate texture, device and hand in a closed loop."),
+    "surfaces": ("surface_commands", "List texture kinds and named surfaces."),
+    "warm": ("setup_commands", "Compile the shipped laws in advance."),
 }
-"""The commands with what each does; each is ``command`` in the module of its name."""
+"""Module and summary of each command; the command is ``NAME_command`` in its module."""
 
 
-class Commands(Group):
-    """Commands that are imported when they are asked for, so that the program starts at once."""
+class LazyCommands(StrictGroup):
+    """Group that imports a command when it is called, so that the program starts fast."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's signature
         """Return the names of the commands."""
@@ -54,59 +99,60 @@ class Commands(Group):
         """Return a command by its name."""
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = importlib.import_module(f"asperity.cli.{cmd_name}").command
+        module = importlib.import_module(f"asperity.cli.{COMMANDS[cmd_name][0]}")
+        command: click.Command = getattr(module, f"{cmd_name}_command")
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - as above
-        """Write what the commands do."""
+        """Write the list of commands."""
         with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+            formatter.write_dl([(name, summary) for name, (_, summary) in COMMANDS.items()])
 
 
 @click.group(
-    cls=Commands,
+    cls=LazyCommands,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(asperity.__version__, prog_name="asperity")
 def cli() -> None:
-    """Haptic textures for the device you have: which law, at which stiffness, what goes wrong.
+    """Render haptic textures: recommend a law and a stiffness, and report what goes wrong.
 
     Start with: asperity compare sinusoid:amplitude=0.8mm,period=1mm --device omega.3
     """
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
-    """Say a warning of asperity's own in one line; others are for developers."""
+    """Print a warning of the cache in one line; other warnings are for developers."""
     if issubclass(category, CacheWarning):
-        tell(str(message))
+        print_message(str(message))
 
 
 def main() -> None:
     """Run the command line; bad input is one line on standard error and exit code 2."""
     warnings.showwarning = _show_warning
     try:
-        size_limit()  # a wrong one is said before any work is done
+        size_limit()  # an invalid value is reported first
         cli(prog_name="asperity", standalone_mode=False)
     except click.exceptions.Exit as stop:
         sys.exit(stop.exit_code)
     except click.Abort:
-        raise KeyboardInterrupt from None  # asperity.__main__ says it
+        raise KeyboardInterrupt from None  # reported by asperity.__main__
     except click.ClickException as error:
         error.show()
         sys.exit(BAD_INPUT)
     except InternalError as error:
-        _stop(error, INTERNAL_ERROR)
+        _exit_with_message(error, INTERNAL_ERROR)
     except AsperityError as error:
-        _stop(error, error.exit_code)
+        _exit_with_message(error, error.exit_code)
     except MemoryError:
-        _stop("the surface is too large for this machine's memory", BAD_INPUT)
-    except Exception as error:  # code of the user's own may raise anything
-        said = own_fault(error)
-        if said is None:
-            raise  # a fault of asperity's own, or of the streams: see asperity.__main__
-        _stop(said, BAD_INPUT)
+        _exit_with_message("the surface is too large for this machine's memory", BAD_INPUT)
+    except Exception as error:  # a plugin may raise anything
+        message = plugin_error_text(error)
+        if message is None:
+            raise  # an internal error, or an error of the streams: see asperity.__main__
+        _exit_with_message(message, BAD_INPUT)
 
 
-def _stop(said: object, code: int) -> NoReturn:
-    tell(str(said))
+def _exit_with_message(message: object, code: int) -> NoReturn:
+    print_message(str(message))
     sys.exit(code)

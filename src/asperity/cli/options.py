@@ -1,136 +1,256 @@
-"""Options that several commands share, made from the arguments' declarations."""
+"""Options shared by several commands, derived from the declarations of the arguments."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from asperity.arguments import JOBS, MAX_DEPTH, MEMORY, STIFFNESS, Argument
-from asperity.cli.own_code import load_own_code
-from asperity.cli.settings import Settings, set_option
-from asperity.devices import Device, load_device
-from asperity.errors import ParameterError
-from asperity.laws import KNOWN_LAWS, LAW_ARGUMENTS, Law, find_law, find_laws, known_arguments
-from asperity.measured.arguments import FILE_ARGUMENTS
-from asperity.memory import limited
-from asperity.processes import at_most, cores
+from asperity.cli.plugins import load_plugins
+from asperity.core.arguments import (
+    JOBS,
+    MAX_DEPTH,
+    MEMORY,
+    REQUESTED_STIFFNESS,
+    STIFFNESS,
+    Argument,
+)
+from asperity.core.errors import ParameterError, suggest_names
+from asperity.core.memory import limit_memory
+from asperity.core.processes import available_cores, limit_processes
+from asperity.devices import FIELD_UNITS, Device, load_device, override_device
+from asperity.laws import (
+    REGISTERED_LAWS,
+    SHIPPED_LAW_ARGUMENTS,
+    Law,
+    find_law,
+    find_laws,
+    registered_arguments,
+)
+from asperity.measured.file_arguments import FILE_ARGUMENTS
 
 if TYPE_CHECKING:
     from asperity.scene import Scene
     from asperity.textures import Texture
 
+
+_DEVICE_PREFIX = "device."
+
+
+@dataclass(frozen=True)
+class Overrides:
+    """Values of ``--set``.
+
+    Attributes:
+        law: parameters of laws by name [SI].
+        device: fields of the device by name, as texts with units.
+    """
+
+    law: Mapping[str, Any] = field(default_factory=dict)
+    device: Mapping[str, str] = field(default_factory=dict)
+
+    def apply_to(self, device: Device) -> Device:
+        """Return the device with the overridden fields."""
+        return override_device(device, self.device) if self.device else device
+
+
+def parse_settings(
+    _ctx: click.Context, _option: click.Parameter, texts: Sequence[str]
+) -> Overrides:
+    """Return the values of all ``--set`` options.
+
+    A parameter of a law takes precedence over a device field of the same name, which is written
+    "device.friction=80mN".
+
+    Raises:
+        ParameterError: for an unknown name, an invalid value, or two values of one name.
+    """
+    law: dict[str, Any] = {}
+    device: dict[str, str] = {}
+    earlier: dict[tuple[bool, str], str] = {}
+    parameters = registered_arguments()
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise ParameterError("set", "must be NAME=VALUE", text)
+        name = name.strip().replace("-", "_")
+        of_device = name.startswith(_DEVICE_PREFIX) or (
+            name not in parameters and name in FIELD_UNITS
+        )
+        name = name.removeprefix(_DEVICE_PREFIX)
+        if name not in (FIELD_UNITS if of_device else parameters):
+            words = f"names {name!r}, which is a parameter of no law and no field of a device"
+            hint = suggest_names(name, [*parameters, *FIELD_UNITS])
+            raise ParameterError("set", f"{words}; {hint}")
+        first = earlier.setdefault((of_device, name), text)
+        if first is not text:
+            raise ParameterError("set", f"is given twice for {name}: {first!r} and {text!r}")
+        if of_device:
+            device[name] = value.strip()
+        else:
+            law[name] = parameters[name].parse(value)
+    return Overrides(law, device)
+
+
+set_option = click.option(
+    "--set",
+    "settings",
+    metavar="NAME=VALUE",
+    multiple=True,
+    callback=parse_settings,
+    help="Set a law parameter, 'gain=2.5', or a device field, 'max_stiffness=1500N/m' or"
+    " 'device.friction=80mN'; may be repeated.",
+)
+
+
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-LAW_OPTIONS = (STIFFNESS, MAX_DEPTH, *LAW_ARGUMENTS.values())
+LAW_OPTIONS = (STIFFNESS, MAX_DEPTH, *SHIPPED_LAW_ARGUMENTS.values())
 
 
-Read = Callable[[str], Any]
-"""Returns what the text of an option stands for."""
+Parser = Callable[[str], Any]
+"""Function that converts the text of an option to its value."""
 
 
-def as_read(read: Read) -> Callable[[click.Context, click.Parameter, str | None], Any]:
-    """Return a callback that reads the text of an option that is given."""
-    return lambda _ctx, _option, text: None if text is None else read(text)
+def parser_callback(parse: Parser) -> Callable[[click.Context, click.Parameter, str | None], Any]:
+    """Return a callback that parses the text of an option."""
+    return lambda _ctx, _option, text: None if text is None else parse(text)
 
 
-def help_of(argument: Argument) -> str:
-    """Return the help of an argument's option.
+def option_help(argument: Argument) -> str:
+    """Return the help text of the option of an argument.
 
     Example:
-        >>> help_of(Argument("length", "of the scan", "m", 0.1, example="5mm"))
+        >>> option_help(Argument("length", "of the scan", "m", 0.1, example="5mm"))
         "Of the scan, '5mm'.  [default: 100 mm]"
     """
-    first, rest = argument.words[:1], argument.words[1:]
-    # A symbol stays as it is written: "c of law H".
+    first, rest = argument.description[:1], argument.description[1:]
+    # A leading symbol keeps its case: "c of law H".
     words = f"{first.upper()}{rest}" if rest[:1].isalpha() else f"{first}{rest}"
     example = f", '{argument.example}'" if argument.example else ""
     default = f"  [default: {argument.default_text}]" if argument.default_text else ""
     return f"{words}{example}.{default}"
 
 
-def options(
-    arguments: Iterable[Argument], read: Callable[[Argument], Read] | None = None
+class _RenamedOption(click.Option):
+    """Option whose former names are accepted but not shown."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """Return the help of the option under its first name."""
+        names, self.opts = self.opts, self.opts[:1]
+        try:
+            return super().get_help_record(ctx)
+        finally:
+            self.opts = names
+
+
+def argument_options(
+    arguments: Iterable[Argument],
+    make_parser: Callable[[Argument], Parser] | None = None,
+    *,
+    former_names: Mapping[str, str] = MappingProxyType({}),
+    hidden: Collection[Argument] = (),
 ) -> Callable[[Command], Command]:
     """Return a decorator that adds an option for each argument.
 
     Args:
-        arguments: their declarations.
-        read: returns how the text of one is read; by default as it is declared.
+        arguments: declarations of the arguments.
+        make_parser: returns the parser of an argument; default: the one of its declaration.
+        former_names: former names of arguments, which are accepted but not shown.
+        hidden: arguments whose options are not shown.
     """
 
     def decorate(command: Command) -> Command:
         for argument in reversed(list(arguments)):
-            flag, words = f"--{argument.name.replace('_', '-')}", help_of(argument)
+            flag, words = f"--{argument.name.replace('_', '-')}", option_help(argument)
             if argument.form == "switch":
                 command = click.option(flag, is_flag=True, default=None, help=words)(command)
                 continue
-            value = as_read(argument.read if read is None else read(argument))
-            listed = read is several or argument.form == "items"
-            shown = "LIST" if listed else "N" if argument.form == "integer" else "TEXT"
-            command = click.option(flag, metavar=shown, callback=value, help=words)(command)
+            parse = argument.parse if make_parser is None else make_parser(argument)
+            is_list = make_parser is list_parser or argument.form == "items"
+            metavar = "LIST" if is_list else "N" if argument.form == "integer" else "TEXT"
+            former = former_names.get(argument.name)
+            option = click.option(
+                flag,
+                *([] if former is None else [f"--{former}"]),
+                argument.name,
+                cls=_RenamedOption,
+                metavar=metavar,
+                callback=parser_callback(parse),
+                help=words,
+                hidden=argument in hidden,
+            )
+            command = option(command)
         return command
 
     return decorate
 
 
-def one(argument: Argument) -> Read:
-    """Read a single value, and say so where a list is given."""
+def single_value_parser(argument: Argument) -> Parser:
+    """Return a parser of a single value that refuses a list."""
 
-    def read(text: str) -> Any:
-        values = several(argument)(text)
+    def parse(text: str) -> Any:
+        values = list_parser(argument)(text)
         if len(values) > 1:
-            raise ParameterError(argument.name, "must be a single one", text)
+            raise ParameterError(argument.name, "must be a single value", text)
         return values[0]
 
-    return read
+    return parse
 
 
-def several(argument: Argument) -> Read:
-    """Read "a; b; c"."""
+def list_parser(argument: Argument) -> Parser:
+    """Return a parser of lists "a; b; c"."""
 
-    def read(text: str) -> list[Any]:
+    def parse(text: str) -> list[Any]:
         parts = [part for part in text.replace(",", ";").split(";") if part.strip()]
         if not parts:
-            raise ParameterError(argument.name, "must be one or several, 'a; b'", text)
-        return [argument.read(part) for part in parts]
+            raise ParameterError(argument.name, "must be one or several values, 'a; b'", text)
+        return [argument.parse(part) for part in parts]
 
-    return read
-
-
-def given(values: Mapping[str, Any], arguments: Iterable[Argument]) -> dict[str, Any]:
-    """Return the values of the options that the user gave, by argument name."""
-    return {one.name: values[one.name] for one in arguments if values[one.name] is not None}
+    return parse
 
 
-def read_device(text: str) -> Device:
-    """Return the one device that a text names.
+def provided_values(values: Mapping[str, Any], arguments: Iterable[Argument]) -> dict[str, Any]:
+    """Return the values of the given options, by the keyword of each argument."""
+    return {
+        one.keyword or one.name: values[one.name]
+        for one in arguments
+        if values[one.name] is not None
+    }
+
+
+def parse_device(text: str) -> Device:
+    """Return the device of a text.
 
     Raises:
-        ParameterError: for one that is unknown, or several.
+        ParameterError: for an unknown device, or several.
     """
-    if len(devices := read_devices(text)) > 1:
-        raise ParameterError("device", "must be a single one here: compare takes several", text)
+    if len(devices := parse_devices(text)) > 1:
+        raise ParameterError("device", "must be a single device: only compare takes several", text)
     return devices[0]
 
 
 def device_option(
-    words: str = "Device of the catalogue, or a TOML file.  [default: omega.3]",
-    read: Read = read_device,
+    help_text: str = "Device of the catalogue, or a TOML file.  [default: omega.3]",
+    parse: Parser = parse_device,
 ) -> Callable[[Command], Command]:
     """Return a decorator that adds ``--device``."""
-    return click.option("--device", metavar="ID|FILE", callback=as_read(read), help=words)
+    return click.option(
+        "--device", metavar="ID|FILE", callback=parser_callback(parse), help=help_text
+    )
 
 
-def read_devices(text: str) -> tuple[Device, ...]:
-    """Return the devices that a text names, with commas or semicolons between.
+def parse_devices(text: str) -> tuple[Device, ...]:
+    """Return the devices of a text, separated by commas or semicolons.
 
     Raises:
-        ParameterError: for one that is unknown, or is named twice.
+        ParameterError: for an unknown device, or one that is named twice.
     """
-    if os.path.exists(text):  # whatever signs the name of a file has
+    if os.path.exists(text):  # the name of a file may contain separators
         return (load_device(text),)
     parts = [part.strip() for part in text.replace(";", ",").split(",") if part.strip()]
     devices = tuple(load_device(part) for part in parts or [text])
@@ -139,74 +259,98 @@ def read_devices(text: str) -> tuple[Device, ...]:
     return devices
 
 
-def law_option(words: str) -> Callable[[Command], Command]:
+def law_option(help_text: str, *, hidden: bool = False) -> Callable[[Command], Command]:
     """Return a decorator that adds ``--law``."""
-    return click.option("--law", metavar="LETTER", callback=as_read(find_law), help=words)
+    parse = parser_callback(find_law)
+    return click.option("--law", metavar="LETTER", callback=parse, help=help_text, hidden=hidden)
 
 
-def laws_option(words: str) -> Callable[[Command], Command]:
+def laws_option(help_text: str) -> Callable[[Command], Command]:
     """Return a decorator that adds ``--laws``."""
-    return click.option("--laws", metavar="LETTERS", callback=as_read(find_laws), help=words)
+    parse = parser_callback(find_laws)
+    return click.option("--laws", metavar="LETTERS", callback=parse, help=help_text)
 
 
-own_code_option = click.option(
+plugin_option = click.option(
+    "--plugin",
     "--law-module",
+    "plugin",
     metavar="FILE",
     multiple=True,
-    is_eager=True,  # what it defines can be named in the other options
+    is_eager=True,  # other options may name what it defines
     expose_value=False,
-    callback=load_own_code,
-    help="Python file of your own, which is run: laws, textures, claims; more by repeating it.",
+    callback=load_plugins,
+    help="Python file with user-defined laws, textures, readers, drivers or other extensions, which"
+    " is executed; may be repeated.",
 )
 
 
-def law_options(arguments: Iterable[Argument] = LAW_OPTIONS) -> Callable[[Command], Command]:
-    """Return a decorator that adds the options of surface and law."""
+def law_options(
+    arguments: Iterable[Argument] = LAW_OPTIONS, hidden: Collection[Argument] = ()
+) -> Callable[[Command], Command]:
+    """Return a decorator that adds the options of the law, ``--set`` and ``--plugin``."""
 
     def decorate(command: Command) -> Command:
-        return options(arguments)(set_option(own_code_option(command)))
+        return argument_options(arguments, hidden=hidden)(set_option(plugin_option(command)))
 
     return decorate
 
 
-def _limit(context: click.Context, _option: click.Parameter, text: str | None) -> None:
+def surface_options(
+    law_help: str, stiffness: Argument = REQUESTED_STIFFNESS
+) -> Callable[[Command], Command]:
+    """Return a decorator that adds SURFACE and the options of law, device and measured files."""
+
+    def decorate(command: Command) -> Command:
+        command = law_options((stiffness, *LAW_OPTIONS[1:]))(file_options(command))
+        return click.argument("surface")(law_option(law_help)(device_option()(command)))
+
+    return decorate
+
+
+def _apply_memory_limit(context: click.Context, _option: click.Parameter, text: str | None) -> None:
     """Limit the memory of surfaces until the command ends."""
-    size = None if text is None else MEMORY.read(text)
-    context.with_resource(limited(str(context.command.name), size))
+    size = None if text is None else MEMORY.parse(text)
+    context.with_resource(limit_memory(str(context.command.name), size))
 
 
 _memory_option = click.option(
-    "--memory", metavar="SIZE", expose_value=False, callback=_limit, help=help_of(MEMORY)
+    "--memory",
+    metavar="SIZE",
+    expose_value=False,
+    callback=_apply_memory_limit,
+    help=option_help(MEMORY),
 )
 
 
-def _share(context: click.Context, _option: click.Parameter, text: str | None) -> None:
-    """Share the work out until the command ends."""
-    context.with_resource(at_most(cores() if text is None else JOBS.checked(JOBS.read(text))))
+def _apply_job_limit(context: click.Context, _option: click.Parameter, text: str | None) -> None:
+    """Limit the number of processes until the command ends."""
+    count = available_cores() if text is None else JOBS.validate(JOBS.parse(text))
+    context.with_resource(limit_processes(count))
 
 
 jobs_option = click.option(
-    "--jobs", metavar="N", expose_value=False, callback=_share, help=help_of(JOBS)
+    "--jobs", metavar="N", expose_value=False, callback=_apply_job_limit, help=option_help(JOBS)
 )
 
 
 def file_options(command: Command) -> Command:
-    """Add the options of a measured file, and of the memory that it may take."""
-    return options(FILE_ARGUMENTS)(_memory_option(command))
+    """Add the options of a measured file and ``--memory``."""
+    return argument_options(FILE_ARGUMENTS)(_memory_option(command))
 
 
 def file_values(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the options say of a measured file."""
-    return given(values, FILE_ARGUMENTS)
+    """Return the values of the options of a measured file."""
+    return provided_values(values, FILE_ARGUMENTS)
 
 
 def surface_values(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the options say of the surface and of the parameters of laws.
+    """Return the values of the options of the surface and of the law parameters.
 
     Raises:
-        ParameterError: for a parameter that has an option and is given by ``--set``, too.
+        ParameterError: for a parameter given by its option and by ``--set``.
     """
-    result = given(values, LAW_OPTIONS)
+    result = provided_values(values, LAW_OPTIONS)
     if values.get("law") is not None:
         result["law"] = values["law"]
     for name, value in values["settings"].law.items():
@@ -217,58 +361,58 @@ def surface_values(values: Mapping[str, Any]) -> dict[str, Any]:
     return result
 
 
-def chosen_device(device: Device | None, scene: Scene, values: Mapping[str, Any]) -> Device:
-    """Return the device of ``--device``, the scene or the default, changed by ``--set``."""
+def select_device(device: Device | None, scene: Scene, values: Mapping[str, Any]) -> Device:
+    """Return the device of ``--device``, of the scene, or the default, with the overrides."""
     from asperity.scene.setup import DEFAULT_DEVICE
 
     chosen = device or scene.device or load_device(DEFAULT_DEVICE)
-    settings: Settings = values["settings"]
-    return settings.changed(chosen)
+    settings: Overrides = values["settings"]
+    return settings.apply_to(chosen)
 
 
-def refuse_idle(asked: Iterable[str], laws: Sequence[Law]) -> None:
-    """Refuse a parameter that was asked for and that none of the laws takes.
+def check_parameters_apply(requested: Iterable[str], laws: Sequence[Law]) -> None:
+    """Check that each requested parameter is one of some of the laws.
 
     Raises:
-        ParameterError: with the laws that take it.
+        ParameterError: otherwise; the message names the laws that take the parameter.
     """
-    taken = known_arguments(laws)
-    for name in asked:
-        takers = [law.letter for law in KNOWN_LAWS.values() if name in law.arguments]
+    taken = registered_arguments(laws)
+    for name in requested:
+        takers = [law.letter for law in REGISTERED_LAWS.values() if name in law.arguments]
         if takers and name not in taken:
             letters, others = (", ".join(part) for part in ((law.letter for law in laws), takers))
-            words = f"would change nothing: law {letters} does not take it; taken by law {others}"
+            words = f"has no effect: law {letters} does not take it; law {others} does"
             raise ParameterError(name, words)
 
 
-def read_surface(
+def load_surface(
     source: str,
     device: Device | None,
     values: Mapping[str, Any],
     laws: Sequence[Law] = (),
     **defaults: Any,
 ) -> tuple[Texture, Device, dict[str, Any]]:
-    """Return the texture and the device that SURFACE and the options name, and all other arguments.
+    """Return the texture, the device and all other arguments of SURFACE and the options.
 
     Args:
         source: a texture with its arguments, a file, or a scene.
-        device: the one of ``--device``; it comes before the scene's.
-        values: of the options, by name.
-        laws: those that are compared; by default the one of ``--law`` or of the scene, which is
-            then among the arguments.
-        defaults: of the other arguments.
+        device: the device of ``--device``, which takes precedence over the scene's.
+        values: values of the options, by name.
+        laws: laws to compare; default: the law of ``--law`` or of the scene, which is then
+            among the arguments.
+        defaults: defaults of the other arguments.
 
     Raises:
-        ParameterError: for what is missing, unknown or wrong.
+        ParameterError: for a missing, unknown or invalid value.
     """
     from asperity.scene import load_scene
     from asperity.scene.sections import surface_keywords
 
-    asked = surface_values(values)
+    requested = surface_values(values)
     scene = load_scene(source, file_values(values))
-    merged = {**defaults, **scene.surface, **asked}
+    merged = {**defaults, **scene.surface, **requested}
     if not laws:
-        laws = [find_law(merged["law"])] if "law" in merged else tuple(KNOWN_LAWS.values())
-    refuse_idle(asked, laws)
+        laws = [find_law(merged["law"])] if "law" in merged else tuple(REGISTERED_LAWS.values())
+    check_parameters_apply(requested, laws)
     arguments = surface_keywords(merged, *laws)
-    return scene.texture, chosen_device(device, scene, values), arguments
+    return scene.texture, select_device(device, scene, values), arguments

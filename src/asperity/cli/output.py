@@ -1,4 +1,4 @@
-"""Where results go: standard output, or a file that is whole or not there."""
+"""Output of results to the terminal and to files, and the progress bar on standard error."""
 
 from __future__ import annotations
 
@@ -6,35 +6,113 @@ import functools
 import os
 import shlex
 import sys
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import timedelta
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cache import no_cache
-from asperity.cli.progress import progress_bar
-from asperity.errors import ParameterError, printable
-from asperity.files import digest, is_device, json_text, write_text
+from asperity.core.cache import bypass
+from asperity.core.errors import ParameterError, escape_unprintable
+from asperity.core.files import is_special_file, json_text, text_digest, write_bytes
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from asperity.report.page import Page
+
+
+@contextmanager
+def progress_bar(description: str) -> Iterator[Callable[..., None]]:
+    """Show a progress bar with the time left, if standard error is a terminal.
+
+    The description counts the functions that are compiled, which slows a first run.
+
+    Args:
+        description: description of the task.
+
+    Yields:
+        A function of the completed fraction in [0, 1] and, optionally, a new description.
+    """
+    if not sys.stderr.isatty():
+        yield lambda _fraction, _description=None: None
+        return
+    from rich import progress
+    from rich.console import Console
+    from rich.text import Text
+
+    from asperity.core.compiled import COMPILE_CALLBACKS
+
+    class TimeLeftColumn(progress.ProgressColumn):
+        """The time left; unlike Rich's column, from the first step on."""
+
+        def render(self, task: progress.Task) -> Text:
+            """Return the text of the column."""
+            return Text(f"left: {format_time_left(task.elapsed or 0.0, task.completed)}")
+
+    columns = (
+        progress.TextColumn("{task.description:<24}"),
+        progress.BarColumn(),
+        progress.TaskProgressColumn(),
+        progress.TimeElapsedColumn(),
+        TimeLeftColumn(),
+    )
+    with progress.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task, loops = bar.add_task(description, total=1.0), count(1)
+        current = [description]
+
+        def report_compilation(_loop: str) -> None:
+            text = f"{current[0]}: compiling loop {next(loops)}, cached for the next run"
+            bar.update(task, description=text, refresh=True)
+
+        def update(fraction: float, text: str | None = None) -> None:
+            current[0] = text or current[0]
+            bar.update(task, completed=fraction, description=current[0])
+
+        COMPILE_CALLBACKS.append(report_compilation)
+        try:
+            yield update
+        finally:
+            COMPILE_CALLBACKS.remove(report_compilation)
+
+
+def format_time_left(elapsed: float, fraction: float) -> str:
+    """Return the estimated time left as text.
+
+    Args:
+        elapsed: elapsed time [s].
+        fraction: completed fraction in [0, 1].
+
+    Example:
+        >>> format_time_left(30.0, 0.25), format_time_left(30.0, 0.0)
+        ('0:01:30', '-:--:--')
+    """
+    if fraction <= 0.0:
+        return "-:--:--"
+    return str(timedelta(seconds=round(elapsed * (1.0 - fraction) / fraction)))
+
+
+@contextmanager
+def step_bar(description: str, steps: int) -> Iterator[Callable[[str], None]]:
+    """Show the progress over a number of steps; yield a function to call before each step."""
+    with progress_bar(description) as update:
+        done = count()
+        yield lambda name: update(next(done) / steps, name)
+
 
 STANDARD_OUTPUT = "-"
 
 
 @dataclass(frozen=True)
 class Outputs:
-    """Where a command writes its result.
+    """Output paths of a command.
 
     Attributes:
-        json: path of the result as JSON, "-" for standard output, ``None`` for nowhere.
+        json: path of the result as JSON, "-" for standard output, ``None`` for none.
         html: path of the report, likewise.
-        trace: path of the samples of a run, of the commands that have some.
+        trace: path of the samples of a run, for commands with a trace.
     """
 
     json: str | None = None
@@ -42,61 +120,56 @@ class Outputs:
     trace: str | None = None
 
     def write(
-        self,
-        data: Any,
-        say: Callable[[Console], None],
-        page: Callable[[], Page] | None = None,
-        page_words: str = "Report",
-        *,
-        keeps_pictures: bool = False,
+        self, data: Any, page: Page, page_label: str = "Report", extra_line: str = ""
     ) -> None:
-        """Write a result where it was asked for, else say it on standard output.
+        """Write a result to the output files, and print it unless standard output is one of them.
 
         Args:
-            data: the result for JSON, see :func:`asperity.files.plain`.
-            say: prints the result for reading.
-            page: returns the report, of a command that has one.
-            page_words: what the report is called.
-            keeps_pictures: whether the page cares for the look of its pictures, which may be kept.
+            data: the result for JSON, see :func:`asperity.core.files.to_plain_data`.
+            page: the result for HTML and for the terminal.
+            page_label: label of the report in the terminal.
+            extra_line: printed after the result, if any.
         """
         if self.json is not None:
             write_output("json", self.json, json_text(data))
-        if self.html is not None and page is not None:
-            from asperity.report.page import Origin, own_look, page_html
+        if self.html is not None:
+            from asperity.report.html import Origin, render_page
 
-            origin = Origin(_command(), digest(json_text(data)))
-            # The page looks as it should, whatever the user's settings.
-            look = nullcontext() if keeps_pictures else own_look()
-            with progress_bar("drawing the report"), look:
-                text = page_html(page(), origin)
+            origin = Origin(_command_line(), text_digest(json_text(data)))
+            with progress_bar("drawing the report"):
+                text = render_page(page, origin)
             write_output("html", self.html, text)
         if STANDARD_OUTPUT in {self.json, self.html}:
             return
         from rich.console import Console
 
+        from asperity.report.terminal import print_page
+
         console = Console(highlight=False)
-        say(console)
-        for words, path in ((page_words, self.html), ("Trace", self.trace)):
+        print_page(page, console)
+        if extra_line:
+            console.print(extra_line, soft_wrap=True, markup=False)
+        for words, path in ((page_label, self.html), ("Trace", self.trace)):
             if path is not None:
-                console.print(f"{words}: {printable(path)}", soft_wrap=True, markup=False)
+                console.print(f"{words}: {escape_unprintable(path)}", soft_wrap=True, markup=False)
 
 
-def _command() -> str:
-    """Return the command as a shell takes it."""
-    return printable(shlex.join(["asperity", *sys.argv[1:]]))
+def _command_line() -> str:
+    """Return the command line as typed in a shell."""
+    return escape_unprintable(shlex.join(["asperity", *sys.argv[1:]]))
 
 
 def output_options(
-    html: str | None, json: str = "Write the result as JSON; - is standard output."
+    *, html: bool = True, uses_cache: bool = True
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Return a decorator that adds ``--json`` and ``--html``.
+    """Return a decorator that adds ``--json``, ``--html`` and ``--no-cache``.
 
-    The command receives :class:`Outputs` as ``outputs``, checked before any work is done; a
-    ``--trace`` of its own goes there too.
+    The command receives :class:`Outputs` as ``outputs``, whose paths, including that of a
+    ``--trace`` option, are checked before the command runs.
 
     Args:
-        html: help of ``--html``; ``None`` for a command without a report.
-        json: help of ``--json``.
+        html: whether the command writes a report.
+        uses_cache: whether the command computes anything that is cached.
     """
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
@@ -106,28 +179,34 @@ def output_options(
             check_outputs(**paths)
             command(outputs=Outputs(**paths), **values)
 
-        if html is not None:
-            run = click.option("--html", "html_path", metavar="PATH", help=html)(run)
-        run = click.option(
-            "--no-cache", is_flag=True, expose_value=False, callback=_without_cache,
-            help="Work everything out anew, and keep nothing.",
-        )(run)  # fmt: skip
-        return click.option("--json", "json_path", metavar="PATH", help=json)(run)
+        if html:
+            words = "Write a report with figures (HTML); - writes to standard output."
+            run = click.option("--html", "html_path", metavar="PATH", help=words)(run)
+        if uses_cache:
+            run = click.option(
+                "--no-cache",
+                is_flag=True,
+                expose_value=False,
+                callback=_apply_bypass,
+                help="Compute everything without the cache, and store nothing.",
+            )(run)
+        words = "Write the result as JSON; - writes to standard output."
+        return click.option("--json", "json_path", metavar="PATH", help=words)(run)
 
     return decorate
 
 
-def _without_cache(context: click.Context, _option: click.Parameter, asked: bool) -> None:
-    """Let a command work without the cache until it ends."""
-    if asked:
-        context.with_resource(no_cache())
+def _apply_bypass(context: click.Context, _option: click.Parameter, enabled: bool) -> None:
+    """Bypass the cache until the command ends."""
+    if enabled:
+        context.with_resource(bypass())
 
 
 def check_outputs(**paths: str | None) -> None:
-    """Refuse paths of which one cannot be written, or two are the same, before any work is done.
+    """Check before a computation that all paths can be written and differ from each other.
 
     Args:
-        paths: by the names of their options; ``None`` for one that is not given.
+        paths: paths by the names of their options; ``None`` for an absent option.
 
     Raises:
         ParameterError: see :func:`check_output`.
@@ -145,17 +224,17 @@ def check_outputs(**paths: str | None) -> None:
 
 
 def check_output(name: str, path: str | None) -> None:
-    """Refuse a path that cannot be written, before any work is done.
+    """Check before a computation that a path can be written.
 
     Raises:
-        ParameterError: if the folder does not exist or is not writable, the path is a folder or a
-            link to itself, or a device or a pipe that cannot be written to.
+        ParameterError: if the folder does not exist or is not writable, or the path is a folder, a
+            link to itself, or a device or a pipe that is not writable.
     """
     if path is None or path == STANDARD_OUTPUT:
         return
     if Path(path).is_dir():
         raise ParameterError(name, "must be a file, not a folder", path)
-    if is_device(path):
+    if is_special_file(path):
         if not os.access(path, os.W_OK):
             raise ParameterError(name, "must be a file that can be written", path)
         return
@@ -170,15 +249,18 @@ def check_output(name: str, path: str | None) -> None:
 
 
 def write_output(name: str, path: str, text: str) -> None:
-    """Write a text to standard output or to a file; see :func:`asperity.files.whole_file`.
-
-    Raises:
-        ParameterError: if the file cannot be written.
-    """
+    """Write a text to standard output or to a file."""
     if path == STANDARD_OUTPUT:
         click.echo(text, nl=not text.endswith("\n"))
-        return
-    try:
-        write_text(path, text)
-    except OSError as error:
-        raise ParameterError(name, f"cannot be written: {error.strerror}", path) from None
+    else:
+        write_bytes(name, path, text.encode())
+
+
+def check_not_existing(name: str, path: str | os.PathLike[str], *, force: bool) -> None:
+    """Check that a file does not exist, or may be replaced.
+
+    Raises:
+        ParameterError: if it exists and ``force`` is false.
+    """
+    if not force and os.path.lexists(path):
+        raise ParameterError(name, f"exists: {escape_unprintable(path)}; --force replaces it")

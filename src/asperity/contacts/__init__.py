@@ -1,12 +1,11 @@
-"""Where a surface is felt: one room per contact, from its symbols to its kernels."""
+"""Contacts between probe and surface, each from its symbols to its compiled kernels."""
 
 from __future__ import annotations
 
+from asperity.contacts.closest.closest_contact import NEAREST
 from asperity.contacts.contact import Contact
-from asperity.contacts.nearest.contact import NEAREST
-from asperity.contacts.nominal import NOMINAL
-from asperity.contacts.split.contact import SPLIT
-from asperity.contacts.vertical import VERTICAL
+from asperity.contacts.height_contacts import NOMINAL, VERTICAL
+from asperity.contacts.split.split_contact import SPLIT
 
 __all__ = ["CONTACTS", "Contact"]
 

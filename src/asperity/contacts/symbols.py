@@ -11,31 +11,30 @@ import sympy as sp
 # Probe position [m]. The body is z < h(x, y).
 X, Y, Z = sp.symbols("x y z", real=True)
 POSITION = (X, Y, Z)
-# Depth of the probe [m], positive inside; which depth it is, the contact says.
+# Depth of the probe [m], positive inside; the contact defines it.
 DEPTH = sp.Symbol("depth", positive=True)
 # Height and its derivatives at the contact point [m, 1, 1/m].
 H, HX, HY, HXX, HXY, HYY = sp.symbols("h hx hy hxx hxy hyy", real=True)
-HEIGHT_DERIVATIVES = (H, HX, HY, HXX, HXY, HYY)
 # Tangential deflection of the dragged anchor [m] and its derivative by the probe position.
 DX, DY = sp.symbols("dx dy", real=True)
 SXX, SXY, SYY = sp.symbols("sxx sxy syy", real=True)
-# From the probe to the contact point where that is no point of the surface, as for the split
-# god-object [m], and the derivative of that vector by the probe position, symmetric.
-TOWARD = sp.symbols("tx ty tz", real=True)
+# From the probe to a contact point that is not on the surface, as for the split god-object [m],
+# and the symmetric derivative of that vector by the probe position.
+CONTACT_VECTOR = sp.symbols("tx ty tz", real=True)
 MXX, MXY, MXZ, MYY, MYZ, MZZ = sp.symbols("mxx mxy mxz myy myz mzz", real=True)
-# Potential energy of a spring of stiffness 1 to that point, where it is no depth²/2 [m²].
-TOWARD_ENERGY = sp.Symbol("energy_tk", nonnegative=True)
-TOWARD_DERIVATIVE = sp.Matrix([[MXX, MXY, MXZ], [MXY, MYY, MYZ], [MXZ, MYZ, MZZ]])
+# Potential energy of a spring of stiffness 1 to that point [m²].
+CONTACT_ENERGY = sp.Symbol("energy_tk", nonnegative=True)
+CONTACT_VECTOR_DERIVATIVE = sp.Matrix([[MXX, MXY, MXZ], [MXY, MYY, MYZ], [MXZ, MYZ, MZZ]])
 # Stiffness of the smooth wall [N/m].
 K = sp.Symbol("k", positive=True)
 # Middle and half of the range of the heights of the texture [m].
 H_MID = sp.Symbol("h_mid", real=True)
 H_HALF = sp.Symbol("h_half", positive=True)
 
-# The order in which a kernel takes its arguments; it takes those that it uses.
+# The order of a kernel's arguments; it takes those that it uses.
 ARGUMENT_ORDER = (
-    *POSITION, DEPTH, *HEIGHT_DERIVATIVES, DX, DY, SXX, SXY, SYY,
-    *TOWARD, TOWARD_ENERGY, MXX, MXY, MXZ, MYY, MYZ, MZZ, K, H_MID, H_HALF,
+    *POSITION, DEPTH, H, HX, HY, HXX, HXY, HYY, DX, DY, SXX, SXY, SYY,
+    *CONTACT_VECTOR, CONTACT_ENERGY, MXX, MXY, MXZ, MYY, MYZ, MZZ, K, H_MID, H_HALF,
 )  # fmt: skip
 
 
@@ -46,11 +45,11 @@ def unit_normal() -> Any:
 
 @dataclass(frozen=True)
 class ContactSymbols:
-    """What a formula may use: the contact of one probe, as SymPy symbols.
+    """The symbols of a law's formula: the contact of one probe, in SymPy.
 
     Attributes:
         parameter_names: names of the law's own parameters.
-        contact_vector: from the probe to the contact point where that is not depth times normal.
+        contact_vector: from the probe to the contact point, unless it is depth times normal.
 
     Example:
         >>> c = ContactSymbols()
@@ -74,7 +73,7 @@ class ContactSymbols:
 
     @cached_property
     def w(self) -> Any:
-        """Upward normal of unnormalised length: (-h_x, -h_y, 1)."""
+        """Upward normal before normalisation: (-h_x, -h_y, 1)."""
         return sp.Matrix([-HX, -HY, 1])
 
     @cached_property
@@ -84,7 +83,7 @@ class ContactSymbols:
 
     @cached_property
     def toward(self) -> Any:
-        """From the probe to the contact point [m]: p_h - p for the god-object, z̄ - p if split."""
+        """Vector from the probe to the contact point [m]: p_h - p, or z̄ - p if split."""
         return self.depth * self.normal if self.contact_vector is None else self.contact_vector
 
     @cached_property
@@ -93,7 +92,7 @@ class ContactSymbols:
         return (H - H_MID) / H_HALF
 
     def tangential(self, vector: Any) -> Any:
-        """Lift a tangential 2-vector into space: (v_x, v_y, 0)."""
+        """Return a tangential 2-vector in space: (v_x, v_y, 0)."""
         return sp.Matrix([vector[0], vector[1], 0])
 
     def parameter(self, name: str) -> Any:

@@ -1,1 +1,1 @@
-"""What follows from a law: Jacobian, curl, definition in many digits, kernels."""
+"""Derivations from a law: Jacobian, curl, facts and kernels."""

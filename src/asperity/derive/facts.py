@@ -1,4 +1,4 @@
-"""What the mathematics of a law says once and for all, without loading SymPy for shipped laws."""
+"""Facts about a law that follow from its symbols; those of shipped laws need no SymPy."""
 
 from __future__ import annotations
 
@@ -6,10 +6,18 @@ from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
-from asperity.derive.shipped import generated_path
+from asperity.clamps import Clamp
 from asperity.laws import LAWS, Law
+
+GENERATED_DIRECTORY = Path(__file__).parent / "generated"
+
+
+def generated_kernel_path(law: Law) -> Path:
+    """Return the path of the generated kernels of a shipped law."""
+    return GENERATED_DIRECTORY / f"law_{law.letter.lower()}.py"
 
 
 @dataclass(frozen=True)
@@ -20,26 +28,26 @@ class LawFacts:
         conservative: whether the work around every closed path is zero.
         reason: why, or why not.
         curl: the three components of the symbolic curl, as text.
-        begins_at_zero: whether the force vanishes with the depth.
-        looks_at_surface: whether the force depends on more of the surface than the depth.
+        vanishes_at_contact: whether the force vanishes with the depth.
+        depends_on_surface: whether the force depends on more of the surface than the depth.
         affine_in_depth: whether the Jacobian is affine in the depth at a fixed contact point; a
             norm of it is then convex, and greatest at an end of the depth range.
-        conservative_clamps: the depth clamps under which the law is conservative, too; empty for
-            a law that is not, or is not clamped.
+        conservative_clamps: names of the depth clamps under which the law stays conservative;
+            empty for a law that is not conservative or cannot be clamped.
     """
 
     conservative: bool
     reason: str
     curl: tuple[str, str, str]
-    begins_at_zero: bool
-    looks_at_surface: bool
+    vanishes_at_contact: bool
+    depends_on_surface: bool
     affine_in_depth: bool
     conservative_clamps: tuple[str, ...] = ()
 
 
 @lru_cache(maxsize=64)
 def law_facts(law: Law) -> LawFacts:
-    """Return the facts of a law: from its generated file, or derived now for a law of your own.
+    """Return the facts of a law: from its generated file, or derived for a user-defined law.
 
     Example:
         >>> from asperity.laws import find_law
@@ -48,22 +56,23 @@ def law_facts(law: Law) -> LawFacts:
     """
     if LAWS.get(law.letter) is not law:
         return derive_facts(law)
-    generated = import_module(f"asperity.derive.generated.{generated_path(law).stem}")
+    generated = import_module(f"asperity.derive.generated.{generated_kernel_path(law).stem}")
     return LawFacts(**generated.FACTS)
 
 
-def clamped_facts(law: Law, clamp: str) -> LawFacts:
+def clamped_facts(law: Law, clamp: Clamp) -> LawFacts:
     """Return the facts of the force that a law renders under a depth clamp.
 
     Example:
         >>> from asperity.laws import find_law
+        >>> from asperity.clamps import BACKED, LATERAL
         >>> law = find_law("C")
-        >>> clamped_facts(law, "backed").conservative, clamped_facts(law, "lateral").conservative
+        >>> clamped_facts(law, BACKED).conservative, clamped_facts(law, LATERAL).conservative
         (True, False)
     """
     facts = law_facts(law)
-    unclamped = clamp == "none" or not law.clampable
-    if unclamped or not facts.conservative or clamp in facts.conservative_clamps:
+    unclamped = not (clamp.changes_force and law.clampable)
+    if unclamped or not facts.conservative or clamp.name in facts.conservative_clamps:
         return facts
     reason = f"below max_depth the {clamp} clamp gives the force a curl"
     return replace(facts, conservative=False, reason=reason)
@@ -76,8 +85,13 @@ def derive_facts(law: Law) -> LawFacts:
         LawError: see :func:`asperity.derive.jacobian.derive`.
     """
     from asperity.contacts.symbols import HX, HY, POSITION, H
-    from asperity.derive.curl import IN_PIECES, begins_at_zero, conservative_clamps, curl_verdict
-    from asperity.derive.jacobian import derive, explicit
+    from asperity.derive.curl import (
+        PIECEWISE_FUNCTIONS,
+        conservative_clamps,
+        curl_verdict,
+        vanishes_at_contact,
+    )
+    from asperity.derive.jacobian import derive, expand_definitions
 
     verdict = curl_verdict(law)
     derivation = derive(law)
@@ -88,11 +102,11 @@ def derive_facts(law: Law) -> LawFacts:
         conservative=verdict.conservative,
         reason=verdict.reason,
         curl=(x, y, z),
-        begins_at_zero=begins_at_zero(force),
-        looks_at_surface=bool(force.free_symbols & {H, HX, HY}),
+        vanishes_at_contact=vanishes_at_contact(force),
+        depends_on_surface=bool(force.free_symbols & {H, HX, HY}),
         affine_in_depth=not moves
-        and not force.has(*IN_PIECES)
-        and _is_affine(explicit(derivation, derivation.jacobian)),
+        and not force.has(*PIECEWISE_FUNCTIONS)
+        and _is_affine(expand_definitions(derivation, derivation.jacobian)),
         conservative_clamps=conservative_clamps(law) if verdict.conservative else (),
     )
 
@@ -102,15 +116,15 @@ def _is_affine(jacobian: Any) -> bool:
     from asperity.contacts.symbols import DEPTH
     from asperity.derive.curl import is_zero
 
-    bend = jacobian.diff(DEPTH, 2)
-    # A point where it is not zero settles it at once; a proof is only tried where there is none.
-    somewhere = {
+    second = jacobian.diff(DEPTH, 2)
+    # A nonzero value at one point decides at once; a proof is tried only if the value is zero.
+    point = {
         symbol: Fraction(2 * index + 3, 7 + index)
-        for index, symbol in enumerate(sorted(bend.free_symbols, key=str))
+        for index, symbol in enumerate(sorted(second.free_symbols, key=str))
     }
-    if any(abs(entry.evalf(30, subs=somewhere)) > 1e-20 for entry in bend):
+    if any(abs(entry.evalf(30, subs=point)) > 1e-20 for entry in second):
         return False
-    return all(is_zero(entry) for entry in bend)
+    return all(is_zero(entry) for entry in second)
 
 
 def facts_source(law: Law) -> str:

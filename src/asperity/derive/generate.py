@@ -1,4 +1,4 @@
-"""Write the kernels of the shipped laws into the package, or check that they are fresh.
+"""Write the kernels of the shipped laws into the package, or check that they are up to date.
 
 Run as ``python -m asperity.derive.generate [--check]``; ``make kernels`` and ``make check`` do.
 """
@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import sys
 
-from asperity.derive.shipped import generated_path
-from asperity.files import write_text
+from asperity.core.files import write_text
+from asperity.derive.facts import generated_kernel_path
 from asperity.laws import LAWS, Law
 
 
-def generated_text(law: Law) -> str:
-    """Return the whole file of kernels of a law: its documentation, then the functions."""
+def kernel_file_text(law: Law) -> str:
+    """Return the kernel file of a law: its documentation, its facts and the functions."""
     from asperity.derive.facts import facts_source
     from asperity.derive.python_source import law_source
 
@@ -24,10 +24,10 @@ def generated_text(law: Law) -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """Write the generated files, or with ``--check`` name those that are out of date."""
+    """Write the generated files, or with ``--check`` list those that are out of date."""
     stale = []
     for law in LAWS.values():
-        path, text = generated_path(law), generated_text(law)
+        path, text = generated_kernel_path(law), kernel_file_text(law)
         current = path.read_text(encoding="utf-8") if path.exists() else ""
         if current == text:
             continue

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import keyword
-import re
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -30,33 +28,25 @@ from asperity.contacts.symbols import (
     H,
     K,
 )
-from asperity.errors import LawError
+from asperity.core.errors import LawError
 from asperity.laws.law import Law
 
-# s = |w| = √(1 + h_x² + h_y²), as a symbol of its own so that formulas become rational.
+# s = |w| = √(1 + h_x² + h_y²), as a separate symbol so that formulas become rational.
 ROOT = sp.Symbol("s", positive=True)
 ROOT_SQUARED = 1 + HX**2 + HY**2
-# Names that the kernels use themselves: symbols, intermediate values, loops and libraries.
-_RESERVED = re.compile(
-    "|".join(str(symbol) for symbol in ARGUMENT_ORDER)
-    + r"|s|r|q\d\d|t\d+|f[xyz]|j\d\d|i|p|a[xy]|below|square|atoms|weights|count|gap"
-    + r"|floor|clamp_depth|texture|law|points?|depths?|derivatives|deflection|sliding|xy|out"
-    + r"|force|jacobian|held|foot_[xy]|height|slope|curvature|nearest|split_\w+|law_\w+|probe_\w+"
-    + r"|\w+_batch|drag_anchor|primal_value|math|np|min|max|abs|range|njit|scalar|inlined|loop|_\w*"
-)
 
 
 @dataclass(frozen=True)
 class Derivation:
-    """A law with what follows from it, as SymPy matrices.
+    """A law with its force and Jacobians, as SymPy matrices.
 
     Attributes:
         law: the law.
         force: force on the probe [N], shape (3, 1).
         jacobian: J[i, j] = ∂f_i/∂p_j [N/m], shape (3, 3).
-        jacobian_saturated: the same where a clamp holds the depth constant.
-        definitions: names that the Jacobians use for parts of the contact's derivative, with
-            their values, in order; see :func:`explicit` for a Jacobian without them.
+        jacobian_saturated: the same at a fixed depth, as below a clamp.
+        definitions: names that the Jacobians use for common subexpressions of the contact's
+            derivative, with their values, in order; see :func:`expand_definitions`.
     """
 
     law: Law
@@ -74,7 +64,7 @@ def derive(law: Law) -> Derivation:
         + ∂f/∂d ∂d/∂p + ∂f/∂p.
 
     Raises:
-        LawError: if the formula fails, or uses what a contact does not offer.
+        LawError: if the formula fails, or uses symbols that the contact does not offer.
 
     Example:
         >>> from asperity.laws import find_law
@@ -91,48 +81,48 @@ def derive(law: Law) -> Derivation:
     saturated = by_height * height_by_point * contact.point_derivative
     saturated += force.jacobian(list(POSITION))
     if law.stateful:
-        # ∂d/∂p is handed in: the identity while sticking, I - u uᵀ while sliding.
+        # ∂d/∂p is an argument: the identity while sticking, I - u uᵀ while sliding.
         saturated += force.jacobian([DX, DY]) * sp.Matrix([[SXX, SXY, 0], [SXY, SYY, 0]])
-    saturated += law.contact.jacobian_part(force)
+    saturated += law.contact.jacobian_contribution(force)
     full = saturated + force.diff(DEPTH) * contact.depth_gradient
-    return Derivation(law, force, _tidy(full), _tidy(saturated), contact.definitions)
+    return Derivation(
+        law, force, _factor_entries(full), _factor_entries(saturated), contact.definitions
+    )
 
 
-def explicit(derivation: Derivation, matrix: Any) -> Any:
-    """Return a matrix of a derivation in the contact symbols alone."""
+def expand_definitions(derivation: Derivation, matrix: Any) -> Any:
+    """Return a matrix of a derivation in contact symbols only."""
     for name, value in reversed(derivation.definitions):
         matrix = matrix.subs(name, value)
     return matrix
 
 
-def with_root_symbol(expression: Any) -> Any:
-    """Return an expression in which every power of the root, odd or even, is a power of s."""
+def substitute_root(expression: Any) -> Any:
+    """Return an expression in which every power of the root is a power of s."""
     return expression.replace(
         lambda e: e.is_Pow and e.base == ROOT_SQUARED, lambda e: ROOT ** (2 * e.exp)
     )
 
 
 def symbolic_force(law: Law) -> Any:
-    """Return the force of a law as a (3, 1) SymPy matrix, checked.
+    """Return the validated force of a law as a (3, 1) SymPy matrix.
 
     Raises:
         LawError: see :func:`derive`.
     """
-    symbols = ContactSymbols(tuple(law.parameters), law.contact.toward())
-    for name in law.parameters:
-        if not name.isidentifier() or keyword.iskeyword(name) or _RESERVED.fullmatch(name):
-            raise LawError(f"law {law.letter}: {name!r} cannot be the name of a parameter")
+    symbols = ContactSymbols(tuple(law.parameters), law.contact.contact_vector())
+    _check_parameter_names(law)
     if law.stateful and "max_deflection" not in law.parameters:
         raise LawError(f"law {law.letter}: a law with state needs the parameter max_deflection")
     try:
         force = sp.Matrix(law.force(symbols))
-    except Exception as error:  # whatever a user's formula raises is a defect of the formula
-        what = " ".join(str(error).split())
+    except Exception as error:  # whatever the formula raises is an error in the formula
+        message = " ".join(str(error).split())
         raise LawError(
-            f"law {law.letter}: its force is not a symbolic formula ({what}); it must return three "
-            "SymPy expressions in the contact symbols, from which Jacobian, kernel and bounds are "
-            "derived. Functions of math and NumPy only compute numbers: use SymPy's, such as "
-            "sympy.sqrt or sympy.Piecewise"
+            f"law {law.letter}: its force is not a symbolic formula ({message}); it must return "
+            "three SymPy expressions in the contact symbols, from which Jacobian, kernel and "
+            "bounds are derived. Functions of math and NumPy only compute numbers: use SymPy's, "
+            "such as sympy.sqrt or sympy.Piecewise"
         ) from error
     if force.shape != (3, 1):
         raise LawError(f"law {law.letter}: force must have 3 components, got {force.shape}")
@@ -142,13 +132,23 @@ def symbolic_force(law: Law) -> Any:
     return force
 
 
+def _check_parameter_names(law: Law) -> None:
+    definitions = [name for name, _ in law.contact.derivatives().definitions]
+    symbols = {str(symbol) for symbol in (*ARGUMENT_ORDER, *definitions)}
+    for name in law.parameters:
+        if not name.isidentifier():
+            raise LawError(
+                f"law {law.letter}: a parameter needs a name like a variable's, got {name!r}"
+            )
+        if name in symbols:
+            reason = f"formulas on the {law.contact} contact have another symbol of that name"
+            raise LawError(f"law {law.letter}: a parameter cannot be called {name!r}: {reason}")
+
+
 def _check_symbols(law: Law, force: Any) -> None:
-    allowed = {*POSITION, *law.contact.formula_symbols()} | {
-        sp.Symbol(n, real=True) for n in law.parameters
-    }
-    allowed |= {K, H_MID, H_HALF}
-    if law.stateful:
-        allowed |= {DX, DY}
+    own = [sp.Symbol(name, real=True) for name in law.parameters]
+    state = (DX, DY) if law.stateful else ()
+    allowed = {*POSITION, *law.contact.formula_symbols(), *own, K, H_MID, H_HALF, *state}
     unknown = sorted(str(symbol) for symbol in force.free_symbols - allowed)
     if unknown:
         raise LawError(
@@ -159,5 +159,5 @@ def _check_symbols(law: Law, force: Any) -> None:
         )
 
 
-def _tidy(matrix: Any) -> Any:
+def _factor_entries(matrix: Any) -> Any:
     return matrix.applyfunc(lambda entry: sp.factor_terms(sp.powsimp(entry)))

@@ -1,17 +1,16 @@
-"""Real devices, as data with a source for every number."""
+"""Catalogue of real devices, with a source for every number."""
 
-from asperity.devices.device import FIELD_TABLE, FIELDS, Datum, Device, Field, WallTest
-from asperity.devices.reading import changed_device, device_names, load_device, parse_device
+from asperity.devices.device import FIELD_TABLE, FIELD_UNITS, Datum, Device, WallTest
+from asperity.devices.device_file import device_names, load_device, override_device, parse_device
 
 __all__ = [
-    "FIELDS",
     "FIELD_TABLE",
+    "FIELD_UNITS",
     "Datum",
     "Device",
-    "Field",
     "WallTest",
-    "changed_device",
     "device_names",
     "load_device",
+    "override_device",
     "parse_device",
 ]

@@ -1,86 +1,72 @@
-"""A device as data: every number with its unit, its source, and whether it was verified.
-
-What can be said of a device: its fields, their units, and which values they may have.
-"""
+"""Devices as data: every number with its unit, its source and whether it was verified."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
-from asperity.display import Displayed
-from asperity.errors import ParameterError
-from asperity.files import Record, record
-from asperity.units import engineering
-
-Range = Literal["positive", "not negative", "any"]
-
-
-@dataclass(frozen=True)
-class Field:
-    """A number that a device may have.
-
-    Attributes:
-        unit: the SI unit in which asperity keeps it; "1" for a plain number.
-        words: what it is.
-        allowed: which values it may have; all are finite.
-        whole: whether it is a whole number.
-    """
-
-    unit: str
-    words: str
-    allowed: Range = "positive"
-    whole: bool = False
+from asperity.core.arguments import Argument
+from asperity.core.display import Displayable
+from asperity.core.errors import ParameterError
+from asperity.core.files import Serializable, attributes_to_dict
+from asperity.core.units import format_quantity
 
 
-FIELD_TABLE: dict[str, Field] = {
-    "max_force": Field("N", "greatest force, for a moment"),
-    "continuous_force": Field("N", "greatest force that it holds without end"),
-    "max_stiffness": Field("N/m", "K₀, the stiffest smooth wall that held without a cycle"),
-    "position_resolution": Field("m", "smallest step of the measured position"),
-    "force_resolution": Field("N", "smallest step of the force"),
-    "update_rate": Field("Hz", "updates of the force per second, 1/T"),
-    "velocity_rate": Field("Hz", "updates of the measured velocity per second"),
-    "bandwidth": Field("Hz", "frequency up to which it transmits force, F₀"),
-    "damping": Field("N*s/m", "physical damping, σ₀(B): the least over the directions"),
-    "joint_damping": Field("N*m*s", "physical damping in each joint"),
-    "virtual_damping": Field("N*s/m", "damping that the controller adds, or takes away", "any"),
-    "controller_damping": Field("N*s/m", "greatest damping gain of the controller; not physical"),
-    "delay_samples": Field(
-        "1", "whole samples between measurement and force", "not negative", True
+def _positive(name: str, description: str, unit: str) -> Argument:
+    return Argument(name, description, unit, must_be_positive=True)
+
+
+_FIELDS = (
+    _positive("max_force", "peak force", "N"),
+    _positive("continuous_force", "greatest continuous force", "N"),
+    _positive("max_stiffness", "K₀, the stiffest smooth wall without a limit cycle", "N/m"),
+    _positive("position_resolution", "smallest step of the measured position", "m"),
+    _positive("force_resolution", "smallest step of the force", "N"),
+    _positive("update_rate", "updates of the force per second, 1/T", "Hz"),
+    _positive("velocity_rate", "updates of the measured velocity per second", "Hz"),
+    _positive("bandwidth", "frequency up to which force is transmitted, F₀", "Hz"),
+    _positive("damping", "physical damping, σ₀(B): the least over the directions", "N*s/m"),
+    _positive("joint_damping", "physical damping in each joint", "N*m*s"),
+    Argument(
+        "virtual_damping", "damping by the controller, or below 0", "N*s/m", minimum=-math.inf
     ),
-    "friction": Field("N", "dry friction, felt when moving it", "not negative"),
-    "least_friction": Field("N", "dry friction that it has at least, everywhere", "not negative"),
-    "apparent_mass": Field("kg", "mass felt when moving it"),
-    "workspace_radius": Field("m", "radius of the ball that it reaches"),
-    "workspace_diameter": Field("m", "diameter of the cylinder that it reaches"),
-    "workspace_length": Field("m", "length of the cylinder that it reaches"),
-    "proximal_link": Field("m", "length of each link at a motor"),
-    "distal_link": Field("m", "length of each link at the handle"),
-    "base_distance": Field("m", "distance of the motors' axes", "not negative"),
-    "encoder_counts": Field("1", "steps of an encoder per turn of its joint", whole=True),
-}
+    _positive("controller_damping", "greatest damping gain of the controller, virtual", "N*s/m"),
+    Argument("delay_samples", "whole samples between measurement and force", form="integer"),
+    Argument("friction", "dry friction felt in motion", "N"),
+    Argument("least_friction", "least dry friction over the workspace", "N"),
+    _positive("apparent_mass", "mass felt in motion", "kg"),
+    _positive("workspace_radius", "radius of a spherical workspace", "m"),
+    _positive("workspace_diameter", "diameter of a cylindrical workspace", "m"),
+    _positive("workspace_length", "length of a cylindrical workspace", "m"),
+    _positive("proximal_link", "length of each link at a motor", "m"),
+    _positive("distal_link", "length of each link at the handle", "m"),
+    Argument("base_distance", "distance of the motors' axes", "m"),
+    Argument("encoder_counts", "encoder steps per turn of its joint", form="integer", minimum=1),
+)
+FIELD_TABLE: dict[str, Argument] = {field.name: field for field in _FIELDS}
+"""The numbers of a device by name: description, SI unit, bounds."""
 
-FIELDS: dict[str, str] = {name: field.unit for name, field in FIELD_TABLE.items()}
-"""The unit in which asperity keeps each field."""
+FIELD_UNITS: dict[str, str] = {field.name: field.unit or "1" for field in _FIELDS}
+"""SI unit of each field; "1" for a plain number."""
 
-WORDS = ("id", "name", "axes", "driver", "notes")
-"""What a device file may say besides its numbers."""
+TEXT_FIELDS = ("id", "name", "axes", "driver", "notes")
+"""Fields of a device file that are text."""
 
 
 @dataclass(frozen=True)
-class Datum(Record):
+class Datum(Serializable):
     """One number of a device.
 
     Attributes:
-        value: in SI units.
+        value: value in SI units.
         unit: the SI unit; "1" for a plain number.
-        source: where the number was read.
-        verified: whether it was read in a source that others can read, or follows from such.
-        also: what else is said of the same number, by other sources or for other conditions.
-        measured: whether the source says that it was measured on such a device; a constant in a
-            driver or a line of a data sheet is read, not measured.
+        source: source of the number.
+        verified: whether the source is accessible, or the number follows from accessible ones.
+        also: values of the same number in other sources or for other conditions.
+        is_measured: whether the number was measured on such a device, according to the source; a
+            constant in a driver or a line of a data sheet is read, not measured.
     """
 
     value: float
@@ -88,16 +74,16 @@ class Datum(Record):
     source: str
     verified: bool
     also: tuple[Datum, ...] = ()
-    measured: bool = False
+    is_measured: bool = False
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units; ``verified`` is "measured" where the number is."""
-        said = record(self, "value", "unit", "source", "verified", "also")
-        return said | ({"verified": "measured"} if self.pedigree == "measured" else {})
+        """Return plain data, SI units; ``verified`` is "measured" for a measured number."""
+        data = attributes_to_dict(self, "value", "unit", "source", "verified", "also")
+        return data | ({"verified": "measured"} if self.pedigree == "measured" else {})
 
     @property
     def text(self) -> str:
-        """The value for reading, with an SI prefix.
+        """The value as text with an SI prefix.
 
         Example:
             >>> Datum(0.005, "N*m*s", "", True).text, Datum(0.045, "kg", "", True).text
@@ -106,15 +92,15 @@ class Datum(Record):
         if self.unit == "1":
             return f"{self.value:.10g}"
         if self.unit == "kg" and self.value < 1.0:
-            return engineering(1e3 * self.value, "g")
-        return engineering(self.value, self.unit).replace("*", "·")
+            return format_quantity(1e3 * self.value, "g")
+        return format_quantity(self.value, self.unit).replace("*", "·")
 
     @property
     def pedigree(self) -> Pedigree:
-        """What the number rests on: ``"measured"``, ``"read"`` or ``"not verified"``."""
+        """Origin of the number: ``"measured"``, ``"read"`` or ``"not verified"``."""
         if not self.verified:
             return "not verified"
-        return "measured" if self.measured else "read"
+        return "measured" if self.is_measured else "read"
 
 
 Pedigree = Literal["measured", "read", "not verified"]
@@ -122,20 +108,24 @@ Axis = Literal["x", "y", "z"]
 Positions = Literal["exact", "stepped"]
 
 
+WALL_KEYS = ("directions", "cycled", "update_rate", "positions", "lightest")
+"""Keys of a wall test besides those of any number."""
+
+
 @dataclass(frozen=True)
 class WallTest(Datum):
-    """A smooth wall that somebody raised on a device: what held, and what did not.
+    """A test of smooth walls of increasing stiffness on a device.
 
-    It is the entry ``max_stiffness`` of a device: its value is K₀, the stiffness that held without
-    a cycle. What a source does not say stays empty.
+    It is the entry ``max_stiffness`` of a device: its value is K₀, the greatest stiffness without a
+    limit cycle. Details missing in the source stay empty.
 
     Attributes:
-        directions: axes of the device along which the wall was pushed; empty if not said.
-        cycled: the least stiffness at which it began to cycle [N/m].
-        update_rate: of the test [Hz]; the device's own if not said.
-        positions: whether positions were read ``"exact"``, or ``"stepped"`` by an encoder.
-        lightest: damping in the lightest direction as a share of that along ``directions`` [1],
-            at most 1, as far as geometry or other tests tell.
+        directions: axes of the device along which the wall was pushed; empty if unknown.
+        cycled: the least stiffness with a limit cycle [N/m].
+        update_rate: update rate of the test [Hz]; the device's own if unknown.
+        positions: whether positions were ``"exact"``, or ``"stepped"`` by an encoder.
+        lightest: damping in the lightest direction relative to that along ``directions`` [1], at
+            most 1, known from geometry or other tests.
     """
 
     directions: tuple[Axis, ...] = ()
@@ -145,22 +135,22 @@ class WallTest(Datum):
     lightest: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units, with what is known of the test and no more."""
-        test = record(self, "directions", "cycled", "update_rate", "positions", "lightest")
+        """Return plain data, SI units, with the known details of the test."""
+        test = attributes_to_dict(self, *WALL_KEYS)
         return super().to_dict() | {name: value for name, value in test.items() if value}
 
 
 @dataclass(frozen=True)
-class Device(Record, Displayed):
+class Device(Serializable, Displayable):
     """A force-feedback device.
 
     Attributes:
         id: short name, as on the command line.
         name: full name.
-        data: what is known, by field; see ``asperity.devices.FIELDS``.
-        axes: where its own x, y and z point; empty if not known.
-        driver: what ``--driver real`` is on it, such as ``haply``; empty if none is known.
-        notes: what else one must know, in sentences.
+        data: the known numbers by field; see ``asperity.devices.FIELD_TABLE``.
+        axes: directions of its own x, y and z; empty if unknown.
+        driver: driver for ``--driver real``, such as ``haply``; empty if none is known.
+        notes: further remarks, in sentences.
 
     Example:
         >>> from asperity.devices import load_device
@@ -171,7 +161,7 @@ class Device(Record, Displayed):
         [('14500 N/m', False)]
     """
 
-    written = "id name axes driver notes data"
+    serialized_attributes = "id name axes driver notes data"
 
     id: str
     name: str
@@ -184,12 +174,12 @@ class Device(Record, Displayed):
         return f"<Device {self.id}, {self.name}: {len(self.data)} numbers>"
 
     def value(self, field: str) -> float | None:
-        """Return a number in SI units, or ``None`` if it is not known."""
+        """Return a number in SI units, ``None`` if it is unknown."""
         return self.data[field].value if field in self.data else None
 
     @property
     def wall_test(self) -> WallTest | None:
-        """What is known of the smooth wall K₀; ``None`` if nothing is."""
+        """The wall test of K₀; ``None`` if K₀ is unknown."""
         datum = self.data.get("max_stiffness")
         if datum is None or isinstance(datum, WallTest):
             return datum
@@ -197,10 +187,10 @@ class Device(Record, Displayed):
 
     @property
     def max_stiffness(self) -> float:
-        """K₀ [N/m]: the stiffest smooth wall that held on the device.
+        """K₀ [N/m]: the stiffest smooth wall without a limit cycle on the device.
 
         Raises:
-            ParameterError: if it is not known.
+            ParameterError: it is unknown.
         """
         value = self.value("max_stiffness")
         if value is None:

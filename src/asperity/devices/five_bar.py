@@ -1,4 +1,4 @@
-"""The five-bar linkage of a pantograph: where its joints are, and how it damps the handle."""
+"""Kinematics of the five-bar linkage of a pantograph, and the damping at its handle."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.checks import FloatArray, array, positive, real
-from asperity.errors import ParameterError
+from asperity.core.checks import FloatArray, check_array, check_positive, check_real
+from asperity.core.errors import ParameterError
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class FiveBar:
         base: distance of the motors [m].
 
     Raises:
-        ParameterError: for a length that is not positive (base: negative).
+        ParameterError: a length is not positive (base: negative).
 
     Example:
         >>> linkage = FiveBar(proximal=0.063, distal=0.075, base=0.025)
@@ -35,78 +35,78 @@ class FiveBar:
     base: float
 
     def __post_init__(self) -> None:
-        positive("proximal", self.proximal, "m")
-        positive("distal", self.distal, "m")
-        if real("base", self.base, "m") < 0.0:
+        check_positive("proximal", self.proximal, "m")
+        check_positive("distal", self.distal, "m")
+        if check_real("base", self.base, "m") < 0.0:
             raise ParameterError("base", "must not be negative [m]", self.base)
 
 
 def joint_angles(linkage: FiveBar, point: ArrayLike) -> FloatArray:
-    """Return the angles of both motors with the elbows outside.
+    """Return the angles of both motors, with the elbows outside.
 
     Args:
         linkage: the lengths.
-        point: of the handle [m], shape (2,).
+        point: position of the handle [m], shape (2,).
 
     Returns:
         (θ₁, θ₂) [rad], each from the x axis to the link at the motor, counter-clockwise.
 
     Raises:
-        ParameterError: for a point that the arms do not reach.
+        ParameterError: the arms do not reach the point.
     """
-    place = array("point", point, (2,), "m")
+    position = check_array("point", point, (2,), "m")
     first, second = linkage.proximal, linkage.distal
     angles = np.empty(2)
     for arm, (motor, side) in enumerate(((0.0, -1.0), (-linkage.base, 1.0))):
-        x, y = float(place[0]) - motor, float(place[1])
+        x, y = float(position[0]) - motor, float(position[1])
         reach = math.hypot(x, y)
         if not abs(first - second) < reach < first + second:
             limit = f"must be reached by both arms, {first:g} m and {second:g} m long"
-            raise ParameterError("point", limit, tuple(float(value) for value in place))
+            raise ParameterError("point", limit, tuple(float(value) for value in position))
         opening = math.acos((first**2 + reach**2 - second**2) / (2.0 * first * reach))
         angles[arm] = math.atan2(y, x) + side * opening
     return angles
 
 
 def joint_rates(linkage: FiveBar, point: ArrayLike) -> FloatArray:
-    """Return ∂θ/∂p = J⁻¹, by how much the motors turn as the handle moves.
+    """Return ∂θ/∂p = J⁻¹, the derivative of the motor angles by the position of the handle.
 
-    The link at the handle keeps its length: with u from elbow to handle and t = ∂(elbow)/∂θ,
+    The link at the handle has constant length: with u from elbow to handle and t = ∂(elbow)/∂θ,
     u · (dp - t dθ) = 0, so the row of each arm is uᵀ/(u · t).
 
     Args:
         linkage: the lengths.
-        point: of the handle [m], shape (2,).
+        point: position of the handle [m], shape (2,).
 
     Returns:
         [rad/m], shape (2, 2); row i for motor i.
 
     Raises:
-        ParameterError: for a point that the arms do not reach.
+        ParameterError: the arms do not reach the point.
     """
-    place = array("point", point, (2,), "m")
+    position = check_array("point", point, (2,), "m")
     rows = []
-    for angle, motor in zip(joint_angles(linkage, place), (0.0, -linkage.base), strict=True):
+    for angle, motor in zip(joint_angles(linkage, position), (0.0, -linkage.base), strict=True):
         along = linkage.proximal * np.array([math.cos(angle), math.sin(angle)])
         across = np.array([-along[1], along[0]])
-        link = place - np.array([motor, 0.0]) - along
+        link = position - np.array([motor, 0.0]) - along
         rows.append(link / (link @ across))
     return np.array(rows)
 
 
 def handle_damping(linkage: FiveBar, joint_damping: float, point: ArrayLike) -> FloatArray:
-    """Return B = J⁻ᵀ b J⁻¹, the damping at the handle of equal damping b in both joints.
+    """Return B = J⁻ᵀ b J⁻¹, the damping at the handle due to equal damping b in both joints.
 
     Args:
         linkage: the lengths.
         joint_damping: b [N·m·s].
-        point: of the handle [m], shape (2,).
+        point: position of the handle [m], shape (2,).
 
     Returns:
-        B [N·s/m], shape (2, 2). Its smallest singular value σ₀(B) decides in the paper's (1).
+        B [N·s/m], shape (2, 2). Its smallest singular value σ₀(B) is the one in the paper's (1).
 
     Raises:
-        ParameterError: for a point that the arms do not reach, or damping that is not positive.
+        ParameterError: the arms do not reach the point, or the damping is not positive.
 
     Reference:
         Campion and Hayward, section V: brakes in the joints of a Pantograph.
@@ -118,4 +118,4 @@ def handle_damping(linkage: FiveBar, joint_damping: float, point: ArrayLike) -> 
                [0.   , 1.158]])
     """
     rates = joint_rates(linkage, point)
-    return np.asarray(positive("joint_damping", joint_damping, "N*m*s") * rates.T @ rates)
+    return np.asarray(check_positive("joint_damping", joint_damping, "N*m*s") * rates.T @ rates)

@@ -1,6 +1,6 @@
-"""C99: one header that holds everything, or a library of header, source and CMake file.
+"""Export target C99: a header, or a library of header, source and CMake file.
 
-Maps that are small stand in the header as data, larger ones in a source beside it.
+The data of large maps are written to a source file beside the header.
 """
 
 from __future__ import annotations
@@ -13,178 +13,185 @@ from functools import lru_cache
 from importlib import resources
 
 from asperity.contacts.contact import Contact
-from asperity.contacts.memory import BUDGET, GAP, SIZE, UNLIMITED
-from asperity.content import surface_content
-from asperity.errors import ParameterError
+from asperity.contacts.warm_start import BUDGET, ERROR_BOUND, UNLIMITED, WARM_START_SIZE
+from asperity.core.errors import ParameterError
+from asperity.export.export_request import ExportRequest
 from asperity.export.expressions import real_literal
-from asperity.export.functions import Functions, surface_functions
-from asperity.export.order import Order
 from asperity.export.program import block_comment
+from asperity.export.surface_functions import SurfaceFunctions, surface_functions
 
-FARTHEST = 1000.0
-"""Positions farther from the origin along an axis get no force [m]: cells could not be counted."""
-IN_HEADER = 256 * 2**10
-"""Bytes of data above which they stand in a source beside the header."""
-_UNLIMITED = "\n * Its search has no limit of looks: not for the loop."
+MAX_POSITION = 1000.0
+"""Limit of the coordinates [m]; the force is zero beyond, where cell indices would overflow."""
+MAX_HEADER_DATA = 256 * 2**10
+"""Size of the data [bytes] above which they are written to a source file."""
+_UNLIMITED_COMMENT = "\n * The search has no limit of evaluations: not for a real-time loop."
 
 
 @lru_cache(maxsize=16)
-def template(name: str) -> str:
-    """Return a text of the folder ``templates``."""
+def load_template(name: str) -> str:
+    """Return a file of the folder ``templates``."""
     return resources.files("asperity.export").joinpath("templates", name).read_text("utf-8")
 
 
-def filled(text: str, words: Mapping[str, str]) -> str:
-    """Return a template with its words, such as ``@name@``, replaced.
+def fill_template(text: str, values: Mapping[str, str]) -> str:
+    """Return a template with its placeholders, such as ``@name@``, replaced.
 
     Example:
-        >>> filled("void @name@_reset(void);", {"name": "texture"})
+        >>> fill_template("void @name@_reset(void);", {"name": "texture"})
         'void texture_reset(void);'
     """
-    return re.sub(r"@(\w+)@", lambda found: words[found[1]], text)
+    return re.sub(r"@(\w+)@", lambda found: values[found[1]], text)
 
 
 @dataclass(frozen=True)
-class Parts:
-    """The parts of a program.
+class ProgramParts:
+    """Parts of a program.
 
     Attributes:
-        words: for templates.
-        arrays: definitions of arrays, without storage class.
-        heads: their declarations, without storage class.
-        records: definitions of constant records.
-        functions: the functions that are not public.
+        substitutions: values of the placeholders of the templates.
+        array_definitions: definitions of the arrays, without storage class.
+        array_declarations: declarations of the arrays, without storage class.
+        record_definitions: definitions of the constant records.
+        functions: the private functions.
     """
 
-    words: dict[str, str]
-    arrays: tuple[str, ...]
-    heads: tuple[str, ...]
-    records: tuple[str, ...]
-    functions: Functions
+    substitutions: dict[str, str]
+    array_definitions: tuple[str, ...]
+    array_declarations: tuple[str, ...]
+    record_definitions: tuple[str, ...]
+    functions: SurfaceFunctions
 
-    def file(self, name: str, link: str, data: str) -> str:
-        """Return a template with words and code.
+    def render(self, name: str, linkage: str, data: str) -> str:
+        """Return a template filled with the parts.
 
         Args:
-            name: of the template.
-            link: how the public functions are declared.
+            name: name of the template.
+            linkage: storage class of the public functions.
             data: definitions or declarations of the arrays.
         """
-        energy = bool(self.functions.energy)
+        energy = bool(self.functions.energy_name)
         contract, public = ["contract.h", "energy.h"], ["public.c", "energy.c"]
-        words = self.words | {"link": link}
-        words["guards"] = filled(template("guards.h"), words)
-        words["contract"] = _joined(contract[: 1 + energy], words)
-        public_code = _joined(public[: 1 + energy], words)
-        words["inside"] = "\n".join([data, *self.records, self.functions.code, public_code])
-        return filled(template(name), words)
+        words = self.substitutions | {"link": linkage}
+        words["guards"] = fill_template(load_template("guards.h"), words)
+        words["contract"] = _fill_templates(contract[: 1 + energy], words)
+        public_code = _fill_templates(public[: 1 + energy], words)
+        words["inside"] = "\n".join(
+            [data, *self.record_definitions, self.functions.code, public_code]
+        )
+        return fill_template(load_template(name), words)
 
 
-def _joined(names: Sequence[str], words: Mapping[str, str]) -> str:
-    return "".join(filled(template(name), words) for name in names)
+def _fill_templates(names: Sequence[str], values: Mapping[str, str]) -> str:
+    return "".join(fill_template(load_template(name), values) for name in names)
 
 
-def c99_files(order: Order, stem: str) -> dict[str, str]:
-    """Return the files of a program, by name: the header first.
+def c99_files(request: ExportRequest, stem: str) -> dict[str, str]:
+    """Return the files of a program by name, the header first.
 
     Args:
-        order: what is to be exported.
-        stem: of the files' names.
+        request: the export request.
+        stem: stem of the file names.
 
     Raises:
-        ParameterError: for what cannot be expressed in C, or would be too large.
+        ParameterError: for a surface that cannot be exported, or would be too large.
     """
-    functions = surface_functions(order.surface, order.name, single=order.single)
-    store = functions.store
-    places, records = store.used(functions.code)
-    size = sum(store.size(place) for place in places)
-    if size > order.largest:
-        raise _too_large(order, functions, places, size)
-    arrays = tuple(store.array(place) for place in places)
-    heads = tuple(store.head(place) for place in places)
-    parts = Parts(_words(order, functions, stem), arrays, heads, tuple(records), functions)
-    if order.shared:
+    functions = surface_functions(request.surface, request.name, single=request.is_single_precision)
+    store = functions.data
+    places, records = store.used_by(functions.code)
+    size = sum(store.size_in_bytes(place) for place in places)
+    if size > request.max_data_size:
+        raise _size_error(request, functions, places, size)
+    arrays = tuple(store.definition(place) for place in places)
+    heads = tuple(store.declaration(place) for place in places)
+    parts = ProgramParts(
+        _substitutions(request, functions, stem), arrays, heads, tuple(records), functions
+    )
+    if request.as_library:
         return _library(parts, stem)
-    return _header(parts, stem, apart=size > IN_HEADER)
+    return _header(parts, stem, separate_data=size > MAX_HEADER_DATA)
 
 
-def _words(order: Order, functions: Functions, stem: str) -> dict[str, str]:
-    surface, single, law = order.surface, order.single, order.surface.law
+def _substitutions(
+    request: ExportRequest, functions: SurfaceFunctions, stem: str
+) -> dict[str, str]:
+    surface, single, law = request.surface, request.is_single_precision, request.surface.law
     return {
-        "name": order.name,
-        "NAME": order.name.upper(),
+        "name": request.name,
+        "NAME": request.name.upper(),
         "stem": stem,
         "real": "float" if single else "double",
         "abs": "fabsf" if single else "fabs",
-        "far": real_literal(FARTHEST, single),
-        "tick": functions.tick,
+        "far": real_literal(MAX_POSITION, single),
+        "tick": functions.tick_name,
         "tick_type": functions.tick_type,
-        "memory": str(SIZE),
+        "memory": str(WARM_START_SIZE),
         "at_budget": str(BUDGET),
-        "at_gap": str(GAP),
-        "budget": real_literal(min(order.budget, UNLIMITED), single),
-        "gap": _gap_words(law.contact),
-        "unlimited": _UNLIMITED if law.contact.remembers else "",
-        "energy": functions.energy,
+        "at_gap": str(ERROR_BOUND),
+        "budget": real_literal(min(request.evaluation_budget, UNLIMITED), single),
+        "gap": _gap_comment(law.contact),
+        "unlimited": _UNLIMITED_COMMENT if law.contact.has_warm_start else "",
+        "energy": functions.energy_name,
         "stiffness": repr(surface.stiffness),
         "max_depth": repr(surface.max_depth),
-        "q_upper": _bound(order.q_upper),
-        "looks": _bound(order.budget),
-        "content": surface_content(surface),
-        "note": block_comment(order.note),
+        "q_upper": _bound_literal(request.q_upper),
+        "max_evaluations": _bound_literal(request.evaluation_budget),
+        "content": surface.digest,
+        "note": block_comment(request.comment),
     }
 
 
-def _gap_words(contact: Contact) -> str:
-    """Return what the gap of a search says, for the comment of ``texture_gap``."""
-    if not contact.remembers:
+def _gap_comment(contact: Contact) -> str:
+    """Return the meaning of the error bound for the comment of ``texture_gap``."""
+    if not contact.has_warm_start:
         return "0, this law does not search."
-    if contact.gap_is_force:
-        said = "the exact one differs by at most k times this."
+    if contact.bounds_force_error:
+        bound = "the exact force differs by at most k times this."
     else:
-        said = "no point of the surface is nearer by more."
-    return f"{said}\n * 0 where the search came to its end within its looks."
+        bound = "no point of the surface is closer by more than this."
+    return f"{bound}\n * 0 if the search converged within its limit of evaluations."
 
 
-def _bound(value: float) -> str:
-    """Return a number as a constant of the contract."""
+def _bound_literal(value: float) -> str:
+    """Return a number as a C constant."""
     return repr(value) if math.isfinite(value) else "HUGE_VAL"
 
 
-def _header(parts: Parts, stem: str, *, apart: bool) -> dict[str, str]:
-    """Return a header that holds everything, its arrays apart if they are large."""
-    if not apart:
-        data = "\n".join(f"static {array}" for array in parts.arrays)
-        return {f"{stem}.h": parts.file("header.h", "static inline", data)}
-    declared = "".join(f"extern {head};\n" for head in parts.heads)
-    data = filled(template("extern.h"), parts.words | {"declared": declared})
-    head = f"{parts.words['note']}#include <stdint.h>\n\n{declared}\n"
+def _header(parts: ProgramParts, stem: str, *, separate_data: bool) -> dict[str, str]:
+    """Return a header, with a source file for large arrays."""
+    if not separate_data:
+        data = "\n".join(f"static {array}" for array in parts.array_definitions)
+        return {f"{stem}.h": parts.render("header.h", "static inline", data)}
+    declared = "".join(f"extern {head};\n" for head in parts.array_declarations)
+    data = fill_template(load_template("extern.h"), parts.substitutions | {"declared": declared})
+    head = f"{parts.substitutions['note']}#include <stdint.h>\n\n{declared}\n"
     return {
-        f"{stem}.h": parts.file("header.h", "static inline", data),
-        f"{stem}_data.c": head + "\n".join(parts.arrays),
+        f"{stem}.h": parts.render("header.h", "static inline", data),
+        f"{stem}_data.c": head + "\n".join(parts.array_definitions),
     }
 
 
-def _library(parts: Parts, stem: str) -> dict[str, str]:
+def _library(parts: ProgramParts, stem: str) -> dict[str, str]:
     """Return header, source and CMake file of a library."""
-    data = "\n".join(f"static {array}" for array in parts.arrays)
+    data = "\n".join(f"static {array}" for array in parts.array_definitions)
     names = {f"{stem}.h": "library.h", f"{stem}.c": "library.c", "CMakeLists.txt": "CMakeLists.txt"}
-    link = f"{parts.words['NAME']}_API"
-    return {file: parts.file(name, link, data) for file, name in names.items()}
+    link = f"{parts.substitutions['NAME']}_API"
+    return {file: parts.render(name, link, data) for file, name in names.items()}
 
 
-def _too_large(
-    order: Order, functions: Functions, places: Sequence[str], size: int
+def _size_error(
+    request: ExportRequest, functions: SurfaceFunctions, names: Sequence[str], size: int
 ) -> ParameterError:
-    """Return the error of a program that would be too large; it says what resolution fits."""
-    store = functions.store
-    # The heights are double; the tree that a search descends is not, and may be longer.
-    arrays = [store.values[place] for place in places]
+    """Return the error of a program that would be too large, with the resolution that fits."""
+    store = functions.data
+    # Heights are double, in contrast to the search tree, which may be longer.
+    arrays = [store.values[place] for place in names]
     doubles = [array for array in arrays if array.dtype.name == "float64"]
     shape = max(doubles or arrays, key=lambda array: array.size).shape
     flat = len(shape) > 1 and min(shape) > 4
-    share = order.largest / size
+    share = request.max_data_size / size
     fits = [int(n * (math.sqrt(share) if flat else share)) for n in shape]
     points = " x ".join(str(max(n, 1)) for n in fits[: 2 if flat else 1])
     words = f"must be at least {size} bytes, the data of this surface; at most {points} points fit"
-    return ParameterError("largest", f"{words}: crop it, or prepare it with fewer", order.largest)
+    return ParameterError(
+        "max_data", f"{words}: crop it, or prepare it with fewer", request.max_data_size
+    )

@@ -1,8 +1,8 @@
-"""A linked text of compiled functions as C functions.
+"""Conversion of the linked source of compiled functions to C.
 
-The text is the one that Numba compiles (:mod:`asperity.kernels.fuse`). From a function at the root
-every function that it calls is printed, once for each combination of kinds of arguments, before
-those that call it.
+The source is the one that Numba compiles (:mod:`asperity.kernels.fuse`). A root function and all
+functions that it calls are converted, once for each combination of argument types; callees come
+before their callers.
 """
 
 from __future__ import annotations
@@ -14,45 +14,35 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from asperity.export import c_language as c
+from asperity.export.c_language import NotExportableError, ValueType
 from asperity.export.expressions import real_literal
-from asperity.export.known import Helper
-from asperity.export.scope import Scope
-from asperity.export.statements import Statements
-from asperity.export.subset import (
-    BOOL,
-    INT,
-    NOTHING,
-    SINGLE,
-    Group,
-    Kind,
-    NotExportableError,
-    Number,
-    number_type,
-)
+from asperity.export.statements import FunctionPrinter
+from asperity.export.type_inference import FunctionTypes
 
-_ROUNDINGS = {"EPS": 2.0**-23, "ROOT_EPS": 2.0**-11.5}
-"""What :mod:`asperity.compiled` says of double precision, in single precision."""
+_SINGLE_PRECISION_ROUNDINGS = {"EPS": 2.0**-23, "SQRT_EPS": 2.0**-11.5}
+"""Constants of :mod:`asperity.core.compiled` in single precision."""
 
 
 @dataclass(frozen=True)
-class Linked:
-    """A linked text, taken apart.
+class LinkedSource:
+    """Functions and constants of a linked source.
 
     Attributes:
-        text: the text.
+        text: the source.
     """
 
     text: str
 
     @cached_property
     def functions(self) -> dict[str, ast.FunctionDef]:
-        """Its functions by name."""
+        """Functions by name."""
         nodes = ast.parse(self.text).body
         return {node.name: node for node in nodes if isinstance(node, ast.FunctionDef)}
 
     @cached_property
     def numbers(self) -> dict[str, float]:
-        """The numbers of modules that its functions use."""
+        """Numbers of the modules, by name."""
         found = {}
         for node in ast.parse(self.text).body:
             if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
@@ -61,7 +51,7 @@ class Linked:
 
     @cached_property
     def records(self) -> dict[str, tuple[str, ...]]:
-        """The names of the items of the records that its functions use."""
+        """Field names of the records, by name of the record."""
         found = {}
         for node in ast.parse(self.text).body:
             if isinstance(node, ast.ImportFrom) and node.module is not None:
@@ -72,169 +62,172 @@ class Linked:
 
 
 class Program:
-    """C functions, as they are printed.
+    """C code that is made function by function.
 
     Args:
         linked: the compiled functions.
-        prefix: of every name, such as ``texture``.
+        prefix: prefix of all names, such as ``texture``.
         single: whether real numbers are of single precision.
-        taken: names after the prefix that functions must not have.
+        reserved: names, after the prefix, that functions must not have.
 
     Attributes:
-        types: C types of tuples, with the functions that make them.
-        helpers: small functions.
-        functions: the compiled ones.
+        types: C types of tuples, with their constructors.
+        helpers: helper functions.
+        functions: the compiled functions.
     """
 
     def __init__(
-        self, linked: Linked, prefix: str, *, single: bool, taken: frozenset[str] = frozenset()
+        self,
+        linked: LinkedSource,
+        prefix: str,
+        *,
+        single: bool,
+        reserved: frozenset[str] = frozenset(),
     ) -> None:
         self.linked, self.prefix, self.single = linked, prefix, single
-        # What ends at rounding ends at that of the precision.
-        own = _ROUNDINGS if single else {}
+        own = _SINGLE_PRECISION_ROUNDINGS if single else {}
         self.numbers: Mapping[str, float] = linked.numbers | own
         self.records: Mapping[str, tuple[str, ...]] = linked.records
         self.types: list[str] = []
         self.helpers: list[str] = []
         self.functions: list[str] = []
-        self._taken = set(taken)
+        self._used_names = set(reserved)
         self._names: dict[object, str] = {}
-        self._scopes: dict[tuple[str, tuple[Kind, ...]], Scope] = {}
-        self._open: list[str] = []
+        self._inferred: dict[tuple[str, tuple[ValueType, ...]], FunctionTypes] = {}
+        self._in_progress: list[str] = []
 
     @property
     def real_type(self) -> str:
         """``float`` or ``double``."""
         return "float" if self.single else "double"
 
-    # --- what scopes ask ----------------------------------------------------------------------
+    # --- type inference -----------------------------------------------------------------------
 
-    def parameters(self, name: str) -> tuple[str, ...] | None:
-        """See :class:`asperity.export.scope.Callees`."""
+    def parameter_names(self, name: str) -> tuple[str, ...] | None:
+        """Return the argument names of a compiled function, ``None`` if there is none."""
         node = self.linked.functions.get(name)
         return None if node is None else tuple(argument.arg for argument in node.args.args)
 
-    def scope(self, name: str, kinds: tuple[Kind, ...]) -> Scope:
-        """See :class:`asperity.export.scope.Callees`.
+    def infer_types(self, name: str, argument_types: tuple[ValueType, ...]) -> FunctionTypes:
+        """Return the types of a compiled function for given argument types.
 
         Raises:
-            NotExportableError: for a function that calls itself, and for what C does not know.
+            NotExportableError: for a recursive function, or one that cannot be exported.
         """
-        key = (name, kinds)
-        if key not in self._scopes:
-            if name in self._open:
+        key = (name, argument_types)
+        if key not in self._inferred:
+            if name in self._in_progress:
                 raise NotExportableError(name, "calls itself")
-            self._open.append(name)
-            self._scopes[key] = Scope(self.linked.functions[name], kinds, self)
-            self._open.pop()
-        return self._scopes[key]
+            self._in_progress.append(name)
+            self._inferred[key] = FunctionTypes(self.linked.functions[name], argument_types, self)
+            self._in_progress.pop()
+        return self._inferred[key]
 
-    # --- what printers ask --------------------------------------------------------------------
+    # --- names --------------------------------------------------------------------------------
 
-    def real(self, value: float) -> str:
-        """Return a real number as a literal."""
+    def real_text(self, value: float) -> str:
+        """Return a real number as a C literal."""
         return real_literal(value, self.single)
 
-    def library(self, name: str) -> str:
-        """Return the name of a function of C's library in the precision of the program."""
+    def library_name(self, name: str) -> str:
+        """Return the name of a C library function in the precision of the program."""
         return f"{name}f" if self.single else name
 
-    def helper(self, helper: Helper) -> str:
-        """Return the name of a small function, which is printed the first time."""
+    def helper_name(self, helper: c.HelperFunction) -> str:
+        """Return the name of a helper function, which is added to the program."""
         if helper not in self._names:
-            self._names[helper] = self._free(helper.name)
-            text = helper.text.replace(f"@{helper.name}", self._names[helper])
+            self._names[helper] = self._unique_name(helper.name)
+            text = helper.definition.replace(f"@{helper.name}", self._names[helper])
             text = re.sub(r"\breal\b", self.real_type, text)
-            # Functions of the library are marked by the sign that C has no use for there.
             text = text.replace("!(", "f(" if self.single else "(")
             self.helpers.append(text)
         return self._names[helper]
 
-    def function(self, name: str, kinds: tuple[Kind, ...]) -> str:
-        """Return the name of a compiled function, which is printed the first time."""
-        scope = self.scope(name, kinds)
-        if scope not in self._names:
-            self._names[scope] = self._free(name)
-            self.functions.append(self._printed(scope, self._names[scope]))
-        return self._names[scope]
+    def function_name(self, name: str, argument_types: tuple[ValueType, ...]) -> str:
+        """Return the name of a compiled function, which is added to the program."""
+        types = self.infer_types(name, argument_types)
+        if types not in self._names:
+            self._names[types] = self._unique_name(name)
+            self.functions.append(self._print_function(types, self._names[types]))
+        return self._names[types]
 
-    def _printed(self, scope: Scope, name: str) -> str:
-        statements = Statements(scope, self)
-        given = ", ".join(statements.parameters()) or "void"
-        result = "void" if scope.result == NOTHING else self.type_of(scope.result)
-        inlined = any(getattr(word, "id", "") == "inlined" for word in scope.node.decorator_list)
+    def _print_function(self, types: FunctionTypes, name: str) -> str:
+        statements = FunctionPrinter(types, self)
+        given = ", ".join(statements.parameter_declarations()) or "void"
+        result = "void" if types.result_type == c.VOID else self.c_type(types.result_type)
+        inlined = any(getattr(word, "id", "") == "inlined" for word in types.node.decorator_list)
         inline = f"{self.prefix.upper()}_INLINE" if inlined else "static inline"
         lines = statements.lines(f"{inline} {result} {name}({given})")
-        return comment(ast.get_docstring(scope.node) or "") + "\n".join(lines) + "\n"
+        return comment(ast.get_docstring(types.node) or "") + "\n".join(lines) + "\n"
 
-    def _free(self, name: str) -> str:
-        """Return a name with the prefix that nothing else has."""
+    def _unique_name(self, name: str) -> str:
+        """Return a unique name with the prefix."""
         whole, number = name, 1
-        while whole in self._taken:
+        while whole in self._used_names:
             number += 1
             whole = f"{name}_{number}"
-        self._taken.add(whole)
+        self._used_names.add(whole)
         return f"{self.prefix}_{whole}"
 
     # --- tuples -------------------------------------------------------------------------------
 
-    def type_of(self, kind: Kind) -> str:
+    def c_type(self, value_type: ValueType) -> str:
         """Return the C type of a number or a tuple."""
-        if isinstance(kind, Group):
-            return self._tuple_type(kind)
-        return number_type(kind, self.real_type)
+        if isinstance(value_type, c.TupleType):
+            return self._tuple_type(value_type)
+        return c.c_scalar_type(value_type, self.real_type)
 
-    def _tuple_type(self, kind: Group) -> str:
-        if kind not in self._names:
-            codes = [self._code(item) for item in kind.items]
-            name = f"{codes[0]}{len(codes)}" if kind.alike else "_".join(codes)
-            self._names[kind] = name = self._free(name)
-            self.types.append(self._tuple_text(kind, name))
-        return self._names[kind]
+    def _tuple_type(self, tuple_type: c.TupleType) -> str:
+        if tuple_type not in self._names:
+            codes = [self._type_code(item) for item in tuple_type.items]
+            name = f"{codes[0]}{len(codes)}" if tuple_type.is_uniform else "_".join(codes)
+            self._names[tuple_type] = name = self._unique_name(name)
+            self.types.append(self._tuple_definition(tuple_type, name))
+        return self._names[tuple_type]
 
-    def _code(self, kind: Kind) -> str:
-        if isinstance(kind, Number):
-            return {BOOL: "flag", INT: "int", SINGLE: "single"}.get(kind, "real")
-        return self.type_of(kind).removeprefix(f"{self.prefix}_")
+    def _type_code(self, value_type: ValueType) -> str:
+        if isinstance(value_type, c.ScalarType):
+            return {c.BOOL: "flag", c.INT: "int", c.SINGLE: "single"}.get(value_type, "real")
+        return self.c_type(value_type).removeprefix(f"{self.prefix}_")
 
-    def _tuple_text(self, kind: Group, name: str) -> str:
-        types = [self.type_of(item) for item in kind.items]
+    def _tuple_definition(self, tuple_type: c.TupleType, name: str) -> str:
+        types = [self.c_type(item) for item in tuple_type.items]
         fields = [f"f{i}" for i in range(len(types))]
         given = ", ".join(f"{one} {letter}" for one, letter in zip(types, fields, strict=True))
-        if kind.alike:
+        if tuple_type.is_uniform:
             inside = [f"    {types[0]} v[{len(types)}];"]
             places = [f"v[{i}]" for i in range(len(types))]
         else:
             inside = [f"    {one} {letter};" for one, letter in zip(types, fields, strict=True)]
             places = fields
         lines = ["typedef struct {", *inside, f"}} {name};", ""]
-        head = f"static inline {name} {self.make(kind)}({given})"
+        head = f"static inline {name} {self.constructor_name(tuple_type)}({given})"
         lines += [head, "{", f"    {name} made;"]
         lines += [f"    made.{at} = {one};" for at, one in zip(places, fields, strict=True)]
         return "\n".join([*lines, "    return made;", "}", ""])
 
-    def make(self, kind: Group) -> str:
-        """Return the name of the C function that makes a tuple."""
-        return f"{self.prefix}_make_{self.type_of(kind).removeprefix(f'{self.prefix}_')}"
+    def constructor_name(self, value_type: c.TupleType) -> str:
+        """Return the name of the constructor of a tuple."""
+        return f"{self.prefix}_make_{self.c_type(value_type).removeprefix(f'{self.prefix}_')}"
 
 
 def comment(text: str) -> str:
-    """Return the first paragraph of a documentation as a C comment; empty if there is none.
+    """Return the first paragraph of a docstring as a C comment; empty if there is none.
 
     Example:
         >>> print(comment("Return h [m]."), end="")
         /* Return h [m]. */
     """
-    first = (
-        " ".join(text.split("\n\n", maxsplit=1)[0].split())
-        .replace("*/", "* /")
-        .replace("/*", "/ *")
-    )
-    return f"/* {first} */\n" if first else ""
+    first = " ".join(text.split("\n\n", maxsplit=1)[0].split())
+    return f"/* {_escape_comment(first)} */\n" if first else ""
+
+
+def _escape_comment(text: str) -> str:
+    return text.replace("*/", "* /").replace("/*", "/ *")
 
 
 def block_comment(text: str) -> str:
-    """Return a text as a C comment, line by line; empty for no text.
+    """Return a text as a C block comment; empty for an empty text.
 
     Example:
         >>> print(block_comment("f = k d w"), end="")
@@ -242,7 +235,7 @@ def block_comment(text: str) -> str:
          * f = k d w
          */
     """
-    safe = text.strip().replace("*/", "* /").replace("/*", "/ *")
+    safe = _escape_comment(text.strip())
     if not safe:
         return ""
     lines = "".join(f" * {line}".rstrip() + "\n" for line in safe.splitlines())

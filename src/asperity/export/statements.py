@@ -1,4 +1,4 @@
-"""Statements of compiled functions as C: one function, from its first line to its last."""
+"""Conversion of compiled functions to C, statement by statement."""
 
 from __future__ import annotations
 
@@ -6,40 +6,31 @@ import ast
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from asperity.export.expressions import Expressions, Printing, field
-from asperity.export.kinds import called
-from asperity.export.names import (
-    as_value,
+from asperity.export import c_language as c
+from asperity.export.c_language import ValueType
+from asperity.export.expression_types import ProgramContext, called_name, to_load
+from asperity.export.expressions import ExpressionPrinter, field_access
+from asperity.export.liveness import (
+    declaring_statements,
     expressions_in,
-    first_values,
     live_names,
     names_in,
-    owned_loops,
-    sequenced,
-    stored_in,
+    self_declaring_loops,
+    sequenced_parts,
+    stored_names,
     without_docstring,
 )
-from asperity.export.scope import Scope
-from asperity.export.subset import (
-    FLOAT,
-    INT,
-    Constants,
-    Group,
-    Kind,
-    Number,
-    Work,
-    is_constant,
-)
+from asperity.export.type_inference import FunctionTypes
 
-_SIGNS: dict[type[ast.operator], str] = {
+_AUGMENTED_OPERATORS: dict[type[ast.operator], str] = {
     ast.Add: "+=",
     ast.Sub: "-=",
     ast.Mult: "*=",
     ast.Div: "/=",
 }
 
-# Words of C and C++, and names that headers of systems define as macros.
-_TAKEN = frozenset(
+# Keywords of C and C++, and names that system headers define as macros.
+_RESERVED_WORDS = frozenset(
     word
     for line in (
         "auto break case char const continue default do double else enum extern float for goto if",
@@ -55,72 +46,75 @@ _TAKEN = frozenset(
 )
 
 
-def is_taken(name: str) -> bool:
-    """Return whether a name is a word of C or C++, or often a macro."""
-    return name in _TAKEN
+def is_reserved(name: str) -> bool:
+    """Return whether a name is a keyword of C or C++, or a common macro."""
+    return name in _RESERVED_WORDS
 
 
-class Statements:
-    """The lines of one function.
+class FunctionPrinter:
+    """Converter of one function.
 
     Args:
-        scope: the kinds of its names.
-        program: the program that it is printed into.
+        types: types of the variables.
+        program: the program.
     """
 
-    def __init__(self, scope: Scope, program: Printing) -> None:
-        self.scope, self.program = scope, program
-        self.names = {name: f"{name}_" if name in _TAKEN else name for name in scope.kinds}
-        self.say = Expressions(scope, program, self.names)
+    def __init__(self, types: FunctionTypes, program: ProgramContext) -> None:
+        self.types, self.program = types, program
+        self.names = {name: f"{name}_" if name in _RESERVED_WORDS else name for name in types.types}
+        self.expressions = ExpressionPrinter(types, program, self.names)
         self._temporaries = 0
-        self._live = live_names(scope)
-        self._owned = dict(owned_loops(scope.node))
-        # Where each variable is declared: with its first value, or at the top.
-        self._first = first_values(scope, self._live, set(self._owned.values()))
+        self._live = live_names(types)
+        self._loop_variables = dict(self_declaring_loops(types.node))
+        self._declaring = declaring_statements(
+            types, self._live, set(self._loop_variables.values())
+        )
 
-    def lines(self, head: str) -> list[str]:
-        """Return the function."""
+    def lines(self, signature: str) -> list[str]:
+        """Return the lines of the function."""
         unused = [
             f"(void){self.names[name]};"
-            for name in self.scope.arguments
-            if name not in self._live and not is_constant(self.scope.kinds[name])
+            for name in self.types.argument_names
+            if name not in self._live and not c.is_constant(self.types.types[name])
         ]
-        body = without_docstring(self.scope.node.body)
-        inside = [*self._copies(), *self._declarations(), *unused, *self._block(body)]
-        return [f"{head}", "{", *_indented(inside), "}"]
+        body = without_docstring(self.types.node.body)
+        inside = [*self._argument_conversions(), *self._declarations(), *unused, *self._block(body)]
+        return [f"{signature}", "{", *_indent(inside), "}"]
 
-    def parameters(self) -> list[str]:
-        """Return the parameters: constants are none, work arrays are handed down by address."""
+    def parameter_declarations(self) -> list[str]:
+        """Return the parameters; constants are not passed."""
         result = []
-        for name in self.scope.arguments:
-            kind = self.scope.given[name]
-            if not is_constant(kind):
-                suffix = "_given" if kind != self.scope.kinds[name] else ""
-                result.append(self._declared(kind, self.names[name] + suffix))
+        for name in self.types.argument_names:
+            kind = self.types.argument_types[name]
+            if not c.is_constant(kind):
+                suffix = "_given" if kind != self.types.types[name] else ""
+                result.append(self._declaration(kind, self.names[name] + suffix))
         return result
 
-    def _declared(self, kind: Kind, name: str) -> str:
-        if isinstance(kind, Work):
-            lengths = "".join(f"[{length}]" for length in kind.shape)
-            return f"{self.program.type_of(FLOAT)} {name}{lengths}"
-        return f"{self.program.type_of(kind)} {name}"
+    def _declaration(self, value_type: ValueType, name: str) -> str:
+        if isinstance(value_type, c.WorkArray):
+            lengths = "".join(f"[{length}]" for length in value_type.shape)
+            return f"{self.program.c_type(c.FLOAT)} {name}{lengths}"
+        return f"{self.program.c_type(value_type)} {name}"
 
-    def _copies(self) -> Iterator[str]:
-        """Yield the lines of arguments that become variables of another kind."""
-        for name in self.scope.arguments:
-            given, kind = self.scope.given[name], self.scope.kinds[name]
-            if given != kind and isinstance(kind, Number):
-                cname, kind_name = self.names[name], self.program.type_of(kind)
+    def _argument_conversions(self) -> Iterator[str]:
+        """Yield the conversions of arguments to variables of another type."""
+        for name in self.types.argument_names:
+            given, kind = self.types.argument_types[name], self.types.types[name]
+            if given != kind and isinstance(kind, c.ScalarType):
+                cname, kind_name = self.names[name], self.program.c_type(kind)
                 yield f"{kind_name} {cname} = ({kind_name}){cname}_given;"
 
     def _declarations(self) -> Iterator[str]:
-        inside = set(self._owned.values())
-        for name, kind in self.scope.kinds.items():
-            elsewhere = name in self.scope.arguments or name in self._first or name in inside
-            if elsewhere or name not in self._live or is_constant(kind):
+        inside = set(self._loop_variables.values())
+        for name, kind in self.types.types.items():
+            elsewhere = (
+                name in self.types.argument_names or name in self._declaring or name in inside
+            )
+            if elsewhere or name not in self._live or c.is_constant(kind):
                 continue
-            value = " = 0" if isinstance(kind, Number) else ""
-            yield f"{self._declared(kind, self.names[name])}{value};"
+            value = " = 0" if isinstance(kind, c.ScalarType) else ""
+            yield f"{self._declaration(kind, self.names[name])}{value};"
 
     # --- statements ------------------------------------------------------------------------------
 
@@ -128,46 +122,48 @@ class Statements:
         return [line for statement in body for line in self._statement(statement)]
 
     def _statement(self, node: ast.stmt) -> list[str]:
-        self._check_order(node)
+        self._check_evaluation_order(node)
         return _PRINTERS[type(node)](self, node)
 
     def _expression(self, node: ast.Expr) -> list[str]:
-        return [] if isinstance(node.value, ast.Constant) else [f"{self.say.text(node.value)};"]
+        if isinstance(node.value, ast.Constant):
+            return []
+        return [f"{self.expressions.text(node.value)};"]
 
-    def _word(self, node: ast.stmt) -> list[str]:
+    def _jump(self, node: ast.stmt) -> list[str]:
         return {ast.Break: ["break;"], ast.Continue: ["continue;"]}.get(type(node), [])
 
     def _while(self, node: ast.While) -> list[str]:
-        inside = _indented(self._block(node.body))
-        return [f"while ({self.say.truth(node.test)}) {{", *inside, "}"]
+        inside = _indent(self._block(node.body))
+        return [f"while ({self.expressions.condition(node.test)}) {{", *inside, "}"]
 
     def _return(self, node: ast.Return) -> list[str]:
         if node.value is None:
             return ["return;"]
-        return [f"return {self.say.as_kind(node.value, self.scope.result)};"]
+        return [f"return {self.expressions.as_type(node.value, self.types.result_type)};"]
 
     def _if(self, node: ast.If) -> list[str]:
-        test = self.say.truth(node.test)
-        if _gives_zeros(node.body[0]):
+        test = self.expressions.condition(node.test)
+        if _returns_zeros(node.body[0]):
             test = f"{self.program.prefix.upper()}_RARE({test})"
-        lines = [f"if ({test}) {{", *_indented(self._block(node.body))]
+        lines = [f"if ({test}) {{", *_indent(self._block(node.body))]
         if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
             first, *rest = self._if(node.orelse[0])
             return [*lines, f"}} else {first}", *rest]
         if node.orelse:
-            lines += ["} else {", *_indented(self._block(node.orelse))]
+            lines += ["} else {", *_indent(self._block(node.orelse))]
         return [*lines, "}"]
 
     def _for(self, node: ast.For) -> list[str]:
-        assert isinstance(node.iter, ast.Call)  # the scope let nothing else through
+        assert isinstance(node.iter, ast.Call)  # checked by the type inference
         assert isinstance(node.target, ast.Name)
         given = node.iter.args
-        start = self.say.as_kind(given[0], INT) if len(given) > 1 else "0"
-        step = self.scope.length(given[2]) if len(given) > 2 else 1
+        start = self.expressions.as_type(given[0], c.INT) if len(given) > 1 else "0"
+        step = self.types.constant_integer(given[2]) if len(given) > 2 else 1
         if not step:
-            raise self.scope.refuse("loops in steps that are no literal", node.iter)
-        end, before = self._end(node, given[1] if len(given) > 1 else given[0])
-        owned = node in self._owned
+            raise self.types.not_exportable("loops with a step that is not a literal", node.iter)
+        end, before = self._loop_end(node, given[1] if len(given) > 1 else given[0])
+        owned = node in self._loop_variables
         name = self.names[node.target.id] if owned else self._temporary("turn")
         if node.target.id.startswith("_"):
             name = self._temporary("turn")
@@ -176,27 +172,28 @@ class Statements:
         inside = [] if owned else [f"{self.names[node.target.id]} = {name};"]
         inside = [] if node.target.id not in self._live else inside
         head = f"for (int64_t {name} = {start}; {name} {sign} {end}; {change}) {{"
-        return [*before, head, *_indented([*inside, *self._block(node.body)]), "}"]
+        return [*before, head, *_indent([*inside, *self._block(node.body)]), "}"]
 
-    def _end(self, node: ast.For, end: ast.expr) -> tuple[str, list[str]]:
-        """Return the end of a loop: what may change meanwhile is looked at once, before it."""
-        text = self.say.as_kind(end, INT, 8)
-        changed = set(stored_in(node))
+    def _loop_end(self, node: ast.For, end: ast.expr) -> tuple[str, list[str]]:
+        """Return the end of a loop, and the line that stores it if the loop may change it."""
+        text = self.expressions.as_type(end, c.INT, 8)
+        changed = set(stored_names(node))
         read = {part.id for part in ast.walk(end) if isinstance(part, ast.Name)}
         calls = any(isinstance(part, (ast.Call, ast.Subscript)) for part in ast.walk(end))
-        if self.scope.length(end) is not None or not (read & changed or calls):
+        if self.types.constant_integer(end) is not None or not (read & changed or calls):
             return text, []
         name = self._temporary("end")
         return name, [f"const int64_t {name} = {text};"]
 
-    def _change(self, node: ast.AugAssign) -> list[str]:
+    def _augmented_assignment(self, node: ast.AugAssign) -> list[str]:
         if isinstance(node.target, ast.Name) and node.target.id not in self._live:
             return []
-        value = ast.BinOp(as_value(node.target), node.op, node.value)
-        kind = self.scope.sure(node.target)
-        if type(node.op) in _SIGNS and self.scope.sure(value) == kind:
-            place = self.say.text(as_value(node.target))
-            return [f"{place} {_SIGNS[type(node.op)]} {self.say.as_kind(node.value, kind)};"]
+        value = ast.BinOp(to_load(node.target), node.op, node.value)
+        kind = self.types.require_type(node.target)
+        if type(node.op) in _AUGMENTED_OPERATORS and self.types.require_type(value) == kind:
+            place = self.expressions.text(to_load(node.target))
+            change = self.expressions.as_type(node.value, kind)
+            return [f"{place} {_AUGMENTED_OPERATORS[type(node.op)]} {change};"]
         return self._assign(node, [node.target], value)
 
     # --- assignments -----------------------------------------------------------------------------
@@ -208,55 +205,59 @@ class Statements:
         return [] if node.value is None else self._assign(node, [node.target], node.value)
 
     def _assign(self, node: ast.stmt, targets: Sequence[ast.expr], value: ast.expr) -> list[str]:
-        if isinstance(value, ast.Call) and called(value) == "local_array":
+        if isinstance(value, ast.Call) and called_name(value) == "local_array":
             return self._array(targets, value)
-        alone = isinstance(targets[0], ast.Tuple)
-        if alone and isinstance(value, ast.Tuple):
-            assert isinstance(targets[0], ast.Tuple)  # as was just asked
-            return self._each(node, targets[0].elts, value.elts)
-        if alone:
-            assert isinstance(targets[0], ast.Tuple)  # as was just asked
-            return self._unpack(node, targets[0].elts, value)
+        first, *others = targets
+        if isinstance(first, ast.Tuple):
+            if isinstance(value, ast.Tuple):
+                return self._assign_each(node, first.elts, value.elts)
+            return self._unpack(node, first.elts, value)
         if len(targets) > 1 and not isinstance(value, ast.Constant):
-            first, *others = targets
             lines = self._store(node, first, value)
-            return lines + [li for one in others for li in self._store(node, one, as_value(first))]
+            for other in others:
+                lines += self._store(node, other, to_load(first))
+            return lines
         return [line for target in targets for line in self._store(node, target, value)]
 
     def _array(self, targets: Sequence[ast.expr], value: ast.Call) -> list[str]:
         if len(targets) != 1 or not isinstance(targets[0], ast.Name):
-            raise self.scope.refuse("gives a work array more than one name", value)
+            raise self.types.not_exportable("gives a work array more than one name", value)
         name = targets[0].id
         if name not in self._live:
             return []
-        if name in self._first:
-            return [f"{self._declared(self.scope.kinds[name], self.names[name])};"]
-        raise self.scope.refuse("makes a work array inside a loop or a branch", value)
+        if name in self._declaring:
+            return [f"{self._declaration(self.types.types[name], self.names[name])};"]
+        raise self.types.not_exportable("makes a work array inside a loop or a branch", value)
 
     def _store(self, node: ast.stmt, target: ast.expr, value: ast.expr) -> list[str]:
-        kind = self.scope.sure(as_value(target))
-        if is_constant(kind):
+        kind = self.types.require_type(to_load(target))
+        if c.is_constant(kind):
             return []
         if isinstance(target, ast.Name) and target.id not in self._live:
-            return [f"(void){self.say.text(value)};"] if self._acts(value) else []
-        return [self._given(node, target, self.say.as_kind(value, kind))]
+            return self._discard(value)
+        return [self._assignment_line(node, target, self.expressions.as_type(value, kind))]
 
-    def _given(self, node: ast.stmt, target: ast.expr, text: str) -> str:
-        """Return the line that gives a variable or an item of an array its value."""
-        if isinstance(target, ast.Name) and self._first.get(target.id) is node:
-            kind = self.scope.kinds[target.id]
-            return f"{self._declared(kind, self.names[target.id])} = {text};"
-        return f"{self.say.text(as_value(target))} = {text};"
+    def _discard(self, value: ast.expr) -> list[str]:
+        """Return the line that evaluates an unused value, if it has side effects."""
+        unused = f"(void){self.expressions.text(value)};"
+        return [unused] if self.types.writes_arrays(value) else []
 
-    def _each(
+    def _assignment_line(self, node: ast.stmt, target: ast.expr, text: str) -> str:
+        """Return the line that assigns to a variable or an array element."""
+        if isinstance(target, ast.Name) and self._declaring.get(target.id) is node:
+            kind = self.types.types[target.id]
+            return f"{self._declaration(kind, self.names[target.id])} = {text};"
+        return f"{self.expressions.text(to_load(target))} = {text};"
+
+    def _assign_each(
         self, node: ast.stmt, targets: Sequence[ast.expr], values: Sequence[ast.expr]
     ) -> list[str]:
-        """Assign several values at once: none of them sees what the others change."""
+        """Return the lines of a simultaneous assignment."""
         stored: set[str] = set()
         clash = False
         for target, value in zip(targets, values, strict=True):
             read = {part.id for part in ast.walk(value) if isinstance(part, ast.Name)}
-            clash = clash or bool(read & stored) or self._acts(value)
+            clash = clash or bool(read & stored) or self.types.writes_arrays(value)
             stored |= set(names_in(target))
         if not clash:
             pairs = zip(targets, values, strict=True)
@@ -265,73 +266,75 @@ class Statements:
         for target, value in zip(targets, values, strict=True):
             if isinstance(target, ast.Name) and target.id not in self._live:
                 continue
-            kind = self.scope.sure(as_value(target))
+            kind = self.types.require_type(to_load(target))
             name = self._temporary("new")
-            lines.append(f"const {self._declared(kind, name)} = {self.say.as_kind(value, kind)};")
-            later.append(self._given(node, target, name))
+            lines.append(
+                f"const {self._declaration(kind, name)} = {self.expressions.as_type(value, kind)};"
+            )
+            later.append(self._assignment_line(node, target, name))
         return lines + later
 
     def _unpack(self, node: ast.stmt, targets: Sequence[ast.expr], value: ast.expr) -> list[str]:
-        kind = self.scope.sure(value)
+        kind = self.types.require_type(value)
         pairs = list(enumerate(targets))
-        if isinstance(kind, Constants):
-            places = [kind.read(name) for name, _item in kind.fields]
-            items: Sequence[Kind] = [item for _name, item in kind.fields]
+        if isinstance(kind, c.ConstantRecord):
+            places = [kind.field_expression(name) for name, _item in kind.fields]
+            items: Sequence[ValueType] = [item for _name, item in kind.fields]
         else:
-            assert isinstance(kind, Group)  # the scope let nothing else through
+            assert isinstance(kind, c.TupleType)  # checked by the type inference
             items = kind.items
         wanted = [
             (index, target)
             for index, target in pairs
             if (not isinstance(target, ast.Name) or target.id in self._live)
-            and not is_constant(items[index])
+            and not c.is_constant(items[index])
         ]
         lines = []
-        if isinstance(kind, Group):
+        if isinstance(kind, c.TupleType):
             if not wanted:
-                return [f"(void){self.say.text(value)};"] if self._acts(value) else []
+                return self._discard(value)
             name = self._temporary("values")
-            lines.append(f"const {self.program.type_of(kind)} {name} = {self.say.text(value)};")
-            places = [f"{name}{field(kind, index)}" for index, _target in pairs]
+            lines.append(
+                f"const {self.program.c_type(kind)} {name} = {self.expressions.text(value)};"
+            )
+            places = [f"{name}{field_access(kind, index)}" for index, _target in pairs]
         for index, target in wanted:
-            lines += self._take(node, target, items[index], places[index])
+            lines += self._unpack_item(node, target, items[index], places[index])
         return lines
 
-    def _take(self, node: ast.stmt, target: ast.expr, kind: Kind, place: str) -> list[str]:
-        """Return the lines that give a target, or the parts of one, what lies at a place."""
-        if isinstance(target, ast.Tuple) and isinstance(kind, Group):
-            parts = enumerate(zip(target.elts, kind.items, strict=True))
+    def _unpack_item(
+        self, node: ast.stmt, target: ast.expr, value_type: ValueType, source: str
+    ) -> list[str]:
+        """Return the lines that assign an item of a tuple to a target or its parts."""
+        if isinstance(target, ast.Tuple) and isinstance(value_type, c.TupleType):
+            parts = enumerate(zip(target.elts, value_type.items, strict=True))
             return [
                 line
                 for index, (part, item) in parts
                 if not isinstance(part, ast.Name) or part.id in self._live
-                for line in self._take(node, part, item, f"{place}{field(kind, index)}")
+                for line in self._unpack_item(
+                    node, part, item, f"{source}{field_access(value_type, index)}"
+                )
             ]
-        own = self.scope.sure(as_value(target))
-        if own != kind and isinstance(own, Number):
-            place = f"({self.program.type_of(own)}){place}"
-        return [self._given(node, target, place)]
+        own = self.types.require_type(to_load(target))
+        if own != value_type and isinstance(own, c.ScalarType):
+            source = f"({self.program.c_type(own)}){source}"
+        return [self._assignment_line(node, target, source)]
 
-    def _temporary(self, word: str) -> str:
+    def _temporary(self, prefix: str) -> str:
         self._temporaries += 1
-        name = f"{word}_{self._temporaries}"
-        return name if name not in self.names.values() else self._temporary(word)
+        name = f"{prefix}_{self._temporaries}"
+        return name if name not in self.names.values() else self._temporary(prefix)
 
     # --- order of evaluation ---------------------------------------------------------------------
 
-    def _acts(self, node: ast.expr) -> bool:
-        """Return whether an expression writes to a work array."""
-        return any(
-            bool(self.scope.effects(part)) for part in ast.walk(node) if isinstance(part, ast.Call)
-        )
-
-    def _check_order(self, node: ast.stmt) -> None:
-        """Refuse a statement whose value depends on an order that C leaves open."""
+    def _check_evaluation_order(self, node: ast.stmt) -> None:
+        """Check that the value does not depend on an evaluation order that C leaves open."""
         for value in expressions_in(node):
-            for piece in sequenced(value):
+            for piece in sequenced_parts(value):
                 calls = [part for part in ast.walk(piece) if isinstance(part, ast.Call)]
-                acting = [call for call in calls if self.scope.effects(call)]
-                written = {name for call in acting for name in self.scope.effects(call)}
+                acting = [call for call in calls if self.types.written_arrays(call)]
+                written = {name for call in acting for name in self.types.written_arrays(call)}
                 inside = {id(part) for call in acting for part in ast.walk(call)}
                 read = {
                     part.value.id
@@ -341,31 +344,33 @@ class Statements:
                     and id(part) not in inside
                 }
                 if len(acting) > 1 or read & written:
-                    raise self.scope.refuse("depends on an order that C leaves open", value)
+                    raise self.types.not_exportable(
+                        "depends on an evaluation order that C leaves open", value
+                    )
 
 
-_PRINTERS: dict[type[ast.stmt], Callable[[Statements, Any], list[str]]] = {
-    ast.AnnAssign: Statements._annotated,
-    ast.Assign: Statements._assignment,
-    ast.AugAssign: Statements._change,
-    ast.Break: Statements._word,
-    ast.Continue: Statements._word,
-    ast.Expr: Statements._expression,
-    ast.For: Statements._for,
-    ast.If: Statements._if,
-    ast.Pass: Statements._word,
-    ast.Return: Statements._return,
-    ast.While: Statements._while,
+_PRINTERS: dict[type[ast.stmt], Callable[[FunctionPrinter, Any], list[str]]] = {
+    ast.AnnAssign: FunctionPrinter._annotated,
+    ast.Assign: FunctionPrinter._assignment,
+    ast.AugAssign: FunctionPrinter._augmented_assignment,
+    ast.Break: FunctionPrinter._jump,
+    ast.Continue: FunctionPrinter._jump,
+    ast.Expr: FunctionPrinter._expression,
+    ast.For: FunctionPrinter._for,
+    ast.If: FunctionPrinter._if,
+    ast.Pass: FunctionPrinter._jump,
+    ast.Return: FunctionPrinter._return,
+    ast.While: FunctionPrinter._while,
 }
 
 
-def _gives_zeros(node: ast.stmt) -> bool:
-    """Return whether a statement returns zeros, as where nothing is touched."""
+def _returns_zeros(node: ast.stmt) -> bool:
+    """Return whether a statement returns zeros, as outside of contact."""
     given = node.value if isinstance(node, ast.Return) else None
     return isinstance(given, ast.Tuple) and all(
         isinstance(item, ast.Constant) and item.value == 0.0 for item in given.elts
     )
 
 
-def _indented(lines: Sequence[str]) -> list[str]:
+def _indent(lines: Sequence[str]) -> list[str]:
     return [f"    {line}" for line in lines]

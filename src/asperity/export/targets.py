@@ -1,39 +1,43 @@
-"""The languages that a surface can be exported to."""
+"""Export targets, and the output of exported files."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 
-from asperity.errors import ParameterError, nearest_names
+from asperity.core.errors import ParameterError, escape_unprintable, suggest_names
+from asperity.core.files import open_atomic
 from asperity.export.c99 import c99_files
-from asperity.export.order import Order
+from asperity.export.export_request import ExportRequest
 
 
 @dataclass(frozen=True)
-class Target:
-    """A language to export to.
+class ExportTarget:
+    """A format to export to.
 
     Attributes:
-        name: by which it is asked for, such as ``c99``.
-        words: what it is.
-        suffix: of the file that is named, such as ``.h``.
-        files: returns the texts of the files by name, the named one first, from what is to be
-            exported and the stem of their names.
+        name: name of the target, such as ``c99``.
+        description: short description.
+        suffix: suffix of the main file, such as ``.h``.
+        files: function of an export request and the stem of the file names that returns the texts
+            of the files by name, the main file first.
     """
 
     name: str
-    words: str
+    description: str
     suffix: str
-    files: Callable[[Order, str], dict[str, str]]
+    files: Callable[[ExportRequest, str], dict[str, str]]
 
 
-TARGETS = {"c99": Target("c99", "a C header, or a C library", ".h", c99_files)}
-"""The languages by name."""
+TARGETS = {"c99": ExportTarget("c99", "a C header, or a C library", ".h", c99_files)}
+"""Export targets by name."""
 
 
-def register(target: Target) -> Target:
-    """Add a language of your own; the command line knows it, too.
+def register(target: ExportTarget) -> ExportTarget:
+    """Register a user-defined export target.
 
     Raises:
         ParameterError: for a name that is taken.
@@ -43,12 +47,65 @@ def register(target: Target) -> Target:
     return target
 
 
-def find_target(name: str) -> Target:
-    """Return a language by its name.
+def find_target(name: str) -> ExportTarget:
+    """Return an export target by its name.
 
     Raises:
-        ParameterError: for an unknown one.
+        ParameterError: for an unknown name.
     """
     if name.lower() not in TARGETS:
-        raise ParameterError("lang", f"is unknown: {name!r}; {nearest_names(name, TARGETS)}")
+        raise ParameterError("lang", f"is unknown: {name!r}; {suggest_names(name, TARGETS)}")
     return TARGETS[name.lower()]
+
+
+def check_not_existing(path: Path, names: Mapping[str, str]) -> None:
+    """Check that none of the files exists.
+
+    Raises:
+        ParameterError: for the first file that exists.
+    """
+    for name in names:
+        if (path.parent / name).exists() or (path.parent / name).is_symlink():
+            words = f"exists: {escape_unprintable(path.parent / name)}; --force replaces it"
+            raise ParameterError("output", words)
+
+
+def check_name(path: Path, target: ExportTarget) -> None:
+    """Check that the file name has the suffix of the target.
+
+    Raises:
+        ParameterError: for another suffix, or a name that is not printable.
+    """
+    if path.suffix != target.suffix or not path.stem.isprintable() or '"' in path.stem:
+        words = f"must be a file that ends in {target.suffix}"
+        raise ParameterError("output", words, escape_unprintable(path.name))
+
+
+def write_files(
+    path: str | os.PathLike[str], target: ExportTarget, request: ExportRequest, *, force: bool
+) -> list[Path]:
+    """Write all files of an exported program, or none, and return their paths.
+
+    Args:
+        path: the main file; further files are written to the same folder.
+        target: the export target.
+        request: the export request.
+        force: whether to replace existing files.
+
+    Raises:
+        ParameterError: for a file that exists, or cannot be written.
+    """
+    place = Path(path)
+    check_name(place, target)
+    files = target.files(request, place.stem)
+    if not force:
+        check_not_existing(place, files)
+    try:
+        with ExitStack() as written:
+            for name, text in files.items():
+                stream = written.enter_context(open_atomic(place.parent / name))
+                stream.write(text.encode())
+                stream.flush()
+    except OSError as error:
+        raise ParameterError("output", f"cannot be written: {error.strerror}", str(path)) from None
+    return [place.parent / name for name in files]

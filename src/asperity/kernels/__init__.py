@@ -1,1 +1,1 @@
-"""What is compiled: functions of texture, contact and law, linked into one module."""
+"""Compiled code: functions of texture, contact and law, linked into one module."""

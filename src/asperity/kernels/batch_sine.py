@@ -1,25 +1,25 @@
-"""Sine and cosine of batches: without branches and calls, so that many points go at once.
+"""Sine and cosine for batches, without branches and calls, so that loops vectorize.
 
-The angle is halved and freed of m quarter turns, x/2 = m π/2 + t with |t| <= π/4 (Cody and Waite);
-sin t and 2 cos t are polynomials, and sin x = ±2 sin t cos t, cos x = ±(1 - 2 sin² t), the sign
-that of (-1)^m. Errors are at most 6e-16 for angles up to 1e6 turns, and results within [-1, 1] by
-less than that; beyond, the error is that of an angle whose last two bits are lost. It is nothing to
-the rounding of an angle that was computed, k x + phase, which is larger from one turn on. All this
-holds whether the processor rounds a product and a sum once or twice.
+The angle is halved and reduced by m quarter turns, x/2 = m π/2 + t with |t| <= π/4 (Cody and
+Waite); sin t and 2 cos t are polynomials, and sin x = ±2 sin t cos t, cos x = ±(1 - 2 sin² t), with
+the sign of (-1)^m. Errors are at most 6e-16 for angles up to 1e6 turns, and results exceed
+[-1, 1] by less than that; beyond, the error is that of an angle whose last two bits are lost. It is
+less than the rounding error of a computed angle, k x + phase, from one turn on. All this holds
+whether the processor rounds a product and a sum once or twice.
 """
 
-from asperity.compiled import Kernels, multiply_add
+from asperity.core.compiled import Kernels, multiply_add
 
 KERNELS = Kernels(provides=("cosine", "sine"))
 
-# A number added and taken away again: what is left is rounded to an integer.
+# Adding and subtracting this number rounds to an integer.
 ROUNDING = 1.5 * 2.0**52
 # 2/π, and π/2 in three parts: multiples of the first and the second up to 2^23 are exact.
 INVERSE = 0.6366197723675814
 PART_0 = 1.570796325802803
 PART_1 = 9.920935791635221e-10
 PART_2 = 5.170182981794105e-19
-# A little more than π/4: for angles whose last bit is more than a turn.
+# Slightly more than π/4, for angles whose last bit is more than a turn.
 LARGEST = 0.7854
 
 

@@ -1,9 +1,9 @@
 """Compiled modules: law, texture sampler and loops fused into one source, then compiled.
 
-A fused module is made in memory and named after its content; the machine code of its loops is kept
-in the cache, :mod:`asperity.kernels.code_store`: a second process compiles nothing. So is the code
-of large functions that many loops call, such as the search for a nearest point: each is a module of
-its own, compiled once for all laws on a kind of texture.
+A fused module is built in memory and named after its content. The machine code of its loops is
+cached (see :mod:`asperity.kernels.numba_internals`), so a second process compiles nothing. Large
+functions that many loops call, such as the search for a closest point, are modules of their own,
+compiled once for all laws on a texture kind.
 """
 
 from __future__ import annotations
@@ -17,22 +17,26 @@ from functools import cache, lru_cache, partial
 from threading import Lock
 from types import ModuleType
 
-from asperity.contacts.sampler import OFFERED
-from asperity.derive.facts import law_facts
-from asperity.derive.shipped import generated_path
-from asperity.errors import ParameterError
+from asperity.clamps import NONE, Clamp
+from asperity.contacts.sampler_interface import SAMPLER_FUNCTIONS
+from asperity.core.errors import ParameterError
+from asperity.derive.facts import generated_kernel_path, law_facts
+from asperity.kernels.law_codegen import LawCode, contact_source, probe_source
 from asperity.kernels.link import (
-    COMMON,
+    INTRINSIC_MODULES,
     MissingFunctionError,
-    Unit,
+    SourceUnit,
+    generated_unit,
     link,
-    link_parts,
+    link_modules,
     loops_of,
-    module_unit,
-    written_unit,
+    unit_from_module,
 )
-from asperity.kernels.probe import ClampName, ProbePlan, contact_source, probe_source
 from asperity.laws import LAWS, Law
+
+Modules = tuple[ModuleType, ...]
+# Functions to link, each with the unit that defines it.
+Roots = Sequence[tuple[str, SourceUnit]]
 
 _HEADER = '''"""{title}
 
@@ -46,19 +50,19 @@ import math
 import numpy as np
 from numba import njit
 
-from asperity.kernels.code_store import keep_code
-from asperity.kernels.ingredients import IngredientCompiler, LoopCompiler
+from asperity.kernels.numba_internals import cache_machine_code
+from asperity.kernels.numba_internals import LinkOnlyCompiler, LoopCompiler
 
-# Nothing allocates, so nothing is counted: counting references to the arrays of a texture at every
-# call costs more than the arithmetic. Only the loops are called from Python; the others need no
-# wrapper, a fifth of the compile time.
+# Nothing allocates, so reference counting is off: counting references to the arrays of a texture at
+# every call costs more than the arithmetic. Only the loops are called from Python; the others need
+# no wrapper, which saves a fifth of the compile time.
 plain = dict(error_model="numpy", _nrt=False)
 internal = dict(**plain, no_cpython_wrapper=True, no_cfunc_wrapper=True)
-scalar = njit(**internal, pipeline_class=IngredientCompiler)
-inlined = njit(**internal, forceinline=True, pipeline_class=IngredientCompiler)
+scalar = njit(**internal, pipeline_class=LinkOnlyCompiler)
+inlined = njit(**internal, forceinline=True, pipeline_class=LinkOnlyCompiler)
 merged = njit(error_model="numpy", inline="always")
-loop = keep_code(njit(**plain, nogil=True, pipeline_class=LoopCompiler))
-shared = keep_code(njit(**internal, pipeline_class=LoopCompiler))
+loop = cache_machine_code(njit(**plain, nogil=True, pipeline_class=LoopCompiler))
+shared = cache_machine_code(njit(**internal, pipeline_class=LoopCompiler))
 
 
 '''
@@ -66,9 +70,9 @@ shared = keep_code(njit(**internal, pipeline_class=LoopCompiler))
 
 @lru_cache(maxsize=256)
 def kernel_source(law: Law) -> str:
-    """Return the kernels of a law: the shipped file, or derived now for a user's own law."""
+    """Return the kernels of a law: the shipped file, or derived now for a user-defined law."""
     if LAWS.get(law.letter) is law:
-        text = generated_path(law).read_text(encoding="utf-8")
+        text = generated_kernel_path(law).read_text(encoding="utf-8")
         return text[text.index("def ") :]
     from asperity.derive.python_source import law_source
 
@@ -76,267 +80,250 @@ def kernel_source(law: Law) -> str:
 
 
 @lru_cache(maxsize=256)
-def law_units(law: Law, clamp: ClampName) -> tuple[Unit, ...]:
-    """Return the functions of a law, those of a probe point, and those that its loops may call."""
-    from asperity.kernels import anchor, storing
+def law_units(law: Law, clamp: Clamp) -> tuple[SourceUnit, ...]:
+    """Return the functions of a law, those of a probe on it, and those that its loops may call."""
+    from asperity.kernels import friction_anchor, point_access
 
-    plan = ProbePlan(law, kernel_source(law), clamp)
+    code = LawCode(law, kernel_source(law), clamp)
+    title, probe = f"law {law}", f"law {law} at a probe"
     return (
-        written_unit(f"law {law}", plan.source, merged=("law_force", "law_jacobian")),
-        written_unit(
-            f"law {law} at a probe", probe_source(plan), merged=("probe_force", "probe_jacobian")
-        ),
-        module_unit(anchor),
-        module_unit(storing),
+        generated_unit(title, code.source, merged=("law_force", "law_jacobian")),
+        generated_unit(probe, probe_source(code), merged=("probe_force", "probe_jacobian")),
+        unit_from_module(friction_anchor),
+        unit_from_module(point_access),
     )
 
 
 @lru_cache(maxsize=256)
-def fuse_surface(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) -> ModuleType:
-    """Return the compiled loops of a law on a texture kind.
+def fuse_surface(law: Law, sampler: Modules, clamp: Clamp) -> ModuleType:
+    """Return the compiled loops over points of a law on a texture kind.
 
     Args:
         law: the law.
-        sampler: the modules whose functions make up the sampler.
+        sampler: the modules of the sampler.
         clamp: the depth clamp.
 
     Returns:
-        A module with ``force_batch``, ``jacobian_batch``, ``trace_batch`` if the law has state, and
-        the loops that its contact brings.
+        A module with ``force_batch``, ``jacobian_batch`` and the loops of the law's contact.
 
     Raises:
-        ParameterError: for a texture that lacks what the law looks at.
+        ParameterError: for a texture that lacks a function that the law requires.
     """
-    from asperity.kernels import anchored_loops, batch_sine, block_loops, probe_loops
+    from asperity.kernels import batch_sine
+    from asperity.kernels.loops import block_loops, point_loops, stateful_loops
 
-    blocks = tuple(m for m in sampler if module_unit(m).kernels.in_blocks)
-    if blocks and _samples_at_probe(law):
-        return fuse_on_texture(law, sampler, clamp, (block_loops,), instead=(batch_sine, *blocks))
-    loops = anchored_loops if law.stateful else probe_loops
-    asking = (loops, *law.contact.kernels())
-    return fuse_on_texture(law, sampler, clamp, asking, instead=(batch_sine,))
+    blocks = tuple(m for m in sampler if unit_from_module(m).kernels.for_blocks)
+    if blocks and _samples_only_at_probe(law):
+        return fuse_on_texture(law, sampler, clamp, (block_loops,), (batch_sine, *blocks))
+    modules = (stateful_loops if law.stateful else point_loops, *law.contact.kernels())
+    return fuse_on_texture(law, sampler, clamp, modules, (batch_sine,))
 
 
-def _samples_at_probe(law: Law) -> bool:
-    """Return whether a law asks the texture for what it is above or below the probe, and no more.
+def _samples_only_at_probe(law: Law) -> bool:
+    """Return whether a law samples the texture above or below the probe only.
 
-    Then points can be sampled before the law is asked.
+    Then a block of points can be sampled before the law is evaluated.
     """
     contact = law.contact
-    asks = contact.begins_on_texture or law_facts(law).looks_at_surface
-    return asks and contact.above_probe and not (law.stateful or contact.kernels())
+    samples = contact.begins_on_texture or law_facts(law).depends_on_surface
+    return samples and contact.is_above_probe and not (law.stateful or contact.kernels())
 
 
 @lru_cache(maxsize=256)
-def fuse_path(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) -> ModuleType:
-    """Return the compiled loop of a law along a path, ``path_batch``; as :func:`fuse_surface`."""
-    from asperity.kernels import path_loops
+def fuse_path(law: Law, sampler: Modules, clamp: Clamp) -> ModuleType:
+    """Return the compiled loop of a law along a path, ``path_batch``; see :func:`fuse_surface`."""
+    from asperity.kernels import batch_sine
+    from asperity.kernels.loops import path_loop
 
-    return fuse_on_texture(law, sampler, clamp, (path_loops,))
+    overrides = () if law.contact.has_warm_start else (batch_sine,)
+    return fuse_on_texture(law, sampler, clamp, (path_loop,), overrides)
 
 
 def fuse_on_texture(
-    law: Law,
-    sampler: tuple[ModuleType, ...],
-    clamp: ClampName,
-    asking: tuple[ModuleType, ...],
-    further: tuple[ModuleType, ...] = (),
-    instead: tuple[ModuleType, ...] = (),
+    law: Law, sampler: Modules, clamp: Clamp, modules: Modules, overrides: Modules = ()
 ) -> ModuleType:
-    """Return the module that :func:`source_on_texture` writes, compiled.
-
-    Raises:
-        ParameterError: for a texture that lacks what is asked of it.
-    """
-    return load_fused(source_on_texture(law, sampler, clamp, asking, further, instead))
+    """Return the compiled module of :func:`source_on_texture`."""
+    return load_fused(source_on_texture(law, sampler, clamp, modules, overrides))
 
 
 def source_on_texture(
-    law: Law,
-    sampler: tuple[ModuleType, ...],
-    clamp: ClampName,
-    asking: tuple[ModuleType, ...],
-    further: tuple[ModuleType, ...] = (),
-    instead: tuple[ModuleType, ...] = (),
+    law: Law, sampler: Modules, clamp: Clamp, modules: Modules, overrides: Modules = ()
 ) -> str:
-    """Return the text of a module of loops that ask a sampler, a law and further modules.
+    """Return the source of a module of loops that call a sampler, a law and further modules.
 
-    Another process can load it, see :func:`load_fused`.
+    Another process can load it with :func:`load_fused`.
 
     Args:
         law: the law.
-        sampler: the modules whose functions make up the sampler.
+        sampler: the modules of the sampler.
         clamp: the depth clamp.
-        asking: the modules with the loops.
-        further: what they ask besides.
-        instead: modules whose functions are taken instead of those of that name elsewhere.
+        modules: modules with the loops and with functions that these call.
+        overrides: modules whose functions replace those of the same name elsewhere.
 
     Raises:
-        ParameterError: for a texture that lacks what is asked of it.
+        ParameterError: for a texture that lacks a function that the law requires.
     """
-    units = tuple(map(module_unit, asking))
-    brought = (*units, *map(module_unit, (*law.contact.kernels(), *further)))
-    first = tuple(map(module_unit, instead))
-    at_hand = _at_hand(law, sampler, clamp, brought, first)
-    title = f"Law {law} on {sampler[0].__name__}."
-    with _naming(law, sampler):
-        return _assembled(title, loops_of(*units), at_hand)
+    units, first = (tuple(map(unit_from_module, group)) for group in (modules, overrides))
+    extra = (*units, *map(unit_from_module, law.contact.kernels()))
+    available = _available_units(law, sampler, clamp, extra, first)
+    with _texture_error_context(law, sampler):
+        return _assemble(f"Law {law} on {sampler[0].__name__}.", loops_of(*units), available)
 
 
 def link_on_texture(
-    law: Law,
-    sampler: tuple[ModuleType, ...],
-    clamp: ClampName,
-    roots: Sequence[tuple[str, Unit]],
-    further: Sequence[Unit],
-    instead: Sequence[Unit] = (),
+    law: Law, sampler: Modules, clamp: Clamp, roots: Roots, extra: Sequence[SourceUnit]
 ) -> str:
-    """Return the text of functions, each named with its unit, and of all that they call.
+    """Return the source of functions, each given with its unit, and of all functions they call.
 
-    They may ask a sampler, a law and further units; ``instead`` come before all of them.
+    They may call a sampler, a law and further units.
 
     Raises:
-        ParameterError: for a texture that lacks what is asked of it.
+        ParameterError: for a texture that lacks a function that the law requires.
     """
-    with _naming(law, sampler):
-        return link(roots, _at_hand(law, sampler, clamp, further, instead))
+    with _texture_error_context(law, sampler):
+        return link(roots, _available_units(law, sampler, clamp, extra))
 
 
-def _at_hand(
+def _available_units(
     law: Law,
-    sampler: tuple[ModuleType, ...],
-    clamp: ClampName,
-    further: Sequence[Unit],
-    instead: Sequence[Unit],
-) -> tuple[Unit, ...]:
-    modules = map(module_unit, sampler)
-    return tuple(dict.fromkeys((*instead, *modules, *law_units(law, clamp), *further)))
+    sampler: Modules,
+    clamp: Clamp,
+    extra: Sequence[SourceUnit],
+    overrides: Sequence[SourceUnit] = (),
+) -> tuple[SourceUnit, ...]:
+    modules = map(unit_from_module, sampler)
+    return tuple(dict.fromkeys((*overrides, *modules, *law_units(law, clamp), *extra)))
 
 
 @contextmanager
-def _naming(law: Law, sampler: tuple[ModuleType, ...]) -> Iterator[None]:
-    """Say of a texture that lacks a function which it is and who needs it."""
+def _texture_error_context(law: Law, sampler: Modules) -> Iterator[None]:
+    """Turn the error of a missing sampler function into one that names texture and law."""
     try:
         yield
     except MissingFunctionError as missing:
-        who = f"which law {law} on the {law.contact} contact needs"
-        raise _lacking(missing, tuple(map(module_unit, sampler)), who) from None
+        requirement = f"required by law {law} on the {law.contact} contact"
+        raise _missing_function_error(missing, sampler, requirement) from None
 
 
-def _lacking(missing: MissingFunctionError, modules: Sequence[Unit], who: str) -> ParameterError:
-    """Return the error of a texture that lacks a function; it says which, and who needs it."""
-    offered = sorted({name for unit in modules for name in unit.kernels.provides} & OFFERED.keys())
-    what = f"must offer {OFFERED.get(missing.name, 'more')} (a sampler function {missing.name!r})"
-    there = f"{modules[0].name} offers {', '.join(offered) or 'nothing'}"
-    return ParameterError("texture", f"{what}, {who}; {there}")
+def _missing_function_error(
+    missing: MissingFunctionError, sampler: Modules, requirement: str
+) -> ParameterError:
+    provided = {name for m in sampler for name in unit_from_module(m).kernels.provides}
+    names = ", ".join(sorted(provided & SAMPLER_FUNCTIONS.keys())) or "nothing"
+    meaning = SAMPLER_FUNCTIONS.get(missing.name, "no standard function")
+    words = f"lacks the sampler function {missing.name!r} ({meaning}), {requirement}"
+    return ParameterError("texture", f"{words}; {sampler[0].__name__} provides {names}")
 
 
 @lru_cache(maxsize=256)
 def fuse_contact(law: Law) -> ModuleType:
-    """Return the compiled loop of a law over given contacts: ``contact_batch``."""
-    from asperity.kernels import contact_loop
+    """Return the compiled loop of a law over given contacts, ``contact_batch``."""
+    from asperity.kernels.loops import contact_loop
 
-    plan = ProbePlan(law, kernel_source(law), "none")
-    loop = module_unit(contact_loop)
-    given = written_unit(f"law {law} at a contact", contact_source(plan))
-    at_hand = (loop, given, *law_units(law, "none"))
-    return load_fused(_assembled(f"Law {law} at contacts.", loops_of(loop), at_hand))
+    loop, code = unit_from_module(contact_loop), LawCode(law, kernel_source(law), NONE)
+    contact = generated_unit(f"law {law} at a contact", contact_source(code))
+    available = (loop, contact, *law_units(law, NONE))
+    return load_fused(_assemble(f"Law {law} at contacts.", loops_of(loop), available))
 
 
 @lru_cache(maxsize=256)
-def reads_position(law: Law) -> bool:
-    """Return whether the Jacobian of a law looks at the position of the probe."""
-    wanted = ProbePlan(law, kernel_source(law), "none").wanted("law_jacobian")
-    return not wanted.isdisjoint(("x", "y", "z"))
+def uses_position(law: Law) -> bool:
+    """Return whether the Jacobian of a law depends on the position of the probe."""
+    arguments = LawCode(law, kernel_source(law), NONE).argument_names("law_jacobian")
+    return not arguments.isdisjoint(("x", "y", "z"))
 
 
 @lru_cache(maxsize=16)
 def fuse_module(module: ModuleType, *helpers: ModuleType) -> ModuleType:
-    """Return a module whose loops are compiled, with what they call in it and in others."""
-    return load_fused(source_of_module(module, *helpers))
+    """Return a module with its loops compiled, and the functions that they call in helpers."""
+    return load_fused(module_source(module, *helpers))
 
 
-def source_of_module(module: ModuleType, *helpers: ModuleType) -> str:
-    """Return the text of such a module, which another process can load."""
-    unit = module_unit(module)
-    at_hand = (unit, *map(module_unit, helpers))
-    return _assembled(f"{module.__name__}.", loops_of(unit), at_hand)
+def module_source(module: ModuleType, *helpers: ModuleType) -> str:
+    """Return the source of such a module, which another process can load."""
+    unit = unit_from_module(module)
+    available = (unit, *map(unit_from_module, helpers))
+    return _assemble(f"{module.__name__}.", loops_of(unit), available)
 
 
 @lru_cache(maxsize=64)
-def fuse_sampler(sampler: tuple[ModuleType, ...], *further: ModuleType) -> ModuleType:
+def fuse_sampler(sampler: Modules, *further: ModuleType) -> ModuleType:
     """Return the compiled loops of a texture kind.
 
     Functions ``height_batch``, ``slope_batch``, ``curvature_batch`` (points (n, 2), result array)
     and ``nearest_batch`` (points (n, 3), result (n, 2)), and the loops of further modules. A loop
-    that asks what the sampler does not offer raises a ParameterError when it is called.
+    that calls a function that the sampler lacks raises a ParameterError when it is called.
     """
-    from asperity.kernels import batch_sine, sampler_loops
+    from asperity.kernels import batch_sine
+    from asperity.kernels.loops import sampler_loops
 
-    modules = tuple(map(module_unit, sampler))
-    asking = tuple(map(module_unit, (sampler_loops, *further)))
-    at_hand = (module_unit(batch_sine), *modules, *asking)
-    served, refused = [], {}
-    for loop in loops_of(*asking):
+    units = tuple(map(unit_from_module, (sampler_loops, *further)))
+    available = (unit_from_module(batch_sine), *map(unit_from_module, sampler), *units)
+    complete, errors = [], {}
+    for loop in loops_of(*units):
         try:
-            link([loop], at_hand)
-            served.append(loop)
+            link([loop], available)
+            complete.append(loop)
         except MissingFunctionError as missing:
-            refused[loop[0]] = _lacking(missing, modules, "which is asked of it")
-    module = load_fused(_assembled(f"Texture {sampler[0].__name__}.", served, at_hand))
-    vars(module).update({name: partial(_refuse, error) for name, error in refused.items()})
+            errors[loop[0]] = _missing_function_error(missing, sampler, "required by this call")
+    module = load_fused(_assemble(f"Texture {sampler[0].__name__}.", complete, available))
+    vars(module).update({name: partial(_raise_error, error) for name, error in errors.items()})
     return module
 
 
-def _refuse(error: ParameterError, *_arguments: object) -> None:
+def _raise_error(error: ParameterError, *_arguments: object) -> None:
     raise error
 
 
-_NEXT = "\n# --- the next module ---\n"
+_MODULE_SEPARATOR = "\n# --- the next module ---\n"
 
 
-def _assembled(title: str, loops: Sequence[tuple[str, Unit]], at_hand: Sequence[Unit]) -> str:
-    """Return the texts of modules: those of shared functions, and after them the one of loops."""
+def _assemble(title: str, loops: Roots, available: Sequence[SourceUnit]) -> str:
+    """Return the sources of modules: those of shared functions, then that of the loops."""
     texts: list[str] = []
     homes: dict[str, str] = {}
-    for part in link_parts(loops, at_hand):
-        taken = "".join(f"from {homes[name]} import {name}\n" for name in part.borrows)
-        texts.append(_head(part.title or title, part.source) + taken + part.source)
+    for part in link_modules(loops, available):
+        imports = "".join(f"from {homes[name]} import {name}\n" for name in part.imports)
+        texts.append(_module_header(part.title or title, part.source) + imports + part.source)
         homes[part.name] = _module_name(texts[-1])
-    return _NEXT.join(texts)
+    return _MODULE_SEPARATOR.join(texts)
 
 
-def _head(title: str, source: str) -> str:
-    used = [f"from {home} import {name}\n" for name, home in COMMON.items() if f"{name}(" in source]
+def _module_header(title: str, source: str) -> str:
+    used = [
+        f"from {home} import {name}\n"
+        for name, home in INTRINSIC_MODULES.items()
+        if f"{name}(" in source
+    ]
     return _HEADER.format(title=title) + "".join([*used, "\n"] if used else [])
 
 
 def _module_name(text: str) -> str:
-    """Return the name of a module after its content, and so after that of what it borrows."""
+    """Return the name of a module, a hash of its source and so of the modules that it imports."""
     return f"asperity_fused_{hashlib.sha256(text.encode()).hexdigest()[:32]}"
 
 
-_LOADING = Lock()
+_LOAD_LOCK = Lock()
 
 
 def load_fused(source: str) -> ModuleType:
-    """Return a fused module, one and the same whichever thread asks.
+    """Return the fused module of a source; all threads get the same module.
 
-    The machine code of its loops, and of what they borrow, is kept between runs.
+    The machine code of its loops, and of the shared functions that they call, is cached.
     """
-    with _LOADING:
-        return [_loaded(text) for text in source.split(_NEXT)][-1]
+    with _LOAD_LOCK:
+        return [_load_module(text) for text in source.split(_MODULE_SEPARATOR)][-1]
 
 
 @cache
-def _loaded(text: str) -> ModuleType:
-    from asperity.kernels.ingredients import share_ingredients  # it imports Numba
+def _load_module(text: str) -> ModuleType:
+    from asperity.kernels.numba_internals import share_identical_functions  # it imports Numba
 
     module = ModuleType(_module_name(text))
     module.__file__ = f"<{module.__name__}>"
-    # For tracebacks, and for whoever wants to read what was compiled.
+    # For tracebacks, and for reading what was compiled.
     linecache.cache[module.__file__] = (len(text), None, text.splitlines(True), module.__file__)
-    sys.modules[module.__name__] = module  # kept code names the module that it belongs to
+    sys.modules[module.__name__] = module  # cached code refers to its module by name
     exec(compile(text, module.__file__, "exec"), vars(module))
-    share_ingredients(module)
+    share_identical_functions(module)
     return module

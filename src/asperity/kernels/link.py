@@ -1,7 +1,7 @@
-"""Compiled modules put together: every function that is needed, and its provider.
+"""Linker of compiled modules: it collects the functions that a loop needs from their providers.
 
-The linker knows no module and no function by name: it goes by what modules declare, see
-:class:`asperity.compiled.Kernels`.
+The linker knows no module and no function by name: it uses what modules declare; see
+:class:`asperity.core.compiled.Kernels`.
 """
 
 from __future__ import annotations
@@ -11,23 +11,31 @@ import builtins
 import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from threading import Lock
 from types import MappingProxyType, ModuleType
 
-from asperity.compiled import Kernels
-from asperity.errors import ParameterError
-from asperity.kernels.parsing import tree_of
+from asperity.core.compiled import Kernels
+from asperity.core.errors import ParameterError
 
-# Anyone may call these and what is built in; they are in the head of every linked text that does.
-COMMON = {
-    "local_array": "asperity.kernels.stack_memory",
-    "multiply_add": "asperity.kernels.lanes",
-    "number_at": "asperity.kernels.lanes",
-}
-_ANYONES = COMMON.keys() | frozenset(dir(builtins))
+# Python 3.11 counts the depth of a tree for all threads together: two that parse at once may fail
+# with "AST constructor recursion depth mismatch" (python/cpython issue 106905).
+_PARSE_LOCK = Lock()
+
+
+def parse_source(source: str) -> ast.Module:
+    """Return the syntax tree of a source text, in any thread."""
+    with _PARSE_LOCK:
+        return ast.parse(source)
+
+
+# Any function may call these and built-in functions; linked modules import them.
+_INTRINSICS = "asperity.kernels.intrinsics"
+INTRINSIC_MODULES = dict.fromkeys(("local_array", "multiply_add", "load_unchecked"), _INTRINSICS)
+_UNDECLARED_CALLS = INTRINSIC_MODULES.keys() | frozenset(dir(builtins))
 
 
 class MissingFunctionError(ParameterError):
-    """A function that is required and that no module at hand provides.
+    """Error: no available module provides a required function.
 
     Attributes:
         name: of the function.
@@ -39,42 +47,38 @@ class MissingFunctionError(ParameterError):
 
 
 @dataclass(frozen=True, eq=False)
-class Unit:
-    """The functions of a module as text, and what the module says of itself.
+class SourceUnit:
+    """The functions of a module as source, and the declaration of the module.
 
     Attributes:
         name: of the module.
         kernels: its declaration.
-        texts: source of each top-level function.
-        calls: the functions that each of them calls, but for those that anyone may call.
-        lines: the lines that define the records and numbers of the module that each of them uses.
+        sources: source of each top-level function.
+        calls: the functions that each of them calls, except intrinsic and built-in ones.
+        definitions: for each function, the lines that define the records and numbers it uses.
     """
 
     name: str
     kernels: Kernels
-    texts: dict[str, str]
+    sources: dict[str, str]
     calls: dict[str, tuple[str, ...]]
-    lines: dict[str, dict[str, str]]
+    definitions: dict[str, dict[str, str]]
 
-    def owner(self, name: str, at_hand: Sequence[Unit]) -> Unit:
+    def find_provider(self, name: str, available: Sequence[SourceUnit]) -> SourceUnit:
         """Return the unit whose function of a name one of this unit's functions calls.
 
         Raises:
             MissingFunctionError: if there is none.
-            ParameterError: for a function that is neither defined nor declared as required.
         """
-        if name in self.texts and name not in self.kernels.provides:
+        if name in self.sources and name not in self.kernels.provides:
             return self
-        if name not in self.texts and name not in self.kernels.requires:
-            words = f"{self.name} calls {name!r}, which it neither defines nor requires in KERNELS"
-            raise ParameterError("sampler", words)
-        for unit in at_hand:
+        for unit in available:
             if name in unit.kernels.provides:
                 return unit
         raise MissingFunctionError(name, self.name)
 
     def decorator(self, name: str, iterates: bool) -> str:
-        """Return how one of its functions is compiled, in words of the head of a fused module."""
+        """Return the decorator of one of its functions, defined in the header of a fused module."""
         kernels = self.kernels
         if name in kernels.loops:
             return "@loop"
@@ -82,183 +86,188 @@ class Unit:
             return "@shared"
         if iterates:
             return "@merged" if name in kernels.merged else "@scalar"
-        return "@scalar" if name in kernels.called else "@inlined"
+        return "@scalar" if name in kernels.not_inlined else "@inlined"
 
 
-def text_unit(
-    name: str, source: str, kernels: Kernels, space: Mapping[str, object] = MappingProxyType({})
-) -> Unit:
-    """Return the unit of a source text, whose records and numbers are in a name space."""
-    unit = Unit(name, kernels, {}, {}, {})
-    rows = source.split("\n")  # once: ast.get_source_segment splits it for every function
-    for node in tree_of(source).body:
+def unit_from_source(
+    name: str, source: str, kernels: Kernels, namespace: Mapping[str, object] = MappingProxyType({})
+) -> SourceUnit:
+    """Return the unit of a source text; the namespace holds its records and numbers."""
+    unit = SourceUnit(name, kernels, {}, {}, {})
+    rows = source.split("\n")  # once; ast.get_source_segment would split it for every function
+    for node in parse_source(source).body:
         if isinstance(node, ast.FunctionDef):
-            lines = _lines(node, space, kernels.native)
+            lines = _used_definitions(node, namespace, kernels.native)
             text = rows[node.lineno - 1 : node.end_lineno]
             text[-1] = text[-1].encode()[: node.end_col_offset].decode()
-            unit.texts[node.name] = "\n".join(text)
-            unit.lines[node.name] = lines
-            unit.calls[node.name] = tuple(sorted(_calls(node) - lines.keys()))
+            unit.sources[node.name] = "\n".join(text)
+            unit.definitions[node.name] = lines
+            unit.calls[node.name] = tuple(sorted(_called_functions(node) - lines.keys()))
     return unit
 
 
-def _calls(function: ast.FunctionDef) -> frozenset[str]:
+def _called_functions(function: ast.FunctionDef) -> frozenset[str]:
     nodes = ast.walk(function)
     calls = [node.func for node in nodes if isinstance(node, ast.Call)]
-    return frozenset(call.id for call in calls if isinstance(call, ast.Name)) - _ANYONES
+    return frozenset(call.id for call in calls if isinstance(call, ast.Name)) - _UNDECLARED_CALLS
 
 
-def _lines(
-    function: ast.FunctionDef, space: Mapping[str, object], native: tuple[str, ...]
+def _used_definitions(
+    function: ast.FunctionDef, namespace: Mapping[str, object], native: tuple[str, ...]
 ) -> dict[str, str]:
     """Return the lines that define records, numbers and native functions that a body uses."""
     body = (node for part in function.body for node in ast.walk(part))
     names = {node.id for node in body if isinstance(node, ast.Name)}
     lines = {}
-    for name in sorted(names & space.keys()):
-        value = space[name]
-        if name in native or (isinstance(value, type) and issubclass(value, tuple)):
-            lines[name] = f"from {value.__module__} import {name}"
+    for name in sorted(names & namespace.keys()):
+        value = namespace[name]
+        if name in native:
+            lines[name] = f"from {_INTRINSICS} import {name}"
+        elif isinstance(value, type) and issubclass(value, tuple):
+            # The fields of a record are part of the text, and so of the key of its machine code.
+            fields = " ".join(getattr(value, "_fields", ()))
+            lines[name] = f"from {value.__module__} import {name}  # {fields}".rstrip(" #")
         elif isinstance(value, (int, float)):
             lines[name] = f"{name} = {value!r}"
     return lines
 
 
-def written_unit(
+def generated_unit(
     name: str, source: str, *, loops: tuple[str, ...] = (), merged: tuple[str, ...] = ()
-) -> Unit:
-    """Return the unit of a text that code has written: it provides and requires all it can."""
-    unit = text_unit(name, source, Kernels())
-    called = {called for names in unit.calls.values() for called in names}
-    provides = tuple(unit.texts)
-    requires = tuple(sorted(called.difference(provides)))
-    return replace(unit, kernels=Kernels(provides, requires, loops, merged=merged))
+) -> SourceUnit:
+    """Return the unit of a generated source text, which provides all of its functions."""
+    unit = unit_from_source(name, source, Kernels())
+    return replace(unit, kernels=Kernels(tuple(unit.sources), loops, merged=merged))
 
 
-_UNITS: dict[ModuleType, Unit] = {}
+_UNITS: dict[ModuleType, SourceUnit] = {}
 
 
-def module_unit(module: ModuleType) -> Unit:
-    """Return the unit of a compiled module: one and the same, whichever thread asks.
+def unit_from_module(module: ModuleType) -> SourceUnit:
+    """Return the unit of a compiled module; all threads get the same unit.
 
     Raises:
-        ParameterError: for a module that does not declare itself.
+        ParameterError: for a module without a declaration.
     """
     if module in _UNITS:
         return _UNITS[module]
     kernels = getattr(module, "KERNELS", None)
     if not isinstance(kernels, Kernels):
         raise ParameterError("sampler", f"{module.__name__} must declare KERNELS = Kernels(...)")
-    made = text_unit(module.__name__, inspect.getsource(module), kernels, vars(module))
-    # Units are told apart by identity: of two that threads make at once, the first is kept.
-    return _UNITS.setdefault(module, made)
+    unit = unit_from_source(module.__name__, inspect.getsource(module), kernels, vars(module))
+    # Units are compared by identity: of two created by threads at once, the first is used.
+    return _UNITS.setdefault(module, unit)
 
 
-def loops_of(*units: Unit) -> list[tuple[str, Unit]]:
-    """Return all loops of units, as :func:`link` takes them."""
+def loops_of(*units: SourceUnit) -> list[tuple[str, SourceUnit]]:
+    """Return all loops of units, as arguments of :func:`link`."""
     return [(name, unit) for unit in units for name in unit.kernels.loops]
 
 
-def link(loops: Sequence[tuple[str, Unit]], at_hand: Sequence[Unit]) -> str:
-    """Return loops, each named with its unit, and all that they call, with their decorators.
+def link(loops: Sequence[tuple[str, SourceUnit]], available: Sequence[SourceUnit]) -> str:
+    """Return the source of loops, each given with its unit, and of all functions they call.
 
     Raises:
         MissingFunctionError: for a function that is required and not provided.
-        ParameterError: for two functions of one name that are both needed.
+        ParameterError: for two needed functions of the same name.
     """
-    return _text(_needed(loops, at_hand, whole=True)[0], at_hand)
+    return _render_functions(_resolve_calls(loops, available, include_shared=True)[0], available)
 
 
 @dataclass(frozen=True)
-class Part:
-    """A piece of a program that is compiled on its own.
+class LinkedModule:
+    """A part of a program that is compiled separately.
 
     Attributes:
-        title: the function that it is made for, and its module; empty for the loops.
+        title: the shared function and its module; empty for the loops.
         name: of that function.
         source: its functions.
-        borrows: the functions of earlier parts that it calls.
+        imports: the functions of earlier parts that it calls.
     """
 
     title: str
     name: str
     source: str
-    borrows: tuple[str, ...]
+    imports: tuple[str, ...]
 
 
-def link_parts(loops: Sequence[tuple[str, Unit]], at_hand: Sequence[Unit]) -> list[Part]:
-    """Return the same in parts: every shared function in one of its own, the loops in the last.
+def link_modules(
+    loops: Sequence[tuple[str, SourceUnit]], available: Sequence[SourceUnit]
+) -> list[LinkedModule]:
+    """Return the same in parts: each shared function in its own part, the loops in the last.
 
-    A part comes after those that it borrows from, and is the same text whoever borrows from it.
+    A part comes after those that it imports from; its source does not depend on the importer.
 
     Raises:
         MissingFunctionError: see :func:`link`.
-        ParameterError: see :func:`link`; for a shared function that calls itself by way of others.
+        ParameterError: see :func:`link`; for a shared function that calls itself indirectly.
     """
-    owners: dict[str, Unit] = {}
-    parts: dict[str, Part] = {}
+    owners: dict[str, SourceUnit] = {}
+    parts: dict[str, LinkedModule] = {}
 
-    def add(roots: Sequence[tuple[str, Unit]], title: str, name: str) -> None:
-        taken, borrowed = _needed(roots, at_hand, whole=False)
+    def add(roots: Sequence[tuple[str, SourceUnit]], title: str, name: str) -> None:
+        taken, borrowed = _resolve_calls(roots, available, include_shared=False)
         for callee, unit in borrowed.items():
             if callee not in owners:
                 owners[callee] = unit
                 add([(callee, unit)], f"Function {callee} of {unit.name}.", callee)
             elif owners[callee] is not unit:
-                raise _two(callee, owners[callee], unit)
-            elif callee not in parts:  # it is under way
+                raise _duplicate_error(callee, owners[callee], unit)
+            elif callee not in parts:  # its part is not complete yet
                 words = f"{unit.name}: the shared function {callee!r} calls itself"
                 raise ParameterError("sampler", words)
-        parts[name] = Part(title, name, _text(taken, at_hand), tuple(sorted(borrowed)))
+        parts[name] = LinkedModule(
+            title, name, _render_functions(taken, available), tuple(sorted(borrowed))
+        )
 
     add(loops, "", "")
     return list(parts.values())
 
 
-def _needed(
-    roots: Sequence[tuple[str, Unit]], at_hand: Sequence[Unit], whole: bool
-) -> tuple[dict[str, Unit], dict[str, Unit]]:
-    """Return functions with their units: those that are needed here, and the shared ones."""
-    taken: dict[str, Unit] = {}
-    borrowed: dict[str, Unit] = {}
+def _resolve_calls(
+    roots: Sequence[tuple[str, SourceUnit]], available: Sequence[SourceUnit], include_shared: bool
+) -> tuple[dict[str, SourceUnit], dict[str, SourceUnit]]:
+    """Return functions with their units: those to include here, and the shared ones."""
+    taken: dict[str, SourceUnit] = {}
+    borrowed: dict[str, SourceUnit] = {}
     waiting = list(roots)
     while waiting:
         name, unit = waiting.pop()
-        known = taken.setdefault(name, unit)
-        if known is not unit:
-            raise _two(name, known, unit)
+        first = taken.setdefault(name, unit)
+        if first is not unit:
+            raise _duplicate_error(name, first, unit)
         for callee in unit.calls[name]:
-            owner = unit.owner(callee, at_hand)
-            if callee in owner.kernels.shared and not whole:
+            owner = unit.find_provider(callee, available)
+            if callee in owner.kernels.shared and not include_shared:
                 if borrowed.setdefault(callee, owner) is not owner:
-                    raise _two(callee, borrowed[callee], owner)
+                    raise _duplicate_error(callee, borrowed[callee], owner)
             elif taken.get(callee) is not owner:
                 waiting.append((callee, owner))
     return taken, borrowed
 
 
-def _two(name: str, one: Unit, other: Unit) -> ParameterError:
-    words = f"has two functions {name!r}, of {one.name} and of {other.name}"
+def _duplicate_error(name: str, one: SourceUnit, other: SourceUnit) -> ParameterError:
+    words = f"function {name!r} is defined by both {one.name} and {other.name}"
     return ParameterError("sampler", words)
 
 
-def _text(taken: Mapping[str, Unit], at_hand: Sequence[Unit]) -> str:
+def _render_functions(functions: Mapping[str, SourceUnit], available: Sequence[SourceUnit]) -> str:
     """Return functions with their decorators, after the records and numbers that they use."""
-    iterates = any(unit.kernels.iterates for unit in taken.values())
+    iterates = any(unit.kernels.iterates for unit in functions.values())
     parts = [
         f"{unit.decorator(name, iterates)}\n{text}"
-        for unit in at_hand
-        for name, text in unit.texts.items()
-        if taken.get(name) is unit
+        for unit in available
+        for name, text in unit.sources.items()
+        if functions.get(name) is unit
     ]
-    return "\n\n\n".join([_common_lines(taken), *parts]) + "\n"
+    return "\n\n\n".join([_definition_lines(functions), *parts]) + "\n"
 
 
-def _common_lines(taken: Mapping[str, Unit]) -> str:
+def _definition_lines(functions: Mapping[str, SourceUnit]) -> str:
     """Return the lines that define records and numbers, each once."""
     lines: dict[str, str] = {}
-    for name, unit in taken.items():
-        for used, line in unit.lines[name].items():
+    for name, unit in functions.items():
+        for used, line in unit.definitions[name].items():
             if lines.setdefault(used, line) != line:
                 words = f"defines {used!r} in two ways: {line!r} and {lines[used]!r}"
                 raise ParameterError("sampler", words)

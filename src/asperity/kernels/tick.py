@@ -1,31 +1,34 @@
-"""One tick of a servo: from the position that an encoder reads to the force that is commanded.
+"""One servo tick: from the encoder position to the commanded force.
 
-A simulation calls it sample by sample, and so may the loop of a device. It keeps nothing: what is
-carried from tick to tick is a record that goes in and comes out, and the array of
-:mod:`asperity.contacts.memory`, which also holds a tick to a budget.
+The loops of simulations and devices call it once per sample. The state is a record, argument and
+result, and the array of :mod:`asperity.contacts.warm_start`, which also limits the evaluations of a
+tick.
 """
 
 import math
 from typing import NamedTuple
 
-from asperity.checks import FloatArray
-from asperity.compiled import Kernels
-from asperity.kernels.law_functions import probe_tick
+from asperity.core.checks import FloatArray
+from asperity.core.compiled import Kernels
+from asperity.kernels.law_interface import probe_tick
 
 KERNELS = Kernels(
-    provides=("first_state", "flushed", "flushed_state", "servo_tick"), requires=("probe_tick",)
-)
+    provides=(
+        "initial_servo_state", "flush_subnormal", "flush_subnormal_state", "quantize", "servo_tick",
+        "state_before_tick",
+    )
+)  # fmt: skip
 
 
 class ServoSettings(NamedTuple):
-    """What a servo does to position and force.
+    """Settings of a servo.
 
     Attributes:
-        position_step: of the encoder [m]; 0 for none.
-        force_step: of the force [N]; 0 for none.
-        max_force: the length to which the force is limited [N].
-        virtual_damping: on the filtered velocity [N s/m].
-        velocity_share: of the newest difference in the filtered velocity [1].
+        position_step: quantisation of the encoder [m]; 0 for none.
+        force_step: quantisation of the force [N]; 0 for none.
+        max_force: greatest magnitude of the force [N].
+        virtual_damping: damping of the filtered velocity [N s/m].
+        velocity_share: weight of the newest difference in the filtered velocity [1].
         period: T [s].
     """
 
@@ -38,10 +41,10 @@ class ServoSettings(NamedTuple):
 
 
 class ServoState(NamedTuple):
-    """What is carried from tick to tick.
+    """State of a servo between ticks.
 
     Attributes:
-        x: position as it was read last [m].
+        x: last encoder position [m].
         y: likewise.
         z: likewise.
         vx: filtered velocity [m/s].
@@ -50,7 +53,7 @@ class ServoState(NamedTuple):
         anchor_x: the law's anchor [m].
         anchor_y: likewise.
         held: whether the law's anchor is held.
-        fx: force that was commanded [N].
+        fx: commanded force [N].
         fy: likewise.
         fz: likewise.
     """
@@ -69,23 +72,23 @@ class ServoState(NamedTuple):
     fz: float = 0.0
 
 
-def rounded(value: float, step: float) -> float:
-    """Round to a multiple of a step; as it is for step 0."""
+def quantize(value: float, step: float) -> float:
+    """Round to a multiple of a step; unchanged for step 0."""
     if step > 0.0:
         return step * math.floor(value / step + 0.5)
     return value
 
 
-def rounded_force(
-    x: float, y: float, z: float, step: float, largest: float
+def quantize_force(
+    x: float, y: float, z: float, step: float, max_square: float
 ) -> tuple[float, float, float]:
-    """Round a force to multiples of a step; towards zero if it would get too long (squared)."""
+    """Round a force to multiples of a step, towards zero if its square would exceed a limit."""
     if step > 0.0:
-        rx = rounded(x, step)
-        ry = rounded(y, step)
-        rz = rounded(z, step)
-        # What is a multiple, but for the last bits, loses no step.
-        if rx * rx + ry * ry + rz * rz <= largest * (1.0 + 1e-12):
+        rx = quantize(x, step)
+        ry = quantize(y, step)
+        rz = quantize(z, step)
+        # A multiple, up to rounding, does not lose a step.
+        if rx * rx + ry * ry + rz * rz <= max_square * (1.0 + 1e-12):
             return rx, ry, rz
         x = math.copysign(step * math.floor(abs(x) / step), x)
         y = math.copysign(step * math.floor(abs(y) / step), y)
@@ -93,37 +96,46 @@ def rounded_force(
     return x, y, z
 
 
-def first_state(x: float, y: float, z: float, settings: ServoSettings) -> ServoState:
+def initial_servo_state(x: float, y: float, z: float, settings: ServoSettings) -> ServoState:
     """Return the state before the first tick, of a handle at rest at a position [m]."""
-    x = rounded(x, settings.position_step)
-    y = rounded(y, settings.position_step)
-    z = rounded(z, settings.position_step)
+    x = quantize(x, settings.position_step)
+    y = quantize(y, settings.position_step)
+    z = quantize(z, settings.position_step)
     return ServoState(x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, False, 0.0, 0.0, 0.0)
 
 
-def flushed(value: float) -> float:
-    """Make nothing of what is next to nothing: subnormal numbers are a hundred times slower."""
+def flush_subnormal(value: float) -> float:
+    """Return 0 for tiny numbers: subnormal numbers are a hundred times slower."""
     return 0.0 if abs(value) < 1e-60 else value
 
 
-def flushed_state(state: ServoState) -> ServoState:
+def flush_subnormal_state(state: ServoState) -> ServoState:
     """Return the state without subnormal numbers."""
     return ServoState(
-        flushed(state.x), flushed(state.y), flushed(state.z),
-        flushed(state.vx), flushed(state.vy), flushed(state.vz),
-        flushed(state.anchor_x), flushed(state.anchor_y), state.held,
-        flushed(state.fx), flushed(state.fy), flushed(state.fz),
+        flush_subnormal(state.x), flush_subnormal(state.y), flush_subnormal(state.z),
+        flush_subnormal(state.vx), flush_subnormal(state.vy), flush_subnormal(state.vz),
+        flush_subnormal(state.anchor_x), flush_subnormal(state.anchor_y), state.held,
+        flush_subnormal(state.fx), flush_subnormal(state.fy), flush_subnormal(state.fz),
     )  # fmt: skip
+
+
+def state_before_tick(
+    servo: ServoState, sample: int, x: float, y: float, z: float, settings: ServoSettings
+) -> ServoState:
+    """Return the state with which a sample begins: initial at sample 0, subnormals flushed."""
+    if sample == 0:
+        servo = initial_servo_state(x, y, z, settings)
+    return flush_subnormal_state(servo) if sample & 255 == 0 else servo
 
 
 def servo_tick(
     state: ServoState, settings: ServoSettings, x: float, y: float, z: float,
-    memory: FloatArray, texture: object, law: object,
+    warm_start: FloatArray, texture: object, law: object,
 ) -> ServoState:  # fmt: skip
-    """Return the state after a tick; it holds the force that is commanded.
+    """Return the state after a tick, with the commanded force.
 
-    The position is read in steps of the encoder, the law answers, virtual damping is added, the
-    force is limited and rounded.
+    The position is quantised, the law is evaluated, virtual damping is added, and the force is
+    limited and quantised.
 
     Args:
         state: after the last tick.
@@ -131,15 +143,15 @@ def servo_tick(
         x: position of the handle [m].
         y: likewise.
         z: likewise.
-        memory: of the contact; changed.
+        warm_start: of the contact; updated.
         texture: record of the texture.
         law: parameters of the law.
     """
-    x = rounded(x, settings.position_step)
-    y = rounded(y, settings.position_step)
-    z = rounded(z, settings.position_step)
+    x = quantize(x, settings.position_step)
+    y = quantize(y, settings.position_step)
+    z = quantize(z, settings.position_step)
     fx, fy, fz, ax, ay, held = probe_tick(
-        x, y, z, state.anchor_x, state.anchor_y, state.held, memory, texture, law
+        x, y, z, state.anchor_x, state.anchor_y, state.held, warm_start, texture, law
     )
     vx = state.vx
     vy = state.vy
@@ -155,9 +167,9 @@ def servo_tick(
     square = fx * fx + fy * fy + fz * fz
     largest = settings.max_force * settings.max_force
     if square > largest:
-        shorter = settings.max_force / math.sqrt(square)
-        fx *= shorter
-        fy *= shorter
-        fz *= shorter
-    fx, fy, fz = rounded_force(fx, fy, fz, settings.force_step, largest)
+        scale = settings.max_force / math.sqrt(square)
+        fx *= scale
+        fy *= scale
+        fz *= scale
+    fx, fy, fz = quantize_force(fx, fy, fz, settings.force_step, largest)
     return ServoState(x, y, z, vx, vy, vz, ax, ay, held, fx, fy, fz)

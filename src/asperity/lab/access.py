@@ -1,90 +1,156 @@
-"""Who may see the page and steer: local users who were given the address, and one at a time."""
+"""Access to the page: token, allowed hosts and origins, rate limit, and HTTP responses."""
 
 from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cache
+from http import HTTPStatus
+from importlib.resources import files
 
-from asperity.errors import AsperityError
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
 
-MOST_BYTES = 4096
-"""Of a message from the page."""
-PER_SECOND, AT_ONCE = 500.0, 1000.0
-"""Messages that a page may send, lastingly and at once."""
+from asperity.core.errors import AsperityError
 
-# Nothing comes from elsewhere and nothing goes there.
-POLICY = (
+MAX_MESSAGE_BYTES = 4096
+"""Greatest size of a message from the page."""
+MAX_MESSAGE_RATE, MAX_MESSAGE_BURST = 500.0, 1000.0
+"""Messages per second that a page may send, and in a burst."""
+
+# Nothing is loaded from elsewhere and nothing is sent there.
+CONTENT_SECURITY_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
     "connect-src 'self'; worker-src 'self'; base-uri 'none'; form-action 'none'; "
     "frame-ancestors 'none'"
 )
 
 
-class MalformedError(AsperityError):
-    """A message that no page of ours sends: the connection is closed, the loop goes on."""
+class MalformedMessageError(AsperityError):
+    """A message that the page never sends: the connection is closed, the loop continues."""
 
 
 @dataclass(frozen=True)
-class Door:
-    """What a request must know to be let in.
+class AccessToken:
+    """Secret path and port that authorize a request.
 
     Attributes:
         port: of the server.
-        token: first part of every path.
+        secret: first part of every path.
     """
 
     port: int
-    token: str = field(default_factory=lambda: secrets.token_urlsafe(16))
+    secret: str = field(default_factory=lambda: secrets.token_urlsafe(16))
 
     @property
-    def hosts(self) -> tuple[str, ...]:
-        """What the server is called by those who sit at this machine."""
+    def host_names(self) -> tuple[str, ...]:
+        """Names of the server on this machine."""
         return f"127.0.0.1:{self.port}", f"localhost:{self.port}"
 
     @property
-    def address(self) -> str:
-        """What is opened in the browser."""
-        return f"http://{self.hosts[0]}/{self.token}/"
+    def url(self) -> str:
+        """Address for the browser."""
+        return f"http://{self.host_names[0]}/{self.secret}/"
 
-    def asked(self, path: str, hosts: Sequence[str]) -> str | None:
-        """Return the name that a request asks for; ``None`` for one that is not let in.
+    def authorize(self, path: str, hosts: Sequence[str]) -> str | None:
+        """Return the name of the requested file; ``None`` for an unauthorized request.
 
         Args:
             path: of the request.
-            hosts: its headers "Host": exactly one, and one of ours. A page of another name that
-                was made to point to this machine says that name here.
+            hosts: its headers "Host": exactly one, and one of the server's names. A foreign name
+                that resolves to this machine (DNS rebinding) is rejected.
         """
-        if len(hosts) != 1 or hosts[0] not in self.hosts:
+        if len(hosts) != 1 or hosts[0] not in self.host_names:
             return None
         token, slash, name = path.partition("?")[0].removeprefix("/").partition("/")
-        same = secrets.compare_digest(token.encode(), self.token.encode())
+        same = secrets.compare_digest(token.encode(), self.secret.encode())
         return name if same and slash else None
 
-    def is_ours(self, origins: Sequence[str]) -> bool:
-        """Whether a live connection was asked for by a page of ours."""
-        return len(origins) == 1 and origins[0] in {f"http://{host}" for host in self.hosts}
+    def is_same_origin(self, origins: Sequence[str]) -> bool:
+        """Whether a live connection is requested by the page of this server."""
+        return len(origins) == 1 and origins[0] in {f"http://{host}" for host in self.host_names}
 
 
-class Pace:
-    """Counts the messages of a connection.
+class RateLimit:
+    """Token bucket for the messages of a connection.
 
     Args:
-        now: returns the time [s].
+        now: time [s]; by default that of the monotonic clock.
     """
 
     def __init__(self, now: float | None = None) -> None:
-        self._left, self._then = AT_ONCE, time.monotonic() if now is None else now
+        self._tokens, self._last_time = MAX_MESSAGE_BURST, time.monotonic() if now is None else now
 
-    def count(self, now: float | None = None) -> None:
-        """Count one.
+    def consume(self, now: float | None = None) -> None:
+        """Count a message.
 
         Raises:
-            MalformedError: if there are too many.
+            MalformedMessageError: if there are too many.
         """
         moment = time.monotonic() if now is None else now
-        self._left = min(AT_ONCE, self._left + PER_SECOND * (moment - self._then)) - 1.0
-        self._then = moment
-        if self._left < 0.0:
-            raise MalformedError(f"more than {PER_SECOND:g} messages per second")
+        refilled = self._tokens + MAX_MESSAGE_RATE * (moment - self._last_time)
+        self._tokens, self._last_time = min(MAX_MESSAGE_BURST, refilled) - 1.0, moment
+        if self._tokens < 0.0:
+            raise MalformedMessageError(f"more than {MAX_MESSAGE_RATE:g} messages per second")
+
+
+FetchFile = Callable[[str], Awaitable[tuple[str, bytes] | None]]
+LIVE_PATH = "live"
+"""Name of the live connection, below the token."""
+_CONTENT_TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
+
+
+@cache
+def page_files() -> dict[str, tuple[str, bytes]]:
+    """Return type and content of each file of the page, by name; "" is the page itself."""
+    found = {}
+    for entry in files("asperity.lab").joinpath("page").iterdir():
+        kind = _CONTENT_TYPES.get(entry.name.rpartition(".")[2])
+        if kind is not None:
+            found[entry.name] = f"{kind}; charset=utf-8", entry.read_bytes()
+    return {**found, "": found["index.html"]}
+
+
+async def respond(
+    access_token: AccessToken, request: Request, fetch_file: FetchFile
+) -> Response | None:
+    """Return the response to a request; ``None`` to accept a live connection.
+
+    Args:
+        access_token: authorizes the request.
+        request: the request.
+        fetch_file: returns type and content of a file that is not of the page, by name.
+    """
+    name = access_token.authorize(request.path, request.headers.get_all("Host"))
+    if name is None:
+        return _text_response(HTTPStatus.FORBIDDEN, "Open the address that asperity lab prints.")
+    if name == LIVE_PATH:
+        if access_token.is_same_origin(request.headers.get_all("Origin")):
+            return None
+        return _text_response(HTTPStatus.FORBIDDEN, "The request comes from another page.")
+    found = page_files().get(name) or await fetch_file(name)
+    if found is None:
+        return _text_response(HTTPStatus.NOT_FOUND, "No such file.")
+    return _response(HTTPStatus.OK, *found)
+
+
+def _text_response(status: HTTPStatus, text: str) -> Response:
+    return _response(status, "text/plain; charset=utf-8", f"{text}\n".encode())
+
+
+def _response(status: HTTPStatus, content_type: str, content: bytes) -> Response:
+    headers = {
+        "Content-Type": content_type,
+        "Content-Length": str(len(content)),
+        "Cache-Control": "no-store",
+        "Content-Security-Policy": CONTENT_SECURITY_POLICY,
+        "Referrer-Policy": "no-referrer",
+        "X-Content-Type-Options": "nosniff",
+        "Connection": "close",
+        # The page shares memory with its worker, which requires isolation from other pages.
+        "Cross-Origin-Opener-Policy": "same-origin",
+        "Cross-Origin-Embedder-Policy": "require-corp",
+    }
+    return Response(status.value, status.phrase, Headers(headers), content)

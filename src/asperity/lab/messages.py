@@ -1,29 +1,27 @@
-"""What the page may say, and nothing else: read, and checked, before anything is done."""
+"""Messages from the page: parsed and validated before anything is done."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
-from asperity.errors import ParameterError
-from asperity.lab.access import MalformedError
+from asperity.core.errors import ParameterError
+from asperity.lab.access import MalformedMessageError
 
-REACH = 0.1
-"""Of the hand from the origin of the surface, along each axis [m]."""
-FASTEST = 400.0
-"""Of the angle of a motion that the hand repeats [rad/s]."""
-LARGEST = 0.2
-"""Side of what a picture shows at most [m]."""
-SMALLEST = 1e-5
-"""Likewise, at least [m]."""
+MAX_REACH = 0.1
+"""Greatest distance of the hand from the origin of the surface, along each axis [m]."""
+MAX_ANGULAR_SPEED = 400.0
+"""Greatest angular speed of a periodic motion of the hand [rad/s]."""
+MIN_VIEW_SIZE, MAX_VIEW_SIZE = 1e-5, 0.2
+"""Least and greatest side of a picture [m]."""
 
 
 @dataclass(frozen=True)
-class Steer:
-    """Where the hand shall be, see :meth:`asperity.servo.drivers.steered.Wheel.steer`."""
+class SteerRequest:
+    """Motion of the hand; see :meth:`asperity.servo.drivers.pointer.PointerHand.request_motion`."""
 
     target: tuple[float, ...]
     cosine: tuple[float, ...]
@@ -32,137 +30,113 @@ class Steer:
 
 
 @dataclass(frozen=True)
-class Change:
-    """What of the stage shall be another."""
-
-    wishes: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Look:
-    """A picture that is wanted, see :func:`asperity.lab.workshop.picture`."""
+class ViewRequest:
+    """A requested picture; see :func:`asperity.lab.background_worker.render_view`."""
 
     kind: str
     numbers: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class Take:
-    """Who watches wants to steer."""
+class Message(NamedTuple):
+    """A message of the page.
+
+    Attributes:
+        kind: "steer", "change", "relief", "cut", "take" (control), "start", "stop", "save" or
+            "seen" (the newest painted frame).
+        content: a :class:`SteerRequest`, the changes by name, a :class:`ViewRequest`, the number of
+            a frame, or ``None``.
+    """
+
+    kind: str
+    content: Any = None
 
 
-@dataclass(frozen=True)
-class Seen:
-    """The newest frame that the page has painted, by its number."""
-
-    frame: float
-
-
-@dataclass(frozen=True)
-class Start:
-    """A loop that has stopped shall start."""
-
-
-@dataclass(frozen=True)
-class Stop:
-    """The force shall go, and the loop end."""
-
-
-@dataclass(frozen=True)
-class Save:
-    """The newest seconds shall be kept, see :mod:`asperity.lab.takes`."""
-
-
-Message = Steer | Change | Start | Stop | Look | Take | Seen | Save
-
-
-def read_message(content: str | bytes) -> Message:
-    """Return what a page says.
+def parse_message(content: str | bytes) -> Message:
+    """Return a message of the page.
 
     Args:
-        content: of a frame; JSON, with the keys of one of the messages and "do".
+        content: JSON with the keys of one kind of message and "do".
 
     Raises:
-        MalformedError: for what no page of ours sends.
+        MalformedMessageError: for a message that the page never sends.
         ParameterError: for a number out of its range.
     """
     if isinstance(content, bytes):
-        raise MalformedError("frames from the page are text")
+        raise MalformedMessageError("frames from the page are text")
     try:
-        said = json.loads(content, parse_constant=_refused)
+        message = json.loads(content, parse_constant=_reject_constant)
     except (ValueError, RecursionError):
-        raise MalformedError("a message must be JSON") from None
-    kind = said.pop("do", None) if isinstance(said, dict) else None
-    reader = _READERS.get(kind) if isinstance(kind, str) else None
-    if reader is None:
-        raise MalformedError(f'a message must say what to "do": {", ".join(_READERS)}')
-    expected, make = reader
-    if set(said) != set(expected):
-        raise MalformedError(f'"{kind}" has {", ".join(expected) or "no more keys"}')
-    message: Message = make(**said)
-    return message
+        raise MalformedMessageError("a message must be JSON") from None
+    kind = message.pop("do", None) if isinstance(message, dict) else None
+    if not isinstance(kind, str) or kind not in _PARSERS:
+        raise MalformedMessageError(f'a message must have "do": {", ".join(_PARSERS)}')
+    keys, parse = _PARSERS[kind]
+    if set(message) != set(keys):
+        raise MalformedMessageError(f'"{kind}" has {", ".join(keys) or "no more keys"}')
+    return Message(kind, parse(**message))
 
 
-def _refused(constant: str) -> float:
+def _reject_constant(constant: str) -> float:
     raise ValueError(constant)
 
 
-def _number(name: str, value: object, least: float, most: float) -> float:
+def _parse_number(name: str, value: object, minimum: float, maximum: float) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise MalformedError(f"{name} must be a number")
-    if not least <= value <= most:
-        raise ParameterError(name, f"must be {least:g} to {most:g}", value)
+        raise MalformedMessageError(f"{name} must be a number")
+    if not minimum <= value <= maximum:
+        raise ParameterError(name, f"must be {minimum:g} to {maximum:g}", value)
     return float(value)
 
 
-def _point(name: str, value: object) -> tuple[float, ...]:
-    if not isinstance(value, list) or len(value) != 3:
-        raise MalformedError(f"{name} must be three numbers")
-    return tuple(_number(name, part, -REACH, REACH) for part in value)
+def _parse_numbers(
+    name: str, value: object, count: int, minimum: float, maximum: float
+) -> tuple[float, ...]:
+    if not isinstance(value, list) or len(value) != count:
+        raise MalformedMessageError(f"{name} must be {count} numbers")
+    return tuple(_parse_number(name, part, minimum, maximum) for part in value)
 
 
-def _steer(target: object, cosine: object, sine: object, speed: object) -> Steer:
-    return Steer(
-        _point("target", target), _point("cosine", cosine), _point("sine", sine),
-        _number("speed", speed, -FASTEST, FASTEST),
-    )  # fmt: skip
+def _parse_steer(speed: object, **points: object) -> SteerRequest:
+    vectors = {
+        name: _parse_numbers(name, value, 3, -MAX_REACH, MAX_REACH)
+        for name, value in points.items()
+    }
+    angular = _parse_number("speed", speed, -MAX_ANGULAR_SPEED, MAX_ANGULAR_SPEED)
+    return SteerRequest(**vectors, speed=angular)
 
 
-def _change(wishes: object) -> Change:
-    if not isinstance(wishes, dict):
-        raise MalformedError("wishes must be names with values")
-    for value in wishes.values():
+def _parse_change(changes: object) -> Mapping[str, Any]:
+    if not isinstance(changes, dict):
+        raise MalformedMessageError("changes must be names with values")
+    for value in changes.values():
         if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-            raise MalformedError("a wish is a number or a text")
-    return Change(wishes)
+            raise MalformedMessageError("a change is a number or a text")
+    return changes
 
 
-def _relief(x: object, y: object, size: object) -> Look:
-    numbers = (
-        _number("x", x, -1.0, 1.0), _number("y", y, -1.0, 1.0),
-        _number("size", size, SMALLEST, LARGEST),
-    )  # fmt: skip
-    return Look("relief", numbers)
+def _parse_relief(x: object, y: object, size: object) -> ViewRequest:
+    middle = _parse_number("x", x, -1.0, 1.0), _parse_number("y", y, -1.0, 1.0)
+    side = _parse_number("size", size, MIN_VIEW_SIZE, MAX_VIEW_SIZE)
+    return ViewRequest("relief", (*middle, side))
 
 
-def _cut(box: object, y: object) -> Look:
-    if not isinstance(box, list) or len(box) != 4:
-        raise MalformedError("box must be four numbers")
-    left, right, bottom, top = (_number("box", side, -1.0, 1.0) for side in box)
-    for low, high in ((left, right), (bottom, top)):
-        if not SMALLEST <= high - low <= LARGEST:
-            raise ParameterError("box", f"must have sides of {SMALLEST:g} to {LARGEST:g} m", box)
-    return Look("cut", (left, right, bottom, top, _number("y", y, -1.0, 1.0)))
+def _parse_section(box: object, y: object) -> ViewRequest:
+    sides = left, right, bottom, top = _parse_numbers("box", box, 4, -1.0, 1.0)
+    if not all(MIN_VIEW_SIZE <= side <= MAX_VIEW_SIZE for side in (right - left, top - bottom)):
+        limits = f"must have sides of {MIN_VIEW_SIZE:g} to {MAX_VIEW_SIZE:g} m"
+        raise ParameterError("box", limits, box)
+    return ViewRequest("cut", (*sides, _parse_number("y", y, -1.0, 1.0)))
 
 
-_READERS: dict[str, tuple[tuple[str, ...], Any]] = {
-    "steer": (("target", "cosine", "sine", "speed"), _steer),
-    "change": (("wishes",), _change),
-    "relief": (("x", "y", "size"), _relief),
-    "cut": (("box", "y"), _cut),
-    "take": ((), Take),
-    "start": ((), Start),
-    "stop": ((), Stop),
-    "save": ((), Save),
-    "seen": (("frame",), lambda frame: Seen(_number("frame", frame, 0.0, math.inf))),
+def _parse_frame(frame: object) -> float:
+    return _parse_number("frame", frame, 0.0, math.inf)
+
+
+_PARSERS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
+    "steer": (("target", "cosine", "sine", "speed"), _parse_steer),
+    "change": (("changes",), _parse_change),
+    "relief": (("x", "y", "size"), _parse_relief),
+    "cut": (("box", "y"), _parse_section),
+    "seen": (("frame",), _parse_frame),
+    **{kind: ((), lambda: None) for kind in ("take", "start", "stop", "save")},
 }

@@ -1,4 +1,4 @@
-"""The server of the lab: the loop's frames to every page, and one page's wishes to the loop."""
+"""Server of the lab: frames of the loop to every page, requests of one page to the loop."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import asyncio
 import json
 import time
 from collections.abc import Callable, Coroutine
-from concurrent.futures import Future
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -15,310 +14,318 @@ import numpy as np
 from websockets.asyncio.server import ServerConnection
 from websockets.exceptions import ConnectionClosed
 
-from asperity.devices import Device, device_names
-from asperity.errors import ParameterError
-from asperity.files import plain
-from asperity.lab.access import MalformedError, Pace
-from asperity.lab.backdrop import Backdrop
-from asperity.lab.frames import frame, layout
+from asperity.core.errors import ParameterError
+from asperity.core.files import to_plain_data
+from asperity.devices import device_names
+from asperity.lab.access import MalformedMessageError, RateLimit
+from asperity.lab.background import BackgroundRenderer
+from asperity.lab.background_worker import BackgroundWorker
+from asperity.lab.clips import ClipStore
+from asperity.lab.frames import encode_frame, frame_layout
 from asperity.lab.handle import Handle
-from asperity.lab.messages import (
-    Change,
-    Look,
-    Save,
-    Seen,
-    Start,
-    Steer,
-    Stop,
-    Take,
-    read_message,
-)
+from asperity.lab.messages import SteerRequest, ViewRequest, parse_message
+from asperity.lab.scene_state import RANGES, SceneState
 from asperity.lab.session import Session
-from asperity.lab.shelf import Shelf
-from asperity.lab.stage import RANGES, Stage
-from asperity.lab.workshop import Workshop
-from asperity.laws import KNOWN_LAWS
-from asperity.servo.process import Spare
-from asperity.servo.risk import risk
-from asperity.servo.statistics import Statistics
-from asperity.surface import Surface
-from asperity.textures.naming import KINDS
+from asperity.laws import REGISTERED_LAWS
+from asperity.servo.loop_memory import LoopStatistics
+from asperity.servo.process import PrestartedProcess
+from asperity.servo.stiffness_check import excess_stiffness_reason
+from asperity.textures.catalogue import KINDS
 
-LEAST = 5e-3
-"""[s] between two frames at least, whatever a page wishes."""
-EVERY = 1e-2
-"""[s] between two frames, but where the hand is moved: more of them only take the processor from
-those that are waited for."""
-UNDER_WAY = 8
-"""Frames that a page has not painted yet, at most: what waits for a slow one would be old."""
-AWAY = 3.0
-"""[s] without a word from the page that steers, after which the force of a real device goes."""
-_SHORT = 5e-4  # [s] for which others can wait: the clock of asyncio goes in milliseconds
-_LOOK = 0.1  # [s] between two looks at that
-_LONGEST_SEND = 10.0  # [s] after which a page that takes nothing is let go
-_MOST_REASON = 120  # bytes that a closing frame holds, less its code
+MIN_FRAME_INTERVAL = 5e-3
+"""Least interval of frames [s]."""
+FRAME_INTERVAL = 1e-2
+"""Interval of frames [s] unless the hand moves: more frames would delay those that count."""
+MAX_PENDING_FRAMES = 8
+"""Greatest number of unpainted frames of a page: frames queued for a slow page would be stale."""
+STEERING_TIMEOUT = 3.0
+"""Silence of the controlling page [s] after which the force of a real device is released."""
+# Waits up to this [s] block: the clock of asyncio has a resolution of milliseconds.
+_MAX_BLOCKING_WAIT = 5e-4
+_POLL_INTERVAL = 0.1  # of the silence of the controlling page [s]
+_SEND_TIMEOUT = 10.0  # after which a page that does not receive is disconnected [s]
+_MAX_REASON_BYTES = 120  # of the reason in a closing frame
 
 
-class Page:
+class Client:
     """A page that is connected.
 
     Args:
-        line: its connection.
+        connection: its connection.
 
     Attributes:
-        looks: pictures that it waits for, by kind: only the newest of each counts.
-        asked: is set when there is one.
-        steered: is set when it has moved the hand.
-        sent: number of the newest frame that it was sent.
+        view_requests: requested pictures by kind; only the newest request of a kind counts.
+        view_requested: set by a request.
+        hand_moved: set by a motion of the hand.
+        last_sent: number of the newest sent frame.
     """
 
-    def __init__(self, line: ServerConnection) -> None:
-        self.line = line
-        self.looks: dict[str, Look] = {}
-        self.asked, self.steered = asyncio.Event(), asyncio.Event()
-        self.sent = self._seen = 0.0
-        self._taken = asyncio.Event()
+    def __init__(self, connection: ServerConnection) -> None:
+        self.connection = connection
+        self.view_requests: dict[str, ViewRequest] = {}
+        self.view_requested, self.hand_moved = asyncio.Event(), asyncio.Event()
+        self.last_sent = self._last_acknowledged = 0.0
+        self._acknowledgement = asyncio.Event()
 
-    def see(self, frame: float) -> None:
-        """Hear that a frame was painted.
+    def request_view(self, request: ViewRequest) -> None:
+        """Request a picture."""
+        self.view_requests[request.kind] = request
+        self.view_requested.set()
+
+    def acknowledge(self, frame: float) -> None:
+        """Note that a frame was painted.
 
         Raises:
-            MalformedError: for one that was not sent.
+            MalformedMessageError: for a frame that was not sent.
         """
-        if frame > self.sent:
-            raise MalformedError("no such frame was sent")
-        self._seen = frame
-        self._taken.set()
+        if frame > self.last_sent:
+            raise MalformedMessageError("no such frame was sent")
+        self._last_acknowledged = frame
+        self._acknowledgement.set()
 
-    async def keeps_up(self) -> None:
+    async def wait_until_ready(self) -> None:
         """Wait until the page has painted all frames but the newest few."""
-        while self.sent - self._seen >= UNDER_WAY:
-            self._taken.clear()
-            await self._taken.wait()
+        while self.last_sent - self._last_acknowledged >= MAX_PENDING_FRAMES:
+            self._acknowledgement.clear()
+            await self._acknowledgement.wait()
 
-    async def say(self, what: str, **content: Any) -> None:
-        """Send words."""
+    async def send(self, topic: str, /, **content: Any) -> None:
+        """Send a message with its content."""
         with suppress(ConnectionClosed):
-            await self.line.send(json.dumps({"say": what, **plain(content)}))
+            await self.connection.send(json.dumps({"say": topic, **to_plain_data(content)}))
 
 
-class Lab:
-    """A session and the pages that watch it.
+class LabServer:
+    """A session and the pages connected to it, one of which has control.
 
     Args:
-        stage: what is shown at first.
-        pictures: process for pictures, see ``workshop``.
-        limits: process for limits.
-        spare: the process of the first loop.
-        handle: what somebody holds; ``None`` for the simulated device.
-        accepts_risk: whether a handle is given a stiffness above the limit.
+        scene_state: the initial scene.
+        picture_worker: process for pictures, see ``background_worker``.
+        limit_worker: process for limits.
+        prestarted: the process of the first loop.
+        handle: of a real device; ``None`` for the simulated device.
+        accept_risk: whether a real device renders a stiffness above the limit.
     """
 
     def __init__(
-        self, stage: Stage, pictures: Workshop, limits: Workshop, spare: Spare | None = None,
-        handle: Handle | None = None, *, accepts_risk: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        scene_state: SceneState,
+        picture_worker: BackgroundWorker,
+        limit_worker: BackgroundWorker,
+        prestarted: PrestartedProcess | None = None,
+        handle: Handle | None = None,
+        *,
+        accept_risk: bool = False,
+    ) -> None:
         self._loop = asyncio.get_running_loop()
-        self._pages: list[Page] = []
-        self._master: Page | None = None
-        self._changed = asyncio.Event()
-        self._heard = 0.0  # when the page that steers said something [s]
-        judged = handle is not None and not accepts_risk
-        judge = partial(_judge, limits) if judged else None
-        self.session = Session(stage, self._tell, spare, handle, judge)
-        self.backdrop = Backdrop(pictures, limits, self._announce)
-        self.shelf = Shelf(self.session)
-        self._saving: set[asyncio.Task[None]] = set()
+        self._clients: list[Client] = []
+        self._controller: Client | None = None
+        self._state_changed = asyncio.Event()
+        self._last_contact = 0.0  # time of the last message of the controlling page [s]
+        assess_risk = None
+        if handle is not None and not accept_risk:
+            assess_risk = partial(limit_worker.submit, excess_stiffness_reason)
+        self.session = Session(scene_state, self._notify, prestarted, handle, assess_risk)
+        self.background = BackgroundRenderer(picture_worker, limit_worker, self._broadcast_state)
+        self.clip_store = ClipStore(self.session)
+        self._save_tasks: set[asyncio.Task[None]] = set()
 
-    def _tell(self) -> None:
-        """Hear of a change, in the session's thread."""
+    def _notify(self) -> None:
+        """Signal a change, from the thread of the session."""
         with suppress(RuntimeError):  # the server has ended
-            self._loop.call_soon_threadsafe(self._changed.set)
+            self._loop.call_soon_threadsafe(self._state_changed.set)
 
-    def _show(self) -> None:
-        stage = self.session.stage
-        self.backdrop.show(stage.setup.surface, stage.judged)
+    def _update_background(self) -> None:
+        scene = self.session.scene_state
+        self.background.show(scene.setup.surface, scene.rated_device)
 
-    async def follow(self) -> None:
-        """Tell the pages what happens to the session, for ever."""
-        self._show()
+    async def watch_session(self) -> None:
+        """Send changes of the session to the pages, until cancelled."""
+        self._update_background()
         while True:
-            await self._changed.wait()
-            self._changed.clear()
+            await self._state_changed.wait()
+            self._state_changed.clear()
             if self.session.state in {"running", "stopped"}:
-                self._show()
-            await self._announce()
+                self._update_background()
+            await self._broadcast_state()
 
-    async def attend(self) -> None:
-        """Let the force of a real device go when no page is there any more to do so, for ever."""
+    async def watch_steering(self) -> None:
+        """Release the force of a real device when no page can do so, until cancelled."""
         handle = self.session.handle
-        while handle is not None and handle.driver.moving:
-            await asyncio.sleep(_LOOK)
+        while handle is not None and handle.driver.has_moving_handle:
+            await asyncio.sleep(_POLL_INTERVAL)
+            silence = self._loop.time() - self._last_contact
             if self.session.state in {"starting", "stopped"}:
-                self._heard = self._loop.time()  # a page has nothing to answer to
-            elif self.session.going and self._loop.time() - self._heard > AWAY:
-                self.session.halt("no page steers that could let the force go, so it went")
+                self._last_contact = self._loop.time()  # no frames to acknowledge
+            elif self.session.is_running and silence > STEERING_TIMEOUT:
+                self.session.release_force("released: no page with control is connected")
 
-    async def welcome(self, line: ServerConnection) -> None:
-        """Serve a page until it goes."""
-        page = Page(line)
-        self._pages.append(page)
-        self._master = self._master or page
+    async def serve_client(self, connection: ServerConnection) -> None:
+        """Serve a page until it disconnects."""
+        page = Client(connection)
+        self._clients.append(page)
+        self._controller = self._controller or page
         tasks: list[asyncio.Task[None]] = []
         try:
-            await page.say("hello", **_hello())
-            for said in self.shelf.told:
-                await page.say("take", **said)
-            await self._announce()
+            await page.send("hello", **_greeting())
+            for announcement in self.clip_store.announcements:
+                await page.send("take", **announcement)
+            await self._broadcast_state()
             tasks = [
-                asyncio.create_task(_while_there(work, page))
-                for work in (self._frames, self._pictures)
+                asyncio.create_task(_run_while_connected(work, page))
+                for work in (self._send_frames, self._send_pictures)
             ]
-            await self._listen(page)
+            await self._receive(page)
         except ConnectionClosed:
             pass
         finally:
             for task in tasks:
                 task.cancel()
-            self._pages.remove(page)
-            if self._master is page:
-                self._master = None
-                await self._announce()
+            self._clients.remove(page)
+            if self._controller is page:
+                self._controller = None
+                await self._broadcast_state()
 
-    async def _listen(self, page: Page) -> None:
-        pace = Pace()
-        async for content in page.line:
+    async def _receive(self, client: Client) -> None:
+        rate = RateLimit()
+        async for content in client.connection:
             try:
-                pace.count()
-                await self._obey(page, content)
-            except MalformedError as error:
-                await page.line.close(1008, str(error)[:_MOST_REASON])
+                rate.consume()
+                await self._handle_message(client, content)
+            except MalformedMessageError as error:
+                await client.connection.close(1008, str(error)[:_MAX_REASON_BYTES])
                 return
             except ParameterError as error:
-                await page.say("refused", words=str(error))
+                await client.send("refused", words=str(error))
 
-    async def _obey(self, page: Page, content: str | bytes) -> None:
-        message = read_message(content)
-        if self._master is page:
-            self._heard = self._loop.time()
-        if isinstance(message, Look):
-            page.looks[message.kind] = message
-            page.asked.set()
-        elif isinstance(message, Seen):
-            page.see(message.frame)
-        elif isinstance(message, Take):
-            if self._master is not None:
+    async def _handle_message(self, client: Client, message: str | bytes) -> None:
+        kind, content = parse_message(message)
+        if self._controller is client:
+            self._last_contact = self._loop.time()
+        if isinstance(content, ViewRequest):
+            client.request_view(content)
+        elif kind == "seen":
+            client.acknowledge(content)
+        elif kind == "take":
+            if self._controller is not None:
                 raise ParameterError("steering", "is done by a page: close that one first")
-            self._master = page
-            await self._announce()
-        elif self._master is not page:
+            self._controller = client
+            await self._broadcast_state()
+        elif self._controller is not client:
             raise ParameterError("steering", "is done by another page: this one watches")
-        elif isinstance(message, Steer):
-            self.session.steer(message)
-            page.steered.set()
-        elif isinstance(message, Change):
-            self.session.change(message.wishes)
-        elif isinstance(message, Start):
+        else:
+            self._control(client, kind, content)
+
+    def _control(self, client: Client, kind: str, content: Any) -> None:
+        """Handle a message that needs control."""
+        if isinstance(content, SteerRequest):
+            self.session.steer(content)
+            client.hand_moved.set()
+        elif kind == "change":
+            self.session.change(content)
+        elif kind == "start":
             self.session.start()
-        elif isinstance(message, Stop):
-            self.session.halt("you let the force go")
-        elif isinstance(message, Save):
-            saving = asyncio.create_task(self._save(page))  # who steers goes on meanwhile
-            self._saving.add(saving)
-            saving.add_done_callback(self._saving.discard)
+        elif kind == "stop":
+            self.session.release_force("the force was released")
+        elif kind == "save":
+            saving = asyncio.create_task(self._save_clip(client))
+            self._save_tasks.add(saving)
+            saving.add_done_callback(self._save_tasks.discard)
 
-    async def _save(self, page: Page) -> None:
-        """Keep the newest seconds."""
+    async def _save_clip(self, client: Client) -> None:
+        """Save the newest seconds as a clip."""
         try:
-            await page.say("take", **await self.shelf.keep())
+            await client.send("take", **await self.clip_store.save_clip())
         except ParameterError as error:
-            await page.say("refused", words=str(error))
+            await client.send("refused", words=str(error))
 
-    async def _announce(self) -> None:
-        """Tell all pages how things stand."""
-        session, setup = self.session, self.session.stage.setup
+    async def _broadcast_state(self) -> None:
+        """Send the state to all pages."""
+        session, setup = self.session, self.session.scene_state.setup
         low, high = map(float, setup.surface.texture.extremes)
-        steps = session.stage.electronics
+        steps = session.scene_state.electronics
         news = {
-            "state": session.state, "words": session.words, "starts": session.starts,
-            "settings": session.stage.settings, "assumptions": setup.assumptions,
-            "free": self._master is None, "wishes": session.steered["wishes"],
+            "state": session.state, "words": session.message, "starts": session.start_count,
+            "settings": session.scene_state.settings, "assumptions": setup.assumptions,
+            "free": self._controller is None, "requested": session.steering_progress["requested"],
             "handle": session.handle,
             "rate": 1.0 / setup.servo.period, "max_force": setup.servo.max_force,
             "step": steps.position_resolution, "force_step": steps.force_resolution,
-            "low": low, "high": high, "middle": session.stage.middle,
-            "limit": self.backdrop.limit, "version": self.backdrop.version,
-            "pictures": self.backdrop.words,
+            "low": low, "high": high, "middle": session.scene_state.centre,
+            "limit": self.background.limit, "version": self.background.version,
+            "pictures": self.background.message,
         }  # fmt: skip
-        for page in tuple(self._pages):
-            await page.say("news", steers=page is self._master, **news)
+        for page in tuple(self._clients):
+            await page.send("news", steers=page is self._controller, **news)
 
-    async def _follows(self) -> None:
-        """Wait until the loop has followed the newest wish: two samples."""
-        span = 2.0 * self.session.stage.setup.servo.period
-        if span <= _SHORT:
+    async def _wait_for_response(self) -> None:
+        """Wait until the loop has processed the newest request: two samples."""
+        span = 2.0 * self.session.scene_state.setup.servo.period
+        if span <= _MAX_BLOCKING_WAIT:
             await asyncio.sleep(0.0)
             time.sleep(span)
         else:
             await asyncio.sleep(span)
 
-    async def _frames(self, page: Page) -> None:
-        """Send the rows since the last frame, after a wish at once, as fast as the page goes."""
+    async def _send_frames(self, client: Client) -> None:
+        """Send the rows since the last frame, at once after a motion."""
         session, starts, seen = self.session, -1, 0
         while True:
-            await asyncio.sleep(LEAST)
+            await asyncio.sleep(MIN_FRAME_INTERVAL)
             with suppress(TimeoutError):
-                async with asyncio.timeout(EVERY - LEAST):
-                    await page.steered.wait()
-            if page.steered.is_set():
-                page.steered.clear()
-                await self._follows()
-            await page.keeps_up()
+                async with asyncio.timeout(FRAME_INTERVAL - MIN_FRAME_INTERVAL):
+                    await client.hand_moved.wait()
+            if client.hand_moved.is_set():
+                client.hand_moved.clear()
+                await self._wait_for_response()
+            await client.wait_until_ready()
             if session.shared is None:
                 continue
-            shared, heard = session.shared, session.steered["heard"]
-            if session.starts != starts:
-                starts, seen = session.starts, max(shared.head - 1, 0)
+            shared, progress = session.shared, session.steering_progress
+            if session.start_count != starts:
+                starts, seen = session.start_count, max(shared.row_count - 1, 0)
             rows, first = shared.rows(seen)
             if not len(rows):
                 continue
             seen = first + len(rows)
-            counted = Statistics.of(shared.status)
-            page.sent += 1
+            counted = LoopStatistics.from_status(shared.status)
+            client.last_sent += 1
             counts = {
-                "frame": page.sent, "heard": heard,
+                "frame": client.last_sent, "acknowledged": progress["acknowledged"],
                 "late": counted.late, "skipped": counted.skipped,
             }  # fmt: skip
-            places = [self.backdrop.nearest(rows[-1, 1:4]), session.anchor]
-            async with asyncio.timeout(_LONGEST_SEND):
-                await page.line.send(frame(rows, first, counts, np.concatenate(places)))
+            places = [self.background.nearest(rows[-1, 1:4]), session.anchor]
+            async with asyncio.timeout(_SEND_TIMEOUT):
+                await client.connection.send(
+                    encode_frame(rows, first, counts, np.concatenate(places))
+                )
 
-    async def _pictures(self, page: Page) -> None:
-        """Send the pictures that a page asks for."""
+    async def _send_pictures(self, client: Client) -> None:
+        """Send the requested pictures."""
         while True:
-            await page.asked.wait()
-            page.asked.clear()
-            for kind in tuple(page.looks):
-                content = await self.backdrop.picture(page.looks.pop(kind))
-                await (page.line.send(content) if content else page.say("later", kind=kind))
+            await client.view_requested.wait()
+            client.view_requested.clear()
+            for kind in tuple(client.view_requests):
+                content = await self.background.render(client.view_requests.pop(kind))
+                if content:
+                    await client.connection.send(content)
+                else:
+                    await client.send("later", kind=kind)
 
 
-def _judge(limits: Workshop, surface: Surface, device: Device) -> Future[str]:
-    """Begin to find out why a surface is a risk on a device."""
-    return limits.submit(risk, surface, device)
-
-
-async def _while_there(work: Callable[[Page], Coroutine[Any, Any, None]], page: Page) -> None:
-    """Do something for a page until it goes, or takes nothing any more."""
+async def _run_while_connected(
+    work: Callable[[Client], Coroutine[Any, Any, None]], client: Client
+) -> None:
+    """Run a task of a page until the page disconnects, or no longer receives."""
     try:
-        await work(page)
+        await work(client)
     except ConnectionClosed:
         return
     except TimeoutError:
-        await page.line.close(1008, "the page does not take what it is sent")
+        await client.connection.close(1008, "the page does not receive")
 
 
-def _hello() -> dict[str, Any]:
+def _greeting() -> dict[str, Any]:
     laws = [
         {
             "letter": law.letter,
@@ -326,10 +333,10 @@ def _hello() -> dict[str, Any]:
             "words": law.summary,
             "parameters": [argument.to_dict() for argument in law.arguments.values()],
         }
-        for law in KNOWN_LAWS.values()
+        for law in REGISTERED_LAWS.values()
     ]
-    kinds = [name for name, kind in KINDS.items() if not kind.required]
+    kinds = [name for name, kind in KINDS.items() if not kind.required_arguments]
     return {
-        "layout": layout(), "laws": laws, "devices": device_names(), "textures": kinds,
+        "layout": frame_layout(), "laws": laws, "devices": device_names(), "textures": kinds,
         "ranges": RANGES,
     }  # fmt: skip

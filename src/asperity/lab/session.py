@@ -1,4 +1,4 @@
-"""The loop of the lab, and the one thread that starts, changes, watches and ends it."""
+"""Session of the lab: the loop, and the thread that starts, changes, polls and stops it."""
 
 from __future__ import annotations
 
@@ -11,279 +11,294 @@ from typing import Any, Literal
 
 import numpy as np
 
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
+from asperity.core.errors import AsperityError, ParameterError
 from asperity.devices import Device
-from asperity.errors import AsperityError, ParameterError
-from asperity.lab.handle import Handle, advice
-from asperity.lab.messages import Steer
-from asperity.lab.stage import Stage
-from asperity.lab.stages import WISH, Stages
+from asperity.lab.handle import Handle, recovery_advice
+from asperity.lab.messages import SteerRequest
+from asperity.lab.scene_state import SCENE_KEY, SavedScenes, SceneState
+from asperity.scene.setup import Setup
 from asperity.servo.drivers.driver import Driver
-from asperity.servo.drivers.steered import Wheel, steered_driver
-from asperity.servo.fault import Cause, DeviceFault
-from asperity.servo.process import ServoProcess, Spare
-from asperity.servo.shared import Shared
+from asperity.servo.drivers.pointer import PointerHand, pointer_driver
+from asperity.servo.fault import DeviceFault, EndReason
+from asperity.servo.loop_memory import LoopMemory
+from asperity.servo.process import PrestartedProcess, ServoProcess
 from asperity.surface import Surface
 
-LOOK = 0.05
-"""[s] between two looks at the loop."""
-ABOVE = 1e-3
-"""Height of the hand above the highest point of the surface, at first [m]."""
+POLL_INTERVAL = 0.05
+"""Interval at which the loop is polled [s]."""
+START_HEIGHT = 1e-3
+"""Initial height of the hand above the highest point of the surface [m]."""
 
-State = Literal["starting", "running", "changing", "stopped"]
-Judge = Callable[[Surface, Device], "Future[str]"]
-"""Begins to find out why a surface is a risk on a device; empty words if it is none."""
-
-
-class _Start(int):
-    """Wish for a start, with how often the force was let go before it."""
+LoopState = Literal["starting", "running", "changing", "stopped"]
+RiskAssessor = Callable[[Surface, Device], "Future[str]"]
+"""Starts to determine why a surface is a risk on a device; an empty text if it is none."""
 
 
-class _Stop(str):
-    """Wish for an end, with the reason."""
+class _StartRequest(int):
+    """Request to start, with the number of stops before it."""
+
+
+class _StopRequest(str):
+    """Request to stop, with the reason."""
+
+
+_Request = Mapping[str, Any] | _StartRequest | _StopRequest
 
 
 class Session:
-    """A loop on a device; use it in a ``with``.
+    """A loop on a simulated device with a steered hand, or on a real device; a context manager.
 
-    The device is simulated and its hand is steered, or somebody holds the handle of a real one.
-    That one is started by :meth:`start` alone, after a fault too.
+    The loop of a real device is started by :meth:`start` alone, after a fault too.
 
-    Rows are read and the hand is steered by whoever likes. All else happens in the session's own
-    thread, one thing after the other, but for :meth:`halt`, which acts at once.
+    Any thread may read rows and steer the hand. All other requests are processed in the thread of
+    the session in order, except :meth:`release_force`, which acts at once.
 
     Args:
-        stage: what is shown.
-        tell: is called when the state has changed, in that thread.
-        spare: the process of the first loop.
-        handle: what is held; ``None`` for the simulated device.
-        judge: of the surfaces of a handle; ``None`` if a risk is accepted.
+        scene_state: the initial scene.
+        on_change: called after a change of the state, in the thread of the session.
+        prestarted: the process of the first loop.
+        handle: of a real device; ``None`` for the simulated device.
+        assess_risk: of surfaces on a real device; ``None`` if risks are accepted.
 
     Attributes:
-        stage: what is shown now.
-        stages: others, to go to by name.
-        shared: rows of the loop; another one after each start.
-        starts: how often the loop was started.
+        scene_state: the current scene.
+        saved_scenes: other scenes by name.
+        shared: rows of the loop; replaced at each start.
+        start_count: number of starts.
         state: of the loop.
-        words: what there is to say of it.
+        message: about the state, for the user.
     """
 
     def __init__(
-        self, stage: Stage, tell: Callable[[], None], spare: Spare | None = None,
-        handle: Handle | None = None, judge: Judge | None = None,
-    ) -> None:  # fmt: skip
-        self.stage, self._tell, self._spare = stage, tell, spare
-        self.stages = Stages()
-        self.handle, self._judge = handle, judge
-        highest = float(stage.setup.surface.texture.extremes[1])
-        self.wheel = None if handle else Wheel((*stage.middle, highest + ABOVE))
-        self.shared: Shared | None = None
-        self.starts = 0
-        self.state: State = "stopped" if handle else "starting"
-        self.words = handle.begins if handle else ""
+        self,
+        scene_state: SceneState,
+        on_change: Callable[[], None],
+        prestarted: PrestartedProcess | None = None,
+        handle: Handle | None = None,
+        assess_risk: RiskAssessor | None = None,
+    ) -> None:
+        self.scene_state, self._on_change, self._prestarted = scene_state, on_change, prestarted
+        self.saved_scenes = SavedScenes()
+        self.handle, self._assess_risk = handle, assess_risk
+        highest = float(scene_state.setup.surface.texture.extremes[1])
+        self.pointer_hand = (
+            None if handle else PointerHand((*scene_state.centre, highest + START_HEIGHT))
+        )
+        self.shared: LoopMemory | None = None
+        self.start_count = 0
+        self.state: LoopState = "stopped" if handle else "starting"
+        self.message = handle.start_prompt if handle else ""
         self._loop: ServoProcess | None = None
-        self._going: Shared | None = None
-        self._halts, self._ends = 0, False
-        self._wishes: Queue[Mapping[str, Any] | _Start | _Stop] = Queue()
-        self._thread = threading.Thread(target=self._work, name="lab session", daemon=True)
+        self._active_shared: LoopMemory | None = None
+        self._stop_count, self._is_closing = 0, False
+        self._requests: Queue[_Request] = Queue()
+        self._thread = threading.Thread(target=self._run, name="lab session", daemon=True)
 
     def __enter__(self) -> Session:
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._ends = True
-        self.halt("")
+        self._is_closing = True
+        self.release_force("")
         self._thread.join()
-        if self.wheel is not None:
-            self.wheel.close()
+        if self.pointer_hand is not None:
+            self.pointer_hand.close()
 
     @property
-    def going(self) -> bool:
-        """Whether a loop is there that nobody has told to end."""
-        return self._going is not None
+    def is_running(self) -> bool:
+        """Whether a loop runs that was not requested to stop."""
+        return self._active_shared is not None
 
     @property
-    def steered(self) -> dict[str, int]:
-        """Numbers of the newest wish for the hand, and of the newest that it follows."""
-        wheel = self.wheel
-        return {"wishes": wheel.wishes if wheel else 0, "heard": wheel.heard if wheel else 0}
+    def steering_progress(self) -> dict[str, int]:
+        """Numbers of the newest request for the hand, and of the newest acknowledged one."""
+        hand = self.pointer_hand
+        counts = (hand.request_count, hand.acknowledged_count) if hand else (0, 0)
+        return dict(zip(("requested", "acknowledged"), counts, strict=True))
 
     @property
     def anchor(self) -> FloatArray:
-        """Where the hand is pulled to (3,) [m]; no number where a real one holds the handle."""
-        return np.full(3, np.nan) if self.wheel is None else self.wheel.anchor
+        """Position of the anchor of the hand (3,) [m]; NaN on a real device."""
+        return np.full(3, np.nan) if self.pointer_hand is None else self.pointer_hand.anchor
 
-    def steer(self, wish: Steer) -> None:
+    def steer(self, request: SteerRequest) -> None:
         """Move the hand.
 
         Raises:
-            ParameterError: where somebody holds the handle.
+            ParameterError: on a real device.
         """
-        if self.wheel is None:
-            raise ParameterError("steering", "is done by whoever holds the handle")
-        self.wheel.steer(wish.target, wish.cosine, wish.sine, wish.speed)
+        if self.pointer_hand is None:
+            raise ParameterError("steering", "is done by the user of the handle")
+        motion = request.target, request.cosine, request.sine, request.speed
+        self.pointer_hand.request_motion(*motion)
 
-    def change(self, wishes: Mapping[str, Any]) -> None:
-        """Ask for a change of the stage; on the simulated device a stopped loop starts by it."""
-        self._wishes.put(dict(wishes))
+    def change(self, changes: Mapping[str, Any]) -> None:
+        """Request a change of the scene, which starts a stopped loop on the simulated device."""
+        self._requests.put(dict(changes))
 
     def start(self) -> None:
-        """Ask for a start of a loop that has stopped."""
-        self._wishes.put(_Start(self._halts))
+        """Request the start of a stopped loop."""
+        self._requests.put(_StartRequest(self._stop_count))
 
-    def halt(self, reason: str) -> None:
-        """Let the force go, by the ramp, and end the loop: now, whatever the thread does."""
-        self._halts += 1  # what was asked for before counts no more
-        going, self._going = self._going, None
-        if going is not None:
-            going.stop()
-        self._wishes.put(_Stop(reason))
+    def release_force(self, reason: str) -> None:
+        """Ramp the force down and stop the loop at once, whatever the thread is doing."""
+        self._stop_count += 1  # makes earlier start requests stale
+        active, self._active_shared = self._active_shared, None
+        if active is not None:
+            active.request_stop()
+        self._requests.put(_StopRequest(reason))
 
-    def _say(self, state: State, words: str = "") -> None:
-        self.state, self.words = state, words
-        self._tell()
+    def _set_state(self, state: LoopState, message: str = "") -> None:
+        self.state, self.message = state, message
+        self._on_change()
 
-    def _work(self) -> None:
+    def _run(self) -> None:
         try:
             if self.handle is None:
-                self._guarded(self._start, self.stage)
-            while not self._ends:
-                for wish in self._asked():
-                    self._guarded(self._do, wish)
-                self._guarded(self._look)
+                self._run_guarded(self._start, self.scene_state)
+            while not self._is_closing:
+                for request in self._next_requests():
+                    self._run_guarded(self._handle_request, request)
+                self._run_guarded(self._poll)
         finally:
             self._stop()
 
-    def _asked(self) -> list[Mapping[str, Any] | _Start | _Stop]:
-        """Return all that is asked for; changes of one stage that follow each other are one."""
+    def _next_requests(self) -> list[_Request]:
+        """Return all pending requests; consecutive changes of one scene are merged."""
         try:
-            wishes = [self._wishes.get(timeout=LOOK)]
+            requests = [self._requests.get(timeout=POLL_INTERVAL)]
         except Empty:
             return []
-        while not self._wishes.empty():
-            more, newest = self._wishes.get(), wishes[-1]
-            # What was wished before another stage was of the former one.
-            if isinstance(more, Mapping) and isinstance(newest, Mapping) and WISH not in more:
-                wishes[-1] = {**newest, **more}
+        while not self._requests.empty():
+            last, new = requests[-1], self._requests.get()
+            # Changes queued before a scene change apply to the previous scene.
+            if isinstance(last, Mapping) and isinstance(new, Mapping) and SCENE_KEY not in new:
+                requests[-1] = {**last, **new}
             else:
-                wishes.append(more)
-        return wishes
+                requests.append(new)
+        return requests
 
-    def _guarded(self, work: Callable[..., None], *arguments: Any) -> None:
-        """Do something; say what it found wrong."""
+    def _run_guarded(self, function: Callable[..., None], *arguments: Any) -> None:
+        """Call a function; report its error in the state."""
         try:
-            work(*arguments)
+            function(*arguments)
         except AsperityError as error:
             fault = error if isinstance(error, DeviceFault) else None
-            going = self._loop is not None and fault is None and self._loop.alive
-            if not going:
+            runs = self._loop is not None and fault is None and self._loop.is_alive
+            if not runs:
                 self._stop()
-            if fault is None and any(isinstance(wish, _Stop) for wish in self._wishes.queue):
-                return  # the force was let go meanwhile, which is said next
-            words = str(error) if self.handle is None else f"{error}{advice(fault)}"
-            self._say("running" if going else "stopped", words)
+            stops = any(isinstance(request, _StopRequest) for request in self._requests.queue)
+            if fault is None and stops:
+                return  # the pending stop request sets the state
+            message = str(error) if self.handle is None else f"{error}{recovery_advice(fault)}"
+            self._set_state("running" if runs else "stopped", message)
 
-    def _do(self, wish: Mapping[str, Any] | _Start | _Stop) -> None:
-        if isinstance(wish, _Stop):
+    def _handle_request(self, request: _Request) -> None:
+        if isinstance(request, _StopRequest):
             if self.state != "stopped":
                 self._stop()
-                self._say("stopped", str(wish))
-        elif isinstance(wish, _Start):
-            if self._loop is None and wish == self._halts:
-                self._start(self.stage)
+                self._set_state("stopped", str(request))
+        elif isinstance(request, _StartRequest):
+            if self._loop is None and request == self._stop_count:
+                self._start(self.scene_state)
         else:
-            self._go_to(wish)
+            self._apply_changes(request)
 
-    def _start(self, stage: Stage) -> None:
-        halts = self._halts
-        self._say("starting", "compiling the loop: the first time takes some seconds")
-        setup, spare = stage.setup, self._spare
-        self._spare = None
+    def _start(self, scene_state: SceneState) -> None:
+        stop_count, setup = self._stop_count, scene_state.setup
+        self._set_state("starting", "compiling the loop: the first time takes some seconds")
+        prestarted, self._prestarted = self._prestarted, None
         loop = ServoProcess(
-            setup.surface, self._driver(stage), setup.servo, setup.safety,
-            setup.safety.reach_on(setup.device), self._span(stage), spare=spare,
-        )  # fmt: skip
-        self._going = loop.shared
-        if halts != self._halts:  # in between: it would not have been heard
-            loop.shared.stop()
+            setup.surface,
+            self._make_driver(setup),
+            setup.servo,
+            setup.safety,
+            setup.safety.reach_limit(setup.device),
+            self._run_duration(setup),
+            prestarted=prestarted,
+        )
+        self._active_shared = loop.memory
+        if stop_count != self._stop_count:  # requested before the loop could receive it
+            loop.memory.request_stop()
         try:
             loop.start()
         except BaseException:
-            self._going = None
+            self._active_shared = None
             raise
-        self._loop, self.shared, self.stage = loop, loop.shared, stage
-        self.starts += 1
-        self._say("running", " ".join(loop.notes))
+        self._loop, self.shared, self.scene_state = loop, loop.memory, scene_state
+        self.start_count += 1
+        self._set_state("running", " ".join(loop.notes))
 
-    def _driver(self, stage: Stage) -> Driver:
+    def _make_driver(self, setup: Setup) -> Driver:
         if self.handle is not None:
             return self.handle.driver
-        assert self.wheel is not None  # without a handle there is one
-        return steered_driver(stage.setup.plant, stage.setup.hand, stage.setup.servo, self.wheel)
+        assert self.pointer_hand is not None  # as there is no handle
+        return pointer_driver(setup.plant, setup.hand, setup.servo, self.pointer_hand)
 
-    def _span(self, stage: Stage) -> float | None:
-        """Return after which time the loop ends by itself [s]."""
-        readings = self.handle and self.handle.driver.readings
-        return readings * stage.setup.servo.period if readings else None
+    def _run_duration(self, setup: Setup) -> float | None:
+        """Return the time after which the loop ends by itself [s]."""
+        readings = self.handle and self.handle.driver.max_readings
+        return readings * setup.servo.period if readings else None
 
-    def _go_to(self, wishes: Mapping[str, Any]) -> None:
-        if self.handle is not None and WISH in wishes:
-            raise ParameterError(WISH, "is of the simulated device")
-        stage = self.stages.changed(self.stage, wishes)
-        if stage is self.stage and self._loop is not None:
-            self._say("running")
+    def _apply_changes(self, changes: Mapping[str, Any]) -> None:
+        if self.handle is not None and SCENE_KEY in changes:
+            raise ParameterError(SCENE_KEY, "needs the simulated device")
+        scene = self.saved_scenes.apply_changes(self.scene_state, changes)
+        if scene is self.scene_state and self._loop is not None:
+            self._set_state("running")
             return
-        if not self._judged(stage):
+        if not self._is_accepted(scene):
             return
         if self.handle is not None and self._loop is None:
-            self.stage = stage  # for the next start: a change moves no handle
-            self._say("stopped", self.words)
+            self.scene_state = scene  # for the next start: a change never starts a real device
+            self._set_state("stopped", self.message)
             return
-        if self._loop is None or self.stage.restarts(stage):
+        if self._loop is None or self.scene_state.needs_restart(scene):
             self._stop()
-            self._start(stage)
+            self._start(scene)
             return
-        self._say("changing", "compiling the law: the first time takes some seconds")
-        # It is judged already; on a simulated device to hear it buzz is what the lab is for.
-        self._loop.change(stage.setup.surface, accept_risk=True)
-        self.stage = stage
-        self._say("running")
+        self._set_state("changing", "compiling the law: the first time takes some seconds")
+        # The risk is assessed already; a simulated device may buzz.
+        self._loop.change_surface(scene.setup.surface, accept_risk=True)
+        self.scene_state = scene
+        self._set_state("running")
 
-    def _judged(self, stage: Stage) -> bool:
-        """Let another process analyse a surface, and go on watching; false if the loop ended.
+    def _is_accepted(self, scene_state: SceneState) -> bool:
+        """Assess a surface in another process while polling the loop; false if the loop ended.
 
         Raises:
             ParameterError: for a stiffness above the limit.
         """
-        if self._judge is None or stage.setup.surface is self.stage.setup.surface:
+        if self._assess_risk is None or scene_state.setup.surface is self.scene_state.setup.surface:
             return True
-        loop, halts = self._loop, self._halts
+        loop, stop_count = self._loop, self._stop_count
         if loop is not None:
-            self._say("changing", "analysing the surface; the former is felt meanwhile")
-        answer = self._judge(stage.setup.surface, stage.setup.device)
-        while not (done := wait([answer], LOOK).done):
-            self._look()
-            if self._loop is not loop or self._halts != halts:
-                answer.cancel()
+            self._set_state("changing", "analysing the surface; the previous one is still rendered")
+        assessment = self._assess_risk(scene_state.setup.surface, scene_state.setup.device)
+        while not (done := wait([assessment], POLL_INTERVAL).done):
+            self._poll()
+            if self._loop is not loop or self._stop_count != stop_count:
+                assessment.cancel()
                 return False
         try:
             reason = done.pop().result()
         except BrokenProcessPool:
-            reason = "the process that analyses it has ended: ask again"
+            reason = "the process that analyses it has crashed: try again"
         if reason:
-            words = f"is refused: {reason}; asperity lab --accept-risk renders it"
-            raise ParameterError("stiffness", words)
+            advice = "asperity lab --accept-risk renders it"
+            raise ParameterError("stiffness", f"is refused: {reason}; {advice}")
         return True
 
-    def _look(self) -> None:
-        if self._loop is not None and (cause := self._loop.poll()) is not Cause.GOING:
-            if cause is Cause.STOPPED:
-                return  # somebody let the force go, and says why
+    def _poll(self) -> None:
+        if self._loop is not None and (cause := self._loop.poll()) is not EndReason.RUNNING:
+            if cause is EndReason.STOPPED:
+                return  # a stop request follows with the reason
             self._stop()
-            self._say("stopped", "the recording is at its end; Start begins it again")
+            self._set_state("stopped", "end of the recording; Start replays it")
 
     def _stop(self) -> None:
-        loop, self._loop, self._going = self._loop, None, None
+        loop, self._loop, self._active_shared = self._loop, None, None
         if loop is not None:
             loop.stop()

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
 
-from asperity.arguments import Argument
-from asperity.errors import LawError, ParameterError, nearest_names
+from asperity.core.arguments import Argument
+from asperity.core.errors import LawError, ParameterError, suggest_names
 from asperity.laws.a_groove_wall_normal import LAW as A
 from asperity.laws.b_groove_texture_normal import LAW as B
 from asperity.laws.c_change_of_height import LAW as C
@@ -17,78 +18,79 @@ from asperity.laws.h_split_god_object import LAW as H
 from asperity.laws.law import Law as Law
 from asperity.laws.w_smooth_wall import LAW as W
 
-# In the order of the paper's tables, the smooth wall first.
+# In the order of the tables of the paper, the smooth wall first.
 LAWS: dict[str, Law] = {law.letter: law for law in (W, A, B, C, D, E, F, G, H)}
 
-LAW_ARGUMENTS: dict[str, Argument] = {
+SHIPPED_LAW_ARGUMENTS: dict[str, Argument] = {
     name: argument for law in LAWS.values() for name, argument in law.arguments.items()
 }
 """The parameters of the shipped laws, by name."""
 
-KNOWN_LAWS: dict[str, Law] = dict(LAWS)
-"""The laws that are found by letter or name: the shipped ones and those that were registered."""
+REGISTERED_LAWS: dict[str, Law] = dict(LAWS)
+"""Shipped and registered laws by letter."""
 
 
 def register(law: Law) -> Law:
-    """Make a law of your own known by its letter and its name, in scenes and commands too.
+    """Register a user-defined law, so that scenes and commands find it by letter or name.
 
     Raises:
         LawError: for a letter or a name that is taken, or a parameter that has another unit in
-            a law that is known.
+            a registered law.
 
     Example:
         >>> register(Law("C", "mine", "vertical", lambda c: c.k * c.depth * c.w))
         Traceback (most recent call last):
         ...
-        asperity.errors.LawError: law C (mine): 'C' is taken by law C (change-of-height)
+        asperity.core.errors.LawError: law C (mine): 'C' is taken by law C (change-of-height)
     """
     for name in (law.letter, law.name):
-        known = _known(name)
-        if known is not None:
-            raise LawError(f"law {law}: {name!r} is taken by law {known}")
-    units = {name: argument.unit for name, argument in known_arguments().items()}
+        other = _find_registered(name)
+        if other is not None:
+            raise LawError(f"law {law}: {name!r} is taken by law {other}")
+    units = {name: argument.unit for name, argument in registered_arguments().items()}
     for name, argument in law.arguments.items():
         if units.get(name, argument.unit) != argument.unit:
             raise LawError(
                 f"law {law}: its parameter {name!r} is in [{argument.unit or '1'}], that of "
                 f"another law in [{units[name] or '1'}]; declare it as an Argument with that unit"
             )
-    KNOWN_LAWS[law.letter] = law
+    REGISTERED_LAWS[law.letter] = law
     return law
 
 
-def known_arguments(laws: Iterable[Law] | None = None) -> dict[str, Argument]:
-    """Return the parameters of laws by name, of all that are known unless told otherwise."""
-    chosen = KNOWN_LAWS.values() if laws is None else laws
+def registered_arguments(laws: Iterable[Law] | None = None) -> dict[str, Argument]:
+    """Return the parameters of laws by name; of all registered laws by default."""
+    chosen = REGISTERED_LAWS.values() if laws is None else laws
     return {name: argument for law in chosen for name, argument in law.arguments.items()}
 
 
-def shared_out(values: Mapping[str, float], laws: Sequence[Law]) -> list[dict[str, float]]:
-    """Return for each law those of the parameters that it declares.
+def distribute_parameters(
+    values: Mapping[str, float], laws: Sequence[Law]
+) -> list[dict[str, float]]:
+    """Return for each law the values of the parameters that it declares.
 
     Raises:
-        ParameterError: for a parameter that none of the laws declares; the nearest are offered.
+        ParameterError: for a parameter that none of the laws declares; it suggests similar names.
     """
-    declared = known_arguments(laws)
+    declared = registered_arguments(laws)
     for name in values:
         if name not in declared:
-            hint = nearest_names(name, declared) if declared else "they have none"
+            hint = suggest_names(name, declared) if declared else "those laws have no parameters"
             letters = ", ".join(law.letter for law in laws)
-            raise ParameterError(
-                "law_parameters", f"names {name!r}, which no law of {letters} has; {hint}"
-            )
+            words = f"contains {name!r}, which is no parameter of the laws {letters}; {hint}"
+            raise ParameterError("law_parameters", words)
     return [{name: values[name] for name in law.arguments if name in values} for law in laws]
 
 
-def _known(name: str) -> Law | None:
-    wanted = _spelling(name)
-    for law in KNOWN_LAWS.values():
-        if wanted in {_spelling(law.letter), _spelling(law.name)}:
+def _find_registered(name: str) -> Law | None:
+    wanted = _normalized_name(name)
+    for law in REGISTERED_LAWS.values():
+        if wanted in {_normalized_name(law.letter), _normalized_name(law.name)}:
             return law
     return None
 
 
-def _spelling(name: str) -> str:
+def _normalized_name(name: str) -> str:
     return name.strip().lower().replace("_", "-").replace(" ", "-")
 
 
@@ -96,7 +98,7 @@ def find_law(law: str | Law) -> Law:
     """Return a law by letter or by name; a :class:`Law` is returned as it is.
 
     Raises:
-        ParameterError: if no law has that letter or name; the nearest are offered.
+        ParameterError: if no law has that letter or name; the message suggests similar names.
 
     Example:
         >>> find_law("b").name, find_law("god-object").letter
@@ -106,15 +108,15 @@ def find_law(law: str | Law) -> Law:
         return law
     if not isinstance(law, str):
         raise ParameterError("law", "must be a letter, a name or a Law", law)
-    known = _known(law)
-    if known is not None:
-        return known
-    names = [name for one in KNOWN_LAWS.values() for name in (one.letter, one.name)]
-    raise ParameterError("law", f"is unknown: {law!r}; {nearest_names(law, names)}")
+    registered = _find_registered(law)
+    if registered is not None:
+        return registered
+    names = [name for one in REGISTERED_LAWS.values() for name in (one.letter, one.name)]
+    raise ParameterError("law", f"is unknown: {law!r}; {suggest_names(law, names)}")
 
 
 def find_laws(laws: str | list[str | Law] | tuple[str | Law, ...]) -> tuple[Law, ...]:
-    """Return several laws: letters in one string ("WABC"), a name, or a sequence of both.
+    """Return several laws from letters ("WABC"), a name, or a sequence of both.
 
     A string with commas is split there; otherwise each of its letters is a law, unless the whole
     string is the name of one.
@@ -128,15 +130,15 @@ def find_laws(laws: str | list[str | Law] | tuple[str | Law, ...]) -> tuple[Law,
     """
     if isinstance(laws, str):
         parts: list[str | Law] = [part.strip() for part in laws.split(",") if part.strip()]
-        if len(parts) == 1 and "-" not in laws and _known(laws) is None:
+        if len(parts) == 1 and "-" not in laws and _find_registered(laws) is None:
             parts = list(laws.strip())
     else:
         parts = list(laws)
     found = tuple(find_law(part) for part in parts)
     if not found:
         raise ParameterError("laws", "must name at least one law", laws)
-    letters = [law.letter for law in found]
-    twice = {letter for letter in letters if letters.count(letter) > 1}
-    if twice:
-        raise ParameterError("laws", f"names law {sorted(twice)[0]} twice", laws)
+    letters = sorted(law.letter for law in found)
+    for letter, following in pairwise(letters):
+        if letter == following:
+            raise ParameterError("laws", f"names law {letter} twice", laws)
     return found

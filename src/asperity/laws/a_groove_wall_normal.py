@@ -5,23 +5,13 @@ Corrections: (9) is written for κ where q is meant; the maximum (10) is attaine
 x = 0 mod l/2, not mod π/l. Table I agrees. The curl is (-h_y, h_x, 0)·(-k): not conservative.
 """
 
-from __future__ import annotations
-
-from typing import Any
-
-from asperity.laws.law import ContactSymbols, Law
-
-
-def force(c: ContactSymbols) -> Any:
-    """Return k δ e_z."""
-    return c.k * c.depth * c.e_z
-
+from asperity.laws.law import Law
 
 LAW = Law(
     letter="A",
     name="groove-wall-normal",
     contact="vertical",
-    force=force,
+    force=lambda c: c.k * c.depth * c.e_z,
     summary="height of the groove, pushed along the wall normal",
     clampable=True,
 )

@@ -5,23 +5,13 @@ Jacobian; here it is derived exactly: -k(s n nᵀ - δ N Eᵀ), N = ∂n/∂(x, 
 normalisation of n destroys the conservativity that law C has.
 """
 
-from __future__ import annotations
-
-from typing import Any
-
-from asperity.laws.law import ContactSymbols, Law
-
-
-def force(c: ContactSymbols) -> Any:
-    """Return k δ n."""
-    return c.k * c.depth * c.normal
-
+from asperity.laws.law import Law
 
 LAW = Law(
     letter="B",
     name="groove-texture-normal",
     contact="vertical",
-    force=force,
+    force=lambda c: c.k * c.depth * c.normal,
     summary="height of the groove, pushed along the texture normal",
     clampable=True,
 )

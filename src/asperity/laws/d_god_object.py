@@ -7,22 +7,12 @@ is unbounded towards the medial axis, where the force jumps (Remark 6). (37) lac
 entry (1, 2) and (41) entry (2, 1) are misprinted.
 """
 
-from __future__ import annotations
-
-from typing import Any
-
-from asperity.laws.law import ContactSymbols, Law
-
-
-def force(c: ContactSymbols) -> Any:
-    """Return k (p_h - p), which is k δₙ n."""
-    return c.k * c.toward
-
+from asperity.laws.law import Law
 
 LAW = Law(
     letter="D",
     name="god-object",
     contact="nearest",
-    force=force,
+    force=lambda c: c.k * c.toward,
     summary="spring to the nearest surface point",
 )

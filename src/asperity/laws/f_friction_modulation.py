@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from asperity.arguments import Argument
+from asperity.core.arguments import Argument
 from asperity.laws.law import ContactSymbols, Law
 
 
@@ -37,13 +37,13 @@ LAW = Law(
         "friction": Argument("friction", "friction coefficient μ of law F", default=0.8),
         "max_deflection": Argument(
             "max_deflection",
-            "greatest deflection d_max of law F's anchor",
+            "maximum deflection d_max between probe and friction anchor (law F)",
             "m",
             1e-3,
-            positive=True,
+            must_be_positive=True,
         ),
         "modulation_depth": Argument(
-            "modulation_depth", "modulation depth a_m of law F, 0 to 1", default=0.8, high=1.0
+            "modulation_depth", "modulation depth a_m of law F, 0 to 1", default=0.8, maximum=1.0
         ),
     },
 )

@@ -5,23 +5,13 @@ the Jacobian; here it is exact: -k(n e_zᵀ - δ₀ N Eᵀ), singular values k a
 conservative, and on an asymmetric profile it pushes steadily along a straight scan.
 """
 
-from __future__ import annotations
-
-from typing import Any
-
-from asperity.laws.law import ContactSymbols, Law
-
-
-def force(c: ContactSymbols) -> Any:
-    """Return k δ₀ n."""
-    return c.k * c.depth * c.normal
-
+from asperity.laws.law import Law
 
 LAW = Law(
     letter="G",
     name="force-shading",
     contact="nominal",
-    force=force,
+    force=lambda c: c.k * c.depth * c.normal,
     summary="smooth wall with a force along the texture normal",
     clampable=True,
 )

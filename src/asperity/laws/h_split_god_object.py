@@ -11,28 +11,21 @@ The mathematics is the upper compensated convex transform of Zhang, Crooks and O
 as a haptic law is new. No perceptual test was done.
 """
 
-from __future__ import annotations
-
-from typing import Any
-
-from asperity.arguments import Argument
-from asperity.laws.law import ContactSymbols, Law
-
-
-def force(c: ContactSymbols) -> Any:
-    """Return k (z̄ - p)."""
-    return c.k * c.toward
-
+from asperity.core.arguments import Argument
+from asperity.laws.law import Law
 
 LAW = Law(
     letter="H",
     name="split-god-object",
     contact="split",
-    force=force,
+    force=lambda c: c.k * c.toward,
     summary="spring to the mean of a god-object that splits",
     parameters={
         "continuity": Argument(
-            "continuity", "c of law H, whose q is max(1, c)", default=1.0, positive=True
+            "continuity",
+            "parameter c of law H, which bounds the change of its force: q is max(1, c)",
+            default=1.0,
+            must_be_positive=True,
         )
     },
 )

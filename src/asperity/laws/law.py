@@ -1,4 +1,4 @@
-"""What a law is: a contact and a formula."""
+"""Texture laws: a contact and a formula."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from asperity.arguments import Argument
 from asperity.contacts import CONTACTS, Contact
-from asperity.errors import LawError, ParameterError, nearest_names
+from asperity.core.arguments import Argument
+from asperity.core.errors import LawError, ParameterError, suggest_names
 
 __all__ = ["ContactSymbols", "ForceFormula", "Law"]
 
 if TYPE_CHECKING:
     from asperity.contacts.symbols import ContactSymbols
 else:
-    ContactSymbols = Any  # SymPy is loaded only where something is derived
+    ContactSymbols = Any  # importing SymPy is left to the modules that derive something
 
 ForceFormula = Callable[[ContactSymbols], Any]
 
@@ -31,20 +31,20 @@ class Law:
     expression. Everything else (Jacobian, curl, kernel) is derived from it.
 
     Args:
-        letter: one letter, or a short word for a law of your own.
-        name: the name in words, joined with hyphens.
-        contact: the point where the surface is felt: ``"nominal"`` (the smooth wall below the
+        letter: one letter, or a short word for a user-defined law.
+        name: a name of words joined with hyphens.
+        contact: the contact point: ``"nominal"`` (the smooth wall below the
             probe), ``"vertical"`` (the textured surface above or below the probe),
             ``"nearest"`` (the god-object) or ``"split"`` (the split god-object); or a
-            :class:`~asperity.contacts.Contact` of your own.
+            :class:`~asperity.contacts.Contact`.
         force: the formula.
         summary: one line for tables.
-        clampable: whether a depth clamp changes this law (W, D, E and H are never clamped); on
-            a contact that can be clamped (nominal, vertical).
-        stateful: whether the force depends on the tangential deflection of a dragged anchor; on
-            a contact that holds one (nominal: the anchor is held while z < 0).
-        parameters: names of the further parameters of the formula, with their defaults [SI], or
-            with an :class:`~asperity.arguments.Argument` that has unit, bounds and words too.
+        clampable: whether a depth clamp changes this law (never W, D, E and H); the contact must
+            support clamps (nominal, vertical).
+        stateful: whether the force depends on the tangential deflection of a dragged anchor; the
+            contact must support state (nominal: the anchor is held while z < 0).
+        parameters: names of the further parameters of the formula with their default values [SI],
+            or with an :class:`~asperity.core.arguments.Argument` that adds unit, bounds and text.
 
     Example:
         >>> from asperity.laws import Law
@@ -76,58 +76,52 @@ class Law:
         stateful: bool = False,
         parameters: Mapping[str, float | Argument] | None = None,
     ) -> None:
-        declared = {
-            key: value if isinstance(value, Argument) else _plain_argument(letter, key, value)
-            for key, value in (parameters or {}).items()
-        }
-        values: dict[str, Any] = {
-            "letter": letter,
-            "name": name,
-            "contact": _find_contact(letter, contact),
-            "force": force,
-            "summary": summary,
-            "clampable": clampable,
-            "stateful": stateful,
-            "parameters": MappingProxyType({key: _default(a) for key, a in declared.items()}),
-            "arguments": MappingProxyType(declared),
-        }
-        for key, value in values.items():
-            object.__setattr__(self, key, value)
-        self._check()
+        declared = {key: _as_argument(letter, key, v) for key, v in (parameters or {}).items()}
+        defaults = {key: _default_value(argument) for key, argument in declared.items()}
+        self.__dict__.update(
+            letter=letter,
+            name=name,
+            contact=_find_contact(letter, contact),
+            force=force,
+            summary=summary,
+            clampable=clampable,
+            stateful=stateful,
+            parameters=MappingProxyType(defaults),
+            arguments=MappingProxyType(declared),
+        )
+        self._validate()
 
-    def _check(self) -> None:
+    def _validate(self) -> None:
         if not self.letter.isidentifier():
             raise LawError(f"law letter must be a letter or a word, got {self.letter!r}")
         if self.clampable and not self.contact.clampable:
             raise LawError(f"law {self.letter}: a law on the {self.contact} contact is not clamped")
-        if self.stateful and not self.contact.holds_anchor:
-            holding = ", ".join(c.name for c in CONTACTS.values() if c.holds_anchor)
-            raise LawError(f"law {self.letter}: a law with state must be on the {holding} contact")
+        if self.stateful and not self.contact.supports_state:
+            names = ", ".join(c.name for c in CONTACTS.values() if c.supports_state)
+            raise LawError(f"law {self.letter}: a law with state must be on the {names} contact")
         missing = [name for name in self.contact.parameters if name not in self.arguments]
         if missing:
-            raise LawError(
-                f"law {self.letter}: a law on the {self.contact} contact must have the parameter "
-                f"{missing[0]}"
-            )
+            words = f"a law on the {self.contact} contact must have the parameter {missing[0]}"
+            raise LawError(f"law {self.letter}: {words}")
         if not callable(self.force):
             raise LawError(f"law {self.letter}: force must be a function of the contact symbols")
 
-    def checked(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return values for parameters of this law [SI].
+    def check_parameters(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return validated values of parameters of this law [SI].
 
         Raises:
             ParameterError: for a parameter that it does not declare, or a value out of bounds.
 
         Example:
             >>> from asperity.laws import find_law
-            >>> find_law("F").checked({"friction": 0.5})
+            >>> find_law("F").check_parameters({"friction": 0.5})
             {'friction': 0.5}
         """
         for name in values:
             if name not in self.arguments:
-                hint = nearest_names(name, self.arguments) if self.arguments else "it has none"
+                hint = suggest_names(name, self.arguments) if self.arguments else "it has none"
                 raise ParameterError("law_parameters", f"names {name!r}; law {self}: {hint}")
-        return {name: self.arguments[name].checked(value) for name, value in values.items()}
+        return {name: self.arguments[name].validate(value) for name, value in values.items()}
 
     def __str__(self) -> str:
         return f"{self.letter} ({self.name})"
@@ -137,20 +131,19 @@ def _find_contact(letter: str, contact: str | Contact) -> Contact:
     if isinstance(contact, Contact):
         return contact
     if not isinstance(contact, str) or contact not in CONTACTS:
-        hint = nearest_names(str(contact), CONTACTS)
-        raise LawError(
-            f"law {letter}: contact must be one of {', '.join(CONTACTS)} or a Contact of your "
-            f"own, got {contact!r}; {hint}"
-        )
+        hint = suggest_names(str(contact), CONTACTS)
+        words = f"contact must be one of {', '.join(CONTACTS)} or a Contact, got {contact!r}"
+        raise LawError(f"law {letter}: {words}; {hint}")
     return CONTACTS[contact]
 
 
-def _plain_argument(letter: str, name: str, default: float) -> Argument:
-    words = f"parameter of law {letter}"
-    return Argument(name, words, default=float(default), low=-math.inf)
+def _as_argument(letter: str, name: str, value: float | Argument) -> Argument:
+    if isinstance(value, Argument):
+        return value
+    return Argument(name, f"parameter of law {letter}", default=float(value), minimum=-math.inf)
 
 
-def _default(argument: Argument) -> float:
+def _default_value(argument: Argument) -> float:
     if not isinstance(argument.default, (int, float)):
         raise LawError(f"the parameter {argument.name!r} needs a number as its default")
     return float(argument.default)

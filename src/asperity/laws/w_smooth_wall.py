@@ -3,22 +3,12 @@
 Paper: (30). The force is a spring to the nominal plane; q = q⁺ = 1, conservative.
 """
 
-from __future__ import annotations
-
-from typing import Any
-
-from asperity.laws.law import ContactSymbols, Law
-
-
-def force(c: ContactSymbols) -> Any:
-    """Return k δ₀ e_z."""
-    return c.k * c.depth * c.e_z
-
+from asperity.laws.law import Law
 
 LAW = Law(
     letter="W",
     name="smooth-wall",
     contact="nominal",
-    force=force,
+    force=lambda c: c.k * c.depth * c.e_z,
     summary="spring to the smooth wall",
 )

@@ -8,35 +8,34 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.checks import FloatArray
-from asperity.errors import ParameterError
-from asperity.measured.length_words import length_text, positive_number
+from asperity.core.checks import FloatArray, check_positive
+from asperity.core.errors import ParameterError
+from asperity.measured.lengths import Pitch, Shape, format_length
 
 ALPHA = math.sqrt(math.log(2.0) / math.pi)
-"""Constant of ISO 16610-21 and -61, which puts 50 % transmission at the cut-off."""
+"""Constant of ISO 16610-21 and -61 for a transmission of 50 % at the cut-off."""
 
 DEFAULT_SAMPLES = 4
-"""Cut-off wavelength in samples where none is given."""
+"""Default cut-off wavelength in samples."""
 
-# Points that are transformed at once: large enough for speed, small against a large map.
-_BLOCK = 2**22
+_BLOCK = 2**22  # points transformed at once: fast, and small compared with a large map
 
 
 def gaussian_filter(
-    heights: FloatArray, pitch: tuple[float, ...], cutoff: float, *, periodic: bool = False
+    heights: FloatArray, pitch: Pitch, cutoff: float, *, periodic: bool = False
 ) -> FloatArray:
-    """Gaussian low-pass of ISO 16610-21 (profile) and -61 (map) with a mirrored border.
+    """Return the heights after the Gaussian low-pass of ISO 16610-21 (profile) and -61 (map).
 
-    A wave of wavelength l keeps the fraction exp(-pi (ALPHA cutoff / l)^2) of its
-    amplitude: one half at the cut-off. The map is mirrored at its border nodes, which is
-    what the type-1 cosine transform assumes, so the transmission is exact for every
-    cut-off; a sampled and truncated weighting function would only come close.
+    The transmission at wavelength l is exp(-pi (ALPHA cutoff / l)^2), one half at the cut-off. The
+    map is mirrored at its border nodes, as the type-1 cosine transform assumes, so that the
+    transmission is exact for every cut-off, unlike that of a sampled and truncated weighting
+    function.
 
     Args:
         heights: [m], shape (ny, nx) or (n,), finite, at least two points along each axis.
         pitch: (px, py) or (px,) [m].
         cutoff: cut-off wavelength [m].
-        periodic: whether the surface repeats after n times the pitch and is not mirrored.
+        periodic: whether the surface repeats after n times the pitch instead of being mirrored.
 
     Returns:
         The filtered heights [m], same shape.
@@ -50,17 +49,17 @@ def gaussian_filter(
         True
     """
     smooth = np.array(heights, dtype=np.float64)
-    smooth_in_place(smooth, pitch, cutoff, periodic=periodic)
+    lowpass_in_place(smooth, pitch, cutoff, periodic=periodic)
     return smooth
 
 
-def smooth_in_place(
-    heights: FloatArray, pitch: tuple[float, ...], cutoff: float, *, periodic: bool = False
+def lowpass_in_place(
+    heights: FloatArray, pitch: Pitch, cutoff: float, *, periodic: bool = False
 ) -> None:
-    """Filter heights where they are; see :func:`gaussian_filter`.
+    """Filter heights in place; see :func:`gaussian_filter`.
 
-    The Gaussian is separable, so that each axis is transformed for itself and in blocks: a map
-    of any size costs no second copy.
+    The Gaussian is separable: each axis is transformed separately and in blocks, so that a large
+    map needs no second copy.
     """
     from scipy.fft import dct, idct, irfft, rfft, rfftfreq
 
@@ -79,10 +78,10 @@ def smooth_in_place(
                 block[...] = idct(spectrum, type=1, axis=axis, overwrite_x=True)
 
 
-def roughen_in_place(heights: FloatArray, pitch: tuple[float, ...], cutoff: float) -> None:
-    """Keep the short waves, the complement of :func:`gaussian_filter`, where the heights are.
+def highpass_in_place(heights: FloatArray, pitch: Pitch, cutoff: float) -> None:
+    """Apply the complementary high-pass of :func:`gaussian_filter` in place.
 
-    A wave of wavelength l keeps 1 - exp(-pi (ALPHA cutoff / l)^2) of its amplitude.
+    The transmission at wavelength l is 1 - exp(-pi (ALPHA cutoff / l)^2).
     """
     heights -= gaussian_filter(heights, pitch, cutoff)
 
@@ -91,76 +90,69 @@ def roughen_in_place(heights: FloatArray, pitch: tuple[float, ...], cutoff: floa
 class Cutoffs:
     """Cut-off wavelengths [m] of the S-filter and, unless None, of the L-filter.
 
-    ``chosen`` says where the first comes from if it was not given.
+    ``note`` explains a default of the first.
     """
 
     short: float
     long: float | None
-    chosen: str
+    note: str
 
 
 def find_cutoffs(
-    shape: tuple[int, ...],
-    pitch: tuple[float, ...],
-    cutoff: float | None,
-    l_cutoff: float | None,
+    shape: Shape, pitch: Pitch, cutoff: float | None, l_cutoff: float | None
 ) -> Cutoffs:
     """Return the cut-offs for a surface.
 
     Args:
         shape: (ny, nx) or (n,).
         pitch: (px, py) or (px,) [m].
-        cutoff: of the S-filter [m]; None for four times the larger pitch.
-        l_cutoff: of the L-filter [m]; None for no L-filter.
+        cutoff: cut-off of the S-filter [m]; None for four times the larger pitch.
+        l_cutoff: cut-off of the L-filter [m]; None for no L-filter.
 
     Raises:
-        ParameterError: for a cut-off that the sampling, the extent or the other does not allow.
+        ParameterError: a cut-off conflicts with the sampling, the extent or the other cut-off.
     """
     longest = max((n - 1) * p for n, p in zip(shape[::-1], pitch, strict=True))
-    short, chosen = _short(max(pitch), longest, cutoff)
+    short, note = _s_cutoff(max(pitch), longest, cutoff)
     if l_cutoff is None:
-        return Cutoffs(short, None, chosen)
-    long = positive_number("l_cutoff", l_cutoff)
+        return Cutoffs(short, None, note)
+    long = check_positive("l_cutoff", l_cutoff, "m")
     if long <= short:
-        raise ParameterError(
-            "l_cutoff", f"must be longer than cutoff, {length_text(short)} [m]", l_cutoff
-        )
-    _at_most("l_cutoff", long, longest)
-    return Cutoffs(short, long, chosen)
+        limit = f"must be longer than cutoff, {format_length(short)} [m]"
+        raise ParameterError("l_cutoff", limit, l_cutoff)
+    _check_at_most("l_cutoff", long, longest)
+    return Cutoffs(short, long, note)
 
 
 def apply_filters(
-    heights: FloatArray,
-    pitch: tuple[float, ...],
-    cutoffs: Cutoffs,
-    record: Callable[..., None] = lambda *_arguments, **_words: None,
+    heights: FloatArray, pitch: Pitch, cutoffs: Cutoffs, record: Callable[..., None]
 ) -> list[str]:
-    """Apply the S-filter, then the L-filter, where the heights are.
+    """Apply the S-filter, then the L-filter, in place.
 
     Args:
-        heights: [m], shape (ny, nx) or (n,), finite; replaced.
+        heights: [m], shape (ny, nx) or (n,), finite; changed in place.
         pitch: (px, py) or (px,) [m].
-        cutoffs: of :func:`find_cutoffs`.
-        record: told after each filter, see :class:`asperity.measured.history.Recorder`.
+        cutoffs: result of :func:`find_cutoffs`.
+        record: called after each filter, see :class:`asperity.measured.prepared.StageRecorder`.
 
     Returns:
-        What was done, one sentence for each filter.
+        One sentence for each filter.
     """
     part = "21" if heights.ndim == 1 else "61"
-    short = length_text(cutoffs.short)
-    steps = [f"filtered: Gaussian ISO 16610-{part}, cut-off {short}{cutoffs.chosen}"]
-    smooth_in_place(heights, pitch, cutoffs.short)
+    short = format_length(cutoffs.short)
+    steps = [f"filtered: Gaussian ISO 16610-{part}, cut-off {short}{cutoffs.note}"]
+    lowpass_in_place(heights, pitch, cutoffs.short)
     record(f"S-filter {short}", heights, pitch, removes=True)
     if cutoffs.long is not None:
-        roughen_in_place(heights, pitch, cutoffs.long)
-        long = length_text(cutoffs.long)
+        highpass_in_place(heights, pitch, cutoffs.long)
+        long = format_length(cutoffs.long)
         record(f"L-filter {long}", heights, pitch, removes=True, nesting=cutoffs.long)
         steps.append(f"waviness removed: Gaussian L-filter ISO 16610-{part}, cut-off {long}")
     return steps
 
 
 def _blocks(heights: FloatArray, axis: int) -> Iterator[FloatArray]:
-    """Yield views that hold whole lines along the axis."""
+    """Yield views of whole lines along the axis."""
     if heights.ndim == 1:
         yield heights
         return
@@ -171,22 +163,20 @@ def _blocks(heights: FloatArray, axis: int) -> Iterator[FloatArray]:
         yield heights[part] if across == 0 else heights[:, part]
 
 
-def _short(coarse: float, longest: float, cutoff: float | None) -> tuple[float, str]:
+def _s_cutoff(max_pitch: float, max_length: float, cutoff: float | None) -> tuple[float, str]:
     if cutoff is None:
-        length = min(DEFAULT_SAMPLES * coarse, longest)
-        return length, f" (chosen from the sampling: {length / coarse:g} samples)"
-    length = positive_number("cutoff", cutoff)
-    # Half a part in a million: a limit that was computed in decimals must not fail on rounding.
-    if length < 2.0 * coarse * (1 - 5e-7):
-        raise ParameterError(
-            "cutoff", f"must be at least two samples, {length_text(2 * coarse)} [m]", length
-        )
-    _at_most("cutoff", length, longest)
+        length = min(DEFAULT_SAMPLES * max_pitch, max_length)
+        return length, f" (chosen from the sampling: {length / max_pitch:g} samples)"
+    length = check_positive("cutoff", cutoff, "m")
+    # The tolerance admits a limit that the user computed in rounded decimals.
+    if length < 2.0 * max_pitch * (1 - 5e-7):
+        limit = f"must be at least two samples, {format_length(2 * max_pitch)} [m]"
+        raise ParameterError("cutoff", limit, length)
+    _check_at_most("cutoff", length, max_length)
     return length, ""
 
 
-def _at_most(name: str, length: float, longest: float) -> None:
-    if length > longest * (1 + 5e-7):
-        raise ParameterError(
-            name, f"must be at most the surface's length, {length_text(longest)} [m]", length
-        )
+def _check_at_most(name: str, length: float, max_length: float) -> None:
+    if length > max_length * (1 + 5e-7):
+        limit = f"must be at most the surface's length, {format_length(max_length)} [m]"
+        raise ParameterError(name, limit, length)

@@ -1,11 +1,11 @@
 """Surface parameters of ISO 25178-2 (maps) and ISO 21920-2 (profiles).
 
 **Discretisation.** Heights are samples of equal weight; z is the height above the mean of all
-that were measured. Slopes and areas are those of the triangles through the nodes, over the cells
-of which all corners were measured; each cell is cut along both diagonals, and the mean taken. So
-Sdq is the root of the mean square of the differences of neighbours over their distance, and Sdr is
-exact for the facets. Of a wave of n samples a period Sdq is too small by the factor
-sin(π/n)/(π/n): by 2.6 % at 8 samples, 0.4 % at 20.
+measured ones. Slopes and areas are those of the triangles through the nodes, over the cells with
+four measured corners; each cell is cut along both diagonals, and the mean taken. So Sdq is the
+root mean square of the difference quotients of neighbours, and Sdr is exact for the facets. For a
+wave of n samples per period Sdq is too small by the factor sin(π/n)/(π/n): by 2.6 % at 8 samples,
+0.4 % at 20.
 """
 
 from __future__ import annotations
@@ -16,160 +16,171 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
+from asperity.measured.lengths import Pitch
 
-Values = Mapping[str, float | None]
-"""Parameters by symbol, SI units; None for what a surface has not (the skewness of a flat one)."""
+ParameterValues = Mapping[str, float | None]
+"""Parameters by symbol, SI units; None for an undefined one (the skewness of a flat surface)."""
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """What a symbol means.
+class SurfaceParameter:
+    """Definition of a parameter.
 
     Attributes:
-        symbol: such as "Sq"; of a profile without P or R, such as "q".
-        words: its name.
-        formula: with z the height above the mean.
-        clause: where it is defined.
+        symbol: symbol such as "Sq"; for profiles without P or R, such as "q".
+        description: its name.
+        formula: formula, with z the height above the mean.
+        clause: clause of ISO 25178-2:2021 or, for profiles, of ISO 4287.
         unit: "m", or "" for a number.
     """
 
     symbol: str
-    words: str
+    description: str
     formula: str
     clause: str
     unit: str = "m"
 
-
-AREAL = (
-    Parameter("Sq", "root mean square height", "√⟨z²⟩", "ISO 25178-2:2021, 4.2.2"),
-    Parameter("Sa", "arithmetic mean height", "⟨|z|⟩", "ISO 25178-2:2021, 4.2.8"),
-    Parameter("Sz", "maximum height", "Sp + Sv", "ISO 25178-2:2021, 4.2.7"),
-    Parameter("Sp", "maximum peak height", "max z", "ISO 25178-2:2021, 4.2.5"),
-    Parameter("Sv", "maximum pit depth", "-min z", "ISO 25178-2:2021, 4.2.6"),
-    Parameter("Ssk", "skewness: below 0 pits, above 0 peaks prevail", "⟨z³⟩/Sq³",
-              "ISO 25178-2:2021, 4.2.3", ""),
-    Parameter("Sku", "kurtosis: 3 for Gaussian heights, more for single spikes", "⟨z⁴⟩/Sq⁴",
-              "ISO 25178-2:2021, 4.2.4", ""),
-    Parameter("Sdq", "root mean square gradient", "√⟨z_x² + z_y²⟩",
-              "ISO 25178-2:2021, 4.4.2", ""),
-    Parameter("Sdr", "developed interfacial area ratio: area beyond that of the plane",
-              "⟨√(1 + z_x² + z_y²)⟩ - 1", "ISO 25178-2:2021, 4.4.3", ""),
-)  # fmt: skip
-"""Of maps, in the order in which they are listed."""
-
-PROFILE = (
-    Parameter("q", "root mean square height", "√⟨z²⟩", "ISO 21920-2; ISO 4287, 4.2.2"),
-    Parameter("a", "arithmetic mean height", "⟨|z|⟩", "ISO 21920-2; ISO 4287, 4.2.1"),
-    Parameter("z", "maximum height, mean over the sections", "⟨p + v⟩ of the sections",
-              "ISO 21920-2; ISO 4287, 4.1.3"),
-    Parameter("p", "peak height, mean over the sections", "⟨max z⟩ of the sections",
-              "ISO 21920-2; ISO 4287, 4.1.1"),
-    Parameter("v", "pit depth, mean over the sections", "⟨-min z⟩ of the sections",
-              "ISO 21920-2; ISO 4287, 4.1.2"),
-    Parameter("t", "total height", "max z - min z", "ISO 21920-2; ISO 4287, 4.1.5"),
-    Parameter("sk", "skewness: below 0 pits, above 0 peaks prevail", "⟨z³⟩/q³",
-              "ISO 21920-2; ISO 4287, 4.2.3", ""),
-    Parameter("ku", "kurtosis: 3 for Gaussian heights, more for single spikes", "⟨z⁴⟩/q⁴",
-              "ISO 21920-2; ISO 4287, 4.2.4", ""),
-    Parameter("Sm", "mean spacing of profile elements", "mean distance of rising crossings of the"
-              " mean line between a pit and a peak deeper and higher than a tenth of z",
-              "ISO 21920-2; ISO 4287, 4.3.1"),
-    Parameter("dq", "root mean square slope", "√⟨z_x²⟩", "ISO 21920-2; ISO 4287, 4.4.1", ""),
-)  # fmt: skip
-"""Of profiles; their symbols begin with P, after an L-filter with R."""
-
-_ENOUGH = 0.1  # of Rz: lower peaks and flatter pits make no profile element (ISO 4287, 4.3.1)
-_BLOCK = 2**15  # points that are counted at once: they stay in the cache
+    @property
+    def reference(self) -> str:
+        """Standard and clause."""
+        standard = "ISO 25178-2:2021" if self in AREAL_PARAMETERS else "ISO 21920-2; ISO 4287"
+        return f"{standard}, {self.clause}"
 
 
-_DECLARED = {one.symbol: one for one in AREAL} | {
-    f"{kind}{one.symbol}": one for kind in "PR" for one in PROFILE
+_SKEWNESS = "skewness: below 0 pits, above 0 peaks prevail"
+_KURTOSIS = "kurtosis: 3 for Gaussian heights, more for single spikes"
+_AREA_RATIO = "developed interfacial area ratio: area beyond that of the plane"
+_PEAK, _PIT = "peak height, mean over the sections", "pit depth, mean over the sections"
+_CROSSINGS = (
+    "mean distance of rising crossings of the mean line between a pit and a peak deeper and higher"
+    " than a tenth of z"
+)
+
+
+AREAL_PARAMETERS = (
+    SurfaceParameter("Sq", "root mean square height", "√⟨z²⟩", "4.2.2"),
+    SurfaceParameter("Sa", "arithmetic mean height", "⟨|z|⟩", "4.2.8"),
+    SurfaceParameter("Sz", "maximum height", "Sp + Sv", "4.2.7"),
+    SurfaceParameter("Sp", "maximum peak height", "max z", "4.2.5"),
+    SurfaceParameter("Sv", "maximum pit depth", "-min z", "4.2.6"),
+    SurfaceParameter("Ssk", _SKEWNESS, "⟨z³⟩/Sq³", "4.2.3", ""),
+    SurfaceParameter("Sku", _KURTOSIS, "⟨z⁴⟩/Sq⁴", "4.2.4", ""),
+    SurfaceParameter("Sdq", "root mean square gradient", "√⟨z_x² + z_y²⟩", "4.4.2", ""),
+    SurfaceParameter("Sdr", _AREA_RATIO, "⟨√(1 + z_x² + z_y²)⟩ - 1", "4.4.3", ""),
+)
+"""Parameters of maps, in the order in which they are listed."""
+
+PROFILE_PARAMETERS = (
+    SurfaceParameter("q", "root mean square height", "√⟨z²⟩", "4.2.2"),
+    SurfaceParameter("a", "arithmetic mean height", "⟨|z|⟩", "4.2.1"),
+    SurfaceParameter(
+        "z", "maximum height, mean over the sections", "⟨p + v⟩ of the sections", "4.1.3"
+    ),
+    SurfaceParameter("p", _PEAK, "⟨max z⟩ of the sections", "4.1.1"),
+    SurfaceParameter("v", _PIT, "⟨-min z⟩ of the sections", "4.1.2"),
+    SurfaceParameter("t", "total height", "max z - min z", "4.1.5"),
+    SurfaceParameter("sk", _SKEWNESS, "⟨z³⟩/q³", "4.2.3", ""),
+    SurfaceParameter("ku", _KURTOSIS, "⟨z⁴⟩/q⁴", "4.2.4", ""),
+    SurfaceParameter("Sm", "mean spacing of profile elements", _CROSSINGS, "4.3.1"),
+    SurfaceParameter("dq", "root mean square slope", "√⟨z_x²⟩", "4.4.1", ""),
+)
+"""Parameters of profiles; their symbols begin with P, after an L-filter with R."""
+
+# Relative to Rz: smaller peaks and pits are no profile elements (ISO 4287, 4.3.1).
+_MIN_PEAK_FRACTION = 0.1
+_BLOCK = 2**15  # points processed at once, which fit into the cache
+
+_PARAMETERS_BY_SYMBOL = {one.symbol: one for one in AREAL_PARAMETERS} | {
+    f"{kind}{one.symbol}": one for kind in "PR" for one in PROFILE_PARAMETERS
 }
 
 
-def declared(symbol: str) -> Parameter:
-    """Return what a symbol means, that of a profile with its P or R.
+def find_parameter(symbol: str) -> SurfaceParameter:
+    """Return the definition of a symbol; that of a profile has its P or R.
 
     Raises:
-        KeyError: for a symbol that means nothing here.
+        KeyError: the symbol is unknown.
     """
-    return _DECLARED[symbol]
+    return _PARAMETERS_BY_SYMBOL[symbol]
 
 
-@np.errstate(over="ignore", invalid="ignore")  # heights that no surface has are refused elsewhere
-def parameters(
-    heights: FloatArray, pitch: tuple[float, ...], nesting: float | None = None
+@np.errstate(over="ignore", invalid="ignore")  # extreme heights are refused elsewhere
+def compute_parameters(
+    heights: FloatArray, pitch: Pitch, nesting: float | None = None
 ) -> dict[str, float | None]:
-    """Return the parameters of a map, or of a profile.
+    """Return the parameters of a map or of a profile.
 
-    A map has those of :data:`AREAL`, a profile those of :data:`PROFILE`, whose symbols begin with
-    P (primary profile), or with R if the nesting index L of its L-filter is given: its sections
-    are then L long, else it is one section.
+    A map has those of :data:`AREAL_PARAMETERS`, a profile those of :data:`PROFILE_PARAMETERS`. The
+    symbols of a profile begin with P (primary profile), or with R if the nesting index L of its
+    L-filter is given: its sections then have the length L, otherwise it is one section.
 
     Args:
-        heights: [m], shape (ny, nx) or (n,); NaN where missing, not everywhere.
+        heights: [m], shape (ny, nx) or (n,); NaN for missing points, not all.
         pitch: (px, py) or (px,) [m].
-        nesting: L of the L-filter that the heights went through [m]; None for none.
+        nesting: L of the L-filter applied to the heights [m]; None for none.
 
     Returns:
-        The values by symbol, SI units; None for what the surface has not.
+        The values by symbol, SI units; None for those that are undefined.
 
     Reference:
         ISO 25178-2:2021, 4.2 and 4.4; ISO 21920-2:2021, which replaces ISO 4287:1997.
 
     Example:
         >>> x = np.arange(100) / 100
-        >>> wave = parameters(np.tile(np.sin(2 * np.pi * x), (100, 1)), (0.01, 0.01))
+        >>> wave = compute_parameters(np.tile(np.sin(2 * np.pi * x), (100, 1)), (0.01, 0.01))
         >>> f"{wave['Sq']:.4f} {wave['Sa']:.4f} {wave['Sku']:.4f} {wave['Sdq']:.3f}"
         '0.7071 0.6364 1.5000 4.420'
     """
     rows, steps = np.atleast_2d(heights), (pitch[0], pitch[-1])
     mean, low, high = _mean_and_range(rows)
-    a, q, skewness, kurtosis = _height_values(rows, mean, high - low)
-    gradient, ratio = _facets(rows, steps)
+    a, q, skewness, kurtosis = _height_moments(rows, mean, high - low)
+    gradient, ratio = _facet_parameters(rows, steps)
     if heights.ndim > 1:
         values = (q, a, high - low, high - mean, mean - low, skewness, kurtosis, gradient, ratio)
-        return dict(zip((one.symbol for one in AREAL), values, strict=True))
-    kind, sections = ("P", 1) if nesting is None else ("R", _sections(len(heights), pitch, nesting))
-    peak, pit = _peak_and_pit(heights - mean, sections)
-    spacing = _spacing(heights - mean, pitch[0], _ENOUGH * (peak + pit))
+        return dict(zip((one.symbol for one in AREAL_PARAMETERS), values, strict=True))
+    kind, sections = "P", 1
+    if nesting is not None:
+        kind = "R"
+        sections = max(1, math.floor((len(heights) - 1) * pitch[0] / nesting * (1 + 1e-9)))
+    peak, pit = _mean_peak_and_pit(heights - mean, sections)
+    spacing = _element_spacing(heights - mean, pitch[0], _MIN_PEAK_FRACTION * (peak + pit))
     line = (q, a, peak + pit, peak, pit, high - low, skewness, kurtosis, spacing, gradient)
-    return {f"{kind}{one.symbol}": v for one, v in zip(PROFILE, line, strict=True)}
+    return {f"{kind}{one.symbol}": v for one, v in zip(PROFILE_PARAMETERS, line, strict=True)}
 
 
-def _blocks(rows: FloatArray, overlap: int = 0) -> Iterator[FloatArray]:
-    """Yield groups of rows; the first ones of the next group belong to each as well."""
+def _row_blocks(rows: FloatArray, overlap: int = 0) -> Iterator[FloatArray]:
+    """Yield groups of rows, each with the first rows of the next group as overlap."""
     count = max(1, _BLOCK // rows.shape[1])
     for first in range(0, rows.shape[0], count):
         yield rows[first : first + count + overlap]
 
 
-def _known(block: FloatArray) -> FloatArray:
-    """Return the heights that are not missing, as a row."""
+def _measured_heights(block: FloatArray) -> FloatArray:
+    """Return the heights that are not missing, shape (n,)."""
     missing = np.isnan(block)
     return block[~missing] if missing.any() else block.ravel()
 
 
 def _mean_and_range(rows: FloatArray) -> tuple[float, float, float]:
     total, count, low, high = 0.0, 0, math.inf, -math.inf
-    for block in _blocks(rows):
-        z = _known(block)
+    for block in _row_blocks(rows):
+        z = _measured_heights(block)
         if z.size:
             total, count = total + float(z.sum()), count + z.size
             low, high = min(low, float(z.min())), max(high, float(z.max()))
     return total / count, low, high
 
 
-def _height_values(
+def _height_moments(
     rows: FloatArray, mean: float, span: float
 ) -> tuple[float, float, float | None, float | None]:
-    """Return Sa, Sq, Ssk and Sku; powers are taken of z over the range, which none overflows."""
+    """Return Sa, Sq, Ssk and Sku; powers are taken of z / range, which cannot overflow."""
     if not 0.0 < span < math.inf:
         return span, span, None, None
     sums, count = np.zeros(4), 0
-    for block in _blocks(rows):
-        z = (_known(block) - mean) / span
+    for block in _row_blocks(rows):
+        z = (_measured_heights(block) - mean) / span
         square = z * z
         sums += np.abs(z).sum(), square.sum(), (square * z).sum(), (square * square).sum()
         count += z.size
@@ -178,12 +189,12 @@ def _height_values(
     return a * span, q * span, third / q**3, fourth / q**4
 
 
-def _facets(rows: FloatArray, pitch: tuple[float, float]) -> tuple[float | None, float | None]:
-    """Return Sdq and Sdr of the facets; None without a cell of which all corners are known."""
+def _facet_parameters(rows: FloatArray, pitch: Pitch) -> tuple[float | None, float | None]:
+    """Return Sdq and Sdr of the facets; None if no cell has four measured corners."""
     if rows.shape[0] == 1:
         rows = np.repeat(rows, 2, axis=0)  # a profile: the same along y
     squares, excess, cells = 0.0, 0.0, 0
-    for block in _blocks(rows, overlap=1):
+    for block in _row_blocks(rows, overlap=1):
         along, across = np.diff(block, axis=1) / pitch[0], np.diff(block, axis=0) / pitch[1]
         lower, upper, left, right = along[:-1], along[1:], across[:, :-1], across[:, 1:]
         corners = [part**2 for part in (lower, upper, left, right)]
@@ -191,44 +202,125 @@ def _facets(rows: FloatArray, pitch: tuple[float, float]) -> tuple[float | None,
         if not known.all():
             corners = [part[known] for part in corners]
         squares += 0.5 * float(sum(part.sum() for part in corners))
-        excess += 0.25 * sum(_excess(x + y) for x in corners[:2] for y in corners[2:])
+        excess += 0.25 * sum(_sum_area_excess(x + y) for x in corners[:2] for y in corners[2:])
         cells += corners[0].size
     return (math.sqrt(squares / cells), excess / cells) if cells else (None, None)
 
 
-def _excess(square: FloatArray) -> float:
-    """Return the sum of √(1 + g²) - 1, also where g² is next to nothing."""
+def _sum_area_excess(square: FloatArray) -> float:
+    """Return the sum of √(1 + g²) - 1, without cancellation for small g²."""
     return float((square / (1.0 + np.sqrt(1.0 + square))).sum())
 
 
-def _sections(count: int, pitch: tuple[float, ...], nesting: float) -> int:
-    return max(1, math.floor((count - 1) * pitch[0] / nesting * (1 + 1e-9)))
-
-
-def _peak_and_pit(z: FloatArray, sections: int) -> tuple[float, float]:
+def _mean_peak_and_pit(z: FloatArray, sections: int) -> tuple[float, float]:
     """Return the means over the sections of their greatest heights and depths."""
     parts = [part[~np.isnan(part)] for part in np.array_split(z, sections)]
-    held = [part for part in parts if part.size]
-    peaks, pits = [float(part.max()) for part in held], [-float(part.min()) for part in held]
-    return sum(peaks) / len(held), sum(pits) / len(held)
+    parts = [part for part in parts if part.size]
+    peaks, pits = [float(part.max()) for part in parts], [-float(part.min()) for part in parts]
+    return sum(peaks) / len(parts), sum(pits) / len(parts)
 
 
-def _spacing(z: FloatArray, pitch: float, enough: float) -> float | None:
+def _element_spacing(z: FloatArray, pitch: float, threshold: float) -> float | None:
     """Return the mean distance of rising crossings; None for fewer than two.
 
-    A peak or pit counts where it is higher or deeper than enough, so that noise on the mean line
-    is no element. Missing points are passed over.
+    Only peaks and pits beyond the threshold count, so that noise on the mean line is no element.
+    Missing points are ignored.
     """
-    place = np.flatnonzero(~np.isnan(z))
-    z = z[place]
-    side = np.where(z > enough, 1, np.where(z < -enough, -1, 0))
+    index = np.flatnonzero(~np.isnan(z))
+    z = z[index]
+    side = np.where(z > threshold, 1, np.where(z < -threshold, -1, 0))
     counted = np.flatnonzero(side)
     rising = counted[1:][(side[counted[1:]] == 1) & (side[counted[:-1]] == -1)]
-    # The last crossing before each counted peak: where the line last was below zero.
+    # The last crossing before each counted peak is after the last point below zero.
     below = np.flatnonzero(z < 0.0)
     if len(rising) < 2:
         return None
     before = below[np.searchsorted(below, rising) - 1]
     share = z[before] / (z[before] - z[before + 1])
-    crossings = place[before] + share * (place[before + 1] - place[before])
+    crossings = index[before] + share * (index[before + 1] - index[before])
     return float(crossings[-1] - crossings[0]) / (len(crossings) - 1) * pitch
+
+
+CORRELATION_LEVEL = 0.2
+"""Level of the autocorrelation that defines the length (the default of ISO 25178-2)."""
+
+MAX_CORRELATION_POINTS = 2**22
+"""Maximum number of points for the autocorrelation, which takes some twenty times their memory."""
+
+_N_DIRECTIONS = 180
+
+
+def correlation_parameters(heights: FloatArray, pitch: Pitch) -> tuple[float | None, float | None]:
+    """Return the autocorrelation length Sal [m] and the texture aspect ratio Str [1] of a map.
+
+    f(t) = ⟨z(r) z(r + t)⟩ / ⟨z²⟩, the mean over all pairs of measured points with that offset. Sal
+    is the least distance, over all directions, at which f has decayed to 0.2, Str its ratio to the
+    greatest: near 1 for an isotropic surface, near 0 for one with a lay.
+
+    f is computed by the Fourier transform up to half of each side, and evaluated by bilinear
+    interpolation along one direction per degree, every half pitch.
+
+    Args:
+        heights: [m], shape (ny, nx); NaN for missing points.
+        pitch: (px, py) [m].
+
+    Returns:
+        Sal, None if f decays to 0.2 along no direction within half of the map; Str, None if it does
+        not along every direction; both None for a flat map or one of more than
+        ``MAX_CORRELATION_POINTS``.
+
+    Reference:
+        ISO 25178-2:2021, 4.3.2 and 4.3.3.
+
+    Example:
+        >>> x, y = np.meshgrid(np.arange(200), np.arange(200))
+        >>> wave = np.cos(2 * np.pi * x / 40) * np.cos(2 * np.pi * y / 80)
+        >>> [round(value, 2) for value in correlation_parameters(wave, (1.0, 1.0))]
+        [8.5, 0.51]
+    """
+    if heights.size > MAX_CORRELATION_POINTS or np.nanmax(heights) == np.nanmin(heights):
+        return None, None
+    distances = _decay_distances(_autocorrelation(heights), heights.shape, pitch)
+    found = [distance for distance in distances if distance is not None]
+    shortest = min(found, default=None)
+    if shortest is None or len(found) < len(distances):
+        return shortest, None
+    return shortest, shortest / max(found)
+
+
+def _autocorrelation(heights: FloatArray) -> FloatArray:
+    """Return f at offsets up to half of the map, wrapped as by a Fourier transform."""
+    from scipy.fft import irfft2, next_fast_len, rfft2
+
+    known = ~np.isnan(heights)
+    z = np.where(known, heights - np.nanmean(heights), 0.0)
+    # Zero padding prevents wrap-around at offsets up to half of the map.
+    shape = tuple(next_fast_len(n + n // 2 + 1, real=True) for n in heights.shape)
+    ones = known.astype(np.float64)
+    products, pairs = (irfft2(np.abs(rfft2(part, shape)) ** 2, shape) for part in (z, ones))
+    products /= np.maximum(pairs, 0.5)  # 0 except for rounding if no two points have the offset
+    return np.asarray(products / products[0, 0])
+
+
+def _decay_distances(
+    autocorrelation: FloatArray, shape: tuple[int, ...], pitch: Pitch
+) -> list[float | None]:
+    """Return the distance [m] at which f decays to the level along each direction."""
+    from scipy.ndimage import map_coordinates
+
+    half = [(n // 2) * p for n, p in zip(shape[::-1], pitch, strict=True)]
+    step = 0.5 * min(pitch)
+    found: list[float | None] = []
+    for angle in np.arange(_N_DIRECTIONS) * math.pi / _N_DIRECTIONS:
+        direction = math.cos(angle), math.sin(angle)
+        reach = min(side / max(abs(c), 1e-12) for side, c in zip(half, direction, strict=True))
+        along = np.arange(0.0, reach + 0.5 * step, step)
+        indices = [along * direction[1] / pitch[1], along * direction[0] / pitch[0]]
+        values = map_coordinates(autocorrelation, indices, order=1, mode="grid-wrap")
+        low = int(np.argmax(values < CORRELATION_LEVEL))
+        if values[low] >= CORRELATION_LEVEL:
+            found.append(None)
+            continue
+        share = (values[low - 1] - CORRELATION_LEVEL) / (values[low - 1] - values[low])
+        found.append(float(along[low - 1] + share * step))
+    return found

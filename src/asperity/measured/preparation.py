@@ -1,4 +1,4 @@
-"""Prepare a measured surface: outliers, fill, form, filter, tip, repeat, magnify, in this order."""
+"""Prepare a measured surface: outliers, form, fill, filter, tip, repeat, magnify, in this order."""
 
 from __future__ import annotations
 
@@ -9,40 +9,117 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.arguments import described
-from asperity.checks import FloatArray
-from asperity.errors import ParameterError
-from asperity.measured.arguments import PREPARING
-from asperity.measured.blending import check_width, make_periodic
+from asperity.core.arguments import document_arguments
+from asperity.core.checks import FloatArray, check_positive
+from asperity.core.errors import ParameterError
+from asperity.core.memory import require_memory
+from asperity.measured.blending import make_periodic, to_blend_samples
+from asperity.measured.file_arguments import PREPARATION_ARGUMENTS
 from asperity.measured.filling import fill_in_place
-from asperity.measured.filters import ALPHA, apply_filters, find_cutoffs, gaussian_filter
+from asperity.measured.filters import apply_filters, find_cutoffs
 from asperity.measured.form import check_degree, fit_form, subtract_form
-from asperity.measured.history import Recorder, Watch, resized
-from asperity.measured.length_words import by_text, length_text, lengths_text, positive_number
+from asperity.measured.lengths import Pitch, Shape, format_counts, format_length, format_lengths
 from asperity.measured.outliers import remove_outliers
-from asperity.measured.plausible import check_heights
-from asperity.measured.prepared import Prepared
-from asperity.measured.reading.raw import RawSurface
-from asperity.measured.stylus import apply_tip, check_radius
-from asperity.memory import reserve
+from asperity.measured.prepared import PreparedSurface, StageCallback, StageRecorder, resized_stage
+from asperity.measured.reading.raw_surface import RawSurface
+from asperity.measured.stylus import apply_tip, check_tip_radius
 
-__all__ = ["ALPHA", "STAGES", "Prepared", "gaussian_filter", "magnified", "prepare"]
+MAX_MEAN_SLOPE = 10.0
+"""Greatest plausible mean slope between neighbouring points: flanks of 84°.
+
+A stylus follows flanks of 60° at most (cones of ISO 3274), a microscope of 72° (aperture 0.95),
+slopes of 1.7 and 3.1; the mean slopes of 30 real surfaces of all kinds are up to 0.4. A wrong unit
+changes the slope by a factor of a thousand.
+"""
+
+GivenPitch = float | Sequence[float] | None
+_MAX_SPAN = 10.0  # [m]; greater heights have probably another unit
+_MAX_LINES = 1024  # lines sampled along each axis
+_COMMON_UNITS = {"mm": 1e-3, "um": 1e-6, "nm": 1e-9}
+
+
+def check_plausible(raw: RawSurface, heights: FloatArray, pitch: Pitch) -> None:
+    """Refuse heights that have no unit, or an implausible one.
+
+    Args:
+        raw: the surface as read.
+        heights: its heights [m], without outliers.
+        pitch: distance of the points [m].
+
+    Raises:
+        ParameterError: the user must give the unit or the height range, with the options for it.
+    """
+    if raw.relative:
+        raise ParameterError(
+            "height_range",
+            f"is required: the values of {raw.source} have no unit; give the peak-to-valley"
+            " height [m]",
+        )
+    span = float(np.nanmax(heights)) - float(np.nanmin(heights))
+    slope = mean_slope(heights, pitch)
+    if slope > MAX_MEAN_SLOPE:
+        raise ParameterError(
+            "height_range",
+            f"must be given: heights that span {format_length(span)} at a pitch of"
+            f" {format_lengths(pitch)} have a mean slope of {slope:.3g}, and no instrument measures"
+            f" {MAX_MEAN_SLOPE:g}; {_suggest_fixes(raw, span, slope)}",
+        )
+    if span > _MAX_SPAN and not raw.has_units:
+        raise ParameterError(
+            "height_range",
+            f"must be given: heights that span {format_length(span)} look not to be in metres, and"
+            f" {raw.source} names no unit; {_suggest_fixes(raw, span, slope)}",
+        )
+
+
+def _suggest_fixes(raw: RawSurface, span: float, slope: float) -> str:
+    """Return the options for another unit, and for heights that are right."""
+    unit = next((u for u, factor in _COMMON_UNITS.items() if slope * factor <= 1.0), "nm")
+    other = f"unit='{unit}' (--unit {unit})"
+    if raw.has_units:  # no option changes the unit of a file: give the height range
+        other = f"height_range={span * _COMMON_UNITS[unit]:.6g} (--height-range {span:.6g}{unit})"
+    as_read = f"height_range={span:.6g} (--height-range {span:.6g}m)"
+    return f"if in {unit}: {other}; if they are right: {as_read}; --outliers 6 removes spikes"
+
+
+def mean_slope(heights: FloatArray, pitch: Pitch) -> float:
+    """Return the mean slope |Δh| / pitch between neighbouring points along the steeper axis.
+
+    Args:
+        heights: shape (ny, nx) or (n,) [m]; NaN is a missing point.
+        pitch: (px, py) or (p,) [m].
+
+    Example:
+        >>> mean_slope(np.array([[0.0, 1.0, 0.0], [0.0, 1.0, np.nan]]), (0.5, 1.0))
+        2.0
+    """
+    slopes = [0.0]
+    for axis, step in enumerate(pitch):
+        lines = np.moveaxis(heights, heights.ndim - 1 - axis, -1)
+        if lines.ndim > 1:
+            lines = lines[:: -(-len(lines) // _MAX_LINES)]
+        with np.errstate(over="ignore"):  # heights near the largest float
+            rises = np.abs(np.diff(lines, axis=-1))
+            rises = rises[~np.isnan(rises)]
+            slopes.append(float(rises.mean()) / step if rises.size else 0.0)
+    return max(slopes)
+
 
 STAGES = ("outliers", "form", "fill", "filter", "tip", "repeat", "magnify")
-"""What :func:`prepare` reports to ``progress`` before it begins each part."""
+"""Names that :func:`prepare` passes to ``progress`` before each part."""
 
-_LEAST = 4
+_MIN_POINTS = 4
 MAX_MISSING = 0.25
-"""Share of missing points that is filled unless more is allowed."""
+"""Default for the greatest share of missing points."""
 
-_LEVELLED = {0: "mean removed", 1: "levelled"}
+_FORM_STAGE_NAMES = {0: "mean removed", 1: "levelled"}
 
 
-@described(PREPARING)
-def prepare(  # noqa: D417 - the others are described where they are declared
+@document_arguments(PREPARATION_ARGUMENTS)
+def prepare(  # noqa: D417 - the others are described by their declarations
     raw: RawSurface,
     *,
-    pitch: float | Sequence[float] | None = None,
+    pitch: GivenPitch = None,
     height_range: float | None = None,
     outliers: float | None = None,
     max_missing: float = MAX_MISSING,
@@ -55,27 +132,27 @@ def prepare(  # noqa: D417 - the others are described where they are declared
     magnify: float = 1.0,
     magnify_height: float | None = None,
     progress: Callable[[str], None] | None = None,
-    watch: Watch | None = None,
-) -> Prepared:
-    """Make a surface ready to be a texture, as far as it is asked for.
+    on_stage: StageCallback | None = None,
+) -> PreparedSurface:
+    """Prepare a measured surface for use as a texture.
 
-    In this order: remove outliers, fill missing points, subtract the form (which levels), filter
-    (S, then L), feel with a tip, make periodic, magnify. The form is fitted to the valid points,
-    and holes are filled by the form and the harmonic interpolation of what it leaves. All lengths
-    but the magnified ones are in the surface's own metres. The tip comes after the filter: where
-    it bridges a groove, the heights have creases as sharp as the sampling.
+    In this order: remove outliers, subtract the form (which levels), fill missing points, filter
+    (S, then L), dilate by a tip, make periodic, magnify. The form is fitted to the valid points,
+    and the residual is interpolated harmonically over holes. All lengths are in the surface's own
+    metres, before magnification. The tip is applied after the filter: where it bridges a groove,
+    the heights have creases as sharp as the sampling.
 
     Args:
         raw: the surface as read.
         {arguments}
-        progress: called with the name of each stage before it begins.
-        watch: told the heights after each step, see :mod:`asperity.measured.history`.
+        progress: called with the name of each stage before it starts.
+        on_stage: called with the heights after each step, see :mod:`asperity.measured.prepared`.
 
     Returns:
-        The prepared surface with what was done to it.
+        The prepared surface with a description of its preparation.
 
     Raises:
-        ParameterError: an argument, or a surface, that cannot be used.
+        ParameterError: an argument or the surface cannot be used.
 
     Reference:
         ISO 16610-21 and -61 (Gaussian filters), ISO 16610-41 (morphological filters).
@@ -90,67 +167,67 @@ def prepare(  # noqa: D417 - the others are described where they are declared
         filtered: Gaussian ISO 16610-21, cut-off 40 µm (chosen from the sampling: 4 samples)
         magnified 20 times laterally and in height
     """
-    begin, record = progress or (lambda _stage: None), Recorder(watch)
+    start, record = progress or (lambda _stage: None), StageRecorder(on_stage)
     raw = raw.in_metres(raw.pitch if pitch is None else pitch)
     steps = list(raw.notes)
-    _check_heights(raw.heights, max_missing)
-    lateral = _chosen_pitch(raw, pitch, steps)
+    _check_shape(raw.heights, max_missing)
+    lateral = _resolve_pitch(raw, pitch, steps)
     check_degree(form)
-    factors(magnify, magnify_height)
+    magnification_factors(magnify, magnify_height)
     cutoffs = find_cutoffs(raw.heights.shape, lateral, cutoff, l_cutoff)
-    _check_early(raw.heights.shape, lateral, tip_radius, periodic, blend)
-    reserve(*raw.heights.shape[::-1])
-    begin("outliers")
+    _check_arguments(raw.heights.shape, lateral, tip_radius, periodic, blend)
+    require_memory(*raw.heights.shape[::-1])
+    start("outliers")
     heights = np.array(raw.heights, dtype=np.float64)
     if height_range is None:
         record("as read", heights, lateral)
     if outliers is not None:
         steps.append(remove_outliers(heights, outliers))
         _check_missing(heights, max_missing)
-    _scale(heights, raw, lateral, height_range, steps)
+    _scale_heights(heights, raw, lateral, height_range, steps)
     if outliers is not None or height_range is not None:
         record("as read" if outliers is None else "without outliers", heights, lateral)
-    begin("form")
+    start("form")
     sentence = subtract_form(heights, fit_form(heights, form), lateral)
-    record(_LEVELLED.get(form, "form removed"), heights, lateral, removes=True)
-    begin("fill")
-    # What the form leaves is interpolated: a hole at the border continues a bow or a tilt.
-    filled = _fill(heights, lateral, form, steps)
+    record(_FORM_STAGE_NAMES.get(form, "form removed"), heights, lateral, removes=True)
+    start("fill")
+    # The residual is interpolated, so that a hole at the border continues a bow or a tilt.
+    filled = _fill_missing(heights, lateral, form, steps)
     if filled.any():
         record("holes filled", heights, lateral)
     steps.append(sentence)
-    begin("filter")
+    start("filter")
     steps.extend(apply_filters(heights, lateral, cutoffs, record))
-    begin("tip")
+    start("tip")
     if tip_radius is not None:
         heights, sentence = apply_tip(heights, lateral, tip_radius)
-        record(f"tip {length_text(tip_radius)}", heights, lateral, removes=True)
+        record(f"tip {format_length(tip_radius)}", heights, lateral, removes=True)
         steps.append(sentence)
-    begin("repeat")
+    start("repeat")
     if periodic:
         heights, filled, sentence = make_periodic(heights, filled, lateral, blend)
         record("periodic", heights, lateral)
         steps.append(sentence)
-    begin("magnify")
-    mask = filled if filled.any() else None
-    ready = Prepared(heights, lateral, tuple(steps), mask, bool(periodic), tuple(record.stages))
-    return magnified(ready, magnify, magnify_height)
+    start("magnify")
+    mask, stages = filled if filled.any() else None, tuple(record.stages)
+    ready = PreparedSurface(heights, lateral, tuple(steps), mask, bool(periodic), stages)
+    return magnify_surface(ready, magnify, magnify_height)
 
 
-def magnified(
-    prepared: Prepared, magnify: float = 1.0, magnify_height: float | None = None
-) -> Prepared:
+def magnify_surface(
+    prepared: PreparedSurface, magnify: float = 1.0, magnify_height: float | None = None
+) -> PreparedSurface:
     """Return a prepared surface at another size.
 
     Args:
         prepared: the surface; its heights are replaced.
-        magnify: lateral factor, and of the heights unless magnify_height is given.
+        magnify: lateral factor; also of the heights unless magnify_height is given.
         magnify_height: factor of the heights.
 
     Raises:
-        ParameterError: for a factor that is not positive, or beyond all bounds.
+        ParameterError: a factor is not positive, or the result overflows.
     """
-    lateral, upward = factors(magnify, magnify_height)
+    lateral, upward = magnification_factors(magnify, magnify_height)
     heights, pitch = prepared.heights, prepared.pitch
     greatest = max(float(heights.max()), -float(heights.min()))
     with np.errstate(over="ignore"):
@@ -163,55 +240,51 @@ def magnified(
     heights *= upward
     history = prepared.history
     if history:
-        history += (resized("magnified", heights, wider, history[-1], lateral),)
-    steps = (*prepared.steps, magnified_text(lateral, upward))
+        history += (resized_stage("magnified", heights, wider, history[-1], lateral),)
+    steps = (*prepared.steps, describe_magnification(lateral, upward))
     return replace(prepared, pitch=wider, steps=steps, history=history)
 
 
-def magnified_text(lateral: float, upward: float) -> str:
-    """Return by how much a surface was magnified, in words."""
+def describe_magnification(lateral: float, vertical: float) -> str:
+    """Return the magnification of a surface in words."""
     size = f"magnified {lateral:g} times laterally and"
-    return f"{size} in height" if lateral == upward else f"{size} {upward:g} times in height"
+    return f"{size} in height" if lateral == vertical else f"{size} {vertical:g} times in height"
 
 
-def _check_early(
-    shape: tuple[int, ...],
-    pitch: tuple[float, ...],
-    tip_radius: float | None,
-    periodic: bool,
-    blend: float | None,
+def _check_arguments(
+    shape: Shape, pitch: Pitch, tip_radius: float | None, periodic: bool, blend: float | None
 ) -> None:
-    """Refuse what is wrong by itself before minutes of work on a large map."""
+    """Refuse arguments that cannot be used, before minutes of work on a large map."""
     if tip_radius is not None:
-        check_radius(shape, pitch, tip_radius)
+        check_tip_radius(shape, pitch, tip_radius)
     if not isinstance(periodic, (bool, np.bool_)):
         raise ParameterError("periodic", "must be true or false", periodic)
     if blend is not None and not periodic:
         raise ParameterError("blend", "is the width of the blended borders: it needs periodic")
     if periodic:
-        check_width(shape, pitch, blend)
+        to_blend_samples(shape, pitch, blend)
 
 
-def factors(magnify: float, magnify_height: float | None) -> tuple[float, float]:
+def magnification_factors(magnify: float, magnify_height: float | None) -> tuple[float, float]:
     """Return the factors along the surface and in height.
 
     Raises:
-        ParameterError: for one that is not positive.
+        ParameterError: a factor is not positive.
     """
-    lateral = positive_number("magnify", magnify, "")
+    lateral = check_positive("magnify", magnify)
     if magnify_height is None:
         return lateral, lateral
-    return lateral, positive_number("magnify_height", magnify_height, "")
+    return lateral, check_positive("magnify_height", magnify_height)
 
 
-def _check_heights(heights: FloatArray, max_missing: float) -> None:
+def _check_shape(heights: FloatArray, max_missing: float) -> None:
     shape = heights.shape
-    if heights.ndim == 1 and shape[0] < _LEAST:
-        raise ParameterError("surface", f"must have at least {_LEAST} points", shape[0])
-    if heights.ndim == 2 and min(shape) < _LEAST:
+    if heights.ndim == 1 and shape[0] < _MIN_POINTS:
+        raise ParameterError("surface", f"must have at least {_MIN_POINTS} points", shape[0])
+    if heights.ndim == 2 and min(shape) < _MIN_POINTS:
         raise ParameterError(
             "surface",
-            f"is too small: the smallest accepted map is 4 x 4, got {by_text(shape)} points",
+            f"is too small: the smallest accepted map is 4 x 4, got {format_counts(shape)} points",
         )
     if heights.ndim not in (1, 2):
         raise ParameterError("surface", "must be a profile (n,) or a map (ny, nx)", shape)
@@ -220,14 +293,14 @@ def _check_heights(heights: FloatArray, max_missing: float) -> None:
     _check_missing(heights, max_missing)
 
 
-def _check_missing(heights: FloatArray, most: float) -> None:
-    if not isinstance(most, (int, float)) or not 0.0 < most < 1.0:
-        raise ParameterError("max_missing", "must lie between 0 and 1", most)
+def _check_missing(heights: FloatArray, max_missing: float) -> None:
+    if not isinstance(max_missing, (int, float)) or not 0.0 < max_missing < 1.0:
+        raise ParameterError("max_missing", "must lie between 0 and 1", max_missing)
     missing = float(np.isnan(heights).mean())
     if missing == 1.0:
         raise ParameterError("surface", "has no valid point: all heights are missing")
-    if missing > most:
-        share = "a quarter" if most == MAX_MISSING else f"{most:.1%}"
+    if missing > max_missing:
+        share = "a quarter" if max_missing == MAX_MISSING else f"{max_missing:.1%}"
         raise ParameterError(
             "surface",
             f"misses {missing:.1%} of its points; at most {share} can be filled, unless you allow"
@@ -235,57 +308,51 @@ def _check_missing(heights: FloatArray, most: float) -> None:
         )
 
 
-def _chosen_pitch(
-    raw: RawSurface, pitch: float | Sequence[float] | None, steps: list[str]
-) -> tuple[float, ...]:
+def _resolve_pitch(raw: RawSurface, pitch: GivenPitch, steps: list[str]) -> Pitch:
     axes = raw.heights.ndim
     if pitch is None:
         if raw.pitch is None:
             raise ParameterError("pitch", f"must be given [m]: {raw.source} has none")
-        return _checked_pitch(raw.pitch, axes)
-    given = _checked_pitch(pitch, axes)
-    before = "" if raw.pitch is None else f" instead of the file's {lengths_text(raw.pitch)}"
-    steps.append(f"pitch {lengths_text(given)} as given{before}")
+        return _check_pitch(raw.pitch, axes)
+    given = _check_pitch(pitch, axes)
+    before = "" if raw.pitch is None else f" instead of the file's {format_lengths(raw.pitch)}"
+    steps.append(f"pitch {format_lengths(given)} as given{before}")
     return given
 
 
-def _checked_pitch(pitch: float | Sequence[float], axes: int) -> tuple[float, ...]:
+def _check_pitch(pitch: float | Sequence[float], n_axes: int) -> Pitch:
     values = np.atleast_1d(np.asarray(pitch, dtype=np.float64))
-    if values.ndim != 1 or len(values) not in (1, axes):
-        wanted = "one number [m]" if axes == 1 else "one number or (px, py) [m]"
+    if values.ndim != 1 or len(values) not in (1, n_axes):
+        wanted = "one number [m]" if n_axes == 1 else "one number or (px, py) [m]"
         raise ParameterError("pitch", f"must be {wanted}", pitch)
     for value in values:
-        positive_number("pitch", value)
-    return tuple(float(v) for v in np.broadcast_to(values, (axes,)))
+        check_positive("pitch", value, "m")
+    return tuple(float(v) for v in np.broadcast_to(values, (n_axes,)))
 
 
-def _scale(
-    heights: FloatArray,
-    raw: RawSurface,
-    pitch: tuple[float, ...],
-    height_range: float | None,
-    steps: list[str],
+def _scale_heights(
+    heights: FloatArray, raw: RawSurface, pitch: Pitch, height_range: float | None, steps: list[str]
 ) -> None:
     low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
     span = high - low
     if not math.isfinite(span):
         raise ParameterError("surface", "has heights too large for floating-point numbers")
     if height_range is None:
-        check_heights(raw, heights, pitch)
+        check_plausible(raw, heights, pitch)
         return
-    wanted = positive_number("height_range", height_range)
+    wanted = check_positive("height_range", height_range, "m")
     if span == 0.0:
         raise ParameterError("height_range", "cannot be reached: the surface is flat")
-    given = f"{span:.4g}" if raw.relative else length_text(span)
-    steps.append(f"heights scaled from {given} to {length_text(wanted)} peak to valley")
+    given = f"{span:.4g}" if raw.relative else format_length(span)
+    steps.append(f"heights scaled from {given} to {format_length(wanted)} peak to valley")
     heights -= low
     heights *= wanted / span
 
 
-def _fill(
-    heights: FloatArray, pitch: tuple[float, ...], form: int, steps: list[str]
+def _fill_missing(
+    heights: FloatArray, pitch: Pitch, form: int, steps: list[str]
 ) -> NDArray[np.bool_]:
-    """Fill the heights where they are; return where they were missing."""
+    """Fill the heights in place; return the mask of the filled points."""
     filled = np.isnan(heights)
     missing = int(filled.sum())
     if missing == 0:

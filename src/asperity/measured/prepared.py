@@ -1,4 +1,4 @@
-"""A prepared surface, and the file that keeps it with everything that was done to it."""
+"""A prepared surface, its parameters after each preparation step, and its NPZ file."""
 
 from __future__ import annotations
 
@@ -7,90 +7,194 @@ import json
 import os
 import tokenize
 import zipfile
-import zlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.checks import FloatArray
-from asperity.errors import ParameterError, SurfaceFileError
-from asperity.files import json_text, open_input, plain, whole_file
-from asperity.measured.history import Stage, stages_of
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError, SurfaceFileError
+from asperity.core.files import Serializable, json_text, open_atomic, open_input, to_plain_data
+from asperity.measured.decomposition import HeightStatistics
+from asperity.measured.lengths import Pitch
+from asperity.measured.parameters import ParameterValues, compute_parameters, find_parameter
+from asperity.measured.reading.raw_surface import MAX_POINTS
+from asperity.measured.reading.unsupported import ARCHIVE_ERRORS, ZIP_MAGIC
 
+
+@dataclass(frozen=True)
+class PreparationStage(Serializable):
+    """A surface after a step of its preparation.
+
+    Attributes:
+        name: short name of the step: "levelled", "S-filter 10 µm".
+        values: parameters of the surface after it, by symbol, see
+            :mod:`asperity.measured.parameters`.
+        removed: RMS about the mean and range of the heights that the step subtracted [m]; None for
+            steps that subtract nothing (a fill) or change the size.
+        nesting: nesting index L of the L-filter applied in this step or before [m]; None for none.
+    """
+
+    name: str
+    values: ParameterValues
+    removed: HeightStatistics | None = None
+    nesting: float | None = None
+
+
+StageCallback = Callable[[PreparationStage, Pitch, FloatArray, FloatArray | None], None]
+"""Called with the stage, the pitch, the heights after it, and those before if it subtracts [m]."""
+
+
+class StageRecorder:
+    """Records the stages of a preparation.
+
+    Args:
+        on_stage: called with each stage.
+    """
+
+    def __init__(self, on_stage: StageCallback | None = None) -> None:
+        self.stages: list[PreparationStage] = []
+        self._on_stage = on_stage
+        self._previous_heights: FloatArray | None = None
+        self._nesting: float | None = None
+
+    def __call__(
+        self,
+        name: str,
+        heights: FloatArray,
+        pitch: Pitch,
+        *,
+        removes: bool = False,
+        nesting: float | None = None,
+    ) -> None:
+        """Record the surface after a step.
+
+        Args:
+            name: name of the step.
+            heights: heights after it [m].
+            pitch: pitch [m].
+            removes: whether the step subtracted heights.
+            nesting: L of an L-filter [m], if the step is one.
+        """
+        self._nesting = nesting or self._nesting
+        before = self._previous_heights
+        removed = _removed_statistics(before, heights) if removes and before is not None else None
+        values = compute_parameters(heights, pitch, self._nesting)
+        stage = PreparationStage(name, values, removed, self._nesting)
+        self.stages.append(stage)
+        if self._on_stage is not None:
+            self._on_stage(stage, pitch, heights, before if removes else None)
+        self._previous_heights = heights.copy()
+
+
+def parse_stages(data: Any) -> tuple[PreparationStage, ...]:
+    """Return the stages of plain data as returned by :meth:`PreparationStage.to_dict`.
+
+    Raises:
+        ValueError: the data are no stages.
+    """
+    try:
+        return tuple(_parse_stage(one) for one in data)
+    except (AttributeError, KeyError, TypeError) as error:
+        raise ValueError(f"no stages of a preparation: {error}") from None
+
+
+def _parse_stage(data: dict[str, Any]) -> PreparationStage:
+    def number(value: Any) -> float | None:
+        return None if value is None else float(value)
+
+    values = {name: number(v) for name, v in data["values"].items() if find_parameter(name)}
+    removed = data["removed"]
+    if removed is not None:
+        removed = HeightStatistics(float(removed["rms"]), float(removed["range"]))
+    return PreparationStage(str(data["name"]), values, removed, number(data["nesting"]))
+
+
+def resized_stage(
+    name: str, heights: FloatArray, pitch: Pitch, previous: PreparationStage, factor: float
+) -> PreparationStage:
+    """Return the stage of a surface that was only scaled.
+
+    Args:
+        name: name of the step.
+        heights: heights after it [m].
+        pitch: pitch after it [m].
+        previous: the stage before.
+        factor: factor of the lengths along x and y.
+    """
+    nesting = None if previous.nesting is None else factor * previous.nesting
+    return PreparationStage(name, compute_parameters(heights, pitch, nesting), None, nesting)
+
+
+def _removed_statistics(before: FloatArray, after: FloatArray) -> HeightStatistics | None:
+    """Return RMS about the mean and range of the difference; None if all its points are missing."""
+    difference = before - after
+    known = difference[~np.isnan(difference)]
+    return HeightStatistics(float(known.std()), float(np.ptp(known))) if known.size else None
+
+
+FilePath = str | os.PathLike[str]
 SCHEMA = 1
-"""Version of the file's layout."""
+"""Version of the file format."""
 
-_MARK = "asperity_schema"
-_ZIP_MAGIC = b"PK\x03\x04"
-_MAX_POINTS = 2**27
-_MAX_TEXT = 2**20
-_DAMAGE = (
-    zipfile.BadZipFile,
-    zlib.error,
-    EOFError,
-    KeyError,
-    NotImplementedError,  # a compression that zipfile does not know
-    RuntimeError,  # an encrypted member
-    tokenize.TokenError,  # a damaged header of an array, from Python 3.12 on
-)
+_SCHEMA_KEY = "asperity_schema"
+_MAX_BYTES = 9 * MAX_POINTS + 2**26  # heights, mask and sentences
+_DAMAGE_ERRORS = (*ARCHIVE_ERRORS, MemoryError, tokenize.TokenError)  # the last: array headers
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class PreparedSurface:
     """A surface that is ready to become a texture.
 
     Attributes:
         heights: [m], shape (ny, nx) or (n,), finite.
         pitch: (px, py) or (px,) [m].
-        steps: what was done, in order, one sentence each with its numbers.
-        filled: where heights were missing and have been interpolated, same shape; None for
-            nowhere.
+        steps: the preparation steps in order, one sentence each with its numbers.
+        filled_mask: True for interpolated heights, same shape; None if there are none.
         periodic: whether the surface repeats after n times the pitch.
-        history: the surface's parameters as read and after each step; none of a file of old.
+        history: parameters of the surface as read and after each step; empty for early files.
     """
 
     heights: FloatArray
-    pitch: tuple[float, ...]
+    pitch: Pitch
     steps: tuple[str, ...]
-    filled: NDArray[np.bool_] | None = None
+    filled_mask: NDArray[np.bool_] | None = None
     periodic: bool = False
-    history: tuple[Stage, ...] = ()
+    history: tuple[PreparationStage, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data without the heights, SI units."""
-        return {
-            "schema": SCHEMA,
-            "points": list(self.heights.shape[::-1]),
-            "pitch": list(self.pitch),
-            "periodic": self.periodic,
-            "steps": list(self.steps),
-            "stages": plain(self.history),
-        }
+        pitch, steps = list(self.pitch), list(self.steps)
+        data = {"pitch": pitch, "periodic": self.periodic, "steps": steps}
+        points, stages = list(self.heights.shape[::-1]), to_plain_data(self.history)
+        return {"schema": SCHEMA, "points": points, **data, "stages": stages}
 
 
-def save_prepared(
-    path: str | os.PathLike[str], prepared: Prepared, source: str | os.PathLike[str]
-) -> None:
-    """Save a prepared surface as NPZ: heights, pitch, mask, steps, and where it came from.
+def save_prepared(path: FilePath, prepared: PreparedSurface, source: FilePath) -> None:
+    """Save a prepared surface as NPZ: heights, pitch, mask, steps and source.
 
-    The file appears whole or not at all; see :func:`asperity.files.whole_file`.
+    The file is written atomically; see :func:`asperity.core.files.open_atomic`.
 
     Args:
         path: the file to write; an existing one is replaced.
         prepared: the surface.
-        source: the file that it was made from; its name and the SHA-256 of its content are kept.
+        source: the file that it was prepared from; its name and SHA-256 are saved.
 
     Raises:
-        ParameterError: if the path is the source, its folder is missing, or it cannot be written.
+        ParameterError: the path is the source, its folder is missing, or it cannot be written.
     """
     target = Path(path)
-    check_target(target, Path(source))
-    filled = np.zeros(prepared.heights.shape, bool) if prepared.filled is None else prepared.filled
+    check_output_path(target, Path(source))
+    filled = prepared.filled_mask
+    if filled is None:
+        filled = np.zeros(prepared.heights.shape, bool)
+    with open_input(source) as stream:
+        sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
     members = {
-        _MARK: np.array(SCHEMA),
+        _SCHEMA_KEY: np.array(SCHEMA),
         "heights": prepared.heights,
         "pitch": np.array(prepared.pitch),
         "periodic": np.array(prepared.periodic),
@@ -98,75 +202,75 @@ def save_prepared(
         "steps": np.array(prepared.steps, dtype=np.str_),
         "history": np.array(json_text(prepared.history)),
         "source": np.array(Path(source).name),
-        "sha256": np.array(_sha256(Path(source))),
+        "sha256": np.array(sha256),
     }
     try:
-        with whole_file(target, durable=True) as file:
+        with open_atomic(target, durable=True) as file:
             np.savez(file, **members)  # type: ignore[arg-type]  # typed as if one might be a flag
     except OSError as error:
-        raise ParameterError(
-            "output", f"cannot be written: {error.strerror or error}", str(path)
-        ) from None
+        reason = f"cannot be written: {error.strerror or error}"
+        raise ParameterError("output", reason, str(path)) from None
 
 
-def check_target(target: Path, source: Path) -> None:
-    """Refuse a path that a prepared surface cannot be written to, before any work is done.
+def check_output_path(path: Path, source: Path) -> None:
+    """Refuse a path that cannot be written, before any work is done.
 
     Raises:
-        ParameterError: for a missing folder, a folder, or the source itself.
+        ParameterError: the folder is missing, or the path is a folder or the source itself.
     """
-    folder = target.absolute().parent
+    folder = path.absolute().parent
     if not folder.is_dir():
         raise ParameterError("output", f"must lie in a folder that exists, {folder} does not")
-    if target.is_dir():
-        raise ParameterError("output", "must be a file, not a folder", str(target))
-    if target.exists() and source.exists() and target.samefile(source):
-        raise ParameterError("output", "must be another file than the surface", str(target))
+    if path.is_dir():
+        raise ParameterError("output", "must be a file, not a folder", str(path))
+    if path.exists() and source.exists() and path.samefile(source):
+        raise ParameterError("output", "must be another file than the surface", str(path))
     if not os.access(folder, os.W_OK):
         raise ParameterError("output", f"must lie in a folder that can be written, not {folder}")
 
 
-def is_prepared(path: str | os.PathLike[str]) -> bool:
-    """Tell by its content whether a file is a prepared surface."""
+def is_prepared(path: FilePath) -> bool:
+    """Whether a file is a prepared surface, by its content."""
     try:
         with open_input(path) as stream:
-            if stream.read(4) != _ZIP_MAGIC:
+            if stream.read(4) != ZIP_MAGIC[0]:
                 return False
             with zipfile.ZipFile(stream) as archive:
-                return f"{_MARK}.npy" in archive.namelist()
-    except (OSError, ValueError, *_DAMAGE):  # the reader of surfaces says what is wrong
+                return f"{_SCHEMA_KEY}.npy" in archive.namelist()
+    except (OSError, *ARCHIVE_ERRORS):  # which the reader of surfaces reports
         return False
 
 
-def load_prepared(path: str | os.PathLike[str]) -> Prepared:
-    """Read a surface that :func:`save_prepared` has written.
+def load_prepared(path: FilePath) -> PreparedSurface:
+    """Load a surface saved by :func:`save_prepared`.
 
     Raises:
-        SurfaceFileError: for a file that is damaged, or of a later version.
+        SurfaceFileError: the file is damaged, or of a later version.
     """
     name = Path(path).name
     try:
         with open_input(path) as stream, zipfile.ZipFile(stream) as archive:
-            return _read(archive)
+            size = sum(member.file_size for member in archive.infolist())
+            if size > _MAX_BYTES:
+                raise SurfaceFileError(f"unpacks to {size} bytes; at most {_MAX_BYTES} are read")
+            return _read_archive(archive)
     except SurfaceFileError as error:
         raise SurfaceFileError(f"{name}: {error}") from None
     except OSError as error:
         raise SurfaceFileError(f"{name}: cannot be read ({error.strerror or error})") from None
-    except (ValueError, *_DAMAGE) as error:
+    except _DAMAGE_ERRORS as error:
         raise SurfaceFileError(f"{name}: damaged prepared surface ({error})") from None
 
 
-def _read(archive: zipfile.ZipFile) -> Prepared:
-    schema = int(_member(archive, _MARK, "iu", 0))
+def _read_archive(archive: zipfile.ZipFile) -> PreparedSurface:
+    schema = int(_read_member(archive, _SCHEMA_KEY, "iu", 0))
     if schema != SCHEMA:
-        raise SurfaceFileError(
-            f"prepared surface of version {schema}; this asperity reads version {SCHEMA}"
-        )
-    heights = _member(archive, "heights", "f")
-    pitch = tuple(float(p) for p in _member(archive, "pitch", "f", 1))
-    filled = _member(archive, "filled", "b")
-    steps = tuple(str(step) for step in _member(archive, "steps", "U", 1))
-    periodic = bool(_member(archive, "periodic", "b", 0))
+        raise SurfaceFileError(f"has version {schema}; this asperity reads version {SCHEMA}")
+    heights = _read_member(archive, "heights", "f")
+    pitch = tuple(float(p) for p in _read_member(archive, "pitch", "f", 1))
+    filled = _read_member(archive, "filled", "b")
+    steps = tuple(str(step) for step in _read_member(archive, "steps", "U", 1))
+    periodic = bool(_read_member(archive, "periodic", "b", 0))
     if heights.dtype != np.float64 or heights.ndim not in (1, 2) or min(heights.shape) < 4:
         raise SurfaceFileError("heights must be float64 of shape (ny, nx) or (n,), at least 4")
     if len(pitch) != heights.ndim or not all(np.isfinite(p) and p > 0 for p in pitch):
@@ -176,43 +280,16 @@ def _read(archive: zipfile.ZipFile) -> Prepared:
     if not np.isfinite(heights).all():
         raise SurfaceFileError("has heights that are not finite")
     mask = filled if filled.any() else None
-    history: tuple[Stage, ...] = ()
-    if "history.npy" in archive.namelist():  # a file of old has none
-        history = stages_of(json.loads(str(_member(archive, "history", "U", 0))))
-    return Prepared(np.ascontiguousarray(heights), pitch, steps, mask, periodic, history)
+    history: tuple[PreparationStage, ...] = ()
+    if "history.npy" in archive.namelist():  # early files have none
+        history = parse_stages(json.loads(str(_read_member(archive, "history", "U", 0))))
+    return PreparedSurface(np.ascontiguousarray(heights), pitch, steps, mask, periodic, history)
 
 
-def _member(archive: zipfile.ZipFile, name: str, kinds: str, axes: int | None = None) -> Any:
-    """Read one array whose header was checked first: a lying one cannot ask for memory."""
-    info = archive.getinfo(f"{name}.npy")
-    if info.compress_type != zipfile.ZIP_STORED:
-        raise SurfaceFileError(f"member {name} is compressed; asperity writes it plain")
-    with archive.open(info) as stream:
-        shape, dtype = _header(stream)
-    size = int(np.prod(shape, dtype=object)) * dtype.itemsize
-    wrong_kind = dtype.kind not in kinds or (axes is not None and len(shape) != axes)
-    if wrong_kind or not 0 <= info.file_size - size <= _MAX_TEXT or min(shape, default=0) < 0:
-        raise SurfaceFileError(f"member {name} is damaged: {dtype} of shape {shape}")
-    if size > 8 * _MAX_POINTS:
-        raise SurfaceFileError(
-            f"member {name} has {size} bytes; at most {8 * _MAX_POINTS} are read"
-        )
-    with archive.open(info) as stream:
-        return np.lib.format.read_array(stream, allow_pickle=False)
-
-
-def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    version = np.lib.format.read_magic(stream)
-    read = {
-        (1, 0): np.lib.format.read_array_header_1_0,
-        (2, 0): np.lib.format.read_array_header_2_0,
-    }.get(version)
-    if read is None:
-        raise SurfaceFileError(f"array of NPY version {version}")
-    shape, _fortran, dtype = read(stream)
-    return shape, dtype
-
-
-def _sha256(path: Path) -> str:
-    with open_input(path) as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+def _read_member(archive: zipfile.ZipFile, name: str, kinds: str, n_axes: int | None = None) -> Any:
+    """Return one array, refused if its type or its number of axes is wrong."""
+    with archive.open(f"{name}.npy") as stream:
+        array = np.lib.format.read_array(stream, allow_pickle=False)
+    if array.dtype.kind not in kinds or (n_axes is not None and array.ndim != n_axes):
+        raise SurfaceFileError(f"member {name} is damaged: {array.dtype} of shape {array.shape}")
+    return array

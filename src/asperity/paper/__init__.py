@@ -1,7 +1,7 @@
 """The paper as runnable code: each of its claims computed, and the data of its figures."""
 
 from asperity.paper.claim import VERDICTS, Claim, Evidence, Result, Verdict
-from asperity.paper.registry import CLAIMS, claim, reproduce_claims
+from asperity.paper.claim_registry import CLAIMS, get_claim, reproduce_claims
 
 __all__ = [
     "CLAIMS",
@@ -10,6 +10,6 @@ __all__ = [
     "Evidence",
     "Result",
     "Verdict",
-    "claim",
+    "get_claim",
     "reproduce_claims",
 ]

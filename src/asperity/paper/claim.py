@@ -1,4 +1,4 @@
-"""A claim of the paper: its statement, code that computes evidence, and a verdict that follows."""
+"""Claims of the paper: a statement, the evidence computed for it and the verdict that follows."""
 
 from __future__ import annotations
 
@@ -10,30 +10,31 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.checks import FloatArray
-from asperity.errors import AsperityError
-from asperity.files import Record, plain, record
-from asperity.paper.changes import Change
+from asperity.core.checks import FloatArray
+from asperity.core.errors import AsperityError
+from asperity.core.files import Serializable, attributes_to_dict, to_plain_data
 
 Verdict = Literal["holds", "holds with correction", "does not hold", "undecided"]
 VERDICTS: tuple[Verdict, ...] = ("holds", "holds with correction", "does not hold", "undecided")
 Number = float | str | list[float]
 
-# Relative to the largest entry; what is compared is computed in double precision or better.
 TOLERANCE = 1e-9
-# From the mildest to the gravest: a claim is as good as the weakest of its parts.
-_GRAVITY: tuple[Verdict, ...] = ("holds", "holds with correction", "undecided", "does not hold")
+"""Relative to the largest entry; the compared values have double precision or better."""
+SCALED_FORCES = "compiled forces times 1.001"
+SCALED_JACOBIANS = "compiled Jacobians times 1.001"
+# By increasing severity: a claim is as good as the weakest of its parts.
+_SEVERITY: tuple[Verdict, ...] = ("holds", "holds with correction", "undecided", "does not hold")
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a verdict rests on.
+    """Evidence for a verdict.
 
     Attributes:
-        summary: one line, with the numbers that decide.
-        numbers: everything computed, by what it is.
-        correction: the corrected statement; empty where none is needed or known.
-        fitted: what the paper does not state and was fitted or guessed; empty where nothing was.
+        summary: one line with the decisive numbers.
+        numbers: computed values by name.
+        correction: the corrected statement; empty if none is needed or known.
+        fitted: parameters that were fitted or guessed, since the paper does not state them.
     """
 
     summary: str
@@ -42,32 +43,32 @@ class Evidence:
     fitted: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data, every number a float: counts and truth values among them too."""
+        """Return plain data; every number is a float, including counts and truth values."""
         numbers = {
-            name: value if isinstance(value, str) else plain(np.asarray(value, dtype=float))
+            name: value if isinstance(value, str) else to_plain_data(np.asarray(value, dtype=float))
             for name, value in self.numbers.items()
         }
         return {
-            **record(self, "summary"),
+            **attributes_to_dict(self, "summary"),
             "numbers": numbers,
-            **record(self, "correction", "fitted"),
+            **attributes_to_dict(self, "correction", "fitted"),
         }
 
 
 @dataclass(frozen=True)
 class Check:
-    """One comparison, or several put together.
+    """The outcome of one comparison or of several combined.
 
     Attributes:
-        verdict: what it alone gives.
-        says: in words, with its numbers.
+        verdict: the verdict of this comparison alone.
+        summary: one line with its numbers.
         numbers: see :class:`Evidence`.
         correction: see :class:`Evidence`.
         fitted: see :class:`Evidence`.
     """
 
     verdict: Verdict
-    says: str
+    summary: str
     numbers: Mapping[str, Number] = field(default_factory=dict)
     correction: str = ""
     fitted: str = ""
@@ -77,21 +78,21 @@ Computation = Callable[[], Check]
 
 
 @dataclass(frozen=True)
-class Result(Record):
+class Result(Serializable):
     """A claim with its verdict.
 
     Attributes:
-        id: of the claim.
-        equations: numbers of the paper that it covers.
-        section: of the paper.
-        statement: in our words.
-        verdict: ``"holds"`` (as printed), ``"holds with correction"`` (as printed it is wrong, a
-            small change makes it right), ``"does not hold"`` or ``"undecided"``.
-        evidence: what the verdict follows from.
-        flips_under: what would give another verdict, in words.
+        id: id of the claim.
+        equations: equation numbers of the paper that it covers.
+        section: section of the paper.
+        statement: the statement, paraphrased.
+        verdict: ``"holds"`` (as printed), ``"holds with correction"`` (wrong as printed, right
+            after a small change), ``"does not hold"`` or ``"undecided"``.
+        evidence: the evidence for the verdict.
+        flips_under: a change under which the verdict would be different.
     """
 
-    written = "id equations statement verdict evidence flips_under"
+    serialized_attributes = "id equations statement verdict evidence flips_under"
 
     id: str
     equations: tuple[str, ...]
@@ -104,15 +105,15 @@ class Result(Record):
 
 @dataclass(frozen=True)
 class Claim:
-    """A statement of the paper and the code that judges it.
+    """A statement of the paper and the computation that judges it.
 
     Attributes:
         id: short and stable, such as ``"eq-12"``.
-        equations: numbers of the paper that it covers, such as ``("(12)",)``.
-        section: of the paper.
-        statement: in our words.
+        equations: equation numbers of the paper that it covers, such as ``("(12)",)``.
+        section: section of the paper.
+        statement: the statement, paraphrased.
         compute: computes the evidence and derives the verdict.
-        flipped_by: a change under which the verdict is another one; a claim of the paper has one.
+        flips_under: a change under which the verdict is different; optional for your own claims.
     """
 
     id: str
@@ -120,164 +121,164 @@ class Claim:
     section: str
     statement: str
     compute: Computation
-    flipped_by: Change | None = None
+    flips_under: str = ""
 
     def run(self) -> Result:
         """Compute the evidence and return it with the verdict.
 
-        What the package refuses to compute leaves the claim undecided, with the reason.
+        An :class:`AsperityError` leaves the claim undecided, with the reason.
         """
         try:
-            found = self.compute()
+            check = self.compute()
         except AsperityError as error:
-            found = Check("undecided", f"could not be computed: {error}")
-        evidence = Evidence(found.says, found.numbers, found.correction, found.fitted)
-        flips_under = "" if self.flipped_by is None else self.flipped_by.says
-        return Result(
-            self.id, self.equations, self.section, self.statement, found.verdict, evidence,
-            flips_under,
-        )  # fmt: skip
+            check = Check("undecided", f"could not be computed: {error}")
+        evidence = Evidence(check.summary, check.numbers, check.correction, check.fitted)
+        about = self.id, self.equations, self.section, self.statement
+        return Result(*about, check.verdict, evidence, self.flips_under)
 
 
-DECLARED: list[Claim] = []
-"""The claims of the paper, in the order in which their code is read."""
+DECLARED_CLAIMS: list[Claim] = []
+"""The claims of the paper, in the order of declaration."""
 
 
-def judges(
-    name: str, section: str, *equations: str, flipped_by: Change
+def declare_claim(
+    claim_id: str, section: str, *equations: str, flips_under: str
 ) -> Callable[[Computation], Computation]:
-    """Declare that a function judges a claim of the paper.
+    """Declare that the decorated function judges a claim of the paper.
 
     The first line of its docstring is the statement.
 
     Args:
-        name: id of the claim.
-        section: of the paper.
-        *equations: numbers of the paper that the claim covers.
-        flipped_by: a change under which the verdict is another one.
+        claim_id: id of the claim.
+        section: section of the paper.
+        *equations: equation numbers of the paper that the claim covers.
+        flips_under: a change under which the verdict is different. Each of these changes is
+            applied by a test in ``tests/paper/perturbations.py``.
     """
 
     def declare(compute: Computation) -> Computation:
         statement = (compute.__doc__ or "").partition("\n")[0]
-        DECLARED.append(Claim(name, equations, section, statement, compute, flipped_by))
+        DECLARED_CLAIMS.append(Claim(claim_id, equations, section, statement, compute, flips_under))
         return compute
 
     return declare
 
 
-def judge(
-    what: str,
+def check_values(
+    quantity: str,
     *,
     printed: ArrayLike | None,
-    truth: ArrayLike,
+    reference: ArrayLike,
     corrected: ArrayLike | None = None,
     correction: str = "",
     tolerance: float = TOLERANCE,
 ) -> Check:
-    """Compare what is printed, and what would be right, with what is true.
+    """Compare printed and corrected values with reference values.
 
-    Errors are relative to the largest absolute entry of the truth.
+    Errors are relative to the largest absolute entry of the reference.
 
     Args:
-        what: is compared, in words.
-        printed: the printed formula's values; ``None`` if it has none.
-        truth: computed without it, same shape.
-        corrected: the corrected formula's values, same shape; ``None`` if no correction is known.
+        quantity: name of the compared quantity.
+        printed: values of the printed formula; ``None`` if it has none.
+        reference: values computed independently of it, same shape.
+        corrected: values of the corrected formula, same shape; ``None`` if no correction is known.
         correction: the corrected statement.
-        tolerance: up to which values agree.
+        tolerance: largest relative error at which values agree.
 
     Example:
-        >>> check = judge("1 + 1", printed=3.0, corrected=2.0, truth=1.0 + 1.0, correction="2")
-        >>> check.verdict, check.says
+        >>> check = check_values("1 + 1", printed=3, corrected=2, reference=2.0, correction="2")
+        >>> check.verdict, check.summary
         ('holds with correction', '1 + 1: printed 3, corrected 2, true 2')
     """
-    target = np.asarray(truth, dtype=float)
+    target = np.asarray(reference, dtype=float)
     if np.isnan(target).any() or target.size == 0:
-        return Check("undecided", f"{what}: could not be computed")
-    off = relative_error(printed, target)
-    left = math.inf if corrected is None else relative_error(corrected, target)
-    agrees, repaired = off <= tolerance, left <= tolerance
-    second = None if agrees else corrected
-    numbers = _compared(what, printed, second, target)
+        return Check("undecided", f"{quantity}: could not be computed")
+    printed_error = relative_error(printed, target)
+    corrected_error = relative_error(corrected, target)
+    agrees, is_repaired = printed_error <= tolerance, corrected_error <= tolerance
+    shown = None if agrees else corrected
+    numbers = _error_numbers(quantity, printed, shown, target)
     if target.ndim == 0:
-        says = f"{what}: {_values(printed, second, target)}"
-    elif second is None:
-        says = f"{what}: {_off(off)}"
+        errors = _format_values(printed, shown, target)
+    elif shown is None:
+        errors = _format_error(printed_error)
     else:
-        says = f"{what}: as printed {_off(off)}, corrected {_off(left)}"
+        errors = (
+            f"as printed {_format_error(printed_error)}, corrected {_format_error(corrected_error)}"
+        )
+    summary = f"{quantity}: {errors}"
     if agrees:
-        return Check("holds", says, numbers)
-    known = correction if repaired or corrected is None else ""
-    return Check("holds with correction" if repaired else "does not hold", says, numbers, known)
+        return Check("holds", summary, numbers)
+    known = correction if is_repaired or corrected is None else ""
+    verdict: Verdict = "holds with correction" if is_repaired else "does not hold"
+    return Check(verdict, summary, numbers, known)
 
 
-def _values(printed: ArrayLike | None, corrected: ArrayLike | None, target: FloatArray) -> str:
-    known = {"printed": printed, "corrected": corrected, "true": target}
+def _format_values(
+    printed: ArrayLike | None, corrected: ArrayLike | None, reference: FloatArray
+) -> str:
+    known = {"printed": printed, "corrected": corrected, "true": reference}
     shown = {name: value for name, value in known.items() if value is not None}
     return ", ".join(f"{name} {float(np.asarray(value)):.6g}" for name, value in shown.items())
 
 
-def _compared(
-    what: str, printed: ArrayLike | None, corrected: ArrayLike | None, target: FloatArray
+def _error_numbers(
+    quantity: str, printed: ArrayLike | None, corrected: ArrayLike | None, reference: FloatArray
 ) -> dict[str, Number]:
-    """Return the errors of what is compared, and a single number itself."""
+    """Return the relative errors, and for scalars the values themselves."""
     numbers: dict[str, Number] = {}
     for name, values in (("as printed", printed), ("corrected", corrected)):
         if values is not None or name == "as printed":
-            numbers[f"{what}, error {name}"] = relative_error(values, target)
-        if values is not None and target.ndim == 0:
-            numbers[f"{what}, {name}"] = float(np.asarray(values))
-    if target.ndim == 0:
-        numbers[f"{what}, true"] = float(target)
+            numbers[f"{quantity}, error {name}"] = relative_error(values, reference)
+        if values is not None and reference.ndim == 0:
+            numbers[f"{quantity}, {name}"] = float(np.asarray(values))
+    if reference.ndim == 0:
+        numbers[f"{quantity}, true"] = float(reference)
     return numbers
 
 
-def decide(
-    says: str,
+def check_statement(
+    summary: str,
     *,
     printed: bool | np.bool_ | None,
     corrected: bool | np.bool_ | None = None,
     correction: str = "",
     numbers: Mapping[str, Number] | None = None,
-    **named: Number,
+    **named_numbers: Number,
 ) -> Check:
-    """Judge a statement that is true or not.
+    """Judge a statement that is either true or false.
 
     Args:
-        says: what was computed, with numbers.
-        printed: whether the printed statement is true; ``None`` if that cannot be computed.
-        corrected: whether the corrected one is; ``None`` if no correction is known.
+        summary: one line with the computed numbers.
+        printed: whether the printed statement is true; ``None`` if it cannot be computed.
+        corrected: whether the corrected one is true; ``None`` if no correction is known.
         correction: the corrected statement.
-        numbers: the evidence, by what it is.
-        **named: more of it, underscores read as spaces.
+        numbers: computed values by name.
+        **named_numbers: further values; underscores in names stand for spaces.
     """
-    known = {name.replace("_", " "): value for name, value in named.items()}
+    known = {name.replace("_", " "): value for name, value in named_numbers.items()}
     known |= {} if numbers is None else dict(numbers)
     if printed is None:
-        return Check("undecided", says, known)
+        return Check("undecided", summary, known)
     if printed:
-        return Check("holds", says, known)
+        return Check("holds", summary, known)
     if corrected:
-        return Check("holds with correction", says, known, correction)
-    return Check("does not hold", says, known, correction if corrected is None else "")
+        return Check("holds with correction", summary, known, correction)
+    return Check("does not hold", summary, known, correction if corrected is None else "")
 
 
-OBSERVED: dict[str, bool] = {}
-"""What people felt, or measured on materials, by claim. Nobody was asked: it is empty."""
+def check_observation(summary: str, numbers: Mapping[str, Number] | None = None) -> Check:
+    """Leave a statement on perception or on materials undecided, since it cannot be computed."""
+    return check_statement(summary, printed=None, numbers=numbers)
 
 
-def observation(name: str, says: str, numbers: Mapping[str, Number] | None = None) -> Check:
-    """Judge what no computation can: it stays undecided until somebody observes it."""
-    return decide(says, printed=OBSERVED.get(name), numbers=numbers)
-
-
-def settle(*checks: Check) -> Check:
-    """Put checks together: a claim is as good as the weakest of its parts."""
-    worst = max(checks, key=lambda check: _GRAVITY.index(check.verdict))
+def combine_checks(*checks: Check) -> Check:
+    """Combine checks: a claim is as good as the weakest of its parts."""
+    worst = max(checks, key=lambda check: _SEVERITY.index(check.verdict))
     numbers: dict[str, Number] = {}
     for check in checks:
         numbers.update(check.numbers)
-    summary = "; ".join(check.says for check in checks)
+    summary = "; ".join(check.summary for check in checks)
     correction, fitted = (
         "; ".join(dict.fromkeys(text for text in texts if text))
         for texts in zip(*((check.correction, check.fitted) for check in checks), strict=True)
@@ -285,20 +286,20 @@ def settle(*checks: Check) -> Check:
     return Check(worst.verdict, summary, numbers, correction, fitted)
 
 
-def relative_error(value: ArrayLike | None, target: ArrayLike) -> float:
-    """Return max |value - target| / max |target|; infinite where they cannot be compared."""
-    goal = np.asarray(target, dtype=float)
+def relative_error(value: ArrayLike | None, reference: ArrayLike) -> float:
+    """Return max |value - reference| / max |reference|; infinite if they cannot be compared."""
+    target = np.asarray(reference, dtype=float)
     if value is None:
         return math.inf
-    given = np.asarray(value, dtype=float)
-    if given.shape != goal.shape or np.isnan(given).any():
+    values = np.asarray(value, dtype=float)
+    if values.shape != target.shape or np.isnan(values).any():
         return math.inf
-    if not (np.isfinite(given).all() and np.isfinite(goal).all()):
-        return 0.0 if np.array_equal(given, goal) else math.inf
-    scale = float(np.abs(goal).max())
-    difference = float(np.abs(given - goal).max())
+    if not (np.isfinite(values).all() and np.isfinite(target).all()):
+        return 0.0 if np.array_equal(values, target) else math.inf
+    scale = float(np.abs(target).max())
+    difference = float(np.abs(values - target).max())
     return difference / scale if scale > 0.0 else (0.0 if difference == 0.0 else math.inf)
 
 
-def _off(error: float) -> str:
+def _format_error(error: float) -> str:
     return f"off by {error:.2g}" if math.isfinite(error) else "not a value to compare"

@@ -1,4 +1,4 @@
-"""What the paper's figures 2 and 3 show, as arrays computed from the laws."""
+"""Data of the paper's figures 2 and 3, computed from the laws."""
 
 from __future__ import annotations
 
@@ -6,47 +6,45 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.analysis.energy.loops import loop_work
-from asperity.checks import FloatArray
-from asperity.files import Record
-from asperity.paper.plane import LAWS, SCANNING, path_of
+from asperity.analysis.energy.loop_integral import loop_work
+from asperity.core.checks import FloatArray
+from asperity.core.files import Serializable
+from asperity.paper.planar_cases import PAPER_LAWS, SCANNING, loop_path
 from asperity.surface import Surface
 
 _COLUMNS, _ROWS, _PROFILE = 33, 13, 401
-_DEPTH = 0.6e-3  # of the handles in figure 2 [m]
-_STEPS = 400  # on each leg of a path of figure 3
+_HANDLE_DEPTH = 0.6e-3  # of the handles in figure 2 [m]
+_STEPS_PER_SEGMENT = 400  # on each leg of a path of figure 3
 _EQUATIONS = {"B": "(12)", "F": "(27)", "G": "(29)"}  # that give the energies of figure 3
 
 
 @dataclass(frozen=True)
-class ForceField(Record):
+class ForceField(Serializable):
     """One panel of figure 2: a law's force in the x-z plane.
 
     Attributes:
         law: its letter.
         name: in words.
-        measured_from: ``"texture"`` or ``"wall"``, the line from which penetration is counted.
         x: of the profile [m], shape (n,).
         height: of the texture there [m], shape (n,).
         points: of a grid [m], shape (rows, columns, 2), x and z.
         forces: at the grid [N], shape (rows, columns, 2), f_x and f_z; zero outside the body.
-        handles: two positions of the handle [m], shape (2, 2).
+        handle_positions: two positions of the handle [m], shape (2, 2).
         handle_forces: [N], shape (2, 2).
     """
 
     law: str
     name: str
-    measured_from: str
     x: FloatArray
     height: FloatArray
     points: FloatArray
     forces: FloatArray
-    handles: FloatArray
+    handle_positions: FloatArray
     handle_forces: FloatArray
 
 
 @dataclass(frozen=True)
-class LoopEnergy(Record):
+class LoopEnergy(Serializable):
     """One panel of figure 3: a closed path and the energy that a law gives along it.
 
     Attributes:
@@ -55,7 +53,7 @@ class LoopEnergy(Record):
         x: of the profile [m], shape (n,).
         height: of the texture there [m], shape (n,); zero for law F, whose path has no texture.
         vertices: of the path [m], shape (m, 2), x and z; the last is joined to the first.
-        way: length along the path [m], shape (p,).
+        arc_length: length along the path [m], shape (p,).
         work: of the force on the probe up to there [J], shape (p,).
         energy: around the whole path [J], by quadrature.
         equation: of the paper that gives it; empty where it gives none.
@@ -66,7 +64,7 @@ class LoopEnergy(Record):
     x: FloatArray
     height: FloatArray
     vertices: FloatArray
-    way: FloatArray
+    arc_length: FloatArray
     work: FloatArray
     energy: float
     equation: str
@@ -101,18 +99,17 @@ def force_fields() -> tuple[ForceField, ...]:
     x, height = _profile()
     length, top = SCANNING.period, SCANNING.amplitude
     columns = np.linspace(0.0, 1.0, _COLUMNS) * length
-    rows = np.linspace(-top - _DEPTH, top, _ROWS)
+    rows = np.linspace(-top - _HANDLE_DEPTH, top, _ROWS)
     points = np.stack(np.meshgrid(columns, rows), axis=-1)
-    handles = np.array([[0.1, 0.0], [0.4, 0.0]]) * length - [0.0, _DEPTH]
+    handles = np.array([[0.1, 0.0], [0.4, 0.0]]) * length - [0.0, _HANDLE_DEPTH]
     panels = []
-    for law in LAWS:
+    for law in PAPER_LAWS:
         surface = SCANNING.surface(law)
         forces = _plane_force(surface, points.reshape(-1, 2)).reshape(points.shape)
-        start = "texture" if surface.law.contact.begins_on_texture else "wall"
+        handle_forces = _plane_force(surface, handles)
         panels.append(
-            ForceField(law, surface.law.name, start, x, height, points, forces, handles,
-                       _plane_force(surface, handles))
-        )  # fmt: skip
+            ForceField(law, surface.law.name, x, height, points, forces, handles, handle_forces)
+        )
     return tuple(panels)
 
 
@@ -129,7 +126,7 @@ def loop_energies() -> tuple[LoopEnergy, ...]:
         >>> [f"{panel.law} {panel.energy * 1e3 + 0.0:.3f} mJ" for panel in loop_energies()][:2]
         ['A 0.320 mJ', 'B 0.147 mJ']
     """
-    return tuple(_loop_energy(law) for law in LAWS)
+    return tuple(_loop_energy(law) for law in PAPER_LAWS)
 
 
 def _loop_energy(law: str) -> LoopEnergy:
@@ -140,9 +137,9 @@ def _loop_energy(law: str) -> LoopEnergy:
         changes = {"modulation_depth": 0.0, "friction": 2.0 * SCANNING.friction}
         height = np.zeros_like(height)
     surface = SCANNING.surface(law, **changes)
-    corners = np.array(path_of(law, SCANNING))
+    corners = np.array(loop_path(law, SCANNING))
     legs = zip(corners, np.roll(corners, -1, axis=0), strict=True)
-    share = np.linspace(0.0, 1.0, _STEPS, endpoint=False)[:, None]
+    share = np.linspace(0.0, 1.0, _STEPS_PER_SEGMENT, endpoint=False)[:, None]
     path = np.concatenate([*(a + share * (b - a) for a, b in legs), corners[:1]])
     step = np.diff(path, axis=0)
     # By midpoints: corners of the path may lie where the force jumps.
@@ -155,7 +152,7 @@ def _loop_energy(law: str) -> LoopEnergy:
         x=x,
         height=height,
         vertices=corners[:, [0, 2]],
-        way=np.concatenate([[0.0], np.cumsum(np.linalg.norm(step, axis=1))]),
+        arc_length=np.concatenate([[0.0], np.cumsum(np.linalg.norm(step, axis=1))]),
         work=np.concatenate([[0.0], np.cumsum(work)]),
         energy=loop_work(surface, corners, 1e-10),
         equation=_EQUATIONS.get(law, ""),

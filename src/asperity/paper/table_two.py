@@ -1,4 +1,4 @@
-"""The paper's Table II computed: what it prints, what is true, and what changed."""
+"""The paper's Table II: printed entries, computed entries and explanations of differences."""
 
 from __future__ import annotations
 
@@ -7,28 +7,28 @@ from dataclasses import dataclass
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import continuity
-from asperity.analysis.energy.loops import loop_work
+from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
-from asperity.display import Displayed
-from asperity.files import Record
-from asperity.paper.claims_friction import PAPER, norm_of, stick_entries
-from asperity.paper.plane import LAWS, PASSIVITY, SCANNING, TURN, path_of
+from asperity.core.display import Displayable
+from asperity.core.files import Serializable
+from asperity.paper.claims.friction_law import PAPER_CASE, sticking_norm
+from asperity.paper.planar_cases import PAPER_LAWS, PASSIVITY, SCANNING, TURNING_DEPTH, loop_path
 
-# Relative to k A²: loops that do not agree differ by more.
-_SAME_ENERGY = 1e-9
+# Relative to k A².
+_ENERGY_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
-class Printed:
+class PrintedRow:
     """A row of Table II as the paper prints it.
 
     Attributes:
-        number: the characteristic number, in the paper's words.
-        value: of it for the parameters of section V.A; ``None`` where no formula is printed.
+        number: the characteristic number as printed.
+        value: its value for the parameters of section V.A; ``None`` if no formula is printed.
         conservative: as printed.
         continuous: as printed.
-        energy: what the formula of the law's own loop gives for the parameters of section V.B [J];
-            ``None`` where only its sign is said.
+        energy: energy gained around the law's loop by the printed formula, for the parameters of
+            section V.B [J]; ``None`` if only its sign is stated.
     """
 
     number: str
@@ -39,28 +39,28 @@ class Printed:
 
 
 @dataclass(frozen=True)
-class TableTwoRow(Record):
+class TableTwoRow(Serializable):
     """A row of Table II, printed and computed.
 
     Attributes:
-        law: its letter.
-        printed: what the paper prints.
+        law: letter of the law.
+        printed: the printed row.
         q: the characteristic number for the parameters of section V.A.
         one_sided: the one-sided number q⁺.
-        formula: the number as a formula, where there is one.
-        conservative: whether the field is, by its symbolic curl.
-        continuous: whether the force is, inside the working region.
-        energy: what the paper's loop gains, for the parameters of section V.B [J].
-        change: what changed, and why.
+        formula: closed form of the number; may be empty.
+        conservative: whether the field is conservative, by its symbolic curl.
+        continuous: whether the force is continuous inside the working region.
+        energy: energy gained around the paper's loop for the parameters of section V.B [J].
+        change: explanation of the differences.
     """
 
-    written = (
+    serialized_attributes = (
         "law printed q one_sided formula conservative continuous energy number_agrees "
         "conservativity_agrees continuity_agrees energy_agrees change"
     )
 
     law: str
-    printed: Printed
+    printed: PrintedRow
     q: Bound
     one_sided: Bound
     formula: str
@@ -71,51 +71,51 @@ class TableTwoRow(Record):
 
     @property
     def number_agrees(self) -> bool | None:
-        """Whether the printed formula gives q; ``None`` where none is printed."""
+        """Whether the printed formula gives q; ``None`` if none is printed."""
         if self.printed.value is None:
             return None
         return math.isclose(self.printed.value, self.q.value, rel_tol=1e-6)
 
     @property
     def conservativity_agrees(self) -> bool:
-        """Whether the paper prints what the curl says."""
+        """Whether the printed entry agrees with the symbolic curl."""
         return self.printed.conservative == ("Yes" if self.conservative else "No")
 
     @property
     def continuity_agrees(self) -> bool:
-        """Whether the paper prints what the force does on this smooth surface."""
+        """Whether the printed entry agrees with the force on this smooth surface."""
         return self.printed.continuous.startswith("No") is not self.continuous
 
     @property
     def energy_agrees(self) -> bool:
-        """Whether the paper's loop gains what its formula says, or has the sign that it says."""
+        """Whether the energy around the loop agrees with the printed formula, or with its sign."""
         scale = SCANNING.stiffness * SCANNING.amplitude**2
         if self.printed.energy is None:
-            return self.energy > _SAME_ENERGY * scale
-        return abs(self.energy - self.printed.energy) <= _SAME_ENERGY * scale
+            return self.energy > _ENERGY_TOLERANCE * scale
+        return abs(self.energy - self.printed.energy) <= _ENERGY_TOLERANCE * scale
 
     @property
     def agrees(self) -> bool:
-        """Whether the row stands as printed."""
+        """Whether the row is correct as printed."""
         return self.verdict == "yes"
 
     @property
     def verdict(self) -> str:
-        """``"yes"`` if the row stands, ``"new"`` if only a number is added, else ``"no"``."""
+        """``"yes"`` if the row is correct, ``"new"`` if only a number is added, else ``"no"``."""
         others = self.conservativity_agrees and self.continuity_agrees and self.energy_agrees
         return {True: "yes", None: "new", False: "no"}[self.number_agrees] if others else "no"
 
 
 @dataclass(frozen=True)
-class TableTwo(Record, Displayed):
+class TableTwo(Serializable, Displayable):
     """The paper's Table II, printed and computed.
 
     Attributes:
         rows: laws A to G.
-        parameters: of the numbers and of the loops, in words.
+        parameters: parameters of the numbers and of the loops, in words.
     """
 
-    written = "parameters rows"
+    serialized_attributes = "parameters rows"
 
     rows: tuple[TableTwoRow, ...]
     parameters: str
@@ -124,12 +124,12 @@ class TableTwo(Record, Displayed):
         """Return the row of a law by its letter.
 
         Raises:
-            KeyError: for a letter that the table has not.
+            KeyError: if the table has no such row.
         """
         return {row.law: row for row in self.rows}[law]
 
     def cells(self) -> list[list[str]]:
-        """Return the table as text, its first row the head."""
+        """Return the cells as text; the first row is the heading."""
         head = ["law", "q printed", "q", "q⁺", "conservative", "continuous", "loop", "stands"]
         return [head, *(_cells(row) for row in self.rows)]
 
@@ -144,8 +144,8 @@ def table_two() -> TableTwo:
     conservativity experiment (V.B) on the paths of Fig. 3.
 
     Returns:
-        A :class:`TableTwo`: for each law what is printed, what is computed, whether the two agree,
-        and why not.
+        A :class:`TableTwo`: for each law the printed and the computed entries, whether they agree,
+        and an explanation if not.
 
     Reference:
         The paper's Table II; (10), (12), (21), (27), (29), (31).
@@ -158,14 +158,15 @@ def table_two() -> TableTwo:
         (5.85, 2.4863)
     """
     parameters = (
-        f"q: A = {_mm(PASSIVITY.amplitude)}, l = {_mm(PASSIVITY.period)}, "
-        f"depth and d_max {_mm(PASSIVITY.depth)}, μ = {PASSIVITY.friction}; "
-        f"loops: k = {SCANNING.stiffness:g} N/m, l = {_mm(SCANNING.period)}, a = {_mm(TURN)}"
+        f"q: A = {_format_mm(PASSIVITY.amplitude)}, l = {_format_mm(PASSIVITY.period)}, "
+        f"depth and d_max {_format_mm(PASSIVITY.depth)}, μ = {PASSIVITY.friction}; "
+        f"loops: k = {SCANNING.stiffness:g} N/m, l = {_format_mm(SCANNING.period)}, "
+        f"a = {_format_mm(TURNING_DEPTH)}"
     )
-    return TableTwo(tuple(_row(letter) for letter in LAWS), parameters)
+    return TableTwo(tuple(_row(letter) for letter in PAPER_LAWS), parameters)
 
 
-def _mm(length: float) -> str:
+def _format_mm(length: float) -> str:
     return f"{length * 1e3:g} mm"
 
 
@@ -174,7 +175,7 @@ def _row(letter: str) -> TableTwoRow:
     # Law F without texture, as in (27).
     changes = {"modulation_depth": 0.0} if letter == "F" else {}
     looped = SCANNING.surface(letter, **changes)
-    q, printed = characteristic_number(surface), _printed()[letter]
+    q, printed = characteristic_number(surface), _printed_rows()[letter]
     return TableTwoRow(
         law=letter,
         printed=printed,
@@ -183,8 +184,8 @@ def _row(letter: str) -> TableTwoRow:
         formula=_FORMULAS[letter],
         conservative=surface.facts.conservative,
         continuous=continuity(surface, q).continuous,
-        energy=loop_work(looped, path_of(letter, SCANNING)),
-        change=_change(letter, printed, q),
+        energy=loop_work(looped, loop_path(letter, SCANNING)),
+        change=_explain_correction(letter, printed, q),
     )
 
 
@@ -199,39 +200,39 @@ _FORMULAS = {
 }
 
 
-def _printed() -> dict[str, Printed]:
-    """Return the table as printed, its formulas put in numbers."""
+def _printed_rows() -> dict[str, PrintedRow]:
+    """Return the rows as printed, with the values of their formulas."""
     slope = 2.0 * math.pi * PASSIVITY.amplitude / PASSIVITY.period
     case, k = SCANNING, SCANNING.stiffness
     root = math.hypot(1.0, 2.0 * math.pi * case.amplitude / case.period)
     half = 0.5 * k * case.amplitude**2
     b_energy = half + k * case.period**2 / (4.0 * math.pi**2) * (1.0 - root)
     # (27) with the modulation m = 1/2 of a law without texture, where the paper has m = 0.
-    f_energy = 0.5 * k * case.friction * 0.5 * case.deflection * (case.depth - TURN)
+    f_energy = 0.5 * k * case.friction * 0.5 * case.deflection * (case.depth - TURNING_DEPTH)
     if_height, if_slope = "If h continuous", "If h' continuous"
     return {
-        "A": Printed("√(1 + [2πA/l]²)", math.hypot(1.0, slope), "No", if_height, half),
-        "B": Printed("No closed-form", None, "No", if_slope, b_energy),
-        "C": Printed("No closed-form", None, "Yes", if_slope, 0.0),
-        "D": Printed("1", 1.0, "Yes", "No. Even if h continuous", 0.0),
-        "E": Printed("1", 1.0, "No", if_height, None),
-        "F": Printed("Appendix I", norm_of(*stick_entries(PAPER)), "Almost", if_height, f_energy),
-        "G": Printed("No closed-form", None, "No", if_slope, None),
+        "A": PrintedRow("√(1 + [2πA/l]²)", math.hypot(1.0, slope), "No", if_height, half),
+        "B": PrintedRow("No closed-form", None, "No", if_slope, b_energy),
+        "C": PrintedRow("No closed-form", None, "Yes", if_slope, 0.0),
+        "D": PrintedRow("1", 1.0, "Yes", "No. Even if h continuous", 0.0),
+        "E": PrintedRow("1", 1.0, "No", if_height, None),
+        "F": PrintedRow("Appendix I", sticking_norm(PAPER_CASE), "Almost", if_height, f_energy),
+        "G": PrintedRow("No closed-form", None, "No", if_slope, None),
     }
 
 
-def _change(letter: str, printed: Printed, q: Bound) -> str:
-    """Return what changed and why, with its numbers."""
+def _explain_correction(letter: str, printed: PrintedRow, q: Bound) -> str:
+    """Return the explanation of the differences."""
     case = PASSIVITY
     y = 4.0 * math.pi**2 * case.amplitude * case.depth / case.period**2
-    radius = _mm(case.depth / y)
+    radius = _format_mm(case.depth / y)
     closed = f"There is a closed form, and it grows with the depth: y = {y:.2f} here."
     if letter == "F":
-        own = printed.value or 0.0
+        norm = printed.value or 0.0
         return (
-            f"The paper uses 8.3. Its own formula gives {own:.2f}, and √2 times that "
-            f"{math.sqrt(2.0) * own:.2f}: a factor √2/2 was dropped. The formula bounds each entry "
-            "by itself, with a factor 2 that 0 <= h <= 1 rules out; the law as defined has "
+            f"The paper uses 8.3. Its own formula gives {norm:.2f}, and √2 times that "
+            f"{math.sqrt(2.0) * norm:.2f}: a factor √2/2 was dropped. The formula bounds each "
+            "entry by itself, with a factor 2 that 0 <= h <= 1 rules out; the law as defined has "
             f"{q.value:.4f}. 'Almost' is no: the loop of (27) gains energy."
         )
     return {
@@ -253,18 +254,18 @@ def _cells(row: TableTwoRow) -> list[str]:
     return [
         row.law,
         "1" if printed.number == "1" else number,
-        f"{_number(row.q)} ({row.q.method})",
-        _number(row.one_sided),
-        _said(row.conservative, printed.conservative, row.conservativity_agrees),
-        _said(row.continuous, printed.continuous, row.continuity_agrees),
+        f"{_format_number(row.q)} ({row.q.method})",
+        _format_number(row.one_sided),
+        _format_fact(row.conservative, printed.conservative, row.conservativity_agrees),
+        _format_fact(row.continuous, printed.continuous, row.continuity_agrees),
         f"{row.energy * 1e6 + 0.0:.0f} µJ",
         row.verdict,
     ]
 
 
-def _said(fact: bool, printed: str, agrees: bool) -> str:
-    return ("yes" if fact else "no") + ("" if agrees else f" ({printed})")
+def _format_fact(value: bool, printed: str, agrees: bool) -> str:
+    return ("yes" if value else "no") + ("" if agrees else f" ({printed})")
 
 
-def _number(bound: Bound) -> str:
+def _format_number(bound: Bound) -> str:
     return f"{bound.value:.4f}" if math.isfinite(bound.value) else "∞"

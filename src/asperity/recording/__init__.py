@@ -1,1 +1,1 @@
-"""What a loop did, on disk, whatever happens: see :mod:`asperity.recording.writer`."""
+"""Recordings of loops on disk: see :mod:`asperity.recording.writer`."""

@@ -25,7 +25,7 @@ _CHUNK = struct.Struct("<QQQIIQ")
 _RECORD = struct.Struct("<BQ")
 
 
-class Op(IntEnum):
+class Opcode(IntEnum):
     """Codes of the records."""
 
     HEADER = 0x01
@@ -44,44 +44,44 @@ class Op(IntEnum):
 
 
 class DamagedError(ValueError):
-    """A record that is not what the format says."""
+    """A record that violates the format."""
 
 
 # --- writing --------------------------------------------------------------------------------------
 
 
-def record(op: Op, content: bytes) -> bytes:
+def encode_record(op: Opcode, content: bytes) -> bytes:
     """Return a record."""
     return _RECORD.pack(op, len(content)) + content
 
 
-def header(library: str) -> bytes:
+def encode_header(library: str) -> bytes:
     """Return what a file begins with."""
-    return MAGIC + record(Op.HEADER, _text("") + _text(library))
+    return MAGIC + encode_record(Opcode.HEADER, _encode_text("") + _encode_text(library))
 
 
-def schema(name: str, text: str) -> bytes:
+def encode_schema(name: str, text: str) -> bytes:
     """Return the schema of the rows, a message definition of ROS 2."""
-    data = _text(name) + _text("ros2msg") + _text(text)
-    return record(Op.SCHEMA, struct.pack("<H", CHANNEL) + data)
+    data = _encode_text(name) + _encode_text("ros2msg") + _encode_text(text)
+    return encode_record(Opcode.SCHEMA, struct.pack("<H", CHANNEL) + data)
 
 
-def channel(topic: str) -> bytes:
+def encode_channel(topic: str) -> bytes:
     """Return the channel of the rows."""
-    data = _text(topic) + _text("cdr") + _texts({})
-    return record(Op.CHANNEL, struct.pack("<HH", CHANNEL, CHANNEL) + data)
+    data = _encode_text(topic) + _encode_text("cdr") + _encode_texts({})
+    return encode_record(Opcode.CHANNEL, struct.pack("<HH", CHANNEL, CHANNEL) + data)
 
 
-def metadata(name: str, texts: Mapping[str, str]) -> bytes:
+def encode_metadata(name: str, texts: Mapping[str, str]) -> bytes:
     """Return a record of texts by name."""
-    return record(Op.METADATA, _text(name) + _texts(texts))
+    return encode_record(Opcode.METADATA, _encode_text(name) + _encode_texts(texts))
 
 
-def attachment(name: str, kind: str, data: bytes) -> bytes:
+def encode_attachment(name: str, kind: str, data: bytes) -> bytes:
     """Return a file inside the file."""
-    content = struct.pack("<QQ", 0, 0) + _text(name) + _text(kind)
+    content = struct.pack("<QQ", 0, 0) + _encode_text(name) + _encode_text(kind)
     content += struct.pack("<Q", len(data)) + data
-    return record(Op.ATTACHMENT, content + struct.pack("<I", zlib.crc32(content)))
+    return encode_record(Opcode.ATTACHMENT, content + struct.pack("<I", zlib.crc32(content)))
 
 
 @dataclass(frozen=True)
@@ -89,16 +89,16 @@ class Chunk:
     """Where a chunk lies.
 
     Attributes:
-        begin: of the record in the file.
-        rows_at: where its rows begin.
+        start: of the record in the file.
+        rows_start: where its rows begin.
         size: of its rows [bytes].
         checksum: of its rows.
         times: of the first and the last row [ns].
         index_size: of the index of its rows, which follows [bytes].
     """
 
-    begin: int
-    rows_at: int
+    start: int
+    rows_start: int
     size: int
     checksum: int
     times: tuple[int, int]
@@ -107,16 +107,16 @@ class Chunk:
     @property
     def end(self) -> int:
         """Where the record ends."""
-        return self.rows_at + self.size
+        return self.rows_start + self.size
 
 
-def chunk(
-    begin: int, rows: memoryview, times: tuple[int, int], index: bytes
+def encode_chunk(
+    start: int, rows: memoryview, times: tuple[int, int], index: bytes
 ) -> tuple[Chunk, tuple[bytes, memoryview, bytes]]:
     """Return where a chunk lies, and its parts: front, rows as they are, index.
 
     Args:
-        begin: where it will begin in the file.
+        start: where it will begin in the file.
         rows: bytes of whole message records.
         times: of the first and the last [ns].
         index: time [ns] and place in ``rows`` of each, 64-bit integers.
@@ -124,62 +124,70 @@ def chunk(
     checksum = zlib.crc32(rows)
     head = _CHUNK.pack(*times, len(rows), checksum, 0, len(rows))
     # The length of the content, before the content is put together: rows are many.
-    front = _RECORD.pack(Op.CHUNK, len(head) + len(rows)) + head
-    listed = record(Op.MESSAGE_INDEX, struct.pack("<HI", CHANNEL, len(index)) + index)
-    place = Chunk(begin, begin + len(front), len(rows), checksum, times, len(listed))
+    front = _RECORD.pack(Opcode.CHUNK, len(head) + len(rows)) + head
+    listed = encode_record(Opcode.MESSAGE_INDEX, struct.pack("<HI", CHANNEL, len(index)) + index)
+    place = Chunk(start, start + len(front), len(rows), checksum, times, len(listed))
     return place, (front, rows, listed)
 
 
-def ending(head: bytes, chunks: list[Chunk], rows: int, begin: int) -> bytes:
+def encode_summary(head: bytes, chunks: list[Chunk], rows: int, offset: int) -> bytes:
     """Return what a whole file ends with.
 
     Args:
         head: what the file begins with.
         chunks: where they lie.
         rows: how many there are.
-        begin: where the ending begins in the file.
+        offset: where the ending begins in the file.
     """
-    data_end = record(Op.DATA_END, struct.pack("<I", 0))
+    data_end = encode_record(Opcode.DATA_END, struct.pack("<I", 0))
     summary = b"".join(
-        head[at : at + size] for op, at, size in _places(head) if op in {Op.SCHEMA, Op.CHANNEL}
+        head[at : at + size]
+        for op, at, size in _record_positions(head)
+        if op in {Opcode.SCHEMA, Opcode.CHANNEL}
     )
     summary += _statistics(head, chunks, rows)
     summary += b"".join(map(_chunk_index, chunks))
     summary += b"".join(_head_index(head))
-    start = begin + len(data_end)
-    footer = _RECORD.pack(Op.FOOTER, 20) + struct.pack("<QQ", start, 0)
+    start = offset + len(data_end)
+    footer = _RECORD.pack(Opcode.FOOTER, 20) + struct.pack("<QQ", start, 0)
     checksum = zlib.crc32(footer, zlib.crc32(summary))
     return data_end + summary + footer + struct.pack("<I", checksum) + MAGIC
 
 
 def _statistics(head: bytes, chunks: list[Chunk], rows: int) -> bytes:
-    ops = [op for op, _, _ in _places(head)]
+    ops = [op for op, _, _ in _record_positions(head)]
     first, last = (chunks[0].times[0], chunks[-1].times[1]) if chunks else (0, 0)
-    counts = rows, 1, 1, ops.count(Op.ATTACHMENT), ops.count(Op.METADATA), len(chunks)
+    counts = rows, 1, 1, ops.count(Opcode.ATTACHMENT), ops.count(Opcode.METADATA), len(chunks)
     each = struct.pack("<IHQ", 10, CHANNEL, rows)
-    return record(Op.STATISTICS, struct.pack("<QHIIIIQQ", *counts, first, last) + each)
+    return encode_record(Opcode.STATISTICS, struct.pack("<QHIIIIQQ", *counts, first, last) + each)
 
 
 def _chunk_index(chunk: Chunk) -> bytes:
-    begin, end = chunk.begin, chunk.end
+    begin, end = chunk.start, chunk.end
     data = struct.pack("<QQQQ", *chunk.times, begin, end - begin)
     data += struct.pack("<IHQQ", 10, CHANNEL, end, chunk.index_size)
-    return record(Op.CHUNK_INDEX, data + struct.pack("<IQQ", 0, chunk.size, chunk.size))
+    return encode_record(Opcode.CHUNK_INDEX, data + struct.pack("<IQQ", 0, chunk.size, chunk.size))
 
 
 def _head_index(head: bytes) -> Iterator[bytes]:
-    for op, at, size in _places(head):
+    for op, at, size in _record_positions(head):
         content = memoryview(head)[at + _RECORD.size : at + size]
-        if op == Op.METADATA:
-            name = Reader(content).text()
-            yield record(Op.METADATA_INDEX, struct.pack("<QQ", at, size) + _text(name))
-        elif op == Op.ATTACHMENT:
+        if op == Opcode.METADATA:
+            name = ContentReader(content).text()
+            yield encode_record(
+                Opcode.METADATA_INDEX, struct.pack("<QQ", at, size) + _encode_text(name)
+            )
+        elif op == Opcode.ATTACHMENT:
             name, kind, data = read_attachment(content)
-            index = struct.pack("<QQQQQ", at, size, 0, 0, len(data)) + _text(name) + _text(kind)
-            yield record(Op.ATTACHMENT_INDEX, index)
+            index = (
+                struct.pack("<QQQQQ", at, size, 0, 0, len(data))
+                + _encode_text(name)
+                + _encode_text(kind)
+            )
+            yield encode_record(Opcode.ATTACHMENT_INDEX, index)
 
 
-def _places(head: bytes) -> Iterator[tuple[int, int, int]]:
+def _record_positions(head: bytes) -> Iterator[tuple[int, int, int]]:
     """Yield code, place and size of the records at the beginning of a file."""
     at = len(MAGIC)
     while at < len(head):
@@ -188,20 +196,20 @@ def _places(head: bytes) -> Iterator[tuple[int, int, int]]:
         at += _RECORD.size + length
 
 
-def _text(text: str) -> bytes:
+def _encode_text(text: str) -> bytes:
     data = text.encode()
     return struct.pack("<I", len(data)) + data
 
 
-def _texts(texts: Mapping[str, str]) -> bytes:
-    data = b"".join(_text(name) + _text(value) for name, value in texts.items())
+def _encode_texts(texts: Mapping[str, str]) -> bytes:
+    data = b"".join(_encode_text(name) + _encode_text(value) for name, value in texts.items())
     return struct.pack("<I", len(data)) + data
 
 
 # --- reading --------------------------------------------------------------------------------------
 
 
-class Reader:
+class ContentReader:
     """Reads the parts of a record's content, one after the other.
 
     Raises:
@@ -209,30 +217,30 @@ class Reader:
     """
 
     def __init__(self, content: bytes | memoryview) -> None:
-        self._left = memoryview(content)
+        self._remaining = memoryview(content)
 
-    def take(self, size: int) -> memoryview:
+    def read(self, size: int) -> memoryview:
         """Return so many bytes."""
-        if size > len(self._left):
+        if size > len(self._remaining):
             raise DamagedError("a record ends within a field")
-        part, self._left = self._left[:size], self._left[size:]
+        part, self._remaining = self._remaining[:size], self._remaining[size:]
         return part
 
     def number(self, size: int) -> int:
         """Return an integer of so many bytes."""
-        return int.from_bytes(self.take(size), "little")
+        return int.from_bytes(self.read(size), "little")
 
     def text(self) -> str:
         """Return a text."""
         try:
-            return bytes(self.take(self.number(4))).decode()
+            return bytes(self.read(self.number(4))).decode()
         except UnicodeDecodeError as error:
-            raise DamagedError(f"a text is none: {error}") from None
+            raise DamagedError(f"invalid text: {error}") from None
 
     def texts(self) -> dict[str, str]:
         """Return texts by name."""
-        inner, found = Reader(self.take(self.number(4))), {}
-        while inner._left:
+        inner, found = ContentReader(self.read(self.number(4))), {}
+        while inner._remaining:
             name = inner.text()
             found[name] = inner.text()
         return found
@@ -244,17 +252,17 @@ def read_attachment(content: bytes | memoryview) -> tuple[str, str, bytes]:
     Raises:
         DamagedError: if its checksum is another.
     """
-    reader = Reader(content)
-    reader.take(16)  # when it was made: not said
+    reader = ContentReader(content)
+    reader.read(16)  # times: unused
     name, kind = reader.text(), reader.text()
-    data = bytes(reader.take(reader.number(8)))
+    data = bytes(reader.read(reader.number(8)))
     checksum = reader.number(4)
     if checksum not in {0, zlib.crc32(content[: len(content) - 4])}:
         raise DamagedError(f"the attachment {name} is damaged")
     return name, kind, data
 
 
-def walk(stream: IO[bytes], size: int) -> Iterator[tuple[int, int, int]]:
+def iterate_records(stream: IO[bytes], size: int) -> Iterator[tuple[int, int, int]]:
     """Yield code, place and length of the content of each whole record; it begins after MAGIC.
 
     Args:

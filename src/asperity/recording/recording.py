@@ -14,47 +14,47 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.checks import FloatArray
-from asperity.display import Plotted
-from asperity.errors import ParameterError, nearest_names
-from asperity.files import open_input
+from asperity.core.checks import FloatArray
+from asperity.core.display import Plottable
+from asperity.core.errors import ParameterError, suggest_names
+from asperity.core.files import open_input
 from asperity.recording import mcap
-from asperity.recording.rows import Columns, row_type, schema_columns, values_of
-from asperity.recording.traced import Traced
-from asperity.recording.writer import FORMAT, NAME
+from asperity.recording.named_columns import TraceTable
+from asperity.recording.row_encoding import Columns, message_values, row_type, schema_columns
+from asperity.recording.writer import FORMAT, SCHEMA_NAME
 
 # A day of a loop at 10 kHz, and more.
-_MOST_BYTES = 2**40
+_MAX_BYTES = 2**40
 # Of one of the records before the rows: a map of 11000 x 11000 points.
-_MOST_HEAD = 2**30
+_MAX_RECORD_BYTES = 2**30
 
 
 @dataclass(frozen=True, eq=False)
-class Recording(Plotted):
-    """What a loop did, in a file. Rows are read when they are asked for.
+class Recording(Plottable):
+    """A recording of a loop; rows are read on demand.
 
     Attributes:
-        path: of the file.
+        path: path of the file.
         columns: names and units.
-        rows: how many there are.
-        about: what the recording says of itself: ``surface``, ``servo``, ``scene`` and more.
-        version: of the asperity that wrote it.
-        whole: whether it was closed; if not, it ends with the last block that was written.
-        unread: bytes at the end that are no whole block.
+        rows: number of rows.
+        metadata: metadata: ``surface``, ``servo``, ``scene`` and more.
+        version: version of asperity that wrote it.
+        is_complete: whether it was closed; if not, it ends with the last complete block.
+        unread_bytes: bytes at the end after the last complete block.
     """
 
     path: Path
     columns: Columns
     rows: int
-    about: Mapping[str, Any]
+    metadata: Mapping[str, Any]
     version: str
-    whole: bool
-    unread: int
+    is_complete: bool
+    unread_bytes: int
     _chunks: tuple[mcap.Chunk, ...] = field(repr=False, default=())
-    _attached: Mapping[str, tuple[int, int]] = field(repr=False, default_factory=dict)
+    _attachments: Mapping[str, tuple[int, int]] = field(repr=False, default_factory=dict)
 
     def __repr__(self) -> str:
-        ends = "" if self.whole else ", not closed"
+        ends = "" if self.is_complete else ", not closed"
         return f"<Recording {self.path.name}, {self.rows} rows, {self.duration:g} s{ends}>"
 
     @property
@@ -75,68 +75,68 @@ class Recording(Plotted):
         Raises:
             ParameterError: if the file is gone, or a block is damaged.
         """
-        with _opened(self.path) as stream:
+        with _open_file(self.path) as stream:
             seen = 0
             for chunk in self._chunks:
                 table = self._block(stream, chunk, seen)
                 seen += len(table)
                 yield table
 
-    def part(self, first: int, end: int) -> FloatArray:
+    def row_range(self, start: int, end: int) -> FloatArray:
         """Return the rows from one to another, which is not among them; no others are read.
 
         Raises:
             ParameterError: see :meth:`blocks`.
         """
-        first, end = max(first, 0), min(end, self.rows)
-        if first >= end:
+        start, end = max(start, 0), min(end, self.rows)
+        if start >= end:
             return np.empty((0, len(self.columns)))
-        least, most = self._begins.searchsorted([first, end - 1], "right")
+        least, most = self._chunk_starts.searchsorted([start, end - 1], "right")
         parts = []
-        with _opened(self.path) as stream:
+        with _open_file(self.path) as stream:
             for number in range(int(least) - 1, int(most)):
-                begin = int(self._begins[number])
+                begin = int(self._chunk_starts[number])
                 table = self._block(stream, self._chunks[number], begin)
-                parts.append(table[max(first - begin, 0) : end - begin])
+                parts.append(table[max(start - begin, 0) : end - begin])
         return np.concatenate(parts)
 
     @cached_property
-    def _begins(self) -> NDArray[np.int64]:
+    def _chunk_starts(self) -> NDArray[np.int64]:
         """Number of the first row of each block."""
         size = row_type(len(self.columns)).itemsize
         ends = np.cumsum([chunk.size // size for chunk in self._chunks], dtype=np.int64)
         return np.concatenate([np.zeros(1, np.int64), ends])[:-1]
 
-    def _block(self, stream: IO[bytes], chunk: mcap.Chunk, seen: int) -> FloatArray:
+    def _block(self, stream: IO[bytes], chunk: mcap.Chunk, first_row: int) -> FloatArray:
         """Return the rows of a block, before which so many were."""
-        stream.seek(chunk.rows_at)
+        stream.seek(chunk.rows_start)
         data = stream.read(chunk.size)
         if zlib.crc32(data) != chunk.checksum:
-            raise _unreadable(self.path, f"the block after row {seen} is damaged")
+            raise _unreadable_error(self.path, f"the block after row {first_row} is damaged")
         try:
-            return values_of(data, len(self.columns))
+            return message_values(data, len(self.columns))
         except mcap.DamagedError as error:
-            raise _unreadable(self.path, str(error)) from None
+            raise _unreadable_error(self.path, str(error)) from None
 
-    def table(self, most: int | None = None) -> FloatArray:
+    def table(self, max_rows: int | None = None) -> FloatArray:
         """Return the rows, shape (rows, columns).
 
         Args:
-            most: rows at most, thinned out evenly from the first; by default all.
+            max_rows: rows at most, thinned out evenly from the first; by default all.
 
         Raises:
             ParameterError: see :meth:`blocks`.
         """
-        step = 1 if most is None else max(1, -(-self.rows // most))
+        step = 1 if max_rows is None else max(1, -(-self.rows // max_rows))
         parts, seen = [np.empty((0, len(self.columns)))], 0
         for block in self.blocks():
             parts.append(block[-seen % step :: step])
             seen += len(block)
         return np.concatenate(parts)
 
-    def traced(self, most: int | None = None) -> Traced:
+    def to_columns(self, max_rows: int | None = None) -> TraceTable:
         """Return the rows with their parts by name: time, position, forces; see :meth:`table`."""
-        return Traced(self.columns, self.table(most))
+        return TraceTable(self.columns, self.table(max_rows))
 
     def __getitem__(self, name: str) -> FloatArray:
         """Return a column, shape (rows,).
@@ -145,7 +145,7 @@ class Recording(Plotted):
             ParameterError: for a name that there is not; the nearest are offered.
         """
         if name not in self.names:
-            hint = nearest_names(name, self.names)
+            hint = suggest_names(name, self.names)
             raise ParameterError("column", f"is unknown: {name!r}; {hint}")
         at = self.names.index(name)
         return np.concatenate([np.empty(0), *(block[:, at] for block in self.blocks())])
@@ -157,21 +157,21 @@ class Recording(Plotted):
             low, high = np.fmin(low, block.min(axis=0)), np.fmax(high, block.max(axis=0))
         return low, high
 
-    def attached(self, name: str) -> bytes | None:
+    def attachment(self, name: str) -> bytes | None:
         """Return a file inside the recording; ``None`` if there is none of this name.
 
         Raises:
             ParameterError: if it is damaged.
         """
-        if name not in self._attached:
+        if name not in self._attachments:
             return None
-        at, length = self._attached[name]
-        with _opened(self.path) as stream:
+        at, length = self._attachments[name]
+        with _open_file(self.path) as stream:
             stream.seek(at)
             try:
                 return mcap.read_attachment(stream.read(length))[2]
             except mcap.DamagedError as error:
-                raise _unreadable(self.path, str(error)) from None
+                raise _unreadable_error(self.path, str(error)) from None
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data without the rows."""
@@ -181,17 +181,17 @@ class Recording(Plotted):
             "version": self.version,
             "rows": self.rows,
             "duration": self.duration,
-            "whole": self.whole,
-            "unread": self.unread,
+            "whole": self.is_complete,
+            "unread": self.unread_bytes,
             "columns": [{"name": name, "unit": unit} for name, unit in self.columns],
-            "about": dict(self.about),
+            "about": dict(self.metadata),
         }
 
 
 def is_recording(path: str | os.PathLike[str]) -> bool:
     """Tell by its first bytes whether a file is MCAP."""
     try:
-        with open_input(path, _MOST_BYTES) as stream:
+        with open_input(path, _MAX_BYTES) as stream:
             return stream.read(len(mcap.MAGIC)) == mcap.MAGIC
     except (OSError, ValueError):
         return False
@@ -221,62 +221,62 @@ def open_recording(path: str | os.PathLike[str]) -> Recording:
         <Recording run.mcap, 2 rows, 0.1 s>
     """
     place = Path(path)
-    with _opened(place) as stream:
+    with _open_file(place) as stream:
         size = os.fstat(stream.fileno()).st_size
         if not size:
-            raise _unreadable(place, "it is empty")
+            raise _unreadable_error(place, "it is empty")
         if stream.read(len(mcap.MAGIC)) != mcap.MAGIC:
-            raise _unreadable(place, "it is no recording (MCAP)")
+            raise _unreadable_error(place, "it is not an MCAP recording")
         try:
             return _read(place, stream, size)
         except mcap.DamagedError as error:
-            raise _unreadable(place, str(error)) from None
+            raise _unreadable_error(place, str(error)) from None
 
 
 def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
     columns: Columns = ()
-    said: dict[str, str] = {}
+    texts: dict[str, str] = {}
     chunks: list[mcap.Chunk] = []
     attached: dict[str, tuple[int, int]] = {}
     whole, foreign, end = False, False, len(mcap.MAGIC)
-    for op, at, length in mcap.walk(stream, size):
-        if op == mcap.Op.DATA_END:
+    for op, at, length in mcap.iterate_records(stream, size):
+        if op == mcap.Opcode.DATA_END:
             whole = True
             break
-        if op == mcap.Op.CHUNK and not said:
+        if op == mcap.Opcode.CHUNK and not texts:
             foreign = True
             break
-        if op == mcap.Op.CHUNK:
+        if op == mcap.Opcode.CHUNK:
             chunks.append(mcap.read_chunk(stream, at, length))
-        elif op == mcap.Op.SCHEMA and not columns:
-            columns = _columns(_content(stream, at, length))
-        elif op == mcap.Op.METADATA:
-            content = _content(stream, at, length)
-            said = content.texts() if content.text() == NAME else said
-        elif op == mcap.Op.ATTACHMENT:
+        elif op == mcap.Opcode.SCHEMA and not columns:
+            columns = _columns(_record_content(stream, at, length))
+        elif op == mcap.Opcode.METADATA:
+            content = _record_content(stream, at, length)
+            texts = content.texts() if content.text() == SCHEMA_NAME else texts
+        elif op == mcap.Opcode.ATTACHMENT:
             attached[_attachment_name(stream, at)] = at, length
         end = at + length
-    about = _about(said, whole or foreign)
+    about = _parse_metadata(texts, whole or foreign)
     if not columns:
         raise mcap.DamagedError("it does not say what its rows are")
-    if not whole and chunks and not _sound(stream, chunks[-1]):
-        end = chunks.pop().begin  # what a loss of power leaves
+    if not whole and chunks and not _is_intact(stream, chunks[-1]):
+        end = chunks.pop().start  # the remains of a loss of power
     rows = sum(chunk.size for chunk in chunks) // row_type(len(columns)).itemsize
     unread = 0 if whole else size - end
     return Recording(
-        path, columns, rows, about, said["version"], whole, unread, tuple(chunks), attached
+        path, columns, rows, about, texts["version"], whole, unread, tuple(chunks), attached
     )
 
 
-def _content(stream: IO[bytes], at: int, length: int) -> mcap.Reader:
-    if length > _MOST_HEAD:
+def _record_content(stream: IO[bytes], at: int, length: int) -> mcap.ContentReader:
+    if length > _MAX_RECORD_BYTES:
         raise mcap.DamagedError(f"a record of {length} bytes before the rows")
     stream.seek(at)
-    return mcap.Reader(stream.read(length))
+    return mcap.ContentReader(stream.read(length))
 
 
-def _columns(content: mcap.Reader) -> Columns:
-    content.take(2)
+def _columns(content: mcap.ContentReader) -> Columns:
+    content.read(2)
     name, encoding = content.text(), content.text()
     if encoding != "ros2msg":
         raise mcap.DamagedError(f"its rows are {name!r} in {encoding!r}, none that asperity writes")
@@ -286,39 +286,39 @@ def _columns(content: mcap.Reader) -> Columns:
 def _attachment_name(stream: IO[bytes], at: int) -> str:
     stream.seek(at + 16)
     size = int.from_bytes(stream.read(4), "little")
-    return mcap.Reader(size.to_bytes(4, "little") + stream.read(min(size, 1024))).text()
+    return mcap.ContentReader(size.to_bytes(4, "little") + stream.read(min(size, 1024))).text()
 
 
-def _sound(stream: IO[bytes], chunk: mcap.Chunk) -> bool:
-    stream.seek(chunk.rows_at)
+def _is_intact(stream: IO[bytes], chunk: mcap.Chunk) -> bool:
+    stream.seek(chunk.rows_start)
     return zlib.crc32(stream.read(chunk.size)) == chunk.checksum
 
 
-def _about(said: Mapping[str, str], foreign: bool) -> dict[str, Any]:
-    """Return what a recording says of itself, if it is one that this asperity reads."""
-    if not {"format", "version", "about"} <= said.keys():
+def _parse_metadata(texts: Mapping[str, str], foreign: bool) -> dict[str, Any]:
+    """Return the metadata of a recording, if this version of asperity reads it."""
+    if not {"format", "version", "about"} <= texts.keys():
         whose = "it was not written by asperity" if foreign else "it ends before its first row"
         raise mcap.DamagedError(whose)
-    if said["format"] != str(FORMAT):
-        words = f"it is of format {said['format']}, of asperity {said['version']}"
+    if texts["format"] != str(FORMAT):
+        words = f"it is of format {texts['format']}, of asperity {texts['version']}"
         raise mcap.DamagedError(f"{words}; this asperity reads format {FORMAT}")
     try:
-        about = json.loads(said["about"])
+        about = json.loads(texts["about"])
     except ValueError as error:
-        raise mcap.DamagedError(f"what it says of itself is no JSON: {error}") from None
+        raise mcap.DamagedError(f"its metadata is not valid JSON: {error}") from None
     if not isinstance(about, dict):
-        raise mcap.DamagedError("what it says of itself is no table")
+        raise mcap.DamagedError("its metadata is not a table")
     return about
 
 
-def _opened(path: Path) -> IO[bytes]:
+def _open_file(path: Path) -> IO[bytes]:
     try:
-        return open_input(path, _MOST_BYTES)
+        return open_input(path, _MAX_BYTES)
     except OSError as error:
-        raise _unreadable(path, error.strerror or str(error)) from None
+        raise _unreadable_error(path, error.strerror or str(error)) from None
     except ValueError as error:  # a name that no file can have
-        raise _unreadable(path, str(error)) from None
+        raise _unreadable_error(path, str(error)) from None
 
 
-def _unreadable(path: Path, reason: str) -> ParameterError:
+def _unreadable_error(path: Path, reason: str) -> ParameterError:
     return ParameterError("recording", f"{path} cannot be read: {reason}")

@@ -1,92 +1,101 @@
-"""Replaying a recording: its positions through its law, compared bit by bit."""
+"""Replay of a recording: its positions through its law, compared bit by bit."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from asperity.checks import FloatArray
-from asperity.contacts.memory import new_memory
-from asperity.content import formula_content, numbers_content, surface_content
-from asperity.display import Displayed
-from asperity.errors import ParameterError
-from asperity.files import Record, open_input
-from asperity.kernels.probe import ClampName
-from asperity.kernels.tick import ServoSettings, ServoState
+from asperity.contacts.warm_start import new_warm_start
+from asperity.core.checks import FloatArray
+from asperity.core.display import Displayable
+from asperity.core.errors import ParameterError
+from asperity.core.files import Serializable, open_input
+from asperity.core.version import __version__
+from asperity.kernels.tick import ServoSettings
 from asperity.laws import Law
-from asperity.recording.field import FILE, Field, field_of, read_field
+from asperity.loop import no_guards, replayed_device, servo_loop
+from asperity.loop.interface import LoopState
+from asperity.loop.loop_program import fuse_loop
+from asperity.loop.replayed_device import ReplayedDevice
+from asperity.recording import replay_trace
+from asperity.recording.recorded_field import (
+    TEXTURE_FILE,
+    RecordedField,
+    formula_digest,
+    has_digest,
+    read_field,
+    surface_field,
+)
 from asperity.recording.recording import Recording
+from asperity.recording.replay_trace import ReplayTrace
 from asperity.surface import Surface
-from asperity.textures.remade import remade_texture
+from asperity.textures.rebuild import rebuild_texture
 from asperity.textures.texture import Texture
-from asperity.version import __version__
 
-COMPARED = (
+COMPARED_COLUMNS = (
     "commanded x", "commanded y", "commanded z", "law anchor x", "law anchor y", "law held",
 )  # fmt: skip
-"""The columns that are computed again."""
+"""The columns that are computed and compared."""
 
 
 @dataclass(frozen=True)
-class Difference(Record):
-    """A number that comes out differently.
+class Difference(Serializable):
+    """A difference between recording and replay.
 
     Attributes:
         row: of the recording, from 0.
         time: of the sample [s].
         column: its name.
-        recorded: what the recording holds.
-        replayed: what the law gives now.
+        recorded_value: value in the recording.
+        replayed_value: value computed now.
     """
 
     row: int
     time: float
     column: str
-    recorded: float
-    replayed: float
+    recorded_value: float
+    replayed_value: float
 
 
 @dataclass(frozen=True)
-class Replay(Record, Displayed):
-    """What a replay found.
+class Replay(Serializable, Displayable):
+    """The result of a replay.
 
     Attributes:
-        path: of the recording.
-        rows: that were computed again.
-        differing: of these, rows of which a bit differs.
-        first: where it begins to differ; ``None`` if it does not.
-        largest: difference of a component of the force [N].
-        notes: what has changed since the recording, in sentences.
+        path: path of the recording.
+        rows: number of rows computed.
+        differing_rows: number of rows with a bit that differs.
+        first_difference: the first difference; ``None`` if there is none.
+        max_force_difference: largest difference of a component of the force [N].
+        notes: changes since the recording, in sentences.
     """
 
     path: str
     rows: int
-    differing: int
-    first: Difference | None
-    largest: float
+    differing_rows: int
+    first_difference: Difference | None
+    max_force_difference: float
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        same = f"{self.differing} differ" if self.differing else "the same bit for bit"
+        same = f"{self.differing_rows} differ" if self.differing_rows else "the same bit for bit"
         return f"<Replay of {self.rows} rows, {same}>"
 
     @property
-    def same(self) -> bool:
+    def is_identical(self) -> bool:
         """Whether every row is the same, bit for bit."""
-        return self.differing == 0
+        return self.differing_rows == 0
 
 
 def replay(recording: Recording, surface: Surface | None = None) -> Replay:
-    """Return whether the law gives the forces that a recording holds, bit for bit.
+    """Replay a recording, and compare the forces of the law bit for bit.
 
-    Position by position the servo's tick is done again: steps of the encoder, law, virtual damping,
+    The servo's tick is computed for each position: steps of the encoder, law, virtual damping,
     limit and steps of the force, with the law's and the servo's state carried from the first row.
 
     Args:
@@ -97,32 +106,44 @@ def replay(recording: Recording, surface: Surface | None = None) -> Replay:
         ParameterError: for a recording without rows, one that lacks a column, leaves samples out or
             holds no surface.
     """
-    said = _surface_of(recording)
+    surface_data = _surface_metadata(recording)
     if not recording.rows:
         raise ParameterError("recording", "has no rows to replay")
-    settings = _settings(recording.about)
-    field = _field(recording, said) if surface is None else field_of(surface)
+    settings = _servo_settings(recording.metadata)
+    field = _load_field(recording, surface_data) if surface is None else surface_field(surface)
     found = _Comparison()
-    for first, block, forces in _replayed(recording, field, settings):
-        found.see(first, block, forces)
-    notes = (*changes(recording, field.law), *_others(said, surface))
+    for first, block, forces in _replay_blocks(recording, field, settings):
+        found.compare(first, block, forces)
+    notes = (
+        *describe_changes(recording, field.law),
+        *_describe_other_surface(surface_data, surface),
+    )
     return Replay(
-        str(recording.path), found.rows, found.differing, found.first, found.largest, notes
+        str(recording.path),
+        found.rows,
+        found.differing_rows,
+        found.first_difference,
+        found.max_force_difference,
+        notes,
     )
 
 
-def recorded_on(recording: Recording, texture: Texture) -> Surface:
+def recorded_surface_on(recording: Recording, texture: Texture) -> Surface:
     """Return the surface that a recording names, on another texture.
 
     Raises:
         ParameterError: if it names none, or one that cannot be had here.
     """
-    said = _surface_of(recording)
+    surface_data = _surface_metadata(recording)
     try:
         return Surface(
-            texture, str(said["law"]), said["stiffness"], said["max_depth"], clamp=said["clamp"],
-            law_parameters=said["parameters"],
-        )  # fmt: skip
+            texture,
+            str(surface_data["law"]),
+            surface_data["stiffness"],
+            surface_data["max_depth"],
+            clamp=surface_data["clamp"],
+            law_parameters=surface_data["parameters"],
+        )
     except (KeyError, TypeError) as error:
         raise ParameterError("recording", f"names no whole surface: {error!r}") from None
 
@@ -133,44 +154,44 @@ def recorded_texture(recording: Recording) -> Texture:
     Raises:
         ParameterError: if it holds none, or one that cannot be had here.
     """
-    said = _surface_of(recording)
-    field = _field(recording, said)
-    described = said.get("texture")
+    surface_data = _surface_metadata(recording)
+    field = _load_field(recording, surface_data)
+    described = surface_data.get("texture")
     described = described if isinstance(described, Mapping) else {}
-    texture = remade_texture(field.texture, field.sampler, described)
-    if texture is None or numbers_content(texture.arguments) != said.get("texture_content"):
+    texture = rebuild_texture(field.texture, field.sampler, described)
+    if texture is None or not has_digest(texture.arguments, surface_data):
         words = f"has a texture of a kind of your own, {described.get('kind')}, that cannot be made"
         raise ParameterError("recording", f"{words} again: describe() must name its arguments")
     return texture
 
 
-def _surface_of(recording: Recording) -> Mapping[str, Any]:
-    said = recording.about.get("surface")
-    if not isinstance(said, Mapping):
+def _surface_metadata(recording: Recording) -> Mapping[str, Any]:
+    surface_data = recording.metadata.get("surface")
+    if not isinstance(surface_data, Mapping):
         raise ParameterError("recording", "does not say which surface it was made on")
-    return said
+    return surface_data
 
 
-def recorded_field(recording: Recording) -> Field:
+def recorded_field(recording: Recording) -> RecordedField:
     """Return the force field that a recording holds.
 
     Raises:
         ParameterError: if it holds none, or one that is not known here.
     """
-    return _field(recording, _surface_of(recording))
+    return _load_field(recording, _surface_metadata(recording))
 
 
-def _field(recording: Recording, said: Mapping[str, Any]) -> Field:
-    data = recording.attached(FILE)
+def _load_field(recording: Recording, metadata: Mapping[str, Any]) -> RecordedField:
+    data = recording.attachment(TEXTURE_FILE)
     if data is None:
         words = "does not hold its surface, which was too large: name it, --surface SURFACE"
         raise ParameterError("recording", words)
-    return read_field(said, data)
+    return read_field(metadata, data)
 
 
-def _settings(about: Mapping[str, Any]) -> ServoSettings:
+def _servo_settings(metadata: Mapping[str, Any]) -> ServoSettings:
     """Return the settings of the servo that a recording names."""
-    every, servo = about.get("every", 1), about.get("servo")
+    every, servo = metadata.get("every", 1), metadata.get("servo")
     if every != 1:
         words = f"holds each {every}th sample only; the state of the loop goes from one to the next"
         raise ParameterError("recording", f"cannot be replayed: it {words}")
@@ -182,33 +203,29 @@ def _settings(about: Mapping[str, Any]) -> ServoSettings:
         raise ParameterError("recording", "does not say the settings of its servo") from None
 
 
-@lru_cache(maxsize=16)
-def _loops(law: Law, sampler: tuple[ModuleType, ...], clamp: ClampName) -> ModuleType:
-    from asperity.kernels import tick
-    from asperity.kernels.fuse import fuse_on_texture
-    from asperity.recording import kernels
-
-    return fuse_on_texture(law, sampler, clamp, (kernels,), (tick,))
-
-
-def _replayed(
-    recording: Recording, field: Field, settings: ServoSettings
+def _replay_blocks(
+    recording: Recording, field: RecordedField, settings: ServoSettings
 ) -> Iterator[tuple[int, FloatArray, FloatArray]]:
     """Yield number of the first row, time and recorded columns, and the same computed again."""
     names = recording.names
-    for name in ("x", "y", "z", *COMPARED):
+    for name in ("x", "y", "z", *COMPARED_COLUMNS):
         if name not in names:
             raise ParameterError("recording", f"cannot be replayed: it has no column {name!r}")
     point = [names.index(axis) for axis in "xyz"]
-    compared = [0, *(names.index(name) for name in COMPARED)]
-    loops, state, first = _loops(field.law, field.sampler, field.clamp), ServoState(), 0
-    memory = new_memory(field.law.contact.looks)
+    compared = [0, *(names.index(name) for name in COMPARED_COLUMNS)]
+    parts = servo_loop, no_guards, replayed_device, replay_trace
+    loops = fuse_loop(field.law, field.sampler, field.clamp, *parts)
+    state, first = LoopState(), 0
+    memory = new_warm_start(field.law.contact.max_evaluations)
     for block in recording.blocks():
         _check_times(block[:, 0], first, settings.period)
         points = np.ascontiguousarray(block[:, point])
-        out = np.empty((len(block), len(COMPARED)))
-        arguments = field.texture, field.law_arguments
-        state = loops.replay_batch(points, first, state, settings, memory, *arguments, out)
+        out = np.empty((len(block), len(COMPARED_COLUMNS)))
+        device = ReplayedDevice(points, np.zeros(1, np.int64))
+        _cause, _code, state = loops.servo_loop(
+            state, first + len(block), settings, (), (), device, ReplayTrace(out, first), memory,
+            field.texture, field.law_arguments,
+        )  # fmt: skip
         yield first, block[:, compared], out
         first += len(block)
 
@@ -223,54 +240,57 @@ def _check_times(times: FloatArray, first: int, period: float) -> None:
 
 
 class _Comparison:
-    """Counts rows that differ."""
+    """Counts the rows that differ."""
 
     def __init__(self) -> None:
-        self.rows = self.differing = 0
-        self.first: Difference | None = None
-        self.largest = 0.0
+        self.rows = self.differing_rows = 0
+        self.first_difference: Difference | None = None
+        self.max_force_difference = 0.0
 
-    def see(self, first: int, block: FloatArray, replayed: FloatArray) -> None:
+    def compare(self, first: int, block: FloatArray, replayed: FloatArray) -> None:
         """Compare a block, its time first, with what was computed again."""
         recorded = np.ascontiguousarray(block[:, 1:])
         differs = recorded.view(np.int64) != replayed.view(np.int64)
         rows = np.flatnonzero(differs.any(axis=1))
         self.rows += len(block)
-        self.differing += len(rows)
+        self.differing_rows += len(rows)
         if not len(rows):
             return
         forces = np.abs(recorded[rows, :3] - replayed[rows, :3])
-        self.largest = max(self.largest, float(np.nanmax(forces, initial=0.0)))
-        if self.first is None:
+        self.max_force_difference = max(
+            self.max_force_difference, float(np.nanmax(forces, initial=0.0))
+        )
+        if self.first_difference is None:
             row = int(rows[0])
             column = int(np.flatnonzero(differs[row])[0])
-            self.first = Difference(
-                first + row, float(block[row, 0]), COMPARED[column],
+            self.first_difference = Difference(
+                first + row, float(block[row, 0]), COMPARED_COLUMNS[column],
                 float(recorded[row, column]), float(replayed[row, column]),
             )  # fmt: skip
 
 
-def changes(recording: Recording, law: Law) -> Iterator[str]:
-    """Yield what is not as it was when the recording was made, in sentences."""
-    said = _surface_of(recording)
+def describe_changes(recording: Recording, law: Law) -> Iterator[str]:
+    """Yield the changes since the recording, in sentences."""
+    surface_data = _surface_metadata(recording)
     if recording.version != __version__:
         yield f"Recorded by asperity {recording.version}; this is {__version__}."
-    if said.get("formula") != formula_content(law):
-        yield f"The formula of law {said.get('law')} is another one than it was."
-    files = recording.about.get("files")
+    if surface_data.get("formula") != formula_digest(law):
+        yield f"The formula of law {surface_data.get('law')} is another one than it was."
+    files = recording.metadata.get("files")
     for name, content in files.items() if isinstance(files, Mapping) else ():
-        now = file_content(name)
+        now = file_digest(name)
         if now is not None and now != content:
             yield f"The file {name} has changed since; the recording holds its own copy."
 
 
-def _others(said: Mapping[str, Any], surface: Surface | None) -> Iterator[str]:
-    if surface is not None and surface_content(surface) != said.get("content"):
-        now = surface_content(surface)
-        yield f"Recorded on another surface: content {said.get('content')}, this is {now}."
+def _describe_other_surface(metadata: Mapping[str, Any], surface: Surface | None) -> Iterator[str]:
+    recorded = str(metadata.get("content"))
+    # The digests of older recordings, of 12 digits, cannot be compared.
+    if surface is not None and len(recorded) != 12 and surface.digest != recorded:
+        yield f"Recorded on another surface: content {recorded}, this is {surface.digest}."
 
 
-def file_content(path: str | Path) -> str | None:
+def file_digest(path: str | Path) -> str | None:
     """Return a hash of a file; ``None`` if it cannot be read."""
     try:
         with open_input(path) as stream:

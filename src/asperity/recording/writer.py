@@ -1,10 +1,9 @@
-"""Writing a recording, row by row as they come, so that what is written can always be read.
+"""Writing of recordings, row by row, readable at any time.
 
-Rows wait in memory until there is a block of them, or half a second has gone by, and go to the
-system in one piece. Killed at any moment a process loses at most what waited and the block that
-was being written: less than a second. What the system holds survives the process, not a loss of
-power: Linux brings it to the disk within half a minute, and :meth:`RecordingWriter.close` waits
-until it is there.
+Rows are buffered until a block is full, or for half a second, and are written in one piece. A
+process that is killed loses at most the buffered rows and the block under way: less than a second.
+Written data survive the process, but not a loss of power: Linux writes them to the disk within half
+a minute, and :meth:`RecordingWriter.close` waits for it.
 """
 
 from __future__ import annotations
@@ -18,35 +17,42 @@ from typing import Any, Self
 
 import numpy as np
 
-from asperity.checks import FloatArray
-from asperity.errors import ParameterError
-from asperity.files import json_text, whole_file
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError
+from asperity.core.files import json_text, open_atomic
+from asperity.core.version import __version__
 from asperity.recording import mcap
-from asperity.recording.rows import Columns, blank_rows, checked_table, fill_rows, schema_text
-from asperity.version import __version__
+from asperity.recording.row_encoding import (
+    Columns,
+    check_table,
+    message_template,
+    schema_text,
+    write_messages,
+)
 
 FORMAT = 1
-"""Version of what a recording says of itself."""
-NAME = "asperity"
-"""Of the metadata, of the channel and of the schema."""
-LONGEST_WAIT = 0.5
-"""[s] that rows wait at most for the next ones."""
-# Rows of a block: 0.4 s of a loop at 10 kHz, a megabyte.
-_BLOCK = 4096
+"""Version of the metadata of a recording."""
+SCHEMA_NAME = "asperity"
+"""Name of the metadata, of the channel and of the schema."""
+MAX_WAIT = 0.5
+"""Longest time that rows are buffered [s]."""
+# Rows of a block: 0.4 s of a loop at 10 kHz, one megabyte.
+_BLOCK_ROWS = 4096
 
 
 class RecordingWriter:
     """Writes a recording.
 
-    The file appears with its beginning whole, and replaces what was there. Rows are numbers in
-    columns; a loop that has stopped calls :meth:`flush`, since rows wait for the next ones.
+    The file appears with its complete head, and replaces an existing one. Rows are numbers in
+    columns; a loop that has stopped calls :meth:`flush`, since rows are buffered.
 
     Args:
         path: of the file.
         columns: names and units; the first is ``("time", "s")``.
-        about: what the recording says of itself, plain data; see :func:`asperity.files.plain`.
-        attached: files inside it, by name.
-        argument: what the path is called in messages.
+        metadata: what the recording says of itself, plain data; see
+            :func:`asperity.core.files.to_plain_data`.
+        attachments: files inside it, by name.
+        argument: name of the path in messages.
 
     Raises:
         ParameterError: if the file cannot be written, or a name cannot be that of a column.
@@ -66,19 +72,19 @@ class RecordingWriter:
         self,
         path: str | os.PathLike[str],
         columns: Columns,
-        about: Mapping[str, Any] | None = None,
-        attached: Mapping[str, bytes] | None = None,
+        metadata: Mapping[str, Any] | None = None,
+        attachments: Mapping[str, bytes] | None = None,
         argument: str = "path",
     ) -> None:
         self._path, self._columns, self._argument = Path(path), columns, argument
-        self._head = _head(columns, about or {}, attached or {})
-        self._blank = blank_rows(_BLOCK, len(columns))
-        self._waiting, self._since = 0, time.monotonic()
+        self._head = _encode_head(columns, metadata or {}, attachments or {})
+        self._messages = message_template(_BLOCK_ROWS, len(columns))
+        self._pending_rows, self._last_flush = 0, time.monotonic()
         self._chunks: list[mcap.Chunk] = []
         self.rows = 0
         """Rows that are written."""
         try:
-            with whole_file(path) as stream:
+            with open_atomic(path) as stream:
                 stream.write(self._head)
             self._file = open(path, "ab", buffering=0)  # noqa: SIM115 - closed by close()
         except OSError as error:
@@ -95,54 +101,54 @@ class RecordingWriter:
             ParameterError: for another shape; if the file cannot grow, which then ends with whole
                 blocks.
         """
-        table = checked_table(block, self._columns)
+        table = check_table(block, self._columns)
         while len(table):
-            room = min(len(table), len(self._blank) - self._waiting)
-            rows = self._blank[self._waiting : self._waiting + room]
-            fill_rows(rows, self.rows + self._waiting, table[:room])
-            self._waiting += room
+            room = min(len(table), len(self._messages) - self._pending_rows)
+            rows = self._messages[self._pending_rows : self._pending_rows + room]
+            write_messages(rows, self.rows + self._pending_rows, table[:room])
+            self._pending_rows += room
             table = table[room:]
-            if self._waiting == len(self._blank):
+            if self._pending_rows == len(self._messages):
                 self.flush()
-        if time.monotonic() - self._since >= LONGEST_WAIT:
+        if time.monotonic() - self._last_flush >= MAX_WAIT:
             self.flush()
 
     def flush(self) -> None:
-        """Write what waits.
+        """Write the buffered rows.
 
         Raises:
             ParameterError: see :meth:`append`.
         """
-        self._since = time.monotonic()
-        if not self._waiting:
+        self._last_flush = time.monotonic()
+        if not self._pending_rows:
             return
-        rows = self._blank[: self._waiting]
+        rows = self._messages[: self._pending_rows]
         logged, size = rows["logged"], np.uint64(rows.dtype.itemsize)
         index = np.stack([logged, np.arange(len(rows), dtype=np.uint64) * size], axis=1)
         times = int(logged[0]), int(logged[-1])
         data = rows.view(np.uint8).data
-        chunk, parts = mcap.chunk(self._size, data, times, index.tobytes())
-        self._waiting = 0
+        chunk, parts = mcap.encode_chunk(self._size, data, times, index.tobytes())
+        self._pending_rows = 0
         self._write(*parts)
         self._chunks.append(chunk)
         self.rows += len(rows)
 
     def close(self) -> None:
-        """Write what waits, the index for readers that seek, and wait for the disk.
+        """Write the buffered rows and the index, and wait for the disk.
 
         Raises:
-            ParameterError: see :meth:`append`; what is written can be read all the same.
+            ParameterError: see :meth:`append`; written rows can be read.
         """
         if self._file.closed:
             return
         self.flush()
-        self._write(mcap.ending(self._head, self._chunks, self.rows, self._size))
-        with suppress(OSError):  # a device such as /dev/null has nothing to wait for
+        self._write(mcap.encode_summary(self._head, self._chunks, self.rows, self._size))
+        with suppress(OSError):  # a device such as /dev/null cannot be synchronized
             os.fsync(self._file.fileno())
         self._file.close()
 
     def _write(self, *parts: bytes | memoryview) -> None:
-        """Write parts that belong together, all of them or none."""
+        """Write all parts, or none."""
         try:
             for part in parts:
                 left = memoryview(part)
@@ -153,8 +159,8 @@ class RecordingWriter:
                 self._file.truncate(self._size)
             self._file.close()
             words = f"cannot be written any further ({error.strerror})"
-            kept = f"{self.rows} rows are in {self._path}"
-            raise ParameterError(self._argument, f"{words}: {kept}") from None
+            rows_text = f"{self.rows} rows are in {self._path}"
+            raise ParameterError(self._argument, f"{words}: {rows_text}") from None
         self._size += sum(map(len, parts))
 
     def __enter__(self) -> Self:
@@ -164,15 +170,15 @@ class RecordingWriter:
         self.close()
 
 
-def _head(columns: Columns, about: Mapping[str, Any], attached: Mapping[str, bytes]) -> bytes:
-    said = {
-        "format": str(FORMAT),
-        "version": __version__,
-        "about": json_text(about),
-    }
-    head = mcap.header(f"asperity {__version__}")
-    head += mcap.schema(f"{NAME}/Row", schema_text(columns)) + mcap.channel(f"/{NAME}")
-    head += mcap.metadata(NAME, said)
-    for name, data in attached.items():
-        head += mcap.attachment(name, "application/octet-stream", data)
+def _encode_head(
+    columns: Columns, metadata: Mapping[str, Any], attachments: Mapping[str, bytes]
+) -> bytes:
+    texts = {"format": str(FORMAT), "version": __version__, "about": json_text(metadata)}
+    head = mcap.encode_header(f"asperity {__version__}")
+    head += mcap.encode_schema(f"{SCHEMA_NAME}/Row", schema_text(columns)) + mcap.encode_channel(
+        f"/{SCHEMA_NAME}"
+    )
+    head += mcap.encode_metadata(SCHEMA_NAME, texts)
+    for name, data in attachments.items():
+        head += mcap.encode_attachment(name, "application/octet-stream", data)
     return head

@@ -1,42 +1,34 @@
-"""Results for reading: tables for a terminal, pictures, one HTML file.
-
-Everything is imported when it is first used: a table needs no matplotlib.
-"""
+"""Reports of results: text for a terminal, figures, notebook output and HTML files."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from asperity.report.comparison_report import comparison_table as comparison_table
+from asperity.report.page import add_section as add_section
+from asperity.report.views import html_text as html_text
+from asperity.report.views import notebook_html as notebook_html
+from asperity.report.views import rich_renderables as rich_renderables
+
 if TYPE_CHECKING:
-    from asperity.report.analysis import print_analysis as print_analysis
-    from asperity.report.comparison import comparison_table as comparison_table
-    from asperity.report.comparison import print_comparison as print_comparison
-    from asperity.report.html import html_text as html_text
-    from asperity.report.notebook import notebook_html as notebook_html
-    from asperity.report.notebook import printed as printed
-    from asperity.report.page import add_section as add_section
-    from asperity.report.pictures.plots import plot as plot
+    from asperity.report.pictures.plotting import plot as plot
 
-_HOMES = {
-    "add_section": "asperity.report.page",
-    "comparison_table": "asperity.report.comparison",
-    "html_text": "asperity.report.html",
-    "notebook_html": "asperity.report.notebook",
-    "plot": "asperity.report.pictures.plots",
-    "print_analysis": "asperity.report.analysis",
-    "print_comparison": "asperity.report.comparison",
-    "printed": "asperity.report.notebook",
-}
-
-__all__ = list(_HOMES)
+__all__ = [
+    "add_section",
+    "comparison_table",
+    "html_text",
+    "notebook_html",
+    "plot",
+    "rich_renderables",
+]
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name != "plot":  # the only function that needs Matplotlib
         raise AttributeError(f"module 'asperity.report' has no attribute {name!r}")
-    import importlib
+    from asperity.report.pictures.plotting import plot
 
-    return getattr(importlib.import_module(_HOMES[name]), name)
+    return plot
 
 
 def __dir__() -> list[str]:

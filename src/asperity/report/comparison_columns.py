@@ -1,4 +1,4 @@
-"""What a comparison says of each law: the columns of its tables."""
+"""Columns of the tables that compare laws."""
 
 from __future__ import annotations
 
@@ -6,248 +6,248 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.compare import Comparison
-from asperity.analysis.passivity.judgement import Basis
-from asperity.analysis.row import LawRow
-from asperity.analysis.words.felt import tier_text
-from asperity.analysis.words.passivity import allowed_text
-from asperity.arguments import Argument
-from asperity.report import page
-from asperity.report.words.number_words import (
-    NONE,
-    SAMPLED,
+from asperity.analysis.comparison_result import LawRow
+from asperity.analysis.passivity.verdict import Basis
+from asperity.analysis.sentences.passivity_sentences import stability_limit_text
+from asperity.analysis.sentences.perceptibility_sentences import tier_text
+from asperity.core.arguments import Argument
+from asperity.core.units import format_quantity, round_down
+from asperity.report.page import Cell, Row, Table, TableLayout
+from asperity.report.sentences.number_text import (
+    NOT_AVAILABLE,
+    SAMPLED_MARK,
     bound_text,
     force_text,
-    holds_text,
-    in_one_unit,
+    format_in_one_unit,
     is_sampled,
-    law_title,
     leak_text,
     limit_text,
     merit_text,
+    readable_name,
     strength_has_unit,
+    yes_no_text,
 )
 from asperity.textures.catalogue import CATALOGUE
-from asperity.units import engineering, rounded_down
 
-_VERDICT_FROM = 72
-"""Console width [characters] from which the verdicts stand in the table, not below it."""
+VERDICT_MIN_CONSOLE = 72
+"""Console width [characters] from which the verdicts are in the table, not below it."""
+_WIDE_GAP_CONSOLE = 90
+"""Console width [characters] from which columns are two characters apart."""
 
 
 @dataclass(frozen=True)
-class Column:
+class LawColumn:
     """A column of the table of laws.
 
     Attributes:
         heading: in a terminal, broken into lines.
-        cell: what it says of a law.
-        number: whether it is set to the right.
-        least: width of the console [characters] from which it is shown.
-        means: what it means, in a few words; empty where the heading says it.
+        cell: returns the cell of a law.
+        is_numeric: whether it is aligned to the right.
+        min_console: console width [characters] from which it is shown.
     """
 
     heading: str
-    cell: Callable[[LawRow, Comparison], page.Cell]
-    number: bool = False
-    least: int = 0
-    means: str = ""
+    cell: Callable[[LawRow, Comparison], Cell]
+    is_numeric: bool = False
+    min_console: int = 0
 
 
-_WORTHS: dict[Basis, str] = {
+_BASIS_TEXT: dict[Basis, str] = {
     "proved": "proved",
     "plausible": "plausible",
     "bounded": "bounded",
     "quiet against buzz": "quiet",
     "none": "–",
 }
-# Of maps and profiles, which are no arguments of a kind.
-_LENGTHS = {"pitch", "cutoff"}
-_UNSAID = {"kind", "preparation", "phase", "direction", "phases", "wavevectors"}
+# Lengths of maps and profiles, which are not arguments of a kind.
+_LENGTH_NAMES = {"pitch", "cutoff"}
+_OMITTED_NAMES = {"kind", "preparation", "phase", "direction", "phases", "wavevectors"}
 
 
-# --- what it says of each law, in words -----------------------------------------------------------
+# --- cells ----------------------------------------------------------------------------------------
 
 
-def stiffness_text(row: LawRow) -> str:
-    """Return the stiffness up to which the device renders the law: "995 N/m", or "none"."""
+def row_limit_text(row: LawRow) -> str:
+    """Return the stability limit of the stiffness on the device: "995 N/m", or "none"."""
     if row.safe_stiffness <= 0.0:
         return "none"
-    mark = SAMPLED if row.allowed.sampled else ""
-    return f"{mark}{engineering(rounded_down(row.safe_stiffness), 'N/m')}"
+    mark = SAMPLED_MARK if row.stability_limit.sampled else ""
+    return f"{mark}{format_quantity(round_down(row.safe_stiffness), 'N/m')}"
 
 
-def any_sampled(comparison: Comparison) -> bool:
-    """Return whether any number of the table carries the ~."""
+def has_sampled(comparison: Comparison) -> bool:
+    """Return whether any number of the table is marked with ~."""
     return any(
         is_sampled(row.q) or is_sampled(row.one_sided) or row.leak.method == "sampled"
         for row in comparison.rows
     )
 
 
-def described(description: dict[str, Any]) -> str:
-    """Return the kind of a texture and its plain arguments in words.
+def describe_texture(description: dict[str, Any]) -> str:
+    """Return the kind of a texture and its plain arguments as text.
 
     Example:
-        >>> described({"kind": "sinusoid", "amplitude": 8e-4, "period": 1e-3, "phase": 0.0})
+        >>> describe_texture({"kind": "sinusoid", "amplitude": 8e-4, "period": 1e-3, "phase": 0.0})
         'sinusoid: amplitude 0.8 mm, period 1 mm'
     """
     kind = CATALOGUE.get(description["kind"])
     declared = {} if kind is None else {argument.name: argument for argument in kind.arguments}
     parts = []
     for name, value in description.items():
-        if name in _UNSAID:
+        if name in _OMITTED_NAMES:
             continue
         values = value if isinstance(value, list) else [value]
         if len(values) > 4:
             parts.append(f"{len(values)} {name}")
             continue
-        shown = [_value_text(name, one, declared.get(name)) for one in values]
-        parts.append(f"{law_title(name)} {' × '.join(shown)}")
+        texts = [_value_text(name, one, declared.get(name)) for one in values]
+        parts.append(f"{readable_name(name)} {' × '.join(texts)}")
     return f"{description['kind']}: {', '.join(parts)}"
 
 
 def _value_text(name: str, value: Any, argument: Argument | None) -> str:
     if isinstance(value, bool):
-        return holds_text(value)
+        return yes_no_text(value)
     if argument is not None:
-        return argument.readable(value)
-    return engineering(value, "m") if name in _LENGTHS and isinstance(value, float) else f"{value}"
+        return argument.format_value(value)
+    is_length = name in _LENGTH_NAMES and isinstance(value, float)
+    return format_quantity(value, "m") if is_length else f"{value}"
 
 
 # --- tables ---------------------------------------------------------------------------------------
 
 
-def start_text(row: LawRow) -> str:
-    """Return the stiffness to begin with: "3050 N/m", or "none"."""
-    return limit_text(row.start) if row.start else "none"
+def recommended_stiffness_text(row: LawRow) -> str:
+    """Return the recommended stiffness: "3050 N/m", or "none"."""
+    return limit_text(row.recommended_stiffness) if row.recommended_stiffness else "none"
 
 
-def _texture_text(row: LawRow, comparison: Comparison) -> str:
-    """Return RMS of the texture that the device shows, all laws in one unit."""
-    if row.felt is None:
-        return NONE
-    forces = [row.shown_force, *(other.shown_force for other in comparison.rows)]
-    return in_one_unit(forces, "N", digits=2)[0]
+def _recommendation_cell(row: LawRow, _comparison: Comparison) -> Cell:
+    return Cell(recommended_stiffness_text(row), note=stability_limit_text(row.stability_limit))
 
 
-_LETTER = Column("law", lambda row, _: page.Cell(row.law.letter, "l"))
-TITLE = Column("name", lambda row, _: page.Cell(law_title(row.law.name)), least=112)
-VERDICT = Column("verdict", lambda row, _: page.Cell(row.verdict), least=_VERDICT_FROM)
-SHORT = (
-    _LETTER,
-    TITLE,
-    Column(
-        "start at",
-        lambda row, _: page.Cell(start_text(row), note=allowed_text(row.allowed)), True,
-        means="stiffness to begin with on this device; none: no stiffness is known to do",
-    ),
-    Column(
-        "texture", lambda row, all_: page.Cell(_texture_text(row, all_)), True, 44,
-        "RMS of the force that is texture and that the device resolves, at the start",
-    ),
-    Column(
-        "felt?", lambda row, _: page.Cell(tier_text(row.felt)),
-        means="whether a hand can feel that on this device",
-    ),
-    Column(
-        "feeds?",
-        lambda row, all_: page.Cell(leak_text(row, all_), note=row.leak.description), True, 44,
-        "energy that one loop can give to the hand: the surface feels alive; 0: proved none",
-    ),
-    Column(
-        "clicks?",
-        lambda row, _: page.Cell(holds_text(row.jumps), note=row.continuous_reason), least=36,
-        means="whether the force jumps",
-    ),
-)  # fmt: skip
-FULL = (
-    _LETTER,
-    TITLE,
-    Column(
-        "q", lambda row, _: page.Cell(bound_text(row.q), note=f"{row.q.method}: {row.q.note}"),
-        True, means="by how much the law multiplies stiffness at worst; smaller is better",
-    ),
-    Column(
-        "q⁺",
-        lambda row, _: page.Cell(
-            bound_text(row.one_sided), note=f"{row.one_sided.method}: {row.one_sided.note}"
-        ),
-        True, means="the same where only what stiffens counts: no delay",
-    ),
-    Column(
-        "stiffness\nup to", lambda row, _: page.Cell(stiffness_text(row)), True,
-        means="limit on this device; the start is below it",
-    ),
-    Column(
-        "worth",
-        lambda row, _: page.Cell(_WORTHS[row.allowed.basis], note=allowed_text(row.allowed)),
-        means="proved passive; bounded: but for steps of an encoder; plausible: a smooth wall of "
-        "that gain held, no proof; quiet: against buzz, yet it feeds the hand below v*",
-        least=60,
-    ),
-    Column(
-        "conser-\nvative",
-        lambda row, _: page.Cell(holds_text(row.conservative), note=row.conservative_reason),
-        means="no closed path of the field gives energy", least=80,
-    ),
-    Column(
-        "worst\nleak",
-        lambda row, all_: page.Cell(leak_text(row, all_), note=row.leak.description),
-        True, 60, "energy that one loop can give to the hand",
-    ),
-    Column(
-        "contin-\nuous",
-        lambda row, _: page.Cell(holds_text(row.continuous), note=row.continuous_reason),
-        means="the force does not jump", least=80,
-    ),
-    Column(
-        "T", lambda row, _: page.Cell(merit_text(row.strength)), True, 80,
-        "strength of the texture for the same q",
-    ),
-    Column(
-        "S", lambda row, _: page.Cell(merit_text(row.support)), True, 80,
-        "support of the hand for the same q",
-    ),
-    Column(
-        "texture\nforce",
-        lambda row, _: page.Cell(
-            force_text(row.texture_force) if row.start or row.textureless else NONE
-        ),
-        True, 80, "RMS of all that oscillates, at the start",
-    ),
-)  # fmt: skip
+def _texture_force_cell(row: LawRow, comparison: Comparison) -> Cell:
+    """Return the RMS texture force that the device resolves, all laws in one unit."""
+    if row.perceptibility is None:
+        return Cell(NOT_AVAILABLE)
+    forces = [row.resolved_force, *(other.resolved_force for other in comparison.rows)]
+    return Cell(format_in_one_unit(forces, "N", digits=2)[0])
 
 
-def _heading(column: Column, comparison: Comparison) -> str:
+def _leak_cell(row: LawRow, comparison: Comparison) -> Cell:
+    return Cell(leak_text(row, comparison), note=row.leak.description)
+
+
+def _continuity_cell(row: LawRow, value: bool | None) -> Cell:
+    return Cell(yes_no_text(value), note=row.continuous_reason)
+
+
+def _conservation_cell(row: LawRow, _comparison: Comparison) -> Cell:
+    return Cell(yes_no_text(row.conservative), note=row.conservative_reason)
+
+
+def _basis_cell(row: LawRow, _comparison: Comparison) -> Cell:
+    limit = row.stability_limit
+    return Cell(_BASIS_TEXT[limit.basis], note=stability_limit_text(limit))
+
+
+def _oscillation_cell(row: LawRow, _comparison: Comparison) -> Cell:
+    has_force = row.recommended_stiffness or row.is_textureless
+    return Cell(force_text(row.texture_force) if has_force else NOT_AVAILABLE)
+
+
+def _bound_cell(bound: Bound) -> Cell:
+    return Cell(bound_text(bound), note=f"{bound.method}: {bound.note}")
+
+
+_MEANINGS = {
+    "start at": "recommended stiffness on this device; none: no stable stiffness is known",
+    "texture": "RMS of the texture force that the device resolves, at that stiffness",
+    "felt?": "whether a hand perceives that force on this device",
+    "feeds?": "energy per loop given to the hand: the surface feels alive; 0: proved none",
+    "clicks?": "whether the force jumps",
+    "q": "greatest factor by which the law multiplies stiffness; smaller is better",
+    "q⁺": "the same for the stiffening part alone: no delay",
+    "stiffness up to": "stability limit on this device; the recommended stiffness is at most this",
+    "basis": "basis of the limit: proved passive; bounded: proved except for encoder steps; "
+    "plausible: a smooth wall of that gain was stable, no proof; quiet: the same for a law that "
+    "delivers energy below v*",
+    "verdict": "v* is the speed below which the device dissipates less than the field delivers",
+    "conservative": "no closed path of the field gains energy",
+    "worst leak": "energy that one loop can give to the hand",
+    "continuous": "the force does not jump",
+    "T": "strength of the texture at equal q",
+    "S": "support of the hand at equal q",
+    "texture force": "RMS of the oscillating force, at the recommended stiffness",
+}
+_LETTER_COLUMN = LawColumn("law", lambda row, _: Cell(row.law.letter, "l"))
+NAME_COLUMN = LawColumn("name", lambda row, _: Cell(readable_name(row.law.name)), False, 112)
+VERDICT_COLUMN = LawColumn("verdict", lambda row, _: Cell(row.verdict), False, VERDICT_MIN_CONSOLE)
+SUMMARY_COLUMNS = (
+    _LETTER_COLUMN,
+    NAME_COLUMN,
+    LawColumn("start at", _recommendation_cell, True),
+    LawColumn("texture", _texture_force_cell, True, 44),
+    LawColumn("felt?", lambda row, _: Cell(tier_text(row.perceptibility))),
+    LawColumn("feeds?", _leak_cell, True, 44),
+    LawColumn("clicks?", lambda row, _: _continuity_cell(row, row.has_jumps), False, 36),
+)
+FULL_COLUMNS = (
+    _LETTER_COLUMN,
+    NAME_COLUMN,
+    LawColumn("q", lambda row, _: _bound_cell(row.q), True),
+    LawColumn("q⁺", lambda row, _: _bound_cell(row.one_sided), True),
+    LawColumn("stiffness\nup to", lambda row, _: Cell(row_limit_text(row)), True),
+    LawColumn("basis", _basis_cell, False, 60),
+    LawColumn("conser-\nvative", _conservation_cell, False, 80),
+    LawColumn("worst\nleak", _leak_cell, True, 60),
+    LawColumn("contin-\nuous", lambda row, _: _continuity_cell(row, row.continuous), False, 80),
+    LawColumn("T", lambda row, _: Cell(merit_text(row.strength)), True, 80),
+    LawColumn("S", lambda row, _: Cell(merit_text(row.support)), True, 80),
+    LawColumn("texture\nforce", _oscillation_cell, True, 80),
+)
+
+
+def _heading(column: LawColumn, comparison: Comparison) -> str:
     unit = " [m]" if column.heading == "T" and strength_has_unit(comparison) else ""
     return f"{column.heading}{unit}"
 
 
-def plain(heading: str) -> str:
+def single_line(heading: str) -> str:
     """Return a heading in one line."""
     return heading.replace("-\n", "").replace("\n", " ")
 
 
-def _rows(
-    comparison: Comparison, cells: Callable[[LawRow], Sequence[str | page.Cell]]
-) -> list[page.Row]:
+def _law_rows(comparison: Comparison, cells: Callable[[LawRow], Sequence[str | Cell]]) -> list[Row]:
     """Return a row per law, the recommended one marked."""
     best = comparison.recommended_row
     return [
-        page.Row(cells(row), "best" if row is best else "", law=row.law.letter)
+        Row(cells(row), "best" if row is best else "", law=row.law.letter)
         for row in comparison.rows
     ]
 
 
-def table_of(comparison: Comparison, columns: Sequence[Column]) -> page.Table:
+def laws_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
     """Return one row per law with these columns."""
-    rows = _rows(comparison, lambda row: [one.cell(row, comparison) for one in columns])
-    numbers = [i for i, one in enumerate(columns) if one.number]
-    return page.Table([_heading(one, comparison) for one in columns], rows, numbers)
-
-
-def verdicts(comparison: Comparison) -> page.Table:
-    """Return each law's letter and what will go wrong with it."""
-    return page.Table(
-        (), _rows(comparison, lambda row: [page.Cell(row.law.letter, "l"), row.verdict])
+    rows = _law_rows(comparison, lambda row: [one.cell(row, comparison) for one in columns])
+    names = [single_line(one.heading) for one in columns]
+    meanings = dict(_MEANINGS)
+    if not any("v*" in row.verdict for row in comparison.rows):
+        del meanings["verdict"]
+    layout = TableLayout(
+        wrap=[i for i, one in enumerate(columns) if one in (NAME_COLUMN, VERDICT_COLUMN)],
+        max_widths={i: 24 for i, one in enumerate(columns) if one is NAME_COLUMN},
+        min_console={i: one.min_console for i, one in enumerate(columns)},
+        legend={i: (name, meanings[name]) for i, name in enumerate(names) if name in meanings},
+        tight_below=_WIDE_GAP_CONSOLE,
     )
+    numeric = [i for i, one in enumerate(columns) if one.is_numeric]
+    return Table([_heading(one, comparison) for one in columns], rows, numeric, layout)
+
+
+def verdicts_table(comparison: Comparison) -> Table:
+    """Return the letter and the verdict of each law."""
+    rows = _law_rows(comparison, lambda row: [Cell(row.law.letter, "l"), row.verdict])
+    return Table((), rows)

@@ -1,41 +1,195 @@
-"""The page of a result, whichever it is, as one HTML file that needs no network."""
+"""HTML: a page as one file that needs no network, and a result in a notebook cell."""
 
 from __future__ import annotations
 
-from typing import Any
+import base64
+import hashlib
+import os
+import re
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from importlib import resources
+from importlib.metadata import version
+from typing import TYPE_CHECKING
 
-from asperity.analysis.analysis_result import Analysis
-from asperity.analysis.compare import Comparison
-from asperity.analysis.limits.limit_result import Limits
-from asperity.analysis.several import Comparisons
-from asperity.files import digest, json_text
-from asperity.report.analysis import analysis_page
-from asperity.report.comparison import comparison_page
-from asperity.report.limits import limits_page
-from asperity.report.page import Origin, own_look, page_html
-from asperity.report.several import comparisons_page
-from asperity.report.show import shown_page
-from asperity.textures.shown import Shown
+from asperity.core.cache import content_digest, get_or_compute
+from asperity.core.processes import precompute
+from asperity.core.version import __version__
+from asperity.report.page import (
+    Cards,
+    Media,
+    Page,
+    Paragraph,
+    Picture,
+    Section,
+    Table,
+    default_style,
+)
 
-_PAGES: dict[type, Any] = {
-    Analysis: analysis_page,
-    Comparison: comparison_page,
-    Comparisons: comparisons_page,
-    Limits: limits_page,
-    Shown: shown_page,
-}
+if TYPE_CHECKING:
+    import jinja2
 
 
-def html_text(result: Comparison | Comparisons | Analysis | Limits | Shown) -> str:
-    """Return the report: answer, tables, pictures, pedigree and assumptions, in one HTML text.
+@dataclass(frozen=True)
+class Origin:
+    """Origin of a page.
 
-    Pictures are inlined; nothing is loaded from elsewhere; light, dark and print are cared for.
-
-    Raises:
-        TypeError: for a result without a report.
+    Attributes:
+        command: the command line that wrote it, as a shell takes it; empty from Python.
+        content: digest of the result, see :func:`asperity.core.files.text_digest`; may be empty.
     """
-    if type(result) not in _PAGES:
-        raise TypeError(f"no report is known for a {type(result).__name__}")
-    with own_look():
-        page = _PAGES[type(result)](result)
-    return page_html(page, Origin(content=digest(json_text(result))))
+
+    command: str = ""
+    content: str = ""
+
+
+@dataclass(frozen=True)
+class RenderedPicture:
+    """A figure as it is embedded in a page.
+
+    Attributes:
+        svg: SVG text of :func:`asperity.report.pictures.svg.svg_text`, embedded unescaped: it never
+            contains text from elsewhere.
+        alt_text: the description of the figure with its ranges.
+        panel_json: the plotted numbers as JSON, for the script of the page.
+    """
+
+    svg: str
+    alt_text: str
+    panel_json: str
+
+
+def render_picture(picture: Picture) -> RenderedPicture:
+    """Return a picture as SVG with its numbers, drawn with Matplotlib's defaults."""
+    from asperity.report.pictures.panel_data import extract_panels, panels_to_json, ranges_text
+    from asperity.report.pictures.svg import svg_text
+
+    with default_style():
+        figure = picture.draw()
+        svg = svg_text(figure, picture.dpi)  # drawing the figure places its panels
+        panels = extract_panels(figure)
+    return RenderedPicture(svg, picture.describe() + ranges_text(panels), panels_to_json(panels))
+
+
+def _render_pictures(sections: Sequence[Section]) -> dict[int, RenderedPicture]:
+    """Return the rendered pictures of sections by ``id`` of the picture.
+
+    Those with a digest are shared out among helper processes, and cached.
+    """
+    pictures = list(_pictures_in(sections))
+    shared = [picture for picture in pictures if picture.digest is not None]
+    rendered = {id(one): render_picture(one) for one in pictures if one.digest is None}
+    with precompute(render_picture, shared) as results:
+        for picture, result in zip(shared, results, strict=True):
+            compute = partial(_result_or_render, result, picture)
+            key = content_digest(picture.digest, version("matplotlib"))
+            rendered[id(picture)] = get_or_compute(f"picture {picture.name}", key, compute)
+    return rendered
+
+
+def _result_or_render(result: RenderedPicture | None, picture: Picture) -> RenderedPicture:
+    return render_picture(picture) if result is None else result
+
+
+def _pictures_in(sections: Sequence[Section]) -> Iterator[Picture]:
+    for section in sections:
+        for block in section.blocks:
+            if isinstance(block, Picture):
+                yield block
+            elif isinstance(block, Cards):
+                yield from _pictures_in(block.sections)
+
+
+def render_page(page: Page, origin: Origin | None = None) -> str:
+    """Return a page as HTML that loads nothing, for light and dark screens and print.
+
+    Args:
+        page: the page.
+        origin: of the result, for the footer.
+    """
+    # Insignificant white space only makes pages larger.
+    style = re.sub(r"\s*([{};])\s*", r"\1", _read_template("style.css"))
+    script = _read_template("page.js")
+    sections = [one for one in page.sections if Media.HTML in one.media]
+    pictures = _render_pictures(sections)
+    return (
+        template_environment()
+        .get_template("page.html.j2")
+        .render(
+            page=page,
+            sections=sections,
+            picture_of=lambda picture: pictures[id(picture)],
+            style=style,
+            script=script,
+            script_digest=_sha256(script),
+            version=__version__,
+            date=_build_date(),
+            origin=origin or Origin(),
+        )
+    )
+
+
+def render_notebook(page: Page) -> str:
+    """Return answer, paragraphs, tables and first figure for a notebook, as HTML."""
+    blocks = [
+        block
+        for section in page.sections
+        if Media.NOTEBOOK in section.media
+        for block in section.blocks
+    ]
+    picture = next((block for block in blocks if isinstance(block, Picture)), None)
+    return (
+        template_environment()
+        .get_template("notebook.html.j2")
+        .render(
+            page=page,
+            paragraphs=[block.text for block in blocks if isinstance(block, Paragraph)],
+            tables=[block for block in blocks if isinstance(block, Table)],
+            picture=picture,
+            png="" if picture is None else _encode_png(picture),
+        )
+    )
+
+
+def _encode_png(picture: Picture) -> str:
+    """Return a picture as PNG in base64: a white card, whatever the colours of the notebook."""
+    from asperity.report.pictures.style import to_png
+
+    with default_style():
+        return base64.b64encode(to_png(picture.draw())).decode("ascii")
+
+
+def _read_template(name: str) -> str:
+    return resources.files("asperity.report").joinpath("templates", name).read_text("utf-8")
+
+
+def _sha256(script: str) -> str:
+    """Return the digest that a content security policy allows the script by."""
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
+
+
+def _build_date() -> str:
+    """Return today's date (UTC), or that of SOURCE_DATE_EPOCH, so that pages are reproducible.
+
+    Reference:
+        https://reproducible-builds.org/specs/source-date-epoch
+    """
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
+    seconds = int(epoch) if epoch.isdecimal() and len(epoch) < 12 else time.time()
+    return time.strftime("%Y-%m-%d", time.gmtime(seconds))
+
+
+@lru_cache(maxsize=1)
+def template_environment() -> jinja2.Environment:
+    """Return the templates of the report; all text is escaped."""
+    import jinja2
+
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader("asperity.report"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )

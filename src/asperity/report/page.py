@@ -1,34 +1,44 @@
-"""A report is values: a page of sections, a section of blocks. One template writes it as HTML."""
+"""Pages: the one description of a result, from which terminal, notebook and HTML are rendered.
+
+:mod:`asperity.report.terminal` prints a page, :mod:`asperity.report.html` writes it as an HTML file
+or as the output of a notebook cell.
+"""
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import os
-import re
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
-from functools import lru_cache
-from importlib import resources
-from importlib.metadata import version
+from dataclasses import dataclass, field
+from enum import Flag, auto
+from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import asperity
-from asperity.kept import content_digest, kept
-from asperity.report.words.number_words import holds_text
+from asperity.report.sentences.number_text import yes_no_text
 
 if TYPE_CHECKING:
-    import jinja2
     from matplotlib.figure import Figure
 
-PAPER = "after Campion and Hayward, “On the Synthesis of Haptic Textures”"
-UNFELT = "No perceptual test stands behind these numbers."
+PAPER_CITATION = "after Campion and Hayward, “On the Synthesis of Haptic Textures”"
+NO_PERCEPTUAL_TEST = "Not validated by a perceptual test."
+
+
+class Media(Flag):
+    """The media that show a section; ``HEADING`` prints its title in a terminal too."""
+
+    HTML = auto()
+    TERMINAL = auto()
+    NOTEBOOK = auto()
+    HEADING = auto()
+
+
+SCREEN = Media.HTML | Media.TERMINAL
+"""An HTML file, and a terminal without the title of the section."""
+HEADED = Media.TERMINAL | Media.HEADING
+"""A terminal, below the title of the section."""
 
 
 @dataclass(frozen=True)
-class Words:
+class Paragraph:
     """A paragraph.
 
     Attributes:
@@ -36,62 +46,76 @@ class Words:
         kind: "note" is faint, "mono" is one line of code; "code" keeps its line breaks.
     """
 
-    form: ClassVar[str] = "words"
+    block_type: ClassVar[str] = "words"
     text: str
     kind: str = ""
 
 
 @dataclass(frozen=True)
-class Items:
+class BulletList:
     """A list of sentences."""
 
-    form: ClassVar[str] = "items"
+    block_type: ClassVar[str] = "items"
     sentences: Sequence[str]
 
 
 @dataclass(frozen=True)
-class Definitions:
-    """Terms, and what each means."""
+class DefinitionList:
+    """Terms with their meanings."""
 
-    form: ClassVar[str] = "definitions"
+    block_type: ClassVar[str] = "definitions"
     pairs: Sequence[tuple[str, str]]
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture.
+    """A figure, drawn only by a renderer that shows it.
 
     Attributes:
-        svg: SVG text of :func:`asperity.report.pictures.svg.svg_text`, which stands in the page as
-            it is: never words from elsewhere.
-        alt: what is seen, with its numbers, for who does not see it.
-        numbers: what it shows as JSON, for the script of the page; "[]" for nothing.
+        figure: the figure, or a function that draws it.
+        description: what the figure shows, in a sentence or two for readers who cannot see it, or
+            a function that returns it; the ranges of lines and colours are appended.
+        name: namespace of the rendered figure in the cache.
+        digest: content digest of everything the figure depends on; with a digest the rendered
+            figure is cached, and drawn in a helper process if one is available, so functions
+            must then be such that can be pickled.
+        dpi: resolution of the parts drawn as pixels.
     """
 
-    form: ClassVar[str] = "picture"
-    svg: str
-    alt: str
-    numbers: str = "[]"
+    block_type: ClassVar[str] = "picture"
+    figure: Figure | Callable[[], Figure]
+    description: str | Callable[[], str]
+    name: str = ""
+    digest: str | None = None
+    dpi: int = 160
+
+    def draw(self) -> Figure:
+        """Return the figure."""
+        return self.figure() if callable(self.figure) else self.figure
+
+    def describe(self) -> str:
+        """Return what the figure shows."""
+        return self.description() if callable(self.description) else self.description
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of a table; a plain string is one too.
+    """A cell of a table; a plain string is a cell too.
 
     Attributes:
-        text: what it says.
+        text: the content.
         kind: "no", "good" and "part" are coloured, "l" is bold, "open" is faint, "mono" is code,
             "line" is not broken.
-        note: shown when pointed at.
-        below: a faint line below the text.
-        summary: of the details.
-        details: names and values of what stands behind it, folded away.
+        note: tooltip.
+        subtext: a faint line below the text.
+        summary: heading of the details.
+        details: names and values of the evidence, folded away on a page.
     """
 
     text: str
     kind: str = ""
     note: str = ""
-    below: str = ""
+    subtext: str = ""
     summary: str = "Evidence"
     details: Sequence[tuple[str, str]] = ()
 
@@ -104,11 +128,11 @@ class Row:
     """A row of a table.
 
     Attributes:
-        cells: as many as the table has columns.
+        cells: one per column.
         kind: "best" is tinted, and bold in a terminal.
-        id: for links to the row; may be empty.
-        style: Rich's, in a terminal.
-        law: letter of the law that the row is of, if it can be hidden with it.
+        id: anchor for links to the row; may be empty.
+        style: Rich style in a terminal.
+        law: letter of the law that the row belongs to; the row is hidden with that law.
     """
 
     cells: Sequence[str | Cell]
@@ -119,44 +143,81 @@ class Row:
 
 
 @dataclass(frozen=True)
+class TableLayout:
+    """How a terminal lays out a table; columns are counted from 0.
+
+    Attributes:
+        wrap: columns whose text is wrapped; no character of them is cut.
+        max_widths: greatest width [characters] of wrapped columns.
+        max_widths_below: console width [characters] below which ``max_widths`` applies; ``None``
+            for every console.
+        min_console: console width [characters] from which a column is shown.
+        drop_order: columns that may be dropped on a narrow console, the most important first.
+        omit: columns that are never shown.
+        legend: heading and meaning of columns, printed below the table for those shown.
+        dropped_note: printed below the table if columns were dropped.
+        gap: characters between columns.
+        tight_below: console width [characters] below which columns are one character apart.
+        has_rule: whether a line is drawn below the headings, if there are any.
+        max_console: console width [characters] up to which the table is shown at all.
+    """
+
+    wrap: Collection[int] = ()
+    max_widths: Mapping[int, int] = field(default_factory=dict)
+    max_widths_below: int | None = None
+    min_console: Mapping[int, int] = field(default_factory=dict)
+    drop_order: Sequence[int] = ()
+    omit: Collection[int] = ()
+    legend: Mapping[int, tuple[str, str]] = field(default_factory=dict)
+    dropped_note: str = ""
+    gap: int = 1
+    tight_below: int = 0
+    has_rule: bool = True
+    max_console: int | None = None
+
+
+@dataclass(frozen=True)
 class Table:
     """A table.
 
     Attributes:
         headings: of the columns; none for a list of pairs.
         rows: its rows.
-        numbers: which columns are numbers, from 0.
+        numeric_columns: columns of numbers, aligned to the right.
+        layout: in a terminal.
     """
 
-    form: ClassVar[str] = "table"
+    block_type: ClassVar[str] = "table"
     headings: Sequence[str]
     rows: Sequence[Row]
-    numbers: Sequence[int] = ()
+    numeric_columns: Sequence[int] = ()
+    layout: TableLayout = TableLayout()
 
 
 @dataclass(frozen=True)
 class Cards:
     """Sections side by side."""
 
-    form: ClassVar[str] = "cards"
+    block_type: ClassVar[str] = "cards"
     sections: Sequence[Section]
 
 
-Block = Words | Items | Definitions | Picture | Table | Cards
+Block = Paragraph | BulletList | DefinitionList | Picture | Table | Cards
 
 
 @dataclass(frozen=True)
 class Section:
-    """A heading and what stands below it.
+    """A heading with the blocks below it.
 
     Attributes:
         title: heading; may be empty.
         blocks: in order.
-        caption: what is to be seen, above the blocks.
-        notes: paragraphs below them.
+        caption: explanation above the blocks, on a page alone.
+        notes: faint paragraphs below the blocks.
         level: 2, or 3 for a part of the section before it.
-        kind: "assumed" stands in a box.
-        id: for links to the section; may be empty.
+        kind: "assumed" is framed.
+        id: anchor for links to the section; may be empty.
+        media: where the section is shown.
     """
 
     title: str
@@ -166,6 +227,7 @@ class Section:
     level: int = 2
     kind: str = ""
     id: str = ""
+    media: Media = Media.HTML
 
 
 @dataclass(frozen=True)
@@ -173,69 +235,85 @@ class Page:
     """A report.
 
     Attributes:
-        title: of the page.
+        title: heading of the HTML file; empty for a result without one.
         answer: one or two sentences.
-        facts: names and values of what was asked.
+        facts: names and values of the given arguments, on a page alone.
         sections: in order.
-        footer: where it comes from.
+        footer: origin of the method.
     """
 
     title: str
     answer: str
-    facts: Sequence[tuple[str, str]]
-    sections: Sequence[Section]
+    facts: Sequence[tuple[str, str]] = ()
+    sections: Sequence[Section] = ()
     footer: str = ""
 
 
-@dataclass(frozen=True)
-class Origin:
-    """Where a page comes from.
-
-    Attributes:
-        command: that made it, as a shell takes it; empty from Python.
-        content: digest of the result, see :func:`asperity.files.digest`; may be empty.
-    """
-
-    command: str = ""
-    content: str = ""
+def pairs_table(rows: Sequence[tuple[str, str]]) -> Table:
+    """Return a table without headings: a bold name and its value per row."""
+    layout = TableLayout(wrap=(0, 1), max_widths={0: 26})
+    return Table((), [Row([Cell(name, "l"), text]) for name, text in rows], layout=layout)
 
 
-def pairs(rows: Sequence[tuple[str, str]]) -> Table:
-    """Return a table without headings: bold words, and what is said of each."""
-    return Table((), [Row([Cell(word, "l"), words]) for word, words in rows])
+def text_page(text: str) -> Page:
+    """Return lines that a terminal does not wrap, as a page."""
+    return Page("", "", (), [Section("", [Paragraph(text, "code")], media=Media.TERMINAL)])
 
 
-def picture(figure: Figure, seen: str, dpi: int = 160) -> Picture:
-    """Return a figure as a picture, with its numbers.
-
-    Args:
-        figure: the figure.
-        seen: what is seen, in a sentence or two; what the lines and colours range over is added.
-        dpi: of what in it is drawn as pixels.
-    """
-    from asperity.report.pictures.readings import panels_json, panels_of, ranges_text
-    from asperity.report.pictures.svg import svg_text
-
-    svg = svg_text(figure, dpi)  # draws it, after which it is known where the panels are
-    panels = panels_of(figure)
-    return Picture(svg, seen + ranges_text(panels), panels_json(panels))
+def plot_later(result: Any, picture: str | None = None) -> Callable[[], Figure]:
+    """Return a function that draws a figure of a result; see :func:`asperity.report.plot`."""
+    return partial(_plot, result, picture)
 
 
-def pictured(
+def _plot(result: Any, picture: str | None) -> Figure:
+    from asperity.report.pictures.plotting import plot  # Matplotlib is needed to draw alone
+
+    return plot(result, picture)
+
+
+def picture_section(
     title: str,
-    figure: Figure,
-    seen: str,
+    figure: Figure | Callable[[], Figure],
+    description: str,
     caption: str = "",
     notes: Sequence[str] = (),
     level: int = 2,
+    media: Media = Media.HTML,
 ) -> Section:
-    """Return a section that shows a figure; see :func:`picture`."""
-    return Section(title, [picture(figure, seen)], caption, notes, level)
+    """Return a section that shows a figure; see :class:`Picture`."""
+    return Section(title, [Picture(figure, description)], caption, notes, level, media=media)
+
+
+def facts_section(facts: Sequence[tuple[str, str]]) -> Section:
+    """Return the facts of a page for a terminal, one faint line each."""
+    notes = [f"{name}: {value}" for name, value in facts]
+    return Section("", (), notes=notes, media=Media.TERMINAL)
+
+
+def assumption_sections(sentences: Sequence[str], *blocks: Block) -> list[Section]:
+    """Return the sections of the assumptions; none without any.
+
+    Args:
+        sentences: the assumptions.
+        blocks: shown below them on a page.
+    """
+    if not sentences:
+        return []
+    listed = BulletList(sentences)
+    return [
+        Section("Assumptions", [listed, *blocks], kind="assumed"),
+        Section("Assumed:", [listed], media=HEADED),
+    ]
+
+
+def holds_cell(holds: bool | None) -> Cell:
+    """Return yes, no, or ? for a condition that cannot be decided."""
+    return Cell(yes_no_text(holds), "open" if holds is None else "" if holds else "no")
 
 
 @contextmanager
-def own_look() -> Iterator[None]:
-    """Let figures look as they should, whatever the user's settings are, which stay."""
+def default_style() -> Iterator[None]:
+    """Draw figures with Matplotlib's defaults, whatever the user's settings, which are restored."""
     import matplotlib
 
     with matplotlib.rc_context():
@@ -243,114 +321,27 @@ def own_look() -> Iterator[None]:
         yield
 
 
-def kept_picture(name: str, content: str | None, make: Callable[[], Picture]) -> Picture:
-    """Return a picture from disk, or draw it in its own look and keep it there.
+# --- user-defined sections ------------------------------------------------------------------------
+
+_USER_SECTIONS: dict[type, list[Callable[..., Section | None]]] = {}
+
+
+def add_section(result_type: type, section: Callable[..., Section | None]) -> None:
+    """Add a section to the page of every result of a type, before the assumptions.
 
     Args:
-        name: of the picture.
-        content: a digest of what it shows; ``None`` where that is not known.
-        make: draws it.
-    """
-
-    def drawn() -> Picture:
-        with own_look():
-            return make()
-
-    if content is None:
-        return drawn()
-    return kept(f"picture {name}", content_digest(content, version("matplotlib")), drawn)
-
-
-def holds_cell(holds: bool | None) -> Cell:
-    """Return yes, no, or ? for what cannot be decided."""
-    return Cell(holds_text(holds), "open" if holds is None else "" if holds else "no")
-
-
-def assumed(sentences: Sequence[str], *blocks: Block) -> list[Section]:
-    """Return the section that says what was assumed; none where nothing was."""
-    if not sentences:
-        return []
-    return [Section("What was assumed", [Items(sentences), *blocks], kind="assumed")]
-
-
-# --- sections of one's own ------------------------------------------------------------------------
-
-_ADDED: dict[type, list[Callable[..., Section | None]]] = {}
-
-
-def add_section(result: type, section: Callable[..., Section | None]) -> None:
-    """Add a section to the page of every result of a type, before what was assumed.
-
-    Args:
-        result: the type, such as :class:`~asperity.analysis.compare.Comparison`.
-        section: called with what the page is made of: a comparison, an analysis, limits; of a run
+        result_type: the type, such as :class:`~asperity.analysis.compare.Comparison`.
+        section: called with the arguments of the page: a comparison, an analysis, limits; of a run
             its setup and the run. It returns a :class:`Section`, or ``None`` for none.
     """
-    added = _ADDED.setdefault(result, [])
-    if section not in added:
-        added.append(section)
+    sections = _USER_SECTIONS.setdefault(result_type, [])
+    if section not in sections:
+        sections.append(section)
 
 
-def added_sections(result: type, *arguments: Any) -> list[Section]:
-    """Return the sections that were added to the pages of a type of result."""
-    sections = _ADDED.get(result, ())
-    with own_look() if sections else nullcontext():
-        made = [section(*arguments) for section in sections]
-    return [section for section in made if section is not None]
-
-
-# --- HTML -----------------------------------------------------------------------------------------
-
-
-def page_html(page: Page, origin: Origin | None = None) -> str:
-    """Return the page as HTML; nothing is loaded from elsewhere; light, dark and print.
-
-    Args:
-        page: what it says.
-        origin: of what it says, for its foot.
-    """
-    # Blanks that mean nothing make no page larger.
-    style = re.sub(r"\s*([{};])\s*", r"\1", _file("style.css"))
-    script = _file("page.js")
-    return (
-        environment()
-        .get_template("page.html.j2")
-        .render(
-            page=page, style=style, script=script, allowed=_sha256(script),
-            version=asperity.__version__, date=_date(), origin=origin or Origin(),
-        )
-    )  # fmt: skip
-
-
-def _file(name: str) -> str:
-    return resources.files("asperity.report").joinpath("templates", name).read_text("utf-8")
-
-
-def _sha256(script: str) -> str:
-    """Return the digest by which a content security policy knows the one script of the page."""
-    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
-
-
-def _date() -> str:
-    """Return the day (UTC), or that of SOURCE_DATE_EPOCH, so that a page can be made again.
-
-    Reference:
-        https://reproducible-builds.org/specs/source-date-epoch
-    """
-    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
-    seconds = int(epoch) if epoch.isdecimal() and len(epoch) < 12 else time.time()
-    return time.strftime("%Y-%m-%d", time.gmtime(seconds))
-
-
-@lru_cache(maxsize=1)
-def environment() -> jinja2.Environment:
-    """Return the templates of this room; all words are escaped."""
-    import jinja2
-
-    return jinja2.Environment(
-        loader=jinja2.PackageLoader("asperity.report"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+def user_sections(result_type: type, *arguments: Any) -> list[Section]:
+    """Return the user-defined sections of a type of result."""
+    functions = _USER_SECTIONS.get(result_type, ())
+    with default_style() if functions else nullcontext():
+        sections = [function(*arguments) for function in functions]
+    return [section for section in sections if section is not None]

@@ -1,117 +1,152 @@
-"""What the results in a terminal share: tables, lists of pairs, what was assumed."""
+"""Pages in a terminal: text, tables and lists, rendered by Rich."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 
 from rich import box
-from rich.console import Console
-from rich.table import Table
+from rich.console import Console, RenderableType
+from rich.table import Table as RichTable
 from rich.text import Text
 
-from asperity.report import page
+from asperity.report.page import (
+    Block,
+    BulletList,
+    Cell,
+    DefinitionList,
+    Media,
+    Page,
+    Paragraph,
+    Section,
+    Table,
+)
+
+_KIND_STYLES = {"l": "bold", "good": "green", "part": "yellow", "no": "red", "open": "dim"}
+_MAX_NAME_WIDTH = 26  # of a list of pairs [characters]
 
 
-def table(
-    shown: page.Table,
-    *,
-    wraps: Collection[int] = (),
-    most: Mapping[int, int] | None = None,
-    without: Collection[int] = (),
-    styles: Mapping[str, str] | None = None,
-    gap: int = 1,
-    ruled: bool = True,
-) -> Table:
-    """Return a table of a page for a terminal.
-
-    Args:
-        shown: the table; notes and details of its cells are for the page alone.
-        wraps: columns whose texts go on in the next line; no character is ever cut there.
-        most: greatest width of columns that wrap [characters].
-        without: columns that are left out.
-        styles: Rich's, of kinds of cells.
-        gap: characters between columns.
-        ruled: whether a line stands below the headings, if there are any.
-    """
-    made = Table(
-        box=box.SIMPLE_HEAD if ruled and shown.headings else None, padding=(0, gap, 0, 0),
-        show_edge=False, pad_edge=False, show_header=bool(shown.headings),
-    )  # fmt: skip
-    headings = shown.headings or [""] * len(shown.rows[0].cells)
-    columns = [i for i in range(len(headings)) if i not in without]
-    for i in columns:
-        made.add_column(
-            Text(headings[i]), justify="right" if i in shown.numbers else "left",
-            no_wrap=i not in wraps, overflow="fold" if i in wraps else "ellipsis",
-            max_width=(most or {}).get(i),
-        )  # fmt: skip
-    for row in shown.rows:
-        style = row.style or ("bold" if row.kind == "best" else "")
-        made.add_row(*[_text(row.cells[i], styles or {}) for i in columns], style=style)
-    return made
+class _CodeText(Text):
+    """A line of code or a path, which a console does not wrap."""
 
 
-def too_wide(shown: page.Table, order: Sequence[int], width: int, gap: int = 2) -> set[int]:
-    """Return the columns of a table to leave out so that the others fit, none of them cut.
+def print_page(page: Page, console: Console) -> None:
+    """Print the answer of a page and its sections for a terminal."""
+    for part in page_renderables(page, console.width):
+        console.print(part, soft_wrap=isinstance(part, _CodeText))
 
-    Args:
-        shown: the table.
-        order: the columns that may be left out, the one that is wanted most first.
-        width: of the console in characters.
-        gap: characters between columns: one more than those of a ruled table.
-    """
-    cells = [shown.headings, *(row.cells for row in shown.rows)]
+
+def page_renderables(page: Page, width: int) -> Iterator[RenderableType]:
+    """Yield the answer of a page and its sections, for a console of a width [characters]."""
+    if page.answer:
+        yield Text(page.answer, "bold")
+    is_first = not page.answer
+    for section in page.sections:
+        parts = list(_section_parts(section, width)) if Media.TERMINAL in section.media else []
+        if parts and not is_first:
+            yield Text()
+        is_first = is_first and not parts
+        yield from parts
+
+
+def _section_parts(section: Section, width: int) -> Iterator[RenderableType]:
+    if Media.HEADING in section.media:
+        yield Text(section.title, "bold")
+    for block in section.blocks:
+        yield from _block_parts(block, width)
+    for note in section.notes:
+        yield Text(note, "dim")
+
+
+def _block_parts(block: Block, width: int) -> Iterator[RenderableType]:
+    """Yield a block; pictures and cards have no equivalent in a terminal."""
+    if isinstance(block, Table):
+        if block.layout.max_console is None or width <= block.layout.max_console:
+            yield rich_table(block, width)
+            hidden = _hidden_columns(block, width)
+            shown = [text for i, text in block.layout.legend.items() if i not in hidden]
+            if shown:
+                yield Text()
+                yield rich_pairs(shown, "dim")
+            if block.layout.dropped_note and _dropped_columns(block, width):
+                yield Text(block.layout.dropped_note, "dim")
+    elif isinstance(block, BulletList):
+        yield rich_pairs(("-", sentence) for sentence in block.sentences)
+    elif isinstance(block, DefinitionList):
+        yield rich_pairs(block.pairs, "dim")
+    elif isinstance(block, Paragraph):
+        if block.kind in ("code", "mono"):
+            yield from (_CodeText(line, overflow="fold") for line in block.text.split("\n"))
+        else:
+            yield Text(block.text, "dim" if block.kind == "note" else "", overflow="fold")
+
+
+def _hidden_columns(table: Table, width: int) -> set[int]:
+    """Return the columns of a table that a console of a width [characters] does not show."""
+    layout = table.layout
+    narrow = {i for i, least in layout.min_console.items() if width < least}
+    return {*layout.omit, *narrow, *_dropped_columns(table, width)}
+
+
+def _dropped_columns(table: Table, width: int) -> set[int]:
+    """Return the columns of the drop order to leave out, so that the others fit uncut."""
+    order, gap = table.layout.drop_order, table.layout.gap + 1
+    if not order:
+        return set()
+    cells = [table.headings, *(row.cells for row in table.rows)]
     texts = [[cell if isinstance(cell, str) else cell.text for cell in row] for row in cells]
     widths = [
         max(len(line) for text in column for line in text.split("\n")) + gap
         for column in zip(*texts, strict=True)
     ]
     room = width + gap - sum(widths) + sum(widths[i] for i in order)
-    left_out = set(order)
+    dropped = set(order)
     for column in order:
         room -= widths[column]
         if room < 0:
             break
-        left_out.discard(column)
-    return left_out
+        dropped.discard(column)
+    return dropped
 
 
-def _text(cell: str | page.Cell, styles: Mapping[str, str]) -> Text:
+def rich_table(table: Table, width: int) -> RichTable:
+    """Return a table for a console of a width [characters], without tooltips and details."""
+    layout, headings = table.layout, table.headings or [""] * len(table.rows[0].cells)
+    columns = sorted(set(range(len(headings))) - _hidden_columns(table, width))
+    is_limited = layout.max_widths_below is None or width < layout.max_widths_below
+    max_widths = layout.max_widths if is_limited else {}
+    result = RichTable(
+        box=box.SIMPLE_HEAD if layout.has_rule and table.headings else None,
+        padding=(0, layout.gap if width >= layout.tight_below else 0, 0, 0),
+        show_edge=False,
+        pad_edge=False,
+        show_header=bool(table.headings),
+    )
+    for i in columns:
+        result.add_column(
+            Text(headings[i]),
+            justify="right" if i in table.numeric_columns else "left",
+            no_wrap=i not in layout.wrap,
+            overflow="fold" if i in layout.wrap else "ellipsis",
+            max_width=max_widths.get(i),
+        )
+    for row in table.rows:
+        style = row.style or ("bold" if row.kind == "best" else "")
+        result.add_row(*[_cell_text(row.cells[i]) for i in columns], style=style)
+    return result
+
+
+def _cell_text(cell: str | Cell) -> Text:
     if isinstance(cell, str):
         return Text(cell)
-    text = Text(cell.text, styles.get(cell.kind, ""))
-    return text.append(f"\n{cell.below}", "dim") if cell.below else text
+    text = Text(cell.text, _KIND_STYLES.get(cell.kind, ""))
+    return text.append(f"\n{cell.subtext}", "dim") if cell.subtext else text
 
 
-def pairs(rows: Iterable[tuple[str, str]], style: str = "", *, most: int | None = None) -> Table:
-    """Return a list of two columns: a short word, and what is said of it.
-
-    Args:
-        rows: the pairs.
-        style: of both columns.
-        most: the greatest width of the words [characters]; by default they are not broken.
-    """
-    made = Table.grid(padding=(0, 1, 0, 0))
-    made.add_column(style=style, max_width=most, no_wrap=most is None)
-    made.add_column(style=style, overflow="fold")
-    for word, words in rows:
-        made.add_row(Text(word), Text(words))
-    return made
-
-
-def say(console: Console, words: str, style: str = "") -> None:
-    """Print a text as it is: brackets and numbers in it mean nothing to Rich."""
-    console.print(Text(words, style=style))
-
-
-def head(console: Console, words: str) -> None:
-    """Print a heading with an empty line above it."""
-    console.print()
-    say(console, words, "bold")
-
-
-def print_assumptions(console: Console, assumptions: Sequence[str]) -> None:
-    """Print what was assumed, if anything was."""
-    if assumptions:
-        head(console, "Assumed:")
-        console.print(pairs(("-", sentence) for sentence in assumptions))
+def rich_pairs(rows: Iterable[tuple[str, str]], style: str = "") -> RichTable:
+    """Return a list of two columns, a short name and its text, in a Rich style."""
+    grid = RichTable.grid(padding=(0, 1, 0, 0))
+    grid.add_column(style=style, max_width=_MAX_NAME_WIDTH)
+    grid.add_column(style=style, overflow="fold")
+    for name, text in rows:
+        grid.add_row(Text(name), Text(text))
+    return grid

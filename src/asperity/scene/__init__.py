@@ -1,6 +1,6 @@
-"""Scenes: which texture, surface, device, hand and motion a text or a file names."""
+"""Scenes: texture, surface, device, hand and motion of a specification or a scene file."""
 
-from asperity.scene.loading import KINDS, Scene, load_scene
-from asperity.textures.naming import build_texture
+from asperity.scene.scene_file import TEXTURE_KINDS, Scene, load_scene
+from asperity.textures.catalogue import build_texture
 
-__all__ = ["KINDS", "Scene", "build_texture", "load_scene"]
+__all__ = ["TEXTURE_KINDS", "Scene", "build_texture", "load_scene"]

@@ -1,4 +1,4 @@
-"""What can stand in the sections [texture], [surface], [hand], [motion] and [run] of a scene."""
+"""Arguments of the sections [surface], [hand], [motion] and [run] of a scene."""
 
 from __future__ import annotations
 
@@ -11,33 +11,32 @@ from typing import Any
 
 import numpy as np
 
-from asperity.arguments import MAX_DEPTH, STIFFNESS, Argument, read_arguments
-from asperity.errors import ParameterError, nearest_names
-from asperity.files import open_input, plain
-from asperity.laws import LAW_ARGUMENTS, Law, known_arguments
+from asperity.core.arguments import MAX_DEPTH, STIFFNESS, Argument, parse_arguments
+from asperity.core.errors import ParameterError, suggest_names
+from asperity.core.files import open_input, to_plain_data
+from asperity.laws import SHIPPED_LAW_ARGUMENTS, Law, registered_arguments
 from asperity.recording.recording import is_recording, open_recording
-from asperity.scene.plant import BRAKES
-from asperity.simulation import BandHand, MovedHand, SpringHand, Still, Strokes
-from asperity.simulation import Path as PathMotion
+from asperity.scene.scene_defaults import BRAKE_MODES
+from asperity.simulation import BandHand, PrescribedHand, SpringHand, Stationary, Strokes
+from asperity.simulation import Waypoints as PathMotion
 from asperity.surface import CLAMP, LAW
 
 PATH_COLUMNS = ("time [s]", "x [m]", "y [m]", "z [m]")
 
 
 def read_path(file: str) -> PathMotion:
-    """Return the motion that a file of positions describes.
+    """Return the motion along the positions in a file.
 
     Args:
-        file: a recording, or text with a line of names, ``time [s]``, ``x [m]``, ``y [m]``,
-            ``z [m]``, and others that are not read; commas between. The traces of ``asperity
-            simulate`` are such files.
+        file: a recording, or comma-separated text whose first line names the columns, ``time [s]``,
+            ``x [m]``, ``y [m]``, ``z [m]`` among others. The traces of ``asperity simulate`` are
+            such files.
 
     Raises:
-        ParameterError: for a file that cannot be read, lacks a column, has no rows or a wrong
-            number.
+        ParameterError: the file cannot be read, or has a missing column, no rows or a wrong number.
     """
     if is_recording(file):
-        traced = open_recording(file).traced()
+        traced = open_recording(file).to_columns()
         if not len(traced.time):
             raise ParameterError("motion.file", f"{file} has no rows")
         return PathMotion(traced.time, traced.position)
@@ -46,7 +45,7 @@ def read_path(file: str) -> PathMotion:
             names = [name.strip() for name in stream.readline().split(",")]
             columns = [_column(names, name, file) for name in PATH_COLUMNS]
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # of no rows: see below
+                warnings.simplefilter("ignore")  # about no rows: see below
                 table = np.loadtxt(stream, delimiter=",", usecols=columns, ndmin=2)
     except OSError as error:
         reason = error.strerror or str(error)
@@ -64,128 +63,125 @@ def _column(names: list[str], name: str, file: str) -> int:
     return names.index(name)
 
 
-SURFACE = (LAW, STIFFNESS, MAX_DEPTH, CLAMP)
-"""What [surface] can say, beside the parameters of its law."""
+SURFACE_FIELDS = (LAW, STIFFNESS, MAX_DEPTH, CLAMP)
+"""Arguments of [surface] besides the parameters of its law."""
 
 
 def surface_arguments() -> tuple[Argument, ...]:
-    """Return what [surface] can say: of the surface, and of any law that is known."""
-    return (*SURFACE, *known_arguments().values())
+    """Return the arguments of [surface]: those of the surface and of all registered laws."""
+    return (*SURFACE_FIELDS, *registered_arguments().values())
 
 
 def surface_keywords(values: Mapping[str, Any], *laws: Law) -> dict[str, Any]:
     """Return values of a surface as keywords of :class:`~asperity.surface.Surface`.
 
-    Parameters that one of the laws declares, and those that no shipped law knows, become
-    ``law_parameters``; a shipped law's parameter is no error beside another law.
+    Parameters declared by one of the laws, and those unknown to the shipped laws, become
+    ``law_parameters``; parameters of other shipped laws are accepted.
     """
-    declared = known_arguments(laws)
-    names = {argument.name for argument in SURFACE} | (set(LAW_ARGUMENTS) - set(declared))
+    names = set(SHIPPED_LAW_ARGUMENTS) - set(registered_arguments(laws))
+    names |= {argument.name for argument in SURFACE_FIELDS}
     keywords = {name: value for name, value in values.items() if name in names}
     rest = {name: value for name, value in values.items() if name not in names}
     return keywords | ({"law_parameters": rest} if rest else {})
 
 
 @dataclass(frozen=True)
-class Part:
+class SectionKind:
     """A kind of hand or motion.
 
     Attributes:
-        words: one line.
-        make: makes it from its arguments by name.
-        arguments: what the section can say.
+        description: one line.
+        make: returns it from its arguments by name.
+        arguments: arguments of the section.
     """
 
-    words: str
+    description: str
     make: Callable[..., Any]
     arguments: tuple[Argument, ...] = ()
 
 
-HANDS: dict[str, Part] = {
-    "spring": Part(
-        "a spring and a damper from the handle to the anchor that moves",
+def _kind(description: str, make: Callable[..., Any], *arguments: Argument) -> SectionKind:
+    return SectionKind(description, make, arguments)
+
+
+_POINT = Argument("point", "position", "m", form="space", required=True)
+_FILE = Argument("file", "positions, relative to the scene", form="path", required=True)
+HANDS: dict[str, SectionKind] = {
+    "spring": _kind(
+        "a spring and a damper from the handle to the moving anchor",
         SpringHand,
-        (
-            Argument("stiffness", "one for all axes, or three", "N/m", 0.0, form="axes"),
-            Argument("damping", "one for all axes, or three", "N*s/m", 0.0, form="axes"),
-            Argument("mass", "of the hand, which moves with the handle", "kg", 0.0),
-            Argument("force", "constant, (0, 0, -1) presses with 1 N", "N", form="space"),
-        ),
+        Argument("stiffness", "one for all axes, or three", "N/m", 0.0, form="axes"),
+        Argument("damping", "one for all axes, or three", "N*s/m", 0.0, form="axes"),
+        Argument("mass", "mass of the hand, moving with the handle", "kg", 0.0),
+        Argument("force", "constant force, (0, 0, -1) presses with 1 N", "N", form="space"),
     ),
-    "band": Part(
+    "band": _kind(
         "an elastic band that pulls the handle into the wall",
         BandHand,
-        (
-            Argument("stiffness", "of the band", "N/m", BandHand.stiffness, positive=True),
-            Argument("tension", "at z = 0", "N", BandHand.tension),
-            Argument("length", "at z = 0", "m", BandHand.length, positive=True),
-            Argument("damping", "of the band and the hand", "N*s/m", BandHand.damping),
-        ),
+        Argument("stiffness", "stiffness", "N/m", BandHand.stiffness, must_be_positive=True),
+        Argument("tension", "tension at z = 0", "N", BandHand.tension),
+        Argument("length", "length at z = 0", "m", BandHand.length, must_be_positive=True),
+        Argument("damping", "damping of band and hand", "N*s/m", BandHand.damping),
     ),
-    "moved": Part("the handle itself follows the motion, whatever the force", MovedHand),
+    "moved": _kind("the handle follows the motion, whatever the force", PrescribedHand),
 }
+"""Kinds of [hand]."""
 
-MOTIONS: dict[str, Part] = {
-    "still": Part(
-        "the anchor stays where it is",
-        Still,
-        (Argument("point", "where it stays", "m", form="space", required=True),),
-    ),
-    "strokes": Part(
-        "the anchor goes to and fro at constant speed",
+MOTIONS: dict[str, SectionKind] = {
+    "still": _kind("the anchor does not move", Stationary, _POINT),
+    "strokes": _kind(
+        "the anchor moves to and fro at constant speed",
         Strokes,
-        (
-            Argument("start", "where the first stroke begins", "m", form="space", required=True),
-            Argument("end", "where it ends", "m", form="space", required=True),
-            Argument("speed", "of the anchor", "m/s", required=True, positive=True),
-            Argument("count", "number of strokes", default=1, form="integer"),
-        ),
+        Argument("start", "start of the first stroke", "m", form="space", required=True),
+        Argument("end", "end of the first stroke", "m", form="space", required=True),
+        Argument("speed", "speed of the anchor", "m/s", required=True, must_be_positive=True),
+        Argument("count", "number of strokes", default=1, form="integer"),
     ),
-    "path": Part(
-        "the anchor follows positions that a file lists against time",
-        read_path,
-        (Argument("file", "of positions, relative to the scene", form="path", required=True),),
-    ),
+    "path": _kind("the anchor follows the positions in a file", read_path, _FILE),
 }
+"""Kinds of [motion]."""
 
+_MOTION_START = "start of the motion"
 DURATION = Argument(
-    "duration", "of the run", "s", default_words="the motion's, else 1 s", positive=True
+    "duration", "duration of the run", "s", None, "the motion's, else 1 s", must_be_positive=True
 )
-RUN: tuple[Argument, ...] = (
+RUN_ARGUMENTS: tuple[Argument, ...] = (
     DURATION,
-    Argument("start", "of the handle", "m", form="space", default_words="where the motion begins"),
-    Argument("velocity", "of the handle at the start", "m/s", form="space", default_words="rest"),
-    Argument("every", "samples from one row of the trace to the next", default=1, form="integer"),
-    Argument("velocity_share", "of the last difference in the estimated velocity", high=1.0),
-    Argument("centre", "of a five-bar's plane, where the origin is", "m", form="plane"),
+    Argument("start", "position of the handle", "m", None, _MOTION_START, form="space"),
+    Argument("velocity", "velocity of the handle at the start", "m/s", None, "rest", form="space"),
+    Argument("every", "write every N-th sample to the trace", default=1, form="integer"),
+    Argument("velocity_share", "weight of the last difference in the velocity", maximum=1.0),
+    Argument("centre", "position of the origin in a five-bar's plane", "m", form="plane"),
     Argument("resonance", "simulate the first structural mode of the device", form="switch"),
-    Argument("brakes", "of a five-bar", default="inside", form="text", choices=BRAKES),
+    Argument("brakes", "brakes of a five-bar", "", "inside", form="text", choices=BRAKE_MODES),
 )
-"""What [run] can say."""
+"""Arguments of [run]."""
 
 
-def built(section: str, given: Mapping[str, Any], kinds: Mapping[str, Part], folder: Path) -> Any:
+def build_section(
+    section: str, content: Mapping[str, Any], kinds: Mapping[str, SectionKind], folder: Path
+) -> Any:
     """Return the hand or the motion of a section.
 
     Args:
-        section: its name, for messages.
-        given: what the section says, its kind and the arguments of that kind.
-        kinds: what it can be.
-        folder: to which files are relative.
+        section: name of the section, for messages.
+        content: content of the section, its kind and the arguments of that kind.
+        kinds: the kinds by name.
+        folder: folder to which paths are relative.
 
     Raises:
-        ParameterError: for an unknown kind or key, one that is missing, or a wrong value.
+        ParameterError: a kind or key is unknown or missing, or a value is wrong.
     """
-    arguments = dict(given)
+    arguments = dict(content)
     kind = arguments.pop("kind", None)
     if not isinstance(kind, str):
         names = " | ".join(f'"{name}"' for name in kinds)
         raise ParameterError(section, f"needs kind = {names}", kind)
     if kind not in kinds:
-        hint = nearest_names(kind, kinds)
+        hint = suggest_names(kind, kinds)
         raise ParameterError(f"{section}.kind", f"is unknown: {kind!r}; {hint}")
     part = kinds[kind]
-    values = read_arguments(section, arguments, part.arguments, folder)
+    values = parse_arguments(section, arguments, part.arguments, folder)
     for argument in part.arguments:
         if argument.required and argument.name not in values:
             file = argument.form == "path"
@@ -194,24 +190,24 @@ def built(section: str, given: Mapping[str, Any], kinds: Mapping[str, Part], fol
     return part.make(**values)
 
 
-def written(values: Mapping[str, Any], arguments: Iterable[Argument]) -> dict[str, Any]:
-    """Return the values that the arguments declare, as a scene writes them, with their units.
+def to_scene_values(values: Mapping[str, Any], arguments: Iterable[Argument]) -> dict[str, Any]:
+    """Return the declared values as written in a scene, with their units.
 
     Args:
-        values: by name [SI]; ``None`` for what is not said.
-        arguments: that may be among them.
+        values: values by name [SI]; ``None`` for missing ones.
+        arguments: the declared arguments.
     """
     known = {argument.name: argument for argument in arguments}
     return {
-        name: _written(plain(value), known[name].unit)
+        name: _to_scene_value(to_plain_data(value), known[name].unit)
         for name, value in values.items()
         if name in known and value is not None
     }
 
 
-def _written(value: Any, unit: str) -> Any:
+def _to_scene_value(value: Any, unit: str) -> Any:
     if isinstance(value, list):
-        return [_written(part, unit) for part in value]
+        return [_to_scene_value(part, unit) for part in value]
     if isinstance(value, (bool, str)):
         return value
     return f"{value!r} {unit}" if unit else value

@@ -1,4 +1,4 @@
-"""From the sections [hand], [motion] and [run] of a scene to a closed loop that can be run."""
+"""Build the closed loop of a scene from its sections [hand], [motion] and [run]."""
 
 from __future__ import annotations
 
@@ -9,29 +9,27 @@ from typing import Any
 
 import numpy as np
 
-from asperity.analysis.words.surface import law_parameters
-from asperity.arguments import read_arguments
+from asperity.analysis.sentences.surface_sentences import law_parameter_sentences
+from asperity.core.arguments import parse_arguments
+from asperity.core.errors import ParameterError
+from asperity.core.files import attributes_to_dict, to_plain_data
+from asperity.core.units import format_quantity
 from asperity.devices import Device, load_device
-from asperity.devices.writing import device_text
-from asperity.errors import ParameterError
-from asperity.files import plain, record
-from asperity.laws import Law, find_law, shared_out
-from asperity.recording.replay import file_content
-from asperity.scene.alone import ALONE_DURATION, hand_alone, with_mass
-from asperity.scene.loading import Scene
-from asperity.scene.plant import default_servo, plant_of
-from asperity.scene.sections import DURATION, HANDS, MOTIONS, RUN, built, surface_keywords
+from asperity.devices.device_file import to_device_toml
+from asperity.laws import Law, distribute_parameters, find_law
+from asperity.recording.replay import file_digest
+from asperity.scene import scene_defaults, sections
+from asperity.scene.scene_file import Scene
 from asperity.servo import safety
 from asperity.servo.safety import Safety
-from asperity.simulation import Hand, Motion, MovedHand, Plant, Run, Servo, simulate
+from asperity.simulation import Hand, Motion, Plant, Run, Servo, simulate
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
-from asperity.units import engineering
 
 DEFAULT_DEVICE = "omega.3"
 DEFAULT_DURATION = 1.0
-SIMULATED = "simulated"
-"""Name of the driver that moves plant and hand of a simulation."""
+SIMULATED_DRIVER = "simulated"
+"""Name of the driver that simulates plant and hand."""
 
 
 @dataclass(frozen=True)
@@ -40,18 +38,18 @@ class Setup:
 
     Attributes:
         surface: texture, law and stiffness.
-        device: whose numbers plant and servo are made of.
-        plant: what moves.
-        hand: what holds it.
-        servo: what the electronics do.
-        motion: of the hand's anchor.
-        duration: of the run [s].
-        start: of the handle [m], ``None`` for where the motion begins.
-        velocity: of the handle at the start [m/s], ``None`` for rest.
+        device: source of the numbers of plant and servo.
+        plant: mechanics of the device.
+        hand: model of the hand.
+        servo: sampling, delay, resolution and limits of the controller.
+        motion: motion of the hand's anchor.
+        duration: length of the run [s].
+        start: position of the handle [m], ``None`` for the start of the motion.
+        velocity: velocity of the handle at the start [m/s], ``None`` for rest.
         every: samples from one row of the trace to the next.
-        assumptions: what was assumed, in sentences.
-        files: that the scene was read from.
-        safety: limits of the loop, where it runs on a device.
+        assumptions: the assumptions, in sentences.
+        files: the files of the scene.
+        safety: limits of the loop on a device.
     """
 
     surface: Surface
@@ -66,48 +64,49 @@ class Setup:
     every: int = 1
     assumptions: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
-    safety: Safety = safety.USUAL
+    safety: Safety = safety.DEFAULT_SAFETY
 
     def simulate(
         self,
         trace: bool | str | Path = True,
         progress: Callable[[float], None] | None = None,
-        most_rows: int | None = None,
+        max_rows: int | None = None,
     ) -> Run:
         """Run the loop; see :func:`~asperity.simulation.simulate`."""
         return simulate(
             self.surface, self.plant, self.hand, self.servo, self.motion, self.duration,
             start=self.start, velocity=self.velocity, trace=trace, every=self.every,
-            most_rows=most_rows, progress=progress, about=self.about(),
+            max_rows=max_rows, progress=progress, metadata=self.recording_metadata(),
         )  # fmt: skip
 
-    def about(self, driver: str = "") -> dict[str, Any]:
-        """Return what a recording says of the scene, besides its parts.
+    def recording_metadata(self, driver: str = "") -> dict[str, Any]:
+        """Return the metadata of a recording of this loop.
 
         Args:
-            driver: by whose name a loop runs that keeps time; what a simulated one moves is said.
+            driver: name of the driver in real time; the simulated one adds plant and hand.
         """
         device = self.device
-        simulated = {"plant": plain(self.plant), "hand": plain(self.hand)}
-        return {
-            "device": {"id": device.id, "name": device.name, "file": device_text(device)},
-            **record(self, "duration", "start", "velocity", "assumptions"),
-            "files": self.contents(),
-            **({"driver": driver} if driver else {}),
-            **(simulated if driver == SIMULATED else {}),
-        }
+        metadata = attributes_to_dict(self, "duration", "start", "velocity", "assumptions")
+        metadata["device"] = attributes_to_dict(device, "id", "name")
+        metadata["device"]["file"] = to_device_toml(device)
+        metadata["files"] = self.file_hashes()
+        if driver:
+            metadata["driver"] = driver
+        if driver == SIMULATED_DRIVER:
+            metadata |= attributes_to_dict(self, "plant", "hand")
+        return metadata
 
-    def contents(self) -> dict[str, str]:
-        """Return a hash of each file as it is now, of those that can be read."""
-        contents = {str(path): file_content(path) for path in self.files}
+    def file_hashes(self) -> dict[str, str]:
+        """Return the current hash of each readable file."""
+        contents = {str(path): file_digest(path) for path in self.files}
         return {name: content for name, content in contents.items() if content is not None}
 
     def with_law(self, law: str | Law, stiffness: float | None = None) -> Setup:
         """Return the same loop with another law, and another stiffness [N/m] if one is given."""
         surface = self.surface.to_law(law)
-        return replace(
-            self, surface=surface if stiffness is None else surface.to_stiffness(stiffness)
-        )
+        if stiffness is not None:
+            surface = surface.to_stiffness(stiffness)
+        return replace(self, surface=surface)
 
     def with_delay(self, delay: int) -> Setup:
         """Return the same loop with another delay [samples]."""
@@ -115,17 +114,11 @@ class Setup:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        surface = self.surface
-        return {
-            "surface": {
-                "texture": surface.texture.describe(),
-                "law": surface.law.letter,
-                **record(surface, "stiffness", "max_depth"),
-                "parameters": plain(surface.law_parameters),
-            },
-            "device": self.device.id,
-            **record(self, without=("surface", "device", "files", "safety")),
-        }
+        surface = attributes_to_dict(self.surface, "stiffness", "max_depth")
+        surface |= {"texture": self.surface.texture.describe(), "law": self.surface.law.letter}
+        surface["parameters"] = to_plain_data(self.surface.law_parameters)
+        rest = attributes_to_dict(self, exclude=("surface", "device", "files", "safety"))
+        return {"surface": surface, "device": self.device.id, **rest}
 
 
 def make_setup(
@@ -135,103 +128,109 @@ def make_setup(
     device: Device | None = None,
     duration: float | None = None,
     laws: Sequence[Law] = (),
-    keeps_delay: bool = True,
-    alone: bool = False,
+    uses_delay: bool = True,
+    use_defaults: bool = False,
 ) -> Setup:
     """Return the closed loop of a scene.
 
     Args:
-        scene: with the sections [hand] and [motion], and [run] if there is something to say.
-        surface: arguments of :class:`~asperity.surface.Surface`, and parameters of laws, that come
-            before the scene's.
-        device: comes before the scene's; omega.3 if there is none.
-        duration: of the run [s]; comes before the scene's.
-        laws: those that the loop will be changed to, which have parameters too.
-        keeps_delay: whether the device's delay counts; not where the loop gets another one.
-        alone: whether a scene without hand and motion gets some, see :mod:`asperity.scene.alone`.
+        scene: the scene, with the sections [hand] and [motion].
+        surface: arguments of :class:`~asperity.surface.Surface` and parameters of laws, which
+            override the scene's.
+        device: overrides the scene's; omega.3 if there is none.
+        duration: length of the run [s]; overrides the scene's.
+        laws: other laws that the loop will be used with, whose parameters are accepted.
+        uses_delay: whether the device's delay is used.
+        use_defaults: whether a scene without hand and motion gets the default ones, see
+            :mod:`asperity.scene.scene_defaults`.
 
     Raises:
-        ParameterError: for a section or a number that is missing, an unknown key (the nearest is
-            offered), or a wrong value.
+        ParameterError: a section or a number is missing, a key is unknown (the message suggests the
+            nearest), or a value is wrong.
     """
     merged = {**scene.surface, **(surface or {})}
-    run = read_arguments("run", scene.loop.get("run", {}), RUN)
-    if alone and not {"hand", "motion"} & scene.loop.keys():
-        return _alone(scene, merged, device, duration or run.get("duration"))
+    run = parse_arguments("run", scene.loop.get("run", {}), sections.RUN_ARGUMENTS)
+    if use_defaults and not {"hand", "motion"} & scene.loop.keys():
+        return _make_default_setup(scene, merged, device, duration or run.get("duration"))
     for name in ("hand", "motion"):
         if name not in scene.loop:
             raise ParameterError("scene", f"needs a section [{name}] with a kind to be simulated")
     if "law" not in merged:
         raise ParameterError("law", "is missing: --law B, or a scene whose [surface] names one")
-    hand = built("hand", scene.loop["hand"], HANDS, scene.folder)
-    motion = built("motion", scene.loop["motion"], MOTIONS, scene.folder)
-    guards = read_arguments("servo", scene.loop.get("servo", {}), safety.ARGUMENTS)
+    hand = sections.build_section("hand", scene.loop["hand"], sections.HANDS, scene.folder)
+    motion = sections.build_section("motion", scene.loop["motion"], sections.MOTIONS, scene.folder)
+    limits = parse_arguments("servo", scene.loop.get("servo", {}), safety.ARGUMENTS)
     chosen = device or scene.device or load_device(DEFAULT_DEVICE)
-    needs_plant = not isinstance(hand, MovedHand)
+    needs_plant = not hand.is_prescribed
     brakes, share = run.pop("brakes", None), run.pop("velocity_share", None)
-    plant, assumed = plant_of(
-        chosen, centre=run.pop("centre", None), resonance=run.pop("resonance", False),
-        brakes=brakes, dynamics=needs_plant,
+    plant, assumed = scene_defaults.make_plant(
+        chosen, centre=run.pop("centre", None), has_resonance=run.pop("resonance", False),
+        brakes=brakes, needs_dynamics=needs_plant,
     )  # fmt: skip
-    servo, said = default_servo(chosen, keeps_delay=keeps_delay)
+    servo, notes = scene_defaults.make_servo(chosen, uses_delay=uses_delay)
     if share is not None:
         servo = replace(servo, velocity_share=share)
-    span, of_span = _duration(duration, run.pop("duration", None), motion)
-    whole = _surface(scene.texture, merged, laws)
-    said += [] if laws else law_parameters(whole)
+    span, default = _resolve_duration(duration, run.pop("duration", None), motion)
+    whole = _make_surface(scene.texture, merged, laws)
+    notes += [] if laws else law_parameter_sentences(whole)
     for law in laws:
-        parameters = law_parameters(whole.to_law(law))
-        said += [f"{parameter} for law {law.letter}" for parameter in parameters]
+        parameters = law_parameter_sentences(whole.to_law(law))
+        notes += [f"{parameter} for law {law.letter}" for parameter in parameters]
     return Setup(
         whole, chosen, plant, hand, servo, motion, span,
-        assumptions=(*assumed, *said, *of_span, *_leaving(scene.texture, motion, span)),
-        files=scene.files, safety=Safety(**guards), **run,
+        assumptions=(*assumed, *notes, *default, *_leaving_warnings(scene.texture, motion, span)),
+        files=scene.files, safety=Safety(**limits), **run,
     )  # fmt: skip
 
 
-def _alone(
+def _make_default_setup(
     scene: Scene, surface: Mapping[str, Any], device: Device | None, duration: float | None
 ) -> Setup:
-    """Return the closed loop of a scene without hand and motion, which get usual ones."""
-    chosen, assumed = with_mass(device or scene.device or load_device(DEFAULT_DEVICE))
-    span = ALONE_DURATION if duration is None else duration
-    hand, words = hand_alone(_surface(scene.texture, surface, ()), chosen, span)
+    """Return the closed loop of a scene with the default hand and motion."""
+    chosen = device or scene.device or load_device(DEFAULT_DEVICE)
+    chosen, assumed = scene_defaults.with_assumed_mass(chosen)
+    span = scene_defaults.DEFAULT_STROKE_DURATION if duration is None else duration
+    built = _make_surface(scene.texture, surface, ())
+    hand, words = scene_defaults.default_hand_sections(built, chosen, span)
     whole = replace(scene, loop={**scene.loop, **hand})
     setup = make_setup(whole, surface=surface, device=chosen, duration=span)
     return replace(setup, assumptions=(words, *assumed, *setup.assumptions))
 
 
-def _surface(texture: Texture, values: Mapping[str, Any], laws: Sequence[Law]) -> Surface:
-    """Return the surface of a loop, which hands the parameters of other laws on to them."""
+def _make_surface(texture: Texture, values: Mapping[str, Any], laws: Sequence[Law]) -> Surface:
+    """Return the surface of a loop, with the parameters of all its laws."""
     law = find_law(values["law"])
-    together = [*laws, law]
-    keywords = surface_keywords(values, *together)
+    all_laws = [*laws, law]
+    keywords = sections.surface_keywords(values, *all_laws)
     parameters = keywords.pop("law_parameters", {})
     surface = Surface(texture, **keywords)
-    for one, own in zip(together, shared_out(parameters, together), strict=True):
-        surface = surface.to_law(one, own)
+    distributed = distribute_parameters(parameters, all_laws)
+    for one, its_parameters in zip(all_laws, distributed, strict=True):
+        surface = surface.to_law(one, its_parameters)
     return surface
 
 
-def _duration(given: float | None, own: float | None, motion: Motion) -> tuple[float, list[str]]:
-    span = own if given is None else given
+def _resolve_duration(
+    argument: float | None, from_scene: float | None, motion: Motion
+) -> tuple[float, list[str]]:
+    span = from_scene if argument is None else argument
     if span is not None:
-        return DURATION.checked(span), []
+        return sections.DURATION.validate(span), []
     ends = getattr(motion, "duration", 0.0)
     if ends > 0.0:
         return float(ends), []
     return DEFAULT_DURATION, [f"Default duration {DEFAULT_DURATION:g} s"]
 
 
-def _leaving(texture: Texture, motion: Motion, span: float) -> list[str]:
-    """Return a warning if the hand's way leaves a surface that ends."""
+def _leaving_warnings(texture: Texture, motion: Motion, duration: float) -> list[str]:
+    """Return a warning if the path of the hand leaves a finite surface."""
     domain = texture.domain
-    if not texture.ends:
+    if not texture.is_mirrored:
         return []
-    way = motion.at(np.linspace(0.0, span, 257))[:, :2] - domain.origin
+    path = motion.at(np.linspace(0.0, duration, 257))[:, :2] - domain.origin
     sides = np.hypot(*domain.spans.T)
-    along = way @ (domain.spans / sides[:, None] ** 2).T
+    along = path @ (domain.spans / sides[:, None] ** 2).T
     if (along >= 0.0).all() and (along <= 1.0).all():
         return []
-    size = " x ".join(engineering(float(side), "m") for side in sides)
-    return [f"The hand's way leaves the surface, {size}: beyond it its mirror images are felt"]
+    size = " x ".join(format_quantity(float(side), "m") for side in sides)
+    return [f"The hand's path leaves the surface, {size}: beyond it, its mirror images are felt"]

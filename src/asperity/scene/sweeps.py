@@ -1,4 +1,4 @@
-"""Many runs of one scene: onsets by law and delay, energy per stroke by law, speed and depth."""
+"""Sweeps of one scene: onset by law and delay; energy per stroke by law, speed and depth."""
 
 from __future__ import annotations
 
@@ -11,105 +11,110 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from asperity.errors import ParameterError
-from asperity.processes import cores
+from asperity.core.errors import ParameterError
+from asperity.core.processes import available_cores
 from asperity.scene.setup import Setup
-from asperity.simulation.hands import SpringHand
+from asperity.simulation.limit_cycles import prediction
+from asperity.simulation.limit_cycles.onset import MIN_STIFFNESS, Onset, find_onsets
+from asperity.simulation.limit_cycles.prediction import Prediction
 from asperity.simulation.motions import Strokes
-from asperity.simulation.onset import LOWEST, Onset, find_onsets
-from asperity.simulation.prediction import Prediction, expected, predict, with_wall
 from asperity.simulation.scan import Stroke, scan_strokes
 
 DEFAULT_SPEEDS = (0.02, 0.05, 0.1, 0.2)  # m/s
 DEFAULT_STROKES = 5
 
 
-Found = TypeVar("Found")
+ResultT = TypeVar("ResultT")
 
 
-def side_by_side(
-    function: Callable[..., Found], jobs: Iterable[tuple[Any, ...]], over: Event | None = None
-) -> tuple[Found, ...]:
-    """Return what a function makes of the arguments of each job, computed at the same time.
+def map_threads(
+    function: Callable[..., ResultT],
+    jobs: Iterable[tuple[Any, ...]],
+    cancelled: Event | None = None,
+) -> tuple[ResultT, ...]:
+    """Return the results of a function for the arguments of each job, computed in threads.
 
     Args:
-        function: called in threads.
+        function: the function.
         jobs: its arguments.
-        over: set when nobody waits for what is still computed: after an interrupt or an error.
+        cancelled: event that is set at the end, also after an interrupt or an error, so that
+            threads that still run can stop.
     """
-    with ThreadPoolExecutor(cores()) as pool:
+    with ThreadPoolExecutor(available_cores()) as pool:
         try:
             return tuple(pool.map(lambda job: function(*job), jobs))
-        finally:  # before the pool waits for its threads
-            if over is not None:
-                over.set()
+        finally:  # the pool waits for its threads afterwards
+            if cancelled is not None:
+                cancelled.set()
 
 
-def onsets(
+def sweep_onsets(
     setup: Setup,
     laws: Sequence[str],
     delays: Sequence[int],
     *,
-    starts: int = 12,
+    n_phases: int = 12,
     tolerance: float = 0.05,
-    lowest: float = LOWEST,
+    min_stiffness: float = MIN_STIFFNESS,
     progress: Callable[[], None] | None = None,
 ) -> tuple[Prediction, ...]:
     """Return the onset of limit cycles for every law and delay, laws first.
 
     Args:
-        setup: the closed loop; its law, stiffness and delay do not count.
+        setup: the closed loop; its law, stiffness and delay are replaced.
         laws: letters.
-        delays: in samples.
-        starts: phases of the texture at which the handle starts.
-        tolerance: width of the bracket over its lower end.
-        lowest: stiffness from which the search goes up [N/m].
+        delays: delays [samples].
+        n_phases: phases of the texture at which the handle starts.
+        tolerance: relative width of the bracket.
+        min_stiffness: lower limit of the search [N/m].
         progress: called after every law and delay.
 
     Raises:
-        ParameterError: for a hand that does not come to rest, see
+        ParameterError: the hand does not come to rest, see
             :func:`~asperity.simulation.find_onset`.
     """
-    jobs, over = [(law, delay) for law in laws for delay in delays], Event()
-    several = side_by_side(
-        partial(_law_onsets, setup, delays, starts, tolerance, lowest, progress, over),
-        [(law,) for law in laws],
-        over,
+    jobs, cancelled = [(law, delay) for law in laws for delay in delays], Event()
+    find = partial(
+        _law_onsets, setup, delays, n_phases, tolerance, min_stiffness, progress, cancelled
     )
-    found = [onset for some in several for onset in some]
+    by_law = map_threads(find, [(law,) for law in laws], cancelled)
+    found = [onset for onsets in by_law for onset in onsets]
     return tuple(
-        predict(
+        prediction.predict(
             setup.with_law(law).surface, setup.plant, setup.hand, setup.with_delay(delay).servo,
-            onset, with_wall(found, delay),
+            onset, prediction.smooth_wall_onset(found, delay),
         )
         for (law, delay), onset in zip(jobs, found, strict=True)
     )  # fmt: skip
 
 
 def _law_onsets(
-    setup: Setup, delays: Sequence[int], starts: int, tolerance: float, lowest: float,
-    progress: Callable[[], None] | None, over: Event, law: str,
+    setup: Setup, delays: Sequence[int], n_phases: int, tolerance: float, min_stiffness: float,
+    progress: Callable[[], None] | None, cancelled: Event, law: str,
 ) -> list[Onset]:  # fmt: skip
-    """Return the onsets of a law for every delay; see :func:`onsets`."""
+    """Return the onsets of a law for every delay; see :func:`sweep_onsets`."""
 
-    def go_on() -> None:
-        if over.is_set():
+    def check_cancelled() -> None:
+        if cancelled.is_set():
             raise CancelledError
 
     loop = setup.with_law(law)
-    begin = loop.motion.at(np.zeros(1))[0] if loop.start is None else loop.start
+    start = loop.motion.at(np.zeros(1))[0] if loop.start is None else loop.start
     nears = [
-        expected(loop.surface, loop.plant, loop.hand, loop.with_delay(delay).servo, begin)
+        prediction.expected_onset(
+            loop.surface, loop.plant, loop.hand, loop.with_delay(delay).servo, start
+        )
         for delay in delays
     ]
     return find_onsets(
         loop.surface, loop.plant, loop.hand, loop.servo, loop.motion, delays, nears,
-        start=loop.start, velocity=loop.velocity, duration=loop.duration, starts=starts,
-        tolerance=tolerance, lowest=lowest, progress=go_on, told=progress,
+        start=loop.start, velocity=loop.velocity, duration=loop.duration, starts=n_phases,
+        tolerance=tolerance, lowest=min_stiffness, progress=check_cancelled,
+        onset_callback=progress,
     )  # fmt: skip
 
 
-def scans(
+def sweep_strokes(
     setup: Setup,
     laws: Sequence[str],
     *,
@@ -121,16 +126,16 @@ def scans(
     """Return the energy per stroke for every law, speed and depth, laws first.
 
     Args:
-        setup: the closed loop; its law does not count.
+        setup: the closed loop; its law is replaced.
         laws: letters.
-        speeds: of the hand [m/s].
-        depths: of the hand below z = 0 [m]; default: the motion's.
-        strokes: per run; default: the motion's, at least 5.
-        progress: is told the part that is done.
+        speeds: speeds of the hand [m/s].
+        depths: depths of the hand below z = 0 [m]; default: the motion's.
+        strokes: number of strokes per run; default: the motion's, at least 5.
+        progress: called with the fraction done.
 
     Raises:
-        ParameterError: for a motion that is not made of strokes, or depths for a hand that does
-            not hold a height.
+        ParameterError: the motion has no strokes, or depths are given for a hand without vertical
+            stiffness.
     """
     motion = setup.motion
     if not isinstance(motion, Strokes):
@@ -140,16 +145,16 @@ def scans(
         if deepest <= 0.0:
             raise ParameterError("depths", "are needed: the motion of the scene is not below z = 0")
         depths = (deepest,)
-    elif isinstance(setup.hand, SpringHand) and setup.hand.stiffness[2] == 0.0:
+    elif not setup.hand.holds_height:
         raise ParameterError("depths", "mean nothing: the hand has no stiffness along z")
     count = max(motion.count, DEFAULT_STROKES) if strokes is None else strokes
-    way = replace(motion, count=count)
+    path = replace(motion, count=count)
     jobs = [(law, speed, depth) for law in laws for speed in speeds for depth in depths]
     done = [0]
 
     def one(law: str, speed: float, depth: float) -> Stroke:
         (found,) = scan_strokes(
-            setup.with_law(law).surface, setup.plant, setup.hand, setup.servo, way,
+            setup.with_law(law).surface, setup.plant, setup.hand, setup.servo, path,
             speeds=[speed], depths=[depth], start=setup.start, velocity=setup.velocity,
         )  # fmt: skip
         done[0] += 1
@@ -157,4 +162,4 @@ def scans(
             progress(done[0] / len(jobs))
         return found
 
-    return side_by_side(one, jobs)
+    return map_threads(one, jobs)

@@ -1,4 +1,4 @@
-"""Why a loop ended, and the error that carries its last samples."""
+"""End reasons of a loop, and the error that carries its last samples."""
 
 from __future__ import annotations
 
@@ -7,77 +7,77 @@ from typing import ClassVar
 
 import numpy as np
 
-from asperity.checks import FloatArray
-from asperity.errors import AsperityError
+from asperity.core.checks import FloatArray
+from asperity.core.errors import AsperityError
 
-KEPT = 50
+FAULT_SAMPLES = 50
 """Samples that a fault carries."""
 
 
-class Cause(Enum):
-    """What ended a loop; the values are those of the compiled loop, and two of the watcher's own.
+class EndReason(Enum):
+    """Why a loop ended: the end causes of the compiled loop, and two of the supervisor.
 
-    The first four are no faults.
+    The first four are not faults.
     """
 
-    GOING = 0
+    RUNNING = 0
     STOPPED = 1
     SWAP = 2
     FINISHED = 3
-    NUMBER = 4
-    """A position or a force that is no number."""
+    NOT_FINITE = 4
+    """A position or a force is not a finite number."""
     DEVICE = 5
     """The driver reported an error."""
     WORKSPACE = 6
-    """The handle was read where no handle can be."""
+    """The handle was read outside its workspace."""
     DEPTH = 7
-    """The probe was deeper than what was analysed."""
-    MISSES = 8
-    """Too many samples in a row were late."""
-    LATE = 9
+    """The probe is deeper than the analysed depth."""
+    MISSED_SAMPLES = 8
+    """Too many consecutive samples were late."""
+    LATE_SAMPLE = 9
     """A sample was later than the limit."""
-    PARENT = 10
-    """The process that watches the loop was not heard of."""
-    SILENT = 11
-    """The loop did not go on: the device does not answer."""
+    NO_HEARTBEAT = 10
+    """The supervising process sent no heartbeat."""
+    UNRESPONSIVE = 11
+    """The loop made no progress: the device does not answer."""
     DIED = 12
     """The process of the loop ended."""
 
     @property
     def is_fault(self) -> bool:
-        """Whether it is one."""
-        return self.value > Cause.FINISHED.value
+        """Whether the reason is a fault."""
+        return self.value > EndReason.FINISHED.value
 
 
-_WORDS = {
-    Cause.NUMBER: "a position or a force is not a number",
-    Cause.WORKSPACE: "the handle was read outside its workspace",
-    Cause.DEPTH: "the probe is deeper than max_depth, for which the surface was analysed",
-    Cause.MISSES: "too many samples in a row were late",
-    Cause.LATE: "a sample was too late",
-    Cause.PARENT: "the program that watches the loop was not heard of",
-    Cause.SILENT: "the device does not answer",
-    Cause.DIED: "the process of the loop ended",
+_DESCRIPTIONS = {
+    EndReason.NOT_FINITE: "a position or a force is not a number",
+    EndReason.WORKSPACE: "the handle was read outside its workspace",
+    EndReason.DEPTH: "the probe is deeper than max_depth, for which the surface was analysed",
+    EndReason.MISSED_SAMPLES: "too many samples in a row were late",
+    EndReason.LATE_SAMPLE: "a sample was too late",
+    EndReason.NO_HEARTBEAT: "the supervising program sent no heartbeat",
+    EndReason.UNRESPONSIVE: "the device does not answer",
+    EndReason.DIED: "the process of the loop ended",
 }
 
 
-def words_of(cause: Cause) -> str:
-    """Return what was wrong, in words; a driver's own errors it says itself."""
-    return _WORDS[cause]
+def describe_end_reason(cause: EndReason) -> str:
+    """Return a fault in words; errors of a driver are described by the driver."""
+    return _DESCRIPTIONS[cause]
 
 
 class DeviceFault(AsperityError):  # noqa: N818 - the field's word for it
-    """The loop was ended by what it found wrong; the force was made zero.
+    """A fault that ended the loop; the force was made zero.
 
     Attributes:
-        cause: what it was.
-        samples: the last rows of the loop, at most ``KEPT``; see
-            :data:`asperity.servo.kernels.published.COLUMNS`.
+        cause: end reason.
+        samples: the last rows of the loop, at most ``FAULT_SAMPLES``; see
+            :data:`asperity.loop.shared_trace.COLUMNS`.
     """
 
     exit_code: ClassVar[int] = 3
 
-    def __init__(self, cause: Cause, words: str, samples: FloatArray | None = None) -> None:
+    def __init__(self, cause: EndReason, message: str, samples: FloatArray | None = None) -> None:
         self.cause = cause
         self.samples = np.empty((0, 0)) if samples is None else samples
-        super().__init__(words)
+        super().__init__(message)

@@ -1,4 +1,4 @@
-"""A loop in a process of its own, as the program sees it that starts and watches it."""
+"""A loop in a process of its own, as the program that starts and supervises it sees it."""
 
 from __future__ import annotations
 
@@ -10,50 +10,49 @@ import time
 from contextlib import suppress
 from importlib.util import find_spec
 from multiprocessing.context import SpawnContext
-from types import TracebackType
 from typing import Any, Self
 
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
+from asperity.core.errors import AsperityError, ParameterError
 from asperity.devices import Device
-from asperity.errors import AsperityError, ParameterError
-from asperity.servo.child import Job, Modules, serve
+from asperity.servo.driver_loop import NO_END, LoopProgram, build_program
 from asperity.servo.drivers.driver import Driver
-from asperity.servo.fault import KEPT, Cause, DeviceFault, words_of
-from asperity.servo.loop import Rendered, render
+from asperity.servo.fault import FAULT_SAMPLES, DeviceFault, EndReason, describe_end_reason
+from asperity.servo.loop_memory import LoopMemory, LoopStatistics
+from asperity.servo.process_main import LoopJob, ModuleFiles, run_loop_process
 from asperity.servo.safety import Safety
-from asperity.servo.shared import Shared
-from asperity.servo.statistics import Statistics
 from asperity.simulation.servo import Servo
 from asperity.surface import Surface
 
-LONGEST_START = 120.0
-"""[s] until the loop must run: compiling for the first time takes most of it."""
-_FOREVER = 2**62
-_TOO_LATE = "comes too late: the loop has ended"
-_LAST_WORDS = 2.0  # [s] that a process gets to say how it ended
+START_TIMEOUT = 120.0
+"""Time until the loop must run [s]: compiling for the first time takes most of it."""
+_ENDED_MESSAGE = "comes too late: the loop has ended"
+_EXIT_TIMEOUT = 2.0  # [s] for a process to report its end
 
 
-class Spare:
-    """A process that stands ready for a loop, made before it is known which: starting takes time.
+class PrestartedProcess:
+    """A process that stands ready for a loop that is not known yet: starting takes time.
 
-    Whoever makes one and has no loop for it says so by :meth:`end`.
+    End a process that gets no loop by :meth:`terminate`.
 
     Args:
-        shared: memory that it shares; its own if ``None``.
+        memory: memory to share; new memory if ``None``.
     """
 
-    def __init__(self, shared: Shared | None = None) -> None:
+    def __init__(self, memory: LoopMemory | None = None) -> None:
         context = SpawnContext()
-        self.shared = shared or Shared()
-        self.line, theirs = context.Pipe()
-        self.process = context.Process(target=serve, args=(theirs, self.shared), daemon=True)
+        self.memory = memory or LoopMemory()
+        self.connection, theirs = context.Pipe()
+        self.process = context.Process(
+            target=run_loop_process, args=(theirs, self.memory), daemon=True
+        )
         self.process.start()
         theirs.close()
 
-    def end(self, patience: float = 0.0) -> None:
-        """End it; what it does may take so long to come to an end [s]."""
-        self.line.close()
-        self.process.join(patience)
+    def terminate(self, timeout: float = 0.0) -> None:
+        """End the process, after a time to finish [s]."""
+        self.connection.close()
+        self.process.join(timeout)
         if self.process.is_alive():
             self.process.kill()
             self.process.join()
@@ -63,251 +62,253 @@ class ServoProcess:
     """A surface on a device, rendered by a process of its own.
 
     Args:
-        surface: what is felt, or what stands in its place, see ``servo.loop.Rendered``.
+        surface: the surface, or a program in its place.
         driver: the device.
-        servo: period, steps of position and force, greatest force, virtual damping.
+        servo: period, steps of position and force, maximum force, virtual damping.
         safety: limits.
-        reach: of the handle from the device's origin [m]; a reading further away is a fault.
-        duration: after which it ends [s]; ``None`` for not by itself.
-        device: whose limit counts for the surfaces of :meth:`change`.
-        spare: the process to be used; its end is then this loop's. ``None`` for a new one.
+        reach: reach of the handle from the device's origin [m]; a reading further away is a fault.
+        duration: duration of the loop [s]; ``None`` for no end.
+        device: device whose limit applies to the surfaces of :meth:`change_surface`.
+        prestarted: process to use, which ends with this loop; ``None`` for a new one.
 
     Raises:
-        ParameterError: for a surface that cannot be rendered, or a device that moves and whose
-            greatest force is not known.
+        ParameterError: for a surface that cannot be rendered, or a moving device without a known
+            maximum force.
 
     Example:
-        Not run as a test: it starts a process on a device; ``tests/servo/test_process.py`` does.
+        Not run as a test: it starts a process on a device; ``tests/servo/test_servo_process.py``
+        does.
 
         >>> with ServoProcess(surface, driver, Servo(1e-3)) as loop:  # doctest: +SKIP
-        ...     while loop.poll() is Cause.GOING:
+        ...     while loop.poll() is EndReason.RUNNING:
         ...         time.sleep(0.05)
     """
 
     def __init__(
-        self, surface: Surface | Rendered, driver: Driver, servo: Servo,
+        self, surface: Surface | LoopProgram, driver: Driver, servo: Servo,
         safety: Safety | None = None, reach: float = math.inf, duration: float | None = None,
-        device: Device | None = None, spare: Spare | None = None,
+        device: Device | None = None, prestarted: PrestartedProcess | None = None,
     ) -> None:  # fmt: skip
-        need_greatest_force(driver, servo)
+        require_max_force(driver, servo)
         self._driver, self._safety, self._device = driver, safety or Safety(), device
-        last = _FOREVER if duration is None else round(duration / servo.period)
-        shown = surface if isinstance(surface, Rendered) else render(surface, driver)
-        self._job = Job(shown, driver, servo, self._safety, reach, last)
-        self._spare = spare
-        self.shared = Shared() if spare is None else spare.shared
+        last = NO_END if duration is None else round(duration / servo.period)
+        program = surface if isinstance(surface, LoopProgram) else build_program(surface, driver)
+        self._job = LoopJob(program, driver, servo, self._safety, reach, last)
+        self._prestarted = prestarted
+        self.memory = LoopMemory() if prestarted is None else prestarted.memory
         self.notes: tuple[str, ...] = ()
-        self._cause, self._said = Cause.GOING, ""
-        self._seen, self._since = 0, 0.0
-        self._beating = threading.Event()
+        self._end_reason, self._driver_message = EndReason.RUNNING, ""
+        self._last_row_count, self._last_progress = 0, 0.0
+        self._heartbeat_stop = threading.Event()
 
     def __enter__(self) -> Self:
         self.start()
         return self
 
     def start(self) -> None:
-        """Start the process; it renders when this returns.
+        """Start the process; the loop runs when this returns.
 
         Raises:
             ParameterError: for a device that cannot be opened.
             DeviceFault: if the process ends or hangs.
         """
-        self._made = self._spare or Spare(self.shared)
-        self._line, self._process = self._made.line, self._made.process
-        threading.Thread(target=self._beat, daemon=True).start()
+        self._prestarted = self._prestarted or PrestartedProcess(self.memory)
+        self._connection, self._process = self._prestarted.connection, self._prestarted.process
+        threading.Thread(target=self._send_heartbeats, daemon=True).start()
         try:
-            self._line.send(_packed(self._job))
-            self.notes = self._heard("ready", LONGEST_START)
+            self._connection.send(_pickle(self._job))
+            self.notes = self._wait_for("ready", START_TIMEOUT)
         except BaseException:
-            self._end()
+            self._terminate()
             raise
-        self._since = time.monotonic()
+        self._last_progress = time.monotonic()
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:  # fmt: skip
+    def __exit__(self, *_error: object) -> None:
         self.stop()
 
     @property
-    def statistics(self) -> Statistics:
-        """What the loop counted."""
-        return Statistics.of(self.shared.status)
+    def statistics(self) -> LoopStatistics:
+        """Counts of the loop."""
+        return LoopStatistics.from_status(self.memory.status)
 
     @property
-    def moving(self) -> bool:
+    def has_moving_handle(self) -> bool:
         """Whether a real handle moves."""
-        return self._driver.moving
+        return self._driver.has_moving_handle
 
     @property
-    def driver(self) -> str:
+    def driver_name(self) -> str:
         """Name of the driver."""
         return self._driver.name
 
     @property
-    def alive(self) -> bool:
-        """Whether the process of the loop is there."""
+    def is_alive(self) -> bool:
+        """Whether the process of the loop is alive."""
         return bool(self._process.is_alive())
 
     @property
     def pid(self) -> int:
-        """Of the process of the loop."""
+        """Id of the process of the loop."""
         return int(self._process.pid or 0)
 
-    def poll(self) -> Cause:
-        """Return why the loop has ended, or ``GOING``.
+    def poll(self) -> EndReason:
+        """Return why the loop has ended, or ``EndReason.RUNNING``.
 
         Raises:
-            DeviceFault: if it was a fault.
+            DeviceFault: if it ended by a fault.
         """
-        if self._cause is Cause.GOING:
-            self._look()
-        if self._cause.is_fault:
+        if self._end_reason is EndReason.RUNNING:
+            self._receive()
+        if self._end_reason.is_fault:
             raise self.fault()
-        return self._cause
+        return self._end_reason
 
     def fault(self) -> DeviceFault:
         """Return the fault that ended the loop."""
-        words = self._said if self._cause is Cause.DEVICE else words_of(self._cause)
-        rows, _first = self.shared.rows(self.shared.head - KEPT)
+        reason = self._end_reason
+        by_driver = reason is EndReason.DEVICE
+        words = self._driver_message if by_driver else describe_end_reason(reason)
+        rows, _first = self.memory.rows(self.memory.row_count - FAULT_SAMPLES)
         at = f" at {rows[-1, 0]:.4g} s" if len(rows) else ""
         end = f"{words}{at}; the force was made zero"
-        if self._cause in {Cause.SILENT, Cause.DIED}:
-            end = f"{words}{at}. {self._driver.when_lost}"
-        return DeviceFault(self._cause, end, rows)
+        if reason in {EndReason.UNRESPONSIVE, EndReason.DIED}:
+            end = f"{words}{at}. {self._driver.loss_notice}"
+        return DeviceFault(reason, end, rows)
 
-    def change(self, surface: Surface, *, accept_risk: bool = False) -> None:
-        """Render another surface: the force goes, the surface is exchanged, the force comes.
+    def change_surface(self, surface: Surface, *, accept_risk: bool = False) -> None:
+        """Render another surface: the force ramps down, the surface is replaced, it ramps up.
 
-        It is analysed and compiled before, while the one that runs goes on. The law's force is
-        multiplied by a share that falls from 1 to 0, and rises from 0 to 1 with the next law, so
-        that at no time the stiffness is above that of either.
+        The surface is analysed and compiled before, while the loop runs. The share of the law's
+        force falls from 1 to 0, and rises from 0 to 1 with the next law, so that the stiffness
+        never exceeds that of either.
 
         Args:
-            surface: the next one.
-            accept_risk: whether it is rendered at a stiffness above the analysed limit, too.
+            surface: the next surface.
+            accept_risk: whether to render it at a stiffness above the analysed limit as well.
 
         Raises:
             ParameterError: for a surface that cannot be rendered, or a stiffness above the limit;
                 without a device no limit is known.
-            DeviceFault: if the loop has ended by one.
+            DeviceFault: if the loop has ended by a fault.
         """
         if not accept_risk:
-            self._refuse_risk(surface)
-        self.exchange(render(surface, self._driver))
+            self._check_stiffness(surface)
+        self.change_program(build_program(surface, self._driver))
 
-    def _refuse_risk(self, surface: Surface) -> None:
-        from asperity.servo.risk import risk
+    def _check_stiffness(self, surface: Surface) -> None:
+        from asperity.servo.stiffness_check import excess_stiffness_reason
 
         if self._device is None:
             words = "is not known to the loop, so no limit is: ServoProcess(..., device=...)"
             raise ParameterError("device", words)
-        if reason := risk(surface, self._device):
+        if reason := excess_stiffness_reason(surface, self._device):
             raise ParameterError("stiffness", f"is refused: {reason}; accept_risk=True renders it")
 
-    def exchange(self, shown: Rendered) -> None:
-        """Render something else, which nobody has analysed; see :meth:`change`.
+    def change_program(self, program: LoopProgram) -> None:
+        """Render another program, without analysis; see :meth:`change_surface`.
 
         Raises:
             ParameterError: if it cannot be rendered, or the loop was ended.
-            DeviceFault: if the loop has ended by one.
+            DeviceFault: if the loop has ended by a fault.
         """
-        packed = _packed(shown)
-        if self.poll() is not Cause.GOING:
-            raise ParameterError("surface", _TOO_LATE)
-        with suppress(OSError):  # it has just ended, and said why
-            self._line.send(packed)
-        self._heard("loaded", LONGEST_START)
+        message = _pickle(program)
+        if self.poll() is not EndReason.RUNNING:
+            raise ParameterError("surface", _ENDED_MESSAGE)
+        with suppress(OSError):  # it has just ended, and reported why
+            self._connection.send(message)
+        self._wait_for("loaded", START_TIMEOUT)
 
     def rows(self, first: int) -> tuple[FloatArray, int]:
-        """Return the rows from one on that are still there, and the number of the first."""
-        return self.shared.rows(first)
+        """Return the available rows from one on, and the number of the first."""
+        return self.memory.rows(first)
 
     def stop(self) -> None:
-        """Let the force go, and end the loop and its process."""
-        if self._cause is Cause.GOING:
-            self.shared.stop()
-            deadline = time.monotonic() + self._safety.ramp + _LAST_WORDS
-            while self._cause is Cause.GOING and time.monotonic() < deadline:
-                self._look(0.01)
-        self._end()
+        """Release the force, and end the loop and its process."""
+        if self._end_reason is EndReason.RUNNING:
+            self.memory.request_stop()
+            deadline = time.monotonic() + self._safety.ramp + _EXIT_TIMEOUT
+            while self._end_reason is EndReason.RUNNING and time.monotonic() < deadline:
+                self._receive(0.01)
+        self._terminate()
 
-    def _end(self) -> None:
-        """End the process, which has let go of the device unless it hangs."""
-        self._beating.set()
-        self._made.end(_LAST_WORDS)
+    def _terminate(self) -> None:
+        """End the process, which has closed the device unless it hangs."""
+        self._heartbeat_stop.set()
+        assert self._prestarted is not None
+        self._prestarted.terminate(_EXIT_TIMEOUT)
 
-    def _beat(self) -> None:
-        while not self._beating.wait(0.1 * self._safety.silence):
-            self.shared.beat()
+    def _send_heartbeats(self) -> None:
+        while not self._heartbeat_stop.wait(0.1 * self._safety.silence):
+            self.memory.send_heartbeat()
 
-    def _look(self, patience: float = 0.0) -> None:
-        """Listen to the process, and see whether it goes on."""
+    def _receive(self, timeout: float = 0.0) -> None:
+        """Receive messages, and check that the loop makes progress."""
         try:
-            while self._line.poll(patience):
-                self._take(self._line.recv())
+            while self._connection.poll(timeout):
+                self._handle_message(*self._connection.recv())
         except (EOFError, OSError):
-            self._cause = Cause.DIED if self._cause is Cause.GOING else self._cause
-        now, head = time.monotonic(), self.shared.head
-        if head != self._seen:
-            self._seen, self._since = head, now
-        elif self._cause is Cause.GOING and now - self._since > self._safety.silence:
-            self._cause = Cause.SILENT
+            if self._end_reason is EndReason.RUNNING:
+                self._end_reason = EndReason.DIED
+        now, count = time.monotonic(), self.memory.row_count
+        if count != self._last_row_count:
+            self._last_row_count, self._last_progress = count, now
+        elif (
+            self._end_reason is EndReason.RUNNING
+            and now - self._last_progress > self._safety.silence
+        ):
+            self._end_reason = EndReason.UNRESPONSIVE
             self._process.kill()
 
-    def _take(self, message: tuple[str, Any]) -> str:
-        kind, content = message
+    def _handle_message(self, kind: str, content: Any) -> None:
         if kind == "ended":
-            self._cause, self._said = content
-        return kind
+            self._end_reason, self._driver_message = content
 
-    def _heard(self, wanted: str, patience: float) -> Any:
-        """Return what the process says next, of the wanted kind."""
+    def _wait_for(self, expected: str, timeout: float) -> Any:
+        """Return the content of the next message of a kind."""
         try:
-            while self._line.poll(patience):
-                kind, content = message = self._line.recv()
-                if kind == wanted:
+            while self._connection.poll(timeout):
+                kind, content = self._connection.recv()
+                if kind == expected:
                     return content
                 if kind in {"failed", "refused"}:
                     raise ParameterError("device" if kind == "failed" else "surface", content)
-                self._take(message)
-                if self.poll() is not Cause.GOING:
-                    raise ParameterError("surface", _TOO_LATE)
+                self._handle_message(kind, content)
+                if self.poll() is not EndReason.RUNNING:
+                    raise ParameterError("surface", _ENDED_MESSAGE)
         except (EOFError, OSError):
-            self._cause = Cause.DIED
+            self._end_reason = EndReason.DIED
         else:
-            self._cause = Cause.SILENT
+            self._end_reason = EndReason.UNRESPONSIVE
         raise self.fault()
 
 
-def need_greatest_force(driver: Driver, servo: Servo) -> None:
-    """Refuse a device that moves and whose greatest force is not known.
+def require_max_force(driver: Driver, servo: Servo) -> None:
+    """Require a known maximum force for a moving device.
 
     Raises:
-        ParameterError: for one.
+        ParameterError: if it is not known.
     """
-    if driver.moving and not math.isfinite(servo.max_force):
+    if driver.has_moving_handle and not math.isfinite(servo.max_force):
         words = "is not known: a device that moves needs it, --set max_force=3N"
         raise ParameterError("max_force", words)
 
 
-def _packed(thing: object) -> tuple[Modules, bytes]:
-    """Return a thing for another process, and the files of modules that it cannot import."""
+def _pickle(value: object) -> tuple[ModuleFiles, bytes]:
+    """Return a pickled value, and the files of the plugins that it needs."""
     try:
-        packed = pickle.dumps(thing)
+        data = pickle.dumps(value)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise AsperityError(f"cannot be sent to the loop's process: {error}") from None
     files = {
         name: str(getattr(module, "__file__", ""))
         for name, module in list(sys.modules.items())
-        if name.startswith("own_") and name.encode() in packed and find_spec_of(name) is None
+        if name.startswith("plugin_") and name.encode() in data and not _is_importable(name)
     }
-    return tuple(files.items()), packed
+    return tuple(files.items()), data
 
 
-def find_spec_of(name: str) -> Any:
-    """Return how a module is found by its name; ``None`` if it is not."""
+def _is_importable(name: str) -> bool:
     try:
-        return find_spec(name)
-    except ValueError:  # it was made by hand: it has no spec
-        return None
+        return find_spec(name) is not None
+    except ValueError:  # a module without a spec
+        return False

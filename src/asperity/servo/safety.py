@@ -1,4 +1,4 @@
-"""When the loop holds the force back, and when it gives up; all defaults stand here."""
+"""Safety limits of a loop, with their defaults."""
 
 from __future__ import annotations
 
@@ -6,40 +6,39 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from asperity.arguments import Argument, whole
-from asperity.checks import positive, real
+from asperity.core.arguments import Argument, check_integer
+from asperity.core.checks import check_positive, check_real
+from asperity.core.errors import ParameterError
+from asperity.core.files import Serializable
 from asperity.devices import Device
-from asperity.errors import ParameterError
-from asperity.files import Record
 
-RISE = 5e-3
-"""[s] in which the force may go from nothing to its greatest, unless a slew limit is given."""
-BEYOND = ("fault", "warn")
-LIES = ("lying", "standing")
+DEFAULT_RISE_TIME = 5e-3
+"""Time for the force to rise from zero to its maximum, unless a slew limit is given [s]."""
+DEPTH_ACTIONS = ("fault", "warn")
+WALL_ORIENTATIONS = ("lying", "standing")
 
-BEYOND_REACH = 1.5
-"""Times the reach of a device: a reading further away is none."""
+REACH_FACTOR = 1.5
+"""Largest distance of a reading, over the radius of the device's workspace."""
 
 
 @dataclass(frozen=True)
-class Safety(Record):
+class Safety(Serializable):
     """Limits of a loop.
 
     Attributes:
-        ramp: time in which the force comes in after the start, and goes before the end [s].
-        max_slew: greatest change of the force [N/s]; ``None`` for from nothing to the greatest
-            force in ``RISE``.
-        misses: samples in a row that may be late: not done when the next one is due.
-        lateness: of one sample that is a fault, from when it was due until it is done [s].
-        silence: time without a heartbeat of the watching process that is a fault [s].
+        ramp: time in which the force rises after the start, and falls before the end [s].
+        max_slew: largest change of the force [N/s]; ``None`` for zero to the maximum force in
+            ``DEFAULT_RISE_TIME``.
+        misses: consecutive samples that may be late: not finished when the next one is due.
+        lateness: largest delay of a sample, from its due time to its end [s].
+        silence: longest time without a heartbeat of the supervising process [s].
         beyond_depth: whether a probe deeper than the surface's ``max_depth`` is a "fault", or is
-            counted and told, "warn". It never is under a clamp that holds at every depth.
-        passivity_damping: greatest damping of the passivity controller [N s/m]; 0 for none.
-        reach: of the handle from the middle of the workspace [m]; a reading further away is a
-            fault. ``None`` for 1.5 times the device's.
-        wall: how the surface lies before the user: "lying", like a table, or "standing", facing
-            him.
-        origin: of the surface, in the device's axes [m].
+            counted and reported, "warn". It is neither under a clamp that bounds every depth.
+        passivity_damping: largest damping of the passivity controller [N s/m]; 0 for none.
+        reach: largest distance of a reading from the middle of the workspace [m]; ``None`` for 1.5
+            times the device's.
+        wall: orientation of the surface: "lying", like a table, or "standing", facing the user.
+        origin: origin of the surface, in the device's axes [m].
 
     Raises:
         ParameterError: for a value out of its range.
@@ -58,30 +57,30 @@ class Safety(Record):
 
     def __post_init__(self) -> None:
         for name in ("ramp", "passivity_damping"):
-            if real(name, getattr(self, name)) < 0.0:
+            if check_real(name, getattr(self, name)) < 0.0:
                 raise ParameterError(name, "must not be negative", getattr(self, name))
         for name in ("lateness", "silence"):
-            positive(name, getattr(self, name), "s")
+            check_positive(name, getattr(self, name), "s")
         for name in ("max_slew", "reach"):
             if getattr(self, name) is not None:
-                positive(name, getattr(self, name))
-        whole("misses", self.misses)
-        if self.wall not in LIES:
+                check_positive(name, getattr(self, name))
+        check_integer("misses", self.misses)
+        if self.wall not in WALL_ORIENTATIONS:
             raise ParameterError("wall", "must be 'lying' or 'standing'", self.wall)
-        if self.beyond_depth not in BEYOND:
+        if self.beyond_depth not in DEPTH_ACTIONS:
             raise ParameterError("beyond_depth", "must be 'fault' or 'warn'", self.beyond_depth)
 
-    def slew(self, max_force: float) -> float:
-        """Return the greatest change of the force [N/s]; infinite where neither is known."""
+    def slew_limit(self, max_force: float) -> float:
+        """Return the largest change of the force [N/s]; infinite if neither number is known."""
         if self.max_slew is not None:
             return self.max_slew
-        return max_force / RISE if math.isfinite(max_force) else math.inf
+        return max_force / DEFAULT_RISE_TIME if math.isfinite(max_force) else math.inf
 
-    def reach_on(self, device: Device) -> float:
-        """Return how far from the middle of the workspace a reading may be [m].
+    def reach_limit(self, device: Device) -> float:
+        """Return the largest distance of a reading from the middle of the workspace [m].
 
-        It is ``BEYOND_REACH`` times the radius of the ball that holds the device's workspace;
-        infinite where that is not known.
+        It is ``REACH_FACTOR`` times the radius of the ball around the device's workspace; infinite
+        if that is not known.
         """
         if self.reach is not None:
             return self.reach
@@ -89,45 +88,43 @@ class Safety(Record):
         sides = device.value("workspace_diameter"), device.value("workspace_length")
         if radius is None and None not in sides:
             radius = 0.5 * math.hypot(*(side or 0.0 for side in sides))
-        return math.inf if radius is None else BEYOND_REACH * radius
+        return math.inf if radius is None else REACH_FACTOR * radius
 
 
 ARGUMENTS: tuple[Argument, ...] = (
+    Argument("ramp", "time in which the force rises, and falls at the end", "s", Safety.ramp),
     Argument(
-        "ramp", "time in which the force comes in, and goes at the end", "s", Safety.ramp
+        "max_slew", "largest change of the force", "N/s", must_be_positive=True, example="2000N/s",
+        default_description="to the maximum force in 5 ms",
+    ),
+    Argument("misses", "consecutive samples that may be late", "", Safety.misses, form="integer"),
+    Argument("lateness", "maximum delay of a sample", "s", Safety.lateness, must_be_positive=True),
+    Argument(
+        "silence", "maximum silence of the supervising process", "s", Safety.silence,
+        must_be_positive=True,
     ),
     Argument(
-        "max_slew", "greatest change of the force", "N/s", positive=True, example="2000N/s",
-        default_words="to the greatest force in 5 ms",
-    ),
-    Argument("misses", "samples in a row that may be late", "", Safety.misses, form="integer"),
-    Argument("lateness", "of one sample that is a fault", "s", Safety.lateness, positive=True),
-    Argument(
-        "silence", "of the program that watches, which is a fault", "s", Safety.silence,
-        positive=True,
+        "beyond_depth", "how a probe below max_depth is treated", "", Safety.beyond_depth,
+        form="text", choices=DEPTH_ACTIONS,
     ),
     Argument(
-        "beyond_depth", "what a probe below max_depth is", "", Safety.beyond_depth, form="text",
-        choices=BEYOND,
-    ),
-    Argument(
-        "passivity_damping", "greatest of the passivity controller, 0 for none", "N*s/m",
+        "passivity_damping", "maximum damping of the passivity controller, 0 for none", "N*s/m",
         Safety.passivity_damping,
     ),
     Argument(
-        "reach", "of the handle from the middle of the workspace", "m", positive=True,
-        example="100mm", default_words="1.5 times the device's",
+        "reach", "maximum distance of a reading from the middle of the workspace", "m",
+        must_be_positive=True, example="100mm", default_description="1.5 times the device's",
     ),
     Argument(
-        "wall", "how the surface lies: like a table, or facing the user", "", Safety.wall,
-        form="text", choices=LIES,
+        "wall", "orientation of the surface: lying (table) or standing (wall)", "", Safety.wall,
+        form="text", choices=WALL_ORIENTATIONS,
     ),
     Argument(
-        "origin", "of the surface, in the device's axes", "m", form="space",
-        default_words="the device's",
+        "origin", "origin of the surface, in the device's axes", "m", form="space",
+        default_description="the device's",
     ),
 )  # fmt: skip
-"""What [servo] can say."""
+"""Arguments of the section [servo]."""
 
-USUAL = Safety()
-"""All by default."""
+DEFAULT_SAFETY = Safety()
+"""Limits by default."""

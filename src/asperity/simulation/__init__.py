@@ -1,10 +1,13 @@
-"""Texture, device and hand in one loop, with the energy accounted for exactly."""
+"""Simulation of texture, device and hand in a closed loop, with an exact energy ledger."""
 
-from asperity.simulation.hands import BandHand, Hand, MovedHand, SpringHand
-from asperity.simulation.motions import Motion, Path, Still, Strokes
-from asperity.simulation.onset import Onset, find_onset
-from asperity.simulation.plants import Cartesian, LinkMasses, Pantograph, Plant, Resonance
+from asperity.simulation.discretization import Resonance
+from asperity.simulation.hands import BandHand, Hand, PrescribedHand, SpringHand
+from asperity.simulation.limit_cycles.onset import Onset, find_onset
+from asperity.simulation.motions import Motion, Stationary, Strokes, Waypoints
+from asperity.simulation.pantograph import LinkMasses, Pantograph
+from asperity.simulation.plants import Cartesian
 from asperity.simulation.run import Ledger, Run
+from asperity.simulation.sampled_plant import Plant
 from asperity.simulation.scan import Stroke, scan_strokes
 from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import simulate, simulate_many
@@ -16,18 +19,18 @@ __all__ = [
     "Ledger",
     "LinkMasses",
     "Motion",
-    "MovedHand",
     "Onset",
     "Pantograph",
-    "Path",
     "Plant",
+    "PrescribedHand",
     "Resonance",
     "Run",
     "Servo",
     "SpringHand",
-    "Still",
+    "Stationary",
     "Stroke",
     "Strokes",
+    "Waypoints",
     "find_onset",
     "scan_strokes",
     "simulate",

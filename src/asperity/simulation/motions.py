@@ -9,9 +9,9 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.checks import FloatArray, array, positive
-from asperity.errors import ParameterError
-from asperity.files import record
+from asperity.core.checks import FloatArray, check_array, check_positive
+from asperity.core.errors import ParameterError
+from asperity.core.files import attributes_to_dict
 
 
 @runtime_checkable
@@ -25,13 +25,13 @@ class Motion(Protocol):
         """Return plain data, SI units."""
 
 
-def _point(name: str, value: ArrayLike) -> tuple[float, float, float]:
-    x, y, z = array(name, value, (3,), "m")
+def _check_point(name: str, value: ArrayLike) -> tuple[float, float, float]:
+    x, y, z = check_array(name, value, (3,), "m")
     return float(x), float(y), float(z)
 
 
 @dataclass(frozen=True)
-class Still:
+class Stationary:
     """An anchor that stays where it is.
 
     Attributes:
@@ -41,7 +41,7 @@ class Still:
         ParameterError: for another shape or a value that is not finite.
 
     Example:
-        >>> Still((0.0, 0.0, -1e-3)).at([0.0, 1.0])
+        >>> Stationary((0.0, 0.0, -1e-3)).at([0.0, 1.0])
         array([[ 0.   ,  0.   , -0.001],
                [ 0.   ,  0.   , -0.001]])
     """
@@ -49,15 +49,15 @@ class Still:
     point: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "point", _point("point", self.point))
+        object.__setattr__(self, "point", _check_point("point", self.point))
 
     def at(self, times: ArrayLike) -> FloatArray:
         """Return the positions [m], shape (n, 3), at the times [s], shape (n,)."""
-        return np.tile(np.array(self.point), (len(array("times", times, (None,), "s")), 1))
+        return np.tile(np.array(self.point), (len(check_array("times", times, (None,), "s")), 1))
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {"kind": "still"} | record(self)
+        return {"kind": "still"} | attributes_to_dict(self)
 
 
 @dataclass(frozen=True)
@@ -88,12 +88,12 @@ class Strokes:
     count: int = 1
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", _point("start", self.start))
-        object.__setattr__(self, "end", _point("end", self.end))
-        positive("speed", self.speed, "m/s")
+        object.__setattr__(self, "start", _check_point("start", self.start))
+        object.__setattr__(self, "end", _check_point("end", self.end))
+        check_positive("speed", self.speed, "m/s")
         if self.start == self.end:
             raise ParameterError("end", "must differ from start", self.end)
-        if positive("count", self.count) % 1 != 0:
+        if check_positive("count", self.count) % 1 != 0:
             raise ParameterError("count", "must be a whole number of strokes", self.count)
         object.__setattr__(self, "count", int(self.count))
         if not math.isfinite(math.dist(self.start, self.end)):
@@ -114,7 +114,7 @@ class Strokes:
 
     def at(self, times: ArrayLike) -> FloatArray:
         """Return the positions [m], shape (n, 3), at the times [s], shape (n,)."""
-        strokes = array("times", times, (None,), "s") / self.period
+        strokes = check_array("times", times, (None,), "s") / self.period
         strokes = np.clip(strokes, 0.0, self.count)
         share = 1.0 - np.abs(1.0 - strokes % 2.0)
         begin, way = np.array(self.start), np.subtract(self.end, self.start)
@@ -122,11 +122,11 @@ class Strokes:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {"kind": "strokes"} | record(self)
+        return {"kind": "strokes"} | attributes_to_dict(self)
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class Waypoints:
     """Through given points at given times, straight and at constant speed in between.
 
     Before the first time and after the last one it rests there.
@@ -139,7 +139,7 @@ class Path:
         ParameterError: for other shapes, values that are not finite, or times that do not increase.
 
     Example:
-        >>> Path([0.0, 1.0], [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]).at([0.25, 3.0])[:, 2]
+        >>> Waypoints([0.0, 1.0], [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]).at([0.25, 3.0])[:, 2]
         array([0.5, 2. ])
     """
 
@@ -147,8 +147,8 @@ class Path:
     points: FloatArray
 
     def __post_init__(self) -> None:
-        times = array("times", self.times, (None,), "s")
-        points = array("points", self.points, (None, 3), "m")
+        times = check_array("times", self.times, (None,), "s")
+        points = check_array("points", self.points, (None, 3), "m")
         if len(times) < 1 or len(times) != len(points):
             raise ParameterError("points", f"must be one for each of {len(times)} times")
         if (np.diff(times) <= 0.0).any():
@@ -163,10 +163,10 @@ class Path:
 
     def at(self, times: ArrayLike) -> FloatArray:
         """Return the positions [m], shape (n, 3), at the times [s], shape (n,)."""
-        wanted = array("times", times, (None,), "s")
+        wanted = check_array("times", times, (None,), "s")
         columns = [np.interp(wanted, self.times, self.points[:, i]) for i in range(3)]
         return np.stack(columns, axis=-1)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
-        return {"kind": "path"} | record(self)
+        return {"kind": "path"} | attributes_to_dict(self)

@@ -1,4 +1,4 @@
-"""What a simulation gave: where the handle went, and where every joule went."""
+"""Results of a simulation: trace, final state and energy ledger."""
 
 from __future__ import annotations
 
@@ -10,25 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from asperity.checks import FloatArray
-from asperity.display import Plotted
-from asperity.files import plain, record
+from asperity.core.checks import FloatArray
+from asperity.core.display import Plottable
+from asperity.core.files import attributes_to_dict, to_plain_data
+from asperity.recording.named_columns import NamedColumns
 from asperity.recording.recording import open_recording
-from asperity.recording.traced import Parts
-from asperity.simulation.ending import Ending, fed
-from asperity.simulation.trace import COLUMNS, is_text
+from asperity.simulation.trace import COLUMNS, TailStatistics, is_text_path
 from asperity.surface import Surface
 
-MOST_ROWS = 20_000
+MAX_ROWS = 20_000
 
 
-class Stop(StrEnum):
-    """What ends a run before its time."""
+class StopReason(StrEnum):
+    """Why a run stops early."""
 
-    NOTHING = ""
+    NONE = ""
     DIVERGED = "diverged"
-    """The state left all bounds, 1e6 in SI units."""
-    LEFT = "left the workspace"
+    """The state exceeds 1e6 in SI units."""
+    LEFT_WORKSPACE = "left the workspace"
 
 
 @dataclass(frozen=True)
@@ -39,92 +38,85 @@ class Ledger:
         supplied: work of the held force on the true motion, Σ f_k · (p_{k+1} - p_k), per axis;
             > 0 feeds the hand.
         same_sample: the paper's sum, Σ f_k · (p_k - p_{k-1}) with the measured position and the
-            force commanded at the same sample, per axis: it turns the sampling leak around.
-        lost: in the damping of device and hand.
+            force commanded at the same sample, per axis; it inverts the sign of the sampling leak.
+        dissipated: loss in the damping of device and hand.
         hand: work of the hand's anchor on the body.
         friction: work of dry friction, mostly negative.
-        sampling: what holding the force from sample to sample adds to the work of the field by
-            the trapezoidal rule, ½ Σ (f_k - f_{k+1}) · (p_{k+1} - p_k), with measured positions;
+        sampling: energy that holding the force from sample to sample adds to the work of the field
+            by the trapezoidal rule, ½ Σ (f_k - f_{k+1}) · (p_{k+1} - p_k), with measured positions;
             for f = -K p it is ½ K Σ|Δp|².
-        exchanged: the sum of all exchanges without their signs, the scale of the closure error.
-        before: stored at the beginning, kinetic and in springs.
-        after: stored at the end.
+        exchanged: sum of the absolute values of all exchanges, the scale of the closure error.
+        stored_before: stored at the start, kinetic and in springs.
+        stored_after: stored at the end.
     """
 
     supplied: tuple[float, float, float]
     same_sample: tuple[float, float, float]
-    lost: float
+    dissipated: float
     hand: float
     friction: float
     sampling: float
     exchanged: float
-    before: float
-    after: float
+    stored_before: float
+    stored_after: float
 
     @classmethod
-    def of(cls, sums: FloatArray, before: float, after: float) -> Ledger:
-        """Return the ledger of the sums of a run; see ``kernels/booking.py``."""
+    def from_sums(cls, sums: FloatArray, stored_before: float, stored_after: float) -> Ledger:
+        """Return the ledger of the sums of a run; see ``kernels/energy_ledger.py``."""
         x, y, z, px, py, pz, lost, hand, friction, sampling, exchanged = map(float, sums)
+        work, same = (x, y, z), (px, py, pz)
         return cls(
-            (x, y, z), (px, py, pz), lost, hand, friction, sampling, exchanged, before, after
+            work, same, lost, hand, friction, sampling, exchanged, stored_before, stored_after
         )
 
     @property
     def total(self) -> float:
-        """The texture's work on the hand, all axes [J]."""
+        """Work of the texture on the hand, all axes [J]."""
         return float(sum(self.supplied))
 
     @property
     def closure(self) -> float:
-        """Energy that does not add up [J]: stored - (supplied + hand + friction - lost)."""
-        change = self.after - self.before
-        return change - (self.total + self.hand + self.friction - self.lost)
+        """Closure error [J]: stored - (supplied + hand + friction - lost)."""
+        change = self.stored_after - self.stored_before
+        return change - (self.total + self.hand + self.friction - self.dissipated)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data [J], the sums over the axes as well; None for what overflowed."""
+        """Return plain data [J], with the sums over the axes; None for an overflow."""
         data = {
-            "supplied": self.supplied,
-            "supplied_sum": self.total,
-            "same_sample": self.same_sample,
-            "same_sample_sum": sum(self.same_sample),
-            "sampling": self.sampling,
-            "lost": self.lost,
-            "hand": self.hand,
-            "friction": self.friction,
-            "stored_before": self.before,
-            "stored_after": self.after,
-            "closure": self.closure,
+            "supplied": self.supplied, "supplied_sum": self.total,
+            "same_sample": self.same_sample, "same_sample_sum": sum(self.same_sample),
+            "sampling": self.sampling, "lost": self.dissipated, "hand": self.hand,
+            "friction": self.friction, "stored_before": self.stored_before,
+            "stored_after": self.stored_after, "closure": self.closure,
             "exchanged": self.exchanged,
-        }
-        return dict(plain(data, infinity=None))
+        }  # fmt: skip
+        return dict(to_plain_data(data, infinity=None))
 
 
 @dataclass(frozen=True, eq=False)
-class Run(Parts, Plotted):
-    """What a simulation gave.
+class Run(NamedColumns, Plottable):
+    """The result of a simulation.
 
     Attributes:
-        table: the trace, one row for each traced sample with the columns of
-            :data:`~asperity.simulation.trace.COLUMNS`; no rows if it went to a file or
-            nowhere.
-        state: of the body at the end: position [m], velocity [m/s], then the same of the part that
-            carries the hand, if it is another one.
-        samples: that were done.
+        table: the trace, one row per traced sample with the columns of
+            :data:`~asperity.simulation.trace.COLUMNS`; no rows if it is in a file or was not
+            requested.
+        state: final state of the body: position [m], velocity [m/s], then those of the mass that
+            carries the hand, if it is a second one.
+        samples: number of samples done.
         period: T [s].
-        ledger: the energies of the whole run.
-        surface: what was explored.
-        stop: what ended it early; then trace and ledger end there (where it left the workspace,
-            with the sample that the body could not follow).
-        place: where it left the workspace, in words.
-        path: of the trace file, or empty.
-        ending: what the last quarter shows, from all rows that were traced, kept or not; ``None``
-            if none were.
-        notes: what about the plant is guessed.
-        short: ticks in which the search for nearest points used up its looks, and took the best
-            point that it had found.
-        gap: the most that the search left open in one of them [m]: on the nearest contact, no
-            surface point was nearer than the one taken by more than this; on the split one, the
-            force was right to stiffness times this.
+        ledger: energies of the whole run.
+        surface: the surface.
+        stop: why the run stopped early; trace and ledger then end there (when the handle left the
+            workspace, with the sample that the body could not follow).
+        stop_location: where the handle left the workspace, in words.
+        path: path of the trace file, or empty.
+        tail: statistics of the last quarter, from all traced rows; ``None`` if none were traced.
+        notes: sentences on parameters of the plant that are guesses.
+        truncated_ticks: ticks whose search for closest points reached the evaluation budget.
+        search_error: largest error bound of a truncated search [m]: on the nearest contact no
+            surface point was closer than the one found by more than this; on the split contact the
+            force was accurate to stiffness times this.
     """
 
     table: FloatArray
@@ -133,24 +125,24 @@ class Run(Parts, Plotted):
     period: float
     ledger: Ledger
     surface: Surface
-    stop: Stop = Stop.NOTHING
-    place: str = ""
+    stop: StopReason = StopReason.NONE
+    stop_location: str = ""
     path: str = ""
-    ending: Ending | None = None
+    tail: TailStatistics | None = None
     notes: tuple[str, ...] = ()
-    short: int = 0
-    gap: float = 0.0
+    truncated_ticks: int = 0
+    search_error: float = 0.0
     columns = COLUMNS
 
     def __repr__(self) -> str:
-        law, stopped = self.surface.law.letter, f", {self.stopped}" if self.stop else ""
+        law, stopped = self.surface.law.letter, f", {self.stop_message}" if self.stop else ""
         work = f"{self.ledger.total:+.4g} J to the hand"
         return f"<Run of law {law}, {self.duration:g} s, {work}{stopped}>"
 
     @property
-    def stopped(self) -> str:
-        """What ended it early, in words; empty if nothing did."""
-        return f"{self.stop}: {self.place}" if self.place else str(self.stop)
+    def stop_message(self) -> str:
+        """Why the run stopped early, in words; empty if it did not."""
+        return f"{self.stop}: {self.stop_location}" if self.stop_location else str(self.stop)
 
     @property
     def duration(self) -> float:
@@ -158,45 +150,39 @@ class Run(Parts, Plotted):
         return self.samples * self.period
 
     @property
-    def fed(self) -> bool:
-        """Whether, in the last quarter, the texture supplies a fifth of what is taken, or more."""
-        return fed(self.table[-max(len(self.time) // 4, 2)], self.table[-1])
+    def is_energy_balanced(self) -> bool:
+        """Whether the ledger closes, to 1e-9 of all energy exchanged.
 
-    @property
-    def closes(self) -> bool:
-        """Whether the ledger adds up, to 1e-9 of all that was exchanged.
-
-        If not, the body is too stiff for its period, and no energy of the run is to be believed.
+        If not, the body is too stiff for its period, and the energies of the run are not valid.
         """
         ledger = self.ledger
-        # Where nothing moves, the last bits of what is stored are all there is.
-        bits = 1e-15 * max(ledger.before, ledger.after)
+        # If nothing moves, only rounding errors of the stored energy are left.
+        bits = 1e-15 * max(ledger.stored_before, ledger.stored_after)
         return abs(ledger.closure) <= 1e-9 * ledger.exchanged + bits
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data without the trace, SI units; None for what overflowed."""
-        names = ("duration", "samples", "period", "stopped", "state", "ledger", "short", "gap")
-        own = record(self, *names, infinity=None)
+        """Return plain data without the trace, SI units; None for an overflow."""
+        names = "duration samples period stop_message state ledger truncated_ticks search_error"
+        own = attributes_to_dict(self, *names.split(), infinity=None)
         return own | {"trace": self.path or None, "notes": list(self.notes)}
 
 
-def reread(run: Run, most: int = MOST_ROWS) -> Run:
-    """Return a run with the trace that it wrote to a file, thinned out evenly.
+def load_trace(run: Run, max_rows: int = MAX_ROWS) -> Run:
+    """Return a run with the trace of its file, decimated evenly.
 
     Args:
-        run: whose trace is in ``run.path``.
-        most: rows that are read at most.
+        run: a run whose trace is in ``run.path``.
+        max_rows: largest number of rows.
 
     Raises:
         OSError: if the file is gone.
-        ParameterError: likewise, of a recording.
+        ParameterError: likewise, for a recording.
     """
-    if not is_text(Path(run.path)):
-        return replace(run, table=open_recording(run.path).table(most))
+    if not is_text_path(Path(run.path)):
+        return replace(run, table=open_recording(run.path).table(max_rows))
     with open(run.path, encoding="utf-8") as file:
         rows = sum(1 for _line in file) - 1
         file.seek(0)
-        step = max(1, -(-rows // most))
-        kept = islice(file, 1, None, step)
-        table = np.loadtxt(kept, delimiter=",", ndmin=2)
+        step = max(1, -(-rows // max_rows))
+        table = np.loadtxt(islice(file, 1, None, step), delimiter=",", ndmin=2)
     return replace(run, table=table)

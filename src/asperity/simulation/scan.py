@@ -1,4 +1,4 @@
-"""What a stroke along the surface gains or costs, against speed and depth."""
+"""Energy gained or lost in strokes along a surface, against speed and depth."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.checks import FloatArray, positive
-from asperity.errors import ParameterError
-from asperity.files import plain, record
+from asperity.core.checks import FloatArray, check_positive
+from asperity.core.errors import ParameterError
+from asperity.core.files import attributes_to_dict
 from asperity.simulation.hands import Hand
 from asperity.simulation.motions import Strokes
-from asperity.simulation.plants import Plant
 from asperity.simulation.run import Run
+from asperity.simulation.sampled_plant import Plant
 from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import simulate
 from asperity.surface import Surface
 
-# Of the work that goes to and fro, what counts as nothing.
+# Share of the work done back and forth that is negligible.
 _NEGLIGIBLE = 1e-3
 
 
@@ -31,28 +31,28 @@ class Stroke:
 
     Attributes:
         law: letter of the law.
-        speed: of the hand [m/s].
-        depth: of the hand below z = 0 [m].
-        reached: mean depth of the handle below z = 0 [m].
-        energy: that the texture supplies per stroke, along x, y and z [J]: the mean over whole
-            turns, there and back, after the first stroke, which has the start in it.
-        field: of it what the law itself supplies per stroke [J]: the work of its force along the
-            true path, at every place at once. The rest is due to sampling, delay and the steps of
-            the encoder; of a conservative law all is.
-        error: of the field's work [J]: of its quadrature by halving the steps, a thousandth of
-            all that goes there and back, and what turns store that do not end where they began.
-        spread: standard deviation of the field's work from turn to turn [J]; 0 for a single one.
+        speed: speed of the hand [m/s].
+        depth: depth of the hand below z = 0 [m].
+        mean_depth: mean depth of the handle below z = 0 [m].
+        energy: energy that the texture supplies per stroke, along x, y and z [J]: the mean over
+            whole cycles, back and forth, after the first stroke, which includes the start.
+        field: the part that the law itself supplies per stroke [J]: the work of its force along the
+            true path, without sampling and delay. The rest is due to sampling, delay and encoder
+            steps; for a conservative law that is all of it.
+        error: error of the field's work [J]: quadrature error by halving the steps, a thousandth of
+            the work done back and forth, and the energy stored in cycles that do not close.
+        spread: standard deviation of the field's work from cycle to cycle [J]; 0 for a single one.
         same_sample: the paper's sum per stroke, along x, y and z [J]: commanded force times the
             measured displacement of the same sample.
-        lost_contact: how often per stroke the force ended.
-        closure: energy of the whole run that does not add up, over what was exchanged [1].
-        stopped: why the run ended early; empty if it did not.
+        lost_contact: contact losses per stroke.
+        closure: closure error of the whole run over the energy exchanged [1].
+        stop_message: why the run ended early; empty if it did not.
     """
 
     law: str
     speed: float
     depth: float
-    reached: float
+    mean_depth: float
     energy: tuple[float, float, float]
     field: float
     error: float
@@ -60,7 +60,7 @@ class Stroke:
     same_sample: tuple[float, float, float]
     lost_contact: float
     closure: float
-    stopped: str
+    stop_message: str
 
     @property
     def total(self) -> float:
@@ -68,19 +68,27 @@ class Stroke:
         return float(sum(self.energy))
 
     @property
-    def feeds(self) -> bool:
-        """Whether the law itself feeds the hand: by more than its spread and its error."""
+    def gains_energy(self) -> bool:
+        """Whether the law itself feeds the hand, by more than its spread and its error."""
         return self.field > self.spread + self.error
 
+    @property
+    def energy_sum(self) -> float:
+        """Energy per stroke, all axes [J]."""
+        return self.total
+
+    @property
+    def same_sample_sum(self) -> float:
+        """The paper's sum per stroke, all axes [J]."""
+        return float(sum(self.same_sample))
+
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units; what is not known, or overflowed, is ``None``."""
-        return {
-            **record(self, "law", "speed", "depth", "reached", "energy", infinity=None),
-            "energy_sum": plain(self.total, infinity=None),
-            **record(self, "field", "error", "spread", "same_sample", infinity=None),
-            "same_sample_sum": plain(sum(self.same_sample), infinity=None),
-            **record(self, "lost_contact", "closure", "stopped", infinity=None),
-        }
+        """Return plain data, SI units; ``None`` for an unknown number or an overflow."""
+        names = (
+            "law speed depth mean_depth energy energy_sum field error spread same_sample"
+            " same_sample_sum lost_contact closure stop_message"
+        )
+        return attributes_to_dict(self, *names.split(), infinity=None)
 
 
 def scan_strokes(
@@ -100,116 +108,111 @@ def scan_strokes(
 
     Args:
         surface: texture, law and stiffness.
-        plant: what moves.
-        hand: what holds it.
-        servo: what the electronics do.
+        plant: the device.
+        hand: the hand that holds it.
+        servo: the electronics.
         motion: the strokes; their speed and depth are replaced.
         speeds: [m/s].
-        depths: of the hand below z = 0 [m].
-        start: of the handle [m], shape (3,); default: where the motion begins.
-        velocity: of the handle at the start [m/s], shape (3,); default: none.
+        depths: depths of the hand below z = 0 [m].
+        start: initial position of the handle [m], shape (3,); default: where the motion starts.
+        velocity: initial velocity of the handle [m/s], shape (3,); default: at rest.
         progress: called after every run.
 
     Raises:
-        ParameterError: for a motion that is not made of strokes, or a wrong number.
+        ParameterError: for a motion that does not consist of strokes, or an invalid number.
     """
     if not isinstance(motion, Strokes):
         raise ParameterError("motion", "must be strokes to be scanned", type(motion).__name__)
     result = []
     for speed in speeds:
         for depth in depths:
-            positive("speeds", speed, "m/s")
-            way = _at_depth(motion, speed, depth)
+            check_positive("speeds", speed, "m/s")
+            (x0, y0, _), (x1, y1, _) = motion.start, motion.end
+            strokes = Strokes((x0, y0, -depth), (x1, y1, -depth), speed, motion.count)
             run = simulate(
-                surface, plant, hand, servo, way, way.duration, start=start, velocity=velocity
-            )
-            result.append(_stroke(surface, way, run, depth))
+                surface, plant, hand, servo, strokes, strokes.duration, start=start,
+                velocity=velocity,
+            )  # fmt: skip
+            result.append(_analyze_stroke(surface, strokes, run, depth))
             if progress is not None:
                 progress()
     return tuple(result)
 
 
-def _at_depth(motion: Strokes, speed: float, depth: float) -> Strokes:
-    (x0, y0, _), (x1, y1, _) = motion.start, motion.end
-    return Strokes((x0, y0, -depth), (x1, y1, -depth), speed, motion.count)
-
-
-def _stroke(surface: Surface, way: Strokes, run: Run, depth: float) -> Stroke:
-    law, speed = surface.law.letter, float(way.speed)
-    reached = -float(run.position[:, 2].mean())
-    contact = np.any(run.applied != 0.0, axis=1)
-    lost = float(np.count_nonzero(contact[:-1] & ~contact[1:]))
-    ledger = run.ledger
+def _analyze_stroke(surface: Surface, motion: Strokes, run: Run, depth: float) -> Stroke:
+    law, speed, ledger = surface.law.letter, float(motion.speed), run.ledger
+    mean_depth = -float(run.position[:, 2].mean())
     closure = abs(ledger.closure) / max(ledger.exchanged, 1e-300)
-    if run.stopped:
+    if run.stop_message:
         nan = math.nan
-        energy = (nan, nan, nan)
+        unknown = (nan, nan, nan)
         return Stroke(
-            law, speed, depth, reached, energy, nan, nan, nan, energy, nan, closure, run.stopped
-        )
-    begins = np.searchsorted(run.time, way.period * np.arange(1, way.count) - 1e-9 * run.period)
-
-    def each(name: str) -> FloatArray:
-        """Return a sum of the ledger, stroke by stroke."""
-        at = [run.energies[name][begins], np.array([getattr(ledger, name)], dtype=float)]
-        summed = np.concatenate(at)
-        return np.asarray(np.diff(summed, axis=0, prepend=np.zeros_like(summed[:1])))
-
-    fine, coarse = field_work(surface, np.vstack([run.position, run.state[:3]]))
-
-    def summed(pieces: FloatArray) -> FloatArray:
-        return _kept(np.array([part.sum() for part in np.split(pieces, begins)]))
-
-    works = summed(fine)
-    error = np.abs(works - summed(coarse)).mean() + _NEGLIGIBLE * summed(np.abs(fine)).mean()
-    error += _not_closed(run, np.array([0, *begins]), len(works))
+            law, speed, depth, mean_depth, unknown, nan, nan, nan, unknown, nan, closure,
+            run.stop_message,
+        )  # fmt: skip
+    ends = motion.period * np.arange(1, motion.count) - 1e-9 * run.period
+    starts = np.searchsorted(run.time, ends)
 
     def mean(name: str) -> tuple[float, float, float]:
-        x, y, z = (float(value) for value in _kept(each(name)).mean(axis=0))
+        """Return the mean over whole cycles of a sum of the ledger, per stroke."""
+        last = np.array([getattr(ledger, name)], dtype=float)
+        sums = np.concatenate([run.energies[name][starts], last])
+        strokes = np.diff(sums, axis=0, prepend=np.zeros_like(sums[:1]))
+        x, y, z = (float(value) for value in _whole_cycles(strokes).mean(axis=0))
         return x, y, z
 
+    def sum_strokes(pieces: FloatArray) -> FloatArray:
+        return _whole_cycles(np.array([part.sum() for part in np.split(pieces, starts)]))
+
+    fine, coarse = field_work(surface, np.vstack([run.position, run.state[:3]]))
+    works = sum_strokes(fine)
+    error = np.abs(works - sum_strokes(coarse)).mean()
+    error += _NEGLIGIBLE * sum_strokes(np.abs(fine)).mean()
+    error += _closing_error(run, np.array([0, *starts]), len(works))
+    contact = np.any(run.applied != 0.0, axis=1)
+    losses = float(np.count_nonzero(contact[:-1] & ~contact[1:]))
     return Stroke(
-        law, speed, depth, reached, mean("supplied"), float(works.mean()), float(error),
-        _spread(works), mean("same_sample"), lost / way.count, closure, "",
+        law, speed, depth, mean_depth, mean("supplied"), float(works.mean()), float(error),
+        _cycle_spread(works), mean("same_sample"), losses / motion.count, closure, "",
     )  # fmt: skip
 
 
-def _kept(strokes: FloatArray) -> FloatArray:
-    """Return whole turns, there and back, without the first stroke where there are enough.
+def _whole_cycles(strokes: FloatArray) -> FloatArray:
+    """Return the strokes of whole cycles, back and forth, without the first one if possible.
 
-    What a field stores on the way there it gives on the way back.
+    A field returns on the way back what it stores on the way out.
     """
     count = (len(strokes) - 1) // 2 * 2 or len(strokes)
     return strokes[-count:]
 
 
-def _not_closed(run: Run, begins: FloatArray, kept: int) -> float:
-    """Return what a field may have given or stored because turns do not end where they began [J].
+def _cycle_spread(works: FloatArray) -> float:
+    """Return the standard deviation of the mean work from cycle to cycle."""
+    cycles = works.reshape(-1, 2).mean(axis=1) if len(works) % 2 == 0 else works
+    return float(cycles.std())
 
-    Per stroke: the distance between both ends of a turn, times the force there.
+
+def _closing_error(run: Run, starts: FloatArray, count: int) -> float:
+    """Return the energy that a field may have stored because cycles do not close [J].
+
+    Per stroke: the distance between both ends of a cycle, times the force there.
     """
-    first = [int(i) for i in begins[-kept::2]]
+    first = [int(i) for i in starts[-count::2]]
     ends = np.vstack([run.position[first[1:]], run.state[:3]])
     gaps = np.linalg.norm(ends - run.position[first], axis=1)
     forces = np.linalg.norm(run.applied[first], axis=1)
-    return float((gaps * forces).mean() / 2.0) if kept % 2 == 0 else 0.0
-
-
-def _spread(works: FloatArray) -> float:
-    """Return the standard deviation of the mean from turn to turn."""
-    turns = works.reshape(-1, 2).mean(axis=1) if len(works) % 2 == 0 else works
-    return float(turns.std())
+    return float((gaps * forces).mean() / 2.0) if count % 2 == 0 else 0.0
 
 
 def field_work(surface: Surface, path: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the work of a law's force along a path, straight from point to point.
+    """Return the work of a law's force along a polygonal path.
 
     Args:
-        surface: whose law, with its state if it has one, follows the path.
+        surface: the surface; the state of its law is carried along the path.
         path: points [m], shape (n + 1, 3).
 
     Returns:
-        Of each piece [J], shape (n,): by Simpson's rule, and by the trapezoidal rule.
+        Work of each segment [J], shape (n,): by Simpson's rule, and by the trapezoidal rule.
     """
     middle = 0.5 * (path[1:] + path[:-1])
     points = np.empty((2 * len(path) - 1, 3))

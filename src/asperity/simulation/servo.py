@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.checks import positive, real
-from asperity.errors import ParameterError
-from asperity.files import Record
+from asperity.core.checks import check_positive, check_real
+from asperity.core.errors import ParameterError
+from asperity.core.files import Serializable
 from asperity.kernels.tick import ServoSettings
-from asperity.simulation.hands import not_negative
+from asperity.simulation.hands import nonnegative
 
 
 @dataclass(frozen=True)
-class Servo(Record):
+class Servo(Serializable):
     """What the device's electronics do to position and force.
 
     Attributes:
@@ -44,14 +44,14 @@ class Servo(Record):
     velocity_share: float = 1.0
 
     def __post_init__(self) -> None:
-        positive("period", self.period, "s")
-        object.__setattr__(self, "delay", _samples(self.delay))
-        not_negative("position_resolution", self.position_resolution, "m")
-        not_negative("force_resolution", self.force_resolution, "N")
-        if isinstance(self.max_force, bool) or not _number(self.max_force) > 0.0:
+        check_positive("period", self.period, "s")
+        object.__setattr__(self, "delay", _check_delay(self.delay))
+        nonnegative("position_resolution", self.position_resolution, "m")
+        nonnegative("force_resolution", self.force_resolution, "N")
+        if isinstance(self.max_force, bool) or not _to_float(self.max_force) > 0.0:
             raise ParameterError("max_force", "must be positive [N]", self.max_force)
-        real("virtual_damping", self.virtual_damping, "N s/m")
-        if not 0.0 < real("velocity_share", self.velocity_share) <= 1.0:
+        check_real("virtual_damping", self.virtual_damping, "N s/m")
+        if not 0.0 < check_real("velocity_share", self.velocity_share) <= 1.0:
             raise ParameterError("velocity_share", "must be in (0, 1]", self.velocity_share)
 
     @property
@@ -63,12 +63,12 @@ class Servo(Record):
         )  # fmt: skip
 
 
-def _number(value: object) -> float:
+def _to_float(value: object) -> float:
     return float(value) if isinstance(value, (int, float, np.number)) else math.nan
 
 
-def _samples(delay: object) -> int:
-    number = _number(delay)
+def _check_delay(delay: object) -> int:
+    number = _to_float(delay)
     if isinstance(delay, bool) or not (math.isfinite(number) and number >= 0.0 and number % 1 == 0):
         raise ParameterError("delay", "must be a whole number of samples, 0 or more", delay)
     return int(number)

@@ -1,4 +1,4 @@
-"""The trace of a run: in memory, in a recording, or in a table of text."""
+"""The trace of a run, in memory, in a recording or in a text table; statistics of its tail."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from asperity.checks import FloatArray
-from asperity.errors import ParameterError
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError
 from asperity.recording.writer import RecordingWriter
 
 COLUMNS = (
     ("time", "s"),
-    *((name, "m") for name in ("x", "y", "z")),
+    *((axis, "m") for axis in "xyz"),
     *((f"v{axis}", "m/s") for axis in "xyz"),
     *((f"commanded {axis}", "N") for axis in "xyz"),
     *((f"applied {axis}", "N") for axis in "xyz"),
@@ -30,136 +30,122 @@ COLUMNS = (
 """Columns of the trace with their units."""
 
 HEADER = ",".join(f"{name} [{unit}]" for name, unit in COLUMNS)
-_TEXT, _RECORDING = (".csv", ".txt"), (".mcap", "")
-_ROW = ",".join(["%.12g"] * len(COLUMNS)) + "\n"
+_TEXT_SUFFIXES, _RECORDING_SUFFIXES = (".csv", ".txt"), (".mcap", "")
+_ROW_FORMAT = ",".join(["%.12g"] * len(COLUMNS)) + "\n"
 
 
-def is_text(path: Path) -> bool:
-    """Tell by its name whether a trace is a table of text, or a recording.
+def is_text_path(path: Path) -> bool:
+    """Return whether a trace file is a text table, not a recording, by its suffix.
 
     Raises:
-        ParameterError: for a name that says something else.
+        ParameterError: for another suffix.
     """
     suffix = path.suffix.lower()
-    if suffix not in (*_TEXT, *_RECORDING):
+    if suffix not in (*_TEXT_SUFFIXES, *_RECORDING_SUFFIXES):
         words = "must be the path of a .mcap file (a recording), or of a .csv file (text)"
         raise ParameterError("trace", words, str(path))
-    return suffix in _TEXT
+    return suffix in _TEXT_SUFFIXES
 
 
-class MemoryTrace:
-    """Keeps all rows in one table; with no rows it keeps nothing."""
+class Trace:
+    """Base class of traces: a buffer that the compiled loop fills, chunk by chunk."""
 
-    def __init__(self, rows: int) -> None:
-        try:
-            self._table = np.empty((rows, len(COLUMNS)))
-        except (MemoryError, ValueError):  # more than there are addresses
-            limit = f"needs memory for {rows} rows: give a path, or a larger 'every'"
-            raise ParameterError("trace", limit) from None
-        self._filled = 0
-
-    def room(self, rows: int) -> FloatArray:  # noqa: ARG002 - it has room for all
-        """Return the rest of the table."""
-        return self._table[self._filled :]
-
-    def keep(self, rows: int) -> None:
-        """Count the rows as filled."""
-        self._filled += rows
-
-    def table(self) -> FloatArray:
-        """Return the filled rows."""
-        return self._table[: self._filled]
-
-    def close(self) -> None:
-        """Do nothing: the table stays."""
-
-
-class ThinTrace:
-    """Keeps a bounded number of rows, thinned out evenly from the first.
-
-    Args:
-        rows: that will come.
-        most: that are kept at most; none for 0.
-    """
-
-    def __init__(self, rows: int, most: int) -> None:
+    def __init__(self) -> None:
         self._buffer = np.empty((0, len(COLUMNS)))
-        self._step = max(1, -(-rows // most)) if most else rows + 1
-        self._table = np.empty((-(-rows // self._step) if most else 0, len(COLUMNS)))
-        self._seen = self._filled = 0
 
-    def room(self, rows: int) -> FloatArray:
-        """Return a buffer of so many rows."""
+    def buffer(self, rows: int) -> FloatArray:
+        """Return a buffer for a number of rows."""
         if len(self._buffer) < rows:
             self._buffer = np.empty((rows, len(COLUMNS)))
         return self._buffer
 
-    def keep(self, rows: int) -> None:
-        """Keep every so manieth of the first rows of the buffer."""
-        chosen = self._buffer[-self._seen % self._step : rows : self._step]
-        if len(self._table):
-            self._table[self._filled : self._filled + len(chosen)] = chosen
-            self._filled += len(chosen)
-        self._seen += rows
+    def commit(self, rows: int) -> None:
+        """Store the first rows of the buffer.
+
+        Raises:
+            ParameterError: if a file cannot grow; it then ends with a whole block or line.
+        """
+        raise NotImplementedError
 
     def table(self) -> FloatArray:
-        """Return the rows that were kept."""
-        return self._table[: self._filled]
+        """Return the rows in memory; none if they are in a file."""
+        return np.empty((0, len(COLUMNS)))
 
     def close(self) -> None:
-        """Do nothing: the table stays."""
+        """Close the file, if there is one."""
 
 
-class FileTrace:
-    """Writes rows of a recording in blocks.
+class DecimatedTrace(Trace):
+    """A trace in memory: all rows, or every n-th so that a number of rows is not exceeded.
 
     Args:
-        path: of the file.
-        about: what the recording says of itself.
-        attached: files inside it.
+        rows: number of rows to come.
+        max_rows: largest number of rows to store; ``None`` for all.
+
+    Raises:
+        ParameterError: for more rows than fit into memory.
+    """
+
+    def __init__(self, rows: int, max_rows: int | None) -> None:
+        super().__init__()
+        most = rows if max_rows is None else max_rows
+        self._step = max(1, -(-rows // most)) if most else rows + 1
+        try:
+            self._table = np.empty((-(-rows // self._step) if most else 0, len(COLUMNS)))
+        except (MemoryError, ValueError):  # more than the address space
+            limit = f"needs memory for {rows} rows: give a path, or a larger 'every'"
+            raise ParameterError("trace", limit) from None
+        self._rows_seen = self._row_count = 0
+
+    def commit(self, rows: int) -> None:
+        """Store every n-th row of the first rows of the buffer."""
+        if len(self._table):
+            chosen = self._buffer[-self._rows_seen % self._step : rows : self._step]
+            self._table[self._row_count : self._row_count + len(chosen)] = chosen
+            self._row_count += len(chosen)
+        self._rows_seen += rows
+
+    def table(self) -> FloatArray:
+        """Return the stored rows."""
+        return self._table[: self._row_count]
+
+
+class RecordingTrace(Trace):
+    """A trace in a recording.
+
+    Args:
+        path: path of the file.
+        metadata: metadata of the recording.
+        attachments: files inside the recording.
     """
 
     def __init__(
         self,
         path: str | os.PathLike[str],
-        about: Mapping[str, Any] | None = None,
-        attached: Mapping[str, bytes] | None = None,
+        metadata: Mapping[str, Any] | None = None,
+        attachments: Mapping[str, bytes] | None = None,
     ) -> None:
-        self._buffer = np.empty((0, len(COLUMNS)))
-        self._writer = RecordingWriter(path, COLUMNS, about, attached, "trace")
+        super().__init__()
+        self._writer = RecordingWriter(path, COLUMNS, metadata, attachments, "trace")
 
-    def room(self, rows: int) -> FloatArray:
-        """Return a buffer of so many rows."""
-        if len(self._buffer) < rows:
-            self._buffer = np.empty((rows, len(COLUMNS)))
-        return self._buffer
-
-    def keep(self, rows: int) -> None:
-        """Hand on the first rows of the buffer.
-
-        Raises:
-            ParameterError: if the file cannot grow; it then ends with a whole block.
-        """
+    def commit(self, rows: int) -> None:
+        """Append the first rows of the buffer."""
         self._writer.append(self._buffer[:rows])
 
-    def table(self) -> FloatArray:
-        """Return an empty table: the rows are in the file."""
-        return np.empty((0, len(COLUMNS)))
-
     def close(self) -> None:
-        """Write what waits, and close the file."""
+        """Write pending rows and close the file."""
         self._writer.close()
 
 
-class TextTrace:
-    """Writes rows of a CSV file in chunks; what is written are whole lines.
+class TextTrace(Trace):
+    """A trace in a CSV file, written in whole lines.
 
     The first line names the columns with their units, ``time [s],x [m],...``.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
+        super().__init__()
         self._path = Path(path)
-        self._buffer = np.empty((0, len(COLUMNS)))
         self.rows = 0
         try:
             self._file = open(self._path, "wb", buffering=0)  # noqa: SIM115 - closed by close()
@@ -168,20 +154,10 @@ class TextTrace:
         self._size = 0
         self._write((HEADER + "\n").encode())
 
-    def room(self, rows: int) -> FloatArray:
-        """Return a buffer of so many rows."""
-        if len(self._buffer) < rows:
-            self._buffer = np.empty((rows, len(COLUMNS)))
-        return self._buffer
-
-    def keep(self, rows: int) -> None:
-        """Write the first rows of the buffer.
-
-        Raises:
-            ParameterError: if the file cannot grow; it then ends with a whole line.
-        """
+    def commit(self, rows: int) -> None:
+        """Write the first rows of the buffer."""
         values = self._buffer[:rows].ravel().tolist()
-        self._write((_ROW * rows % tuple(values)).encode())
+        self._write((_ROW_FORMAT * rows % tuple(values)).encode())
 
     def _write(self, text: bytes) -> None:
         left = memoryview(text)
@@ -189,16 +165,14 @@ class TextTrace:
             while left:
                 left = left[self._file.write(left) or 0 :]
         except OSError as error:
-            whole = self._cut(text[: len(text) - len(left)])
-            kept = f"{whole} rows are in {self._path}"
-            raise ParameterError(
-                "trace", f"cannot be written any further ({error.strerror}): {kept}"
-            ) from None
+            whole = self._truncate_to_line(text[: len(text) - len(left)])
+            words = f"cannot be written any further ({error.strerror})"
+            raise ParameterError("trace", f"{words}: {whole} rows are in {self._path}") from None
         self._size += len(text)
         self.rows += text.count(b"\n") - (self._size == len(text))
 
-    def _cut(self, written: bytes) -> int:
-        """Cut the file after its last whole line; returns the rows that it holds."""
+    def _truncate_to_line(self, written: bytes) -> int:
+        """Truncate the file after its last whole line; return its number of rows."""
         whole = written.rfind(b"\n") + 1
         with suppress(OSError):  # a device such as /dev/full has no length
             self._file.truncate(self._size + whole)
@@ -206,13 +180,71 @@ class TextTrace:
         self.close()
         return self.rows + written.count(b"\n") - header
 
-    def table(self) -> FloatArray:
-        """Return an empty table: the rows are in the file."""
-        return np.empty((0, len(COLUMNS)))
-
     def close(self) -> None:
         """Close the file."""
         self._file.close()
 
 
-Trace = MemoryTrace | ThinTrace | FileTrace | TextTrace
+_MIN_ROWS = 4
+_NAMES = [name for name, _unit in COLUMNS]
+_VELOCITY = slice(_NAMES.index("vx"), _NAMES.index("vz") + 1)
+_SUPPLIED = slice(_NAMES.index("supplied x"), _NAMES.index("supplied z") + 1)
+_LOST, _FRICTION = _NAMES.index("lost"), _NAMES.index("friction")
+# Smallest share of the loss that the texture supplies in a cycle: not always all, as amplitudes
+# beat.
+SUPPLY_SHARE = 0.2
+
+
+class TailStatistics:
+    """Statistics of the last quarter of a run: spread of the velocity, and energies.
+
+    Args:
+        rows: number of rows that the trace will have.
+    """
+
+    def __init__(self, rows: int) -> None:
+        self._tail_start = rows - rows // 4
+        self._energy_start = rows - max(rows // 4, 2)
+        self._rows_total, self._rows_seen, self._count_in_tail = rows, 0, 0
+        self._mean, self._squares = np.zeros(3), np.zeros(3)
+        self._first_row = self._last_row = np.zeros(len(COLUMNS))
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all rows have been seen, and are enough for a verdict."""
+        return self._rows_seen == self._rows_total >= _MIN_ROWS
+
+    @property
+    def velocity_spread(self) -> float:
+        """Standard deviations of the velocity, summed over the axes [m/s]."""
+        return float(np.sqrt(self._squares / self._count_in_tail).sum())
+
+    @property
+    def gains_energy(self) -> bool:
+        """Whether the texture supplies at least a fifth of what damping and friction take."""
+        return gains_energy(self._first_row, self._last_row)
+
+    def update(self, rows: FloatArray) -> None:
+        """Update the statistics with the next rows of the trace, shape (n, columns)."""
+        first, self._rows_seen = self._rows_seen, self._rows_seen + len(rows)
+        if first <= self._energy_start < self._rows_seen:
+            self._first_row = rows[self._energy_start - first].copy()
+        part = rows[max(self._tail_start - first, 0) :, _VELOCITY]
+        if len(rows):
+            self._last_row = rows[-1].copy()
+        if not len(part):
+            return
+        # Mean and squares of two parts are merged without a difference of large numbers.
+        mean, total = part.mean(axis=0), self._count_in_tail + len(part)
+        change = mean - self._mean
+        self._squares += ((part - mean) ** 2).sum(axis=0)
+        self._squares += change**2 * (self._count_in_tail * len(part) / total)
+        self._mean = self._mean + change * (len(part) / total)
+        self._count_in_tail = total
+
+
+def gains_energy(first: FloatArray, last: FloatArray) -> bool:
+    """Return whether the texture feeds the handle between two rows of the trace."""
+    supplied = (last[_SUPPLIED] - first[_SUPPLIED]).sum()
+    taken = (last[_LOST] - first[_LOST]) - (last[_FRICTION] - first[_FRICTION])
+    return bool(supplied > SUPPLY_SHARE * taken)

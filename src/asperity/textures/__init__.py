@@ -1,16 +1,17 @@
-"""What a surface looks like: one kind of texture per file, and reading measured ones."""
+"""Textures: height functions in closed form, splines, named surfaces and measured files."""
 
 from __future__ import annotations
 
-from asperity.textures.fourier import Fourier
-from asperity.textures.grating import Grating
-from asperity.textures.heightmap import HeightMap
+from asperity.textures.domain import Domain, ScanLine
+from asperity.textures.kinds.fourier import Fourier
+from asperity.textures.kinds.grating import Grating
+from asperity.textures.kinds.noise import Noise, NoiseProfile
+from asperity.textures.kinds.sinusoid import Sinusoid
 from asperity.textures.library import LIBRARY, NamedSurface, named_surface, surface_names
-from asperity.textures.loading import load_texture
-from asperity.textures.noise import Noise, NoiseProfile
-from asperity.textures.profile import Profile
-from asperity.textures.sinusoid import Sinusoid
-from asperity.textures.texture import Domain, ScanLine, Texture
+from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.spline.profile import Profile
+from asperity.textures.texture import Texture
+from asperity.textures.texture_loading import load_texture
 
 __all__ = [
     "LIBRARY",

@@ -1,63 +1,45 @@
-"""Every texture that can be asked for by name, as data: the command line and scenes read it."""
+"""Catalogue of texture kinds, and textures from a specification or a measured file."""
 
 from __future__ import annotations
 
-import math
+import os
 import re
+from collections import ChainMap
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
-from asperity.arguments import Argument
-from asperity.errors import ParameterError
-from asperity.textures.fourier import Fourier
-from asperity.textures.grating import GRATING
-from asperity.textures.library.registry import LIBRARY
-from asperity.textures.noise import NOISE, NOISE_PROFILE
-from asperity.textures.sinusoid import Sinusoid
-from asperity.textures.texture import Kind
+from asperity.core.arguments import Argument, parse_arguments
+from asperity.core.errors import ParameterError, suggest_names
+from asperity.measured.file_arguments import FILE_ARGUMENTS, SYNTHETIC_ARGUMENTS
+from asperity.textures.kinds.fourier import FOURIER
+from asperity.textures.kinds.grating import GRATING
+from asperity.textures.kinds.noise import NOISE, NOISE_PROFILE
+from asperity.textures.kinds.sinusoid import SINUSOID
+from asperity.textures.library.surface_library import LIBRARY
+from asperity.textures.synthetic import prepare_texture
+from asperity.textures.texture import Texture, TextureKind
+from asperity.textures.texture_loading import load_texture
 
-_SINUSOID = Kind(
-    "sinusoid",
-    "one sinusoid, the classic of haptic texture",
-    Sinusoid,
-    (
-        Argument("amplitude", "half of the peak-to-valley height", "m", required=True),
-        Argument("period", "wavelength", "m", required=True),
-        Argument("phase", "at the origin", "rad", 0.0, low=-math.inf),
-        Argument("direction", "across the waves", default_words="1 0", form="vector"),
-    ),
-    example={"amplitude": 0.4e-3, "period": 1.5e-3},
-)
-_FOURIER = Kind(
-    "fourier",
-    "sum of plane waves",
-    Fourier,
-    (
-        Argument("amplitudes", "of the waves", "m", form="items", required=True),
-        Argument("wavevectors", "of the waves", "rad/m", form="vectors", required=True),
-        Argument("phases", "of the waves", "rad", default_words="0", form="items"),
-    ),
-    example={"amplitudes": [2e-4, 1e-4], "wavevectors": [[3000.0, 0.0], [0.0, 6000.0]]},
-)
+_KINDS = SINUSOID, FOURIER, GRATING, NOISE, NOISE_PROFILE
+CATALOGUE: dict[str, TextureKind] = {kind.name: kind for kind in _KINDS} | LIBRARY
+"""All texture kinds and named surfaces by name, and those added by :func:`register`."""
 
-CATALOGUE: dict[str, Kind] = {
-    kind.name: kind for kind in (_SINUSOID, _FOURIER, GRATING, NOISE, NOISE_PROFILE)
-} | LIBRARY
-"""All kinds and all named surfaces; what :func:`register` has added too."""
-
-# What else the command line and scenes take where a kind stands.
+# Names that the command line and scenes use for something else.
 _RESERVED = ("file", "recording")
 
 
-def register(kind: Kind) -> Kind:
-    """Make a kind of your own known by its name, on the command line and in scenes too.
+def register(kind: TextureKind) -> TextureKind:
+    """Register a user-defined kind by its name, also for the command line and scenes.
 
     Raises:
-        ParameterError: for a name that is taken, or is not lower-case letters, digits and hyphens.
+        ParameterError: for a name that is taken or is not lower-case letters, digits and hyphens.
 
     Example:
-        >>> register(Kind("sinusoid", "mine", Sinusoid, ()))
+        >>> register(TextureKind("sinusoid", "another", load_texture, ()))
         Traceback (most recent call last):
         ...
-        asperity.errors.ParameterError: kind 'sinusoid' is taken: one sinusoid, the classic of haptic texture
+        asperity.core.errors.ParameterError: kind 'sinusoid' is taken: one sinusoid, the classic of haptic texture
     """  # noqa: E501  # doctest compares the whole message
     if not re.fullmatch(r"[a-z][a-z0-9-]+", kind.name):
         requirement = "must have a name of lower-case letters, digits and hyphens"
@@ -67,3 +49,130 @@ def register(kind: Kind) -> Kind:
         raise ParameterError("kind", f"{kind.name!r} is taken: {owner}")
     CATALOGUE[kind.name] = kind
     return kind
+
+
+TextureLike = Texture | str | os.PathLike[str]
+"""A texture, or an argument of :func:`as_texture`."""
+
+_PATH = Argument("path", "the file, relative to the scene", form="path", required=True)
+_FILE = TextureKind("file", "a measured surface", load_texture, (_PATH, *FILE_ARGUMENTS))
+
+KINDS: ChainMap[str, TextureKind] = ChainMap({_FILE.name: _FILE}, CATALOGUE)
+"""Texture kinds accepted in [texture]: the catalogue and measured files."""
+
+
+def as_texture(
+    texture: TextureLike, values: Mapping[str, Any] | None = None, name: str = "texture"
+) -> Texture:
+    """Return a texture from a texture, a specification or a path.
+
+    Args:
+        texture: a texture, ``kind:argument=value,...`` ("sinusoid:amplitude=0.8mm,period=1mm", or
+            "sandpaper" with its defaults), or the path of a measured surface. A text that is the
+            path of an existing file means that file.
+        values: arguments of :func:`~asperity.textures.load_texture` [SI]; synthetic textures accept
+            those of :func:`~asperity.textures.synthetic.prepare_texture`.
+        name: name of the argument in error messages.
+
+    Raises:
+        ParameterError: for an unknown kind or argument (the nearest are offered), a value that
+            cannot be used, another type, or a scene file.
+        SurfaceFileError: for a file that cannot be read.
+
+    Example:
+        >>> as_texture("sinusoid:amplitude=0.8mm,period=1 mm")
+        Sinusoid(amplitude=0.0008, period=0.001, phase=0.0, direction=(1.0, 0.0))
+    """
+    if isinstance(texture, Texture):
+        return texture
+    if not isinstance(texture, (str, os.PathLike)):
+        words = "must be a texture, a text such as 'sandpaper:grit=P60', or the path of a file"
+        raise ParameterError(name, words, texture)
+    extra = dict(values or {})
+    if isinstance(texture, str) and (named := parse_specification(texture)) is not None:
+        return build_texture(*named, values=extra)
+    if is_scene(texture):
+        words = "is a scene, which defines more than a texture; use asperity.scene.load_scene"
+        raise ParameterError(name, words, os.fspath(texture))
+    return load_texture(texture, **extra)
+
+
+def is_scene(source: str | os.PathLike[str]) -> bool:
+    """Return whether a text or a path is the name of a scene file."""
+    return str(source).lower().endswith(".toml")
+
+
+def parse_specification(source: str) -> tuple[str, dict[str, str]] | None:
+    """Return the kind and the arguments in a specification, as text; ``None`` for a path.
+
+    Raises:
+        ParameterError: for a name that is neither a kind nor a file.
+    """
+    kind, colon, arguments = source.partition(":")
+    if not re.fullmatch(r"[A-Za-z][\w-]+", kind) or os.path.exists(source):
+        return None
+    named = kind.lower()
+    if not colon and (named == _FILE.name or named not in KINDS):
+        hint = suggest_names(kind, KINDS)
+        words = f"is neither a file nor a named surface: {source!r}; {hint}"
+        raise ParameterError("surface", words)
+    return named, _parse_arguments(arguments)
+
+
+def _parse_arguments(text: str) -> dict[str, str]:
+    arguments: dict[str, str] = {}
+    for part in text.split(",") if text.strip() else ():
+        name, equals, value = part.partition("=")
+        name = name.strip().replace("-", "_")
+        if not equals or not name:
+            raise ParameterError("surface", "must be kind:argument=value,...", part.strip())
+        if name in arguments:
+            raise ParameterError(name, "is given twice")
+        arguments[name] = value.strip()
+    return arguments
+
+
+def build_texture(
+    kind: str,
+    arguments: Mapping[str, Any],
+    folder: Path | None = None,
+    values: Mapping[str, Any] | None = None,
+    kinds: Mapping[str, TextureKind] = KINDS,
+) -> Texture:
+    """Return a texture of a kind from its arguments as text or lists.
+
+    Args:
+        kind: name in the catalogue, or "file".
+        arguments: arguments of the kind and of the preparation, by name.
+        folder: folder that the path of a file is relative to.
+        values: further arguments of the preparation [SI]; they take precedence.
+        kinds: texture kinds by name.
+
+    Raises:
+        ParameterError: for an unknown kind or argument, one that is missing, or a wrong value.
+    """
+    if kind not in kinds:
+        raise ParameterError("surface", f"kind is unknown: {kind!r}; {suggest_names(kind, kinds)}")
+    entry, synthetic = kinds[kind], () if kind == "file" else SYNTHETIC_ARGUMENTS
+    own = {argument.name for argument in entry.arguments}
+    preparing = [argument for argument in synthetic if argument.name not in own]
+    read = parse_arguments(kind, arguments, (*entry.arguments, *preparing), folder)
+    preparation = {name: read.pop(name) for name in read.keys() - own} | dict(values or {})
+    if kind == "file":
+        return entry.factory(**_require_all(entry, read | preparation))
+    names = [argument.name for argument in synthetic]
+    for name in preparation:
+        if name not in names:
+            reason = f"applies to measured surfaces only; others take {', '.join(names)}"
+            raise ParameterError(name, reason)
+    texture = entry.factory(**_require_all(entry, read))
+    return prepare_texture(texture, **preparation) if preparation else texture
+
+
+def _require_all(kind: TextureKind, arguments: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments if no required one is missing."""
+    required = [argument.name for argument in kind.required_arguments]
+    for name in required:
+        if name not in arguments:
+            raise ParameterError(name, f"is missing: a {kind.name} needs {', '.join(required)}")
+    return arguments

@@ -1,4 +1,4 @@
-"""Where a texture lives: the region that stands for all of it, and the line that is scanned."""
+"""The domain of a texture, which represents all of it, and its scan line."""
 
 from __future__ import annotations
 
@@ -7,18 +7,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
+
+GridValues = tuple[FloatArray, tuple[float, float], bool]
+"""Values on a grid, its spacing (x, y) [m], and whether it covers a whole period."""
 
 
 @dataclass(frozen=True)
 class Domain:
-    """The region of the plane that stands for the whole texture.
+    """A region of the plane that represents the whole texture.
 
     Attributes:
         origin: one corner [m], shape (2,).
         spans: edge vectors [m], shape (1, 2) for a profile, (2, 2) for a map.
         periodic: whether the texture repeats along every span.
-        description: in words, for tables.
+        description: phrase for tables.
     """
 
     origin: FloatArray
@@ -30,14 +33,14 @@ class Domain:
         """Return the points (n, 2) [m] at fractions (n, d) of the spans."""
         return np.ascontiguousarray(self.origin + fractions @ self.spans)
 
-    def widened(self, margin: float) -> Domain:
-        """Return the region that reaches so far beyond this one on every side [m]."""
+    def expand(self, margin: float) -> Domain:
+        """Return the region extended by a margin [m] on every side."""
         unit = self.spans / np.hypot(*self.spans.T)[:, None]
         spans = self.spans + 2.0 * margin * unit
         return replace(self, origin=self.origin - margin * unit.sum(axis=0), spans=spans)
 
-    def upright(self) -> tuple[FloatArray, bool]:
-        """Return spans at right angles [m], and whether the texture repeats along them."""
+    def orthogonal_spans(self) -> tuple[FloatArray, bool]:
+        """Return orthogonal spans [m], and whether the texture is periodic along them."""
         if len(self.spans) == 1:
             return self.spans, self.periodic
         along = self.spans[0] / np.hypot(*self.spans[0])
@@ -46,31 +49,29 @@ class Domain:
         square = skew < 1e-9 * float(np.hypot(*across))
         return np.array([self.spans[0], across]), self.periodic and square
 
-    def grid(
-        self, counts: Sequence[int], most: int | None = None
-    ) -> tuple[FloatArray, tuple[float, float], bool]:
-        """Return points at equal distances along spans at right angles.
+    def grid(self, counts: Sequence[int], max_count: int | None = None) -> GridValues:
+        """Return equally spaced points along orthogonal spans.
 
         Args:
             counts: points along each span.
-            most: points along each side; from the middle of a larger grid. All by default.
+            max_count: greatest number of points along each side, taken from the middle of the grid.
 
         Returns:
             Points [m], shape (ny, nx, 2), (1, nx, 2) for a profile; spacing (x, y) [m]; whether
-            they are a whole period.
+            they cover a whole period.
         """
-        spans, repeats = self.upright()
+        spans, repeats = self.orthogonal_spans()
         sides, number = np.hypot(*spans.T), np.array(counts, dtype=np.intp)
-        # A finite map has a node at both ends, a periodic one does not repeat its first.
+        # A finite map has nodes at both ends; a periodic one does not repeat its first node.
         steps = sides / (number if self.periodic else number - 1)
         first = np.zeros_like(number)
-        if most is not None and number.max() > most:
+        if max_count is not None and number.max() > max_count:
             repeats = False
-            first = np.maximum((number - most) // 2, 0)
-            number = np.minimum(number, most)
+            first = np.maximum((number - max_count) // 2, 0)
+            number = np.minimum(number, max_count)
         ticks = [
-            (begin + np.arange(count)) * step / side
-            for begin, count, step, side in zip(first, number, steps, sides, strict=True)
+            (start + np.arange(count)) * step / side
+            for start, count, step, side in zip(first, number, steps, sides, strict=True)
         ]
         points = self.origin + np.stack(np.meshgrid(*ticks), axis=-1) @ spans
         points = points[None] if len(ticks) == 1 else points
@@ -85,7 +86,7 @@ class ScanLine:
         start: first point [m], shape (2,).
         direction: unit vector, shape (2,).
         length: one period, or the extent [m].
-        periodic: whether the texture repeats after the length.
+        periodic: whether the texture repeats after this length.
     """
 
     start: FloatArray
@@ -94,6 +95,6 @@ class ScanLine:
     periodic: bool
 
     def points(self, count: int) -> FloatArray:
-        """Return points (count, 2) [m], in the middle of equal steps."""
+        """Return points (count, 2) [m] in the middle of equal steps."""
         steps = (np.arange(count) + 0.5) * (self.length / count)
         return np.ascontiguousarray(self.start + steps[:, None] * self.direction)

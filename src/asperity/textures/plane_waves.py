@@ -1,7 +1,4 @@
-"""Plane waves as data: what sums of them tell those who can do better with waves.
-
-Which integer combinations a set of wave vectors is made of: the periods of a Fourier sum.
-"""
+"""Plane waves, and the lattice of their wave vectors: the periods of a Fourier sum."""
 
 from __future__ import annotations
 
@@ -13,10 +10,10 @@ from typing import Protocol
 
 import numpy as np
 
-from asperity.checks import FloatArray
-from asperity.errors import ParameterError
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError
 
-_LEAST_BEND, _MOST_BEND = 1e-30, 1e30
+_MIN_CURVATURE, _MAX_CURVATURE = 1e-30, 1e30
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +36,7 @@ class PlaneWaves:
         return integer_lattice(self.wavevectors)
 
     @property
-    def shortest(self) -> float:
+    def shortest_wavelength(self) -> float:
         """Wavelength of the shortest wave [m]."""
         return 2.0 * math.pi / float(np.hypot(*self.wavevectors.T).max())
 
@@ -62,10 +59,10 @@ class SingleWave(Protocol):
 
 _LARGEST_DENOMINATOR = 64
 _LARGEST_MULTIPLE = 8
-# Relations between more independent waves than this are not looked for.
+# Relations between more independent waves than this are not searched.
 _LARGEST_SEARCHED_RANK = 3
-# What rounding alone leaves of an exact relation, as a part of the sizes that are added up: a wave
-# number made of a wavelength is four roundings off, and a direction made of an angle as many more.
+# Relative residual of an exact relation by rounding: a wave number computed from a wavelength has
+# four rounding errors, a direction computed from an angle as many more.
 _ROUNDING = 4.0 * 2.0**-53
 _NEARLY_PARALLEL = 1e-9
 
@@ -74,13 +71,12 @@ def integer_lattice(waves: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return a basis B and integers N with waves = N @ B.
 
     The number of rows of B is the number of independent phases: 1 for a periodic profile, 2 for a
-    doubly periodic map, more for sums that never repeat. A ratio counts as rational, up to
-    denominator 64 (8 where three waves or parallel ones are combined), if nothing but the rounding
-    of the numbers themselves is left of it: a phase drifts by no more than what rounding changes
-    the phases of the kernels by at the same place. Any other ratio, however near, leaves the
-    phases independent: they drift through all of the torus, far enough out. A relation that is not
-    recognised leaves more phases independent than there are: a supremum over all phases is then
-    an upper bound, never too low.
+    doubly periodic map, more for aperiodic sums. A ratio counts as rational, up to denominator 64
+    (8 where three waves or parallel ones are combined), if its residual is explained by the
+    rounding of the numbers: the phase then drifts by no more than the rounding error of the
+    phases in the kernels. With any other ratio the phases are independent: far enough out they
+    cover the whole torus. An unrecognised relation only increases the number of independent phases:
+    a supremum over all phases is then an upper bound, never too low.
 
     Args:
         waves: wave vectors [rad/m], shape (n, 2).
@@ -119,20 +115,18 @@ def integer_lattice(waves: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _relation(basis: FloatArray, wave: FloatArray) -> tuple[int, list[int]] | None:
-    """Return q and n with q·wave = n @ basis, or nothing if there are none of modest size."""
+    """Return q and n with q·wave = n @ basis; ``None`` if there are none of moderate size."""
     rank = len(basis)
     if rank == 0:
         return None
-    if (
-        rank <= 2
-        and np.linalg.matrix_rank(basis, tol=_NEARLY_PARALLEL * np.abs(basis).max()) == rank
-    ):
+    tolerance = _NEARLY_PARALLEL * np.abs(basis).max()
+    if rank <= 2 and np.linalg.matrix_rank(basis, tol=tolerance) == rank:
         return _rational_relation(basis, wave)
     if rank > _LARGEST_SEARCHED_RANK:
         return None
     span = np.arange(-_LARGEST_MULTIPLE, _LARGEST_MULTIPLE + 1)
     combinations = np.stack(np.meshgrid(*[span] * rank, indexing="ij"), axis=-1).reshape(-1, rank)
-    # Small combinations first: of equal sums the simplest is taken.
+    # Small combinations first, to find the simplest of equal sums.
     combinations = combinations[np.argsort(np.abs(combinations).sum(axis=1), kind="stable")]
     sums = combinations @ basis
     size = float(np.hypot(*wave))
@@ -145,11 +139,11 @@ def _relation(basis: FloatArray, wave: FloatArray) -> tuple[int, list[int]] | No
 
 
 def _is_exact(q: int, row: list[int], basis: FloatArray, wave: FloatArray) -> bool:
-    """Return whether q·wave = row @ basis, but for the rounding of the waves themselves."""
+    """Return whether q·wave = row @ basis up to the rounding of the waves."""
     size = q * float(np.hypot(*wave)) + float(np.abs(row) @ np.hypot(*basis.T))
     across = np.abs(basis[:, 0] * wave[1] - basis[:, 1] * wave[0])
-    turned = across > _NEARLY_PARALLEL * np.hypot(*basis.T) * np.hypot(*wave)
-    allowed = Fraction((2.0 if turned.any() else 1.0) * _ROUNDING * size)
+    rotated = across > _NEARLY_PARALLEL * np.hypot(*basis.T) * np.hypot(*wave)
+    allowed = Fraction((2.0 if rotated.any() else 1.0) * _ROUNDING * size)
     for axis in (0, 1):
         terms = (n * Fraction(b) for n, b in zip(row, basis[:, axis].tolist(), strict=True))
         if abs(sum(terms, -q * Fraction(float(wave[axis])))) > allowed:
@@ -158,7 +152,7 @@ def _is_exact(q: int, row: list[int], basis: FloatArray, wave: FloatArray) -> bo
 
 
 def _rational_relation(basis: FloatArray, wave: FloatArray) -> tuple[int, list[int]] | None:
-    """Solve for the coefficients and recognise them as ratios of integers."""
+    """Return the relation whose coefficients are ratios of integers, if there is one."""
     real = np.linalg.lstsq(basis.T, wave, rcond=None)[0]
     parts = [Fraction(float(c)).limit_denominator(_LARGEST_DENOMINATOR) for c in real]
     q = math.lcm(*(p.denominator for p in parts))
@@ -192,7 +186,7 @@ def _shorten(basis: FloatArray, multiples: FloatArray) -> tuple[FloatArray, Floa
         if a @ a > b @ b:
             a, b = b, a
         shorter = b - round(float(a @ b / (a @ a))) * a
-        # Of a hexagon's lattice three pairs are equally short: rounding would swap them forever.
+        # A hexagonal lattice has three equally short pairs: rounding would swap them forever.
         if shorter @ shorter >= b @ b * (1.0 - 1e-12):
             break
         b = shorter
@@ -200,17 +194,19 @@ def _shorten(basis: FloatArray, multiples: FloatArray) -> tuple[FloatArray, Floa
     return short, np.round(multiples @ basis @ np.linalg.inv(short))
 
 
-def check_bend(name: str, bend: float, other: str) -> None:
-    """Refuse waves whose greatest curvature leaves no digits, and no search of a number ends.
+def check_curvature(name: str, curvature: float, wavelength_name: str) -> None:
+    """Reject waves whose curvature is beyond the range in which searches converge.
 
     Args:
-        name: of the argument that gives the heights, for the message.
-        bend: greatest curvature, the sum of a |k|² [1/m].
-        other: name of the argument that gives the wavelengths.
+        name: name of the argument with the heights, for the message.
+        curvature: greatest curvature, the sum of a |k|² [1/m].
+        wavelength_name: name of the argument that gives the wavelengths.
 
     Raises:
-        ParameterError: for a curvature beyond 1e±30; flat is flat.
+        ParameterError: for a curvature beyond 1e±30, except zero.
     """
-    if bend and not _LEAST_BEND <= bend <= _MOST_BEND:
-        limits = f"must be {_LEAST_BEND:g}/m to {_MOST_BEND:g}/m"
-        raise ParameterError(name, f"and {other} make a curvature of {bend:.3g}/m, which {limits}")
+    if curvature and not _MIN_CURVATURE <= curvature <= _MAX_CURVATURE:
+        limits = f"must be {_MIN_CURVATURE:g}/m to {_MAX_CURVATURE:g}/m"
+        raise ParameterError(
+            name, f"and {wavelength_name} make a curvature of {curvature:.3g}/m, which {limits}"
+        )

@@ -1,7 +1,4 @@
-"""What every texture offers: heights, derivatives, nearest points, extremes and a domain.
-
-A kind of texture that can be asked for by name, as data.
-"""
+"""Abstract base class of height functions, and the record that registers a texture kind."""
 
 from __future__ import annotations
 
@@ -16,26 +13,31 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from asperity.arguments import Argument
-from asperity.checks import FloatArray, Points
-from asperity.checks import points as read_points
 from asperity.contacts.contact import ExactHeight
-from asperity.display import Plotted
+from asperity.core.arguments import Argument
+from asperity.core.cache import content_digest, is_shipped
+from asperity.core.checks import FloatArray, Points, check_points
+from asperity.core.display import Plottable
+from asperity.core.files import to_plain_data
 from asperity.enclosures.cells import Cells
-from asperity.measured.history import Stage
-from asperity.textures.cells.bounded import BoundedCells, DerivativeBounds
-from asperity.textures.cells.lines import Pieces, equal_pieces
-from asperity.textures.domain import Domain, ScanLine
+from asperity.measured.prepared import PreparationStage
+from asperity.textures.bounds.bounded_cells import BoundedCells, DerivativeBounds
+from asperity.textures.bounds.line_segments import LineSegments, equal_segments, wave_segments
+from asperity.textures.bounds.wave_cells import WaveCells
+from asperity.textures.domain import Domain, GridValues, ScanLine
 from asperity.textures.plane_waves import PlaneWaves, SingleWave
 
-__all__ = ["Domain", "ExactHeight", "Kind", "ScanLine", "Texture"]
+__all__ = ["Domain", "ExactHeight", "ScanLine", "Texture", "TextureKind"]
 
-# Points of a grid that shows a texture whose waves are not known: along a profile, along each
-# side of a map; fewer where the shortest wave is long.
+# Points of a grid that resolves a texture: along a profile and along each side of a map, at most;
+# per shortest wave, where it is known.
 _LINE_POINTS, _SIDE_POINTS, _POINTS_PER_WAVE = 2**15, 1024, 8.0
-# Samples along a profile, along each side of a map, and where the shortest wave is known.
+# Greatest number of independent phases of waves over which suprema are searched.
+_MAX_PHASES = 4
+# Samples of a dense search: along a profile and along each side of a map whose waves are unknown;
+# otherwise per shortest wave, within limits.
 _PROFILE_SAMPLES, _SIDE_SAMPLES, _SAMPLES_PER_WAVE = 4096, 512, 24
-_LEAST_SAMPLES, _MOST_SAMPLES = 64, 1000
+_MIN_SAMPLES, _MAX_SAMPLES = 64, 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +45,11 @@ class TexturePart:
     """A texture without form and waviness.
 
     Attributes:
-        texture: what is left.
-        nesting: the wavelength from which on waves were taken away as waviness [m]; ``None`` if
-            nothing was.
-        form: range of the form that was taken away [m].
-        waviness: range of the waviness [m].
+        texture: the remaining texture.
+        nesting: wavelength from which waves were removed as waviness [m]; ``None`` if nothing was
+            removed.
+        form: range of the removed form [m].
+        waviness: range of the removed waviness [m].
     """
 
     texture: Texture
@@ -56,31 +58,33 @@ class TexturePart:
     waviness: float = 0.0
 
 
-class Texture(Plotted, ABC):
+class Texture(Plottable, ABC):
     """A height function h(x, y) [m], twice continuously differentiable.
 
-    A texture kind names its sampler (scalar functions that are compiled together with a law) and
-    the arguments that it takes, and knows its certified extremes and bounds. That is all a kind
-    of your own must give: what :attr:`twist` and the methods after it answer follows, right if
-    slow, and a kind that can do better overrides them.
+    A texture kind defines its sampler (scalar functions that are compiled together with a law),
+    the record passed to it, its certified extremes and bounds, its domain and scan line. These are
+    the abstract members; all others have correct, possibly slow defaults that a kind may override.
 
     Attributes:
-        kind: its name.
-        sample_offset: where in its cell a sample lies: 0 at the nodes of a spline, where second
+        kind: name of the kind.
+        constructor_arguments: declarations of the arguments of the constructor, which are stored as
+            attributes of the same names.
+        sample_offset: position of a sample in its cell: 0 at the nodes of a spline, where second
             derivatives are extreme.
-        preparation: what was done to measured heights, in words, for reports.
-        filled: where heights were missing and have been interpolated; ``None`` for nowhere.
+        preparation: steps of the preparation of measured heights, as sentences for reports.
+        filled_mask: where missing heights have been interpolated; ``None`` for nowhere.
         history: surface parameters as read and after each step of the preparation.
     """
 
     kind: ClassVar[str]
+    constructor_arguments: ClassVar[tuple[Argument, ...]] = ()
     sample_offset: ClassVar[float] = 0.5
     preparation: tuple[str, ...] = ()
-    filled: NDArray[np.bool_] | None = None
-    history: tuple[Stage, ...] = ()
+    filled_mask: NDArray[np.bool_] | None = None
+    history: tuple[PreparationStage, ...] = ()
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what another process needs: compiled loops are its own."""
+        """Return the state to pickle, without the compiled loops."""
         return {name: value for name, value in vars(self).items() if name != "_loops"}
 
     @property
@@ -91,7 +95,7 @@ class Texture(Plotted, ABC):
     @property
     @abstractmethod
     def arguments(self) -> tuple[Any, ...]:
-        """What the sampler's functions receive after the position, as one record (NamedTuple)."""
+        """Record (NamedTuple) passed to the sampler functions after the position."""
 
     @cached_property
     @abstractmethod
@@ -110,118 +114,144 @@ class Texture(Plotted, ABC):
 
     @abstractmethod
     def scan_line(self) -> ScanLine:
-        """The straight line along which the texture is scanned unless told otherwise."""
+        """Return the default straight line along which the texture is scanned."""
 
-    @abstractmethod
+    # --- optional members -------------------------------------------------------------------------
+
+    def constructor_values(self) -> dict[str, Any]:
+        """Return the arguments of the constructor by name, SI units."""
+        return {
+            argument.name: getattr(self, argument.name) for argument in self.constructor_arguments
+        }
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name}={value!r}" for name, value in self.constructor_values().items())
+        return f"{type(self).__name__}({values})"
+
     def describe(self) -> dict[str, Any]:
-        """The texture in words and numbers, SI units, for reports; ``kind`` among them."""
+        """Return the kind and its parameters as plain data, SI units, for reports."""
+        return {"kind": self.kind} | dict(to_plain_data(self.constructor_values()))
 
-    # --- what a kind may know better --------------------------------------------------------------
+    @cached_property
+    def digest(self) -> str | None:
+        """Digest of all that the heights depend on, the key of cached results.
 
-    @property
-    def content(self) -> str | None:
-        """A digest of all that the heights depend on, under which answers are kept between runs.
-
-        ``None`` where that is not known, as of a kind of one's own: nothing of it is kept.
+        ``None`` for a user-defined kind, which is never cached.
         """
-        return None
+        if not is_shipped(type(self)):
+            return None
+        return content_digest(type(self).__qualname__, *self._content())
+
+    def _content(self) -> tuple[Any, ...]:
+        """Return the numbers that determine the heights."""
+        return tuple(self.arguments)
 
     @property
-    def twist(self) -> float:
+    def third_derivative_bound(self) -> float:
         """A proved bound T >= ‖D³h‖ [1/m²], the rate of change of the Hessian; infinite if none.
 
-        With it numbers that depend on second derivatives are certified as closely as others.
+        It tightens certified numbers that depend on second derivatives.
         """
         return math.inf
 
     @property
     def waves(self) -> PlaneWaves | None:
-        """The plane waves whose sum the height is; nothing for other heights."""
+        """Plane waves whose sum is the height; ``None`` for other heights."""
         return None
 
     @property
     def single_wave(self) -> SingleWave | None:
-        """The one wave that the height is, where closed forms of it hold."""
+        """The only wave of the height, for closed forms; ``None`` for other heights."""
         return None
 
     @property
-    def ends(self) -> bool:
-        """Whether the texture stops at the border of its domain and is mirrored there."""
+    def is_mirrored(self) -> bool:
+        """Whether the texture ends at the border of its domain and is mirrored there."""
         return False
 
     def exact_height(self) -> ExactHeight:
         """Return h(x, y, m, n), the derivative of order (m, n), m + n <= 2, in mpmath.
 
-        Kernels are tested against it. Unless the kind has a formula it is good to double
-        precision only: the sampler's own values, continued by Taylor's formula between doubles.
+        Kernels are tested against it. By default it is accurate to double precision only: values of
+        the sampler, continued by Taylor's formula between doubles.
         """
-        from asperity.textures.exact import exact_continuation
+        from asperity.textures.exact_heights import taylor_continuation
 
-        return exact_continuation(self.derivatives)
+        return taylor_continuation(self.derivatives)
 
     def cells(self, extent: tuple[float, float] | None = None, margin: float = 0.0) -> Cells | None:
         """Return the cells over which suprema are certified; by default from the bounds alone.
 
         Args:
-            extent: width and depth [m] of the part of the plane to look at, from the origin; the
-                domain, or the whole plane, by default.
-            margin: how far beyond to look on every side [m].
+            extent: width and depth [m] of the rectangle to search, from the origin; by default the
+                domain, or the whole plane.
+            margin: width by which the rectangle is extended on every side [m].
 
         Returns:
-            The cells; nothing for a kind that needs an extent and got none.
+            The cells; ``None`` for a kind that requires an extent if none is given.
         """
+        if self.waves is not None:
+            wave_cells = WaveCells(self.waves, extent, margin)
+            return wave_cells if wave_cells.dimensions <= _MAX_PHASES else None
         region = self.domain
         if extent is not None:
             region = Domain(np.zeros(2), np.diag(extent), periodic=False, description="extent")
-        return self._bounded(region if region.periodic else region.widened(margin))
+        return self._bounded_cells(region if region.periodic else region.expand(margin))
 
     def sampling_cells(self) -> Cells:
-        """Return the cells over which suprema are sampled where none are certified."""
-        return self.cells() or self._bounded(self.domain)
+        """Return the cells over which suprema are sampled where they cannot be certified."""
+        cells = self.cells()
+        if cells is None and self.waves is not None:  # a rectangle of the plane
+            cells = WaveCells(self.waves, tuple(np.abs(self.domain.spans).sum(axis=0).tolist()))
+        return cells or self._bounded_cells(self.domain)
 
-    def line_pieces(self, line: ScanLine, least: int) -> Pieces | None:
-        """Return at least so many pieces of a line; nothing where a kind cannot cut along it."""
+    def line_segments(self, line: ScanLine, min_count: int) -> LineSegments | None:
+        """Return at least ``min_count`` segments of a line; ``None`` where the kind has none."""
+        if self.waves is not None:
+            return wave_segments(self.waves, line, min_count)
         span = line.length * line.direction[None]
         region = Domain(line.start, span, periodic=False, description="line")
-        return equal_pieces(self._bounded(region), line, least, 1.0)
+        return equal_segments(self._bounded_cells(region), line, min_count, 1.0)
 
-    def _bounded(self, region: Domain) -> BoundedCells:
-        bounds = DerivativeBounds(*self.extremes, *self.bounds, self.twist)
+    def _bounded_cells(self, region: Domain) -> BoundedCells:
+        bounds = DerivativeBounds(*self.extremes, *self.bounds, self.third_derivative_bound)
         return BoundedCells(region, self.derivatives, bounds)
 
     def sample_counts(self) -> list[int]:
-        """Return how many samples along each span of the domain a dense search begins with."""
-        if self.is_profile:
-            return [_PROFILE_SAMPLES]
-        if self.waves is None:
-            return [_SIDE_SAMPLES] * 2
-        wanted = _SAMPLES_PER_WAVE * np.hypot(*self.domain.spans.T) / self.waves.shortest
-        return [int(min(max(count, _LEAST_SAMPLES), _MOST_SAMPLES)) for count in wanted]
+        """Return the numbers of initial samples of a dense search along each span of the domain."""
+        if self.is_profile or self.waves is None:
+            return [_PROFILE_SAMPLES] if self.is_profile else [_SIDE_SAMPLES] * 2
+        counts = _SAMPLES_PER_WAVE * np.hypot(*self.domain.spans.T) / self.waves.shortest_wavelength
+        return [int(count) for count in np.clip(counts, _MIN_SAMPLES, _MAX_SAMPLES)]
 
     def grid_counts(self) -> list[int]:
-        """Return how many points along each span of the domain show every wave."""
-        sides = np.hypot(*self.domain.upright()[0].T)
+        """Return the numbers of points along each span of the domain that resolve every wave."""
+        sides = np.hypot(*self.domain.orthogonal_spans()[0].T)
         most = _LINE_POINTS if self.is_profile else _SIDE_POINTS
         if self.waves is None:
             return [most] * len(sides)
-        wanted = np.ceil(_POINTS_PER_WAVE * sides / self.waves.shortest)
-        return [int(count) for count in np.clip(wanted, 16, most)]
+        counts = np.ceil(_POINTS_PER_WAVE * sides / self.waves.shortest_wavelength)
+        return [int(count) for count in np.clip(counts, 16, most)]
 
     def texture_part(self) -> TexturePart:
-        """Return what of the heights is texture: all of them, where they were written down.
+        """Return the texture without form and waviness: by default all of it.
 
-        Measured heights have form and waviness too, which are felt as a shape.
+        Measured heights also have form and waviness, which are felt as a shape.
         """
         return TexturePart(self)
 
-    def samples(self) -> tuple[FloatArray, tuple[float, float], bool]:
-        """Return heights on a grid of the domain, the nodes of a measured texture.
+    def samples(self, dense: bool = False) -> GridValues:
+        """Return heights on a grid of the domain, at the nodes of a spline.
+
+        Args:
+            dense: whether to sample each wave as densely as a search does, so that a tip feels it.
 
         Returns:
             Heights [m], shape (ny, nx), (1, nx) for a profile; spacing (x, y) [m]; whether they
-            repeat, so that no window is needed.
+            are periodic, so that no window is needed.
         """
-        points, spacing, repeats = self.domain.grid(self.grid_counts())
+        counts = self.sample_counts() if dense else self.grid_counts()
+        points, spacing, repeats = self.domain.grid(counts)
         return self.height(points.reshape(-1, 2)).reshape(points.shape[:2]), spacing, repeats
 
     # --- values -----------------------------------------------------------------------------------
@@ -247,8 +277,8 @@ class Texture(Plotted, ABC):
         """Return the height h(x, y).
 
         Args:
-            xy: points [m], shape (n, 2), or (2,) for one: then the answer has no first axis
-                either.
+            xy: points [m], shape (n, 2), or (2,) for one; the result then lacks the first axis
+                too.
 
         Returns:
             Heights [m], shape (n,).
@@ -256,28 +286,28 @@ class Texture(Plotted, ABC):
         Raises:
             ParameterError: for another shape, or positions that are not finite.
         """
-        points, values = self._sample("height_batch", xy, 1)
-        return points.answer(values[:, 0])
+        points, values = self._evaluate("height_batch", xy, 1)
+        return points.restore_shape(values[:, 0])
 
     def gradient(self, xy: ArrayLike) -> FloatArray:
         """Return the slopes (h_x, h_y) [1], shape (n, 2); see :meth:`height`."""
-        points, values = self._sample("slope_batch", xy, 3)
-        return points.answer(np.ascontiguousarray(values[:, 1:]))
+        points, values = self._evaluate("slope_batch", xy, 3)
+        return points.restore_shape(np.ascontiguousarray(values[:, 1:]))
 
     def hessian(self, xy: ArrayLike) -> FloatArray:
         """Return the Hessian of h [1/m], shape (n, 2, 2); see :meth:`height`."""
-        points, values = self._sample("curvature_batch", xy, 6)
-        return points.answer(values[:, [3, 4, 4, 5]].reshape(-1, 2, 2))
+        points, values = self._evaluate("curvature_batch", xy, 6)
+        return points.restore_shape(values[:, [3, 4, 4, 5]].reshape(-1, 2, 2))
 
     def derivatives(self, xy: ArrayLike) -> FloatArray:
         """Return h, h_x, h_y, h_xx, h_xy, h_yy in SI units, shape (n, 6); see :meth:`height`."""
-        points, values = self._sample("curvature_batch", xy, 6)
-        return points.answer(values)
+        points, values = self._evaluate("curvature_batch", xy, 6)
+        return points.restore_shape(values)
 
     def nearest(self, points: ArrayLike) -> FloatArray:
-        """Return the globally nearest surface point of each probe point (the god-object).
+        """Return the globally closest surface point of each probe point (the god-object).
 
-        p_h = argmin |p - (X, Y, h(X, Y))|. At a tie one of the nearest points, always the same.
+        p_h = argmin |p - (X, Y, h(X, Y))|. At a tie one of the closest points, always the same.
 
         Args:
             points: probe points [m], shape (n, 3), or (3,) for one.
@@ -288,39 +318,39 @@ class Texture(Plotted, ABC):
         Raises:
             ParameterError: for another shape, or positions that are not finite.
         """
-        probes = read_points("points", points, 3, "m")
-        feet = np.empty((probes.count, 2))
-        self._loops.nearest_batch(probes.rows, feet, self.arguments)
-        return probes.answer(np.column_stack([feet, self.height(feet)]))
+        probes = check_points("points", points, 3, "m")
+        closest = np.empty((probes.count, 2))
+        self._loops.nearest_batch(probes.rows, closest, self.arguments)
+        return probes.restore_shape(np.column_stack([closest, self.height(closest)]))
 
-    def _sample(self, loop: str, xy: ArrayLike, width: int) -> tuple[Points, FloatArray]:
-        points = read_points("xy", xy, 2, "m")
+    def _evaluate(self, loop_name: str, xy: ArrayLike, width: int) -> tuple[Points, FloatArray]:
+        points = check_points("xy", xy, 2, "m")
         out = np.empty((points.count, width))
-        getattr(self._loops, loop)(points.rows, out, self.arguments)
+        getattr(self._loops, loop_name)(points.rows, out, self.arguments)
         return points, out
 
 
 @dataclass(frozen=True)
-class Kind:
-    """A kind of texture that can be asked for by name.
+class TextureKind:
+    """A texture kind that is available by name.
 
     Attributes:
         name: as on the command line, before the colon.
         summary: one line.
-        make: makes the texture from its arguments by name.
-        arguments: in the order in which they are listed.
-        example: arguments [SI] that show it; none if the defaults do.
-        source: where its sizes come from.
+        factory: function or class that takes the arguments by name and returns the texture.
+        arguments: declarations, in the order in which they are listed.
+        example: example arguments [SI]; none if the defaults are an example.
+        source: source of its dimensions.
     """
 
     name: str
     summary: str
-    make: Callable[..., Texture]
+    factory: Callable[..., Texture]
     arguments: tuple[Argument, ...]
     example: Mapping[str, Any] = field(default_factory=dict)
     source: str = ""
 
     @property
-    def required(self) -> tuple[Argument, ...]:
-        """The arguments that have no default."""
+    def required_arguments(self) -> tuple[Argument, ...]:
+        """The arguments without a default."""
         return tuple(argument for argument in self.arguments if argument.required)

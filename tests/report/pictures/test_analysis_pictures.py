@@ -10,16 +10,16 @@ from matplotlib.collections import QuadMesh
 
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.analyze import analyze
+from asperity.core.errors import ParameterError
 from asperity.devices import parse_device
-from asperity.errors import ParameterError
 from asperity.report import plot
-from asperity.report.pictures.analysis_pictures import analysis_figure, pictures_of
-from asperity.report.pictures.analysis_region import (
+from asperity.report.pictures.analysis_pictures import analysis_figure, available_pictures
+from asperity.report.pictures.analysis_windows import (
     gain_window,
-    in_window,
     loop_window,
+    project_on_window,
     top_view,
-    witness_column,
+    witness_profile,
     working_depth,
 )
 from asperity.surface import Surface
@@ -58,7 +58,7 @@ def test_every_picture_can_be_had_alone(
         "hills": (hills, ["field", "gain", "top", "depth"]),
     }
     for tag, (result, names) in expected.items():
-        assert list(pictures_of(result)) == names
+        assert list(available_pictures(result)) == names
         for name in names:
             figure = plot(result, picture=name)
             labels = [axes.get_xlabel() + axes.get_ylabel() for axes in figure.axes]
@@ -78,7 +78,7 @@ def test_the_worst_loop_is_drawn_where_it_is(groove: Analysis) -> None:
     drawn = [line for line in axes.lines if len(line.get_xdata()) == len(vertices) + 1]
     assert len(drawn) == 1
     x, z = (np.asarray(values)[:-1] * 1e-3 for values in drawn[0].get_data())
-    start = window.stretch.xy(np.zeros(1))[0]
+    start = window.segment.xy(np.zeros(1))[0]
     np.testing.assert_allclose(start[0] + x, vertices[:, 0], atol=1e-12)
     np.testing.assert_allclose(z, vertices[:, 2], atol=1e-12)
     left, right = (1e-3 * edge for edge in axes.get_xlim())
@@ -91,7 +91,7 @@ def test_the_worst_loop_is_drawn_where_it_is(groove: Analysis) -> None:
 
 def test_a_conservative_field_has_no_loop_in_its_picture() -> None:
     axes = analysis_figure(analysis("C"), "field").axes[0]
-    assert axes.get_title(loc="left") == "conservative: no loop gains"
+    assert axes.get_title(loc="left") == "conservative: no loop gains energy"
     mesh = next(item for item in axes.collections if isinstance(item, QuadMesh))
     assert float(np.abs(mesh.get_array()).max()) < 1e-6
 
@@ -102,13 +102,13 @@ def test_the_cross_is_on_the_witness_and_nothing_is_above_q(law: str) -> None:
     axes = analysis_figure(result, "gain").axes[0]
     crosses = [line for line in axes.lines if line.get_marker() == "x"]
     window = gain_window(result)
-    at = in_window(window, np.array(result.q.at))
+    at = project_on_window(window, np.array(result.q.at))
     assert crosses
     assert at is not None
     x, z = (float(values[0]) * 1e-3 for values in crosses[-1].get_data())
     assert (x, z) == (pytest.approx(at[0], abs=1e-12), pytest.approx(at[1], abs=1e-12))
     # Moved by whole periods, the cross is still a point where the norm is q.
-    point = np.array([*window.stretch.xy(np.array([x]))[0], z])
+    point = np.array([*window.segment.xy(np.array([x]))[0], z])
     state = result.surface.jacobian([point])[0]
     gain = np.linalg.norm(state, 2) / result.surface.stiffness
     assert gain == pytest.approx(result.q.lower, rel=1e-6)
@@ -133,19 +133,19 @@ def test_the_working_depth_of_every_contact() -> None:
 @pytest.mark.parametrize("law", ["A", "B", "C", "F", "G"])
 def test_the_column_reaches_q_at_the_witness(law: str) -> None:
     result = analysis(law, max_depth=0.25e-3)
-    column = witness_column(result)
-    at = np.interp(column.witness, column.depth, column.values[:, 0])
+    column = witness_profile(result)
+    at = np.interp(column.witness_depth, column.depth, column.values[:, 0])
     assert at == pytest.approx(result.q.lower, rel=1e-4)
     assert column.values[:, 0].max() <= result.q.upper * (1 + 1e-12)
     np.testing.assert_allclose(
-        column.place + column.witness * column.below, result.q.at, atol=1e-12
+        column.start + column.witness_depth * column.direction, result.q.at, atol=1e-12
     )
 
 
 def test_the_column_of_d_grows_as_the_paper_of_the_medial_axis_says(god_object: Analysis) -> None:
     """Below the crest σ₁ = y/(1 - y), y = δ/onset, from y = 1/2 up to the onset."""
-    column = witness_column(god_object)
-    y = column.depth / column.witness
+    column = witness_profile(god_object)
+    y = column.depth / column.witness_depth
     part = (y > 0.55) & (y < 0.95)
     assert part.sum() > 20
     np.testing.assert_allclose(column.values[part, 0], y[part] / (1 - y[part]), rtol=1e-6)

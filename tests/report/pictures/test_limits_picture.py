@@ -8,8 +8,7 @@ import pytest
 from asperity.analysis.check_limits import limits
 from asperity.analysis.limits.limit_result import Limits
 from asperity.devices import parse_device
-from asperity.report.pictures.limits_picture import limits_figure
-from asperity.report.pictures.spectrum_picture import shortest
+from asperity.report.pictures.spectrum_pictures import limits_figure, shortest_wavelengths
 from asperity.textures import Fourier, HeightMap, Sinusoid
 
 BENCH = {
@@ -25,7 +24,9 @@ def result() -> Limits:
 
 
 def shortest_of(result: Limits) -> list[tuple[float, int, str]]:
-    return shortest(result.device, result.speed, result.time_samples, result.position_samples)
+    return shortest_wavelengths(
+        result.device, result.speed, result.time_samples, result.position_samples
+    )
 
 
 def test_the_shortest_waves_by_hand(result: Limits) -> None:
@@ -73,7 +74,7 @@ def test_waves_that_meet_every_limit_are_filled(result: Limits) -> None:
 def test_pictures_of_what_is_not_known_and_of_what_is_flat() -> None:
     unknown = limits(Sinusoid(5e-5, 1e-3), parse_device({}, "none"), law="A")
     words = " ".join(text.get_text() for text in limits_figure(unknown).axes[1].texts)
-    assert "not known" in words
+    assert "no data" in words
     flat = limits(HeightMap(np.full((6, 6), 1e-3), 1e-4), parse_device(BENCH, "bench"), law="A")
     assert "flat" in " ".join(text.get_text() for text in limits_figure(flat).axes[0].texts)
 

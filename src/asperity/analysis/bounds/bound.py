@@ -1,4 +1,4 @@
-"""A number with its pedigree."""
+"""A number with proved bounds, and the method that gave it."""
 
 from __future__ import annotations
 
@@ -6,33 +6,33 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from asperity.display import Displayed
-from asperity.files import Record
+from asperity.core.display import Displayable
+from asperity.core.files import Serializable
 
 Method = Literal["theorem", "closed form", "certified", "sampled"]
 
 
 @dataclass(frozen=True)
-class Bound(Record, Displayed):
-    """A supremum, with what is known of it.
+class Bound(Serializable, Displayable):
+    """A supremum between bounds.
 
     Attributes:
         lower: a value that is attained at ``at``.
-        upper: a proved upper bound; infinity if none is.
+        upper: a proved upper bound; infinity without proof.
         method: ``"theorem"``, ``"closed form"``, ``"certified"`` or ``"sampled"``.
         at: the probe position [m] that attains ``lower``, or approaches it from inside; for an
-            infinite number the point where it first becomes so; ``None`` if there is none.
-        note: one sentence on how the number came about.
-        deflection: the state of a law with an anchor at ``at``: its deflection [m], shape (2,);
-            ``None`` for a law without state.
-        sliding: whether that anchor is dragged.
+            infinite number the point where it first diverges; ``None`` if there is none.
+        note: derivation of the number, in one sentence.
+        deflection: deflection [m], shape (2,), of the anchor at ``at``; ``None`` for a law without
+            state.
+        sliding: whether that anchor slides.
 
     Example:
         >>> Bound(2.0, math.inf, "sampled", (0.0, 0.0, -1e-3)).value
         2.0
     """
 
-    written = "value lower upper method at note deflection sliding"
+    serialized_attributes = "value lower upper method at note deflection sliding"
 
     lower: float
     upper: float

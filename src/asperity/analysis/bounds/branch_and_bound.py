@@ -1,8 +1,7 @@
-"""Certified suprema: halve the cells that may hold the greatest value until none is left.
+"""Certified suprema by branch and bound: cells that may hold the supremum are subdivided.
 
-A cell is dropped when a proved upper bound on it is not above what is already attained, but for
-the tolerance. The greatest bound of all cells dropped, or left over at the work limit, is the
-certificate.
+A cell is pruned when its proved upper bound exceeds the best attained value by no more than the
+tolerance. The greatest bound of all cells pruned, or left at the work limit, is the certificate.
 """
 
 from __future__ import annotations
@@ -14,27 +13,28 @@ from functools import lru_cache
 
 import numpy as np
 
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
+from asperity.core.errors import InternalError
 from asperity.enclosures.cells import Cells
-from asperity.errors import InternalError
 
 DEFAULT_WORK_LIMIT = 20_000_000
-# Cells of each chunk at which the value itself is computed: the most promising ones.
-_TRIED = 4
-# Fewer cells than this cost no more than one.
-_SMALL = 128
+# Cells of each chunk whose value is computed: those with the greatest upper bounds.
+_PROBED_CELLS = 4
+# Evaluating fewer cells than this costs no more than one.
+_MIN_CELLS = 128
 _POLISH_STEPS = 50
-# Steps that are tried at once, and the change of a step below which nothing is gained.
-_SCALES = 4.0 ** -np.arange(5.0)
-_FINEST = 1e-10
-_LEAST_HALF = 1e-12
-# What rounding may put an attained value above its bound by: a kernel and an eigenvalue are a few
-# hundred operations, 2⁸ units of the round-off; a second derivative is a difference of heights of
-# neighbouring nodes, which costs (n/2π)² more at n nodes a wave, 2¹⁶ at 1600 of them.
-OPERATIONS = 2.0**8 * float(np.finfo(np.float64).eps)
-DIFFERENCES = 2.0**16
-# So many cells cost next to nothing.
-_FEW = 4096
+# Step sizes tried together, and the step below which the search stops.
+_POLISH_SCALES = 4.0 ** -np.arange(5.0)
+_MIN_POLISH_STEP = 1e-10
+_MIN_HALF_WIDTH = 1e-12
+# Relative error by which rounding may raise an attained value above its bound: a kernel and an
+# eigenvalue are a few hundred operations, 2⁸ units of round-off; a second derivative is a
+# difference of heights of neighbouring nodes, which amplifies it by (n/2π)² at n nodes a wave,
+# 2¹⁶ at 1600.
+ROUNDING_ERROR = 2.0**8 * float(np.finfo(np.float64).eps)
+DIFFERENCE_AMPLIFICATION = 2.0**16
+# The cost of this many cells is negligible.
+_CHEAP_CELLS = 4096
 
 
 @dataclass(frozen=True)
@@ -47,57 +47,59 @@ class Contacts:
 
 
 class Problem(ABC):
-    """A function on cells whose supremum is wanted.
+    """A function on cells whose supremum is computed.
 
     Attributes:
-        cells: where it lives.
-        floor: a value that is attained, or that does not matter below.
+        cells: the domain.
+        floor: a value that is attained, or below which the supremum is irrelevant.
     """
 
     cells: Cells
     floor: float = 0.0
 
     @abstractmethod
-    def at_most(self, centres: FloatArray, half: FloatArray, above: float) -> FloatArray:
-        """Return proved upper bounds on cells, shape (n,); rough ones where below ``above``."""
+    def upper_bounds(
+        self, centres: FloatArray, half_widths: FloatArray, threshold: float
+    ) -> FloatArray:
+        """Return proved upper bounds on cells, shape (n,), coarse ones below ``threshold``."""
 
     @abstractmethod
     def values(self, coordinates: FloatArray) -> FloatArray:
         """Return the value at coordinates (n, d), shape (n,)."""
 
-    def enough(self, best: float, tolerance: float) -> float:
-        """Return the bound at which a cell can be dropped."""
+    def prune_threshold(self, best: float, tolerance: float) -> float:
+        """Return the upper bound at which a cell can be pruned."""
         return best * (1.0 + tolerance)
 
     def contacts(self, coordinates: FloatArray) -> list[Contacts]:  # noqa: ARG002 - of a default
         """Return the contacts that may attain the value at coordinates (n, d).
 
-        None where the value is one of the surface alone: then either end of the depth may.
+        Empty where the value depends on the surface alone: either end of the depth range may.
         """
         return []
 
-    def at_once(self) -> Supremum | None:
-        """Return bounds over the whole plane that need no search, where there are some."""
+    def direct_bound(self) -> Supremum | None:
+        """Return bounds over the whole plane that need no search, if available."""
         return None
 
 
 @dataclass(frozen=True)
 class Supremum:
-    """What branch and bound found.
+    """The result of branch and bound.
 
     Attributes:
         lower: the greatest value attained, or the floor of the problem.
         upper: a proved bound.
         at: coordinates where ``lower`` is attained; ``None`` for the floor.
-        cells: how many cells were looked at.
-        reached: whether the tolerance was reached within the work limit.
+        cell_count: number of evaluated cells.
+        converged: whether the tolerance was reached within the work limit.
     """
 
     lower: float
     upper: float
     at: FloatArray | None
-    cells: int
-    reached: bool
+    cell_count: int
+    converged: bool
 
 
 def supremum(
@@ -108,129 +110,133 @@ def supremum(
 ) -> Supremum:
     """Return proved bounds of the supremum of a problem.
 
-    Errors shrink with the square of the cells, so a much smaller gap often costs little more.
+    Errors shrink with the square of the cell size, so a much smaller gap often costs little more.
 
     Args:
         problem: the function on its cells.
         tolerance: relative gap at which to stop.
-        work_limit: greatest number of cells to look at; the bounds reached by then are returned.
-        cheap_gap: a smaller gap, to be reached as long as few cells are left.
+        work_limit: greatest number of cells to evaluate; the bounds reached by then are returned.
+        cheap_gap: a smaller gap to reach as long as few cells remain.
 
     Raises:
         InternalError: if a value is above the proved bound, so that nothing is proved.
     """
     goal = tolerance if cheap_gap is None else min(cheap_gap, tolerance)
-    limit = min(work_limit, problem.cells.most or work_limit)
-    chunks, half = problem.cells.start()
-    # Of a few samples, so that most cells are dropped at first sight.
-    best, at = _better(problem, problem.cells.samples(), problem.floor, None)
-    dropped, looked = problem.floor, 0
+    limit = min(work_limit, problem.cells.max_cells or work_limit)
+    chunks, half = problem.cells.initial_cells()
+    # A few samples first, so that most cells are pruned at once.
+    best, at = _improve_at_points(problem, problem.cells.sample_coordinates(), problem.floor, None)
+    pruned, evaluated = problem.floor, 0
     while True:
-        kept, bounds = [], []
+        remaining, bounds = [], []
         for centres in chunks:
-            looked += len(centres)
-            upper = problem.at_most(centres, half, problem.enough(best, goal))
+            evaluated += len(centres)
+            upper = problem.upper_bounds(centres, half, problem.prune_threshold(best, goal))
             upper = np.where(np.isnan(upper), np.inf, upper)
-            best, at = _try(problem, centres, half, upper, best, at)
-            keep = upper > problem.enough(best, goal)
-            dropped = max(dropped, float(upper[~keep].max(initial=0.0)))
-            kept.append(centres[keep])
+            best, at = _improve_in_cells(problem, centres, half, upper, best, at)
+            keep = upper > problem.prune_threshold(best, goal)
+            pruned = max(pruned, float(upper[~keep].max(initial=0.0)))
+            remaining.append(centres[keep])
             bounds.append(upper[keep])
-        centres, upper = np.concatenate(kept), np.concatenate(bounds)
-        keep = upper > problem.enough(best, goal)
-        dropped = max(dropped, float(upper[~keep].max(initial=0.0)))
+        centres, upper = np.concatenate(remaining), np.concatenate(bounds)
+        keep = upper > problem.prune_threshold(best, goal)
+        pruned = max(pruned, float(upper[~keep].max(initial=0.0)))
         centres, upper = centres[keep], upper[keep]
         left = float(upper.max(initial=0.0))
-        parts = _parts(len(centres), problem.cells.dimensions)
+        parts = _subdivision_count(len(centres), problem.cells.dimensions)
         children = len(centres) * parts**problem.cells.dimensions
-        good = left <= problem.enough(best, tolerance)
-        done = len(centres) == 0 or (good and children > _FEW)
-        if done or looked + children > limit or float(half.max()) < _LEAST_HALF:
+        converged = left <= problem.prune_threshold(best, tolerance)
+        done = len(centres) == 0 or (converged and children > _CHEAP_CELLS)
+        if done or evaluated + children > limit or float(half.max()) < _MIN_HALF_WIDTH:
             break
         half = half / parts
-        chunks = _split(centres, half, parts, problem.cells.chunk())
+        chunks = _subdivide(centres, half, parts, problem.cells.chunk_size())
     if at is not None:
         best, at = polish(problem, at, half, best)
-    proved = max(dropped, left)
-    if best > proved + OPERATIONS * DIFFERENCES * abs(proved):
-        words = "the enclosures, or the bounds that the texture claims, are wrong"
-        raise InternalError(f"{best:g} is attained, above the proved bound {proved:g}: {words}")
-    return Supremum(best, max(best, proved), at, looked, good)
+    proved = max(pruned, left)
+    if best > proved + ROUNDING_ERROR * DIFFERENCE_AMPLIFICATION * abs(proved):
+        cause = "the enclosures, or the bounds declared by the texture, are wrong"
+        raise InternalError(f"{best:g} is attained, above the proved bound {proved:g}: {cause}")
+    return Supremum(best, max(best, proved), at, evaluated, converged)
 
 
-def _try(
+def _improve_in_cells(
     problem: Problem,
     centres: FloatArray,
-    half: FloatArray,
+    half_widths: FloatArray,
     upper: FloatArray,
     best: float,
     at: FloatArray | None,
 ) -> tuple[float, FloatArray | None]:
-    """Return the best value and where it is, after a look at the most promising cells."""
-    top = np.argpartition(-upper, min(_TRIED, len(upper) - 1))[:_TRIED]
+    """Return the best value and its place after evaluating the most promising cells."""
+    top = np.argpartition(-upper, min(_PROBED_CELLS, len(upper) - 1))[:_PROBED_CELLS]
     top = top[upper[top] > best]
     if len(top) == 0:
         return best, at
-    points = centres[top, None] + _star(len(half)) * half
-    return _better(problem, problem.cells.inside(points.reshape(-1, len(half))), best, at)
+    points = centres[top, None] + _cell_stencil(len(half_widths)) * half_widths
+    return _improve_at_points(
+        problem, problem.cells.clip_to_region(points.reshape(-1, len(half_widths))), best, at
+    )
 
 
-def _better(
+def _improve_at_points(
     problem: Problem, points: FloatArray, best: float, at: FloatArray | None
 ) -> tuple[float, FloatArray | None]:
-    """Return the best value and where it is, after a look at some points."""
+    """Return the best value and its place after evaluating some points."""
     values = problem.values(points)
-    first = _greatest(values)
+    first = _argmax_ignoring_nan(values)
     return (float(values[first]), points[first]) if values[first] > best else (best, at)
 
 
-def _greatest(values: FloatArray) -> int:
-    """Return the index of the greatest value; what is no number is smaller than any."""
+def _argmax_ignoring_nan(values: FloatArray) -> int:
+    """Return the index of the greatest value; NaN is smaller than any."""
     return int(np.where(np.isnan(values), -np.inf, values).argmax())
 
 
 @lru_cache(maxsize=8)
-def _star(dimensions: int) -> FloatArray:
+def _cell_stencil(dimensions: int) -> FloatArray:
     """Return the centre and the corners of a cell in units of its half widths."""
     corners = np.stack(np.meshgrid(*[(-1.0, 1.0)] * dimensions, indexing="ij"), axis=-1)
     return np.concatenate([np.zeros((1, dimensions)), corners.reshape(-1, dimensions)])
 
 
-def _parts(cells: int, dimensions: int) -> int:
-    """Return into how many parts to cut along every coordinate: more than halves of few cells."""
+def _subdivision_count(cells: int, dimensions: int) -> int:
+    """Return the number of parts of a cell along every coordinate, more than 2 for few cells."""
     parts = 2
-    while max(cells, 1) * (2 * parts) ** dimensions <= _SMALL:
+    while max(cells, 1) * (2 * parts) ** dimensions <= _MIN_CELLS:
         parts *= 2
     return parts
 
 
-def _split(centres: FloatArray, half: FloatArray, parts: int, chunk: int) -> Iterator[FloatArray]:
-    """Return the parts, of half widths ``half``, of cells, chunk by chunk."""
+def _subdivide(
+    centres: FloatArray, half_widths: FloatArray, parts: int, chunk: int
+) -> Iterator[FloatArray]:
+    """Yield the subcells, of half widths ``half_widths``, of cells, chunk by chunk."""
     ticks = 2.0 * np.arange(parts) + 1.0 - parts
-    grid = np.stack(np.meshgrid(*[ticks] * len(half), indexing="ij"), axis=-1)
-    offsets = grid.reshape(-1, len(half)) * half
+    grid = np.stack(np.meshgrid(*[ticks] * len(half_widths), indexing="ij"), axis=-1)
+    offsets = grid.reshape(-1, len(half_widths)) * half_widths
     step = max(1, chunk // len(offsets))
     for first in range(0, len(centres), step):
-        yield (centres[first : first + step, None] + offsets).reshape(-1, len(half))
+        yield (centres[first : first + step, None] + offsets).reshape(-1, len(half_widths))
 
 
 def polish(
-    problem: Problem, at: FloatArray, half: FloatArray, best: float
+    problem: Problem, at: FloatArray, half_widths: FloatArray, best: float
 ) -> tuple[float, FloatArray]:
-    """Climb to the top near a point, by steps of several sizes at once."""
-    size = len(half)
-    offsets = np.concatenate([_star(size)[1:], np.eye(size), -np.eye(size)])
-    offsets = (_SCALES[:, None, None] * offsets).reshape(-1, size)
-    scale, step = np.repeat(_SCALES, len(offsets) // len(_SCALES)), 2.0
+    """Return the local maximum near a point, by pattern search with several step sizes."""
+    size = len(half_widths)
+    offsets = np.concatenate([_cell_stencil(size)[1:], np.eye(size), -np.eye(size)])
+    offsets = (_POLISH_SCALES[:, None, None] * offsets).reshape(-1, size)
+    scale, step = np.repeat(_POLISH_SCALES, len(offsets) // len(_POLISH_SCALES)), 2.0
     for _ in range(_POLISH_STEPS):
-        points = problem.cells.inside(at + offsets * (step * half))
+        points = problem.cells.clip_to_region(at + offsets * (step * half_widths))
         values = problem.values(points)
-        first = _greatest(values)
+        first = _argmax_ignoring_nan(values)
         if values[first] > best:
             best, at = float(values[first]), points[first]
             step *= min(2.0 * float(scale[first]), 1.0)
         else:
-            step *= 0.5 * float(_SCALES[-1])
-        if step < _FINEST:
+            step *= 0.5 * float(_POLISH_SCALES[-1])
+        if step < _MIN_POLISH_STEP:
             break
     return best, at

@@ -1,7 +1,7 @@
-"""What is maximised over cells: ‖J‖ itself, or something simpler of which a number is a function.
+"""Problems over cells: a measure of J, or a simpler quantity that determines a number.
 
-A law's own generated kernel, run on Taylor models, gives J on whole cells. Of the surface alone
-there are the slope, the change of the normal and the crest curvature.
+A law's own generated kernel, evaluated on Taylor models, encloses J on whole cells. The slope, the
+change of the normal and the crest curvature depend on the surface alone.
 """
 
 from __future__ import annotations
@@ -15,28 +15,29 @@ from typing import Any
 import numpy as np
 
 from asperity.analysis.bounds.branch_and_bound import Contacts, Problem
-from asperity.analysis.bounds.dense_search import ContactField
-from asperity.analysis.bounds.measures import NORM, ONE_SIDED
-from asperity.analysis.bounds.measures import Number as MatrixNumber
-from asperity.checks import FloatArray
-from asperity.enclosures.cells import NAMES, Cells
-from asperity.enclosures.products import (
-    ANGLE,
-    DEPTH,
-    LENGTH,
+from asperity.analysis.bounds.measures import NORM, ONE_SIDED, JacobianMeasure
+from asperity.analysis.bounds.sampling import ContactField
+from asperity.contacts.contact import parameter_name
+from asperity.core.checks import FloatArray
+from asperity.enclosures.cells import (
+    ANGLE_COORDINATE,
+    DEPTH_COORDINATE,
+    DERIVATIVE_NAMES,
+    LENGTH_COORDINATE,
+    Cells,
     ProductCells,
-    anchor_models,
-    with_deflection,
-    with_depth,
+    anchor_enclosures,
+    cells_with_deflection,
+    cells_with_depth,
 )
-from asperity.enclosures.taylor import Number, Taylor, TaylorMath
+from asperity.enclosures.taylor import TaylorMath, TaylorModel, TaylorNumber
 from asperity.laws import Law
 from asperity.surface import Surface
 
 Entries = Sequence[Sequence[Any]]
 Formula = Callable[[Sequence[Any], Callable[[Any], Any]], Entries]
-# Numbers of J/k below this are not resolved; a flat surface would have no relative gap.
-_LEAST = 1e-9
+# Numbers of J/k below this are not resolved: a flat surface has no relative gap.
+_RESOLUTION = 1e-9
 
 
 class MatrixProblem(Problem):
@@ -44,48 +45,56 @@ class MatrixProblem(Problem):
 
     Args:
         cells: of the texture.
-        names: the derivatives that are needed.
-        number: the measure.
+        names: names of the needed derivatives.
+        measure: the measure.
         floor: see :class:`Problem`.
     """
 
     def __init__(
-        self, cells: Cells, names: Sequence[str], number: MatrixNumber, floor: float = _LEAST
+        self,
+        cells: Cells,
+        names: Sequence[str],
+        measure: JacobianMeasure,
+        floor: float = _RESOLUTION,
     ) -> None:
         self.cells, self.floor = cells, floor
-        self._names, self._number = names, number
+        self._names, self._measure = names, measure
 
     @abstractmethod
-    def matrices(self, models: dict[str, Number]) -> list[Entries]:
-        """Return 3 × 3 entries from the derivatives' models; several, the greatest counts."""
+    def matrices(self, models: dict[str, TaylorNumber]) -> list[Entries]:
+        """Return 3 × 3 entries from the derivatives' models, several if the greatest counts."""
 
     @abstractmethod
-    def exact(self, coordinates: FloatArray) -> list[FloatArray]:
-        """Return the same matrices from numbers: (n, d) coordinates to several (n, 3, 3)."""
+    def exact_matrices(self, coordinates: FloatArray) -> list[FloatArray]:
+        """Return the same matrices at coordinates (n, d), each of shape (n, 3, 3)."""
 
-    def at_most(self, centres: FloatArray, half: FloatArray, above: float) -> FloatArray:
+    def upper_bounds(
+        self, centres: FloatArray, half_widths: FloatArray, threshold: float
+    ) -> FloatArray:
         """See :class:`Problem`."""
-        n, d = len(centres), len(half)
+        n, d = len(centres), len(half_widths)
         best = np.full(n, -np.inf)
         with np.errstate(all="ignore"):
-            models = self.cells.models(centres, half, self._names)
+            models = self.cells.enclosures(centres, half_widths, self._names)
             for entries in self.matrices(models):
-                c, g, e = _stacked(entries, n, d)
-                best = np.maximum(best, self._number.at_most(c, g, e, above))
+                c, g, e = _stack_entries(entries, n, d)
+                best = np.maximum(best, self._measure.upper_bounds(c, g, e, threshold))
         return best
 
     def values(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Problem`."""
         with np.errstate(all="ignore"):
-            values = [self._number.careful(matrices) for matrices in self.exact(coordinates)]
+            values = [
+                self._measure.accurate(matrices) for matrices in self.exact_matrices(coordinates)
+            ]
         return np.asarray(np.max(values, axis=0))
 
 
-def _stacked(entries: Entries, n: int, d: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _stack_entries(entries: Entries, n: int, d: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     c, g, e = np.zeros((n, 3, 3)), np.zeros((d, n, 3, 3)), np.zeros((n, 3, 3))
     for i, row in enumerate(entries):
         for j, entry in enumerate(row):
-            if isinstance(entry, Taylor):
+            if isinstance(entry, TaylorModel):
                 c[:, i, j], g[:, :, i, j], e[:, i, j] = entry.c, entry.g, entry.e
             else:
                 c[:, i, j] = entry
@@ -98,7 +107,7 @@ def law_kernel(
     """Return one of a law's generated kernels for Taylor models or arrays, and its arguments.
 
     Raises:
-        TypeError: when called, if the kernel decides by comparing, as pieces and max() do.
+        TypeError: when called, if the kernel branches on comparisons, as pieces and max() do.
     """
     from asperity.kernels.fuse import kernel_source
 
@@ -110,69 +119,72 @@ def law_kernel(
 
 
 def law_constants(surface: Surface) -> dict[str, float]:
-    """Return the arguments of a kernel that do not change over the surface; k is 1."""
+    """Return the arguments of a kernel that are constant over the surface; k is 1."""
     _k, middle, half = surface.law_arguments[:3]
-    return {"k": 1.0, "h_mid": middle, "h_half": half, **surface.law_parameters}
+    own = {parameter_name(name): value for name, value in surface.law_parameters.items()}
+    return {"k": 1.0, "h_mid": middle, "h_half": half, **own}
 
 
 class LawProblem(MatrixProblem):
     """A measure of J/k itself, over contacts, depths in [0, D] and states of an anchor.
 
     At a fixed contact most Jacobians are affine in the depth, and a convex measure is then
-    greatest at an end; else the depth is one more coordinate.
+    greatest at an end; else the depth is an additional coordinate.
     """
 
-    def __init__(self, surface: Surface, cells: Cells, number: MatrixNumber) -> None:
+    def __init__(self, surface: Surface, cells: Cells, measure: JacobianMeasure) -> None:
         self._surface, self._field = surface, ContactField(surface)
         self._kernel, arguments = law_kernel(surface.law)
         self._constants = {n: v for n, v in law_constants(surface).items() if n in arguments}
-        self._taken = arguments
+        self._argument_names = arguments
         depth = surface.max_depth
-        self._ends = (0.0, depth) if surface.facts.affine_in_depth else (None,)
+        self._depths = (0.0, depth) if surface.facts.affine_in_depth else (None,)
         if surface.law.stateful:
-            level = None if self._ends[0] is not None else depth
-            self._longest = surface.parameter("max_deflection")
-            cells = with_deflection(cells, self._longest, level)
-        elif self._ends[0] is None:
-            cells = with_depth(cells, depth)
-        self._slides = (False, True) if surface.law.stateful else (False,)
-        names = [name for name in NAMES if name in arguments]
-        super().__init__(cells, names, number)
+            level = None if self._depths[0] is not None else depth
+            self._max_deflection = surface.parameter("max_deflection")
+            cells = cells_with_deflection(cells, self._max_deflection, level)
+        elif self._depths[0] is None:
+            cells = cells_with_depth(cells, depth)
+        self._sliding_states = (False, True) if surface.law.stateful else (False,)
+        names = [name for name in DERIVATIVE_NAMES if name in arguments]
+        super().__init__(cells, names, measure)
 
-    def matrices(self, models: dict[str, Number]) -> list[Entries]:
+    def matrices(self, models: dict[str, TaylorNumber]) -> list[Entries]:
         """See :class:`MatrixProblem`."""
         result = []
-        for sliding in self._slides:
+        for sliding in self._sliding_states:
             state = {}
             if self._surface.law.stateful:
-                state = anchor_models(models, self._longest, sliding=sliding)
-            for end in self._ends:
-                known = {**models, **state, **({} if end is None else {DEPTH: end})}
-                taken = {name: known[name] for name in self._taken if name in known}
-                if len(taken) + len(self._constants) < len(self._taken):
+                state = anchor_enclosures(models, self._max_deflection, sliding=sliding)
+            for end in self._depths:
+                known = {**models, **state, **({} if end is None else {DEPTH_COORDINATE: end})}
+                taken = {name: known[name] for name in self._argument_names if name in known}
+                if len(taken) + len(self._constants) < len(self._argument_names):
                     raise TypeError("the force depends on the position itself")
-                result.append(rows_of(self._kernel(**taken, **self._constants)[3:]))
+                result.append(as_rows(self._kernel(**taken, **self._constants)[3:]))
         return result
 
     def contacts(self, coordinates: FloatArray) -> list[Contacts]:
-        """Return every depth and state that is looked at for given coordinates."""
+        """Return every depth and state evaluated at given coordinates."""
         n = len(coordinates)
         further: dict[str, FloatArray] = {}
         if isinstance(self.cells, ProductCells):
-            further = self.cells.further(coordinates)
+            further = self.cells.extra_coordinates(coordinates)
         result = []
-        for sliding in self._slides:
+        for sliding in self._sliding_states:
             deflection = np.zeros((n, 2))
             if self._surface.law.stateful:
-                length = np.full(n, self._longest) if sliding else further[LENGTH]
-                unit = np.stack([np.cos(further[ANGLE]), np.sin(further[ANGLE])], axis=-1)
+                length = np.full(n, self._max_deflection) if sliding else further[LENGTH_COORDINATE]
+                unit = np.stack(
+                    [np.cos(further[ANGLE_COORDINATE]), np.sin(further[ANGLE_COORDINATE])], axis=-1
+                )
                 deflection = length[:, None] * unit
-            for end in self._ends:
-                depth = further[DEPTH] if end is None else np.full(n, end)
+            for end in self._depths:
+                depth = further[DEPTH_COORDINATE] if end is None else np.full(n, end)
                 result.append(Contacts(depth, deflection, sliding))
         return result
 
-    def exact(self, coordinates: FloatArray) -> list[FloatArray]:
+    def exact_matrices(self, coordinates: FloatArray) -> list[FloatArray]:
         """See :class:`MatrixProblem`."""
         derivatives = self.cells.derivatives(coordinates)
         nowhere = np.zeros((len(coordinates), 2))
@@ -182,7 +194,7 @@ class LawProblem(MatrixProblem):
         ]
 
 
-def rows_of(entries: Sequence[Any]) -> Entries:
+def as_rows(entries: Sequence[Any]) -> Entries:
     """Return nine entries as three rows."""
     return [entries[0:3], entries[3:6], entries[6:9]]
 
@@ -192,9 +204,9 @@ class SurfaceProblem(MatrixProblem):
 
     Args:
         cells: of the texture.
-        names: the derivatives that the formula takes, see ``NAMES``.
-        formula: rows of entries from the derivatives and a square root, of models or of numbers.
-        number: the measure.
+        names: names of the derivatives that the formula takes, see ``DERIVATIVE_NAMES``.
+        formula: rows of entries from the derivatives and a square root, for models or numbers.
+        measure: the measure.
         floor: see :class:`Problem`.
     """
 
@@ -203,20 +215,20 @@ class SurfaceProblem(MatrixProblem):
         cells: Cells,
         names: Sequence[str],
         formula: Formula,
-        number: MatrixNumber,
-        floor: float = _LEAST,
+        measure: JacobianMeasure,
+        floor: float = _RESOLUTION,
     ) -> None:
-        super().__init__(cells, names, number, floor)
+        super().__init__(cells, names, measure, floor)
         self._formula = formula
 
-    def matrices(self, models: dict[str, Number]) -> list[Entries]:
+    def matrices(self, models: dict[str, TaylorNumber]) -> list[Entries]:
         """See :class:`MatrixProblem`."""
         return [self._formula([models[name] for name in self._names], TaylorMath.sqrt)]
 
-    def exact(self, coordinates: FloatArray) -> list[FloatArray]:
+    def exact_matrices(self, coordinates: FloatArray) -> list[FloatArray]:
         """See :class:`MatrixProblem`; the entries that a formula leaves out are zero."""
         derivatives = self.cells.derivatives(coordinates).T[1 : 1 + len(self._names)]
-        return [_stacked(self._formula(list(derivatives), np.sqrt), len(coordinates), 0)[0]]
+        return [_stack_entries(self._formula(list(derivatives), np.sqrt), len(coordinates), 0)[0]]
 
 
 class SlopeProblem(SurfaceProblem):
@@ -224,20 +236,22 @@ class SlopeProblem(SurfaceProblem):
 
     Args:
         cells: of the texture.
-        beside: the 1 in √(1 + |∇h|²), whose gap is what counts; 0 for the slope alone.
+        offset: the 1 in √(1 + |∇h|²), whose gap counts; 0 for the slope alone.
     """
 
-    def __init__(self, cells: Cells, beside: float) -> None:
-        self._beside = beside
-        super().__init__(cells, NAMES[1:3], lambda slope, _root: [[part] for part in slope], NORM)
+    def __init__(self, cells: Cells, offset: float) -> None:
+        self._offset = offset
+        super().__init__(
+            cells, DERIVATIVE_NAMES[1:3], lambda slope, _root: [[part] for part in slope], NORM
+        )
 
-    def enough(self, best: float, tolerance: float) -> float:
+    def prune_threshold(self, best: float, tolerance: float) -> float:
         """See :class:`Problem`."""
-        whole = math.hypot(self._beside, best) * (1.0 + tolerance)
-        return math.sqrt((whole - self._beside) * (whole + self._beside))
+        whole = math.hypot(self._offset, best) * (1.0 + tolerance)
+        return math.sqrt((whole - self._offset) * (whole + self._offset))
 
 
-def _normal_change(derivatives: Sequence[Any], root: Callable[[Any], Any]) -> Entries:
+def _normal_derivatives(derivatives: Sequence[Any], root: Callable[[Any], Any]) -> Entries:
     """∂n/∂x and ∂n/∂y as columns: (∂w - n (n · ∂w))/s with w = (-h_x, -h_y, 1)."""
     hx, hy, hxx, hxy, hyy = derivatives
     s = root(1.0 + hx * hx + hy * hy)
@@ -249,9 +263,9 @@ def _normal_change(derivatives: Sequence[Any], root: Callable[[Any], Any]) -> En
     return [[column[row] for column in columns] for row in range(3)]
 
 
-def normal_problem(cells: Cells, floor: float) -> MatrixProblem:
+def normal_change_problem(cells: Cells, floor: float) -> MatrixProblem:
     """Return the problem of ‖∂n/∂(x, y)‖, the change of the surface normal [1/m]."""
-    return SurfaceProblem(cells, NAMES[1:], _normal_change, NORM, floor)
+    return SurfaceProblem(cells, DERIVATIVE_NAMES[1:], _normal_derivatives, NORM, floor)
 
 
 def _shape_operator(derivatives: Sequence[Any], root: Callable[[Any], Any]) -> Entries:
@@ -275,24 +289,28 @@ class CrestProblem(SurfaceProblem):
 
     Args:
         cells: of the texture.
-        depth: where only law D's number down to a depth [m] is wanted; then curvatures up to
-            1/(2 depth), and differences that do not change the number, do not matter.
+        depth: depth [m] if only law D's number down to it is needed; then curvatures up to
+            1/(2 depth), and differences that do not change the number, are irrelevant.
     """
 
     def __init__(self, cells: Cells, depth: float | None = None) -> None:
         self._depth = depth
-        floor = _LEAST if depth is None else 0.5 / depth
-        # No third curvature: a zero is small enough never to be the greatest of a crest.
-        super().__init__(cells, NAMES[1:], _shape_operator, ONE_SIDED, floor)
+        floor = _RESOLUTION if depth is None else 0.5 / depth
+        # The missing third curvature is zero, which is never the greatest at a crest.
+        super().__init__(cells, DERIVATIVE_NAMES[1:], _shape_operator, ONE_SIDED, floor)
 
-    def at_most(self, centres: FloatArray, half: FloatArray, above: float) -> FloatArray:
+    def upper_bounds(
+        self, centres: FloatArray, half_widths: FloatArray, threshold: float
+    ) -> FloatArray:
         """See :class:`Problem`: S = G⁻¹ H / s with G >= 1, s >= 1, so no curvature is above ‖H‖."""
-        return np.minimum(super().at_most(centres, half, above), self.cells.bend)
+        return np.minimum(
+            super().upper_bounds(centres, half_widths, threshold), self.cells.hessian_bound
+        )
 
-    def enough(self, best: float, tolerance: float) -> float:
+    def prune_threshold(self, best: float, tolerance: float) -> float:
         """See :class:`Problem`: y/(1 - y) within the tolerance, y = depth times curvature."""
         if self._depth is None:
-            return super().enough(best, tolerance)
+            return super().prune_threshold(best, tolerance)
         y = self._depth * best
         if y >= 1.0:
             return math.inf

@@ -1,51 +1,248 @@
-"""The fallback where nothing is proved: many samples, the best of which are climbed from."""
+"""Sampled suprema, where nothing is proved: dense samples, refined around the best ones.
+
+A contact is (X, Y, depth, deflection, sliding). The law's ``contact_batch`` gives the Jacobian at
+a contact without a texture, so depth zero, the limit from inside, can be sampled too.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.analysis.bounds.branch_and_bound import Problem, Supremum, polish
-from asperity.checks import FloatArray
+from asperity.analysis.bounds.measures import (
+    Measure,
+    precise_norm,
+    precise_one_sided,
+    spectral_norm,
+)
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError
 from asperity.enclosures.cells import Cells
+from asperity.kernels.fuse import fuse_contact, uses_position
+from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
-_CANDIDATES = 12
-_SAMPLES = 65_536
+_ZOOM_CANDIDATES = 12
+_ZOOM_STEPS = 44
+_BLOCK = 100_000
+DEPTH_FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+DepthLimit = Callable[[FloatArray], FloatArray]
 
 
-def sampled(problem: Problem) -> Supremum:
+@dataclass(frozen=True)
+class DenseMaximum:
+    """The greatest value found and the contact that attains it.
+
+    Attributes:
+        value: value of the measure, in units of the stiffness [1].
+        xy: contact point [m].
+        depth: depth [m].
+    """
+
+    value: float
+    xy: tuple[float, float]
+    depth: float
+
+
+class ContactField:
+    """The Jacobian of a surface as a function of the contact, in units of the stiffness."""
+
+    def __init__(self, surface: Surface) -> None:
+        self.surface = surface
+        self.texture = surface.texture
+        self._loops = fuse_contact(surface.law)
+        self._reads_position = uses_position(surface.law)
+        self._law = (1.0, *surface.law_arguments[1:])
+
+    def jacobians(
+        self,
+        xy: FloatArray,
+        depth: FloatArray,
+        derivatives: FloatArray,
+        deflection: FloatArray,
+        *,
+        sliding: bool = False,
+    ) -> FloatArray:
+        """Return J/k at contacts, shape (n, 3, 3)."""
+        n = len(xy)
+        force, jacobian = np.empty((n, 3)), np.empty((n, 3, 3))
+        slides = np.full(n, sliding)
+        contact = self.surface.law.contact
+        points = (
+            contact.probe_positions(xy, depth, derivatives)
+            if self._reads_position
+            else np.zeros((n, 3))
+        )
+        self._loops.contact_batch(
+            points, depth, derivatives, deflection, slides, force, jacobian, self._law
+        )
+        return jacobian
+
+    def contacts(
+        self, rows: FloatArray, depth_limit: DepthLimit
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return points, depths, derivatives and deflections of rows (fractions, depth part)."""
+        xy = self.texture.domain.points(rows[:, :-1])
+        derivatives = self.texture.derivatives(xy)
+        depth = np.ascontiguousarray(rows[:, -1] * np.maximum(depth_limit(derivatives), 0.0))
+        deflection = np.zeros((len(xy), 2))
+        if self.surface.law.stateful:
+            deflection = worst_deflection(self.surface, derivatives[:, 1:3])
+        return xy, depth, derivatives, deflection
+
+
+def worst_deflection(surface: Surface, slope: FloatArray) -> FloatArray:
+    """Return the deflection that maximises every norm of law F, (n, 2) [m], for slopes (n, 2).
+
+    ‖J‖ and λ_max are convex in d, hence greatest for |d| = d_max, and there for d against
+    the slope of the height: the friction then falls along d fastest (MATH section 3).
+    """
+    length = np.hypot(*slope.T)[:, None]
+    unit = np.where(length > 0.0, slope / np.where(length > 0.0, length, 1.0), [1.0, 0.0])
+    return np.ascontiguousarray(-surface.parameter("max_deflection") * unit)
+
+
+def require_depth_contact(surface: Surface) -> None:
+    """Refuse a law whose contacts are not determined by a point and a depth: it has no samples.
+
+    Raises:
+        ParameterError: for such a law; its numbers need a theorem.
+    """
+    contact = surface.law.contact
+    if not contact.is_determined_by_depth:
+        raise ParameterError(
+            "law", f"{surface.law} is on the {contact} contact, which has no samples"
+        )
+
+
+def sample_fractions(texture: Texture) -> tuple[FloatArray, FloatArray]:
+    """Return sample points as fractions of the domain's spans (n, d), and their spacing (d,)."""
+    counts = texture.sample_counts()
+    axes = [(np.arange(count) + texture.sample_offset) / count for count in counts]
+    if not texture.domain.periodic:
+        axes = [np.linspace(0.0, 1.0, count + 1) for count in counts]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(counts))
+    return grid, 1.0 / np.array(counts, dtype=float)
+
+
+def dense_maximum(surface: Surface, measure: Measure, depth_limit: DepthLimit) -> DenseMaximum:
+    """Return the greatest value of a measure of J/k over the contacts of a surface.
+
+    Dense samples of the domain at five depths (at both ends of the depth range where the Jacobian
+    is affine in the depth); the best dozen are refined until the step is below 1e-12 of the sample
+    spacing. The result is a lower bound, attained at the returned contact; nothing is certified.
+
+    Args:
+        surface: the surface, without its clamp.
+        measure: :func:`~asperity.analysis.bounds.measures.spectral_norm` or ``one_sided``.
+        depth_limit: greatest depth [m] of each contact from its height derivatives (n, 6).
+
+    Raises:
+        ParameterError: for a user-defined law on the split contact.
+    """
+    require_depth_contact(surface)
+    field = ContactField(surface)
+
+    def values(rows: FloatArray) -> FloatArray:
+        return measure(field.jacobians(*field.contacts(rows, depth_limit)))
+
+    fractions, spacing = sample_fractions(surface.texture)
+    levels = (0.0, 1.0) if surface.facts.affine_in_depth else DEPTH_FRACTIONS
+    sampled = _sample_values(values, fractions, levels)
+    point = _best_of_blocks(sampled.max(axis=1))
+    level = np.argmax(sampled[point], axis=1)
+    centres = np.column_stack([fractions[point], np.array(levels)[level]])
+    bounded = slice(-1 if surface.texture.domain.periodic else 0, None)
+    centres = _zoom_in(values, centres, np.append(spacing, 0.25), bounded)
+    best = centres[int(np.argmax(values(centres)))]
+    xy, depth, derivatives, deflection = field.contacts(best[None, :], depth_limit)
+    accurate = precise_norm if measure is spectral_norm else precise_one_sided
+    value = accurate(field.jacobians(xy, depth, derivatives, deflection))[0]
+    return DenseMaximum(float(value), (float(xy[0, 0]), float(xy[0, 1])), float(depth[0]))
+
+
+def _sample_values(values: Measure, fractions: FloatArray, levels: Sequence[float]) -> FloatArray:
+    """Return the values at every sample and depth, shape (n, levels)."""
+    blocks = [fractions[first : first + _BLOCK] for first in range(0, len(fractions), _BLOCK)]
+
+    def at(part: float) -> FloatArray:
+        rows = (np.column_stack([block, np.full(len(block), part)]) for block in blocks)
+        return np.concatenate([values(block) for block in rows])
+
+    return np.stack([at(part) for part in levels], axis=1)
+
+
+def _best_of_blocks(values: FloatArray) -> NDArray[np.intp]:
+    """Return the indices of the best samples of the best blocks, one candidate per block."""
+    starts = np.arange(0, len(values), max(len(values) // 256, 1))
+    blocks = np.split(np.arange(len(values)), starts[1:])
+    best = np.array([block[np.argmax(values[block])] for block in blocks])
+    return best[np.argsort(values[best], kind="stable")[-_ZOOM_CANDIDATES:]]
+
+
+def _zoom_in(values: Measure, centres: FloatArray, step: FloatArray, bounded: slice) -> FloatArray:
+    """Return the candidates after repeatedly halving the step around the best neighbour."""
+    width = len(step)
+    offsets = np.stack(np.meshgrid(*[(-1.0, -0.5, 0.0, 0.5, 1.0)] * width), axis=-1)
+    offsets = offsets.reshape(-1, width)
+    # The centre first: of equal values the first one is chosen.
+    offsets = offsets[np.argsort(np.abs(offsets).sum(axis=1), kind="stable")]
+    for _ in range(_ZOOM_STEPS):
+        trial = centres[:, None, :] + offsets * step
+        trial[..., bounded] = np.clip(trial[..., bounded], 0.0, 1.0)
+        scores = values(trial.reshape(-1, width)).reshape(trial.shape[:2])
+        centres = trial[np.arange(len(trial)), np.argmax(scores, axis=1)]
+        step = step * 0.5
+    return centres
+
+
+_POLISHED_SAMPLES = 12
+_SAMPLE_COUNT = 65_536
+
+
+def sample_supremum(problem: Problem) -> Supremum:
     """Return the greatest value found, without an upper bound."""
-    points = problem.cells.samples(_SAMPLES)
+    points = problem.cells.sample_coordinates(_SAMPLE_COUNT)
     values = np.concatenate([problem.values(part) for part in np.array_split(points, 16)])
-    _chunks, half = problem.cells.start()
+    _chunks, half = problem.cells.initial_cells()
     best, at = problem.floor, None
-    for index in np.argsort(-values)[:_CANDIDATES]:
+    for index in np.argsort(-values)[:_POLISHED_SAMPLES]:
         top, where = polish(problem, points[index], half, float(values[index]))
         if top > best:
             best, at = top, where
-    return Supremum(best, math.inf, at, len(points), reached=False)
+    return Supremum(best, math.inf, at, len(points), converged=False)
 
 
-def sampled_supremum(texture: Texture, build: Callable[[Cells], Problem]) -> tuple[Cells, Supremum]:
-    """Return the cells that were sampled and the greatest value found of a problem on them."""
+def sample_on_texture(
+    texture: Texture, make_problem: Callable[[Cells], Problem]
+) -> tuple[Cells, Supremum]:
+    """Return the sampled cells and the greatest value found of a problem on them."""
     cells = texture.sampling_cells()
-    return cells, sampled(build(cells))
+    return cells, sample_supremum(make_problem(cells))
 
 
 class HeightProblem(Problem):
-    """The height itself [m]; only its values are asked for."""
+    """The height [m], of which only values are used."""
 
     floor = -np.inf
 
     def __init__(self, cells: Cells) -> None:
         self.cells = cells
 
-    def at_most(self, centres: FloatArray, half: FloatArray, above: float) -> FloatArray:  # noqa: ARG002 - of the problem
-        """See :class:`Problem`; no bound is known, extremes are certified by the textures."""
+    def upper_bounds(
+        self,
+        centres: FloatArray,
+        half_widths: FloatArray,  # noqa: ARG002 - of the interface
+        threshold: float,  # noqa: ARG002 - of the interface
+    ) -> FloatArray:
+        """See :class:`Problem`; infinite: extremes are certified by the textures."""
         return np.full(len(centres), np.inf)
 
     def values(self, coordinates: FloatArray) -> FloatArray:
@@ -55,7 +252,7 @@ class HeightProblem(Problem):
 
 @lru_cache(maxsize=16)
 def highest_point(texture: Texture) -> FloatArray:
-    """Return a point of the plane (2,) [m] that is higher than all around it."""
-    cells, found = sampled_supremum(texture, HeightProblem)
+    """Return a point of the plane (2,) [m] at a local maximum of the height."""
+    cells, found = sample_on_texture(texture, HeightProblem)
     assert found.at is not None
-    return np.asarray(cells.plane(found.at[None])[0])
+    return np.asarray(cells.to_plane(found.at[None])[0])

@@ -1,1 +1,1 @@
-"""What a field gives to the hand, where its force jumps, how much texture it renders."""
+"""Energy gained by the hand: leaks, loop integrals, continuity and merit."""

@@ -1,4 +1,4 @@
-"""How much energy the worst simple loop gains, and how fast one has to be to lose it again."""
+"""The leak: the energy gained on the worst simple loop, and the speed at which it is absorbed."""
 
 from __future__ import annotations
 
@@ -8,63 +8,65 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from asperity.analysis.bounds.branch_and_bound import DIFFERENCES, OPERATIONS
-from asperity.analysis.energy.columns import (
-    column_loop,
-    comb,
-    curl_integral,
+from asperity.analysis.bounds.branch_and_bound import DIFFERENCE_AMPLIFICATION, ROUNDING_ERROR
+from asperity.analysis.energy.curl_columns import (
+    column_polygon,
+    curl_integral_bounds,
+    curl_region_loop,
     plane_curl,
     positive_interval,
-    sampled_sides,
+    sample_curl_integrals,
 )
-from asperity.analysis.energy.loops import integrate, loop_work, smooth_panels
+from asperity.analysis.energy.loop_integral import initial_panels, integrate, loop_work
 from asperity.analysis.energy.merit import scan_height
 from asperity.analysis.energy.state_loops import in_plane_loop, light_then_deep_loop
-from asperity.analysis.gain.answers import at_unit_stiffness, kept_answer
-from asperity.checks import FloatArray, array, positive
-from asperity.errors import InternalError, ParameterError
-from asperity.files import Record
+from asperity.analysis.gain.surface_cache import at_unit_stiffness, cached_result
+from asperity.core.checks import FloatArray, check_array, check_positive
+from asperity.core.errors import InternalError, ParameterError
+from asperity.core.files import Serializable
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine
 
-_LINES = 33
-_NEAREST_LINES = 4
+_SCAN_LINES = 33
+_NEAREST_SCAN_LINES = 4
 # Relative error of the work of an edge.
 _TOLERANCE = 1e-12
-# The same where each force is a search for the nearest point.
-_COSTLY = 1e-4
-# Where the region is found by a grid: columns along the line and levels of depth, for profiles and
-# for maps, and halvings to where the surface is max_depth away.
+# The same where each force requires a closest-point search.
+_NEAREST_TOLERANCE = 1e-4
+# Grid of the region: columns along the line and levels of depth, for profiles and for maps, and
+# bisections to the distance max_depth from the surface.
 _GRID = {True: (512, 96), False: (160, 24)}
-_BISECTIONS = 16
-# Equal steps, which a periodic mean is good at.
+_DEPTH_BISECTIONS = 16
+# Equal steps, accurate for a periodic mean.
 _THRUST_STEPS = 512
 
 
 @dataclass(frozen=True)
-class Leak(Record):
+class Leak(Serializable):
     """The worst simple loop, turned once, in a vertical plane along a scan line.
 
     Its energy is the larger of ∬curl⁺ and ∬curl⁻ over the length of the line and the depth range,
-    curl = ∂f_t/∂z - ∂f_z/∂t, t along the line. For a law with state also loops in a plane of
-    constant depth are looked at.
+    curl = ∂f_t/∂z - ∂f_z/∂t, t along the line. For a law with state loops in a plane of constant
+    depth are evaluated too.
 
     Attributes:
         energy: work of the field on the probe around ``vertices`` [J]; 0 for a conservative law.
-        upper_per_period: proved bound for every simple loop in that plane [J] that stays within
-            one period of the line, or within its length where it does not repeat; a loop around n
-            periods may gain n times as much. Infinite if none is proved.
+        upper_per_period: proved bound for every simple loop in that plane [J] within one period of
+            the line, or within its length where it does not repeat; a loop around n periods may
+            gain n times as much. Infinite without proof.
         line: the scan line of the plane.
         method: ``"theorem"`` (zero by proof), ``"certified"`` or ``"sampled"``.
         description: the loop in words.
-        vertices: the loop as a closed polygon (n, 3) [m], empty if no loop gains anything;
+        vertices: the loop as a closed polygon (n, 3) [m], empty if no loop gains energy;
             ``loop_work(surface, vertices)`` is ``energy``.
         thrust: mean tangential force on a straight scan along the line at the scan height [N],
-            > 0 along it; ``None`` for a law with state, whose friction resists anyway, and for a
-            conservative law on a line that does not repeat.
+            > 0 along it; ``None`` for a law with state, whose friction opposes the motion, and for
+            a conservative law on a line that does not repeat.
     """
 
-    written = "energy upper_per_period per_length length thrust line method description vertices"
+    serialized_attributes = (
+        "energy upper_per_period per_length length thrust line method description vertices"
+    )
 
     energy: float
     upper_per_period: float
@@ -80,7 +82,7 @@ class Leak(Record):
 
     @property
     def worst_per_period(self) -> float:
-        """``upper_per_period`` where it is proved, else ``energy`` [J]."""
+        """``upper_per_period`` where one is proved, else ``energy`` [J]."""
         return self.upper_per_period if math.isfinite(self.upper_per_period) else self.energy
 
     @property
@@ -94,8 +96,8 @@ class Leak(Record):
         """Energy over the length of the line [J/m]: a mean thrust [N]."""
         return self.energy / self.line.length
 
-    def scaled(self, factor: float) -> Leak:
-        """Return the same loop in a field that is stiffer by a factor; a bound is rounded up."""
+    def scale(self, factor: float) -> Leak:
+        """Return the same loop in a field scaled by a factor; a bound is rounded up."""
         if factor == 1.0:
             return self
         upper = self.upper_per_period * factor
@@ -106,7 +108,7 @@ class Leak(Record):
             thrust=None if self.thrust is None else self.thrust * factor,
         )
 
-    def speed(self, damping: float) -> float:
+    def critical_speed(self, damping: float) -> float:
         """Return v* = W/(σ₀ · length), the speed below which damping does not absorb the loop.
 
         Args:
@@ -115,7 +117,7 @@ class Leak(Record):
         Raises:
             ParameterError: for a damping that is not positive.
         """
-        sigma = positive("damping", damping, "N s/m")
+        sigma = check_positive("damping", damping, "N s/m")
         return self.energy / (sigma * self.length) if self.energy > 0.0 else 0.0
 
 
@@ -129,7 +131,7 @@ def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -
 
     Args:
         surface: the surface.
-        direction: of the vertical plane, (x, y); the texture's scan line by default.
+        direction: direction (x, y) of the vertical plane; that of the scan line by default.
 
     Raises:
         ParameterError: for a direction without length.
@@ -138,41 +140,37 @@ def worst_loop(surface: Surface, direction: tuple[float, float] | None = None) -
         The paper's section III.C and (27); MATH section 4.
 
     Example:
-        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
         >>> surface = Surface(Sinusoid(amplitude=0.8e-3, period=2e-3), "A", max_depth=0.8e-3)
         >>> leak = worst_loop(surface)  # k D 2A, down one flank and up the other
         >>> round(leak.energy * 1e3, 3), round(leak.upper_per_period * 1e3, 3)
         (1.28, 1.28)
     """
-    line = surface.texture.scan_line() if direction is None else scan_line(surface, direction)
+    line = surface.texture.scan_line() if direction is None else scan_line_along(surface, direction)
     unit = at_unit_stiffness(surface)
-    asked = repr((line.start.tolist(), line.direction.tolist(), line.length, line.periodic))
-    found = kept_answer("worst loop", unit, lambda: _worst_loop(unit, line), asked)
-    return found.scaled(surface.stiffness / unit.stiffness)
+    key = repr((line.start.tolist(), line.direction.tolist(), line.length, line.periodic))
+    leak = cached_result("worst loop", unit, lambda: _find_worst_loop(unit, line), key)
+    return leak.scale(surface.stiffness / unit.stiffness)
 
 
-def _worst_loop(surface: Surface, line: ScanLine) -> Leak:
-    nothing = np.zeros((0, 3))
+def _find_worst_loop(surface: Surface, line: ScanLine) -> Leak:
     if surface.law.stateful:
-        return _state_leak(surface, line)
-    facts = surface.facts
-    if facts.conservative:
+        return _stateful_leak(surface, line)
+    if surface.facts.conservative:
         text = "every closed loop: zero by the symbolic curl"
         thrust = 0.0 if line.periodic else None
-        return Leak(0.0, 0.0, line, "theorem", text, nothing, thrust)
-    lines = parallel_lines(surface, line)
-    if surface.law.contact.above_probe:
-        leak = _column_leak(surface, lines)
-    else:
-        leak = _nearest_leak(surface, lines)
+        return Leak(0.0, 0.0, line, "theorem", text, np.zeros((0, 3)), thrust)
+    lines = parallel_scan_lines(surface, line)
+    find = _column_leak if surface.law.contact.is_above_probe else _nearest_leak
+    leak = find(surface, lines)
     if len(lines) > 1:
         return replace(leak, description=f"{leak.description}, the worst of {len(lines)} lines")
     return leak
 
 
-def scan_line(surface: Surface, direction: tuple[float, float]) -> ScanLine:
-    """Return the line in a direction through the start of the texture's own, as long as that."""
-    vector = array("direction", direction, (2,), "1")
+def scan_line_along(surface: Surface, direction: tuple[float, float]) -> ScanLine:
+    """Return the line in a direction through the start of the texture's own scan line."""
+    vector = check_array("direction", direction, (2,), "1")
     size = math.hypot(*vector)
     if size == 0.0:
         raise ParameterError("direction", "must have a length", direction)
@@ -185,15 +183,15 @@ def scan_line(surface: Surface, direction: tuple[float, float]) -> ScanLine:
     return ScanLine(domain.origin, unit, reach if reach > 0.0 else own.length, periodic=False)
 
 
-def parallel_lines(surface: Surface, line: ScanLine) -> list[ScanLine]:
-    """Return lines parallel to a line, spread over a map; on a profile the line alone."""
+def parallel_scan_lines(surface: Surface, line: ScanLine) -> list[ScanLine]:
+    """Return lines parallel to a line, spread over a map; on a profile only the line itself."""
     domain = surface.texture.domain
     if surface.texture.is_profile:
         return [line]
     across = np.array([-line.direction[1], line.direction[0]])
     reach = domain.spans @ across
     low, high = float(np.minimum(reach, 0.0).sum()), float(np.maximum(reach, 0.0).sum())
-    count = _LINES if surface.law.contact.above_probe else _NEAREST_LINES
+    count = _SCAN_LINES if surface.law.contact.is_above_probe else _NEAREST_SCAN_LINES
     first = float((domain.origin - line.start) @ across) + low
     shifts = first + (high - low) * (np.arange(count) + 0.5) / count
     return [
@@ -204,44 +202,43 @@ def parallel_lines(surface: Surface, line: ScanLine) -> list[ScanLine]:
 
 def _column_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
     """Return the loop around the curl of one sign, certified in the plane of the worst line."""
-    sides = [sampled_sides(surface, line) for line in lines]
+    sides = [sample_curl_integrals(surface, line) for line in lines]
     worst = int(np.argmax([max(side) for side in sides]))
     line = lines[worst]
     sign = 1.0 if sides[worst][0] >= sides[worst][1] else -1.0
-    vertices, energy = gaining(surface, column_loop(surface, line, sign))
-    bounds = curl_integral(surface, line)
+    vertices, energy = orient_loop(surface, curl_region_loop(surface, line, sign))
+    bounds = curl_integral_bounds(surface, line)
     upper = math.inf if bounds is None else max(high for _low, high in bounds)
     if energy > upper:
-        _refuse_contradiction(surface, line, vertices, energy)
+        _check_against_bound(surface, line, vertices, energy)
     method = "sampled" if bounds is None else "certified"
     text = f"around the region of one sign of the curl, depth to {surface.clamped_depth * 1e3:g} mm"
     thrust = _mean_thrust(surface, line)
     return Leak(energy, max(upper, energy), line, method, text, vertices, thrust)
 
 
-def _refuse_contradiction(
+def _check_against_bound(
     surface: Surface, line: ScanLine, vertices: FloatArray, energy: float
 ) -> None:
     """Refuse a loop that gains more than is proved.
 
-    A straight edge between two columns is deeper than the region by at most K Δ²/8 where the
-    surface is curved between them, Δ being their distance; so the bound for that depth holds.
-    Beyond that the quadrature of each edge may be wrong by its tolerance, and each force by its
-    rounding.
+    A straight edge between two columns at distance Δ is deeper than the region by at most K Δ²/8,
+    the sag of the surface between them, so the bound for that depth holds. The quadrature of each
+    edge adds its tolerance, and each force its rounding.
 
     Raises:
         InternalError: if the loop gains more than that.
     """
     gap = float(np.hypot(*np.diff(vertices[:, :2], axis=0).T).max())
     sag = surface.texture.bounds[1] * gap * gap / 8.0
-    bounds = curl_integral(surface, line, sag) if math.isfinite(sag) else None
+    bounds = curl_integral_bounds(surface, line, sag) if math.isfinite(sag) else None
     if bounds is None:
         return
     proved = max(high for _low, high in bounds)
     edges = np.linalg.norm(np.diff(vertices, axis=0, append=vertices[:1]), axis=1)
     force = float(np.linalg.norm(surface.force(vertices), axis=1).max())
     height = 1.0 + max(map(abs, surface.texture.extremes)) / surface.max_depth
-    error = len(edges) * _TOLERANCE + OPERATIONS * DIFFERENCES * height
+    error = len(edges) * _TOLERANCE + ROUNDING_ERROR * DIFFERENCE_AMPLIFICATION * height
     if energy > proved + error * force * float(edges.sum()):
         raise InternalError(
             f"the leak of {surface!r} along {line.direction} from {line.start} m is proved to be "
@@ -250,10 +247,10 @@ def _refuse_contradiction(
         )
 
 
-def gaining(
+def orient_loop(
     surface: Surface, vertices: FloatArray, tolerance: float = _TOLERANCE
 ) -> tuple[FloatArray, float]:
-    """Return a polygon in the sense in which it gains energy, and its work [J]."""
+    """Return a polygon in the orientation in which it gains energy, and its work [J]."""
     if len(vertices) < 2:
         return np.zeros((0, 3)), 0.0
     work = loop_work(surface, vertices, tolerance)
@@ -261,10 +258,10 @@ def gaining(
 
 
 def _nearest_leak(surface: Surface, lines: list[ScanLine]) -> Leak:
-    """Return the loop around the curl of one sign where the surface is near enough."""
+    """Return the loop around the curl of one sign within the distance max_depth of the surface."""
     outlines = [outline for line in lines for outline in _nearest_outlines(surface, line)]
-    _promise, polygon, line = max(outlines, key=lambda outline: outline[0])
-    vertices, energy = gaining(surface, polygon, _COSTLY)
+    _estimate, polygon, line = max(outlines, key=lambda outline: outline[0])
+    vertices, energy = orient_loop(surface, polygon, _NEAREST_TOLERANCE)
     text = (
         "around the region of one sign of the curl where the surface is nearer than "
         f"{surface.max_depth * 1e3:g} mm"
@@ -278,19 +275,19 @@ def _nearest_outlines(
 ) -> Iterator[tuple[float, FloatArray, ScanLine]]:
     """Yield the polygons around the regions of either sign of the curl in a vertical plane.
 
-    Each with ∬|curl| inside [J], by the grid; the work around the polygon tells exactly.
+    Each comes with a grid estimate of ∬|curl| inside [J].
 
-    The region is where the distance to the surface is at most max_depth. The distance grows on
-    the way down, so a column ends where it first exceeds max_depth; in each column the longest
-    interval of the sign is taken.
+    The region is where the distance to the surface is at most max_depth. The distance grows with
+    the depth, so a column ends where it first exceeds max_depth; in each column the longest
+    interval of the sign is used.
     """
     columns, levels = _GRID[surface.texture.is_profile]
     along = np.linspace(0.0, line.length, columns + 1)
     xy = np.ascontiguousarray(line.start + along[:, None] * line.direction)
     tops = surface.texture.height(xy)
-    reach = _reach(surface, xy, tops)
+    reach = _region_depth(surface, xy, tops)
     parts: FloatArray = np.linspace(0.0, 1.0, levels + 1)
-    # At the surface itself the sign is that just below it.
+    # At the surface the curl is evaluated just below it.
     inside = np.maximum(parts, 0.5 / levels)
     points = np.concatenate([np.column_stack([xy, tops - part * reach]) for part in inside])
     curls = plane_curl(surface.jacobian(points), line).reshape(levels + 1, -1)
@@ -298,21 +295,21 @@ def _nearest_outlines(
     for sign in (1.0, -1.0):
         top, bottom = positive_interval(parts.tolist(), sign * curls)
         chosen = (parts[:, None] >= top) & (parts[:, None] <= bottom) & (sign * curls > 0.0)
-        promise = float((np.where(chosen, np.abs(curls), 0.0) * area).sum())
+        estimate = float((np.where(chosen, np.abs(curls), 0.0) * area).sum())
         low, high = tops - bottom * reach, tops - top * reach
-        yield promise, comb(xy, high, low, periodic=line.periodic), line
+        yield estimate, column_polygon(xy, high, low, periodic=line.periodic), line
 
 
-def _reach(surface: Surface, xy: FloatArray, tops: FloatArray) -> FloatArray:
-    """Return how far below the surface the distance to it is max_depth [m], by bisection."""
-    # Deeper than the lowest point by max_depth, no point is near enough.
-    low = np.full(len(tops), 0.0)
-    high = tops - surface.texture.extremes[0] + surface.max_depth
-    for _ in range(_BISECTIONS):
+def _region_depth(surface: Surface, xy: FloatArray, heights: FloatArray) -> FloatArray:
+    """Return the vertical distance [m] below the surface at which the distance is max_depth."""
+    # max_depth below the lowest point, the distance is at least max_depth.
+    low = np.full(len(heights), 0.0)
+    high = heights - surface.texture.extremes[0] + surface.max_depth
+    for _ in range(_DEPTH_BISECTIONS):
         middle = 0.5 * (low + high)
-        points = np.column_stack([xy, tops - middle])
-        feet = surface.texture.nearest(points)
-        near = np.linalg.norm(feet - points, axis=1) <= surface.max_depth
+        points = np.column_stack([xy, heights - middle])
+        closest = surface.texture.nearest(points)
+        near = np.linalg.norm(closest - points, axis=1) <= surface.max_depth
         low, high = np.where(near, middle, low), np.where(near, high, middle)
     return low
 
@@ -334,19 +331,19 @@ def _mean_thrust(surface: Surface, line: ScanLine) -> float:
         points = np.column_stack([xy, np.full(len(s), height)])
         return np.asarray(surface.force(points) @ tangent)
 
-    if surface.law.contact.costly:
-        # Costly contacts: the periodic mean needs no more than equal steps.
+    if surface.law.contact.requires_search:
+        # For costly contacts: equal steps suffice for a periodic mean.
         steps = (np.arange(_THRUST_STEPS) + 0.5) / _THRUST_STEPS
         return float(integrand(steps).mean())
-    return integrate(integrand, smooth_panels(surface, line.length))
+    return integrate(integrand, initial_panels(surface, line.length))
 
 
-def _state_leak(surface: Surface, line: ScanLine) -> Leak:
+def _stateful_leak(surface: Surface, line: ScanLine) -> Leak:
     """Return the worst of the paper's path of (27) and of loops at constant depth."""
     found = [light_then_deep_loop(surface, line), in_plane_loop(surface, line)]
     worst = max(found, key=lambda loop: loop.energy)
     pressing = 0.5 * surface.stiffness * surface.max_depth**2
-    if worst.energy <= _TOLERANCE * pressing:  # what quadrature leaves of nothing
-        text = "no loop that was tried gains energy"
+    if worst.energy <= _TOLERANCE * pressing:  # error of the quadrature
+        text = "no evaluated loop gains energy"
         return Leak(0.0, math.inf, line, "sampled", text, np.zeros((0, 3)), None)
     return Leak(worst.energy, math.inf, line, "sampled", worst.description, worst.vertices, None)

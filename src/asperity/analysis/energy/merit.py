@@ -1,4 +1,4 @@
-"""How much texture, and how much support, a law gives for the loop gain that it costs."""
+"""Merit of a law: the strength of its texture and its support, relative to its loop gain."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.analysis.bounds.dense_search import greatest
 from asperity.analysis.bounds.measures import spectral_norm
-from asperity.analysis.gain.answers import at_unit_stiffness, kept_answer
+from asperity.analysis.bounds.sampling import dense_maximum
+from asperity.analysis.gain.surface_cache import at_unit_stiffness, cached_result
 from asperity.analysis.gain.theorems import theorem_of
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.texture import ScanLine, Texture
 
-_POINTS = 2048
-_LINES = 16
-_NEAREST_POINTS = {True: 2048, False: 128}
+_SCAN_POINTS_PER_LINE = 2048
+_MAP_LINES = 16
+_NEAREST_SCAN_POINTS = {True: 2048, False: 128}
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,8 @@ class Merit:
     """Strength and support of a law on a straight scan at constant height.
 
     Attributes:
-        strength: T, RMS of the oscillating force / (sup‖J‖ · l) [1]; without a period, times a
-            length: RMS / sup‖J‖ [m].
+        strength: T, RMS of the oscillating force / (sup‖J‖ · l) [1]; without a period,
+            RMS / sup‖J‖ [m].
         support: S, d⟨f_z⟩/d depth / sup‖J‖ [1].
         ripple: RMS of the oscillating force over the stiffness, RMS/k [m].
         gain: sup‖J‖/k over the body above the scan height [1].
@@ -47,23 +47,23 @@ def merit(surface: Surface) -> Merit:
 
     The scan runs at z = max h - max_depth (vertical and nearest contact) or z = -max_depth
     (nominal contact), along the texture's scan line; on a map along parallel lines, each with
-    its own mean. A law with state slides: its anchor trails the probe at full deflection.
+    its own mean. A law with state slides, its anchor trailing the probe at full deflection.
     """
     unit = at_unit_stiffness(surface)
-    return kept_answer("merit", unit, lambda: _merit(unit))
+    return cached_result("merit", unit, lambda: _compute_merit(unit))
 
 
-def _merit(surface: Surface) -> Merit:
+def _compute_merit(surface: Surface) -> Merit:
     line = surface.texture.scan_line()
     height = scan_height(surface)
-    forces, slopes, lost = _scan(surface, line, height)
+    forces, slopes, lost = _scan_forces_and_slopes(surface, line, height)
     variance = float(np.mean(np.var(forces, axis=1).sum(axis=1)))
     size = float(np.mean(np.square(forces).sum(axis=2)))
-    # What is left of a constant force is rounding.
+    # The variance of a constant force is rounding.
     ripple = math.sqrt(variance) if variance > 1e-24 * size else 0.0
-    gain = _gain_above(surface, height)
+    gain = _gain_above_height(surface, height)
     unit = line.length if line.periodic else 1.0
-    if math.isinf(gain) or gain == 0.0:  # a force that nowhere varies has neither
+    if math.isinf(gain) or gain == 0.0:  # a constant force has neither
         strength = support = 0.0
     else:
         strength, support = ripple / (gain * unit), float(slopes.mean()) / gain
@@ -77,13 +77,13 @@ def scan_height(surface: Surface) -> float:
 
 def scan_points(surface: Surface, line: ScanLine, height: float) -> FloatArray:
     """Return the probe points of the scan, shape (lines, points, 3) [m]."""
-    costly = surface.law.contact.costly
-    count = _NEAREST_POINTS[surface.texture.is_profile] if costly else _POINTS
-    xy = parallel_lines(surface.texture, line, count)
+    costly = surface.law.contact.requires_search
+    count = _NEAREST_SCAN_POINTS[surface.texture.is_profile] if costly else _SCAN_POINTS_PER_LINE
+    xy = parallel_line_points(surface.texture, line, count)
     return np.concatenate([xy, np.full((*xy.shape[:2], 1), height)], axis=2)
 
 
-def parallel_lines(texture: Texture, line: ScanLine, count: int) -> FloatArray:
+def parallel_line_points(texture: Texture, line: ScanLine, count: int) -> FloatArray:
     """Return points (lines, count, 2) [m] of the scan line of a profile, or 16 lines of a map.
 
     The lines of a map are parallel to its scan line and spread evenly over the domain.
@@ -92,14 +92,16 @@ def parallel_lines(texture: Texture, line: ScanLine, count: int) -> FloatArray:
     if texture.is_profile:
         return xy[None]
     spans = texture.domain.spans
-    parts = (np.arange(_LINES) + 0.5) / _LINES
+    parts = (np.arange(_MAP_LINES) + 0.5) / _MAP_LINES
     across = spans[np.argmin(np.abs(spans @ line.direction) / np.hypot(*spans.T))]
     first = line.start if line.periodic else texture.domain.origin
     shifts = parts[:, None] * across + (first - line.start)
     return np.asarray(xy + shifts[:, None, :])
 
 
-def _scan(surface: Surface, line: ScanLine, height: float) -> tuple[FloatArray, FloatArray, float]:
+def _scan_forces_and_slopes(
+    surface: Surface, line: ScanLine, height: float
+) -> tuple[FloatArray, FloatArray, float]:
     """Return f/k and -J_zz/k on the scan, and the fraction without contact."""
     points = scan_points(surface, line, height)
     flat = points.reshape(-1, 3)
@@ -115,13 +117,13 @@ def _scan(surface: Surface, line: ScanLine, height: float) -> tuple[FloatArray, 
     return forces.reshape(*shape, 3) / surface.stiffness, slopes, lost
 
 
-def _gain_above(surface: Surface, height: float) -> float:
+def _gain_above_height(surface: Surface, height: float) -> float:
     """Return sup‖J‖/k over the body above a height: by theorem, else sampled."""
-    proved = theorem_of(surface.law).gain_above
+    proved = theorem_of(surface.law).gain_above_height
     if proved is not None:
         return proved(surface, height)
 
     def limit(derivatives: FloatArray) -> FloatArray:
-        return surface.law.contact.greatest_depth(height, derivatives)
+        return surface.law.contact.depth_at_height(height, derivatives)
 
-    return greatest(surface, spectral_norm, limit).value
+    return dense_maximum(surface, spectral_norm, limit).value

@@ -1,1 +1,1 @@
-"""How much a law raises the loop gain: characteristic, one-sided and curl number."""
+"""Loop gain of a law: characteristic, one-sided and curl number."""

@@ -6,21 +6,23 @@ section 4). Both are taken over the working region: depths up to the surface's m
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import astuple
 
+import numpy as np
+
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
-from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED, Number
+from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED, JacobianMeasure
 from asperity.analysis.bounds.sampling import highest_point
-from asperity.analysis.bounds.witness import proved
-from asperity.analysis.gain.answers import at_unit_stiffness, kept_answer
-from asperity.analysis.gain.certificate import certified, wave_number, with_clamp
-from asperity.analysis.gain.kept import kept
-from asperity.analysis.gain.search import Search
+from asperity.analysis.bounds.witness import bound_from_theorem
+from asperity.analysis.gain.certificate import certify, include_clamp
+from asperity.analysis.gain.search_options import SearchOptions
+from asperity.analysis.gain.surface_cache import at_unit_stiffness, cached_result
 from asperity.analysis.gain.theorems import theorem_of
-from asperity.checks import positive
-from asperity.errors import ParameterError
+from asperity.core.checks import check_positive
+from asperity.core.errors import ParameterError
 from asperity.surface import Surface
 
 
@@ -34,37 +36,37 @@ def characteristic_number(
 
     Theorem for W, E and H; closed form for A, B, C, D and G on a sinusoid; else certified by
     branch and bound with enclosures of the height's derivatives. What cannot be certified is
-    sampled and says so.
+    sampled, as its method and note state.
 
     Args:
         surface: the surface.
         tolerance: relative gap (upper - lower)/lower at which to stop; by default 1e-6 on
             profiles and periodic sums, 1e-4 on sums of three independent waves, 1e-3 on those of
             four and on maps.
-        work_limit: greatest number of cells to look at; if it is reached the bounds found by then
-            are returned, and the note says so.
-        extent: width and depth [m] of the part of the plane that counts, from the origin, for
-            sums of waves; the whole plane by default. For laws that feel the nearest point it is
+        work_limit: greatest number of cells to evaluate; when it is reached, the bounds found so
+            far are returned with a note.
+        extent: width and depth [m] of the part of the plane to search, from the origin, for
+            sums of waves; the whole plane by default. For laws on the nearest contact it is
             widened by the depth on every side.
 
     Returns:
-        A :class:`Bound`; infinite for D where the depth reaches the medial axis, ``at`` then
-        being the onset, the least depth of the medial axis.
+        A :class:`Bound`; infinite for D where the depth reaches the medial axis; ``at`` is then
+        the onset, the point of least depth on the medial axis.
 
     Raises:
-        ParameterError: for a tolerance, a limit or an extent that is not positive, or a law of
-            your own on the split contact.
+        ParameterError: for a tolerance, a limit or an extent that is not positive, or a
+            user-defined law on the split contact.
 
     Reference:
         The paper's (5), (10) and Table II; MATH section 4 for the rest.
 
     Example:
-        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
         >>> paper = Sinusoid(amplitude=0.8e-3, period=1e-3)
         >>> round(characteristic_number(Surface(paper, "A")).value, 4)
         5.1251
     """
-    return _number(surface, NORM, _search(surface, tolerance, work_limit, extent))
+    return _compute_bound(surface, NORM, _make_options(surface, tolerance, work_limit, extent))
 
 
 def one_sided_number(
@@ -78,12 +80,12 @@ def one_sided_number(
     1 by theorem for W, D, E and H; closed form for A and C on a sinusoid.
 
     Example:
-        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
         >>> paper = Sinusoid(amplitude=0.8e-3, period=1e-3)
         >>> one_sided_number(Surface(paper, "D")).value
         1.0
     """
-    return _number(surface, ONE_SIDED, _search(surface, tolerance, work_limit, extent))
+    return _compute_bound(surface, ONE_SIDED, _make_options(surface, tolerance, work_limit, extent))
 
 
 def curl_number(
@@ -100,62 +102,93 @@ def curl_number(
         ParameterError: for a law with state, whose force is no field of position.
 
     Example:
-        >>> from asperity.textures.sinusoid import Sinusoid
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
         >>> paper = Sinusoid(amplitude=0.8e-3, period=1e-3)
         >>> round(curl_number(Surface(paper, "A")).value, 4)  # the greatest slope, 2πA/l
         5.0265
     """
-    search = _search(surface, tolerance, work_limit, extent)
+    options = _make_options(surface, tolerance, work_limit, extent)
     if surface.law.stateful:
-        raise ParameterError("law", f"{surface.law} has state: its force is no field with a curl")
+        raise ParameterError(
+            "law", f"{surface.law} has state: its force is not a field with a curl"
+        )
     facts = surface.facts
     if facts.conservative:
         return Bound(0.0, 0.0, "theorem", None, facts.reason)
-    return _number(surface, CURL, search)
+    return _cached_bound(surface, CURL, options)
 
 
-def _search(
-    surface: Surface,
-    tolerance: float | None,
-    work_limit: int,
-    extent: tuple[float, float] | None,
-) -> Search:
+def _make_options(
+    surface: Surface, tolerance: float | None, work_limit: int, extent: tuple[float, float] | None
+) -> SearchOptions:
     if not isinstance(surface, Surface):
         raise ParameterError("surface", "must be a Surface", surface)
-    gap = None if tolerance is None else positive("tolerance", tolerance)
-    limit = int(positive("work_limit", work_limit))
+    if tolerance is not None:
+        tolerance = check_positive("tolerance", tolerance)
+    limit = int(check_positive("work_limit", work_limit))
     if extent is not None:
         if not isinstance(extent, Sequence) or isinstance(extent, str) or len(extent) != 2:
             raise ParameterError("extent", "must be (width, depth) [m]", extent)
-        width, depth = (positive("extent", side, "m") for side in extent)
+        width, depth = (check_positive("extent", side, "m") for side in extent)
         extent = (width, depth)
-    return Search(gap, limit, extent)
+    return SearchOptions(tolerance, limit, extent)
 
 
-def _number(surface: Surface, number: Number, search: Search) -> Bound:
-    """Return a number of the force that is rendered: of the law, and where its clamp acts."""
-    unit, asked = at_unit_stiffness(surface), repr(astuple(search))
-    return kept_answer(f"number {number.name}", unit, lambda: _found(unit, number, search), asked)
+def cached_number(
+    surface: Surface,
+    measure: JacobianMeasure,
+    tolerance: float | None = None,
+    work_limit: int = DEFAULT_WORK_LIMIT,
+    extent: tuple[float, float] | None = None,
+) -> Bound:
+    """Return a number from the cache, also where it is a theorem or a closed form.
+
+    Reading the cache is faster than importing the compiled kernels that evaluate a witness.
+    """
+    return _cached_bound(surface, measure, _make_options(surface, tolerance, work_limit, extent))
 
 
-def _found(surface: Surface, number: Number, search: Search) -> Bound:
-    above = _above_the_clamp(surface, number, search)
-    if surface.acting_clamp == "none":
-        return above
-    name = f"{number.name}, clamped"
-    return kept(surface, name, search, lambda: with_clamp(surface, number, search, above))
+def _compute_bound(surface: Surface, measure: JacobianMeasure, options: SearchOptions) -> Bound:
+    """Return a number of the rendered force: by theorem or closed form, else by a cached search."""
+    known = _bound_without_search(surface, measure, options)
+    if known is not None and not surface.effective_clamp.changes_force:
+        return known
+    return _cached_bound(surface, measure, options)
 
 
-def _above_the_clamp(surface: Surface, number: Number, search: Search) -> Bound:
+def _cached_bound(surface: Surface, measure: JacobianMeasure, options: SearchOptions) -> Bound:
+    unit, key = at_unit_stiffness(surface), repr(astuple(options))
+    return cached_result(
+        f"number {measure.name}", unit, lambda: _search_bound(unit, measure, options), key
+    )
+
+
+def _search_bound(surface: Surface, measure: JacobianMeasure, options: SearchOptions) -> Bound:
+    bound = _bound_without_search(surface, measure, options)
+    if bound is None:
+        proof = theorem_of(surface.law).special_proofs.get(measure)
+        bound = certify(surface, measure, options) if proof is None else proof(surface, options)
+    return include_clamp(surface, measure, options, bound)
+
+
+def _bound_without_search(
+    surface: Surface, measure: JacobianMeasure, options: SearchOptions
+) -> Bound | None:
+    """Return a number above max_depth by theorem or closed form, ``None`` if it needs a search."""
     theorem, wave = theorem_of(surface.law), surface.texture.single_wave
-    known = theorem.constants.get(number)
-    if known is not None:
+    constant = theorem.constants.get(measure)
+    if constant is not None:
         # Just inside the highest point the normal is e_z.
         top = highest_point(surface.texture)
-        return proved(surface, number, known.value, "theorem", known.reason, top, [0.0])
-    own_way = theorem.own_way.get(number)
-    if own_way is not None:
-        return kept(surface, f"{number.name}, proved", search, lambda: own_way(surface, search))
-    if wave is not None and search.extent is None and number in theorem.on_a_wave:
-        return wave_number(surface, number, wave, theorem.on_a_wave[number])
-    return kept(surface, number.name, search, lambda: certified(surface, number, search))
+        return bound_from_theorem(
+            surface, measure, constant.value, "theorem", constant.reason, top, [0.0]
+        )
+    form = theorem.closed_forms.get(measure)
+    if form is None or wave is None or options.extent is not None:
+        return None
+    value, phase = form.value(wave, surface.max_depth), form.phase(wave, surface.max_depth)
+    xy = (phase - wave.phase) * wave.period / (2.0 * math.pi) * np.array(wave.direction)
+    # At full depth; on the nearest contact wherever the closest point is unique.
+    depth = surface.max_depth if surface.law.contact.single_valued else 0.0
+    note = "formula on a sinusoid"
+    return bound_from_theorem(surface, measure, value, "closed form", note, xy, [depth])

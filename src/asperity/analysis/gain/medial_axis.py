@@ -1,9 +1,9 @@
-"""Where the god-object jumps: the medial axis below the crests.
+"""The medial axis below the crests, where the god-object jumps.
 
-Below a crest of curvature radius R the nearest surface point splits at depth R, the centre of
+Below a crest of curvature radius R the closest surface point splits at depth R, the centre of
 curvature; above it law D's tangential stiffness is k δκ/(1 - δκ) with κ = 1/R, unbounded towards R.
-The least depth of the whole medial axis is the radius of the sharpest crest. For along the axis
-the depth is least either at a centre of curvature or half-way between two surface points
+The least depth of the whole medial axis is the radius of the sharpest crest: along the axis the
+depth is least either at a centre of curvature or half-way between two surface points
 whose normals are opposite (Aamari et al., Electron. J. Statist. 13 (2019) 1359, theorem 3.4), and
 the normals of a height function all point upwards.
 """
@@ -18,12 +18,12 @@ import numpy as np
 
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT, Supremum, supremum
 from asperity.analysis.bounds.problems import CrestProblem
-from asperity.analysis.bounds.sampling import sampled_supremum
-from asperity.checks import FloatArray
+from asperity.analysis.bounds.sampling import sample_on_texture
+from asperity.core.checks import FloatArray
 from asperity.textures.plane_waves import SingleWave
 from asperity.textures.texture import Texture
 
-_TOLERANCE = 1e-4
+_CURVATURE_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -31,16 +31,16 @@ class Crest:
     """The sharpest crest.
 
     Attributes:
-        foot: the surface point [m].
+        point: the surface point [m].
         radius: radius of curvature [m], the depth at which the medial axis begins below it.
         centre: the centre of curvature [m].
-        least_radius: proved lower bound of every crest's radius [m]; zero if none is proved.
+        min_radius: proved lower bound of every crest's radius [m]; zero without proof.
     """
 
-    foot: tuple[float, float, float]
+    point: tuple[float, float, float]
     radius: float
     centre: tuple[float, float, float]
-    least_radius: float
+    min_radius: float
 
 
 def crest_curvature(derivatives: FloatArray) -> FloatArray:
@@ -62,41 +62,41 @@ def crest_curvature(derivatives: FloatArray) -> FloatArray:
 @lru_cache(maxsize=16)
 def sharpest_crest(
     texture: Texture,
-    tolerance: float = _TOLERANCE,
+    tolerance: float = _CURVATURE_TOLERANCE,
     work_limit: int = DEFAULT_WORK_LIMIT,
     extent: tuple[float, float] | None = None,
     margin: float = 0.0,
 ) -> Crest | None:
-    """Return the crest of least radius, certified; nothing for a surface without crests.
+    """Return the crest of least radius, certified; ``None`` for a surface without crests.
 
     Exact for a sinusoid; else by branch and bound to a relative tolerance of the curvature. A sum
     of more than four independent waves is sampled unless an extent is given, which is then
-    looked at with a margin on every side.
+    searched with a margin on every side.
     """
     if texture.single_wave is not None and extent is None:
-        return _wave_crest(texture, texture.single_wave)
+        return _crest_of_wave(texture, texture.single_wave)
     cells = texture.cells(extent, margin)
     found: Supremum
     if cells is None:
-        cells, found = sampled_supremum(texture, CrestProblem)
+        cells, found = sample_on_texture(texture, CrestProblem)
     else:
-        # Cells that say nothing of a smaller gap reach their own in reasonable time, and no less.
-        gap = tolerance if cells.cheap_gap else max(tolerance, cells.gap)
-        found = supremum(CrestProblem(cells), gap, work_limit, cells.cheap_gap)
+        # Cells without a refined gap reach only their default gap in reasonable time.
+        gap = tolerance if cells.refined_gap else max(tolerance, cells.default_gap)
+        found = supremum(CrestProblem(cells), gap, work_limit, cells.refined_gap)
     if found.at is None:
         return None
-    return _crest(texture, cells.plane(found.at[None])[0], found.upper)
+    return _make_crest(texture, cells.to_plane(found.at[None])[0], found.upper)
 
 
-def _wave_crest(texture: Texture, wave: SingleWave) -> Crest:
+def _crest_of_wave(texture: Texture, wave: SingleWave) -> Crest:
     along = wave.period * (0.25 - wave.phase / (2.0 * math.pi))
     curvature = (2.0 * math.pi / wave.period) ** 2 * wave.amplitude
-    crest = _crest(texture, along * np.array(wave.direction), curvature)
+    crest = _make_crest(texture, along * np.array(wave.direction), curvature)
     assert crest is not None
     return crest
 
 
-def _crest(texture: Texture, xy: FloatArray, greatest: float) -> Crest | None:
+def _make_crest(texture: Texture, xy: FloatArray, max_curvature: float) -> Crest | None:
     derivatives = texture.derivatives(xy[None, :])
     curvature = float(crest_curvature(derivatives)[0])
     if curvature <= 0.0:
@@ -104,7 +104,7 @@ def _crest(texture: Texture, xy: FloatArray, greatest: float) -> Crest | None:
     radius = 1.0 / curvature
     h, hx, hy = derivatives[0, :3]
     below = radius / math.sqrt(1.0 + hx * hx + hy * hy)
-    foot = (float(xy[0]), float(xy[1]), float(h))
-    centre = (foot[0] + below * float(hx), foot[1] + below * float(hy), foot[2] - below)
-    least = 1.0 / greatest if math.isfinite(greatest) else 0.0
-    return Crest(foot, radius, centre, min(least, radius))
+    point = (float(xy[0]), float(xy[1]), float(h))
+    centre = (point[0] + below * float(hx), point[1] + below * float(hy), point[2] - below)
+    least = 1.0 / max_curvature if math.isfinite(max_curvature) else 0.0
+    return Crest(point, radius, centre, min(least, radius))

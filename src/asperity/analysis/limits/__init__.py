@@ -1,1 +1,1 @@
-"""What a device sets as limits to a texture."""
+"""Limits of a device on textures: the six limits, spectra and perceptibility."""

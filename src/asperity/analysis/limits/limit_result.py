@@ -1,4 +1,4 @@
-"""What is known of the six limits for one surface, device and speed."""
+"""The result of checking the six limits for one surface, device and speed."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ from dataclasses import dataclass
 from typing import Any
 
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.limits.felt import Felt
 from asperity.analysis.limits.limit_rules import Limit
+from asperity.analysis.limits.perceptibility import Perceptibility
 from asperity.analysis.limits.spectrum import Spectrum
-from asperity.analysis.passivity.judgement import Allowed
-from asperity.analysis.passivity.margin import Margin
+from asperity.analysis.passivity.recommended_stiffness import Margin
+from asperity.analysis.passivity.verdict import StabilityLimit
+from asperity.core.display import Plottable, Reportable
+from asperity.core.files import Serializable, attributes_to_dict
 from asperity.devices import Device
-from asperity.display import Plotted, Reported
-from asperity.files import Record, record
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
-SCHEMA = 1
+SCHEMA = 2
 
 
 @dataclass(frozen=True)
-class RenderedWave(Record):
+class RenderedWave(Serializable):
     """One wave of the texture on the device.
 
     Attributes:
@@ -30,8 +30,8 @@ class RenderedWave(Record):
         share: of the variance of the heights.
         frequency: v/l [Hz].
         force: A_F [N], amplitude of the force at this wavelength.
-        holds: whether each limit holds, by its number; those that cannot be decided, and the gain
-            limit, which is not on waves, are missing.
+        holds: whether each limit holds, by its number, without undecidable limits and without the
+            gain limit, which does not concern waves.
         top_speed: speed [m/s] below which all of these hold; 0 if one holds at no speed.
     """
 
@@ -45,7 +45,7 @@ class RenderedWave(Record):
 
 
 @dataclass(frozen=True)
-class Limits(Plotted, Reported):
+class Limits(Plottable, Reportable):
     """The six limits for one surface on one device at one scanning speed.
 
     Attributes:
@@ -55,18 +55,18 @@ class Limits(Plotted, Reported):
         time_samples: α, updates in a wave.
         position_samples: β, position steps in a wave.
         force_steps: γ, steps of force in an amplitude.
-        gain: what limit 5 multiplies the stiffness by: q, or less where the delay is known.
-        gain_symbol: "q", "q⁺" or what lies between.
-        allowed: up to which stiffness the law may be rendered, as in a comparison.
-        margin: the share of that at which to begin.
-        limits: the six, in the paper's order.
-        waves: what the texture is made of, the longest first.
-        spectrum: all waves, with those that were too small to count.
-        felt: whether the texture is felt at this stiffness and speed.
-        speeds: speeds [m/s] at which all limits hold that could be decided, from the first up to
-            but without the second.
-        answer: in words.
-        assumptions: what was assumed, in sentences.
+        gain: factor of the stiffness in limit 5: q, or less where the delay is known.
+        gain_symbol: "q", "q⁺" or the combination of both.
+        stability_limit: stability limit of the stiffness, as in a comparison.
+        margin: safety margin below it.
+        limits: the six limits, in the paper's order.
+        waves: the significant waves of the texture, the longest first.
+        spectrum: all waves, also insignificant ones.
+        perceptibility: perceptibility at this stiffness and speed.
+        speeds: scanning speeds [m/s] at which all decidable limits hold, from the first up to but
+            excluding the second.
+        answer: the result in words.
+        assumptions: the assumptions, in sentences.
     """
 
     surface: Surface
@@ -77,20 +77,20 @@ class Limits(Plotted, Reported):
     force_steps: float
     gain: Bound
     gain_symbol: str
-    allowed: Allowed
+    stability_limit: StabilityLimit
     margin: Margin
     limits: tuple[Limit, ...]
     waves: tuple[RenderedWave, ...]
     spectrum: Spectrum
-    felt: Felt
+    perceptibility: Perceptibility
     speeds: tuple[float, float]
-    answer: str
-    assumptions: tuple[str, ...]
+    answer: str = ""
+    assumptions: tuple[str, ...] = ()
 
     @property
     def safe_stiffness(self) -> float | None:
-        """The stiffness of ``allowed`` [N/m]; ``None`` if none is known."""
-        return self.allowed.stiffness
+        """Stiffness of ``stability_limit`` [N/m]; ``None`` if none is known."""
+        return self.stability_limit.stiffness
 
     @property
     def texture(self) -> Texture:
@@ -98,8 +98,8 @@ class Limits(Plotted, Reported):
         return self.surface.texture
 
     @property
-    def share(self) -> float:
-        """Share of the height variance in waves that meet every limit on waves that is decided."""
+    def resolved_share(self) -> float:
+        """Share of the height variance in waves that meet every decidable limit on waves."""
         total = sum(wave.share for wave in self.waves)
         met = sum(wave.share for wave in self.waves if all(wave.holds.values()))
         return met / total if total > 0.0 else 0.0
@@ -113,22 +113,24 @@ class Limits(Plotted, Reported):
         return {limit.number: limit for limit in self.limits}[number]
 
     def __repr__(self) -> str:
-        law, held = self.surface.law.letter, sum(bool(limit.holds) for limit in self.limits)
-        said = f"{held} of 6 hold, {self.felt.tier}"
-        return f"<Limits of law {law} on {self.device.id} at {self.speed:g} m/s: {said}>"
+        law, count = self.surface.law.letter, sum(bool(limit.holds) for limit in self.limits)
+        outcome = f"{count} of 6 hold, {self.perceptibility.tier}"
+        return f"<Limits of law {law} on {self.device.id} at {self.speed:g} m/s: {outcome}>"
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units, with a schema number."""
         surface = self.surface
+        after_gain = (
+            "safe_stiffness stability_limit margin limits waves spectrum perceptibility "
+            "resolved_share speeds answer assumptions"
+        )
         return {
             "schema": SCHEMA,
             "texture": surface.texture.describe(),
             "law": surface.law.letter,
-            **record(self, "device", "speed"),
-            **record(surface, "law_parameters", "stiffness", "max_depth"),
-            **record(self, "time_samples", "position_samples", "force_steps"),
+            **attributes_to_dict(self, "device", "speed"),
+            **attributes_to_dict(surface, "law_parameters", "stiffness", "max_depth"),
+            **attributes_to_dict(self, "time_samples", "position_samples", "force_steps"),
             "gain": {"symbol": self.gain_symbol} | self.gain.to_dict(),
-            **record(self, "safe_stiffness", "allowed", "margin", "limits", "waves", "spectrum"),
-            **record(self, "felt", "share"),
-            **record(self, "speeds", "answer", "assumptions"),
+            **attributes_to_dict(self, *after_gain.split()),
         }

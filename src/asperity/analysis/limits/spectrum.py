@@ -1,8 +1,8 @@
-"""The waves that a texture is made of: amplitude against wavelength.
+"""The spectrum of a texture, and the force of each of its waves on a scan at constant height.
 
-A sum of plane waves is taken wave by wave, exactly. A profile or a map is taken by its
-periodogram, a map radially: every bin counts by its wavelength, whatever its direction. Bins of a
-third of an octave are one wave, with the amplitude of the sinusoid of the same variance.
+A sum of plane waves is decomposed exactly, wave by wave. A profile or a map is decomposed by its
+periodogram, a map radially: every bin counts by its wavelength in any direction. The bins of a
+third of an octave form one wave, with the amplitude of the sinusoid of the same variance.
 """
 
 from __future__ import annotations
@@ -12,22 +12,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.checks import FloatArray
-from asperity.files import Record
-from asperity.kept import kept
+from asperity.analysis.energy.merit import scan_height
+from asperity.analysis.gain.surface_cache import at_unit_stiffness, cached_result
+from asperity.core.cache import get_or_compute
+from asperity.core.checks import FloatArray
+from asperity.core.files import Serializable
+from asperity.surface import Surface
 from asperity.textures.plane_waves import PlaneWaves
 from asperity.textures.texture import Texture
 
 BANDS_PER_OCTAVE = 3
-LEAST_SHARE = 1e-3
-"""Bands with less of the variance of the heights, and of the force, are left out of the limits."""
+MIN_SHARE = 1e-3
+"""Bands with a smaller share of the variance of heights and of force are insignificant."""
 
-# A sum of more waves than this is taken by bands.
-_MOST_WAVES = 64
-# What is less than this of the variance is the rounding of the transform.
-_ROUNDING = 1e-18
-# Rows of a map that are counted at once: what bounds the memory.
-_ROWS = 512
+# A sum of more waves than this is decomposed into bands.
+_MAX_WAVES = 64
+# Rounding of the transform, as a share of the variance.
+_TRANSFORM_ROUNDING = 1e-18
+# Rows of a map processed at once, to bound the memory.
+_ROWS_PER_BLOCK = 512
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class Wave:
     Attributes:
         wavelength: l [m]; of a band the mean, by variance, of the logarithms.
         amplitude: a [m]; of a band that of the sinusoid of the same variance.
-        share: of the variance of the heights.
+        share: share of the variance of the heights.
         vector: (k_x, k_y) [rad/m]; ``None`` for a band.
         phase: [rad], of a sin(k·x + phase); 0 for a band.
     """
@@ -50,16 +53,16 @@ class Wave:
 
 
 @dataclass(frozen=True)
-class Spectrum(Record):
+class Spectrum(Serializable):
     """The waves of a texture, the longest first.
 
     Attributes:
         waves: the waves.
         exact: whether they are the waves of a sum, not bands of a periodogram.
-        description: how they were found, in words.
+        description: the method, in words.
     """
 
-    written = "exact description wavelengths amplitudes"
+    serialized_attributes = "exact description wavelengths amplitudes"
 
     waves: tuple[Wave, ...]
     exact: bool
@@ -78,15 +81,21 @@ class Spectrum(Record):
         """Amplitudes a [m], shape (n,)."""
         return np.array([wave.amplitude for wave in self.waves])
 
+    @property
+    def shares(self) -> FloatArray:
+        """Shares of the variance of the heights, shape (n,)."""
+        return np.array([wave.share for wave in self.waves])
+
 
 @dataclass(frozen=True)
 class Bands:
     """Variance by third of an octave.
 
     Attributes:
-        number: of the band, floor(3 log₂ f) with f in waves per metre, shape (n,), ascending.
-        variance: in it, shape (n,).
-        wavelength: mean, by variance, of the logarithms [m], shape (n,).
+        number: numbers of the bands, floor(3 log₂ f) with f in waves per metre, shape (n,),
+            ascending.
+        variance: variances of the bands, shape (n,).
+        wavelength: means, by variance, of the logarithms [m], shape (n,).
     """
 
     number: FloatArray
@@ -94,28 +103,29 @@ class Bands:
     wavelength: FloatArray
 
 
-def spectrum(texture: Texture) -> Spectrum:
+def compute_spectrum(texture: Texture) -> Spectrum:
     """Return the waves of a texture.
 
     Args:
-        texture: any kind; a flat one has no waves.
+        texture: a texture of any kind; a flat one has no waves.
 
     Example:
-        >>> from asperity.textures.sinusoid import Sinusoid
-        >>> [(wave.wavelength, wave.amplitude) for wave in spectrum(Sinusoid(4e-4, 1e-3)).waves]
-        [(0.001, 0.0004)]
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> spectrum = compute_spectrum(Sinusoid(amplitude=4e-4, period=1e-3))
+        >>> spectrum.wavelengths, spectrum.amplitudes
+        (array([0.001]), array([0.0004]))
     """
-    return kept("spectrum", texture.content, lambda: _spectrum(texture))
+    return get_or_compute("spectrum", texture.digest, lambda: _compute_spectrum(texture))
 
 
-def _spectrum(texture: Texture) -> Spectrum:
+def _compute_spectrum(texture: Texture) -> Spectrum:
     waves = _plane_waves(texture)
-    if waves is not None and len(waves) <= _MOST_WAVES:
+    if waves is not None and len(waves) <= _MAX_WAVES:
         return Spectrum(waves, True, "the waves of the sum")
     heights, spacing, repeats = texture.samples()
-    found = banded(heights[None], spacing, repeats)
+    found = band_variances(heights[None], spacing, repeats)
     total = float(found.variance.sum())
-    # What is left of a constant height is rounding.
+    # The variance of a constant height is rounding.
     if total <= 1e-24 * float(np.max(np.abs(heights)) ** 2):
         return Spectrum((), False, "flat")
     words = "third-octave bands of the periodogram" + ("" if texture.is_profile else ", radially")
@@ -125,7 +135,7 @@ def _spectrum(texture: Texture) -> Spectrum:
         tuple(
             Wave(float(length), math.sqrt(2.0 * variance), float(variance) / total)
             for length, variance in bands
-            if variance > _ROUNDING * total
+            if variance > _TRANSFORM_ROUNDING * total
         ),
         False,
         words,
@@ -139,24 +149,27 @@ def _plane_waves(texture: Texture) -> tuple[Wave, ...] | None:
         k = 2.0 * math.pi / wave.period
         vector = (k * wave.direction[0], k * wave.direction[1])
         return (Wave(wave.period, wave.amplitude, 1.0, vector, wave.phase),)
-    return None if texture.waves is None else _taken_together(texture.waves)
+    return None if texture.waves is None else _merge_waves(texture.waves)
 
 
-def _taken_together(given: PlaneWaves) -> tuple[Wave, ...]:
-    """Return the waves of a sum, those along one wave vector as one."""
+def _merge_waves(plane_waves: PlaneWaves) -> tuple[Wave, ...]:
+    """Return the waves of a sum, merged by wave vector."""
     summed: dict[tuple[float, float], complex] = {}
     for amplitude, (kx, ky), phase in zip(
-        given.amplitudes.tolist(), given.wavevectors.tolist(), given.phases.tolist(), strict=True,
-    ):  # fmt: skip
+        plane_waves.amplitudes.tolist(),
+        plane_waves.wavevectors.tolist(),
+        plane_waves.phases.tolist(),
+        strict=True,
+    ):
         # a sin(-k·x + φ) is a sin(k·x + π - φ).
-        turned = (kx, ky) < (0.0, 0.0)
-        vector = (-kx, -ky) if turned else (kx, ky)
-        angle = math.pi - phase if turned else phase
+        is_reversed = (kx, ky) < (0.0, 0.0)
+        vector = (-kx, -ky) if is_reversed else (kx, ky)
+        angle = math.pi - phase if is_reversed else phase
         phasor = amplitude * complex(math.cos(angle), math.sin(angle))
         summed[vector] = summed.get(vector, 0.0) + phasor
-    least = 1e-12 * float(np.abs(given.amplitudes).max())
-    kept = {vector: phasor for vector, phasor in summed.items() if abs(phasor) > least}
-    total = sum(abs(phasor) ** 2 for phasor in kept.values())
+    least = 1e-12 * float(np.abs(plane_waves.amplitudes).max())
+    phasors = {vector: phasor for vector, phasor in summed.items() if abs(phasor) > least}
+    total = sum(abs(phasor) ** 2 for phasor in phasors.values())
     waves = [
         Wave(
             2.0 * math.pi / math.hypot(*vector),
@@ -165,23 +178,23 @@ def _taken_together(given: PlaneWaves) -> tuple[Wave, ...]:
             vector,
             math.atan2(phasor.imag, phasor.real),
         )
-        for vector, phasor in kept.items()
+        for vector, phasor in phasors.items()
     ]
     return tuple(sorted(waves, key=lambda wave: -wave.wavelength))
 
 
-def banded(values: FloatArray, spacing: tuple[float, float], repeats: bool) -> Bands:
+def band_variances(values: FloatArray, spacing: tuple[float, float], is_periodic: bool) -> Bands:
     """Return the variance of values on a grid by wavelength, in third-octave bands.
 
     Args:
         values: shape (components, ny, nx); the variances of the components are added.
         spacing: of the points along x and y [m].
-        repeats: whether the values repeat; else they are windowed (Hann).
+        is_periodic: whether the values repeat; else they are windowed (Hann).
     """
     import scipy.fft
 
     _components, ny, nx = values.shape
-    across, along = _hann(ny, repeats), _hann(nx, repeats)
+    across, along = _hann_window(ny, is_periodic), _hann_window(nx, is_periodic)
     power = float(across @ across) * float(along @ along) * nx * ny
     fx, fy = np.fft.rfftfreq(nx, spacing[0]), np.fft.fftfreq(ny, spacing[1])
     twice = np.full(len(fx), 2.0)
@@ -194,19 +207,21 @@ def banded(values: FloatArray, spacing: tuple[float, float], repeats: bool) -> B
         windowed = (component - level) * along
         windowed *= across[:, None]
         transform = scipy.fft.rfft2(windowed, overwrite_x=True)
-        for first in range(0, ny, _ROWS):
-            part = slice(first, first + _ROWS)
+        for first in range(0, ny, _ROWS_PER_BLOCK):
+            part = slice(first, first + _ROWS_PER_BLOCK)
             variance = twice * np.abs(transform[part]) ** 2 / power
-            _count(sums, np.hypot(fx, fy[part, None]), variance)
+            _add_to_bands(sums, np.hypot(fx, fy[part, None]), variance)
     numbers = sorted(sums)
     variances = np.array([sums[number][0] for number in numbers])
     logs = np.array([sums[number][1] for number in numbers])
-    # A band without variance has no logarithms either, and no wavelength of its own.
+    # A band without variance has no logarithms either, and no wavelength.
     wavelength = np.exp(-logs / np.maximum(variances, np.finfo(float).tiny))
     return Bands(np.array(numbers, dtype=float), variances, wavelength)
 
 
-def _count(sums: dict[int, list[float]], frequency: FloatArray, variance: FloatArray) -> None:
+def _add_to_bands(
+    sums: dict[int, list[float]], frequency: FloatArray, variance: FloatArray
+) -> None:
     """Add the variance of bins, and its product with ln f, to their bands."""
     moving = frequency > 0.0
     f, v = frequency[moving], variance[moving]
@@ -220,8 +235,102 @@ def _count(sums: dict[int, list[float]], frequency: FloatArray, variance: FloatA
         entry[1] += float(logs[index])
 
 
-def _hann(count: int, repeats: bool) -> FloatArray:
-    """Return a window that a wave with a whole number of periods sees as three bins."""
-    if repeats or count == 1:
+def _hann_window(count: int, is_periodic: bool) -> FloatArray:
+    """Return a window whose transform of a wave with whole periods has three bins."""
+    if is_periodic or count == 1:
         return np.ones(count)
     return np.asarray(0.5 - 0.5 * np.cos(2.0 * math.pi * (np.arange(count) + 0.5) / count))
+
+
+# Points of the fit to a sum of waves, and of a side of the patch of a map; fewer where every
+# force requires a closest-point search.
+_FIT_POINTS = {False: 16384, True: 4096}
+_LINE_POINTS = {False: 2**15, True: 4096}
+_SIDE_POINTS = {False: 1024, True: 96}
+# An aperiodic sum is fitted over this many of its longest waves.
+_APERIODIC_FIT_LENGTH = 64.0
+_GOLDEN_RATIO = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+def wave_forces(surface: Surface, spectrum: Spectrum) -> FloatArray:
+    """Return the force amplitude of every wave of a texture.
+
+    The probe moves at constant height, as deep as
+    :func:`~asperity.analysis.energy.merit.merit` scans; a law with state slides at full
+    deflection. For a sum of waves the force is fitted by the same waves (least squares). For bands
+    it is the amplitude of the band times the square root of the ratio of force variance to height
+    variance on the same patch. The squares of the force components are added.
+
+    Args:
+        surface: texture, law and stiffness.
+        spectrum: the spectrum of its texture.
+
+    Returns:
+        A_F [N], shape (n,).
+
+    Example:
+        >>> from asperity.analysis.limits.spectrum import compute_spectrum
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> texture = Sinusoid(amplitude=1e-4, period=1e-3)
+        >>> wave_forces(Surface(texture, "A", stiffness=500.0), compute_spectrum(texture)).round(9)
+        array([0.05])
+    """
+    if not spectrum.waves:
+        return np.zeros(0)
+    unit = at_unit_stiffness(surface)
+    compute = _fit_waves if spectrum.exact else _band_force_amplitudes
+    key = repr((spectrum.exact, spectrum.waves))
+    forces = cached_result("wave forces", unit, lambda: compute(unit, spectrum), key)
+    return forces * (surface.stiffness / unit.stiffness)
+
+
+def scan_forces(surface: Surface, xy: FloatArray) -> FloatArray:
+    """Return the forces [N], shape (n, 3), at points (n, 2) [m] of the scan's height."""
+    probes = np.column_stack([xy, np.full(len(xy), scan_height(surface))])
+    if not surface.law.stateful:
+        return surface.force(probes)
+    direction = surface.texture.scan_line().direction
+    return surface.force(
+        probes, np.tile(surface.parameter("max_deflection") * direction, (len(xy), 1))
+    )
+
+
+def _fit_waves(surface: Surface, spectrum: Spectrum) -> FloatArray:
+    """Return the amplitudes of the least-squares fit of waves to the force."""
+    xy = _fit_points(surface.texture, spectrum, _FIT_POINTS[surface.law.contact.requires_search])
+    vectors = np.array([wave.vector for wave in spectrum.waves])
+    angles = xy @ vectors.T + np.array([wave.phase for wave in spectrum.waves])
+    columns = np.hstack([np.ones((len(xy), 1)), np.sin(angles), np.cos(angles)])
+    fit = np.linalg.lstsq(columns, scan_forces(surface, xy), rcond=None)[0][1:]
+    squares = np.sum(fit**2, axis=1)
+    return np.asarray(np.sqrt(squares[: len(vectors)] + squares[len(vectors) :]))
+
+
+def _fit_points(texture: Texture, spectrum: Spectrum, count: int) -> FloatArray:
+    """Return points (n, 2) [m] spread evenly over one period, or over many wavelengths."""
+    domain, steps = texture.domain, np.arange(count)
+    spans = domain.spans
+    if not domain.periodic:
+        side = _APERIODIC_FIT_LENGTH * float(spectrum.wavelengths.max())
+        spans = side * spans / np.hypot(*spans.T)[:, None]
+    # Equal steps along the first span, the golden ratio across: a low-discrepancy lattice.
+    fractions = [(steps + 0.5) / count, (steps * _GOLDEN_RATIO) % 1.0][: len(spans)]
+    return np.asarray(domain.origin + np.stack(fractions, axis=-1) @ spans)
+
+
+def _band_force_amplitudes(surface: Surface, spectrum: Spectrum) -> FloatArray:
+    """Return the amplitude of each band, from the ratio of force to height on a patch."""
+    texture, costly = surface.texture, surface.law.contact.requires_search
+    max_count = (_LINE_POINTS if texture.is_profile else _SIDE_POINTS)[costly]
+    points, spacing, repeats = texture.domain.grid(texture.grid_counts(), max_count)
+    flat = points.reshape(-1, 2)
+    shape = points.shape[:2]
+    heights = band_variances(texture.height(flat).reshape(1, *shape), spacing, repeats)
+    forces = scan_forces(surface, flat).T.reshape(3, *shape)
+    pushed = band_variances(np.ascontiguousarray(forces), spacing, repeats)
+    known = heights.variance > 1e-12 * heights.variance.max()
+    ratio = np.sqrt(pushed.variance[known] / heights.variance[known])
+    wanted = np.floor(BANDS_PER_OCTAVE * np.log2(1.0 / spectrum.wavelengths))
+    # A wave longer than the patch has the force ratio of the longest wave in it.
+    nearest = np.abs(heights.number[known] - wanted[:, None]).argmin(axis=1)
+    return np.asarray(spectrum.amplitudes * ratio[nearest])

@@ -1,1 +1,1 @@
-"""What each criterion says of a law on a device."""
+"""Passivity of a surface on a device: criteria, verdict and recommended stiffness."""

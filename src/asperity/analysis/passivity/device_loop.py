@@ -1,4 +1,4 @@
-"""A surface on a device, as the criteria of passivity see it: exact numbers and what is known."""
+"""A surface on a device as the criteria of passivity use it: exact numbers, known or unknown."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import Leak
 from asperity.analysis.gain.theorems import theorem_of
-from asperity.checks import positive, real
+from asperity.core.checks import check_positive, check_real
+from asperity.core.errors import ParameterError
 from asperity.devices import Device, WallTest
-from asperity.errors import ParameterError
 from asperity.surface import Surface
 
 HALF = Fraction(1, 2)
 Number = Fraction | float  # a fraction, or infinity
 # A leak below this part of k · depth · length of the line is rounding, not a leak.
-_ROUNDING = 1e-12
+_LEAK_ROUNDING = 1e-12
 
 
 class Obstacle(Enum):
@@ -30,26 +30,26 @@ class Obstacle(Enum):
 
 
 @dataclass(frozen=True)
-class Loop:
-    """A surface on a device; numbers of the device as exact fractions, ``None`` if not known.
+class DeviceLoop:
+    """A surface on a device; numbers of the device as exact fractions, ``None`` if unknown.
 
     Attributes:
         surface: the surface.
         device: the device.
         q: characteristic number.
         one_sided: one-sided number q⁺.
-        leak: the worst loop; ``None`` where only stiffnesses are asked for.
-        conservative: whether the law is.
+        leak: the worst loop; ``None`` where only stiffness limits are needed.
+        conservative: whether the law is conservative.
         obstacle: why the rules for conservative laws do not apply; ``None`` if they do.
-        reason: what the curl, or the continuity of the force, says of the obstacle.
+        reason: reason of the obstacle, from the curl or the continuity of the force.
         rate: update rate 1/T [Hz].
         damping: σ₀ [N s/m].
-        virtual: b_v [N s/m].
+        virtual_damping: b_v [N s/m].
         delay: d, whole samples.
-        test: what is known of the smooth wall K₀.
-        friction: f_c, dry friction that acts at least [N]; 0 where none is known.
-        step: |δ|, the longest way that positions may jump by when they are read [m].
-        force_step: |b|, the same of the force [N].
+        wall_test: test of the smooth wall K₀.
+        friction: f_c, least dry friction [N]; 0 where it is unknown.
+        position_step: |δ|, greatest step of the quantised position [m].
+        force_step: |b|, greatest step of the quantised force [N].
     """
 
     surface: Surface
@@ -62,11 +62,11 @@ class Loop:
     reason: str
     rate: Fraction | None
     damping: Fraction | None
-    virtual: Fraction | None
+    virtual_damping: Fraction | None
     delay: int | None
-    test: WallTest | None
+    wall_test: WallTest | None
     friction: Fraction
-    step: Fraction
+    position_step: Fraction
     force_step: Fraction
 
     @property
@@ -75,80 +75,80 @@ class Loop:
         return Fraction(self.surface.stiffness)
 
     @property
-    def loss(self) -> Fraction | None:
+    def damping_gain(self) -> Fraction | None:
         """σ₀/T [N/m]."""
         return None if self.damping is None or self.rate is None else self.damping * self.rate
 
     @property
-    def damper(self) -> Fraction:
-        """b_v/T [N/m]; 0 if no virtual damping is known of, which every criterion then says."""
-        return (self.virtual or Fraction(0)) * (self.rate or Fraction(0))
+    def virtual_damping_gain(self) -> Fraction:
+        """b_v/T [N/m]; 0 if virtual damping is unknown, as every criterion states."""
+        return (self.virtual_damping or Fraction(0)) * (self.rate or Fraction(0))
 
     @property
-    def samples(self) -> Fraction:
-        """d, taken as 0 where it is not known: only for criteria that say so."""
+    def known_delay(self) -> Fraction:
+        """d, 0 where it is unknown: only for criteria that state this assumption."""
         return Fraction(self.delay or 0)
 
     @property
-    def wall(self) -> Fraction | None:
-        """K₀ [N/m] at the device's rate, of a texture in the lightest direction."""
-        if self.test is None:
+    def wall_stiffness(self) -> Fraction | None:
+        """K₀ [N/m] at the device's rate, for a texture in the lightest direction."""
+        if self.wall_test is None:
             return None
         share = Fraction(1)
-        if self.test.lightest is not None and self.surface.feels_texture:
-            share = Fraction(self.test.lightest)
-        if self.test.update_rate is not None and self.rate is not None:
-            share *= min(Fraction(1), self.rate / Fraction(self.test.update_rate))
-        return share * Fraction(self.test.value)
+        if self.wall_test.lightest is not None and self.surface.depends_on_texture:
+            share = Fraction(self.wall_test.lightest)
+        if self.wall_test.update_rate is not None and self.rate is not None:
+            share *= min(Fraction(1), self.rate / Fraction(self.wall_test.update_rate))
+        return share * Fraction(self.wall_test.value)
 
     @property
     def longest_delay(self) -> Number | None:
-        """The greatest delay [samples] that the wall's test admits; ``None`` if it admits none.
+        """Greatest delay [samples] that the wall test admits; ``None`` if it admits none.
 
         With the wall on the verge of cycling, σ₀/T >= K₀ (1/2 + d): any delay, unless d or σ₀ is
-        known; it need not be whole then.
+        known. It need not be whole.
         """
         if self.delay is not None:
             return Fraction(self.delay)
-        if self.loss is None or self.wall is None:
+        if self.damping_gain is None or self.wall_stiffness is None:
             return math.inf
-        longest = self.loss / self.wall - HALF
+        longest = self.damping_gain / self.wall_stiffness - HALF
         return longest if longest >= 0 else None
 
     @property
-    def cycled(self) -> Fraction | None:
-        """A stiffness K at which a wall cycled with exact positions [N/m]: σ₀/T < K (1/2 + d)."""
-        test = self.test
-        exact = test is not None and test.positions == "exact" and not self.virtual
+    def cycling_stiffness(self) -> Fraction | None:
+        """Stiffness K [N/m] at which a wall cycled with exact positions: σ₀/T < K (1/2 + d)."""
+        test = self.wall_test
+        exact = test is not None and test.positions == "exact" and not self.virtual_damping
         if test is None or test.cycled is None or not exact:
             return None
         same = test.update_rate is None or Fraction(test.update_rate) == self.rate
         return Fraction(test.cycled) if same else None
 
-    def number(self, plus: Fraction, full: Fraction, side: str) -> Number:
-        """Return plus · q⁺ + full · q at its lower or upper end; a weight of 0 hides infinity."""
+    def weighted_gain(self, one_sided_weight: Fraction, norm_weight: Fraction, end: str) -> Number:
+        """Return the weighted sum of q⁺ and q at one end; a weight of 0 drops infinity."""
         total = Fraction(0)
-        for weight, bound in ((plus, self.one_sided), (full, self.q)):
-            value = float(getattr(bound, side))
+        for weight, bound in ((one_sided_weight, self.one_sided), (norm_weight, self.q)):
+            value = float(getattr(bound, end))
             if weight and math.isinf(value):
                 return math.inf
             total += weight * Fraction(value) if weight else 0
         return total
 
 
-def make_loop(
+def make_device_loop(
     surface: Surface, device: Device, q: Bound, one_sided: Bound, leak: Leak | None
-) -> Loop:
-    """Return what the criteria are about.
+) -> DeviceLoop:
+    """Return the loop of a surface and a device.
 
     Raises:
-        ParameterError: for a number of the device that is out of its range.
+        ParameterError: for device data out of range.
     """
-    obstacle, reason = _obstacle(surface, q)
-    delay = _fraction(device, "delay_samples", _NOT_NEGATIVE)
+    obstacle, reason = _find_obstacle(surface, q)
+    delay = _exact_value(device, "delay_samples", _NOT_NEGATIVE)
     if delay is not None and delay.denominator != 1:
         raise ParameterError("device.delay_samples", "must be a whole number", float(delay))
-    return Loop(
+    return DeviceLoop(
         surface=surface,
         device=device,
         q=q,
@@ -157,29 +157,29 @@ def make_loop(
         conservative=surface.facts.conservative,
         obstacle=obstacle,
         reason=reason,
-        rate=_fraction(device, "update_rate", _POSITIVE),
-        damping=_fraction(device, "damping", _NOT_NEGATIVE),
-        virtual=_fraction(device, "virtual_damping", _FINITE),
+        rate=_exact_value(device, "update_rate", _POSITIVE),
+        damping=_exact_value(device, "damping", _NOT_NEGATIVE),
+        virtual_damping=_exact_value(device, "virtual_damping", _FINITE),
         delay=None if delay is None else int(delay),
-        test=_wall_test(device),
-        friction=_fraction(device, "least_friction", _NOT_NEGATIVE) or Fraction(0),
-        step=_AXES * (_fraction(device, "position_resolution", _NOT_NEGATIVE) or 0),
-        force_step=_AXES * (_fraction(device, "force_resolution", _NOT_NEGATIVE) or 0),
+        wall_test=_checked_wall_test(device),
+        friction=_exact_value(device, "least_friction", _NOT_NEGATIVE) or Fraction(0),
+        position_step=_SQRT_3 * (_exact_value(device, "position_resolution", _NOT_NEGATIVE) or 0),
+        force_step=_SQRT_3 * (_exact_value(device, "force_resolution", _NOT_NEGATIVE) or 0),
     )
 
 
 # √3, rounded up: a step along each of three axes at once.
-_AXES = Fraction(17320508075688773, 10**16)
+_SQRT_3 = Fraction(17320508075688773, 10**16)
 
 
-def _wall_test(device: Device) -> WallTest | None:
-    """Return what is known of the smooth wall; checked, since a device may be built by hand."""
-    _fraction(device, "max_stiffness", _POSITIVE)
+def _checked_wall_test(device: Device) -> WallTest | None:
+    """Return the test of the smooth wall, checked, since a device may be built by hand."""
+    _exact_value(device, "max_stiffness", _POSITIVE)
     test = device.wall_test
     for name in ("cycled", "update_rate", "lightest"):
         value = None if test is None else getattr(test, name)
         if value is not None:
-            positive(f"device.max_stiffness.{name}", value)
+            check_positive(f"device.max_stiffness.{name}", value)
     return test
 
 
@@ -188,68 +188,68 @@ _NOT_NEGATIVE = ("must not be negative", 0.0)
 _FINITE = ("must be finite", -math.inf)
 
 
-def _fraction(device: Device, field: str, rule: tuple[str, float]) -> Fraction | None:
-    """Return a number of the device, exactly; checked, since a device may be built by hand."""
+def _exact_value(device: Device, field: str, requirement: tuple[str, float]) -> Fraction | None:
+    """Return exact device data, checked, since a device may be built by hand."""
     value = device.value(field)
     if value is None:
         return None
-    words, least = rule
+    words, least = requirement
     unit = device.data[field].unit
     if value < least or not math.isfinite(value):
         raise ParameterError(f"device.{field}", f"{words}, and finite [{unit}]", value)
-    return Fraction(real(f"device.{field}", value, unit))
+    return Fraction(check_real(f"device.{field}", value, unit))
 
 
-def _obstacle(surface: Surface, q: Bound) -> tuple[Obstacle | None, str]:
-    """Return why the law's potential gives no bound, if so, and what is said of that.
+def _find_obstacle(surface: Surface, q: Bound) -> tuple[Obstacle | None, str]:
+    """Return why the law's potential gives no bound, if so, and the reason in words.
 
     The rules need U(p + Δ) <= U(p) + ∇U · Δ + q⁺|Δ|²/2. The Jacobian proves that where the force
-    is continuous. A jump can break it, but not where a theorem says that U is an infimum.
+    is continuous. A jump can violate it, except where U is an infimum by theorem.
     """
     if not surface.facts.conservative:
         return Obstacle.CURL, surface.facts.reason
-    if theorem_of(surface.law).infimum:
+    if theorem_of(surface.law).is_infimum:
         return None, ""
     smooth = continuity(surface, q)
     return (None, "") if smooth.continuous else (Obstacle.JUMPS, smooth.reason)
 
 
-def contradictory(loop: Loop) -> bool:
-    """Return whether damping and delay prove a wall passive that cycled: one of them is wrong."""
-    if loop.cycled is None or loop.loss is None or loop.delay is None:
+def is_contradictory(loop: DeviceLoop) -> bool:
+    """Return whether damping and delay prove a wall passive that cycled: the data contradict."""
+    if loop.cycling_stiffness is None or loop.damping_gain is None or loop.delay is None:
         return False
-    return loop.loss >= loop.cycled * (loop.delay + HALF)
+    return loop.damping_gain >= loop.cycling_stiffness * (loop.delay + HALF)
 
 
-def greatest_delay(loop: Loop) -> int | None:
+def max_proved_delay(loop: DeviceLoop) -> int | None:
     """Return the greatest d for which the delay rule is proved at this stiffness.
 
-    ``None`` if not even d = 0 is, if it cannot be decided, or if q is 0 and any d will do.
+    ``None`` if not even d = 0 is proved, if it cannot be decided, or if q is 0 and d is unlimited.
     """
-    if loop.loss is None or loop.obstacle:
+    if loop.damping_gain is None or loop.obstacle:
         return None
-    rest = (loop.loss - abs(loop.damper)) / loop.stiffness
-    half = loop.number(HALF, Fraction(0), "upper")
+    rest = (loop.damping_gain - abs(loop.virtual_damping_gain)) / loop.stiffness
+    half = loop.weighted_gain(HALF, Fraction(0), "upper")
     if half == math.inf or rest < half:
         return None
-    q = loop.number(Fraction(0), Fraction(1), "upper")
+    q = loop.weighted_gain(Fraction(0), Fraction(1), "upper")
     if q == math.inf:
         return 0
     return math.floor((rest - Fraction(half)) / Fraction(q)) if q > 0 else None
 
 
-def leaks(loop: Loop) -> bool:
+def has_known_leak(loop: DeviceLoop) -> bool:
     """Return whether a loop that gains energy is known."""
     if loop.conservative or loop.leak is None:
         return False
     size = loop.surface.stiffness * loop.surface.max_depth * loop.leak.line.length
-    return loop.leak.energy > _ROUNDING * size
+    return loop.leak.energy > _LEAK_ROUNDING * size
 
 
-def critical_speed(loop: Loop) -> float | None:
+def critical_speed(loop: DeviceLoop) -> float | None:
     """Return v* = W/(σ₀ length) [m/s], 0 for a conservative law, ``None`` if unknown."""
     if loop.conservative:
         return 0.0
-    if loop.damping is None or loop.leak is None or not leaks(loop):
+    if loop.damping is None or loop.leak is None or not has_known_leak(loop):
         return None
-    return loop.leak.speed(float(loop.damping)) if loop.damping > 0 else math.inf
+    return loop.leak.critical_speed(float(loop.damping)) if loop.damping > 0 else math.inf

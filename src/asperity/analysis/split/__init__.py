@@ -1,1 +1,1 @@
-"""Law H beyond its force: its state, and its potential as a table."""
+"""Law H beyond its force: its state, and its baked potential field."""

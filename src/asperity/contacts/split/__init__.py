@@ -1,1 +1,1 @@
-"""The split god-object: the mean of several surface points that are about equally near."""
+"""The split god-object: the mean of several surface points at about equal distance."""

@@ -14,8 +14,8 @@ FACTS = {
     'conservative': False,
     'reason': 'the curl is not zero',
     'curl': ('hy*k', '-hx*k', '0'),
-    'begins_at_zero': True,
-    'looks_at_surface': False,
+    'vanishes_at_contact': True,
+    'depends_on_surface': False,
     'affine_in_depth': True,
     'conservative_clamps': (),
 }

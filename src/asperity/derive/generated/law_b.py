@@ -14,8 +14,8 @@ FACTS = {
     'conservative': False,
     'reason': 'the curl is not zero',
     'curl': ('-depth*k*(hx*hxy + hy*hyy)/(hx**2 + hy**2 + 1)**(3/2)', 'depth*k*(hx*hxx + hxy*hy)/(hx**2 + hy**2 + 1)**(3/2)', 'depth*k*(-hx**2*hxy + hx*hxx*hy - hx*hy*hyy + hxy*hy**2)/(hx**2 + hy**2 + 1)**(3/2)'),
-    'begins_at_zero': True,
-    'looks_at_surface': True,
+    'vanishes_at_contact': True,
+    'depends_on_surface': True,
     'affine_in_depth': True,
     'conservative_clamps': (),
 }

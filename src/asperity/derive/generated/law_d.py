@@ -16,8 +16,8 @@ FACTS = {
     'conservative': True,
     'reason': 'the curl is zero identically, its potential does not jump',
     'curl': ('0', '0', '0'),
-    'begins_at_zero': True,
-    'looks_at_surface': True,
+    'vanishes_at_contact': True,
+    'depends_on_surface': True,
     'affine_in_depth': False,
     'conservative_clamps': (),
 }

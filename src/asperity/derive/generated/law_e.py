@@ -3,8 +3,8 @@
 E, the god-object with a force along the wall's normal: f = k |p_h - p| e_z.
 
 Paper: (19) field, (20) Jacobian, (21) q = 1. Correction: the sign of (19) and (20) as printed
-pulls the probe inwards. The Jacobian is -k e_z nᵀ with n at the foot: norm exactly k, and f is
-k-Lipschitz even across the medial axis; not conservative.
+pulls the probe inwards. The Jacobian is -k e_z nᵀ with n at the closest point: norm exactly k,
+and f is k-Lipschitz even across the medial axis; not conservative.
 """
 
 import math
@@ -14,8 +14,8 @@ FACTS = {
     'conservative': False,
     'reason': 'the curl is not zero',
     'curl': ('hy*k/sqrt(hx**2 + hy**2 + 1)', '-hx*k/sqrt(hx**2 + hy**2 + 1)', '0'),
-    'begins_at_zero': True,
-    'looks_at_surface': False,
+    'vanishes_at_contact': True,
+    'depends_on_surface': False,
     'affine_in_depth': True,
     'conservative_clamps': (),
 }

@@ -19,17 +19,17 @@ FACTS = {
     'conservative': False,
     'reason': 'the force depends on the deflection of the anchor: it is no field of position',
     'curl': ('dy*friction*k*(h*modulation_depth - h_half - h_mid*modulation_depth)/(2*h_half*max_deflection)', 'dx*friction*k*(-h*modulation_depth + h_half + h_mid*modulation_depth)/(2*h_half*max_deflection)', 'depth*friction*k*modulation_depth*(-dx*hy + dy*hx)/(2*h_half*max_deflection)'),
-    'begins_at_zero': True,
-    'looks_at_surface': True,
+    'vanishes_at_contact': True,
+    'depends_on_surface': True,
     'affine_in_depth': True,
     'conservative_clamps': (),
 }
 
 
-def law_force(depth, h, dx, dy, k, h_mid, h_half, friction, max_deflection, modulation_depth):
+def law_force(depth, h, dx, dy, k, h_mid, h_half, param_friction, param_max_deflection, param_modulation_depth):
     """Force on the probe: fx, fy, fz [N]."""
     t0 = depth*k
-    t1 = friction*t0*(1/2 - 1/2*modulation_depth*(h - h_mid)/h_half)/max_deflection
+    t1 = param_friction*t0*(1/2 - 1/2*param_modulation_depth*(h - h_mid)/h_half)/param_max_deflection
     return (
         -dx*t1,
         -dy*t1,
@@ -37,12 +37,12 @@ def law_force(depth, h, dx, dy, k, h_mid, h_half, friction, max_deflection, modu
     )
 
 
-def law_jacobian(depth, h, hx, hy, dx, dy, sxx, sxy, syy, k, h_mid, h_half, friction, max_deflection, modulation_depth):
+def law_jacobian(depth, h, hx, hy, dx, dy, sxx, sxy, syy, k, h_mid, h_half, param_friction, param_max_deflection, param_modulation_depth):
     """Force [N] and Jacobian [N/m]: fx, fy, fz, then J row by row."""
-    t0 = modulation_depth/h_half
+    t0 = param_modulation_depth/h_half
     t1 = t0*(h - h_mid)
     t2 = depth*k
-    t3 = friction/max_deflection
+    t3 = param_friction/param_max_deflection
     t4 = t2*t3
     t5 = t4*(1/2 - 1/2*t1)
     t6 = dx*t0
@@ -67,12 +67,12 @@ def law_jacobian(depth, h, hx, hy, dx, dy, sxx, sxy, syy, k, h_mid, h_half, fric
     )
 
 
-def law_jacobian_saturated(depth, h, hx, hy, dx, dy, sxx, sxy, syy, k, h_mid, h_half, friction, max_deflection, modulation_depth):
+def law_jacobian_saturated(depth, h, hx, hy, dx, dy, sxx, sxy, syy, k, h_mid, h_half, param_friction, param_max_deflection, param_modulation_depth):
     """Jacobian [N/m], row by row, where a clamp holds the depth constant."""
-    t0 = modulation_depth/h_half
+    t0 = param_modulation_depth/h_half
     t1 = dx*t0
     t2 = -t0*(h - h_mid) + 1
-    t3 = (1/2)*depth*friction*k/max_deflection
+    t3 = (1/2)*depth*param_friction*k/param_max_deflection
     t4 = -sxy*t2
     t5 = dy*t0
     return (

@@ -20,8 +20,8 @@ FACTS = {
     'conservative': True,
     'reason': 'the curl is zero identically',
     'curl': ('0', '0', '0'),
-    'begins_at_zero': True,
-    'looks_at_surface': False,
+    'vanishes_at_contact': True,
+    'depends_on_surface': False,
     'affine_in_depth': True,
     'conservative_clamps': (),
 }

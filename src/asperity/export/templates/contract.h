@@ -1,26 +1,26 @@
 #define @NAME@_STIFFNESS @stiffness@ /* k [N/m] */
 #define @NAME@_MAX_DEPTH @max_depth@ /* [m] */
-#define @NAME@_Q_UPPER @q_upper@ /* the force changes by at most this times k per metre */
-#define @NAME@_LOOKS @looks@ /* evaluations of the surface that a search may take in a tick */
-#define @NAME@_CONTENT "@content@" /* of surface and law, as in recordings of asperity */
+#define @NAME@_Q_UPPER @q_upper@ /* upper bound of the change of force per metre, over k */
+#define @NAME@_MAX_EVALUATIONS @max_evaluations@ /* budget of surface evaluations per tick */
+#define @NAME@_CONTENT "@content@" /* digest of surface and law, as in recordings of asperity */
 
-/* Carried from call to call: the anchor of friction, and where the last search ended. */
+/* State between calls: the anchor of friction, and the warm start of the search. */
 typedef struct @name@_state {
     @real@ anchor[2]; /* [m] */
     @real@ memory[@memory@];
     int held;
 } @name@_state;
 
-/* Forget everything: before the first call, and when the loop was interrupted. */
+/* Reset the state before the first call and after an interruption of the loop. */
 @link@ void @name@_reset(@name@_state *state);
 
 /*
- * Write the force on the probe [N] at its position [m]; once in each tick of the loop.
- * Zero for a position that is not finite or farther than @far@ m from the origin.
+ * Compute the force on the probe [N] at its position [m], once per tick of the loop.
+ * The force is zero for a position that is not finite, or with a coordinate beyond @far@ m.
  */
 @link@ void @name@_force(@name@_state *state, const @real@ position[3], @real@ force[3]);
 
 /*
- * Return how far from certain the last force is [m]: @gap@
+ * Return the error bound of the last search [m]: @gap@
  */
 @link@ @real@ @name@_gap(const @name@_state *state);

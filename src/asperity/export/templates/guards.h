@@ -1,12 +1,12 @@
 #if defined(__FAST_MATH__)
-#error "compile without -ffast-math: the force would not be the one that was analysed"
+#error "compile without -ffast-math: the force would differ from the analyzed one"
 #endif
 #if (-1 >> 1) != -1
 #error "the shift of a negative integer must keep its sign"
 #endif
 /*
- * A product and a sum that are rounded once (FMA) would change the last bits. In ISO C (-std=c99)
- * gcc makes none unless told to; elsewhere it has to be kept from it, and then does not inline.
+ * Fused multiply-add would change the last bits. In ISO C (-std=c99) gcc does not use it by
+ * default; elsewhere it is disabled, which prevents inlining.
  */
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
@@ -17,11 +17,11 @@
 #elif defined(_MSC_VER)
 #pragma fp_contract (off)
 #endif
-/* gcc makes a branch of the smaller of a number and a known one: a parameter is read instead. */
+/* gcc compiles a minimum with a known constant to a branch: the constant is read from memory. */
 #define @NAME@_READ(number) (*(const volatile @real@ *)&(number))
 /*
- * Small functions: a call would cost more than they do. And where a probe touches nothing is rare:
- * what is needed in contact shall not wait for it.
+ * Small functions are inlined. The branch without contact is marked as unlikely, since the time in
+ * contact matters.
  */
 #if defined(__GNUC__) && defined(__OPTIMIZE__) && !defined(__OPTIMIZE_SIZE__)
 #define @NAME@_INLINE static inline __attribute__((always_inline))

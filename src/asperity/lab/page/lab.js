@@ -1,21 +1,21 @@
-// The page: what is heard from the lab is shown, and what is done here is said to it.
+// The page: what is acknowledged from the lab is shown, and what is done here is said to it.
 
-import { Ledger } from "./gauge.js";
-import { Hand } from "./hand.js";
-import { Handle } from "./handle.js";
+import { Ledger } from "./tactile_metrics.js";
+import { Hand } from "./pointer_hand.js";
+import { Handle } from "./device_handle.js";
 import { Latency } from "./latency.js";
-import { fromSlider, showLimit, toSlider } from "./limit.js";
-import { Line } from "./line.js";
-import { download, pngOf, svgOf } from "./picture.js";
-import { readTheme } from "./sheet.js";
+import { fromSlider, showLimit, toSlider } from "./stiffness_slider.js";
+import { Line } from "./connection.js";
+import { download, pngOf, svgOf } from "./image_export.js";
+import { readTheme } from "./canvas.js";
 import { Sound } from "./sound.js";
-import { Player } from "./takes.js";
-import { TakesPanel } from "./takespanel.js";
+import { Player } from "./player.js";
+import { TakesPanel } from "./clips_panel.js";
 import { Tour } from "./tour.js";
-import { TourPanel } from "./tourpanel.js";
+import { TourPanel } from "./tour_panel.js";
 import { Spectrum, Traces } from "./traces.js";
 import { Cut, Relief, isRelief } from "./views.js";
-import { millimetres, quantity } from "./words.js";
+import { millimetres, quantity } from "./format.js";
 
 const $ = id => document.getElementById(id);
 const NUMBERS = ["delay", "hand_stiffness", "hand_damping", "magnify", "magnify_height"]; // fields that say them as they are
@@ -47,7 +47,7 @@ const line = new Line({
   news(said) {
     const before = news;
     news = said;
-    if (said.steers && !before?.steers) hand.sent = said.wishes;
+    if (said.steers && !before?.steers) hand.sent = said.requested;
     if (before?.starts !== said.starts) traces.clear();
     if (before?.starts !== said.starts || before?.settings.law !== said.settings.law) ledger.clear();
     if (!before && !frame) [hand.x, hand.y] = centre = [...said.middle];
@@ -80,13 +80,13 @@ const line = new Line({
     asked = {};
     $("state").className = "stopped";
     $("state").textContent = "connection lost";
-    alarm(`${reason ? `The lab has closed the connection: ${reason}.` : "The connection to the lab is lost. Is asperity lab still running?"}${goes} Trying again …`);
+    alarm(`${reason ? `The server closed the connection: ${reason}.` : "Connection lost. Is asperity lab still running?"}${goes} Reconnecting …`);
   },
 });
 
 const hand = new Hand((what, content) => {
   const said = Boolean(news?.steers && !news.handle) && line.say(what, content);
-  if (said) latency.wish(hand.sent + 1, hand.since);
+  if (said) latency.request(hand.sent + 1, hand.since);
   return said;
 });
 
@@ -101,7 +101,7 @@ const player = new Player({
   },
 });
 const takes = new TakesPanel({
-  player, change(wishes) { line.say("change", { wishes }); }, save() { line.say("save"); },
+  player, change(changes) { line.say("change", { changes }); }, save() { line.say("save"); },
   get columns() { return line.layout.columns; }, get version() { return news?.version; },
 });
 
@@ -122,7 +122,7 @@ function fill(select, pairs, chosen) {
 }
 
 /** Ask for something else; behind a recording is what it was felt on, and nothing else. */
-function change(wishes) { takes.close(); line.say("change", { wishes }); }
+function change(changes) { takes.close(); line.say("change", { changes }); }
 
 function alarm(words) {
   $("alarm").hidden = !words;
@@ -141,7 +141,7 @@ function show() {
   $("state").textContent = { running: `law ${settings.law} at ${news.rate.toFixed(0)} Hz`, stopped: "stopped",
     starting: "starting", changing: "changing" }[state];
   const told = state === "stopped" ? `The loop has stopped: ${words}` : !steers
-    ? "Another page steers; this one watches." : words || news.pictures;
+    ? "Another page has control; this page is read-only." : words || news.pictures;
   alarm(told);
   handle.show(news);
   $("take").hidden = !free || steers;
@@ -187,11 +187,11 @@ function put(name, value) {
 }
 
 function fromAddress() {
-  const wishes = {};
+  const changes = {};
   for (const [name, text] of new URLSearchParams(location.hash.slice(1))) {
-    if (name in news.settings || laws.some(law => law.parameters.some(one => one.name === name))) wishes[name] = ["law", "texture", "device"].includes(name) ? text : Number(text);
+    if (name in news.settings || laws.some(law => law.parameters.some(one => one.name === name))) changes[name] = ["law", "texture", "device"].includes(name) ? text : Number(text);
   }
-  if (Object.keys(wishes).length && Object.values(wishes).every(value => value === value)) change(wishes);
+  if (Object.keys(changes).length && Object.values(changes).every(value => value === value)) change(changes);
 }
 
 function toAddress(settings) {
@@ -257,7 +257,7 @@ function paint(time) {
   relief.draw(state);
   cut.draw(state, boxes());
   if (due("traces", time, 60)) traces.draw(ledger.base);
-  latency.paints(frame?.heard ?? 0);
+  latency.paints(frame?.acknowledged ?? 0);
   if (due("look", time, 200)) look(state);
   if (state && due("words", time, 150)) tell(state);
 }
@@ -275,15 +275,15 @@ function tell(state) {
   $("verdict").textContent = ledger.words;
   const [f, amplitude] = spectrum.draw(rate());
   $("peak").textContent = amplitude > 1e-3 ? `strongest ${quantity(f, "Hz")}, ${quantity(amplitude, "N")}` : "quiet";
-  $("trace-note").textContent = `${frame.late} samples late, ${frame.skipped} left out`;
+  $("trace-note").textContent = `${frame.late} late samples, ${frame.skipped} skipped`;
   const size = Math.hypot(...force), place = probe.map(millimetres).join(", ");
   $("readout").textContent = `probe ${place} mm · force ${quantity(size, "N")} · time ${frame.newest[0].toFixed(1)} s`;
   $("relief-note").textContent = `heights × ${(relief.exaggeration ?? 1).toPrecision(2)} · ${handle.there ? "the handle is the hand" : "hold down to press"}`;
   const curl = cut.most > 1e-6 * (cut.strongest ?? 1) ? `curl up to ${quantity(cut.most, "N/m")}` : "no curl: no loop feeds the hand";
-  $("cut-note").textContent = cut.box ? `${curl} · wheel: zoom` : "being computed …";
+  $("cut-note").textContent = cut.box ? `${curl} · wheel: zoom` : "computing …";
   const words = `Probe at ${place} millimetres, force ${quantity(size, "N")}${state.inside ? ", in contact" : ""}`;
   $("relief").setAttribute("aria-label", `The surface in relief. ${words}`);
-  $("cut").setAttribute("aria-label", `A cut through the surface along x. ${words}. ${curl}`);
+  $("cut").setAttribute("aria-label", `Section through the surface along x. ${words}. ${curl}`);
   $("traces").setAttribute("aria-label", `Traces of five seconds. Energy given to the hand ${quantity(energy, "J")}`);
   $("spectrum").setAttribute("aria-label", `Spectrum of the normal force: ${$("peak").textContent}`);
 }
@@ -306,20 +306,20 @@ for (const [canvas, move] of [
     hand.pressed = event.buttons > 0;
     hand.force = event.pointerType === "pen" ? 2 * event.pressure : 1;
     move(event);
-    hand.wish(event.timeStamp);
+    hand.request(event.timeStamp);
   };
   canvas.onpointerdown = event => { canvas.setPointerCapture(event.pointerId); follow(event); };
   canvas.onpointermove = canvas.onpointerup = follow;
   // Said at once, where a browser says it; "moved" waits for the next picture.
   canvas.addEventListener("pointerrawupdate", follow);
-  canvas.onpointercancel = () => { hand.pressed = false; hand.wish(); };
+  canvas.onpointercancel = () => { hand.pressed = false; hand.request(); };
   canvas.addEventListener("wheel", event => { event.preventDefault(); zoom(1.15 ** Math.sign(event.deltaY)); }, { passive: false });
 }
 
 $("stiffness").oninput = event => { $("stiffness-value").textContent = quantity(fromSlider(event.target.value), "N/m"); };
 $("stiffness").onchange = event => change({ stiffness: fromSlider(event.target.value) });
-$("press").oninput = event => { hand.press = 1e-3 * event.target.value; hand.wish(); };
-$("motion").onchange = event => { hand.motion = event.target.value; hand.wish(); };
+$("press").oninput = event => { hand.press = 1e-3 * event.target.value; hand.request(); };
+$("motion").onchange = event => { hand.motion = event.target.value; hand.request(); };
 $("texture").onchange = event => change({ texture: event.target.value });
 $("device").onchange = event => change({ device: event.target.value });
 $("max_depth").onchange = event => change({ max_depth: 1e-3 * event.target.value });
@@ -348,9 +348,9 @@ $("drawing").onclick = () => download(new Blob([svgOf(views)], { type: "image/sv
 
 const MOVES = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const KEYS = {
-  " ": () => { hand.z = null; hand.force = 1; hand.latched = !hand.latched; hand.wish(); },
-  PageUp: () => { hand.z = Math.min(hand.height + span / 80, 0.01); hand.wish(); },
-  PageDown: () => { hand.z = Math.max(hand.height - span / 80, -0.01); hand.wish(); },
+  " ": () => { hand.z = null; hand.force = 1; hand.latched = !hand.latched; hand.request(); },
+  PageUp: () => { hand.z = Math.min(hand.height + span / 80, 0.01); hand.request(); },
+  PageDown: () => { hand.z = Math.max(hand.height - span / 80, -0.01); hand.request(); },
   m: () => hand.next(),
   x: () => $("swap").click(), r: () => ledger.clear(), s: () => $("sound").click(),
   k: () => handle.there || $("save").click(), j: () => player.on && $("play").click(), l: () => player.on && $("live").click(),
@@ -368,7 +368,7 @@ addEventListener("keydown", event => {
   if (arrow && !ranged) {
     hand.x += arrow[0] * span / 60;
     hand.y += arrow[1] * span / 60;
-    hand.wish();
+    hand.request();
   } else if (KEYS[key] && !pressing && !(ranged && key.startsWith("Page"))) KEYS[key]();
   else if (letter) { if (news?.steers) letter.click(); } else return;
   event.preventDefault();

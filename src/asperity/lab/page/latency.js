@@ -4,24 +4,24 @@ const MOST = 5000; // that are kept
 
 export class Latency {
   constructor() {
-    this.waits = []; // wishes: number, and since when [ms]
+    this.waits = []; // changes: number, and since when [ms]
     this.all = []; // [ms]
-    this.shown = 0; // the newest wish that the last picture follows
+    this.shown = 0; // the newest request that the last picture follows
     // A task after the picture says that the browser has done with it, or the next picture does: while a pointer
     // moves tasks may wait for longer.
     this.after = new MessageChannel();
     this.after.port2.onmessage = () => this.painted();
   }
 
-  wish(number, since) {
+  request(number, since) {
     this.waits.push([number, since]);
     if (this.waits.length > MOST) this.waits.shift();
   }
 
-  /** Hear that a picture is being painted which follows a wish. */
-  paints(wish) {
-    this.shown = wish;
-    if (this.waits[0]?.[0] <= wish) this.after.port1.postMessage(0);
+  /** Hear that a picture is being painted which follows a request. */
+  paints(request) {
+    this.shown = request;
+    if (this.waits[0]?.[0] <= request) this.after.port1.postMessage(0);
   }
 
   /** Hear that the browser has done with the last picture. */

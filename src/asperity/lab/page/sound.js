@@ -13,7 +13,7 @@ export class Sound {
   async toggle() {
     if (!this.context) {
       this.context = new AudioContext();
-      await this.context.audioWorklet.addModule("ear.js");
+      await this.context.audioWorklet.addModule("force_audio_processor.js");
       this.ear = new AudioWorkletNode(this.context, "ear", { numberOfInputs: 0, outputChannelCount: [2] });
       this.gain = this.context.createGain();
       this.ear.connect(this.gain).connect(this.context.destination);

@@ -1,7 +1,7 @@
-// The guided tour: six steps, each of which finds by itself that what it tells of has happened.
+// The guided tour: six steps, each of which finds by itself that its effect has occurred.
 
-import { BUZZ, Gauge } from "./gauge.js";
-import { quantity } from "./words.js";
+import { BUZZ, Gauge } from "./tactile_metrics.js";
+import { quantity } from "./format.js";
 
 const STAGE = { // of all steps: the same hand holds the same surface on the same device
   texture: "sinusoid:amplitude=0.4mm,period=2mm", device: "omega.3", delay: 1, max_depth: 8e-4,
@@ -33,12 +33,12 @@ const at = (value, goal, unit) => `${quantity(value, unit)} of ${quantity(goal, 
 
 // What an act asks for, and what of it is seen: words, how much of it is done, and whether it has happened.
 const quiet = g => ({
-  words: `stroked ${at(g.gauge.way, STROKED, "m")}; the force swings by ${quantity(g.gauge.swing, "N")}`,
+  words: `stroked ${at(g.gauge.way, STROKED, "m")}; the force varies by ${quantity(g.gauge.swing, "N")}`,
   share: g.gauge.way / STROKED,
   done: g.gauge.way >= STROKED && g.gauge.swing < BUZZ && !g.gauge.clicks && !g.ledger.fed && below(g),
 });
 const unfed = g => ({
-  words: `given ${quantity(g.ledger.energy, "J")}; at most ${quantity(g.ledger.sampled, "J")} by sampling; way ${at(g.gauge.way, LOOPED, "m")}`,
+  words: `given ${quantity(g.ledger.energy, "J")}; at most ${quantity(g.ledger.sampled, "J")} by sampling; path ${at(g.gauge.way, LOOPED, "m")}`,
   share: g.gauge.way / LOOPED, done: g.landed && g.gauge.way >= LOOPED && !g.ledger.fed && g.gauge.free,
 });
 const fed = g => ({
@@ -46,7 +46,7 @@ const fed = g => ({
   share: g.ledger.energy / GIVEN, done: g.landed && g.ledger.fed && g.ledger.energy >= GIVEN,
 });
 const buzzes = g => ({
-  words: `the hand ${g.gauge.still ? "holds still" : "moves"}; the force swings by ${at(g.gauge.swing, BUZZ, "N")}`,
+  words: `the hand ${g.gauge.still ? "holds still" : "moves"}; the force varies by ${at(g.gauge.swing, BUZZ, "N")}`,
   share: g.gauge.still ? g.gauge.swing / BUZZ : 0, done: g.gauge.still > 1 && g.gauge.swing > BUZZ && above(g),
 });
 const clicks = g => ({
@@ -69,39 +69,39 @@ const soft = g => ({
 export const STEPS = [
   {
     title: "W is quiet", watch: "The traces: a flat force. The energy: not fed.",
-    why: "The smooth wall is the measure of all. It pushes straight up, as hard as the probe is deep: there is no texture, and no buzz.",
-    found: "The wall was stroked, and the force did not swing. Quiet, and dull.",
-    acts: [{ law: "W", stiffness: 1500, ask: "Stroke the wall: hold the pointer down on the surface and move it to and fro.", show: stroke, judge: quiet }],
+    why: "The smooth wall is the reference. It pushes straight up, in proportion to the depth of the probe: no texture, and no buzz.",
+    found: "The wall was stroked, and the force did not oscillate.",
+    acts: [{ law: "W", stiffness: 1500, ask: "Stroke the wall: hold the pointer down on the surface and move it back and forth.", show: stroke, judge: quiet }],
   }, {
-    title: "A feels alive", watch: "The energy that the hand was given: it climbs with every loop, and turns red.",
-    why: "Law A pushes straight up by the depth below the groove, without pushing sideways. Such a field has curl: who goes down on one flank and up on the other gets more work than he puts in.",
-    found: "The field has fed the hand, by more than sampling and steps explain. A body that gives energy feels alive.",
-    acts: [{ law: "A", stiffness: 1500, ask: "Go round in small loops on a slope: in the cut, move the pointer right, down, left and up again.", show: loop, judge: fed }],
+    title: "A feels alive", watch: "The energy given to the hand: it grows with every loop, and turns red.",
+    why: "Law A pushes straight up by the depth below the groove, without pushing sideways. Such a field has curl: a probe that moves down on one flank and up on the other gains energy.",
+    found: "The field has fed the hand, by more than sampling and quantisation explain. A surface that supplies energy feels alive.",
+    acts: [{ law: "A", stiffness: 1500, ask: "Move in small loops on a slope: in the section, move the pointer right, down, left and up again.", show: loop, judge: fed }],
   }, {
-    title: "B buzzes above its limit", watch: "The mark at the stiffness, and the band in the force: it swings while the hand holds still.",
-    why: ({ B, W }) => `Law B turns the force into the surface's normal. On a curved surface that makes it stiffer sideways than it is set: its limit is ${!B ? "below the wall's" : `${quantity(B, "N/m")}${W ? `, ${percent(B, W)} of the wall's` : ""}`}, and here it is set to ${quantity(BUZZING, "N/m")}${B ? `, ${times(BUZZING, B)} times that` : ""}.`,
-    found: "The hand holds still, and the force swings by itself: a buzz.",
+    title: "B buzzes above its limit", watch: "The mark at the stiffness, and the band of the force: it oscillates while the hand is still.",
+    why: ({ B, W }) => `Law B rotates the force to the surface normal. On a curved surface its lateral stiffness exceeds the nominal one: its limit is ${!B ? "below the wall's" : `${quantity(B, "N/m")}${W ? `, ${percent(B, W)} of the wall's` : ""}`}, and here it is set to ${quantity(BUZZING, "N/m")}${B ? `, ${times(BUZZING, B)} times that` : ""}.`,
+    found: "The hand is still, and the force oscillates: a buzz.",
     acts: [{ law: "B", stiffness: BUZZING, ask: "Press on a slope, and hold still.", show: pressFlank, judge: buzzes }],
   }, {
-    title: "D clicks", watch: "The dot, the nearest point: it leaps from one flank to the other. The sideways force leaps with it.",
-    why: "Law D, the god-object, pulls to the nearest point of the surface. Below a crest two points are equally near, and a step to the side exchanges one for the other.",
-    found: "In a single sample the force has jumped by more than any stiffness explains: a click at each crest.",
+    title: "D clicks", watch: "The dot, the closest point: it jumps from one flank to the other, and the lateral force with it.",
+    why: "Law D, the god-object, pulls to the closest point of the surface. Below a crest two points are equally close, and a lateral step switches between them.",
+    found: "Within one sample the force jumped by more than the stiffness explains: a click at each crest.",
     acts: [{ law: "D", stiffness: 1000, ask: "Press deep, and stroke across the crests.", show: stroke, judge: clicks }],
   }, {
-    title: "C is soft", watch: "The cut: how deep the same push sinks.",
-    why: ({ C, W }) => `Law C has no curl and no jumps. But it gets steep where the surface is curved, and its limit is ${C && W ? `${quantity(C, "N/m")}, ${percent(C, W)} of the wall's` : "below the wall's"}: within it, it is soft.`,
-    found: seen => `Near its limit, law C yields ${seen} times as far as the wall.`,
+    title: "C is soft", watch: "The section: the depth reached with the same push.",
+    why: ({ C, W }) => `Law C has no curl and no jumps. But it stiffens where the surface is curved, and its limit is ${C && W ? `${quantity(C, "N/m")}, ${percent(C, W)} of the wall's` : "below the wall's"}: below that limit it is soft.`,
+    found: seen => `Near its limit, law C yields ${seen} times as much as the wall.`,
     acts: [
       { law: "W", stiffness: 4500, plane: true, ask: "First the wall, near its limit: press, and hold still.", show: press, judge: firm },
       { law: "C", stiffness: 1350, ask: "Now law C, near its own limit: press in a trough, and hold still.", show: press, judge: soft },
     ],
   }, {
-    title: "H does none of it", watch: "All of it: no energy, no click, no buzz, and the wall's stiffness.",
-    why: "Law H splits the god-object: between two points that are equally near it pulls to a place between them. No curl, no jump, and its limit is the wall's own.",
-    found: "As stiff as the wall, it did not feed, did not click and did not buzz.",
+    title: "H avoids all of these", watch: "No energy, no click, no buzz, and the stiffness of the wall.",
+    why: "Law H splits the god-object: between two equally close points it pulls to a point between them. No curl, no jump, and the limit of the wall.",
+    found: "As stiff as the wall, without energy gain, clicks or buzz.",
     acts: [
       { law: "H", stiffness: 4500, also: SPLIT, ask: "Press in a trough, and hold still: it is as stiff as the wall, and does not buzz.", show: press, judge: firm },
-      { law: "H", stiffness: 1500, also: SPLIT, ask: "Go round in loops on a slope, as with law A.", show: loop, judge: unfed },
+      { law: "H", stiffness: 1500, also: SPLIT, ask: "Move in loops on a slope, as with law A.", show: loop, judge: unfed },
       { law: "H", stiffness: 1500, also: SPLIT, ask: "Stroke deep across the crests, as with law D.", show: stroke, judge: unclicked },
     ],
   },
@@ -111,7 +111,7 @@ export const STEPS = [
 const said = (words, seen) => (typeof words === "function" ? words(seen) : words);
 
 export class Tour {
-  /** @param host object with change(wishes), hand, ledger, news and span, the width of what is seen */
+  /** @param host object with change(changes), hand, ledger, news and span, the width of what is seen */
   constructor(host) {
     this.host = host;
     this.gauge = new Gauge();
@@ -119,7 +119,7 @@ export class Tour {
     this.shows = false;
     this.seen = STEPS.map(() => false);
     this.before = null;
-    this.limits = {}; // of laws on this stage, as they were heard [N/m]
+    this.limits = {}; // of laws on this stage, as received [N/m]
   }
 
   get on() { return this.step >= 0; }
@@ -172,7 +172,7 @@ export class Tour {
     this.host.change({ ...Object.fromEntries(others), law, stiffness });
     this.host.hand.motion = "pointer";
     this.host.hand.latched = false;
-    this.host.hand.wish();
+    this.host.hand.request();
     this.gauge.begin();
     this.host.ledger.clear();
     this.free = this.landed = false;
@@ -181,7 +181,7 @@ export class Tour {
   /** Let the hand move by itself, or no more. */
   show(on = !this.shows) {
     this.shows = on && this.on;
-    if (this.on && !on) { this.host.hand.latched = false; this.host.hand.motion = "pointer"; this.host.hand.wish(); }
+    if (this.on && !on) { this.host.hand.latched = false; this.host.hand.motion = "pointer"; this.host.hand.request(); }
     this.shown = false;
   }
 

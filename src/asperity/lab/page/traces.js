@@ -1,7 +1,7 @@
 // What happened in the last seconds: bands from the least to the greatest of each frame, and a spectrum.
 
-import { Sheet, colours } from "./sheet.js";
-import { quantity } from "./words.js";
+import { Sheet, colours } from "./canvas.js";
+import { quantity } from "./format.js";
 
 const SECONDS = 5, BINS = 400; // of time: what a band is wide
 const STRIPS = [

@@ -1,9 +1,9 @@
 // The surface in relief, and a cut under the probe with field and curl behind it.
 
-import { Marker } from "./marker.js";
-import { corners, paintRelief } from "./relief.js";
-import { Sheet, channels, colours } from "./sheet.js";
-import { quantity, roundStep } from "./words.js";
+import { Marker } from "./probe_overlay.js";
+import { corners, paintRelief } from "./relief_renderer.js";
+import { Sheet, channels, colours } from "./canvas.js";
+import { quantity, roundStep } from "./format.js";
 
 const RELIEF = 2;
 

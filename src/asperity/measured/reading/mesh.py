@@ -1,7 +1,4 @@
-"""Read STL and OBJ meshes as a height field over their best plane.
-
-The plane that a mesh patch lies over, and the axes in it.
-"""
+"""Read STL and OBJ meshes as a height field over their least-squares plane."""
 
 from __future__ import annotations
 
@@ -15,216 +12,198 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import ParameterError, SurfaceFileError
-from asperity.measured.reading.child import in_child
-from asperity.measured.reading.mesh_raster import Grid, rasterise
-from asperity.measured.reading.quiet import guarded
-from asperity.measured.reading.raw import RawSurface
-from asperity.measured.reading.reader import Reader, ReadingOptions, SurfaceFile, naming
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError, SurfaceFileError
+from asperity.measured.reading.isolation import reject_on_error
+from asperity.measured.reading.mesh_raster import RasterGrid, rasterise
+from asperity.measured.reading.raw_surface import RawSurface
+from asperity.measured.reading.reader import ReadingOptions, SurfaceFile
 
 _STL_HEADER, _STL_RECORD = 84, 50
 _STL_TEXT = re.compile(rb"\s*solid\b[^\n]*\n\s*(facet\s+normal\b|endsolid\b)", re.IGNORECASE)
 _OBJ_LINE = re.compile(rb"(#|v |vn |vt |vp |f |o |g |s |l |mtllib |usemtl |o$|g$)")
 _OBJ_VERTEX = re.compile(rb"^v[ \t]+[-+.0-9]", re.MULTILINE)
 _OBJ_FACE = re.compile(rb"^f[ \t]+-?[0-9]", re.MULTILINE)
-_LONGEST = 1.0  # [m]; a texture that one touches is rather smaller
+_MAX_EXPECTED_LENGTH = 1.0  # [m]; a longer patch has probably another unit
 _OBJ_FACE_LINE = re.compile(rb"^f[ \t]+([^\r\n]*)", re.MULTILINE)
-_OBJ_ZERO = re.compile(rb"[+-]?0+(/|$)")  # corners are counted from 1, or from -1 backwards
-_CLOSED = 0.25  # share of overhanging area from which a mesh looks like a whole body
+_OBJ_ZERO = re.compile(rb"[+-]?0+(/|$)")  # indices of corners start at 1, or at -1 backwards
+_CLOSED_BODY_FRACTION = 0.25  # share of overhanging area that suggests a closed body
 
 
-def mesh_kind(content: bytes) -> str | None:
-    r"""Return "STL" or "OBJ" where the content is one, else None.
+def is_binary_stl(file: SurfaceFile) -> bool:
+    """Whether the number of triangles in the header of a file matches its size."""
+    if len(file.head) < _STL_HEADER + _STL_RECORD:
+        return False
+    (count,) = struct.unpack_from("<I", file.head, 80)
+    return bool(file.path.stat().st_size == _STL_HEADER + _STL_RECORD * count)
 
-    Args:
-        content: the bytes of the file.
 
-    Example:
-        >>> mesh_kind(b"solid x\nfacet normal 0 0 1\n"), mesh_kind(b"v 1 2 3\nf 1 1 1\n")
-        ('STL', 'OBJ')
-        >>> mesh_kind(b"1 2 3\n")
-    """
-    if _STL_TEXT.match(content[:4096]) or _is_binary_stl(content):
-        return "STL"
+def is_text_stl(file: SurfaceFile) -> bool:
+    """Whether a file starts as an STL in text."""
+    return _STL_TEXT.match(file.head) is not None
+
+
+def is_obj(file: SurfaceFile) -> bool:
+    """Whether a file starts as an OBJ, and has vertices and faces."""
+    content = file.content
     lines = (line.strip() for line in content[:65536].splitlines())
     first = next((line for line in lines if line and not line.startswith(b"#")), b"")
-    if _OBJ_LINE.match(first) and _OBJ_VERTEX.search(content) and _OBJ_FACE.search(content):
-        return "OBJ"
-    return None
+    is_start = _OBJ_LINE.match(first) is not None
+    return is_start and bool(_OBJ_VERTEX.search(content) and _OBJ_FACE.search(content))
 
 
-def _is_binary_stl(content: bytes) -> bool:
-    """A binary STL has no magic: its number of triangles gives its size."""
-    if len(content) < _STL_HEADER + _STL_RECORD:
-        return False
-    (count,) = struct.unpack_from("<I", content, 80)
-    return bool(len(content) == _STL_HEADER + _STL_RECORD * count)
+def read_mesh(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
+    """Read a mesh; trimesh parses text.
 
+    Heights [m] are over the least-squares plane of the patch, on a grid whose pitch is about the
+    median edge; NaN at holes.
 
-def mesh_reader(kind: str) -> Reader:
-    """Return the reader of "STL" or "OBJ".
-
-    Heights [m] are over the patch's least-squares plane, on a grid whose pitch is about the median
-    edge; NaN at holes. A unit is required, which neither format has. What is damaged, overhanging
-    or folded is refused.
+    Raises:
+        ParameterError: no unit is given; neither format has one.
+        SurfaceFileError: the mesh is damaged, overhanging or folded.
     """
-
-    def read(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
-        if options.metres is None:
-            raise ParameterError(
-                "unit",
-                f"is required: {file.name} is an {kind} file, which has no unit; say what its"
-                " coordinates are in, such as 'mm'",
-            )
-        binary = kind == "STL" and _is_binary_stl(file.content)
-        return (_read_binary if binary else read_mesh_text)(file, options)
-
-    return Reader(f"an {kind} mesh", lambda file: mesh_kind(file.content) == kind, read, ("unit",))
-
-
-@naming
-def _read_binary(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
-    return _surface(_binary_stl(file.content) * (options.metres or 1.0), file.name)
-
-
-@in_child
-@naming
-def read_mesh_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
-    """Read an OBJ or an STL in text, which trimesh parses."""
+    mesh_format = "STL" if is_binary_stl(file) or is_text_stl(file) else "OBJ"
+    unit = options.metres_per_unit
+    if unit is None:
+        raise ParameterError(
+            "unit",
+            f"is required: {file.name} is an {mesh_format} file, which has no unit; say what its"
+            " coordinates are in, such as 'mm'",
+        )
     content = file.content
-    triangles = _parsed(content, mesh_kind(content) or "STL")
-    return _surface(_finite(triangles) * (options.metres or 1.0), file.name)
-
-
-def _binary_stl(content: bytes) -> NDArray[np.float64]:
-    """Return the corners of the triangles, shape (n, 3, 3); the normals in the file are ignored."""
-    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
-    return _finite(np.frombuffer(content, record, offset=_STL_HEADER)["corners"])
-
-
-def _finite(triangles: NDArray[Any]) -> NDArray[np.float64]:
-    with np.errstate(invalid="ignore"):  # what is no number is refused below
-        corners = triangles.astype(np.float64)
+    if is_binary_stl(file):
+        corners = _parse_binary_stl(content)
+    else:
+        corners = _parse_text_mesh(content, mesh_format)
+    with np.errstate(invalid="ignore"):  # refused below
+        corners = corners.astype(np.float64)
     if not np.isfinite(corners).all():
         raise SurfaceFileError("has corners that are not finite numbers")
-    return corners
+    return _to_surface(corners * unit, file.name)
 
 
-def _parsed(content: bytes, kind: str) -> NDArray[np.float64]:
+def _parse_binary_stl(content: bytes) -> NDArray[Any]:
+    """Return the corners of the triangles, shape (n, 3, 3); the normals in the file are ignored."""
+    record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+    return np.frombuffer(content, record, offset=_STL_HEADER)["corners"]
+
+
+def _parse_text_mesh(content: bytes, mesh_format: str) -> FloatArray:
     import trimesh
 
-    options: dict[str, Any] = {"skip_materials": True} if kind == "OBJ" else {}
-    with guarded(f"damaged {kind} mesh", "trimesh"):
-        loaded: Any = trimesh.load(
-            io.BytesIO(content), file_type=kind.lower(), process=False, **options
-        )
+    options: dict[str, Any] = {"file_type": mesh_format.lower(), "process": False}
+    if mesh_format == "OBJ":
+        options["skip_materials"] = True
+    with reject_on_error(f"damaged {mesh_format} mesh"):
+        loaded: Any = trimesh.load(io.BytesIO(content), **options)
         meshes = [loaded] if isinstance(loaded, trimesh.Trimesh) else loaded.dump()
         parts = [np.asarray(part.triangles, dtype=np.float64) for part in meshes]
         triangles = np.concatenate(parts) if parts else np.empty((0, 3, 3))
     if triangles.ndim != 3 or triangles.shape[1:] != (3, 3):
-        raise SurfaceFileError(f"damaged {kind} mesh (its faces are no triangles)")
-    expected = _faces_of_obj(content) if kind == "OBJ" else content.lower().count(b"facet normal")
-    if len(triangles) != expected:  # trimesh leaves out what it does not understand
+        raise SurfaceFileError(f"damaged {mesh_format} mesh (its faces are no triangles)")
+    if mesh_format == "OBJ":
+        expected = _count_obj_triangles(content)
+    else:
+        expected = content.lower().count(b"facet normal")
+    if len(triangles) != expected:  # trimesh ignores faces that it cannot parse
         raise SurfaceFileError(
-            f"damaged or truncated {kind} mesh ({len(triangles)} of {expected} triangles are sound)"
+            f"damaged or truncated {mesh_format} mesh"
+            f" ({len(triangles)} of {expected} triangles are sound)"
         )
     return triangles
 
 
-def _faces_of_obj(content: bytes) -> int:
-    """Count the triangles that the faces of an OBJ ask for."""
+def _count_obj_triangles(content: bytes) -> int:
+    """Return the number of triangles in the faces of an OBJ."""
     count = 0
     for match in _OBJ_FACE_LINE.finditer(content.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")):
         corners = match.group(1).partition(b"#")[0].split()
         if len(corners) < 3 or any(_OBJ_ZERO.match(corner) for corner in corners):
-            raise SurfaceFileError(
-                f"damaged OBJ mesh (the face {match.group().decode('latin-1')[:40]!r})"
-            )
+            face = match.group().decode("latin-1")[:40]
+            raise SurfaceFileError(f"damaged OBJ mesh (the face {face!r})")
         count += len(corners) - 2
     return count
 
 
-def _surface(corners: NDArray[np.float64], name: str) -> RawSurface:
+def _to_surface(corners: FloatArray, name: str) -> RawSurface:
     notes: list[str] = []
     with np.errstate(over="ignore", invalid="ignore"):
         cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         areas = 0.5 * np.linalg.norm(cross, axis=1)
     if not np.isfinite(areas).all():
         raise SurfaceFileError("has triangles too large for floating-point numbers")
-    kept = areas > 0.0
-    if not kept.all():
-        notes.append(f"{int((~kept).sum())} triangles without area ignored")
-        corners, cross, areas = corners[kept], cross[kept], areas[kept]
+    valid = areas > 0.0
+    if not valid.all():
+        notes.append(f"{int((~valid).sum())} triangles without area ignored")
+        corners, cross, areas = corners[valid], cross[valid], areas[valid]
     if len(corners) < 2:
         raise SurfaceFileError(f"a mesh of {len(corners)} triangles is no surface")
-    plane = best_plane(corners, cross, areas)
+    plane = fit_plane(corners, cross, areas)
     _check_overhangs(cross, areas, plane)
-    grid = rasterise(plane.local(corners))
+    grid = rasterise(plane.to_local(corners))
     notes.extend(plane.notes)
     notes.extend(grid.notes)
     _check_folds(grid)
     longest = max(n * p for n, p in zip(grid.heights.shape[::-1], grid.pitch, strict=True))
-    if longest > _LONGEST:
+    if longest > _MAX_EXPECTED_LENGTH:
         notes.append(f"the patch is {longest:.3g} m long: check the unit")
     return RawSurface(grid.heights, grid.pitch, name, tuple(notes))
 
 
-def _check_overhangs(cross: NDArray[np.float64], areas: NDArray[np.float64], plane: Plane) -> None:
-    away = cross @ plane.normal < 0.0
-    if not away.any():
+def _check_overhangs(cross: FloatArray, areas: FloatArray, plane: ReferencePlane) -> None:
+    overhanging = cross @ plane.normal < 0.0
+    if not overhanging.any():
         return
-    area, total = float(areas[away].sum()), float(areas.sum())
+    area, total = float(areas[overhanging].sum()), float(areas.sum())
     advice = (
         "it looks like a whole body: cut off the textured side"
-        if area > _CLOSED * total
-        else "a height field has one height at each place: cut them off"
+        if area > _CLOSED_BODY_FRACTION * total
+        else "a height field has one height at each point: cut them off"
     )
     raise SurfaceFileError(
-        f"{int(away.sum())} triangles overhang, {1e6 * area:.4g} mm² or {area / total:.2%} of the"
-        f" surface; {advice}"
+        f"{int(overhanging.sum())} triangles overhang, {1e6 * area:.4g} mm² or"
+        f" {area / total:.2%} of the surface; {advice}"
     )
 
 
-def _check_folds(grid: Grid) -> None:
-    if grid.folded:
-        area = grid.folded * grid.pitch[0] * grid.pitch[1]
+def _check_folds(grid: RasterGrid) -> None:
+    if grid.n_folded:
+        area = grid.n_folded * grid.pitch[0] * grid.pitch[1]
         raise SurfaceFileError(
-            f"the mesh lies above itself at {grid.folded} grid points, about {1e6 * area:.4g} mm²;"
-            " a height field has one height at each place"
+            f"the mesh lies above itself at {grid.n_folded} grid points, about"
+            f" {1e6 * area:.4g} mm²; a height field has one height at each point"
         )
 
 
-_FLAT_TURN = 0.02  # a turn that saves less area than this is not worth turning the axes
+_MIN_AREA_SAVING = 0.02  # least relative saving of area for which the axes are turned
 
 
 @dataclass(frozen=True, eq=False)
-class Plane:
+class ReferencePlane:
     """An orthonormal frame: rows are the x axis, the y axis and the normal.
 
     Attributes:
         centre: area-weighted centre of the mesh [m], shape (3,).
         axes: shape (3, 3).
-        notes: where the plane is.
+        notes: description of the plane.
     """
 
-    centre: NDArray[np.float64]
-    axes: NDArray[np.float64]
+    centre: FloatArray
+    axes: FloatArray
     notes: tuple[str, ...]
 
     @property
-    def normal(self) -> NDArray[np.float64]:
+    def normal(self) -> FloatArray:
         """The unit normal, on the side that the triangles face."""
         return np.asarray(self.axes[2])
 
-    def local(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_local(self, points: FloatArray) -> FloatArray:
         """Return points, shape (..., 3), in the frame [m]."""
         return np.asarray((points - self.centre) @ self.axes.T)
 
 
-def best_plane(
-    corners: NDArray[np.float64], cross: NDArray[np.float64], areas: NDArray[np.float64]
-) -> Plane:
-    """Fit the plane with the least mean square distance of the surface (not of its vertices).
+def fit_plane(corners: FloatArray, cross: FloatArray, areas: FloatArray) -> ReferencePlane:
+    """Return the plane with the least mean square distance from the surface (not its vertices).
 
     The second moment of a triangle about a point is exact from its corners and centre:
     integral of v v^T = area / 12 (sum of v_i v_i^T + 9 c c^T).
@@ -235,11 +214,11 @@ def best_plane(
         areas: their areas [m²], shape (n,).
 
     Returns:
-        The plane; x is the file's x axis as far as the plane allows, turned in the plane
-        so that the patch fits its rectangle.
+        The plane; x is the projection of the file's x axis, turned in the plane so that the patch
+        fits its rectangle.
 
     Raises:
-        SurfaceFileError: the triangles face all ways, as those of a closed body.
+        SurfaceFileError: the triangles face in all directions, as those of a closed body.
     """
     total = float(areas.sum())
     centre = areas @ corners.mean(axis=1) / total
@@ -251,33 +230,33 @@ def best_plane(
     facing = 0.5 * cross.sum(axis=0) @ normal
     if abs(facing) < 1e-6 * total:
         raise SurfaceFileError(
-            f"its triangles ({1e6 * total:.4g} mm²) face all ways, as those of a closed body;"
-            " cut off the textured side"
+            f"its triangles ({1e6 * total:.4g} mm²) face in all directions, as those of a closed"
+            " body; cut off the textured side"
         )
     normal = normal * math.copysign(1.0, facing)
-    axes = _frame(normal)
-    angle = _turn(moved.reshape(-1, 3) @ axes[:2].T)
+    axes = _plane_axes(normal)
+    angle = _min_rectangle_angle(moved.reshape(-1, 3) @ axes[:2].T)
     turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     axes[:2] = turn @ axes[:2]
-    return Plane(centre, axes, (_sentence(normal, angle),))
+    return ReferencePlane(centre, axes, (_describe_plane(normal, angle),))
 
 
-def _frame(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return axes with this normal and x along the file's x, or y where that is the normal."""
+def _plane_axes(normal: FloatArray) -> FloatArray:
+    """Return axes with this normal; x is the projected x of the file, or y if x is the normal."""
     first = np.eye(3)[0 if abs(normal[0]) < 0.9 else 1]
     x = first - (first @ normal) * normal
     x /= np.linalg.norm(x)
     return np.stack((x, np.cross(normal, x), normal))
 
 
-def _sentence(normal: NDArray[np.float64], angle: float) -> str:
+def _describe_plane(normal: FloatArray, angle: float) -> str:
     text = ", ".join(f"{value:.4g}" for value in normal + 0.0)
     turned = f", axes turned by {math.degrees(angle):.3g}° in it" if angle else ""
     return f"heights are over the mesh's best plane, normal ({text}){turned}"
 
 
-def _turn(points: NDArray[np.float64]) -> float:
-    """Return the angle, within 45°, of the smallest rectangle around the points; 0 where as good.
+def _min_rectangle_angle(points: FloatArray) -> float:
+    """Return the angle, within 45°, of the smallest enclosing rectangle; 0 if it is as good.
 
     One side of the smallest rectangle lies on an edge of the convex hull.
     """
@@ -285,19 +264,19 @@ def _turn(points: NDArray[np.float64]) -> float:
 
     try:
         hull = points[ConvexHull(points).vertices]
-    except QhullError:  # no extent across: the caller finds that out
+    except QhullError:  # no extent across, which the caller refuses
         return 0.0
     edges = np.roll(hull, -1, axis=0) - hull
     angles = np.arctan2(edges[:, 1], edges[:, 0])
     angles = (angles + math.pi / 4) % (math.pi / 2) - math.pi / 4
-    best, least = 0.0, _rectangle(hull, 0.0) * (1 - _FLAT_TURN)
+    best, least = 0.0, _rectangle_area(hull, 0.0) * (1 - _MIN_AREA_SAVING)
     for angle in angles:
-        area = _rectangle(hull, float(angle))
+        area = _rectangle_area(hull, float(angle))
         if area < least:
             best, least = float(angle), area
     return best
 
 
-def _rectangle(hull: NDArray[np.float64], angle: float) -> float:
+def _rectangle_area(hull: FloatArray, angle: float) -> float:
     c, s = math.cos(angle), math.sin(angle)
     return float(np.ptp(c * hull[:, 0] + s * hull[:, 1]) * np.ptp(c * hull[:, 1] - s * hull[:, 0]))

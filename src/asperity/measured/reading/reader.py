@@ -1,42 +1,48 @@
-"""What a reader of surface files is: a format's name, its mark, and how heights come from it."""
+"""File readers: the format's name, how it is recognised, and the function that reads it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import wraps
 from pathlib import Path
 
-from asperity.errors import ParameterError, SurfaceFileError
-from asperity.measured.reading.length_units import metres_of
-from asperity.measured.reading.raw import RawSurface
+from asperity.core.errors import ParameterError
+from asperity.core.files import open_input
+from asperity.measured.lengths import unit_to_metres
+from asperity.measured.reading.raw_surface import RawSurface
 
 
 @dataclass(frozen=True)
 class SurfaceFile:
-    """A file that somebody wants to be read.
+    """A file to be read.
 
     Attributes:
-        path: where it lies.
+        path: path of the file.
         head: its first 4096 bytes, or all if it has fewer.
     """
 
     path: Path
     head: bytes
 
+    @classmethod
+    def open(cls, path: Path) -> SurfaceFile:
+        """Return the file at a path."""
+        with open_input(path) as stream:
+            return cls(path, stream.read(4096))
+
     @property
     def name(self) -> str:
-        """For messages: its name without the folder."""
+        """Name of the file without its folder, for messages."""
         return self.path.name or str(self.path)
 
     @property
     def content(self) -> bytes:
-        """All its bytes, read anew each time: a large file is not kept in memory."""
+        """All bytes of the file, read from disk at each access to save memory."""
         return self.path.read_bytes()
 
     @property
     def is_text(self) -> bool:
-        """False where control characters show that this is no text."""
+        """Whether the file is text: without NUL and with few other control characters."""
         content = self.content
         if content.startswith((b"\xff\xfe", b"\xfe\xff")):  # UTF-16 text has NULs
             return True
@@ -62,27 +68,51 @@ class ReadingOptions:
     resample: float | None = None
 
     @property
-    def metres(self) -> float | None:
-        """Length of the unit [m]; None where none is given."""
-        return None if self.unit is None else metres_of(self.unit)
+    def metres_per_unit(self) -> float | None:
+        """Length of the unit [m]; None if no unit was given."""
+        return None if self.unit is None else unit_to_metres(self.unit)
+
+    def resolve_unit(
+        self, name: str, own: float | None = None
+    ) -> tuple[float | None, tuple[str, ...]]:
+        """Return the length of a file's unit [m] and the note about it.
+
+        Args:
+            name: name of the file.
+            own: length of the unit that the file names [m]; None if it names none.
+
+        Returns:
+            The unit of the file or of the option, None if there is neither; and the notes.
+
+        Raises:
+            ParameterError: a unit was given for a file that names its own.
+        """
+        if self.metres_per_unit is None:
+            return own, ()
+        if own is not None:
+            raise ParameterError("unit", f"must not be given: {name} names its unit")
+        note = f"no unit in the file: {self.metres_per_unit:g} m as given"
+        return self.metres_per_unit, (note,)
 
 
-Read = Callable[[SurfaceFile, ReadingOptions], RawSurface | None]
+ReadFunction = Callable[[SurfaceFile, ReadingOptions], RawSurface | None]
 
 
 @dataclass(frozen=True)
 class Reader:
-    """Recognises one format by its content, and reads it.
+    """A reader of one file format.
 
     Attributes:
-        name: of the format with its article, such as "an X3P file"; no two readers have the same.
-        recognises: whether the content of a file is of this format.
-        read: makes heights of a file that was recognised. None leaves the file to the readers
-            after this one, as if it had not been recognised.
-        arguments: those of ``read_surface`` that say something about this format.
-        certain: whether a file that was recognised cannot be of another format. Where it can (any
-            text may be a table of numbers), a refusal leaves the file to the readers after this
-            one, and counts only if none of them reads it.
+        name: name of the format with its article, such as "an X3P file"; unique among readers.
+        recognises: whether a file is of this format, from its content.
+        read: returns the surface of a recognised file; None leaves the file to the readers
+            that follow, as if it had not been recognised.
+        arguments: arguments of ``read_surface`` that apply to this format.
+        certain: whether a recognised file cannot be of another format. If it can (any text may be
+            a table of numbers), a file that ``read`` refuses is left to the readers that follow,
+            and the refusal is raised only if none of them reads it.
+        is_isolated: whether ``read``, then a function at module level, runs in a subprocess with
+            limits of time and memory.
 
     Example:
         >>> import numpy as np
@@ -95,38 +125,25 @@ class Reader:
 
     name: str
     recognises: Callable[[SurfaceFile], bool]
-    read: Read
+    read: ReadFunction
     arguments: tuple[str, ...] = ()
     certain: bool = True
+    is_isolated: bool = False
 
-    def check(self, file: SurfaceFile, options: ReadingOptions) -> None:
-        """Refuse an argument that says nothing about this format.
+    def check_options(self, file: SurfaceFile, options: ReadingOptions) -> None:
+        """Refuse an argument that does not apply to this format.
 
         Raises:
             ParameterError: for the first such argument that is given.
         """
-        for argument, why in (
+        for argument, reason in (
             ("channel", "has no channels to choose from"),
             ("unit", "has its own unit, or none at all"),
             ("integrate_normals", "is no image"),
             ("resample", "is no list of points"),
         ):
-            given = getattr(options, argument)
-            absent = given is None or given is False  # a channel may be number 0
-            if not absent and argument not in self.arguments:
-                raise ParameterError(
-                    argument, f"must not be given: {file.name} ({self.name}) {why}", given
-                )
-
-
-def naming(read: Read) -> Read:
-    """Let the refusals of a reader begin with the name of the file."""
-
-    @wraps(read)
-    def named(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
-        try:
-            return read(file, options)
-        except SurfaceFileError as error:
-            raise SurfaceFileError(f"{file.name}: {error}") from error
-
-    return named
+            value = getattr(options, argument)
+            is_given = value is not None and value is not False  # a channel may be number 0
+            if is_given and argument not in self.arguments:
+                requirement = f"must not be given: {file.name} ({self.name}) {reason}"
+                raise ParameterError(argument, requirement, value)

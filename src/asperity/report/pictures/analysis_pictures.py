@@ -1,4 +1,4 @@
-"""The pictures of an analysis: field and worst loop, ‖J‖, singular values, jumps."""
+"""Figures of an analysis: field and worst loop, loop gain, singular values, jumps."""
 
 from __future__ import annotations
 
@@ -16,117 +16,116 @@ from matplotlib.ticker import FuncFormatter, SymmetricalLogLocator
 
 from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.bounds.bound import Bound
-from asperity.checks import FloatArray
+from asperity.core.checks import FloatArray
+from asperity.core.units import format_quantity
 from asperity.report.pictures import style
-from asperity.report.pictures.analysis_region import (
+from asperity.report.pictures.analysis_windows import (
     gain_window,
-    in_window,
     loop_window,
+    project_on_window,
     top_view,
-    witness,
-    witness_column,
+    witness_point,
+    witness_profile,
     working_depth,
 )
-from asperity.report.pictures.field_picture import Window, draw_fields
-from asperity.report.pictures.gain_picture import draw_gain_field, gain_bar
-from asperity.report.pictures.vertical_cut import CurlField, curl_field
-from asperity.report.words.number_words import interval_text, law_title, span_text
-from asperity.units import engineering
+from asperity.report.pictures.field_pictures import Window, draw_fields
+from asperity.report.pictures.law_pictures import add_gain_colorbar, draw_gain_field
+from asperity.report.pictures.scan_plane import CurlField, curl_field
+from asperity.report.sentences.alt_text import analysis_figure_names
+from asperity.report.sentences.number_text import interval_text, range_text
 
-Part = Figure | SubFigure
-Drawing = tuple[Callable[[Part, Analysis], None], Callable[[Analysis], float]]
+FigureArea = Figure | SubFigure
+PictureSpec = tuple[Callable[[FigureArea, Analysis], None], Callable[[Analysis], float]]
 
 _WIDTH = 10.0
-# Width and height of a panel [inch]; flatter ones are not drawn true to scale.
-_BROAD, _TALL, _LOW = 9.0, 4.6, 2.4
-_FLATTEST = 2.4
+# Width and greatest and least height of a panel [inch].
+_PANEL_WIDTH, _MAX_PANEL_HEIGHT, _MIN_PANEL_HEIGHT = 9.0, 4.6, 2.4
+_MAX_ASPECT = 2.4
 # Titles, labels and the colour bar below a panel [inch].
-_AROUND = 1.9
-_GRAPH = 3.6  # height of a graph [inch]
-_CELLS = (200, 110)
-# What lies on a field has colours that stay in the dark.
-_BLUE, _WHITE = style.on_field(style.BLUE), style.on_field(style.CARD)
+_PANEL_MARGIN = 1.9
+_GRAPH_HEIGHT = 3.6  # height of a graph [inch]
+_GRID_CELLS = (200, 110)
+# Artists on a field have colours that do not follow the theme.
+_BLUE, _WHITE = style.unthemed_colour(style.BLUE), style.unthemed_colour(style.BACKGROUND)
 _HALO = [withStroke(linewidth=4.0, foreground=_WHITE)]
-# Where the numbers of a picture grow without bound it is cut off here.
-_HIGHEST = 1e3
-_ARROWS = 5
+# Limit of the scale for a gain without bound.
+_MAX_GAIN = 1e3
+_ARROW_COUNT = 5
 
 
-def pictures_of(analysis: Analysis) -> dict[str, Drawing]:
-    """Return the pictures that an analysis has by name: what draws each, its height [inch]."""
-    found: dict[str, Drawing] = {
+def available_pictures(analysis: Analysis) -> dict[str, PictureSpec]:
+    """Return drawing function and height [inch] of the figures of an analysis, by name."""
+    specs: dict[str, PictureSpec] = {
         "field": (draw_field, lambda result: _plane_height(loop_window(result))),
         "gain": (draw_gain, lambda result: _plane_height(gain_window(result))),
+        "top": (draw_top_view, _map_height),
+        "depth": (draw_depth, lambda _result: _GRAPH_HEIGHT),
+        "jumps": (draw_jumps, lambda _result: _GRAPH_HEIGHT),
     }
-    if not analysis.surface.texture.is_profile:
-        found["top"] = (draw_top, _map_height)
-    found["depth"] = (draw_depth, lambda _result: _GRAPH)
-    if analysis.continuity.jumps:
-        found["jumps"] = (draw_jumps, lambda _result: _GRAPH)
-    return found
+    return {name: specs[name] for name in analysis_figure_names(analysis)}
 
 
 def _plane_height(window: Window) -> float:
-    ratio = (window.top - window.bottom) / window.stretch.length
-    return min(max(_BROAD * ratio, _LOW), _TALL) + _AROUND
+    height = _PANEL_WIDTH / window.aspect
+    return min(max(height, _MIN_PANEL_HEIGHT), _MAX_PANEL_HEIGHT) + _PANEL_MARGIN
 
 
 def _map_height(analysis: Analysis) -> float:
     spans = np.abs(analysis.surface.texture.domain.spans).sum(axis=0)
-    return min(_BROAD * float(spans[1] / spans[0]), 6.5) + _AROUND
+    return min(_PANEL_WIDTH * float(spans[1] / spans[0]), 6.5) + _PANEL_MARGIN
 
 
 def picture_size(analysis: Analysis, name: str) -> tuple[float, float]:
-    """Return width and height of a picture [inch]."""
-    return _WIDTH, pictures_of(analysis)[name][1](analysis)
+    """Return width and height of a figure [inch]."""
+    return _WIDTH, available_pictures(analysis)[name][1](analysis)
 
 
 def analysis_figure(analysis: Analysis, name: str) -> Figure:
     """Return one picture of an analysis."""
     figure = style.new_figure(*picture_size(analysis, name))
-    pictures_of(analysis)[name][0](figure, analysis)
+    available_pictures(analysis)[name][0](figure, analysis)
     return figure
 
 
 # --- the field and the worst loop -----------------------------------------------------------------
 
 
-def draw_field(figure: Part, analysis: Analysis) -> None:
+def draw_field(figure: FigureArea, analysis: Analysis) -> None:
     """Draw the force over its curl in the plane of the worst loop, and the loop.
 
-    What lies deeper than the working region is paled; the vertices of the loop are projected on
-    the plane.
+    Points deeper than the working region are faded; the vertices of the loop are projected on the
+    plane.
     """
     window, leak = loop_window(analysis), analysis.leak
-    remark = "conservative: no loop gains"
+    remark = "conservative: no loop gains energy"
     if len(leak.vertices):
-        gain = span_text(leak.energy, leak.upper_per_period, "J")
+        gain = range_text(leak.energy, leak.upper_per_period, "J")
         remark = f"the worst loop of one period gains {gain}"
     elif not analysis.conservative:
-        remark = "no loop found that gains"
+        remark = "no loop found that gains energy"
     axes = draw_fields(figure, [analysis.surface], [remark], window)[0]
     for arrows in axes.findobj(Quiver):
-        # Seen on the darkest curl, too.
+        # A halo, for dark colours of the curl.
         arrows.set_path_effects([withStroke(linewidth=1.2, foreground=_WHITE)])
     wide, high = window.units
-    if not _is_true(window):
+    if not _is_true_to_scale(window):
         axes.set_aspect("auto")
-    style.label(axes, f"{_along_text(window)} [{wide.name}]", f"z [{high.name}]")
-    field = curl_field(analysis.surface, window.stretch, window.bottom, *_CELLS)
-    _pale(axes, analysis, window, field)
+    style.label_axes(axes, f"{_horizontal_axis_text(window)} [{wide.name}]", f"z [{high.name}]")
+    field = curl_field(analysis.surface, window.segment, window.bottom, *_GRID_CELLS)
+    _fade_beyond_depth(axes, analysis, window, field)
     if len(leak.vertices):
-        offset = leak.vertices[:, :2] - window.stretch.xy(np.zeros(1))[0]
-        along = offset @ window.stretch.line.direction
+        offset = leak.vertices[:, :2] - window.segment.xy(np.zeros(1))[0]
+        along = offset @ window.segment.line.direction
         _draw_loop(axes, along * wide.scale, leak.vertices[:, 2] * high.scale)
 
 
-def _is_true(window: Window) -> bool:
-    """Return whether a picture true to scale fills its panel well."""
-    return _BROAD / _TALL <= window.stretch.length / (window.top - window.bottom) <= _FLATTEST
+def _is_true_to_scale(window: Window) -> bool:
+    """Return whether a figure true to scale fills its panel well."""
+    return _PANEL_WIDTH / _MAX_PANEL_HEIGHT <= window.aspect <= _MAX_ASPECT
 
 
 def _draw_loop(axes: Axes, x: FloatArray, z: FloatArray) -> None:
-    """Draw a closed polygon with arrows that tell its sense."""
+    """Draw a closed polygon with arrows of its direction."""
     x, z = np.append(x, x[0]), np.append(z, z[0])
     axes.plot(x, z, color=_BLUE, lw=1.6, zorder=5.0, path_effects=_HALO)
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
@@ -134,31 +133,31 @@ def _draw_loop(axes: Axes, x: FloatArray, z: FloatArray) -> None:
     seen = (np.maximum(x[1:], x[:-1]) > left) & (np.minimum(x[1:], x[:-1]) < right)
     passed = np.concatenate([[0.0], np.cumsum(np.where(seen, steps, 0.0))])
     arrow = {"arrowstyle": "-|>", "color": _BLUE, "lw": 1.6, "mutation_scale": 14}
-    for part in (np.arange(_ARROWS) + 0.5) / _ARROWS:
-        ways = part * passed[-1] + np.array([-0.004, 0.004])
-        start, end = zip(np.interp(ways, passed, x), np.interp(ways, passed, z), strict=True)
+    for part in (np.arange(_ARROW_COUNT) + 0.5) / _ARROW_COUNT:
+        ends = part * passed[-1] + np.array([-0.004, 0.004])
+        start, end = zip(np.interp(ends, passed, x), np.interp(ends, passed, z), strict=True)
         axes.annotate("", end, start, arrowprops=arrow, zorder=6.0, annotation_clip=True)
 
 
-def _pale(axes: Axes, analysis: Analysis, window: Window, field: CurlField) -> None:
-    """Pale what is deeper than the working region, and draw its border."""
-    points = np.column_stack([window.stretch.xy(field.along.ravel()), field.z.ravel()])
+def _fade_beyond_depth(axes: Axes, analysis: Analysis, window: Window, field: CurlField) -> None:
+    """Fade the field below the working region, and draw the border of the region."""
+    points = np.column_stack([window.segment.xy(field.along.ravel()), field.z.ravel()])
     depth = working_depth(analysis.surface, points).reshape(field.z.shape)
     beyond = depth - analysis.surface.max_depth
     if beyond.max() <= 0.0:
         return
     wide, high = window.units
     places = (field.along * wide.scale, field.z * high.scale)
-    axes.contourf(*places, beyond, [0.0, math.inf], colors=[style.FREE], alpha=0.8, zorder=4.5)
-    axes.contour(
-        *places, beyond, [0.0], colors=[style.on_field(style.SOFT)], linewidths=0.9, zorder=4.6
-    )
+    fade: dict[str, Any] = {"colors": [style.FREE_SPACE], "alpha": 0.8, "zorder": 4.5}
+    axes.contourf(*places, beyond, [0.0, math.inf], **fade)
+    border: dict[str, Any] = {"colors": [style.unthemed_colour(style.MUTED)], "linewidths": 0.9}
+    axes.contour(*places, beyond, [0.0], zorder=4.6, **border)
 
 
-def _along_text(window: Window) -> str:
-    """Return where the horizontal axis begins and where it goes."""
-    x, y = (engineering(float(v) + 0.0, "m") for v in window.stretch.xy(np.zeros(1))[0])
-    u, v = (float(part) for part in window.stretch.line.direction)
+def _horizontal_axis_text(window: Window) -> str:
+    """Return start and direction of the horizontal axis."""
+    x, y = (format_quantity(float(v) + 0.0, "m") for v in window.segment.xy(np.zeros(1))[0])
+    u, v = (float(part) for part in window.segment.line.direction)
     return f"from x = {x}, y = {y} along ({u:.4g}, {v:.4g})"
 
 
@@ -166,155 +165,152 @@ def _along_text(window: Window) -> str:
 
 
 def _gain_scale(analysis: Analysis, values: FloatArray) -> LogNorm:
-    """Return a logarithmic scale that ends at q, or where the picture is cut off."""
+    """Return a logarithmic scale up to q, or up to a limit."""
     known = values[np.isfinite(values) & (values > 0.0)]
     top = max(analysis.q.lower, 2.0)
     if math.isinf(top):
-        top = min(_HIGHEST, max(float(np.quantile(known, 0.995)), 10.0))
+        top = min(_MAX_GAIN, max(float(np.quantile(known, 0.995)), 10.0))
     low = min(0.5, 0.5 * top, float(np.quantile(known, 0.02)) if known.size else 0.5)
     return LogNorm(max(low, 1e-3 * top), top)
 
 
-def draw_gain(figure: Part, analysis: Analysis) -> None:
+def draw_gain(figure: FigureArea, analysis: Analysis) -> None:
     """Draw ‖J‖/k in the vertical plane through the witness of q, and the witness."""
     window, surface = gain_window(analysis), analysis.surface
     wide, high = window.units
-    field = curl_field(surface, window.stretch, window.bottom, *_CELLS)
+    field = curl_field(surface, window.segment, window.bottom, *_GRID_CELLS)
     scale = _gain_scale(analysis, field.gain)
-    axes = style.panel(figure)
+    axes = style.single_axes(figure)
     mesh = draw_gain_field(axes, field, scale, (wide, high))
-    _pale(axes, analysis, window, field)
-    at = in_window(window, witness(analysis)) if analysis.q.at is not None else None
+    _fade_beyond_depth(axes, analysis, window, field)
+    at = project_on_window(window, witness_point(analysis)) if analysis.q.at is not None else None
     if at is not None:
-        _mark(axes, at[0] * wide.scale, at[1] * high.scale)
-    axes.set_xlim(0.0, window.stretch.length * wide.scale)
+        _draw_cross(axes, at[0] * wide.scale, at[1] * high.scale)
+    axes.set_xlim(0.0, window.segment.length * wide.scale)
     axes.set_ylim(window.bottom * high.scale, window.top * high.scale)
-    axes.set_aspect("equal" if wide == high and _is_true(window) else "auto")
-    style.label(axes, f"{_along_text(window)} [{wide.name}]", f"z [{high.name}]")
-    style.entitle(axes, surface.law.letter, law_title(surface.law.name), _gain_remark(analysis))
-    gain_bar(figure, mesh, axes, "‖J‖ / k [1]")
+    axes.set_aspect("equal" if wide == high and _is_true_to_scale(window) else "auto")
+    style.label_axes(axes, f"{_horizontal_axis_text(window)} [{wide.name}]", f"z [{high.name}]")
+    style.title_law(axes, surface.law, _gain_remark(analysis))
+    add_gain_colorbar(figure, mesh, axes, "‖J‖ / k [1]")
 
 
 def _gain_remark(analysis: Analysis) -> str:
     if math.isinf(analysis.q.lower):
-        return "q = ∞; the cross is where it first becomes so"
+        return "q = ∞; the cross is the onset"
     cross = "; the cross attains the lower end" if analysis.q.at is not None else ""
     return f"q = {interval_text(analysis.q)} ({analysis.q.method}){cross}"
 
 
-def _mark(axes: Axes, x: float, y: float) -> None:
-    """Draw a cross that is seen on dark and on light."""
+def _draw_cross(axes: Axes, x: float, y: float) -> None:
+    """Draw a cross that is visible on dark and light colours."""
     halo = [Stroke(linewidth=5.0, foreground=_WHITE), withStroke(linewidth=2.0)]
     axes.plot(x, y, "x", color=_BLUE, ms=10, mew=2.2, zorder=7, path_effects=halo[:1])
     axes.plot(x, y, "x", color=_BLUE, ms=10, mew=2.2, zorder=8, clip_on=False)
 
 
-def draw_top(figure: Part, analysis: Analysis) -> None:
-    """Draw the greatest ‖J‖/k found over depth, from above, with the witness of q."""
+def draw_top_view(figure: FigureArea, analysis: Analysis) -> None:
+    """Draw the greatest sampled ‖J‖/k over depth, from above, with the witness of q."""
     (grid, gain), surface = top_view(analysis), analysis.surface
     scale = _gain_scale(analysis, gain)
     unit, (x0, x1, y0, y1) = grid.frame
-    axes = style.panel(figure)
-    shown = np.maximum(gain, scale.vmin or 0.0)
-    mesh = axes.imshow(
-        shown, norm=scale, cmap="magma_r", origin="lower", extent=(x0, x1, y0, y1),
-        interpolation="nearest",
-    )  # fmt: skip
+    axes = style.single_axes(figure)
+    options: dict[str, Any] = {"norm": scale, "cmap": "magma_r", "interpolation": "nearest"}
+    clipped = np.maximum(gain, scale.vmin or 0.0)
+    mesh = axes.imshow(clipped, origin="lower", extent=(x0, x1, y0, y1), **options)
     at = analysis.q.at
     if at is not None:
         spans = surface.texture.domain
-        place = _into(np.array(at[:2]), grid.low, grid.size, periodic=spans.periodic)
+        place = _wrap_into_domain(np.array(at[:2]), grid.low, grid.size, periodic=spans.periodic)
         x, y = place * unit.scale
-        _mark(axes, float(x), float(y))
-        line = analysis.leak.line
-        start = np.array([x, y])
-        axes.axline(
-            tuple(start), tuple(start + line.direction), color=_BLUE, lw=0.8, ls=":", zorder=3
-        )
+        _draw_cross(axes, float(x), float(y))
+        dx, dy = analysis.leak.line.direction
+        axes.axline((x, y), (x + dx, y + dy), color=_BLUE, lw=0.8, ls=":", zorder=3)
         axes.set_xlim(x0, x1)
         axes.set_ylim(y0, y1)
-    style.label(axes, f"x [{unit.name}]", f"y [{unit.name}]")
-    remark = "greatest of five depths, sampled; dotted: the vertical plane of the other picture"
-    style.entitle(axes, surface.law.letter, "seen from above", remark)
-    gain_bar(figure, mesh, axes, "‖J‖ / k [1]")
+    style.label_axes(axes, f"x [{unit.name}]", f"y [{unit.name}]")
+    remark = "greatest of five depths, sampled; dotted: the vertical plane of the other figure"
+    style.set_panel_title(axes, surface.law.letter, "seen from above", remark)
+    add_gain_colorbar(figure, mesh, axes, "‖J‖ / k [1]")
 
 
-def _into(at: FloatArray, low: FloatArray, size: FloatArray, *, periodic: bool) -> FloatArray:
-    """Return a point moved into the rectangle of a texture that repeats along x and y."""
-    inside = np.all((at >= low) & (at <= low + size))
-    return at if inside or not periodic else low + (at - low) % size
+def _wrap_into_domain(
+    point: FloatArray, low: FloatArray, size: FloatArray, *, periodic: bool
+) -> FloatArray:
+    """Return a point wrapped into the rectangle of a periodic texture."""
+    inside = np.all((point >= low) & (point <= low + size))
+    return point if inside or not periodic else low + (point - low) % size
 
 
 # --- depth ----------------------------------------------------------------------------------------
 
 
-def draw_depth(figure: Part, analysis: Analysis) -> None:
-    """Draw the singular values of J/k against depth at the witness column, with q's bounds."""
-    column, surface = witness_column(analysis), analysis.surface
+def draw_depth(figure: FigureArea, analysis: Analysis) -> None:
+    """Draw the singular values of J/k over depth at the witness, with the bounds of q."""
+    column, surface = witness_profile(analysis), analysis.surface
     unit = style.length_unit(surface.max_depth)
-    axes = style.panel(figure)
-    for index, colour in enumerate((style.BLUE, style.GREEN, style.SOFT)):
-        values = np.minimum(column.values[:, index], 2.0 * _HIGHEST)
-        look: dict[str, Any] = {"color": colour, "lw": 2.2 - 0.5 * index}
-        axes.plot(column.depth * unit.scale, values, label=f"σ{'₁₂₃'[index]}", **look)
+    axes = style.single_axes(figure)
+    for index, colour in enumerate((style.BLUE, style.GREEN, style.MUTED)):
+        values = np.minimum(column.values[:, index], 2.0 * _MAX_GAIN)
+        options: dict[str, Any] = {"color": colour, "lw": 2.2 - 0.5 * index}
+        axes.plot(column.depth * unit.scale, values, label=f"σ{'₁₂₃'[index]}", **options)
     _draw_bounds(axes, analysis.q)
     if analysis.q.at is not None:
         infinite = math.isinf(analysis.q.lower)
-        words = "onset: from here down the force jumps" if infinite else "witness"
-        axes.axvline(column.witness * unit.scale, color=style.FAINT, lw=1.2, zorder=0)
-        _beside(axes, column.witness / surface.max_depth, words)
+        text = "onset: the force jumps from here down" if infinite else "witness"
+        axes.axvline(column.witness_depth * unit.scale, color=style.FAINT, lw=1.2, zorder=0)
+        _annotate_line(axes, column.witness_depth / surface.max_depth, text)
     top = float(np.quantile(column.values[:, 0], 0.98))
-    _scale_values(axes, max(top, analysis.q.lower) if math.isfinite(analysis.q.lower) else top)
+    _set_value_scale(axes, max(top, analysis.q.lower) if math.isfinite(analysis.q.lower) else top)
     axes.set_xlim(0.0, surface.max_depth * unit.scale)
-    along = "along the normal" if abs(column.below[2]) < 1.0 else "below the surface"
+    along = "along the normal" if abs(column.direction[2]) < 1.0 else "below the surface"
     if not surface.law.contact.begins_on_texture:
         along = "below the smooth wall"
-    style.label(axes, f"depth {along} [{unit.name}]", "singular values of J/k [1]")
+    style.label_axes(axes, f"depth {along} [{unit.name}]", "singular values of J/k [1]")
     remark = f"q = {interval_text(analysis.q)} ({analysis.q.method})"
-    style.entitle(axes, surface.law.letter, "down to the witness", remark)
-    axes.legend(frameon=False, fontsize=style.TICK, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    style.set_panel_title(axes, surface.law.letter, "down to the witness", remark)
+    style.add_legend(axes, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def _draw_bounds(axes: Axes, q: Bound) -> None:
-    """Draw the ends of q that are finite."""
+    """Draw the finite bounds of q."""
     if math.isfinite(q.lower):
         axes.axhline(q.lower, color=style.ORANGE, lw=1.1, label="q, lower")
     if math.isfinite(q.upper):
         axes.axhline(q.upper, color=style.INK, lw=1.1, ls=(0, (6, 6)), label="q, upper")
 
 
-def _scale_values(axes: Axes, top: float) -> None:
-    """Scale the vertical axis up to a value; logarithmically above 1 where that is great."""
-    great = top > 30.0
+def _set_value_scale(axes: Axes, max_value: float) -> None:
+    """Scale the vertical axis up to a value, logarithmically above 1 for a large value."""
+    great = max_value > 30.0
     if great:
         axes.set_yscale("symlog", linthresh=1.0)
         axes.yaxis.set_major_locator(SymmetricalLogLocator(base=10, linthresh=1, subs=[1, 2, 5]))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _place: f"{value:g}"))
-    highest = 1.12 * min(top, _HIGHEST)
+    highest = 1.12 * min(max_value, _MAX_GAIN)
     axes.set_ylim(-0.1 if great else -0.03 * highest, highest)
 
 
-def _beside(axes: Axes, part: float, words: str) -> None:
-    """Write words beside a vertical line at a part of the width, on the side with more room."""
-    left = part > 0.5
+def _annotate_line(axes: Axes, fraction: float, text: str) -> None:
+    """Add text beside a vertical line at a fraction of the width, on the wider side."""
+    left = fraction > 0.5
     side, away = ("right", -4) if left else ("left", 4)
-    style.note(axes, words, (min(part, 1.0), 0.5), xytext=(away, 0), ha=side, va="center")
+    style.add_note(axes, text, (min(fraction, 1.0), 0.5), xytext=(away, 0), ha=side, va="center")
 
 
-def draw_jumps(figure: Part, analysis: Analysis) -> None:
-    """Draw by how much the force jumps at each depth where that was located."""
+def draw_jumps(figure: FigureArea, analysis: Analysis) -> None:
+    """Draw the size of the force jump at each depth where one was located."""
     jumps = analysis.continuity.jumps
     depth = np.array([jump.depth for jump in jumps])
     size = np.array([jump.size for jump in jumps])
     wide, high = style.length_unit(float(depth.max())), style.force_unit(float(size.max()))
-    axes = style.panel(figure)
+    axes = style.single_axes(figure)
     axes.plot(
         depth * wide.scale, size * high.scale, "o-", color=style.BLUE, lw=1.0, ms=5.5, label="jump"
     )
     axes.set_xlim(0.0, 1.05 * max(float(depth.max()), 1e-12) * wide.scale)
     axes.set_ylim(0.0, 1.12 * float(size.max()) * high.scale)
     axes.grid(color=style.FAINT, lw=0.5)
-    style.label(axes, f"depth [{wide.name}]", f"jump of the force [{high.name}]")
+    style.label_axes(axes, f"depth [{wide.name}]", f"jump of the force [{high.name}]")
     surface = analysis.surface
     remark = f"at {surface.stiffness:g} N/m; every point has two witnesses on either side"
-    style.entitle(axes, surface.law.letter, "how far the force jumps", remark)
+    style.set_panel_title(axes, surface.law.letter, "how far the force jumps", remark)

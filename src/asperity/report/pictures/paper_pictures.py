@@ -1,25 +1,34 @@
-"""The paper's figures 2 and 3, drawn from what the laws give."""
+"""Figures 2 and 3 of the paper, and figures of the simulated experiments of its section V."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from asperity.core.units import format_quantity
 from asperity.laws import find_law
+from asperity.paper.experiments import Experiments
+from asperity.paper.experiments.bump_runs import BumpExperiment
+from asperity.paper.experiments.cycle_counts import CycleCount, PassivityExperiment
+from asperity.paper.experiments.experiment_setups import bump_setup
+from asperity.paper.experiments.stroke_energies import ScanningExperiment
 from asperity.paper.figures import ForceField, LoopEnergy, force_fields, loop_energies
 from asperity.report.pictures import style
-from asperity.report.words.number_words import law_title
+from asperity.report.sentences.number_text import readable_name
 
 _COLUMNS = 4
 _MILLI, _MICRO = 1e3, 1e6
-_PER_INCH = 4.0  # force at a handle that an inch of arrow stands for [N]
-_LONGEST = 0.24  # of the arrows of the field, in every panel [inch]
-_KEY = 2.0  # force of the arrow in the key [N]
-_LEAST = 40.0  # half the height of an energy axis, so that nothing looks like nothing [µJ]
+_FORCE_PER_INCH = 4.0  # of arrows at a handle [N]
+_MAX_ARROW_LENGTH = 0.24  # of the arrows of the field, in every panel [inch]
+_HANDLE_ARROW = {"color": style.ORANGE, "width": 0.024, "scale": _FORCE_PER_INCH}
+_KEY_FORCE = 2.0  # force of the arrow in the key [N]
+_MIN_ENERGY_RANGE = 40.0  # least half range of an energy axis, so that rounding stays small [µJ]
 
 
 def figure_two(panels: Sequence[ForceField] | None = None) -> Figure:
@@ -36,34 +45,32 @@ def figure_two(panels: Sequence[ForceField] | None = None) -> Figure:
     grid: Any = figure.subplots(2, _COLUMNS, sharex=True, sharey=True)
     places = list(grid.ravel())
     for number, (axes, panel) in enumerate(zip(places, panels, strict=False)):
-        style.dress(axes)
+        style.style_axes(axes)
         _draw_body(axes, panel)
         _draw_forces(axes, panel)
-        style.of_law(axes, panel.law)
-        start = "flat wall" if _is_flat(panel.law) else "texture"
-        style.entitle(axes, panel.law, law_title(panel.name), f"depth below the {start}")
-        style.label(
-            axes,
-            "x [mm]" if number + _COLUMNS >= len(panels) else "",
-            "z [mm]" if number % _COLUMNS == 0 else "",
-        )
-        axes.tick_params(labelbottom=number + _COLUMNS >= len(panels))
+        style.mark_law(axes, panel.law)
+        start = "flat wall" if _is_measured_from_wall(panel.law) else "texture"
+        remark = f"depth below the {start}"
+        style.set_panel_title(axes, panel.law, readable_name(panel.name), remark)
+        lowest, first = number + _COLUMNS >= len(panels), number % _COLUMNS == 0
+        style.label_axes(axes, "x [mm]" if lowest else "", "z [mm]" if first else "")
+        axes.tick_params(labelbottom=lowest)
         axes.set_aspect("equal")
     _draw_key(places[len(panels) :])
     for axes in places:
-        # Arrows at the border are not clipped; they must not shrink the panels either.
+        # Arrows at the border are not clipped, and must not shrink the panels.
         for artist in axes.collections:
             artist.set_in_layout(False)
     return figure
 
 
-def _is_flat(law: str) -> bool:
-    """Return whether depth is counted from the smooth wall."""
+def _is_measured_from_wall(law: str) -> bool:
+    """Return whether depth is measured from the smooth wall."""
     return not find_law(law).contact.begins_on_texture
 
 
 def _draw_body(axes: Axes, panel: ForceField) -> None:
-    """Draw what is solid, and show the part of the plane that the field fills."""
+    """Draw the body, and limit the axes to the field."""
     low, high = panel.points[..., 1].min() * _MILLI, panel.points[..., 1].max() * _MILLI
     _draw_solid(axes, panel, low, 1.2)
     axes.set_xlim(panel.points[..., 0].min() * _MILLI, panel.points[..., 0].max() * _MILLI)
@@ -71,10 +78,10 @@ def _draw_body(axes: Axes, panel: ForceField) -> None:
 
 
 def _draw_solid(axes: Axes, panel: ForceField | LoopEnergy, low: float, width: float) -> None:
-    """Draw what is solid, the texture, and the wall where depth is counted from it."""
+    """Draw the body, the texture, and the wall if depth is measured from it."""
     x, height = panel.x * _MILLI, panel.height * _MILLI
-    flat = _is_flat(panel.law)
-    axes.fill_between(x, 0.0 * height if flat else height, low, color=style.BODY, lw=0.0, alpha=0.6)
+    flat = _is_measured_from_wall(panel.law)
+    style.fill_below(axes, x, 0.0 * height if flat else height, low)
     axes.plot(x, height, color=style.INK, lw=width, ls=":" if flat else "-")
     if flat:
         axes.axhline(0.0, color=style.INK, lw=width)
@@ -83,51 +90,42 @@ def _draw_solid(axes: Axes, panel: ForceField | LoopEnergy, low: float, width: f
 def _draw_forces(axes: Axes, panel: ForceField) -> None:
     points, forces = panel.points[::2, ::2] * _MILLI, panel.forces[::2, ::2]
     acts = np.abs(forces).max(axis=-1) > 0.0
-    scale = float(np.linalg.norm(forces, axis=-1).max()) / _LONGEST
-    arrows: list[tuple[Any, Any, str, float, float]] = [
-        (points[acts], forces[acts], style.SOFT, 0.008, scale),
-        (panel.handles * _MILLI, panel.handle_forces, style.ORANGE, 0.024, _PER_INCH),
+    scale = float(np.linalg.norm(forces, axis=-1).max()) / _MAX_ARROW_LENGTH
+    handles = panel.handle_positions * _MILLI
+    arrows: list[tuple[Any, Any, dict[str, Any]]] = [
+        (points[acts], forces[acts], {"color": style.MUTED, "width": 0.008, "scale": scale}),
+        (handles, panel.handle_forces, _HANDLE_ARROW),
     ]
-    for place, force, colour, width, per_inch in arrows:
-        axes.quiver(
-            place[:, 0], place[:, 1], force[:, 0], force[:, 1], angles="uv", units="inches",
-            scale_units="inches", scale=per_inch, width=width, color=colour, minlength=0.4,
-            zorder=4, clip_on=False,
-        )  # fmt: skip
-    handles = panel.handles * _MILLI
+    common = style.INCH_ARROWS | {"minlength": 0.4, "zorder": 4, "clip_on": False}
+    for place, force, options in arrows:
+        axes.quiver(*place[:, :2].T, *force[:, :2].T, **common, **options)
     axes.plot(handles[:, 0], handles[:, 1], "o", color=style.ORANGE, ms=4.0, zorder=5)
 
 
-def _draw_key(places: Sequence[Axes]) -> None:
-    """Draw an arrow of known force in the first place that is left; hide the others."""
-    for axes in places:
+def _draw_key(free_axes: Sequence[Axes]) -> None:
+    """Draw an arrow of known force in the first free axes; hide the others."""
+    for axes in free_axes:
         axes.set_axis_off()
-    if not places:
+    if not free_axes:
         return
-    style_of: dict[str, Any] = {
-        "transform": places[0].transAxes,
-        "fontsize": style.LABEL,
-        "color": style.SOFT,
-    }
-    key: dict[str, Any] = {"units": "inches", "scale_units": "inches", "scale": _PER_INCH}
-    places[0].quiver(
-        [0.02], [0.78], [_KEY], [0.0], transform=places[0].transAxes, angles="uv", width=0.024,
-        color=style.ORANGE, **key,
-    )  # fmt: skip
+    place: dict[str, Any] = {"transform": free_axes[0].transAxes}
+    options: dict[str, Any] = {**place, "fontsize": style.LABEL, "color": style.MUTED}
+    arrow = style.INCH_ARROWS | _HANDLE_ARROW | place
+    free_axes[0].quiver([0.02], [0.78], [_KEY_FORCE], [0.0], **arrow)
     words = (
-        f"{_KEY:g} N at a handle",
+        f"{_KEY_FORCE:g} N at a handle",
         "brown: where the force acts",
         "grey: its direction, and its",
         "size within one panel",
         "F: while it slides to +x",
     )
-    places[0].text(0.4, 0.78, words[0], va="center", **style_of)
+    free_axes[0].text(0.4, 0.78, words[0], va="center", **options)
     for number, line in enumerate(words[1:]):
-        places[0].text(0.02, 0.58 - 0.12 * number, line, va="center", **style_of)
+        free_axes[0].text(0.02, 0.58 - 0.12 * number, line, va="center", **options)
 
 
 def figure_three(panels: Sequence[LoopEnergy] | None = None) -> Figure:
-    """Return the closed path of each law, and the work of its force along the way.
+    """Return the closed path of each law, and the work of its force along the path.
 
     Args:
         panels: see :func:`~asperity.paper.figures.loop_energies`; computed by default.
@@ -145,14 +143,14 @@ def figure_three(panels: Sequence[LoopEnergy] | None = None) -> Figure:
     for number, panel in enumerate(panels):
         path, work = places[2 * number], places[2 * number + 1]
         for axes in (path, work):
-            style.dress(axes)
-            style.of_law(axes, panel.law)
+            style.style_axes(axes)
+            style.mark_law(axes, panel.law)
         lowest = number + 2 >= len(panels)
         _draw_path(path, panel)
         _draw_work(work, panel)
         path.tick_params(labelbottom=lowest)
-        style.label(path, "x [mm]" if lowest else "", "z [mm]")
-        style.label(work, "way along the path [mm]" if lowest else "", "energy [µJ]")
+        style.label_axes(path, "x [mm]" if lowest else "", "z [mm]")
+        style.label_axes(work, "arc length [mm]" if lowest else "", "energy [µJ]")
     return figure
 
 
@@ -163,27 +161,187 @@ def _draw_path(axes: Axes, panel: LoopEnergy) -> None:
     _draw_solid(axes, panel, low, 0.9)
     axes.plot(closed[:, 0], closed[:, 1], color=style.ORANGE, lw=1.4)
     middle, leg = 0.5 * (closed[1:] + closed[:-1]), np.diff(closed, axis=0)
-    axes.quiver(
-        middle[:, 0], middle[:, 1], leg[:, 0], leg[:, 1], angles="xy", units="inches",
-        scale_units="inches", scale=1e6, width=0.02, headwidth=5.0, headlength=6.0, minlength=0.0,
-        minshaft=0.0, pivot="middle", color=style.ORANGE, zorder=4,
-    )  # fmt: skip
+    head = {"width": 0.02, "headwidth": 5.0, "headlength": 6.0, "minlength": 0.0, "minshaft": 0.0}
+    options = style.INCH_ARROWS | head | {"angles": "xy", "scale": 1e6, "pivot": "middle"}
+    axes.quiver(*middle.T, *leg.T, color=style.ORANGE, zorder=4, **options)
     axes.set_xlim(x.min(), x.max())
     axes.set_ylim(low, max(float(closed[:, 1].max()), float(height.max())) + 0.2)
-    style.entitle(axes, panel.law, law_title(panel.name))
+    style.set_panel_title(axes, panel.law, readable_name(panel.name))
 
 
 def _draw_work(axes: Axes, panel: LoopEnergy) -> None:
-    way, work = panel.way * _MILLI, panel.work * _MICRO
+    length, work = panel.arc_length * _MILLI, panel.work * _MICRO
     axes.set_label(panel.law)
-    axes.plot(way, work, color=style.BLUE, lw=1.3, label="energy")
-    axes.plot(way[-1:], work[-1:], "o", color=style.BLUE, ms=4.0, clip_on=False)
-    style.zero_line(axes, _LEAST)
-    axes.set_title(energy_words(panel), loc="left", fontsize=style.LABEL, color=style.SOFT, pad=5.0)
+    axes.plot(length, work, color=style.BLUE, lw=1.3, label="energy")
+    axes.plot(length[-1:], work[-1:], "o", color=style.BLUE, ms=4.0, clip_on=False)
+    style.draw_zero_line(axes, _MIN_ENERGY_RANGE)
+    options: dict[str, Any] = {"fontsize": style.LABEL, "color": style.MUTED}
+    axes.set_title(loop_energy_text(panel), loc="left", pad=5.0, **options)
 
 
-def energy_words(panel: LoopEnergy) -> str:
-    """Return what the loop gives, in words."""
+def loop_energy_text(panel: LoopEnergy) -> str:
+    """Return the energy of the loop as text."""
     gain = round(panel.energy * _MICRO, 1)
     source = f", as {panel.equation}" if panel.equation else ""
     return f"gains {gain:.1f} µJ{source}" if gain > 0.0 else f"returns all{source}"
+
+
+# Colours of the laws, in their order.
+_LAW_COLOURS = (style.ORANGE, style.MUTED, style.BLUE, "#cc79a7", style.GREEN)
+
+
+# --- section V.A ----------------------------------------------------------------------------------
+
+
+def cycles_figure(experiment: PassivityExperiment) -> Figure:
+    """Return the height of the handle against time for each wall of figure 5."""
+    counts = experiment.counts
+    figure, panels = style.law_panels(len(counts), 2.1, 0.4, x="time [s]", y="z [mm]")
+    for axes, count in zip(panels, counts, strict=True):
+        _draw_wall(axes, count)
+    return figure
+
+
+def _draw_wall(axes: Axes, count: CycleCount) -> None:
+    axes.axhspan(-100.0, 0.0, color=style.BODY, alpha=0.5, lw=0.0, zorder=0.0)
+    colour = style.ORANGE if count.cycles else style.BLUE
+    axes.plot(count.time, 1e3 * count.z, color=colour, lw=0.8, label="height")
+    axes.set_ylim(-13.0, 6.5)
+    name = count.law if count.divisor == 1.0 else f"{count.law}/{count.divisor:g}"
+    remark = f"{count.cycles} of {count.starts} starts cycle"
+    if count.slow:
+        remark += f", {count.slow} decay slowly"
+    style.mark_law(axes, count.law)
+    style.set_panel_title(axes, name, format_quantity(round(count.stiffness), "N/m"), remark)
+
+
+# --- section V.B ----------------------------------------------------------------------------------
+
+
+def energies_figure(experiment: ScanningExperiment) -> Figure:
+    """Return energy along x and z against time, one panel per law."""
+    traces = experiment.traces
+    figure, panels = style.law_panels(
+        len(traces), 2.3, 0.4, x="time [s]", y="energy [mJ]", sharey=False
+    )
+    for axes, trace in zip(panels, traces, strict=True):
+        for i, (name, colour) in enumerate((("x", style.ORANGE), ("z", style.BLUE))):
+            axes.plot(trace.time, 1e3 * trace.exact[:, i], color=colour, lw=1.2, label=name)
+            summed = 1e3 * trace.paper[:, i]
+            axes.plot(trace.time, summed, color=colour, lw=0.9, ls="--", label=f"{name}, paper's")
+        style.draw_zero_line(axes, 0.5)
+        style.set_panel_title(axes, trace.law, "")
+        style.mark_law(axes, trace.law)
+    style.add_legend(panels[0])
+    return figure
+
+
+# --- section V.C ----------------------------------------------------------------------------------
+
+
+def bumps_figure(experiment: BumpExperiment) -> Figure:
+    """Return path and energy over the bump, one row per entry."""
+    entries = list(dict.fromkeys(one.entry for one in experiment.bumps))
+    laws = dict.fromkeys(one.law for one in experiment.bumps)
+    colours = dict(zip(laws, _LAW_COLOURS * len(laws), strict=False))
+    figure = style.new_figure(10.0, 2.8 * len(entries) + 0.4)
+    grid: Any = figure.subplots(len(entries), 2, squeeze=False)
+    x = np.linspace(-0.012, 0.014, 400)
+    height = bump_setup("A").surface.texture.height(np.column_stack([x, 0.0 * x]))
+    for (left, right), entry in zip(grid, entries, strict=True):
+        for axes in (left, right):
+            style.style_axes(axes)
+        style.fill_below(left, 1e3 * x, 1e3 * height, -25.0)
+        runs = [bump for bump in experiment.bumps if bump.entry == entry]
+        for one in runs:
+            options: dict[str, Any] = {"color": colours[one.law], "label": one.law}
+            drawn = left.plot(1e3 * one.x, 1e3 * one.z, lw=0.9, **options)
+            drawn += right.plot(one.time, 1e3 * one.supplied, lw=1.2, **options)
+            for line in drawn:
+                style.mark_law(line, one.law)
+        style.draw_zero_line(right)
+        style.add_legend(right)
+        left.set_ylim(-25.0, max(25.0, *(1e3 * one.z.max() + 2.0 for one in runs)))
+        style.set_panel_title(left, "Path", entry)
+        style.set_panel_title(right, "Energy", "supplied to the hand")
+        style.label_axes(left, "x [mm]", "z [mm]")
+        style.label_axes(right, "time [s]", "energy [mJ]")
+    return figure
+
+
+# --- other devices and surfaces -------------------------------------------------------------------
+
+
+_PAPER_DEVICE = "section V.A"
+
+
+@dataclass(frozen=True)
+class _OnsetPoint:
+    """One case: the stiffness that a rule allows and the onset of cycles [N/m]."""
+
+    predicted: float
+    onset: float
+    law: str
+    device: str
+    is_missed: bool
+
+
+def devices_figure(experiments: Experiments) -> Figure:
+    """Return onset against allowed stiffness for two rules, on logarithmic axes."""
+    figure = style.new_figure(10.0, 5.2)
+    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+    devices = dict.fromkeys(one.device for one in experiments.devices.onsets)
+    markers = {**dict(zip(devices, "osD^vP*" * len(devices), strict=False)), _PAPER_DEVICE: "X"}
+    cases = [
+        (one.prediction, one.device, one.catalogue_limit, one.is_limit_violated)
+        for one in experiments.devices.onsets
+    ]
+    cases += [
+        (one, _PAPER_DEVICE, one.wall_rule or math.nan, one.violates_wall_rule)
+        for one in experiments.passivity.onsets
+    ]
+    rules: tuple[list[_OnsetPoint], list[_OnsetPoint]] = ([], [])
+    for one, device, allowed, violated in cases:
+        case = one.onset.value, one.onset.law, device
+        rules[0].append(_OnsetPoint(allowed, *case, violated))
+        if one.conservative:
+            rules[1].append(_OnsetPoint(one.delay_rule, *case, one.violates_delay_rule))
+    names = ("K₀/q", "delay rule")
+    for axes, points, name in zip((left, right), rules, names, strict=True):
+        _draw_rule(axes, points, markers)
+        y = "cycles from [N/m]" if axes is left else ""
+        style.label_axes(axes, f"allowed by {name} [N/m]", y)
+        missed = sum(point.is_missed for point in points)
+        style.set_panel_title(axes, name, f"{missed} of {len(points)} wrong")
+    for device, marker in markers.items():
+        left.plot([], [], marker, mfc=style.BACKGROUND, mec=style.BLUE, label=device)
+    style.add_legend(left)
+    return figure
+
+
+def _draw_rule(axes: Axes, points: Sequence[_OnsetPoint], markers: Mapping[str, str]) -> None:
+    style.style_axes(axes)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    named: dict[tuple[int, int], list[_OnsetPoint]] = {}  # by position
+    for point in points:
+        allowed, onset = point.predicted, point.onset
+        if not (math.isfinite(onset) and math.isfinite(allowed) and allowed > 0.0):
+            continue
+        place = round(3.0 * math.log10(allowed)), round(8.0 * math.log10(onset))
+        named.setdefault(place, []).append(point)
+        edge = style.ORANGE if point.is_missed else style.BLUE
+        options: dict[str, Any] = {
+            "mec": edge,
+            "mfc": edge if point.is_missed else style.BACKGROUND,
+        }
+        label = f"_{point.law}, {point.device}"
+        marker = markers[point.device]
+        (drawn,) = axes.plot(allowed, onset, marker, ms=5.5, mew=0.9, label=label, **options)
+        style.mark_law(drawn, point.law)
+    for near in named.values():
+        letters = "".join(dict.fromkeys(point.law for point in near))
+        last = max(near, key=lambda point: point.predicted)
+        note: dict[str, Any] = {"textcoords": "offset points", "color": style.MUTED}
+        axes.annotate(letters, (last.predicted, last.onset), (5, 3), fontsize=7.0, **note)
+    axes.plot([1.0, 1e5], [1.0, 1e5], color=style.FAINT, lw=1.2, zorder=0.0)

@@ -1,4 +1,4 @@
-"""One look for every picture: colours, type sizes, units."""
+"""Common style of the figures: colours, font sizes, units, axes."""
 
 from __future__ import annotations
 
@@ -13,40 +13,41 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure, SubFigure
 
-CARD = "#ffffff"
-"""Background of every picture."""
-FREE = "#eceef1"
-"""Free space in a field: where the probe touches nothing."""
-INK, SOFT, FAINT = "#1d2733", "#5b6673", "#c9ced6"
-BODY = "#d9cdb8"
-# Okabe and Ito's palette: told apart by colour-blind readers.
-BLUE, ORANGE, GREEN = "#0072b2", "#d55e00", "#009e73"
-THEMED = {
-    CARD: "card", INK: "ink", "#000000": "ink", SOFT: "soft", FAINT: "faint", BODY: "body",
-    BLUE: "blue", ORANGE: "orange", GREEN: "green",
-}  # fmt: skip
-"""The colours that follow the theme of a page: names of the variables that stand for them.
+from asperity.laws import Law
 
-Their values in the dark are in ``templates/style.css``; in the light, in print and in a file of its
-own a picture has the colours above.
+BACKGROUND = "#ffffff"
+"""Background of every picture."""
+FREE_SPACE = "#eceef1"
+"""Background of a field where the probe is not in contact."""
+INK, MUTED, FAINT = "#1d2733", "#5b6673", "#c9ced6"
+BODY = "#d9cdb8"
+# Okabe and Ito's palette, which colour-blind readers can distinguish.
+BLUE, ORANGE, GREEN = "#0072b2", "#d55e00", "#009e73"
+_THEMED = (BACKGROUND, INK, "#000000", MUTED, FAINT, BODY, BLUE, ORANGE, GREEN)
+_VARIABLES = ("card", "ink", "ink", "soft", "faint", "body", "blue", "orange", "green")
+THEME_VARIABLES = dict(zip(_THEMED, _VARIABLES, strict=True))
+"""CSS variables of the colours that follow the theme of a page.
+
+Their dark values are in ``templates/style.css``; light, in print and as a file a figure has the
+colours above.
 """
 TITLE, LABEL, TICK = 10.0, 9.0, 8.0
 HEIGHTS = "cividis"
+INCH_ARROWS: dict[str, Any] = {"angles": "uv", "units": "inches", "scale_units": "inches"}
 
-# ColorBrewer's PuOr with a middle that is truly white: white is "no curl".
+# ColorBrewer's PuOr with a pure white centre, which means no curl.
 CURL = LinearSegmentedColormap.from_list(
-    "asperity_curl",
-    ["#4d1a6b", "#8073ac", "#c5bfdf", "#ffffff", "#fbc98a", "#e08214", "#7f3b08"],
+    "asperity_curl", ["#4d1a6b", "#8073ac", "#c5bfdf", "#ffffff", "#fbc98a", "#e08214", "#7f3b08"]
 )
 
 
-def on_field(colour: str) -> str:
-    """Return a colour of the palette for what lies on a field, which is as light in the dark.
+def unthemed_colour(colour: str) -> str:
+    """Return a colour for artists on a field, which does not follow the theme.
 
-    It is off by one part in 255, so that no variable stands for it.
+    It differs by one part in 255 from the colour of the palette, so that no variable replaces it.
 
     Example:
-        >>> on_field("#1d2733"), on_field("#ffffff")
+        >>> unthemed_colour("#1d2733"), unthemed_colour("#ffffff")
         ('#1d2732', '#fffffe')
     """
     value = int(colour[1:], 16)
@@ -54,7 +55,7 @@ def on_field(colour: str) -> str:
 
 
 @dataclass(frozen=True)
-class Unit:
+class AxisUnit:
     """A unit for an axis.
 
     Attributes:
@@ -66,21 +67,21 @@ class Unit:
     scale: float
 
 
-def length_unit(extent: float) -> Unit:
-    """Return the unit in which lengths up to the extent [m] are best read.
+def length_unit(extent: float) -> AxisUnit:
+    """Return the best unit of an axis for lengths up to the extent [m].
 
     Example:
         >>> length_unit(1e-3).name, length_unit(2e-6).name, length_unit(0.5).name
         ('mm', 'µm', 'mm')
     """
     if extent < 2e-7:
-        return Unit("nm", 1e9)
-    return Unit("µm", 1e6) if extent < 1e-4 else Unit("mm", 1e3)
+        return AxisUnit("nm", 1e9)
+    return AxisUnit("µm", 1e6) if extent < 1e-4 else AxisUnit("mm", 1e3)
 
 
-def force_unit(extent: float) -> Unit:
-    """Return the unit in which forces up to the extent [N] are best read."""
-    return Unit("mN", 1e3) if extent < 0.1 else Unit("N", 1.0)
+def force_unit(extent: float) -> AxisUnit:
+    """Return the best unit of an axis for forces up to the extent [N]."""
+    return AxisUnit("mN", 1e3) if extent < 0.1 else AxisUnit("N", 1.0)
 
 
 def nice_length(target: float) -> float:
@@ -95,15 +96,15 @@ def nice_length(target: float) -> float:
     return round(step * power, 12)
 
 
-class Drawn(Figure):
-    """A figure that a notebook shows, with ``%matplotlib inline`` or without."""
+class NotebookFigure(Figure):
+    """A figure that a notebook displays, with ``%matplotlib inline`` or without."""
 
     def _repr_png_(self) -> bytes:
-        """Return the figure as PNG, as wide as a notebook's column."""
-        return png(self)
+        """Return the figure as PNG, as wide as a notebook cell."""
+        return to_png(self)
 
 
-def png(figure: Figure) -> bytes:
+def to_png(figure: Figure) -> bytes:
     """Return a figure as PNG: 720 pixels for its 10 inches."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=72)
@@ -111,54 +112,54 @@ def png(figure: Figure) -> bytes:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure [inch] that belongs to nobody: no pyplot, no global state."""
-    figure = Drawn(figsize=(width, height), facecolor=CARD, layout="constrained")
+    """Return an empty figure of a size [inch], without pyplot or global state."""
+    figure = NotebookFigure(figsize=(width, height), facecolor=BACKGROUND, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
-def dress(axes: Axes) -> None:
-    """Give axes the common look."""
-    axes.tick_params(which="both", labelsize=TICK, colors=SOFT, length=3, width=0.6)
+def style_axes(axes: Axes) -> None:
+    """Apply the common style to axes."""
+    axes.tick_params(which="both", labelsize=TICK, colors=MUTED, length=3, width=0.6)
     for side, spine in axes.spines.items():
         spine.set_visible(side in {"left", "bottom"})
         spine.set_color(FAINT)
         spine.set_linewidth(0.8)
 
 
-def panel(figure: Figure | SubFigure) -> Axes:
-    """Return the only axes of a figure, dressed."""
+def single_axes(figure: Figure | SubFigure) -> Axes:
+    """Return the only axes of a figure, styled."""
     axes: Axes = figure.subplots()
-    dress(axes)
+    style_axes(axes)
     return axes
 
 
 def law_panels(
-    count: int, height: float, around: float, *, x: str, y: str, sharey: bool = True
+    count: int, height: float, margin: float, *, x: str, y: str, sharey: bool = True
 ) -> tuple[Figure, list[Axes]]:
-    """Return a new figure with axes for so many laws, three in a row; see :func:`panels`.
+    """Return a new figure with axes for a number of laws, three in a row; see :func:`axes_grid`.
 
     Args:
         count: of laws.
         height: of a row [inch].
-        around: what the figure is higher than its rows [inch].
-        x: what all have along.
-        y: what all have upwards.
-        sharey: whether all have one vertical scale.
+        margin: height of the figure besides its rows [inch].
+        x: label of the horizontal axes.
+        y: label of the vertical axes.
+        sharey: whether all share one vertical scale.
     """
-    figure = new_figure(10.0, height * math.ceil(count / 3) + around)
-    return figure, panels(figure, count, 3, x=x, y=y, sharey=sharey)
+    figure = new_figure(10.0, height * math.ceil(count / 3) + margin)
+    return figure, axes_grid(figure, count, 3, x=x, y=y, sharey=sharey)
 
 
-def zero_line(axes: Axes, least: float = 0.0) -> None:
-    """Draw where values are zero, and show at least so much above and below it."""
+def draw_zero_line(axes: Axes, min_extent: float = 0.0) -> None:
+    """Draw a line at zero, and show at least the least extent above and below it."""
     axes.axhline(0.0, color=FAINT, lw=0.8, zorder=0.0)
-    if least:
+    if min_extent:
         low, high = axes.get_ylim()
-        axes.set_ylim(min(low, -least), max(high, least))
+        axes.set_ylim(min(low, -min_extent), max(high, min_extent))
 
 
-def panels(
+def axes_grid(
     figure: Figure | SubFigure,
     count: int,
     columns: int,
@@ -167,15 +168,15 @@ def panels(
     y: str = "",
     sharey: bool = True,
 ) -> list[Axes]:
-    """Return axes side by side, dressed, in rows; only the outer ones carry words and numbers.
+    """Return a grid of styled axes, of which only the outer ones have labels.
 
     Args:
-        figure: where to.
+        figure: receives the axes.
         count: of axes.
         columns: greatest number of axes in a row.
-        x: what all have along, written below the lowest.
-        y: what all have upwards, written beside the first of each row.
-        sharey: whether all have one vertical scale, too.
+        x: label of the lowest axes.
+        y: label of the first axes of each row.
+        sharey: whether all share one vertical scale.
     """
     columns = min(columns, count)
     rows = -(-count // columns)
@@ -183,60 +184,67 @@ def panels(
     for index, axes in enumerate(grid.ravel()):
         axes.set_visible(index < count)
         lowest = index + columns >= count
-        dress(axes)
+        style_axes(axes)
         axes.tick_params(labelbottom=lowest)
-        label(axes, x if lowest else "", y if index % columns == 0 else "")
+        label_axes(axes, x if lowest else "", y if index % columns == 0 else "")
     return list(grid.ravel()[:count])
 
 
-def legend(axes: Axes, **options: Any) -> None:
-    """Name the lines, without a frame."""
-    axes.legend(**{"fontsize": TICK, "frameon": False, "labelcolor": SOFT, **options})
+def add_legend(axes: Axes, **options: Any) -> None:
+    """Add a legend without a frame."""
+    axes.legend(**{"fontsize": TICK, "frameon": False, "labelcolor": MUTED, **options})
 
 
-def note(axes: Axes, words: str, place: tuple[float, float], **options: Any) -> None:
-    """Write small words on a plate, so that lines do not run through them."""
-    plate = {"facecolor": CARD, "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
-    defaults: dict[str, Any] = {
-        "xycoords": "axes fraction", "xytext": (0, 0), "textcoords": "offset points",
-        "fontsize": TICK, "color": SOFT, "bbox": plate,
-    }  # fmt: skip
-    axes.annotate(words, place, **{**defaults, **options})
+def add_note(axes: Axes, text: str, position: tuple[float, float], **options: Any) -> None:
+    """Add small text on a plate, above the lines."""
+    plate = {"facecolor": BACKGROUND, "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
+    place = {"xycoords": "axes fraction", "xytext": (0, 0), "textcoords": "offset points"}
+    text_style = {"fontsize": TICK, "color": MUTED, "bbox": plate}
+    axes.annotate(text, position, **{**place, **text_style, **options})
 
 
-LAW = "law-"
-"""Begins the ``gid`` of what belongs to one law; the rest is its letter."""
+LAW_PREFIX = "law-"
+"""Prefix of the ``gid`` of an artist that belongs to a law; the letter follows."""
 
 
-def of_law(artist: Artist, letter: str) -> None:
-    """Say that an artist, or axes with all in them, is of one law: a page can hide it."""
-    artist.set_gid(f"{LAW}{letter}")
+def mark_law(artist: Artist, letter: str) -> None:
+    """Mark an artist, or axes with all their artists, as of one law, with which a page hides it."""
+    artist.set_gid(f"{LAW_PREFIX}{letter}")
 
 
-def entitle(axes: Axes, letter: str, name: str, remark: str = "") -> None:
-    """Write a title: the letter bold, the name after it, and a remark below them."""
+def set_panel_title(axes: Axes, letter: str, name: str, remark: str = "") -> None:
+    """Add a title: the letter in bold, the name, and a remark below them."""
     axes.set_label(f"{letter}, {name}" if name else letter)
     above = TICK + 6.0 if remark else 0.0
     if remark:
-        axes.set_title(remark, loc="left", fontsize=TICK, color=SOFT, pad=5.0)
-    look: dict[str, Any] = {
-        "textcoords": "offset points", "fontsize": TITLE, "color": INK, "parse_math": False,
-        "annotation_clip": False, "va": "bottom",
-    }  # fmt: skip
+        axes.set_title(remark, loc="left", fontsize=TICK, color=MUTED, pad=5.0)
+    text_style: dict[str, Any] = {"fontsize": TITLE, "color": INK, "va": "bottom"}
+    text_style |= {"textcoords": "offset points", "parse_math": False, "annotation_clip": False}
     corner: dict[str, Any] = {"xycoords": "axes fraction", "fontweight": "bold"}
-    bold = axes.annotate(letter, (0.0, 1.0), (0.0, above + 3.0), **corner, **look)
-    axes.annotate(name, (1.0, 0.0), (5.0, 0.0), xycoords=bold, **look)
+    bold = axes.annotate(letter, (0.0, 1.0), (0.0, above + 3.0), **corner, **text_style)
+    axes.annotate(name, (1.0, 0.0), (5.0, 0.0), xycoords=bold, **text_style)
 
 
-def label(axes: Axes, x: str = "", y: str = "") -> None:
-    """Name the axes, unit included."""
-    axes.set_xlabel(x, fontsize=LABEL, color=SOFT)
-    axes.set_ylabel(y, fontsize=LABEL, color=SOFT)
+def title_law(axes: Axes, law: Law, remark: str = "") -> None:
+    """Add the title of a law with a remark, and mark the axes as of that law."""
+    set_panel_title(axes, law.letter, law.name.replace("-", " "), remark)
+    mark_law(axes, law.letter)
 
 
-def dress_bar(bar: Any, text: str) -> None:
-    """Give a colour bar the common look."""
-    bar.ax.tick_params(labelsize=TICK, colors=SOFT, length=3, width=0.6)
+def fill_below(axes: Axes, x: Any, heights: Any, bottom: float) -> None:
+    """Fill the body between heights and a bottom."""
+    axes.fill_between(x, heights, bottom, color=BODY, linewidth=0.0, alpha=0.7)
+
+
+def label_axes(axes: Axes, x: str = "", y: str = "") -> None:
+    """Label the axes, with units."""
+    axes.set_xlabel(x, fontsize=LABEL, color=MUTED)
+    axes.set_ylabel(y, fontsize=LABEL, color=MUTED)
+
+
+def style_colorbar(bar: Any, text: str) -> None:
+    """Apply the common style to a colour bar."""
+    bar.ax.tick_params(labelsize=TICK, colors=MUTED, length=3, width=0.6)
     bar.outline.set_edgecolor(FAINT)
-    bar.solids.set_rasterized(True)  # its colours are data, whatever the theme
-    bar.set_label(text, fontsize=LABEL, color=SOFT)
+    bar.solids.set_rasterized(True)  # its colours are data and do not follow the theme
+    bar.set_label(text, fontsize=LABEL, color=MUTED)

@@ -1,1 +1,1 @@
-"""What no data sheet gives: a device is pushed, and raised against a wall, until it tells."""
+"""Measurement of a device: noise, dynamics, delay and the stiffest stable wall."""

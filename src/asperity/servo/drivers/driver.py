@@ -1,4 +1,4 @@
-"""What a driver is: where the handle is, a force to hold, and what becomes of it when all ends."""
+"""The interface of drivers: reading the position, holding a force, describing failures."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from asperity.checks import FloatArray, array, positive
-from asperity.errors import ParameterError
+from asperity.core.checks import FloatArray, check_array, check_positive
+from asperity.core.errors import ParameterError
 
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Where the surface lies in the frame of a device.
+    """Pose of the surface in the frame of a device.
 
-    p = unit Rᵀ (p_device - origin) and f_device = R f, as :doc:`/howto/own-loop` has it.
+    p = unit Rᵀ (p_device - origin) and f_device = R f, see :doc:`/howto/own-loop`.
 
     Attributes:
-        rotation: R, rows; column j is where the surface's j-th axis points in the device's frame.
-        origin: of the surface, in the device's frame and unit.
+        rotation: R, rows; column j is the surface's j-th axis in the device's frame.
+        origin: origin of the surface, in the device's frame and unit.
         unit: one unit of the device's positions [m].
 
     Raises:
-        ParameterError: for a matrix that is no rotation, or a unit that is not positive.
+        ParameterError: for a matrix that is not a rotation, or a unit that is not positive.
 
     Example:
-        >>> Frame(origin=(0.0, 0.0, 20.0), unit=1e-3).table[2].tolist()
+        >>> Frame(origin=(0.0, 0.0, 20.0), unit=1e-3).matrix[2].tolist()
         [0.0, 0.0, 0.001, -0.02]
     """
 
@@ -40,15 +40,15 @@ class Frame:
     unit: float = 1.0
 
     def __post_init__(self) -> None:
-        turn = array("rotation", self.rotation, (3, 3), "1")
-        array("origin", self.origin, (3,), "m")
-        positive("unit", self.unit, "m")
+        turn = check_array("rotation", self.rotation, (3, 3), "1")
+        check_array("origin", self.origin, (3,), "m")
+        check_positive("unit", self.unit, "m")
         if np.abs(turn @ turn.T - np.eye(3)).max() > 1e-9 or np.linalg.det(turn) < 0.0:
             raise ParameterError("rotation", "must be a rotation without mirroring", self.rotation)
 
     @property
-    def table(self) -> FloatArray:
-        """What the compiled loop receives: to the surface, then to the device (6, 4)."""
+    def matrix(self) -> FloatArray:
+        """Matrix for the compiled loop: to the surface, then to the device (6, 4)."""
         turn, origin = np.array(self.rotation), np.array(self.origin)
         table = np.zeros((6, 4))
         table[:3, :3] = self.unit * turn.T
@@ -57,92 +57,93 @@ class Frame:
         return table
 
 
-UNTURNED = Frame()
+IDENTITY_FRAME = Frame()
 """The surface's own frame."""
 
 RIGHT, AWAY, UP = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 TOWARDS = (0.0, -1.0, 0.0)
-WALLS = {"lying": (RIGHT, AWAY, UP), "standing": (RIGHT, UP, TOWARDS)}
-"""Where x, y and z of a surface point, seen by the user: on a table, or facing him."""
+WALL_AXES = {"lying": (RIGHT, AWAY, UP), "standing": (RIGHT, UP, TOWARDS)}
+"""Directions of the surface's x, y and z, seen by the user: on a table, or facing the user."""
 
 
-def frame_of(axes: Sequence[Vector], wall: str, origin: Vector, unit: float) -> Frame:
-    """Return where a surface lies in the frame of a device.
+def surface_frame(axes: Sequence[Vector], wall: str, origin: Vector, unit: float) -> Frame:
+    """Return the pose of a surface in the frame of a device.
 
     Args:
-        axes: where the device's x, y and z point, seen by the user: right, away, up.
-        wall: one of ``WALLS``.
-        origin: of the surface, in the device's axes [m].
+        axes: directions of the device's x, y and z, seen by the user: right, away, up.
+        wall: one of ``WALL_AXES``.
+        origin: origin of the surface, in the device's axes [m].
         unit: one unit of the device's positions [m].
     """
-    turn = np.array(axes) @ np.array(WALLS[wall]).T
+    turn = np.array(axes) @ np.array(WALL_AXES[wall]).T
     x, y, z = (value / unit for value in origin)
     rows = tuple((float(a), float(b), float(c)) for a, b, c in turn)
     return Frame(rows, (x, y, z), unit)  # type: ignore[arg-type]  # three rows
 
 
 class Driver(ABC):
-    """A kind of device; what is made of it goes to the loop's process, so it must be picklable.
+    """A kind of device; instances go to the loop's process, so they must be picklable.
 
     Attributes:
-        name: as on the command line.
-        moving: whether a real handle moves.
-        when_lost: what the device does if the process of the loop dies, in a sentence.
+        name: name on the command line.
+        has_moving_handle: whether a real handle moves.
+        loss_notice: what the device does if the process of the loop dies, in a sentence.
     """
 
     name: ClassVar[str]
-    moving: ClassVar[bool] = True
-    when_lost: ClassVar[str]
+    has_moving_handle: ClassVar[bool] = True
+    loss_notice: ClassVar[str]
 
     @property
     def frame(self) -> Frame:
-        """Where the surface lies in the device's frame."""
-        return UNTURNED
+        """Pose of the surface in the device's frame: the field ``surface_frame``, if any."""
+        frame: Frame = getattr(self, "surface_frame", IDENTITY_FRAME)
+        return frame
 
     @property
-    def readings(self) -> int | None:
-        """How many readings there are; ``None`` for as many as are wanted."""
+    def max_readings(self) -> int | None:
+        """Number of readings; ``None`` for any number."""
         return None
 
     @abstractmethod
-    def kernels(self) -> tuple[ModuleType, ...]:
-        """Return the compiled modules: ``device_read`` and ``device_write``, and what they need."""
+    def kernel_modules(self) -> tuple[ModuleType, ...]:
+        """Return the compiled modules of ``device_read`` and ``device_write``."""
 
     @abstractmethod
-    def blank(self) -> tuple[Any, ...]:
-        """Return a record of the right type, for compiling before the device is open."""
+    def placeholder_record(self) -> tuple[Any, ...]:
+        """Return a record of the same type, to compile before the device is open."""
 
     @abstractmethod
     def open(self) -> tuple[Any, ...]:
         """Open the device, in the loop's process; return its record.
 
         Raises:
-            ParameterError: if it cannot be opened, with what to do.
+            ParameterError: if it cannot be opened, with a hint.
         """
 
     def close(self) -> None:
-        """Let go of the device, without force; called however the loop ended."""
+        """Close the device, without force; called however the loop ended."""
         return
 
-    def explain(self, code: int) -> str:
-        """Return what a number means that the driver returned, in words."""
+    def describe_error(self, code: int) -> str:
+        """Return the meaning of an error code of the driver, in words."""
         return f"error {code}"
 
 
 @dataclass(frozen=True)
 class DriverKind:
-    """A driver of real devices that a word chooses, declared in the driver's file.
+    """A driver of real devices with its name, declared in the driver's file.
 
     Attributes:
-        name: the word, which a colon may follow with more.
-        axes: where the device's x, y and z point, seen by the user: right, away, up.
+        name: name on the command line; a colon and an argument may follow.
+        axes: directions of the device's x, y and z, seen by the user: right, away, up.
         unit: one unit of the device's positions [m].
-        make: returns a driver from what stands after the colon, and where the surface lies.
-        example: of the word with what may follow it.
+        create: returns a driver from the argument and the pose of the surface.
+        example: example of a name with an argument.
     """
 
     name: str
     axes: tuple[Vector, Vector, Vector]
     unit: float
-    make: Callable[[str, Frame], Driver]
+    create: Callable[[str, Frame], Driver]
     example: str

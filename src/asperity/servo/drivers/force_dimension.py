@@ -1,6 +1,6 @@
 """Devices of Force Dimension (omega, delta, sigma, lambda) and the Falcon, by libdhd.
 
-Metres and newtons; x towards the user, y to his right, z up.
+Metres and newtons; x towards the user, y to the user's right, z up.
 """
 
 from __future__ import annotations
@@ -10,16 +10,17 @@ from dataclasses import dataclass, field
 from types import ModuleType
 from typing import ClassVar
 
-from asperity.errors import ParameterError
-from asperity.servo.drivers.driver import RIGHT, TOWARDS, UNTURNED, UP, Driver, DriverKind, Frame
-from asperity.servo.drivers.library import functions, load_library
-from asperity.servo.kernels import force_dimension
-from asperity.servo.kernels.force_dimension import ForceDimensionDevice
+from asperity.core.errors import ParameterError
+from asperity.servo.drivers import driver
+from asperity.servo.drivers.driver import RIGHT, TOWARDS, UP, Driver, DriverKind
+from asperity.servo.drivers.library import function_addresses, load_library
+from asperity.servo.kernels import force_dimension_device
+from asperity.servo.kernels.force_dimension_device import ForceDimensionDevice
 
 LIBRARY = "ASPERITY_LIBDHD"
-"""Variable of the environment that may hold the path of the library."""
-_NAMES = ("libdhd.so.3", "libdhd.so", "dhd64.dll")
-_USED = (
+"""Environment variable of the path of the library."""
+_LIBRARY_NAMES = ("libdhd.so.3", "libdhd.so", "dhd64.dll")
+_FUNCTIONS = (
     "dhdGetDeviceCount", "dhdOpenID", "dhdEnableForce", "dhdClose", "dhdErrorGetLastStr",
     "dhdGetPosition", "dhdSetForce",
 )  # fmt: skip
@@ -30,48 +31,43 @@ class ForceDimensionDriver(Driver):
     """A device of Force Dimension.
 
     Attributes:
-        number: of the device among those that are connected, from 0; ``None`` for the only one.
-        placed: where the surface lies.
+        number: number of the device among the connected ones, from 0; ``None`` for the only one.
+        surface_frame: pose of the surface.
     """
 
     name: ClassVar[str] = "forcedimension"
-    when_lost: ClassVar[str] = (
-        "Nobody tells the device then: count on its holding the last force, and cut it with the"
-        " force switch."
+    loss_notice: ClassVar[str] = (
+        "The device receives no further commands and may hold the last force: cut it with the force"
+        " switch."
     )
 
     number: int | None = None
-    placed: Frame = UNTURNED
-    _opened: int = field(default=-1, init=False, repr=False)
+    surface_frame: driver.Frame = driver.IDENTITY_FRAME
+    _device_id: int = field(default=-1, init=False, repr=False)
 
-    @property
-    def frame(self) -> Frame:
-        """Where the surface lies in the device's frame."""
-        return self.placed
+    def kernel_modules(self) -> tuple[ModuleType, ...]:
+        """Return the module that calls libdhd."""
+        return (force_dimension_device,)
 
-    def kernels(self) -> tuple[ModuleType, ...]:
-        """Return what calls libdhd."""
-        return (force_dimension,)
-
-    def blank(self) -> ForceDimensionDevice:
+    def placeholder_record(self) -> ForceDimensionDevice:
         """Return a record of no device."""
         return ForceDimensionDevice(0, 0, 0)
 
     def open(self) -> ForceDimensionDevice:
-        """Open the device and switch its force on."""
+        """Open the device and enable its force."""
         library = _library()
-        *_others, get_position, set_force = functions(library, *_USED)
-        number = self._chosen(library.dhdGetDeviceCount())
+        *_others, get_position, set_force = function_addresses(library, *_FUNCTIONS)
+        number = self._choose_device(library.dhdGetDeviceCount())
         opened = library.dhdOpenID(number)
         if opened < 0:
-            raise ParameterError("driver", f"cannot open device {number}: {_said(library)}")
+            raise ParameterError("driver", f"cannot open device {number}: {_last_error(library)}")
         if library.dhdEnableForce(1, opened) < 0:
             library.dhdClose(opened)
-            raise ParameterError("driver", f"cannot switch the force on: {_said(library)}")
-        self._opened = opened
+            raise ParameterError("driver", f"cannot switch the force on: {_last_error(library)}")
+        self._device_id = opened
         return ForceDimensionDevice(get_position, set_force, opened)
 
-    def _chosen(self, count: int) -> int:
+    def _choose_device(self, count: int) -> int:
         if count < 1:
             raise ParameterError("driver", "finds no device of Force Dimension: is it switched on?")
         if self.number is None and count > 1:
@@ -82,32 +78,32 @@ class ForceDimensionDriver(Driver):
         return self.number or 0
 
     def close(self) -> None:
-        """Switch the force off and close the device."""
+        """Disable the force and close the device."""
         library = _library()
         set_force = library.dhdSetForce
         set_force.argtypes = [ctypes.c_double] * 3 + [ctypes.c_byte]
-        set_force(0.0, 0.0, 0.0, self._opened)
-        library.dhdEnableForce(0, self._opened)
-        library.dhdClose(self._opened)
+        set_force(0.0, 0.0, 0.0, self._device_id)
+        library.dhdEnableForce(0, self._device_id)
+        library.dhdClose(self._device_id)
 
-    def explain(self, code: int) -> str:
-        """Return what libdhd says of its last error."""
-        return f"libdhd: {_said(_library())} ({code})"
+    def describe_error(self, code: int) -> str:
+        """Return the last error of libdhd."""
+        return f"libdhd: {_last_error(_library())} ({code})"
 
 
 def _library() -> ctypes.CDLL:
-    return load_library(_NAMES, LIBRARY, "the SDK of Force Dimension (forcedimension.com)")
+    return load_library(_LIBRARY_NAMES, LIBRARY, "the SDK of Force Dimension (forcedimension.com)")
 
 
-def _said(library: ctypes.CDLL) -> str:
+def _last_error(library: ctypes.CDLL) -> str:
     library.dhdErrorGetLastStr.restype = ctypes.c_char_p
     return (library.dhdErrorGetLastStr() or b"no reason given").decode(errors="replace")
 
 
-def _numbered(text: str, frame: Frame) -> ForceDimensionDriver:
+def _create_driver(text: str, frame: driver.Frame) -> ForceDimensionDriver:
     if text and not text.isdecimal():
         raise ParameterError("driver", "must have a number after the colon, from 0", text)
     return ForceDimensionDriver(int(text) if text else None, frame)
 
 
-KIND = DriverKind("forcedimension", (TOWARDS, RIGHT, UP), 1.0, _numbered, "forcedimension:1")
+KIND = DriverKind("forcedimension", (TOWARDS, RIGHT, UP), 1.0, _create_driver, "forcedimension:1")

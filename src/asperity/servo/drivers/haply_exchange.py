@@ -1,8 +1,9 @@
 """The thread that talks to the Haply Inverse Service, beside the compiled loop.
 
-It sends each force as the loop gives it and puts each place that comes back into the slot. The
-service answers every message with one state, so a state is as old as the message that it answers:
-what piles up anywhere on the way makes it old, and the loop judges its age.
+It sends each force of the loop and pushes each position into the ring buffer. The service answers
+every message with one state, so a state is as old as the message that it answers: a backlog
+anywhere
+makes states old, and the loop checks their age.
 """
 
 from __future__ import annotations
@@ -15,48 +16,45 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
-from types import ModuleType
 from typing import Any
 
-from asperity.kernels.fuse import fuse_module
-from asperity.servo.drivers.exchanged import new_slot
-from asperity.servo.drivers.websocket import WebSocket
-from asperity.servo.kernels import slot
-from asperity.servo.kernels.slot import PATIENCE, SILENT, Slot
-from asperity.servo.priority import PRIORITY
+from asperity.servo.drivers.threaded import ThreadBuffer
+from asperity.servo.drivers.websocket_client import WebSocketClient
+from asperity.servo.kernels.ring_buffer import FORCE_TIMEOUT, LOOP_SILENT
+from asperity.servo.realtime import PRIORITY
 
-LOST, NO_STATE, GONE = 3, 4, 5
-"""What the thread finds wrong: no connection, no state in a message, no device."""
+CONNECTION_LOST, INVALID_STATE, DEVICE_GONE = 3, 4, 5
+"""Failures of the thread: no connection, no state in a message, no device."""
 KEEP_ALIVE = 5e-3
-"""[s] without a force of the loop after which the last one is sent again: states keep coming."""
-MOST_ASKED = 4
-"""Messages that may wait for their answer."""
-_NOTHING = (0.0, 0.0, 0.0)
+"""Time without a new force after which the last one is sent again [s]: states keep coming."""
+MAX_PENDING = 4
+"""Largest number of messages without an answer."""
+_ZERO_FORCE = (0.0, 0.0, 0.0)
 Force = tuple[float, float, float]
 
 
-def states_of(message: bytes) -> list[dict[str, Any]]:
-    """Return what a message of the service says of its devices.
+def parse_states(message: bytes) -> list[dict[str, Any]]:
+    """Return the states of the devices in a message of the service.
 
     Raises:
-        ValueError: if that is not the service's format 3.1 or newer.
+        ValueError: for a message that is not of format 3.1 or newer.
     """
     try:
-        said = json.loads(message)
-        devices = said.get("inverse3", [])
-        ours = not said.keys().isdisjoint(("session_id", "inverse3"))
-        if ours and all(isinstance(device["device_id"], str) for device in devices):
+        content = json.loads(message)
+        devices = content.get("inverse3", [])
+        known = not content.keys().isdisjoint(("session_id", "inverse3"))
+        if known and all(isinstance(device["device_id"], str) for device in devices):
             return list(devices)
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
         pass
     raise ValueError(f"a message of another format: {message[:60]!r}")
 
 
-def place_of(state: dict[str, Any]) -> Force:
-    """Return the position of a device [m]; a coordinate that is missing is 0.
+def cursor_position(state: dict[str, Any]) -> Force:
+    """Return the position of a device [m]; a missing coordinate is 0.
 
     Raises:
-        ValueError: if there is none.
+        ValueError: for a state without a position.
     """
     try:
         given = state["state"]["cursor_position"]
@@ -68,111 +66,102 @@ def place_of(state: dict[str, Any]) -> Force:
     raise ValueError(f"a state without a position: {str(state)[:60]}")
 
 
-def _compiled_ends() -> ModuleType:
-    """Return this thread's ends of a slot, compiled now: no message is to wait for it."""
-    ends, spare = fuse_module(slot), new_slot()
-    ends.deliver(*spare, 0.0, 0.0, 0.0, 0)
-    ends.fetch(*spare)
-    ends.give_up(spare.words, LOST)
-    return ends
-
-
-class Exchange(threading.Thread):
-    """The thread; it ends when the connection does, or when it is told to.
+class HaplyThread(threading.Thread):
+    """The thread of a device; it ends with the connection, or by :meth:`stop`.
 
     Args:
-        line: to the service.
-        device: its id.
-        shared: the slot between this thread and the loop.
+        connection: connection to the service.
+        device: id of the device.
+        force_timeout: time after which a force that is not renewed is released [s].
 
     Attributes:
-        slot: between this thread and the loop.
-        bell: the file that wakes this thread when a byte is written to it.
-        reason: what is wrong, in words.
+        buffer: buffer between this thread and the loop.
+        wakeup: file that wakes this thread when a byte is written to it.
+        reason: what failed, in words.
     """
 
-    def __init__(self, line: WebSocket, device: str, shared: Slot) -> None:
+    def __init__(self, connection: WebSocketClient, device: str, force_timeout: float) -> None:
         super().__init__(daemon=True)
-        self.slot = shared
-        self.reason = ""
-        self._ends = _compiled_ends()
-        self._line, self._device = line, device
-        self._heard, self.bell = os.pipe()
-        for end in (self._heard, self.bell):
+        self.buffer, self.reason = ThreadBuffer(force_timeout), ""
+        self._connection, self._device_id = connection, device
+        self._wakeup_reader, self.wakeup = os.pipe()
+        for end in (self._wakeup_reader, self.wakeup):
             os.set_blocking(end, False)
-        self._asked: deque[int] = deque()
-        self._sent, self._told, self._ending = _NOTHING, 0, False
+        self._pending: deque[int] = deque()
+        self._last_force, self._last_force_time, self._stopping = _ZERO_FORCE, 0, False
 
     def run(self) -> None:
-        """Exchange until something ends it; the last word is no force, if anybody hears it."""
-        with suppress(OSError, AttributeError):  # not allowed, or not of this system
+        """Exchange until a failure or :meth:`stop`; the last message is no force."""
+        with suppress(OSError, AttributeError):  # not permitted, or not supported
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY - 1))
         try:
-            self._serve()
+            self._exchange()
         except OSError as error:
-            self._fail(LOST, f"the connection to the Inverse Service is lost: {error}")
+            self._fail(CONNECTION_LOST, f"the connection to the Inverse Service is lost: {error}")
         except ValueError as error:
-            self._fail(NO_STATE, f"the Inverse Service sent {error}")
+            self._fail(INVALID_STATE, f"the Inverse Service sent {error}")
         finally:
             with suppress(OSError):
-                self._send(_NOTHING)
+                self._send(_ZERO_FORCE)
 
-    def end(self, patience: float) -> None:
-        """End it: the service is told that there is no force, and has time to answer [s]."""
-        self._ending = True
-        with suppress(BlockingIOError):  # it rings as it is
-            os.write(self.bell, b"\0")
-        self.join(patience)
-        self._line.close()
-        os.close(self._heard)
-        os.close(self.bell)
+    def stop(self, timeout: float) -> None:
+        """End the thread: the service receives no force, and has time to answer [s]."""
+        self._stopping = True
+        with suppress(BlockingIOError):  # the pipe is full: it wakes the thread
+            os.write(self.wakeup, b"\0")
+        self.join(timeout)
+        self._connection.close()
+        os.close(self._wakeup_reader)
+        os.close(self.wakeup)
 
-    def _serve(self) -> None:
+    def _exchange(self) -> None:
         poller = select.poll()
-        poller.register(self._line, select.POLLIN)
-        poller.register(self._heard, select.POLLIN)
-        self._send(_NOTHING)
-        while not self._ending and not self.reason:
+        poller.register(self._connection, select.POLLIN)
+        poller.register(self._wakeup_reader, select.POLLIN)
+        self._send(_ZERO_FORCE)
+        while not self._stopping and not self.reason:
             ready = [file for file, _event in poller.poll(1e3 * KEEP_ALIVE)]
-            if self._heard in ready:
-                os.read(self._heard, 1 << 16)
-            if self._line.fileno() in ready:
-                self._take(self._line.received())
-            self._tell(again=not ready)
+            if self._wakeup_reader in ready:
+                os.read(self._wakeup_reader, 1 << 16)
+            if self._connection.fileno() in ready:
+                self._process_messages(self._connection.receive())
+            self._send_newest_force(resend=not ready)
 
-    def _take(self, messages: Sequence[bytes]) -> None:
-        """Put what the messages say into the slot."""
+    def _process_messages(self, messages: Sequence[bytes]) -> None:
+        """Push the positions of messages to the loop."""
         for message in messages:
-            if not self._asked:
-                raise ValueError("a state that nobody asked for")
-            asked = self._asked.popleft()
-            for state in states_of(message):
-                if state["device_id"] == self._device:
-                    self._ends.deliver(*self.slot, *place_of(state), asked)
+            if not self._pending:
+                raise ValueError("a state without a request")
+            sent = self._pending.popleft()
+            for state in parse_states(message):
+                if state["device_id"] == self._device_id:
+                    self.buffer.push_position(*cursor_position(state), sent)
                     break
             else:
-                self._fail(GONE, f"the Inverse Service has no {self._device} any more: unplugged?")
+                words = f"the Inverse Service has no {self._device_id} any more: unplugged?"
+                self._fail(DEVICE_GONE, words)
 
-    def _tell(self, *, again: bool) -> None:
-        """Send the newest force, if there is a new one or the last is to be sent again."""
-        x, y, z, given = self._ends.fetch(*self.slot)
+    def _send_newest_force(self, *, resend: bool) -> None:
+        """Send the newest force if it is new, or the last one again."""
+        x, y, z, given = self.buffer.latest_force()
         force = (x, y, z)
-        if force != _NOTHING and time.monotonic_ns() - given > self.slot.words[PATIENCE]:
-            self._fail(SILENT, "its force was taken away")
+        timeout = self.buffer.ring.words[FORCE_TIMEOUT]
+        if force != _ZERO_FORCE and time.monotonic_ns() - given > timeout:
+            self._fail(LOOP_SILENT, "its force was released")
             return
-        letting_go = force == _NOTHING != self._sent
-        if letting_go or ((again or given != self._told) and len(self._asked) < MOST_ASKED):
-            self._told = given
+        is_due = (resend or given != self._last_force_time) and len(self._pending) < MAX_PENDING
+        if is_due or force == _ZERO_FORCE != self._last_force:
+            self._last_force_time = given
             self._send(force)
 
     def _send(self, force: Force) -> None:
         x, y, z = force
-        self._asked.append(time.monotonic_ns())
+        self._pending.append(time.monotonic_ns())
         commands = {"set_cursor_force": {"values": {"x": x, "y": y, "z": z}}}
-        message = {"inverse3": [{"device_id": self._device, "commands": commands}]}
-        self._line.send(json.dumps(message))
-        self._sent = force
+        message = {"inverse3": [{"device_id": self._device_id, "commands": commands}]}
+        self._connection.send(json.dumps(message))
+        self._last_force = force
 
-    def _fail(self, code: int, words: str) -> None:
-        self.reason = words
-        self._ends.give_up(self.slot.words, code)
+    def _fail(self, code: int, reason: str) -> None:
+        self.reason = reason
+        self.buffer.report_failure(code)

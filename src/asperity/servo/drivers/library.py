@@ -1,26 +1,40 @@
-"""Shared libraries of vendors and users, found when a device is opened."""
+"""Shared libraries of vendors, and the driver of a user-defined one.
+
+A user-defined device is a shared library with four C functions, see ``examples/own_device.c``.
+
+Metres and newtons; x to the right, y away from the user, z up.
+"""
 
 from __future__ import annotations
 
 import ctypes
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import ClassVar
 
-from asperity.errors import ParameterError
+from asperity.core.errors import ParameterError
+from asperity.servo.drivers.driver import AWAY, IDENTITY_FRAME, RIGHT, UP, Driver, DriverKind, Frame
+from asperity.servo.kernels import library_device
+from asperity.servo.kernels.library_device import LibraryDevice
 
-_FOREIGN = ("wrong elf class", "invalid elf header", "incompatible architecture", "exec format")
+_WRONG_ARCHITECTURE = (
+    "wrong elf class", "invalid elf header", "incompatible architecture", "exec format",
+)  # fmt: skip
 
 
 def load_library(names: Sequence[str], variable: str, install: str) -> ctypes.CDLL:
     """Return a shared library.
 
     Args:
-        names: under which the system may know it.
-        variable: of the environment, which may hold its path; it comes before the names.
-        install: where it is from, for whoever lacks it.
+        names: possible names on the system.
+        variable: environment variable of its path, which takes precedence.
+        install: what to install if it is missing.
 
     Raises:
-        ParameterError: if there is none, with what to install, or if it is for another machine.
+        ParameterError: if it is not found, or built for another machine.
     """
     path = os.environ.get(variable)
     reasons = []
@@ -29,20 +43,20 @@ def load_library(names: Sequence[str], variable: str, install: str) -> ctypes.CD
             return ctypes.CDLL(name)
         except OSError as error:
             reasons.append(str(error))
-    foreign = [reason for reason in reasons if any(sign in reason.lower() for sign in _FOREIGN)]
-    if foreign:
-        words = f"finds a library for another kind of machine: {foreign[0]}"
-        raise ParameterError("driver", words)
+    for reason in reasons:
+        if any(sign in reason.lower() for sign in _WRONG_ARCHITECTURE):
+            words = f"finds a library for another kind of machine: {reason}"
+            raise ParameterError("driver", words)
     tried = path or ", ".join(names)
     words = f"needs {tried}, which is not found: install {install}, or name the file in {variable}"
     raise ParameterError("driver", words)
 
 
-def functions(library: ctypes.CDLL, *names: str) -> list[int]:
+def function_addresses(library: ctypes.CDLL, *names: str) -> list[int]:
     """Return the addresses of functions.
 
     Raises:
-        ParameterError: if the library lacks one, which is named.
+        ParameterError: for a missing function, with its name.
     """
     found = []
     for name in names:
@@ -51,3 +65,54 @@ def functions(library: ctypes.CDLL, *names: str) -> list[int]:
         pointer = ctypes.cast(getattr(library, name), ctypes.c_void_p)
         found.append(int(pointer.value or 0))
     return found
+
+
+FUNCTIONS = ("asperity_open", "asperity_read", "asperity_write", "asperity_close")
+
+
+@dataclass(frozen=True)
+class LibraryDriver(Driver):
+    """A device that a shared library drives.
+
+    Attributes:
+        path: path of the library.
+        surface_frame: pose of the surface.
+    """
+
+    name: ClassVar[str] = "own"
+    loss_notice: ClassVar[str] = "What the device does then depends on its library: see its C file."
+
+    path: str
+    surface_frame: Frame = IDENTITY_FRAME
+
+    def kernel_modules(self) -> tuple[ModuleType, ...]:
+        """Return the module that calls the library."""
+        return (library_device,)
+
+    def placeholder_record(self) -> LibraryDevice:
+        """Return a record of no device."""
+        return LibraryDevice(0, 0)
+
+    def open(self) -> LibraryDevice:
+        """Load the library and open the device."""
+        library = self._load()
+        _open, read, write, _close = function_addresses(library, *FUNCTIONS)
+        answer = library.asperity_open()
+        if answer != 0:
+            raise ParameterError("driver", f"{self.path}: asperity_open returned {answer}, not 0")
+        return LibraryDevice(read, write)
+
+    def close(self) -> None:
+        """Close the device."""
+        self._load().asperity_close()
+
+    def describe_error(self, code: int) -> str:
+        """Return the error code of the library."""
+        return f"{Path(self.path).name} returned {code}"
+
+    def _load(self) -> ctypes.CDLL:
+        # The system takes a name for a path only if it contains a slash.
+        return load_library([str(Path(self.path).resolve())], "", "it: compile your C file")
+
+
+KIND = DriverKind("own", (RIGHT, AWAY, UP), 1.0, LibraryDriver, "own:./device.so")

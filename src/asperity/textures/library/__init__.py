@@ -1,8 +1,8 @@
-"""Named surfaces of physical size, drawn by rules: deterministic, periodic, band-limited."""
+"""Named synthetic surfaces of physical size: deterministic, periodic, band-limited."""
 
 from __future__ import annotations
 
 from asperity.textures.library.named import NamedSurface
-from asperity.textures.library.registry import LIBRARY, named_surface, surface_names
+from asperity.textures.library.surface_library import LIBRARY, named_surface, surface_names
 
 __all__ = ["LIBRARY", "NamedSurface", "named_surface", "surface_names"]

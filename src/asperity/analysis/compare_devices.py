@@ -1,0 +1,142 @@
+"""Comparison of the laws on several devices and at several depths."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from asperity.analysis.compare import SCHEMA, Comparison, compare, missing_data_hint
+from asperity.analysis.sentences.comparison_sentences import DeviceCase, devices_summary
+from asperity.core.display import Reportable
+from asperity.core.errors import ParameterError
+from asperity.core.files import Serializable, to_plain_data
+from asperity.devices import Device, load_device
+from asperity.laws import REGISTERED_LAWS, Law
+from asperity.textures.catalogue import TextureLike, as_texture
+from asperity.textures.texture import Texture
+
+# Called with the device, the given depth if any, and the letter of the next law.
+DeviceProgress = Callable[[Device, float | None, str], None]
+
+
+@dataclass(frozen=True)
+class MissingData(Serializable):
+    """A device with too little data to compare laws on it.
+
+    Attributes:
+        device: its id.
+        hint: the missing line of its device file.
+    """
+
+    serialized_attributes = "device hint"
+
+    device: str
+    hint: str
+
+    @property
+    def sentence(self) -> str:
+        """The missing data and how to supply them."""
+        option = self.hint.replace(" = ", "=").replace('"', "").replace(" ", "")
+        return (
+            f"{self.device}: the stiffest smooth wall that held is unknown; measure it, and add "
+            f"{self.hint} to its file, or give --set {option}"
+        )
+
+
+@dataclass(frozen=True)
+class DeviceComparisons(Reportable):
+    """A surface on several devices, pressed to several depths.
+
+    Attributes:
+        texture: the surface.
+        comparisons: one for each device and depth, grouped by device.
+        missing_data: the devices that could not be compared.
+    """
+
+    texture: Texture
+    comparisons: tuple[Comparison, ...]
+    missing_data: tuple[MissingData, ...] = ()
+
+    @property
+    def recommendation(self) -> str:
+        """The best device and law for the texture, and the number of cases by tier."""
+        cases = [
+            DeviceCase(one.device.name, one.max_depth, row or one.nearest_row, row is not None)
+            for one in self.comparisons
+            for row in (one.recommended_row,)
+        ]
+        return devices_summary(cases, [one.device for one in self.missing_data])
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.comparisons)} compared, {len(self.missing_data)} without data"
+        return f"<DeviceComparisons: {counts}>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units, with a schema number."""
+        return {
+            "schema": SCHEMA,
+            "texture": self.texture.describe(),
+            "recommendation": self.recommendation,
+            "comparisons": to_plain_data(self.comparisons),
+            "missing_data": to_plain_data(self.missing_data),
+        }
+
+
+def compare_devices(
+    texture: TextureLike,
+    devices: Sequence[str | os.PathLike[str] | Device],
+    max_depths: Sequence[float] | None = None,
+    laws: str | Sequence[str | Law] | None = None,
+    *,
+    progress: DeviceProgress | None = None,
+    **arguments: Any,
+) -> DeviceComparisons:
+    """Compare laws on each of several devices, at each of several depths.
+
+    Args:
+        texture: the surface, or what names it; see :func:`~asperity.analysis.compare.compare`.
+        devices: ids of the catalogue, TOML files, or devices.
+        max_depths: depths to which the surface is pressed [m]; by default that of
+            :func:`~asperity.analysis.compare.compare`.
+        laws: letters or names; all by default.
+        progress: called before each law.
+        **arguments: further arguments of :func:`~asperity.analysis.compare.compare`.
+
+    Raises:
+        ParameterError: without any device, and as for ``compare``. A device with too little data
+            is part of the result, not an error.
+
+    Example:
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> result = compare_devices(Sinusoid(2e-4, 2e-3), ["omega.3", "2diy"], [2e-4, 4e-4], "WC")
+        >>> [(case.device.id, case.max_depth, case.recommended) for case in result.comparisons]
+        [('omega.3', 0.0002, 'C'), ('omega.3', 0.0004, 'C')]
+        >>> [data.device for data in result.missing_data]
+        ['2diy']
+    """
+    loaded = [load_device(device) for device in devices]
+    if not loaded:
+        raise ParameterError("device", "must be one or several")
+    laws = tuple(REGISTERED_LAWS.values()) if laws is None else laws
+    depths: Sequence[float | None] = [None] if max_depths is None else max_depths
+    if not depths:
+        raise ParameterError("max_depth", "must be one or several depths")
+    if len(set(depths)) < len(depths):
+        raise ParameterError("max_depth", "contains a depth twice", list(depths))
+    texture, comparisons, missing_data = as_texture(texture), [], []
+    for device in loaded:
+        if hint := missing_data_hint(device):
+            missing_data.append(MissingData(device.id, hint))
+            continue
+        for depth in depths:
+
+            def on_law(letter: str, device: Device = device, depth: float | None = depth) -> None:
+                if progress is not None:
+                    progress(device, depth, letter)
+
+            comparisons.append(
+                compare(texture, device, laws, max_depth=depth, progress=on_law, **arguments)
+            )
+    return DeviceComparisons(texture, tuple(comparisons), tuple(missing_data))

@@ -1,0 +1,269 @@
+"""The verdict on the passivity of a surface on a device, and the stability limit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import Enum, auto
+from fractions import Fraction
+from typing import Literal
+
+from asperity.analysis.passivity.criteria import (
+    DELAY,
+    LEAK,
+    ONE_SIDED,
+    QUANTIZATION,
+    VIRTUAL,
+    WALL,
+    WALL_TEST,
+    BuzzBound,
+    Criterion,
+)
+from asperity.analysis.passivity.device_loop import HALF, DeviceLoop, Number, is_contradictory
+from asperity.core.display import Displayable
+from asperity.core.files import Serializable
+
+Verdict = Literal["passive", "bounded", "plausible", "not passive", "undecided"]
+Basis = Literal["proved", "plausible", "bounded", "quiet against buzz", "none"]
+
+
+class Ground(Enum):
+    """The ground of a verdict."""
+
+    PROVED = auto()
+    """The deciding criterion holds."""
+    CRITERION = auto()
+    """The conclusion of the deciding criterion."""
+    BOUNDED = auto()
+    """Passive but for quantisation, whose buzz is bounded."""
+    UNBOUNDED = auto()
+    """Passive but for quantisation, whose buzz has no bound."""
+    WALL_HELD = auto()
+    """A smooth wall of that gain did not cycle: no proof."""
+    WALL_CYCLED = auto()
+    """A smooth wall of at most that gain cycled."""
+    CONTRADICTION = auto()
+    """Damping and delay prove a wall passive that cycled."""
+    GAINS_ENERGY = auto()
+    """A small oscillation gains energy if damping there is σ₀."""
+    GAINS_ENERGY_REGARDLESS = auto()
+    """A small oscillation gains energy whatever the damping."""
+    DEVICE_UNKNOWN = auto()
+    """The wall test decides nothing, and damping or rate of the device are unknown."""
+
+
+@dataclass(frozen=True)
+class StabilityLimit(Serializable):
+    """Stability limit of the stiffness of a law on a device, and its basis.
+
+    Attributes:
+        stiffness: the limit [N/m]; 0 if no stable stiffness is known, ``None`` if undecidable.
+        basis: ``"proved"``: passive up to the limit, under the assumptions of the criterion.
+            ``"plausible"``: a smooth wall of that gain did not cycle. ``"bounded"``: half of the
+            limit of the delay rule, where quantisation leaves a buzz with a bound.
+            ``"quiet against buzz"``: a wall of that gain did not cycle, but the law has curl and
+            gains energy below v* at any stiffness. ``"none"``.
+        criterion: name of the criterion that gives the limit; empty for none.
+        delay: delay of the binding pair of damping and delay, in samples; infinity where any delay
+            is admissible, ``None`` where the limit has no such pair.
+        sampled: whether the limit uses a number that was only sampled, so that it may be too high.
+        proved_stiffness: stiffness up to which passivity is proved [N/m]; 0 for none.
+    """
+
+    stiffness: float | None
+    basis: Basis
+    criterion: str = ""
+    delay: float | None = None
+    sampled: bool = False
+    proved_stiffness: float = 0.0
+
+
+@dataclass(frozen=True)
+class Passivity(Serializable, Displayable):
+    """Passivity of a surface on a device: whether the hand can gain energy without limit.
+
+    Attributes:
+        criteria: all criteria, also those that do not decide.
+        decided_by: name of the deciding criterion; for ``"undecided"``, of the one that would
+            decide.
+        verdict: ``"passive"`` (proved, under the assumptions of that criterion), ``"bounded"``
+            (proved but for quantisation, whose buzz stays below ``buzz``), ``"plausible"`` (no
+            proof: a smooth wall did not cycle), ``"not passive"`` (a motion of the hand that gains
+            energy without limit is known) or ``"undecided"``.
+        ground: ground of the verdict.
+        reason: the reason in one sentence.
+        stiffness: stiffness of the surface [N/m].
+        stability_limit: stability limit of the stiffness, and its basis.
+        critical_speed: v* [m/s], the speed on the worst loop below which damping does not absorb
+            the energy gained; 0 for a conservative law, ``None`` if unknown.
+        greatest_delay: greatest number of whole samples of delay for which the delay rule is proved
+            at this stiffness; ``None`` if not even 0 is proved, or if it is unknown.
+        buzz: bound of the motion that quantisation may cause; ``None`` if there is no bound.
+    """
+
+    serialized_attributes = (
+        "verdict decided_by reason stiffness safe_stiffness stability_limit critical_speed "
+        "greatest_delay buzz criteria"
+    )
+
+    criteria: tuple[Criterion, ...]
+    decided_by: str
+    verdict: Verdict
+    ground: Ground
+    reason: str
+    stiffness: float
+    stability_limit: StabilityLimit
+    critical_speed: float | None
+    greatest_delay: int | None
+    buzz: BuzzBound | None
+
+    @property
+    def safe_stiffness(self) -> float | None:
+        """Stiffness of ``stability_limit`` [N/m]."""
+        return self.stability_limit.stiffness
+
+    def criterion(self, name: str) -> Criterion:
+        """Return a criterion by its name.
+
+        Raises:
+            KeyError: if there is none of that name.
+        """
+        return {criterion.name: criterion for criterion in self.criteria}[name]
+
+    def __repr__(self) -> str:
+        stiffness = self.safe_stiffness
+        limit = "not known" if stiffness is None else f"{stiffness:.4g} N/m"
+        return f"<Passivity: {self.verdict}, decided by {self.decided_by}, stiffness up to {limit}>"
+
+
+def decide_verdict(
+    loop: DeviceLoop, by_name: Mapping[str, Criterion], buzz: BuzzBound | None
+) -> tuple[Verdict, str, Ground]:
+    """Return the verdict, the name of the deciding criterion, and the ground.
+
+    For a law that is not conservative the leak decides, never a norm.
+    """
+    main = _main_rule(loop)
+    if not loop.conservative:
+        unknown = by_name[LEAK].holds is None
+        return "undecided" if unknown else "not passive", LEAK, Ground.CRITERION
+    if is_contradictory(loop):
+        return "undecided", main, Ground.CONTRADICTION
+    if loop.delay is not None and by_name[main].holds:
+        return _assess_quantization(by_name, main, buzz)
+    ground = _find_unstable_motion(loop)
+    if ground is not None:
+        return "not passive", WALL_TEST if ground is Ground.WALL_CYCLED else main, ground
+    return _assess_wall_test(loop, by_name, main)
+
+
+def _assess_quantization(
+    by_name: Mapping[str, Criterion], main: str, buzz: BuzzBound | None
+) -> tuple[Verdict, str, Ground]:
+    """Return the verdict on a loop that is passive but for quantisation."""
+    steps = by_name[QUANTIZATION]
+    if steps.holds:
+        return "passive", main, Ground.PROVED
+    if buzz is not None and not steps.missing:
+        return "bounded", QUANTIZATION, Ground.BOUNDED
+    return "undecided", QUANTIZATION, Ground.UNBOUNDED
+
+
+def stability_limit(loop: DeviceLoop, by_name: Mapping[str, Criterion]) -> StabilityLimit:
+    """Return the stability limit of the stiffness, and its basis.
+
+    Comparison, analysis and the six limits of the device share this limit.
+    """
+    main, steps = by_name[_main_rule(loop)], by_name[QUANTIZATION]
+    if not loop.conservative:
+        return _limit_from_criterion("quiet against buzz", by_name[WALL])
+    plausible = _limit_from_criterion("plausible", by_name[WALL_TEST], loop.longest_delay)
+    if loop.obstacle is not None or loop.delay is None or is_contradictory(loop):
+        return plausible
+    proved = _proved_limit(main, steps)
+    if (plausible.stiffness or 0.0) > (proved.stiffness or 0.0):
+        return replace(plausible, proved_stiffness=proved.proved_stiffness)
+    if proved.stiffness is None:
+        return plausible
+    if proved.stiffness == 0.0 and main.limit:
+        return StabilityLimit(0.5 * main.limit, "bounded", QUANTIZATION)
+    return proved
+
+
+def _proved_limit(main: Criterion, steps: Criterion) -> StabilityLimit:
+    """Return the stiffness up to which the rule and the quantisation criterion are proved."""
+    if main.limit is None or steps.limit is None:
+        sampled = _limit_from_criterion("proved", main)
+        return sampled if sampled.sampled else StabilityLimit(None, "none")
+    stiffness = min(main.limit, steps.limit)
+    basis: Basis = "proved" if stiffness else "none"
+    return StabilityLimit(
+        stiffness, basis, main.name if stiffness else "", proved_stiffness=stiffness
+    )
+
+
+def _limit_from_criterion(
+    basis: Basis, criterion: Criterion, delay: Number | None = None
+) -> StabilityLimit:
+    sampled = criterion.limit is None and criterion.upper_limit is not None
+    stiffness = criterion.upper_limit if sampled else criterion.limit
+    if not stiffness:
+        return StabilityLimit(stiffness, "none")
+    pair = None if delay is None else float(delay)
+    return StabilityLimit(stiffness, basis, criterion.name, pair, sampled)
+
+
+def _main_rule(loop: DeviceLoop) -> str:
+    """Return the name of the criterion for the known data of the device."""
+    if loop.virtual_damping is not None:
+        return VIRTUAL
+    return ONE_SIDED if loop.delay == 0 else DELAY
+
+
+def _find_unstable_motion(loop: DeviceLoop) -> Ground | None:
+    """Return why a small motion at a witness point gains energy without limit, if one does.
+
+    A straight oscillation along the witness direction, p + u ε cos(θ i), where -uᵀJu = K, gains
+    per sample 2 ε² sin²(θ/2) times
+
+        K sin((d + ½)θ)/(2 sin(θ/2)) - (b_v/T) cos((d + 1)θ) - σ₀/T.
+
+    θ -> 0 and θ = πm/(d + 1), m odd, give the first two gains below; in a slack direction,
+    K = -k q, where q is attained if q > q⁺, m even gives the third (d >= 1). A wall that cycled has
+    σ₀/T < K (½ + d): then θ -> 0 gains energy from that K on, for any σ₀ and d.
+    """
+    if _has_unbounded_slack(loop):
+        return Ground.GAINS_ENERGY_REGARDLESS
+    stiff = loop.weighted_gain(Fraction(1), Fraction(0), "lower") * loop.stiffness
+    if loop.cycling_stiffness is not None and stiff >= loop.cycling_stiffness:
+        return Ground.WALL_CYCLED
+    if loop.damping_gain is None:
+        return None
+    gains = [stiff / 2 + loop.virtual_damping_gain]
+    if loop.delay is not None:
+        gains.append(stiff * (loop.delay + HALF) - loop.virtual_damping_gain)
+    if loop.delay and loop.q.lower > loop.one_sided.upper:
+        slack = loop.weighted_gain(Fraction(0), Fraction(1), "lower") * loop.stiffness
+        gains.append(slack / 2 - loop.virtual_damping_gain)
+    return Ground.GAINS_ENERGY if max(gains) > loop.damping_gain else None
+
+
+def _has_unbounded_slack(loop: DeviceLoop) -> bool:
+    """Return whether delay meets an unbounded slack direction, as below crests with law D."""
+    return bool(loop.delay) and math.isinf(loop.q.lower) and math.isfinite(loop.one_sided.upper)
+
+
+def _assess_wall_test(
+    loop: DeviceLoop, by_name: Mapping[str, Criterion], main: str
+) -> tuple[Verdict, str, Ground]:
+    """Return the verdict of the wall test, or the criterion that would decide."""
+    if by_name[WALL_TEST].holds:
+        return "plausible", WALL_TEST, Ground.WALL_HELD
+    if loop.obstacle is not None:
+        return "undecided", main, Ground.CRITERION
+    if loop.damping_gain is None and by_name[WALL_TEST].limit is not None:
+        return "undecided", WALL_TEST, Ground.DEVICE_UNKNOWN
+    if loop.delay is None and not by_name[main].missing:
+        main = DELAY
+    return "undecided", main, Ground.CRITERION

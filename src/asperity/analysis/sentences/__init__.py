@@ -1,0 +1,1 @@
+"""Sentences of the results: verdicts, reasons, recommendations and assumptions."""

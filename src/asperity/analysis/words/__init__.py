@@ -1,1 +1,0 @@
-"""From values to the sentences that results carry."""

@@ -1,0 +1,215 @@
+"""The commands ``analyze``, ``compare`` and ``limits``."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.cli import options
+from asperity.cli.output import Outputs, output_options, step_bar
+from asperity.core.arguments import MAX_DEPTH, REQUESTED_STIFFNESS, SPEED, Argument
+from asperity.core.errors import ParameterError
+from asperity.laws import REGISTERED_LAWS
+
+if TYPE_CHECKING:
+    from asperity.analysis.compare_devices import DeviceComparisons
+    from asperity.devices import Device
+    from asperity.laws import Law
+    from asperity.textures import Texture
+
+
+_BOUND_SEARCH = (
+    Argument(
+        "tolerance",
+        "relative distance between lower and upper bound at which a search stops",
+        default_description="1e-6 for waves, 1e-3 for maps",
+        must_be_positive=True,
+        example="1e-4",
+    ),
+    Argument(
+        "work_limit",
+        "maximum number of cells that branch and bound examines",
+        default=20_000_000,
+        form="integer",
+        minimum=1,
+    ),
+    Argument(
+        "direction",
+        "direction of the vertical plane in which the worst closed path is searched: x, y,"
+        " or '1,0.5'",
+        default_description="the scan line of the texture",
+        form="direction",
+    ),
+    Argument(
+        "extent",
+        "rectangle on which a non-periodic sum of more than four waves is certified",
+        "m",
+        form="pair",
+        must_be_positive=True,
+        example="10mm; 5mm",
+    ),
+)
+
+
+def _validated_parser(argument: Argument) -> Callable[[str], Any]:
+    """Return a parser that validates a value before a surface is read."""
+
+    def parse(text: str) -> Any:
+        value = argument.parse(text)
+        if argument.form == "direction":
+            return value
+        value = argument.validate(value)
+        return (value, value) if argument.form == "pair" and isinstance(value, float) else value
+
+    return parse
+
+
+@click.command("analyze")
+@options.surface_options("Law, by letter or name.  [default: the scene's, or the recommended law]")
+@options.argument_options(_BOUND_SEARCH, _validated_parser)
+@output_options()
+def analyze_command(surface: str, device: Device | None, outputs: Outputs, **values: Any) -> None:
+    """Analyze one law on SURFACE and a device: bounds, energy, continuity and stability.
+
+    SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
+    or a scene file (TOML).
+    """
+    from asperity.analysis.analyze import STEPS, analyze
+
+    with step_bar("reading the surface", len(STEPS)) as step:
+        texture, device, arguments = options.load_surface(surface, device, values)
+        search = options.provided_values(values, _BOUND_SEARCH)
+        result = analyze(texture, device, progress=step, **search, **arguments)
+    code = _texture_code(surface, options.file_values(values), texture)
+
+    from asperity.report.analysis_report import analysis_page
+
+    outputs.write(result, analysis_page(result, code))
+
+
+def _texture_code(source: str, file_options: Mapping[str, Any], texture: Texture) -> str:
+    """Return a Python expression that makes the texture; empty if its ``repr`` is one."""
+    if not repr(texture).startswith("<"):
+        return ""
+    if source.lower().endswith(".toml") or not os.path.exists(source):
+        extra = f", {dict(file_options)!r}" if file_options else ""
+        return f"load_scene({source!r}{extra}).texture"
+    arguments = [repr(source), *[f"{name}={value!r}" for name, value in file_options.items()]]
+    return f"asp.load_texture({', '.join(arguments)})"
+
+
+_STIFFNESS = replace(
+    REQUESTED_STIFFNESS, default_description="the recommended stiffness of each law"
+)
+_MAX_DEPTHS = replace(MAX_DEPTH, form="items", example="0.1mm; 0.5mm")
+
+
+@click.command("compare")
+@click.argument("surface")
+@options.device_option(
+    "Devices of the catalogue, or TOML files, 'touch,mine.toml'.  [default: omega.3]",
+    options.parse_devices,
+)
+@options.argument_options([SPEED])
+@options.laws_option("Laws to compare, 'WAC' or names with commas.  [default: all]")
+@options.law_options((_STIFFNESS, _MAX_DEPTHS, *options.LAW_OPTIONS[2:]))
+@options.file_options
+@click.option(
+    "--full",
+    is_flag=True,
+    help="Show the characteristic numbers q and q⁺, the limits, leaks, strength T and support S.",
+)
+@options.jobs_option
+@output_options()
+def compare_command(
+    surface: str,
+    device: tuple[Device, ...] | None,
+    laws: tuple[Law, ...] | None,
+    full: bool,
+    outputs: Outputs,
+    **values: Any,
+) -> None:
+    """Compare all laws on SURFACE and a device, and recommend one with its stiffness.
+
+    SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
+    (X3P, SDF, NPY, text, PNG, TIFF, STL, OBJ ...) or a scene file (TOML). Several devices and
+    depths give one table.
+    """
+    from asperity.analysis.compare_devices import compare_devices
+
+    chosen = laws or tuple(REGISTERED_LAWS.values())
+    first, *others = device or (None,)
+    cases = (1 + len(others)) * len(values["max_depth"] or [None])
+    with step_bar("reading the surface", len(chosen) * cases) as step:
+        texture, known, arguments = options.load_surface(surface, first, values, chosen)
+        arguments.pop("law", None)  # the law of a scene is for running it
+        depths = arguments.pop("max_depth", None)  # a single value in a scene
+        result = compare_devices(
+            texture,
+            [known, *(values["settings"].apply_to(other) for other in others if other)],
+            [depths] if isinstance(depths, float) else depths,
+            chosen,
+            progress=lambda on, _depth, law: step(f"{on.id}, law {law}"),
+            **options.provided_values(values, [SPEED]),
+            **arguments,
+        )
+    _write_comparisons(result, outputs, full)
+
+
+def _write_comparisons(result: DeviceComparisons, outputs: Outputs, full: bool) -> None:
+    """Write a single comparison, or the table of several.
+
+    Raises:
+        ParameterError: if the data of no device suffices; the table is written before.
+    """
+    from asperity.report import comparison_report as report
+
+    if len(result.comparisons) == 1 and not result.missing_data:
+        one = result.comparisons[0]
+        outputs.write(one, report.comparison_page(one, full))
+        return
+    if result.comparisons or len(result.missing_data) > 1:
+        outputs.write(result, report.comparisons_page(result))
+    if not result.comparisons:
+        reasons = "; ".join(one.sentence for one in result.missing_data)
+        raise ParameterError("device", f"lacks data to compare laws: {reasons}")
+
+
+# The paper recommends 5 to 10 samples per wave or amplitude.
+_SAMPLING = (
+    Argument(
+        "time_samples", "minimum number of updates per wavelength (α of the paper)", default=5.0
+    ),
+    Argument(
+        "position_samples", "minimum number of position steps per wavelength (β)", default=5.0
+    ),
+    Argument("force_steps", "minimum number of force steps per amplitude (γ)", default=5.0),
+)
+
+
+@click.command("limits")
+@options.surface_options("Law, by letter or name.  [default: the recommended law]")
+@options.argument_options((SPEED, *_SAMPLING))
+@output_options()
+def limits_command(surface: str, device: Device | None, outputs: Outputs, **values: Any) -> None:
+    """Report which wavelengths of SURFACE are perceptible, and up to which scanning speed.
+
+    SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
+    or a scene file (TOML).
+    """
+    from asperity.analysis.check_limits import limits
+
+    with step_bar("reading the surface", 2) as step:
+        step("reading the surface")
+        texture, device, arguments = options.load_surface(surface, device, values)
+        step("analyzing the waves")
+        sampling = options.provided_values(values, (SPEED, *_SAMPLING))
+        result = limits(texture, device, **sampling, **arguments)
+
+    from asperity.report.limits_report import limits_page
+
+    outputs.write(result, limits_page(result))

@@ -1,0 +1,208 @@
+"""The commands ``export`` and ``maps``."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.clamps import BACKED, CLAMPS
+from asperity.cli import options
+from asperity.cli.output import check_not_existing, check_output, progress_bar, step_bar
+from asperity.core.arguments import REQUESTED_STIFFNESS, STIFFNESS, Argument
+from asperity.core.errors import ParameterError, escape_unprintable
+from asperity.core.files import write_bytes
+
+if TYPE_CHECKING:
+    from asperity.devices import Device
+    from asperity.export.surface_maps import SampledMap
+    from asperity.textures.texture import Texture
+
+
+_LANG = Argument("lang", "export target: c99, or one of a plugin", default="c99", form="text")
+_REQUEST_ARGUMENTS = (
+    Argument("name", "prefix of all names in the exported code", default="texture", form="text"),
+    Argument(
+        "precision",
+        "floating-point type: double or float",
+        default="double",
+        form="text",
+        choices=("double", "float"),
+    ),
+    Argument(
+        "max_data",
+        "maximum size of the exported data",
+        "B",
+        default_description="64 MB",
+        form="size",
+        example="512kB",
+        keyword="max_data_size",
+    ),
+    Argument(
+        "max_evaluations",
+        "maximum number of surface evaluations per tick",
+        default_description="600 for D and E, 1800 for H",
+        form="integer",
+        minimum=1,
+        example="1000",
+    ),
+)
+_FORMER_NAMES = {"max_data": "largest", "max_evaluations": "looks"}
+_CLAMP = Argument(
+    "clamp",
+    "depth clamp beyond max_depth: none, whole, backed or lateral",
+    default_description="the scene's, or backed",
+    form="text",
+    choices=tuple(CLAMPS),
+)
+
+
+@click.command("export")
+@click.option("-o", "--output", metavar="PATH", required=True, help="The file to write, texture.h.")
+@click.option(
+    "--exact",
+    is_flag=True,
+    help="Search without an evaluation budget: exact, at unbounded cost per tick.",
+)
+@click.option("--shared", is_flag=True, help="Write a library: header, source and CMakeLists.txt.")
+@click.option("--force", is_flag=True, help="Replace existing files.")
+@options.argument_options((_LANG, *_REQUEST_ARGUMENTS, _CLAMP), former_names=_FORMER_NAMES)
+@options.surface_options(
+    "Law, by letter or name.  [default: the scene's, or the recommended law]",
+    replace(REQUESTED_STIFFNESS, description="stiffness of the exported force"),
+)
+def export_command(
+    surface: str,
+    output: str,
+    device: Device | None,
+    *,
+    exact: bool,
+    shared: bool,
+    force: bool,
+    **values: Any,
+) -> None:
+    """Export SURFACE and its law as C code with one function, texture_force().
+
+    SURFACE is a texture with its arguments (sinusoid:amplitude=0.8mm,period=1mm), a measured file
+    or a scene file (TOML).
+    """
+    from asperity.export import targets
+    from asperity.export.export_request import ExportRequest
+
+    request = options.provided_values(values, _REQUEST_ARGUMENTS)
+    if exact:
+        if "max_evaluations" in request:
+            raise ParameterError("exact", "searches without a budget: leave out --max-evaluations")
+        request["max_evaluations"] = math.inf
+    target, path = targets.find_target(values["lang"] or "c99"), Path(output)
+    targets.check_name(path, target)
+    check_output("output", output)
+    check_not_existing("output", path, force=force)
+    ExportRequest.validate(
+        request.get("name", "texture"),
+        request.get("precision", "double"),
+        request.get("max_evaluations"),
+    )
+
+    from asperity.analysis.analyze import STEPS, analyze
+    from asperity.export.header_comment import header_comment_text
+
+    clamp = {"clamp": values["clamp"]} if values["clamp"] is not None else {}
+    with step_bar("reading the surface", len(STEPS)) as step:
+        texture, device, arguments = options.load_surface(
+            surface, device, values, clamp=BACKED.name
+        )
+        analysis = analyze(texture, device, progress=step, **{**arguments, **clamp})
+    order = ExportRequest(
+        analysis.surface,
+        comment=header_comment_text(analysis, path.name),
+        q_upper=analysis.q.upper,
+        as_library=shared,
+        **request,
+    )
+    files = targets.write_files(path, target, order, force=force)
+    click.echo(f"Written: {', '.join(escape_unprintable(file) for file in files)}")
+    for source in [file.name for file in files if file.name.endswith("_data.c")]:
+        click.echo(f"To be compiled with the program: {escape_unprintable(source)}")
+    click.echo(f"{order.name}_force() is law {analysis.surface.law}. {analysis.answer}")
+
+
+_GRID_ARGUMENTS = (
+    Argument(
+        "extent",
+        "size of the map, one value or one each for x and y",
+        "m",
+        form="pair",
+        example="10mm; 5mm",
+        default_description="one period, or the whole surface",
+    ),
+    Argument(
+        "spacing",
+        "distance between points, one value or one each for x and y",
+        "m",
+        form="pair",
+        example="20um",
+        default_description="the surface's own, or an eighth of its shortest wave",
+    ),
+)
+
+
+@click.command("maps")
+@click.argument("surface")
+@click.option(
+    "-o",
+    "--output",
+    metavar="PATH",
+    required=True,
+    help="The file to write: heights as .png (16 bit), .tif (float) or .x3p; normals as .png.",
+)
+@click.option(
+    "--normals", metavar="gltf|chai3d", help="Write normals in this convention instead of heights."
+)
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+@options.argument_options((*_GRID_ARGUMENTS, STIFFNESS))
+@options.plugin_option
+@options.file_options
+def maps_command(
+    surface: str, output: str, *, normals: str | None, force: bool, **values: Any
+) -> None:
+    """Write SURFACE as a height map or a normal map, and report its accuracy.
+
+    Every file states its physical size. A program that rotates the force of a smooth wall by a
+    normal map renders law G; the report describes that law at the given stiffness.
+    """
+    from asperity.export.surface_maps import HEIGHT_MAPS, find_convention, normal_png, sample_map
+    from asperity.scene import load_scene
+
+    path = Path(output)
+    suffix = path.suffix.lower()
+    suffixes = [".png"] if normals is not None else list(HEIGHT_MAPS)
+    if normals is not None:
+        find_convention(normals)
+    if suffix not in suffixes:
+        raise ParameterError("output", f"must end in {', '.join(suffixes)}", output)
+    check_output("output", output)
+    check_not_existing("output", path, force=force)
+    with progress_bar("reading the surface"):
+        texture = load_scene(surface, options.file_values(values)).texture
+        sampled = sample_map(texture, **options.provided_values(values, _GRID_ARGUMENTS))
+        content = HEIGHT_MAPS[suffix](sampled) if normals is None else normal_png(sampled, normals)
+    write_bytes("output", path, content)
+    click.echo(f"Written: {escape_unprintable(output)}")
+    for sentence in _describe_map(texture, sampled, suffix, normals, values["stiffness"]):
+        click.echo(sentence)
+
+
+def _describe_map(
+    texture: Texture, sampled: SampledMap, suffix: str, normals: str | None, stiffness: float | None
+) -> list[str]:
+    from asperity.report.sentences import map_text
+
+    if normals is None:
+        return [map_text.describe_map(sampled), map_text.describe_heights(sampled, suffix)]
+    with progress_bar("analyzing law G"):
+        shading = map_text.describe_shading(texture, stiffness)
+    return [map_text.describe_map(sampled), map_text.describe_normals(sampled, normals), shading]

@@ -1,0 +1,251 @@
+"""Options and set-up of the commands that run a closed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.clamps import BACKED
+from asperity.cli import options
+from asperity.cli.options import Command, file_values
+from asperity.cli.output import progress_bar, step_bar
+from asperity.core.arguments import STIFFNESS, Argument
+from asperity.core.errors import ParameterError, print_message
+from asperity.core.units import format_quantity
+from asperity.laws import REGISTERED_LAWS, Law, find_law
+
+if TYPE_CHECKING:
+    from asperity.devices import Device
+    from asperity.scene.setup import Setup
+    from asperity.servo.drivers.driver import Driver
+    from asperity.servo.process import PrestartedProcess
+    from asperity.simulation.servo import Servo
+    from asperity.textures import Texture
+
+
+def stiffness_option(default: str) -> Argument:
+    """Return the declaration of ``--stiffness`` with another default."""
+    return replace(STIFFNESS, default=None, default_description=default)
+
+
+def loop_options(
+    stiffness: Argument | None, *, several_laws: bool = False
+) -> Callable[[Command], Command]:
+    """Return a decorator that adds SCENE and the options of surface, law and device.
+
+    Args:
+        stiffness: declaration of ``--stiffness``; ``None`` for a command that finds it, where the
+            option is an error and not shown.
+        several_laws: whether the command has ``--laws``, which replaces ``--law`` in the help.
+    """
+    arguments = (stiffness or STIFFNESS, *options.LAW_OPTIONS[1:])
+
+    def decorate(command: Command) -> Command:
+        hidden = () if stiffness else arguments[:1]
+        command = options.law_options(arguments, hidden)(options.file_options(command))
+        words = "Device, in place of the scene's.  [default: the scene's, else omega.3]"
+        command = options.device_option(words)(command)
+        law = options.law_option("Law, in place of the scene's.", hidden=several_laws)
+        return click.argument("scene")(law(command))
+
+    return decorate
+
+
+def load_setup(
+    source: str,
+    values: dict[str, Any],
+    duration: float | None = None,
+    laws: Sequence[Law] = (),
+    *,
+    include_delay: bool = True,
+    defaults: Mapping[str, Any] | None = None,
+    simulated: bool = True,
+    allow_bare_surface: bool = False,
+) -> Setup:
+    """Return the closed loop of a scene file and the options.
+
+    Args:
+        source: path of the scene.
+        values: values of the options, by name.
+        duration: duration of the run [s], in place of the scene's.
+        laws: laws that replace the one of the scene.
+        include_delay: whether to include the delay of the device.
+        defaults: surface arguments that neither the options nor the scene set.
+        simulated: whether device and hand are simulated; otherwise any surface can be a scene.
+        allow_bare_surface: whether a simulated loop accepts a surface without a scene, with a
+            default hand, and the recommended law and stiffness where they are not set.
+
+    Raises:
+        ParameterError: for a missing, unknown or invalid value.
+    """
+    from asperity.scene import load_scene
+    from asperity.scene.setup import make_setup
+
+    if simulated and not allow_bare_surface and not source.lower().endswith(".toml"):
+        words = "must be a scene file (.toml) with [texture], [hand] and [motion]"
+        raise ParameterError("scene", words, source)
+    surface = options.surface_values(values)
+    if laws:
+        surface.setdefault("law", find_law("W"))
+    with progress_bar("reading the surface"):
+        scene = load_scene(source, file_values(values))
+    loop = scene.loop
+    if not simulated:
+        servo = {name: section for name, section in loop.items() if name == "servo"}
+        scene = replace(scene, loop={**_NO_HAND, **servo})
+    unset = (defaults or {}).keys() - scene.surface.keys() - surface.keys()
+    surface |= {name: (defaults or {})[name] for name in unset}
+    device = options.select_device(values["device"], scene, values)
+    merged, note = {**scene.surface, **surface}, ""
+    if allow_bare_surface and not {"law", "stiffness"} <= merged.keys() and "hand" not in loop:
+        chosen, note = recommend_law_and_stiffness(scene.texture, device, merged)
+        surface, merged = {**surface, **chosen}, {**merged, **chosen}
+    if laws or "law" in merged:
+        options.check_parameters_apply(surface, laws or (find_law(merged["law"]),))
+    setup = make_setup(
+        scene,
+        surface=surface,
+        device=device,
+        duration=duration,
+        laws=laws,
+        uses_delay=include_delay,
+        use_defaults=allow_bare_surface,
+    )
+    return replace(setup, assumptions=(note, *setup.assumptions)) if note else setup
+
+
+def recommend_law_and_stiffness(
+    texture: Texture, device: Device, specified: Mapping[str, Any]
+) -> tuple[dict[str, Any], str]:
+    """Return the recommended law and stiffness with a note for the assumptions.
+
+    Args:
+        texture: the texture.
+        device: the device.
+        specified: surface arguments that are set; a law or stiffness among them is used.
+
+    Raises:
+        ParameterError: if nothing can be recommended.
+    """
+    from asperity.analysis.compare import compare
+    from asperity.scene.sections import surface_keywords
+
+    laws = [find_law(specified["law"])] if "law" in specified else list(REGISTERED_LAWS.values())
+    keywords = surface_keywords(specified, *laws)
+    keywords.pop("law", None)
+    with step_bar("comparing the laws", len(laws)) as step:
+        result = compare(texture, device, laws, progress=step, **keywords)
+    row = result.rows[0] if "law" in specified else result.recommended_row or result.nearest_row
+    if row is None:
+        reason = f"is missing, and none can be recommended: {result.recommendation}"
+        raise ParameterError("law", reason)
+    chosen: dict[str, Any] = {"law": row.law}
+    if "stiffness" in specified:
+        return chosen, f"Law {row.law.letter}, as asperity compare recommends"
+    if not row.recommended_stiffness:
+        reason = f"is missing, and none is known to be stable for law {row.law.letter}"
+        raise ParameterError("stiffness", f"{reason} on {device.id}: try --stiffness 100N/m")
+    chosen["stiffness"] = row.recommended_stiffness
+    stiffness = format_quantity(row.recommended_stiffness, "N/m")
+    return chosen, f"Law {row.law.letter} at {stiffness}, as asperity compare recommends"
+
+
+# A real hand on a real device is not simulated.
+_NO_HAND: dict[str, Any] = {
+    "hand": {"kind": "moved"},
+    "motion": {"kind": "still", "point": [0, 0, 0]},
+}
+
+
+def select_laws(laws: tuple[Law, ...] | None, law: Law | None) -> tuple[Law, ...]:
+    """Return the laws of ``--laws``, else the one of ``--law``, else all."""
+    return laws or (() if law is None else (law,)) or tuple(REGISTERED_LAWS.values())
+
+
+SIMULATED = "simulated"
+REPLAY_PREFIX = "replay:"
+# A clamp bounds the force, and the analysis then holds at every depth.
+DEFAULT_CLAMP = {"clamp": BACKED.name}
+
+
+def driver_options(command: Command) -> Command:
+    """Add ``--driver`` and ``--accept-risk``."""
+    command = click.option(
+        "--accept-risk", is_flag=True, help="Allow a stiffness above the stability limit."
+    )(command)
+    return click.option(
+        "--driver",
+        metavar="NAME",
+        default=SIMULATED,
+        help="'simulated', 'real' (the driver named in the device entry), haply, forcedimension,"
+        " openhaptics, ./device.so, or replay:run.mcap.  [default: simulated]",
+    )(command)
+
+
+def driver_setup(
+    source: str, values: dict[str, Any], name: str, duration: float | None = None
+) -> tuple[Setup, Servo]:
+    """Return the set-up for a driver, and the servo parameters of the scene.
+
+    A real device has its own quantisation and delay: the loop adds none.
+
+    Raises:
+        ParameterError: for a missing, unknown or invalid value.
+    """
+    setup = load_setup(
+        source, values, duration, defaults=DEFAULT_CLAMP, simulated=False, allow_bare_surface=True
+    )
+    if name.startswith(REPLAY_PREFIX):
+        return setup, setup.servo
+    servo = replace(setup.servo, delay=0, position_resolution=0.0, force_resolution=0.0)
+    return replace(setup, servo=servo), setup.servo
+
+
+def make_driver(name: str, setup: Setup) -> Driver:
+    """Return a driver by its name; for a real device a safety notice is printed.
+
+    Raises:
+        ParameterError: for an unknown driver, or a recording that cannot be replayed.
+    """
+    if name.startswith(REPLAY_PREFIX):
+        from asperity.servo.drivers.replay_driver import replay_driver
+
+        return replay_driver(name.removeprefix(REPLAY_PREFIX), setup.servo.period)
+    from asperity.servo.drivers.driver_registry import hardware_driver
+
+    driver = hardware_driver(name, setup.safety.wall, setup.safety.origin, setup.device)
+    print_message(
+        f"{setup.device.name} is a real device: keep a hand near its switch. If the loop dies:"
+        f" {driver.loss_notice}"
+    )
+    return driver
+
+
+def check_stiffness_limit(setup: Setup) -> None:
+    """Check that the stiffness is within the analyzed limit.
+
+    Raises:
+        ParameterError: otherwise, with the reason.
+    """
+    from asperity.servo.stiffness_check import excess_stiffness_reason
+
+    with progress_bar("analyzing the surface"):
+        reason = excess_stiffness_reason(setup.surface, setup.device)
+    if reason:
+        raise ParameterError("stiffness", f"is refused: {reason}; --accept-risk accepts it")
+
+
+@contextmanager
+def prestarted_process() -> Iterator[PrestartedProcess]:
+    """Start the process of the loop while the surface is read and analyzed."""
+    from asperity.servo.process import PrestartedProcess
+
+    process = PrestartedProcess()
+    try:
+        yield process
+    finally:
+        process.terminate()

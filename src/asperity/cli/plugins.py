@@ -1,0 +1,217 @@
+"""The option ``--plugin``: Python files with user-defined laws, textures, readers, claims and more.
+
+Only the command line names such files: the user who types the command runs the code. What a file
+defines is registered until the command ends.
+"""
+
+from __future__ import annotations
+
+import ast
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import click
+
+from asperity.core.errors import AsperityError, ParameterError
+from asperity.core.files import open_input
+
+_OPTION = "plugin"
+_LOADED_FILES: list[str] = []
+
+
+@dataclass(frozen=True)
+class PluginRegistry:
+    """A registry that plugins add to.
+
+    Attributes:
+        entries: the registered objects.
+        plugin_type: type of the objects that are registered when a file defines them at its top
+            level; ``None`` where the file must call a function.
+        register: registers an object.
+        check: raises an error for an object that cannot be used.
+    """
+
+    entries: dict[Any, Any]
+    plugin_type: type | None = None
+    register: Callable[..., Any] = lambda _object: None
+    check: Callable[[Any], Any] = lambda _object: None
+
+    def accepts(self, value: Any) -> bool:
+        """Return whether a value of a file is to be registered."""
+        matches = self.plugin_type is not None and isinstance(value, self.plugin_type)
+        return matches and all(value is not entry for entry in self.entries.values())
+
+    def snapshot(self) -> dict[Any, Any]:
+        """Return a copy of the entries."""
+        return {
+            key: value.copy() if isinstance(value, list) else value
+            for key, value in self.entries.items()
+        }
+
+
+def plugin_registries() -> tuple[PluginRegistry, ...]:
+    """Return all registries."""
+    from asperity import laws
+    from asperity.analysis.gain.theorems import THEOREMS
+    from asperity.analysis.passivity.criteria import CRITERIA
+    from asperity.derive.jacobian import symbolic_force
+    from asperity.export import targets
+    from asperity.measured.reading import Reader, readers
+    from asperity.paper import claim_registry
+    from asperity.paper.claim import Claim
+    from asperity.report import page
+    from asperity.servo.drivers import driver_registry
+    from asperity.servo.drivers.driver import DriverKind
+    from asperity.textures import catalogue
+    from asperity.textures.texture import TextureKind
+
+    return (
+        PluginRegistry(laws.REGISTERED_LAWS, laws.Law, laws.register, symbolic_force),
+        PluginRegistry(catalogue.CATALOGUE, TextureKind, catalogue.register),
+        PluginRegistry(readers.USER_READERS, Reader, readers.register),
+        PluginRegistry(claim_registry.CLAIMS, Claim, claim_registry.register),
+        PluginRegistry(driver_registry.DRIVER_KINDS, DriverKind, driver_registry.register_driver),
+        PluginRegistry(targets.TARGETS, targets.ExportTarget, targets.register),
+        PluginRegistry(CRITERIA),
+        PluginRegistry(THEOREMS),
+        PluginRegistry(page._USER_SECTIONS),
+    )
+
+
+def load_plugins(ctx: click.Context, _option: click.Parameter, files: tuple[str, ...]) -> None:
+    """Run files and register what they define until the command ends.
+
+    Raises:
+        ParameterError: for a file that cannot be read or run, with line and reason, that
+            registers nothing, or that uses a name that is taken.
+    """
+    if not files:
+        return
+    registries = plugin_registries()
+    for registry in registries:
+        ctx.find_root().with_resource(_restore_on_exit(registry))
+    for file in files:
+        _load_plugin(file, registries)
+
+
+@contextmanager
+def _restore_on_exit(registry: PluginRegistry) -> Iterator[None]:
+    before = registry.snapshot()
+    try:
+        yield
+    finally:
+        registry.entries.clear()
+        registry.entries.update(before)
+
+
+def plugin_files() -> tuple[str, ...]:
+    """Return the files that were run."""
+    return tuple(dict.fromkeys(_LOADED_FILES))
+
+
+def plugin_contents() -> dict[str, bytes]:
+    """Return the contents of the files that were run, by unique file names."""
+    contents: dict[str, bytes] = {}
+    for file in plugin_files():
+        name = Path(file).name
+        contents[name if name not in contents else f"{len(contents)}_{name}"] = _read_source(file)
+    return contents
+
+
+def load_plugin_files(files: tuple[str, ...]) -> None:
+    """Run files and register what they define, in a worker process."""
+    for file in files:
+        _load_plugin(file, plugin_registries())
+
+
+def _load_plugin(file: str, registries: tuple[PluginRegistry, ...]) -> None:
+    before = [registry.snapshot() for registry in registries]
+    source = _read_source(file)
+    with _as_parameter_error(file):
+        tree = ast.parse(source, file)
+        module = _execute(file, source)
+    for name, value in vars(module).items():
+        for registry in registries:
+            if registry.accepts(value):
+                with _as_parameter_error(file, _line_of_assignment(tree, name)):
+                    registry.register(value)
+                    registry.check(value)
+    if before == [registry.entries for registry in registries]:
+        types = [registry.plugin_type for registry in registries]
+        names = ", ".join(one.__name__ for one in types if one is not None)
+        functions = "register_criterion, register_theorem or add_section"
+        words = f"{file} registers nothing: no {names} at its top level, and no call of {functions}"
+        raise ParameterError(_OPTION, words)
+
+
+def _read_source(file: str) -> bytes:
+    try:
+        with open_input(file, 2**24) as stream:
+            return stream.read()
+    except (OSError, ValueError) as error:  # ValueError: an impossible path
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ParameterError(_OPTION, f"{file} cannot be read: {reason}") from None
+
+
+def _execute(file: str, source: bytes) -> ModuleType:
+    """Run a file as a module that can import its neighbours, as ``python FILE`` does."""
+    _LOADED_FILES.append(file)
+    path = Path(file).resolve()
+    module = ModuleType(f"plugin_{path.stem}")
+    module.__file__ = str(path)
+    sys.modules[module.__name__] = module
+    sys.path.insert(0, str(path.parent))
+    try:
+        exec(compile(source, file, "exec"), vars(module))
+    finally:
+        sys.path.remove(str(path.parent))
+    return module
+
+
+@contextmanager
+def _as_parameter_error(file: str, line: int = 1) -> Iterator[None]:
+    """Convert any error of user code into one line with file, line and reason."""
+    try:
+        yield
+    except (Exception, SystemExit) as error:
+        at = _line_in_file(error, file) or line
+        raise ParameterError(_OPTION, f"{file}, line {at}: {_error_text(error)}") from error
+
+
+def plugin_error_text(error: BaseException) -> str | None:
+    """Return the message for an error that was raised in a plugin; ``None`` for other errors."""
+    for file in _LOADED_FILES:
+        if line := _line_in_file(error, file):
+            return f"{file}, line {line}: {_error_text(error)}"
+    return None
+
+
+def _error_text(error: BaseException) -> str:
+    text = error.msg if isinstance(error, SyntaxError) else str(error)
+    kind = "" if isinstance(error, AsperityError) else f"{type(error).__name__}: "
+    return " ".join(f"{kind}{text}".split())
+
+
+def _line_in_file(error: BaseException | None, file: str) -> int | None:
+    """Return the line of a file at which an error, or its cause, was raised."""
+    if error is None:
+        return None
+    if isinstance(error, SyntaxError) and error.filename == file:
+        return error.lineno
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = (frame.lineno for frame in reversed(frames) if frame.filename == file)
+    return next(lines, None) or _line_in_file(error.__cause__, file)
+
+
+def _line_of_assignment(tree: ast.Module, name: str) -> int:
+    for node in tree.body:
+        targets = getattr(node, "targets", [getattr(node, "target", None)])
+        if any(isinstance(target, ast.Name) and target.id == name for target in targets):
+            return node.lineno
+    return 1

@@ -1,0 +1,317 @@
+"""The commands ``run`` and ``lab``."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.cli import options
+from asperity.cli.loop_setup import (
+    DEFAULT_CLAMP,
+    REPLAY_PREFIX,
+    SIMULATED,
+    check_stiffness_limit,
+    driver_options,
+    driver_setup,
+    load_setup,
+    loop_options,
+    make_driver,
+    prestarted_process,
+    stiffness_option,
+)
+from asperity.cli.options import file_values, surface_values
+from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
+from asperity.cli.plugins import load_plugin_files, plugin_contents, plugin_files
+from asperity.core.arguments import Argument
+from asperity.core.errors import ParameterError, print_message
+from asperity.devices import load_device
+
+if TYPE_CHECKING:
+    from asperity.lab.handle import Handle
+    from asperity.lab.playback import Playback
+    from asperity.lab.scene_state import SceneState
+    from asperity.scene.setup import Setup
+    from asperity.servo.drivers.driver import Driver
+    from asperity.servo.fault import EndReason
+    from asperity.servo.process import PrestartedProcess, ServoProcess
+
+
+POLL_INTERVAL = 0.05
+"""Interval at which the loop is polled [s]."""
+
+_RUN_ARGUMENTS = (
+    Argument("duration", "duration of the run", "s", default_description="the scene's",
+             example="10s", must_be_positive=True),
+)  # fmt: skip
+
+
+@click.command("run")
+@loop_options(stiffness_option("the scene's; without a scene, the recommended stiffness"))
+@options.argument_options(_RUN_ARGUMENTS)
+@driver_options
+@click.option("--record", metavar="PATH", help="Record every sample to a recording, 'run.mcap'.")
+@output_options(html=False)
+def run_command(
+    scene: str,
+    outputs: Outputs,
+    duration: float | None,
+    driver: str,
+    record: str | None,
+    accept_risk: bool,
+    **values: Any,
+) -> None:
+    """Run SCENE in real time on a simulated device, or on a real one with --driver.
+
+    SCENE is a scene file (TOML), a texture with its arguments or a measured file. Without a scene
+    file the law and stiffness are those that compare recommends, and a simulated hand strokes the
+    surface for 10 s.
+
+    The loop runs in its own process at the update rate of the device; limits on force, slew rate,
+    depth, lateness and energy are set in section [servo] of the scene. Ctrl-C releases the force
+    and stops; a fault sets the force to zero and ends with exit code 3. Read docs/howto/safety.md
+    before using a real device.
+    """
+    check_outputs(json=outputs.json, record=record)
+    process = click.get_current_context().with_resource(prestarted_process())
+    if driver == SIMULATED:
+        setup = load_setup(scene, values, duration, defaults=DEFAULT_CLAMP, allow_bare_surface=True)
+    else:
+        setup, _servo = driver_setup(scene, values, driver, duration)
+    hashes = setup.file_hashes()
+    if not accept_risk:
+        check_stiffness_limit(setup)
+    from asperity.report.loop.servo_report import device_run_page
+
+    loop = make_loop(setup, driver, duration, process)
+    with collect_signals() as signals, record_loop(record, loop, setup) as write_rows:
+        with progress_bar("compiling the loop"):
+            loop.start()
+        try:
+            reason = watch_loop(loop, signals, write_rows)
+        finally:
+            loop.stop()
+    for path, current in setup.file_hashes().items():
+        if hashes.get(path, current) != current:
+            print_message(f"{path} was changed during the run, which used the earlier content")
+    data = {
+        "schema": 1, "scene": setup, "driver": driver, "ended": reason.name.lower(),
+        "notes": loop.notes, "statistics": loop.statistics,
+    }  # fmt: skip
+    outputs.write(data, device_run_page(setup, loop, reason, record))
+
+
+def make_loop(
+    setup: Setup, driver_name: str, duration: float | None, process: PrestartedProcess
+) -> ServoProcess:
+    """Return the loop of a driver; a replay without a duration ends with its rows.
+
+    Raises:
+        ParameterError: for an unknown driver, or a device without a maximum force.
+    """
+    from asperity.servo.drivers.simulated import simulated_driver
+    from asperity.servo.process import ServoProcess
+
+    if driver_name == SIMULATED:
+        duration = setup.duration
+        driver: Driver = simulated_driver(
+            setup.plant, setup.hand, setup.servo, setup.motion, duration, setup.start,
+            setup.velocity,
+        )  # fmt: skip
+    else:
+        driver = make_driver(driver_name, setup)
+        if duration is None and driver.max_readings is not None:
+            duration = setup.servo.period * driver.max_readings
+    reach = setup.safety.reach_limit(setup.device)
+    return ServoProcess(
+        setup.surface, driver, setup.servo, setup.safety, reach, duration, prestarted=process
+    )
+
+
+@contextmanager
+def collect_signals() -> Iterator[list[int]]:
+    """Collect SIGINT and SIGTERM in a list."""
+    received: list[int] = []
+
+    def collect(number: int, _frame: FrameType | None) -> None:
+        received.append(number)
+
+    handlers = {one: signal.signal(one, collect) for one in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield received
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def record_loop(path: str | None, loop: ServoProcess, setup: Setup) -> Iterator[Callable[[], None]]:
+    """Record a loop if there is a path; yield a function that writes the new rows."""
+    if path is None:
+        yield lambda: None
+        return
+    from asperity.servo.loop_recorder import LoopRecorder
+
+    metadata = setup.recording_metadata(loop.driver_name)
+    with LoopRecorder(path, loop, setup.surface, setup.servo, metadata) as recorder:
+        yield recorder.write_new_rows
+    if lost := recorder.lost_rows:
+        print_message(f"{lost} rows are missing in the recording: this program was too slow")
+
+
+def watch_loop(loop: ServoProcess, signals: list[int], write_rows: Callable[[], None]) -> EndReason:
+    """Poll a running loop until it ends, and return the reason.
+
+    Args:
+        loop: the loop.
+        signals: received signals, which stop the loop.
+        write_rows: called at each poll.
+
+    Raises:
+        DeviceFault: for a fault.
+    """
+    from asperity.servo.fault import EndReason
+
+    for note in loop.notes:
+        print_message(note)
+    with show_live_state() as show:
+        while (reason := loop.poll()) is EndReason.RUNNING:
+            if signals:
+                loop.stop()
+                continue
+            write_rows()
+            show(loop)
+            time.sleep(POLL_INTERVAL)
+    return reason
+
+
+@contextmanager
+def show_live_state() -> Iterator[Any]:
+    """Show position, force, energy and lateness, if standard error is a terminal."""
+    if not sys.stderr.isatty():
+        yield lambda _loop: None
+        return
+    from rich.console import Console
+    from rich.live import Live
+
+    from asperity.report.loop.servo_report import status_line
+
+    with Live(console=Console(stderr=True), transient=True, refresh_per_second=20) as live:
+        yield lambda loop: live.update(status_line(loop))
+
+
+_LAB_ARGUMENTS = (
+    Argument("port", "port of the page on this machine", "", form="integer", example="8137",
+             default_description="8137, or the next free port"),
+)  # fmt: skip
+
+
+@click.command("lab")
+@click.argument("surface", required=False)
+@options.law_option(
+    "Initial law.  [default: the scene's, else C; with --driver the recommended law]"
+)
+@options.law_options(
+    (
+        stiffness_option("the scene's, else 1000 N/m; with --driver the recommended stiffness"),
+        *options.LAW_OPTIONS[1:],
+    )
+)
+@options.file_options
+@options.device_option("Device.  [default: the scene's, else touch-x; with --driver omega.3]")
+@driver_options
+@options.argument_options(_LAB_ARGUMENTS)
+@click.option("--no-browser", is_flag=True, help="Print the address without opening a browser.")
+def lab_command(
+    surface: str | None, port: int | None, driver: str, *, accept_risk: bool, no_browser: bool,
+    **values: Any,
+) -> None:  # fmt: skip
+    """Run SURFACE interactively in a browser, with the loop of asperity run.
+
+    On the simulated device the mouse pointer acts as the hand. With --driver the loop runs on a
+    real device and is started, changed and stopped from the page: read docs/howto/safety.md first.
+    SURFACE may be a recording (.mcap, or an archive saved by the lab), which is played back;
+    without SURFACE, a sinusoid is used. The page is served on this machine only, to anyone who has
+    the printed address, and loads nothing from a network. Ctrl-C stops the lab.
+    """
+    # Started first, since it takes long in another process.
+    process = click.get_current_context().with_resource(prestarted_process())
+    from asperity.lab.launch import LabOptions, bind_socket, run_lab
+    from asperity.lab.scene_state import DEFAULT_SURFACE
+
+    source = surface or DEFAULT_SURFACE
+    playback = handle = None
+    if driver == SIMULATED:
+        scene, playback = _simulated_scene(source, values)
+        scene = replace(scene, plugin_files=plugin_contents())
+    else:
+        scene, handle = _device_scene(source, values, driver, accept_risk=accept_risk)
+
+    def open_page(address: str) -> None:
+        print_message(f"the lab is at {address}")
+        if not no_browser and not webbrowser.open(address):
+            print_message("no browser was found: open the address in a browser of this machine")
+
+    load = partial(load_plugin_files, plugin_files())
+    options = LabOptions(load, process, playback, handle, accept_risk)
+    run_lab(scene, bind_socket(port), open_page, options)
+
+
+def _simulated_scene(source: str, values: dict[str, Any]) -> tuple[SceneState, Playback | None]:
+    """Return the initial scene on the simulated device, and the playback of a recording."""
+    from asperity.lab.recorded_clip import find_recording, load_recorded_clip
+    from asperity.lab.scene_state import DEFAULT_DEVICE, make_scene_state
+    from asperity.scene import load_scene
+
+    own, file_options, settings = surface_values(values), file_values(values), values["settings"]
+    if (path := find_recording(source, _temporary_folder())) is not None:
+        for name in file_options:
+            raise ParameterError(name, "has no effect on a recording, which holds its surface")
+        with progress_bar("reading the recording"):
+            return load_recorded_clip(path, source, own, values["device"], settings.apply_to)
+    with progress_bar("reading the surface"):
+        scene = load_scene(source, file_options)
+        device = values["device"] or scene.device or load_device(DEFAULT_DEVICE)
+        return make_scene_state(scene, source, own, settings.apply_to(device), file_options), None
+
+
+def _temporary_folder() -> Path:
+    """Return a folder that is deleted when the command ends."""
+    return Path(click.get_current_context().with_resource(TemporaryDirectory()))
+
+
+def _device_scene(
+    source: str, values: dict[str, Any], name: str, *, accept_risk: bool
+) -> tuple[SceneState, Handle]:
+    """Return the scene on the device of a driver, and its handle.
+
+    Raises:
+        ParameterError: for an unknown driver, a device without a maximum force, a stiffness above
+            the limit, or a recording.
+    """
+    from asperity.lab.handle import make_handle
+    from asperity.lab.recorded_clip import find_recording
+    from asperity.lab.scene_state import make_device_scene_state
+    from asperity.servo.process import require_max_force
+
+    if find_recording(source, _temporary_folder()) is not None:
+        words = f"cannot play back the recording {source}: leave it out, or give a surface and"
+        raise ParameterError("driver", f"{words} --driver {REPLAY_PREFIX}run.mcap")
+    setup, servo = driver_setup(source, values, name)
+    driver = make_driver(name, setup)
+    require_max_force(driver, setup.servo)
+    if not accept_risk:
+        check_stiffness_limit(setup)
+    scene = make_device_scene_state(setup, servo, source, file_values(values))
+    return scene, make_handle(driver, setup)

@@ -1,0 +1,176 @@
+"""The commands ``simulate``, ``onset`` and ``scan``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import count
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.cli import options
+from asperity.cli.loop_setup import load_setup, loop_options, select_laws, stiffness_option
+from asperity.cli.output import Outputs, output_options, progress_bar
+from asperity.core.arguments import Argument
+from asperity.core.errors import ParameterError
+
+if TYPE_CHECKING:
+    from asperity.laws import Law
+
+
+_STIFFNESS = stiffness_option("the scene's, else 1000 N/m")
+_SIMULATE_ARGUMENTS = (
+    Argument(
+        "duration", "duration of the run", "s", default_description="the scene's", example="2s"
+    ),
+    Argument(
+        "every",
+        "write every N-th sample to trace and figures",
+        default_description="the scene's, 1",
+        form="integer",
+    ),
+)
+
+
+@click.command("simulate")
+@loop_options(_STIFFNESS)
+@options.argument_options(_SIMULATE_ARGUMENTS)
+@click.option(
+    "--trace",
+    "trace_path",
+    metavar="PATH",
+    help="Record every sample to a recording, 'run.mcap', or a text table, 'run.csv'.",
+)
+@output_options()
+def simulate_command(
+    scene: str, outputs: Outputs, duration: float | None, every: int | None, **values: Any
+) -> None:
+    """Simulate the closed loop of SCENE (TOML) and report its energy balance.
+
+    A scene has the sections [texture], [surface], [device], [hand], [motion] and [run];
+    [servo] is for asperity run. The trace has columns for positions, velocities, forces and
+    energies, with units.
+    """
+    setup = load_setup(scene, values, duration)
+    setup = setup if every is None else replace(setup, every=every)
+    from asperity.report.loop.run_report import run_page
+    from asperity.simulation.run import MAX_ROWS
+
+    # Rows are needed for figures only.
+    max_rows = 0 if outputs.html is None else MAX_ROWS
+    with progress_bar("simulating") as update:
+        run = setup.simulate(trace=outputs.trace or True, progress=update, max_rows=max_rows)
+
+    outputs.write({"schema": 2, "scene": setup, "run": run}, run_page(setup, run))
+
+
+_DELAYS = Argument(
+    "delays",
+    "delays to simulate, in samples",
+    default_description="0 to 5",
+    form="integer",
+    example="0; 2; 5",
+)
+_ONSET_SEARCH = (
+    Argument(
+        "starts",
+        "number of initial positions, spread over a period of the texture",
+        default=12,
+        form="integer",
+        keyword="n_phases",
+    ),
+    Argument("tolerance", "relative width at which bisection stops", default=0.05),
+    Argument("lowest", "lowest stiffness to try", "N/m", 1.0, keyword="min_stiffness"),
+)
+_DURATION = Argument(
+    "duration", "duration of each run", "s", default_description="the scene's", example="0.4s"
+)
+_laws_option = options.laws_option("Laws to simulate.  [default: all]")
+_report_options = output_options()
+
+
+@click.command("onset")
+@loop_options(None, several_laws=True)
+@_laws_option
+@options.argument_options([_DELAYS], options.list_parser)
+@options.argument_options(_ONSET_SEARCH, options.single_value_parser)
+@options.argument_options([_DURATION])
+@_report_options
+def onset_command(
+    scene: str,
+    outputs: Outputs,
+    laws: tuple[Law, ...] | None,
+    delays: list[int] | None,
+    duration: float | None,
+    **values: Any,
+) -> None:
+    """Find the stiffness at which limit cycles begin in SCENE by simulation, by law and delay.
+
+    The motion of the scene must end at rest ([motion] kind = "still"). The report compares each
+    onset with the passivity criteria.
+    """
+    if values["stiffness"] is not None:
+        raise ParameterError("stiffness", "is the result of onset: leave it out")
+    chosen = select_laws(laws, values["law"])
+    setup = load_setup(scene, values, duration, chosen, include_delay=False)
+    from asperity.scene.sweeps import sweep_onsets
+
+    delays, letters = delays or list(range(6)), [law.letter for law in chosen]
+    done, total = count(1), len(letters) * len(delays)
+    search = options.provided_values(values, _ONSET_SEARCH)
+    with progress_bar("simulating onsets") as update:
+        onsets = sweep_onsets(
+            setup, letters, delays, progress=lambda: update(next(done) / total), **search
+        )
+
+    from asperity.report.loop.sweep_report import onset_page
+
+    data = {"schema": 2, "scene": setup, "onsets": onsets}
+    outputs.write(data, onset_page(setup, onsets))
+
+
+_SCAN_LISTS = (
+    Argument(
+        "speeds",
+        "speeds of the hand",
+        "m/s",
+        default_description="0.02 to 0.2 m/s",
+        example="0.05m/s; 0.1m/s",
+    ),
+    Argument(
+        "depths",
+        "depths of the hand below z = 0",
+        "m",
+        default_description="the scene's",
+        example="0.5mm; 1mm",
+    ),
+)
+_STROKES = Argument(
+    "strokes", "strokes per run", default_description="the scene's, at least 5", form="integer"
+)
+
+
+@click.command("scan")
+@loop_options(_STIFFNESS, several_laws=True)
+@_laws_option
+@options.argument_options(_SCAN_LISTS, options.list_parser)
+@options.argument_options([_STROKES], options.single_value_parser)
+@_report_options
+def scan_command(scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **values: Any) -> None:
+    """Simulate strokes on the surface of SCENE; report their energy by law, speed and depth.
+
+    The motion of the scene must consist of strokes; their speed and depth are replaced.
+    """
+    from asperity.scene.sweeps import sweep_strokes
+
+    chosen = select_laws(laws, values["law"])
+    setup = load_setup(scene, values, laws=chosen)
+    letters = [law.letter for law in chosen]
+    arguments = options.provided_values(values, (*_SCAN_LISTS, _STROKES))
+    with progress_bar("simulating strokes") as update:
+        strokes = sweep_strokes(setup, letters, progress=update, **arguments)
+
+    from asperity.report.loop.sweep_report import strokes_page
+
+    data = {"schema": 2, "scene": setup, "strokes": strokes}
+    outputs.write(data, strokes_page(setup, strokes))

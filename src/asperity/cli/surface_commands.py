@@ -1,0 +1,107 @@
+"""The commands ``surfaces``, ``prepare`` and ``show``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.cli.options import file_options, file_values, plugin_option
+from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
+
+if TYPE_CHECKING:
+    pass
+
+
+@click.command("surfaces")
+@click.argument("names", nargs=-1, metavar="[NAME]...")
+@plugin_option
+@output_options()
+def surfaces_command(names: tuple[str, ...], outputs: Outputs) -> None:
+    """List texture kinds and named surfaces with their arguments, units, defaults and sizes.
+
+    With NAMEs, show details. Other commands accept these names as SURFACE, with arguments after a
+    colon: cloth, sandpaper:grit=P60, noise:rms=20um,size=10mm.
+    """
+    from asperity.report.surface_gallery import find_surfaces, surfaces_page
+
+    surfaces = find_surfaces(names)
+    page = surfaces_page(surfaces, detailed=bool(names))
+    outputs.write({"schema": 2, "surfaces": surfaces}, page, "Figures")
+
+
+_STAGE_LABELS = {
+    "read": "reading the surface",
+    "outliers": "removing outliers",
+    "form": "removing the form",
+    "fill": "filling missing points",
+    "filter": "filtering",
+    "tip": "simulating the tip",
+    "repeat": "blending the borders",
+    "magnify": "magnifying",
+    "measure": "computing parameters",
+    "write": "writing",
+}
+
+
+@contextmanager
+def preparation_progress() -> Iterator[Callable[[str], None]]:
+    """Show the stage of a preparation; yield a function to call before each stage."""
+    stages = list(_STAGE_LABELS)
+    with progress_bar(_STAGE_LABELS["read"]) as update:
+        yield lambda stage: update(stages.index(stage) / len(stages), _STAGE_LABELS[stage])
+
+
+@click.command("prepare")
+@click.argument("file")
+@click.option(
+    "-o", "--output", metavar="PATH", required=True, help="The file to write, surface.npz."
+)
+@plugin_option
+@file_options
+@output_options(html=False)
+def prepare_command(file: str, output: str, outputs: Outputs, **values: Any) -> None:
+    """Prepare the measured surface FILE and write it with the history of its preparation.
+
+    The steps are: read, outliers, fill, form, filter, tip, blend, magnify. Every other command
+    accepts the result in place of the measured file. Lengths are those of the measured surface,
+    before magnification. The parameters of the surface (ISO 25178-2, ISO 21920-2) are printed after
+    each step; asperity show prints more of them.
+    """
+    from asperity.measured.prepared import check_output_path, save_prepared
+    from asperity.textures.texture_loading import prepare_file
+
+    check_output_path(Path(output), Path(file))
+    check_outputs(output=output, json=outputs.json)
+    with preparation_progress() as start_stage:
+        prepared = prepare_file(file, progress=start_stage, **file_values(values))
+        start_stage("write")
+        save_prepared(output, prepared, file)
+    from asperity.report.measured_report import preparation_page
+
+    outputs.write(prepared, preparation_page(prepared, output))
+
+
+@click.command("show")
+@click.argument("file")
+@plugin_option
+@file_options
+@output_options()
+def show_command(file: str, outputs: Outputs, **values: Any) -> None:
+    """Report the roughness parameters of the measured surface FILE after each preparation step.
+
+    For maps, the parameters are those of ISO 25178-2 (Sq, Sa, Sz, Sdr ...); for profiles, those of
+    ISO 21920-2 (Rq, Ra, Rz ...). The report also shows what each step removed and separates form,
+    waviness and texture. FILE may also be an output of asperity prepare.
+    """
+    from asperity.textures.measurement_summary import summarize_file
+
+    with preparation_progress() as start_stage:
+        summary = summarize_file(file, progress=start_stage, **file_values(values))
+
+    from asperity.report.measured_report import surface_summary_page
+
+    outputs.write(summary, surface_summary_page(summary))

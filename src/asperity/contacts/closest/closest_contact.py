@@ -1,0 +1,154 @@
+"""The nearest contact: the god-object, the globally closest point of the textured surface."""
+
+from __future__ import annotations
+
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from asperity.contacts.contact import Contact, ContactDerivatives, ExactHeight, HeightField
+from asperity.contacts.sampler_interface import sampler_call
+
+if TYPE_CHECKING:
+    from asperity.core.checks import FloatArray
+
+
+class NearestContact(Contact):
+    """Depth |p - p_h|, contact point p_h; p_h jumps at the medial axis, where two points tie."""
+
+    name = "nearest"
+    relative_cost = 100.0
+    has_warm_start = True
+    max_evaluations = 600.0
+
+    def derivatives(self) -> ContactDerivatives:
+        """Return ∇depth = -n and, by the implicit function theorem, ∂(X, Y)/∂p = Q⁻¹ [I g].
+
+        Q = I + g gᵀ + (h - z) H, where h - z = depth / s because p_h - p is along the normal
+        (MATH section 3).
+        """
+        import sympy as sp
+
+        from asperity.contacts.symbols import DEPTH, HX, HXX, HXY, HY, HYY
+
+        root = sp.sqrt(1 + HX**2 + HY**2)
+        q11, q12, q22, r = sp.symbols("q11 q12 q22 r", real=True)
+        definitions = (
+            (q11, 1 + HX**2 + DEPTH / root * HXX),
+            (q12, HX * HY + DEPTH / root * HXY),
+            (q22, 1 + HY**2 + DEPTH / root * HYY),
+            (r, 1 / (q11 * q22 - q12**2)),
+        )
+        inverse = r * sp.Matrix([[q22, -q12], [-q12, q11]])
+        return ContactDerivatives(
+            depth_gradient=sp.Matrix([[HX, HY, -1]]) / root,
+            point_derivative=inverse * sp.Matrix([[1, 0, HX], [0, 1, HY]]),
+            definitions=definitions,
+        )
+
+    def inward_direction(self) -> Any:
+        """Return the downward normal at the closest point."""
+        from asperity.contacts.symbols import unit_normal
+
+        return -unit_normal()
+
+    def kernels(self) -> tuple[ModuleType, ...]:
+        """Return the warm-started search and the fallback for a search without a budget."""
+        from asperity.contacts.closest import closest_warm, unlimited_search
+
+        return closest_warm, unlimited_search
+
+    def detection_code(self, needed: frozenset[str]) -> tuple[list[str], str]:
+        """Return the comparison with the height at the probe: no search out of contact."""
+        return [], "sample_height(x, y, texture) - z > 0.0"
+
+    def sampling_code(self, needed: frozenset[str]) -> list[str]:
+        """Return the search, which also returns the slopes at the closest point."""
+        return self._closest_point_code("closest_point(x, y, z, texture)", needed)
+
+    def warm_start_code(self, needed: frozenset[str]) -> list[str]:
+        """Return the search that starts from the last closest point, within a budget."""
+        return self._closest_point_code("closest_point_warm(x, y, z, warm_start, texture)", needed)
+
+    def depth_code(self) -> list[str]:
+        """Return the distance found with half the budget of a tick; it is never too short."""
+        lines, condition = self.detection_code(frozenset())
+        found = f"closest_point_within_budget(x, y, z, x, y, {0.5 * self.max_evaluations}, texture)"
+        return [
+            *[*lines, f"if not {condition}:", "    return 0.0"],
+            f"closest_x, closest_y, h, _hx, _hy, _error_bound, _evaluations = {found}",
+            "return math.sqrt((x - closest_x)**2 + (y - closest_y)**2 + (z - h)**2)",
+        ]
+
+    @staticmethod
+    def _closest_point_code(call: str, needed: frozenset[str]) -> list[str]:
+        return [
+            f"closest_x, closest_y, h, hx, hy = {call}",
+            *sampler_call(needed & {"hxx", "hxy", "hyy"}, "closest_x, closest_y"),
+            "depth = math.sqrt((x - closest_x)**2 + (y - closest_y)**2 + (z - h)**2)",
+        ]
+
+    def contact_height(self, texture: HeightField, xy: FloatArray) -> FloatArray:
+        """Return the heights of the texture."""
+        return texture.height(xy)
+
+    def depth(self, texture: HeightField, points: FloatArray) -> FloatArray:
+        """Return the distance to the surface, negative outside of the body."""
+        import numpy as np
+
+        closest = texture.nearest(points)
+        below = points[:, 2] < texture.height(np.ascontiguousarray(points[:, :2]))
+        return np.asarray(np.where(below, 1.0, -1.0) * np.linalg.norm(closest - points, axis=1))
+
+    def depth_axis(self, texture: HeightField, point: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the normal line through the closest point, into the body."""
+        import numpy as np
+
+        closest = texture.nearest(point[None])[0]
+        hx, hy = texture.gradient(closest[None, :2])[0]
+        inward = np.array([hx, hy, -1.0])
+        return closest, inward / np.linalg.norm(inward)
+
+    def exact_contact(
+        self, texture: HeightField, h: ExactHeight, p: list[Any]
+    ) -> tuple[Any, ...] | None:
+        """Return the closest point, by Newton's method from the one of the kernels.
+
+        Solves (X - x) + (h - z) h_x = 0, (Y - y) + (h - z) h_y = 0.
+        """
+        import mpmath
+
+        start = texture.nearest([[float(c) for c in p]])[0]
+        fx, fy = mpmath.mpf(start[0]), mpmath.mpf(start[1])
+        for _ in range(60):
+            gap, hx, hy = h(fx, fy, 0, 0) - p[2], h(fx, fy, 1, 0), h(fx, fy, 0, 1)
+            hxx, hxy, hyy = h(fx, fy, 2, 0), h(fx, fy, 1, 1), h(fx, fy, 0, 2)
+            a, b = fx - p[0] + gap * hx, fy - p[1] + gap * hy
+            qxx, qxy, qyy = 1 + hx * hx + gap * hxx, hx * hy + gap * hxy, 1 + hy * hy + gap * hyy
+            det = qxx * qyy - qxy * qxy
+            sx, sy = (qxy * b - qyy * a) / det, (qxy * a - qxx * b) / det
+            fx, fy = fx + sx, fy + sy
+            if abs(sx) + abs(sy) <= mpmath.eps * (abs(fx) + abs(fy) + abs(gap)):
+                break
+        away = [fx - p[0], fy - p[1], h(fx, fy, 0, 0) - p[2]]
+        distance = mpmath.sqrt(sum(part**2 for part in away))
+        return (distance if h(p[0], p[1], 0, 0) > p[2] else -distance), fx, fy
+
+    def probe_positions(
+        self, xy: FloatArray, depth: FloatArray, derivatives: FloatArray
+    ) -> FloatArray:
+        """Return the points below the closest point along its normal."""
+        import numpy as np
+
+        h, hx, hy = derivatives[:, :3].T
+        below = depth / np.sqrt(1.0 + hx * hx + hy * hy)
+        return np.column_stack([xy[:, 0] + below * hx, xy[:, 1] + below * hy, h - below])
+
+    def depth_at_height(self, height: float, derivatives: FloatArray) -> FloatArray:
+        """Return the depths at which the normal line reaches the height."""
+        import numpy as np
+
+        above = derivatives[:, 0] - height
+        return np.asarray(above * np.sqrt(1.0 + derivatives[:, 1] ** 2 + derivatives[:, 2] ** 2))
+
+
+NEAREST = NearestContact()

@@ -1,0 +1,259 @@
+"""Certified search for the closest surface point, shared by the samplers of maps and waves.
+
+Let φ(X, Y) = |(X, Y) - (x, y)|² + (h(X, Y) - z)² be the squared distance from the probe, with
+p = ∇φ/2 and Q = Hess φ/2 = I + ∇h ∇hᵀ + (h - z) Hess h. A global minimum is a point with p = 0 and
+no negative eigenvalue of Q. Over a box of half-diagonal r in which ‖Hess h‖ <= K and ‖D³h‖ <= T,
+Q differs from its value at the centre by at most L r, L = 3 K max|∇h| + T max|h - z|: Taylor's
+formula at the centre decides most boxes.
+
+Boxes are quartered without a stack: the next one follows from the indices of the last.
+
+A search counts evaluations of the surface: an evaluation of a sum of many waves counts as several
+(``evaluation_cost``), and eight pruned boxes of the pyramid count as one. Boxes in which φ is
+nowhere less than ``pruning_factor`` times the best are pruned; the factor is 1 less rounding for
+the closest point itself. The search is truncated once ``evaluations_left`` is used up.
+"""
+
+import math
+
+import numpy as np
+
+from asperity.contacts.sampler_interface import PlanePoint as Point
+from asperity.contacts.sampler_interface import sample_hessian
+from asperity.core.compiled import EPS, SQRT_EPS, Kernels
+
+KERNELS = Kernels(
+    provides=(
+        "descend",
+        "symmetric_eigenvalues",
+        "descend_within_budget",
+        "evaluate_box",
+        "evaluation_cost",
+        "next_box",
+    ),
+    not_inlined=("evaluate_box", "newton_step"),
+    shared=("descend_within_budget",),
+)
+
+
+def evaluation_cost(texture: object) -> float:
+    """Return 1; a texture kind that takes longer provides its own cost."""
+    return 1.0
+
+
+def symmetric_eigenvalues(qxx: float, qxy: float, qyy: float) -> tuple[float, float]:
+    """Return the smaller and the larger eigenvalue of a symmetric matrix."""
+    mean = 0.5 * (qxx + qyy)
+    half = 0.5 * (qxx - qyy)
+    spread = math.sqrt(half * half + qxy * qxy)
+    return mean - spread, mean + spread
+
+
+def newton_step(
+    px: float, py: float, qxx: float, qxy: float, qyy: float
+) -> tuple[float, float, bool]:
+    """Return a descent step of φ, Newton's where φ is convex, and whether φ is convex."""
+    low, high = symmetric_eigenvalues(qxx, qxy, qyy)
+    convex = low > 0.07 * SQRT_EPS * high
+    if not convex:
+        # Shifted so that the step in the steepest direction keeps its size and none is flat.
+        shift = max(abs(low), 0.05 * abs(high), 0.07 * SQRT_EPS) - low
+        qxx += shift
+        qyy += shift
+    det = qxx * qyy - qxy * qxy
+    return (qxy * py - qyy * px) / det, (qxy * px - qxx * py) / det, convex
+
+
+def descend(x: float, y: float, z: float, start_x: float, start_y: float, texture: object) -> Point:
+    """Return a local minimum of φ downhill from a start, to rounding."""
+    return descend_within_budget(x, y, z, start_x, start_y, np.inf, texture)[0]
+
+
+def descend_within_budget(
+    x: float, y: float, z: float, fx: float, fy: float, evaluations_left: float, texture: object
+) -> tuple[Point, float]:
+    """Return a local minimum of φ downhill from a start, to rounding, and the evaluations left.
+
+    If none are left it is the lowest point so far; the surface is evaluated at least once.
+    """
+    best = (fx, fy, np.inf, 0.0, 0.0, 0.0)
+    sx = sy = last = 0.0
+    close = False
+    cost = evaluation_cost(texture)
+    for _ in range(200):
+        evaluations_left -= cost
+        h, hx, hy, hxx, hxy, hyy = sample_hessian(fx, fy, texture)
+        gap = h - z
+        dx = fx - x
+        dy = fy - y
+        new = dx * dx + dy * dy + gap * gap
+        rounding = 2.0 * EPS * EPS * (fx * fx + fy * fy + h * h + z * z)
+        if new <= best[2] or close:
+            best = (fx, fy, new, h, hx, hy)
+            sx, sy, convex = newton_step(
+                dx + gap * hx, dy + gap * hy,
+                1.0 + hx * hx + gap * hxx, hx * hy + gap * hxy, 1.0 + hy * hy + gap * hyy,
+            )  # fmt: skip
+            size = sx * sx + sy * sy
+            if size <= 0.5 * EPS * new + rounding:
+                h += hx * sx + hy * sy
+                hx += hxx * sx + hxy * sy
+                hy += hxy * sx + hyy * sy
+                return (fx + sx, fy + sy, new, h, hx, hy), evaluations_left
+            # φ resolves only half the digits: from here on the steps must shrink instead.
+            if close and size >= 0.6 * last:
+                break
+            close = convex and size <= 1e-6 * new
+            last = size
+        else:
+            sx *= 0.5
+            sy *= 0.5
+            if sx * sx + sy * sy <= 4e-5 * EPS * best[2] + rounding:
+                break
+        if evaluations_left <= 0.0:
+            break
+        fx = best[0] + sx
+        fy = best[1] + sy
+    return best, evaluations_left
+
+
+def taylor_remainders(
+    r: float, gap: float, slope: float, hessian_norm: float, k: float, t: float
+) -> tuple[float, float]:
+    """Return how far Q can be from its value at r = 0, and h from its tangent plane [m].
+
+    From h - z, |∇h| and ‖Hess h‖ at r = 0 and the bounds K and T everywhere.
+    """
+    k = min(k, hessian_norm + t * r)
+    slope += k * r
+    change = (3.0 * slope * k + (abs(gap) + slope * r) * t) * r
+    return change, (0.5 * hessian_norm + t * r / 6.0) * r * r
+
+
+def distance_lower_bound(
+    offset: tuple[float, float, float], hx: float, hy: float, r: float, tangent_error: float
+) -> float:
+    """Return a lower bound of √φ: the distance of a piece of the tangent plane, less its error.
+
+    The centre of the piece is at the offset from the probe, its lateral half-width at most r.
+    """
+    dx, dy, gap = offset
+    square = 1.0 + hx * hx + hy * hy
+    normal = gap - hx * dx - hy * dy
+    straight = normal * normal / square
+    aside = math.sqrt(max(dx * dx + dy * dy + gap * gap - straight, 0.0)) - r * math.sqrt(square)
+    aside = max(aside, 0.0)
+    return max(math.sqrt(straight + aside * aside) - tangent_error, 0.0)
+
+
+def can_prune(
+    offset: tuple[float, float, float],
+    hx: float,
+    hy: float,
+    q: tuple[float, float, float],
+    smallest_eigenvalue: float,
+    hessian_change: float,
+    tangent_error: float,
+    a: float,
+    b: float,
+    threshold: float,
+) -> bool:
+    """Return whether no point of a box with half-widths a, b is a minimum with φ < threshold.
+
+    Decided from values at the centre of the box; the small numbers leave room for rounding.
+    """
+    dx, dy, gap = offset
+    qxx, qxy, qyy = q
+    px = dx + gap * hx
+    py = dy + gap * hy
+    r = math.sqrt(a * a + b * b)
+    margin = 1e-6 * (abs(qxx) + abs(qyy))
+    # Nowhere convex, so without a minimum; or too far by Taylor's formula.
+    bound = dx * dx + dy * dy + gap * gap - 2.0 * (abs(px) * a + abs(py) * b)
+    if (
+        smallest_eigenvalue + hessian_change < -margin
+        or bound + (min(smallest_eigenvalue, 0.0) - hessian_change / 3.0) * r * r >= threshold
+    ):
+        return True
+    # φ is too steep at the centre to be stationary in the box; or too far by the tangent plane.
+    fall = math.sqrt(px * px + py * py)
+    turn = abs(qxx * px + qxy * py) * a + abs(qxy * px + qyy * py) * b
+    if fall * (fall - (0.5 * hessian_change + margin) * r) > turn:
+        return True
+    clear = distance_lower_bound(offset, hx, hy, r, tangent_error)
+    return clear * clear >= threshold
+
+
+def evaluate_box(
+    x: float,
+    y: float,
+    z: float,
+    cx: float,
+    cy: float,
+    a: float,
+    b: float,
+    k: float,
+    t: float,
+    best: Point,
+    pruning_factor: float,
+    evaluations_left: float,
+    texture: object,
+) -> tuple[Point, bool, float]:
+    """Evaluate one box: return the best point, whether to divide the box, and evaluations left.
+
+    The box is (cx, cy) ± (a, b) [m], with bounds K [1/m] and T [1/m²].
+    """
+    evaluations_left -= evaluation_cost(texture)
+    h, hx, hy, hxx, hxy, hyy = sample_hessian(cx, cy, texture)
+    gap = h - z
+    offset = (cx - x, cy - y, gap)
+    q = (1.0 + hx * hx + gap * hxx, hx * hy + gap * hxy, 1.0 + hy * hy + gap * hyy)
+    low, _high = symmetric_eigenvalues(q[0], q[1], q[2])
+    r = math.sqrt(a * a + b * b)
+    norm = math.sqrt(hxx * hxx + 2.0 * hxy * hxy + hyy * hyy)
+    change, lift = taylor_remainders(r, gap, math.sqrt(hx * hx + hy * hy), norm, k, t)
+    if can_prune(offset, hx, hy, q, low, change, lift, a, b, best[2] * pruning_factor):
+        return best, False, evaluations_left
+    if low <= change:
+        return best, True, evaluations_left
+    det = q[0] * q[2] - q[1] * q[1]
+    sx = (q[1] * (offset[1] + gap * hy) - q[2] * (offset[0] + gap * hx)) / det
+    sy = (q[1] * (offset[0] + gap * hx) - q[0] * (offset[1] + gap * hy)) / det
+    # Convex in the box: the only minimum is where Newton's method leads, or not in the box.
+    error = 1e-6 * r + 0.5 * change * r / low
+    # A minimum on the border of the box counts, as on the mirror lines of a finite map.
+    if abs(sx) > a + error or abs(sy) > b + error:
+        return best, False, evaluations_left
+    is_inside = abs(best[0] - cx) <= a and abs(best[1] - cy) <= b
+    start_x = best[0] if is_inside else cx + sx
+    start_y = best[1] if is_inside else cy + sy
+    found, evaluations_left = descend_within_budget(
+        x, y, z, start_x, start_y, evaluations_left, texture
+    )
+    slack = 1.0 + 0.07 * SQRT_EPS
+    outside = abs(found[0] - cx) > a * slack or abs(found[1] - cy) > b * slack
+    return (found if found[2] < best[2] else best), outside, evaluations_left
+
+
+def next_box(
+    level: int, side: float, i: int, j: int, top: int, u: float, v: float
+) -> tuple[int, float, int, int]:
+    """Return the box after box (i, j) of a level and its parts; a level above top at the end.
+
+    Boxes of a level have equal sides, twice as long as those of the level below. Of the four
+    parts of a box the one closest to (u, v) comes first.
+    """
+    while level < top:
+        half_i = i >> 1
+        half_j = j >> 1
+        near_i = 1 if v >= (2 * half_i + 1) * side else 0
+        near_j = 1 if u >= (2 * half_j + 1) * side else 0
+        k = 2 * ((i & 1) ^ near_i) + ((j & 1) ^ near_j)
+        if k < 3:
+            k += 1
+            return level, side, 2 * half_i + ((k >> 1) ^ near_i), 2 * half_j + ((k & 1) ^ near_j)
+        level += 1
+        side *= 2.0
+        i = half_i
+        j = half_j
+    return top + 1, side, i, j

@@ -1,0 +1,150 @@
+"""Certified bounds of the second derivatives of a baked potential (``potential_spline.py``)."""
+
+import math
+
+from asperity.contacts.split.potential_spline import PotentialSpline, potential_hessian
+from asperity.core.checks import FloatArray
+from asperity.core.compiled import Kernels
+
+KERNELS = Kernels(loops=("hull_batch",), iterates=True)
+
+
+def bernstein_coefficient(c0: float, c1: float, c2: float, order: int, index: int) -> float:
+    """Return a Bernstein coefficient of a derivative of a quadratic B-spline on its middle cell.
+
+    All orders are represented as polynomials of degree 2, so that their hulls can be combined.
+    """
+    if order == 2:
+        return c0 - 2.0 * c1 + c2
+    if order == 1:
+        if index == 1:
+            return 0.5 * (c2 - c0)
+        return c1 - c0 if index == 0 else c2 - c1
+    if index == 1:
+        return c1
+    return 0.5 * (c0 + c1) if index == 0 else 0.5 * (c1 + c2)
+
+
+def largest_eigenvalue_3x3(
+    xx: float, xy: float, xz: float, yy: float, yz: float, zz: float
+) -> float:
+    """Return the greatest eigenvalue of a symmetric matrix, to 1e-7 of its norm."""
+    mean = (xx + yy + zz) / 3.0
+    a = xx - mean
+    b = yy - mean
+    d = zz - mean
+    size = math.sqrt((a * a + b * b + d * d + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0)
+    if size == 0.0:
+        return mean
+    det = a * (b * d - yz * yz) - xy * (xy * d - yz * xz) + xz * (xy * yz - b * xz)
+    cosine = min(max(0.5 * det / (size * size * size), -1.0), 1.0)
+    return mean + 2.0 * size * math.cos(math.acos(cosine) / 3.0)
+
+
+def eigenvalues_below(
+    bound: float, xx: float, xy: float, xz: float, yy: float, yz: float, zz: float
+) -> bool:
+    """Return whether all eigenvalues are below the bound: bound I - H has positive pivots."""
+    p0 = bound - xx
+    if p0 <= 0.0:
+        return False
+    p1 = bound - yy - xy * xy / p0
+    if p1 <= 0.0:
+        return False
+    mixed = -yz - xy * xz / p0
+    return bound - zz - xz * xz / p0 - mixed * mixed / p1 > 0.0
+
+
+def hull_entry(
+    c: FloatArray, i: int, j: int, m: int, order: tuple[int, int, int], e: int, f: int, g: int
+) -> float:
+    """Return a Bernstein coefficient of a derivative on the cell around node (i, j, m)."""
+    order_v, order_u, order_w = order
+    columns = (0.0, 0.0, 0.0)
+    rows = 1 if c.shape[0] == 1 else 3
+    for a in range(rows):
+        lines = (0.0, 0.0, 0.0)
+        for b in range(3):
+            k = j + b
+            value = bernstein_coefficient(
+                c[i + a, k, m - 1], c[i + a, k, m], c[i + a, k, m + 1], order_w, g
+            )
+            lines = (lines[1], lines[2], value)
+        column = bernstein_coefficient(lines[0], lines[1], lines[2], order_u, f)
+        columns = (columns[1], columns[2], column)
+    if rows == 1:
+        return columns[2] if order_v == 0 else 0.0
+    return bernstein_coefficient(columns[0], columns[1], columns[2], order_v, e)
+
+
+def hull_matrix(
+    i: int, j: int, m: int, e: int, f: int, g: int, spline: PotentialSpline
+) -> tuple[float, float, float, float, float, float]:
+    """Return one matrix of the Bernstein hull of Hess U on a cell: xx, xy, xz, yy, yz, zz."""
+    c = spline.c
+    vv = hull_entry(c, i, j, m, (2, 0, 0), e, f, g)
+    uv = hull_entry(c, i, j, m, (1, 1, 0), e, f, g)
+    vw = hull_entry(c, i, j, m, (1, 0, 1), e, f, g)
+    uu = hull_entry(c, i, j, m, (0, 2, 0), e, f, g)
+    uw = hull_entry(c, i, j, m, (0, 1, 1), e, f, g)
+    ww = hull_entry(c, i, j, m, (0, 0, 2), e, f, g)
+    return potential_hessian(uu, uv, uw, vv, vw, ww, spline)
+
+
+def raise_bound(
+    bound: FloatArray, corner: bool, hessian: tuple[float, float, float, float, float, float],
+    position: tuple[float, float, float],
+) -> None:  # fmt: skip
+    """Raise the bounds of the greatest eigenvalue by one matrix of a hull.
+
+    ``bound`` holds the upper bound, the greatest value at a corner of a cell, and that corner.
+    """
+    if eigenvalues_below(bound[1] if corner else bound[0], *hessian):
+        return
+    top = largest_eigenvalue_3x3(*hessian)
+    bound[0] = max(bound[0], top * (1.0 + 1e-7))
+    if corner and top > bound[1]:
+        bound[1] = top
+        for d in range(3):
+            bound[2 + d] = position[d]
+
+
+def hull_cell(i: int, j: int, m: int, out: FloatArray, spline: PotentialSpline) -> None:
+    """Raise the bounds of the eigenvalues of Hess U by one cell; see ``hull_batch``."""
+    rows = 1 if spline.c.shape[0] == 1 else 3
+    for n in range(9 * rows):
+        e, f, g = n // 9, n // 3 % 3, n % 3
+        xx, xy, xz, yy, yz, zz = hull_matrix(i, j, m, e, f, g, spline)
+        corner = (rows == 1 or e != 1) and f != 1 and g != 1
+        place = (j + 0.5 * f - 0.5, i + (0.5 * e - 0.5 if rows > 1 else 0.0), m + 0.5 * g - 0.5)
+        raise_bound(out[0], corner, (xx, xy, xz, yy, yz, zz), place)
+        raise_bound(out[1], corner, (-xx, -xy, -xz, -yy, -yz, -zz), place)
+
+
+def hull_batch(first: int, last: int, out: FloatArray, spline: PotentialSpline) -> None:
+    """Write bounds of the eigenvalues of Hess U over the cells of nodes first to last along x.
+
+    A polynomial lies in the hull of its Bernstein coefficients, and so does a matrix of them; the
+    greatest eigenvalue is a convex function, so no matrix of the hull has a greater one than the
+    coefficients have.
+
+    Args:
+        first: first node along x.
+        last: node after the last.
+        out: (2, 5), for Hess U and for its negative: an upper bound of the greatest eigenvalue,
+            the greatest value at a corner of a cell, and that corner in nodes along x, y, z.
+        spline: the field.
+    """
+    c = spline.c
+    rows = 1 if c.shape[0] == 1 else 3
+    out[:, :2] = 0.0
+    for i in range(c.shape[0] - rows + 1):
+        for j in range(first, last):
+            for m in range(1, c.shape[2] - 1):
+                # U decreases along z: if the lowest nodes of a cell are outside, all are.
+                inside = 0.0
+                for a in range(rows):
+                    for b in range(3):
+                        inside = max(inside, c[i + a, j + b, m - 1])
+                if inside > 0.0:
+                    hull_cell(i, j, m, out, spline)

@@ -1,0 +1,117 @@
+"""Split contact at a probe: vector to the mean, its derivative and energy; see ``solver.py``."""
+
+from typing import Any
+
+import numpy as np
+
+from asperity.contacts.sampler_interface import sample_height
+from asperity.contacts.split.optimality import (
+    split_add_atom_motion,
+    split_assemble_system,
+    split_closest_derivative,
+    split_evaluate_energy,
+    split_solve_linear,
+)
+from asperity.contacts.split.solver import split_compute_atoms
+from asperity.contacts.warm_start import UNLIMITED
+from asperity.core.checks import FloatArray
+from asperity.core.compiled import Kernels, local_array
+
+KERNELS = Kernels(
+    provides=("split_contact", "split_derivative", "split_energy"),
+    loops=("split_batch",),
+    merged=("split_contact", "split_derivative", "split_energy"),
+    iterates=True,
+)
+
+
+def split_contact(
+    x: float, y: float, z: float, continuity: float, texture: object
+) -> tuple[float, float, float]:
+    """Return z̄ - p, from the probe to the mean of the split god-object [m]."""
+    atoms = local_array((5, 4))
+    p = local_array((3,))
+    offset = local_array((3,))
+    none: Any = np.int64(0)
+    split_compute_atoms(x, y, z, continuity, none, UNLIMITED, p, atoms, offset, texture)
+    return offset[0], offset[1], offset[2]
+
+
+def split_energy(
+    x: float, y: float, z: float, continuity: float, texture: object
+) -> tuple[float, int, float]:
+    """Return U [m²], the number of atoms and the duality gap [m²]."""
+    atoms = local_array((5, 4))
+    p = local_array((3,))
+    offset = local_array((3,))
+    none: Any = np.int64(0)
+    count, gap, _evaluations, _truncated = split_compute_atoms(
+        x, y, z, continuity, none, UNLIMITED, p, atoms, offset, texture
+    )
+    return split_evaluate_energy(atoms, count, p, 1.0 / (1.0 + continuity), offset), count, gap
+
+
+def split_contact_derivative(
+    p: FloatArray, continuity: float, atoms: FloatArray, count: int, offset: FloatArray,
+    derivative: FloatArray, texture: object,
+) -> None:  # fmt: skip
+    """Write M = ∂(z̄ - p)/∂p, (3, 3).
+
+    One atom: P - I, P the derivative of the closest point. Several: z̄ = (p - (1 - μ) y)/μ with
+    ∂y/∂p from the optimality conditions, so M = c (I - ∂y/∂p).
+    """
+    a = local_array((7, 10))
+    y = local_array((3,))
+    mu = 1.0 / (1.0 + continuity)
+    n = 3 + count
+    for r in range(3):
+        y[r] = p[r] - offset[r] / continuity
+        for s in range(3):
+            derivative[r, s] = 0.0
+    if count == 1:
+        if split_closest_derivative(p, atoms, count - 1, derivative, texture):
+            for d in range(3):
+                derivative[d, d] -= 1.0
+        return
+    split_assemble_system(atoms, count, p, y, mu, a)
+    for r in range(n):
+        for s in range(3):
+            a[r, n + s] = 1.0 if r == s else 0.0
+    if split_add_atom_motion(atoms, count, y, mu, a, texture) and split_solve_linear(a, n, n + 3):
+        for r in range(3):
+            for s in range(3):
+                derivative[r, s] = -continuity * a[r, n + s]
+            derivative[r, r] += continuity
+
+
+def split_derivative(
+    x: float, y: float, z: float, continuity: float, texture: object
+) -> tuple[float, float, float, float, float, float, float, float, float]:
+    """Return z̄ - p [m] and M = ∂(z̄ - p)/∂p as m_xx, m_xy, m_xz, m_yy, m_yz, m_zz."""
+    atoms = local_array((5, 4))
+    p = local_array((3,))
+    offset = local_array((3,))
+    m = local_array((3, 3))
+    none: Any = np.int64(0)
+    count, _gap, _evaluations, _truncated = split_compute_atoms(
+        x, y, z, continuity, none, UNLIMITED, p, atoms, offset, texture
+    )
+    split_contact_derivative(p, continuity, atoms, count, offset, m, texture)
+    mxy, mxz, myz = 0.5 * (m[0, 1] + m[1, 0]), 0.5 * (m[0, 2] + m[2, 0]), 0.5 * (m[1, 2] + m[2, 1])
+    return offset[0], offset[1], offset[2], m[0, 0], mxy, mxz, m[1, 1], myz, m[2, 2]
+
+
+def split_batch(points: FloatArray, out: FloatArray, continuity: float, texture: object) -> None:
+    """Write potential/k [m²], number of atoms and gap [m²] (n, 3) at points (n, 3) [m]."""
+    for i in range(points.shape[0]):
+        x = points[i, 0]
+        y = points[i, 1]
+        z = points[i, 2]
+        value = 0.0
+        count = 0
+        gap = 0.0
+        if sample_height(x, y, texture) > z:
+            value, count, gap = split_energy(x, y, z, continuity, texture)
+        out[i, 0] = value
+        out[i, 1] = count
+        out[i, 2] = gap

@@ -1,0 +1,1 @@
+"""Plumbing that knows nothing of haptics: errors, units, checks, files, cache, processes."""

@@ -1,0 +1,463 @@
+"""Cache on disk for compiled code and computed results.
+
+Each entry is a file in a namespace (a folder) of the cache folder: ``ASPERITY_CACHE_DIR`` if set,
+else the user's cache directory. A file starts with a digest of its key and content; a damaged or
+exchanged file is moved aside before its content is used. Since entries hold code that is executed,
+a folder that is owned or writable by other users is not used. A cache that cannot be used costs
+time only. The total size is limited, see :func:`size_limit`; the least recently used entries are
+deleted first.
+
+A result is stored under the digest of all that it depends on, which includes this package and its
+numerical libraries. Results of user-defined code are not stored, since their dependencies are
+unknown.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import pickle
+import platform
+import re
+import stat
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, TypeVar
+
+from filelock import FileLock, Timeout
+
+from asperity.core.files import open_atomic, open_input
+from asperity.core.units import parse_size
+
+_MAGIC = b"asperity cache 1\n"
+_HEADER_SIZE = len(_MAGIC) + 32
+_QUARANTINE_SUFFIX, _LOCK_SUFFIX = ".damaged", ".lock"
+# Files of this package; others in the folder are neither counted nor deleted.
+_ENTRY_NAME = re.compile(r"[0-9a-f]{40}(\.damaged|\.lock)?|\.[0-9a-f]{16}\.tmp")
+
+_FOLDER_VARIABLE, _SIZE_VARIABLE = "ASPERITY_CACHE_DIR", "ASPERITY_CACHE_SIZE"
+DEFAULT_SIZE_LIMIT = 2 * 10**9
+"""Size limit of the cache [bytes] unless ``ASPERITY_CACHE_SIZE`` is set."""
+_ENTRIES_PER_LIMIT = 8
+"""The largest entry takes this part of the limit, so that it cannot evict all others."""
+_FRACTION_AFTER_EVICTION = 0.75
+LOCK_TIMEOUT = 30.0
+"""Time [s] to wait for an entry that another process computes."""
+_CONSEQUENCE = "results are computed again each time"
+
+
+class CacheWarning(UserWarning):
+    """A problem of the cache that costs time and that the user can solve."""
+
+
+def cache_folder() -> Path:
+    """Return the cache folder, whether or not it exists."""
+    chosen = os.environ.get(_FOLDER_VARIABLE)
+    if chosen:
+        return Path(chosen)
+    from platformdirs import user_cache_path
+
+    try:
+        return user_cache_path("asperity")
+    except RuntimeError:  # a user without a name and a home, as in a container
+        return Path(tempfile.gettempdir(), f"asperity-{os.getuid()}")
+
+
+def size_limit() -> int:
+    """Return the size limit of the cache [bytes]: ``ASPERITY_CACHE_SIZE``, or 2 GB.
+
+    Raises:
+        ParameterError: for a value that is not a size.
+    """
+    value = os.environ.get(_SIZE_VARIABLE)
+    return parse_size(_SIZE_VARIABLE, value) if value else DEFAULT_SIZE_LIMIT
+
+
+@contextmanager
+def bypass() -> Iterator[None]:
+    """Use an empty temporary folder in place of the cache."""
+    previous = os.environ.get(_FOLDER_VARIABLE)
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        os.environ[_FOLDER_VARIABLE] = folder
+        try:
+            yield
+        finally:
+            if previous is None:
+                del os.environ[_FOLDER_VARIABLE]
+            else:
+                os.environ[_FOLDER_VARIABLE] = previous
+
+
+# --- entries --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class CacheEntry:
+    """A file of the cache.
+
+    Attributes:
+        namespace: name of its folder.
+        path: the file.
+        size: size [bytes].
+        last_used: time of its last use [ns].
+    """
+
+    namespace: str
+    path: Path
+    size: int
+    last_used: int
+
+
+def list_entries() -> list[CacheEntry]:
+    """Return the entries of the cache that can be read."""
+    entries = []
+    with suppress(OSError):
+        for folder in sorted(path for path in cache_folder().iterdir() if path.is_dir()):
+            with suppress(OSError):
+                for path in folder.iterdir():
+                    if _ENTRY_NAME.fullmatch(path.name):
+                        status = path.stat()
+                        entry = CacheEntry(folder.name, path, status.st_size, status.st_mtime_ns)
+                        entries.append(entry)
+    return entries
+
+
+def clear() -> list[CacheEntry]:
+    """Delete all entries and return those that could not be deleted."""
+    _delete(list_entries())
+    return list_entries()
+
+
+def _delete(entries: list[CacheEntry]) -> None:
+    for entry in entries:
+        with suppress(OSError):  # another process may have deleted it, or may be using it
+            entry.path.unlink()
+
+
+def get_entry(namespace: str, key: str) -> bytes | None:
+    """Return the content of an entry, or ``None``.
+
+    Args:
+        namespace: kind of entry, the name of a folder.
+        key: text of all that the content depends on.
+    """
+    path = _entry_path(namespace, key)
+    try:
+        if not (_is_trusted(path.parent.parent) and _is_trusted(path.parent)):
+            return None
+        with open_input(path) as stream:
+            data = stream.read()
+    except (FileNotFoundError, NotADirectoryError):  # reported when an entry is written
+        return None
+    except (OSError, ValueError) as error:
+        if isinstance(error, OSError) and error.errno == errno.EINVAL:  # a folder, a pipe
+            quarantine(namespace, key)
+        else:
+            _warn_about_folder(f"cannot be read ({_error_text(error)}): {_CONSEQUENCE}")
+        return None
+    if data[:_HEADER_SIZE] == _MAGIC + _entry_digest(key, data[_HEADER_SIZE:]):
+        with suppress(OSError):  # the folder may be read-only
+            os.utime(path)  # entries are evicted in the order of their last use
+        return data[_HEADER_SIZE:]
+    quarantine(namespace, key)
+    return None
+
+
+def put_entry(namespace: str, key: str, content: bytes) -> None:
+    """Store an entry; without a usable cache nothing is stored."""
+    if len(content) > size_limit() // _ENTRIES_PER_LIMIT:
+        return
+    path = _entry_path(namespace, key)
+    try:
+        if _ensure_folder(path.parent):
+            with open_atomic(path) as stream:
+                stream.write(_MAGIC + _entry_digest(key, content) + content)
+            _evict(_HEADER_SIZE + len(content))
+    except (OSError, ValueError) as error:
+        _warn_about_folder(f"cannot be written ({_error_text(error)}): {_CONSEQUENCE}")
+
+
+def quarantine(namespace: str, key: str) -> None:
+    """Move a damaged entry aside and warn once."""
+    path = _entry_path(namespace, key)
+    with suppress(OSError):  # another process may be replacing it
+        path.replace(path.with_name(path.name + _QUARANTINE_SUFFIX))
+    _warn_once(f"the cache {cache_folder()} had damaged entries: they were moved aside")
+
+
+# Bytes that this process may write before it measures the whole folder again.
+_unchecked_bytes = {"left": 0}
+
+
+def _evict(written: int) -> None:
+    """Delete the least recently used entries if the folder is above its limit."""
+    _unchecked_bytes["left"] -= written
+    if _unchecked_bytes["left"] > 0:
+        return
+    limit, entries = size_limit(), list_entries()
+    size = sum(entry.size for entry in entries)
+    if size > limit:
+        entries.sort(key=lambda entry: entry.last_used)
+        while entries and size > _FRACTION_AFTER_EVICTION * limit:
+            oldest = entries.pop(0)
+            _delete([oldest])
+            size -= oldest.size
+    # Other processes write too, so the folder is measured again after a part of the rest.
+    _unchecked_bytes["left"] = (limit - size) // _ENTRIES_PER_LIMIT
+
+
+def _entry_path(namespace: str, key: str) -> Path:
+    return cache_folder() / namespace / hashlib.sha256(key.encode()).hexdigest()[:40]
+
+
+def _entry_digest(key: str, content: bytes) -> bytes:
+    # The digest includes the key, so that exchanged entries are detected.
+    return hashlib.sha256(hashlib.sha256(key.encode()).digest() + content).digest()
+
+
+# --- locks ----------------------------------------------------------------------------------------
+
+_locks: dict[Path, FileLock] = {}
+# Folders in which a wait ended by a timeout: the process that holds the lock may hold others.
+_unresponsive: set[Path] = set()
+
+
+def wait_and_lock(namespace: str, key: str) -> bool:
+    """Lock an entry before its content is computed; wait while another process computes it.
+
+    The lock is released by :func:`unlock` or when the process ends. Without a usable cache, and
+    after a timeout, nothing is locked.
+
+    Returns:
+        Whether another process was waited for: it may have stored the content.
+    """
+    path = _entry_path(namespace, key).with_suffix(_LOCK_SUFFIX)
+    if path in _locks or path.parent in _unresponsive or not size_limit():
+        return False
+    lock = FileLock(path, thread_local=False)
+    try:
+        if not _ensure_folder(path.parent):
+            return False
+        waited = not _acquire(lock, 0.0) and _acquire(lock, LOCK_TIMEOUT)
+    except (OSError, ValueError, NotImplementedError):  # a file system without locks
+        return False
+    if lock.is_locked:
+        _locks[path] = lock
+    else:
+        _unresponsive.add(path.parent)
+    return waited
+
+
+def _acquire(lock: FileLock, timeout: float) -> bool:
+    with suppress(Timeout):
+        lock.acquire(timeout=timeout, poll_interval=0.02)
+    return lock.is_locked
+
+
+def unlock(namespace: str, key: str) -> None:
+    """Release the lock of an entry."""
+    path = _entry_path(namespace, key).with_suffix(_LOCK_SUFFIX)
+    if path in _locks:
+        with suppress(OSError):  # Windows does not delete an open file
+            path.unlink()
+        _locks.pop(path).release()
+
+
+# --- trusted folders and warnings -----------------------------------------------------------------
+
+
+def _ensure_folder(folder: Path) -> bool:
+    """Create the folder of a namespace, and return whether it is trusted."""
+    folder.parent.mkdir(mode=0o755, parents=True, exist_ok=True)
+    if not _is_trusted(folder.parent):
+        return False
+    if not folder.exists():
+        folder.mkdir(exist_ok=True)
+        folder.chmod(stat.S_IMODE(folder.parent.stat().st_mode))  # also for a group
+    return _is_trusted(folder)
+
+
+def _is_trusted(folder: Path) -> bool:
+    """Return whether the content of a folder can be trusted, and warn if not.
+
+    Raises:
+        OSError: for a folder that does not exist.
+    """
+    reason = _distrust_reason(folder.stat())
+    if reason:
+        advice = "set ASPERITY_CACHE_DIR to a folder of your own"
+        _warn_about_folder(f"is not used: {reason}; {advice}", folder)
+    return not reason
+
+
+def _distrust_reason(status: os.stat_result) -> str:
+    """Return why the content of a folder cannot be trusted; empty if it can."""
+    if not hasattr(os, "geteuid"):
+        return ""  # a system without owners and modes
+    mode, groups = status.st_mode, {os.getegid(), *os.getgroups()}
+    for_group = bool(mode & stat.S_ISGID) and status.st_gid in groups
+    if mode & stat.S_IWOTH:
+        return "everybody may write there"
+    if status.st_uid not in {os.geteuid(), 0} and not for_group:
+        return "somebody else owns it"
+    # Systems with a private group per user create folders that the group may write.
+    if mode & stat.S_IWGRP and not for_group and status.st_gid != os.getegid():
+        return "another group may write there"
+    return ""
+
+
+_warned: set[str] = set()
+
+
+def _warn_once(message: str, topic: str = "") -> None:
+    """Warn once per process and topic; default topic: the message."""
+    if (topic or message) not in _warned:
+        _warned.add(topic or message)
+        warnings.warn(message, CacheWarning, stacklevel=2)
+
+
+def _warn_about_folder(problem: str, folder: Path | None = None) -> None:
+    # One warning per folder: what cannot be read can seldom be written.
+    _warn_once(f"the cache {folder or cache_folder()} {problem}", str(cache_folder()))
+
+
+def _error_text(error: OSError | ValueError) -> str:
+    return getattr(error, "strerror", None) or str(error)
+
+
+# --- results --------------------------------------------------------------------------------------
+
+RESULTS_NAMESPACE = "results"
+"""Folder of computed results in the cache."""
+
+Value = TypeVar("Value")
+
+_BYPASS_RESULTS: ContextVar[bool] = ContextVar("bypass_results", default=False)
+_PACKAGE = Path(__file__).parents[1]
+_SOURCE_SUFFIXES = (".py", ".toml")
+
+
+def get_or_compute(name: str, content: str | None, compute: Callable[[], Value]) -> Value:
+    """Return a result from the cache, or compute and store it.
+
+    Args:
+        name: name of the result.
+        content: digest of all that the result depends on besides the package, see
+            :func:`content_digest`; ``None`` if it is unknown: then nothing is stored.
+        compute: computes the result.
+    """
+    return get_or_compute_each(name, [content], lambda _indices: iter([(0, compute())]))[0]
+
+
+def get_or_compute_each(
+    name: str,
+    contents: Sequence[str | None],
+    compute: Callable[[Sequence[int]], Iterator[tuple[int, Value]]],
+) -> list[Value]:
+    """Return several results of one name, from the cache where they are stored.
+
+    Args:
+        name: name of the results.
+        contents: digest for each result, see :func:`get_or_compute`.
+        compute: yields index and value of the missing results, in any order; each is stored at
+            once.
+    """
+    keys = [_result_key(name, content) for content in contents]
+    results: dict[int, Value] = {}
+    for index, key in enumerate(keys):
+        entry = None if key is None else get_entry(RESULTS_NAMESPACE, key)
+        if key is None or entry is None:
+            continue
+        try:
+            results[index] = pickle.loads(entry)
+        except Exception:  # undamaged, but written by an incompatible Python
+            quarantine(RESULTS_NAMESPACE, key)
+    missing = [index for index in range(len(keys)) if index not in results]
+    for index, value in compute(missing) if missing else ():
+        results[index] = value
+        key = keys[index]
+        if key is not None:
+            put_entry(RESULTS_NAMESPACE, key, pickle.dumps(value, protocol=5))
+    return [results[index] for index in range(len(keys))]
+
+
+def _result_key(name: str, content: str | None) -> str | None:
+    package = None if content is None or _BYPASS_RESULTS.get() else package_digest()
+    return None if package is None else f"{name}\n{content}\n{package}"
+
+
+@contextmanager
+def bypass_results() -> Iterator[None]:
+    """Compute all results without the cache; compiled code is still taken from it."""
+    token = _BYPASS_RESULTS.set(True)
+    try:
+        yield
+    finally:
+        _BYPASS_RESULTS.reset(token)
+
+
+def content_digest(*parts: Any) -> str:
+    """Return a digest of numbers, strings, arrays and tuples of them; -0.0 differs from 0.0.
+
+    Example:
+        >>> content_digest(1.0, "a") == content_digest(1.0, "a")
+        True
+        >>> len({content_digest(*parts) for parts in [(1.0, 2.0), ((1.0, 2.0),), (1, 2.0), (1.0,)]})
+        4
+    """
+    digest = hashlib.sha256()
+    for part in parts:
+        if isinstance(part, tuple):
+            text = f"tuple {content_digest(*part)}"
+        elif hasattr(part, "tobytes"):  # NumPy arrays
+            # Copied only if it is not contiguous.
+            data = part.data if part.flags.c_contiguous else part.tobytes()
+            text = f"{part.dtype} {part.shape} {hashlib.sha256(data).hexdigest()}"
+        elif part is None or isinstance(part, (str, float, int)):
+            text = f"{type(part).__name__} {part!r}"
+        else:
+            raise TypeError(f"cannot compute a content digest of {part!r}")
+        digest.update(f"{len(text)} {text}".encode())
+    return digest.hexdigest()
+
+
+def is_shipped(cls: type) -> bool:
+    """Return whether a class and its bases belong to this package or to Python."""
+    packages = {base.__module__.partition(".")[0] for base in cls.__mro__}
+    return packages <= {_PACKAGE.name} | sys.stdlib_module_names
+
+
+@lru_cache(maxsize=1)
+def package_digest() -> str | None:
+    """Return a digest of this package, of Python, NumPy, SciPy, Numba and the processor type.
+
+    ``None`` if the files of the package are not found.
+    """
+    import numpy as np
+    import scipy
+
+    digest = hashlib.sha256()
+    count = 0
+    for folder, inner, names in os.walk(_PACKAGE):
+        inner.sort()
+        for name in sorted(names):
+            if name.endswith(_SOURCE_SUFFIXES):
+                path = Path(folder, name)
+                content = path.read_bytes()
+                header = f"{path.relative_to(_PACKAGE).as_posix()} {len(content)}\n"
+                digest.update(header.encode() + content)
+                count += 1
+    # Versions of Numba and LLVM come from metadata, since importing Numba is slow.
+    libraries = np.__version__, scipy.__version__, version("numba"), version("llvmlite")
+    machine = sys.version, platform.machine(), sys.byteorder
+    digest.update(repr((libraries, machine)).encode())
+    return digest.hexdigest() if count else None

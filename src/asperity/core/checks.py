@@ -1,0 +1,187 @@
+"""Checks of arguments at the public interface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, TypeVar, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from asperity.core.errors import ParameterError
+
+FloatArray = NDArray[np.float64]
+Values = TypeVar("Values", bound=NDArray[Any])
+
+# Beyond these limits products of a few values leave the range of double precision.
+_SMALLEST, _LARGEST = 1e-30, 1e30
+_FLOAT = np.dtype(np.float64)
+
+
+def check_real(name: str, value: object, unit: str = "") -> float:
+    """Return a finite number of magnitude at most 1e30.
+
+    Raises:
+        ParameterError: for any other value.
+    """
+    unit = f" [{unit}]" if unit else ""
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise ParameterError(name, f"must be a number{unit}", value)
+    number = float(value)
+    if not math.isfinite(number):
+        raise ParameterError(name, f"must be finite{unit}", value)
+    if abs(number) > _LARGEST:
+        raise ParameterError(name, f"must be at most {_LARGEST:g}{unit}", value)
+    return number
+
+
+def check_positive(name: str, value: object, unit: str = "") -> float:
+    """Return a positive number, at least 1e-30; see :func:`check_real`."""
+    number = check_real(name, value, unit)
+    unit = f" [{unit}]" if unit else ""
+    if number <= 0.0:
+        raise ParameterError(name, f"must be positive{unit}", value)
+    if number < _SMALLEST:
+        raise ParameterError(name, f"must be at least {_SMALLEST:g}{unit}", value)
+    return number
+
+
+def check_fraction(name: str, value: object) -> float:
+    """Return a number in [0, 1]; see :func:`check_real`."""
+    number = check_real(name, value)
+    if not 0.0 <= number <= 1.0:
+        raise ParameterError(name, "must be in [0, 1]", value)
+    return number
+
+
+def check_array(
+    name: str, value: ArrayLike, shape: tuple[int | None, ...], unit: str
+) -> FloatArray:
+    """Return a contiguous float array of a shape in which ``None`` stands for any length.
+
+    Raises:
+        ParameterError: for another shape or a value that is not finite.
+
+    Example:
+        >>> check_array("points", [[0, 0, 1]], (None, 3), "m").shape
+        (1, 3)
+    """
+    described = _shape_text(shape)
+    return _check_shape_and_values(
+        name, _to_float_array(name, value, described, unit), shape, described, unit
+    )
+
+
+@dataclass(slots=True, eq=False)
+class Points:
+    """An array of points, and whether a single point was passed.
+
+    Attributes:
+        rows: shape (n, width).
+        is_single: whether one point of shape (width,) was passed.
+    """
+
+    rows: FloatArray
+    is_single: bool
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return len(self.rows)
+
+    def restore_shape(self, values: Values) -> Values:
+        """Return values per point, without the first axis for a single point.
+
+        For a single point and values without a second axis the result is a NumPy scalar.
+
+        Example:
+            >>> check_points("p", [0, 0, 1], 3, "m").restore_shape(np.array([0.5])).item()
+            0.5
+        """
+        if not self.is_single:
+            return values
+        return cast(Values, values[0])
+
+    def check_array_per_point(
+        self, name: str, value: ArrayLike, width: int, unit: str
+    ) -> FloatArray:
+        """Return an array per point, shape (n, width); (width,) is accepted for one point."""
+        shape = (width,) if self.is_single else (self.count, width)
+        return check_array(name, value, shape, unit).reshape(self.count, width)
+
+    def check_flags_per_point(self, name: str, value: ArrayLike | None) -> NDArray[np.bool_]:
+        """Return flags per point, shape (n,); all False for ``None``."""
+        if value is None:
+            return np.zeros(self.count, dtype=bool)
+        given = np.asarray(value)
+        if given.shape != (() if self.is_single else (self.count,)) or given.dtype != bool:
+            wanted = "one truth value" if self.is_single else f"{self.count} truth values"
+            raise ParameterError(name, f"must be {wanted}", value)
+        return np.ascontiguousarray(given).reshape(self.count)
+
+
+def check_points(name: str, value: ArrayLike, width: int, unit: str) -> Points:
+    """Return points of shape (n, width), or (width,) for a single point.
+
+    Raises:
+        ParameterError: for another shape or a value that is not finite.
+
+    Example:
+        >>> check_points("points", [0, 0, 1], 3, "m").rows.shape
+        (1, 3)
+        >>> check_points("xy", [[0, 1]], 2, "m").is_single
+        False
+    """
+    plain = type(value) is np.ndarray and value.dtype is _FLOAT and value.flags.c_contiguous
+    given: Any = value if plain else _to_float_array(name, value, _point_shape_text(width), unit)
+    shape, item = given.shape, given.item
+    single = shape == (width,)
+    # Single points are checked inside loops: their two or three values are finite if the sum is.
+    if single or shape == (1, width):
+        total: float = item(0) + item(1) + item(-1)
+        if total - total == 0.0:
+            return Points(given[None] if single else given, single)
+    rows = given[None] if single else given
+    return Points(
+        _check_shape_and_values(name, rows, (None, width), _point_shape_text(width), unit), single
+    )
+
+
+def _point_shape_text(width: int) -> str:
+    return f"(n, {width}), or ({width},) for one point"
+
+
+def _to_float_array(name: str, value: ArrayLike, shape_text: str, unit: str) -> FloatArray:
+    try:
+        given = np.asarray(value)
+    except (TypeError, ValueError):  # rows of different length
+        given = np.array(None)
+    if given.dtype.kind not in "fiu" and given.size:
+        raise ParameterError(name, f"must be numbers of shape {shape_text} [{unit}]")
+    return np.ascontiguousarray(given, dtype=np.float64)
+
+
+def _check_shape_and_values(
+    name: str, values: FloatArray, shape: tuple[int | None, ...], shape_text: str, unit: str
+) -> FloatArray:
+    """Return the values if they are finite and of the shape."""
+    fits = values.ndim == len(shape)
+    for wanted, length in zip(shape, values.shape, strict=False):
+        fits = fits and wanted in (None, length)
+    if not fits:
+        raise ParameterError(name, f"must have shape {shape_text} [{unit}]", values.shape)
+    if not np.isfinite(values).all():
+        raise ParameterError(name, f"must be finite [{unit}]; {_describe_first_nonfinite(values)}")
+    return values
+
+
+def _shape_text(shape: tuple[int | None, ...]) -> str:
+    lengths = ["n" if length is None else str(length) for length in shape]
+    return f"({lengths[0]},)" if len(lengths) == 1 else f"({', '.join(lengths)})"
+
+
+def _describe_first_nonfinite(values: FloatArray) -> str:
+    index: Any = np.argwhere(~np.isfinite(values))[0]
+    place = ", ".join(str(int(i)) for i in index)
+    return f"the value at [{place}] is {float(values[tuple(index)])}"

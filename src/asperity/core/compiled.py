@@ -1,0 +1,91 @@
+"""Declarations of compiled modules, and functions that compiled code may call.
+
+A compiled module is plain Python whose top-level functions are compiled by Numba. Arguments are
+scalars, whole contiguous arrays and records of both; results are scalars, tuples and records.
+Closures, slices and starred arguments are not allowed; records and numbers of the module are. The
+constant ``KERNELS`` declares what the module provides; :mod:`asperity.kernels.link`
+joins modules by these declarations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.core.checks import FloatArray
+
+COMPILE_CALLBACKS: list[Callable[[str], None]] = []
+"""Functions called with the name of a loop before it is compiled; not called for cached loops."""
+EPS = 2.0**-52
+"""Machine epsilon of double precision; replaced by that of ``float`` in single-precision exports.
+
+Stopping rules of iterations in compiled functions are multiples of it.
+"""
+SQRT_EPS = 2.0**-26
+"""Its square root: the accuracy of a minimum that is located by function values."""
+
+
+@dataclass(frozen=True)
+class Kernels:
+    """Declaration of a compiled module: what it provides, and compiler hints.
+
+    Attributes:
+        provides: functions for other modules; the first module that provides a name is used.
+        loops: functions called from Python.
+        not_inlined: functions that are too large to be inlined in every caller.
+        shared: large functions compiled once for all modules that call them, together with the
+            functions they call: see :func:`asperity.kernels.link.link_modules`.
+        merged: functions merged into their caller before compilation in iterative code: the
+            compiler repeats all optimisations at each level of a chain of calls.
+        native: those of ``call_address``, ``load_acquire`` and ``store_release`` that the module
+            calls; see :mod:`asperity.kernels.intrinsics`.
+        for_blocks: whether its functions replace those of the same names in loops over blocks of
+            points; see :mod:`asperity.kernels.loops.block_loops`.
+        iterates: whether it holds long iterations, for which inlining only slows compilation.
+    """
+
+    provides: tuple[str, ...] = ()
+    loops: tuple[str, ...] = ()
+    not_inlined: tuple[str, ...] = ()
+    shared: tuple[str, ...] = ()
+    merged: tuple[str, ...] = ()
+    native: tuple[str, ...] = ()
+    for_blocks: bool = False
+    iterates: bool = False
+
+
+def call_address(address: int, *arguments: object) -> int:
+    """Call the C function at an address and return its ``int``; in compiled code only."""
+    raise NotImplementedError("call_address works in compiled code only")
+
+
+def load_acquire(array: NDArray[np.int64], index: int) -> int:
+    """Return an element of an int64 array; in compiled code later reads see values as new."""
+    return int(array[index])
+
+
+def store_release(array: NDArray[np.int64], index: int, value: int) -> None:
+    """Write an element of an int64 array; in compiled code its readers see all earlier writes."""
+    array[index] = value
+
+
+def local_array(shape: tuple[int, ...]) -> FloatArray:
+    """Return an uninitialised float64 array of a constant shape such as ``(5, 4)``.
+
+    In compiled code the array lies on the stack of the calling function, see
+    :mod:`asperity.kernels.intrinsics`: pass it to callees, never return it.
+    """
+    return np.empty(shape)
+
+
+def multiply_add(a: float, b: float, c: float) -> float:
+    """Return a b + c; in compiled batches a fused operation where the processor has one."""
+    return a * b + c
+
+
+def load_unchecked(array: FloatArray, index: int) -> float:
+    """Return an element by its flat index, which compiled code does not check."""
+    return float(array.reshape(-1)[index])

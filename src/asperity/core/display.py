@@ -1,0 +1,97 @@
+"""Notebook, terminal, figure and page representations of results.
+
+Results know nothing of their representations: the package registers the module that renders them
+with :func:`set_renderer`, and it is loaded at the first use.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any, overload
+
+from asperity.core.files import write_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_load_renderer: Callable[[], Any]
+
+
+def set_renderer(load: Callable[[], Any]) -> None:
+    """Set the function that loads the renderer of results; see :mod:`asperity.report`."""
+    global _load_renderer  # noqa: PLW0603  # set once, when the package is imported
+    _load_renderer = load
+
+
+class Displayable:
+    """A result with an HTML representation in a notebook."""
+
+    def _repr_html_(self) -> str | None:
+        """Return HTML without scripts; ``None`` where the ``repr`` suffices."""
+        try:
+            text: str | None = _load_renderer().notebook_html(self)
+        except Exception:  # a failure to display a result must not hide the result
+            return None
+        return text
+
+
+class Plottable(Displayable):
+    """A result with a figure."""
+
+    def plot(self, picture: str | None = None) -> Figure:
+        """Return a figure; see :func:`asperity.report.plot`.
+
+        Args:
+            picture: name of one figure of the report; by default the main figures together. The
+                error for an unknown name lists the names.
+
+        Returns:
+            A Matplotlib figure, which a notebook shows; ``figure.savefig(path)`` writes it.
+
+        Raises:
+            ParameterError: for an unknown name.
+
+        Example:
+            >>> import asperity as asp
+            >>> result = asp.compare("sinusoid:amplitude=0.2mm,period=2mm", laws="WC")
+            >>> [axes.get_ylabel() for axes in result.plot("merit").axes]
+            ['support S']
+        """
+        figure: Figure = _load_renderer().plot(self, picture)
+        return figure
+
+
+class Reportable(Displayable):
+    """A result with a report: an HTML page, and the output of the command line."""
+
+    @overload
+    def to_html(self) -> str: ...
+    @overload
+    def to_html(self, path: str | os.PathLike[str]) -> None: ...
+    def to_html(self, path: str | os.PathLike[str] | None = None) -> str | None:
+        """Return the report as one HTML text that needs no network, or write it to a file.
+
+        Args:
+            path: of the file, which is written completely or not at all; by default the text is
+                returned.
+
+        Raises:
+            ParameterError: if the file cannot be written.
+
+        Example:
+            >>> import asperity as asp
+            >>> result = asp.compare("sinusoid:amplitude=0.2mm,period=2mm", laws="W")
+            >>> result.to_html()[:15]
+            '<!DOCTYPE html>'
+        """
+        text: str = _load_renderer().html_text(self)
+        if path is None:
+            return text
+        write_bytes("path", path, text.encode())
+        return None
+
+    def __rich_console__(self, console: Any, options: Any) -> Iterator[Any]:
+        """Yield the output of the command line, for a console of this width."""
+        del console  # the options contain its width
+        yield from _load_renderer().rich_renderables(self, options.max_width)

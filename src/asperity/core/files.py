@@ -1,0 +1,268 @@
+"""Input files, atomically written output files, and conversion of results to plain data."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import math
+import os
+import secrets
+import stat
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from io import BufferedReader
+from pathlib import Path
+from typing import IO, Any, ClassVar, overload
+
+from asperity.core.errors import ParameterError
+
+_MAX_DOTS = 10_000  # in a line of TOML
+
+
+def is_special_file(path: str | os.PathLike[str]) -> bool:
+    """Return whether a path exists and is not a regular file (a pipe, a device, a folder)."""
+    return Path(path).exists() and not Path(path).is_file()
+
+
+def open_input(path: str | os.PathLike[str], max_bytes: int = 2**31) -> BufferedReader:
+    """Open a regular file for reading; reading a pipe or a device might never end.
+
+    Args:
+        path: the file, or a link to it.
+        max_bytes: greatest size [bytes].
+
+    Raises:
+        OSError: if the file cannot be read, is not a regular file, or is larger.
+    """
+    # The opened file is checked, not the path; O_NONBLOCK avoids waiting for a pipe.
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    try:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise OSError(errno.EINVAL, "not a regular file", str(path))
+        if status.st_size > max_bytes:
+            raise OSError(
+                errno.EFBIG, f"{status.st_size} bytes; at most {max_bytes} are read", str(path)
+            )
+        return os.fdopen(descriptor, "rb")
+    except BaseException:  # also for an interrupt
+        os.close(descriptor)
+        raise
+
+
+def read_toml(name: str, path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the content of a TOML file of at most 4 MiB.
+
+    Args:
+        name: name of the argument, for the error message.
+        path: the file.
+
+    Raises:
+        ParameterError: if the file cannot be read or is not valid TOML.
+    """
+    import tomllib
+
+    try:
+        with open_input(path, 2**22) as stream:
+            # Some editors write a byte order mark.
+            text = stream.read().decode("utf-8-sig")
+        # tomllib takes quadratic time in the length of a dotted key.
+        if any(line.count(".") > _MAX_DOTS for line in text.splitlines()):
+            raise ParameterError(name, f"file {path} has a line with more than {_MAX_DOTS} dots")
+        return tomllib.loads(text)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ParameterError(name, f"file {path} cannot be read: {reason}") from None
+    except RecursionError:
+        raise ParameterError(name, f"file {path} is nested too deeply") from None
+    except ValueError as error:  # of TOML, of the encoding, of an impossible path or number
+        raise ParameterError(name, f"file {path} is not valid TOML: {error}") from None
+
+
+@contextmanager
+def open_atomic(path: str | os.PathLike[str], *, durable: bool = False) -> Iterator[IO[bytes]]:
+    """Open a file for writing that replaces an existing file when the block ends without an error.
+
+    The content is written to a temporary file in the same folder, which is then moved. For a
+    symbolic link the target is replaced. Devices and pipes are written to directly.
+
+    Args:
+        path: the file to write.
+        durable: wait until the content is on the disk, so that it survives a loss of power.
+
+    Yields:
+        The stream to write to.
+
+    Raises:
+        OSError: if the file cannot be written.
+    """
+    if is_special_file(path):
+        with Path(path).open("wb") as stream:
+            yield stream
+        return
+    target = Path(os.path.realpath(path))
+    beside = target.with_name(f".{secrets.token_hex(8)}.tmp")
+    try:
+        with _open_unnamed(target.parent) or beside.open("xb") as stream:
+            yield stream
+            stream.flush()
+            if durable:
+                os.fsync(stream.fileno())
+            if stream.name != str(beside):
+                _link_unnamed(stream.fileno(), beside)
+        beside.replace(target)
+    except BaseException:  # also for an interrupt
+        beside.unlink(missing_ok=True)
+        raise
+
+
+def _open_unnamed(folder: Path) -> IO[bytes] | None:
+    """Open a file without a name, which disappears if the process is killed.
+
+    Returns ``None`` where the system or the file system does not support such files.
+    """
+    if not hasattr(os, "O_TMPFILE"):
+        return None
+    try:
+        return os.fdopen(os.open(folder, os.O_TMPFILE | os.O_WRONLY, 0o666), "wb")
+    except OSError:
+        return None  # a named file is tried instead
+
+
+def _link_unnamed(descriptor: int, path: Path) -> None:
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        # With dst_dir_fd Python calls linkat(), which follows the link in /proc to the open file.
+        os.link(f"/proc/self/fd/{descriptor}", path.name, dst_dir_fd=folder)
+    finally:
+        os.close(folder)
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write a text as UTF-8 with :func:`open_atomic`."""
+    with open_atomic(path) as stream:
+        stream.write(text.encode())
+
+
+def write_bytes(name: str, path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file with :func:`open_atomic`.
+
+    Args:
+        name: name of the argument, for the error message.
+        path: the file.
+        content: its content.
+
+    Raises:
+        ParameterError: if the file cannot be written.
+    """
+    try:
+        with open_atomic(path) as stream:
+            stream.write(content)
+    except OSError as error:
+        requirement = f"cannot be written: {error.strerror}"
+        raise ParameterError(name, requirement, os.fspath(path)) from None
+
+
+def json_text(value: Any) -> str:
+    """Return a value as JSON text that ends in a line feed; see :func:`to_plain_data`.
+
+    Example:
+        >>> print(json_text({"reach": math.inf}), end="")
+        {
+          "reach": "inf"
+        }
+    """
+    return json.dumps(to_plain_data(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def text_digest(text: str) -> str:
+    """Return the first 12 digits of the SHA-256 of a text in UTF-8.
+
+    For :func:`json_text` it equals that of ``sha256sum`` for the file written by ``--json``.
+
+    Example:
+        >>> text_digest(json_text({"reach": 1.0}))
+        '4a07eef8f6b6'
+    """
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+@overload
+def to_plain_data(value: Mapping[str, Any], infinity: str | None = "inf") -> dict[str, Any]: ...
+@overload
+def to_plain_data(value: Any, infinity: str | None = "inf") -> Any: ...
+def to_plain_data(value: Any, infinity: str | None = "inf") -> Any:
+    """Return a value as JSON types: dictionaries, lists, strings, numbers, booleans and None.
+
+    NaN becomes None, an enumeration its value, and a dataclass a dictionary of its fields; a
+    method ``to_dict`` is used where there is one.
+
+    Args:
+        value: the value.
+        infinity: replacement of an unbounded number, with a minus sign if it is negative; None
+            where infinity is an overflow.
+
+    Raises:
+        TypeError: for a value without a plain form.
+
+    Example:
+        >>> to_plain_data((1.5, -math.inf, math.nan)), to_plain_data(math.inf, infinity=None)
+        ([1.5, '-inf', None], None)
+    """
+    if isinstance(value, Enum):
+        value = value.value
+    elif hasattr(value, "tolist"):  # NumPy arrays and scalars
+        value = value.tolist()
+    if value is None or isinstance(value, (str, int)):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else _nonfinite_to_plain(value, infinity)
+    if isinstance(value, Mapping):
+        return {str(name): to_plain_data(item, infinity) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [to_plain_data(item, infinity) for item in value]
+    if hasattr(value, "to_dict"):
+        return value.to_dict()
+    return attributes_to_dict(value, infinity=infinity)
+
+
+def _nonfinite_to_plain(value: float, infinity: str | None) -> str | None:
+    if infinity is None or math.isnan(value):
+        return None
+    return infinity if value > 0.0 else f"-{infinity}"
+
+
+def attributes_to_dict(
+    value: Any, *names: str, exclude: Sequence[str] = (), infinity: str | None = "inf"
+) -> dict[str, Any]:
+    """Return attributes of an object as plain data; see :func:`to_plain_data`.
+
+    Args:
+        value: the object.
+        names: names of the attributes, in order; default: all fields of a dataclass.
+        exclude: fields to omit.
+        infinity: replacement of an unbounded number.
+    """
+    if not names:
+        if not is_dataclass(value):
+            raise TypeError(f"no plain data: {type(value).__name__}")
+        names = tuple(field.name for field in fields(value) if field.name not in exclude)
+    return {name: to_plain_data(getattr(value, name), infinity) for name in names}
+
+
+class Serializable:
+    """Mixin for dataclasses that are written as plain data.
+
+    Attributes:
+        serialized_attributes: names of the attributes to write, in order, separated by spaces;
+            empty for all fields.
+    """
+
+    serialized_attributes: ClassVar[str] = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data in SI units; infinity is the string "inf", an unknown value None."""
+        return attributes_to_dict(self, *self.serialized_attributes.split())

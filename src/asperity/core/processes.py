@@ -1,0 +1,181 @@
+"""Worker processes that compute results in advance, so that a command uses all cores.
+
+Results do not depend on the number of processes: the calling process works through all tasks in
+order, and uses the result of a worker where there is one. Workers start after a delay, or when a
+function is compiled, so that results from the cache start none. From Python nothing runs in
+parallel unless :func:`limit_processes` allows it.
+
+Threads would not help, since Numba compiles under a global lock. Processes are spawned, since a
+fork copies the threads of numerical libraries incompletely; a spawned process imports the main
+module of the program, which therefore needs the usual ``if __name__ == "__main__"``.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future, ProcessPoolExecutor
+    from multiprocessing.process import BaseProcess
+
+START_DELAY = 1.0
+"""Time [s] after which workers start at the latest; starting one takes about as long."""
+SINGLE_THREADED = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+"""Environment of every process: the last digit of linear algebra depends on its threads."""
+
+_MAX_PROCESSES: ContextVar[int] = ContextVar("max_processes", default=1)
+
+
+def available_cores() -> int:
+    """Return the number of processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@contextmanager
+def limit_processes(count: int) -> Iterator[None]:
+    """Use at most a number of processes, including this one."""
+    token = _MAX_PROCESSES.set(count)
+    try:
+        yield
+    finally:
+        _MAX_PROCESSES.reset(token)
+
+
+def make_pool(
+    workers: int, prepare: Callable[[], None] | None = None, niceness: int = 0
+) -> ProcessPoolExecutor:
+    """Return a pool of spawned processes that ignore interrupts and end with this process.
+
+    Args:
+        workers: number of processes.
+        prepare: function called first in each process, such as one that loads plugins.
+        niceness: added to the niceness of the processes.
+    """
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    return ProcessPoolExecutor(
+        workers, get_context("spawn"), initializer=_start_worker, initargs=(prepare, niceness)
+    )
+
+
+def _start_worker(prepare: Callable[[], None] | None, niceness: int) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends its workers
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    os.environ |= SINGLE_THREADED
+    null = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):  # output of libraries
+        os.dup2(null, stream)
+    if hasattr(os, "nice"):
+        os.nice(niceness)
+    if prepare is not None:
+        prepare()
+
+
+def _end_with_parent() -> None:
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(0)  # a task may take long
+
+
+@contextmanager
+def precompute(work: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Iterator[Any]]:
+    """Compute tasks in worker processes, from the last to the first.
+
+    Args:
+        work: function of a module, called in the workers; its result must be picklable.
+        tasks: its arguments.
+
+    Yields:
+        An iterator over the tasks in order: the result of a worker, or ``None`` for a task that
+        the caller has to do.
+    """
+    workers = min(_MAX_PROCESSES.get(), len(tasks)) - 1
+    if workers < 1:
+        yield iter([None] * len(tasks))
+        return
+    from asperity.core.compiled import COMPILE_CALLBACKS
+
+    queue = _TaskQueue(work, tasks, workers)
+    COMPILE_CALLBACKS.append(queue.start)
+    queue.timer.start()
+    try:
+        yield queue.iterate_results()
+    finally:
+        COMPILE_CALLBACKS.remove(queue.start)
+        queue.stop()
+
+
+class _TaskQueue:
+    """Tasks that are left, and the results of the others."""
+
+    def __init__(self, work: Callable[[Any], Any], tasks: Sequence[Any], workers: int) -> None:
+        self.work, self.tasks, self.workers = work, tasks, workers
+        self.pending = deque(range(len(tasks)))
+        self.results: dict[int, Future[Any]] = {}
+        self.lock, self.started = threading.RLock(), threading.Lock()
+        self.timer = threading.Timer(START_DELAY, self.start)
+        self.pool: ProcessPoolExecutor | None = None
+        self.other_children: set[BaseProcess] = set()
+
+    def iterate_results(self) -> Iterator[Any]:
+        """Yield the result of each task, ``None`` if no worker has it."""
+        for index in range(len(self.tasks)):
+            with self.lock:
+                future = self.results.get(index)
+                if future is None:
+                    self.pending.popleft()
+            value = None
+            if future is not None:
+                with suppress(Exception):  # the caller meets the error when it does the task
+                    value = future.result()
+            yield value
+
+    def start(self, _name: str = "") -> None:
+        """Start the workers, unless they were started or stopped."""
+        if not self.started.acquire(blocking=False):
+            return
+        from multiprocessing import active_children
+
+        self.other_children = set(active_children())
+        self.pool = make_pool(self.workers)
+        for _ in range(self.workers):
+            self._submit_last(self.pool)
+
+    def _submit_last(self, pool: ProcessPoolExecutor) -> None:
+        with self.lock, suppress(RuntimeError):  # the pool is broken
+            if self.pending:
+                future = pool.submit(self.work, self.tasks[self.pending[-1]])
+                self.results[self.pending.pop()] = future
+                future.add_done_callback(lambda done: self._continue(pool, done))
+
+    def _continue(self, pool: ProcessPoolExecutor, done: Future[Any]) -> None:
+        # A broken pool takes no tasks, and may not be called from its callbacks.
+        if not done.cancelled() and not isinstance(done.exception(), RuntimeError):
+            self._submit_last(pool)
+
+    def stop(self) -> None:
+        """End the workers without waiting for their tasks."""
+        self.timer.cancel()
+        self.pending.clear()
+        if self.started.acquire(blocking=False):
+            return  # nothing was started, and nothing will be
+        self.timer.join()
+        from multiprocessing import active_children
+
+        for child in set(active_children()) - self.other_children:
+            child.kill()
+        if self.pool is not None:
+            self.pool.shutdown(cancel_futures=True)

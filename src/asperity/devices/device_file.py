@@ -1,0 +1,308 @@
+"""Device files: the catalogue, files of users, a template, and writing them."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from asperity.core.arguments import Argument
+from asperity.core.errors import ParameterError, suggest_names
+from asperity.core.files import read_toml
+from asperity.core.units import parse_quantity
+from asperity.devices.device import FIELD_TABLE, TEXT_FIELDS, WALL_KEYS, Datum, Device, WallTest
+
+Table = Mapping[str, Any]
+_DATUM_KEYS = ("value", "unit", "source", "verified", "also")
+_WALL_UNITS = {"cycled": "N/m", "update_rate": "Hz", "lightest": ""}
+_CONTROL_CHARACTERS = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*")
+
+
+def device_names() -> list[str]:
+    """Return the ids of all devices in the catalogue."""
+    return sorted(_catalogue())
+
+
+@lru_cache(maxsize=1)
+def _catalogue() -> dict[str, dict[str, Any]]:
+    """Return the content of all catalogue files by id."""
+    folder = resources.files("asperity.devices") / "catalogue"
+    texts = [item.read_text("utf-8") for item in folder.iterdir() if item.name.endswith(".toml")]
+    contents = [tomllib.loads(text) for text in texts]
+    return {str(content["id"]): content for content in contents}
+
+
+def load_device(device: str | os.PathLike[str] | Device) -> Device:
+    """Return a device of the catalogue by its id, or one from a TOML file.
+
+    A file has ``id``, ``name`` and any of the fields of the catalogue, each with its unit
+    ("12 N"), or as a table with ``value``, ``unit``, ``source``, ``verified`` (``true``,
+    ``"read"``, ``"measured"`` or ``false``) and ``also``. ``max_stiffness`` is a wall test, which
+    may have ``directions``, ``cycled``, ``update_rate``, ``positions`` and ``lightest``; see
+    :class:`~asperity.devices.device.WallTest`.
+
+    Raises:
+        ParameterError: the id is unknown, or the file has unknown or wrong fields.
+
+    Example:
+        >>> load_device("Touch").name
+        '3D Systems Touch'
+    """
+    if isinstance(device, Device):
+        return device
+    text = os.fspath(device) if isinstance(device, os.PathLike) else device
+    if not isinstance(text, str):
+        raise ParameterError("device", "must be an id, a TOML file or a Device", device)
+    for known, content in _catalogue().items():
+        if known.lower() == text.strip().lower():
+            return parse_device(content, known)
+    if text.lower().endswith(".toml"):
+        return parse_device(read_toml("device", Path(text)), Path(text).stem, from_file=True)
+    hint = suggest_names(text, _catalogue())
+    raise ParameterError("device", f"is unknown: {text!r}; {hint}, or a TOML file")
+
+
+def parse_device(content: Table, default_id: str, *, from_file: bool = False) -> Device:
+    """Return a device from its fields; see :func:`load_device`.
+
+    Args:
+        content: fields by name: text with a unit, or a number in SI units.
+        default_id: id of a device without one.
+        from_file: whether the fields are from a user's file, whose numbers need units.
+
+    Raises:
+        ParameterError: fields are unknown or wrong.
+
+    Example:
+        >>> mine = parse_device({"max_stiffness": "1.2 N/mm", "delay_samples": 1}, "mine")
+        >>> mine.max_stiffness, mine.data["max_stiffness"].source
+        (1200.0, 'given by the user')
+    """
+    unknown = [key for key in content if key not in FIELD_TABLE and key not in TEXT_FIELDS]
+    if unknown:
+        hint = suggest_names(unknown[0], [*FIELD_TABLE, *TEXT_FIELDS])
+        raise ParameterError("device", f"has an unknown field {unknown[0]!r}; {hint}")
+    device_id = _check_text("device.id", content.get("id", default_id))
+    name = _check_text("device.name", content.get("name", device_id))
+    axes, driver = (
+        _check_text(f"device.{key}", content[key]) if key in content else ""
+        for key in ("axes", "driver")
+    )
+    notes = content.get("notes", [])
+    if not isinstance(notes, (list, tuple)):
+        raise ParameterError("device.notes", "must be a list of sentences", notes)
+    sentences = tuple(_check_text("device.notes", note) for note in notes)
+    data = {
+        field: _parse_datum(field, value, from_file)
+        for field, value in content.items()
+        if field in FIELD_TABLE
+    }
+    _check_forces(data)
+    return Device(device_id, name, data, axes, sentences, driver)
+
+
+def override_device(device: Device, content: Table) -> Device:
+    """Return a device with some of its fields overridden.
+
+    Args:
+        device: the device.
+        content: the overriding fields by name, with their units.
+
+    Raises:
+        ParameterError: fields are unknown, wrong, or contradict others.
+
+    Example:
+        >>> stiff = override_device(load_device("touch"), {"max_stiffness": "1.5 N/mm"})
+        >>> stiff.id, stiff.max_stiffness, stiff.data["max_stiffness"].source
+        ('touch', 1500.0, 'given by the user')
+    """
+    changed = parse_device(content, device.id, from_file=True)
+    texts = {key: getattr(changed, key) for key in TEXT_FIELDS[1:] if key in content}
+    data = {**device.data, **changed.data}
+    _check_forces(data)
+    return replace(device, data=data, **texts)
+
+
+def _check_text(name: str, value: Any) -> str:
+    if not isinstance(value, str) or not value.strip() or _CONTROL_CHARACTERS.search(value):
+        raise ParameterError(name, "must be text on one line", value)
+    return value.strip()
+
+
+def _check_forces(data: Mapping[str, Datum]) -> None:
+    most, lasting = data.get("max_force"), data.get("continuous_force")
+    if most is not None and lasting is not None and lasting.value > most.value:
+        limit = f"must not be greater than max_force, {most.text}"
+        raise ParameterError("device.continuous_force", limit, lasting.text)
+
+
+def _parse_datum(field: str, value: Any, from_file: bool, is_nested: bool = False) -> Datum:
+    """Return a number of a device, with the values of other sources."""
+    name = f"device.{field}.also" if is_nested else f"device.{field}"
+    table = value if isinstance(value, dict) else {"value": value}
+    is_wall = field == "max_stiffness" and not is_nested
+    keys = (*(_DATUM_KEYS[:-1] if is_nested else _DATUM_KEYS), *(WALL_KEYS if is_wall else ()))
+    unknown = [key for key in table if key not in keys]
+    if unknown or "value" not in table:
+        problem = f"unknown key {unknown[0]!r}" if unknown else "no value"
+        raise ParameterError(name, f"has {problem}; known: {', '.join(keys)}")
+    argument = replace(FIELD_TABLE[field], name=name)
+    quantity = table["value"]
+    if "unit" in table:
+        quantity = _append_unit(name, quantity, table["unit"], argument.unit)
+    value = argument.validate(_parse_quantity(name, quantity, argument.unit, from_file))
+    verified, measured = _parse_verified(name, table.get("verified", False))
+    source = _check_text(f"{name}.source", table.get("source", "given by the user"))
+    others = table.get("also", [])
+    if not isinstance(others, list) or not all(isinstance(other, dict) for other in others):
+        raise ParameterError(f"{name}.also", "must be a list of tables with value and unit", others)
+    also = tuple(_parse_datum(field, other, from_file, is_nested=True) for other in others)
+    datum = (float(value), argument.unit or "1", source, verified, also, measured)
+    if is_wall:
+        return WallTest(*datum, **_parse_wall_test(name, value, table, from_file))
+    return Datum(*datum)
+
+
+def _parse_verified(name: str, value: Any) -> tuple[bool, bool]:
+    """Return whether a number was verified, and whether it was measured."""
+    if value in ("read", "measured"):
+        return True, value == "measured"
+    if not isinstance(value, bool):
+        words = "verified must be true or false, 'read' or 'measured'"
+        raise ParameterError(name, words, value)
+    return value, False
+
+
+def _parse_wall_test(name: str, stiffness: float, table: Table, from_file: bool) -> dict[str, Any]:
+    """Return the details of a wall test [SI] besides its stiffness."""
+    details: dict[str, Any] = {}
+    for key, unit in _WALL_UNITS.items():
+        if key in table:
+            argument = Argument(f"{name}.{key}", "", unit, must_be_positive=True)
+            quantity = _parse_quantity(argument.name, table[key], unit, from_file)
+            details[key] = argument.validate(quantity)
+    if details.get("cycled", math.inf) <= stiffness:
+        limit = f"must be above the stiffness that held, {stiffness:g} N/m"
+        raise ParameterError(f"{name}.cycled", limit, table["cycled"])
+    if details.get("lightest", 1.0) > 1.0:
+        limit = "must be at most 1: the lightest direction is damped least"
+        raise ParameterError(f"{name}.lightest", limit, table["lightest"])
+    details["positions"] = table.get("positions")
+    if details["positions"] not in (None, "exact", "stepped"):
+        requirement = "must be 'exact' or 'stepped'"
+        raise ParameterError(f"{name}.positions", requirement, details["positions"])
+    axes = table.get("directions", [])
+    if not isinstance(axes, list) or not all(axis in ("x", "y", "z") for axis in axes):
+        raise ParameterError(f"{name}.directions", "must be a list of 'x', 'y' and 'z'", axes)
+    return {**details, "directions": tuple(dict.fromkeys(axes))}
+
+
+def _parse_quantity(name: str, value: Any, unit: str, from_file: bool) -> float:
+    """Return a finite quantity [SI]; numbers are in SI units, except in a file."""
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return parse_quantity(name, value, "" if is_number and not from_file else unit)
+
+
+def _append_unit(name: str, value: Any, unit_name: Any, unit: str) -> Any:
+    """Return a value as text with the unit that its table names."""
+    if not unit:
+        if unit_name != "1":
+            raise ParameterError(f"{name}.unit", "must be '1': it is a plain number", unit_name)
+        return value
+    if not isinstance(unit_name, str) or not unit_name.strip() or _NUMBER.fullmatch(unit_name):
+        raise ParameterError(f"{name}.unit", f"must be text such as '{unit}'", unit_name)
+    parse_quantity(f"{name}.unit", f"1 {unit_name}", unit)
+    parse_quantity(name, value, "")  # a plain number: its unit is given once
+    return f"{value} {unit_name}"
+
+
+def to_device_toml(device: Device) -> str:
+    """Return a device file (TOML): every number with its unit, its source and its origin.
+
+    Example:
+        >>> from asperity.devices.device_file import load_device
+        >>> print(to_device_toml(load_device("2diy")).splitlines()[0])
+        id = "2diy"
+    """
+    lines = [_toml_line("id", device.id), _toml_line("name", device.name)]
+    lines += [_toml_line("driver", device.driver)] if device.driver else []
+    lines += [_toml_line("axes", device.axes)] if device.axes else []
+    lines += [_toml_line("notes", list(device.notes))] if device.notes else []
+    for field, datum in device.data.items():
+        lines += ["", f"[{field}]", *_datum_lines(datum)]
+        for other in datum.also:
+            lines += ["", f"[[{field}.also]]", *_datum_lines(other)]
+    return "\n".join(lines) + "\n"
+
+
+def _datum_lines(datum: Datum) -> list[str]:
+    entries = datum.to_dict()
+    entries.pop("also", None)
+    for key, unit in (("cycled", "N/m"), ("update_rate", "Hz")):
+        if key in entries:
+            entries[key] = f"{entries[key]!r} {unit}"
+    return [_toml_line(key, value) for key, value in entries.items()]
+
+
+def _toml_line(key: str, value: Any) -> str:
+    # JSON of texts, numbers, booleans and lists of texts is valid TOML.
+    return f"{key} = {json.dumps(value, ensure_ascii=False)}"
+
+
+_TEMPLATE_HEADER = """\
+# Your device. Remove the "# " in front of the numbers that you know and replace the examples; leave
+# all other lines as they are: unknown numbers are reported as unknown. Every number needs its unit.
+# Then: asperity compare cloth --device mine.toml
+
+id = "mine"
+name = "My device"
+# axes = "x to the right, y away from the user, z up"
+# driver = "./device.so"  # driver of `asperity run --driver real`
+# notes = ["further remarks, in sentences"]
+
+"""
+_TABLE_HELP = """
+# A number may have more details, in a table at the end of the file instead of the line above:
+# [max_stiffness]
+# value = "1.8 N/mm"
+# source = "smooth wall, raised until it buzzed"  # source of the number
+# verified = "measured"  # or "read" in an accessible source, or false
+# cycled = "2 N/mm"  # the least stiffness with a limit cycle
+# directions = ["x", "z"]  # axes along which it was pushed
+# update_rate = "1 kHz"  # update rate of this test
+# positions = "stepped"  # by an encoder, or "exact"
+# lightest = 0.8  # damping in the lightest direction relative to that along directions
+"""
+
+
+def device_template() -> str:
+    """Return a template of a device file (TOML), valid as it is and with all lines uncommented.
+
+    Example:
+        >>> [line for line in device_template().splitlines() if "max_force" in line]
+        ['# max_force = "3.3 N"  # peak force [N]']
+    """
+    lines = []
+    for name, field in FIELD_TABLE.items():
+        unit = f" [{field.unit}]" if field.unit else ""
+        lines.append(f"# {name} = {_example_value(field)}  # {field.description}{unit}\n")
+    return "".join([_TEMPLATE_HEADER, *lines, _TABLE_HELP])
+
+
+def _example_value(field: Argument) -> str:
+    """Return the value of a device in the catalogue, or one in the right unit."""
+    for device in ("touch", "pantograph", *device_names()):
+        datum = load_device(device).data.get(field.name)
+        if datum is not None:
+            plain = datum.text.replace("·", "*").replace("µ", "u")
+            return f'"{plain}"' if field.unit else plain
+    return f'"0.1 {field.unit}"' if field.unit else "1"

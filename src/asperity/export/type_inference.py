@@ -1,0 +1,178 @@
+"""Type inference for the variables and the result of a compiled function.
+
+As in Numba, a function is typed for each combination of argument types by following its
+assignments until no type changes.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Sequence
+
+from asperity.export import c_language as c
+from asperity.export.c_language import ValueType
+from asperity.export.expression_types import ExpressionTypes, ProgramContext, called_name, to_load
+
+
+class FunctionTypes(ExpressionTypes):
+    """Types of the variables of a function for given types of its arguments.
+
+    Args:
+        node: the function.
+        argument_types: types of its arguments.
+        program: the program, which types the other functions.
+
+    Attributes:
+        argument_types: types of the arguments, by name.
+        types: types of the variables, by name.
+        result_type: type of the result.
+        written_arguments: arguments that are work arrays and that the function writes to.
+
+    Raises:
+        NotExportableError: for a construct that cannot be exported.
+    """
+
+    def __init__(
+        self, node: ast.FunctionDef, argument_types: tuple[ValueType, ...], program: ProgramContext
+    ) -> None:
+        super().__init__(node, {}, program)
+        self.argument_names = tuple(argument.arg for argument in node.args.args)
+        self.argument_types = dict(zip(self.argument_names, argument_types, strict=True))
+        self.types |= self.argument_types
+        self._changed = True
+        self._check_arguments()
+        while self._changed:
+            self._changed = False
+            for statement in _iterate_statements(node.body):
+                self._infer_statement(statement)
+        self.result_type = self.types.pop("return", c.VOID)
+        self.written_arguments = self._find_written()
+
+    def _check_arguments(self) -> None:
+        given = self.node.args
+        if given.vararg or given.kwarg or given.kwonlyargs or given.posonlyargs:
+            raise self.not_exportable("has starred, keyword-only or positional-only arguments")
+
+    # --- statements ------------------------------------------------------------------------------
+
+    def _infer_statement(self, node: ast.stmt) -> None:
+        if isinstance(node, ast.Assign):
+            for target in node.targets:
+                self._assign(target, self.infer(node.value), node.value)
+        elif isinstance(node, ast.AnnAssign):
+            if node.value is not None:
+                self._assign(node.target, self.infer(node.value), node.value)
+        elif isinstance(node, ast.AugAssign):
+            value = ast.BinOp(to_load(node.target), node.op, node.value)
+            self._assign(node.target, self.infer(value), value)
+        elif isinstance(node, ast.For):
+            self._infer_loop(node)
+        elif isinstance(node, ast.While) and node.orelse:
+            raise self.not_exportable("has a loop with 'else'")
+        elif isinstance(node, ast.Return) and node.value is not None:
+            self._infer_return(self.infer(node.value))
+        elif isinstance(node, ast.Expr):
+            if not isinstance(node.value, (ast.Call, ast.Constant)):
+                raise self.not_exportable("has an expression without effect", node.value)
+        elif not isinstance(node, _CONTROL_FLOW):
+            raise self.not_exportable(f"uses {type(node).__name__}", node)
+
+    def _assign(self, target: ast.expr, value_type: ValueType | None, value: ast.expr) -> None:
+        if isinstance(target, ast.Tuple):
+            self._unpack(target, value_type, value)
+        elif isinstance(target, ast.Subscript):
+            if isinstance(self.infer(target.value), (c.ConstantArray, c.ConstantRecord)):
+                raise self.not_exportable("writes to the texture or the law", target)
+        elif isinstance(target, ast.Name):
+            if value_type is not None:
+                self._unify(target.id, value_type)
+        else:
+            raise self.not_exportable("assigns to a target that is not a variable", target)
+
+    def _unify(self, name: str, value_type: ValueType) -> None:
+        if value_type == c.VOID:
+            raise self.not_exportable(
+                f"gives {name!r} the result of a function that returns nothing"
+            )
+        known = self.types.get(name, value_type)
+        both = c.common_type(known, value_type)
+        if both is None:
+            raise self.not_exportable(f"uses {name!r} for values of different types")
+        if self.types.get(name) != both:
+            self.types[name], self._changed = both, True
+
+    def _unpack(self, target: ast.Tuple, value_type: ValueType | None, value: ast.expr) -> None:
+        if isinstance(value, ast.Tuple) and len(value.elts) == len(target.elts):
+            for part, single in zip(target.elts, value.elts, strict=True):
+                self._assign(part, self.infer(single), single)
+            return
+        if value_type is None:
+            return
+        if isinstance(value_type, c.ConstantRecord):
+            items: Sequence[ValueType] = [item for _name, item in value_type.fields]
+        elif isinstance(value_type, c.TupleType):
+            items = value_type.items
+        else:
+            raise self.not_exportable("unpacks a value that is not a tuple", value)
+        if len(items) != len(target.elts):
+            words = f"unpacks {len(items)} values into {len(target.elts)} names"
+            raise self.not_exportable(words, target)
+        for part, item in zip(target.elts, items, strict=True):
+            self._assign(part, item, value)
+
+    def _infer_loop(self, node: ast.For) -> None:
+        call = node.iter
+        ranged = isinstance(call, ast.Call) and getattr(call.func, "id", "") == "range"
+        if not ranged or not isinstance(node.target, ast.Name):
+            raise self.not_exportable("loops over something other than range(...)", call)
+        if node.orelse:
+            raise self.not_exportable("has a loop with 'else'")
+        self._unify(node.target.id, c.INT)
+
+    def _infer_return(self, value_type: ValueType | None) -> None:
+        if isinstance(value_type, c.WorkArray):
+            raise self.not_exportable("returns a work array, which lies on its stack")
+        if value_type is not None:
+            self._unify("return", value_type)
+
+    # --- effects ---------------------------------------------------------------------------------
+
+    def _find_written(self) -> frozenset[str]:
+        """Return the names of work arrays that the function or its callees write to."""
+        names = set()
+        for node in ast.walk(self.node):
+            if isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store):
+                names |= {node.value.id} if isinstance(node.value, ast.Name) else set()
+            elif isinstance(node, ast.Call):
+                names |= self.written_arrays(node)
+        return frozenset(names)
+
+    def writes_arrays(self, node: ast.AST) -> bool:
+        """Return whether a part of the code writes to a work array."""
+        calls = (part for part in ast.walk(node) if isinstance(part, ast.Call))
+        return any(self.written_arrays(call) for call in calls)
+
+    def written_arrays(self, node: ast.Call) -> set[str]:
+        """Return the names of the work arrays that a call writes to."""
+        if not self.is_compiled_call(node):
+            return set()
+        arguments = self.call_arguments(node)
+        callee = self.program.infer_types(
+            called_name(node), tuple(self.require_type(one) for one in arguments)
+        )
+        pairs = zip(callee.argument_names, arguments, strict=True)
+        return {
+            argument.id
+            for parameter, argument in pairs
+            if parameter in callee.written_arguments and isinstance(argument, ast.Name)
+        }
+
+
+_CONTROL_FLOW = (ast.If, ast.While, ast.Return, ast.Break, ast.Continue, ast.Pass)
+
+
+def _iterate_statements(body: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
+    for statement in body:
+        yield statement
+        for field in ("body", "orelse"):
+            yield from _iterate_statements(getattr(statement, field, ()))

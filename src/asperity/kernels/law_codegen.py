@@ -1,0 +1,155 @@
+"""Generation of the functions of one probe: contact, formula and clamp of a law.
+
+They combine the code of the contact with the functions of the law; ``law_interface`` lists them.
+Loops over points are plain modules in ``loops``.
+"""
+
+from __future__ import annotations
+
+import ast
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from asperity.clamps import Clamp
+from asperity.contacts.contact import parameter_name
+from asperity.kernels.link import parse_source
+from asperity.laws.law import Law
+
+# Parameters that every kernel receives, before those of the law.
+SHARED_PARAMETERS = ("k", "h_mid", "h_half", "clamp_depth", "floor")
+
+_FORCE = ("fx", "fy", "fz")
+_JACOBIAN = tuple(f"j{row}{column}" for row in range(3) for column in range(3))
+_STATE = ("dx", "dy", "sxx", "sxy", "syy")
+
+
+@dataclass(frozen=True)
+class LawCode:
+    """A law, its kernels and a clamp, from which its functions are generated.
+
+    Attributes:
+        law: the law.
+        source: its kernels; see :func:`asperity.derive.python_source.law_source`.
+        clamp: the depth clamp.
+    """
+
+    law: Law
+    source: str
+    clamp: Clamp
+
+    @cached_property
+    def signatures(self) -> dict[str, tuple[str, ...]]:
+        """The argument names of each of the law's functions."""
+        return {
+            node.name: tuple(argument.arg for argument in node.args.args)
+            for node in parse_source(self.source).body
+            if isinstance(node, ast.FunctionDef)
+        }
+
+    def call(self, function: str) -> str:
+        """Return the call of one of the law's functions with its arguments."""
+        return f"{function}({', '.join(self.signatures[function])})"
+
+    def argument_names(self, *functions: str) -> frozenset[str]:
+        """Return the names of all arguments of some of the law's functions."""
+        return frozenset(name for function in functions for name in self.signatures[function])
+
+    @property
+    def unpack_line(self) -> str:
+        """The line that unpacks the parameters."""
+        own = map(parameter_name, self.law.parameters)
+        return f"{', '.join((*SHARED_PARAMETERS, *own))} = law"
+
+
+def probe_source(code: LawCode) -> str:
+    """Return the source of the functions of a probe."""
+    parts = (_probe_force, _probe_jacobian, _probe_in_contact, _probe_depth, _probe_tick)
+    texts = [part(code) for part in parts]
+    if code.law.contact.has_warm_start:
+        texts.append(_probe_force(code, warm=True))
+    return "\n\n\n".join(texts)
+
+
+def _function_source(signature: str, lines: Sequence[str]) -> str:
+    return f"def {signature}:\n{textwrap.indent(chr(10).join(lines), ' ' * 4)}\n"
+
+
+def _contact_prologue(
+    code: LawCode, needed: frozenset[str], results: Sequence[str], warm: bool = False
+) -> list[str]:
+    """Return the lines that return zeros out of contact and sample the texture in contact."""
+    contact = code.law.contact
+    lines, condition = contact.detection_code(needed)
+    exit_lines = [f"if not {condition}:", f"    return {', '.join(['0.0'] * len(results))}"]
+    sample = contact.warm_start_code(needed) if warm else contact.sampling_code(needed)
+    return [code.unpack_line, *lines, *exit_lines, *sample]
+
+
+def _probe_force(code: LawCode, warm: bool = False) -> str:
+    lines = _contact_prologue(code, code.argument_names("law_force"), _FORCE, warm)
+    lines += [*code.clamp.force_code(code.call("law_force")), f"return {', '.join(_FORCE)}"]
+    head = "probe_force_warm(x, y, z, dx, dy, warm_start" if warm else "probe_force(x, y, z, dx, dy"
+    return _function_source(f"{head}, texture, law)", lines)
+
+
+def _probe_jacobian(code: LawCode) -> str:
+    every = (*_FORCE, *_JACOBIAN)
+    held = ("law_force", "law_jacobian_saturated") if code.clamp.changes_force else ()
+    called = ("law_jacobian", *held)
+    lines = _contact_prologue(code, code.argument_names(*called), every)
+    lines += code.clamp.jacobian_code(*map(code.call, called))
+    head = f"probe_jacobian(x, y, z, {', '.join(_STATE)}, texture, law)"
+    return _function_source(head, [*lines, f"return {', '.join(every)}"])
+
+
+def _probe_in_contact(code: LawCode) -> str:
+    lines, condition = code.law.contact.detection_code(frozenset())
+    return _function_source("probe_in_contact(x, y, z, texture)", [*lines, f"return {condition}"])
+
+
+def _probe_depth(code: LawCode) -> str:
+    return _function_source("probe_depth(x, y, z, texture)", code.law.contact.depth_code())
+
+
+def _probe_tick(code: LawCode) -> str:
+    state = (
+        [code.unpack_line, *_STICK_SLIP.splitlines()] if code.law.stateful else ["dx = dy = 0.0"]
+    )
+    warm = "_warm" if code.law.contact.has_warm_start else ""
+    arguments = f"x, y, z, dx, dy{', warm_start' if warm else ''}, texture, law"
+    lines = [
+        *state,
+        f"fx, fy, fz = probe_force{warm}({arguments})",
+        "return fx, fy, fz, ax, ay, held",
+    ]
+    return _function_source("probe_tick(x, y, z, ax, ay, held, warm_start, texture, law)", lines)
+
+
+_STICK_SLIP = """dx = 0.0
+dy = 0.0
+if probe_in_contact(x, y, z, texture):
+    ax, ay, dx, dy = drag_anchor(x, y, held, ax, ay, param_max_deflection)
+    held = True
+else:
+    held = False
+"""
+
+
+def energy_source(code: LawCode) -> str:
+    """Return ``probe_energy``, the potential energy [J] of a conservative law.
+
+    The source of the code is ``law_energy``, which returns the energy and its derivative by the
+    depth.
+    """
+    lines = _contact_prologue(code, code.argument_names("law_energy"), ("energy",))
+    lines += code.clamp.energy_code(code.call("law_energy"))
+    return _function_source("probe_energy(x, y, z, texture, law)", [*lines, "return energy"])
+
+
+def contact_source(code: LawCode) -> str:
+    """Return ``contact_jacobian``, whose arguments are contact and height derivatives there."""
+    given = ("x", "y", "z", "depth", "h", "hx", "hy", "hxx", "hxy", "hyy", *_STATE)
+    lines = [code.unpack_line, f"return {code.call('law_jacobian')}"]
+    return _function_source(f"contact_jacobian({', '.join(given)}, law)", lines)

@@ -1,0 +1,281 @@
+"""Everything that uses private parts of Numba: two compilers, and a cache of machine code.
+
+Private names: ``JITCodeLibrary`` with its methods ``_optimize_final_module``,
+``_finalize_final_module``, ``_finalize_dynamic_globals`` and ``_verify_declare_only_symbols``,
+``_dynfunc.make_function``, ``caching._Cache``, ``Dispatcher._cache`` and ``_compiler``,
+``CompileResult._rebuild`` and ``_reduce``. The dependency on Numba has an upper bound for their
+sake, and ``tests/kernels/test_numba_internals.py`` says which of them a new version changes.
+
+Compilers. Numba optimises each function and generates machine code for it with everything that it
+calls, again at each level of a chain of calls. Only functions that Python calls need that. The
+others are link-only: their code is optimised once, in the loop that they are linked into. Identical
+link-only functions of several modules are lowered once. Loops are compiled for the widest vector
+registers of the processor.
+
+Cache. Numba's own cache unpickles an index and code without verification: a flipped bit crashes
+every start, a planted file is executed. Here each compiled overload is one entry of
+:mod:`asperity.core.cache`, verified before anything is unpickled, and there is no index. Of two
+processes that need the same code at the same time one compiles it and the other waits.
+"""
+
+from __future__ import annotations
+
+import pickle
+import sys
+from collections.abc import Callable
+from types import FunctionType, ModuleType
+from typing import Any
+
+import llvmlite  # type: ignore[import-untyped]  # it has no types
+import numba
+from numba import _dynfunc  # type: ignore[attr-defined]  # of compiled code
+from numba.core import (
+    caching,
+    codegen,
+    compiler,
+    compiler_machinery,
+    dispatcher,
+    serialize,
+    typed_passes,
+)
+
+from asperity.core.cache import (
+    cache_folder,
+    get_entry,
+    put_entry,
+    quarantine,
+    unlock,
+    wait_and_lock,
+)
+from asperity.core.compiled import COMPILE_CALLBACKS
+
+# Numba is untyped.
+_Library: Any = codegen.JITCodeLibrary
+_Lowering: Any = typed_passes.NativeLowering
+_Compiler: Any = compiler.Compiler
+_Dispatcher: Any = dispatcher.Dispatcher
+_register: Any = compiler_machinery.register_pass
+
+
+class LinkOnlyLibrary(_Library):  # type: ignore[misc]  # see above
+    """Code that is only linked into other code."""
+
+    def _optimize_final_module(self) -> None:
+        """Do nothing: the code is optimised in its callers."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+
+@_register(mutates_CFG=True, analysis_only=False)
+class LinkOnlyLowering(_Lowering):  # type: ignore[misc]  # see above
+    """Numba's lowering from typed code to LLVM code, without machine code."""
+
+    _name = "link_only_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower a function."""
+        context, name = state.targetctx, state.func_id.func_qualname
+        state.library = LinkOnlyLibrary(context.codegen(), name)
+        state.flags.no_compile = True
+        changed: bool = super().run_pass(state)
+        lowered = state["cr"]
+        # Callers find the function by this handle, which is never called: it has no code.
+        module = lowered.fndesc.lookup_module()
+        handle = _dynfunc.make_function(module, name, "", 0, lowered.env, (state.library,))
+        context.insert_user_function(handle, lowered.fndesc, [state.library])
+        state["cr"] = lowered._replace(cfunc=handle)
+        return changed
+
+
+class WideVectorLibrary(_Library):  # type: ignore[misc]  # see above
+    """Code in the widest vector registers of the processor.
+
+    For many processors LLVM uses half of an AVX-512 register, because programs with a few wide
+    instructions would run at a lower clock rate. A loop over many points consists of them.
+    """
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        """Add functions; llvmlite prints unknown attributes, too."""
+        for function in ir_module.functions:
+            if not function.is_declaration:
+                set.add(function.attributes, '"prefer-vector-width"="512"')
+        super().add_ir_module(ir_module)
+
+
+@_register(mutates_CFG=True, analysis_only=False)
+class WideVectorLowering(_Lowering):  # type: ignore[misc]  # see above
+    """Numba's lowering from typed code to machine code, in wide registers."""
+
+    _name = "wide_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower a function."""
+        state.library = WideVectorLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        changed: bool = super().run_pass(state)
+        return changed
+
+
+class _CustomLoweringCompiler(_Compiler):  # type: ignore[misc]  # see above
+    """Numba's compiler with a different lowering."""
+
+    lowering: Any
+
+    def define_pipelines(self) -> list[Any]:
+        """Return Numba's pipeline with its lowering replaced."""
+        (manager,) = super().define_pipelines()
+        manager.passes = [
+            (self.lowering if step is typed_passes.NativeLowering else step, description)
+            for step, description in manager.passes
+        ]
+        manager.finalize()
+        return [manager]
+
+
+class LinkOnlyCompiler(_CustomLoweringCompiler):
+    """Compiler of link-only functions: ``njit(pipeline_class=LinkOnlyCompiler)``."""
+
+    lowering = LinkOnlyLowering
+
+
+class LoopCompiler(_CustomLoweringCompiler):
+    """Compiler of loops over points or samples, and of the functions that loops share."""
+
+    lowering = WideVectorLowering
+
+
+_FUNCTION_IDS: dict[tuple[object, ...], int] = {}
+_CANONICAL_FUNCTIONS: dict[int, Any] = {}
+
+
+def share_identical_functions(module: ModuleType) -> None:
+    """Replace link-only functions of a module by identical ones of earlier modules.
+
+    Functions are identical if their code, the options of the compiler and all global names in the
+    code are: numbers, records, and functions that are identical themselves. This happens before
+    compilation, since a function looks up what it calls in the module that it comes from.
+    """
+    names, known_ids = vars(module), dict[FunctionType, int]()
+    for name, value in list(names.items()):
+        if _is_link_only(value) and value.py_func.__globals__ is names:
+            names[name] = _CANONICAL_FUNCTIONS.setdefault(_function_id(value, known_ids), value)
+
+
+def _is_link_only(value: object) -> bool:
+    return isinstance(value, _Dispatcher) and value._compiler.pipeline_class is LinkOnlyCompiler
+
+
+def _function_id(dispatcher: Any, known_ids: dict[FunctionType, int]) -> int:
+    """Return a number that identical link-only functions share; ``known_ids`` is a cache."""
+    function: FunctionType = dispatcher.py_func
+    if function not in known_ids:
+        known_ids[function] = id(function)  # a recursive function is identical to no other
+        code, names = function.__code__, function.__globals__
+        content = (code.co_code, repr(code.co_consts), code.co_names, code.co_varnames)
+        options = repr(sorted(dispatcher.targetoptions.items()))
+        used = tuple(_global_key(names.get(name), known_ids) for name in code.co_names)
+        whole = (function.__name__, *content, repr(function.__defaults__), options, used)
+        known_ids[function] = _FUNCTION_IDS.setdefault(whole, len(_FUNCTION_IDS))
+    return known_ids[function]
+
+
+def _global_key(value: object, known_ids: dict[FunctionType, int]) -> object:
+    """Return a key of a global value in code; most objects are their own."""
+    if _is_link_only(value):
+        return "function", _function_id(value, known_ids)
+    return repr(value) if isinstance(value, (int, float)) else id(value)
+
+
+CODE_NAMESPACE = "code"
+# Numba is untyped.
+_CompileResult: Any = compiler.CompileResult
+_serialize: Any = serialize.dumps
+
+
+class MachineCodeCache(caching._Cache):
+    """Cache of the compiled overloads of one function, as Numba's dispatcher uses it.
+
+    Args:
+        function: the Python function; its module is named by the content of all that is compiled.
+    """
+
+    def __init__(self, function: FunctionType) -> None:
+        self._function = function
+
+    @property
+    def cache_path(self) -> str:
+        """The folder of the entries."""
+        return str(cache_folder() / CODE_NAMESPACE)
+
+    def enable(self) -> None:
+        """Do nothing: the cache is always enabled."""
+
+    def disable(self) -> None:
+        """Do nothing: the cache is always enabled."""
+
+    def flush(self) -> None:
+        """Do nothing: keys contain everything that is compiled, so no entry is stale."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return the compiled overload of a signature, or ``None`` to compile it."""
+        key = self._key(sig, target_context.codegen())
+        found = self._load_cached(key, target_context)
+        if found is None and wait_and_lock(CODE_NAMESPACE, key):
+            found = self._load_cached(key, target_context)
+            if found is not None:
+                unlock(CODE_NAMESPACE, key)
+        if found is None:
+            for callback in COMPILE_CALLBACKS:
+                callback(self._function.__name__)
+        return found
+
+    def _load_cached(self, key: str, target_context: Any) -> Any:
+        target_context.refresh()
+        content = get_entry(CODE_NAMESPACE, key)
+        if content is None:
+            return None
+        try:
+            return _CompileResult._rebuild(target_context, *pickle.loads(content))
+        except Exception:  # of another build of Numba: whatever it raises, compile again
+            quarantine(CODE_NAMESPACE, key)
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Store a compiled overload."""
+        *parts, environments = data._reduce()
+        # A link-only function may be of a module that does not exist where this code is loaded; no
+        # compiled function uses its environment.
+        own = self._function.__module__
+        mine = tuple(one for one in environments if one.globals["__name__"] == own)
+        key = self._key(sig, data.codegen)
+        put_entry(CODE_NAMESPACE, key, _serialize((*parts, mine)))
+        unlock(CODE_NAMESPACE, key)
+
+    def _key(self, sig: Any, codegen: Any) -> str:
+        """Return what the machine code depends on: source, types, processor and versions."""
+        versions = (sys.version, numba.__version__, llvmlite.__version__, sys.byteorder)
+        types = (str(sig), *map(_record_fields, sig))
+        function = (self._function.__module__, self._function.__name__, types)
+        return repr((*function, codegen.magic_tuple(), *versions))
+
+
+def _record_fields(numba_type: Any) -> tuple[Any, ...]:
+    """Return the module and fields of a record, on which stored code relies."""
+    names = tuple(getattr(numba_type, "fields", ()))
+    if names:
+        names = (numba_type.instance_class.__module__, *names)
+    return (*names, *map(_record_fields, getattr(numba_type, "types", ())))
+
+
+def cache_machine_code(decorator: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a decorator of Numba whose functions cache their machine code between runs."""
+
+    def decorate(function: FunctionType) -> Any:
+        dispatcher = decorator(function)
+        dispatcher._cache = MachineCodeCache(function)
+        return dispatcher
+
+    return decorate

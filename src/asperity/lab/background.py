@@ -1,0 +1,149 @@
+"""Pictures of the surface and its stability limit, computed in worker processes."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Coroutine
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from asperity.core.checks import FloatArray
+from asperity.devices import Device
+from asperity.lab.background_worker import BackgroundWorker, compute_limit, render_view, set_surface
+from asperity.lab.messages import ViewRequest
+from asperity.surface import Surface
+
+MAX_CRASHES, CRASH_WINDOW = 3, 600.0
+"""Crashes of the picture process, within so many seconds, after which it is not restarted."""
+_RESTART_TEXT = "the picture process has crashed and is restarted"
+_NO_PICTURES_TEXT = "no pictures of this surface: the picture process crashed each time"
+_NO_LIMIT_TEXT = "the process that computes the limit has crashed twice"
+
+
+class BackgroundRenderer:
+    """Pictures and stability limit of the current surface, computed by worker processes.
+
+    A process that crashes is replaced; a surface that crashes each of them has no pictures, until
+    another surface is shown.
+
+    Args:
+        picture_worker: process for pictures.
+        limit_worker: process for limits, which take longer.
+        on_update: called when a result or a message is new.
+
+    Attributes:
+        limit: of :func:`asperity.lab.background_worker.compute_limit`; empty until computed.
+        version: incremented with each surface whose pictures are available.
+        message: state of the pictures, for the user.
+    """
+
+    def __init__(
+        self,
+        picture_worker: BackgroundWorker,
+        limit_worker: BackgroundWorker,
+        on_update: Callable[[], Coroutine[Any, Any, None]],
+    ) -> None:
+        self._picture_worker, self._limit_worker = picture_worker, limit_worker
+        self._on_update = on_update
+        self._requested_surface: Surface | None = None
+        self._requested_device: Device | None = None
+        self._ready_surface: Surface | None = None
+        self._crash_times: list[float] = []
+        self._tasks: set[asyncio.Task[None]] = set()
+        self.limit: dict[str, Any] = {}
+        self.version = 0
+        self.message = ""
+
+    def show(self, surface: Surface, device: Device) -> None:
+        """Start the computations for a surface on a device, unless it is the current one."""
+        if surface is self._requested_surface and device == self._requested_device:
+            return
+        previous, self.limit = self._requested_surface, {}
+        self._requested_surface, self._requested_device = surface, device
+        if surface is previous:
+            self._start_task(self._compute_limit(surface, device))
+            return
+        self._crash_times, self.message = [], ""
+        self._start_task(self._compute(surface, device))
+
+    def _start_task(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    def close(self) -> None:
+        """Cancel all tasks."""
+        for task in self._tasks:
+            task.cancel()
+
+    async def _compute(self, surface: Surface, device: Device) -> None:
+        """Prepare the pictures first: the page waits for them, and the limit takes longer."""
+        await self._prepare_pictures(surface)
+        await self._compute_limit(surface, device)
+
+    async def _prepare_pictures(self, surface: Surface) -> None:
+        while surface is self._requested_surface and len(self._crash_times) < MAX_CRASHES:
+            try:
+                await _run_in_worker(self._picture_worker, set_surface, surface)
+            except BrokenProcessPool:
+                await self._record_crash(surface)
+                continue
+            if surface is self._requested_surface:
+                self._ready_surface, self.message = surface, ""
+                self.version += 1
+                await self._on_update()
+            return
+
+    async def _record_crash(self, surface: Surface) -> None:
+        """Count a crash of the picture process, and report it."""
+        self._ready_surface = None
+        if surface is self._requested_surface:
+            now = time.monotonic()
+            recent = [when for when in self._crash_times if when > now - CRASH_WINDOW]
+            self._crash_times = [*recent, now]
+            restarts = len(self._crash_times) < MAX_CRASHES
+            self.message = _RESTART_TEXT if restarts else _NO_PICTURES_TEXT
+            await self._on_update()
+
+    async def _compute_limit(self, surface: Surface, device: Device) -> None:
+        limit = {"stiffness": None, "basis": _NO_LIMIT_TEXT, "q": None, "one_sided": None}
+        for _attempt in range(2):  # the crash may have had another cause
+            with suppress(BrokenProcessPool):
+                limit = await _run_in_worker(self._limit_worker, compute_limit, surface, device)
+                break
+        if surface is self._requested_surface and device == self._requested_device:
+            self.limit = limit
+            await self._on_update()
+
+    async def render(self, request: ViewRequest) -> bytes:
+        """Return a picture as a message; empty while no surface is ready."""
+        surface = self._ready_surface
+        if surface is None:
+            return b""
+        view = b""
+        with suppress(BrokenProcessPool):
+            arguments = request.kind, request.numbers
+            view = await _run_in_worker(self._picture_worker, render_view, *arguments)
+        if not view and surface is self._ready_surface:  # the crash was not yet recorded
+            await self._record_crash(surface)
+            self._start_task(self._prepare_pictures(surface))
+        return view
+
+    def nearest(self, point: FloatArray) -> FloatArray:
+        """Return the closest point of the surface to a point (3,) [m].
+
+        It is NaN until the worker process has compiled the search.
+        """
+        if self._ready_surface is None:
+            return np.full(3, np.nan)
+        return self._ready_surface.texture.nearest(point)
+
+
+async def _run_in_worker(
+    worker: BackgroundWorker, work: Callable[..., Any], *arguments: Any
+) -> Any:
+    return await asyncio.wrap_future(worker.submit(work, *arguments))

@@ -1,0 +1,140 @@
+"""Start and shutdown of the lab: worker processes, socket and server."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing import active_children
+from pathlib import Path
+
+from websockets.asyncio.server import serve
+
+from asperity.core.errors import ParameterError
+from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, respond
+from asperity.lab.background_worker import BackgroundWorker
+from asperity.lab.handle import Handle
+from asperity.lab.playback import Playback
+from asperity.lab.scene_state import SceneState
+from asperity.lab.server import LabServer
+from asperity.servo.process import PrestartedProcess
+
+LOOPBACK_ADDRESS = "127.0.0.1"
+DEFAULT_PORT = 8137
+"""Port of the lab, if it is free."""
+PORT_COUNT = 65_536
+_PORT_ATTEMPTS = 50  # consecutive ports that are tried
+
+
+def bind_socket(port: int | None) -> socket.socket:
+    """Return a socket that is bound to the loopback interface.
+
+    Args:
+        port: the port, 0 for any; ``None`` for the first free one from ``DEFAULT_PORT``.
+
+    Raises:
+        ParameterError: for an invalid port, or one that is not free; the next free one is named.
+    """
+    wanted = DEFAULT_PORT if port is None else port
+    if not 0 <= wanted < PORT_COUNT:
+        raise ParameterError("port", f"must be 0 (any free port) to {PORT_COUNT - 1}", wanted)
+    for number in range(wanted, min(wanted + _PORT_ATTEMPTS, PORT_COUNT)):
+        bound = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        try:
+            bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            bound.bind((LOOPBACK_ADDRESS, number))
+        except OSError:
+            bound.close()
+            continue
+        if port is not None and number != wanted:
+            bound.close()
+            raise ParameterError("port", f"{wanted} is not available; {number} is free")
+        return bound
+    raise ParameterError("port", "is not available, nor are the next ones", wanted)
+
+
+@dataclass(frozen=True)
+class LabOptions:
+    """Options of the lab.
+
+    Attributes:
+        load_plugins: registers user-defined laws in another process.
+        prestarted: the process of the first loop.
+        playback: recorded rows of the initial scene, to be replayed.
+        handle: of a real device; ``None`` for the simulated device.
+        accept_risk: whether a real device renders a stiffness above the limit.
+    """
+
+    load_plugins: Callable[[], None] | None = None
+    prestarted: PrestartedProcess | None = None
+    playback: Playback | None = None
+    handle: Handle | None = None
+    accept_risk: bool = False
+
+
+def run_lab(
+    scene_state: SceneState,
+    listener: socket.socket,
+    on_ready: Callable[[str], None],
+    options: LabOptions = LabOptions(),  # frozen
+) -> None:
+    """Serve the lab until Ctrl-C.
+
+    Args:
+        scene_state: the initial scene.
+        listener: the bound socket.
+        on_ready: called with the address once the server answers.
+        options: see :class:`LabOptions`.
+    """
+    asyncio.run(serve_lab(scene_state, listener, on_ready, options))
+
+
+async def serve_lab(
+    scene_state: SceneState,
+    listener: socket.socket,
+    on_ready: Callable[[str], None],
+    options: LabOptions,
+) -> None:
+    """Serve the lab until a signal arrives, or the task is cancelled; see :func:`run_lab`."""
+    token = AccessToken(listener.getsockname()[1])
+    stopped = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        # Without support by system or thread, Ctrl-C cancels the task.
+        with suppress(NotImplementedError, RuntimeError, ValueError):
+            asyncio.get_running_loop().add_signal_handler(number, stopped.set)
+    plugins = options.load_plugins
+    with BackgroundWorker(plugins) as pictures, BackgroundWorker(plugins) as limits:
+        lab = LabServer(
+            scene_state,
+            pictures,
+            limits,
+            options.prestarted,
+            options.handle,
+            accept_risk=options.accept_risk,
+        )
+        if options.playback is not None:
+            title = Path(scene_state.source).name
+            lab.clip_store.add_recording("recording", options.playback, scene_state, title)
+        tasks = [asyncio.create_task(work()) for work in (lab.watch_session, lab.watch_steering)]
+        fetch = lab.clip_store.fetch
+        try:
+            with lab.session:
+                async with serve(
+                    lab.serve_client,
+                    sock=listener,
+                    max_size=MAX_MESSAGE_BYTES,
+                    compression=None,
+                    process_request=lambda _line, request: respond(token, request, fetch),
+                ):
+                    on_ready(token.url)
+                    await stopped.wait()
+        finally:
+            for task in tasks:
+                task.cancel()
+            lab.background.close()
+            # The loop has ended; remaining processes compute pictures and limits, maybe for long.
+            for child in active_children():
+                child.terminate()

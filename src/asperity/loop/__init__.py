@@ -1,0 +1,1 @@
+"""The compiled servo loop, with its parts: clock, device, guards and trace."""

@@ -1,0 +1,50 @@
+"""The clock of a servo loop: that of the system, or none for a loop that runs unpaced."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.core.compiled import Kernels, call_address
+
+KERNELS = Kernels(provides=("clock_now", "clock_wait_until"), native=("call_address",))
+
+# Linux: the monotonic clock, absolute times, and the answer of a wait that a signal interrupted.
+CLOCK_MONOTONIC = 1
+TIMER_ABSTIME = 1
+EINTR = 4
+NANOSECONDS = 1_000_000_000
+
+
+class Clock(NamedTuple):
+    """A clock.
+
+    Attributes:
+        gettime: address of ``clock_gettime``; 0 for no clock, whose time is always the due time.
+        nanosleep: address of ``clock_nanosleep``.
+        timespec: seconds and nanoseconds, as both functions take them (2,).
+    """
+
+    gettime: int
+    nanosleep: int
+    timespec: NDArray[np.int64]
+
+
+def clock_now(due: int, clock: Clock) -> int:
+    """Return the time [ns]."""
+    if clock.gettime == 0:
+        return due
+    call_address(clock.gettime, CLOCK_MONOTONIC, clock.timespec)
+    return int(clock.timespec[0]) * NANOSECONDS + int(clock.timespec[1])
+
+
+def clock_wait_until(due: int, clock: Clock) -> int:
+    """Wait until a time [ns]; return the time after the wait [ns]."""
+    if clock.gettime == 0:
+        return due
+    answer = EINTR
+    while answer == EINTR:
+        clock.timespec[0] = due // NANOSECONDS
+        clock.timespec[1] = due % NANOSECONDS
+        answer = call_address(clock.nanosleep, CLOCK_MONOTONIC, TIMER_ABSTIME, clock.timespec, 0)
+    return clock_now(due, clock)

@@ -1,0 +1,101 @@
+"""Format lengths for messages; parse units of length and numbers in files."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+from asperity.core.errors import ParameterError, SurfaceFileError
+
+Pitch = tuple[float, ...]
+"""Distance of neighbouring points, (px, py) or (px,) for a profile [m]."""
+Shape = tuple[int, ...]
+"""Shape of heights, (ny, nx) or (n,) for a profile."""
+
+
+def format_length(value: float) -> str:
+    """Return a length as text, with a readable unit.
+
+    Example:
+        >>> format_length(1.03e-5), format_length(-2e-9)
+        ('10.3 µm', '-2 nm')
+    """
+    for unit, factor in (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6)):
+        if abs(value) >= factor:
+            return f"{value / factor:.4g} {unit}"
+    return f"{value / 1e-9:.4g} nm"
+
+
+def format_lengths(values: Sequence[float]) -> str:
+    """Return lengths along x and y as text, once if they are equal.
+
+    Example:
+        >>> format_lengths((1e-6, 1e-6)), format_lengths((1e-6, 2e-6))
+        ('1 µm', '1 µm x 2 µm')
+    """
+    texts = [format_length(value) for value in values]
+    return texts[0] if len(set(texts)) == 1 else " x ".join(texts)
+
+
+def format_counts(values: Sequence[int]) -> str:
+    """Return counts along the axes as text: "30 x 40"."""
+    return " x ".join(str(value) for value in values)
+
+
+_UNIT_NAMES = {
+    1.0: "m meter metre",
+    1e-2: "cm",
+    1e-3: "mm millimeter millimetre",
+    1e-6: "um µm μm micron micrometer micrometre",  # with U+00B5 and with U+03BC
+    1e-9: "nm nanometer nanometre",
+    1e-10: "angstrom ångström å",
+    1e-12: "pm",
+}
+METRES_PER_UNIT = {name: metres for metres, names in _UNIT_NAMES.items() for name in names.split()}
+"""Lengths of the units [m] by name in lower case."""
+_EXPLICIT_UNITS = {"Å": 1e-10, "in": 0.0254, "inch": 0.0254, "km": 1e3, "dm": 0.1}
+
+
+def unit_to_metres(unit: str) -> float:
+    """Return the length of a unit [m].
+
+    Args:
+        unit: its symbol or English name, such as "mm".
+
+    Raises:
+        ParameterError: not a known unit of length.
+
+    Example:
+        >>> unit_to_metres("um")
+        1e-06
+    """
+    name = unit.strip() if isinstance(unit, str) else ""
+    plural = name[:-1] if len(name) > 3 and name.endswith("s") else name
+    for key in (name, plural):
+        if key in METRES_PER_UNIT or key in _EXPLICIT_UNITS:
+            return METRES_PER_UNIT.get(key) or _EXPLICIT_UNITS[key]
+    raise ParameterError("unit", "must be a unit of length: m, cm, mm, um, nm, angstrom, in", unit)
+
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+
+def parse_number(text: str, what: str) -> float:
+    """Return a finite number in plain notation (``float`` also accepts 1_000 and nan).
+
+    Args:
+        text: the number.
+        what: name of the number, for the message.
+
+    Raises:
+        SurfaceFileError: not a finite number.
+
+    Example:
+        >>> parse_number("-2.5e-3", "offset")
+        -0.0025
+    """
+    value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    if not math.isfinite(value):
+        raise SurfaceFileError(f"{what} is {text[:40]!r}; a finite number is expected")
+    return value

@@ -1,0 +1,309 @@
+"""Read a surface file of any supported format, recognised by content rather than by name.
+
+The readers are tried in this order: those that recognise a signature; the user's, first the
+registered ones in the order of registration, then the entry points of the group
+``asperity.readers`` by name, which are loaded only if no reader before them took the file; last the
+readers of text and of instruments' files, which recognise almost anything.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from importlib.metadata import EntryPoint, entry_points, version
+from pathlib import Path
+
+import numpy as np
+
+from asperity.core.checks import check_positive
+from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError
+from asperity.measured.reading import unsupported
+from asperity.measured.reading.images.png import PNG_MAGIC, read_png
+from asperity.measured.reading.images.tiff import TIFF_MAGIC, read_tiff
+from asperity.measured.reading.isolation import describe_exception, read_isolated
+from asperity.measured.reading.mesh import is_binary_stl, is_obj, is_text_stl, read_mesh
+from asperity.measured.reading.metrology import surface_topography
+from asperity.measured.reading.metrology.sdf import is_sdf, read_sdf
+from asperity.measured.reading.metrology.x3p import read_x3p
+from asperity.measured.reading.npy import NPY_MAGIC, read_npy
+from asperity.measured.reading.plain_text.esri import is_esri, read_esri
+from asperity.measured.reading.plain_text.text_reader import read_text
+from asperity.measured.reading.raw_surface import RawSurface
+from asperity.measured.reading.reader import Reader, ReadingOptions, SurfaceFile
+
+MAX_BYTES = 2 * 10**9
+_MAX_TEXT_BYTES = 5 * 10**8  # parsing text takes several times the size of the file
+
+
+def _is_x3p(file: SurfaceFile) -> bool:
+    is_zip = file.head.startswith(unsupported.ZIP_MAGIC)
+    return is_zip and unsupported.classify_archive(file.path) == "X3P"
+
+
+def _read_text(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
+    size = file.path.stat().st_size
+    if size > _MAX_TEXT_BYTES:
+        raise unsupported.too_large_error(file.name, size, _MAX_TEXT_BYTES, " of text")
+    return read_text(file, options)
+
+
+SIGNATURE_READERS = (
+    Reader("an X3P file", _is_x3p, read_x3p),
+    Reader("an NPY file", lambda file: file.head.startswith(NPY_MAGIC), read_npy, ("unit",)),
+    Reader("a PNG image", lambda f: f.head.startswith(PNG_MAGIC), read_png, ("integrate_normals",)),
+    Reader(
+        "a TIFF image",
+        lambda file: file.head.startswith(TIFF_MAGIC),
+        read_tiff,
+        ("integrate_normals", "unit"),
+        is_isolated=True,
+    ),
+    Reader("an ESRI ASCII grid", is_esri, read_esri, ("unit",)),
+    Reader("an SDF file", lambda file: is_sdf(file.head), read_sdf),
+    Reader("a binary STL mesh", is_binary_stl, read_mesh, ("unit",)),
+    Reader("a text STL mesh", is_text_stl, read_mesh, ("unit",), is_isolated=True),
+    Reader("an OBJ mesh", is_obj, read_mesh, ("unit",), is_isolated=True),
+)
+"""Readers that recognise a signature of their format."""
+
+FALLBACK_READERS = (
+    Reader("a file of another kind", lambda _: True, unsupported.reject_unsupported),
+    Reader(
+        "a text file", lambda file: file.is_text, _read_text, ("unit", "resample"), certain=False
+    ),
+    Reader(
+        "an instrument's file",
+        lambda _: surface_topography.has_library(),
+        surface_topography.read_instrument,
+        ("channel", "unit", "resample"),
+        certain=False,
+        is_isolated=True,
+    ),
+)
+"""Readers of files without a signature, tried last."""
+
+ENTRY_POINT_GROUP = "asperity.readers"
+"""Group of the entry points with which an installed package provides a :class:`Reader`."""
+
+_EXPECTED_ERRORS = (AsperityError, OSError, MemoryError)  # errors that a reader may raise
+USER_READERS: dict[str, Reader] = {}
+
+
+def register(reader: Reader) -> None:
+    """Register a user-defined reader; it is tried after the built-in ones with a signature.
+
+    Args:
+        reader: the reader.
+
+    Raises:
+        ParameterError: another reader has the same name.
+    """
+    taken = (*SIGNATURE_READERS, *USER_READERS.values(), *FALLBACK_READERS)
+    if reader.name in {other.name for other in taken}:
+        raise ParameterError("reader", "must have a name that no other reader has", reader.name)
+    USER_READERS[reader.name] = reader
+
+
+def iter_readers(problems: list[str]) -> Iterator[Reader]:
+    """Yield all readers in the order in which they are tried.
+
+    Args:
+        problems: receives a sentence for each user-defined reader that cannot be used.
+    """
+    yield from SIGNATURE_READERS
+    for reader in USER_READERS.values():
+        yield _guard_reader(reader, problems)
+    for point in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda point: point.name):
+        loaded = _load_entry_point(point, problems)
+        if loaded is not None:
+            yield _guard_reader(loaded, problems)
+    yield from FALLBACK_READERS
+
+
+def external_reader_version() -> str | None:
+    """Return the version of SurfaceTopography, empty if it is not installed.
+
+    ``None`` if there are user-defined readers, whose versions are unknown.
+    """
+    if USER_READERS or entry_points(group=ENTRY_POINT_GROUP):
+        return None
+    return version(surface_topography.LIBRARY) if surface_topography.has_library() else ""
+
+
+def _load_entry_point(point: EntryPoint, problems: list[str]) -> Reader | None:
+    try:
+        reader = point.load()
+        if not isinstance(reader, Reader):
+            raise TypeError(f"{point.value} is no Reader")
+    except Exception as error:  # another package may raise anything
+        problems.append(f"the reader {point.name!r} cannot be used ({_describe_error(error)})")
+        return None
+    return reader
+
+
+def _guard_reader(reader: Reader, problems: list[str]) -> Reader:
+    """Return a user-defined reader whose programming errors do not stop the others."""
+
+    def recognises(file: SurfaceFile) -> bool:
+        try:
+            return bool(reader.recognises(file))
+        except _EXPECTED_ERRORS:
+            raise
+        except Exception as error:  # a user's code may raise anything
+            message = f"the reader of {reader.name} cannot be used ({_describe_error(error)})"
+            problems.append(message)
+            return False
+
+    def read(file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
+        try:
+            return _check_result(_run(reader, file, options))
+        except _EXPECTED_ERRORS:
+            raise
+        except Exception as error:  # as above
+            message = f"{file.name}: the reader of {reader.name} failed ({_describe_error(error)})"
+            raise SurfaceFileError(message) from error
+
+    return replace(reader, recognises=recognises, read=read, is_isolated=False)
+
+
+def _check_result(raw: RawSurface | None) -> RawSurface | None:
+    """Return the result of a user-defined reader with floats, or refuse it."""
+    if raw is None:
+        return None
+    if not isinstance(raw, RawSurface):
+        raise TypeError(f"{type(raw).__name__} instead of a RawSurface")
+    heights = np.ascontiguousarray(raw.heights, dtype=np.float64)
+    if heights.ndim not in (1, 2) or heights.size == 0:
+        raise ValueError(f"heights of shape {heights.shape}")
+    pitch = None if raw.pitch is None else tuple(float(p) for p in raw.pitch)
+    if pitch is not None and not (
+        len(pitch) == heights.ndim and all(np.isfinite(p) and p > 0.0 for p in pitch)
+    ):
+        raise ValueError(f"pitch {pitch} for heights of shape {heights.shape}")
+    return replace(raw, heights=heights, pitch=pitch)
+
+
+def _describe_error(error: Exception) -> str:
+    return f"{type(error).__name__}: {describe_exception(error)}"
+
+
+def read_surface(
+    path: str | os.PathLike[str],
+    *,
+    channel: str | int | None = None,
+    unit: str | None = None,
+    integrate_normals: bool = False,
+    resample: float | None = None,
+) -> RawSurface:
+    r"""Read a measured or synthetic surface; the content of the file decides its format.
+
+    X3P (ISO 25178-72), SDF (ISO 25178-71, text and binary), NumPy arrays (NPY), text matrices
+    and two-column profiles with or without an instrument's header, PNG and TIFF images, STL and
+    OBJ patches, and the files of instruments that SurfaceTopography reads where the extra
+    ``asperity[formats]`` is installed.
+
+    Args:
+        path: the file.
+        channel: name or number (from 0) of the height channel, for a file with several.
+        unit: unit of length of a file that has none, such as "mm": required for STL and OBJ,
+            optional for NPY and text (metres if not given).
+        integrate_normals: integrate a normal map (an image of slopes) to heights.
+        resample: pitch [m] of the map interpolated through a list of x, y, z points that are on no
+            regular grid, or of the profile through unevenly spaced ones; the interpolation error
+            is in the notes.
+
+    Returns:
+        The heights [m] of the file, and the pitch if the file has one. Heights of images have no
+        unit: ``relative`` is True, and the pitch None.
+
+    Raises:
+        SurfaceFileError: the file cannot be read, with the reason.
+        ParameterError: an argument is missing, unknown or does not apply to this file.
+
+    Example:
+        >>> import tempfile, pathlib
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     file = pathlib.Path(folder) / "groove.csv"
+        ...     _ = file.write_text("x [um],z [nm]\n0.0,1\n0.5,2\n1.0,4\n1.5,2\n")
+        ...     groove = read_surface(file)
+        >>> groove.heights.shape, [f"{p:.1e}" for p in groove.pitch]
+        ((4,), ['5.0e-07'])
+    """
+    name = Path(path).name or str(path)
+    if resample is not None:
+        resample = check_positive("resample", resample, "m")
+    options = ReadingOptions(channel, unit, integrate_normals, resample)
+    try:
+        _ = options.metres_per_unit  # refuses an unknown unit, whatever the file is
+        _check_file(Path(path), name)
+        return _check_finite(_read_first(SurfaceFile.open(Path(path)), options))
+    except MemoryError as error:
+        raise SurfaceFileError(f"{name}: not enough memory to read this surface") from error
+    except OSError as error:
+        reason = error.strerror or describe_exception(error)
+        raise SurfaceFileError(f"{name}: cannot be read ({reason})") from error
+
+
+def _read_first(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
+    """Return the result of the first reader that can read the file."""
+    refusal: AsperityError | None = None
+    problems: list[str] = []
+    for reader in iter_readers(problems):
+        if not reader.recognises(file):
+            continue
+        try:
+            raw = _run(reader, file, options)
+        except AsperityError as error:
+            refusal = error
+            if reader.certain:
+                break
+            continue
+        if raw is not None:
+            reader.check_options(file, options)
+            notes = (*raw.notes, *problems)
+            if not raw.has_units and not raw.relative:
+                notes = ("no unit in the file: taken as metres", *notes)
+            return replace(raw, notes=notes)
+    refusal = refusal or unsupported.unrecognised_error(file)
+    if problems and isinstance(refusal, SurfaceFileError):
+        raise SurfaceFileError("; ".join((str(refusal), *problems))) from refusal
+    raise refusal
+
+
+def _run(reader: Reader, file: SurfaceFile, options: ReadingOptions) -> RawSurface | None:
+    """Run a reader, in a subprocess if it is isolated; its refusals name the file."""
+    try:
+        if reader.is_isolated:
+            return read_isolated(reader.read, file, options)
+        return reader.read(file, options)
+    except SurfaceFileError as error:
+        if str(error).startswith(file.name):
+            raise
+        raise SurfaceFileError(f"{file.name}: {error}") from error
+
+
+def _check_file(path: Path, name: str) -> None:
+    """Refuse what is no file of a size that can be read, with a hint."""
+    try:
+        is_folder, size = path.is_dir(), path.stat().st_size
+    except FileNotFoundError as error:
+        raise SurfaceFileError(f"{path}: no such file") from error
+    except ValueError as error:  # a NUL in the name
+        raise SurfaceFileError(f"{str(path)!r} is not a file name") from error
+    if is_folder:
+        formats = unsupported.SUPPORTED_FORMATS
+        raise SurfaceFileError(f"{path} is a directory; a file is expected ({formats})")
+    if path.is_file() and size == 0:
+        raise SurfaceFileError(f"{name} is empty")
+    if size > MAX_BYTES:
+        raise unsupported.too_large_error(name, size, MAX_BYTES)
+
+
+def _check_finite(raw: RawSurface) -> RawSurface:
+    infinite = np.isinf(raw.heights)
+    if infinite.any():
+        index = tuple(int(k) for k in np.argwhere(infinite)[0])
+        fault = f"infinite height at index {index}; a missing point is written as NaN"
+        raise SurfaceFileError(f"{raw.source}: {fault}")
+    return raw

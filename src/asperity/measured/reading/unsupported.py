@@ -1,0 +1,126 @@
+"""Refuse files of unsupported formats, naming the format and a remedy."""
+
+from __future__ import annotations
+
+import struct
+import zipfile
+import zlib
+from pathlib import Path
+
+from asperity.core.errors import SurfaceFileError
+from asperity.measured.reading.images.tiff import TIFF_MAGIC
+from asperity.measured.reading.metrology.surface_topography import has_library
+from asperity.measured.reading.reader import ReadingOptions, SurfaceFile
+
+ZIP_MAGIC = (b"PK\x03\x04", b"PK\x05\x06")  # the second is that of an empty archive
+_MAX_UNPACKED_BYTES = 2 * 10**9
+ARCHIVE_ERRORS = (
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+    EOFError,
+    KeyError,
+    NotImplementedError,  # a compression that zipfile does not support
+    RuntimeError,  # an encrypted member
+    ValueError,
+)
+"""Errors that zipfile raises for a damaged archive."""
+
+
+def classify_archive(path: Path) -> str:
+    """Return "X3P", "NPZ" or "other"; a damaged archive counts as X3P, whose reader refuses it.
+
+    Args:
+        path: a file with the signature of a zip archive.
+
+    Raises:
+        SurfaceFileError: the archive would unpack to gigabytes.
+    """
+    try:
+        with zipfile.ZipFile(path) as file:
+            members = file.infolist()
+    except ARCHIVE_ERRORS:
+        return "X3P"
+    names = [member.filename.replace("\\", "/").lower() for member in members]
+    if any(name.rpartition("/")[2] == "main.xml" for name in names):
+        return "X3P"  # its reader checks the size of each member against main.xml
+    size = sum(member.file_size for member in members)
+    if size > _MAX_UNPACKED_BYTES:
+        raise SurfaceFileError(
+            f"{path.name} unpacks to {size / 1e9:.1f} GB;"
+            f" at most {_MAX_UNPACKED_BYTES / 1e9:.0f} GB are read"
+        )
+    return "NPZ" if any(name.endswith(".npy") for name in names) else "other"
+
+
+SUPPORTED_FORMATS = "X3P, SDF, NPY, text matrix, two-column profile, PNG, TIFF, STL, OBJ"
+_EXTRA_HINT = "the files of most instruments need the extra: pip install 'asperity[formats]'"
+
+_PICTURE_HINT = "save the heights as a grey PNG or TIFF, 16 bit if possible"
+# Signatures of formats that are mistaken for surfaces, so that the message can name them.
+_SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
+    (b"\xff\xd8\xff", "JPEG image", _PICTURE_HINT),
+    (b"GIF8", "GIF image", _PICTURE_HINT),
+    (b"BM", "BMP image", _PICTURE_HINT),
+    (b"%PDF", "PDF document", ""),
+    (b"\x1f\x8b", "gzip archive", "unpack it first"),
+    (b"BZh", "bzip2 archive", "unpack it first"),
+    (b"7z\xbc\xaf", "7-Zip archive", "unpack it first"),
+    (b"Rar!", "RAR archive", "unpack it first"),
+    (b"<?xml", "XML document", ""),
+    (b"{\\rtf", "RTF document", ""),
+)
+
+
+def reject_unsupported(file: SurfaceFile, _options: ReadingOptions) -> None:
+    """Refuse a file of a known format that holds no surface, with a remedy.
+
+    Raises:
+        SurfaceFileError: the file has such a format.
+    """
+    if file.head.startswith(ZIP_MAGIC) and classify_archive(file.path) == "NPZ":
+        raise SurfaceFileError(
+            f"{file.name} is an NPZ archive that asperity did not prepare;"
+            " save one array of heights as NPY"
+        )
+    found = _match_signature(file)
+    if found is not None:
+        raise _unsupported_error(file, f"a {found[0]}", found[1])
+
+
+def _match_signature(file: SurfaceFile) -> tuple[str, str] | None:
+    """Return the format and a remedy for a file with a known signature."""
+    for magic, kind, advice in _SIGNATURES:
+        # Text may start with the same two letters ("BMS profile ..."): require a binary byte too.
+        if file.head.startswith(magic) and (
+            len(magic) > 2 or b"\x00" in file.head[:64] or magic[0] < 32  # a control character
+        ):
+            return kind, advice
+    return None
+
+
+def unrecognised_error(file: SurfaceFile) -> SurfaceFileError:
+    """Return the error for a file that no reader recognises."""
+    if file.head.startswith(TIFF_MAGIC):
+        return _unsupported_error(file, "an instrument's TIFF file", _EXTRA_HINT)
+    advice = "" if has_library() else _EXTRA_HINT
+    if file.head.startswith(ZIP_MAGIC):
+        tail = f"; {advice}" if advice else ""
+        return SurfaceFileError(f"{file.name}: a zip archive without a main.xml is no X3P{tail}")
+    return _unsupported_error(file, "a binary file", advice)
+
+
+def _unsupported_error(file: SurfaceFile, kind: str, advice: str) -> SurfaceFileError:
+    tail = f"; {advice}" if advice else ""
+    return SurfaceFileError(
+        f"{file.name} looks like {kind}: not a surface format that asperity reads:"
+        f" {SUPPORTED_FORMATS}{tail}"
+    )
+
+
+def too_large_error(name: str, size: int, limit: int, what: str = "") -> SurfaceFileError:
+    """Return the error for a file that is too large for the memory."""
+    return SurfaceFileError(
+        f"{name} has {size / 1e9:.1f} GB{what}; at most {limit / 1e9:g} GB are read:"
+        " cut out a part, take every second point, or save as X3P or NPY in single precision"
+    )

@@ -1,0 +1,158 @@
+"""Registry of all claims in the order of the paper, and their evaluation."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import nullcontext
+from difflib import get_close_matches
+
+from asperity.core.errors import ParameterError
+from asperity.core.processes import limit_processes, precompute
+from asperity.paper.claim import DECLARED_CLAIMS, Claim, Result
+from asperity.paper.claims import (  # noqa: F401 - each module declares its claims
+    appendices,
+    conclusions,
+    design_limits,
+    experiment_statements,
+    formula_claims,
+    friction_law,
+    god_object_laws,
+    passivity_condition,
+    penetration_laws,
+    tables_and_remarks,
+)
+from asperity.paper.experiments import simulated_claims  # noqa: F401 - declares its claims
+
+Progress = Callable[[Result, int, int], None]
+"""Called after each claim with its result, the number of finished claims and their total."""
+
+
+def _paper_order(claim: Claim) -> tuple[bool, str, float]:
+    """Sort key: section (Roman numerals up to VI sort as text), then equation number."""
+    number = claim.id.removeprefix("eq-")
+    position = float(number) if number.isdecimal() else math.inf
+    return claim.section.startswith("App."), claim.section, position
+
+
+CLAIMS: dict[str, Claim] = {one.id: one for one in sorted(DECLARED_CLAIMS, key=_paper_order)}
+_PAPER_CLAIM_IDS = frozenset(CLAIMS)
+
+
+def register(new_claim: Claim) -> Claim:
+    """Register a user-defined claim.
+
+    Raises:
+        ParameterError: if the id is already in use.
+    """
+    if new_claim.id in CLAIMS:
+        raise ParameterError("claim", f"cannot be added: {new_claim.id!r} is taken")
+    CLAIMS[new_claim.id] = new_claim
+    return new_claim
+
+
+def get_claim(claim_id: str) -> Claim:
+    """Return a claim by its id.
+
+    Raises:
+        ParameterError: if there is none; the message suggests similar ids.
+
+    Example:
+        >>> get_claim("eq-12").equations
+        ('(12)',)
+    """
+    if not isinstance(claim_id, str) or claim_id not in CLAIMS:
+        close = get_close_matches(str(claim_id).lower(), [known.lower() for known in CLAIMS], n=3)
+        close.append(f"eq-{str(claim_id).strip('() ')}")
+        near = [known for known in CLAIMS if known.lower() in close]
+        hint = f"did you mean {' or '.join(map(repr, near))}? " if near else ""
+        listing = "run without it to list them; fig-3 selects the claims of a figure"
+        raise ParameterError(
+            "claim", f"is unknown: {claim_id!r}; {hint}there are {len(CLAIMS)} claims: {listing}"
+        )
+    return CLAIMS[claim_id]
+
+
+def find_claims(reference: str) -> tuple[Claim, ...]:
+    """Return the claims selected by a reference, in the order of the paper.
+
+    Args:
+        reference: an id, the first words of several ids ("table-1"), or a place in the paper:
+            "fig-3", "Fig. 3", "(12)", "Remark 6".
+
+    Raises:
+        ParameterError: if there is none; the message suggests similar ids.
+
+    Example:
+        >>> [found.id for found in find_claims("fig-5")]
+        ['sentence-V.A-cycles', 'sentence-V.A-settles']
+    """
+    if isinstance(reference, str) and reference not in CLAIMS:
+        wanted = _normalize_reference(reference)
+        found = tuple(one for one in CLAIMS.values() if wanted in _claim_references(one))
+        if wanted and found:
+            return found
+    return (get_claim(reference),)
+
+
+def _normalize_reference(text: str) -> str:
+    """Return the canonical form of a reference: "fig3", "remark6", "12"."""
+    return re.sub(r"[^a-z0-9]", "", text.lower()).replace("figure", "fig")
+
+
+def _claim_references(entry: Claim) -> set[str]:
+    """Return the references that select a claim, including the figures its statement names."""
+    figures = re.findall(r"Fig\. \d+", entry.statement)
+    parts = entry.id.split("-")
+    prefixes = ["-".join(parts[:count]) for count in range(1, len(parts))]
+    return {_normalize_reference(text) for text in (*entry.equations, *figures, *prefixes)}
+
+
+def reproduce_claims(
+    ids: Iterable[str] | None = None, progress: Progress | None = None, workers: int | None = None
+) -> tuple[Result, ...]:
+    """Compute claims and return their results in the order of the paper.
+
+    Args:
+        ids: references, see :func:`find_claims`; all claims by default.
+        progress: called after each claim.
+        workers: number of processes; 1 by default, one per core on the command line.
+
+    Raises:
+        ParameterError: if an id is unknown or ``workers`` is not a positive integer.
+
+    Example:
+        >>> [result.verdict for result in reproduce_claims(["eq-10", "eq-12"])]
+        ['holds with correction', 'holds']
+    """
+    count = 1 if workers is None else workers
+    if isinstance(count, bool) or count != int(count) or count < 1:
+        raise ParameterError("workers", "must be a whole number, 1 or more", workers)
+    if isinstance(ids, str):
+        raise ParameterError("ids", "must be a sequence of ids, not one text", ids)
+    wanted = None if ids is None else {found.id for given in ids for found in find_claims(given)}
+    names = [name for name in CLAIMS if wanted is None or name in wanted]
+    results = []
+    with nullcontext() if workers is None else limit_processes(int(count)):
+        for result in _compute_results(names):
+            results.append(result)
+            if progress is not None:
+                progress(result, len(results), len(names))
+    return tuple(results)
+
+
+def _run_claim(claim_id: str) -> Result:
+    return CLAIMS[claim_id].run()
+
+
+def _compute_results(claim_ids: list[str]) -> Iterator[Result]:
+    """Yield results in order; other processes may have computed them already."""
+    with precompute(_run_in_worker, claim_ids) as precomputed:
+        for name, found in zip(claim_ids, precomputed, strict=True):
+            yield _run_claim(name) if found is None else found
+
+
+def _run_in_worker(claim_id: str) -> Result | None:
+    """Compute a claim of the paper; user-defined claims are unknown to worker processes."""
+    return _run_claim(claim_id) if claim_id in _PAPER_CLAIM_IDS else None

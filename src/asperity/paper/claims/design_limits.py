@@ -1,0 +1,304 @@
+"""Section II.B: the six limits, checked by their meaning and by their dimensions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from asperity.core.checks import FloatArray
+from asperity.paper.claim import (
+    SCALED_FORCES,
+    Check,
+    check_statement,
+    combine_checks,
+    declare_claim,
+)
+from asperity.paper.formula_checks import max_difference_quotients
+from asperity.paper.planar_cases import random_settings
+from asperity.surface import Surface
+from asperity.textures.kinds.sinusoid import Sinusoid
+
+# Exponents of metre, second and newton.
+_DIMENSIONS: dict[str, tuple[int, int, int]] = {
+    "v": (1, -1, 0),
+    "T": (0, 1, 0),
+    "l": (1, 0, 0),
+    "delta": (1, 0, 0),
+    "b": (0, 0, 1),
+    "force": (0, 0, 1),
+    "A": (1, 0, 0),
+    "stiffest": (-1, 0, 1),
+    "k": (-1, 0, 1),
+    "resonance": (0, -1, 0),
+    "alpha": (0, 0, 0),
+    "beta": (0, 0, 0),
+    "gamma": (0, 0, 0),
+    "q": (0, 0, 0),
+}
+Quantities = Mapping[str, float]
+Inequality = Callable[[Quantities], tuple[float, float]]
+_CASES = 400
+_SCANS = 100
+
+
+def unit_invariant_share(inequality: Inequality, seed: int) -> float:
+    """Return the share of random cases in which a change of units leaves an inequality as it is."""
+    draw = np.random.default_rng(seed)
+    same = 0
+    for _ in range(_CASES):
+        values = {name: float(10.0 ** draw.uniform(-2.0, 2.0)) for name in _DIMENSIONS}
+        scale = 10.0 ** draw.uniform(-3.0, 3.0, 3)
+        other = {
+            name: value * float(np.prod(scale ** np.array(_DIMENSIONS[name])))
+            for name, value in values.items()
+        }
+        left, right = inequality(values)
+        other_left, other_right = inequality(other)
+        same += (left < right) == (other_left < other_right)
+    return same / _CASES
+
+
+def _check_dimensions(
+    printed: Inequality, corrected: Inequality | None = None, correction: str = ""
+) -> Check:
+    """Check that both sides of an inequality have the same dimension."""
+    share = unit_invariant_share(printed, 1)
+    corrected_share = None if corrected is None else unit_invariant_share(corrected, 1)
+    tail = f", corrected in {corrected_share:.2f}" if corrected and share < 1.0 else ""
+    return check_statement(
+        f"unchanged by other units in {share:.2f} of {_CASES} cases{tail}",
+        printed=share == 1.0,
+        corrected=None if corrected is None else corrected_share == 1.0,
+        correction=correction,
+        share_as_printed=share,
+    )
+
+
+def _min_sample_count(step: float, length: float) -> int:
+    """Return the least number of grid points in a half-open window of a given length."""
+    starts = step * (np.arange(200) + 0.5) / 200
+    grid = step * np.arange(math.ceil(2.0 * length / step) + 3)
+    inside = (grid >= starts[:, None]) & (grid < starts[:, None] + length)
+    return int(inside.sum(axis=1).min())
+
+
+# The limits as printed: left and right side.
+PRINTED_LIMITS: dict[int, Inequality] = {
+    1: lambda v: (v["alpha"] * v["v"] * v["T"] / v["l"], 1.0),
+    2: lambda v: (v["beta"] * v["delta"] / v["l"], 1.0),
+    3: lambda v: (v["alpha"] * v["delta"] / v["l"], 1.0),
+    4: lambda v: (v["gamma"] * v["b"] / v["l"], v["force"]),
+    5: lambda v: (2.0 * math.pi * v["A"] / v["l"], v["stiffest"]),
+    6: lambda v: (v["v"] / v["l"], v["resonance"]),
+}
+CORRECTED_LIMITS: dict[int, Inequality] = {
+    4: lambda v: (v["gamma"] * v["b"], v["force"]),
+    5: lambda v: (v["q"] * v["k"], v["stiffest"]),
+}
+
+
+def reconstruction_error(step: float, length: float, *, is_quantized: bool) -> float:
+    """Return the RMS error of A's force along a sampled sinusoid, over its RMS variation.
+
+    The probe moves along a texture of period ``length`` at half the greatest depth. The force is
+    held from step to step, or computed at the position that an encoder reads (``is_quantized``).
+    """
+    surface = Surface(Sinusoid(0.1 * length, length), "A", max_depth=length)
+    x = np.linspace(0.0, 40.0 * length, 8001)[1:-1]
+    at = step * (np.floor(x / step + 0.5) if is_quantized else np.floor(x / step))
+
+    def force(positions: FloatArray) -> FloatArray:
+        points = np.column_stack([positions, 0 * x, np.full(len(x), -0.5 * length)])
+        return surface.force(points)[:, 2]
+
+    return float(np.std(force(at) - force(x)) / np.std(force(x)))
+
+
+def _check_reconstruction(
+    inequality: Inequality,
+    sample_name: str,
+    step: Callable[[Quantities], float],
+    seed: int,
+    *,
+    is_quantized: bool,
+) -> Check:
+    """Check that an inequality holds exactly where the kernel's force is reconstructed well enough.
+
+    That is, with a smaller error than from the required number of samples per period.
+    """
+    draw, wrong = np.random.default_rng(seed), 0
+    for _ in range(_SCANS):
+        wanted = float(draw.uniform(5.0, 10.0))
+        values = {name: float(draw.uniform(0.5, 2.0)) for name in _DIMENSIONS}
+        values |= {"alpha": wanted, "beta": wanted}
+        values["l"] = step(values) * wanted * float(draw.choice([0.95, 1.05]))
+        enough = reconstruction_error(1.0 / wanted, 1.0, is_quantized=is_quantized)
+        good = reconstruction_error(step(values), values["l"], is_quantized=is_quantized) < enough
+        left, right = inequality(values)
+        wrong += (left < right) != good
+    return check_statement(
+        f"wrong about whether the force of A is known better than from the required number of "
+        f"{sample_name} in {wrong} of {_SCANS} random scans",
+        printed=wrong == 0,
+        wrong_scans=float(wrong),
+    )
+
+
+def _check_sample_count(
+    inequality: Inequality,
+    sample_name: str,
+    step: Callable[[Quantities], float],
+    window: str,
+    seed: int,
+) -> Check:
+    """Check that an inequality holds exactly if every window contains enough samples.
+
+    Samples are ``step`` apart; the window length is the quantity named ``window``.
+    """
+    draw = np.random.default_rng(seed)
+    wrong = 0
+    for _ in range(200):
+        wanted = int(draw.integers(5, 11))
+        values = {name: float(draw.uniform(0.5, 2.0)) for name in _DIMENSIONS}
+        values |= {"alpha": wanted, "beta": wanted, "gamma": wanted}
+        values[window] = step(values) * float(draw.uniform(3.0, 14.0))
+        left, right = inequality(values)
+        wrong += (left < right) != (_min_sample_count(step(values), values[window]) >= wanted)
+    return check_statement(
+        f"wrong about whether there are enough {sample_name} in {wrong} of 200 random cases",
+        printed=wrong == 0,
+        wrong_cases=float(wrong),
+    )
+
+
+@declare_claim("limit-1", "II.B", "Limit 1", flips_under="½ α v T/l < 1")
+def limit_1() -> Check:
+    """Scanning velocity: α v T/l < 1.
+
+    Checked with a force that is held from update to update.
+    """
+    limit = PRINTED_LIMITS[1]
+    reconstruction = _check_reconstruction(
+        limit, "updates per period", lambda v: v["v"] * v["T"], 2, is_quantized=False
+    )
+    return combine_checks(reconstruction, _check_dimensions(limit))
+
+
+@declare_claim("limit-2", "II.B", "Limit 2", flips_under="½ β δ/l < 1")
+def limit_2() -> Check:
+    """Low speed reconstruction: β δ/l < 1.
+
+    Checked with a force computed at the position that an encoder reads.
+    """
+    limit = PRINTED_LIMITS[2]
+    reconstruction = _check_reconstruction(
+        limit, "steps of position per period", lambda v: v["delta"], 3, is_quantized=True
+    )
+    return combine_checks(reconstruction, _check_dimensions(limit))
+
+
+@declare_claim("limit-3", "II.B", "Limit 3", flips_under="α (δ + v T)/l < 1")
+def limit_3() -> Check:
+    """High speed reconstruction: α δ/l < 1, one more limit.
+
+    With α in place of β; checked for cases in which it differs from limit 2.
+    """
+    rng, differing, merged, count = np.random.default_rng(4), 0, 0, 4000
+
+    def holds(number: int, values: Quantities) -> bool:
+        left, right = PRINTED_LIMITS[number](values)
+        return left < right
+
+    for _ in range(count):
+        values = {name: float(10.0 ** rng.uniform(-2.0, 1.0)) for name in _DIMENSIONS}
+        greater = max(values["alpha"], values["beta"])
+        merged += (holds(2, values) and holds(3, values)) == (
+            greater * values["delta"] < values["l"]
+        )
+        values["beta"] = values["alpha"]
+        differing += holds(2, values) != holds(3, values)
+    return combine_checks(
+        _check_sample_count(
+            PRINTED_LIMITS[3], "steps of position per period", lambda v: v["delta"], "l", 5
+        ),
+        check_statement(
+            f"with α = β it differs from limit 2 in {differing} of {count} random cases",
+            printed=differing > 0,
+            corrected=merged == count,
+            correction="2 and 3 are one condition: max(α, β) δ < l",
+            cases_in_which_they_differ=float(differing),
+        ),
+    )
+
+
+@declare_claim("limit-4", "II.B", "Limit 4", flips_under="γ b < A")
+def limit_4() -> Check:
+    """Force reconstruction: γ b/l < A.
+
+    Checked with steps of force.
+    """
+    return combine_checks(
+        _check_sample_count(
+            CORRECTED_LIMITS[4],
+            "steps of force in an amplitude (corrected)",
+            lambda v: v["b"],
+            "force",
+            6,
+        ),
+        _check_dimensions(
+            PRINTED_LIMITS[4],
+            CORRECTED_LIMITS[4],
+            "γ b < A_F, the amplitude of the force: the length has no place in it",
+        ),
+    )
+
+
+@declare_claim("limit-5", "II.B", "Limit 5", flips_under=SCALED_FORCES)
+def limit_5() -> Check:
+    """Gain: 2πA/l < A₀.
+
+    Checked with the greatest slope of the force of every law.
+    """
+    shares = max_difference_quotients(8)
+    best, worst = min(shares.values()), max(shares.values())
+    return combine_checks(
+        _check_dimensions(
+            PRINTED_LIMITS[5],
+            CORRECTED_LIMITS[5],
+            "q k <= K₀, the stiffest smooth wall; for A q is close to 2πA/l",
+        ),
+        check_statement(
+            "the greatest difference of forces of 4250 pairs of probes is, for A, B, C, E, G, "
+            f"{best:.6f} to {worst:.6f} q k per length",
+            printed=worst <= 1.0 + 1e-6 and best > 0.97,
+            numbers={f"greatest share for {law}": share for law, share in shares.items()},
+        ),
+    )
+
+
+@declare_claim("limit-6", "II.B", "Limit 6", flips_under="v l < F₀")
+def limit_6() -> Check:
+    """Structure of the device: v/l < F₀.
+
+    Checked with the frequency of the force while scanning.
+    """
+    error = 0.0
+    for case in random_settings(4, 17):
+        surface, v = case.surface("C"), 0.07
+        duration = 16 * case.period / v
+        time = np.arange(4096) * duration / 4096
+        path = np.column_stack([v * time, 0 * time, np.full(len(time), -1.5 * case.amplitude)])
+        for force in surface.force(path)[:, [0, 2]].T:
+            spectrum = np.abs(np.fft.rfft(force - force.mean()))
+            frequency = float(np.argmax(spectrum)) / duration
+            error = max(error, abs(frequency * case.period / v - 1.0))
+    return combine_checks(
+        check_statement(
+            f"the force of C scanned at v is strongest at v/l within {error:.1e}",
+            printed=error < 1e-9,
+            error=error,
+        ),
+        _check_dimensions(PRINTED_LIMITS[6]),
+    )

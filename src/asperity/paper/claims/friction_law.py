@@ -1,0 +1,419 @@
+"""Section IV.F: friction modulated by the texture.
+
+Here the paper's h = A sin(2πx/l) is dimensionless, with A a number. In comparisons with the
+package's law, the paper's h is the law's modulation m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from asperity.analysis.energy.loop_integral import loop_work
+from asperity.core.checks import FloatArray
+from asperity.paper.claim import (
+    SCALED_FORCES,
+    SCALED_JACOBIANS,
+    Check,
+    check_observation,
+    check_statement,
+    check_values,
+    combine_checks,
+    declare_claim,
+)
+from asperity.paper.formula_checks import Potential, numerical_gradient
+from asperity.paper.planar_cases import (
+    SCANNING,
+    ExperimentCase,
+    friction_path,
+    generic_probes,
+    random_settings,
+)
+from asperity.surface import Surface
+from asperity.textures.kinds.sinusoid import Sinusoid
+
+_TWO_PI = 2.0 * math.pi
+
+
+@dataclass(frozen=True)
+class FrictionCase:
+    """Parameters of the paper's law F: friction, d_max [m], A [1], l [m], |p^z| [m]."""
+
+    friction: float
+    deflection: float
+    amplitude: float
+    period: float
+    depth: float
+
+    def modulation(self, x: Any, order: int = 0) -> Any:
+        """Return h = A sin(2πx/l), or its derivative."""
+        import mpmath
+
+        wave = _TWO_PI / self.period
+        return self.amplitude * wave**order * mpmath.sin(wave * x + order * mpmath.pi / 2)
+
+    def surface(self) -> Surface:
+        """Return this law as a surface, with twice the friction: 2μ(1 - m) = μ(1 - h).
+
+        The modulation is m = (1 + A sin(2πx/l))/2, whatever the height of the texture.
+        """
+        parameters = self.depth, 2.0 * self.friction, self.deflection, self.amplitude
+        return Surface(Sinusoid(1e-4, self.period), "F", 1.0, *parameters)
+
+    def compiled_jacobians(self, count: int) -> FloatArray:
+        """Return J/κ₀ in x and z by the kernel at the depth p^z, shape (2, 2, count, 2, 2).
+
+        The first axes are: sliding and sticking; d = -d_max and d_max; points along a period.
+        """
+        surface, x = self.surface(), np.linspace(0.0, self.period, count)
+        points = np.column_stack([x, 0 * x, np.full(count, -self.depth)])
+        phases = [
+            [
+                surface.jacobian(
+                    points, np.outer(np.full(count, d), [1, 0]), np.full(count, slides)
+                )
+                for d in (-self.deflection, self.deflection)
+            ]
+            for slides in (True, False)
+        ]
+        return np.array(phases)[..., ::2, ::2]
+
+
+PAPER_CASE = FrictionCase(0.8, 1e-3, 0.8, 1e-3, 1e-3)
+"""Section V.A, where the paper uses A = 0.8 mm for the dimensionless A: in millimetres, 0.8."""
+SCANNING_CASE = replace(PAPER_CASE, period=SCANNING.period)
+
+
+def random_friction_cases(count: int = 4, seed: int = 7) -> Iterator[FrictionCase]:
+    """Yield random parameter sets with 0 < A < 1."""
+    draw = np.random.default_rng(seed)
+    for _ in range(count):
+        yield FrictionCase(
+            friction=draw.uniform(0.1, 1.2),
+            deflection=draw.uniform(0.1e-3, 3e-3),
+            amplitude=draw.uniform(0.1, 0.95),
+            period=draw.uniform(0.5e-3, 4e-3),
+            depth=draw.uniform(0.1e-3, 2e-3),
+        )
+
+
+def sticking_entries(r: FrictionCase) -> tuple[float, float]:
+    """Return the entries (1, 1) and (1, 2) of the printed (26) over -κ₀."""
+    a = 2.0 * r.friction * r.depth * (1.0 / r.deflection + math.pi * r.amplitude / r.period)
+    return a, 2.0 * r.friction
+
+
+def matrix_norm(a: float, b: float) -> float:
+    """Return ‖[[a, b], [0, 1]]‖."""
+    return float(np.linalg.norm(np.array([[a, b], [0.0, 1.0]]), 2))
+
+
+def sticking_norm(case: FrictionCase) -> float:
+    """Return the norm of the printed (26) over κ₀."""
+    return matrix_norm(*sticking_entries(case))
+
+
+# --- field and Jacobian ---------------------------------------------------------------------------
+
+
+@declare_claim("eq-22", "IV.F", "(22)", flips_under=SCALED_FORCES)
+def field_f() -> Check:
+    """Force of F: the wall, and friction that h modulates.
+
+    Compared with the definition, and by the work of friction on a sliding probe.
+    """
+    correction = "the x part with a plus sign: friction must oppose the deflection"
+    force = _check_force(9, lambda pull, _share: -pull, lambda pull, _share: pull, correction)
+    return combine_checks(force, _check_sliding_work(correction))
+
+
+@declare_claim("table-1-F", "IV", "Table I", flips_under=SCALED_FORCES)
+def table_one_f() -> Check:
+    """Force of F (Fig. 2): [-κ(x) d, -κ₀ d].
+
+    With κ(x) = μκ₀(1 - h), d = p^z.
+    """
+    correction = "the x part times -d^x/d_max"
+    return _check_force(
+        19, lambda pull, share: -pull / share, lambda pull, _share: pull, correction
+    )
+
+
+FrictionFormula = Callable[[float, float], float]
+
+
+def _check_force(
+    seed: int, printed: FrictionFormula, corrected: FrictionFormula, correction: str
+) -> Check:
+    """Compare formulas for f_x with the definition and the kernel.
+
+    Their arguments are μκ₀(1 - m) p^z d/d_max and d/d_max.
+    """
+    from asperity.reference import exact_force
+
+    rng = np.random.default_rng(seed)
+    printed_forces, corrected_forces, reference = [], [], []
+    for spot in generic_probes("F"):
+        surface = spot.surface
+        k, middle, half = surface.law_arguments[:3]
+        m = 0.5 * (1.0 + surface.modulation_depth * (spot.h - middle) / half)
+        share = rng.uniform(-1.0, 1.0)
+        pull = k * surface.friction * (1.0 - m) * spot.z * share
+        probe, d = [spot.x, 0.0, spot.z], [share * surface.max_deflection, 0.0]
+        exact, kernel = exact_force(surface, probe, d), surface.force([probe], [d])[0]
+        printed_forces += [[printed(pull, share), -k * spot.z]] * 2
+        corrected_forces += [[corrected(pull, share), -k * spot.z]] * 2
+        reference += [[float(exact[0]), float(exact[2])], [kernel[0], kernel[2]]]
+    return check_values(
+        "force of F at 4 generic probes, by definition and kernel",
+        printed=printed_forces,
+        corrected=corrected_forces,
+        reference=reference,
+        correction=correction,
+    )
+
+
+def _check_sliding_work(correction: str) -> Check:
+    """Check the sign of friction by 1 mm of sliding with d = d_max at 1 mm depth and h = 0."""
+    work = SCANNING.stiffness * SCANNING.friction * 1e-3 * 1e-3
+    return check_statement(
+        f"work of the printed friction over 1 mm of sliding {work * 1e3:+.2f} mJ",
+        printed=work < 0.0,
+        corrected=-work < 0.0,
+        correction=correction,
+        work_as_printed=work,
+    )
+
+
+@declare_claim("eq-23", "IV.F", "(23)", flips_under=SCALED_JACOBIANS)
+def jacobian_f() -> Check:
+    """Jacobian of F.
+
+    Compared with differences of (22) as printed, and, with opposite friction, with the kernel.
+    """
+    rng = np.random.default_rng(13)
+    printed, corrected, reference = [], [], []
+    for case in random_friction_cases(6):
+        x, d = rng.uniform(0.0, case.period), rng.uniform(-1.0, 1.0) * case.deflection
+        for rate in (1.0, 0.0):  # sticking, sliding
+            force = _printed_force_components(case, x, d, rate)
+            probe = [x, 0.0, -case.depth]
+            kernel = case.surface().jacobian([probe], [[d, 0.0]], np.array([rate == 0.0]))[0]
+            # The kernel's friction opposes the motion, see (22).
+            mirrored = kernel[np.ix_([0, 2], [0, 2])] * [[-1.0], [1.0]]
+            reference += [[numerical_gradient(part, 0.0, -case.depth) for part in force], mirrored]
+            h, slope = float(case.modulation(x)), float(case.modulation(x, 1))
+            printed += [_printed_jacobian(case, d, h, rate, slope)] * 2
+            corrected += [_printed_jacobian(case, d, h, rate, slope * d)] * 2
+    return check_values(
+        "Jacobian of (22) and of its kernel at 12 random states",
+        printed=printed,
+        corrected=corrected,
+        reference=reference,
+        correction="h' must be h' d^x (as printed it has another dimension)",
+    )
+
+
+def _printed_force_components(
+    r: FrictionCase, x: float, d: float, rate: float
+) -> tuple[Potential, Potential]:
+    def friction(dx: Any, z: Any) -> Any:
+        share = 1 - r.modulation(x + dx)
+        return -r.friction * share * (d + rate * dx) / r.deflection * z
+
+    return friction, lambda _dx, z: -z
+
+
+def _printed_jacobian(
+    r: FrictionCase, d: float, h: float, rate: float, slope: float
+) -> list[list[float]]:
+    """Return (23) over κ₀ with ``slope`` in the place of h'."""
+    first = r.friction * -r.depth / r.deflection * (rate - h * rate - slope)
+    return [[-first, -r.friction * (1.0 - h) * d / r.deflection], [0.0, -1.0]]
+
+
+@declare_claim(
+    "eq-24", "IV.F", "(24)", flips_under="an anchor that is dragged from twice the deflection on"
+)
+def stick_slip_phases() -> Check:
+    """d follows the probe while d < d_max and does not change while d = d_max.
+
+    Checked with the package's anchor on a path forth and back.
+    """  # noqa: D403 - a symbol
+    case = random_settings(1, 21)[0]
+    surface = case.surface("F", modulation_depth=0.0)
+    reach = case.deflection
+    x = np.concatenate([np.linspace(0.0, 3.3, 1001), np.linspace(3.3, -1.7, 1489)[1:]]) * reach
+    path = np.column_stack([x, 0.0 * x, np.full(len(x), -case.depth)])
+    force = surface.trace(path)
+    d = -force[:, 0] * reach / (0.5 * case.friction * force[:, 2])
+    rate = np.diff(d) / np.diff(x)
+    # Steps in which sticking ends are excluded: they belong to neither phase.
+    pure = (np.abs(rate) < 1e-6) | (np.abs(rate - 1.0) < 1e-6)
+    end, rate = d[1:][pure], rate[pure]
+    is_sliding = np.abs(rate) < 0.5
+    forward = is_sliding == (np.abs(end - reach) < 1e-9 * reach)
+    both = is_sliding == (np.abs(np.abs(end) - reach) < 1e-9 * reach)
+    return check_statement(
+        f"of {len(end)} steps forth and back d = d_max tells slip from stick in "
+        f"{forward.mean():.3f}, |d| = d_max in {both.mean():.3f}",
+        printed=bool(forward.all() and len(pure) - pure.sum() <= 3),
+        corrected=bool(both.all() and len(pure) - pure.sum() <= 3),
+        correction="|d^x| in place of d^x: the anchor is dragged both ways",
+        share_as_printed=float(forward.mean()),
+        share_with_absolute_value=float(both.mean()),
+    )
+
+
+def _max_entries(r: FrictionCase) -> FloatArray:
+    """Return the greatest entries (1, 1) and (1, 2) by the kernel: sliding, then sticking.
+
+    Both are linear in d, so they are greatest at |d| = d_max.
+    """
+    return np.asarray(np.abs(r.compiled_jacobians(40001)[..., 0, :]).max(axis=(1, 2)))
+
+
+@declare_claim("eq-25", "IV.F", "(25)", flips_under=SCALED_JACOBIANS)
+def sliding_entries_bound() -> Check:
+    """Greatest entries of F's Jacobian while sliding."""
+    cases = [PAPER_CASE, *random_friction_cases()]
+    first = [_TWO_PI * r.friction * r.depth * r.amplitude / r.period for r in cases]
+    second = [r.friction * (1.0 + r.amplitude) for r in cases]
+    return check_values(
+        "greatest entries while sliding, 5 parameter sets",
+        printed=np.column_stack([first, [2.0 * r.friction for r in cases]]),
+        corrected=np.column_stack([first, second]),
+        reference=np.array([_max_entries(r)[0] for r in cases]),
+        tolerance=1e-8,
+        correction="bounds, entry by entry: (1,2) is at most μ(1 + A) for h = A sin, and μ "
+        "where 0 <= h <= 1 as (22) assumes",
+    )
+
+
+@declare_claim("eq-26", "IV.F", "(26)", flips_under=SCALED_JACOBIANS)
+def sticking_entries_bound() -> Check:
+    """Greatest entries of F's Jacobian while sticking."""
+    cases = [PAPER_CASE, *random_friction_cases()]
+    printed = np.array([sticking_entries(case) for case in cases])
+    reference = np.array([_max_entries(case)[1] for case in cases])
+    entries = check_values(
+        "greatest entries while sticking, 5 parameter sets",
+        printed=printed,
+        corrected=[_corrected_sticking_entries(case) for case in cases],
+        reference=reference,
+        tolerance=1e-8,
+        correction="a bound, entry by entry: the greatest are "
+        "μp/d_max (1 + A √(1 + (2πd_max/l)²)) and μ(1 + A)",
+    )
+    ratios = printed / reference
+    bound = check_statement(
+        f"as bounds the entries exceed the greatest {ratios.min():.2f} to {ratios.max():.2f} times",
+        printed=ratios.min() >= 1.0,
+        ratios_to_the_greatest=ratios.ravel().tolist(),
+    )
+    return combine_checks(entries, bound)
+
+
+def _corrected_sticking_entries(r: FrictionCase) -> tuple[float, float]:
+    variation = r.amplitude * math.hypot(1.0, _TWO_PI * r.deflection / r.period)
+    gain = r.friction * r.depth / r.deflection
+    return gain * (1.0 + variation), r.friction * (1.0 + r.amplitude)
+
+
+# --- energy ---------------------------------------------------------------------------------------
+
+
+@declare_claim("sentence-IV.F-deflections", "IV.F", flips_under="an observation that confirms it")
+def deflection_range() -> Check:
+    """Realistic d_max go from 1e-2 m (tissue) to 1e-6 m (metal)."""
+    return check_observation("a statement on real materials: nothing here can be computed")
+
+
+@declare_claim("eq-27", "IV.F", "(27)", flips_under=SCALED_FORCES)
+def energy_f() -> Check:
+    """Energy of F without texture around its path of Fig. 3.
+
+    Without texture, twice the friction makes the law's m = 1/2 equal to the paper's h = 0.
+    """
+    cases, share = [SCANNING, *random_settings(4)], 0.2
+    printed, reference, limit = [], [], 0.0
+    for case in cases:
+        surface = _untextured_surface(case)
+        whole = 0.5 * case.stiffness * case.friction * case.depth * case.deflection
+        printed.append(whole)
+        reference.append(loop_work(surface, friction_path(case, share * case.depth)))
+        shallow = loop_work(surface, friction_path(case, 1e-7 * case.depth))
+        limit = max(limit, abs(shallow / whole - 1.0))
+    return combine_checks(
+        check_values(
+            f"energy around the path with a = {share:g} d_max^z, {len(cases)} parameter sets",
+            printed=printed,
+            corrected=np.array(printed) * (1.0 - share),
+            reference=reference,
+            correction="κ₀μ/2 · d_max^x (d_max^z - a): the printed energy is the limit a → 0",
+        ),
+        check_statement(
+            f"with a = 1e-7 d_max^z the printed energy is off by {limit:.1e}",
+            printed=limit < 1e-6,
+            error_in_the_limit=limit,
+        ),
+    )
+
+
+def _untextured_surface(case: ExperimentCase) -> Surface:
+    """Return law F without texture, for which m = 1/2, as in the paper for h = 0."""
+    return case.surface("F", modulation_depth=0.0, friction=2.0 * case.friction)
+
+
+@declare_claim("sentence-IV.F-stick", "IV.F", flips_under="law W in the place of F")
+def sticking_generates_energy() -> Check:
+    """F generates energy while sticking only, which is at most 2 d_max wide."""
+    case = SCANNING
+    surface, reach = case.surface("F"), case.deflection
+    x = np.concatenate([np.linspace(0.0, 4.0, 8001), np.linspace(4.0, -2.0, 12001)[1:]]) * reach
+    path = np.column_stack([x, 0.0 * x, np.full(len(x), -case.depth)])
+    force = surface.trace(path)[:, 0]
+    gain = 0.5 * (force[1:] + force[:-1]) * np.diff(x)
+    d = _anchor_deflection(x, reach)
+    sliding = np.abs(np.abs(d[1:]) - reach) + np.abs(np.abs(d[:-1]) - reach) < 1e-9 * reach
+    slip_gain, stick_gain = float(gain[sliding].max()), float(gain[~sliding].max())
+    back = np.flatnonzero(~sliding & (np.arange(len(gain)) >= 8000))
+    width = float(np.abs(np.diff(x)[back]).sum()) / reach
+    return check_statement(
+        f"greatest gain of a sliding step {slip_gain * 1e9:+.3g} nJ, of a sticking step "
+        f"{stick_gain * 1e9:+.3g} nJ; after turning it sticks over {width:.3f} d_max",
+        printed=slip_gain < 0.0 < stick_gain and width <= 2.0 + 1e-3,
+        sliding=slip_gain,
+        sticking=stick_gain,
+        width_over_d_max=width,
+    )
+
+
+def _anchor_deflection(x: FloatArray, max_deflection: float) -> FloatArray:
+    """Return the deflection along a path by (24), |d| <= d_max."""
+    d = np.zeros(len(x))
+    for i in range(1, len(x)):
+        d[i] = min(max(d[i - 1] + x[i] - x[i - 1], -max_deflection), max_deflection)
+    return d
+
+
+@declare_claim(
+    "sentence-IV.F-compliant", "IV.F", flips_under="work around a path times 1 plus 0.001 J"
+)
+def compliant_materials() -> Check:
+    """The energy that is not conserved is proportional to d_max, as with d_max = 1 cm."""
+    energies = []
+    for deflection in (1e-3, 1e-2):
+        case = replace(SCANNING, deflection=deflection)
+        path = friction_path(case, 1e-7 * case.depth)
+        energies.append(loop_work(_untextured_surface(case), path))
+    ratio, energy = energies[1] / energies[0], energies[1] * 1e3
+    return check_statement(
+        f"d_max from 1 mm to 1 cm multiplies the energy by {ratio:.6f}, to {energy:.2f} mJ",
+        printed=abs(ratio - 10.0) < 1e-6,
+        energies=energies,
+    )

@@ -1,0 +1,254 @@
+"""Sections IV.D and IV.E and appendix II: the two god-object laws."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from asperity.analysis.energy.continuity import continuity
+from asperity.analysis.energy.loop_integral import loop_work
+from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
+from asperity.paper.claim import (
+    SCALED_FORCES,
+    Check,
+    check_statement,
+    check_values,
+    combine_checks,
+    declare_claim,
+)
+from asperity.paper.claims.formula_claims import FormulaRow
+from asperity.paper.formula_checks import (
+    Potential,
+    check_curl,
+    check_energy_sign,
+    check_potential,
+    compute_q,
+    segment_work,
+)
+from asperity.paper.planar_cases import (
+    BUMP,
+    PASSIVITY,
+    SCANNING,
+    SETTINGS,
+    ExperimentCase,
+    ProbePoint,
+    find_closest_point,
+    generic_probes,
+    groove_path,
+    path_points,
+    random_settings,
+)
+
+# --- D --------------------------------------------------------------------------------------------
+
+
+@declare_claim("eq-16", "IV.D", "(16)", flips_under=SCALED_FORCES)
+def potential_d() -> Check:
+    """Potential of D."""
+
+    def potential(probe: ProbePoint) -> Potential:
+        def value(x: Any, z: Any) -> Any:
+            closest = find_closest_point(probe.surface, x, z, 60)
+            return -probe.k * ((x - closest[0]) ** 2 + (z - closest[1]) ** 2) / 2
+
+        return value
+
+    return check_potential("D", potential, lambda s: 0.5 * s.distance**2)
+
+
+@declare_claim("eq-35", "App. II", "(35)", flips_under=SCALED_FORCES)
+def energy_function() -> Check:
+    """Energy function of D."""
+    return check_energy_sign("D", lambda s: 0.5 * s.distance**2)
+
+
+@declare_claim("eq-17", "IV.D", "(17)", flips_under=SCALED_FORCES)
+def field_d() -> Check:
+    """Force of D, a spring to the nearest point; conservative.
+
+    Conservative also across the ridges where it jumps.
+    """
+    energy = max(
+        abs(loop_work(case.surface("D"), groove_path(case), 1e-10))
+        / (case.stiffness * case.amplitude**2)
+        for case in [SCANNING, *random_settings()]
+    )
+    loops = check_statement(
+        f"energy around the path {energy:.1e} of κ₀A²", printed=energy < 1e-7, loop=energy
+    )
+    row = FormulaRow(law="D", quantity="force", printed="[-k*rx, -k*rz]", conservative={"D": True})
+    return combine_checks(row.check(), loops)
+
+
+@declare_claim("eq-38", "App. II", "(38)", flips_under=SCALED_FORCES)
+def force_x_of_d() -> Check:
+    """f_x of D after (33) is used.
+
+    Including f_x = 0 where h' = 0.
+    """
+    row = FormulaRow(law="D", quantity="force", label="f_x of D", true="fx", printed="-k*rx")
+    share = 0.0
+    for case in random_settings():
+        for x, height in ((0.25, case.amplitude), (0.75, -case.amplitude)):
+            probe = [[x * case.period, 0.0, height - 0.7 * case.crest_radius]]
+            force = case.surface("D").force(probe)[0]
+            share = max(share, abs(float(force[0] / force[2])))
+    level = check_statement(
+        f"above crests' centres and over troughs f_x is {share:.1e} of f_z",
+        printed=share < 1e-9,
+        greatest_share=share,
+    )
+    return combine_checks(row.check(), level)
+
+
+@declare_claim("sentence-IV.D-singular", "IV.D", flips_under="D's Jacobian without curvature, (18)")
+def singular_d() -> Check:
+    """Moving at right angles to the penetration leaves D's force as it is."""
+    shares = []
+    for probe in generic_probes("D"):
+        x, z = probe.from_closest_point / probe.distance
+        for matrix in (probe.jacobian(), probe.compiled_jacobian()):
+            shares.append(float(np.linalg.norm(matrix @ [-z, x])) / probe.k)
+    return check_statement(
+        f"moving across, the force of D changes by {min(shares):.3f} to {max(shares):.3f} κ₀",
+        printed=max(shares) < 1e-9,
+        correction="only where the surface is not curved; else by κ₀ δκ/(1 + δκ) per length",
+        change_per_length_over_stiffness=shares,
+    )
+
+
+@declare_claim("sentence-IV.D-number", "IV.D", flips_under="law E in the place of D")
+def number_d() -> Check:
+    """‖J_D‖ = κ₀ whatever the surface, and q_D = 1."""
+    norms = [float(s.norms().max()) / s.k for s in generic_probes("D", 12)]
+    surface = PASSIVITY.surface("D")
+    q, plus = characteristic_number(surface), one_sided_number(surface)
+    shallow = characteristic_number(BUMP.surface("D", max_depth=0.8 * BUMP.crest_radius))
+    return check_statement(
+        f"‖J‖/κ₀ up to {max(norms):.3f} at 12 generic probes; sup {q.value} in V.A's setting, "
+        f"{shallow.value:.3f} at 0.8 of the crests' radius; q⁺ = {plus.value:g}",
+        printed=max(norms) <= 1.0 + 1e-9 and abs(q.value - 1.0) < 1e-9,
+        correction="1 is the one-sided number q⁺; with y = 4π²AD/l², q_D is 1 up to y = 1/2, "
+        "y/(1 - y) up to 1, then infinite",
+        greatest_norm=max(norms),
+        q=q.value,
+        q_at_0_8_of_the_radius=shallow.value,
+        one_sided_number=plus.value,
+    )
+
+
+@declare_claim("remark-6", "IV.D", "Remark 6", flips_under="law E in the place of D")
+def remark_6() -> Check:
+    """D's force jumps, on a sinusoid below its maxima (Fig. 2); its potential has a kink there."""
+    checks = [_check_jumps(name, case) for name, case in SETTINGS.items()]
+    return combine_checks(*checks, _check_potential_kink())
+
+
+def _check_jumps(name: str, case: ExperimentCase) -> Check:
+    """Check that the force of D jumps below the maxima only."""
+    surface = case.surface("D")
+    result = continuity(surface, characteristic_number(surface))
+    offset = max(
+        (abs((j.before[0] / case.period + 0.25) % 1.0 - 0.5) for j in result.jumps),
+        default=math.inf,
+    )
+    size = max((jump.size for jump in result.jumps), default=0.0)
+    return check_statement(
+        f"{name}: {len(result.jumps)} jumps located, up to {size:.2f} N, all within {offset:.1e} l "
+        f"of a maximum, from {case.crest_radius * 1e3:.3f} mm down",
+        printed=not result.continuous and offset < 1e-6,
+        numbers={
+            f"{name}: greatest jump [N]": size,
+            f"{name}: farthest from a maximum [l]": offset,
+        },
+    )
+
+
+def _check_potential_kink() -> Check:
+    """Check that the potential of D is continuous across the ridge but not differentiable."""
+    case = SCANNING
+    surface, crest = case.surface("D"), 0.25 * case.period
+    level, step = case.amplitude - case.depth, 1e-9
+    points = path_points((crest - step, level), (crest, level), (crest + step, level))
+    energy = 0.5 * case.stiffness * ((surface.texture.nearest(points) - points) ** 2).sum(axis=1)
+    left, right = np.diff(energy) / step
+    change = float(abs(energy[2] - energy[0]) / energy[1])
+    return check_statement(
+        f"across a ridge the potential changes by {change:.1e} of itself, its slope by "
+        f"{abs(right - left):.3f} N",
+        printed=change < 1e-6 and abs(right - left) > 1e-2,
+        change_of_slope=float(abs(right - left)),
+    )
+
+
+# --- E --------------------------------------------------------------------------------------------
+
+
+@declare_claim("eq-21", "IV.E", "(21)", flips_under=SCALED_FORCES)
+def norm_e() -> Check:
+    """‖J_E‖ = κ₀ and q_E = 1."""
+    probes = list(generic_probes("E", 6))
+    norms = check_values(
+        "norm of the Jacobian of E at 6 generic probes",
+        printed=[[probe.k, probe.k] for probe in probes],
+        reference=[probe.norms() for probe in probes],
+    )
+    q = compute_q(PASSIVITY, "E")
+    number = check_values("q_E in V.A's setting", printed=1.0, reference=q)
+    return combine_checks(norms, number, _check_lipschitz_e())
+
+
+def _check_lipschitz_e() -> Check:
+    """Check |f(a) - f(b)| <= κ₀ |a - b| for pairs of probes, also across ridges."""
+    surface, rng = PASSIVITY.surface("E"), np.random.default_rng(3)
+    ends = rng.uniform(0.0, 1e-3, (2, 4000, 3)) - np.array([0.0, 0.0, 1e-3])
+    ends[..., 1] = 0.0
+    ends[1] = ends[0] + (ends[1] - ends[0]) * rng.uniform(1e-4, 1.0, (4000, 1))
+    forces = [surface.force(points) for points in ends]
+    changes = np.linalg.norm(forces[1] - forces[0], axis=1)
+    ratio = changes / np.linalg.norm(ends[1] - ends[0], axis=1) / surface.stiffness
+    return check_statement(
+        f"over 4000 pairs of probes the force changes by at most {ratio.max():.4f} κ₀ per length",
+        printed=ratio.max() <= 1.0 + 1e-9,
+        greatest_slope_of_pairs=float(ratio.max()),
+    )
+
+
+@declare_claim("sentence-IV.E-energy", "IV.E", flips_under="law D in the place of E")
+def energy_e() -> Check:
+    """Around the path of Fig. 3 E gains energy, on the rising leg only."""
+    least, other = math.inf, 0.0
+    for case in [SCANNING, *random_settings()]:
+        surface, points = case.surface("E"), np.array(groove_path(case))
+        scale = case.stiffness * case.amplitude**2
+        gain = segment_work(surface, points[1], points[2])
+        total = loop_work(surface, points, 1e-9)
+        least, other = min(least, total / scale), max(other, abs(total - gain) / scale)
+    return combine_checks(
+        check_statement(
+            f"gain at least {least:.4f} κ₀A²; other legs together {other:.1e} κ₀A²",
+            printed=least > 0.0 and other < 1e-7,
+            least_gain=least,
+            other_legs=other,
+        ),
+        check_curl("E", is_conservative=False),
+    )
+
+
+@declare_claim("remark-7", "IV.E", "Remark 7", flips_under="law D in the place of E")
+def remark_7() -> Check:
+    """E is not conservative, but does not jump."""
+    surface = PASSIVITY.surface("E")
+    result = continuity(surface, characteristic_number(surface))
+    across = np.array(path_points((0.25e-3 - 1e-12, 0.0), (0.25e-3 + 1e-12, 0.0)))
+    jump = float(np.linalg.norm(np.diff(surface.force(across), axis=0)))
+    return combine_checks(
+        check_statement(
+            f"force of E across a ridge of D changes by {jump:.1e} N; {result.reason}",
+            printed=result.continuous and jump < 1e-6,
+            change_across_a_ridge=jump,
+        ),
+        check_curl("E", is_conservative=False),
+    )

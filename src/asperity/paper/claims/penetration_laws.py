@@ -1,0 +1,311 @@
+"""Sections IV.A to IV.C and IV.G: numbers, potentials and energies of the laws A, B, C and G."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from asperity.analysis.energy.loop_integral import loop_work
+from asperity.analysis.gain.closed_forms import q_b, q_c, q_g
+from asperity.laws import Law, find_law
+from asperity.paper.claim import (
+    SCALED_FORCES,
+    SCALED_JACOBIANS,
+    Check,
+    check_statement,
+    check_values,
+    combine_checks,
+    declare_claim,
+)
+from asperity.paper.formula_checks import (
+    Potential,
+    check_curl,
+    check_loop_energy,
+    check_potential,
+    compute_q,
+    find_max_norm,
+    segment_work,
+)
+from asperity.paper.planar_cases import (
+    PASSIVITY,
+    SCANNING,
+    SETTINGS,
+    ExperimentCase,
+    ProbePoint,
+    crossing_path,
+    generic_probes,
+    groove_path,
+    random_settings,
+)
+
+# --- A --------------------------------------------------------------------------------------------
+
+
+@declare_claim("eq-8", "IV.A", "(8)", flips_under=SCALED_JACOBIANS)
+def norm_a() -> Check:
+    """Norm of that Jacobian: κ₀ √(1 + h'²)."""
+    probes = list(generic_probes("A"))
+    norms = np.array([probe.norms() for probe in probes])
+    printed = np.array([[probe.k * math.hypot(1.0, probe.slope)] * 2 for probe in probes])
+    return check_values("norm of the Jacobian of A", printed=printed, reference=norms)
+
+
+@declare_claim("eq-9", "IV.A", "(9)", flips_under=SCALED_JACOBIANS)
+def number_a() -> Check:
+    """The increase of stiffness by A is √(1 + h'²).
+
+    The printed equation sets a ratio of the greatest norm equal to a local value.
+    """
+    probes = list(generic_probes("A"))
+    x = np.linspace(0.0, 2.0 * math.pi / 1e3, 20001)
+    gradients = probes[0].surface.texture.gradient(np.column_stack([x, 0 * x]))
+    max_ratio = math.hypot(1.0, float(np.abs(gradients[:, 0]).max()))
+    ratios = np.array([math.hypot(1.0, probe.slope) for probe in probes])
+    local = check_values(
+        "‖J‖/κ₀ at each place against √(1 + h'²)",
+        printed=[ratios, ratios],
+        reference=np.array([probe.norms() / probe.k for probe in probes]).T,
+    )
+    ratio = check_values(
+        "κ_A^max/κ₀ against √(1 + h'²) at generic places",
+        printed=ratios,
+        corrected=np.full(len(probes), max_ratio),
+        correction="q_A = max over p^x of √(1 + h'(p^x)²); κ_A, a stiffness, is κ₀ times that",
+        reference=np.full(len(probes), max_ratio),
+    )
+    return combine_checks(local, ratio)
+
+
+@declare_claim("eq-10", "IV.A", "(10)", flips_under=SCALED_JACOBIANS)
+def sinusoid_a() -> Check:
+    """On a sinusoid the greatest norm is κ₀ √(1 + (2πA/l)²), at x = 0 mod π/l.
+
+    Both the value and the place are checked.
+    """
+    cases = [PASSIVITY, SCANNING, *random_settings()]
+    printed = [c.stiffness * math.hypot(1.0, 2.0 * math.pi * c.amplitude / c.period) for c in cases]
+    norms = [case.stiffness * find_max_norm(case.surface("A")) for case in cases]
+    value = check_values("greatest norm for 5 sinusoids", printed=printed, reference=norms)
+    as_printed = _least_norm_share(cases, printed, [math.pi / case.period for case in cases])
+    half = _least_norm_share(cases, printed, [0.5 * case.period for case in cases])
+    place = check_statement(
+        f"the norm at x = nπ/l is {as_printed:.4f} of the greatest at worst, at n l/2 {half:.4f}",
+        printed=as_printed > 1.0 - 1e-9,
+        corrected=half > 1.0 - 1e-9,
+        correction="attained at p^x = 0 mod l/2 (π/l is no length)",
+        least_share_at_multiples_of_pi_over_l=as_printed,
+        least_share_at_multiples_of_half_a_period=half,
+    )
+    return combine_checks(value, place)
+
+
+def _least_norm_share(
+    cases: list[ExperimentCase], max_norms: list[float], steps: list[float]
+) -> float:
+    """Return the least norm at multiples of a step over the greatest norm of each texture."""
+    least = math.inf
+    for case, most, step in zip(cases, max_norms, steps, strict=True):
+        x = np.arange(1, 6) * step
+        slope = case.texture.gradient(np.column_stack([x, 0 * x]))[:, 0]
+        norms = case.stiffness * np.hypot(1.0, slope)
+        least = min(least, float(norms.min()) / most)
+    return least
+
+
+@declare_claim("sentence-IV.A-proportional", "IV.A", flips_under="characteristic numbers times 1.1")
+def proportional_a() -> Check:
+    """2πA/l is large, so A's number is nearly proportional to A and 1/l.
+
+    Checked to a tenth for each of the paper's experiments.
+    """
+    slopes = {name: 2.0 * math.pi * case.amplitude / case.period for name, case in SETTINGS.items()}
+    ratios = {name: compute_q(case, "A") / slopes[name] for name, case in SETTINGS.items()}
+    summary = ", ".join(f"{name} {slopes[name]:.2f} ({ratios[name]:.3f})" for name in SETTINGS)
+    return check_statement(
+        f"2πA/l, and q_A over it: {summary}",
+        printed=max(abs(ratio - 1.0) for ratio in ratios.values()) < 0.1,
+        numbers={f"q_A over 2πA/l in {name}": ratio for name, ratio in ratios.items()},
+    )
+
+
+@declare_claim("sentence-IV.A-energy", "IV.A", flips_under=SCALED_FORCES)
+def energy_a() -> Check:
+    """A is not conservative; around a path of Fig. 3 it generates κ₀A²/2."""
+    printed = check_loop_energy("A", lambda c: 0.5 * c.stiffness * c.amplitude**2)
+    return combine_checks(printed, check_curl("A", is_conservative=False))
+
+
+# --- B --------------------------------------------------------------------------------------------
+
+
+_CLOSED_FORMS = {
+    "B": (q_b, "max(√(1 + G²), y)"),
+    "C": (q_c, "the greatest of 1, y and the feasible roots of a cubic"),
+    "G": (q_g, "max(1, y), with G = 2πA/l and y = 4π²AD/l²"),
+}
+
+
+@declare_claim("sentence-IV-closed-form", "IV.B", flips_under=SCALED_JACOBIANS)
+def closed_forms() -> Check:
+    """No manageable closed form was found for the numbers of B, C and G: they are evaluated.
+
+    A search over Jacobians, as in the paper, is compared with closed forms that exist.
+    """
+    cases = [PASSIVITY, SCANNING, *random_settings(6)]
+    checks = []
+    for law, (closed_form, formula) in _CLOSED_FORMS.items():
+        error = max(
+            abs(find_max_norm(case.surface(law)) / closed_form(case.texture, case.depth) - 1.0)
+            for case in cases
+        )
+        checks.append(
+            check_statement(
+                f"{law}: closed form and search differ by {error:.1e} on {len(cases)} sinusoids",
+                printed=error > 1e-6,
+                corrected=error <= 1e-6,
+                correction=f"a search gives them, and on a sinusoid q_{law} = {formula}",
+                numbers={f"greatest relative difference for {law}": error},
+            )
+        )
+    return combine_checks(*checks)
+
+
+@declare_claim("eq-12", "IV.B", "(12)", flips_under=SCALED_FORCES)
+def energy_b() -> Check:
+    """Energy of B around the path of Fig. 3."""
+
+    def printed(c: ExperimentCase) -> float:
+        a, length = c.amplitude, c.period
+        root = math.sqrt((length**2 + 4.0 * a**2 * math.pi**2) / length**2)
+        return 0.5 * c.stiffness * a**2 + c.stiffness * length**2 / (4.0 * math.pi**2) * (1 - root)
+
+    return check_loop_energy("B", printed)
+
+
+# --- C --------------------------------------------------------------------------------------------
+
+
+@declare_claim("eq-13", "IV.C", "(13)", flips_under=SCALED_FORCES)
+def potential_c() -> Check:
+    """Potential of C.
+
+    Both its gradient and its sign as an energy are checked.
+    """
+
+    def potential(probe: ProbePoint) -> Potential:
+        profile = probe.profile()
+        return lambda x, z: -probe.k * (z - profile(x, 0)) ** 2 / 2
+
+    return check_potential("C", potential, lambda s: 0.5 * s.d**2)
+
+
+@declare_claim("sentence-IV.C-normal", "IV.C", flips_under="law A in the place of C")
+def direction_c() -> Check:
+    """The force field of C does not follow the normal of the texture.
+
+    Compared with the normal at the contact point, vertically above the probe.
+    """
+    shares = []
+    for probe in generic_probes("C", 12):
+        normal = np.array([-probe.slope, 1.0]) / math.hypot(1.0, probe.slope)
+        for force in (probe.force(), probe.compiled_force()):
+            across = abs(force[0] * normal[1] - force[1] * normal[0])
+            shares.append(float(across / np.linalg.norm(force)))
+    return check_statement(
+        f"the part of C's force across the texture's normal is at most {max(shares):.1e} of it, at "
+        "12 generic probes",
+        printed=max(shares) > 1e-9,
+        correction="it does: (14) is κ₀ d^z [h', -1], along the normal of (11), and longer than "
+        "B's force by √(1 + h'²)",
+        greatest_share_across=max(shares),
+    )
+
+
+@declare_claim("sentence-IV.C-curvature", "IV.C", flips_under=SCALED_JACOBIANS)
+def curvature_c() -> Check:
+    """C's stiffness grows with curvature, very large in sharp asperities and crevices.
+
+    At crests and troughs the norm is κ₀ times the greater of 1 and depth times curvature.
+    """
+    printed, reference = [], []
+    for case in [PASSIVITY, SCANNING, *random_settings()]:
+        x = np.array([0.25, 0.75]) * case.period
+        xy = np.column_stack([x, 0 * x])
+        curvature = np.abs(case.texture.hessian(xy)[:, 0, 0])
+        for depth in (0.3 * case.depth, case.depth):
+            points = np.column_stack([xy, case.texture.height(xy) - depth])
+            reference.append(np.linalg.norm(case.surface("C").jacobian(points), 2, axis=(1, 2)))
+            printed.append(case.stiffness * np.maximum(1.0, depth * curvature))
+    return check_values(
+        "norm of C's Jacobian at crests and troughs", printed=printed, reference=reference
+    )
+
+
+@declare_claim("sentence-IV.C-conservative", "IV.C", flips_under="law B in the place of C")
+def conservative_c() -> Check:
+    """C is conservative.
+
+    Checked by its curl and by closed paths.
+    """
+    energies = [
+        loop_work(case.surface("C"), groove_path(case)) / (case.stiffness * case.amplitude**2)
+        for case in [SCANNING, *random_settings()]
+    ]
+    greatest = max(abs(energy) for energy in energies)
+    loops = check_statement(
+        f"energy around the path {greatest:.1e} of κ₀A²", printed=greatest < 1e-9, greatest=greatest
+    )
+    return combine_checks(check_curl("C", is_conservative=True), loops)
+
+
+@declare_claim("remark-5", "IV.C", "Remark 5", flips_under="law C in the place of B")
+def remark_5() -> Check:
+    """The factor √(1 + h'²) is what keeps B from being conservative."""
+    import sympy as sp
+
+    from asperity.derive.curl import curl_verdict
+
+    def force(c: Any) -> Any:
+        return sp.sqrt(1 + c.slope.dot(c.slope)) * find_law("B").force(c)
+
+    without = curl_verdict(Law("Bs", "b-times-root", "vertical", force))
+    return combine_checks(
+        check_curl("B", is_conservative=False),
+        check_curl("C", is_conservative=True),
+        check_statement(
+            f"B times the factor: {without.reason}",
+            printed=without.conservative,
+            curl_of_B_times_the_factor=", ".join(str(entry) for entry in without.curl),
+        ),
+    )
+
+
+# --- G --------------------------------------------------------------------------------------------
+
+
+@declare_claim("eq-29", "IV.G", "(29)", flips_under=SCALED_FORCES)
+def energy_g() -> Check:
+    """Around its path of Fig. 3 G gains energy on one leg."""
+    errors, gains = [], []
+    for case in [SCANNING, *random_settings()]:
+        a, surface = 0.5 * case.depth, case.surface("G")
+        points = np.array(crossing_path(case, a))
+        scale = case.stiffness * a**2
+        ends = np.roll(points, -1, axis=0)
+        legs = [segment_work(surface, *leg) / scale for leg in zip(points, ends, strict=True)]
+        expected = [-0.5, legs[1], 0.5, 0.0]
+        errors += [abs(leg - value) for leg, value in zip(legs, expected, strict=True)]
+        errors.append(abs(loop_work(surface, points) / scale - legs[1]))
+        gains.append(legs[1])
+    error, gain = max(errors), min(gains)
+    return combine_checks(
+        check_statement(
+            f"legs are -κ₀a²/2, ΔE₂, +κ₀a²/2, 0 within {error:.1e} κ₀a²; ΔE₂ >= {gain:.3f} κ₀a²",
+            printed=error < 1e-9 and gain > 0.0,
+            worst_leg=error,
+            least_gain=gain,
+        ),
+        check_curl("G", is_conservative=False),
+    )

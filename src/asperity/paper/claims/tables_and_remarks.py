@@ -1,0 +1,285 @@
+"""Table II, and Remarks 1 to 3."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import lru_cache, partial
+
+import numpy as np
+
+from asperity.analysis.energy.loop_integral import loop_work
+from asperity.analysis.gain.characteristic import characteristic_number
+from asperity.laws import find_law
+from asperity.paper.claim import (
+    DECLARED_CLAIMS,
+    Check,
+    Claim,
+    check_observation,
+    check_statement,
+    check_values,
+    combine_checks,
+    declare_claim,
+    relative_error,
+)
+from asperity.paper.claims.appendices import max_norm_ratio
+from asperity.paper.claims.friction_law import PAPER_CASE, sticking_norm
+from asperity.paper.figures import loop_energies
+from asperity.paper.formula_checks import compute_q, format_by_name
+from asperity.paper.planar_cases import SCANNING, ExperimentCase, generic_profile, groove_path
+from asperity.paper.table_two import TableTwoRow, table_two
+from asperity.surface import Surface
+from asperity.textures.kinds.fourier import Fourier
+from asperity.textures.kinds.sinusoid import Sinusoid
+
+# --- Table II -------------------------------------------------------------------------------------
+
+
+_cached_table_two = lru_cache(maxsize=1)(table_two)
+
+
+def check_table_two_row(letter: str) -> Check:
+    """Check the cells of a row of Table II."""
+    row = _cached_table_two().row(letter)
+    return combine_checks(_check_number(row), _check_conservativity(row), _check_continuity(row))
+
+
+@declare_claim("sentence-IV-figure-3", "IV.G", flips_under="law C in the place of A")
+def figure_three_energies() -> Check:
+    """Along the paths of Fig. 3 A, B, E, F and G gain energy.
+
+    C and D, which the figure does not show, must not gain.
+    """
+    scale = SCANNING.stiffness * SCANNING.amplitude**2
+    energies = {panel.law: panel.energy for panel in loop_energies()}
+    gains = {law: energy * 1e6 for law, energy in energies.items() if law not in "CD"}
+    rest = max(abs(energies[law]) for law in "CD") / scale
+    return check_statement(
+        f"around their paths {format_by_name(gains, '.1f', ' µJ')}; C and D around that of A "
+        f"{rest:.1e} κ₀A²",
+        printed=min(gains.values()) > scale and rest < 1e-6,
+        numbers={f"energy of {law}": energy for law, energy in energies.items()},
+    )
+
+
+def _check_number(row: TableTwoRow) -> Check:
+    if row.law == "F":
+        return _check_appendix_bound(row)
+    if row.printed.value is None:
+        exists = row.q.method == "closed form"
+        return check_statement(
+            f"q = {row.q.value:.4f} ({row.q.method})",
+            printed=not exists,
+            corrected=exists,
+            correction=f"there is a closed form: q_{row.law} = {row.formula}",
+            q=row.q.value,
+        )
+    return check_values(
+        f"q_{row.law} in V.A's setting",
+        printed=row.printed.value,
+        reference=row.q.value,
+        correction=f"q_{row.law} is {row.formula}; 1 is the one-sided number",
+        tolerance=1e-6,
+    )
+
+
+def _check_appendix_bound(row: TableTwoRow) -> Check:
+    """Check the bound of Appendix I on law F; the package's law has a number of its own."""
+    bound, true = sticking_norm(PAPER_CASE), max_norm_ratio(PAPER_CASE)
+    return check_statement(
+        f"Appendix I gives {bound:.4f}; the greatest ‖J‖/κ₀ of the paper's law is {true:.4f}, of "
+        f"the package's, whose modulation stays between 0 and 1, {row.q.value:.4f}",
+        printed=abs(bound / true - 1.0) < 1e-6,
+        corrected=bound > max(true, row.q.value),
+        correction="an upper bound, not attained",
+        bound=bound,
+        number_of_the_papers_law=true,
+        number_of_the_packages_law=row.q.value,
+    )
+
+
+def _check_conservativity(row: TableTwoRow) -> Check:
+    property_name = "conservative" if row.conservative else "not conservative"
+    return check_statement(
+        f"{property_name}, the loop gives {row.energy * 1e6:+.1f} µJ",
+        printed=row.conservativity_agrees,
+        corrected=not row.conservative and row.energy > 0.0,
+        correction="conservative: no",
+        energy=row.energy,
+    )
+
+
+def _check_continuity(row: TableTwoRow) -> Check:
+    """Check the condition on h: a force that depends on h' jumps where h' jumps."""
+    from asperity.contacts.symbols import HX
+    from asperity.derive.jacobian import symbolic_force
+
+    uses_slope = HX in symbolic_force(find_law(row.law)).free_symbols
+    needs_slope = "h'" in row.printed.continuous
+    is_unconditional = row.printed.continuous.startswith("No")
+    return check_statement(
+        f"{'continuous' if row.continuous else 'jumps'} on a smooth surface, its formula "
+        f"{'uses' if uses_slope else 'does not use'} h'",
+        printed=row.continuity_agrees and (is_unconditional or uses_slope == needs_slope),
+    )
+
+
+# --- Remarks --------------------------------------------------------------------------------------
+
+
+@declare_claim("remark-1", "IV", "Remark 1", flips_under="an observation that confirms it")
+def remark_1() -> Check:
+    """What a texture feels like depends on more than the algorithm."""
+    return check_observation(
+        "a statement on perception and on real contacts: nothing here can be computed"
+    )
+
+
+def _refine_texture(case: ExperimentCase, factor: float) -> ExperimentCase:
+    """Return a texture with the same slopes and a period shorter by a factor."""
+    return ExperimentCase(
+        case.stiffness, case.period / factor, case.amplitude / factor, depth=case.depth
+    )
+
+
+@declare_claim("remark-2", "IV", "Remark 2", flips_under="characteristic numbers times 1.1")
+def remark_2() -> Check:
+    """The results hold for any texture with a Lipschitz bound M in the place of 2πA/l.
+
+    Two textures of the same M and different curvatures are compared.
+    """
+    base = ExperimentCase(1000.0, 2e-3, 0.2e-3, depth=0.02e-3)
+    cases = [_refine_texture(base, n) for n in (1.0, 100.0)]
+    numbers = {law: [compute_q(case, law) for case in cases] for law in "ABCDEG"}
+    # The paper's own bound for F, whose h is dimensionless.
+    numbers["F"] = [
+        sticking_norm(replace(PAPER_CASE, amplitude=0.8 / n, period=1e-3 / n)) for n in (1.0, 100.0)
+    ]
+    unchanged = [law for law, pair in numbers.items() if relative_error(*pair) < 1e-9]
+    changed = [law for law in numbers if law not in unchanged]
+    margin = _least_bound_ratio()
+    growth = ", ".join(f"{law} {numbers[law][0]:.2f} to {numbers[law][1]:.2f}" for law in changed)
+    return check_statement(
+        f"waves 100 times finer at the same M leave q of {', '.join(unchanged)} as it is and "
+        f"change {growth}; bounds with K >= |h''| are at least {margin:.3f} times q",
+        printed=not changed,
+        corrected=sorted(unchanged) == ["A", "E", "F"] and margin >= 1.0,
+        correction="M alone decides for A, E and F only; with a bound K on h'' too, "
+        "q_B <= √(1 + M²) + DK, q_C <= 1 + M² + DK, q_G <= max(1, DK), q_D = 1 if DK <= 1/2",
+        numbers={f"q_{law}, coarse and fine": pair for law, pair in numbers.items()},
+        least_margin=margin,
+    )
+
+
+def _least_bound_ratio() -> float:
+    """Return the least ratio to q of the bounds by M and K, on sums of waves."""
+    least = math.inf
+    for seed, dk in ((5, 0.45), (6, 0.45), (5, 6.0)):
+        texture: Fourier = generic_profile(seed)
+        slope, curvature = texture.bounds
+        root, depth = math.hypot(1.0, slope), dk / curvature
+        bounds = {"A": root, "B": root + dk, "C": 1.0 + slope**2 + dk, "G": max(1.0, dk)}
+        if dk <= 0.5:
+            bounds["D"] = 1.0
+        for law, bound in bounds.items():
+            q = characteristic_number(Surface(texture, law, max_depth=depth))
+            least = min(least, bound * (1.0 + 1e-9) / q.lower)
+    return least
+
+
+_CLAMPS = ("none", "lateral", "whole")
+
+
+@declare_claim(
+    "remark-3", "IV", "Remark 3", flips_under="a lateral clamp that holds the whole force"
+)
+def remark_3() -> Check:
+    """Limiting the depth that the lateral force uses bounds the numbers of B, C, F and G."""
+    growth, lateral, whole = (
+        {
+            law: _max_norm_at_depth(law, clamp, 50.0) / _max_norm_at_depth(law, "none", 1.0)
+            for law in "BCFG"
+        }
+        for clamp in _CLAMPS
+    )
+    loops = {
+        clamp: loop_work(
+            SCANNING.surface("C", clamp=clamp, max_depth=0.1e-3), groove_path(SCANNING)
+        )
+        for clamp in ("lateral", "whole")
+    }
+    bounded = "".join(law for law, ratio in lateral.items() if ratio <= 1.0 + 1e-6)
+    return combine_checks(
+        check_statement(
+            f"50 times deeper ‖J‖ grows {format_by_name(growth)} times",
+            printed=min(growth.values()) > 1.5,
+            numbers={f"growth of {law}": value for law, value in growth.items()},
+        ),
+        check_statement(
+            f"with the lateral force held it grows {format_by_name(lateral)} times, with the whole "
+            f"force held {format_by_name(whole)} times; a loop of C then gives "
+            f"{loops['lateral'] * 1e6:.2f} and {abs(loops['whole']) * 1e6:.2f} µJ",
+            printed=bounded == "BCFG",
+            corrected=max(whole.values()) <= 1.0 + 1e-6 and abs(loops["whole"]) < 1e-12,
+            correction="the depth must be held in the whole force; held in the lateral part alone "
+            "it does not bound B and G, and C is no longer conservative",
+            bounded_by_the_lateral_clamp=bounded,
+            loop_of_C_lateral=loops["lateral"],
+            loop_of_C_whole=loops["whole"],
+        ),
+    )
+
+
+@declare_claim("sentence-IV.F-clamp", "IV.F", flips_under="a lateral clamp that holds nothing")
+def unbounded_friction() -> Check:
+    """The gain of F grows with the depth without bound; clamping p^z bounds it."""
+    free, clamped = (
+        [_max_norm_at_depth("F", clamp, factor) / 1000.0 for factor in (1.0, 10.0, 1000.0)]
+        for clamp in _CLAMPS[:2]
+    )
+    return check_statement(
+        "‖J_F‖/κ₀ at 1, 10, 1000 times the depth: "
+        + ", ".join(f"{v:.3g}" for v in free)
+        + "; with p^z clamped "
+        + ", ".join(f"{v:.3g}" for v in clamped),
+        printed=free[2] > 50.0 * free[1] and clamped[2] <= free[0] * (1.0 + 1e-9),
+        free=free,
+        clamped=clamped,
+    )
+
+
+def _max_norm_at_depth(law: str, clamp: str, depth_factor: float) -> float:
+    """Return the greatest ‖J‖ over x at a multiple of the depth; for F, over both phases."""
+    texture = Sinusoid(0.2e-3, 1e-3)
+    surface = Surface(texture, law, max_depth=0.3e-3, clamp=clamp)
+    x = np.arange(2000) / 2000 * texture.period
+    xy = np.column_stack([x, 0 * x])
+    level = 0.0 if law in "FG" else texture.height(xy)
+    points = np.column_stack([xy, level - depth_factor * 0.3e-3 * (1.0 - 1e-12) + 0 * x])
+    if law != "F":
+        return float(np.linalg.norm(surface.jacobian(points), 2, axis=(1, 2)).max())
+    norms = []
+    for sign in (-1.0, 1.0):
+        for slides in (False, True):
+            d = np.column_stack([np.full(len(x), sign * surface.max_deflection), 0 * x])
+            jacobian = surface.jacobian(points, deflection=d, sliding=np.full(len(x), slides))
+            norms.append(np.linalg.norm(jacobian, 2, axis=(1, 2)).max())
+    return float(max(norms))
+
+
+_ROWS = {
+    "A": ("q = √(1 + (2πA/l)²); not conservative; continuous if h is", "law C in the place of A"),
+    "B": ("no closed form; not conservative; continuous if h' is", "law A in the place of B"),
+    "C": ("no closed form; conservative; continuous if h' is", "law A in the place of C"),
+    "D": ("q = 1; conservative; not continuous even if h is", "∞ printed for q of D"),
+    "E": ("q = 1; not conservative; continuous if h is", "law A in the place of E"),
+    "F": (
+        "q in Appendix I; almost conservative; continuous if h is",
+        "Jacobians of the paper's F times 1.2",
+    ),
+    "G": ("no closed form; not conservative; continuous if h' is", "law A in the place of G"),
+}
+for _law, (_text, _change) in _ROWS.items():
+    _check = partial(check_table_two_row, _law)
+    _id = f"table-2-{_law}"
+    DECLARED_CLAIMS.append(Claim(_id, ("Table II",), "IV.H", f"{_law}: {_text}.", _check, _change))

@@ -1,0 +1,311 @@
+"""Claims of section V judged by simulated experiments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+from asperity.paper.claim import (
+    DECLARED_CLAIMS,
+    Check,
+    Number,
+    Verdict,
+    check_statement,
+    declare_claim,
+)
+from asperity.paper.experiments.bump_runs import BumpRun, bump_experiment
+from asperity.paper.experiments.cycle_counts import STARTS, count_cycles, passivity_onsets
+from asperity.paper.experiments.experiment_setups import (
+    ALL_LAWS,
+    BUMP_SUMMARY,
+    FITTED_SUMMARY,
+    FITTED_SUMMARY_WITHOUT_DELAY,
+    HANDS_SUMMARY,
+)
+from asperity.paper.experiments.stroke_energies import scanning_experiment
+from asperity.paper.planar_cases import PAPER_LAWS
+from asperity.simulation.scan import Stroke
+
+TRIED_DELAYS = (0, 4, 5, 6, 7)
+"""Loop delays [samples]; the paper states none."""
+MARGINAL_SHARE = 0.05
+"""An energy is marginal below this share of the largest one of the stroke."""
+CLEAR_ENERGY = 0.01
+"""[mJ]"""
+
+
+def _simulated_strokes(law: str) -> tuple[Stroke, ...]:
+    return scanning_experiment(law).strokes_of(law)
+
+
+def _simulated_bumps(law: str) -> tuple[BumpRun, ...]:
+    return bump_experiment(law).runs_of(law)
+
+
+def check_over_assumptions(
+    summary: str,
+    by_paper_measure: Sequence[bool],
+    by_exact_measure: Sequence[bool],
+    fitted: str,
+    numbers: Mapping[str, Number],
+) -> Check:
+    """Judge an experiment for all guesses of what the paper leaves open.
+
+    The claim holds if every guess confirms it by the paper's measure and by the exact one, and does
+    not hold if no guess confirms it by either. Otherwise it is undecided.
+
+    Args:
+        summary: result with numbers.
+        by_paper_measure: for each guess, whether the paper's measure confirms the claim.
+        by_exact_measure: the same for the exact measure.
+        fitted: what was fitted or guessed.
+        numbers: computed values by name.
+    """
+    outcomes = {*by_paper_measure, *by_exact_measure}
+    verdict: Verdict = "undecided"
+    if len(outcomes) == 1:
+        verdict = "holds" if True in outcomes else "does not hold"
+    tally = (
+        f"as printed in {sum(by_paper_measure)} of {len(by_paper_measure)} guesses by the paper's "
+        f"measure, {sum(by_exact_measure)} by ours"
+    )
+    return Check(verdict, f"{tally}: {summary}", numbers, fitted=fitted)
+
+
+@declare_claim(
+    "sentence-V.A-cycles", "V.A", flips_under="A and F cycling from every start, W from none"
+)
+def textured_walls_cycle() -> Check:
+    """At 2000 N/m W settles; textured with A or F it enters a limit cycle (Fig. 5).
+
+    W must settle from every start. A and F must end in a limit cycle: by the paper's measure from
+    one start, as in its figure, by ours from at least a quarter of them.
+    """
+    counts = {(law, d): count_cycles(law, 1.0, d) for law in "WAF" for d in TRIED_DELAYS}
+
+    def is_confirmed(delay: int, least: float) -> bool:
+        wall, a, f = (counts[law, delay] for law in "WAF")
+        return wall.cycles == 0 and min(a.cycles, f.cycles) >= least
+
+    starts = counts["W", 0].starts
+    summary = "; ".join(
+        f"lag {d}: {', '.join(f'{law} {counts[law, d].cycles}' for law in 'WAF')}"
+        for d in TRIED_DELAYS
+    )
+    numbers: dict[str, Number] = {}
+    for (law, d), one in counts.items():
+        numbers[f"{law}, lag {d}: cycles"] = float(one.cycles)
+        numbers[f"{law}, lag {d}: calms down slowly"] = float(one.slow)
+    return check_over_assumptions(
+        f"of {starts} starts cycle for good at {summary}",
+        [is_confirmed(d, 1.0) for d in TRIED_DELAYS],
+        [is_confirmed(d, 0.25 * starts) for d in TRIED_DELAYS],
+        FITTED_SUMMARY,
+        numbers,
+    )
+
+
+@declare_claim(
+    "sentence-V.A-settles", "V.A", flips_under="A and F cycling from every start, W from none"
+)
+def divided_walls_settle() -> Check:
+    """Divided by 5.1 and 8.3 the stiffness of A and F lets them settle (Fig. 5)."""
+    counts = [
+        count_cycles(law, by, d) for law, by in (("A", 5.1), ("F", 8.3)) for d in TRIED_DELAYS
+    ]
+    cycling, starts = sum(one.cycles for one in counts), sum(one.starts for one in counts)
+    delays = ", ".join(map(str, TRIED_DELAYS))
+    summary = f"A/5.1 and F/8.3 at lags of {delays} samples: {cycling} of {starts} starts cycle"
+    numbers = {f"{one.law}/{one.divisor:g}, lag {one.delay}": float(one.cycles) for one in counts}
+    settles = [one.cycles == 0 for one in counts]
+    return check_over_assumptions(summary, settles, settles, FITTED_SUMMARY, numbers)
+
+
+def _stroke_numbers(strokes: tuple[Stroke, ...]) -> dict[str, float]:
+    numbers = {}
+    for number, one in enumerate(strokes, start=1):
+        where = f"{one.law} {number}, {one.speed:g} m/s"
+        numbers[f"{where}: x [J]"] = one.energy[0]
+        numbers[f"{where}: z [J]"] = one.energy[2]
+        numbers[f"{where}: field [J]"] = one.field
+        numbers[f"{where}: the paper's sum along x [J]"] = one.same_sample[0]
+        numbers[f"{where}: the paper's sum along z [J]"] = one.same_sample[2]
+    return numbers
+
+
+EnergyPair = tuple[float, float]
+
+
+def _energies_by_measure(strokes: tuple[Stroke, ...]) -> tuple[list[EnergyPair], list[EnergyPair]]:
+    """Return the energies along x and z by the paper's sum and by the exact ledger [mJ]."""
+    paper = [(1e3 * one.same_sample[0], 1e3 * one.same_sample[2]) for one in strokes]
+    return paper, [(1e3 * one.energy[0], 1e3 * one.energy[2]) for one in strokes]
+
+
+def _format_ranges(energies: list[EnergyPair]) -> str:
+    return ", ".join(
+        f"{min(along):+.3g} to {max(along):+.3g} mJ along {axis}"
+        for axis, along in zip("xz", zip(*energies, strict=True), strict=True)
+    )
+
+
+def _check_strokes(
+    strokes: tuple[Stroke, ...], predicate: Callable[[float, float], bool], suffix: str = ""
+) -> Check:
+    """Check the energies along x and z of all hands and speeds by both measures."""
+    paper, exact = _energies_by_measure(strokes)
+    return check_over_assumptions(
+        f"the paper's sum {_format_ranges(paper)}; exact ledger {_format_ranges(exact)}{suffix}",
+        [predicate(*one) for one in paper],
+        [predicate(*one) for one in exact],
+        HANDS_SUMMARY,
+        _stroke_numbers(strokes),
+    )
+
+
+def _format_gain_count(strokes: tuple[Stroke, ...]) -> str:
+    count = sum(one.gains_energy for one in strokes)
+    return f"; its field supplies energy in {count} of {len(strokes)}"
+
+
+@declare_claim("sentence-V.B-decrease", "V.B", flips_under="the paper's sum with its sign turned")
+def decrease_indicates_supply() -> Check:
+    """A decreasing energy indicates that energy is supplied by the virtual environment.
+
+    Checked with strokes in which the balance of the whole loop shows a supply.
+    """
+    strokes = [one for law in "AE" for one in _simulated_strokes(law) if one.total > 0.0]
+    rising = sum(sum(one.same_sample) > 0.0 for one in strokes)
+    closure = max(one.closure for one in strokes)
+    return check_statement(
+        f"of {len(strokes)} strokes in which A and E supply energy to the hand, by a balance of "
+        f"all energies that closes within {closure:.0e}, the paper's sum of f Δp rises in {rising}",
+        printed=rising == 0,
+        corrected=rising == len(strokes),
+        correction="an increasing one, as f is the force sent to the device; it decreases if f is "
+        "the hand's force on the environment",
+        rising=float(rising),
+    )
+
+
+@declare_claim("sentence-V.B-A", "V.B", flips_under="strokes of law H")
+def law_a_gains() -> Check:
+    """On a stroke A gains energy along z, none along x (Fig. 6)."""
+    strokes = _simulated_strokes("A")
+    return _check_strokes(strokes, lambda x, z: z > 0.0 and x == 0.0, _format_gain_count(strokes))
+
+
+@declare_claim("sentence-V.B-G", "V.B", flips_under="strokes of law A")
+def law_g_is_passive() -> Check:
+    """On a stroke G is marginally passive along x and z (Fig. 6).
+
+    Marginally: the energy supplied along one axis is at most a small share of the largest one.
+    """
+    strokes = _simulated_strokes("G")
+    return _check_strokes(
+        strokes,
+        lambda x, z: max(x, z) <= MARGINAL_SHARE * max(abs(x), abs(z)),
+        _format_gain_count(strokes),
+    )
+
+
+@declare_claim("sentence-V.B-D", "V.B", flips_under="strokes of law A")
+def law_d_is_passive() -> Check:
+    """On a stroke D is marginally passive along z, clearly along x (Fig. 6)."""
+    strokes = _simulated_strokes("D")
+    field = max(abs(1e3 * one.field) for one in strokes)
+    return _check_strokes(
+        strokes,
+        lambda x, z: abs(z) <= MARGINAL_SHARE and x < -CLEAR_ENERGY,
+        f"; its field supplies at most {field:.2g} mJ, the rest is sampling",
+    )
+
+
+@declare_claim("sentence-V.B-F", "V.B", flips_under="strokes of law A")
+def law_f_is_passive() -> Check:
+    """On a stroke F is marginally passive along z, passive along x (Fig. 6)."""
+    return _check_strokes(
+        _simulated_strokes("F"), lambda x, z: x < 0.0 and abs(z) <= MARGINAL_SHARE * abs(x)
+    )
+
+
+@declare_claim("sentence-V.C-A", "V.C", flips_under="bumps of law D for A")
+def law_a_loses_contact() -> Check:
+    """On a 20 mm bump A gains in jumps and loses contact (Fig. 7)."""
+    bumps = _simulated_bumps("A")
+    summary = "; ".join(
+        f"{one.entry}: {1e3 * one.total:+.3g} mJ, up to {1e3 * one.jump:.3g} mJ in 20 ms, "
+        f"contact lost {one.lost} times"
+        for one in bumps
+    )
+    # The energy of a jump must not be taken back, as it is by a field with a potential.
+    confirmed = [0.25 * one.total < one.jump < one.total and one.lost > 1 for one in bumps]
+    return check_over_assumptions(summary, confirmed, confirmed, BUMP_SUMMARY, _bump_numbers(bumps))
+
+
+@declare_claim("sentence-V.C-D", "V.C", flips_under="bumps of law A for D")
+def law_d_is_balanced() -> Check:
+    """On a 20 mm bump D keeps its energy in balance (Fig. 7)."""
+    bumps = _simulated_bumps("D")
+    gains = [one.total for one in _simulated_bumps("A")]
+    summary = "; ".join(
+        f"{one.entry}: {1e3 * one.total:+.3g} mJ against {1e3 * gain:+.3g} of A, up to "
+        f"{1e3 * one.top:.0f} mm high"
+        for one, gain in zip(bumps, gains, strict=True)
+    )
+    balanced = [
+        abs(one.total) <= MARGINAL_SHARE * gain for one, gain in zip(bumps, gains, strict=True)
+    ]
+    return check_over_assumptions(
+        f"{summary} of 20", balanced, balanced, BUMP_SUMMARY, _bump_numbers(bumps)
+    )
+
+
+def _bump_numbers(bumps: tuple[BumpRun, ...]) -> dict[str, float]:
+    numbers = {}
+    for one in bumps:
+        numbers[f"{one.entry}: energy [J]"] = one.total
+        numbers[f"{one.entry}: in 20 ms [J]"] = one.jump
+        numbers[f"{one.entry}: contact lost"] = float(one.lost)
+        numbers[f"{one.entry}: highest [m]"] = one.top
+        numbers[f"{one.entry}: ledger does not close by"] = one.closure
+    return numbers
+
+
+@declare_claim(
+    "sentence-III.B-reduced",
+    "III.B",
+    flips_under="every textured wall cycling at ten times the stiffness",
+)
+def divided_walls_are_passive() -> Check:
+    """κ₁ = κ₀/q preserves passivity, for any algorithm.
+
+    κ₀ is the smooth wall's own onset of limit cycles in V.A's loop, q that of the depth reached.
+    """
+    onsets = {one.onset.law: one for one in passivity_onsets(ALL_LAWS, 0, STARTS) if one.wall_rule}
+    wall = onsets["W"].onset.quiet
+    textured = {law: one for law, one in onsets.items() if law in PAPER_LAWS}
+    violating = {law: one for law, one in textured.items() if one.violates_wall_rule}
+    summary = ", ".join(
+        f"{law} from {one.onset.cycling:.0f} N/m on, where κ₀/q is {one.wall_rule:.0f}"
+        for law, one in violating.items()
+    )
+    numbers: dict[str, Number] = {"W: quiet to [N/m]": wall}
+    for law, one in textured.items():
+        numbers[f"{law}: cycles at [N/m]"] = one.onset.cycling
+        numbers[f"{law}: κ₀/q [N/m]"] = one.wall_rule or 0.0
+    check = check_statement(
+        f"without lag W is quiet to {wall:.0f} N/m; of {', '.join(textured)} cycle below κ₀/q: "
+        f"{summary or 'none'}; D has no finite q there",
+        printed=not violating,
+        correction="a wall that stays quiet proves no damping: κ₀ q⁺ <= 2σ₀/T does, where the "
+        "field is conservative and nothing is late",
+        numbers=numbers,
+    )
+    return replace(check, fitted=FITTED_SUMMARY_WITHOUT_DELAY)
+
+
+SIMULATED_CLAIM_IDS = tuple(
+    claim.id for claim in DECLARED_CLAIMS if claim.compute.__module__ == __name__
+)
+"""Ids of the claims that are judged in this module."""

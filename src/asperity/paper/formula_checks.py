@@ -1,0 +1,184 @@
+"""Checks shared by the claims on the laws: curl, continuity, energies, potentials and norms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from asperity.analysis.bounds.measures import spectral_norm
+from asperity.analysis.bounds.sampling import dense_maximum
+from asperity.analysis.energy.continuity import continuity
+from asperity.analysis.energy.loop_integral import integrate, loop_work
+from asperity.analysis.gain.characteristic import characteristic_number
+from asperity.core.checks import FloatArray
+from asperity.laws import find_law
+from asperity.paper.claim import Check, check_statement, check_values, combine_checks
+from asperity.paper.planar_cases import (
+    SCANNING,
+    ExperimentCase,
+    ProbePoint,
+    generic_probes,
+    groove_path,
+    random_settings,
+)
+from asperity.surface import Surface
+
+Potential = Callable[[Any, Any], Any]
+
+
+def format_by_name(values: Mapping[str, float], spec: str = ".2f", unit: str = "") -> str:
+    """Return "A 1.00 unit, B 2.00 unit"."""
+    return ", ".join(f"{name} {value:{spec}}{unit}" for name, value in values.items())
+
+
+def check_zero_outside(law: str) -> Check:
+    """Check that the force of a law is zero just outside the body."""
+    surface = SCANNING.surface(law)
+    x = np.linspace(0.0, SCANNING.period, 17)
+    height = surface.texture.height(np.column_stack([x, 0 * x]))
+    level = 0.0 * x if law in "WFG" else height
+    force = surface.force(np.column_stack([x, 0 * x, level + 1e-9]))
+    most = float(np.abs(force).max())
+    return check_statement(
+        f"force 1 nm outside at most {most:g} N", printed=most == 0.0, outside=most
+    )
+
+
+def check_curl(law: str, *, is_conservative: bool) -> Check:
+    """Check whether a law is conservative by its symbolic curl."""
+    from asperity.derive.curl import curl_verdict
+
+    verdict = curl_verdict(find_law(law))
+    kind = "conservative" if verdict.conservative else "not conservative"
+    return check_statement(
+        f"{law} is {kind}: {verdict.reason}",
+        printed=verdict.conservative is is_conservative,
+        numbers={f"curl of {law}": ", ".join(str(entry) for entry in verdict.curl)},
+    )
+
+
+def check_continuity(law: str, *, is_continuous: bool) -> Check:
+    """Check whether the force of a law is continuous inside the body."""
+    surface = SCANNING.surface(law)
+    result = continuity(surface, characteristic_number(surface)).continuous
+    summary = f"force of {law} {'does not jump' if result else 'jumps'}"
+    return check_statement(summary, printed=result is is_continuous)
+
+
+def check_loop_energy(law: str, printed: Callable[[ExperimentCase], float]) -> Check:
+    """Compare the printed energy around the path of Fig. 3 with quadrature of the force."""
+    cases = [SCANNING, *random_settings()]
+    return check_values(
+        f"energy of {law} around the path for {len(cases)} parameter sets",
+        printed=np.array([printed(case) for case in cases]),
+        reference=np.array([loop_work(case.surface(law), groove_path(case)) for case in cases]),
+    )
+
+
+def numerical_gradient(potential: Potential, at_x: float, at_z: float) -> list[float]:
+    """Return the gradient by central differences in 60 digits."""
+    import mpmath
+
+    with mpmath.workdps(60):
+        x, z, step = mpmath.mpf(at_x), mpmath.mpf(at_z), mpmath.mpf(10) ** -20
+        pairs = [
+            (potential(x + step, z), potential(x - step, z)),
+            (potential(x, z + step), potential(x, z - step)),
+        ]
+        return [float((ahead - behind) / (2 * step)) for ahead, behind in pairs]
+
+
+def check_potential(
+    law: str,
+    potential: Callable[[ProbePoint], Potential],
+    half_square: Callable[[ProbePoint], float],
+) -> Check:
+    """Check the gradient of a printed potential and its sign as an energy."""
+    probes = list(generic_probes(law))
+    gradient = check_values(
+        f"+∇U against the force of {law}",
+        printed=[numerical_gradient(potential(s), s.x, s.z) for s in probes],
+        reference=np.array([s.force() for s in probes]),
+    )
+    return combine_checks(gradient, check_energy_sign(law, half_square))
+
+
+def check_energy_sign(law: str, half_square: Callable[[ProbePoint], float]) -> Check:
+    """Compare a printed energy -κ₀ · half_square with the work of pressing straight in."""
+    probes = list(generic_probes(law))
+    energies = np.array([probe.k * half_square(probe) for probe in probes])
+    return check_values(
+        f"U against the work that pressing into {law} takes",
+        printed=-energies,
+        corrected=energies,
+        correction="the stored energy is -U as printed, and the force minus its gradient",
+        reference=[_pressing_work(probe) for probe in probes],
+        tolerance=1e-8,
+    )
+
+
+def _pressing_work(probe: ProbePoint) -> float:
+    """Return the work against the force on the vertical path from the surface to the probe [J]."""
+    top = float(probe.profile()(probe.x, 0))
+    span = top - probe.z
+
+    def force(s: FloatArray) -> FloatArray:
+        points = np.column_stack([np.full(len(s), probe.x), 0 * s, top - s * span])
+        return np.asarray(probe.surface.force(points)[:, 2])
+
+    return span * integrate(force, 4)
+
+
+def find_max_norm(surface: Surface) -> float:
+    """Return the greatest ‖J‖/κ₀ at full depth by a search over compiled Jacobians."""
+    return dense_maximum(
+        surface, spectral_norm, lambda heights: np.full(len(heights), surface.max_depth)
+    ).value
+
+
+def segment_work(surface: Surface, start: FloatArray, end: FloatArray) -> float:
+    """Return the work of the force along a straight segment [J]."""
+    along = end - start
+    return integrate(lambda s: surface.force(start + s[:, None] * along) @ along, 8, 1e-10)
+
+
+def max_difference_quotients(seed: int) -> dict[str, float]:
+    """Return the greatest difference quotient of the force over q k, for five laws.
+
+    Taken over 4000 random pairs of probes, both no deeper than ``max_depth``, and 250 pairs close
+    to the witness of q.
+    """
+    rng, case, shares = np.random.default_rng(seed), SCANNING, {}
+    for law in "ABCEG":
+        surface = case.surface(law)
+        q = characteristic_number(surface)
+        start = _random_pairs(law, rng, 4000)
+        close = np.array(q.at) - [0.0, 0.0, 1e-8] + 1e-9 * rng.normal(size=(500, 3)) * [1, 0, 1]
+        pairs = np.concatenate([start, np.stack([close[:250], close[250:]])], axis=1)
+        forces = [surface.force(points) for points in pairs]
+        distance = np.linalg.norm(pairs[1] - pairs[0], axis=1)
+        ratio = (
+            np.linalg.norm(forces[1] - forces[0], axis=1) / distance / (case.stiffness * q.value)
+        )
+        shares[law] = float(ratio.max())
+    return shares
+
+
+def _random_pairs(law: str, rng: np.random.Generator, count: int) -> FloatArray:
+    """Return the ends of short random steps, no deeper than ``max_depth``, shape (2, n, 3)."""
+    case = SCANNING
+    x = rng.uniform(0.0, case.period, count)
+    top = case.texture.height(np.column_stack([x, 0 * x])) if law in "ABC" else 0.0 * x
+    depth = case.depth * rng.uniform(0.1, 0.9, count)
+    if law == "E":
+        depth = depth + case.amplitude
+    points = np.column_stack([x, 0 * x, top - depth])
+    step = case.depth * 1e-3 * rng.normal(size=(count, 3)) * [1, 0, 1]
+    return np.stack([points, points + step])
+
+
+def compute_q(case: ExperimentCase, law: str) -> float:
+    """Return the characteristic number of a law for the parameters of an experiment."""
+    return characteristic_number(case.surface(law)).value

@@ -1,0 +1,310 @@
+"""The paper's x-z plane: parameter sets, generic probes, and exact forces and closest points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from asperity.core.checks import FloatArray
+from asperity.surface import Surface
+from asperity.textures.kinds.fourier import Fourier
+from asperity.textures.kinds.sinusoid import Sinusoid
+
+PAPER_LAWS = "ABCDEFG"
+_DIGITS = 25
+
+
+@dataclass(frozen=True)
+class ExperimentCase:
+    """Parameters of one of the paper's experiments, SI.
+
+    Attributes:
+        stiffness: κ₀ [N/m].
+        period: l [m].
+        amplitude: A [m].
+        friction: μ.
+        deflection: d_max in x [m].
+        depth: d_max in z [m].
+        joint_damping: [N·m·s].
+    """
+
+    stiffness: float
+    period: float
+    amplitude: float
+    friction: float = 0.8
+    deflection: float = 1e-3
+    depth: float = 1e-3
+    joint_damping: float = 4.0e-3
+
+    @property
+    def texture(self) -> Sinusoid:
+        """A sin(2πx/l)."""
+        return Sinusoid(self.amplitude, self.period)
+
+    @property
+    def crest_radius(self) -> float:
+        """Radius of curvature at the crests [m]."""
+        return self.period**2 / (4.0 * math.pi**2 * self.amplitude)
+
+    def surface(self, law: str, **changes: Any) -> Surface:
+        """Return this texture with a law; ``changes`` are arguments of ``Surface``."""
+        arguments: dict[str, Any] = {"stiffness": self.stiffness, "max_depth": self.depth}
+        if law == "F":
+            arguments |= {"friction": self.friction, "max_deflection": self.deflection}
+        return Surface(self.texture, law, **(arguments | changes))
+
+
+PASSIVITY = ExperimentCase(2000.0, 1e-3, 0.8e-3, joint_damping=4.7e-3)  # section V.A
+SCANNING = ExperimentCase(1000.0, 2e-3, 0.8e-3)  # V.B
+BUMP = ExperimentCase(1000.0, 20e-3, 20e-3)  # V.C
+SETTINGS = {"V.A": PASSIVITY, "V.B": SCANNING, "V.C": BUMP}
+SAMPLING_PERIOD = 1e-4  # [s], section V
+
+
+def random_settings(count: int = 3, seed: int = 11) -> list[ExperimentCase]:
+    """Return random parameter sets; the same ones for the same seed."""
+    draw = np.random.default_rng(seed)
+    result = []
+    for _ in range(count):
+        period = draw.uniform(0.7e-3, 4e-3)
+        amplitude = period * draw.uniform(0.1, 0.7)
+        result.append(
+            ExperimentCase(
+                stiffness=draw.uniform(300.0, 2500.0),
+                period=period,
+                amplitude=amplitude,
+                friction=draw.uniform(0.2, 1.1),
+                deflection=draw.uniform(0.1e-3, 2e-3),
+                depth=amplitude * draw.uniform(0.4, 1.3),
+            )
+        )
+    return result
+
+
+@dataclass(frozen=True)
+class ProbePoint:
+    """A probe inside the body, with the quantities that the paper's formulas use, SI.
+
+    Attributes:
+        surface: law, texture and stiffness.
+        x: x coordinate of the probe.
+        z: z coordinate of the probe.
+        contact_x: x coordinate of the contact point: that of the probe or of the closest point.
+        h: height there.
+        slope: h' there.
+        second_derivative: h'' there.
+    """
+
+    surface: Surface
+    x: float
+    z: float
+    contact_x: float
+    h: float
+    slope: float
+    second_derivative: float
+
+    @property
+    def k(self) -> float:
+        """κ₀ [N/m]."""
+        return self.surface.stiffness
+
+    @property
+    def d(self) -> float:
+        """The paper's penetration d^z = p^z - h, negative inside."""
+        return self.z - self.h
+
+    @property
+    def from_closest_point(self) -> FloatArray:
+        """Vector from the closest point to the probe [m]."""
+        return np.array([self.x - self.contact_x, self.z - self.h])
+
+    @property
+    def distance(self) -> float:
+        """|p - p_h| [m]."""
+        return math.hypot(*self.from_closest_point)
+
+    def profile(self) -> Callable[[Any, int], Any]:
+        """Return the function h(x, order of the derivative) in mpmath."""
+        return _profile(self.surface)
+
+    def force(self) -> FloatArray:
+        """Return (f_x, f_z) by the definition in 25 digits [N]."""
+        from asperity.reference import exact_force
+
+        exact = exact_force(self.surface, [self.x, 0.0, self.z], digits=_DIGITS)
+        return np.array([float(exact[0]), float(exact[2])])
+
+    def jacobian(self) -> FloatArray:
+        """Return the Jacobian in x and z by central differences of the definition [N/m]."""
+        from asperity.reference import exact_jacobian
+
+        exact = exact_jacobian(self.surface, [self.x, 0.0, self.z], digits=_DIGITS)
+        return np.array([[float(exact[i, j]) for j in (0, 2)] for i in (0, 2)])
+
+    def compiled_force(self) -> FloatArray:
+        """Return (f_x, f_z) by the compiled kernel [N]."""
+        return np.asarray(self.surface.force([[self.x, 0.0, self.z]])[0, [0, 2]])
+
+    def compiled_jacobian(self) -> FloatArray:
+        """Return the Jacobian in x and z by the compiled kernel [N/m]."""
+        whole = self.surface.jacobian([[self.x, 0.0, self.z]])[0]
+        return np.asarray(whole[::2, ::2])
+
+    def norms(self) -> FloatArray:
+        """Return ‖J‖ by the definition and by the kernel [N/m], shape (2,)."""
+        both = [self.jacobian(), self.compiled_jacobian()]
+        return np.asarray(np.linalg.norm(both, 2, axis=(1, 2)))
+
+
+def generic_profile(seed: int = 5) -> Fourier:
+    """Return h(x) of three waves in arbitrary phases, without symmetry that could hide an error."""
+    draw = np.random.default_rng(seed)
+    base = 2.0 * math.pi / draw.uniform(1e-3, 3e-3)
+    waves = base * np.array([1.0, 2.0, 3.0])
+    slopes = draw.uniform(0.2, 0.5, 3)
+    return Fourier(slopes / waves, waves, draw.uniform(0.0, 6.0, 3))
+
+
+def generic_probes(law: str, count: int = 4, seed: int = 5) -> Iterator[ProbePoint]:
+    """Yield generic probes inside the body of a generic profile, with a unique closest point.
+
+    Depths reach 0.7 of the least radius of curvature, so that curvature matters.
+    """
+    texture = generic_profile(seed)
+    surface = Surface(texture, law, stiffness=731.0)
+    profile = _profile(surface)
+    draw = np.random.default_rng(seed)
+    radius = 1.0 / texture.bounds[1]
+    for _ in range(count):
+        contact = draw.uniform(0.0, 3e-3)
+        h, slope = (float(profile(contact, order)) for order in (0, 1))
+        depth = radius * draw.uniform(0.2, 0.7)
+        size = math.hypot(1.0, slope)
+        x, z = contact + depth * slope / size, h - depth / size
+        if law in "FG":
+            z = -depth
+        at = float(find_closest_point(surface, x, z)[0]) if law in "DE" else x
+        yield ProbePoint(surface, x, z, at, *(float(profile(at, order)) for order in (0, 1, 2)))
+
+
+def _profile(surface: Surface) -> Callable[[Any, int], Any]:
+    height = surface.texture.exact_height()
+    return lambda x, order: height(x, 0.0, order, 0)
+
+
+def find_closest_point(surface: Surface, x: Any, z: Any, digits: int = _DIGITS) -> tuple[Any, Any]:
+    """Return the closest point (p_h^x, p_h^z) in mpmath, by a scan and Newton iterations."""
+    import mpmath
+
+    profile = _profile(surface)
+    with mpmath.workdps(digits):
+        reach = 4.0 * surface.texture.peak_to_valley
+        grid = float(x) + np.linspace(-reach, reach, 4001)
+        heights = surface.texture.height(np.column_stack([grid, 0 * grid]))
+        start = float(grid[np.argmin((grid - float(x)) ** 2 + (heights - float(z)) ** 2)])
+        return _solve_closest_point(profile, mpmath.mpf(start), mpmath.mpf(x), mpmath.mpf(z))
+
+
+def _solve_closest_point(
+    profile: Callable[[Any, int], Any], initial_x: Any, x: Any, z: Any
+) -> tuple[Any, Any]:
+    """Solve (X - x) + (h(X) - z) h'(X) = 0 for X by Newton iterations."""
+    import mpmath
+
+    for _ in range(40):
+        offset, slope = profile(initial_x, 0) - z, profile(initial_x, 1)
+        rate = 1 + slope**2 + offset * profile(initial_x, 2)
+        step = (initial_x - x + offset * slope) / rate
+        initial_x -= step
+        if abs(step) <= 10 * mpmath.eps * abs(initial_x):
+            break
+    return initial_x, profile(initial_x, 0)
+
+
+@dataclass(frozen=True)
+class ClosestPointDerivatives:
+    """Derivatives of the closest point by the probe position, with force and Jacobian of law D.
+
+    Attributes:
+        probe: the probe.
+        derivatives: ∂(p_h^x, p_h^z)/∂(p^x, p^z), shape (2, 2).
+        force: force of D [N], shape (2,).
+        jacobian: Jacobian of D [N/m], shape (2, 2).
+    """
+
+    probe: ProbePoint
+    derivatives: FloatArray = field(compare=False)
+    force: FloatArray = field(compare=False)
+    jacobian: FloatArray = field(compare=False)
+
+
+def closest_point_derivatives(count: int = 4) -> list[ClosestPointDerivatives]:
+    """Return derivatives of the closest point at generic probes, three entries for each probe.
+
+    The first two have central differences of Newton's solution, with force and Jacobian by the
+    definition and by D's kernel. The third derives them from the kernel's Jacobian, which is
+    -κ₀ (I - derivatives), with force and Jacobian by the definition.
+    """
+    import mpmath
+
+    result = []
+    for probe in generic_probes("D", count):
+        digits = 3 * _DIGITS
+        with mpmath.workdps(digits):
+            step = mpmath.mpf(10) ** -_DIGITS
+            columns = []
+            for dx, dz in ((step, 0), (0, step)):
+                x, z = mpmath.mpf(probe.x), mpmath.mpf(probe.z)
+                ahead = find_closest_point(probe.surface, x + dx, z + dz, digits)
+                behind = find_closest_point(probe.surface, x - dx, z - dz, digits)
+                columns.append(
+                    [float((a - b) / (2 * step)) for a, b in zip(ahead, behind, strict=True)]
+                )
+        rates, kernel = np.array(columns).T, probe.compiled_jacobian()
+        defined = probe.force(), probe.jacobian()
+        result.append(ClosestPointDerivatives(probe, rates, *defined))
+        result.append(ClosestPointDerivatives(probe, rates, probe.compiled_force(), kernel))
+        result.append(ClosestPointDerivatives(probe, np.eye(2) + kernel / probe.k, *defined))
+    return result
+
+
+def path_points(*corners: tuple[float, float]) -> list[tuple[float, float, float]]:
+    """Return vertices (x, z) as points (x, 0, z)."""
+    return [(x, 0.0, z) for x, z in corners]
+
+
+# --- closed paths of the paper's Fig. 3 -----------------------------------------------------------
+
+Points = list[tuple[float, float, float]]
+TURNING_DEPTH = 0.1e-3
+"""Depth at which the paths of (27) and (29) turn [m]; not stated by the paper."""
+
+
+def groove_path(case: ExperimentCase) -> Points:
+    """Return the path for A, B and E: along the wall, up at the crest, and back."""
+    quarter, top = 0.25 * case.period, case.amplitude
+    return path_points((0.0, 0.0), (quarter, 0.0), (quarter, top), (0.0, top))
+
+
+def friction_path(case: ExperimentCase, shallow_depth: float = TURNING_DEPTH) -> Points:
+    """Return the path of (27), for F: out at the shallow depth a, back at the full depth."""
+    x, deep = case.deflection, -case.depth
+    return path_points(
+        (0.0, 1e-3), (0.0, -shallow_depth), (x, -shallow_depth), (x, deep), (0.0, deep)
+    )
+
+
+def crossing_path(case: ExperimentCase, turning_depth: float = TURNING_DEPTH) -> Points:
+    """Return the path of (29), for G: down at the crest, along at depth a, up at the trough."""
+    quarter = 0.25 * case.period
+    a, crest, trough = turning_depth, quarter, 3 * quarter
+    return path_points((crest, a), (crest, -a), (trough, -a), (trough, a))
+
+
+def loop_path(law: str, case: ExperimentCase) -> Points:
+    """Return the path of a law by its letter; C and D, absent from the figure, use that of A."""
+    return {"F": friction_path, "G": crossing_path}.get(law, groove_path)(case)

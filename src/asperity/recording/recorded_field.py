@@ -1,0 +1,184 @@
+"""The force field inside a recording: the arguments of its kernels.
+
+A recording replays by itself, without its surface file or scene.
+"""
+
+from __future__ import annotations
+
+import importlib
+import io
+import sys
+import zipfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from asperity.clamps import Clamp, find_clamp
+from asperity.core.cache import content_digest
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError
+from asperity.core.files import text_digest, to_plain_data
+from asperity.kernels.fuse import kernel_source
+from asperity.laws import Law, find_law
+from asperity.surface import Surface
+
+TEXTURE_FILE = "texture.npz"
+"""Name of the attachment with the arguments of the sampler."""
+# Largest attachment of a recording: a map of 2400 x 2400 points.
+MAX_BYTES = 2**26
+_PACKAGE_PREFIX = "asperity."
+# Modules of samplers in recordings of earlier versions, and their modules now.
+MOVED_MODULES = {
+    "asperity.contacts.nearest.line_search": "asperity.contacts.closest.line_search",
+    "asperity.contacts.nearest.line_within": "asperity.contacts.closest.line_budget",
+    "asperity.contacts.nearest.plane_search": "asperity.contacts.closest.plane_search",
+    "asperity.contacts.nearest.plane_within": "asperity.contacts.closest.plane_budget",
+    "asperity.textures.samplers.fourier": "asperity.textures.kinds.fourier_sampler",
+    "asperity.textures.samplers.fourier_line": "asperity.textures.kinds.fourier_line_sampler",
+    "asperity.textures.samplers.heightmap": "asperity.textures.spline.heightmap_sampler",
+    "asperity.textures.samplers.heightmap_block": (
+        "asperity.textures.spline.heightmap_block_sampler"
+    ),
+    "asperity.textures.samplers.heightmap_cells": "asperity.textures.spline.heightmap_pruning",
+    "asperity.textures.samplers.heightmap_search": "asperity.textures.spline.heightmap_search",
+    "asperity.textures.samplers.heightmap_window": "asperity.textures.spline.heightmap_search",
+    "asperity.textures.samplers.profile": "asperity.textures.spline.profile_sampler",
+    "asperity.textures.samplers.sine": "asperity.textures.kinds.sine",
+    "asperity.textures.samplers.sinusoid": "asperity.textures.kinds.sinusoid_sampler",
+    "asperity.textures.samplers.sinusoid_split": "asperity.textures.kinds.sinusoid_sampler",
+    "asperity.textures.samplers.spline": "asperity.textures.spline.bspline_kernels",
+}
+_DAMAGE_ERRORS = (ValueError, KeyError, EOFError, OSError, TypeError, zipfile.BadZipFile)
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedField:
+    """The arguments of the kernels of a force.
+
+    Attributes:
+        law: the law.
+        clamp: the depth clamp.
+        sampler: modules whose functions evaluate the texture.
+        texture: record of the texture.
+        law_arguments: parameters of the law.
+    """
+
+    law: Law
+    clamp: Clamp
+    sampler: tuple[ModuleType, ...]
+    texture: tuple[Any, ...]
+    law_arguments: tuple[float, ...]
+
+    def height(self, points: FloatArray) -> FloatArray:
+        """Return the height of the texture [m], shape (n,), at points (n, 2) [m]."""
+        from asperity.kernels.fuse import fuse_sampler
+
+        out = np.empty((len(points), 1))
+        places = np.ascontiguousarray(points, dtype=np.float64)
+        fuse_sampler(self.sampler).height_batch(places, out, self.texture)
+        return out[:, 0]
+
+
+def surface_field(surface: Surface) -> RecordedField:
+    """Return the field of a surface."""
+    return RecordedField(
+        surface.law, surface.effective_clamp, surface.texture.sampler, surface.texture.arguments,
+        surface.law_arguments,
+    )  # fmt: skip
+
+
+def field_metadata(surface: Surface) -> dict[str, Any]:
+    """Return the metadata of a surface in a recording, as plain data."""
+    texture = surface.texture
+    return {
+        "content": surface.digest,
+        "texture": to_plain_data(texture.describe()),
+        "texture_content": arguments_digest(texture.arguments),
+        "sampler": [module.__name__ for module in texture.sampler],
+        "record": type(texture.arguments).__name__,
+        "law": surface.law.letter,
+        "law_name": surface.law.name,
+        "formula": formula_digest(surface.law),
+        "clamp": surface.effective_clamp.name,
+        "stiffness": surface.stiffness,
+        "max_depth": surface.max_depth,
+        "parameters": dict(surface.law_parameters),
+        "law_arguments": [float(value).hex() for value in surface.law_arguments],
+    }
+
+
+def arguments_digest(arguments: Iterable[Any]) -> str:
+    """Return a digest of the record that a sampler receives."""
+    return content_digest(*map(np.asarray, arguments))
+
+
+def has_digest(arguments: Iterable[Any], metadata: Mapping[str, Any]) -> bool:
+    """Return whether a recording holds these numbers.
+
+    Older recordings have a digest of 16 digits; the checksums of their archive protect them.
+    """
+    recorded = str(metadata.get("texture_content"))
+    return len(recorded) == 16 or recorded == arguments_digest(arguments)
+
+
+def formula_digest(law: Law) -> str:
+    """Return a digest of the compiled formula of a law."""
+    return text_digest(kernel_source(law))
+
+
+def field_attachments(surface: Surface) -> dict[str, bytes]:
+    """Return the attachment with the arguments of the sampler; none if it would be large."""
+    arguments = surface.texture.arguments
+    if sum(np.asarray(value).nbytes for value in arguments) > MAX_BYTES:
+        return {}
+    stream = io.BytesIO()
+    np.savez(stream, *map(np.asarray, arguments))
+    return {TEXTURE_FILE: stream.getvalue()}
+
+
+def read_field(metadata: Mapping[str, Any], data: bytes) -> RecordedField:
+    """Return the field inside a recording.
+
+    Args:
+        metadata: metadata by :func:`field_metadata`.
+        data: attachment by :func:`field_attachments`.
+
+    Raises:
+        ParameterError: for an unknown law or texture kind, or a damaged attachment.
+    """
+    try:
+        law = find_law(str(metadata["law"]))
+        clamp = find_clamp(str(metadata["clamp"]))
+        names = dict.fromkeys(MOVED_MODULES.get(name, name) for name in metadata["sampler"])
+        modules = (_sampler_module(str(name)) for name in names)
+        sampler = tuple(dict.fromkeys(modules))  # earlier recordings name modules merged since
+        kind = getattr(sampler[0], str(metadata["record"]))
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            values = [archive[f"arr_{i}"] for i in range(len(archive.files))]
+        texture = kind(*(value if value.ndim else value.item() for value in values))
+        parameters = tuple(float.fromhex(text) for text in metadata["law_arguments"])
+    except ParameterError:
+        raise
+    except (*_DAMAGE_ERRORS, AttributeError, IndexError) as error:
+        reason = f"its surface cannot be read ({type(error).__name__}: {error})"
+        raise ParameterError("recording", reason) from None
+    if not has_digest(texture, metadata):
+        raise ParameterError("recording", "holds another texture than its metadata: it is damaged")
+    return RecordedField(law, clamp, sampler, texture, parameters)
+
+
+def _sampler_module(name: str) -> ModuleType:
+    """Return a module of asperity, or one that the user has imported, by its name.
+
+    A recording never imports other code.
+    """
+    module = sys.modules.get(name)
+    if module is None and name.startswith(_PACKAGE_PREFIX):
+        module = importlib.import_module(name)
+    if not hasattr(module, "KERNELS"):
+        words = f"has a texture of an unknown kind ({name})"
+        raise ParameterError("recording", f"{words}: name its file, --plugin FILE")
+    return module  # type: ignore[return-value]  # None has no KERNELS

@@ -1,0 +1,128 @@
+"""Rows of a recording: a message of ROS 2 for each, all of one size: NumPy moves them whole.
+
+A row is a sequence of 64-bit numbers, whose names and units the schema of the file says.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError
+from asperity.recording.mcap import CHANNEL, DamagedError
+
+Columns = tuple[tuple[str, str], ...]
+"""Names and units; the first is the time in seconds."""
+
+_MESSAGE = 0x05
+# What stands before the numbers of a message in CDR: little-endian.
+_CDR_HEADER = np.frombuffer(b"\x00\x01\x00\x00", np.dtype("V4"))[0]
+_COLUMN_NAME = re.compile(r"[a-z]+( ?[a-z0-9]+)*")
+_FIELD_LINE = re.compile(r"float64 ([a-z][a-z0-9_]*) # \[([^\]]*)\]")
+
+
+def schema_text(columns: Columns) -> str:
+    r"""Return the definition of a message with these columns.
+
+    Raises:
+        ParameterError: for a name that cannot stand in one, or a first column that is no time.
+
+    Example:
+        >>> schema_text((("time", "s"), ("applied x", "N")))
+        'float64 time # [s]\nfloat64 applied_x # [N]\n'
+    """
+    names = [name for name, _unit in columns]
+    if not columns or columns[0] != ("time", "s"):
+        raise ParameterError("columns", "must begin with ('time', 's')", columns)
+    if len(set(names)) < len(names) or not all(map(_COLUMN_NAME.fullmatch, names)):
+        raise ParameterError("columns", "must have different names of small letters", names)
+    return "".join(f"float64 {name.replace(' ', '_')} # [{unit}]\n" for name, unit in columns)
+
+
+def schema_columns(text: str) -> Columns:
+    """Return the columns of a definition that :func:`schema_text` has written.
+
+    Raises:
+        DamagedError: for another one.
+    """
+    found = [_FIELD_LINE.fullmatch(line) for line in text.splitlines()]
+    columns = tuple((one[1].replace("_", " "), one[2]) for one in found if one is not None)
+    if len(columns) < len(found) or columns[:1] != (("time", "s"),):
+        raise DamagedError("its rows are no table with a time")
+    return columns
+
+
+def row_type(column_count: int) -> np.dtype[np.void]:
+    """Return how the message record of a row with so many numbers lies in the file."""
+    return np.dtype(
+        [
+            ("op", "u1"),
+            ("length", "<u8"),
+            ("channel", "<u2"),
+            ("sequence", "<u4"),
+            ("logged", "<u8"),
+            ("published", "<u8"),
+            ("cdr", "V4"),
+            ("values", "<f8", (column_count,)),
+        ]
+    )
+
+
+def message_template(row_count: int, column_count: int) -> NDArray[np.void]:
+    """Return message records in which number, time and values are still to be written."""
+    kind = row_type(column_count)
+    blank = np.zeros(row_count, kind)
+    blank["op"], blank["channel"], blank["cdr"] = _MESSAGE, CHANNEL, _CDR_HEADER
+    blank["length"] = kind.itemsize - 9  # all but code and length
+    return blank
+
+
+def write_messages(messages: NDArray[np.void], first: int, table: FloatArray) -> None:
+    """Write number, time and values of rows into as many message records.
+
+    Args:
+        messages: the records.
+        first: number of the first row.
+        table: shape (rows, count); the time [s] in its first column.
+    """
+    messages["sequence"] = np.arange(first, first + len(table), dtype=np.uint64) & 0xFFFFFFFF
+    messages["logged"] = messages["published"] = nanoseconds(table[:, 0])
+    messages["values"] = table
+
+
+def nanoseconds(times: FloatArray) -> NDArray[np.uint64]:
+    """Return times [s] in whole nanoseconds."""
+    return np.rint(np.clip(times, 0.0, 1e10) * 1e9).astype(np.uint64)
+
+
+def message_values(data: bytes, column_count: int) -> FloatArray:
+    """Return the numbers of whole message records, shape (rows, count).
+
+    Raises:
+        DamagedError: for records of another kind.
+    """
+    kind = row_type(column_count)
+    if len(data) % kind.itemsize:
+        raise DamagedError("a block holds part of a row")
+    rows = np.frombuffer(data, kind)
+    ours = (rows["op"] == _MESSAGE) & (rows["length"] == kind.itemsize - 9)
+    if not (ours & (rows["channel"] == CHANNEL)).all():
+        raise DamagedError("a block holds something else than rows")
+    return np.ascontiguousarray(rows["values"])
+
+
+def check_table(table: FloatArray, columns: Sequence[object]) -> FloatArray:
+    """Return a table whose rows have these columns.
+
+    Raises:
+        ParameterError: for another shape.
+    """
+    values = np.asarray(table, dtype=np.float64)
+    if values.ndim != 2 or values.shape[1] != len(columns):
+        words = f"must have the shape (rows, {len(columns)}), one column for each name"
+        raise ParameterError("block", words, values.shape)
+    return values

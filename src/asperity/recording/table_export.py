@@ -1,0 +1,110 @@
+"""The rows of a recording for other tools: CSV, MATLAB, Parquet."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import IO, Any
+
+from asperity.core.errors import ParameterError
+from asperity.core.files import json_text, open_atomic
+from asperity.recording.recording import Recording
+
+Progress = Callable[[float], object]
+# A variable of MATLAB's format 5 has fewer bytes.
+_MAX_MAT_BYTES = 2**31 - 1
+
+
+def export_recording(
+    recording: Recording, path: str | os.PathLike[str], progress: Progress | None = None
+) -> None:
+    """Write the rows to a file that is whole or not there, its format by its suffix.
+
+    No digit is lost: text has 17 of them, the others keep the numbers as they are. Names of columns
+    are those of the recording with underscores, in CSV followed by their units as in a trace.
+
+    Args:
+        recording: what is written.
+        path: ends in .csv, .mat or .parquet.
+        progress: is told the part that is done, in [0, 1], now and then.
+
+    Raises:
+        ParameterError: for another suffix, a file that cannot be written, a library that is
+            missing, or more rows than the format takes.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in TABLE_WRITERS:
+        raise ParameterError("output", f"must end in {', '.join(TABLE_WRITERS)}", str(path))
+    if suffix == ".parquet":
+        _import_pyarrow()  # said before anything is written
+    try:
+        with open_atomic(path) as stream:
+            TABLE_WRITERS[suffix](recording, stream, progress or (lambda _part: None))
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ParameterError("output", f"cannot be written: {reason}", str(path)) from None
+
+
+def _write_csv(recording: Recording, stream: IO[bytes], progress: Progress) -> None:
+    head = ",".join(f"{name} [{unit}]" for name, unit in recording.columns)
+    stream.write(f"{head}\n".encode())
+    row, done = ",".join(["%.17g"] * len(recording.columns)) + "\n", 0
+    for block in recording.blocks():
+        stream.write((row * len(block) % tuple(block.ravel().tolist())).encode())
+        done += len(block)
+        progress(done / recording.rows)
+
+
+def _write_mat(recording: Recording, stream: IO[bytes], progress: Progress) -> None:
+    from scipy.io import savemat
+
+    if recording.rows * 8 > _MAX_MAT_BYTES:
+        most = _MAX_MAT_BYTES // 8
+        raise ParameterError("output", f"has room for {most} rows in .mat, not {recording.rows}")
+    table = recording.table()
+    progress(0.5)
+    columns = {_variable_name(name): table[:, [i]] for i, name in enumerate(recording.names)}
+    units = {_variable_name(name): unit for name, unit in recording.columns}
+    about = json_text(recording.metadata)
+    content = {**columns, "units": units, "about": about}
+    savemat(stream, content, long_field_names=True)  # type: ignore[arg-type]  # streams are taken, too
+
+
+def _write_parquet(recording: Recording, stream: IO[bytes], progress: Progress) -> None:
+    arrow: Any = _import_pyarrow()
+    from pyarrow import parquet
+
+    fields = [
+        arrow.field(_variable_name(name), arrow.float64(), metadata={"unit": unit})
+        for name, unit in recording.columns
+    ]
+    schema = arrow.schema(fields, metadata={"asperity": json_text(recording.metadata)})
+    done = 0
+    with parquet.ParquetWriter(stream, schema) as writer:
+        for block in recording.blocks():
+            columns = [arrow.array(column) for column in block.T]
+            writer.write_table(arrow.Table.from_arrays(columns, schema=schema))
+            done += len(block)
+            progress(done / recording.rows)
+
+
+def _import_pyarrow() -> Any:
+    try:
+        import pyarrow
+    except ImportError:
+        words = "needs pyarrow for .parquet: pip install 'asperity[parquet]'"
+        raise ParameterError("output", words) from None
+    return pyarrow
+
+
+def _variable_name(name: str) -> str:
+    return name.replace(" ", "_")
+
+
+TABLE_WRITERS: Mapping[str, Callable[[Recording, IO[bytes], Progress], None]] = {
+    ".csv": _write_csv,
+    ".mat": _write_mat,
+    ".parquet": _write_parquet,
+}
+"""What writes a file, by its suffix."""

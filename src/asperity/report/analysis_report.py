@@ -1,0 +1,336 @@
+"""Report of the analysis of one law."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from asperity.analysis.analysis_result import Analysis
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.passivity.verdict import Passivity
+from asperity.analysis.sentences.passivity_sentences import stability_limit_text
+from asperity.core.units import format_quantity
+from asperity.report import page
+from asperity.report.device_report import device_numbers_table
+from asperity.report.page import HEADED, Cell, Media, Row, Section, Table, TableLayout
+from asperity.report.sentences import glossary
+from asperity.report.sentences.alt_text import analysis_alt_text, analysis_figure_names
+from asperity.report.sentences.number_text import (
+    NOT_AVAILABLE,
+    format_in_one_unit,
+    interval_text,
+    limit_text,
+    lower_bound_text,
+    merit_text,
+    position_text,
+    range_text,
+    readable_name,
+    upper_bound_text,
+    witness_text,
+)
+from asperity.report.sentences.reproduction_code import reproduction_lines
+
+_BOUND_HEADINGS = ("number", "lower", "upper", "method", "attained at")
+_CRITERIA_HEADINGS = ("criterion", "condition", "holds", "limit", "margin", "conclusion, premises")
+_JUMP_HEADINGS = ("at depth", "jumps by", "near (both witnesses are in the JSON)")
+_MEDIA = HEADED | Media.HTML
+# Data of the device that the criteria of passivity use.
+_CRITERIA_FIELDS = (
+    "max_stiffness",
+    "update_rate",
+    "damping",
+    "virtual_damping",
+    "delay_samples",
+    "position_resolution",
+    "force_resolution",
+    "least_friction",
+)
+
+
+def named_bounds(analysis: Analysis) -> list[tuple[str, Bound]]:
+    """Return the numbers of an analysis with their symbols."""
+    density = analysis.curl_density
+    bounds = _computed_bounds(analysis)
+    if density is not None and density.upper > 0.0:
+        bounds.append(("|curl f| [N/m]", density))
+    return bounds
+
+
+def _computed_bounds(analysis: Analysis) -> list[tuple[str, Bound]]:
+    """Return the numbers that were searched for, from which the others follow."""
+    curl = [] if analysis.curl is None else [("|curl f|/k", analysis.curl)]
+    return [("q", analysis.q), ("q⁺", analysis.one_sided), *curl]
+
+
+def undecided_criteria(analysis: Analysis) -> list[tuple[str, str]]:
+    """Return the criteria that decide nothing, grouped by reason: names and reason."""
+    names: dict[str, list[str]] = {}
+    for criterion in analysis.passivity.criteria:
+        if criterion.holds is None:
+            names.setdefault(criterion.conclusion, []).append(criterion.name)
+    return [("; ".join(group), reason) for reason, group in names.items()]
+
+
+def stiffness_text(analysis: Analysis) -> str:
+    """Return the stability limit of the stiffness with its basis, as in a comparison."""
+    return stability_limit_text(
+        analysis.passivity.stability_limit, analysis.passivity.critical_speed
+    )
+
+
+def bound_notes(analysis: Analysis) -> list[str]:
+    """Return how each number was obtained, and whether and why the law is conservative."""
+    notes = [f"{name}: {bound.note}" for name, bound in _computed_bounds(analysis) if bound.note]
+    word = "yes" if analysis.conservative else "no"
+    return [*notes, f"conservative: {word}, {analysis.conservative_reason}"]
+
+
+def critical_speed_text(analysis: Analysis) -> str:
+    """Return v* as text, with its meaning or the missing data."""
+    speed = analysis.v_star
+    if speed is None:
+        if analysis.device.value("damping") is None:
+            return "not decidable: needs damping"
+        return "not known: no loop found that gains energy"
+    if speed == 0.0:
+        return "0 m/s: no energy to absorb"
+    if math.isinf(speed):
+        return "∞: a device without damping never absorbs the energy"
+    datum = analysis.device.data["damping"]
+    mark = "" if datum.verified else " (not verified)"
+    return (
+        f"{format_quantity(speed, 'm/s')}: below it, damping {datum.text}{mark} absorbs too little"
+    )
+
+
+def thrust_text(analysis: Analysis) -> str:
+    """Return the mean thrust on a straight scan as text."""
+    thrust, surface = analysis.leak.thrust, analysis.surface
+    if surface.law.stateful:
+        return "not defined: friction resists in any case"
+    if thrust is None:
+        return "not stated: the line is not periodic"
+    # Smaller values are rounding errors of forces up to stiffness times depth.
+    is_zero = abs(thrust) <= 1e-12 * surface.stiffness * surface.max_depth
+    return f"{'0 N' if is_zero else format_quantity(thrust, 'N')} on a straight scan"
+
+
+def jump_rows(analysis: Analysis) -> list[tuple[str, str, str]]:
+    """Return depth, size and position of every located jump, in common units."""
+    jumps = analysis.continuity.jumps
+    depths = format_in_one_unit([jump.depth for jump in jumps], "m")
+    sizes = format_in_one_unit([jump.size for jump in jumps], "N")
+    places = [position_text(jump.before) for jump in jumps]
+    return list(zip(depths, sizes, places, strict=True))
+
+
+def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
+    """Return names and values of the worst loop."""
+    leak, density, line = analysis.leak, analysis.curl_density, analysis.leak.line
+    x, y = (float(part) + 0.0 for part in line.direction)
+    start = ", ".join(f"{1e3 * float(part) + 0.0:.6g}" for part in line.start)
+    plane = f"vertical, along ({x:.6g}, {y:.6g}) through ({start}) mm"
+    energy = range_text(leak.energy, leak.upper_per_period, "J")
+    facts = [
+        ("energy", f"{energy} per turn ({leak.method})"),
+        ("description", leak.description),
+        ("plane", f"{plane}, {format_quantity(line.length, 'm')} of it"),
+    ]
+    if len(leak.vertices):
+        path = f"{len(leak.vertices)} vertices, {format_quantity(leak.length, 'm')} long"
+        mean = format_quantity(leak.per_length, "N")
+        facts.append(("polygon", path))
+        facts.append(("per length", f"{mean}: energy over the length of the line"))
+    facts += [("v*", critical_speed_text(analysis)), ("thrust", thrust_text(analysis))]
+    if density is not None and density.upper > 0.0:
+        area = range_text(density.lower, density.upper, "J/m²")
+        facts.append(("small loops", f"gain at most {area}: the greatest |curl f|"))
+    return facts
+
+
+def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
+    """Return strength, support and force on the scan that compares laws."""
+    scan, surface = analysis.merit, analysis.surface
+    unit = "" if surface.texture.scan_line().periodic else " m"
+    facts = [
+        ("strength T", f"{merit_text(scan.strength)}{unit}"),
+        ("support S", merit_text(scan.support)),
+        ("texture force", f"{format_quantity(scan.ripple * surface.stiffness, 'N')} RMS at this k"),
+        ("height", f"z = {format_quantity(scan.height, 'm')}"),
+    ]
+    if scan.contact_lost > 0.0:
+        facts.append(("no contact", f"on {100.0 * scan.contact_lost:.0f} % of the scan"))
+    return facts
+
+
+# --- tables ---------------------------------------------------------------------------------------
+
+
+def bounds_table(analysis: Analysis) -> Table:
+    """Return one row per number: lower, upper, method and the point that attains lower."""
+    rows = []
+    for name, bound in named_bounds(analysis):
+        ends = [lower_bound_text(bound.lower), upper_bound_text(bound.upper)]
+        rows.append(Row([Cell(name, "l"), *ends, bound.method, witness_text(bound)]))
+    return Table(_BOUND_HEADINGS, rows, (1, 2), TableLayout(wrap=(4,)))
+
+
+def criteria_table(passivity: Passivity) -> Table:
+    """Return one row per criterion of passivity; the decisive one is marked."""
+    rows = []
+    for criterion in passivity.criteria:
+        decides = criterion.name == passivity.decided_by
+        cells: page.Cells = [
+            Cell(criterion.name, "l"),
+            Cell(criterion.formula, "line"),
+            page.holds_cell(criterion.holds),
+            limit_text(criterion.limit),
+            NOT_AVAILABLE if criterion.margin is None else lower_bound_text(criterion.margin, 3),
+            Cell(criterion.conclusion, subtext=criterion.assumptions),
+        ]
+        style = "dim" if criterion.holds is None and not decides else ""
+        rows.append(Row(cells, "best" if decides else "", style=style))
+    return Table(_CRITERIA_HEADINGS, rows, (3, 4))
+
+
+def _jumps_table(analysis: Analysis) -> Table:
+    """Return one row per depth at which a jump was located."""
+    rows = [Row(cells) for cells in jump_rows(analysis)]
+    return Table(_JUMP_HEADINGS, rows, (0, 1), TableLayout(wrap=(2,)))
+
+
+# --- the page -------------------------------------------------------------------------------------
+
+
+def analysis_page(analysis: Analysis, texture_code: str = "") -> page.Page:
+    """Return the report: verdict, numbers, criteria, figures and assumptions.
+
+    Args:
+        analysis: the result.
+        texture_code: a Python expression of the texture; see
+            :func:`asperity.report.sentences.reproduction_code.reproduction_lines`.
+    """
+    law, code = analysis.surface.law, "\n".join(reproduction_lines(analysis, texture_code))
+    return page.Page(
+        title=f"Law {law.letter} on the {analysis.device.name}",
+        answer=analysis.answer,
+        facts=_facts(analysis),
+        sections=[
+            _bounds_section(analysis),
+            *_figure_sections(analysis, "gain", "top", "depth"),
+            *_criteria_sections(analysis),
+            Section("Worst loop", [page.pairs_table(leak_facts(analysis))], media=_MEDIA),
+            *_figure_sections(analysis, "field"),
+            _continuity_section(analysis),
+            *_figure_sections(analysis, "jumps"),
+            Section("On a straight scan", [page.pairs_table(merit_facts(analysis))], media=_MEDIA),
+            Section("Reproduce q", [page.Paragraph(code, "code")], media=_MEDIA),
+            *page.user_sections(Analysis, analysis),
+            *page.assumption_sections(
+                analysis.assumptions, device_numbers_table(analysis.device, _CRITERIA_FIELDS)
+            ),
+            Section("How to read it", [page.DefinitionList(glossary.ANALYSIS)]),
+        ],
+        footer=f"{page.PAPER_CITATION}. {page.NO_PERCEPTUAL_TEST}",
+    )
+
+
+def _facts(analysis: Analysis) -> list[tuple[str, str]]:
+    surface = analysis.surface
+    decisive = analysis.passivity.criterion(analysis.passivity.decided_by)
+    return [
+        ("Surface", str(surface.texture.describe()["kind"])),
+        ("Peak to valley", format_quantity(surface.texture.peak_to_valley, "m")),
+        ("Law", f"{surface.law.letter}, {readable_name(surface.law.name)}"),
+        ("Device", analysis.device.name),
+        ("Stiffness", f"{surface.stiffness:g} N/m"),
+        ("Pressed to", format_quantity(surface.max_depth, "m")),
+        ("Characteristic number q", interval_text(analysis.q)),
+        (f"Greatest stiffness by {decisive.name}", limit_text(decisive.limit)),
+    ]
+
+
+def _bounds_section(analysis: Analysis) -> Section:
+    law = analysis.surface.law
+    return Section(
+        f"Law {law.letter}, {readable_name(law.name)}: suprema over the working region",
+        [bounds_table(analysis)],
+        notes=bound_notes(analysis),
+        media=_MEDIA | Media.NOTEBOOK,
+    )
+
+
+def _criteria_sections(analysis: Analysis) -> list[Section]:
+    """Return the criteria for a page, and in short for a terminal."""
+    passivity, table = analysis.passivity, criteria_table(analysis.passivity)
+    title = f"Passive on the {analysis.device.name}?"
+    marked = [replace(one, cells=["→" if one.kind else "", *one.cells]) for one in table.rows]
+    layout = TableLayout(wrap=(1,), max_widths={1: 18}, omit=(6,))
+    short = Table(("", *table.headings), marked, (4, 5), layout)
+    stiffness = f"Stiffness: {stiffness_text(analysis)}"
+    caption = (
+        f"Verdict: {passivity.verdict}. It rests on: {passivity.decided_by}. {stiffness}. T is the "
+        "update period, σ₀ the least damping of the device, b_v virtual damping, d the delay in "
+        "whole samples, K₀ the stiffest smooth wall that held on the device, |δ| and |b| steps of "
+        "position and force, f_c a lower bound of the dry friction."
+    )
+    undecided = page.DefinitionList(undecided_criteria(analysis))
+    blocks: list[page.Block] = [short, undecided, page.Paragraph(stiffness)]
+    return [
+        Section(title, [table], caption, media=Media.HTML | Media.NOTEBOOK),
+        Section(f"{title} {passivity.verdict}", blocks, media=HEADED),
+    ]
+
+
+def _continuity_section(analysis: Analysis) -> Section:
+    blocks: list[page.Block] = [page.Paragraph(analysis.continuity.reason)]
+    if analysis.continuity.jumps:
+        blocks.append(_jumps_table(analysis))
+    return Section("Continuity", blocks, media=_MEDIA)
+
+
+def _figure_sections(analysis: Analysis, *names: str) -> list[Section]:
+    """Return the figures of these names that the analysis has."""
+    sections = []
+    for name in names:
+        if name in analysis_figure_names(analysis):
+            title, caption = _CAPTIONS[name]
+            picture = page.Picture(
+                page.plot_later(analysis, name), analysis_alt_text(analysis, name)
+            )
+            media = Media.HTML | Media.NOTEBOOK if name == "gain" else Media.HTML
+            sections.append(Section(title, [picture], caption, level=3, media=media))
+    return sections
+
+
+_CAPTIONS = {
+    "field": (
+        "The field and the worst loop",
+        "Arrows: force on the probe. Colour: curl; the probe gains energy on a loop around one "
+        "colour. White everywhere: conservative. Blue: the worst loop, in the direction of its "
+        "arrows, projected on the plane. The dashed line is the scan; points deeper than the "
+        "working region are faded. A law with state is drawn sliding at full deflection; its worst "
+        "loop may lie in a horizontal plane and is then seen from the side.",
+    ),
+    "gain": (
+        "Where the loop gain is",
+        "‖J‖/k in the vertical plane through the witness of q: the factor by which the law "
+        "multiplies the stiffness of the smooth wall at each point. Computed on a grid, which "
+        "samples thin ridges of the medial axis only in places.",
+    ),
+    "top": (
+        "The loop gain from above",
+        "The greatest ‖J‖/k of five depths below each point, sampled on a grid: greater values "
+        "may lie between. The bounds of q above are not sampled.",
+    ),
+    "depth": (
+        "Singular values over depth",
+        "Singular values of J/k on the line down to the witness of q; the greatest is ‖J‖/k. The "
+        "horizontal lines are the bounds of q.",
+    ),
+    "jumps": (
+        "Force jumps",
+        "At each depth the difference of the force at two points on either side of the medial "
+        "axis, closer together than 1e-9 of the texture.",
+    ),
+}

@@ -1,0 +1,321 @@
+"""Reports of a comparison of laws, on one device or on several devices and depths."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+from rich.table import Table as RichTable
+
+from asperity.analysis.compare import Comparison
+from asperity.analysis.compare_devices import DeviceComparisons
+from asperity.analysis.gain.surface_cache import surface_content
+from asperity.analysis.sentences.perceptibility_sentences import (
+    force_magnitude_text,
+    speed_text,
+    tier_text,
+)
+from asperity.core.cache import content_digest
+from asperity.core.files import json_text
+from asperity.core.units import format_quantity
+from asperity.report import page, terminal
+from asperity.report.comparison_columns import (
+    FULL_COLUMNS,
+    SUMMARY_COLUMNS,
+    VERDICT_COLUMN,
+    VERDICT_MIN_CONSOLE,
+    LawColumn,
+    describe_texture,
+    has_sampled,
+    laws_table,
+    recommended_stiffness_text,
+    single_line,
+    verdicts_table,
+)
+from asperity.report.device_report import datum_text, device_numbers_table
+from asperity.report.measured_report import measured_sections
+from asperity.report.page import Cell, Media, Page, Row, Section, Table, TableLayout
+from asperity.report.sentences import glossary
+from asperity.report.sentences.alt_text import comparison_alt_text
+from asperity.report.sentences.number_text import (
+    NOT_AVAILABLE,
+    bound_text,
+    limit_text,
+    position_text,
+)
+
+_FOOTER = f"{page.PAPER_CITATION}. {page.NO_PERCEPTUAL_TEST}"
+_SAMPLED_NOTE = (
+    "~ found by sampling, not proved: the true q, q⁺ and leak may be larger, "
+    "the true safe stiffness smaller."
+)
+
+
+def comparison_table(comparison: Comparison, width: int = 120, full: bool = False) -> RichTable:
+    """Return one row per law, the first column the letter of the law alone.
+
+    Args:
+        comparison: the result.
+        width: of the console [characters]; on a narrow one columns are left out.
+        full: whether to show q, q⁺, the limit with its basis, leak, T and S instead of the summary.
+
+    Returns:
+        A Rich table.
+    """
+    columns = FULL_COLUMNS if full else (*SUMMARY_COLUMNS, VERDICT_COLUMN)
+    return terminal.rich_table(laws_table(comparison, columns), width)
+
+
+def comparison_page(comparison: Comparison, full: bool = False) -> Page:
+    """Return the report: answer, tables, figures, assumptions and provenance.
+
+    Args:
+        comparison: the result.
+        full: whether a terminal shows every number instead of the summary.
+    """
+    return Page(
+        title=f"Haptic texture on {comparison.device.name}",
+        answer=comparison.recommendation,
+        facts=_facts(comparison),
+        sections=[
+            *_terminal_sections(comparison, full),
+            *_law_sections(comparison),
+            *_figure_sections(comparison),
+            *measured_sections(comparison.texture),
+            *page.user_sections(Comparison, comparison),
+            *page.assumption_sections(
+                comparison.assumptions,
+                device_numbers_table(comparison.device, list(comparison.device.data)),
+            ),
+            _provenance_section(comparison),
+            Section("How to read it", [page.DefinitionList(glossary.COMPARISON)]),
+        ],
+        footer=_FOOTER,
+    )
+
+
+def _facts(comparison: Comparison) -> list[tuple[str, str]]:
+    texture, device = comparison.texture, comparison.device
+    return [
+        ("Surface", describe_texture(texture.describe())),
+        ("Peak to valley", format_quantity(texture.peak_to_valley, "m")),
+        ("Device", device.name),
+        ("K₀, stiffest smooth wall", datum_text(device.wall_test)),
+        ("Stiffness", _requested_stiffness_text(comparison)),
+        ("Pressed to", format_quantity(comparison.max_depth, "m")),
+        ("Scanned at", speed_text(comparison.speed)),
+    ]
+
+
+def _requested_stiffness_text(comparison: Comparison) -> str:
+    stiffness = comparison.stiffness
+    if stiffness is None:
+        return "the recommended one of each law"
+    return format_quantity(stiffness, "N/m")
+
+
+def _terminal_sections(comparison: Comparison, full: bool) -> list[Section]:
+    summary_columns = (*SUMMARY_COLUMNS, VERDICT_COLUMN)
+    table = laws_table(comparison, FULL_COLUMNS if full else summary_columns)
+    if has_sampled(comparison):
+        mark = ("~", "sampled, not proved: leak and q may be larger, the limit lower")
+        legend = {**table.layout.legend, len(table.headings): mark}
+        table = replace(table, layout=replace(table.layout, legend=legend))
+    widest = None if full else VERDICT_MIN_CONSOLE - 1
+    layout = TableLayout(wrap=(1,), max_console=widest)
+    verdicts = replace(verdicts_table(comparison), layout=layout)
+    summary = _single_line_table(comparison, summary_columns)
+    return [
+        Section("", [table], media=Media.TERMINAL),
+        Section("", [verdicts], media=Media.TERMINAL),
+        Section("", [summary], media=Media.NOTEBOOK),
+    ]
+
+
+def _single_line_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
+    """Return a table whose headings are not broken into lines."""
+    table = laws_table(comparison, columns)
+    return replace(table, headings=[single_line(heading) for heading in table.headings])
+
+
+def _law_sections(comparison: Comparison) -> list[Section]:
+    summary = _single_line_table(comparison, SUMMARY_COLUMNS)
+    full = _single_line_table(comparison, FULL_COLUMNS)
+    return [
+        Section("The laws compared", [summary]),
+        Section("What will go wrong", [verdicts_table(comparison)]),
+        Section("Every number", [full], notes=[_SAMPLED_NOTE] if has_sampled(comparison) else []),
+    ]
+
+
+def _figure_sections(comparison: Comparison) -> list[Section]:
+    depth = format_quantity(comparison.max_depth, "m")
+    stiffness = _requested_stiffness_text(comparison)
+    digest = _figure_digest(comparison)
+    sections = []
+    for name, (title, caption) in _CAPTIONS.items():
+        text = partial(comparison_alt_text, comparison, name)
+        picture = page.Picture(page.plot_later(comparison, name), text, name, digest)
+        media = Media.HTML | Media.NOTEBOOK if name == "merit" else Media.HTML
+        words = caption.format(depth=depth, stiffness=stiffness)
+        sections.append(Section(title, [picture], words, media=media))
+    return sections
+
+
+def _figure_digest(comparison: Comparison) -> str | None:
+    """Return a digest of everything that the figures depend on; ``None`` if it is not known."""
+    contents = [surface_content(row.surface) for row in comparison.rows]
+    if None in contents:
+        return None
+    return content_digest(json_text(comparison), comparison.texture.filled_mask, tuple(contents))
+
+
+def _provenance_section(comparison: Comparison) -> Section:
+    """Return how each number was obtained."""
+    headings = ("law", "q", "attained at", "q⁺", "conservative", "leak", "continuous")
+    rows = [
+        Row(
+            [
+                Cell(row.law.letter, "l"),
+                f"{bound_text(row.q)} ({row.q.method}: {row.q.note})",
+                position_text(row.q.at),
+                f"{bound_text(row.one_sided)} ({row.one_sided.method}: {row.one_sided.note})",
+                row.conservative_reason,
+                f"{row.leak.method}: {row.leak.description}",
+                row.continuous_reason,
+            ],
+            law=row.law.letter,
+        )
+        for row in comparison.rows
+    ]
+    return Section("Provenance of the numbers", [Table(headings, rows)])
+
+
+_CAPTIONS = {
+    "surface": ("The surface", "As it is rendered, after preparation."),
+    "spectrum": (
+        "Its spectrum",
+        "Amplitude against wavelength along the scan line, with what the device can resolve.",
+    ),
+    "force": (
+        "Force along a scan",
+        "Straight scan at constant height, {depth} below the highest point (below the smooth wall "
+        "for laws that act below it). Stiffness: {stiffness}.",
+    ),
+    "field": (
+        "Force field over its curl",
+        "Arrows: force on the probe in the vertical plane of the scan. Colour: curl; the probe "
+        "gains energy on a loop around one colour. White everywhere: conservative. The dashed "
+        "line is the scan. A law with state is drawn sliding at full deflection.",
+    ),
+    "gain": (
+        "Loop gain",
+        "‖J‖/k in the same plane: the factor by which the law multiplies the stiffness of the "
+        "smooth wall at each point. The cross is the witness of q, if it lies in the picture.",
+    ),
+    "merit": (
+        "Strength and support",
+        "Texture and support that each law gives for the loop gain that it costs. Up and to the "
+        "right is better.",
+    ),
+}
+
+
+# --- several devices and depths -------------------------------------------------------------------
+
+_CASE_HEADINGS = ("device", "depth", "law", "start at", "texture", "felt?")
+_CASE_MEANINGS = {
+    1: ("depth", "to which the surface is pressed"),
+    2: ("law", "the recommended one; in brackets the nearest, where nothing is felt"),
+    3: ("start at", "recommended stiffness"),
+    4: ("texture", "RMS of the texture force that the device resolves, at that stiffness"),
+}
+_CASES_LAYOUT = TableLayout(wrap=(0,), drop_order=(3, 4), legend=_CASE_MEANINGS)
+
+
+def _case_row(comparison: Comparison) -> Row:
+    depth = format_quantity(comparison.max_depth, "m")
+    best = comparison.recommended_row or comparison.nearest_row
+    if best is None:
+        return Row([comparison.device.name, depth, "none", *[NOT_AVAILABLE] * 3])
+    text = best.law.letter if comparison.recommended else f"({best.law.letter})"
+    return Row(
+        [
+            comparison.device.name,
+            depth,
+            Cell(text, "l", note=comparison.recommendation),
+            limit_text(best.recommended_stiffness),
+            force_magnitude_text(best.resolved_force),
+            tier_text(best.perceptibility),
+        ]
+    )
+
+
+def cases_table(comparisons: DeviceComparisons) -> Table:
+    """Return a row for each device and depth."""
+    rows = [_case_row(one) for one in comparisons.comparisons]
+    for missing in comparisons.missing_data:
+        rows.append(Row([missing.device, NOT_AVAILABLE, "K₀ missing", *[NOT_AVAILABLE] * 3]))
+    return Table(_CASE_HEADINGS, rows, (1, 3, 4), _CASES_LAYOUT)
+
+
+def comparisons_page(comparisons: DeviceComparisons) -> Page:
+    """Return the report: the table, then each device and depth with its laws and assumptions."""
+    texture, missing = comparisons.texture, [one.sentence for one in comparisons.missing_data]
+    cases, table = comparisons.comparisons, cases_table(comparisons)
+    answers = [f"{_case_title(one)}: {one.recommendation}" for one in cases]
+    common = [
+        sentence
+        for sentence in (cases[0].assumptions if cases else ())
+        if all(sentence in one.assumptions for one in cases)
+    ]
+    assumed = [one for one in page.assumption_sections(common) if Media.TERMINAL in one.media]
+    return Page(
+        title="Haptic texture on several devices",
+        answer=comparisons.recommendation,
+        facts=[
+            ("Surface", describe_texture(texture.describe())),
+            ("Peak to valley", format_quantity(texture.peak_to_valley, "m")),
+        ],
+        sections=[
+            Section("", [table], media=Media.TERMINAL),
+            *[
+                Section("", [page.Paragraph(text)], media=Media.TERMINAL)
+                for text in (*answers, *missing)
+            ],
+            *assumed,
+            Section("", [table, *map(page.Paragraph, missing)], media=Media.NOTEBOOK),
+            Section("Summary", [table, page.DefinitionList(list(_CASE_MEANINGS.values()))]),
+            *[_case_section(one) for one in cases],
+            *([Section("Missing", [page.BulletList(missing)])] if missing else ()),
+            *measured_sections(texture),
+        ],
+        footer=_FOOTER,
+    )
+
+
+def _case_title(comparison: Comparison) -> str:
+    return f"{comparison.device.name}, {format_quantity(comparison.max_depth, 'm')} deep"
+
+
+def _case_section(comparison: Comparison) -> Section:
+    """Return answer, laws and assumptions of one device and depth."""
+    rows = [
+        Row(
+            [
+                Cell(row.law.letter, "l"),
+                recommended_stiffness_text(row),
+                tier_text(row.perceptibility),
+                row.verdict,
+            ],
+            "best" if row is comparison.recommended_row else "",
+            law=row.law.letter,
+        )
+        for row in comparison.rows
+    ]
+    table = Table(("law", "start at", "felt?", "verdict"), rows, (1,))
+    answer, assumptions = comparison.recommendation, comparison.assumptions
+    return Section(
+        _case_title(comparison), [page.Paragraph(answer), table, page.BulletList(assumptions)]
+    )

@@ -1,0 +1,189 @@
+"""Report of the six limits of a device."""
+
+from __future__ import annotations
+
+from asperity.analysis.limits.limit_result import Limits, RenderedWave
+from asperity.analysis.limits.limit_rules import LIMIT_RULES
+from asperity.analysis.sentences.limits_sentences import percent, speeds_text, stiffness_text
+from asperity.analysis.sentences.perceptibility_sentences import speed_text, texture_amount_text
+from asperity.core.units import format_quantity
+from asperity.report import page
+from asperity.report.device_report import device_numbers_table
+from asperity.report.page import SCREEN, Cell, Media, Row, Section, Table, TableLayout
+from asperity.report.sentences import glossary
+from asperity.report.sentences.number_text import (
+    INFINITY_SIGN,
+    NOT_AVAILABLE,
+    readable_name,
+    yes_no_text,
+)
+
+_LIMIT_HEADINGS = ("", "limit", "condition", "left", "right", "holds", "for", "at speeds")
+_NAME_COLUMN, _SHARE_COLUMN, _SPEEDS_COLUMN = 1, 6, 7
+_WIDE_CONSOLE = 96
+"""Console width [characters] from which names have one line and shares are shown."""
+_LIMITS_LAYOUT = TableLayout(
+    wrap=(_NAME_COLUMN, _SPEEDS_COLUMN),
+    max_widths={_NAME_COLUMN: len("reconstruction")},
+    max_widths_below=_WIDE_CONSOLE,
+    min_console={_SHARE_COLUMN: _WIDE_CONSOLE},
+)
+_WAVE_HEADINGS = ("wavelength", "amplitude", "share", "frequency", "force")
+_SIDES_NOTE = (
+    "Left and right: of the wave that comes closest to breaking the limit. For: share of the "
+    "height variance in waves that meet it."
+)
+MAX_WAVES = 16
+"""Number of waves listed: those with the greatest share of the height variance."""
+WAVE_LIMITS = tuple(rule.number for rule in LIMIT_RULES if rule.number != 5)
+_SYMBOL_FIELDS = {
+    "T": "update_rate",
+    "δ": "position_resolution",
+    "b": "force_resolution",
+    "K₀": "max_stiffness",
+    "F₀": "bandwidth",
+}
+
+
+def side_text(side: float | None, unit: str) -> str:
+    """Return one side of an inequality as text; "–" if it is unknown.
+
+    Example:
+        >>> side_text(5e-5, "m"), side_text(float("inf"), "N/m"), side_text(None, "Hz")
+        ('50 µm', '∞', '–')
+    """
+    if side is None:
+        return NOT_AVAILABLE
+    return INFINITY_SIGN if side == float("inf") else format_quantity(side, unit)
+
+
+def six_limits_table(result: Limits) -> Table:
+    """Return one row per limit: number, name, condition, both sides, result, share and speeds."""
+    rows = []
+    for limit in result.limits:
+        missing = f"needs {', '.join(limit.missing_data)}" if limit.missing_data else ""
+        cells: page.Cells = [
+            Cell(str(limit.number), "l"),
+            limit.name,
+            limit.inequality,
+            side_text(limit.left, limit.unit),
+            side_text(limit.right, limit.unit),
+            page.holds_cell(limit.holds),
+            "" if limit.share is None else percent(limit.share),
+            missing or speeds_text(limit.speeds),
+        ]
+        style = "bold red" if limit.holds is False else "dim" if limit.holds is None else ""
+        rows.append(Row(cells, style=style))
+    return Table(_LIMIT_HEADINGS, rows, (3, 4, _SHARE_COLUMN), _LIMITS_LAYOUT)
+
+
+def listed_waves(result: Limits) -> list[RenderedWave]:
+    """Return the waves of the table, the longest first."""
+    largest = sorted(result.waves, key=lambda wave: -wave.share)[:MAX_WAVES]
+    return sorted(largest, key=lambda wave: -wave.wavelength)
+
+
+def _waves_table(result: Limits, *, short: bool) -> Table:
+    """Return wave, force and the limits met, a row per wave; ``short`` abbreviates the limits."""
+
+    def cell(holds: bool | None) -> str | Cell:
+        return yes_no_text(holds)[0] if short else page.holds_cell(holds)
+
+    rows = [
+        Row(
+            [
+                format_quantity(wave.wavelength, "m"),
+                format_quantity(wave.amplitude, "m"),
+                percent(wave.share),
+                format_quantity(wave.frequency, "Hz"),
+                format_quantity(wave.force, "N", digits=2),
+                *[cell(wave.holds.get(number)) for number in WAVE_LIMITS],
+                speeds_text((0.0, wave.top_speed)),
+            ]
+        )
+        for wave in listed_waves(result)
+    ]
+    limits = [f"{number}" if short else f"limit {number}" for number in WAVE_LIMITS]
+    headings = (*_WAVE_HEADINGS, *limits, "at speeds")
+    return Table(headings, rows, range(len(_WAVE_HEADINGS)))
+
+
+def symbol_lines(result: Limits) -> list[str]:
+    """Return the symbols of the limits with their values."""
+    device, surface = result.device, result.surface
+    values = []
+    for symbol, field in _SYMBOL_FIELDS.items():
+        if field in device.data:
+            datum = device.data[field]
+            text = f"1/({datum.text})" if field == "update_rate" else datum.text
+            values.append(f"{symbol} = {text}{'' if datum.verified else ' (not verified)'}")
+    q = INFINITY_SIGN if result.gain.value == float("inf") else f"{result.gain.value:.4g}"
+    return [
+        f"v = {speed_text(result.speed)}, α = {result.time_samples:g}, "
+        f"β = {result.position_samples:g}, γ = {result.force_steps:g}; {device.name}: "
+        f"{', '.join(values) or 'no data'}",
+        f"Law {surface.law.letter} at k = {stiffness_text(result)}: "
+        f"{result.gain_symbol} = {q} ({result.gain.method})",
+    ]
+
+
+def limits_page(result: Limits) -> page.Page:
+    """Return the report: answer, limits, figure, waves and assumptions."""
+    fields = [*dict.fromkeys(limit.device_field for limit in result.limits), "friction"]
+    notes = [*symbol_lines(result), _SIDES_NOTE]
+    limits = [six_limits_table(result)]
+    return page.Page(
+        title=f"Rendering limits of law {result.surface.law.letter} on {result.device.name}",
+        answer=result.answer,
+        facts=_facts(result),
+        sections=[
+            Section("The six limits", limits, notes=notes, media=SCREEN | Media.NOTEBOOK),
+            _figure_section(result),
+            *(_waves_sections(result) if result.waves else ()),
+            *page.user_sections(Limits, result),
+            *page.assumption_sections(
+                result.assumptions, device_numbers_table(result.device, fields)
+            ),
+            Section("How to read it", [page.DefinitionList(glossary.LIMITS)]),
+        ],
+        footer=f"{page.PAPER_CITATION}, section II.B. {page.NO_PERCEPTUAL_TEST}",
+    )
+
+
+def _facts(result: Limits) -> list[tuple[str, str]]:
+    texture, law = result.texture, result.surface.law
+    perceptibility = result.perceptibility
+    return [
+        ("Surface", str(texture.describe()["kind"])),
+        ("Peak to valley", format_quantity(texture.peak_to_valley, "m")),
+        ("Law", f"{law.letter}, {readable_name(law.name)}"),
+        ("Device", result.device.name),
+        ("Scanning speed", speed_text(result.speed)),
+        ("Stiffness", stiffness_text(result)),
+        ("Speeds at which all decided limits hold", speeds_text(result.speeds)),
+        ("Texture force", f"{texture_amount_text(perceptibility)}: {perceptibility.tier}"),
+    ]
+
+
+def _figure_section(result: Limits) -> Section:
+    caption = (
+        "Amplitude of the waves of the texture, and the force of each, against wavelength. Waves "
+        "to the left of a dashed line are too short for the device at this speed; below a dashed "
+        "line they are too weak. Filled: the wave meets every limit that could be decided."
+    )
+    met = sum(all(wave.holds.values()) for wave in result.waves)
+    description = f"{len(result.waves)} waves, of which {met} meet every limit."
+
+    title, media = "The waves and their forces", Media.HTML | Media.NOTEBOOK
+    figure = page.plot_later(result)
+    return page.picture_section(title, figure, description, caption, media=media)
+
+
+def _waves_sections(result: Limits) -> list[Section]:
+    """Return the waves in numbers, for a page and for a terminal."""
+    more = len(result.waves) - MAX_WAVES
+    notes = [f"And {more} more with less of the height variance."] if more > 0 else []
+    return [
+        Section("Wave by wave", [_waves_table(result, short=False)], notes=notes),
+        Section("", [_waves_table(result, short=True)], notes=notes, media=Media.TERMINAL),
+    ]

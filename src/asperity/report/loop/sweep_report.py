@@ -1,0 +1,253 @@
+"""Reports of sweeps: onsets of limit cycles, and energy per stroke against speed and depth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+from asperity.core.units import format_quantity
+from asperity.report.loop.run_report import LOOP_FOOTER, loop_facts
+from asperity.report.page import (
+    Cell,
+    Cells,
+    Media,
+    Page,
+    Row,
+    Section,
+    Table,
+    TableLayout,
+    assumption_sections,
+    picture_section,
+    user_sections,
+)
+from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE
+from asperity.scene.setup import Setup
+from asperity.simulation.limit_cycles.onset_search import CYCLE_SPEED
+from asperity.simulation.limit_cycles.prediction import Prediction
+from asperity.simulation.scan import Stroke
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+ONSET_HEADINGS = (
+    "law",
+    "d",
+    "quiet to",
+    "cycles",
+    "starts",
+    "depth",
+    "q",
+    "paper (1)",
+    "delay rule",
+    "K₀/q",
+)
+ONSET_NOTES = (
+    "Stiffnesses in N/m, d the delay in samples. Quiet to, cycles: the bracket of the onset over "
+    "all starts. Starts: how many of them end in a limit cycle at the onset. Depth: of the handle "
+    "at the onset; q is computed for this depth.",
+    "Paper (1): σ₀/(2Tq). Delay rule: σ₀/(T(q⁺/2 + dq)), a proof for conservative laws and exact "
+    "positions; in brackets for other laws, where it proves nothing. K₀/q: onset of the smooth "
+    "wall at that delay, over q; the paper's rule of thumb, not a proof.",
+)
+
+
+def onset_cells(prediction: Prediction) -> list[Cell]:
+    """Return the cells of a row; rules that allowed a stiffness that cycled are coloured."""
+    onset, rule = prediction.onset, stiffness_number(prediction.delay_rule)
+    cycling = "none" if math.isinf(onset.cycling) else stiffness_number(onset.cycling)
+    wall = prediction.wall_rule
+    wall_text = NOT_AVAILABLE if wall is None else stiffness_number(wall)
+    texts = [
+        str(onset.delay),
+        stiffness_number(onset.quiet),
+        cycling,
+        f"{onset.cycles}/{onset.starts}",
+        format_quantity(prediction.depth, "m", digits=2),
+        stiffness_number(prediction.q),
+        stiffness_number(prediction.paper_limit),
+    ]
+    proved = rule if prediction.conservative else f"({rule})"
+    return [
+        Cell(onset.law, "l"),
+        *map(Cell, texts),
+        Cell(proved, "no" if prediction.violates_delay_rule else ""),
+        Cell(wall_text, "no" if prediction.violates_wall_rule else ""),
+    ]
+
+
+def _onset_table(predictions: Sequence[Prediction]) -> Table:
+    rows = [Row(onset_cells(one), law=one.onset.law) for one in predictions]
+    return _sweep_table(ONSET_HEADINGS, rows)
+
+
+def _sweep_table(headings: Sequence[str], rows: Sequence[Row], omit: Sequence[int] = ()) -> Table:
+    """Return a table whose numbers are wrapped on a narrow console, so that no digit is cut."""
+    columns = range(len(headings))
+    layout = TableLayout(wrap=columns, omit=omit, gap=2, has_rule=False)
+    return Table(headings, rows, columns[1:], layout)
+
+
+def stiffness_number(value: float) -> str:
+    """Return a stiffness [N/m] with three digits, without the unit."""
+    if math.isinf(value):
+        return INFINITY_SIGN
+    return f"{value:.3g}" if value < 1000.0 else f"{float(f'{value:.3g}'):,.0f}".replace(",", " ")
+
+
+def onset_answer(setup: Setup, predictions: Sequence[Prediction]) -> str:
+    """Return the result in two sentences."""
+    missed = [one for one in predictions if one.violates_delay_rule]
+    walls = [one for one in predictions if one.violates_wall_rule]
+    step = setup.servo.position_resolution
+    if missed:
+        shares = [f"{_case_name(one)} ({one.onset.cycling / one.delay_rule:.0%})" for one in missed]
+        answer = f"Limit cycles below the delay rule, at this share of it: {', '.join(shares)}."
+        if step:
+            resolution = format_quantity(step, "m")
+            answer += f" The rule is proved for exact positions, not for steps of {resolution}."
+    else:
+        proved = sum(one.conservative for one in predictions)
+        cases = "case" if proved == 1 else "cases"
+        answer = f"No limit cycle below the delay rule, in {proved} {cases} of conservative laws."
+    if any(one.wall_rule is not None and not one.onset.is_smooth_wall for one in predictions):
+        names = ", ".join(map(_case_name, walls))
+        answer += f" K₀/q was too much for: {names}." if walls else " K₀/q was safe in all of them."
+    return answer
+
+
+def _case_name(prediction: Prediction) -> str:
+    return f"{prediction.onset.law} at d = {prediction.onset.delay}"
+
+
+def onset_page(setup: Setup, predictions: Sequence[Prediction]) -> Page:
+    """Return the report of the onsets."""
+    caption = (
+        "Stiffness at which the first of the starts ends in a limit cycle, and the limits of the "
+        "criteria. A solid green line is a proof: no blue point may lie below it."
+    )
+    limit = format_quantity(CYCLE_SPEED, "m/s")
+    cycle = f"A limit cycle: the velocity varies by more than {limit} RMS in the last quarter."
+    figure, text = partial(draw_onsets, predictions), onset_alt_text(predictions)
+    terminal = Section("", [_onset_table(predictions)], notes=ONSET_NOTES, media=Media.TERMINAL)
+    return Page(
+        title=f"Onset of limit cycles, {setup.device.name}",
+        answer=onset_answer(setup, predictions),
+        facts=loop_facts(setup),
+        sections=[
+            terminal,
+            picture_section("Onset against delay", figure, text, caption),
+            onset_section("In numbers, N/m", predictions, cycle),
+            *user_sections(Prediction, setup, predictions),
+            *assumption_sections(setup.assumptions),
+        ],
+        footer=LOOP_FOOTER,
+    )
+
+
+def draw_onsets(predictions: Sequence[Prediction]) -> Figure:
+    """Return the figure of the onsets."""
+    from asperity.report.pictures.loop_pictures import onset_figure
+
+    return onset_figure(predictions)
+
+
+def onset_alt_text(predictions: Sequence[Prediction]) -> str:
+    """Return the description of the figure of the onsets, without its numbers."""
+    laws = ", ".join(dict.fromkeys(one.onset.law for one in predictions))
+    return f"Onset of limit cycles and the limits of the criteria, over delay: laws {laws}."
+
+
+def onset_section(title: str, predictions: Sequence[Prediction], caption: str = "") -> Section:
+    """Return onsets and limits in numbers."""
+    return Section(title, [_onset_table(predictions)], caption, ONSET_NOTES)
+
+
+STROKE_HEADINGS = ("law", "speed", "depth", "x", "y", "z", "sum", "field", "±", "paper's", "lost")
+STROKE_NOTE = (
+    "Energies in mJ per stroke: work of the held force on the true motion, mean over whole turns, "
+    "forth and back, after the first stroke; positive feeds the hand. Field: work of the field of "
+    "the law along the true path, without sampling, delay and encoder steps, which account for the "
+    "rest; ±: variation from turn to turn and quadrature error. Paper's: its sum of force and step "
+    "of the same sample. Depth: mean depth of the handle below z = 0. Lost: losses of contact per "
+    "stroke."
+)
+
+
+def millijoules(value: float, *, signed: bool = True) -> str:
+    """Return an energy [J] as text in mJ."""
+    size = abs(value)
+    digits = 0 if size >= 1.0 else 1 if size >= 0.1 else 2 if size >= 1e-4 else 4
+    text = f"{1e3 * value:+.{digits}f}" if signed else f"{1e3 * value:.{digits}f}"
+    return "0" if not text.strip("+-0.") else text
+
+
+def _stroke_cells(stroke: Stroke) -> Cells:
+    depth = format_quantity(stroke.mean_depth, "m", digits=2)
+    prefix: Cells = [Cell(stroke.law, "l"), format_quantity(stroke.speed, "m/s"), depth]
+    if stroke.stop_message:
+        stopped = Cell("stopped", summary="Why", details=[("stopped", stroke.stop_message)])
+        return [*prefix, "", "", "", stopped, "", "", "", ""]
+    return [
+        *prefix,
+        *[millijoules(value) for value in stroke.energy],
+        millijoules(stroke.total),
+        Cell(millijoules(stroke.field), "no" if stroke.gains_energy else ""),
+        millijoules(stroke.spread + stroke.error, signed=False),
+        millijoules(sum(stroke.same_sample)),
+        f"{stroke.lost_contact:.3g}",
+    ]
+
+
+def _stroke_table(strokes: Sequence[Stroke]) -> Table:
+    rows = [Row(_stroke_cells(one), law=one.law) for one in strokes]
+    return _sweep_table(STROKE_HEADINGS, rows, omit=(STROKE_HEADINGS.index("y"),))
+
+
+def stroke_answer(strokes: Sequence[Stroke]) -> str:
+    """Return which laws feed the hand, and which do so by their field, in two sentences."""
+    by_all = _group_laws(strokes, lambda stroke: stroke.total > stroke.spread + stroke.error)
+    by_field = _group_laws(strokes, lambda stroke: stroke.gains_energy)
+    return f"A stroke feeds the hand: {by_all}. The law's field itself feeds it: {by_field}."
+
+
+def _group_laws(strokes: Sequence[Stroke], gains_energy: Callable[[Stroke], bool]) -> str:
+    laws = list(dict.fromkeys(stroke.law for stroke in strokes))
+    groups: dict[str, list[str]] = {"always": [], "at times": [], "never": []}
+    for law in laws:
+        gains = [gains_energy(stroke) for stroke in strokes if stroke.law == law]
+        groups["always" if all(gains) else "at times" if any(gains) else "never"].append(law)
+    return ", ".join(f"{', '.join(laws)} {when}" for when, laws in groups.items() if laws)
+
+
+def strokes_page(setup: Setup, strokes: Sequence[Stroke]) -> Page:
+    """Return the report of the strokes."""
+    caption = (
+        "Energy that the texture supplies per stroke: thick the sum, orange along x, blue along z. "
+        "Above the line it feeds the hand."
+    )
+    laws = ", ".join(dict.fromkeys(stroke.law for stroke in strokes))
+    text = f"Energy of a stroke over its speed, a panel for each of the laws {laws}."
+    stops = sorted({stroke.stop_message for stroke in strokes if stroke.stop_message})
+    notes = [f"{STROKE_NOTE} The y axis: --html, --json.", *(f"Stopped: it {one}" for one in stops)]
+    table = _stroke_table(strokes)
+    return Page(
+        title=f"Energy per stroke, {setup.device.name}",
+        answer=stroke_answer(strokes),
+        facts=loop_facts(setup),
+        sections=[
+            Section("", [table], notes=notes, media=Media.TERMINAL),
+            picture_section("Energy per stroke", partial(_draw_strokes, strokes), text, caption),
+            Section("In numbers", [table], notes=[STROKE_NOTE]),
+            *user_sections(Stroke, setup, strokes),
+            *assumption_sections(setup.assumptions),
+        ],
+        footer=LOOP_FOOTER,
+    )
+
+
+def _draw_strokes(strokes: Sequence[Stroke]) -> Figure:
+    from asperity.report.pictures.loop_pictures import strokes_figure
+
+    return strokes_figure(strokes)

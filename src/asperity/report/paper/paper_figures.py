@@ -1,0 +1,179 @@
+"""Figures of the reproduction as files, for lectures."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import matplotlib
+from matplotlib.figure import Figure
+
+from asperity.core.errors import ParameterError
+from asperity.core.files import open_atomic
+from asperity.paper.claim_registry import find_claims
+from asperity.paper.experiments import Experiments
+from asperity.paper.experiments.bump_runs import bump_experiment
+from asperity.paper.experiments.cycle_counts import passivity_experiment
+from asperity.paper.experiments.stroke_energies import scanning_experiment
+from asperity.report.pictures import paper_pictures as pictures
+from asperity.report.pictures.loop_pictures import onset_figure
+from asperity.report.pictures.paper_pictures import figure_three, figure_two
+
+FileFormat = Literal["svg", "png"]
+_DPI = 192  # of a PNG: about 1920 pixels for the 10 inches that all figures are wide
+_MARGIN = 0.15  # around the figure [inch]
+_HASH_SALT = "asperity"  # of the identifiers in an SVG, which are random without one
+
+
+@dataclass(frozen=True)
+class PaperFigure:
+    """A figure of the reproduction.
+
+    Attributes:
+        name: of the file, without its suffix.
+        claim_names: claims that it shows, as names for
+            :func:`~asperity.paper.claim_registry.find_claims`.
+        draw: returns the figure, from all experiments or from the one that it needs.
+        needs_simulation: whether it needs an experiment.
+    """
+
+    name: str
+    claim_names: tuple[str, ...]
+    draw: Callable[[Experiments | None], Figure]
+    needs_simulation: bool = True
+
+    def shows_any(self, names: Iterable[str]) -> bool:
+        """Return whether it shows one of the named claims."""
+        ours = {claim.id for name in self.claim_names for claim in find_claims(name)}
+        return any(claim.id in ours for name in names for claim in find_claims(name))
+
+
+def _devices_figure(experiments: Experiments | None) -> Figure:
+    assert experiments is not None, "no claim needs this figure alone"
+    return pictures.devices_figure(experiments)
+
+
+def _cycles_figure(experiments: Experiments | None) -> Figure:
+    # This figure needs no onsets, which take minutes.
+    return pictures.cycles_figure(
+        experiments.passivity if experiments else passivity_experiment(delays=())
+    )
+
+
+PAPER_FIGURES = (
+    PaperFigure("fig-2", ("fig-2",), lambda _found: figure_two(), needs_simulation=False),
+    PaperFigure("fig-3", ("fig-3",), lambda _found: figure_three(), needs_simulation=False),
+    PaperFigure("fig-5", ("fig-5",), _cycles_figure),
+    PaperFigure(
+        "onsets",
+        ("sentence-III.B-reduced",),
+        lambda found: onset_figure((found.passivity if found else passivity_experiment()).onsets),
+    ),
+    PaperFigure(
+        "fig-6",
+        ("fig-6",),
+        lambda found: pictures.energies_figure(found.scanning if found else scanning_experiment()),
+    ),
+    PaperFigure(
+        "fig-7",
+        ("fig-7",),
+        lambda found: pictures.bumps_figure(found.bump if found else bump_experiment()),
+    ),
+    PaperFigure("devices", (), _devices_figure),
+)
+"""In the order of the paper; additional figures follow those that they belong to."""
+
+
+def find_figures(
+    names: Sequence[str] = (), *, include_simulated: bool = True
+) -> tuple[PaperFigure, ...]:
+    """Return the figures that show claims; all if none is named.
+
+    Args:
+        names: of claims, see :func:`~asperity.paper.claim_registry.find_claims`.
+        include_simulated: whether all figures include those of experiments.
+
+    Raises:
+        ParameterError: if no figure shows a named claim.
+
+    Example:
+        >>> [figure.name for figure in find_figures(["eq-12", "fig-5"])]
+        ['fig-3', 'fig-5']
+    """
+    if not names:
+        return tuple(one for one in PAPER_FIGURES if include_simulated or not one.needs_simulation)
+    found = tuple(one for one in PAPER_FIGURES if one.shows_any(names))
+    if not found:
+        available = ", ".join(name for one in PAPER_FIGURES for name in one.claim_names)
+        reason = f"are not available for {', '.join(names)}, but for {available}"
+        raise ParameterError("figures", reason)
+    return found
+
+
+def create_folder(path: str) -> Path:
+    """Return a writable folder, created if it is missing.
+
+    Raises:
+        ParameterError: if the path is a file, or the folder cannot be created or written.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise ParameterError("figures", "must be a folder, not a file", path) from None
+    except (OSError, ValueError) as error:  # ValueError: a path with a null byte
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ParameterError("figures", f"cannot be created: {reason}", path) from None
+    if not os.access(folder, os.W_OK):
+        raise ParameterError("figures", "must be a folder that can be written", path)
+    return folder
+
+
+def write_figures(
+    figures: Sequence[PaperFigure],
+    folder: Path,
+    file_format: FileFormat,
+    experiments: Experiments | None = None,
+    progress: Callable[[str], None] = lambda _name: None,
+) -> tuple[Path, ...]:
+    """Draw figures and write each to a file, the same bytes for the same numbers.
+
+    Args:
+        figures: the figures.
+        folder: destination.
+        file_format: of the files.
+        experiments: their data; by default each figure computes what it needs.
+        progress: called with the name of each figure before it is drawn.
+
+    Raises:
+        ParameterError: if a file cannot be written.
+    """
+    paths = []
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams["svg.hashsalt"] = _HASH_SALT
+        for figure in figures:
+            progress(figure.name)
+            paths.append(folder / f"{figure.name}.{file_format}")
+            _write_figure(figure.draw(experiments), paths[-1], file_format)
+    return tuple(paths)
+
+
+def _write_figure(figure: Figure, path: Path, file_format: FileFormat) -> None:
+    metadata: dict[str, Any] = {"svg": {"Date": None, "Creator": None}, "png": {"Software": None}}
+    try:
+        with open_atomic(path) as stream:
+            figure.savefig(
+                stream,
+                format=file_format,
+                dpi=_DPI,
+                metadata=metadata[file_format],
+                bbox_inches="tight",
+                pad_inches=_MARGIN,
+            )
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise ParameterError("figures", f"cannot be written: {reason}", str(path)) from None

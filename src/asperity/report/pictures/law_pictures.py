@@ -1,0 +1,222 @@
+"""Figures of several laws: forces along a scan, loop gain in a plane, strength and support."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+from asperity.analysis.compare import Comparison
+from asperity.analysis.comparison_result import LawRow
+from asperity.analysis.energy.merit import scan_height
+from asperity.core.units import format_quantity
+from asperity.report.pictures import style
+from asperity.report.pictures.field_pictures import field_segment
+from asperity.report.pictures.scan_plane import (
+    CurlField,
+    PlaneForces,
+    ScanSegment,
+    choose_segment,
+    curl_field,
+    feature_length,
+    field_range,
+    scan_forces,
+)
+from asperity.report.sentences.number_text import bound_text, number_text, strength_has_unit
+from asperity.surface import Surface
+from asperity.textures.texture import Texture
+
+_FORCE_COLUMNS = 2
+# Greatest ratio of a panel's range to the usual range, beyond which it is clipped.
+_MAX_FORCE_RATIO = 3.0
+
+
+def force_segment(texture: Texture) -> ScanSegment:
+    """Return the part of the scan line shown in figures of forces."""
+    length = feature_length(texture)
+    return choose_segment(texture, 2.0 * length, 12.0 * length)
+
+
+def force_size(count: int) -> tuple[float, float]:
+    """Return width and height of the figure [inch]."""
+    return 10.0, 1.45 * math.ceil(count / _FORCE_COLUMNS) + 1.0
+
+
+def draw_forces(figure: Figure | SubFigure, surfaces: Sequence[Surface]) -> None:
+    """Draw tangential and normal force along the scan for every law, on shared axes."""
+    segment = force_segment(surfaces[0].texture)
+    forces = [scan_forces(surface, segment) for surface in surfaces]
+    equal_stiffness = len({surface.stiffness for surface in surfaces}) == 1
+    limits = _shared_limits(forces, equal_stiffness)
+    unit = style.force_unit(max(map(abs, limits)))
+    wide = style.length_unit(segment.length)
+    x, y = f"along the scan line [{wide.name}]", f"force [{unit.name}]"
+    panels = style.axes_grid(figure, len(surfaces), _FORCE_COLUMNS, x=x, y=y)
+    for axes, surface, force in zip(panels, surfaces, forces, strict=True):
+        _draw_force_panel(axes, surface, force, (wide, unit))
+        _annotate_clipping(axes, force, limits, unit)
+    panels[0].set_ylim(limits[0] * unit.scale, limits[1] * unit.scale)
+    panels[0].set_xlim(0.0, segment.length * wide.scale)
+    _draw_force_legend(figure, panels[0])
+
+
+def _shared_limits(forces: Sequence[PlaneForces], equal_stiffness: bool) -> tuple[float, float]:
+    """Return the limits of the shared axis [N], which clip a law that exceeds the others by far.
+
+    Only laws at equal stiffness are clipped.
+    """
+    lows = [min(float(f.tangential.min()), float(f.normal.min()), 0.0) for f in forces]
+    highs = [max(float(f.tangential.max()), float(f.normal.max()), 0.0) for f in forces]
+    spans = sorted(max(high, -low) for low, high in zip(lows, highs, strict=True))
+    usual = spans[(len(spans) - 1) // 2 if equal_stiffness else -1]
+    limit = _MAX_FORCE_RATIO * usual if usual > 0.0 else (spans[-1] or 1.0)
+    low, high = max(min(lows), -limit), min(max(highs), limit)
+    margin = 0.08 * ((high - low) or 1.0)
+    return low - margin, high + margin
+
+
+def _draw_force_panel(
+    axes: Axes, surface: Surface, force: PlaneForces, units: tuple[style.AxisUnit, style.AxisUnit]
+) -> None:
+    wide, unit = units
+    x = force.along * wide.scale
+    axes.axhline(0.0, color=style.FAINT, linewidth=0.8)
+    axes.plot(x, force.normal * unit.scale, color=style.ORANGE, linewidth=1.3, label="normal")
+    axes.plot(x, force.tangential * unit.scale, color=style.BLUE, linewidth=1.3, label="tangential")
+    style.title_law(axes, surface.law)
+    height = f"z = {format_quantity(scan_height(surface), 'm', digits=2)}"
+    axes.set_title(height, loc="right", fontsize=style.TICK, color=style.MUTED)
+
+
+def _annotate_clipping(
+    axes: Axes, force: PlaneForces, limits: tuple[float, float], unit: style.AxisUnit
+) -> None:
+    """Add the extremes of a curve that leaves the panel."""
+    both = np.concatenate([force.tangential, force.normal])
+    low, high = float(both.min()), float(both.max())
+    words = []
+    if high > limits[1]:
+        words.append(f"up to {high * unit.scale:.2g} {unit.name}")
+    if low < limits[0]:
+        words.append(f"down to {low * unit.scale:.2g} {unit.name}")
+    if words:
+        left = f"clipped: {', '.join(words)}"
+        style.add_note(axes, left, (0.99, 0.95), ha="right", va="top", color=style.INK)
+
+
+def _draw_force_legend(figure: Figure | SubFigure, axes: Axes) -> None:
+    handles, names = axes.get_legend_handles_labels()
+    figure.legend(
+        handles,
+        [f"{name} force" for name in names],
+        loc="outside upper left",
+        ncols=2,
+        fontsize=style.LABEL,
+        frameon=False,
+        labelcolor=style.INK,
+    )
+
+
+_GAIN_CELLS = (120, 60)
+
+
+def gain_figure(comparison: Comparison) -> Figure:
+    """Return ‖J‖₂/k, one panel per law on one logarithmic scale, with the witness of q.
+
+    The witness is a cross, if it is in the part of the plane that is shown.
+    """
+    surfaces = [row.surface for row in comparison.rows]
+    segment = field_segment(surfaces)
+    bottom, top = field_range(surfaces, segment)
+    fields = [curl_field(surface, segment, bottom, *_GAIN_CELLS) for surface in surfaces]
+    values = np.concatenate([field.gain.ravel() for field in fields])
+    highest = max(float(np.quantile(values[np.isfinite(values)], 0.995)), 2.0)
+    scale = LogNorm(min(0.5, float(np.quantile(values[values > 0.0], 0.02))), highest)
+    wide, high = style.length_unit(segment.length), style.length_unit(top - bottom)
+    x, y = f"along the scan line [{wide.name}]", f"z [{high.name}]"
+    figure, panels = style.law_panels(len(surfaces), 2.2, 0.9, x=x, y=y)
+    for axes, row, field in zip(panels, comparison.rows, fields, strict=True):
+        mesh = draw_gain_field(axes, field, scale, (wide, high))
+        style.title_law(axes, row.law, f"q = {bound_text(row.q)}")
+        _draw_witness(axes, row, segment, (wide, high))
+        axes.set_ylim(bottom * high.scale, top * high.scale)
+    add_gain_colorbar(figure, mesh, panels, "‖J‖ / k: loop gain over that of the smooth wall [1]")
+    return figure
+
+
+def _draw_witness(
+    axes: Axes, row: LawRow, segment: ScanSegment, units: tuple[style.AxisUnit, style.AxisUnit]
+) -> None:
+    """Draw a cross at the witness of q, if it is in the part of the plane that is shown."""
+    if row.q.at is None:
+        return
+    along, aside = segment.project(np.array(row.q.at[:2]))
+    if 0.0 <= along <= segment.length and aside < 0.01 * segment.length:
+        x, y = along * units[0].scale, row.q.at[2] * units[1].scale
+        axes.plot(x, y, "x", color=style.unthemed_colour(style.BLUE), ms=7, mew=2, zorder=5)
+
+
+def draw_gain_field(
+    axes: Axes, field: CurlField, scale: LogNorm, units: tuple[style.AxisUnit, style.AxisUnit]
+) -> Any:
+    """Draw ‖J‖/k of the cells of a vertical plane; return the mesh for a colour bar."""
+    axes.set_facecolor(style.FREE_SPACE)
+    x, z = field.along * units[0].scale, field.z * units[1].scale
+    gain = np.maximum(field.gain, scale.vmin or 0.0)
+    return axes.pcolormesh(x, z, gain, norm=scale, cmap="magma_r", shading="flat", rasterized=True)
+
+
+def add_gain_colorbar(
+    figure: Figure | SubFigure, mesh: Any, axes: Axes | list[Axes], label: str
+) -> None:
+    """Draw the colour bar of ‖J‖/k."""
+    bar = figure.colorbar(
+        mesh, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.02, extend="both",
+        ticks=LogLocator(subs=(1.0, 2.0, 5.0)),
+        format=FuncFormatter(lambda value, _place: number_text(value)),
+    )  # fmt: skip
+    bar.ax.xaxis.set_minor_locator(NullLocator())
+    style.style_colorbar(bar, label)
+
+
+def merit_figure(comparison: Comparison) -> Figure:
+    """Return strength T against support S, a point per law.
+
+    Laws with unbounded loop gain are at the origin.
+    """
+    figure = style.new_figure(10.0, 4.6)
+    axes = style.single_axes(figure)
+    scale, unit = (1e3, " · l [mm]") if strength_has_unit(comparison) else (1.0, "")
+    widest = max(max(row.strength for row in comparison.rows) * scale, 1e-12)
+    for row in comparison.rows:
+        sound = row.conservative and row.continuous
+        x, y = row.strength * scale, row.support
+        colour = style.GREEN if sound else style.ORANGE
+        name = f"_{row.law.letter}"
+        (point,) = axes.plot(x, y, "o", ms=8, color=colour, clip_on=False, label=name)
+        letter = axes.annotate(
+            row.law.letter,
+            (x, y),
+            xytext=(0, 7),
+            textcoords="offset points",
+            ha="center",
+            fontsize=style.TITLE,
+            color=style.INK,
+            fontweight="bold" if row is comparison.recommended_row else "normal",
+        )
+        for artist in (point, letter):
+            style.mark_law(artist, row.law.letter)
+    axes.set_xlim(0.0, 1.15 * widest)
+    axes.set_ylim(0.0, 1.15)
+    axes.grid(color=style.FAINT, lw=0.5)
+    style.label_axes(axes, f"strength T{unit}", "support S")
+    axes.plot([], [], "o", color=style.GREEN, label="conservative and continuous")
+    axes.plot([], [], "o", color=style.ORANGE, label="leaks or jumps")
+    style.add_legend(axes, loc="upper right")
+    return figure

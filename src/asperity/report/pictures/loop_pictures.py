@@ -1,0 +1,237 @@
+"""Figures of a loop: motion, force, energy and phase of a run; onsets and strokes of sweeps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError
+from asperity.core.units import format_quantity
+from asperity.recording.named_columns import NamedColumns
+from asperity.recording.recording import Recording
+from asperity.recording.replay import recorded_field
+from asperity.report.pictures import style
+from asperity.simulation.limit_cycles.prediction import Prediction
+from asperity.simulation.run import MAX_ROWS
+from asperity.simulation.scan import Stroke
+
+_MAX_POINTS = 6000
+_AXIS_NAMES = ("x", "y", "z")
+_AXIS_COLOURS = (style.ORANGE, style.GREEN, style.BLUE)
+
+
+HeightFunction = Callable[[FloatArray], FloatArray]
+"""Returns the heights of the surface [m], shape (n,), at points (n, 2) [m]."""
+
+
+def run_figure(run: NamedColumns, height: HeightFunction) -> Figure:
+    """Return height, force and energy against time, the path, and the phase portrait.
+
+    Args:
+        run: with its trace in memory.
+        height: of the surface.
+    """
+    figure = style.new_figure(10.0, 8.2)
+    grid: Any = figure.add_gridspec(3, 3, width_ratios=[1.0, 1.0, 0.95])
+    step = max(1, -(-len(run.time) // _MAX_POINTS))
+    shown = slice(None, None, step)
+    motion = figure.add_subplot(grid[0, :2])
+    force = figure.add_subplot(grid[1, :2], sharex=motion)
+    energy = figure.add_subplot(grid[2, :2], sharex=motion)
+    path, phase_z, phase_x = (figure.add_subplot(grid[i, 2]) for i in range(3))
+    for axes in (motion, force, energy, path, phase_z, phase_x):
+        style.style_axes(axes)
+    _draw_motion(motion, run, height, shown)
+    _draw_force(force, run, shown)
+    _draw_energy(energy, run, shown)
+    _draw_path(path, run, height, shown)
+    _draw_phase(phase_z, run, 2, shown)
+    _draw_phase(phase_x, run, _scan_axis(run), shown)
+    return figure
+
+
+def recording_figure(recording: Recording) -> Figure:
+    """Return motion, force, energy and phase of a recording.
+
+    Raises:
+        ParameterError: for less than two rows, or missing columns.
+    """
+    traced = recording.to_columns(MAX_ROWS)
+    if len(traced.table) < 2:
+        raise ParameterError("recording", "needs at least two rows to be drawn")
+    return run_figure(traced, recorded_field(recording).height)
+
+
+def _scan_axis(run: NamedColumns) -> int:
+    """Return the axis, 0 or 1, with the longer motion of the handle."""
+    return int(np.argmax(np.ptp(run.position[:, :2], axis=0)))
+
+
+def _draw_motion(
+    axes: Axes, run: NamedColumns, height_at: HeightFunction, selection: slice
+) -> None:
+    time, place = run.time[selection], run.position[selection]
+    height = height_at(place[:, :2])
+    unit = style.length_unit(float(np.abs(np.append(place[:, 2], height)).max()))
+    low = min(float(place[:, 2].min()), float(height.min())) * unit.scale
+    style.fill_below(axes, time, height * unit.scale, low)
+    axes.plot(time, place[:, 2] * unit.scale, color=style.BLUE, lw=1.0, label="handle")
+    if run.has_columns("anchor z"):  # not known on a real device
+        anchor = run.select("anchor z")[selection, 0]
+        if np.abs(anchor).max() < 4.0 * max(np.abs(place[:, 2]).max(), 1e-9):
+            axes.plot(time, anchor * unit.scale, color=style.MUTED, lw=0.8, ls="--", label="hand")
+            style.add_legend(axes)
+    style.label_axes(axes, "", f"z [{unit.name}]")
+    style.set_panel_title(axes, "Motion", "height of the handle over the surface below it")
+
+
+def _nonzero_axes(values: np.ndarray) -> list[int]:
+    """Return the axes that are not constantly zero."""
+    return [i for i in range(3) if np.any(values[:, i] != 0.0)] or [2]
+
+
+def _draw_force(axes: Axes, run: NamedColumns, selection: slice) -> None:
+    applied = run.applied[selection]
+    unit = style.force_unit(float(np.abs(applied).max()))
+    for i in _nonzero_axes(applied):
+        options: dict[str, Any] = {"color": _AXIS_COLOURS[i], "lw": 0.8, "label": _AXIS_NAMES[i]}
+        axes.plot(run.time[selection], applied[:, i] * unit.scale, **options)
+    style.add_legend(axes)
+    style.label_axes(axes, "", f"force [{unit.name}]")
+    style.set_panel_title(axes, "Force", "applied to the handle")
+
+
+def _draw_energy(axes: Axes, run: NamedColumns, selection: slice) -> None:
+    time = run.time[selection]
+    if run.has_columns("supplied x"):
+        energies = run.energies
+        supplied = energies["supplied"][selection] * 1e3
+        for i in _nonzero_axes(supplied):
+            axes.plot(time, supplied[:, i], color=_AXIS_COLOURS[i], lw=0.8, label=_AXIS_NAMES[i])
+        total, paper = supplied.sum(axis=1), energies["same_sample"][selection].sum(axis=1) * 1e3
+        axes.plot(time, total, color=style.INK, lw=1.4, label="sum, exact")
+        axes.plot(time, paper, color=style.MUTED, lw=0.9, ls="--", label="the paper's sum")
+    else:  # a real device records the sum alone
+        total = run.select("supplied")[selection, 0] * 1e3
+        axes.plot(time, total, color=style.INK, lw=1.4, label="sum, exact")
+    style.draw_zero_line(axes)
+    style.add_legend(axes)
+    style.label_axes(axes, "time [s]", "energy [mJ]")
+    style.set_panel_title(axes, "Energy", "supplied by the texture; positive feeds the hand")
+
+
+def _draw_path(axes: Axes, run: NamedColumns, height_at: HeightFunction, selection: slice) -> None:
+    i = _scan_axis(run)
+    place = run.position[selection]
+    wide = style.length_unit(float(np.abs(place[:, i]).max()))
+    high = style.length_unit(float(np.abs(place[:, 2]).max()))
+    low, top = float(place[:, i].min()), float(place[:, i].max())
+    line = np.repeat(np.median(run.position, axis=0)[None, :2], 600, axis=0)
+    line[:, i] = np.linspace(low, top, 600) if top > low else low
+    height = height_at(line)
+    floor = min(float(place[:, 2].min()), float(height.min()))
+    style.fill_below(axes, line[:, i] * wide.scale, height * high.scale, floor * high.scale)
+    x, z = place[:, i] * wide.scale, place[:, 2] * high.scale
+    axes.plot(x, z, color=style.BLUE, lw=0.7, label="path")
+    style.label_axes(axes, f"{_AXIS_NAMES[i]} [{wide.name}]", f"z [{high.name}]")
+    style.set_panel_title(axes, "Path", f"in the {_AXIS_NAMES[i]}-z plane")
+
+
+def _axis_velocity(run: NamedColumns, i: int) -> FloatArray:
+    """Return the velocity along an axis, from positions if it is not recorded."""
+    if run.has_columns("vx", "vy", "vz"):
+        return run.velocity[:, i]
+    steps = np.diff(run.position[:, i]) / np.diff(run.time)
+    return np.append(steps[:1], steps)
+
+
+def _draw_phase(axes: Axes, run: NamedColumns, i: int, selection: slice) -> None:
+    place, speed = run.position[selection, i], _axis_velocity(run, i)[selection]
+    unit = style.length_unit(float(np.abs(place).max()))
+    fast = style.length_unit(float(np.abs(speed).max()))
+    last = len(place) - max(len(place) // 4, 1)
+    axes.plot(place * unit.scale, speed * fast.scale, color=style.FAINT, lw=0.6, label="phase")
+    axes.plot(place[last:] * unit.scale, speed[last:] * fast.scale, color=style.BLUE, lw=0.8)
+    name = _AXIS_NAMES[i]
+    style.label_axes(axes, f"{name} [{unit.name}]", f"d{name}/dt [{fast.name}/s]")
+    style.set_panel_title(axes, "Phase", f"along {name}, last quarter blue")
+
+
+_DASHES = ("-", "--", ":", "-.")
+
+
+def onset_figure(predictions: Sequence[Prediction]) -> Figure:
+    """Return onset stiffness against delay, one panel per law, with the predictions."""
+    laws = list(dict.fromkeys(one.onset.law for one in predictions))
+    figure, panels = style.law_panels(len(laws), 2.3, 0.5, x="delay [samples]", y="stiffness [N/m]")
+    for axes, law in zip(panels, laws, strict=True):
+        mine = [one for one in predictions if one.onset.law == law]
+        proved = mine[0].conservative
+        axes.set_yscale("log")
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        delays, dashes = [one.onset.delay for one in mine], "-" if proved else ":"
+        lines: list[tuple[str, list[float], dict[str, Any]]] = [
+            ("onset", [one.onset.value for one in mine], _line_style(style.BLUE, "-", 1.2, "o")),
+            ("delay rule", [one.delay_rule for one in mine], _line_style(style.GREEN, dashes)),
+            ("paper (1)", [one.paper_limit for one in mine], _line_style(style.MUTED, "--")),
+            ("K₀/q", [one.wall_rule or math.nan for one in mine], _line_style(style.ORANGE, "-.")),
+        ]
+        for name, values, options in lines:
+            axes.plot(delays, _mask_nonpositive(values), label=name, **options)
+        if any(one.onset.quiet == 0.0 for one in predictions):
+            below = [math.nan if one.onset.quiet else one.onset.cycling for one in mine]
+            options = _line_style(style.BLUE, "", marker="v") | {"ms": 8.0, "mfc": style.BACKGROUND}
+            axes.plot(delays, below, label="the least tried", **options)
+        style.set_panel_title(axes, law, "conservative" if proved else "not conservative: no proof")
+        style.mark_law(axes, law)
+    style.add_legend(panels[0])
+    return figure
+
+
+def _line_style(colour: str, dashes: str, width: float = 1.1, marker: str = "") -> dict[str, Any]:
+    return {"color": colour, "ls": dashes, "lw": width, "marker": marker, "ms": 4.0}
+
+
+def _mask_nonpositive(values: Sequence[float]) -> list[float]:
+    """Return the values, with NaN for those that a logarithmic axis cannot show."""
+    return [value if math.isfinite(value) and value > 0.0 else math.nan for value in values]
+
+
+def strokes_figure(strokes: Sequence[Stroke]) -> Figure:
+    """Return energy per stroke against speed, one panel per law, one line per depth."""
+    laws = list(dict.fromkeys(stroke.law for stroke in strokes))
+    figure, panels = style.law_panels(
+        len(laws), 2.3, 0.5, x="speed [m/s]", y="energy per stroke [mJ]", sharey=False
+    )
+    totals = [abs(one.total) for one in strokes if math.isfinite(one.total)]
+    least = 1e3 * 0.01 * max(totals, default=1e-3)
+    for axes, law in zip(panels, laws, strict=True):
+        _draw_law_strokes(axes, [stroke for stroke in strokes if stroke.law == law])
+        style.draw_zero_line(axes, least)  # so that small values options small
+        axes.xaxis.set_major_locator(MaxNLocator(5))
+        style.set_panel_title(axes, law, "")
+        style.mark_law(axes, law)
+    style.add_legend(panels[0])
+    return figure
+
+
+def _draw_law_strokes(axes: Axes, strokes: Sequence[Stroke]) -> None:
+    """Draw one line per depth: the sum, and thinner lines for x and z."""
+    depths = dict.fromkeys(stroke.depth for stroke in strokes)
+    for depth, dashes in zip(depths, _DASHES * len(depths), strict=False):
+        mine = [one for one in strokes if one.depth == depth]
+        speeds = [one.speed for one in mine]
+        name = f"{format_quantity(depth, 'm', digits=3)} deep"
+        for i, colour in ((0, style.ORANGE), (2, style.BLUE)):
+            values = [1e3 * one.energy[i] for one in mine]
+            along = f"_{'xyz'[i]}, {name}"
+            axes.plot(speeds, values, dashes, color=colour, lw=0.9, label=along)
+        values = [1e3 * one.total for one in mine]
+        axes.plot(speeds, values, dashes, color=style.INK, lw=1.5, marker="o", ms=3.0, label=name)

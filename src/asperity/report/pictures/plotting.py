@@ -1,0 +1,171 @@
+"""Figures of results: ``plot(result)`` returns a Matplotlib figure, without global state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial, singledispatch
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from asperity.analysis.analysis_result import Analysis
+from asperity.analysis.compare import Comparison
+from asperity.analysis.limits.limit_result import Limits
+from asperity.core.errors import ParameterError
+from asperity.recording.recording import Recording
+from asperity.report.pictures import style
+from asperity.report.pictures.analysis_pictures import available_pictures, picture_size
+from asperity.report.pictures.field_pictures import draw_fields, field_size
+from asperity.report.pictures.law_pictures import draw_forces, force_size, gain_figure, merit_figure
+from asperity.report.pictures.loop_pictures import recording_figure, run_figure
+from asperity.report.pictures.spectrum_pictures import limits_figure, spectrum_figure
+from asperity.report.pictures.surface_pictures import draw_surface, surface_size
+from asperity.report.sentences.number_text import leak_text
+from asperity.simulation import Run
+from asperity.surface import Surface
+from asperity.textures.texture import Texture
+
+
+@singledispatch
+def plot(result: Any, picture: str | None = None) -> Figure:
+    """Return a figure of a result.
+
+    Args:
+        result: a :class:`~asperity.analysis.compare.Comparison` (the surface, the forces and
+            the fields of all laws), a :class:`~asperity.surface.Surface` (forces and field of its
+            law), a texture (the surface), an :class:`~asperity.analysis.analysis_result.Analysis`
+            (the field with the worst loop, the loop gain, the singular values), the
+            :class:`~asperity.analysis.limits.limit_result.Limits` (waves and their forces), a
+            :class:`~asperity.simulation.Run` or a :class:`~asperity.Recording` (motion, force,
+            energy, phase).
+        picture: name of one figure of the report: of a comparison "surface", "spectrum", "force",
+            "field", "gain" or "merit", of an analysis "field", "gain", "depth", for a map also
+            "top", and where the force jumps "jumps".
+
+    Returns:
+        A figure; ``figure.savefig(path)`` writes it, as PNG or SVG by the path.
+
+    Raises:
+        TypeError: for a result without a figure.
+        ParameterError: for an unknown name.
+
+    Example:
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> [axes.get_ylabel() for axes in plot(Sinusoid(0.4e-3, 1.5e-3)).axes]
+        ['height [mm]']
+    """
+    del picture  # used by the registered functions
+    raise TypeError(f"a {type(result).__name__} has no figure")
+
+
+@plot.register
+def _plot_texture(result: Texture, picture: str | None = None) -> Figure:
+    _check_picture_name(picture, "surface")
+    return _stacked_figure(_texture_drawing(result))
+
+
+@plot.register
+def _plot_surface(result: Surface, picture: str | None = None) -> Figure:
+    _check_picture_name(picture)
+    return _stacked_figure(_forces_drawing([result]), _fields_drawing([result]))
+
+
+@plot.register
+def _plot_comparison(result: Comparison, picture: str | None = None) -> Figure:
+    _check_picture_name(picture, *COMPARISON_PICTURES)
+    if picture is not None:
+        return COMPARISON_PICTURES[picture](result)
+    surfaces = [row.surface for row in result.rows]
+    fields = _fields_drawing(surfaces, _conservation_remarks(result))
+    return _stacked_figure(_texture_drawing(result.texture), _forces_drawing(surfaces), fields)
+
+
+@plot.register
+def _plot_analysis(result: Analysis, picture: str | None = None) -> Figure:
+    drawings = available_pictures(result)
+    _check_picture_name(picture, *drawings)
+    names = list(drawings) if picture is None else [picture]
+    return _stacked_figure(*[_analysis_drawing(result, name) for name in names])
+
+
+@plot.register
+def _plot_limits(result: Limits, picture: str | None = None) -> Figure:
+    _check_picture_name(picture)
+    return limits_figure(result)
+
+
+@plot.register
+def _plot_run(result: Run, picture: str | None = None) -> Figure:
+    _check_picture_name(picture)
+    if len(result.time) < 2:
+        raise ParameterError("trace", "must be kept in memory to be drawn")
+    return run_figure(result, result.surface.texture.height)
+
+
+@plot.register
+def _plot_recording(result: Recording, picture: str | None = None) -> Figure:
+    _check_picture_name(picture)
+    return recording_figure(result)
+
+
+# Width and height [inch], and a function that draws into a figure or a part of one.
+_SizedDrawing = tuple[tuple[float, float], Callable[[Any], object]]
+
+
+def _texture_drawing(texture: Texture) -> _SizedDrawing:
+    return surface_size(texture), partial(draw_surface, texture=texture)
+
+
+def _forces_drawing(surfaces: Sequence[Surface]) -> _SizedDrawing:
+    """Return the forces along the scan, one panel per law, on shared axes."""
+    return force_size(len(surfaces)), partial(draw_forces, surfaces=surfaces)
+
+
+def _fields_drawing(surfaces: Sequence[Surface], remarks: Sequence[str] = ()) -> _SizedDrawing:
+    """Return the force fields over their curl, one panel per law, on shared scales."""
+    return field_size(surfaces), partial(draw_fields, surfaces=surfaces, remarks=remarks)
+
+
+def _analysis_drawing(analysis: Analysis, name: str) -> _SizedDrawing:
+    draw = available_pictures(analysis)[name][0]
+    return picture_size(analysis, name), lambda part: draw(part, analysis)
+
+
+def _conservation_remarks(comparison: Comparison) -> list[str]:
+    return [
+        "conservative" if row.conservative else f"leaks up to {leak_text(row, comparison)} per loop"
+        for row in comparison.rows
+    ]
+
+
+def _stacked_figure(*drawings: _SizedDrawing) -> Figure:
+    """Return a figure with one drawing below the other."""
+    heights = [height for (_, height), _ in drawings]
+    figure = style.new_figure(max(width for (width, _), _ in drawings), sum(heights))
+    if len(drawings) == 1:
+        drawings[0][1](figure)
+        return figure
+    parts: Any = figure.subfigures(len(drawings), 1, height_ratios=heights, squeeze=False)
+    for part, (_, draw) in zip(parts.ravel(), drawings, strict=True):
+        part.set_facecolor(style.BACKGROUND)
+        draw(part)
+    return figure
+
+
+def _check_picture_name(picture: str | None, *names: str) -> None:
+    if picture is not None and picture not in names:
+        allowed = f"one of {', '.join(names)}" if names else "left out for this result"
+        raise ParameterError("picture", f"must be {allowed}", picture)
+
+
+# The figures of a comparison in its report.
+COMPARISON_PICTURES: dict[str, Callable[[Comparison], Figure]] = {
+    "surface": lambda result: _stacked_figure(_texture_drawing(result.texture)),
+    "spectrum": lambda result: spectrum_figure(result.texture, result.device),
+    "force": lambda result: _stacked_figure(_forces_drawing([row.surface for row in result.rows])),
+    "field": lambda result: _stacked_figure(
+        _fields_drawing([row.surface for row in result.rows], _conservation_remarks(result))
+    ),
+    "gain": gain_figure,
+    "merit": merit_figure,
+}

@@ -1,0 +1,214 @@
+"""Spectrum of a surface along its scan line, and waves with their forces, with device limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+from asperity.analysis.energy.merit import parallel_line_points
+from asperity.analysis.limits.limit_result import Limits
+from asperity.analysis.sentences.limits_sentences import stiffness_text
+from asperity.analysis.sentences.perceptibility_sentences import speed_text
+from asperity.core.checks import FloatArray
+from asperity.core.units import format_quantity
+from asperity.devices import Device
+from asperity.report.pictures import style
+from asperity.textures.texture import Texture
+
+_LINE_POINTS = 4096
+# Samples per period for a correct reconstruction, 5 to 10 in section II.B of the paper.
+_SAMPLES_PER_PERIOD = 5.0
+_SCAN_SPEED = 0.1  # of a fast stroke [m/s]
+
+
+def line_spectrum(texture: Texture) -> tuple[FloatArray, FloatArray]:
+    """Return wavelengths [m] and amplitudes [m] along the scan line, averaged over lines.
+
+    The amplitude of a sinusoid is its A. A line that is not periodic is windowed (Hann).
+    """
+    line = texture.scan_line()
+    heights = texture.height(parallel_line_points(texture, line, _LINE_POINTS).reshape(-1, 2))
+    rows = heights.reshape(-1, _LINE_POINTS)
+    rows = rows - rows.mean(axis=1, keepdims=True)
+    window = np.ones(_LINE_POINTS) if line.periodic else np.hanning(_LINE_POINTS)
+    spectrum = 2.0 * np.abs(np.fft.rfft(rows * window, axis=1)) / window.sum()
+    amplitude = np.sqrt(np.mean(spectrum**2, axis=0))[1:]
+    wavelength = line.length / np.arange(1, len(amplitude) + 1)
+    return wavelength, amplitude
+
+
+def shortest_wavelengths(
+    device: Device, speed: float, time_samples: float, position_samples: float
+) -> list[tuple[float, int, str]]:
+    """Return the wavelengths [m] below which a limit fails at a speed, with number and name.
+
+    Limits 1, 2, 3 and 6 of the paper's section II.B, α v T < l, β δ < l, α δ < l and v/l < F₀; 3
+    only where it differs from 2.
+    """
+    rate, step = device.value("update_rate"), device.value("position_resolution")
+    bandwidth = device.value("bandwidth")
+    found = []
+    if rate is not None:
+        found.append((time_samples * speed / rate, 1, f"{time_samples:g} updates"))
+    if step is not None:
+        found.append((position_samples * step, 2, f"{position_samples:g} position steps"))
+        if time_samples != position_samples:
+            found.append((time_samples * step, 3, f"{time_samples:g} position steps"))
+    if bandwidth is not None:
+        found.append((speed / bandwidth, 6, "bandwidth"))
+    return sorted(found)
+
+
+def device_wavelength_limits(device: Device) -> list[tuple[float, str]]:
+    """Return the wavelengths [m] below which a device renders no texture, and why."""
+    found = shortest_wavelengths(device, _SCAN_SPEED, _SAMPLES_PER_PERIOD, _SAMPLES_PER_PERIOD)
+    speed = f" at {_SCAN_SPEED:g} m/s"
+    return [
+        (least, f"{words}{'' if number == 2 else speed}: {format_quantity(least, 'm')}")
+        for least, number, words in found
+    ]
+
+
+def spectrum_figure(texture: Texture, device: Device) -> Figure:
+    """Return amplitude against wavelength, with the limits of the device."""
+    figure = style.new_figure(10.0, 3.4)
+    axes = style.single_axes(figure)
+    wavelength, amplitude = line_spectrum(texture)
+    shown = amplitude > 1e-6 * max(float(amplitude.max()), 1e-300)
+    unit = style.length_unit(float(amplitude.max()))
+    limits = device_wavelength_limits(device)
+    x, y = wavelength[shown] * _MILLI, amplitude[shown] * unit.scale
+    if shown.sum() <= 40:
+        axes.vlines(x, 0.0, y, color=style.BLUE)
+    marker = {"lw": 1.0} if shown.sum() > 40 else {"marker": "o", "ls": ""}
+    axes.plot(x, y, color=style.BLUE, label="amplitude", **marker)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for level, (least, text) in enumerate(limits):
+        _draw_wavelength_limit([axes], least, text, 0.96 - 0.1 * level)
+    edges = [*wavelength[shown], *(least for least, _text in limits)]
+    axes.set_xlim(min(edges) * _MILLI / 1.5, max(edges) * _MILLI * 2.5)
+    top = float(amplitude.max()) * unit.scale
+    axes.set_ylim(min(top / 300.0, float(y.min()) / 2.0), top * 4.0)
+    style.label_axes(axes, "wavelength [mm]", f"amplitude [{unit.name}]")
+    return figure
+
+
+def _draw_wavelength_limit(
+    panels: Sequence[Axes], wavelength: float, text: str, height: float
+) -> None:
+    """Draw a shortest wavelength [m] in all panels, with a text in the first one."""
+    for axes in panels:
+        axes.axvline(wavelength * _MILLI, color=style.ORANGE, lw=1.0, ls="--", zorder=1.0)
+    place = {"xycoords": ("data", "axes fraction"), "xytext": (4, 0), "va": "top"}
+    style.add_note(panels[0], text, (wavelength * _MILLI, height), color=style.ORANGE, **place)
+
+
+_MILLI = 1e3  # wavelengths are in mm: the axis is logarithmic
+
+
+def limits_figure(result: Limits) -> Figure:
+    """Return amplitude and force against wavelength, with the limits.
+
+    Waves to the left of a dashed line are too short for the device at this speed; waves below the
+    line of the force are too weak. Filled circles meet every limit that can be decided.
+    """
+    figure = style.new_figure(10.0, 5.6)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.15, 1.0])
+    for axes in (upper, lower):
+        style.style_axes(axes)
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+    if not result.waves:
+        style.add_note(upper, "flat: no waves", (0.5, 0.5), ha="center")
+        return figure
+    lengths = np.array([wave.wavelength for wave in result.waves])
+    heights = np.array([wave.amplitude for wave in result.waves])
+    forces = np.array([wave.force for wave in result.waves])
+    met = [all(wave.holds.values()) for wave in result.waves]
+    unit, push = style.length_unit(float(heights.max())), style.force_unit(float(forces.max()))
+    _draw_waves(upper, lengths, heights * unit.scale, met, result.spectrum.exact)
+    _draw_waves(lower, lengths, forces * push.scale, met, result.spectrum.exact)
+    least = _draw_wavelength_limits(result, (upper, lower))
+    _draw_force_limits(result, lower, push.scale)
+    edges = [*lengths.tolist(), *least]
+    span = max(max(edges) / min(edges), 4.0)
+    # The text of the last line needs a third of the width.
+    room = span**0.45 if least and least[-1] > 0.5 * max(edges) else 1.6
+    lower.set_xlim(min(edges) * _MILLI / 1.6, max(edges) * _MILLI * room)
+    plain = FuncFormatter(lambda value, _place: f"{value:g}")
+    for axis in (lower.xaxis, upper.yaxis, lower.yaxis):
+        axis.set_major_formatter(plain)
+    lower.xaxis.set_minor_formatter(plain if span < 8.0 else NullFormatter())
+    style.label_axes(upper, "", f"amplitude [{unit.name}]")
+    style.label_axes(lower, "wavelength [mm]", f"force [{push.name}]")
+    k = stiffness_text(result)
+    law = f"law {result.surface.law.letter} at {k}, {speed_text(result.speed)}"
+    style.set_panel_title(upper, "Waves", "and the shortest wavelengths of the device")
+    style.set_panel_title(lower, "Force", f"of each wave, {law}")
+    return figure
+
+
+def _draw_waves(
+    axes: Axes, lengths: np.ndarray, values: np.ndarray, meets_limits: Sequence[bool], exact: bool
+) -> None:
+    """Draw waves of a sum as stems, and bands as circles on a line."""
+    top = float(values.max())
+    floor = max(min(float(values[values > 0.0].min(initial=top)), top) / 4.0, top * 1e-7)
+    floor = min(floor, top / 30.0)
+    shown = values > floor
+    if exact:
+        axes.vlines(lengths[shown] * _MILLI, floor, values[shown], color=style.BLUE, lw=1.2)
+    else:
+        axes.plot(lengths[shown] * _MILLI, values[shown], color=style.BLUE, lw=0.9)
+    filled = np.array(meets_limits)
+    for which, face, name in (
+        (shown & filled, style.BLUE, "meets every limit"),
+        (shown & ~filled, style.BACKGROUND, "breaks a limit"),
+    ):
+        x = lengths[which] * _MILLI
+        axes.plot(x, values[which], "o", ms=5.0, mfc=face, mec=style.BLUE, zorder=4.0, label=name)
+    axes.set_ylim(floor, top * 4.0)
+
+
+def _draw_wavelength_limits(result: Limits, panels: Sequence[Axes]) -> list[float]:
+    """Draw the shortest wavelengths in both panels; return them."""
+    found = shortest_wavelengths(
+        result.device, result.speed, result.time_samples, result.position_samples
+    )
+    for level, (least, number, words) in enumerate(found):
+        text = f"{number}: {words}, {format_quantity(least, 'm')}"
+        _draw_wavelength_limit(panels, least, text, 0.97 - 0.11 * level)
+    if found:
+        for axes in panels:
+            axes.axvspan(1e-12, found[-1][0] * _MILLI, color=style.ORANGE, alpha=0.06, lw=0.0)
+    return [least for least, _number, _words in found]
+
+
+def _draw_force_limits(result: Limits, axes: Axes, scale: float) -> None:
+    """Draw the forces below which a wave is not rendered, or masked by friction."""
+    device = result.device
+    step, friction = device.value("force_resolution"), device.value("friction")
+    lines = []
+    if step is not None:
+        words = f"4: {result.force_steps:g} steps of force"
+        lines.append((result.force_steps * step, words, style.ORANGE))
+    if friction:
+        lines.append((friction, "dry friction of the device", style.GREEN))
+    for force, words, colour in lines:
+        axes.axhline(force * scale, color=colour, lw=1.0, ls="--", zorder=1.0)
+        place = {"xycoords": ("axes fraction", "data"), "xytext": (0, 4), "color": colour}
+        text = f"{words}, {format_quantity(force, 'N')}"
+        style.add_note(axes, text, (0.005, force * scale), **place)
+    low, high = axes.get_ylim()
+    values = [force * scale for force, _words, _colour in lines]
+    if values:
+        axes.set_ylim(min(low, min(values) / 3.0), max(high, max(values) * 4.0))
+    if not lines and math.isfinite(low):
+        words = "no data on force steps and friction of the device"
+        style.add_note(axes, words, (0.995, 0.94), ha="right", va="top")

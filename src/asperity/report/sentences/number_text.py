@@ -1,0 +1,229 @@
+"""Numbers, quantities and positions as text, for terminal, pages and figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.compare import Comparison
+from asperity.analysis.comparison_result import LawRow
+from asperity.core.units import format_quantity, round_down
+
+INFINITY_SIGN = "∞"
+NOT_AVAILABLE = "–"
+SAMPLED_MARK = "~"
+_PREFIXES = {"": 1.0, "m": 1e3, "µ": 1e6, "n": 1e9, "p": 1e12, "k": 1e-3, "M": 1e-6}
+
+
+def number_text(value: float, digits: int = 3) -> str:
+    """Return a number as text.
+
+    Example:
+        >>> number_text(5.02548), number_text(math.inf), number_text(1.0), number_text(0.08765)
+        ('5.03', '∞', '1', '0.0877')
+    """
+    if math.isinf(value):
+        return INFINITY_SIGN
+    if math.isnan(value):
+        return NOT_AVAILABLE
+    if value != 0.0 and not 1e-4 <= abs(value) < 1e5:
+        return f"{value:.{digits - 1}e}"
+    return f"{float(f'{value:.{digits}g}'):.10g}"
+
+
+def merit_text(value: float) -> str:
+    """Return a figure of merit with two digits; "–" for none."""
+    return number_text(value, digits=2)
+
+
+def force_text(value: float) -> str:
+    """Return a force as text: "0.12 N"; "–" for none."""
+    if math.isnan(value):
+        return NOT_AVAILABLE
+    if value < 0.01:
+        return format_quantity(value, "N", digits=2)
+    return f"{float(f'{value:.2g}'):.10g} N"
+
+
+def yes_no_text(holds: bool | None) -> str:
+    """Return yes, no, or ? for an undecidable condition."""
+    return "?" if holds is None else "yes" if holds else "no"
+
+
+def readable_name(name: str) -> str:
+    """Return the name of a law, or of a field of a device, with spaces.
+
+    Example:
+        >>> readable_name("groove-wall-normal"), readable_name("update_rate")
+        ('groove wall normal', 'update rate')
+    """
+    return name.replace("-", " ").replace("_", " ")
+
+
+# --- bounds ---------------------------------------------------------------------------------------
+
+
+def is_sampled(bound: Bound) -> bool:
+    """Return whether a number is sampled, not proved."""
+    return bound.method == "sampled" and math.isfinite(bound.value)
+
+
+def bound_text(bound: Bound) -> str:
+    """Return a number, a sampled one marked with ~.
+
+    Example:
+        >>> bound_text(Bound(2.0, math.inf, "sampled")), bound_text(Bound(1.0, 1.0, "theorem"))
+        ('~2', '1')
+    """
+    mark = SAMPLED_MARK if is_sampled(bound) else ""
+    return f"{mark}{number_text(bound.value)}"
+
+
+def lower_bound_text(value: float, digits: int = 6) -> str:
+    """Return a lower bound rounded down to a number of digits.
+
+    Example:
+        >>> [lower_bound_text(value) for value in (31.58279, 0.9999999999999997, math.inf)]
+        ['31.5827', '1', '∞']
+    """
+    return _round_outward(value, digits, ROUND_FLOOR)
+
+
+def upper_bound_text(value: float, digits: int = 6) -> str:
+    """Return an upper bound rounded up to a number of digits.
+
+    Example:
+        >>> upper_bound_text(31.58271), upper_bound_text(1.0), upper_bound_text(8.0464e-4, 3)
+        ('31.5828', '1', '0.000805')
+    """
+    return _round_outward(value, digits, ROUND_CEILING)
+
+
+def _round_outward(value: float, digits: int, rounding: str) -> str:
+    if math.isinf(value):
+        return INFINITY_SIGN if value > 0.0 else f"−{INFINITY_SIGN}"
+    # Thirteen digits first, so that the rounding of a double does not change a digit.
+    plain = Decimal(f"{value:.12e}")
+    rounded = Context(prec=digits, rounding=rounding).create_decimal(plain)
+    text = f"{rounded:f}" if 1e-5 <= abs(value) < 1e7 or value == 0.0 else f"{rounded:e}"
+    return text.rstrip("0").rstrip(".") if "." in text and "e" not in text.lower() else text
+
+
+def limit_text(stiffness: float | None) -> str:
+    """Return a greatest stiffness, rounded down; "–" for none.
+
+    Example:
+        >>> limit_text(975.6), limit_text(math.inf), limit_text(None)
+        ('975 N/m', '∞', '–')
+    """
+    if stiffness is None:
+        return NOT_AVAILABLE
+    return INFINITY_SIGN if math.isinf(stiffness) else f"{round_down(stiffness):.10g} N/m"
+
+
+def interval_text(bound: Bound) -> str:
+    """Return a number with both bounds, rounded outwards.
+
+    Example:
+        >>> interval_text(Bound(5.12503, 5.12511, "certified"))
+        '5.12503 to 5.12511'
+        >>> interval_text(Bound(1, 1, "theorem")), interval_text(Bound(2.0, math.inf, "sampled"))
+        ('1', '~2')
+    """
+    low, high = lower_bound_text(bound.lower), upper_bound_text(bound.upper)
+    if low == high:
+        return low
+    if math.isinf(bound.upper):
+        return f"{SAMPLED_MARK}{low}"
+    return f"{low} to {high}"
+
+
+# --- quantities in one unit -----------------------------------------------------------------------
+
+
+def _choose_unit(value: float, unit: str) -> tuple[str, float]:
+    """Return the best prefixed unit of a quantity, and its number per SI unit."""
+    name = format_quantity(value, unit).split()[1]
+    return name, _PREFIXES[name.removesuffix(unit)]
+
+
+def format_in_one_unit(values: Sequence[float], unit: str, digits: int = 3) -> list[str]:
+    """Return quantities in the unit of the largest, for comparison.
+
+    Example:
+        >>> format_in_one_unit([0.25, 1.5e-3], "m")
+        ['250 mm', '1.5 mm']
+    """
+    name, scale = _choose_unit(max((abs(v) for v in values), default=0.0), unit)
+    return [f"{float(f'{value * scale:.{digits}g}'):.10g} {name}" for value in values]
+
+
+def range_text(low: float, high: float, unit: str, digits: int = 5) -> str:
+    """Return a quantity between two bounds, in one unit, rounded outwards.
+
+    Example:
+        >>> range_text(8.0464e-4, 8.0493e-4, "J"), range_text(0.0, 0.0, "J")
+        ('0.80464 to 0.80493 mJ', '0 J')
+        >>> range_text(4.9116e-3, math.inf, "J")
+        'at least 4.9116 mJ'
+    """
+    size = high if math.isfinite(high) else low
+    if size == 0.0:
+        return f"0 {unit}"
+    name, scale = _choose_unit(size, unit)
+    lower, upper = lower_bound_text(low * scale, digits), upper_bound_text(high * scale, digits)
+    if math.isinf(high):
+        return f"at least {lower} {name}"
+    return f"{lower} {name}" if lower == upper else f"{lower} to {upper} {name}"
+
+
+def leak_text(row: LawRow, comparison: Comparison) -> str:
+    """Return the energy of the worst loop: "0.64 mJ"; "0" if proved.
+
+    All laws have the unit of the largest, for comparison.
+    """
+    leak = row.leak
+    if leak.energy == 0.0 and leak.method == "theorem":
+        return "0"
+    mark = SAMPLED_MARK if leak.method == "sampled" else ""
+    energies = [leak.worst_per_period, *(other.leak.worst_per_period for other in comparison.rows)]
+    return f"{mark}{format_in_one_unit(energies, 'J', digits=2)[0]}"
+
+
+def strength_has_unit(comparison: Comparison) -> bool:
+    """Return whether T is in metres, as for a surface without a period."""
+    return not comparison.texture.scan_line().periodic
+
+
+# --- positions ------------------------------------------------------------------------------------
+
+
+def position_text(point: tuple[float, float, float] | None) -> str:
+    """Return a position in one unit.
+
+    Example:
+        >>> position_text((-0.25e-3, -0.0, -1.8e-3)), position_text(None)
+        ('(-0.25, 0, -1.8) mm', '–')
+    """
+    if point is None:
+        return NOT_AVAILABLE
+    largest = max(abs(value) for value in point)
+    unit, scale = ("mm", 1e3) if largest >= 1e-4 else ("µm", 1e6)
+    return f"({', '.join(f'{value * scale + 0.0:.6g}' for value in point)}) {unit}"
+
+
+def witness_text(bound: Bound) -> str:
+    """Return the point that attains the lower bound, with its state, or the onset of ∞.
+
+    Example:
+        >>> witness_text(Bound(math.inf, math.inf, "certified", (0.0, 0.0, 1e-3)))
+        'onset (0, 0, 1) mm'
+    """
+    onset = "onset " if math.isinf(bound.lower) and bound.at is not None else ""
+    if bound.deflection is None:
+        return f"{onset}{position_text(bound.at)}"
+    x, y = (f"{1e3 * part + 0.0:.6g}" for part in bound.deflection)
+    state = f"deflection ({x}, {y}) mm, {'sliding' if bound.sliding else 'sticking'}"
+    return f"{onset}{position_text(bound.at)}, {state}"

@@ -1,0 +1,139 @@
+"""Registry of the pages of results, and the representations that results get from it."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import Any
+
+from rich.console import RenderableType
+
+from asperity.analysis.analysis_result import Analysis
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.compare import Comparison
+from asperity.analysis.compare_devices import DeviceComparisons
+from asperity.analysis.limits.limit_result import Limits
+from asperity.analysis.passivity.verdict import Passivity
+from asperity.core.files import json_text, text_digest
+from asperity.core.units import format_quantity
+from asperity.devices import Device
+from asperity.paper.table_two import TableTwo
+from asperity.recording.recording import Recording
+from asperity.recording.replay import Replay
+from asperity.report.analysis_report import analysis_page, criteria_table
+from asperity.report.comparison_columns import describe_texture
+from asperity.report.comparison_report import comparison_page, comparisons_page
+from asperity.report.device_report import device_page
+from asperity.report.html import Origin, render_notebook, render_page
+from asperity.report.limits_report import limits_page
+from asperity.report.loop.recording_report import recording_page, replay_page
+from asperity.report.loop.run_report import figure_sections, ledger_table, work_text
+from asperity.report.measured_report import surface_summary_page
+from asperity.report.page import Block, Media, Page, Picture, Row, Section, Table, plot_later
+from asperity.report.sentences.number_text import interval_text, readable_name, witness_text
+from asperity.report.terminal import page_renderables
+from asperity.simulation import Run
+from asperity.surface import Surface
+from asperity.textures.measurement_summary import MeasurementSummary
+from asperity.textures.texture import Texture
+
+
+@singledispatch
+def find_page(result: Any) -> Page | None:
+    """Return the page of a result; ``None`` for a result without one."""
+    del result  # used by the registered functions
+    return None
+
+
+find_page.register(Analysis, analysis_page)
+find_page.register(Comparison, comparison_page)
+find_page.register(Device, device_page)
+find_page.register(DeviceComparisons, comparisons_page)
+find_page.register(Limits, limits_page)
+find_page.register(MeasurementSummary, surface_summary_page)
+find_page.register(Recording, recording_page)
+find_page.register(Replay, replay_page)
+
+
+def _notebook_page(answer: str, *blocks: Block) -> Page:
+    """Return a page without a title, which only a notebook shows."""
+    return Page("", answer, (), [Section("", blocks, media=Media.NOTEBOOK)])
+
+
+@find_page.register
+def _passivity_page(result: Passivity) -> Page:
+    answer = f"{result.verdict}, decided by {result.decided_by}: {result.reason}"
+    return _notebook_page(answer, criteria_table(result))
+
+
+@find_page.register
+def _bound_page(result: Bound) -> Page:
+    note = f": {result.note}" if result.note else ""
+    where = "" if result.at is None else f"; lower end at {witness_text(result)}"
+    return _notebook_page(f"{interval_text(result)}, {result.method}{note}{where}")
+
+
+@find_page.register
+def _texture_page(result: Texture) -> Page:
+    height = format_quantity(result.peak_to_valley, "m")
+    text = f"{describe_texture(result.describe())}; {height} high"
+    return _notebook_page(text, Picture(plot_later(result), f"The surface: {text}"))
+
+
+@find_page.register
+def _surface_page(result: Surface) -> Page:
+    law, texture = result.law, describe_texture(result.texture.describe())
+    stiffness = format_quantity(result.stiffness, "N/m")
+    depth = format_quantity(result.max_depth, "m")
+    name = f"law {law.letter}, {readable_name(law.name)}"
+    answer = f"{name}, at {stiffness}, pressed to {depth}: {texture}"
+    return _notebook_page(answer, Picture(plot_later(result.texture), f"The surface: {texture}"))
+
+
+@find_page.register
+def _run_page(result: Run) -> Page:
+    page = _notebook_page(f"{work_text(result.surface, result)}.", ledger_table(result))
+    return Page("", page.answer, (), [*page.sections, *figure_sections(result)])
+
+
+@find_page.register
+def _table_two_page(result: TableTwo) -> Page:
+    head, *rows = result.cells()
+    return _notebook_page(result.parameters, Table(head, [Row(cells) for cells in rows]))
+
+
+def html_text(result: Any) -> str:
+    """Return the report of a result: answer, tables, figures, pedigree and assumptions, as HTML.
+
+    Figures are inlined; nothing is loaded from elsewhere; there are styles for light and dark
+    screens and for print.
+
+    Args:
+        result: a comparison, on one or several devices, an analysis, limits, the summary of a
+            measured surface, or a recording.
+
+    Raises:
+        TypeError: for a result without a report.
+    """
+    page = find_page(result)
+    if page is None or not page.title:
+        raise TypeError(f"a {type(result).__name__} has no report")
+    return render_page(page, Origin(content=text_digest(json_text(result))))
+
+
+def notebook_html(result: Any) -> str | None:
+    """Return the output of a notebook cell for a result as HTML; ``None`` if its ``repr`` suffices.
+
+    Example:
+        >>> print(notebook_html(Bound(2.0, 2.5, "certified", note="branch & bound")))
+        <div>
+        <p><strong>2 to 2.5, certified: branch &amp; bound</strong></p>
+        </div>
+    """
+    page = find_page(result)
+    return None if page is None else render_notebook(page)
+
+
+def rich_renderables(result: Any, width: int) -> list[RenderableType]:
+    """Return the output of the command line for a result, on a console of a width [characters]."""
+    page = find_page(result)
+    return [] if page is None else list(page_renderables(page, width))

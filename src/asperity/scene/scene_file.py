@@ -1,0 +1,120 @@
+"""Load a scene from a scene file (TOML) or from the specification of a texture."""
+
+from __future__ import annotations
+
+from collections import ChainMap
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from asperity.core.arguments import Argument, parse_arguments
+from asperity.core.errors import ParameterError, suggest_names
+from asperity.core.files import read_toml
+from asperity.devices import Device, load_device, override_device, parse_device
+from asperity.recording.recording import open_recording
+from asperity.recording.replay import recorded_texture
+from asperity.scene.sections import surface_arguments
+from asperity.textures import catalogue
+from asperity.textures.texture import Texture, TextureKind
+
+_PATH = Argument("path", "the recording, relative to the scene", form="path", required=True)
+
+
+def _load_recorded_texture(path: str) -> Texture:
+    return recorded_texture(open_recording(path))
+
+
+_SUMMARY = "the surface of a recording"
+RECORDING_KIND = TextureKind("recording", _SUMMARY, _load_recorded_texture, (_PATH,))
+TEXTURE_KINDS = ChainMap({"recording": RECORDING_KIND}, *catalogue.KINDS.maps)
+"""Texture kinds of the section [texture]."""
+_DEVICE_ID = Argument("device.id", "device of the catalogue", form="text")
+LOOP_SECTIONS = ("hand", "motion", "run", "servo")
+SECTIONS = ("texture", "surface", "device", *LOOP_SECTIONS)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The content of a specification, a scene file or a measured file.
+
+    Attributes:
+        texture: the texture.
+        surface: the given arguments of :class:`~asperity.surface.Surface`.
+        device: the device, ``None`` if there is none.
+        loop: the sections [hand], [motion], [run] and [servo]; see
+            :func:`~asperity.scene.setup.make_setup`.
+        folder: folder to which paths in these sections are relative.
+        files: the scene file and a measured surface, if it was loaded from them.
+    """
+
+    texture: Texture
+    surface: Mapping[str, Any] = field(default_factory=dict)
+    device: Device | None = None
+    loop: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    folder: Path = Path()
+    files: tuple[Path, ...] = ()
+
+
+def load_scene(source: str, file_arguments: Mapping[str, Any] | None = None) -> Scene:
+    """Load a scene.
+
+    Args:
+        source: ``kind:argument=value,...`` ("sinusoid:amplitude=0.8mm,period=1mm", or "cloth"
+            with its defaults), the path of a scene file (TOML), or of a measured surface.
+        file_arguments: arguments of :func:`~asperity.textures.load_texture`; those of
+            :func:`~asperity.textures.synthetic.prepare_texture` apply to any other texture.
+
+    Raises:
+        ParameterError: a kind or argument is unknown (the message suggests the nearest), or a
+            value cannot be used.
+        SurfaceFileError: a file cannot be read.
+
+    Example:
+        >>> load_scene("sinusoid:amplitude=0.8mm,period=1 mm").texture.period
+        0.001
+    """
+    extra = dict(file_arguments or {})
+    if catalogue.is_scene(source) and catalogue.parse_specification(source) is None:
+        return _load_scene_file(Path(source), extra)
+    return Scene(catalogue.as_texture(source, extra))
+
+
+def _load_scene_file(path: Path, extra: Mapping[str, Any]) -> Scene:
+    content = read_toml("scene", path)
+    _reject_code(content)
+    for name in content:
+        if name not in SECTIONS:
+            hint = suggest_names(name, SECTIONS)
+            raise ParameterError("scene", f"{path.name} has an unknown section [{name}]; {hint}")
+    for name, section in content.items():
+        if not isinstance(section, dict):
+            raise ParameterError("scene", f"{path.name}: [{name}] must be a section", section)
+    texture = dict(content.get("texture", {}))
+    kind = texture.pop("kind", None)
+    if not isinstance(kind, str):
+        known = " | ".join(f'"{name}"' for name in TEXTURE_KINDS)
+        raise ParameterError("scene", f"{path.name} needs [texture] with kind = {known}", kind)
+    surface = parse_arguments("surface", content.get("surface", {}), surface_arguments())
+    device = _scene_device(content["device"]) if "device" in content else None
+    loop = {name: content[name] for name in LOOP_SECTIONS if name in content}
+    built = catalogue.build_texture(kind, texture, path.parent, extra, TEXTURE_KINDS)
+    files = [path.parent / texture["path"]] if "path" in texture else []
+    return Scene(built, surface, device, loop, path.parent, (path, *files))
+
+
+def _reject_code(content: Mapping[str, Any]) -> None:
+    """Refuse a scene that names code, which only the command line may do."""
+    sections = [section for section in content.values() if isinstance(section, dict)]
+    for name in (name for section in (content, *sections) for name in section):
+        if name.replace("-", "_").lower() in {"law_module", "law_modules", "plugin", "plugins"}:
+            words = "a scene never runs code; name the file on the command line, --plugin FILE"
+            raise ParameterError(name, f"is refused: {words}")
+
+
+def _scene_device(section: Mapping[str, Any]) -> Device:
+    """Return a device of the catalogue with overridden fields, or one defined in the scene."""
+    fields = {name: value for name, value in section.items() if name != "id"}
+    if "id" not in section:
+        return parse_device(fields, "the scene's device", from_file=True)
+    return override_device(load_device(_DEVICE_ID.parse(section["id"])), fields)

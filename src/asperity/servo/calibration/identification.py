@@ -1,0 +1,281 @@
+"""Identification of a device from the rows of its loop, with uncertainties.
+
+The equation of motion is fitted in a form without velocities:
+m p'' = u(t - d T) - b p' - F_c sign p' + c, integrated twice over a segment of time, is
+
+    ∬u = m p + b ∫p + F_c ∬sign p' + a₀ + a₁ t + a₂ t²,
+
+linear in the unknowns. ∬u of a force that is held from sample to sample is exact; a₀, a₁ and a₂
+contain initial position, initial velocity and a constant force. The delay is the whole number of
+samples with the least sum of squares.
+
+Reference:
+    Integrating a model instead of differentiating a record: Young, "Parameter estimation for
+    continuous-time models: a survey", Automatica 17(1), 1981, section 3.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from asperity.core.checks import FloatArray
+from asperity.core.files import Serializable
+
+MAX_DELAY = 20
+"""Largest delay tried [samples]."""
+SEGMENTS = 8
+"""Number of segments of a record; the scatter of their fits is the uncertainty."""
+_MIN_STEP = 1e-10  # [m] smaller steps are rounding errors of a position
+_GRID_TOLERANCE = 0.1  # of a step: positions further from its multiples are not on a grid
+_SMOOTHING_DIVISOR = 8
+_FAST_STEPS = 3.0  # steps per sample of a handle that moves in every fresh reading
+
+
+NormalEquations = FloatArray
+"""Sums of products of the regressors of mass, damping and friction, and of ∬u (4, 4)."""
+
+
+@dataclass(frozen=True)
+class Estimate(Serializable):
+    """A measured number.
+
+    Attributes:
+        value: in SI units.
+        uncertainty: its standard uncertainty, in the same unit.
+    """
+
+    value: float
+    uncertainty: float
+
+
+@dataclass(frozen=True)
+class AxisDynamics(Serializable):
+    """The dynamics along an axis.
+
+    Attributes:
+        mass: mass as felt [kg].
+        damping: physical damping [N s/m].
+        friction: dry friction [N].
+    """
+
+    mass: Estimate
+    damping: Estimate
+    friction: Estimate
+
+
+@dataclass(frozen=True)
+class DelayEstimate(Serializable):
+    """The delay between a reading and its force, in whole samples.
+
+    Attributes:
+        samples: delay of the best fit of all records together.
+        alternatives: delays of the best fits when a part of the records is left out.
+    """
+
+    samples: int
+    alternatives: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class PushRecord:
+    """A record of a handle that was pushed back and forth along an axis.
+
+    Attributes:
+        positions: positions at the samples (n,) [m].
+        forces: commanded forces (n,) [N].
+        push_samples: mean duration of a push [samples].
+    """
+
+    positions: FloatArray
+    forces: FloatArray
+    push_samples: int
+
+
+def position_step(positions: FloatArray) -> Estimate | None:
+    """Return the step of the positions [m]; ``None`` if they are exact.
+
+    Args:
+        positions: positions of a moving handle along an axis (n,) [m].
+
+    The readings of an encoder are multiples of its step, which their differences show far better
+    than their scatter. The positions of an arm with joint encoders are not: then the step is the
+    median change between readings, provided that the readings repeat in between.
+
+    Example:
+        >>> position_step(2e-5 * np.array([0, 1, 3, 2, 5, 5, 4])).value
+        2e-05
+    """
+    apart = np.diff(np.unique(positions))
+    apart = apart[apart > _MIN_STEP]
+    moves = np.abs(np.diff(positions))
+    moves = moves[moves > _MIN_STEP]
+    if len(apart) < 2:
+        return None
+    for part in (1, 2, 3):
+        step = float(apart.min()) / part
+        counts = np.rint(apart / step)
+        step = float(apart @ counts / (counts @ counts))
+        rest = np.abs(apart / step - counts)
+        if rest.max() < _GRID_TOLERANCE and len(apart) > 2:
+            return Estimate(step, step * max(float(rest.std()), 1e-6) / math.sqrt(len(apart)))
+    if len(moves) > 0.9 * (len(positions) - 1):
+        return None
+    return Estimate(float(np.median(moves)), float(np.subtract(*np.percentile(moves, [75, 25]))))
+
+
+def rest_noise(positions: FloatArray) -> Estimate:
+    """Return the standard deviation of readings at rest [m], without drift.
+
+    Args:
+        positions: positions along an axis (n,) [m].
+    """
+    count = len(positions)
+    times = np.linspace(-1.0, 1.0, count)
+    line = np.polynomial.Polynomial.fit(times, positions, 1)
+    spread = float(np.std(positions - line(times)))
+    return Estimate(spread, spread / math.sqrt(2.0 * count))
+
+
+def fresh_fraction(positions: FloatArray, step: float) -> float:
+    """Return the share of fresh readings; 1 if it cannot be determined.
+
+    A device that is read more often than it measures repeats a reading between two moves of several
+    steps in one direction.
+
+    Args:
+        positions: positions of a fast handle along an axis (n,) [m].
+        step: step of the positions [m]; 0 for exact ones.
+    """
+    moves = np.diff(positions)
+    changes = np.flatnonzero(np.abs(moves) > _MIN_STEP)
+    far = moves[changes] * (np.abs(moves[changes]) > _FAST_STEPS * step)
+    on = far[1:] * far[:-1] > 0.0
+    return 1.0 / float(np.diff(changes)[on].mean()) if on.any() else 1.0
+
+
+def integrate_twice(force: FloatArray, period: float) -> FloatArray:
+    """Return the double integral of a force held over each sample, at the samples."""
+    once = period * np.concatenate([[0.0], np.cumsum(force)[:-1]])
+    inner = period * once + 0.5 * period**2 * force
+    return np.concatenate([[0.0], np.cumsum(inner)[:-1]])
+
+
+def velocity_sign(positions: FloatArray, lag: int) -> FloatArray:
+    """Return the sign of the velocity, by differences over a number of samples to both sides."""
+    padded = np.pad(positions, lag, mode="edge")
+    return np.asarray(np.sign(padded[2 * lag :] - padded[: -2 * lag]))
+
+
+def fit_dynamics(
+    records: Sequence[PushRecord], period: float
+) -> tuple[DelayEstimate, list[AxisDynamics]]:
+    """Return the delay of a device, and the dynamics along each of its axes.
+
+    Args:
+        records: one for each axis.
+        period: T [s].
+    """
+    tables = [
+        [_segments(record, delay, period) for delay in range(MAX_DELAY + 1)] for record in records
+    ]
+    whole = np.array([[_fit(parts)[1] for parts in table] for table in tables])
+    delay = _best_delay(whole)
+    others = set()
+    for left_out in range(SEGMENTS):
+        errors = np.array([
+            [_fit(parts[:left_out] + parts[left_out + 1 :])[1] for parts in table]
+            for table in tables
+        ])  # fmt: skip
+        others.add(_best_delay(errors))
+    motions = [_estimate_dynamics(record, table[delay], delay, period)
+               for record, table in zip(records, tables, strict=True)]  # fmt: skip
+    return DelayEstimate(delay, tuple(sorted(others - {delay}))), motions
+
+
+def _best_delay(errors: FloatArray) -> int:
+    """Return the delay with the least product of the errors of all axes (axes, delays)."""
+    return int(np.argmin(np.log(errors + 1e-300).sum(axis=0)))
+
+
+def _segments(
+    record: PushRecord, delay: int, period: float, smoothing_divisor: int = _SMOOTHING_DIVISOR
+) -> list[NormalEquations]:
+    """Return the normal equations of the segments of a record, for a delay.
+
+    The sign of the velocity is that of the displacement over 1/``smoothing_divisor`` of a push to
+    both sides.
+    """
+    signs = velocity_sign(record.positions, max(1, record.push_samples // smoothing_divisor))
+    # The force held at sample k was commanded d samples before.
+    held = np.concatenate([np.zeros(delay), record.forces[: len(record.forces) - delay]])
+    edges = np.linspace(MAX_DELAY, len(held), SEGMENTS + 3).astype(int)
+    # The ends of the record have no velocity.
+    parts = [slice(a, b) for a, b in pairwise(edges[1:-1])]
+    return [
+        _normal_equations(record.positions[part], held[part], signs[part], period) for part in parts
+    ]
+
+
+def _normal_equations(
+    positions: FloatArray, applied_forces: FloatArray, signs: FloatArray, period: float
+) -> NormalEquations:
+    """Return the normal equations of a segment.
+
+    The part of the form a₀ + a₁ t + a₂ t² is removed from all columns.
+    """
+    moved = positions - positions[0]
+    once = period * np.concatenate([[0.0], np.cumsum(0.5 * (moved[1:] + moved[:-1]))])
+    rubbed = integrate_twice(0.5 * (signs + np.append(signs[1:], signs[-1])), period)
+    given = integrate_twice(applied_forces, period)
+    basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, len(moved)), 3))[0]
+    table = np.column_stack([moved, once, rubbed, given])
+    table -= basis @ (basis.T @ table)
+    return np.asarray(table.T @ table)
+
+
+def _fit(segments: Sequence[NormalEquations]) -> tuple[FloatArray, float]:
+    """Return mass, damping and friction of segments (3,), and the squared residual [m²]."""
+    square = np.sum(segments, axis=0)
+    size = np.sqrt(np.diag(square))
+    size[size == 0.0] = 1.0
+    scaled = square / np.outer(size, size)
+    active, answer = [0, 1, 2], np.full(3, -1.0)
+    while active and answer.min() < 0.0:
+        answer = np.zeros(3)
+        square_part = scaled[np.ix_(active, active)]
+        answer[active] = np.linalg.lstsq(square_part, scaled[active, 3], rcond=None)[0]
+        if answer.min() < 0.0:  # a negative number is not physical: zero in its place
+            active.remove(int(np.argmin(answer)))
+    left = float(scaled[3, 3] - answer @ scaled[:3, 3]) * float(size[3]) ** 2
+    whole = answer * size[3] / size[:3]
+    # In metres, so that the residual does not depend on the mass.
+    return whole, max(left, 0.0) / max(float(whole[0]) ** 2, 1e-12)
+
+
+def _estimate_dynamics(
+    record: PushRecord, segments: Sequence[NormalEquations], delay: int, period: float
+) -> AxisDynamics:
+    """Return the dynamics of a record, with uncertainties.
+
+    The random part is the larger of the jackknife's scatter over the segments and that of the least
+    squares, since equal pushes hardly separate damping from friction. The systematic part is the
+    change of the result when the sign of the velocity is taken over twice the displacement.
+    """
+    whole, error = _fit(segments)
+    count = len(segments)
+    others = np.array([_fit([*segments[:i], *segments[i + 1 :]])[0] for i in range(count)])
+    spread = np.sqrt((count - 1) ** 2 / count * others.var(axis=0, ddof=1))
+    square = np.sum(segments, axis=0)[:3, :3]
+    size = np.sqrt(np.diag(square))
+    size[size == 0.0] = 1.0
+    inverse = np.linalg.pinv(square / np.outer(size, size)) / np.outer(size, size)
+    formal = float(whole[0]) * np.sqrt(error / len(record.positions) * np.abs(np.diag(inverse)))
+    smoother, _error = _fit(_segments(record, delay, period, _SMOOTHING_DIVISOR // 2))
+    uncertainty = np.hypot(np.maximum(spread, formal), whole - smoother)
+    pairs = zip(whole.tolist(), uncertainty.tolist(), strict=True)
+    return AxisDynamics(*(Estimate(value, sigma) for value, sigma in pairs))

@@ -1,0 +1,175 @@
+"""The compiled loop of a driver, in this process."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from asperity.contacts.warm_start import BUDGET, POINT_COUNT, UNLIMITED, new_warm_start
+from asperity.core.checks import FloatArray
+from asperity.kernels.fuse import load_fused, source_on_texture
+from asperity.kernels.tick import ServoState
+from asperity.loop import clock, guards, servo_loop, shared_trace
+from asperity.loop.clock import Clock
+from asperity.loop.guards import Guards, LoopLimits
+from asperity.loop.interface import LoopState
+from asperity.loop.shared_trace import SharedBlock
+from asperity.servo.drivers.driver import Driver
+from asperity.servo.fault import EndReason
+from asperity.servo.safety import Safety
+from asperity.simulation.servo import Servo
+from asperity.surface import Surface
+
+NO_END = 2**62
+"""End sample of a loop that does not end by itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopProgram:
+    """A surface as the loop renders it, here or in another process.
+
+    Attributes:
+        source: text of the compiled module.
+        texture: record of the texture.
+        law: parameters of the law.
+        safe_height: height above which the depth is within its limit at every position [m].
+        max_depth: limit of the depth [m].
+        max_evaluations: evaluation budget of a tick.
+    """
+
+    source: str
+    texture: tuple[Any, ...]
+    law: tuple[float, ...]
+    safe_height: float
+    max_depth: float
+    max_evaluations: float
+
+
+def loop_parts() -> tuple[Any, ...]:
+    """Return the modules of the loop's parts but the device."""
+    from asperity.kernels import tick
+
+    return tick, clock, guards, shared_trace
+
+
+def build_program(surface: Surface, driver: Driver) -> LoopProgram:
+    """Return the program that renders a surface on a driver.
+
+    Raises:
+        ParameterError: for a texture without a function that the law needs.
+    """
+    from asperity.analysis.gain.theorems import theorem_of
+
+    source = source_on_texture(
+        surface.law, surface.texture.sampler, surface.effective_clamp,
+        (servo_loop, *loop_parts(), *driver.kernel_modules()),
+    )  # fmt: skip
+    bounded = surface.effective_clamp.holds_whole_force
+    everywhere = bounded or theorem_of(surface.law).holds_at_any_depth(surface)
+    crest = surface.law.contact.extremes(surface.texture)[1]
+    safe_height = -math.inf if everywhere else crest - surface.max_depth
+    return LoopProgram(
+        source, surface.texture.arguments, surface.law_arguments, safe_height, surface.max_depth,
+        surface.law.contact.max_evaluations,
+    )  # fmt: skip
+
+
+def loop_limits(
+    servo: Servo, safety: Safety, reach: float, centre: FloatArray, program: LoopProgram
+) -> LoopLimits:  # fmt: skip
+    """Return the limits of a loop."""
+    period = servo.period
+    share = 1.0 if safety.ramp < period else period / safety.ramp
+    x, y, z = map(float, centre)
+    return LoopLimits(
+        round(1e9 * period), safety.slew_limit(servo.max_force) * period, share,
+        float(safety.passivity_damping), int(safety.misses), round(1e9 * safety.lateness),
+        round(1e9 * safety.silence), float(reach), x, y, z, program.safe_height, program.max_depth,
+        safety.beyond_depth == "fault",
+    )  # fmt: skip
+
+
+def function_address(function: Any) -> int:
+    """Return the address of a C function."""
+    return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
+
+
+def system_clock() -> Clock:
+    """Return the system's clock."""
+    library = ctypes.CDLL(None)
+    gettime, sleep = (
+        function_address(library.clock_gettime),
+        function_address(library.clock_nanosleep),
+    )
+    return Clock(gettime, sleep, np.zeros(2, np.int64))
+
+
+def no_clock() -> Clock:
+    """Return a clock whose time is always that of the next due sample."""
+    return Clock(0, 0, np.zeros(2, np.int64))
+
+
+class DriverLoop:
+    """The loop of a driver.
+
+    Args:
+        driver: the device; the caller opens and closes it.
+        servo: period, steps of position and force, maximum force, virtual damping.
+        safety: limits.
+        reach: reach of the handle from the origin of the device [m].
+        block: memory of rows and counts.
+        clock: the clock.
+    """
+
+    def __init__(
+        self, driver: Driver, servo: Servo, safety: Safety, reach: float, block: SharedBlock,
+        clock: Clock,
+    ) -> None:  # fmt: skip
+        self._servo, self._safety, self._reach = servo, safety, reach
+        self._frame: FloatArray = driver.frame.matrix
+        self._block, self._clock, self._placeholder = block, clock, driver.placeholder_record()
+        self.state = LoopState()
+        self._memory = new_warm_start(UNLIMITED)
+
+    def compile(self, program: LoopProgram) -> None:
+        """Compile the loop for a surface, or load it; the device is left alone."""
+        self._call(program, self._placeholder, LoopState(), -1)
+
+    def run(
+        self, program: LoopProgram, device: tuple[Any, ...], end_sample: int = NO_END
+    ) -> tuple[EndReason, int]:
+        """Run until ``end_sample``, a request, or a fault.
+
+        Args:
+            program: the surface.
+            device: record of the open device.
+            end_sample: number of the first sample that is not run.
+
+        Returns:
+            End reason, and error code of the driver.
+        """
+        cause, code, self.state = self._call(program, device, self.state, end_sample)
+        return EndReason(int(cause)), int(code)
+
+    def reset_contact(self) -> None:
+        """Reset the state of the law; position and velocity are kept for the next surface."""
+        servo = self.state.servo
+        self._memory[POINT_COUNT] = 0.0
+        fresh = ServoState(servo.x, servo.y, servo.z, servo.vx, servo.vy, servo.vz)
+        self.state = self.state._replace(servo=fresh)
+
+    def _call(
+        self, program: LoopProgram, device: tuple[Any, ...], state: LoopState, end_sample: int
+    ) -> tuple[int, int, LoopState]:
+        limits = loop_limits(self._servo, self._safety, self._reach, self._frame[:3, 3], program)
+        self._memory[BUDGET] = program.max_evaluations
+        answer: tuple[int, int, LoopState] = load_fused(program.source).servo_loop(
+            state, end_sample, self._servo.settings, self._clock,
+            Guards(limits, self._frame, self._block), device, self._block, self._memory,
+            program.texture, program.law,
+        )  # fmt: skip
+        return answer

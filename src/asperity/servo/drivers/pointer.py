@@ -1,0 +1,196 @@
+"""A simulated device whose hand follows a pointer while the loop runs."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from asperity.core.checks import FloatArray, check_array, check_real
+from asperity.core.errors import ParameterError
+from asperity.servo.drivers.simulated import SimulatedDriver, simulated_driver
+from asperity.servo.kernels import pointer_anchor
+from asperity.servo.kernels.pointer_anchor import (
+    ANCHOR,
+    ANGLE,
+    COSINE,
+    HEADER_ROWS,
+    HISTORY_SAMPLES,
+    REQUEST_NUMBER,
+    REQUEST_ROW,
+    ROWS_PER_SAMPLE,
+    SINE,
+    STATE_ROW,
+    TARGET,
+)
+from asperity.simulation.hands import Hand
+from asperity.simulation.kernels.simulated_device import SimulatedDevice
+from asperity.simulation.motions import Stationary
+from asperity.simulation.sampled_plant import Plant
+from asperity.simulation.servo import Servo
+
+_ROW_COUNT = HEADER_ROWS + ROWS_PER_SAMPLE * HISTORY_SAMPLES
+_MEMORY_FOLDER = "/dev/shm" if Path("/dev/shm").is_dir() else None
+
+
+class PointerHand:
+    """The memory through which a pointer moves a hand; use it in a ``with``.
+
+    One process writes requests and one loop follows them, without locks: each number is written
+    whole, and a request that is half written is followed for one sample.
+
+    Args:
+        start: initial position of the anchor [m].
+
+    Attributes:
+        name: name of the file by which the loop's process finds the memory.
+    """
+
+    def __init__(self, start: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        position = check_array("start", start, (3,), "m")
+        # A file in memory, if the system provides it.
+        descriptor, self.name = tempfile.mkstemp(prefix="asperity-", dir=_MEMORY_FOLDER)
+        with open(descriptor, "wb") as file:
+            file.write(bytes(8 * 3 * _ROW_COUNT))
+        self._table: FloatArray | None = open_pointer_table(self.name)
+        self._table[TARGET] = self._table[ANCHOR] = position
+
+    @property
+    def table(self) -> FloatArray:
+        """The memory, see ``kernels/pointer_anchor.py``."""
+        if self._table is None:
+            raise ParameterError("pointer", "is closed")
+        return self._table
+
+    def request_motion(
+        self, target: ArrayLike, cosine: ArrayLike = (0.0, 0.0, 0.0),
+        sine: ArrayLike = (0.0, 0.0, 0.0), angular_velocity: float = 0.0,
+    ) -> int:  # fmt: skip
+        """Request the points target + cosine cos(angle) + sine sin(angle) [m].
+
+        Args:
+            target: a point, or the centre of an ellipse.
+            cosine: from the centre to the start of the ellipse.
+            sine: from the centre to the point a quarter later.
+            angular_velocity: angular velocity [rad/s].
+
+        Returns:
+            The number of the request, which :attr:`acknowledged_count` reaches when the anchor
+            follows it.
+
+        Raises:
+            ParameterError: for a number that is not finite.
+        """
+        points = {TARGET: ("target", target), COSINE: ("cosine", cosine), SINE: ("sine", sine)}
+        rows = {row: check_array(*point, (3,), "m") for row, point in points.items()}
+        velocity = check_real("angular_velocity", angular_velocity, "rad/s")
+        table = self.table
+        for row, values in rows.items():
+            table[row] = values
+        table[REQUEST_ROW, ANGLE] = velocity
+        number = self.request_count + 1
+        table[REQUEST_ROW, REQUEST_NUMBER] = number
+        return number
+
+    @property
+    def request_count(self) -> int:
+        """Number of the newest request."""
+        return int(self.table[REQUEST_ROW, REQUEST_NUMBER])
+
+    @property
+    def acknowledged_count(self) -> int:
+        """Number of the newest acknowledged request."""
+        return int(self.table[STATE_ROW, REQUEST_NUMBER])
+
+    @property
+    def anchor(self) -> FloatArray:
+        """Position of the anchor (3,) [m]."""
+        return np.array(self.table[ANCHOR])
+
+    @property
+    def history(self) -> FloatArray:
+        """Anchor [m], velocity [m/s] and position [m] of the newest samples (n, 3, 3).
+
+        The k-th sample is at k modulo n, with n = ``HISTORY_SAMPLES``; none is counted twice or
+        left out.
+        """
+        return np.array(self.table[HEADER_ROWS:]).reshape(HISTORY_SAMPLES, ROWS_PER_SAMPLE, 3)
+
+    def close(self) -> None:
+        """Release the memory; a running loop keeps its own mapping."""
+        if self._table is not None:
+            self._table = None
+            with suppress(OSError):  # some systems do not remove files in use
+                os.remove(self.name)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def open_pointer_table(name: str) -> FloatArray:
+    """Return the shared memory as a table, which keeps it mapped.
+
+    Raises:
+        FileNotFoundError: if the pointer was closed.
+    """
+    return np.asarray(np.memmap(name, np.float64, "r+", shape=(_ROW_COUNT, 3)))
+
+
+@dataclass(frozen=True, eq=False)
+class PointerDriver(SimulatedDriver):
+    """A simulated device whose hand follows a :class:`PointerHand`.
+
+    Attributes:
+        pointer_file: name of the file of its memory.
+    """
+
+    name: ClassVar[str] = "simulated"
+    pointer_file: str = ""
+
+    def kernel_modules(self) -> tuple[ModuleType, ...]:
+        """Return the modules of a simulated device, with the anchor of the pointer first."""
+        return pointer_anchor, *super().kernel_modules()
+
+    def open(self) -> tuple[Any, ...]:
+        """Return the device, held by the hand.
+
+        Raises:
+            ParameterError: if the pointer was closed.
+        """
+        try:
+            table = open_pointer_table(self.pointer_file)
+        except FileNotFoundError:
+            raise ParameterError("pointer", "is closed: nothing moves the hand") from None
+        table[STATE_ROW] = 0.0
+        device = super().open()
+        return SimulatedDevice(*device)._replace(anchor=table)
+
+
+def pointer_driver(plant: Plant, hand: Hand, servo: Servo, pointer: PointerHand) -> PointerDriver:
+    """Return a simulated device whose hand follows a pointer.
+
+    Args:
+        plant: the device.
+        hand: the hand that holds it, without a prescribed motion.
+        servo: period and delay.
+        pointer: moves the hand's anchor, from the initial position of the handle.
+
+    Raises:
+        ParameterError: for a plant that cannot be simulated with this hand; for a prescribed hand.
+    """
+    if hand.is_prescribed:
+        raise ParameterError("hand", "must be a spring or a band: the pointer moves its anchor")
+    start = Stationary(tuple(pointer.anchor))
+    driver = simulated_driver(plant, hand, servo, start, servo.period)
+    device = driver.device._replace(anchor=np.zeros((_ROW_COUNT, 3)))
+    return PointerDriver(driver.body_modules, device, pointer.name)

@@ -1,0 +1,156 @@
+"""The excitations of a calibration, in the place of a law: rest, pushes, a smooth wall.
+
+They run in the loop of a device, so all its guards apply. The wall is a spring from both sides,
+as a pressed wall is felt, without anybody pressing. A soft spring holds the handle across the
+tested axis.
+"""
+
+# ruff: noqa: ARG001 - the signatures of a law on a texture
+
+import math
+from typing import NamedTuple
+
+from asperity.contacts.warm_start import FIRST_POINT, POINT_COUNT
+from asperity.core.checks import FloatArray
+from asperity.core.compiled import Kernels
+
+KERNELS = Kernels(provides=("probe_depth", "probe_in_contact", "probe_tick"))
+
+# Kinds of excitation.
+REST, PUSHING, WALL = 0.0, 1.0, 2.0
+
+# Places in the memory of a contact, which is unused here; POINT_COUNT is 0 at the start.
+CENTRE = FIRST_POINT
+SAMPLE_INDEX, RANDOM_STATE, PUSH_SIGN, PUSH_REMAINING, TRIPPED = range(
+    FIRST_POINT + 3, FIRST_POINT + 8
+)
+LAST_POSITION, FILTERED_VELOCITY = FIRST_POINT + 8, FIRST_POINT + 11
+
+
+class Excitation(NamedTuple):
+    """The parameters of an excitation.
+
+    Attributes:
+        number: number that identifies its rows.
+        kind: REST, PUSHING or WALL.
+        axis: tested axis, 0 to 2.
+        holding_stiffness: stiffness of the soft spring towards the centre [N/m].
+        brake_damping: damping on the filtered velocity [N s/m].
+        filter_fraction: weight of the newest difference in that velocity [1].
+        rate: 1/T [1/s].
+        x: centre [m]; NaN for the initial position of the handle.
+        y: likewise.
+        z: likewise.
+        stiffness: stiffness of the wall [N/m].
+        wall_step: step of the wall, once [m].
+        wait_samples: samples before the step.
+        push_force: force of the pushes [N].
+        push_samples: mean duration of a push [samples].
+        trip_distance: displacement along the axis that ends the force [m].
+        samples: duration of the excitation.
+    """
+
+    number: float
+    kind: float
+    axis: float
+    holding_stiffness: float
+    brake_damping: float
+    filter_fraction: float
+    rate: float
+    x: float
+    y: float
+    z: float
+    stiffness: float
+    wall_step: float
+    wait_samples: float
+    push_force: float
+    push_samples: float
+    trip_distance: float
+    samples: float
+
+
+def initialize_excitation(
+    x: float, y: float, z: float, memory: FloatArray, law: Excitation
+) -> None:
+    """Initialize the memory with the position of the handle."""
+    given = not math.isnan(law.x)
+    memory[CENTRE] = law.x if given else x
+    memory[CENTRE + 1] = law.y if given else y
+    memory[CENTRE + 2] = law.z if given else z
+    memory[LAST_POSITION] = x
+    memory[LAST_POSITION + 1] = y
+    memory[LAST_POSITION + 2] = z
+    for i in range(3):
+        memory[FILTERED_VELOCITY + i] = 0.0
+    memory[SAMPLE_INDEX] = 0.0
+    memory[RANDOM_STATE] = 1.0 + law.number
+    memory[PUSH_SIGN] = 1.0
+    memory[PUSH_REMAINING] = 0.0
+    memory[TRIPPED] = 0.0
+    memory[POINT_COUNT] = 1.0
+
+
+def push_force(memory: FloatArray, law: Excitation) -> float:
+    """Return the push of this sample [N]; its sign alternates after 0.5 to 1.5 mean durations."""
+    if memory[PUSH_REMAINING] <= 0.0:
+        memory[PUSH_SIGN] = -memory[PUSH_SIGN]
+        # Minimal standard generator of Park and Miller: exact in double precision.
+        memory[RANDOM_STATE] = (16807.0 * memory[RANDOM_STATE]) % 2147483647.0
+        memory[PUSH_REMAINING] = law.push_samples * (0.5 + memory[RANDOM_STATE] / 2147483647.0)
+    memory[PUSH_REMAINING] -= 1.0
+    force: float = law.push_force * memory[PUSH_SIGN]
+    return force
+
+
+def brake_force(x: float, i: int, memory: FloatArray, law: Excitation) -> float:
+    """Return the force of the brake along an axis [N]."""
+    speed = (x - memory[LAST_POSITION + i]) * law.rate
+    memory[LAST_POSITION + i] = x
+    memory[FILTERED_VELOCITY + i] += law.filter_fraction * (speed - memory[FILTERED_VELOCITY + i])
+    force: float = -law.brake_damping * memory[FILTERED_VELOCITY + i]
+    return force
+
+
+def probe_tick(
+    x: float, y: float, z: float, ax: float, ay: float, held: bool, memory: FloatArray,
+    texture: object, law: Excitation,
+) -> tuple[float, float, float, float, float, bool]:  # fmt: skip
+    """Return the force [N], the number, the sample, and whether the excitation tripped."""
+    if memory[POINT_COUNT] == 0.0:
+        initialize_excitation(x, y, z, memory, law)
+    count = memory[SAMPLE_INDEX]
+    memory[SAMPLE_INDEX] = count + 1.0
+    ex = x - memory[CENTRE]
+    ey = y - memory[CENTRE + 1]
+    ez = z - memory[CENTRE + 2]
+    if law.kind == WALL and count >= law.wait_samples:
+        ex -= law.wall_step if law.axis == 0.0 else 0.0
+        ey -= law.wall_step if law.axis == 1.0 else 0.0
+        ez -= law.wall_step if law.axis == 2.0 else 0.0
+    along = ex if law.axis == 0.0 else ey if law.axis == 1.0 else ez
+    # The trip is inactive before the step: the handle may be pulled from further away.
+    if law.kind != REST and count >= law.wait_samples and abs(along) > law.trip_distance:
+        memory[TRIPPED] = 1.0
+    over = memory[TRIPPED] != 0.0
+    if over or count >= law.samples:
+        return 0.0, 0.0, 0.0, law.number, count, over
+    push = push_force(memory, law) if law.kind == PUSHING else 0.0
+    bx = brake_force(x, 0, memory, law)
+    by = brake_force(y, 1, memory, law)
+    bz = brake_force(z, 2, memory, law)
+    stiff = law.stiffness if law.kind == WALL else law.holding_stiffness
+    along_it = push - stiff * along
+    fx = along_it if law.axis == 0.0 else -law.holding_stiffness * ex
+    fy = along_it if law.axis == 1.0 else -law.holding_stiffness * ey
+    fz = along_it if law.axis == 2.0 else -law.holding_stiffness * ez
+    return fx + bx, fy + by, fz + bz, law.number, count, over
+
+
+def probe_in_contact(x: float, y: float, z: float, texture: object) -> bool:
+    """Return that there is contact: brakes act as in a body."""
+    return True
+
+
+def probe_depth(x: float, y: float, z: float, texture: object) -> float:
+    """Return zero: no depth limit applies."""
+    return 0.0

@@ -1,0 +1,127 @@
+"""Memory shared by the loop's process and the supervising one: rows, counts, heartbeat."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from multiprocessing.context import SpawnContext
+from typing import Any
+
+import numpy as np
+
+from asperity.core.checks import FloatArray
+from asperity.core.files import Serializable
+from asperity.loop import shared_trace as words
+from asperity.loop.shared_trace import COLUMNS, SharedBlock
+
+BUFFER_ROWS = 40_000
+"""Rows that the memory holds: 4 s of the fastest loop."""
+
+
+class LoopMemory:
+    """Rows of a loop, for one writer and any number of readers, without locks.
+
+    The loop writes a row and then increments their count. A reader copies the counted rows, reads
+    the count again, and discards the rows that were overwritten meanwhile.
+    """
+
+    def __init__(self) -> None:
+        context = SpawnContext()
+        self._control: Any = context.RawArray(ctypes.c_int64, words.CONTROL_SIZE)
+        self._status: Any = context.RawArray(ctypes.c_int64, words.STATUS_SIZE)
+        self._table: Any = context.RawArray(ctypes.c_double, BUFFER_ROWS * len(COLUMNS))
+
+    def block(self) -> SharedBlock:
+        """Return the memory as the compiled loop takes it."""
+        return SharedBlock(
+            np.frombuffer(self._control, np.int64), np.frombuffer(self._status, np.int64),
+            np.frombuffer(self._table, np.float64).reshape(-1, len(COLUMNS)), np.zeros(1, np.int64),
+        )  # fmt: skip
+
+    @property
+    def row_count(self) -> int:
+        """Number of rows written since the start."""
+        return int(self._status[words.ROW_COUNT])
+
+    @property
+    def status(self) -> list[int]:
+        """Counts and histograms of the loop, see :mod:`asperity.loop.shared_trace`."""
+        return list(self._status)
+
+    def send_heartbeat(self) -> None:
+        """Send a heartbeat."""
+        self._control[words.HEARTBEAT_WORD] += 1
+
+    def request_stop(self) -> None:
+        """Request the loop to release the force and end."""
+        self._control[words.STOP_WORD] = 1
+
+    def rows(self, first_row: int) -> tuple[FloatArray, int]:
+        """Return the available rows from a number on, and the number of the first."""
+        table, count = self.block().rows, self.row_count
+        first_row = max(first_row, count - len(table))
+        rows = table[np.arange(first_row, count) % len(table)]
+        # The row after the newest may be half written: it counts as overwritten.
+        lost = max(0, self.row_count + 1 - len(table) - first_row)
+        return rows[lost:], first_row + min(lost, len(rows))
+
+
+@dataclass(frozen=True)
+class LoopStatistics(Serializable):
+    """Counts of a loop.
+
+    Attributes:
+        samples: number of samples.
+        late: samples that ended when the next one was due already.
+        skipped: samples that were left out because of it.
+        max_lateness: largest start delay of a sample [s].
+        force_limited: samples whose force was limited.
+        slew_limited: samples whose change of force was limited.
+        too_deep: samples deeper than the analysed depth.
+        lateness_histogram: number of samples that started less than 2ⁿ ns late, but not less than
+            2ⁿ⁻¹, by n.
+        period_histogram: the same for the difference between two starts and the period.
+    """
+
+    samples: int
+    late: int
+    skipped: int
+    max_lateness: float
+    force_limited: int
+    slew_limited: int
+    too_deep: int
+    lateness_histogram: tuple[int, ...]
+    period_histogram: tuple[int, ...]
+
+    @classmethod
+    def from_status(cls, status: Sequence[int]) -> LoopStatistics:
+        """Return the statistics of the words of a loop, see :mod:`asperity.loop.shared_trace`."""
+        rows, late, skipped, lateness, forces, slews, deep = status[: words.LAST_START_TIME]
+        first, second = words.LATENESS_HISTOGRAM, words.PERIOD_HISTOGRAM
+        histograms = tuple(status[first:second]), tuple(status[second : words.STATUS_SIZE])
+        return cls(rows, late, skipped, 1e-9 * lateness, forces, slews, deep, *histograms)
+
+    def lateness_quantile(self, fraction: float) -> float:
+        """Return an upper bound of the lateness of a share of the samples [s], to a factor of 2.
+
+        Example:
+            >>> words = [3, 0, 0, 900, 0, 0, 0, 0] + [0] * 9 + [2, 1] + [0] * 69
+            >>> LoopStatistics.from_status(words).lateness_quantile(0.5)
+            5.12e-07
+        """
+        return min(_quantile(self.lateness_histogram, fraction), max(self.max_lateness, 1e-9))
+
+    def jitter_quantile(self, fraction: float) -> float:
+        """Return the same for the deviation of the period from T [s]."""
+        return _quantile(self.period_histogram, fraction)
+
+
+def _quantile(histogram: tuple[int, ...], fraction: float) -> float:
+    """Return the upper end of the bin that completes a share of the counts [s]; 0 for none."""
+    target, total = fraction * sum(histogram), 0
+    for exponent, count in enumerate(histogram):
+        total += count
+        if count and total >= target:
+            return 2.0**exponent * 1e-9
+    return 0.0

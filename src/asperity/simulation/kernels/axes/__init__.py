@@ -1,0 +1,1 @@
+"""Kernels of bodies that move along each axis independently."""

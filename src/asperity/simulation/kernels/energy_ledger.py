@@ -1,0 +1,32 @@
+"""The ledger: sums of energies [J], and where each of them stands."""
+
+from asperity.core.checks import FloatArray
+from asperity.core.compiled import Kernels
+
+KERNELS = Kernels(provides=("add_energies",))
+
+# Work of the held force, per axis; the paper's same-sample sum, per axis; loss; work of the hand;
+# work of dry friction; what sampling adds; all without their signs.
+SUPPLIED, SAME_SAMPLE, LOST, HAND, FRICTION, SAMPLING, EXCHANGED = 0, 3, 6, 7, 8, 9, 10
+LEDGER_SIZE = 11
+
+
+def add_energies(
+    ledger: FloatArray,
+    wx: float,
+    wy: float,
+    wz: float,
+    lost: float,
+    hand_work: float,
+    friction_work: float,
+) -> None:
+    """Add work of the held force per axis, loss, work of the hand and of dry friction [J]."""
+    ledger[SUPPLIED] += wx
+    ledger[SUPPLIED + 1] += wy
+    ledger[SUPPLIED + 2] += wz
+    ledger[LOST] += lost
+    ledger[HAND] += hand_work
+    ledger[FRICTION] += friction_work
+    ledger[EXCHANGED] += (
+        abs(wx) + abs(wy) + abs(wz) + abs(lost) + abs(hand_work) + abs(friction_work)
+    )

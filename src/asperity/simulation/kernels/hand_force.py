@@ -1,0 +1,86 @@
+"""The hand on a body that is integrated: a spring to its anchor, or a band to a far end."""
+
+import math
+from typing import NamedTuple
+
+from asperity.core.compiled import Kernels
+
+KERNELS = Kernels(provides=("band_changes_state", "hand_energy", "hand_force"))
+
+
+Triple = tuple[float, float, float]
+
+
+class HandRecord(NamedTuple):
+    """A hand: a spring to its anchor, or an elastic band to its far end.
+
+    Attributes:
+        is_band: whether it is a band.
+        stiffness: per axis; of a band the same three times [N/m].
+        damping: likewise [N s/m].
+        force: constant force [N].
+        length: of the band, from its far end down to the anchor [m].
+        rest_length: of the band [m].
+    """
+
+    is_band: bool
+    stiffness: Triple
+    damping: Triple
+    force: Triple
+    length: float
+    rest_length: float
+
+
+def hand_force(
+    sx: float, sy: float, sz: float,
+    rx: float, ry: float, rz: float,
+    hand: HandRecord,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Force of spring and damper, or band, on the handle [N], and its loss [W].
+
+    s = a - p and r = u - p' (anchor less handle).
+    """
+    fx = hand.damping[0] * rx
+    fy = hand.damping[1] * ry
+    fz = hand.damping[2] * rz
+    lost = fx * rx + fy * ry + fz * rz
+    if hand.is_band:
+        sz -= hand.length
+        length = math.sqrt(sx * sx + sy * sy + sz * sz)
+        if length > hand.rest_length:
+            pull = hand.stiffness[0] * (length - hand.rest_length) / length
+            fx += pull * sx
+            fy += pull * sy
+            fz += pull * sz
+        return fx, fy, fz, lost
+    return (
+        fx + hand.stiffness[0] * sx,
+        fy + hand.stiffness[1] * sy,
+        fz + hand.stiffness[2] * sz,
+        lost,
+    )
+
+
+def band_changes_state(
+    sx: float, sy: float, sz: float, tx: float, ty: float, tz: float, hand: HandRecord
+) -> bool:  # fmt: skip
+    """Whether a band is slack at one of two places s = a - p and t, and taut at the other."""
+    if not hand.is_band:
+        return False
+    sz -= hand.length
+    tz -= hand.length
+    rest = hand.rest_length * hand.rest_length
+    return (sx * sx + sy * sy + sz * sz > rest) != (tx * tx + ty * ty + tz * tz > rest)
+
+
+def hand_energy(sx: float, sy: float, sz: float, hand: HandRecord) -> float:
+    """Energy of the spring or the band [J], for s = a - p."""
+    if hand.is_band:
+        sz -= hand.length
+        length = math.sqrt(sx * sx + sy * sy + sz * sz)
+        over = max(length - hand.rest_length, 0.0)
+        return float(0.5 * hand.stiffness[0] * over * over)
+    return float(
+        0.5
+        * (hand.stiffness[0] * sx * sx + hand.stiffness[1] * sy * sy + hand.stiffness[2] * sz * sz)
+    )

@@ -1,0 +1,51 @@
+"""A handle whose motion is prescribed: that of the hand's anchor."""
+
+# ruff: noqa: ARG001 - one signature for every body
+
+from typing import NamedTuple
+
+from asperity.core.checks import FloatArray
+from asperity.core.compiled import Kernels
+from asperity.simulation.kernels.body_interface import RUNNING, SampleInput
+from asperity.simulation.kernels.energy_ledger import add_energies
+
+KERNELS = Kernels(provides=("advance_body", "stored_energy"))
+
+
+class PrescribedMotionRecord(NamedTuple):
+    """A handle whose motion is prescribed.
+
+    Attributes:
+        period: T [s].
+    """
+
+    period: float
+
+
+def advance_body(
+    x: FloatArray, ledger: FloatArray, inputs: SampleInput, plant: PrescribedMotionRecord
+) -> int:
+    """Move the handle over one sample; see ``body_functions``."""
+    fx, fy, fz, ax, ay, az, ux, uy, uz, _inside = inputs
+    period = plant.period
+    dx = ux * period
+    dy = uy * period
+    dz = uz * period
+    x[0] = ax + dx
+    x[1] = ay + dy
+    x[2] = az + dz
+    x[3] = ux
+    x[4] = uy
+    x[5] = uz
+    wx = fx * dx
+    wy = fy * dy
+    wz = fz * dz
+    add_energies(ledger, wx, wy, wz, 0.0, -(wx + wy + wz), 0.0)
+    return RUNNING
+
+
+def stored_energy(
+    x: FloatArray, ax: float, ay: float, az: float, plant: PrescribedMotionRecord
+) -> float:
+    """Nothing is stored."""
+    return 0.0

@@ -1,0 +1,1 @@
+"""Detection of limit cycles, and the stiffness at which they begin."""

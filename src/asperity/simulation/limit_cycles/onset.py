@@ -1,0 +1,264 @@
+"""The stiffness at which limit cycles begin, by bisection over many starts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from asperity.analysis.gain.surface_cache import surface_content
+from asperity.core.cache import get_or_compute_each, is_shipped
+from asperity.core.checks import FloatArray, check_array, check_positive
+from asperity.core.errors import ParameterError
+from asperity.core.files import Serializable, json_text
+from asperity.laws.w_smooth_wall import LAW as SMOOTH_WALL
+from asperity.simulation.batch import BatchSimulation, Trajectory
+from asperity.simulation.hands import Hand
+from asperity.simulation.kernels.body_interface import LANES
+from asperity.simulation.limit_cycles.onset_search import (
+    CYCLE_SPEED,
+    OnsetSearch,
+    bracket_onset,
+    limit_cycle_rule,
+    run_searches,
+)
+from asperity.simulation.motions import Motion
+from asperity.simulation.sampled_plant import Plant
+from asperity.simulation.servo import Servo
+from asperity.simulation.simulate import count_samples
+from asperity.surface import Surface
+
+MIN_STIFFNESS, MAX_STIFFNESS = 1.0, 1e6  # stiffness [N/m]
+_MIN_TOLERANCE = 1e-9
+_MIN_SAMPLES = 16
+_MAX_STARTS = 10_000
+
+
+@dataclass(frozen=True)
+class Onset(Serializable):
+    """The stiffness at which limit cycles begin.
+
+    Attributes:
+        law: letter of the law.
+        delay: delay of the servo [samples].
+        quiet: largest stiffness tried, below ``cycling``, at which no start ended in a limit cycle
+            [N/m]; 0 if the lowest one cycled already.
+        cycling: least stiffness tried at which a start did [N/m]; infinite if none did up to the
+            highest. The onset of these starts lies between the two, unless it is not monotone: of
+            the stiffnesses a factor of 2 apart, see :func:`find_onset`, the first pair is taken of
+            which the upper one cycles.
+        starts: number of starts tried at each stiffness.
+        cycles: number of starts that ended in a limit cycle at ``cycling``.
+        low: least position in the runs at ``cycling`` (at the highest stiffness if nothing cycled),
+            per axis [m].
+        high: greatest position there [m].
+        is_smooth_wall: whether the law is the smooth wall.
+    """
+
+    serialized_attributes = "law delay quiet cycling starts cycles low high"
+
+    law: str
+    delay: int
+    quiet: float
+    cycling: float
+    starts: int
+    cycles: int
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+    is_smooth_wall: bool = False
+
+    @property
+    def value(self) -> float:
+        """Geometric mean of the bracket [N/m].
+
+        It is the upper end if the lowest stiffness cycled, infinite if nothing did.
+        """
+        return math.sqrt(self.quiet * self.cycling) if self.quiet else self.cycling
+
+
+def is_at_rest(motion: Motion, duration: float) -> bool:
+    """Return whether a hand is at rest in the second half of a run [s]."""
+    times = np.linspace(0.5, 1.0, 33) * duration
+    return bool(np.ptp(motion.at(times), axis=0).max() == 0.0)
+
+
+def run_starts(
+    batch: BatchSimulation, stiffness: float, servo: Servo, offsets: FloatArray, duration: float,
+    threshold: float = CYCLE_SPEED,
+) -> list[Trajectory]:  # fmt: skip
+    """Return the trajectories for each shift of the start [m], (n, 3), with their verdicts."""
+    samples = _samples_for(duration, servo)
+    runs = [
+        batch.new_trajectory(stiffness, servo.delay, shift, limit_cycle_rule(samples, threshold))
+        for shift in offsets
+    ]
+    while active := [run for run in runs if run.verdict is None][:LANES]:
+        batch.run(active)
+    return runs
+
+
+def _samples_for(duration: float, servo: Servo) -> Callable[[float], int]:
+    return lambda factor: count_samples(factor * duration, servo.period)
+
+
+def start_offsets(surface: Surface, count: int) -> FloatArray:
+    """Return starting phases along the scan line [m], shape (count, 3).
+
+    They divide one period evenly; for a texture that is not periodic, its scan line.
+    """
+    line = surface.texture.scan_line()
+    along = np.append(line.direction, 0.0)
+    return np.asarray(np.arange(count)[:, None] / count * line.length * along)
+
+
+def find_onset(
+    surface: Surface,
+    plant: Plant,
+    hand: Hand,
+    servo: Servo,
+    motion: Motion,
+    *,
+    start: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    duration: float = 0.5,
+    starts: int = 24,
+    tolerance: float = 0.02,
+    threshold: float = CYCLE_SPEED,
+    lowest: float = MIN_STIFFNESS,
+    highest: float = MAX_STIFFNESS,
+    near: float | None = None,
+    progress: Callable[[], None] | None = None,
+) -> Onset:
+    """Find the stiffness at which limit cycles begin, by bisection over many starting phases.
+
+    Args:
+        surface: the surface; its stiffness is not used.
+        plant: the device.
+        hand: the hand that holds it.
+        servo: period, delay, resolutions.
+        motion: motion of the hand's anchor; it must be at rest in the second half of the run.
+        start: initial position of the handle [m], shape (3,); default: where the motion starts.
+        velocity: initial velocity of the handle [m/s], shape (3,); default: at rest.
+        duration: duration of a run [s]; a run that still oscillates is extended, up to 16 times as
+            long.
+        starts: number of phases of the texture at which the handle starts.
+        tolerance: width of the bracket over its lower end.
+        threshold: sum over the axes of the standard deviations of the velocity above which an
+            oscillation counts as a limit cycle [m/s].
+        lowest: stiffness at which the search starts [N/m]; a surface too soft for the hand's force
+            lets the handle sink to depths at which the numbers of the law do not hold.
+        highest: stiffness at which the search ends [N/m].
+        near: expected onset [N/m]. The search then starts at the nearest of the stiffnesses a
+            factor of 2 apart, and goes up from a quiet one, down from one that cycles. For loops
+            that cycle above a single stiffness the answer is the same, with a quarter of the runs;
+            a window of cycles below a quiet stiffness is missed.
+        progress: called after every stiffness; not for an onset from the cache.
+
+    Raises:
+        ParameterError: for a prescribed motion of the handle, a motion that does not come to rest,
+            or an invalid number.
+    """
+    (onset,) = find_onsets(
+        surface, plant, hand, servo, motion, [servo.delay], [near], start=start, velocity=velocity,
+        duration=duration, starts=starts, tolerance=tolerance, threshold=threshold, lowest=lowest,
+        highest=highest, progress=progress,
+    )  # fmt: skip
+    return onset
+
+
+def find_onsets(
+    surface: Surface,
+    plant: Plant,
+    hand: Hand,
+    servo: Servo,
+    motion: Motion,
+    delays: Sequence[int],
+    nears: Sequence[float | None],
+    *,
+    start: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    duration: float = 0.5,
+    starts: int = 24,
+    tolerance: float = 0.02,
+    threshold: float = CYCLE_SPEED,
+    lowest: float = MIN_STIFFNESS,
+    highest: float = MAX_STIFFNESS,
+    progress: Callable[[], None] | None = None,
+    onset_callback: Callable[[], None] | None = None,
+) -> list[Onset]:
+    """Find the onsets for several delays [samples], each with its expected onset [N/m].
+
+    The searches run together, so that as many runs as possible are simulated at once. The arguments
+    are those of :func:`find_onset`; ``onset_callback`` is called after every onset.
+    """
+    _check_arguments(hand, motion, servo, duration, starts)
+    width = check_positive("tolerance", tolerance)
+    if width < _MIN_TOLERANCE:
+        raise ParameterError("tolerance", f"must be at least {_MIN_TOLERANCE:g}", tolerance)
+    if not check_positive("lowest", lowest, "N/m") < check_positive("highest", highest, "N/m"):
+        raise ParameterError("lowest", f"must be below the highest, {highest:g} N/m", lowest)
+    limit = check_positive("threshold", threshold, "m/s")
+    origin = motion.at(np.zeros(1))[0] if start is None else check_array("start", start, (3,), "m")
+    samples = _samples_for(duration, servo)
+
+    def search_all(numbers: Sequence[int]) -> Iterator[tuple[int, Onset]]:
+        batch = BatchSimulation(surface, plant, hand, servo, motion, origin, velocity)
+        offsets = start_offsets(surface, int(starts))
+
+        def search(number: int) -> OnsetSearch:
+            def trajectory(stiffness: float, start: int) -> Trajectory:
+                rule = limit_cycle_rule(samples, limit)
+                return batch.new_trajectory(stiffness, delays[number], offsets[start], rule)
+
+            bracketing = bracket_onset(lowest, highest, width, nears[number])
+            return OnsetSearch(trajectory, len(offsets), bracketing, batch.is_vectorized, progress)
+
+        searches = {number: search(number) for number in numbers}
+        for number in run_searches(batch, searches):
+            found = searches[number].result()
+            yield number, Onset(
+                surface.law.letter, delays[number], found.quiet, found.cycling, len(offsets),
+                found.cycles, _to_point(found.low), _to_point(found.high),
+                is_smooth_wall=surface.law is SMOOTH_WALL,
+            )  # fmt: skip
+            if onset_callback is not None:
+                onset_callback()
+
+    contents = []
+    for delay, near in zip(delays, nears, strict=True):
+        numbers = tuple(origin), velocity, duration, starts, width, limit, lowest, highest, near
+        parts = plant, hand, replace(servo, delay=delay), motion
+        contents.append(_cache_key(surface, parts, numbers))
+    return get_or_compute_each("onset", contents, search_all)
+
+
+def _cache_key(surface: Surface, parts: Sequence[Any], numbers: Sequence[Any]) -> str | None:
+    """Return the content that an onset depends on; ``None`` for user-defined parts."""
+    if not all(is_shipped(type(part)) for part in parts):
+        return None
+    values = [None if number is None else np.asarray(number).tolist() for number in numbers]
+    return surface_content(surface, json_text([*parts, values]))
+
+
+def _to_point(row: FloatArray) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in row)
+    return x, y, z
+
+
+def _check_arguments(
+    hand: Hand, motion: Motion, servo: Servo, duration: float, starts: int
+) -> None:
+    if hand.is_prescribed:
+        raise ParameterError("hand", "must not prescribe the motion: such a handle never cycles")
+    if check_positive("duration", duration, "s") < _MIN_SAMPLES * servo.period:
+        least = f"must be at least {_MIN_SAMPLES} samples, {_MIN_SAMPLES * servo.period:g} s"
+        raise ParameterError("duration", least, duration)
+    if not is_at_rest(motion, duration):
+        raise ParameterError("motion", "must be at rest in the second half of the run")
+    if isinstance(starts, bool) or not (1 <= starts <= _MAX_STARTS and starts == int(starts)):
+        limit = f"must be a whole number, 1 to {_MAX_STARTS}"
+        raise ParameterError("starts", limit, starts)

@@ -1,0 +1,256 @@
+"""Detection of limit cycles, and the search for their onset over starts and stiffnesses.
+
+A run is extended until its verdict is clear; the search schedules starts and stiffnesses.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Generator, Iterator, Mapping
+from itertools import islice
+from typing import NamedTuple
+
+import numpy as np
+
+from asperity.core.checks import FloatArray
+from asperity.simulation.batch import BatchSimulation, SegmentStatistics, StopRule, Trajectory
+from asperity.simulation.kernels.body_interface import LANES
+from asperity.simulation.run import StopReason
+from asperity.simulation.trace import SUPPLY_SHARE
+
+# Spread of the velocity above which an oscillation counts; the paper gives none [m/s].
+CYCLE_SPEED = 15e-3
+# A run that still oscillates is extended by these factors, up to the last one.
+DURATION_FACTORS = (1.0, 4.0, 16.0)
+# A motion whose spread is below this share of the spread one quarter before is decaying.
+_DECAY_RATIO = 0.9
+# With fewer samples a quarter is a single sample, without spread.
+_MIN_SAMPLES = 8
+
+
+def limit_cycle_rule(samples: Callable[[float], int], threshold: float = CYCLE_SPEED) -> StopRule:
+    """Return the stop rule that detects a limit cycle: an oscillation fed by the texture.
+
+    A run oscillates if, in its last quarter, the standard deviations of the velocity, summed over
+    the axes, exceed the threshold. For a cycle in place this sum is rms(vx) + rms(vy) + rms(vz);
+    sinking at constant speed does not count. It is fed if in that quarter the texture supplies at
+    least a fifth of the loss in damping and dry friction; on average it supplies all of it. A
+    handle that swings or falls by itself is no limit cycle; a handle that leaves the workspace
+    while it is fed is one, and so is a diverged run.
+
+    A run that still oscillates is extended, to 4 and 16 times its duration, until the oscillation
+    no longer decays by a tenth or more from one quarter to the next.
+
+    Args:
+        samples: number of samples of a run, by the factor of its duration.
+        threshold: [m/s].
+    """
+    for factor in DURATION_FACTORS:
+        rows = samples(factor)
+        quarter = rows // 4
+        # Quarters as NumPy splits: the remainder goes to the first ones.
+        third = rows - 2 * quarter - (rows % 4 == 3)
+        segments: list[SegmentStatistics] = []
+        for goal in (third, rows - quarter, rows):
+            segments.append((yield goal))
+            if segments[-1].stop:
+                return (yield from _judge_stopped_run(segments[-1], threshold))
+        _, before, last = segments
+        if last.velocity_spread <= threshold:
+            return False
+        if factor > 1.0 and not last.velocity_spread < _DECAY_RATIO * before.velocity_spread:
+            break
+    return _gains_energy(before, last)
+
+
+def _judge_stopped_run(
+    segment: SegmentStatistics, threshold: float
+) -> Generator[int, SegmentStatistics, bool]:
+    """Return the verdict on a run that stopped; its last quarter is run again."""
+    if segment.stop is StopReason.DIVERGED:
+        return True
+    rows = segment.samples + 1  # with the sample that the body could not follow
+    if rows < _MIN_SAMPLES:
+        return False
+    first = yield rows - rows // 4
+    last = yield rows
+    return last.velocity_spread > threshold and _gains_energy(first, last)
+
+
+def _gains_energy(first: SegmentStatistics, last: SegmentStatistics) -> bool:
+    """Return whether the texture feeds the handle between two segments."""
+    supplied = last.previous_energies[0] - first.energies[0]
+    taken = last.previous_energies[1] - first.energies[1]
+    return supplied > SUPPLY_SHARE * taken
+
+
+_COARSE_FACTOR = 2.0  # factor between the stiffnesses of the coarse search
+
+
+class OnsetBracket(NamedTuple):
+    """The result of a search.
+
+    Attributes:
+        quiet: largest stiffness at which no start cycled [N/m]; 0 if there is none.
+        cycling: least stiffness at which a start did [N/m]; infinite if there is none.
+        cycles: number of starts that cycle there, or at the highest stiffness.
+        low: least position there [m], shape (3,).
+        high: greatest position there [m], shape (3,).
+    """
+
+    quiet: float
+    cycling: float
+    cycles: int
+    low: FloatArray
+    high: FloatArray
+
+
+def run_searches(batch: BatchSimulation, searches: Mapping[int, OnsetSearch]) -> Iterator[int]:
+    """Run the most urgent trajectories of all searches; yield the number of each finished one."""
+    active = dict(searches)
+    while active:
+        queue = [
+            (priority, place, run)
+            for search in active.values()
+            for place, (priority, run) in enumerate(search.next_trajectories())
+        ]
+        queue.sort(key=lambda entry: entry[:2])
+        batch.run([run for _priority, _place, run in queue[:LANES]])
+        for number, search in list(active.items()):
+            if search.is_finished():
+                del active[number]
+                yield number
+
+
+class OnsetSearch:
+    """The verdicts on the starts at each stiffness, none run twice, and the next ones to run.
+
+    Args:
+        start: returns the trajectory of a start, by number, at a stiffness [N/m].
+        count: number of starts.
+        bracketing: yields stiffnesses, receives whether any start cycles, returns the bracket.
+        speculative: whether to run starts that may not be needed, if lanes are free.
+        progress: called after every stiffness.
+    """
+
+    def __init__(
+        self, start: Callable[[float, int], Trajectory], count: int,
+        bracketing: Generator[float, bool, tuple[float, float]], speculative: bool,
+        progress: Callable[[], None] | None,
+    ) -> None:  # fmt: skip
+        self._start, self._count, self._bracketing = start, count, bracketing
+        self._speculative, self._progress = speculative, progress
+        self._results: dict[tuple[float, int], tuple[bool, FloatArray]] = {}
+        self._running: dict[tuple[float, int], Trajectory] = {}
+        # The selection does not change until a run ends.
+        self._selected: list[tuple[int, Trajectory]] | None = None
+        self._first = 0  # the start that cycled last is the most likely to cycle again
+        self._bracket: tuple[float, float] | None = None
+        self._stiffness = next(bracketing)
+
+    def next_trajectories(self) -> list[tuple[int, Trajectory]]:
+        """Return the trajectories to continue, each with its priority, 0 or 1."""
+        if self._selected is None:
+            self._selected = self._select_trajectories()
+        return self._selected
+
+    def _keys(self) -> list[tuple[float, int]]:
+        return [(self._stiffness, (self._first + i) % self._count) for i in range(self._count)]
+
+    def _select_trajectories(self) -> list[tuple[int, Trajectory]]:
+        keys = self._keys()
+        new = list(islice((key for key in keys if key not in self._results), LANES))
+        # The first one runs alone: if it cycles, the others are not needed.
+        alone = self._bracket is None and new[0] == keys[0]
+        for key in new[: 1 if alone and not self._speculative else None]:
+            if key not in self._running:
+                self._running[key] = self._start(*key)
+        running = [key for key in new if key in self._running]
+        return [(int(alone and key != new[0]), self._running[key]) for key in running]
+
+    def is_finished(self) -> bool:
+        """Process the verdicts, and return whether the search is finished."""
+        ended = [key for key, run in self._running.items() if run.verdict is not None]
+        if not ended:
+            return False
+        for key in ended:
+            run = self._running.pop(key)
+            self._results[key] = bool(run.verdict), run.position_bounds
+        self._selected = None
+        while self._bracket is None:
+            results = self._results_at_stiffness()
+            cycling = [key for key, (cycles, _bounds) in results.items() if cycles]
+            if not cycling and len(results) < self._count:
+                return False
+            if cycling:
+                self._first = cycling[0][1]
+                # Unfinished runs may be needed at this stiffness later, and at no other.
+                here = self._stiffness
+                self._running = {key: run for key, run in self._running.items() if key[0] == here}
+            self._report_progress()
+            try:
+                self._stiffness = self._bracketing.send(bool(cycling))
+            except StopIteration as end:
+                self._bracket = end.value
+                quiet, least = end.value
+                self._stiffness = quiet if math.isinf(least) else least
+        if len(self._results_at_stiffness()) < self._count:
+            return False
+        self._report_progress()
+        return True
+
+    def result(self) -> OnsetBracket:
+        """Return the bracket, with the positions reached."""
+        assert self._bracket is not None
+        ends = self._results_at_stiffness().values()
+        low = np.fmin.reduce([bounds[0] for _, bounds in ends])
+        high = np.fmax.reduce([bounds[1] for _, bounds in ends])
+        return OnsetBracket(*self._bracket, sum(cycles for cycles, _ in ends), low, high)
+
+    def _results_at_stiffness(self) -> dict[tuple[float, int], tuple[bool, FloatArray]]:
+        """Return the results of the starts at the current stiffness."""
+        return {key: self._results[key] for key in self._keys() if key in self._results}
+
+    def _report_progress(self) -> None:
+        if self._progress is not None:
+            self._progress()
+
+
+def bracket_onset(
+    lowest: float, highest: float, width: float, expected: float | None = None
+) -> Generator[float, bool, tuple[float, float]]:
+    """Return the largest quiet and the least cycling stiffness [N/m].
+
+    Yields stiffnesses, and receives whether any start cycles there: upwards from the lowest by
+    factors of 2 until one does, then by bisection; with ``expected``, from the step nearest to it,
+    downwards first if that one cycles.
+    """
+    steps = _coarse_stiffnesses(lowest, highest)
+    index = 0
+    if expected is not None and expected > 0.0:
+        index = int(np.argmin(np.abs(np.log(steps) - math.log(expected))))
+    if (yield steps[index]):
+        while index > 0 and (yield steps[index - 1]):
+            index -= 1
+    else:
+        index += 1
+        while index < len(steps) and not (yield steps[index]):
+            index += 1
+        if index == len(steps):
+            return steps[-1], math.inf
+    quiet, cycling = (steps[index - 1] if index else 0.0), steps[index]
+    while quiet > 0.0 and cycling > quiet * (1.0 + width):
+        middle = math.sqrt(quiet * cycling)
+        if (yield middle):
+            cycling = middle
+        else:
+            quiet = middle
+    return quiet, cycling
+
+
+def _coarse_stiffnesses(lowest: float, highest: float) -> list[float]:
+    """Return stiffnesses a factor of 2 apart, with a shorter last step [N/m]."""
+    steps = [lowest]
+    while steps[-1] < highest:
+        steps.append(min(steps[-1] * _COARSE_FACTOR, highest))
+    return steps

@@ -1,0 +1,213 @@
+"""Pyramids of certified bounds over the cells of a spline, for closest-point searches.
+
+A box of the finest level has one cell of a profile, or two by two cells of a map; each further
+level has boxes of twice the side. A box has five numbers, rounded outward to single precision: a
+lower and an upper bound of the height [m], a bound of the second derivatives times the pitch [1], a
+bound of the third derivatives times the squared pitch [1], and a bound of the greatest eigenvalue
+of -Hess h times the pitch, at least 0, which is the curvature of crests.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.core.checks import FloatArray
+
+# Cells of a map that are processed together, so that they fit the processor caches.
+_TILE_ROWS, _TILE_COLUMNS = 128, 512
+# Relative rounding error of a few operations in single precision.
+_ROUNDING_ALLOWANCE = 1e-6
+
+BOUNDS_PER_BOX = 5
+
+Float32Array = NDArray[np.float32]
+Pyramid = tuple[Float32Array, NDArray[np.int64]]
+# Bernstein coefficients, and the number of neighbours along each axis that belong to a box.
+BernsteinPart = tuple[Float32Array, tuple[int, ...]]
+
+
+def line_pyramid(c: FloatArray, pitch: float) -> Pyramid:
+    """Return the pyramid of a profile.
+
+    Args:
+        c: B-spline coefficients [m], shape (n + 3,).
+        pitch: of the nodes [m].
+
+    Returns:
+        The boxes of all levels, shape (boxes, 5), and for each level, from the finest on, the
+        index of its first box and its number of boxes, shape (levels, 2).
+    """
+    middle, spread = _midrange(c)
+    second = _max_abs(np.diff(c, 2), (1,), 1)
+    third = _max_abs(np.diff(c, 3), (0,), 1)
+    crest = _max_negative(np.diff(c, 2), (1,), 1)
+    low, high = _height_bounds(c - middle, (3,), 1, spread)
+    return _build_levels(
+        _round_outward(middle, [low, high, second / pitch, third / pitch, crest / pitch])
+    )
+
+
+def plane_pyramid(c: FloatArray, pitch: tuple[float, float]) -> Pyramid:
+    """Return the pyramid of a map.
+
+    Args:
+        c: B-spline coefficients [m], shape (ny + 3, nx + 3).
+        pitch: p_x, p_y [m]; the pitch in the bounds of derivatives is p_x.
+
+    Returns:
+        The boxes of all levels, shape (boxes, 5), and for each level, from the finest on, the
+        index of its first box and its numbers of rows and columns, shape (levels, 3).
+    """
+    middle, spread = _midrange(c)
+    rows = []
+    for i in range(0, c.shape[0] - 3, _TILE_ROWS):
+        tiles = []
+        for j in range(0, c.shape[1] - 3, _TILE_COLUMNS):
+            tile = c[i : i + _TILE_ROWS + 3, j : j + _TILE_COLUMNS + 3] - middle
+            # An odd last cell gets a neighbour by odd reflection.
+            odd = [(0, (size - 3) % 2) for size in tile.shape]
+            tile = np.pad(tile, odd, mode="reflect", reflect_type="odd")
+            tiles.append(_round_outward(middle, _plane_bounds(tile, pitch, spread)))
+        rows.append(np.concatenate(tiles, axis=1))
+    return _build_levels(np.concatenate(rows))
+
+
+def _plane_bounds(c: FloatArray, pitch: tuple[float, float], spread: float) -> list[FloatArray]:
+    """Return the five bounds of every two by two cells, the lower one negated."""
+    xx, yy, xy = np.diff(c, 2, axis=1), np.diff(c, 2, axis=0), np.diff(np.diff(c, axis=0), axis=1)
+    aspect = pitch[0] / pitch[1]
+    fxx, fyy = _max_abs(xx, (3, 1), 2), aspect**2 * _max_abs(yy, (1, 3), 2)
+    fxy = aspect * _max_abs(xy, (2, 2), 2)
+    second = np.minimum(np.maximum(fxx, fyy) + fxy, np.sqrt(fxx**2 + 2.0 * fxy**2 + fyy**2))
+    # ‖D³h‖ is at most the root of the sum of the squares of all eight derivatives.
+    third = _max_abs(np.diff(xx, axis=1), (3, 0), 2) ** 2
+    third += 3.0 * (aspect * _max_abs(np.diff(xx, axis=0), (2, 1), 2)) ** 2
+    third += 3.0 * (aspect**2 * _max_abs(np.diff(yy, axis=1), (1, 2), 2)) ** 2
+    third += (aspect**3 * _max_abs(np.diff(yy, axis=0), (0, 3), 2)) ** 2
+    # Gershgorin's discs of -Hess h.
+    crest = np.maximum(_max_negative(xx, (3, 1), 2), aspect**2 * _max_negative(yy, (1, 3), 2)) + fxy
+    low, high = _height_bounds(c, (3, 3), 2, spread)
+    derivatives = second, np.sqrt(third), np.minimum(crest, second)
+    return [low, high, *(bound / pitch[0] for bound in derivatives)]
+
+
+def _midrange(c: FloatArray) -> tuple[float, float]:
+    """Return the middle of the range of the values and half of the range."""
+    low, high = float(c.min()), float(c.max())
+    middle = 0.5 * (low + high)
+    return middle, max(high - middle, middle - low)
+
+
+def _max_abs(c: FloatArray, degrees: tuple[int, ...], cells: int) -> FloatArray:
+    """Return bounds of the absolute value of a spline over boxes.
+
+    Args:
+        c: B-spline coefficients.
+        degrees: degrees of the spline along each axis.
+        cells: cells along the side of a box.
+    """
+    single = c.astype(np.float32)
+    parts = _bernstein_coefficients(single, degrees, cells)
+    found = _max_over_boxes([(np.abs(part), widths) for part, widths in parts], cells)
+    return found + _ROUNDING_ALLOWANCE * float(np.abs(single).max())
+
+
+def _max_negative(c: FloatArray, degrees: tuple[int, ...], cells: int) -> FloatArray:
+    """Return upper bounds of a negated spline over boxes, at least 0."""
+    single = c.astype(np.float32)
+    found = _max_over_boxes(
+        [(-part, widths) for part, widths in _bernstein_coefficients(single, degrees, cells)], cells
+    )
+    return np.maximum(found, 0.0) + _ROUNDING_ALLOWANCE * float(np.abs(single).max())
+
+
+def _height_bounds(
+    c: FloatArray, degrees: tuple[int, ...], cells: int, spread: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the lower bounds of a spline over boxes, negated, and the upper ones."""
+    parts = _bernstein_coefficients(c.astype(np.float32), degrees, cells)
+    allowance = _ROUNDING_ALLOWANCE * spread
+    below = _max_over_boxes([(-part, widths) for part, widths in parts], cells)
+    return below + allowance, _max_over_boxes(parts, cells) + allowance
+
+
+def _bernstein_coefficients(
+    c: Float32Array, degrees: tuple[int, ...], cells: int
+) -> list[BernsteinPart]:
+    """Return the Bernstein coefficients of a spline, whose hull contains it, cell by cell.
+
+    Along an axis a cell has coefficients at its two nodes, shared with its neighbours, and inner
+    ones.
+    """
+    parts: list[BernsteinPart] = [(c, ())]
+    for axis, degree in enumerate(degrees):
+        parts = [
+            (np.moveaxis(values, 0, axis), (*widths, cells + shared))
+            for part, widths in parts
+            for values, shared in _bernstein_along_axis(np.moveaxis(part, axis, 0), degree)
+        ]
+    return parts
+
+
+def _bernstein_along_axis(c: Float32Array, degree: int) -> list[tuple[Float32Array, int]]:
+    """Return Bernstein coefficients along the first axis, with 1 for those at nodes, else 0."""
+    if degree == 3:
+        third = (c[2:-1] - c[1:-2]) * np.float32(1.0 / 3.0)
+        node = (c[:-2] + c[2:] + np.float32(4.0) * c[1:-1]) * np.float32(1.0 / 6.0)
+        return [(node, 1), (c[1:-2] + third, 0), (c[2:-1] - third, 0)]
+    if degree == 2:
+        return [(np.float32(0.5) * (c[:-1] + c[1:]), 1), (c[1:-1], 0)]
+    return [(c, degree)]
+
+
+def _max_over_boxes(parts: list[BernsteinPart], step: int) -> FloatArray:
+    """Return the maximum over each box and over all parts."""
+    result: Float32Array | None = None
+    for values, widths in parts:
+        boxes = values
+        for axis, width in enumerate(widths):
+            boxes = _window_max(boxes, axis, width, step)
+        result = boxes if result is None else np.maximum(result, boxes, out=result)
+    assert result is not None
+    return result.astype(np.float64)
+
+
+def _window_max(values: Float32Array, axis: int, width: int, step: int) -> Float32Array:
+    """Return the maximum of ``width`` neighbours along an axis, at every ``step``-th value."""
+    values = np.moveaxis(values, axis, 0)
+    count = (len(values) - width) // step + 1
+    result = values[: step * count : step].copy()
+    for shift in range(1, width):
+        np.maximum(result, values[shift : shift + step * count : step][:count], out=result)
+    return np.moveaxis(result, 0, axis)
+
+
+def _round_outward(middle: float, bounds: list[FloatArray]) -> Float32Array:
+    """Return the bounds in single precision, rounded up, with the middle added to the heights."""
+    low, high, *derivatives = bounds
+    together = np.stack([low - middle, high + middle, *derivatives], axis=-1)
+    return np.nextafter(together.astype(np.float32), np.float32(np.inf))
+
+
+def _build_levels(finest: Float32Array) -> Pyramid:
+    """Return all levels; each box is the maximum of two (by two) boxes of the finer level."""
+    level, shape = finest, finest.shape[:-1]
+    parts, starts = [finest.reshape(-1, BOUNDS_PER_BOX)], [(0, *shape)]
+    while max(shape) > 1:
+        for axis in range(len(shape)):
+            odd = [(0, 0)] * level.ndim
+            odd[axis] = (0, level.shape[axis] % 2)
+            level = _pairwise_max(np.pad(level, odd, mode="edge"), axis)
+        shape = level.shape[:-1]
+        starts.append((starts[-1][0] + len(parts[-1]), *shape))
+        parts.append(level.reshape(-1, BOUNDS_PER_BOX))
+    boxes = np.concatenate(parts)
+    boxes[:, 0] *= -1.0
+    return np.ascontiguousarray(boxes), np.array(starts, dtype=np.int64)
+
+
+def _pairwise_max(level: Float32Array, axis: int) -> Float32Array:
+    """Return the maximum of every two neighbours along an axis."""
+    values = np.moveaxis(level, axis, 0)
+    return np.ascontiguousarray(np.moveaxis(np.maximum(values[::2], values[1::2]), 0, axis))

@@ -1,0 +1,271 @@
+"""Certified extremes of a spline surface, and its cells with enclosures of height derivatives.
+
+On a cell every derivative is a polynomial, enclosed by its Bernstein coefficients. On blocks of
+several cells of a map it is enclosed by its B-spline coefficients.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.core.checks import FloatArray
+from asperity.enclosures.cells import (
+    CHUNK_SIZE,
+    DERIVATIVE_ORDERS,
+    EPS,
+    SAMPLE_COUNT,
+    Cells,
+    low_discrepancy_points,
+)
+from asperity.enclosures.taylor import TaylorModel, TaylorNumber
+
+# From uniform B-spline to Bernstein coefficients on one cell, by degree.
+_TO_BERNSTEIN = {
+    1: np.eye(2),
+    2: np.array([[1, 1, 0], [0, 2, 0], [0, 1, 1]]) / 2.0,
+    3: np.array([[1, 4, 1, 0], [0, 4, 2, 0], [0, 2, 4, 0], [0, 1, 4, 1]]) / 6.0,
+}
+# De Casteljau's algorithm at the middle: the left and the right half.
+_LEFT = np.array([[8, 0, 0, 0], [4, 4, 0, 0], [2, 4, 2, 0], [1, 3, 3, 1]]) / 8.0
+_RIGHT = _LEFT[::-1, ::-1]
+_ROWS_PER_CHUNK = 256
+# If so many cells are equally high (along a groove), the hull of the rest is the result.
+_MAX_CELLS = 60_000
+
+
+def max_height(coefficients: FloatArray) -> float:
+    """Return the greatest value of a bicubic B-spline over all its cells.
+
+    A polynomial lies in the hull of its Bernstein coefficients and attains those at the corners:
+    the hull gives an upper bound of each cell, the corners a lower bound of the maximum. Cells that
+    may exceed it are divided into quarters until both bounds agree to rounding.
+
+    Args:
+        coefficients: B-spline coefficients [m], shape (ny + 3, nx + 3) for ny × nx cells.
+    """
+    best = _max_node_height(coefficients)
+    open_patches: list[FloatArray] = []
+    for first in range(0, coefficients.shape[0] - 3, _ROWS_PER_CHUNK):
+        rows = coefficients[first : first + _ROWS_PER_CHUNK + 3]
+        # The hull of the 16 coefficients of a cell, cheaper than its Bernstein coefficients.
+        hull = np.max([rows[i : rows.shape[0] - 3 + i] for i in range(4)], axis=0)
+        hull = np.max([hull[:, j : hull.shape[1] - 3 + j] for j in range(4)], axis=0)
+        windows = np.lib.stride_tricks.sliding_window_view(rows, (4, 4))[hull > best]
+        patches = _TO_BERNSTEIN[3] @ windows @ _TO_BERNSTEIN[3].T
+        open_patches.append(patches[patches.max(axis=(1, 2), initial=-np.inf) > best])
+    patches = np.concatenate(open_patches)
+    scale = max(float(np.abs(coefficients).max()), 1e-300)
+    for _ in range(60):
+        patches = patches[patches.max(axis=(1, 2)) > best + 1e-15 * scale]
+        if len(patches) == 0 or len(patches) > _MAX_CELLS:
+            break
+        patches = np.concatenate(
+            [rows @ patches @ columns.T for rows in (_LEFT, _RIGHT) for columns in (_LEFT, _RIGHT)]
+        )
+        best = max(best, float(patches[:, ::3, ::3].max()))
+    return max(best, float(patches.max())) if len(patches) else best
+
+
+def _max_node_height(coefficients: FloatArray) -> float:
+    """Return the greatest height at a node, where the spline is (1 4 1)/6 of coefficients."""
+    best = -np.inf
+    for first in range(0, coefficients.shape[0] - 2, _ROWS_PER_CHUNK):
+        c = coefficients[first : first + _ROWS_PER_CHUNK + 2]
+        rows = (c[:-2] + 4.0 * c[1:-1] + c[2:]) / 6.0
+        best = max(best, float(((rows[:, :-2] + 4.0 * rows[:, 1:-1] + rows[:, 2:]) / 6.0).max()))
+    return best
+
+
+# Cells along the side of the initial blocks of a map: a power of two.
+_BLOCK = 4
+_GAPS = {1: (1e-6, 1e-9), 2: (1e-3, 1e-6)}
+
+
+class SplineCells(Cells):
+    """The cells of a spline, in units of its pitch; initially blocks of cells for a map.
+
+    Args:
+        coefficients: B-spline coefficients [m], along each axis one before the first cell and two
+            after the last; shape (n + 3,) for a profile along x.
+        pitch: distance of the nodes [m], (p_x, p_y) or (p_x,).
+        origin: the first node [m], shape (2,) or (1,).
+        derivatives: function returning h, h_x, h_y, h_xx, h_xy, h_yy, (n, 6), at points (n, 2)
+            [m].
+    """
+
+    def __init__(
+        self,
+        coefficients: FloatArray,
+        pitch: tuple[float, ...],
+        origin: FloatArray,
+        derivatives: Callable[[FloatArray], FloatArray],
+    ) -> None:
+        self._coefficients, self._origin = coefficients, origin
+        self._nodes_per_metre = 1.0 / np.array(pitch)
+        self._counts = np.array(coefficients.shape[::-1]) - 3
+        self._evaluate = derivatives
+        self.dimensions = len(pitch)
+        self.default_gap, self.refined_gap = _GAPS[self.dimensions]
+
+    def initial_cells(self) -> tuple[Iterator[FloatArray], FloatArray]:
+        """See :class:`Cells`."""
+        side = _BLOCK if self.dimensions > 1 else 1
+        while side > self._counts.min():
+            side //= 2
+        # The last blocks overlap others if the number of cells is no multiple of the side.
+        firsts = [np.append(np.arange(0, n - side, side), n - side) for n in self._counts]
+        shape = [len(first) for first in firsts[::-1]]
+        total = math.prod(shape)
+
+        def chunks() -> Iterator[FloatArray]:
+            for first in range(0, total, CHUNK_SIZE):
+                index = np.unravel_index(np.arange(first, min(first + CHUNK_SIZE, total)), shape)
+                places = zip(firsts, index[::-1], strict=True)
+                yield np.stack([starts[k] for starts, k in places], axis=-1) + 0.5 * side
+
+        return chunks(), np.full(self.dimensions, 0.5 * side)
+
+    def sample_coordinates(self, count: int = SAMPLE_COUNT) -> FloatArray:
+        """See :class:`Cells`; at nodes, where second derivatives of a spline are extreme."""
+        if self.dimensions == 1:
+            count = min(count, 4 * int(self._counts[0]))
+        return np.asarray(np.round(low_discrepancy_points(count, self.dimensions) * self._counts))
+
+    def enclosures(
+        self, centres: FloatArray, half: FloatArray, names: Sequence[str]
+    ) -> dict[str, TaylorNumber]:
+        """See :class:`Cells`."""
+        side = max(1, round(2.0 * float(half.max())))
+        first = centres if side == 1 else centres - half
+        cell = np.minimum(np.floor(first).astype(np.int64), self._counts - side)
+        patch = self._patches(cell, side + 3)
+        matrices = _AxisMatrices(centres - half - cell, 2.0 * half)
+        slack = 256.0 * EPS * np.abs(patch).max(axis=(0, 1))
+        per_x, per_y = (*self._nodes_per_metre, 1.0)[:2]
+        result: dict[str, TaylorNumber] = {}
+        for name in names:
+            nx, ny = DERIVATIVE_ORDERS[name]
+            if ny and self.dimensions == 1:
+                result[name] = 0.0
+                continue
+            scale = float(per_x**nx * per_y**ny)
+            part = np.diff(np.diff(patch, nx, axis=1), ny, axis=0)
+            if side > 1:
+                result[name] = _fit_block(part, side, scale, slack)
+            else:
+                result[name] = _fit_linear(matrices.bernstein(part), scale, slack)
+        return result
+
+    def _patches(self, cell: NDArray[np.int64], width: int) -> FloatArray:
+        """Return the coefficients from a cell on, (width, width, n); (1, width, n) for profiles."""
+        step = np.arange(width)
+        columns = (cell[:, 0] + step[:, None])[None]
+        if self.dimensions == 1:
+            return np.asarray(self._coefficients[columns])
+        return np.asarray(self._coefficients[(cell[:, 1] + step[:, None])[:, None], columns])
+
+    def derivatives(self, coordinates: FloatArray) -> FloatArray:
+        """See :class:`Cells`."""
+        return self._evaluate(self.to_plane(coordinates))
+
+    def to_plane(self, coordinates: FloatArray) -> FloatArray:
+        """See :class:`Cells`."""
+        points = self._origin + coordinates / self._nodes_per_metre
+        return np.ascontiguousarray(np.pad(points, ((0, 0), (0, 2 - self.dimensions))))
+
+    def coordinates(self, xy: FloatArray) -> FloatArray:
+        """Return the coordinates (n, d) of points of the plane."""
+        return np.asarray((xy[:, : self.dimensions] - self._origin) * self._nodes_per_metre)
+
+    def clip_to_region(self, coordinates: FloatArray) -> FloatArray:
+        """See :class:`Cells`."""
+        return np.clip(coordinates, 0.0, self._counts)
+
+
+class _AxisMatrices:
+    """Matrices from B-spline to Bernstein coefficients on a part of each cell."""
+
+    def __init__(self, left: FloatArray, width: FloatArray) -> None:
+        whole = bool((width >= 1.0).all())
+        # All whole cells share one matrix, and equal parts of cells share theirs.
+        lefts = np.zeros((1, left.shape[1])) if whole else left
+        self._parts = [np.unique(column, return_inverse=True) for column in lefts.T]
+        self._width = width
+        self._matrices: dict[tuple[int, int], FloatArray] = {}
+
+    def _matrix(self, axis: int, degree: int) -> FloatArray:
+        key = (axis, degree)
+        if key not in self._matrices:
+            left, index = self._parts[axis]
+            split = _subdivision(degree, left, left + self._width[axis]) @ _TO_BERNSTEIN[degree]
+            self._matrices[key] = np.take(
+                np.ascontiguousarray(split.transpose(1, 2, 0)), index, axis=2
+            )
+        return self._matrices[key]
+
+    def bernstein(self, part: FloatArray) -> FloatArray:
+        """Return the tensor Bernstein coefficients of patches (q, p, n), lines having q = 1."""
+        rows, columns, _ = part.shape
+        along = _matrix_products(part, self._matrix(0, columns - 1).transpose(1, 0, 2))
+        return along if rows == 1 else _matrix_products(self._matrix(1, rows - 1), along)
+
+
+def _matrix_products(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the products of matrices (p, q, n) and (q, r, n)."""
+    return np.asarray(np.einsum("pqn,qrn->prn", a, b))
+
+
+def _subdivision(degree: int, left: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the matrices, (n, p + 1, p + 1), of de Casteljau's algorithm for [left, right]."""
+    rows = []
+    for k in range(degree + 1):
+        points = np.broadcast_to(np.eye(degree + 1), (len(left), degree + 1, degree + 1))
+        for u in [left] * (degree - k) + [right] * k:
+            t = u[:, None, None]
+            points = (1.0 - t) * points[:, :-1] + t * points[:, 1:]
+        rows.append(points[:, 0])
+    return np.stack(rows, axis=1)
+
+
+def _fit_linear(bernstein: FloatArray, scale: float, slack: FloatArray) -> TaylorModel:
+    """Return the linear function through the corners, and the hull of the remainder."""
+    rows, columns, _ = bernstein.shape
+    left, right = bernstein[:, 0], bernstein[:, -1]
+    gx = 0.25 * (right[0] + right[-1] - left[0] - left[-1])
+    slopes = [gx]
+    rest = bernstein - gx * np.linspace(-1.0, 1.0, columns)[:, None]
+    if rows > 1:
+        gy = 0.25 * (left[-1] + right[-1] - left[0] - right[0])
+        slopes.append(gy)
+        rest -= gy * np.linspace(-1.0, 1.0, rows)[:, None, None]
+    low, high = rest.min(axis=(0, 1)), rest.max(axis=(0, 1))
+    c = 0.5 * (low + high)
+    # The conversion sums at most 16 coefficients with weights of at most one.
+    e = 0.5 * (high - low) * (1.0 + 8.0 * EPS) + slack
+    return TaylorModel(scale * c, scale * np.stack(slopes), scale * e * (1.0 + 8.0 * EPS))
+
+
+def _fit_block(part: FloatArray, side: int, scale: float, slack: FloatArray) -> TaylorModel:
+    """Return a linear function on blocks of cells, and the hull of the remainder.
+
+    The B-spline coefficients of a linear function are its values at the Greville points; those of
+    the remainder enclose it.
+
+    Args:
+        part: coefficients, shape (side + degree along y, side + degree along x, n).
+        side: cells along the side of a block.
+        scale: factor of the derivative.
+        slack: rounding error of the coefficients.
+    """
+    y, x = ((2.0 * np.arange(count) - (count - side - 1) - side) / side for count in part.shape[:2])
+    gx = x @ part.mean(axis=0) / (x @ x)
+    gy = y @ part.mean(axis=1) / (y @ y)
+    rest = part - gx * x[:, None]
+    rest -= gy * y[:, None, None]
+    low, high = rest.min(axis=(0, 1)), rest.max(axis=(0, 1))
+    c, e = 0.5 * (low + high), 0.5 * (high - low) * (1.0 + 8.0 * EPS) + slack
+    return TaylorModel(scale * c, scale * np.stack([gx, gy]), scale * e * (1.0 + 8.0 * EPS))

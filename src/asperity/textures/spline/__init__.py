@@ -1,0 +1,1 @@
+"""B-spline textures: coefficients, samplers and searches."""

@@ -1,0 +1,220 @@
+"""Base class of profiles and height maps: a cubic B-spline through heights at grid nodes."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from asperity.core.cache import get_or_compute
+from asperity.core.checks import FloatArray, check_array
+from asperity.core.errors import ParameterError
+from asperity.core.memory import require_memory
+from asperity.textures.bounds.line_segments import LineSegments, spline_segments
+from asperity.textures.bounds.spline_bounds import SplineCells
+from asperity.textures.domain import Domain, GridValues, ScanLine
+from asperity.textures.texture import ExactHeight, Texture, TexturePart
+
+MIN_NODES = 4
+# Coefficients decay by 0.27 per node next to a flat part. Below this share of the greatest they
+# change no height, but their squares are subnormal, which slows a processor down tenfold.
+_FLUSH_THRESHOLD = 1e-90
+
+
+class Spline(Texture):
+    """A C² cubic B-spline through heights at the nodes of a grid, see its subclasses.
+
+    A finite spline is mirrored at its border nodes.
+
+    Attributes:
+        heights: heights at the nodes [m], shape (n,) or (ny, nx).
+        pitch: distance of the nodes [m], a number for a profile, (p_x, p_y) for a map.
+        origin: position of the first node [m], likewise.
+        periodic: whether the spline repeats.
+    """
+
+    sample_offset: ClassVar[float] = 0.0
+    noun: ClassVar[str]
+    axes: ClassVar[int]
+    pitch: Any
+    origin: Any
+
+    def __init__(
+        self,
+        heights: ArrayLike,
+        pitch: float | Sequence[float],
+        *,
+        periodic: bool = False,
+        origin: float | Sequence[float] | None = None,
+        preparation: Sequence[str] = (),
+        filled_mask: ArrayLike | None = None,
+    ) -> None:
+        self.heights = node_heights(heights, self.axes)
+        self._set_grid(pitch, origin)
+        self.periodic = bool(periodic)
+        self.preparation = tuple(preparation)
+        self.filled_mask = _check_mask(filled_mask, self.heights.shape)
+
+    @abstractmethod
+    def _set_grid(self, pitch: Any, origin: Any) -> None:
+        """Check and set the pitch and the origin."""
+
+    @abstractmethod
+    def with_heights(self, heights: ArrayLike) -> Spline:
+        """Return the spline through other heights at the same nodes."""
+
+    @abstractmethod
+    def _compute_extremes(self) -> tuple[float, float]: ...
+
+    @abstractmethod
+    def _compute_bounds(self) -> tuple[float, float]: ...
+
+    @cached_property
+    def extremes(self) -> tuple[float, float]:
+        """Least and greatest height of the spline [m], certified to rounding."""
+        return get_or_compute("extremes", self.digest, self._compute_extremes)
+
+    @cached_property
+    def bounds(self) -> tuple[float, float]:
+        """Greatest differences of coefficients (convex hull property of B-splines)."""
+        return get_or_compute("bounds", self.digest, self._compute_bounds)
+
+    def __repr__(self) -> str:
+        if self.constructor_arguments:
+            return super().__repr__()
+        points = " x ".join(map(str, self.heights.shape[::-1]))
+        edge = "periodic" if self.periodic else "finite"
+        return f"<{type(self).__name__} of {points} points, pitch {self.pitch} m, {edge}>"
+
+    @property
+    def _pitches(self) -> tuple[float, ...]:
+        return tuple(np.atleast_1d(self.pitch).tolist())
+
+    def texture_part(self) -> TexturePart:
+        """See :class:`Texture` and :func:`~asperity.measured.decomposition.decompose_surface`."""
+        heights, nesting, form, waviness = get_or_compute(
+            "texture part", self.digest, self._separate_texture
+        )
+        return TexturePart(self.with_heights(heights), nesting, form, waviness)
+
+    def _separate_texture(self) -> tuple[FloatArray, float, float, float]:
+        """Return the heights without form and waviness, the nesting index and both ranges."""
+        from asperity.measured.decomposition import decompose_surface
+
+        parts = decompose_surface(self.heights, self._pitches, periodic=self.periodic)
+        return parts.heights, parts.nesting, parts.form.range, parts.waviness.range
+
+    @property
+    def _sides(self) -> tuple[float, ...]:
+        """One period, or the extent, along each axis [m]."""
+        counts = self.heights.shape[::-1]
+        return tuple((n - self.is_mirrored) * p for n, p in zip(counts, self._pitches, strict=True))
+
+    def _content(self) -> tuple[Any, ...]:
+        return self.heights, self._pitches, np.atleast_1d(self.origin), self.periodic
+
+    @cached_property
+    def coefficients(self) -> FloatArray:
+        """B-spline coefficients [m], along each axis one before the first cell and two after."""
+        from scipy.ndimage import spline_filter
+
+        mode: Literal["grid-wrap", "mirror"] = "grid-wrap" if self.periodic else "mirror"
+        inner = spline_filter(self.heights, order=3, output=np.float64, mode=mode)
+        _flush_small_values(inner)
+        if self.periodic:
+            return np.ascontiguousarray(np.pad(inner, (1, 2), mode="wrap"))
+        return np.ascontiguousarray(np.pad(inner, 1, mode="reflect"))
+
+    @cached_property
+    def domain(self) -> Domain:
+        """One period, or the extent."""
+        text = "one period" if self.periodic else f"the extent of the {self.noun}"
+        corner = np.append(self.origin, 0.0)[:2]
+        spans = np.array(self._sides)[:, None] * np.eye(len(self._sides), 2)
+        return Domain(corner, spans, periodic=self.periodic, description=text)
+
+    @property
+    def is_mirrored(self) -> bool:
+        """See :class:`Texture`."""
+        return not self.periodic
+
+    def exact_height(self) -> ExactHeight:
+        """See :class:`Texture`."""
+        from asperity.textures.exact_heights import exact_spline
+
+        inner = self.coefficients[tuple(slice(1, n + 1) for n in self.heights.shape)]
+        return exact_spline(inner, self._pitches, np.atleast_1d(self.origin), self.periodic)
+
+    def cells(
+        self,
+        extent: tuple[float, float] | None = None,  # noqa: ARG002 - always the whole spline
+        margin: float = 0.0,  # noqa: ARG002 - likewise
+    ) -> SplineCells:
+        """See :class:`Texture`; all cells of the spline."""
+        first = np.atleast_1d(self.origin)
+        return SplineCells(self.coefficients, self._pitches, first, self.derivatives)
+
+    def line_segments(self, line: ScanLine, min_count: int) -> LineSegments | None:
+        """See :class:`Texture`; a line along an axis, from node to node."""
+        return spline_segments(self.cells(), line, min_count)
+
+    def grid_counts(self) -> list[int]:
+        """See :class:`Texture`; the nodes."""
+        return list(self.heights.shape[::-1])
+
+    def samples(self, dense: bool = False) -> GridValues:  # noqa: ARG002 - always the nodes
+        """See :class:`Texture`; the nodes."""
+        spacing = self._pitches[0], self._pitches[-1]
+        return np.atleast_2d(self.heights), spacing, self.periodic
+
+    def scan_line(self) -> ScanLine:
+        """Along x, over the whole profile or through the middle of the map."""
+        width, *depth = self._sides
+        start = self.domain.origin + np.array([0.0, 0.5 * sum(depth)])
+        return ScanLine(start, np.array([1.0, 0.0]), width, periodic=self.periodic)
+
+    def describe(self) -> dict[str, Any]:
+        """See :class:`Texture`."""
+        both = list(self.heights.shape[::-1]), list(self._pitches)
+        points, pitch = both if self.axes > 1 else (along_x[0] for along_x in both)
+        return super().describe() | {
+            "points": points,
+            "pitch": pitch,
+            "periodic": self.periodic,
+            "preparation": list(self.preparation),
+        }
+
+
+def node_heights(heights: ArrayLike, axes: int) -> FloatArray:
+    """Return a copy of heights at the nodes of a grid.
+
+    Raises:
+        ParameterError: for heights that are not finite, or fewer than 4 along an axis.
+    """
+    require_memory(*np.shape(heights)[::-1])
+    result = check_array("heights", heights, (None,) * axes, "m").copy()
+    if min(result.shape) < MIN_NODES:
+        least, given = (" x ".join(map(str, n)) for n in ((MIN_NODES,) * axes, result.shape))
+        raise ParameterError("heights", f"must be at least {least} points, got {given}")
+    return result
+
+
+def _check_mask(mask: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.bool_] | None:
+    if mask is None:
+        return None
+    result = np.ascontiguousarray(mask)
+    if result.dtype != np.bool_ or result.shape != shape:
+        reason = f"must be true or false for each height, shape {shape}"
+        raise ParameterError("filled_mask", reason, f"{result.dtype} of shape {result.shape}")
+    return result
+
+
+def _flush_small_values(values: FloatArray) -> None:
+    """Set values whose square would be subnormal to zero, in place, row by row."""
+    least = _FLUSH_THRESHOLD * max(float(values.max()), -float(values.min()))
+    for row in np.atleast_2d(values):
+        row[np.abs(row) < least] = 0.0

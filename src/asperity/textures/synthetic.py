@@ -1,0 +1,165 @@
+"""Scale, filter and magnify synthetic textures.
+
+Sums of waves remain exact sums of waves: each amplitude is multiplied by the transfer of the
+filters. Other textures become the spline through their nodes, or through samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from asperity.core.arguments import document_arguments
+from asperity.core.checks import FloatArray, check_positive
+from asperity.core.errors import ParameterError
+from asperity.measured.file_arguments import SYNTHETIC_ARGUMENTS
+from asperity.measured.filters import ALPHA, find_cutoffs, gaussian_filter
+from asperity.measured.lengths import format_length
+from asperity.measured.preparation import describe_magnification, magnification_factors
+from asperity.measured.stylus import apply_tip, check_tip_radius
+from asperity.textures.kinds.fourier import Fourier
+from asperity.textures.kinds.sinusoid import Sinusoid
+from asperity.textures.plane_waves import PlaneWaves
+from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.spline.profile import Profile
+from asperity.textures.texture import Texture
+
+
+@document_arguments(SYNTHETIC_ARGUMENTS)
+def prepare_texture(  # noqa: D417 - the others are described where they are declared
+    texture: Texture,
+    *,
+    height_range: float | None = None,
+    cutoff: float | None = None,
+    l_cutoff: float | None = None,
+    tip_radius: float | None = None,
+    magnify: float = 1.0,
+    magnify_height: float | None = None,
+) -> Texture:
+    """Return a texture prepared like a measured surface.
+
+    The steps are, in this order: scale, filter (S, then L), scan with a tip, magnify. Only the
+    requested ones are done; the ``preparation`` of the result lists them.
+
+    Args:
+        texture: any texture; it is not changed.
+        {arguments}
+
+    Raises:
+        ParameterError: for an argument that cannot be used.
+
+    Example:
+        >>> half = prepare_texture(Sinusoid(1e-3, 2e-3), cutoff=2e-3, magnify=3)
+        >>> round(half.amplitude, 9), half.period, half.preparation[-1]
+        (0.0015, 0.006, 'magnified 3 times laterally and in height')
+    """
+    lateral, vertical = magnification_factors(magnify, magnify_height)
+    steps, scale = [*texture.preparation], 1.0
+    if height_range is not None:
+        before, after = format_length(texture.peak_to_valley), format_length(height_range)
+        steps.append(f"heights scaled from {before} to {after} peak to valley")
+        scale = _height_scale(texture, height_range)
+    prepared: Texture
+    if texture.waves is not None and tip_radius is None:
+        amplitudes = _filter_amplitudes(texture.waves, scale * vertical, cutoff, l_cutoff)
+        prepared = _scaled_waves(texture, texture.waves, amplitudes, lateral)
+        steps += _filter_steps(cutoff, l_cutoff)
+    else:
+        if not texture.preparation:
+            steps.insert(0, f"made from {texture!r}")
+        heights, pitch, periodic = _sample(texture)
+        heights = _filter_heights(scale * heights, pitch, periodic, cutoff, l_cutoff)
+        steps += _filter_steps(cutoff, l_cutoff)
+        if tip_radius is not None:
+            heights, sentence = _apply_periodic_tip(heights, pitch, tip_radius, periodic=periodic)
+            steps.append(sentence)
+        grown, spacing = heights * vertical, tuple(step * lateral for step in pitch)
+        options: Any = {"periodic": periodic, "filled_mask": texture.filled_mask}
+        if heights.ndim == 1:
+            prepared = Profile(grown, spacing[0], **options)
+        else:
+            prepared = HeightMap(grown, spacing, **options)
+    if not lateral == vertical == 1.0:
+        steps.append(describe_magnification(lateral, vertical))
+    prepared.preparation = tuple(steps)
+    return prepared
+
+
+def _height_scale(texture: Texture, height_range: float) -> float:
+    height = check_positive("height_range", height_range, "m")
+    if texture.peak_to_valley == 0.0:
+        raise ParameterError("height_range", "cannot be reached: the surface is flat")
+    return height / texture.peak_to_valley
+
+
+def _filter_amplitudes(
+    waves: PlaneWaves, factor: float, cutoff: float | None, l_cutoff: float | None
+) -> FloatArray:
+    """Return the amplitudes times a factor and the transfer of the filters."""
+    numbers = np.hypot(*waves.wavevectors.T)
+    amplitudes = waves.amplitudes * factor
+    for name, length in (("cutoff", cutoff), ("l_cutoff", l_cutoff)):
+        if length is not None:
+            short = ALPHA * check_positive(name, length, "m") * numbers / (2.0 * math.pi)
+            transfer = np.exp(-math.pi * short**2)
+            amplitudes = amplitudes * (transfer if name == "cutoff" else 1.0 - transfer)
+    return amplitudes
+
+
+def _scaled_waves(
+    texture: Texture, waves: PlaneWaves, amplitudes: FloatArray, lateral: float
+) -> Texture:
+    one = texture.single_wave
+    if one is not None:
+        return Sinusoid(float(amplitudes[0]), one.period * lateral, one.phase, one.direction)
+    return Fourier(amplitudes, waves.wavevectors / lateral, waves.phases)
+
+
+def _sample(texture: Texture) -> tuple[FloatArray, tuple[float, ...], bool]:
+    """Return heights, (n,) or (ny, nx), pitch and whether they are periodic, densely for waves."""
+    nodes, spacing, periodic = texture.samples(dense=texture.waves is not None)
+    if abs(float(texture.domain.spans[0] @ (0.0, 1.0))) > 0.0:
+        raise ParameterError("tip_radius", "needs a texture whose waves run along x")
+    heights = np.array(nodes[0] if texture.is_profile else nodes)
+    return heights, spacing[: heights.ndim], periodic
+
+
+def _filter_heights(
+    heights: FloatArray,
+    pitch: tuple[float, ...],
+    periodic: bool,
+    cutoff: float | None,
+    l_cutoff: float | None,
+) -> FloatArray:
+    if cutoff is not None or l_cutoff is not None:
+        # Checks the cut-offs; the first node of the next period is one pitch from the last one.
+        shape = tuple(count + periodic for count in heights.shape)
+        find_cutoffs(shape, pitch, cutoff, l_cutoff)
+    if cutoff is not None:
+        heights = gaussian_filter(heights, pitch, cutoff, periodic=periodic)
+    if l_cutoff is not None:
+        heights = heights - gaussian_filter(heights, pitch, l_cutoff, periodic=periodic)
+    return heights
+
+
+def _filter_steps(cutoff: float | None, l_cutoff: float | None) -> Iterator[str]:
+    if cutoff is not None:
+        yield f"filtered: Gaussian S-filter, cut-off {format_length(cutoff)}"
+    if l_cutoff is not None:
+        yield f"waviness removed: Gaussian L-filter, cut-off {format_length(l_cutoff)}"
+
+
+def _apply_periodic_tip(
+    heights: FloatArray, pitch: tuple[float, ...], radius: float, *, periodic: bool
+) -> tuple[FloatArray, str]:
+    """Return the heights scanned with a tip, which touches neighbouring periods too."""
+    if not periodic:
+        return apply_tip(heights, pitch, radius)
+    check_tip_radius(heights.shape, pitch, radius)
+    margins = [(math.ceil(radius / step),) * 2 for step in reversed(pitch)]
+    scanned, sentence = apply_tip(np.pad(heights, margins, mode="wrap"), pitch, radius)
+    inner = tuple(slice(before, -after) for before, after in margins)
+    return np.ascontiguousarray(scanned[inner]), sentence

@@ -1,0 +1,142 @@
+"""Load a measured file as a texture: read, prepare, fit the spline."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from asperity.core.arguments import document_arguments
+from asperity.core.cache import content_digest, get_or_compute
+from asperity.core.errors import ParameterError
+from asperity.core.files import open_input
+from asperity.measured.file_arguments import FILE_ARGUMENTS, READING_ARGUMENTS
+from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.spline.profile import Profile
+
+if TYPE_CHECKING:
+    from asperity.measured.prepared import PreparedSurface, StageCallback
+
+
+@document_arguments(FILE_ARGUMENTS)
+def load_texture(  # noqa: D417 - the others are described where they are declared
+    path: str | os.PathLike[str],
+    *,
+    channel: str | int | None = None,
+    unit: str | None = None,
+    integrate_normals: bool = False,
+    resample: float | None = None,
+    pitch: float | Sequence[float] | None = None,
+    height_range: float | None = None,
+    outliers: float | None = None,
+    max_missing: float | None = None,
+    form: int | None = None,
+    cutoff: float | None = None,
+    l_cutoff: float | None = None,
+    tip_radius: float | None = None,
+    periodic: bool = False,
+    blend: float | None = None,
+    magnify: float = 1.0,
+    magnify_height: float | None = None,
+) -> HeightMap | Profile:
+    """Load a measured surface as a texture.
+
+    Reads the file and prepares it: remove outliers, fill missing points, level, Gaussian band
+    limit, stylus tip, periodic continuation, magnify. The ``preparation`` of the result lists the
+    steps. A file written by ``asperity prepare`` is used as it is.
+
+    Args:
+        path: the file; its format is recognised by its content.
+        {arguments}
+
+    Raises:
+        SurfaceFileError: for a file that cannot be read, with the reason.
+        ParameterError: for an argument that cannot be used.
+    """
+    return texture_from_prepared(prepare_file(**locals()))  # every argument under its own name
+
+
+def prepare_file(
+    path: str | os.PathLike[str],
+    *,
+    progress: Callable[[str], None] | None = None,
+    watch: StageCallback | None = None,
+    magnify: float = 1.0,
+    magnify_height: float | None = None,
+    **arguments: Any,
+) -> PreparedSurface:
+    """Read and prepare a surface, or load a prepared one.
+
+    Args:
+        path: the file.
+        progress: called with the name of each stage before it starts.
+        watch: called with the heights after each step, see :mod:`asperity.measured.prepared`.
+        magnify: see :func:`load_texture`; also for a prepared surface.
+        magnify_height: see :func:`load_texture`; also for a prepared surface.
+        **arguments: the others of :func:`load_texture`; None and False mean not given.
+
+    Raises:
+        SurfaceFileError: for a file that cannot be read, with the reason.
+        ParameterError: for an argument that cannot be used, or that does not apply to a prepared
+            surface.
+    """
+    from asperity.measured.preparation import magnify_surface, prepare
+    from asperity.measured.prepared import is_prepared, load_prepared
+    from asperity.measured.reading import read_surface
+
+    given = {k: v for k, v in arguments.items() if v is not None and v is not False}
+    if progress is not None:
+        progress("read")
+    if is_prepared(path):
+        for name in given:
+            raise ParameterError(name, f"cannot be applied: {os.fspath(path)} was prepared already")
+        return magnify_surface(load_prepared(path), magnify, magnify_height)
+    options = {**given, "magnify": magnify, "magnify_height": magnify_height}
+    key = None if watch is not None else _source_digest(path, options)
+
+    def read_and_prepare() -> PreparedSurface:
+        reading = {a.name: options.pop(a.name) for a in READING_ARGUMENTS if a.name in options}
+        return prepare(read_surface(path, **reading), progress=progress, on_stage=watch, **options)
+
+    return get_or_compute("prepared", key, read_and_prepare)
+
+
+def _source_digest(path: str | os.PathLike[str], options: Mapping[str, Any]) -> str | None:
+    """Return the cache key of a prepared surface; ``None`` if external readers may take part.
+
+    The name of the file counts, because sentences about a surface may contain it.
+    """
+    from asperity.measured.reading.readers import external_reader_version
+
+    library = external_reader_version()
+    if library is None:
+        return None
+    try:
+        with open_input(path) as stream:
+            whole = hashlib.file_digest(stream, "sha256").hexdigest()
+    except (OSError, ValueError):  # the reader reports the error
+        return None
+    values = tuple(
+        (name, tuple(np.ravel(value).tolist()) if name == "pitch" else value)
+        for name, value in sorted(options.items())
+    )
+    return content_digest(whole, os.path.basename(os.fspath(path)), library, values)
+
+
+def texture_from_prepared(prepared: PreparedSurface) -> HeightMap | Profile:
+    """Return the spline through a prepared surface."""
+    spline, pitch = (
+        (Profile, prepared.pitch[0]) if prepared.heights.ndim == 1 else (HeightMap, prepared.pitch)
+    )
+    texture = spline(
+        prepared.heights,
+        pitch,
+        periodic=prepared.periodic,
+        preparation=prepared.steps,
+        filled_mask=prepared.filled_mask,
+    )
+    texture.history = prepared.history
+    return texture

@@ -1,0 +1,397 @@
+"""Witnesses, samples and the parts of the search for bounds, each against its definition."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.analysis.bounds import branch_and_bound as search
+from asperity.analysis.bounds import sampling
+from asperity.analysis.bounds import sampling as dense
+from asperity.analysis.bounds import witness as witnesses
+from asperity.analysis.bounds.branch_and_bound import Problem
+from asperity.analysis.bounds.measures import NORM, ONE_SIDED, one_sided, spectral_norm
+from asperity.analysis.bounds.problems import LawProblem
+from asperity.analysis.bounds.sampling import highest_point, sample_supremum
+from asperity.analysis.bounds.witness import Witness
+from asperity.analysis.gain import closed_forms as forms
+from asperity.core.checks import FloatArray
+from asperity.core.errors import InternalError
+from asperity.enclosures.cells import Cells
+from asperity.surface import Surface
+from asperity.textures import Fourier, HeightMap, Profile, Sinusoid
+
+WAVE = Sinusoid(0.13e-3, 0.9e-3, 0.4, (1.0, 2.0))
+WAVES = Fourier([4e-4, 3e-4, 1e-4], [[2100.0, 300.0], [-500.0, 1700.0], [3100, -3100]], [0.4, 1, 2])
+XY = np.array([0.21e-3, -0.34e-3])
+DEPTH = 0.5e-3
+
+# --- witnesses ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("far", [0.0, 400.0])
+@pytest.mark.parametrize("letter", ["A", "D", "F"])
+def test_a_witness_is_strictly_inside(letter: str, far: float) -> None:
+    """1e-9 of the greatest depth, or 1e-14 of the coordinates where that is more."""
+    surface = Surface(WAVE, letter, max_depth=DEPTH)
+    xy = XY + far
+    derivatives = WAVE.derivatives(xy[None])
+    size = {"A": 0.0, "D": float(abs(xy).max()), "F": -abs(derivatives[0, 0])}[letter]
+    least = max(1e-9 * DEPTH, 1e-14 * (abs(float(derivatives[0, 0])) + size))
+    assert (least > 1e-9 * DEPTH) == (far > 0.0 and letter == "D")
+    for depth, level in ((-1.0, least), (0.0, least), (0.3e-3, 0.3e-3), (1.0, DEPTH)):
+        expected = surface.law.contact.probe_positions(xy[None], np.array([level]), derivatives)[0]
+        np.testing.assert_array_equal(witnesses.probe_position(surface, xy, depth), expected)
+
+
+def test_a_witness_stays_above_a_clamp() -> None:
+    for clamp, depth in (("none", DEPTH), ("whole", (1.0 - 1e-9) * DEPTH)):
+        surface = Surface(WAVE, "A", max_depth=DEPTH, clamp=clamp)
+        expected = float(WAVE.height(XY[None])[0]) - depth
+        assert witnesses.probe_position(surface, XY, 1.0)[2] == pytest.approx(expected, rel=1e-14)
+
+
+def test_a_witness_is_the_surface_evaluated_there() -> None:
+    surface = Surface(WAVE, "F", max_depth=DEPTH, max_deflection=0.3e-3, stiffness=350.0)
+    held = np.array([0.1e-3, -0.25e-3])
+    for sliding in (False, True):
+        found = witnesses.witness_in_contact(surface, NORM, XY, 0.4e-3, held, sliding=sliding)
+        matrix = surface.jacobian([found.at], held[None], [sliding])[0] / 350.0
+        assert found.at == (*XY, -0.4e-3)
+        assert found.deflection == tuple(held)
+        assert found.sliding == sliding
+        assert found.value == pytest.approx(np.linalg.norm(matrix, 2), rel=1e-14)
+        assert found.size == pytest.approx(np.linalg.norm(matrix), rel=1e-14)
+    plain = Surface(WAVE, "C", max_depth=DEPTH, stiffness=350.0, clamp="backed")
+    for depth in (0.4e-3, 0.7e-3, 3e-3):
+        seen = witnesses.witness_at_depth(plain, ONE_SIDED, XY, depth)
+        matrix = plain.jacobian([seen.at])[0] / 350.0
+        assert seen.at == pytest.approx((*XY, float(WAVE.height(XY[None])[0]) - depth), rel=1e-13)
+        assert seen.size == pytest.approx(np.linalg.norm(matrix), rel=1e-14)
+        top = np.linalg.eigvalsh(-0.5 * (matrix + matrix.T))[-1]
+        assert seen.value == pytest.approx(top, rel=1e-14)
+        assert seen.deflection is None
+
+
+@pytest.mark.parametrize("letter", ["A", "D", "F"])
+def test_a_witness_exceeds_its_bound_by_rounding_only(letter: str) -> None:
+    """2⁸ units, times 2¹⁶ for differences of heights, and as much as coordinates move a depth."""
+    surface = Surface(WAVE, letter, max_depth=0.7e-3)
+    at = (0.9, 2.5, 1e-3)
+    height = abs(float(WAVE.height([at[:2]])[0]))
+    size = {"A": height, "D": height + 2.5, "F": 0.0}[letter]
+    for proved, norm in ((1.5, 1.0), (1.5, 2.5)):
+        relative = 2.0**16 * (1.0 + height / 0.7e-3) + size / 0.7e-3 * (1.0 + proved)
+        allowed = 2.0**-44 * relative * max(norm, proved)
+        for part in (-1.0, 0.0, 0.999):
+            value = proved + part * allowed
+            found = witnesses.checked_upper_bound(surface, NORM, proved, Witness(value, norm, at))
+            assert found == max(value, proved)
+        for value in (proved + 1.001 * allowed, math.nan):
+            state = Witness(value, norm, at, (1e-3, 2e-3)) if letter == "F" else None
+            wrong = state or Witness(value, norm, at)
+            if math.isnan(value):
+                assert witnesses.checked_upper_bound(surface, NORM, proved, wrong) == proved
+                continue
+            with pytest.raises(InternalError, match="the norm of") as caught:
+                witnesses.checked_upper_bound(surface, NORM, proved, wrong)
+            assert ("deflection (0.001, 0.002) m" in str(caught.value)) == (letter == "F")
+
+
+def test_a_theorem_s_number_is_attained_but_for_rounding() -> None:
+    surface = Surface(WAVE, "A", max_depth=DEPTH)
+    at = (*XY, 0.0)
+    for value, lower in ((2.0 * (1.0 - 0.9e-13), 2.0), (2.0 * (1.0 - 1.2e-13), None), (1.0, None)):
+        found = witnesses.checked_lower_bound(surface, NORM, 2.0, Witness(value, 1.0, at))
+        assert found == (value if lower is None else lower)
+    with pytest.raises(InternalError):
+        witnesses.checked_lower_bound(surface, NORM, 2.0, Witness(2.1, 1.0, at))
+
+
+def test_a_theorem_shows_the_best_of_its_witnesses() -> None:
+    surface = Surface(WAVE, "B", max_depth=DEPTH)
+    values = [
+        witnesses.witness_in_contact(surface, NORM, XY, depth) for depth in (0.0, 0.2e-3, DEPTH)
+    ]
+    best = max(values, key=lambda one: one.value)
+    bound = witnesses.bound_from_theorem(
+        surface, NORM, 9.0, "theorem", "why", XY, [0.2e-3, DEPTH, 0.0]
+    )
+    assert (bound.lower, bound.upper, bound.at) == (best.value, 9.0, best.at)
+    assert (bound.method, bound.note) == ("theorem", "why")
+
+
+# --- parts of the search --------------------------------------------------------------------------
+
+
+def test_a_cell_is_looked_at_in_its_centre_and_corners() -> None:
+    assert search._cell_stencil(1).tolist() == [[0.0], [-1.0], [1.0]]
+    for d in (2, 3):
+        star = search._cell_stencil(d)
+        assert len(star) == 1 + 2**d == len(np.unique(star, axis=0))
+        assert not star[0].any()
+        assert (np.abs(star[1:]) == 1.0).all()
+
+
+def test_cells_are_cut_into_equal_parts() -> None:
+    """In more than two where few are left: as long as there are at most 128."""
+    centres, half = np.array([[0.0, 10.0], [4.0, 30.0], [8.0, 50.0]]), np.array([0.5, 1.0])
+    for chunk, pieces in ((16, 3), (32, 2), (1, 3), (10**6, 1)):
+        found = list(search._subdivide(centres, half, 4, chunk))
+        assert len(found) == pieces
+        ticks = np.array([-3.0, -1.0, 1.0, 3.0])
+        expected = [[x + a, y + b] for x, y in centres for a in 0.5 * ticks for b in ticks]
+        np.testing.assert_array_equal(np.concatenate(found), expected)
+    for d in (1, 2, 3, 4):
+        for cells in (0, 1, 2, 3, 8, 9, 32, 33, 1000):
+            parts = search._subdivision_count(cells, d)
+            few = max(cells, 1)
+            assert parts == 2 or few * parts**d <= 128
+            assert few * (2 * parts) ** d > 128
+
+
+def test_nan_is_never_the_greatest() -> None:
+    assert search._argmax_ignoring_nan(np.array([1.0, math.nan, 3.0, 3.0, -math.inf])) == 2
+    assert search._argmax_ignoring_nan(np.array([math.nan, -5.0])) == 1
+
+
+class Line(Cells):
+    """The unit interval in four cells."""
+
+    dimensions, default_gap = 1, 1e-6
+
+    def initial_cells(self) -> tuple[Any, FloatArray]:
+        return iter([np.array([[0.125], [0.375], [0.625], [0.875]])]), np.array([0.125])
+
+    def sample_coordinates(self, count: int = 8) -> FloatArray:
+        return ((np.arange(count) + 0.5) / count)[:, None]
+
+    def enclosures(self, *_arguments: Any) -> Any:
+        raise NotImplementedError  # no part of what is searched here
+
+    derivatives = to_plane = enclosures
+
+    def clip_to_region(self, coordinates: FloatArray) -> FloatArray:
+        return np.clip(coordinates, 0.0, 1.0)
+
+
+class Peaks(Problem):
+    """As many peaks as there are heights, side by side; a bound that falls short by a share."""
+
+    def __init__(self, heights: FloatArray, short: float = 0.0) -> None:
+        self.cells, self._heights, self._short = Line(), np.asarray(heights), short
+        self.requests: list[FloatArray] = []
+
+    def values(self, coordinates: FloatArray) -> FloatArray:
+        self.requests.append(coordinates)
+        place = np.clip(coordinates[:, 0], 0.0, 1.0 - 1e-12) * len(self._heights)
+        index = place.astype(int)
+        return np.asarray(self._heights[index] * (1.0 - (place - index - 0.37) ** 2))
+
+    def upper_bounds(
+        self,
+        centres: FloatArray,
+        half_widths: FloatArray,  # noqa: ARG002 - of the interface
+        threshold: float,  # noqa: ARG002 - of the interface
+    ) -> FloatArray:
+        return np.full(len(centres), self._heights.max() * (1.0 - self._short))
+
+
+@pytest.mark.parametrize(("short", "noticed"), [(3e-9, False), (5e-9, True)])
+def test_how_far_rounding_may_put_a_value_above_its_bound(short: float, noticed: bool) -> None:
+    """2²⁴ units of the round-off: 3.7e-9."""
+    problem = Peaks(np.array([1.0]), short)
+    if noticed:
+        with pytest.raises(InternalError, match="1 is attained, above the proved bound 1"):
+            search.supremum(problem, 1e-12, 100)
+    else:
+        found = search.supremum(problem, 1e-12, 100)
+        assert found.lower == found.upper == pytest.approx(1.0, abs=1e-15)
+
+
+def test_without_bounds_the_best_samples_are_climbed_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    """65 536 samples, of which the twelve best are climbed from; nothing is proved."""
+    heights, tops = np.linspace(1.0, 2.0, 500), []
+
+    def climbed(*given: Any) -> Any:
+        tops.append(given[3])
+        return search.polish(*given)
+
+    monkeypatch.setattr(sampling, "polish", climbed)
+    problem = Peaks(heights)
+    found = sample_supremum(problem)
+    assert len(tops) == 12
+    assert tops == sorted(Peaks(heights).values(Line().sample_coordinates(65_536)))[:-13:-1]
+    assert (found.cell_count, found.upper, found.converged) == (65_536, math.inf, False)
+    assert sum(len(points) for points in problem.requests[:16]) == 65_536
+    assert found.lower == pytest.approx(2.0, rel=1e-12)
+    assert found.at is not None
+    assert problem.values(found.at[None])[0] == found.lower
+    assert found.at[0] == pytest.approx((499 + 0.37) / 500, abs=1e-9)
+    low = Peaks(heights)
+    low.floor = 2.5
+    nothing = sample_supremum(low)
+    assert (nothing.lower, nothing.at) == (2.5, None)
+
+
+@pytest.mark.parametrize("rises", [(), (0.0625,), (1.0, 0.25), (1.0,) * 60])
+def test_steps_of_a_climb(rises: tuple[float, ...]) -> None:
+    """From two half-widths on; a step that helped is tried twice as far, else a 512th of it.
+
+    Five sizes at once, each a quarter of the one before; until 1e-10, or fifty times.
+    """
+    problem, half, request = Peaks(np.array([1.0])), 0.01, []
+
+    def values(points: FloatArray) -> FloatArray:
+        # Symmetric about where the climb has come to.
+        away = np.abs(points[:, 0] - points[:, 0].mean())
+        sizes = np.unique(np.round(away / away.max(), 6))
+        np.testing.assert_allclose(sizes, 4.0 ** np.arange(-4.0, 1.0), rtol=1e-3)
+        request.append(away.max() / half)
+        found = np.zeros(len(points))
+        if len(request) <= len(rises):
+            found[np.argmin(np.abs(away / away.max() - rises[len(request) - 1]))] = len(request)
+        return found
+
+    problem.values = values  # type: ignore[method-assign]  # records the evaluated points
+    problem.cells.clip_to_region = lambda points: points  # type: ignore[method-assign]  # nothing is cut
+    expected, step = [], 2.0
+    for rise in rises[:50]:
+        expected.append(step)
+        step *= min(2.0 * rise, 1.0)
+    while step >= 1e-10 and len(expected) < 50:
+        expected.append(step)
+        step /= 512.0
+    best, _at = search.polish(problem, np.array([0.0]), np.array([half]), 0.0)
+    assert best == float(min(len(rises), 50))
+    np.testing.assert_allclose(request, expected, rtol=1e-6)
+
+
+def test_the_highest_point_is_higher_than_all_around() -> None:
+    for texture in (WAVE, WAVES):
+        at = highest_point(texture)
+        assert float(texture.height(at[None])[0]) == pytest.approx(texture.extremes[1], rel=1e-9)
+
+
+# --- dense samples --------------------------------------------------------------------------------
+
+
+def no_limit(surface: Surface) -> dense.DepthLimit:
+    return lambda derivatives: np.full(len(derivatives), surface.max_depth)
+
+
+@pytest.mark.parametrize(
+    ("letter", "measure", "form"),
+    [("A", spectral_norm, forms.q_a), ("B", spectral_norm, forms.q_b),
+     ("C", spectral_norm, forms.q_c), ("G", spectral_norm, forms.q_g),
+     ("A", one_sided, forms.one_sided_a), ("C", one_sided, forms.q_c)],
+)  # fmt: skip
+def test_dense_samples_attain_the_closed_forms(letter: str, measure: Any, form: Any) -> None:
+    surface = Surface(WAVE, letter, max_depth=0.3e-3)
+    found = dense.dense_maximum(surface, measure, no_limit(surface))
+    wave = WAVE.single_wave
+    assert wave is not None
+    assert found.value == pytest.approx(form(wave, 0.3e-3), rel=1e-12)
+    probe = witnesses.probe_position(surface, np.array(found.xy), found.depth)
+    matrix = surface.jacobian([probe])[0] / surface.stiffness
+    exact = (NORM if measure is spectral_norm else ONE_SIDED).accurate(matrix[None])[0]
+    assert exact == pytest.approx(found.value, rel=1e-6)
+
+
+def test_dense_samples_keep_to_the_depth_that_is_allowed() -> None:
+    """Law D, whose number grows with the depth; a limit below zero is none."""
+    surface = Surface(WAVE, "D", max_depth=DEPTH)
+    radius = WAVE.period**2 / (4.0 * math.pi**2 * WAVE.amplitude)
+    for share in (0.6, 0.8):
+        found = dense.dense_maximum(
+            surface, spectral_norm, lambda d, share=share: np.full(len(d), share * radius)
+        )
+        assert found.value == pytest.approx(share / (1.0 - share), rel=1e-9)
+        assert found.depth == pytest.approx(share * radius, rel=1e-9)
+    assert dense.dense_maximum(surface, spectral_norm, lambda d: np.full(len(d), -1.0)).depth == 0.0
+
+
+def test_samples_lie_in_the_middle_of_their_cells_or_on_the_nodes_to_both_ends() -> None:
+    for texture in (WAVE, WAVES):
+        points, spacing = dense.sample_fractions(texture)
+        counts = texture.sample_counts()
+        assert len(points) == math.prod(counts)
+        np.testing.assert_allclose(spacing, 1.0 / np.array(counts), rtol=1e-15)
+        np.testing.assert_allclose(points[0], 0.5 * spacing, rtol=1e-12)
+        np.testing.assert_allclose(points[-1], 1.0 - 0.5 * spacing, rtol=1e-12)
+    heights = 1e-4 * np.random.default_rng(2).normal(size=9)
+    for line, last in ((Profile(heights, 3e-4, periodic=False), 1.0),
+                       (Profile(heights, 3e-4, periodic=True), None)):  # fmt: skip
+        points, spacing = dense.sample_fractions(line)
+        assert points[0, 0] == 0.0
+        assert points[-1, 0] == (last or pytest.approx(1.0 - spacing[0], rel=1e-12))
+    plate = HeightMap(1e-4 * np.random.default_rng(2).normal(size=(7, 9)), (3e-4, 7e-4))
+    found = dense.dense_maximum(
+        Surface(plate, "A", max_depth=DEPTH), spectral_norm, lambda d: 0.0 * d[:, 0]
+    )
+    slope = math.sqrt(found.value**2 - 1.0)
+    assert slope == pytest.approx(np.hypot(*plate.gradient([found.xy])[0]), rel=1e-9)
+
+
+def test_neighbours_are_one_candidate() -> None:
+    """Of 256 blocks the best twelve, in rising order."""
+    values = np.zeros(2560)
+    values[[5, 7, 400, 2559, 1300]] = [3.0, 4.0, 1.0, 5.0, 2.0]
+    found = dense._best_of_blocks(values)
+    assert len(found) == 12
+    assert found[-4:].tolist() == [400, 1300, 7, 2559]
+    assert len(dense._best_of_blocks(np.arange(40.0))) == 12
+    assert dense._best_of_blocks(np.arange(5.0)).tolist() == [0, 1, 2, 3, 4]
+
+
+def test_the_worst_deflection_is_against_the_slope() -> None:
+    surface = Surface(WAVE, "F", max_deflection=0.3e-3)
+    found = dense.worst_deflection(surface, np.array([[3.0, -4.0], [0.0, 0.0], [0.0, 1e-9]]))
+    expected = [[-0.18e-3, 0.24e-3], [-0.3e-3, 0.0], [0.0, -0.3e-3]]
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+# --- contacts of a law ----------------------------------------------------------------------------
+
+
+def test_every_depth_and_state_of_a_law_is_looked_at() -> None:
+    """Both ends where J is affine in the depth, else every depth; an anchor sticks or slides."""
+    for letter, ends, coordinates in (
+        ("A", (0.0, DEPTH), 1),
+        ("D", (None,), 2),
+        ("F", (0.0, DEPTH), 3),
+    ):
+        surface = Surface(WAVE, letter, max_depth=DEPTH)
+        cells = WAVE.cells()
+        assert cells is not None
+        problem = LawProblem(surface, cells, NORM)
+        at = problem.cells.sample_coordinates(400)
+        assert problem.cells.dimensions == coordinates
+        found = problem.contacts(at)
+        slides = (False, True) if letter == "F" else (False,)
+        assert [one.sliding for one in found] == [s for s in slides for _ in ends]
+        for one, end in zip(found, [*ends] * len(slides), strict=True):
+            if end is None:
+                assert 0.0 <= one.depth.min() < 0.05 * DEPTH
+                assert 0.95 * DEPTH < one.depth.max() <= DEPTH
+            else:
+                assert (one.depth == end).all()
+            length = np.hypot(*one.deflection.T)
+            longest = surface.parameter("max_deflection") if letter == "F" else 0.0
+            assert (length <= longest * (1.0 + 1e-12)).all()
+            if one.sliding:
+                np.testing.assert_allclose(length, longest, rtol=1e-12)
+        values = problem.values(at)
+        xy = problem.cells.to_plane(at)
+        best = np.zeros(len(at))
+        for one in found:
+            inside = np.clip(one.depth, 1e-9 * DEPTH, (1.0 - 1e-9) * DEPTH)
+            probes = surface.law.contact.probe_positions(xy, inside, WAVE.derivatives(xy))
+            state = (one.deflection, np.full(len(at), one.sliding)) if letter == "F" else ()
+            matrices = surface.jacobian(probes, *state) / surface.stiffness
+            best = np.maximum(best, np.linalg.norm(matrices, 2, axis=(1, 2)))
+        if letter != "D":  # whose probes may be nearer to another point
+            np.testing.assert_allclose(values, best, rtol=1e-5)

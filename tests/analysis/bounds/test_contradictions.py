@@ -1,0 +1,163 @@
+"""A witness above a proved bound is an internal error, loudly; rounding is none."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.analysis.bounds.measures import NORM
+from asperity.analysis.bounds.witness import Witness, checked_lower_bound, checked_upper_bound
+from asperity.analysis.energy import leak as leaks
+from asperity.analysis.energy.leak import worst_loop
+from asperity.analysis.gain import search_options as search
+from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
+from asperity.analysis.gain.theorems import ClosedForm, Constant, Theorem, register_theorem
+from asperity.core.errors import AsperityError, InternalError
+from asperity.laws import LAWS, Law
+from asperity.surface import Surface
+from asperity.textures import Fourier, HeightMap, Profile, Sinusoid
+
+WAVE = Sinusoid(amplitude=0.1e-3, period=1e-3)
+WAVES = Fourier([1e-4, 5e-5], [[3000.0, 0.0], [6000.0, 0.0]], [0.3, 1.0])
+HEIGHTS = 5e-5 * np.random.default_rng(3).normal(size=(7, 7))
+
+
+class Flatterer(Fourier):
+    """Waves that declare half of their true slopes and second derivatives."""
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        slope, hessian = super().bounds
+        return 0.5 * slope, 0.5 * hessian
+
+
+def copy_of(letter: str) -> Law:
+    law = LAWS[letter]
+    return Law("copy", "copy", law.contact, law.force)
+
+
+def test_wrong_bounds_of_a_texture_are_detected() -> None:
+    # Five independent waves are not certified: their bound uses the declared derivatives.
+    waves = [1e-4, 5e-5, 4e-5, 3e-5, 2e-5]
+    vectors = [[3000.0, 0.0], [0.0, 5000.0], [1234.0, 777.0], [-500.0, 2222.0], [1777.0, -3210.0]]
+    honest, liar = Fourier(waves, vectors), Flatterer(waves, vectors)
+    assert characteristic_number(Surface(honest, "A")).upper > 1.0
+    with pytest.raises(InternalError) as caught:
+        characteristic_number(Surface(liar, "A"))
+    text = str(caught.value)
+    for part in ("norm", "law='A'", "proved to be at most", "is attained at (", "report"):
+        assert part in text
+    assert "deflection" not in text
+    assert isinstance(caught.value, AsperityError)
+
+
+def test_a_broken_kernel_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its Jacobians are one in a million too large: branch and bound knows better."""
+    surface = Surface(WAVES, "B")
+    assert characteristic_number(surface).method == "certified"
+    intact = Surface.jacobian
+
+    def broken(self: Surface, *arguments: Any) -> Any:
+        return (1.0 + 1e-6) * intact(self, *arguments)
+
+    monkeypatch.setattr(Surface, "jacobian", broken)
+    with pytest.raises(InternalError, match="norm"):
+        characteristic_number(surface)
+    with pytest.raises(InternalError, match="one-sided"):
+        one_sided_number(Surface(WAVE, "D"))
+
+
+def test_a_wrong_theorem_is_detected() -> None:
+    constant, closed = copy_of("W"), copy_of("A")
+    register_theorem(constant, Theorem({NORM: Constant(0.999, "wrong")}))
+    form = ClosedForm(lambda _wave, _depth: 1.1, lambda _wave, _depth: 0.0)
+    register_theorem(closed, Theorem(closed_forms={NORM: form}))
+    for law in (constant, closed):
+        with pytest.raises(InternalError):
+            characteristic_number(Surface(WAVE, law))
+
+
+def test_a_wrong_crest_is_detected(monkeypatch: pytest.MonkeyPatch) -> None:
+    surface = Surface(WAVES, "D", max_depth=3e-4)
+    assert characteristic_number(surface).upper > 1.0
+    intact = search.supremum
+
+    def flatter(*arguments: Any) -> Any:
+        found = intact(*arguments)
+        return replace(found, upper=0.999 * found.upper)
+
+    monkeypatch.setattr(search, "supremum", flatter)
+    with pytest.raises(InternalError, match="norm"):
+        characteristic_number(surface)
+
+
+def test_a_crest_of_which_nothing_is_proved_is_undecided(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search that ends before its first proof gives no bound, and no error."""
+    intact = search.supremum
+    monkeypatch.setattr(
+        search, "supremum", lambda *arguments: replace(intact(*arguments), upper=math.inf)
+    )
+    bound = characteristic_number(Surface(WAVES, "D", max_depth=3e-4))
+    assert (bound.method, bound.upper) == ("sampled", math.inf)
+    assert bound.lower == pytest.approx(2.1244, rel=1e-4)
+
+
+LEAKING = {
+    "wave, A": (WAVE, "A"),
+    "waves, G": (WAVES, "G"),
+    "profile, B": (Profile(HEIGHTS[0], 3e-4, periodic=False), "B"),
+    "map, A": (HeightMap(HEIGHTS, 3e-4), "A"),
+}
+
+
+@pytest.mark.parametrize("case", LEAKING.values(), ids=list(LEAKING))
+def test_a_loop_above_its_proved_bound_is_detected(
+    case: tuple[Any, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    surface = Surface(*case)
+    honest = worst_loop(surface)
+    assert 0.9 * honest.upper_per_period < honest.energy <= honest.upper_per_period
+    intact, share = leaks.curl_integral_bounds, [0.8]
+
+    def flatter(*arguments: Any) -> Any:
+        found = intact(*arguments)
+        assert found is not None
+        return [(share[0] * low, share[0] * high) for low, high in found]
+
+    monkeypatch.setattr(leaks, "curl_integral_bounds", flatter)
+    with pytest.raises(InternalError, match="gains"):
+        worst_loop(surface)
+    share[0] = honest.energy / honest.upper_per_period * (1.0 - 1e-12)  # that much is rounding
+    # Scaled to the stiffness, a bound is rounded up.
+    assert worst_loop(surface).upper_per_period == math.nextafter(honest.energy, math.inf)
+
+
+def test_rounding_is_no_contradiction() -> None:
+    surface = Surface(WAVE, "A")
+    for excess in (-1e-3, 0.0, 1e-15, 1e-12):
+        witness = Witness(2.0 * (1.0 + excess), 2.0, (0.0, 0.0, -1e-5))
+        assert checked_upper_bound(surface, NORM, 2.0, witness) == max(2.0, witness.value)
+    witness = Witness(2.0 * (1.0 + 1e-7), 2.0, (0.0, 0.0, -1e-5))
+    with pytest.raises(InternalError):
+        checked_upper_bound(surface, NORM, 2.0, witness)
+    with pytest.raises(InternalError):
+        checked_lower_bound(surface, NORM, 2.0, witness)
+
+
+def test_the_command_line_has_an_exit_code_for_contradictions(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from asperity.cli import main as commands
+
+    def contradict(**_options: Any) -> None:
+        raise InternalError("proved to be at most 1, but 2 is attained")
+
+    monkeypatch.setattr(commands, "cli", contradict)
+    with pytest.raises(SystemExit) as stop:
+        commands.main()
+    assert stop.value.code == commands.INTERNAL_ERROR
+    assert "at most 1, but 2" in capsys.readouterr().err

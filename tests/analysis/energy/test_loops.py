@@ -1,0 +1,168 @@
+"""The paper's loops (Fig. 3) to 1e-8 of k A², and paths with state."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from asperity.analysis import loop_work
+from asperity.analysis.energy.loop_integral import initial_panels
+from asperity.core.errors import ParameterError
+from asperity.surface import Surface
+from asperity.textures.kinds.sinusoid import Sinusoid
+from asperity.textures.spline.heightmap import HeightMap
+
+K, PERIOD, AMPLITUDE = 1000.0, 2e-3, 0.8e-3
+TEXTURE = Sinusoid(amplitude=AMPLITUDE, period=PERIOD)
+QUARTER = PERIOD / 4
+FIGURE_3 = [[0, 0, 0], [QUARTER, 0, 0], [QUARTER, 0, AMPLITUDE], [0, 0, AMPLITUDE]]
+TOLERANCE = 1e-8 * K * AMPLITUDE**2
+
+
+def work(letter: str, path: object, **arguments: object) -> float:
+    return loop_work(Surface(TEXTURE, letter, stiffness=K, **arguments), path)
+
+
+def test_a_gains_half_k_a_squared() -> None:
+    assert abs(work("A", FIGURE_3) - K * AMPLITUDE**2 / 2) < TOLERANCE
+
+
+def test_energy_of_law_b_is_equation_12() -> None:
+    root = math.sqrt(1 + 4 * math.pi**2 * AMPLITUDE**2 / PERIOD**2)
+    expected = K * AMPLITUDE**2 / 2 + K * PERIOD**2 / (4 * math.pi**2) * (1 - root)
+    assert abs(work("B", FIGURE_3) - expected) < TOLERANCE
+
+
+@pytest.mark.parametrize("letter", "CD")
+def test_conservative_laws_gain_nothing(letter: str) -> None:
+    assert abs(work(letter, FIGURE_3)) < TOLERANCE
+
+
+def test_e_gains_the_integral_of_the_distance() -> None:
+    def distance(z: float) -> float:
+        probe = np.array([[QUARTER, 0.0, z]])
+        return float(np.linalg.norm(TEXTURE.nearest(probe) - probe))
+
+    # The distance has a kink where the closest point leaves the crest.
+    kink = AMPLITUDE - PERIOD**2 / (4 * math.pi**2 * AMPLITUDE)
+    expected = K * quad(distance, 0, AMPLITUDE, points=[kink], epsabs=1e-18, epsrel=1e-12)[0]
+    assert abs(work("E", FIGURE_3) - expected) < TOLERANCE
+
+
+def test_energy_of_law_g_is_the_arctangent_formula() -> None:
+    a = 0.5e-3
+    path = [[QUARTER, 0, a], [QUARTER, 0, -a], [3 * QUARTER, 0, -a], [3 * QUARTER, 0, a]]
+    expected = K * a * PERIOD / math.pi * math.atan(2 * math.pi * AMPLITUDE / PERIOD)
+    assert abs(work("G", path) - expected) < TOLERANCE
+
+
+@pytest.mark.parametrize("light", [1e-4, 3e-4])
+def test_energy_of_law_f_is_equation_27(light: float) -> None:
+    """W_F = k μ (1 - m) d_max (D - a)/2 for constant m = 1/2 (modulation depth 0)."""
+    deflection, depth = 0.7e-3, 1e-3
+    path = [
+        [0, 0, 1e-3],
+        [0, 0, -light],
+        [deflection, 0, -light],
+        [deflection, 0, -depth],
+        [0, 0, -depth],
+    ]
+    expected = K * 0.8 * 0.5 * deflection * (depth - light) / 2
+    gained = work("F", path, modulation_depth=0.0, max_deflection=deflection)
+    assert abs(gained - expected) < TOLERANCE
+
+
+def test_reversed_loop_gains_the_opposite() -> None:
+    assert work("A", FIGURE_3[::-1]) == pytest.approx(-work("A", FIGURE_3), abs=1e-18)
+
+
+def test_starting_vertex_does_not_matter_without_state() -> None:
+    turned = FIGURE_3[2:] + FIGURE_3[:2]
+    assert work("B", turned) == pytest.approx(work("B", FIGURE_3), abs=1e-17)
+
+
+@pytest.mark.parametrize("letter", "ABCEG")
+def test_loops_in_space_against_brute_force(letter: str) -> None:
+    surface = Surface(_rough(), letter, stiffness=K)
+    rng = np.random.default_rng(5)
+    vertices = rng.uniform(1e-3, 2e-3, (5, 3)) - [0, 0, 2e-3]
+    path = np.concatenate(
+        [
+            np.linspace(a, b, 20_000, endpoint=False)
+            for a, b in zip(vertices, np.roll(vertices, -1, axis=0), strict=True)
+        ]
+        + [vertices[:1]]
+    )
+    force = surface.force(path)
+    trapezoid = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(path, axis=0)))
+    # The rule's own error is of second order in steps of 1/20000 of an edge.
+    assert loop_work(surface, vertices) == pytest.approx(trapezoid, abs=1e-11)
+
+
+def test_god_object_gains_nothing_across_its_ridges() -> None:
+    """The force jumps on the way; the energy does not; E is the negative control."""
+    surface = Surface(_rough(), "D", stiffness=K)
+    rng = np.random.default_rng(7)
+    scale = 0.5 * K * 1e-6
+    for _ in range(5):
+        vertices = rng.uniform(1e-3, 2e-3, (5, 3)) - [0, 0, 2e-3]
+        assert abs(loop_work(surface, vertices)) < 1e-9 * scale
+        control = loop_work(Surface(_rough(), "E", stiffness=K), vertices)
+        assert abs(control) > 1e-4 * scale
+
+
+def _rough() -> HeightMap:
+    rng = np.random.default_rng(0)
+    return HeightMap(rng.normal(size=(20, 30)) * 1e-4, (2e-4, 1.5e-4))
+
+
+def test_friction_loop_is_the_limit_of_small_steps() -> None:
+    surface = Surface(TEXTURE, "F", stiffness=K, max_deflection=0.4e-3)
+    rng = np.random.default_rng(1)
+    vertices = rng.uniform(-2e-3, 2e-3, (6, 3)) - [0, 0, 1.2e-3]
+    vertices[0, 2] = 1e-3
+    exact = loop_work(surface, vertices)
+    errors = []
+    for count in (2_000, 4_000):
+        path = np.concatenate(
+            [
+                np.linspace(a, b, count, endpoint=False)
+                for a, b in zip(vertices, np.roll(vertices, -1, axis=0), strict=True)
+            ]
+            + [vertices[:1]]
+        )
+        force = surface.trace(path)
+        stepped = np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(path, axis=0))
+        errors.append(abs(stepped - exact))
+    assert errors[1] < 1e-4 * abs(exact)
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.5)  # first order
+
+
+def test_a_wave_is_two_panels() -> None:
+    """2π M/K is the period of a sinusoid, whatever its amplitude; what is flat has no waves."""
+    for amplitude in (1e-6, AMPLITUDE):
+        surface = Surface(Sinusoid(amplitude, PERIOD, direction=(1.0, 2.0)), "A")
+        assert [initial_panels(surface, n * PERIOD) for n in (1.0, 50.2)] == [4, 101]
+    flat = Surface(HeightMap(np.zeros((5, 5)), 1e-3), "A", max_depth=1e-3)
+    assert initial_panels(flat, 1e3) == 4
+
+
+@pytest.mark.parametrize(
+    "vertices", [[[0, 0, 0]], [[0, 0], [1, 1]], [[0, 0, 0], [math.nan, 0, 0]], "no"]
+)
+def test_bad_polygons(vertices: object) -> None:
+    with pytest.raises(ParameterError) as caught:
+        work("A", vertices)
+    assert caught.value.argument == "vertices"
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-9, math.nan])
+def test_a_tolerance_that_nothing_reaches_is_refused(tolerance: float) -> None:
+    """Panels would be halved until memory ends."""
+    surface = Surface(Sinusoid(1e-4, 1e-3), "A")
+    with pytest.raises(ParameterError) as caught:
+        loop_work(surface, [[0.0, 0.0, -1e-4], [1e-4, 0.0, 0.0]], tolerance)
+    assert caught.value.argument == "tolerance"

@@ -1,0 +1,99 @@
+"""What the limits say: in words, as data, in a notebook, and of a flat surface."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.analysis.check_limits import limits
+from asperity.analysis.limits.limit_result import Limits
+from asperity.devices import Device, parse_device
+from asperity.textures import Fourier, HeightMap, Sinusoid, Texture
+
+NUMBERS = {
+    "update_rate": 2000.0,
+    "position_resolution": 20e-6,
+    "force_resolution": 2e-3,
+    "max_stiffness": 900.0,
+    "bandwidth": 300.0,
+    "friction": 5e-3,
+}
+A, L, V, D = 5e-5, 0.8e-3, 0.12, 2e-4
+TWO = Fourier([5e-5, 2.4e-5], [2 * math.pi / 0.8e-3, 2 * math.pi / 0.32e-3], [0.2, 1.0])
+LONG = 5.0**2 / (5.0**2 + 2.4**2)  # share of the long wave
+
+
+def device(**changes: float | None) -> Device:
+    """A device that knows everything; None leaves a number out."""
+    content = {field: value for field, value in {**NUMBERS, **changes}.items() if value is not None}
+    return parse_device(content, "bench")
+
+
+def ask(texture: Texture | None = None, **arguments: Any) -> Limits:
+    """The limits of law A at 500 N/m on the bench by default."""
+    given = {"device": device(), "speed": V, "law": "A", "stiffness": 500.0, "max_depth": D}
+    return limits(texture or Sinusoid(A, L), **{**given, **arguments})
+
+
+def verdicts(result: Limits) -> dict[int, bool | None]:
+    return {limit.number: limit.holds for limit in result.limits}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"bandwidth": None}, "limits 1, 2, 3, 4 and 5 hold at 0.12 m/s"),
+        (dict.fromkeys(NUMBERS.keys() - {"max_stiffness"}), "limit 5 holds at 0.12 m/s"),
+    ],
+)
+def test_one_limit_holds_and_several_hold(changes: dict[str, None], words: str) -> None:
+    result = ask(device=device(**changes))
+    assert f"As far as can be decided: {words}. Not decidable: " in result.answer
+
+
+def test_plain_data_are_complete() -> None:
+    result = ask(TWO)
+    content = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    assert content["schema"] == 2
+    assert [limit["number"] for limit in content["limits"]] == [1, 2, 3, 4, 5, 6]
+    assert content["limits"][1]["speeds"] == [0.0, "inf"]
+    assert content["waves"][0]["holds"] == {"1": True, "2": True, "3": True, "4": True, "6": True}
+    assert content["speed"] == V
+    assert content["perceptibility"]["resolved"] == pytest.approx(LONG)
+    assert content["gain"]["symbol"] == "q"
+
+
+def test_defaults_are_stated() -> None:
+    assumptions = " | ".join(limits(Sinusoid(A, L), device()).assumptions)
+    for words in ("Default speed 0.1 m/s", "α = 5, β = 5, γ = 5", "Default max depth 100 µm"):
+        assert words in assumptions
+    given = " | ".join(ask(time_samples=5.0, position_samples=5.0, force_steps=5.0).assumptions)
+    for words in ("Default speed", "α = ", "Default max depth", "Stiffness"):
+        assert words not in given
+    assert "Not verified for the bench: update rate 2 kHz" in assumptions
+
+
+def test_a_verified_number_is_not_called_unverified() -> None:
+    assumptions = " | ".join(limits(Sinusoid(A, L), "inverse3").assumptions)
+    assert "Not verified" not in assumptions
+    assert "filters the force" in assumptions
+
+
+def test_notebooks_show_a_table() -> None:
+    text = ask(device=device(bandwidth=None))._repr_html_()
+    assert text.count("<tr") == 7
+    assert "needs" in text
+    assert "bandwidth" in text
+
+
+def test_a_flat_surface_is_reported_as_flat() -> None:
+    result = ask(HeightMap(np.full((6, 6), 1e-3), 1e-4))
+    assert result.answer == "The surface is flat: there is no texture to feel."
+    assert verdicts(result) == {**dict.fromkeys([1, 2, 3, 4, 6]), 5: True}
+    assert result.limit(1).missing_data == ("waves: the surface is flat",)
+    assert result.resolved_share == 0.0
+    json.dumps(result.to_dict(), allow_nan=False)

@@ -1,0 +1,388 @@
+"""Law H: the statements of MATH section 6, each with a law that fails it.
+
+Some statements hold for C or D too, by mathematics: both are free of force outside, keep the
+stiffness of a flat wall and gain nothing in loops. There another law is the negative control.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from asperity.analysis import characteristic_number, loop_work, one_sided_number
+from asperity.analysis.split.split_state import pop_through, split_state
+from asperity.core.errors import ParameterError
+from asperity.laws import Law
+from asperity.surface import Surface
+from asperity.textures.kinds.sinusoid import Sinusoid
+from asperity.textures.spline.profile import Profile
+from asperity.textures.texture import Texture
+
+K, PERIOD = 800.0, 1e-3
+
+
+def _profile(shape: Callable[[np.ndarray], np.ndarray]) -> Profile:
+    """Twenty nodes per period; the spline rounds corners over one of them."""
+    return Profile(0.5e-3 * shape(np.arange(20) / 20), 0.05e-3, periodic=True)
+
+
+TEXTURES: dict[str, Texture] = {
+    "gentle": Sinusoid(0.05 * PERIOD, PERIOD),
+    "middle": Sinusoid(0.4 * PERIOD, PERIOD, phase=-1.1),
+    "steep": Sinusoid(3.0 * PERIOD, PERIOD, phase=0.4, direction=(1.0, 2.0)),
+    "triangle": _profile(lambda t: np.abs(2.0 * t - 1.0)),
+    "square": _profile(lambda t: np.where(t < 0.5, 1.0, 0.0)),
+    "sawtooth": _profile(lambda t: t),
+    "noise": Profile(1e-4 * np.random.default_rng(2).normal(size=30), 0.1e-3, periodic=True),
+}
+SOME = ["steep", "noise", "sawtooth"]
+
+
+def _probes(texture: Texture, count: int, seed: int = 0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    xy = rng.uniform(0.0, 2e-3, (count, 2))
+    depth = texture.peak_to_valley * 10 ** rng.uniform(-3, 0.3, count)
+    return np.column_stack([xy, texture.height(xy) - depth])
+
+
+def _god_object_energy(texture: Texture, points: np.ndarray) -> np.ndarray:
+    """Return φ, half the squared distance to the free set [m²]."""
+    square = np.sum((texture.nearest(points) - points) ** 2, axis=1)
+    return 0.5 * np.where(texture.height(points[:, :2]) > points[:, 2], square, 0.0)
+
+
+# --- outside, and how large the energy is ---------------------------------------------------------
+
+
+def _outside(texture: Texture) -> np.ndarray:
+    points = _probes(texture, 400)
+    points[:, 2] = 2.0 * texture.height(points[:, :2]) - points[:, 2]
+    touching = points.copy()
+    touching[:, 2] = texture.height(points[:, :2])
+    return np.concatenate([points, touching])
+
+
+@pytest.mark.parametrize("name", TEXTURES)
+def test_there_is_nothing_outside(name: str) -> None:
+    surface = Surface(TEXTURES[name], "H", K)
+    points = _outside(surface.texture)
+    state = split_state(surface, points)
+    assert not surface.force(points).any()
+    assert not state.potential.any()
+    assert not state.atoms.any()
+    assert not surface.jacobian(points).any()
+
+
+@pytest.mark.parametrize("letter", "WG")
+def test_laws_of_the_wall_push_outside(letter: str) -> None:
+    surface = Surface(TEXTURES["steep"], letter, K)
+    assert surface.force(_outside(surface.texture)).any()
+
+
+@pytest.mark.parametrize("name", TEXTURES)
+@pytest.mark.parametrize("c", [0.5, 1.0, 3.0])
+def test_energy_lies_between_its_bounds(name: str, c: float) -> None:
+    """(1 - μ) φ <= U <= φ, and the gap certifies U."""
+    texture = TEXTURES[name]
+    points = _probes(texture, 400)
+    phi = K * _god_object_energy(texture, points)
+    state = split_state(Surface(texture, "H", K, continuity=c), points)
+    # Positions are rounded: a distance d is known to 1e-15 of the coordinates.
+    size = np.abs(points).sum(axis=1) + texture.peak_to_valley
+    rounding = 2e-15 * size * np.sqrt(2.0 * K * phi)
+    assert (state.potential <= phi + rounding).all()
+    assert (state.potential >= c / (1.0 + c) * phi - rounding).all()
+    assert (state.gap <= rounding).all()
+
+
+def test_the_energy_of_c_is_larger() -> None:
+    texture = TEXTURES["noise"]
+    points = _probes(texture, 400)
+    vertical = 0.5 * K * (texture.height(points[:, :2]) - points[:, 2]) ** 2
+    assert (vertical > 1.1 * K * _god_object_energy(texture, points)).any()
+
+
+# --- the force is the gradient of the energy ------------------------------------------------------
+
+
+def _gradient(surface: Surface, points: np.ndarray, step: float) -> np.ndarray:
+    ahead = [split_state(surface, points + step * axis).potential for axis in np.eye(3)]
+    behind = [split_state(surface, points - step * axis).potential for axis in np.eye(3)]
+    return (np.stack(ahead, axis=-1) - np.stack(behind, axis=-1)) / (2.0 * step)
+
+
+@pytest.mark.parametrize("name", TEXTURES)
+@pytest.mark.parametrize("c", [1.0, 4.0])
+def test_force_is_minus_the_gradient_of_the_energy(name: str, c: float) -> None:
+    surface = Surface(TEXTURES[name], "H", K, continuity=c)
+    points = _probes(surface.texture, 150)
+    step = 1e-4 * surface.texture.peak_to_valley
+    error = np.linalg.norm(_gradient(surface, points, step) + surface.force(points), axis=1)
+    # The Hessian is at most k max(1, c): a central difference errs by at most half a step of it.
+    assert error.max() <= 0.5 * math.sqrt(3.0) * K * max(1.0, c) * step
+
+
+@pytest.mark.parametrize("letter", "CD")
+def test_the_force_of_c_or_d_is_another(letter: str) -> None:
+    surface = Surface(TEXTURES["steep"], "H", K)
+    points = _probes(surface.texture, 150)
+    other = Surface(surface.texture, letter, K).force(points)
+    error = np.linalg.norm(_gradient(surface, points, 6e-7) + other, axis=1)
+    assert error.max() > 100.0 * K * 6e-7
+
+
+def test_loops_gain_nothing_across_the_medial_axis() -> None:
+    """C and D gain nothing either; A and E do."""
+    texture = TEXTURES["noise"]
+    rng = np.random.default_rng(3)
+    scale = 0.5 * K * 1e-6
+    for _ in range(2):
+        loop = rng.uniform(0.5e-3, 1.5e-3, (4, 3)) - [0.0, 0.0, 1.4e-3]
+        assert abs(loop_work(Surface(texture, "H", K), loop)) < 1e-9 * scale
+        for letter in "AE":
+            assert abs(loop_work(Surface(texture, letter, K), loop)) > 1e-4 * scale
+
+
+# --- continuity -----------------------------------------------------------------------------------
+
+
+@cache
+def _pairs(name: str, count: int = 1500) -> tuple[np.ndarray, np.ndarray]:
+    """Return random pairs of all distances, and pairs that straddle the jumps of a nearest point.
+
+    The latter come from bisection between two points whose nearest points are far apart.
+    """
+    texture = TEXTURES[name]
+    rng = np.random.default_rng(1)
+    a = _probes(texture, count)
+    b = a + rng.normal(size=a.shape) * 10 ** rng.uniform(-9, -4, (count, 1))
+    low, high = a.copy(), a + rng.normal(size=a.shape) * [2e-4, 2e-4, 0.0]
+    foot_low, foot_high = texture.nearest(low), texture.nearest(high)
+    for _ in range(26):
+        middle = 0.5 * (low + high)
+        closest_point = texture.nearest(middle)
+        to_low = np.linalg.norm(closest_point - foot_low, axis=1, keepdims=True)
+        left = to_low < np.linalg.norm(closest_point - foot_high, axis=1, keepdims=True)
+        low, foot_low = np.where(left, middle, low), np.where(left, closest_point, foot_low)
+        high, foot_high = np.where(left, high, middle), np.where(left, foot_high, closest_point)
+    return np.concatenate([a, low]), np.concatenate([b, high])
+
+
+def _excess(surface: Surface, name: str, gain: float) -> np.ndarray:
+    """Return |Δf| - k gain |Δp| (1 + 1e-6), over k l."""
+    a, b = _pairs(name)
+    change = np.linalg.norm(surface.force(b) - surface.force(a), axis=1)
+    allowed = K * gain * np.linalg.norm(b - a, axis=1) * (1.0 + 1e-6)
+    return (change - allowed) / (K * PERIOD)
+
+
+@pytest.mark.parametrize("name", TEXTURES)
+@pytest.mark.parametrize("c", [1.0, 4.0])
+def test_force_is_lipschitz_across_ridges(name: str, c: float) -> None:
+    surface = Surface(TEXTURES[name], "H", K, continuity=c)
+    assert _excess(surface, name, max(1.0, c)).max() <= 1e-10
+
+
+@pytest.mark.parametrize("name", ["middle", "steep", "triangle", "square", "sawtooth", "noise"])
+@pytest.mark.parametrize("letter", "CD")
+def test_the_forces_of_c_and_d_are_not(name: str, letter: str) -> None:
+    surface = Surface(TEXTURES[name], letter, K)
+    assert _excess(surface, name, 1.0).max() > 1e-3
+
+
+def test_the_bound_is_sharp() -> None:
+    """A bound that is smaller by 1e-6 of itself fails."""
+    surface = Surface(TEXTURES["middle"], "H", K)
+    a, b = _pairs("middle")
+    far = np.linalg.norm(b - a, axis=1) > 1e-7
+    change = np.linalg.norm(surface.force(b) - surface.force(a), axis=1)[far]
+    assert change.max() > 0.0
+    ratio = change / (K * np.linalg.norm(b - a, axis=1)[far])
+    x = 0.25 * PERIOD * (1.0 + 1.1 * 2.0 / math.pi)  # straight below a crest, deep: J_xx = c k
+    line = np.array([[x - 1e-5, 0.0, -1e-3], [x + 1e-5, 0.0, -1e-3]])
+    along = np.diff(surface.force(line)[:, 0])[0] / (2e-5 * K)
+    assert max(along, ratio.max()) == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", TEXTURES)
+def test_jacobian_against_differences_and_bounds(name: str) -> None:
+    c = 2.0
+    surface = Surface(TEXTURES[name], "H", K, continuity=c)
+    points = _probes(surface.texture, 200)
+    step = 1e-7 * PERIOD
+    numeric = np.stack(
+        [
+            (surface.force(points + step * v) - surface.force(points - step * v)) / (2 * step)
+            for v in np.eye(3)
+        ],
+        axis=-1,
+    )
+    exact = surface.jacobian(points)
+    error = np.linalg.norm(exact - numeric, axis=(1, 2)) / K
+    # Between one atom and two the Jacobian jumps: a few pairs straddle that.
+    assert np.quantile(error, 0.97) < 1e-5
+    np.testing.assert_allclose(exact, np.swapaxes(exact, 1, 2), atol=1e-9 * K)
+    values = np.linalg.eigvalsh(-exact / K)
+    assert values.max() <= 1.0 + 1e-9
+    assert values.min() >= -c - 1e-9
+
+
+def test_the_jacobians_of_c_and_d_leave_the_bounds() -> None:
+    steep, gentle = TEXTURES["steep"], TEXTURES["gentle"]
+    values = np.linalg.eigvalsh(-Surface(steep, "C", K).jacobian(_probes(steep, 200)) / K)
+    assert values.max() > 1.1
+    # Below a crest, nine tenths of the way to its centre of curvature: 0.9/(1 - 0.9).
+    depth = 0.9 / gentle.bounds[1]
+    crest = [[0.25 * PERIOD, 0.0, 0.05 * PERIOD - depth]]
+    values = np.linalg.eigvalsh(-Surface(gentle, "D", K).jacobian(crest) / K)
+    assert values.min() == pytest.approx(-9.0)
+
+
+# --- what it is near to ---------------------------------------------------------------------------
+
+
+def test_flat_wall_has_the_stiffness() -> None:
+    flat = Profile(np.zeros(8), 1e-3)
+    points = [[1e-3, 0.0, -2e-4], [2e-3, 1.0, 1e-4]]
+    expected = [[0.0, 0.0, 2e-4 * K], [0.0, 0.0, 0.0]]
+    surface = Surface(flat, "H", K, max_depth=1e-3)
+    np.testing.assert_allclose(surface.force(points), expected, atol=1e-15 * K)
+    np.testing.assert_allclose(surface.jacobian(points)[0], np.diag([0, 0, -K]), atol=1e-9)
+    stiffening = Law("S", "stiffening", "vertical", lambda c: c.k * c.depth**2 * c.w / 1e-3)
+    other = Surface(flat, stiffening, K, max_depth=1e-3)
+    assert not np.allclose(other.force(points), expected, atol=0.1 * K * 1e-4)
+
+
+@pytest.mark.parametrize("c", [0.5, 1.0, 3.0])
+def test_equals_d_up_to_its_fraction_of_the_way_to_the_medial_axis(c: float) -> None:
+    """Below a crest of radius R: to c/(1 + c) R law D, beyond it softer, and no jump."""
+    gentle = TEXTURES["gentle"]
+    radius = PERIOD**2 / (4 * math.pi**2 * 0.05 * PERIOD)
+    limit = c / (1.0 + c) * radius
+    split, single = Surface(gentle, "H", K, continuity=c), Surface(gentle, "D", K)
+    x = 0.25 * PERIOD
+    above = [[x, 0.0, 0.05 * PERIOD - 0.999 * limit]]
+    below = [[x, 0.0, 0.05 * PERIOD - 1.2 * limit]]
+    np.testing.assert_allclose(split.force(above), single.force(above), rtol=1e-9, atol=1e-12)
+    assert split_state(split, below).atoms[0] == 2
+    assert split.force(below)[0, 2] < single.force(below)[0, 2] * (1 - 1e-3)
+
+
+@pytest.mark.parametrize("name", SOME)
+def test_equals_d_where_the_foot_stays(name: str) -> None:
+    """H is D wherever going on by 1/c keeps the nearest point; C is not."""
+    texture = TEXTURES[name]
+    points, c = _probes(texture, 400), 2.0
+    closest_points = texture.nearest(points)
+    on = points - (closest_points - points) / c
+    stays = np.linalg.norm(texture.nearest(on) - closest_points, axis=1) < 1e-9
+    single, split = (Surface(texture, law, K, continuity=c).force(points) for law in "DH")
+    error = np.linalg.norm(split - single, axis=1) / np.linalg.norm(single, axis=1)
+    assert 20 < stays.sum() < 380
+    assert error[stays].max() < 1e-6  # of a depth that is itself rounded
+    assert error[~stays].max() > 1e-2
+    vertical = Surface(texture, "C", K).force(points)
+    assert np.linalg.norm(vertical - single, axis=1)[stays].max() > 1e-2 * K * PERIOD
+
+
+def test_tends_to_d_as_c_grows() -> None:
+    texture = TEXTURES["noise"]
+    points = _probes(texture, 300)
+    reference = Surface(texture, "D", K).force(points)
+
+    def distance(letter: str, c: float = 1.0) -> float:
+        force = Surface(texture, letter, K, continuity=c).force(points)
+        return float(np.mean(np.linalg.norm(force - reference, axis=1)))
+
+    # |z̄ - p_h| shrinks like 1/c on average, because the split region does.
+    near = [distance("H", c) for c in (1.0, 10.0, 100.0, 1000.0)]
+    assert all(b < 0.2 * a for a, b in pairwise(near))
+    assert distance("C") > 2.0 * near[1]
+
+
+@pytest.mark.parametrize("name", SOME)
+def test_no_gentler_law_stores_more_energy(name: str) -> None:
+    """Item 4: U_1 is the largest potential of a law with q <= 1 that is free of force outside.
+
+    Candidates: C divided by its own gain, H with less continuity. D and the whole of C are larger.
+    """
+    texture = TEXTURES[name]
+    points = _probes(texture, 300)
+    largest = split_state(Surface(texture, "H", 1.0), points).potential
+    depth = texture.height(points[:, :2]) - points[:, 2]
+    slope, hessian = texture.bounds
+    # The safe bound of MATH section 4 for C, down to the deepest probe.
+    gain = 1.0 + slope**2 + depth.max() * hessian
+    assert (0.5 * depth**2 / gain <= largest * (1.0 + 1e-9)).all()
+    gentler = split_state(Surface(texture, "H", 1.0, continuity=0.3), points).potential
+    assert (gentler <= largest * (1.0 + 1e-9)).all()
+    assert (0.5 * depth**2 > 1.01 * largest).any()
+    assert (_god_object_energy(texture, points) > 1.01 * largest).any()
+
+
+@pytest.mark.parametrize("name", ["steep", "sawtooth", "triangle"])
+def test_oscillation_is_bounded_and_nearly_attained(name: str) -> None:
+    """Item 5: with ‖J‖ <= k the RMS of one component is at most k l/(4√3); D has twice that."""
+    texture = TEXTURES[name]
+    line = texture.scan_line()
+    xy = line.points(2000)
+    deep = np.full(2000, texture.extremes[0] - 1.5e-3)
+    scan = np.column_stack([xy, deep])
+    limit = K * line.length / (4 * math.sqrt(3))
+
+    def oscillation(letter: str) -> float:
+        return float((Surface(texture, letter, K).force(scan)[:, :2] @ line.direction).std())
+
+    assert 0.99 * limit < oscillation("H") <= limit * (1.0 + 1e-9)
+    assert oscillation("D") > 1.9 * limit
+    assert oscillation("C") > 1.5 * limit
+
+
+# --- numbers, limits, bad input -------------------------------------------------------------------
+
+
+def test_numbers_are_theorems() -> None:
+    surface = Surface(TEXTURES["steep"], "H", continuity=2.5)
+    for bound, value in ((characteristic_number(surface), 2.5), (one_sided_number(surface), 1.0)):
+        assert (bound.lower, bound.upper, bound.method) == (value, value, "theorem")
+
+
+@pytest.mark.parametrize("c", [0.0, -1.0, math.inf, math.nan])
+def test_bad_continuity(c: float) -> None:
+    with pytest.raises(ParameterError) as caught:
+        Surface(TEXTURES["gentle"], "H", continuity=c)
+    assert caught.value.argument == "continuity"
+
+
+@pytest.mark.parametrize("name", ["steep", "noise"])
+def test_far_below_and_extreme_continuity(name: str) -> None:
+    """A body of a height function has no bottom: there is a force however deep the probe is."""
+    texture = TEXTURES[name]
+    for c in (0.1, 1e3, 1e6):
+        surface = Surface(texture, "H", K, continuity=c)
+        points = _probes(texture, 20)
+        points[:, 2] = texture.extremes[0] - 5e-3
+        force = surface.force(points)
+        # Between the lowest and the highest point of the surface, seen from the probe.
+        assert (force[:, 2] >= K * 5e-3).all()
+        assert (force[:, 2] <= K * (5e-3 + texture.peak_to_valley)).all()
+
+
+def test_state_is_of_the_split_contact_only() -> None:
+    with pytest.raises(ParameterError, match="split contact"):
+        split_state(Surface(TEXTURES["gentle"], "D"), [[0.0, 0.0, 0.0]])
+
+
+def test_a_probe_is_beyond_where_the_plate_can_pull_it_down() -> None:
+    """Deeper below the highest point than (1 - μ) t/2, 1 - μ = c/(1 + c), wherever it is."""
+    surface = Surface(Sinusoid(0.1e-3, PERIOD), "H", K, continuity=0.5)
+    plate = pop_through(surface, 2e-3)
+    assert plate.depth == pytest.approx(1e-3 / 3.0)
+    points = [[x, y, plate.highest - share * plate.depth]
+              for x, y in ((-5e-3, 0.0), (5e-3, -1.0)) for share in (0.999, 1.001)]  # fmt: skip
+    assert plate.beyond(points).tolist() == [False, True, False, True]

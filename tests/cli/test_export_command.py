@@ -1,0 +1,232 @@
+"""``asperity export``: a C program from the command line, and what it refuses."""
+
+from __future__ import annotations
+
+import errno
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+import pytest
+from tests.helpers.c_programs import STRICT, run_command, tool
+
+import asperity as asp
+from asperity.export import c99
+from asperity.export import targets as writing
+
+Call = Callable[..., tuple[int, str, str]]
+WAVE = "sinusoid:amplitude=0.2mm,period=2mm"
+MAIN = '#include <stdio.h>\n#include "{stem}.h"\nint main(void)\n{{\n{body}\n    return 0;\n}}\n'
+
+
+def printed(folder: Path, stem: str, name: str, *sources: str) -> list[str]:
+    """Return what a program that includes an exported header prints."""
+    body = f"""    {name}_state state;
+    const double at[3] = {{1e-4, 2e-4, -5e-5}};
+    double f[3];
+    {name}_reset(&state);
+    {name}_force(&state, at, f);
+    printf("%a %a %a %s", f[0], f[1], f[2], {name.upper()}_CONTENT);"""
+    (folder / "main.c").write_text(MAIN.format(stem=stem, body=body))
+    run_command(tool("gcc"), *STRICT, "-O1", "main.c", *sources, "-o", "main", "-lm", cwd=folder)
+    return run_command(folder / "main").split()
+
+
+def test_one_header_gives_the_force(call: Call, tmp_path: Path) -> None:
+    target = tmp_path / "wall.h"
+    code, out, err = call("export", WAVE, "--law", "B", "--stiffness", "500N/m", "-o", str(target))
+    assert (code, err) == (0, "")
+    assert out.startswith(f"Written: {target}\n")
+    surface = asp.Surface(asp.Sinusoid(2e-4, 2e-3), "B", 500.0, clamp="backed")
+    *force, content = printed(tmp_path, "wall", "texture")
+    expected = surface.force([1e-4, 2e-4, -5e-5])
+    assert [float.fromhex(part) for part in force] == pytest.approx(expected, rel=1e-14)
+    text = target.read_text()
+    assert content == surface.digest  # as a recording has it
+    assert "#define TEXTURE_STIFFNESS 500.0" in text
+    assert "#define TEXTURE_MAX_DEPTH 0.0004" in text
+    q = re.search(r"#define TEXTURE_Q_UPPER (\S+)", text)
+    assert q is not None
+    assert float(q[1]) == asp.characteristic_number(surface).upper
+
+
+def test_the_comment_says_what_it_is(call: Call, tmp_path: Path) -> None:
+    call("export", WAVE, "--law", "C", "--device", "touch", "-o", str(tmp_path / "t.h"))
+    said = (tmp_path / "t.h").read_text().split("#ifndef")[0]
+    for words in ("f = k δ w", "closed form", "backed", "Touch", asp.__version__, "0 J per period",
+                  "every depth", "period = 0.002", "heights -200 µm to 200 µm"):  # fmt: skip
+        assert words in said, words
+
+
+def test_the_content_knows_the_force_and_not_the_name(call: Call, tmp_path: Path) -> None:
+    contents = {}
+    for name, law in (("texture", "B"), ("wall", "B"), ("texture", "A")):
+        target = tmp_path / f"{name}_{law}.h"
+        call("export", WAVE, "--law", law, "--name", name, "-o", str(target))
+        found = re.search(r'_CONTENT "(\w+)"', target.read_text())
+        assert found is not None
+        contents[name, law] = found[1]
+    assert contents["texture", "B"] == contents["wall", "B"] != contents["texture", "A"]
+
+
+@pytest.mark.parametrize(
+    ("options", "budget"),
+    [
+        ((), "600.0"),
+        (("--max-evaluations", "90"), "90"),
+        (("--looks", "90"), "90"),  # the former name
+        (("--exact",), "HUGE_VAL"),
+    ],
+)
+def test_the_budget_of_a_search(
+    options: tuple[str, ...], budget: str, call: Call, tmp_path: Path
+) -> None:
+    target = tmp_path / "t.h"
+    assert call("export", WAVE, "--law", "D", *options, "-o", str(target))[0] == 0
+    assert f"#define TEXTURE_MAX_EVALUATIONS {budget} " in target.read_text()
+
+
+def test_a_scene_with_its_law_and_clamp(call: Call, tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        '[texture]\nkind = "sinusoid"\namplitude = "0.2 mm"\nperiod = "2 mm"\n'
+        '[surface]\nlaw = "A"\nstiffness = "700 N/m"\nclamp = "none"\n'
+    )
+    assert call("export", str(scene), "-o", str(tmp_path / "a.h"))[0] == 0
+    assert call("export", str(scene), "-o", str(tmp_path / "b.h"), "--clamp", "whole")[0] == 0
+    assert "clamp     none; meant to be pressed to 400 µm" in (tmp_path / "a.h").read_text()
+    assert "clamp     whole, the depth is held at 400 µm" in (tmp_path / "b.h").read_text()
+
+
+@pytest.fixture
+def large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A measured map whose data are too many for a header."""
+    monkeypatch.setattr(c99, "MAX_HEADER_DATA", 5_000)
+    rng = np.random.default_rng(3)
+    path = tmp_path / "large.npy"
+    np.save(path, 1e-4 * rng.normal(size=(30, 40)))
+    return path
+
+
+def test_large_data_stand_beside_the_header(call: Call, large: Path, tmp_path: Path) -> None:
+    target = tmp_path / "m.h"
+    options = ("--pitch", "0.2mm", "--law", "D", "--max-depth", "0.2mm")
+    assert call("export", str(large), *options, "-o", str(target))[0] == 0
+    source = tmp_path / "m_data.c"
+    assert "_data_c[32][42] = {" in source.read_text()
+    assert "_data_c[32][42] = {" not in target.read_text()
+    *force, _content = printed(tmp_path, "m", "texture", str(source))
+    texture = asp.load_texture(large, pitch=2e-4)
+    expected = asp.Surface(texture, "D").force([1e-4, 2e-4, -5e-5])
+    assert [float.fromhex(part) / 1.0 for part in force] != [0.0, 0.0, 0.0]
+    ratio = np.array([float.fromhex(part) for part in force]) / expected
+    np.testing.assert_allclose(ratio, ratio[0], rtol=1e-14)  # the stiffness is the device's
+    run_command(tool("gcc"), *STRICT, "-c", source, "-o", tmp_path / "m_data.o")
+    # A second time: both files are in the way.
+    target.unlink()
+    code, _out, err = call("export", str(large), *options, "-o", str(target))
+    assert code == 2
+    assert err == f"asperity: output exists: {source}; --force replaces it\n"
+    assert not target.exists()
+
+
+def test_a_full_disk_leaves_nothing(
+    call: Call, large: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The header alone would be there, and not compile."""
+    folder = tmp_path / "full"
+    folder.mkdir()
+    whole = writing.open_atomic
+
+    @contextmanager
+    def short(path: Path) -> Iterator[IO[bytes]]:
+        with whole(path) as stream:
+            if path.suffix == ".c":
+                raise OSError(errno.ENOSPC, "No space left on device")
+            yield stream
+
+    monkeypatch.setattr(writing, "open_atomic", short)
+    options = ("--pitch", "0.2mm", "--law", "B", "-o", str(folder / "m.h"))
+    code, _out, err = call("export", str(large), *options)
+    assert code == 2
+    assert err.startswith("asperity: output cannot be written: No space left on device")
+    assert not list(folder.iterdir())
+
+
+def test_too_much_data_says_what_fits(call: Call, large: Path, tmp_path: Path) -> None:
+    target = str(tmp_path / "m.h")
+    options = ("--pitch", "0.2mm", "--law", "B", "-o", target, "--max-data")
+    code, _out, err = call("export", str(large), *options, "8kB")
+    assert code == 2
+    found = re.search(r"max_data must be at least (\d+) bytes.* at most (\d+) x (\d+) points", err)
+    assert found is not None
+    assert int(found[1]) == 32 * 42 * 8
+    assert 8 * int(found[2]) * int(found[3]) <= 8_000 * 1.1
+    assert call("export", str(large), *options, found[1] + "B")[0] == 0
+    # With the tree of a search beside the heights it is still the map that is told.
+    code, _out, err = call("export", str(large), "--force", *options[:3], "D", *options[4:], "8kB")
+    found = re.search(r"at most (\d+) x (\d+) points", err)
+    assert found is not None
+    assert int(found[1]) / int(found[2]) == pytest.approx(32 / 42, rel=0.1)
+
+
+BAD = {
+    ("--name", "2fast"): "name must be a C identifier: letters, digits and single _, a letter "
+    "first, got '2fast'",
+    ("--name", "my-wall"): "name must be a C identifier",
+    ("--name", "double"): "name must not be a reserved word of C or C++, got 'double'",
+    ("--name", "class"): "name must not be a reserved word of C or C++",
+    ("--name", "a__b"): "name must be a C identifier",
+    ("--lang", "fortran"): "lang is unknown: 'fortran'; known: c99",
+    ("--precision", "half"): "precision must be one of double, float",
+    ("--clamp", "soft"): "clamp must be one of none, whole, lateral, backed",
+    ("-o", "wall.txt"): "output must be a file that ends in .h",
+    ("-o", "no/such/folder/wall.h"): "output must lie in a folder that exists",
+    ("--law", "Z"): "law",
+    ("--largest", "soft"): "max_data",
+    ("--max-data", "soft"): "max_data",
+    ("--max-evaluations", "0"): "max_evaluations must be positive, got 0",
+    ("--max-evaluations", "many"): "max_evaluations must be a number, got 'many'",
+    ("--exact", "--max-evaluations", "9"): "exact searches without a budget: leave out "
+    "--max-evaluations",
+}
+
+
+@pytest.mark.parametrize("options", BAD, ids=" ".join)
+def test_bad_input_is_one_line(
+    options: tuple[str, ...], call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    where = () if options[0] == "-o" else ("-o", "wall.h")
+    code, out, err = call("export", WAVE, *where, *options)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"asperity: {BAD[options]}")
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_exists_is_kept_without_force(call: Call, tmp_path: Path) -> None:
+    target = tmp_path / "t.h"
+    target.write_text("mine")
+    code, _out, err = call("export", WAVE, "--law", "C", "-o", str(target))
+    assert (code, err) == (2, f"asperity: output exists: {target}; --force replaces it\n")
+    assert target.read_text() == "mine"
+    assert call("export", WAVE, "--law", "C", "-o", str(target), "--force")[0] == 0
+    assert "texture_force" in target.read_text()
+
+
+def test_a_law_that_c_does_not_know(call: Call, tmp_path: Path) -> None:
+    module = tmp_path / "mine.py"
+    module.write_text(
+        "import sympy as sp\nimport asperity as asp\n"
+        "LAW = asp.Law('Q', 'odd', 'vertical', lambda c: c.k * c.depth * sp.Abs(sp.gamma("
+        "1 + c.depth)) * c.e_z)\n"
+    )
+    target = tmp_path / "t.h"
+    code, _out, err = call("export", WAVE, "--plugin", str(module), "--law", "Q", "-o", str(target))
+    assert code == 2
+    assert err.count("\n") == 1
+    assert not target.exists()

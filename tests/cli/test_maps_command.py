@@ -1,0 +1,69 @@
+"""asperity maps."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import asperity as asp
+
+Call = Callable[..., tuple[int, str, str]]
+COMMAND = "maps"
+WAVE = "sinusoid:amplitude=0.1mm,period=2mm"
+
+
+def test_heights_are_written_and_read(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "map.png"
+    code, out, err = call(WAVE, "-o", str(path), "--spacing", "50um")
+    assert (code, err) == (0, "")
+    assert f"Written: {path}\n" in out
+    assert "2 mm x 2 mm, 40 x 40 points, 50 µm apart: 2 mm x 2 mm as a picture" in out
+    assert "Heights from -100 µm to 100 µm, with errors up to 1.53 nm" in out
+    assert asp.load_texture(path).pitch == (5e-5, 5e-5)
+
+
+@pytest.mark.parametrize("convention", ["gltf", "chai3d"])
+def test_normals_say_what_they_cost(call: Call, tmp_path: Path, convention: str) -> None:
+    path = str(tmp_path / "map.png")
+    code, out, err = call(WAVE, "-o", path, "--normals", convention, "--stiffness", "500N/m")
+    assert (code, err) == (0, "")
+    words = r"8 bits turn a normal by up to 0\.\d+°: .* up to 0\.\d+ % of the force\."
+    assert re.search(words, out)
+    assert "is law G. At 500 N/m, pressed to 200 µm, a loop gains" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["-o", "there.png"], "output exists: there.png; --force replaces it"),
+        (["-o", "map.gif"], "output must end in .png, .tif, .tiff, .x3p"),
+        (["-o", "map.x3p", "--normals", "gltf"], "output must end in .png"),
+        (
+            ["-o", "map.png", "--normals", "unity"],
+            "normals is an unknown convention: 'unity'; known: chai",
+        ),
+        (["-o", "no/map.png"], "folder that exists"),
+        (["-o", "map.png", "--spacing", "1nm"], "spacing gives 2000000 points"),
+        (["-o", "map.png", "--extent", "5"], "extent"),
+    ],
+)
+def test_bad_input_is_one_line(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there.png").write_text("precious")
+    code, out, err = call(WAVE, *arguments)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert words in err
+    assert (tmp_path / "there.png").read_text() == "precious"
+    assert [one.name for one in tmp_path.iterdir()] == ["there.png"]
+
+
+def test_force_replaces_what_is_there(call: Call, tmp_path: Path) -> None:
+    path = tmp_path / "map.x3p"
+    path.write_text("old")
+    assert call(WAVE, "-o", str(path), "--force")[0] == 0
+    assert path.read_bytes()[:2] == b"PK"

@@ -1,0 +1,267 @@
+"""Files that are whole or not there, and values as JSON has them."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import stat
+from dataclasses import dataclass
+from enum import Enum, StrEnum
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.core.errors import ParameterError
+from asperity.core.files import (
+    Serializable,
+    attributes_to_dict,
+    json_text,
+    open_atomic,
+    open_input,
+    read_toml,
+    to_plain_data,
+    write_text,
+)
+
+
+class Side(StrEnum):
+    LEFT = "left"
+
+
+class Sign(Enum):
+    LESS = -math.inf
+
+
+@dataclass(frozen=True)
+class Inner:
+    reach: float
+    at: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Outer(Serializable):
+    name: str
+    inner: Inner
+    more: tuple[Inner, ...] = ()
+
+    @property
+    def size(self) -> int:
+        return len(self.more)
+
+
+@dataclass(frozen=True)
+class Own:
+    def to_dict(self) -> dict[str, Any]:
+        return {"said": "by itself"}
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (math.inf, "inf"),
+        (-math.inf, "-inf"),
+        (math.nan, None),
+        (np.float64("inf"), "inf"),
+        (np.float32(0.5), 0.5),
+        (np.int64(3), 3),
+        (np.bool_(True), True),
+        (True, True),
+        (None, None),
+        ("inf", "inf"),
+        (np.array([[1.0, np.nan], [-np.inf, 2.0]]), [[1.0, None], ["-inf", 2.0]]),
+        (np.array([], dtype=int), []),
+        ((1, 2.0), [1, 2.0]),
+        (Side.LEFT, "left"),
+        (Sign.LESS, "-inf"),
+        (MappingProxyType({3: np.inf}), {"3": "inf"}),
+        (Own(), {"said": "by itself"}),
+        (Inner(math.inf, (0.0, 1.0)), {"reach": "inf", "at": [0.0, 1.0]}),
+    ],
+)
+def test_values_as_plain_data(value: object, expected: object) -> None:
+    found = to_plain_data(value)
+    assert found == expected
+    assert type(found) is type(expected)
+    json.dumps(found, allow_nan=False)
+
+
+def test_an_overflow_is_not_an_unbounded_number() -> None:
+    data = {"a": [math.inf, -math.inf], "b": Inner(math.inf, (math.nan, 1.0))}
+    assert to_plain_data(data, infinity=None) == {
+        "a": [None, None],
+        "b": {"reach": None, "at": [None, 1.0]},
+    }
+
+
+@pytest.mark.parametrize("value", [object(), {1}, 1j])
+def test_what_has_no_plain_form_is_refused(value: object) -> None:
+    with pytest.raises(TypeError, match="no plain data"):
+        to_plain_data(value)
+
+
+def test_a_record_is_its_fields_or_the_attributes_that_are_named() -> None:
+    outer = Outer("o", Inner(1.0, (2.0, 3.0)), (Inner(math.inf, (0.0, 0.0)),))
+    inner = {"reach": 1.0, "at": [2.0, 3.0]}
+    found = outer.to_dict()
+    assert list(found.items())[:2] == [("name", "o"), ("inner", inner)]
+    assert found["more"] == [{"reach": "inf", "at": [0.0, 0.0]}]
+    assert list(attributes_to_dict(outer, "size", "name").items()) == [("size", 1), ("name", "o")]
+
+
+def test_a_class_says_what_is_written_of_it() -> None:
+    class Short(Outer):
+        serialized_attributes = "size name"
+
+    assert list(Short("o", Inner(1.0, (2.0, 3.0))).to_dict().items()) == [
+        ("size", 0),
+        ("name", "o"),
+    ]
+
+
+def test_json_is_readable_and_strict() -> None:
+    text = json_text({"Länge": np.inf, "n": [1]})
+    assert text == '{\n  "Länge": "inf",\n  "n": [\n    1\n  ]\n}\n'
+
+
+@pytest.mark.parametrize("exists", [False, True])
+@pytest.mark.parametrize("error", [OSError("full"), KeyboardInterrupt(), MemoryError()])
+def test_a_failure_leaves_what_was_there(
+    tmp_path: Path, error: BaseException, exists: bool
+) -> None:
+    target = tmp_path / "a.txt"
+    if exists:
+        target.write_text("old")
+
+    def half() -> None:
+        with open_atomic(target, durable=True) as stream:
+            stream.write(b"half")
+            raise error
+
+    with pytest.raises(type(error)):
+        half()
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"] * exists
+    assert not exists or target.read_text() == "old"
+
+
+def test_nothing_is_seen_before_all_is_written(tmp_path: Path) -> None:
+    target = tmp_path / "a.txt"
+    write_text(target, "old")
+    with open_atomic(target) as stream:
+        stream.write(b"new")
+        assert target.read_text() == "old"
+    assert target.read_text() == "new"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the mode of a file is one of POSIX")
+def test_the_mode_is_that_of_a_new_file(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.txt", "text")
+    (tmp_path / "b.txt").write_text("text")
+    mode, expected = (stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("a.txt", "b.txt"))
+    assert mode == expected
+
+
+def test_a_name_may_be_as_long_as_the_system_allows(tmp_path: Path) -> None:
+    """A temporary name made from the file's own was too long for some."""
+    target = tmp_path / ("a" * 255)
+    write_text(target, "text")
+    assert target.read_text() == "text"
+
+
+def test_a_link_stays_one(tmp_path: Path) -> None:
+    link, real = tmp_path / "link", tmp_path / "real"
+    link.symlink_to(real)
+    write_text(link, "text")
+    assert link.is_symlink()
+    assert real.read_text() == "text"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
+def test_a_pipe_is_written_to_and_not_replaced(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        write_text(pipe, "text")
+        assert os.read(reader, 100) == b"text"
+    finally:
+        os.close(reader)
+    assert pipe.is_fifo()
+
+
+# --- what is read ---------------------------------------------------------------------------------
+
+
+def test_a_link_to_a_file_is_read(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"content")
+    (tmp_path / "link").symlink_to(tmp_path / "file")
+    with open_input(tmp_path / "link") as stream:
+        assert stream.read() == b"content"
+
+
+@pytest.mark.parametrize("kind", ["pipe", "link to a pipe", "folder", "device"])
+def test_what_is_no_file_is_refused_at_once(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "input"
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "device":
+        path = Path("/dev/zero")
+    else:
+        os.mkfifo(path)
+    if kind == "link to a pipe":
+        path = tmp_path / "link"
+        path.symlink_to(tmp_path / "input")
+    with pytest.raises(OSError, match="not a regular file"):
+        open_input(path)
+
+
+def test_a_file_above_the_cap_is_refused_with_both_sizes(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(bytes(101))
+    with pytest.raises(OSError, match="101 bytes; at most 100 are read"):
+        open_input(tmp_path / "file", max_bytes=100)
+    with open_input(tmp_path / "file", max_bytes=101) as stream:
+        assert len(stream.read()) == 101
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"a = " + b"[" * 20000 + b"]" * 20000, "nested too deeply"),
+        (b"a = " + b"9" * 5000, "not valid TOML"),
+        (b"a = \xff", "not valid TOML"),
+        (b"#" * (2**22 + 1), "at most 4194304 are read"),
+    ],
+    ids=["deep", "integer", "encoding", "size"],
+)
+def test_toml_that_cannot_be_read_is_refused_with_its_name(
+    tmp_path: Path, content: bytes, words: str
+) -> None:
+    path = tmp_path / "file.toml"
+    path.write_bytes(content)
+    with pytest.raises(ParameterError, match=f"scene file .*file.toml .*{words}"):
+        read_toml("scene", path)
+
+
+def test_a_file_being_written_has_no_name(tmp_path: Path) -> None:
+    """A process that is killed while it writes leaves nothing behind."""
+    with open_atomic(tmp_path / "target") as stream:
+        stream.write(b"half")
+        stream.flush()
+        assert list(tmp_path.iterdir()) == []
+        stream.write(b" and half")
+    assert (tmp_path / "target").read_bytes() == b"half and half"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_without_such_files_there_is_a_name_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(os, "O_TMPFILE", raising=False)
+    with open_atomic(tmp_path / "target") as stream:
+        assert len(list(tmp_path.iterdir())) == 1
+        stream.write(b"content")
+    assert [path.name for path in tmp_path.iterdir()] == ["target"]

@@ -1,0 +1,124 @@
+"""Results and values say themselves in one line at a prompt."""
+
+from __future__ import annotations
+
+import dataclasses
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import asperity as asp
+from asperity.analysis.compare_devices import compare_devices
+from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, simulate
+
+MANY = asp.Fourier(np.full(60, 1e-6), 1e3 * np.random.default_rng(0).normal(size=(60, 2)))
+HEIGHTS = 1e-5 * np.random.default_rng(1).normal(size=(32, 32))
+
+
+def surface(law: str = "C") -> asp.Surface:
+    return asp.Surface(asp.Sinusoid(2e-4, 2e-3), law)
+
+
+def recorded() -> Path:
+    """Return the recording of a short run."""
+    path = Path(tempfile.mkdtemp(), "run.mcap")
+    hand, still = SpringHand(stiffness=200.0), Stationary((0.0, 0.0, -1e-3))
+    simulate(surface("W"), Cartesian(0.05), hand, Servo(1e-3), still, 0.1, trace=path)
+    return path
+
+
+def closed_writer() -> asp.RecordingWriter:
+    writer = asp.RecordingWriter(Path(tempfile.mkdtemp(), "run.mcap"), (("time", "s"),))
+    writer.close()
+    return writer
+
+
+MADE: dict[str, Callable[[], Any]] = {
+    "Analysis": lambda: asp.analyze(surface("B"), "touch"),
+    "Bound": lambda: asp.characteristic_number(surface("F")),
+    "Comparison": lambda: asp.compare(MANY, "touch", "WC", max_depth=1e-5),
+    "Device": lambda: asp.load_device("touch"),
+    "Fourier": lambda: MANY,
+    "Grating": lambda: asp.Grating(1e-4, 1e-3),
+    "HeightMap": lambda: asp.HeightMap(HEIGHTS, 5e-5),
+    "Law": lambda: surface("H").law,
+    "Leak": lambda: asp.worst_loop(surface("B")),
+    "Limits": lambda: asp.limits(asp.Sinusoid(2e-4, 2e-3), law="C"),
+    "Noise": lambda: asp.Noise(rms=2e-5, size=5e-3),
+    "NoiseProfile": lambda: asp.NoiseProfile(rms=2e-5, size=5e-3),
+    "Passivity": lambda: asp.analyze(surface("B"), "pantograph").passivity,
+    "PopThrough": lambda: asp.pop_through(surface("H"), 2e-3),
+    "Profile": lambda: asp.Profile(HEIGHTS[0], 5e-5),
+    "Recording": lambda: asp.open_recording(recorded()),
+    "RecordingWriter": closed_writer,
+    "Replay": lambda: asp.replay(asp.open_recording(recorded())),
+    "Sinusoid": lambda: asp.Sinusoid(2e-4, 2e-3),
+    "SplitState": lambda: asp.split_state(surface("H"), np.zeros((200, 3))),
+    "Surface": lambda: asp.Surface(MANY, "F", max_depth=1e-5),
+    "BakedField": lambda: asp.bake(surface("H"), resolution=1e-4),
+}
+
+
+def test_every_public_class_is_tested() -> None:
+    public = {name for name in asp.__all__ if isinstance(getattr(asp, name), type)}
+    errors = {name for name in public if issubclass(getattr(asp, name), Exception)}
+    assert set(MADE) == public - errors
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_values_are_one_short_line(name: str) -> None:
+    made = MADE[name]()
+    assert isinstance(made, getattr(asp, name))
+    text = repr(made)
+    assert len(text) < 300
+    assert "\n" not in text
+    assert " at 0x" not in text
+    assert type(made).__name__ in text
+
+
+def test_a_long_one_would_be_noticed() -> None:
+    @dataclasses.dataclass
+    class Bare:
+        heights: np.ndarray
+
+    assert "\n" in repr(Bare(HEIGHTS))
+
+
+@pytest.mark.parametrize("name", asp.surface_names())
+def test_named_surfaces_are_one_short_line(name: str) -> None:
+    assert repr(asp.named_surface(name)).startswith(f"named_surface('{name}', ")
+    assert len(repr(asp.named_surface(name))) < 200
+
+
+def test_few_waves_are_all_said_and_many_are_counted() -> None:
+    assert repr(MANY) == "<Fourier of 60 waves>"
+    few = asp.Fourier([1e-4, 2e-4], [[1e3, 0.0], [0.0, 2e3]])
+    assert repr(few).startswith("Fourier(amplitudes=[0.0001, 0.0002], wavevectors=")
+
+
+def test_a_run_says_what_the_texture_did() -> None:
+    hand, still = SpringHand(stiffness=200.0, damping=2.0), Stationary((0.0, 0.0, -1e-3))
+    run = simulate(surface(), Cartesian(0.05), hand, Servo(1e-3), still, 0.1)
+    assert repr(run) == f"<Run of law C, 0.1 s, {run.ledger.total:+.4g} J to the hand>"
+
+
+def test_results_say_their_answer() -> None:
+    texture = asp.Sinusoid(2e-4, 2e-3)
+    result = asp.compare(texture, "omega.3", "WCH")
+    row = result.recommended_row
+    assert row is not None
+    start = f"start at {row.recommended_stiffness:g} N/m, felt"
+    assert repr(row) == f"<LawRow {row.law.letter}: {start}>"
+    assert repr(result) == f"<Comparison of 3 laws on omega.3: {row!r} recommended>"
+    assert repr(asp.compare(texture, "touch", "W")).endswith("none recommended>")
+    analysis = repr(asp.analyze(asp.Surface(texture, "A", 100.0), "omega.3"))
+    assert analysis.startswith("<Analysis of law A on omega.3: q = ")
+    assert analysis.endswith("not passive>")
+    limits = repr(asp.limits(texture, "omega.3", law="C"))
+    assert limits == "<Limits of law C on omega.3 at 0.1 m/s: 4 of 6 hold, felt>"
+    several = repr(compare_devices(texture, ["omega.3", "2diy"], laws="W"))
+    assert several == "<DeviceComparisons: 1 compared, 1 without data>"

@@ -1,0 +1,56 @@
+"""Tools that the tests of the export need, and what they share with the benchmark."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+from bench import c_programs
+from bench.c_programs import (
+    STRICT,
+    compile_library,
+    energies,
+    header,
+    kernel_ticks,
+    list_differing,
+    probes,
+    run_command,
+    same_bits,
+    ticks,
+)
+
+__all__ = [
+    "COMPILERS",
+    "STRICT",
+    "compile_library",
+    "energies",
+    "header",
+    "kernel_ticks",
+    "library",
+    "list_differing",
+    "probes",
+    "run_command",
+    "same_bits",
+    "ticks",
+    "tool",
+]
+
+COMPILERS = ("gcc", "clang")
+
+
+def tool(name: str) -> str:
+    """Return the path of a program; without it the test is not run."""
+    path = shutil.which(name)
+    if path is None:
+        pytest.skip(f"not run: no {name} here")
+    return path
+
+
+def library(
+    folder: Path, compiler: str, headers: Mapping[str, str], *flags: str, single: bool = False
+) -> ctypes.CDLL:
+    """Return exported headers, by name, compiled into one library; see ``bench.c_programs``."""
+    return c_programs.library(folder, tool(compiler), headers, *flags, single=single)

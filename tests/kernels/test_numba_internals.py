@@ -1,0 +1,80 @@
+"""The private parts of Numba that ``numba_internals`` uses exist, with the expected signatures.
+
+If one of these tests fails after an upgrade of Numba, its message names the class or function of
+``asperity.kernels.numba_internals`` that has to be adapted. Then raise the upper bound of Numba in
+pyproject.toml.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numba
+import pytest
+from numba import _dynfunc
+from numba.core import caching, codegen, compiler, dispatcher, typed_passes
+
+from asperity.kernels import numba_internals
+
+# The private name, its parameters (None: not inspected), and what uses it.
+USED: dict[str, tuple[Any, str, tuple[str, ...] | None, str]] = {
+    "optimize": (codegen.JITCodeLibrary, "_optimize_final_module", ("self",), "LinkOnlyLibrary"),
+    "finalize": (codegen.JITCodeLibrary, "_finalize_final_module", ("self",), "LinkOnlyLibrary"),
+    "globals": (codegen.JITCodeLibrary, "_finalize_dynamic_globals", ("self",), "LinkOnlyLibrary"),
+    "verify": (
+        codegen.CPUCodeLibrary, "_verify_declare_only_symbols", ("self",), "LinkOnlyLibrary",
+    ),
+    "add": (codegen.CodeLibrary, "add_ir_module", ("self", "ir_module"), "WideVectorLibrary"),
+    "lower": (typed_passes.NativeLowering, "run_pass", ("self", "state"), "LinkOnlyLowering"),
+    "pipeline": (compiler.Compiler, "define_pipelines", ("self",), "LoopCompiler"),
+    "function": (_dynfunc, "make_function", None, "LinkOnlyLowering"),
+    "load": (
+        caching._Cache, "load_overload", ("self", "sig", "target_context"), "MachineCodeCache",
+    ),
+    "save": (caching._Cache, "save_overload", ("self", "sig", "data"), "MachineCodeCache"),
+    "rebuild": (compiler.CompileResult, "_rebuild", None, "MachineCodeCache._load_cached"),
+    "reduce": (compiler.CompileResult, "_reduce", ("self",), "MachineCodeCache.save_overload"),
+    "magic": (codegen.CPUCodegen, "magic_tuple", ("self",), "MachineCodeCache._key"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", USED)
+def test_a_private_name_is_there(case: str) -> None:
+    owner, name, parameters, user = USED[case]
+    message = f"Numba {numba.__version__}: {owner.__name__}.{name} changed; adapt {user}"
+    assert hasattr(owner, name), message
+    assert hasattr(numba_internals, user.partition(".")[0])
+    if parameters is not None:
+        assert tuple(inspect.signature(getattr(owner, name)).parameters) == parameters, message
+
+
+def test_a_dispatcher_has_a_cache_and_a_compiler() -> None:
+    function = numba.njit(lambda x: x)
+    message = f"Numba {numba.__version__}: Dispatcher changed; adapt "
+    assert isinstance(function, dispatcher.Dispatcher), message + "_is_link_only"
+    assert hasattr(function, "_cache"), message + "cache_machine_code"
+    assert function._compiler.pipeline_class is compiler.Compiler, message + "_is_link_only"
+
+
+def test_the_pipeline_has_one_lowering_to_replace() -> None:
+    message = f"Numba {numba.__version__}: the pipeline changed; adapt _CustomLoweringCompiler"
+    state = compiler.StateDict()
+    state.flags, state.func_ir = compiler.Flags(), None
+    for kind in (numba_internals.LinkOnlyCompiler, numba_internals.LoopCompiler):
+        built = object.__new__(kind)
+        built.state = state
+        (manager,) = built.define_pipelines()
+        steps = [step for step, _description in manager.passes]
+        assert steps.count(kind.lowering) == 1, message
+        assert typed_passes.NativeLowering not in steps, message
+
+
+def test_the_dependency_on_numba_has_an_upper_bound() -> None:
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))
+    (bound,) = [r for r in project["project"]["dependencies"] if r.startswith("numba")]
+    major, minor = map(int, numba.__version__.split(".")[:2])
+    assert re.fullmatch(rf"numba>=[0-9.]+,<{major}\.{minor + 1}", bound)

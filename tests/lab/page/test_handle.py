@@ -1,0 +1,399 @@
+"""The page as the window on a handle that somebody holds: here, one that the tests move."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from concurrent.futures import Future
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bench.fakes import compile_library
+from tests.lab.browser import Browser, needs_browser, until
+from tests.lab.client import STILL, column, frames, head, heard, joined, news, refused, say
+from tests.lab.started import Started
+
+from asperity.lab.handle import make_handle
+from asperity.lab.scene_state import make_device_scene_state
+from asperity.lab.server import STEERING_TIMEOUT
+from asperity.lab.session import Session
+from asperity.scene import load_scene
+from asperity.scene.setup import make_setup
+from asperity.servo.drivers.library import LibraryDriver
+
+SOURCE = Path(__file__).parents[3] / "bench" / "c" / "mapped_device.c"
+# A busy machine is late, and that is not what is tested here.
+SCENE = """
+[texture]
+kind = "sinusoid"
+amplitude = "0.1 mm"
+period = "2 mm"
+[surface]
+law = "C"
+stiffness = "150 N/m"
+[device]
+id = "touch"
+[servo]
+misses = 1000000
+lateness = "60 s"
+silence = "30 s"
+"""
+LIBRARY = "mapped_device.so"
+ABOVE, PRESSED = (3e-4, 1e-4, 2e-3), (3e-4, 1e-4, -8e-4)
+
+
+class Device:
+    """What the compiled device reads and writes."""
+
+    def __init__(self, path: Path) -> None:
+        path.write_bytes(bytes(64))
+        self._map = np.memmap(path, np.float64, "r+")
+        self.go(ABOVE)
+
+    def go(self, place: tuple[float, ...]) -> None:
+        self._map[:3] = place
+
+    def fail(self, code: int) -> None:
+        self._map[6] = code
+
+    @property
+    def force(self) -> np.ndarray:
+        return np.array(self._map[3:6])
+
+    @property
+    def open(self) -> bool:
+        return bool(self._map[7])
+
+    @property
+    def pushes(self) -> bool:
+        return float(self.force[2]) > 0.05
+
+    def lets_go(self) -> None:
+        """Wait until there is no force and the device is closed."""
+        until(lambda: not self.force.any() and not self.open)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("handle")
+    (made / "scene.toml").write_text(SCENE)
+    compile_library(SOURCE, made)
+    return made
+
+
+@pytest.fixture(scope="module")
+def device(folder: Path) -> Device:
+    return Device(folder / "map")
+
+
+@pytest.fixture(scope="module")
+def held(folder: Path, device: Device) -> Iterator[Started]:
+    """A lab on that device."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MAPPED_DEVICE", str(folder / "map"))
+        started = Started(str(folder / "scene.toml"), "--driver", str(folder / LIBRARY))
+    yield started
+    code, said = started.end()
+    assert code == 0, said
+    device.lets_go()
+
+
+@pytest.fixture
+def page(held: Started, device: Device) -> Iterator[Any]:
+    """A page that steers; the loop has stopped, and the handle is in the air."""
+    device.fail(0)
+    device.go(ABOVE)
+    with joined(held) as line:
+        said = heard(line, lambda m: news(free=True)(m) or news(steers=True)(m))
+        if not said["steers"]:
+            say(line, "take")
+            said = heard(line, news(steers=True))
+        if said["state"] != "stopped":
+            say(line, "stop")
+            heard(line, news(state="stopped"))
+        yield line
+
+
+def begin(page: Any, device: Device) -> dict[str, Any]:
+    """Start the loop, and press."""
+    say(page, "start")
+    said: dict[str, Any] = heard(page, news(state="running"))
+    device.go(PRESSED)
+    heard(page, lambda m: frames(m) and column(m, "newest", "share") == 1.0 and device.pushes)
+    return said
+
+
+def test_nothing_moves_before_somebody_starts_it(page: Any, held: Started, device: Device) -> None:
+    with joined(held) as watcher:
+        first = heard(watcher, news(state="stopped"))
+        assert first["handle"]["driver"] == "own"
+        assert "You hold the handle of 3D Systems Touch" in first["handle"]["where"]
+        assert not device.open
+        # Who only watches can neither start nor end it.
+        for what in ("start", "stop"):
+            say(watcher, what)
+            assert "steering" in heard(watcher, refused)["words"]
+        starts = begin(page, device)["starts"]
+        say(watcher, "stop")
+        assert "steering" in heard(watcher, refused)["words"]
+        # The nearest point is known once another process has compiled it.
+        frame = heard(watcher, lambda m: frames(m) and np.isfinite(head(m, "god z")))
+        assert starts == first["starts"] + 1
+    assert device.pushes
+    # The frames are those of the real loop; nobody knows where the hand is pulled to.
+    assert column(frame, "newest", "z") == PRESSED[2]
+    assert column(frame, "newest", "applied z") == pytest.approx(device.force[2], rel=1e-9)
+    assert np.isnan([head(frame, f"hand {axis}") for axis in "xyz"]).all()
+
+
+def test_the_pointer_moves_nothing_and_the_device_stays(page: Any, device: Device) -> None:
+    settings = begin(page, device)["settings"]
+    say(page, "steer", target=[0, 0, 0], **STILL)
+    assert "done by the user of the handle" in heard(page, refused)["words"]
+    for changes in ({"device": "omega.3"}, {"delay": 3}, {"hand_stiffness": 100.0},
+                   {"stage": "tour"}, {"stage": "back"}):  # fmt: skip
+        say(page, "change", changes=changes)
+        name = next(iter(changes))
+        words = f"{name} needs the simulated device" if name == "stage" else f"{name} is "
+        told = heard(page, lambda m, w=words: news(state="running")(m) and w in m["words"])
+        assert told["settings"] == settings
+    say(page, "save")
+    assert "asperity run --record" in heard(page, refused)["words"]
+    assert device.pushes
+
+
+def test_a_stiffness_above_the_limit_is_refused_and_one_below_is_ramped(
+    page: Any, device: Device
+) -> None:
+    first = begin(page, device)
+    say(page, "change", changes={"stiffness": 2000.0})
+    told = heard(page, lambda m: news(state="running")(m) and bool(m["words"]))
+    assert "2000 N/m is above the limit" in told["words"]
+    assert "--accept-risk" in told["words"]
+    assert told["settings"]["stiffness"] == 150.0
+    before = device.force[2]
+    assert before > 0.05
+    say(page, "change", changes={"stiffness": 75.0})
+    gone = heard(page, lambda m: frames(m) and column(m, "least", "share") == 0.0)
+    assert column(gone, "greatest", "applied z") < 0.1 * before
+    back = heard(page, lambda m: frames(m) and column(m, "newest", "share") == 1.0)
+    assert column(back, "newest", "applied z") == pytest.approx(0.5 * before, rel=1e-6)
+    say(page, "change", changes={"stiffness": 150.0})
+    assert heard(page, news(state="running", stiffness=150.0))["starts"] == first["starts"]
+
+
+def test_the_force_is_let_go_by_a_ramp(page: Any, device: Device) -> None:
+    begin(page, device)
+    before, then = device.force[2], time.monotonic()
+    say(page, "stop")
+    seen = []
+    while device.force.any():
+        seen.append(device.force[2])
+        assert time.monotonic() < then + 20.0
+    assert max(seen) <= before
+    assert sum(0.1 * before < one < 0.9 * before for one in seen) > 20  # it did not jump
+    assert heard(page, news(state="stopped"))["words"] == "the force was released"
+    device.lets_go()
+
+
+def test_a_fault_is_said_and_only_a_start_brings_the_force_again(page: Any, device: Device) -> None:
+    starts = begin(page, device)["starts"]
+    device.fail(17)
+    told = heard(page, news(state="stopped"))
+    assert "mapped_device.so returned 17" in told["words"]
+    assert "the force was made zero. Check the device" in told["words"]
+    assert "Start, with the handle in the air, ramps the force up again" in told["words"]
+    device.lets_go()
+    device.fail(0)
+    for changes in ({"stiffness": 75.0}, {}):
+        say(page, "change", changes=changes)
+        after = heard(page, news(state="stopped", stiffness=75.0))
+        assert "returned 17" in after["words"]  # what is said stays
+        assert (after["starts"], device.open) == (starts, False)
+    # What is a risk is refused before it is started, too.
+    say(page, "change", changes={"stiffness": 2000.0})
+    risky = heard(page, lambda m: news(state="stopped")(m) and "above the limit" in m["words"])
+    assert risky["settings"]["stiffness"] == 75.0
+    say(page, "change", changes={"stiffness": 150.0})
+    heard(page, news(state="stopped", stiffness=150.0))
+    assert begin(page, device)["starts"] == starts + 1
+
+
+def test_a_handle_that_is_read_far_away_is_a_fault(page: Any, device: Device) -> None:
+    begin(page, device)
+    device.go((0.0, 0.0, 9.0))
+    assert "Move the handle to its centre" in heard(page, news(state="stopped"))["words"]
+    device.lets_go()
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_the_force_goes_when_no_page_steers(
+    page: Any, held: Started, device: Device, closed: bool
+) -> None:
+    with joined(held) as watcher:  # who watches does not count
+        begin(page, device)
+        heard(watcher, news(state="running"))
+        then = time.monotonic()
+        if closed:
+            page.close()
+        # Else it is there, but hangs: nothing is painted, nothing said.
+        words = "released: no page with control is connected"
+        heard(watcher, news(state="stopped", words=words), STEERING_TIMEOUT + 10.0)
+        assert time.monotonic() - then > STEERING_TIMEOUT
+        device.lets_go()
+        with joined(held) as other:  # another page begins nothing
+            told = heard(other, news())
+            assert (told["state"], device.open) == ("stopped", False)
+
+
+def test_a_page_that_is_loaded_anew_keeps_the_force(
+    page: Any, held: Started, device: Device
+) -> None:
+    starts = begin(page, device)["starts"]
+    page.close()
+    with joined(held) as again:
+        heard(again, news(state="running", steers=True))
+        end = time.monotonic() + 1.5 * STEERING_TIMEOUT
+        while time.monotonic() < end:
+            heard(again, frames)
+            assert device.pushes
+        say(again, "stop")
+        assert heard(again, news(state="stopped"))["starts"] == starts
+
+
+@needs_browser
+def test_the_page_is_the_window_on_the_device(
+    held: Started, device: Device, browser: Browser
+) -> None:
+    device.fail(0)
+    device.go(ABOVE)
+    browser.said.clear()
+    browser.resize(1280, 900)
+    # What an address says moves no handle.
+    browser.call("Page.navigate", url=f"{held.address}#stiffness=100&law=W")
+    browser.until("globalThis.lab?.news?.state === 'stopped' && lab.ready")
+    if not browser.ask("lab.news.steers"):
+        browser.until("!document.getElementById('take').hidden")
+        browser.ask("document.getElementById('take').click()")
+    browser.until("lab.news.steers")
+    gone = "['press', 'motion', 'device', 'delay', 'hand_stiffness', 'save', 'tour-begin', 'halt']"
+    seen = f"{gone}.filter(id => document.getElementById(id).checkVisibility())"
+    assert browser.ask(seen) == []
+    assert "You hold the handle" in browser.ask("document.getElementById('held').innerText")
+    assert not browser.ask("document.getElementById('again').hidden")
+    browser.ask("document.getElementById('again').click()")
+    browser.until("lab.news.state === 'running'")
+    assert browser.ask("lab.news.settings.stiffness") == 150.0
+    device.go(PRESSED)
+    browser.until("lab.probeState().force[2] > 0.05 && lab.probeState().inside")
+    assert browser.ask(seen) == ["halt"]
+    # The pointer presses, keys move the hand and begin the tour: nothing of it is there.
+    box = browser.ask("document.getElementById('relief').getBoundingClientRect().toJSON()")
+    x, y = box["x"] + 0.4 * box["width"], box["y"] + 0.5 * box["height"]
+    browser.mouse("mousePressed", x, y, 1)
+    browser.mouse("mouseMoved", x + 50, y, 1)
+    browser.mouse("mouseReleased", x + 50, y)
+    for key in (" ", "m", "t", "k", "ArrowLeft"):
+        browser.press(key)
+    browser.ask("new Promise(done => setTimeout(done, 500))")
+    assert browser.ask("[lab.hand.sent, lab.tour.on, lab.news.state]") == [0, False, "running"]
+    assert browser.ask("lab.probeState().probe[2]") == PRESSED[2]
+    # In the picture: probe and force, and no cross of a hand.
+    browser.until("lab.current")
+    assert browser.ask("lab.svg()").count("<svg") == 5
+    browser.press("Escape")
+    device.lets_go()
+    browser.until("lab.news.state === 'stopped' && !document.getElementById('again').hidden")
+    device.go(ABOVE)
+    browser.ask("document.getElementById('again').click()")
+    browser.until("lab.news.state === 'running'")
+    device.go(PRESSED)
+    browser.until("lab.probeState().force[2] > 0.05")
+    device.fail(9)
+    browser.until("lab.news.state === 'stopped'")
+    device.lets_go()
+    words = browser.ask("document.getElementById('alarm').innerText")
+    assert "The loop has stopped: mapped_device.so returned 9" in words
+    assert "Check the device, its power and its cable" in words
+    browser.call("Page.navigate", url="about:blank")
+    assert browser.said == []
+
+
+def test_letting_go_waits_for_no_analysis(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    device = Device(folder / "own")
+    monkeypatch.setenv("MAPPED_DEVICE", str(folder / "own"))
+    scene = load_scene(str(folder / "scene.toml"))
+    still = {"hand": {"kind": "moved"}, "motion": {"kind": "still", "point": [0, 0, 0]}}
+    whole = replace(scene, loop={**still, **scene.loop})
+    setup = make_setup(whole, surface={"clamp": "backed"})
+    handle = make_handle(LibraryDriver(str(folder / LIBRARY)), setup)
+    stage = make_device_scene_state(setup, setup.servo, "scene", {})
+    never: Future[str] = Future()
+    with Session(stage, lambda: None, None, handle, lambda _surface, _device: never) as session:
+        session.start()
+        session.release_force("before it began")
+        until(lambda: session._requests.empty() and session.state == "stopped")
+        assert not session.is_running
+        session.start()
+        until(lambda: session.state == "running")
+        device.go(PRESSED)
+        until(lambda: device.pushes)
+        session.change({"stiffness": 100.0})
+        until(lambda: session.state == "changing")
+        then = time.monotonic()
+        session.release_force("enough")
+        until(lambda: not device.force.any())
+        assert time.monotonic() - then < 20.0
+        until(lambda: session.state == "stopped")
+        assert session.message == "enough"
+        assert session.scene_state is stage
+    device.lets_go()
+
+
+def test_a_lab_that_is_ended_lets_the_force_go(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = Device(folder / "other")
+    monkeypatch.setenv("MAPPED_DEVICE", str(folder / "other"))
+    started = Started(str(folder / "scene.toml"), "--driver", str(folder / LIBRARY))
+    with joined(started) as line:
+        begin(line, other)
+        assert started.end()[0] == 0
+    assert not other.force.any()
+    assert not other.open
+
+
+def test_what_cannot_be_rendered_is_said_before_the_page(folder: Path) -> None:
+    driver = str(folder / LIBRARY)
+    cases = {
+        "is above the limit": ("--stiffness", "2kN/m", "--driver", driver),
+        "driver is unknown": ("--driver", "velvet"),
+        "max_force is not known": ("--device", "pantograph", "--driver", driver, "--accept-risk"),
+        "none.mcap": ("--driver", "replay:none.mcap"),
+    }
+    for words, more in cases.items():
+        with pytest.raises(AssertionError, match=words):
+            Started(str(folder / "scene.toml"), *more).close()
+
+
+def test_a_recording_moves_the_handle_and_ends_with_its_rows(folder: Path) -> None:
+    scene = folder / "replayed.toml"
+    hand = '[hand]\nkind = "spring"\nstiffness = "800 N/m"\ndamping = "5 N*s/m"\nmass = "50 g"\n'
+    still = (
+        '[motion]\nkind = "still"\npoint = ["0 mm", "0 mm", "-0.3 mm"]\n[run]\nduration = "1.5 s"\n'
+    )
+    scene.write_text(SCENE + hand + still)
+    setup = make_setup(load_scene(str(scene)))
+    setup.simulate(trace=str(folder / "run.mcap"))
+    started = Started(str(scene), "--law", "W", "--driver", f"replay:{folder / 'run.mcap'}")
+    with joined(started) as line:
+        assert "A recording moves the handle" in heard(line, news())["handle"]["where"]
+        for _ in range(2):
+            say(line, "start")
+            heard(line, news(state="running", law="W"))
+            heard(line, lambda m: frames(m) and column(m, "newest", "inside") == 1.0)
+            heard(line, news(state="stopped", words="end of the recording; Start replays it"))
+    assert started.end()[0] == 0

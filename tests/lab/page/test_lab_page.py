@@ -1,0 +1,151 @@
+"""The page in a real browser: it lives, obeys, and says what has happened."""
+
+from __future__ import annotations
+
+from io import BytesIO
+
+import numpy as np
+import pytest
+from PIL import Image
+from tests.lab.browser import Browser, needs_browser
+from tests.lab.started import Started
+
+from asperity.lab.access import page_files
+
+MOST_BYTES = 1_000_000
+
+
+def test_the_page_is_small_and_comes_from_here_alone() -> None:
+    files = page_files()
+    assert sum(len(content) for _kind, content in files.values()) < MOST_BYTES
+    for name, (_kind, content) in files.items():
+        text = content.decode("utf-8")
+        assert "http://" not in text, name
+        assert "https://" not in text, name
+
+
+def inside(page: Browser, name: str, x: float, y: float) -> tuple[float, float]:
+    """Return the place on the screen of a point of a view, in shares of its size."""
+    box = page.ask(f"document.getElementById('{name}').getBoundingClientRect().toJSON()")
+    return box["x"] + x * box["width"], box["y"] + y * box["height"]
+
+
+def colours_in(page: Browser, name: str) -> int:
+    """Return how many colours a view shows."""
+    box = page.ask(f"document.getElementById('{name}').getBoundingClientRect().toJSON()")
+    picture = np.asarray(Image.open(BytesIO(page.picture())).convert("RGB"))
+    top, left = int(box["y"]), int(box["x"])
+    part = picture[top : top + int(box["height"]), left : left + int(box["width"])]
+    return len(np.unique(part.reshape(-1, 3), axis=0))
+
+
+@needs_browser
+def test_the_pointer_presses_and_the_force_is_drawn(page: Browser) -> None:
+    page.mouse("mouseMoved", *inside(page, "relief", 0.5, 0.5))
+    page.mouse("mousePressed", *inside(page, "relief", 0.5, 0.5), 1)
+    page.until("lab.probeState().force[2] > 0.02 && lab.latencies.length > 0")
+    assert page.ask("document.getElementById('readout').textContent").startswith("probe")
+    page.mouse("mouseReleased", *inside(page, "relief", 0.5, 0.5))
+    page.until("!lab.probeState().inside && lab.probeState().probe[2] > 2e-4")
+    assert min(colours_in(page, name) for name in ("relief", "cut")) > 20
+
+
+@needs_browser
+def test_all_is_done_by_keyboard(page: Browser) -> None:
+    for key, reached in (
+        (" ", "lab.probeState().force[2] > 0.02"), (" ", "lab.probeState().probe[2] > 2e-4"),
+        ("ArrowRight", "lab.hand.x != 0"), ("x", "lab.news.settings.law == 'A'"),
+        ("m", "lab.hand.motion == 'stroke'"), ("m", "lab.hand.motion == 'loop'"),
+    ):  # fmt: skip
+        page.press(key)
+        page.until(f"{reached} && lab.news.state == 'running'")
+    assert "law=A" in page.ask("location.hash")
+
+
+@needs_browser
+def test_law_a_feeds_the_hand_and_the_ledger_says_so(page: Browser) -> None:
+    page.ask("lab.hand.press = 2e-4, lab.hand.loop = 5e-4, lab.hand.x = 0, lab.hand.request()")
+    page.until("document.getElementById('ledger').classList.contains('fed')")
+    assert "fed the hand" in page.ask("document.getElementById('verdict').textContent")
+    page.press("w")
+    page.until("lab.news.settings.law == 'W' && lab.news.state == 'running'")
+    page.press("r")
+    page.until("!document.getElementById('ledger').classList.contains('fed')")
+
+
+@needs_browser
+@pytest.mark.parametrize(("width", "dark"), [(360, False), (1280, True), (3840, False)])
+def test_it_fits_every_screen(page: Browser, width: int, dark: bool) -> None:
+    page.resize(width, 900 if width < 2000 else 2160, dark=dark)
+    page.ask("new Promise(done => setTimeout(done, 300))")
+    assert page.ask("document.documentElement.scrollWidth <= innerWidth")
+    words = "document.querySelector('#cut').getAttribute('aria-label')"
+    assert page.ask(words).startswith("Section through the surface")
+    if width > 360:
+        assert page.ask("document.documentElement.scrollHeight <= innerHeight + 120")
+    ground = page.ask("getComputedStyle(document.body).backgroundColor")
+    assert (ground == "rgb(20, 24, 26)") is dark
+
+
+@needs_browser
+def test_a_lost_connection_is_said_and_comes_back(page: Browser) -> None:
+    # What no page of ours sends.
+    page.ask("lab.hand.say('steer', {})")
+    page.until("document.getElementById('state').textContent == 'connection lost'")
+    words = page.ask("document.getElementById('alarm').innerText")
+    assert 'The server closed the connection: "steer" has target, cosine' in words
+    page.until("lab.news?.steers && lab.news.state == 'running'")
+    numbers = page.ask("lab.frame.first")
+    page.until(f"lab.frame.first > {numbers} && lab.frame.number < 1e4")
+
+
+@needs_browser
+def test_without_shared_memory_all_comes_as_messages(page: Browser, lab: Started) -> None:
+    assert page.ask("lab.line.reads")
+    script = "Object.defineProperty(globalThis, 'crossOriginIsolated', {value: false})"
+    added = page.call("Page.addScriptToEvaluateOnNewDocument", source=script)
+    try:
+        page.call("Page.navigate", url="about:blank")
+        page.call("Page.navigate", url=lab.address)
+        page.until("globalThis.lab?.frame && lab.ready && lab.news.state == 'running'")
+        assert not page.ask("lab.line.reads")
+        numbers = page.ask("lab.frame.number")
+        page.until(f"lab.frame.number > {numbers} + 100")
+    finally:
+        page.call("Page.removeScriptToEvaluateOnNewDocument", **added)
+    assert page.ask("lab.faults") == 0
+
+
+# The thread's own source, and what reads its memory, one after the other: what is said, and heard.
+_THROUGH_MEMORY = """((size, count) => {
+  const [TOLD, socket] = ((postMessage, WebSocket) => {
+    let onmessage; %s; return [TOLD, () => socket];
+  })(() => {}, class {});
+  const shared = { places: new SharedArrayBuffer(8), ring: new SharedArrayBuffer(8 * size) };
+  const said = [], heard = [], written = one => (typeof one === "string" ? one : [...one].join());
+  const line = Object.assign(Object.create(Object.getPrototypeOf(lab.line)), {
+    reads: true, places: new Int32Array(shared.places), ring: new Float64Array(shared.ring),
+    take(data) { heard.push(written(typeof data === "string" ? data : new Float64Array(data))); },
+  });
+  TOLD.memory(shared); TOLD.open(""); TOLD.reads(true);
+  const come = one => { said.push(written(one)); socket().onmessage({ data: one.buffer ?? one }); };
+  for (let k = 0; k < count; k++) {
+    const long = k * 7 %% 31;
+    const numbers = Float64Array.from({ length: long + 1 }, (_, j) => k + j / 64);
+    come(k %% 3 ? numbers : "é€".repeat(long) + k);
+    if (k %% 5 === 4) line.look();
+  }
+  const late = count - heard.length;
+  while (heard.length < said.length && said.length < 3 * count) { come("more"); line.look(); }
+  return [late, heard.length, said.length, heard.every((one, k) => one === said[k])];
+})"""
+
+
+@needs_browser
+def test_what_comes_through_the_memory_is_whole_and_in_its_order(page: Browser) -> None:
+    through = _THROUGH_MEMORY % page_files()["socket_worker.js"][1].decode()
+    # Memory that holds the longest twice, and is often full; memory with room.
+    for size in (150, 1000):
+        late, heard, said, same = page.ask(f"{through}({size}, 400)")
+        assert (heard == said, same) == (True, True)
+        assert (late > 20) is (size == 150)

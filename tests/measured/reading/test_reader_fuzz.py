@@ -1,0 +1,136 @@
+"""A bounded fuzz run of every reader; ``python -m bench.fuzz`` is the long one."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import random
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parents[3]
+sys.path.insert(0, str(ROOT))
+fuzz = importlib.import_module("bench.fuzz")
+seeds = importlib.import_module("bench.fuzz_seeds")
+
+COUNT = 200
+
+
+@pytest.fixture(scope="module")
+def results() -> dict[str, dict[str, Any]]:
+    """Fuzz all readers in one worker with 1 GB of memory, as the long run does it."""
+    readers = seeds.available_readers()
+    return dict(zip(readers, fuzz.results(readers, COUNT), strict=True))
+
+
+@pytest.fixture(scope="module")
+def reading() -> Iterator[Any]:
+    """One process for many files, as in the long run."""
+    with importlib.import_module("bench.fuzz_child").ReadingWorker() as started:
+        yield started
+
+
+@pytest.mark.parametrize("reader", seeds.SEEDS)
+def test_every_mutated_file_is_read_or_refused(
+    reader: str, results: dict[str, dict[str, Any]]
+) -> None:
+    if reader not in results:
+        pytest.skip("real surfaces (../shared/data) or the extra asperity[formats] missing")
+    result = results[reader]
+    assert result["faults"] == []
+    assert result["other"] == 0
+    assert result["read"] + result["refused"] == COUNT
+    assert result["peak"] < 1024
+    # The run is worth something only if the damage is neither harmless nor always fatal.
+    assert result["refused"] > COUNT // 20
+    if reader not in {"archive", "marks"}:  # none of which is a surface
+        assert result["read"] > 2
+
+
+@pytest.mark.parametrize("reader", seeds.SEEDS)
+def test_the_sound_files_are_read(
+    reader: str, tmp_path: Path, reading: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from asperity.core.errors import SurfaceFileError
+    from asperity.measured.reading import isolation, read_surface
+
+    monkeypatch.setattr(isolation, "run_subprocess", reading.start)
+
+    if reader not in seeds.available_readers():
+        pytest.skip("real surfaces (../shared/data) or the extra asperity[formats] missing")
+    refused: list[str] = []
+    for number, content in enumerate(seeds.SEEDS[reader](tmp_path)):
+        path = tmp_path / f"{number}.dat"
+        path.write_bytes(content)
+        try:
+            raw = read_surface(path, **seeds.OPTIONS.get(reader, {}))
+        except SurfaceFileError as error:
+            refused.append(str(error))
+        else:
+            assert raw.heights.size > 0
+    known = {"archive": "archive", "png": "normal map", "tiff": "normal map", "marks": ""}
+    expected = known.get(reader)
+    assert all(expected is not None and expected in message for message in refused)
+
+
+def test_mutations_are_the_same_in_every_run() -> None:
+    content = bytes(range(256)) * 4
+    first = [fuzz.mutate(content, random.Random(f"x {k}")) for k in range(50)]
+    assert first == [fuzz.mutate(content, random.Random(f"x {k}")) for k in range(50)]
+    assert sum(data != content for data in first) > 45
+    assert len(set(first)) > 40
+
+
+def test_the_worker_sees_faults(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Negative control: readers that raise, ask for too much, or return nonsense."""
+    import numpy as np
+
+    from asperity.core.errors import SurfaceFileError
+    from asperity.measured import reading
+
+    def raising(*_: object, **__: object) -> None:
+        raise IndexError("oops")
+
+    def hungry(*_: object, **__: object) -> None:
+        raise SurfaceFileError("a.npy: not enough memory to read this surface")
+
+    def wrong(*_: object, **__: object) -> reading.RawSurface:
+        return reading.RawSurface(np.full((4, 4), np.inf), None, "", ())
+
+    for reader in (raising, hungry, wrong):
+        monkeypatch.setattr(reading, "read_surface", reader)
+        found = [outcome for outcome, _ in fuzz.outcomes("npy", 3, tmp_path)]
+        assert found == ["other"] * 3
+
+
+def test_the_memory_of_a_worker_is_limited() -> None:
+    code = (
+        "import resource, numpy; from bench import fuzz;"
+        "resource.setrlimit(resource.RLIMIT_DATA, (fuzz.MEMORY, fuzz.MEMORY));"
+        "numpy.ones(fuzz.MEMORY // 8)"
+    )
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        env=environment,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "MemoryError" in done.stderr
+
+
+def test_the_table_and_the_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
+    assert fuzz.main(["20", "npy"]) == 0
+    printed = capsys.readouterr().out
+    assert "npy" in printed
+    assert "peak [MB]" in printed
+    assert fuzz.main(["20", "mpy"]) == 2
+    assert "unknown reader 'mpy'" in capsys.readouterr().err

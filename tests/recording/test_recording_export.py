@@ -1,0 +1,77 @@
+"""Rows for other tools: the same numbers to the last bit."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+from asperity.core.errors import ParameterError
+from asperity.recording.recording import Recording, open_recording
+from asperity.recording.table_export import export_recording
+from asperity.recording.writer import RecordingWriter
+
+COLUMNS = (("time", "s"), ("x", "m"), ("applied x", "N"))
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Recording:
+    table = np.random.default_rng(0).normal(size=(9001, 3))
+    table[:, 0] = np.arange(9001) * 1e-4
+    with RecordingWriter(tmp_path / "run.mcap", COLUMNS, {"law": "B"}) as writer:
+        writer.append(table)
+    return open_recording(tmp_path / "run.mcap")
+
+
+def test_csv_keeps_every_digit(recording: Recording, tmp_path: Path) -> None:
+    told: list[float] = []
+    export_recording(recording, tmp_path / "run.csv", told.append)
+    assert (tmp_path / "run.csv").read_text().startswith("time [s],x [m],applied x [N]\n")
+    read = np.loadtxt(tmp_path / "run.csv", delimiter=",", skiprows=1)
+    np.testing.assert_array_equal(read, recording.table())
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+
+
+def test_matlab_has_columns_by_name(recording: Recording, tmp_path: Path) -> None:
+    export_recording(recording, tmp_path / "run.mat")
+    found = loadmat(tmp_path / "run.mat")
+    np.testing.assert_array_equal(found["applied_x"][:, 0], recording["applied x"])
+    np.testing.assert_array_equal(found["time"][:, 0], recording["time"])
+    assert found["units"]["applied_x"][0, 0][0] == "N"
+    assert '"law": "B"' in found["about"][0]
+
+
+def test_parquet_has_columns_with_units(recording: Recording, tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet", reason="not run: no pyarrow here")
+    export_recording(recording, tmp_path / "run.parquet")
+    found = parquet.read_table(tmp_path / "run.parquet")
+    np.testing.assert_array_equal(found["applied_x"].to_numpy(), recording["applied x"])
+    assert found.schema.field("applied_x").metadata == {b"unit": b"N"}
+    assert b'"law": "B"' in found.schema.metadata[b"asperity"]
+
+
+def test_what_cannot_be_exported_is_said(
+    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(ParameterError, match=r"output must end in .csv, .mat, .parquet"):
+        export_recording(recording, tmp_path / "run.xls")
+    with pytest.raises(ParameterError, match="output cannot be written: No such file"):
+        export_recording(recording, tmp_path / "no" / "run.csv")
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(ParameterError, match=r"pip install 'asperity\[parquet\]'"):
+        export_recording(recording, tmp_path / "run.parquet")
+    assert {path.name for path in tmp_path.iterdir()} == {"run.mcap"}
+
+
+def test_a_file_is_whole_or_not_there(recording: Recording, tmp_path: Path) -> None:
+    data = bytearray(recording.path.read_bytes())
+    data[recording._chunks[1].rows_start + 100] ^= 1
+    recording.path.write_bytes(data)
+    (tmp_path / "run.csv").write_text("precious")
+    with pytest.raises(ParameterError, match="is damaged"):
+        export_recording(recording, tmp_path / "run.csv")
+    assert (tmp_path / "run.csv").read_text() == "precious"

@@ -1,0 +1,81 @@
+"""A simulated run in words, table and page."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from tests.report.pages import terminal
+
+from asperity.report.html import render_page
+from asperity.report.loop.run_report import (
+    closure_text,
+    energy_text,
+    ledger_rows,
+    run_answer,
+    run_page,
+)
+from asperity.scene import load_scene
+from asperity.scene.setup import Setup, make_setup
+from asperity.simulation import Run
+from asperity.simulation.run import StopReason
+
+PRESS = Path(__file__).parents[3] / "examples" / "press.toml"
+
+
+@pytest.fixture(scope="module")
+def setup() -> Setup:
+    return make_setup(load_scene(str(PRESS)), surface={"law": "W"}, duration=0.3)
+
+
+@pytest.fixture(scope="module")
+def run(setup: Setup) -> Run:
+    return setup.simulate()
+
+
+def test_energies_have_signs() -> None:
+    assert energy_text(2.97e-3) == "+2.97 mJ"
+    assert energy_text(-4e-7) == "-400 nJ"
+    assert energy_text(0.0) == "0 J"
+    assert energy_text(math.nan) == "not finite"
+
+
+def test_rows_add_up(run: Run) -> None:
+    rows = dict(ledger_rows(run))
+    assert rows["texture, exact"][3] == energy_text(run.ledger.total)
+    assert rows["stored energy, after minus before"][3] == energy_text(
+        run.ledger.stored_after - run.ledger.stored_before
+    )
+    assert run.is_energy_balanced
+
+
+def test_a_run_that_does_not_close_is_not_believed(setup: Setup, run: Run) -> None:
+    assert "does not close" not in run_answer(setup, run)
+    wrong = replace(
+        run, ledger=replace(run.ledger, dissipated=run.ledger.dissipated * (1.0 + 1e-6))
+    )
+    assert "does not close" in run_answer(setup, wrong)
+
+
+def test_numbers_beyond_all_bounds_are_words(setup: Setup, run: Run) -> None:
+    nan = (math.nan, 0.0, math.nan)
+    wrong = replace(run, ledger=replace(run.ledger, supplied=nan, exchanged=math.inf))
+    wrong = replace(wrong, stop=StopReason.DIVERGED)
+    for text in (run_answer(setup, wrong), closure_text(wrong)):
+        assert "nan" not in text.lower()
+    assert "not finite" in run_answer(setup, wrong)
+    assert dict(ledger_rows(wrong))["texture, exact"][0] == "not finite"
+
+
+def test_table_and_page_say_the_same(setup: Setup, run: Run) -> None:
+    shown = terminal(run_page(setup, run), 80)
+    page = render_page(run_page(setup, run))
+    for name, cells in ledger_rows(run):
+        assert name.replace("'", "&#39;") in page
+        assert cells[3] in page
+        assert cells[3] in shown
+    for sentence in setup.assumptions:
+        assert sentence.replace("'", "&#39;") in page
+        assert sentence in " ".join(shown.split())

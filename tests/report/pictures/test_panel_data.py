@@ -1,0 +1,175 @@
+"""What pictures show as numbers and in words, and how they stand in a page."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from importlib import resources
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+
+from asperity.report.pictures import style
+from asperity.report.pictures.panel_data import extract_panels, panels_to_json, ranges_text
+from asperity.report.pictures.svg import svg_text
+
+HOSTILE = "</script><b>"
+
+
+def two_panels() -> Figure:
+    """Return lines beside a sheared mesh whose value is its x in mm, with a bar."""
+    figure = style.new_figure(8.0, 3.0)
+    left, right = style.axes_grid(figure, 2, 2, x="x [mm]", y="z [µm]", sharey=False)
+    left.plot(np.linspace(0.0, 2.0, 9), np.linspace(-1.0, 1.0, 9), label="_rise")
+    left.plot([0.0, 0.3, 2.0], [0.0, math.nan, 5.0], label=HOSTILE)
+    left.plot([0.0, 2.0], [9.0, 9.0])  # without a label: decoration
+    left.axhline(3.0, label="border")
+    style.set_panel_title(left, "A", "first")
+    style.mark_law(left, "A")
+    x, part = np.meshgrid(np.linspace(0.0, 2.0, 41), np.linspace(0.0, 1.0, 21), indexing="ij")
+    z = -1.0 + part * (1.0 + 0.5 * x)  # from −1 up to 0.5 x
+    middles = 0.5 * (x[1:, 1:] + x[:-1, 1:])
+    mesh = right.pcolormesh(x, z, middles, rasterized=True)
+    right.set_xlim(0.0, 2.0)
+    right.set_ylim(-1.0, 1.0)
+    style.style_colorbar(figure.colorbar(mesh, ax=right), "curl [N/m]: white is none")
+    return figure
+
+
+@pytest.fixture(scope="module")
+def drawn() -> tuple[str, Figure]:
+    figure = two_panels()
+    return svg_text(figure), figure
+
+
+def test_labelled_lines_are_read_and_axes_named(drawn: tuple[str, Figure]) -> None:
+    left, right = extract_panels(drawn[1])
+    assert (left.name, left.law, left.x, left.y) == ("A, first", "A", "x [mm]", "z [µm]")
+    assert [one.name for one in left.series] == ["rise", HOSTILE]
+    assert right.y == "z [µm]"  # its neighbour's, which carries the words for both
+    assert right.series == []
+
+
+def test_a_field_is_read_where_it_is(drawn: tuple[str, Figure]) -> None:
+    field = extract_panels(drawn[1])[1].field
+    assert field is not None
+    assert field.name == "curl [N/m]"
+    rows, columns = field.values.shape
+    x = (np.arange(columns) + 0.5) * 2.0 / columns
+    z = -1.0 + (np.arange(rows) + 0.5) * 2.0 / rows
+    # A cell's edges are straight between its corners, and half a cell is 25 µm.
+    inside = z[:, None] < 0.5 * x - 0.03
+    assert np.nanmax(np.abs(field.values - x)[inside]) <= 0.026
+    assert np.isnan(field.values[z[:, None] > 0.5 * x + 0.03]).all()
+    assert not np.isnan(field.values[inside]).any()
+
+
+def test_an_image_is_read_with_its_first_row_lowest() -> None:
+    figure = style.new_figure(4.0, 3.0)
+    axes = style.single_axes(figure)
+    axes.imshow(np.array([[1.0, 2.0], [3.0, math.nan]]), origin="lower", extent=(0, 4, 0, 2))
+    svg_text(figure)
+    field = extract_panels(figure)[0].field
+    assert field is not None
+    assert (field.values[0, 0], field.values[0, -1], field.values[-1, 0]) == (1.0, 2.0, 3.0)
+    assert math.isnan(field.values[-1, -1])
+
+
+def test_numbers_are_json_that_closes_no_script(drawn: tuple[str, Figure]) -> None:
+    text = panels_to_json(extract_panels(drawn[1]))
+    assert "<" not in text
+    left, right = json.loads(text)
+    assert left["series"][0]["x"] == {"from": 0, "to": 2, "count": 9}
+    assert left["series"][1] == {
+        "name": HOSTILE, "law": "A", "x": [0, 0.3, 2], "y": [0, None, 5],
+    }  # fmt: skip
+    assert left["x"]["scale"] == "linear"
+    assert len(right["field"]["values"]) % right["field"]["columns"] == 0
+
+
+def test_words_say_from_where_to_where(drawn: tuple[str, Figure]) -> None:
+    words = ranges_text(extract_panels(drawn[1]))
+    assert "Rise, z [µm]: −1 to 1 in A, first." in words
+    assert "Curl [N/m]: 0.025 to 1.98." in words
+
+
+def test_of_many_panels_the_widest_and_the_narrowest_are_told() -> None:
+    figure, panels = style.law_panels(4, 2.0, 0.5, x="x", y="force [N]")
+    for axes, letter, size in zip(panels, "ABCD", (2.0, 1.0, 9.0, 3.0), strict=True):
+        axes.plot([0.0, 1.0], [-size, size], label="f")
+        style.set_panel_title(axes, letter, "")
+    words = ranges_text(extract_panels(figure))
+    assert words == " F, force [N]: varies most in C, −9 to 9, and least in B, −1 to 1."
+
+
+def test_lone_points_are_told_while_they_are_few() -> None:
+    figure = style.new_figure(4.0, 3.0)
+    axes = style.single_axes(figure)
+    style.label_axes(axes, "T", "S")
+    for number in range(13):
+        assert f"{number} points" not in ranges_text(extract_panels(figure))
+        axes.plot(number, 2 * number, "o", label=f"_P{number}")
+        if number == 1:
+            assert ranges_text(extract_panels(figure)) == " T and S: P0 at 0, 0; P1 at 1, 2."
+    assert ranges_text(extract_panels(figure)) == " 13 points."
+
+
+# --- as SVG ---------------------------------------------------------------------------------------
+
+
+def test_the_same_figure_is_the_same_text(drawn: tuple[str, Figure]) -> None:
+    assert svg_text(two_panels()) == drawn[0]
+
+
+def test_identifiers_are_those_that_are_referred_to(drawn: tuple[str, Figure]) -> None:
+    text = drawn[0]
+    used = set(re.findall(r'(?:url\(|href=")#([^")]+)', text))
+    there = re.findall(r' id="([^"]+)"', text)
+    assert used == set(there)
+    assert len(used) == len(there) > 5
+    assert 'data-law="A"' in text
+    assert text.count('class="shared"') >= 4  # two axes of each panel
+    other = svg_text(Figure())
+    assert not used & set(re.findall(r' id="([^"]+)"', other))
+
+
+def test_no_colour_of_the_palette_is_left_and_a_field_keeps_its_own(
+    drawn: tuple[str, Figure],
+) -> None:
+    for colour in style.THEME_VARIABLES:
+        assert f": {colour}" not in drawn[0]
+    assert f"var(--p-ink, {style.INK})" in drawn[0]
+    figure = style.new_figure(2.0, 2.0)
+    figure.subplots().plot([0, 1], [0, 1], color=style.unthemed_colour(style.INK))
+    assert f"stroke: {style.unthemed_colour(style.INK)}" in svg_text(figure)
+
+
+def luminance(colour: str) -> float:
+    parts = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in to_rgb(colour)]
+    return float(np.dot(parts, (0.2126, 0.7152, 0.0722)))
+
+
+def contrast(one: str, other: str) -> float:
+    """Return the contrast of WCAG 2.2: 21 of black on white."""
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_what_is_drawn_is_seen_in_both_themes() -> None:
+    css = resources.files("asperity.report").joinpath("templates", "style.css").read_text("utf-8")
+    dark = dict(re.findall(r"--p-(\w+): (#[0-9a-f]{6})", css))
+    light = {name: colour for colour, name in style.THEME_VARIABLES.items() if colour != "#000000"}
+    assert set(dark) == set(light)
+    assert contrast("#000000", "#ffffff") == pytest.approx(21.0)
+    for theme in (light, dark):
+        for name, least in {
+            "ink": 7.0,
+            "soft": 4.5,
+            "blue": 3.0,
+            "orange": 3.0,
+            "green": 3.0,
+        }.items():
+            assert contrast(theme[name], theme["card"]) >= least, (name, theme)

@@ -1,0 +1,130 @@
+"""The comparison in a terminal, as a page, and in a notebook."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from tests.report.pages import Reader, check_alone, check_alts, terminal
+
+import asperity as asp
+from asperity.devices import parse_device
+from asperity.report import comparison_table, html_text
+from asperity.report.comparison_columns import describe_texture
+from asperity.report.comparison_report import comparison_page
+from asperity.report.sentences.number_text import limit_text
+from asperity.textures.catalogue import CATALOGUE
+
+TEXTURE = asp.Sinusoid(amplitude=0.2e-3, period=2e-3)
+
+
+@pytest.fixture(scope="module")
+def result() -> asp.Comparison:
+    return asp.compare(TEXTURE, device="omega.3", laws="WACD", max_depth=0.3e-3)
+
+
+@pytest.fixture(scope="module")
+def page(result: asp.Comparison) -> str:
+    return html_text(result)
+
+
+@pytest.mark.parametrize("full", [False, True])
+@pytest.mark.parametrize("width", [40, 60, 80, 100, 120, 200])
+def test_the_answer_fits_the_terminal(result: asp.Comparison, width: int, full: bool) -> None:
+    text = terminal(comparison_page(result, full), width)
+    assert max(len(line) for line in text.splitlines()) <= width
+    for row in result.rows:
+        found = [line for line in text.splitlines() if re.match(rf"{row.law.letter} +\S", line)]
+        # The table's row; on a narrow terminal, or where all numbers are shown, the verdict too.
+        assert len(found) >= (2 if width < 72 or full else 1)
+    assert "…" not in text
+    assert "K₀" in text
+
+
+def test_a_narrow_table_has_fewer_columns_and_whole_numbers(result: asp.Comparison) -> None:
+    counts = [len(comparison_table(result, width).columns) for width in (30, 40, 60, 80, 120)]
+    assert counts == [3, 4, 6, 7, 8]
+    starts = [str(cell) for cell in comparison_table(result, 40).columns[1].cells]
+    assert starts[:2] == ["5000 N/m", limit_text(result.row("A").recommended_stiffness)]
+
+
+def test_a_newcomer_finds_the_answer_in_the_first_lines(result: asp.Comparison) -> None:
+    """Which law, which stiffness, whether it is felt, why: a checklist for the page's answer."""
+    text = result.recommendation
+    best = result.recommended_row
+    assert best is not None
+    checks = {
+        "which law": f"Use law {best.law.letter} ({best.law.name.replace('-', ' ')})",
+        "on what": "on the Force Dimension omega.3",
+        "which stiffness": f"start at {limit_text(best.recommended_stiffness)}",
+        "is it felt": "felt, ",
+        "how much": "RMS of texture",
+        "is it proved": "but not proved",
+        "why so much": "simulated loops",
+    }
+    missing = [question for question, words in checks.items() if words not in text]
+    assert not missing
+    faint = asp.compare(asp.Sinusoid(1e-6, 1e-3), "touch", "CH").recommendation
+    for words in ("Nothing of this texture will be felt", "dry friction of 260 mN", "magnify"):
+        assert words in faint
+
+
+def test_sampled_numbers_carry_a_mark() -> None:
+    found = asp.compare(asp.Sinusoid(amplitude=0.1e-3, period=2e-3), laws="ACF")
+    leaks = [str(cell) for cell in comparison_table(found, 120).columns[5].cells]
+    assert leaks[0][0].isdigit()  # A's leak is certified
+    assert leaks[1] == "0"  # C's is zero by theorem
+    assert leaks[2].startswith("~")  # F's is the worst loop that was tried
+
+
+def test_page_has_a_row_per_law_with_the_letter_alone(page: str) -> None:
+    rows = re.findall(r'<tr[^>]*><td class="l">([^<]*)</td>', page)
+    assert rows[:4] == ["W", "A", "C", "D"]
+
+
+def test_page_loads_nothing(page: str) -> None:
+    reader = check_alone(page)
+    assert len(reader.alts) == 6
+    check_alts(reader, page)
+
+
+def test_page_says_what_was_assumed(result: asp.Comparison, page: str) -> None:
+    assert "Assumptions</h2>" in page
+    for sentence in result.assumptions:
+        assert sentence.split(":")[0][:40].replace("'", "&#39;") in page
+    assert "not verified" in page.lower() or ">no<" in page
+
+
+def test_hostile_names_are_escaped() -> None:
+    hostile = "<script>alert(1)</script>"
+    device = parse_device({"name": hostile, "max_stiffness": 1000.0}, "mine")
+    text = html_text(asp.compare(TEXTURE, device=device, laws="WA"))
+    assert hostile not in text
+    assert Reader(text).tags.count("script") == 1 + 6
+    check_alone(text)
+    assert "&lt;script&gt;" in text
+
+
+def test_notebook_table_has_a_row_per_law(result: asp.Comparison) -> None:
+    text = result._repr_html_()
+    assert text.count("<tr") == 1 + len(result.rows)
+    assert "<td>∞" not in text
+    assert result.recommendation[:20] in text
+
+
+def described_of(name: str, **arguments: float) -> dict[str, object]:
+    return CATALOGUE[name].factory(**arguments).describe()
+
+
+def test_arguments_are_read_as_their_kind_declares_them() -> None:
+    said = describe_texture(described_of("cloth", yarn_thickness=0.2e-3))
+    assert said.startswith("cloth: points 448 × 448, pitch 7.5 µm × 7.5 µm, periodic yes")
+    assert "yarn thickness 200 µm, irregularity 0.05, seed 0" in said
+    assert "groove angle 30°" in describe_texture(described_of("knurl"))
+
+
+def test_a_kind_that_nobody_declared_is_said_as_it_is() -> None:
+    found = describe_texture(
+        {"kind": "moon", "craters": 3, "cutoff": 1e-3, "heights": [1, 2, 3, 4, 5]}
+    )
+    assert found == "moon: craters 3, cutoff 1 mm, 5 heights"

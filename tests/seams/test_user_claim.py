@@ -1,0 +1,81 @@
+"""A user-defined claim is computed, judged and reported like those of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from asperity.core.errors import ParameterError
+from asperity.paper import get_claim, reproduce_claims
+from asperity.paper.claim import Claim
+from asperity.paper.claim_registry import CLAIMS, register
+
+Call = Callable[..., tuple[int, str, str]]
+Answer = Callable[..., Any]
+
+MODULE = '''
+"""Check that a wall without texture has its nominal stiffness."""
+
+import asperity as asp
+from asperity.paper.claim import Claim, check_statement
+
+
+def compute():
+    wall = asp.Surface(asp.Sinusoid(1e-4, 1e-3), "W", stiffness=700.0)
+    force = float(wall.force([[0.0, 0.0, -1e-3]])[0, 2])
+    summary = f"{force:g} N at 1 mm"
+    return check_statement(summary, printed=abs(force - 0.7) < 1e-12, force=force)
+
+
+WALL = Claim("own-wall", ("(own 1)",), "mine", "The smooth wall is a linear spring.", compute)
+'''
+
+
+@pytest.fixture
+def module(tmp_path: Path) -> str:
+    (tmp_path / "mine.py").write_text(MODULE, encoding="utf-8")
+    return str(tmp_path / "mine.py")
+
+
+@pytest.fixture
+def own() -> Iterator[Claim]:
+    names: dict[str, Any] = {}
+    exec(MODULE, names)
+    yield register(names["WALL"])
+    del CLAIMS["own-wall"]
+
+
+def test_the_command_reports_it(call: Call, answer: Answer, module: str) -> None:
+    options = ["--plugin", module, "--claim", "own-wall", "--claim", "eq-12"]
+    data = answer("reproduce", *options)
+    assert [one["id"] for one in data["claims"]] == ["eq-12", "own-wall"]
+    mine = data["claims"][1]
+    assert mine["verdict"] == "holds"
+    assert mine["evidence"]["numbers"]["force"] == pytest.approx(0.7)
+    code, out, err = call("reproduce", *options)
+    assert (code, err) == (0, "")
+    assert "0.7 N at 1 mm" in out
+    code, page, _err = call("reproduce", *options, "--html", "-")
+    assert (code, "The smooth wall is a linear spring." in page) == (0, True)
+    assert "own-wall" not in CLAIMS
+
+
+def test_python_computes_it(own: Claim) -> None:
+    assert get_claim("own-wall") is own
+    (result,) = reproduce_claims(["own-wall"])
+    assert (result.verdict, result.evidence.summary) == ("holds", "0.7 N at 1 mm")
+
+
+@pytest.mark.usefixtures("own")
+def test_other_processes_leave_it_to_this_one() -> None:
+    results = reproduce_claims(["own-wall", "eq-12", "eq-10"], workers=2)
+    assert [one.id for one in results] == ["eq-10", "eq-12", "own-wall"]
+    assert results[-1].verdict == "holds"
+
+
+def test_an_id_that_is_taken_is_refused(own: Claim) -> None:
+    with pytest.raises(ParameterError, match="'own-wall' is taken"):
+        register(own)

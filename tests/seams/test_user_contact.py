@@ -1,0 +1,252 @@
+"""A contact of a user's own, in a file outside the package: everything else follows.
+
+The surface is felt at half of its height: depth h/2 - z, contact point (x, y).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.helpers.user_modules import imported
+
+import asperity as asp
+from asperity.contacts import VERTICAL
+from asperity.core.errors import LawError, ParameterError
+from asperity.laws import Law
+from asperity.reference import exact_force, exact_jacobian
+from asperity.simulation import Cartesian, PrescribedHand, Servo, Strokes, simulate
+
+MODULE = '''
+import sys
+
+import numpy as np
+import sympy as sp
+
+from asperity.core.arguments import Argument
+from asperity.core.compiled import Kernels
+from asperity.contacts.contact import Contact, ContactDerivatives
+from asperity.contacts.sampler_interface import sample_height
+from asperity.contacts.symbols import HX, HY
+from asperity.laws import Law
+
+KERNELS = Kernels(provides=("contact_point",))
+
+
+def contact_point(x, y, z, texture):
+    return 0.5 * sample_height(x, y, texture) - z, x, y
+
+
+class Halved(Contact):
+    """Depth h/2 - z."""
+
+    name = "halved"
+    single_valued = True
+    is_above_probe = True
+    clampable = True
+    supports_state = True
+
+    def kernels(self):
+        return (sys.modules[__name__],)
+
+    def derivatives(self):
+        return ContactDerivatives(
+            sp.Matrix([[HX / 2, HY / 2, -1]]), sp.Matrix([[1, 0, 0], [0, 1, 0]])
+        )
+
+    def contact_height(self, texture, xy):
+        return 0.5 * texture.height(xy)
+
+    def extremes(self, texture):
+        return 0.5 * texture.extremes[0], 0.5 * texture.extremes[1]
+
+    def depth(self, texture, points):
+        return self.contact_height(texture, np.ascontiguousarray(points[:, :2])) - points[:, 2]
+
+    def exact_contact(self, texture, h, p):
+        return h(p[0], p[1], 0, 0) / 2 - p[2], p[0], p[1]
+
+    def probe_positions(self, xy, depth, derivatives):
+        return np.column_stack([xy, 0.5 * derivatives[:, 0] - depth])
+
+    def depth_at_height(self, height, derivatives):
+        return 0.5 * derivatives[:, 0] - height
+
+    def lateral_reach(self, max_depth):
+        return 0.0
+
+
+LAW = Law(
+    "half", "half-texture-normal", Halved(),
+    lambda c: c.k * c.parameter("gain") * c.depth * c.normal,
+    clampable=True, parameters={"gain": Argument("gain", "of the force", "1", 0.7, minimum=0.0)},
+)
+PULLED = Law(
+    "pull", "pulled-back", Halved(),
+    lambda c: c.k * c.depth * c.e_z - c.k * c.depth / 1e-3 * c.tangential(c.deflection),
+    stateful=True,
+    parameters={"max_deflection": Argument("max_deflection", "of the anchor", "m", 0.2e-3)},
+)
+'''
+
+TEXTURES = {
+    "sinusoid": asp.Sinusoid(0.3e-3, 2e-3, 0.4, (2.0, 1.0)),
+    "map": asp.HeightMap(1e-4 * np.random.default_rng(3).normal(size=(9, 8)), 0.5e-3),
+}
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
+    folder = tmp_path_factory.mktemp("own")
+    (folder / "my_contact.py").write_text(MODULE, encoding="utf-8")
+    with imported(folder, "my_contact") as module:
+        yield module
+
+
+def probes(texture: asp.Texture, count: int) -> np.ndarray:
+    """Points around the half height, one in three out of contact."""
+    rng = np.random.default_rng(5)
+    xy = rng.uniform(0.0, 4e-3, (count, 2))
+    return np.column_stack([xy, 0.5 * texture.height(xy) + rng.uniform(-0.4e-3, 0.2e-3, count)])
+
+
+def by_hand(texture: asp.Texture, p: np.ndarray) -> np.ndarray:
+    """The force of the law at stiffness 500 N/m, gain 0.7."""
+    depth = 0.5 * texture.height(p[:, :2]) - p[:, 2]
+    w = np.column_stack([-texture.gradient(p[:, :2]), np.ones(len(p))])
+    force = 500.0 * 0.7 * depth[:, None] * w / np.linalg.norm(w, axis=1)[:, None]
+    return np.where(depth[:, None] > 0.0, force, 0.0)
+
+
+@pytest.mark.parametrize("name", TEXTURES)
+def test_force_is_the_formula(own: ModuleType, name: str) -> None:
+    texture = TEXTURES[name]
+    surface, p = asp.Surface(texture, own.LAW, 500.0), probes(texture, 300)
+    force, expected = surface.force(p), by_hand(texture, p)
+    assert (np.linalg.norm(expected, axis=1) > 0.0).mean() == pytest.approx(2 / 3, abs=0.1)
+    np.testing.assert_allclose(force, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
+    np.testing.assert_array_equal(surface.trace(p), force)
+    # Not what the contact at the full height gives.
+    full = asp.Surface(texture, Law("V", "full", VERTICAL, own.LAW.force, parameters={"gain": 0.7}))
+    assert np.abs(full.to_stiffness(500.0).force(p) - expected).max() > 0.01
+
+
+def worst_difference(surface: asp.Surface, step: float = 1e-8) -> float:
+    """Greatest error of the Jacobian against central differences, relative to its norm."""
+    p = probes(surface.texture, 300)
+    p = p[np.abs(surface.law.contact.depth(surface.texture, p)) > 1e-6]
+    moves = step * np.eye(3)
+    columns = [(surface.force(p + m) - surface.force(p - m)) / (2.0 * step) for m in moves]
+    jacobian = surface.jacobian(p)
+    return float(np.abs(np.stack(columns, axis=-1) - jacobian).max() / np.abs(jacobian).max())
+
+
+@pytest.mark.parametrize("name", TEXTURES)
+def test_jacobian_is_the_derivative(own: ModuleType, name: str) -> None:
+    assert worst_difference(asp.Surface(TEXTURES[name], own.LAW, 500.0)) < 1e-5
+
+
+def test_derivatives_of_another_contact_are_noticed(own: ModuleType) -> None:
+    class Wrong(own.Halved):
+        def derivatives(self) -> Any:
+            return VERTICAL.derivatives()
+
+    law = Law("wrong", "wrong", Wrong(), own.LAW.force, parameters={"gain": 0.7})
+    assert worst_difference(asp.Surface(TEXTURES["sinusoid"], law, 500.0)) > 0.05
+
+
+def test_kernels_are_the_definition(own: ModuleType) -> None:
+    surface = asp.Surface(TEXTURES["sinusoid"], own.LAW, 500.0)
+    for p in probes(surface.texture, 6):
+        force = np.array(exact_force(surface, p.tolist()), dtype=float).ravel()
+        jacobian = np.array(exact_jacobian(surface, p.tolist()).tolist(), dtype=float)
+        np.testing.assert_allclose(surface.force(p[None])[0], force, atol=1e-13)
+        np.testing.assert_allclose(surface.jacobian(p[None])[0], jacobian, atol=1e-9)
+
+
+def test_a_clamp_acts_at_the_contact_s_depth(own: ModuleType) -> None:
+    texture = TEXTURES["sinusoid"]
+    surface = asp.Surface(texture, own.LAW, 500.0, max_depth=0.1e-3, clamp="whole")
+    p = probes(texture, 300)
+    depth = 0.5 * texture.height(p[:, :2]) - p[:, 2]
+    length = np.linalg.norm(surface.force(p), axis=1)
+    expected = 500.0 * 0.7 * np.clip(depth, 0.0, 0.1e-3)
+    np.testing.assert_allclose(length, expected, atol=1e-12)
+    assert (depth > 0.1e-3).any()
+
+
+def test_state_is_held_while_the_contact_says_so(own: ModuleType) -> None:
+    """Along a path that leaves the half height below the full one, and comes back."""
+    texture, limit = TEXTURES["sinusoid"], 0.2e-3
+    surface = asp.Surface(texture, own.PULLED, 500.0, max_deflection=limit)
+    t = np.linspace(0.0, 1.0, 400)
+    path = np.column_stack([3e-3 * t, 1e-3 * t, 0.2e-3 * np.sin(30.0 * t) - 0.05e-3])
+    depth = 0.5 * texture.height(path[:, :2]) - path[:, 2]
+    assert ((depth <= 0.0) & (path[:, 2] < 0.0)).any()
+    expected, anchor = np.zeros((400, 3)), None
+    for i in range(400):
+        if depth[i] <= 0.0:
+            anchor = None
+            continue
+        d = np.zeros(2) if anchor is None else path[i, :2] - anchor
+        length = float(np.hypot(*d))
+        d *= min(1.0, limit / length) if length > 0.0 else 1.0
+        anchor = path[i, :2] - d
+        expected[i] = 500.0 * depth[i] * np.array([*(-d / 1e-3), 1.0])
+    assert np.abs(expected[:, :2]).max() > 0.01
+    np.testing.assert_allclose(surface.trace(path), expected, atol=1e-12)
+
+
+def test_it_is_simulated(own: ModuleType) -> None:
+    texture = TEXTURES["sinusoid"]
+    surface = asp.Surface(texture, own.LAW, 500.0)
+    way = Strokes((0.0, 0.0, -0.1e-3), (5e-3, 2e-3, -0.1e-3), speed=0.05, count=3)
+    run = simulate(surface, Cartesian(0.05), PrescribedHand(), Servo(1e-4), way, 0.2)
+    np.testing.assert_allclose(run.commanded, by_hand(texture, run.position), atol=1e-12)
+    assert (run.commanded[:, 2] > 0.0).any()
+    assert (run.commanded[:, 2] == 0.0).any()
+    assert abs(run.ledger.closure) < 1e-9 * run.ledger.exchanged
+
+
+def test_it_is_analysed_and_compared(own: ModuleType) -> None:
+    texture = TEXTURES["sinusoid"]
+    surface = asp.Surface(texture, own.LAW, 500.0, max_depth=0.2e-3)
+    bound = asp.characteristic_number(surface)
+    assert 0.7 * 0.9 < bound.lower <= bound.upper
+    table = asp.compare(texture, laws=["W", own.LAW], max_depth=0.2e-3)
+    assert [row.law.letter for row in table.rows] == ["W", "half"]
+
+
+def test_what_a_contact_lacks_is_named(own: ModuleType) -> None:
+    class Bare(own.Halved):
+        name = "bare"
+
+        def kernels(self) -> tuple[ModuleType, ...]:
+            return ()
+
+    law = Law("bare", "bare", Bare(), own.LAW.force, parameters={"gain": 0.7})
+    words = r"lacks .* 'contact_point' .*, required by law bare \(bare\) on the bare contact"
+    with pytest.raises(ParameterError, match=words):
+        asp.Surface(TEXTURES["sinusoid"], law).force([[0.0, 0.0, 0.0]])
+
+
+def test_a_law_must_have_the_parameters_of_its_contact() -> None:
+    with pytest.raises(LawError, match="split contact must have the parameter continuity"):
+        Law("S", "split-without", "split", lambda c: c.k * c.toward)
+
+
+Call = Callable[..., tuple[int, str, str]]
+Answer = Callable[..., Any]
+
+
+def test_the_command_line_knows_it(own: ModuleType, call: Call, answer: Answer) -> None:
+    file = Path(own.__file__ or "")
+    given = ("sinusoid:amplitude=0.1mm,period=2mm", "--max-depth", "0.2mm", "--plugin", str(file))
+    assert answer("compare", *given, "--laws", "half")["laws"][0]["law"] == "half"
+    assert answer("analyze", *given, "--law", "half")["law"] == "half"
+    code, page, _err = call("analyze", *given, "--law", "half", "--html", "-")
+    assert (code, "half-texture-normal" in page or "half texture normal" in page) == (0, True)

@@ -1,0 +1,147 @@
+"""A criterion of a user's own: it stands in every analysis, and decides nothing."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from fractions import Fraction
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+import asperity as asp
+from asperity.analysis.passivity.criteria import CRITERIA, LEAK, Criterion, register_criterion
+from asperity.core.errors import ParameterError
+from asperity.core.units import round_down
+from asperity.devices import parse_device
+from asperity.report import html_text
+
+Call = Callable[..., tuple[int, str, str]]
+
+OWN = '''
+"""Llewellyn's way: half of what the damping takes away, and an amplifier that must not clip."""
+
+from fractions import Fraction
+
+from asperity.analysis.passivity.criteria import (
+    Criterion,
+    StiffnessRule,
+    evaluate_rule,
+    register_criterion,
+)
+
+
+def half(loop):
+    budget = None if loop.damping_gain is None else loop.damping_gain / 2
+    needs = ("update_rate", "damping")
+    rule = StiffnessRule("half the loss", "k q+ <= s/(2T)", Fraction(1), Fraction(0), budget, needs,
+                         "the amplifier is linear")
+    return evaluate_rule(loop, rule)
+
+
+def clips(loop):
+    force = loop.device.value("max_force")
+    if force is None:
+        return Criterion("clipping", "k D <= F", missing=("max_force",), used_fields=("max_force",))
+    limit = force / loop.surface.max_depth
+    return Criterion(
+        "clipping", "k D <= F", holds=bool(loop.stiffness <= limit), limit=limit,
+        margin=limit / float(loop.stiffness), assumptions="static", used_fields=("max_force",),
+    )
+
+
+register_criterion("half the loss", half)
+register_criterion("clipping", clips)
+'''
+RIG = {
+    "damping": "2 N*s/m", "update_rate": "4 kHz", "delay_samples": 0, "max_force": "0.5 N",
+}  # fmt: skip
+SURFACE = asp.Surface(asp.Sinusoid(amplitude=0.1e-3, period=2e-3), "C", 1500.0)
+NAMES = ("half the loss", "clipping")
+
+
+@pytest.fixture
+def own() -> Iterator[None]:
+    """The criteria of a user's module, registered as it does that; taken out again after."""
+    exec(compile(OWN, "own", "exec"), ModuleType("own").__dict__)
+    yield
+    for name in NAMES:
+        del CRITERIA[name]
+
+
+@pytest.mark.usefixtures("own")
+def test_it_is_evaluated_and_reported() -> None:
+    result = asp.analyze(SURFACE, parse_device(RIG, "mine"))
+    half, clips = (result.passivity.criterion(name) for name in NAMES)
+    limit = Fraction(4000) / Fraction(result.one_sided.upper)  # 2 · 4000 / 2 over q⁺
+    assert half.limit == pytest.approx(float(limit), rel=1e-15)
+    assert half.limit <= limit
+    assert half.conclusion == f"holds: the limit is {round_down(half.limit):.10g} N/m"
+    assert half.assumptions.startswith("the amplifier is linear; no deeper than 200 µm; ")
+    assert (clips.holds, clips.conclusion) == (True, "holds: the limit is 2500 N/m")
+    assert clips.assumptions == "static; no deeper than 200 µm; max_force 500 mN (not verified)"
+    written = result.to_dict()["passivity"]["criteria"]
+    assert [one["name"] for one in written][-2:] == list(NAMES)
+    assert set(written[-1]) == set(written[0])
+    json.dumps(written, allow_nan=False)
+    page = html_text(result)
+    for text in (*NAMES, clips.conclusion, "the amplifier is linear"):
+        assert text in page
+
+
+@pytest.mark.usefixtures("own")
+def test_missing_fields_are_listed() -> None:
+    device = parse_device({"max_stiffness": "2 N/mm"}, "bare")
+    found = asp.analyze(SURFACE, device).passivity
+    half, clips = (found.criterion(name) for name in NAMES)
+    assert half.conclusion == "not decidable: needs update_rate, damping"
+    assert (half.holds, half.limit, clips.missing) == (None, None, ("max_force",))
+    assert clips.conclusion == "not decidable: needs max_force"
+    stiff = asp.analyze(SURFACE.to_stiffness(1e4), parse_device(RIG, "mine")).passivity
+    assert stiff.criterion("clipping").conclusion == "does not hold: the limit is 2500 N/m"
+
+
+def test_it_decides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even one that calls itself the leak."""
+    device = parse_device(RIG, "mine")
+    before = asp.analyze(SURFACE, device).passivity
+
+    def liar(_loop: Any) -> Criterion:
+        return Criterion(LEAK, "nothing is allowed", holds=False, limit=0.0, margin=0.0)
+
+    monkeypatch.setitem(CRITERIA, "liar", liar)
+    after = asp.analyze(SURFACE, device).passivity
+    assert after.criteria[:-1] == before.criteria
+    assert after.criteria[-1].name == "liar"
+    for name in ("verdict", "decided_by", "reason", "safe_stiffness"):
+        assert getattr(after, name) == getattr(before, name)
+
+
+def test_a_name_that_is_taken_is_refused() -> None:
+    with pytest.raises(ParameterError, match="name is the name of another criterion"):
+        register_criterion(LEAK, lambda _loop: Criterion("mine", "0 < 1", holds=True))
+
+
+def test_the_command_line_takes_it_from_a_file(call: Call, tmp_path: Path) -> None:
+    module, page = tmp_path / "own.py", tmp_path / "page.html"
+    module.write_text(OWN, encoding="utf-8")
+    arguments = (
+        "analyze",
+        "sinusoid:amplitude=0.1mm,period=2mm",
+        "--law",
+        "C",
+        "--device",
+        "touch",
+    )
+    summary = ("--plugin", str(module), "--html", str(page))
+    code, out, err = call(*arguments, *summary)
+    assert (code, err) == (0, "")
+    for name in NAMES:
+        assert name in out
+        assert name in page.read_text("utf-8")
+    code, out, _err = call(*arguments, "--plugin", str(module), "--json", "-")
+    names = [one["name"] for one in json.loads(out)["passivity"]["criteria"]]
+    assert names[-2:] == list(NAMES)
+    assert not set(NAMES) & set(CRITERIA)  # until the command ends

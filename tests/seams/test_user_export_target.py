@@ -1,0 +1,116 @@
+"""A user-defined export target, and user-defined laws and textures in C."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.helpers.c_programs import (
+    COMPILERS,
+    header,
+    kernel_ticks,
+    library,
+    probes,
+    same_bits,
+    ticks,
+)
+from tests.helpers.user_modules import imported
+
+import asperity as asp
+from asperity.export import targets
+from asperity.export.program import LinkedSource
+
+Call = Callable[..., tuple[int, str, str]]
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def page_example() -> tuple[str, list[str]]:
+    """Return the file and the command of the documented example."""
+    page = (Path(__file__).parents[2] / "docs/howto/export.md").read_text("utf-8")
+    section = page[page.index("## Another language") :]
+    code = re.search(r"```python\n(.*?)```", section, re.DOTALL)
+    command = re.search(r"`asperity (export .*?)`", section)
+    assert code is not None
+    assert command is not None
+    return code[1], command[1].split()
+
+
+def test_the_documented_example(
+    call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code, command = page_example()
+    monkeypatch.chdir(tmp_path)
+    Path(command[command.index("--plugin") + 1]).write_text(code)
+    status, out, err = call(*command)
+    assert (status, err) == (0, "")
+    assert "Written: texture.txt" in out
+    assert Path("texture.txt").read_text() == "texture"
+    assert set(targets.TARGETS) == {"c99"}  # registered until the command ends
+
+
+def test_a_target_at_the_top_level_writes_several_files(call: Call, tmp_path: Path) -> None:
+    (tmp_path / "notes.py").write_text(
+        "from asperity.export.targets import ExportTarget\n"
+        "def files(request, stem):\n"
+        "    law = request.surface.law.letter\n"
+        "    return {f'{stem}.txt': f'{request.name}: law {law}\\n',\n"
+        "            f'{stem}.more': f'q = {request.q_upper!r}\\n'}\n"
+        "NOTES = ExportTarget('notes', 'two lines', '.txt', files)\n"
+    )
+    target, plugin = tmp_path / "wall.txt", ("--plugin", str(tmp_path / "notes.py"))
+    wave = ("sinusoid:amplitude=0.2mm,period=2mm", "--law", "C", "--lang", "notes", *plugin)
+    code, out, err = call("export", *wave, "-o", str(target), "--name", "wall")
+    assert (code, err) == (0, "")
+    assert target.read_text() == "wall: law C\n"
+    assert (tmp_path / "wall.more").read_text().startswith("q = 1.43")
+    assert "wall.more" in out
+    code, _out, err = call("export", *wave, "-o", str(tmp_path / "wall.h"))
+    assert (code, err) == (2, "asperity: output must be a file that ends in .txt, got 'wall.h'\n")
+
+
+def test_a_name_is_registered_once() -> None:
+    target = targets.ExportTarget("c99", "", ".h", lambda _request, _stem: {})
+    with pytest.raises(asp.ParameterError, match="lang is registered already"):
+        targets.register(target)
+
+
+def test_a_user_defined_law_and_texture(tmp_path: Path) -> None:
+    for name in ("own_law.py", "own_texture.py"):
+        shutil.copy(EXAMPLES / name, tmp_path / f"my_{name}")
+    with imported(tmp_path, "my_own_law") as laws, imported(tmp_path, "my_own_texture") as kinds:
+        texture = kinds.EggBox(amplitude=0.1e-3, period=2e-3)
+        surfaces = {
+            name: asp.Surface(texture, law, max_depth=0.3e-3)
+            for name, law in (("own", laws.STIFFENING), ("c", "C"), ("d", "D"), ("h", "H"))
+        }
+        headers = {name: header(surface, name) for name, surface in surfaces.items()}
+        for compiler in COMPILERS:
+            program = library(tmp_path, compiler, headers, "-O1")
+            for name, surface in surfaces.items():
+                at = probes(texture, 0.3e-3, 400 if name == "h" else 4000, 9)
+                forces = ticks(program, name, at)
+                assert same_bits(forces, kernel_ticks(surface, at)).all(), (compiler, name)
+    assert re.search(r"reference_depth = |double reference_depth", headers["own"])
+
+
+def test_the_exported_source_is_the_compiled_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A change of the linked source changes the C code."""
+    surface = asp.Surface(asp.Sinusoid(2e-4, 2e-3), "C")
+    before = header(surface)
+    monkeypatch.setattr(
+        LinkedSource, "__init__", lambda self, text: object.__setattr__(
+            self, "text", text.replace("depth*k", "2.0*depth*k")
+        ),
+    )  # fmt: skip
+    assert "2.0 * depth * k" not in before
+    assert "2.0 * depth * k" in header(surface)
+
+
+def test_forces_are_not_zero() -> None:
+    surface = asp.Surface(asp.Sinusoid(2e-4, 2e-3), "C")
+    at = probes(surface.texture, 3e-4, 4000, 9)
+    assert np.count_nonzero(surface.force(at)[:, 2]) > 2000

@@ -1,0 +1,371 @@
+"""A user-defined texture kind with its own sampler works everywhere, without further code.
+
+The kind is that of the example, as a file outside the package.
+"""
+
+from __future__ import annotations
+
+import ast
+import itertools
+import json
+import math
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+from tests.helpers.user_modules import imported
+
+import asperity as asp
+from asperity.analysis import one_sided_number
+from asperity.analysis.bounds.branch_and_bound import supremum
+from asperity.analysis.bounds.problems import CrestProblem
+from asperity.analysis.gain.surface_cache import surface_content
+from asperity.core.errors import InternalError, ParameterError
+from asperity.enclosures.cells import DERIVATIVE_NAMES
+from asperity.reference import exact_force, exact_jacobian
+from asperity.report.views import html_text
+from asperity.textures import Domain, Texture, catalogue
+from asperity.textures.texture import TextureKind
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "own_texture.py"
+A, PERIOD = 0.1e-3, 2e-3
+WAVE = 2.0 * math.pi / PERIOD
+DEPTH = 0.2e-3
+Call = Callable[..., tuple[int, str, str]]
+Answer = Callable[..., Any]
+
+
+@pytest.fixture(scope="module")
+def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
+    """The user's module, imported from a directory outside the package."""
+    folder = tmp_path_factory.mktemp("own")
+    shutil.copy(EXAMPLE, folder / "my_eggs.py")
+    with imported(folder, "my_eggs") as module:
+        yield module
+
+
+@pytest.fixture
+def texture(own: ModuleType) -> Any:
+    return own.EggBox(amplitude=A, period=PERIOD)
+
+
+@pytest.fixture
+def plain(own: ModuleType) -> Any:
+    """The same kind without optional members."""
+
+    class Plain(own.EggBox):
+        third_derivative_bound = Texture.third_derivative_bound
+
+    return Plain(A, PERIOD)
+
+
+@pytest.fixture
+def finite(plain: Any) -> Any:
+    """A part of it that is not periodic: suprema lie on its border."""
+    part = Domain(np.zeros(2), 0.2 * PERIOD * np.eye(2), periodic=False, description="a part")
+    return type("Finite", (type(plain),), {"domain": part})(A, PERIOD)
+
+
+@pytest.fixture
+def registered(own: ModuleType, monkeypatch: pytest.MonkeyPatch) -> TextureKind:
+    # Change the catalogue in place: other modules hold a reference to it.
+    monkeypatch.setitem(catalogue.CATALOGUE, "egg-box", own.EGG_BOX)
+    monkeypatch.delitem(catalogue.CATALOGUE, "egg-box")
+    return catalogue.register(own.EGG_BOX)
+
+
+def kinds_of(base: type) -> set[str]:
+    return {base.__name__}.union(*(kinds_of(kind) for kind in base.__subclasses__()))
+
+
+def type_checks(path: Path, known: set[str]) -> list[str]:
+    """Return the calls of isinstance or issubclass on one of the known classes in a module."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in {"isinstance", "issubclass"}:
+            named = {n.id for n in ast.walk(node.args[1]) if isinstance(n, ast.Name)}
+            if named & known:
+                found.append(f"{path.name}: {ast.unparse(node)}")
+    return found
+
+
+def test_no_code_outside_textures_checks_the_class_of_a_texture() -> None:
+    package, known = Path(asp.__file__).parent, kinds_of(Texture)
+    assert {"Sinusoid", "HeightMap", "Grating"} <= known
+    room = package / "textures"
+    others = [path for path in package.rglob("*.py") if not path.is_relative_to(room)]
+    assert [found for path in others for found in type_checks(path, known)] == []
+    assert type_checks(room / "catalogue.py", known) == [
+        "catalogue.py: isinstance(texture, Texture)"
+    ]
+
+
+# --- values, by independent formulas ----------------------------------------------------------
+
+
+def grid(count: int) -> np.ndarray:
+    ticks = (np.arange(count) + 0.3) / count * PERIOD
+    return np.stack(np.meshgrid(ticks, ticks), axis=-1).reshape(-1, 2)
+
+
+def formulas(xy: np.ndarray) -> np.ndarray:
+    """Return h, h_x, h_y, h_xx, h_xy, h_yy by the sum of two waves along the diagonals."""
+    total = np.zeros((len(xy), 6))
+    for sign in (1.0, -1.0):
+        k = WAVE * np.array([1.0, sign])
+        s, c = 0.5 * A * np.sin(xy @ k), 0.5 * A * np.cos(xy @ k)
+        total += np.stack(
+            [c, *(-k[i] * s for i in (0, 1)), *(-k[i] * k[j] * c for i, j in PAIRS)]
+        ).T
+    return total
+
+
+PAIRS = ((0, 0), (0, 1), (1, 1))
+
+
+def dense_numbers(law: str, count: int = 401) -> tuple[float, float]:
+    """Return the greatest ‖J‖/k and λ_max(-sym J)/k of law A or C on a dense grid."""
+    _h, hx, hy, hxx, hxy, hyy = formulas(grid(count)).T
+    down = np.stack([hx, hy, np.full_like(hx, -1.0)], axis=-1)
+    norms, sides = [], []
+    for depth in (0.0, DEPTH):
+        if law == "C":  # the gradient of the energy k δ²/2
+            second = np.zeros((len(hx), 3, 3))
+            second[:, 0, 0], second[:, 0, 1], second[:, 1, 1] = hxx, hxy, hyy
+            second[:, 1, 0] = hxy
+            jacobian = -(down[:, :, None] * down[:, None, :] + depth * second)
+        else:  # A pushes along e_z with k δ
+            jacobian = np.zeros((len(hx), 3, 3))
+            jacobian[:, 2] = down
+        norms.append(np.linalg.norm(jacobian, 2, axis=(1, 2)).max())
+        symmetric = -0.5 * (jacobian + jacobian.transpose(0, 2, 1))
+        sides.append(np.linalg.eigvalsh(symmetric).max())
+    return float(max(norms)), float(max(sides))
+
+
+def test_the_sampler_evaluates_the_formulas(texture: Any) -> None:
+    xy = grid(7)
+    scale = np.array([A, *[A * WAVE] * 2, *[A * WAVE**2] * 3])
+    assert (np.abs(texture.derivatives(xy) - formulas(xy)) < 1e-13 * scale).all()
+    points = np.column_stack([xy, np.full(len(xy), -0.3e-3)])
+    closest = texture.nearest(points)
+    near = grid(201)
+    around = near[None] + PERIOD * np.array([[[i, j]] for i in (-1, 0, 1) for j in (-1, 0, 1)])
+    surface = np.column_stack([around.reshape(-1, 2), np.tile(formulas(near)[:, 0], 9)])
+    for point, found in zip(points, closest, strict=True):
+        best = np.linalg.norm(surface - point, axis=1).min()
+        assert np.linalg.norm(found - point) <= best * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("law", ["A", "C"])
+@pytest.mark.parametrize("kind", ["texture", "plain"])
+def test_numbers_are_within_their_bounds(
+    law: str, kind: str, request: pytest.FixtureRequest
+) -> None:
+    """A dense evaluation stays below the proved bound; the attained value is above the grid's."""
+    surface = asp.Surface(request.getfixturevalue(kind), law, max_depth=DEPTH)
+    found = (asp.characteristic_number(surface), one_sided_number(surface))
+    for bound, dense in zip(found, dense_numbers(law), strict=True):
+        assert bound.method == "certified"
+        assert dense * (1.0 - 1e-9) <= bound.upper
+        assert bound.lower >= dense * (1.0 - 1e-4)
+        # Without enclosures of second derivatives each entry may be as large as their bound.
+        loose = 2.0 * DEPTH * (A * WAVE**2) if law == "C" and kind == "plain" else 0.0
+        assert bound.upper <= (dense + loose) * (1.01 if loose else 1.0011)
+
+
+def test_numbers_of_all_shipped_laws_are_bounds(plain: Any, finite: Any) -> None:
+    rng = np.random.default_rng(3)
+    for texture, law in itertools.product((plain, finite), "WABCDEFG"):
+        surface = asp.Surface(texture, law, max_depth=DEPTH)
+        bound = asp.characteristic_number(surface)
+        assert bound.lower <= bound.upper
+        xy = texture.domain.points(rng.random((2000, 2)))
+        jacobians = surface.jacobian(np.column_stack([xy, A - DEPTH * rng.random(2000)]))
+        norms = np.linalg.norm(jacobians / surface.stiffness, 2, axis=(1, 2))
+        assert norms.max() <= bound.upper * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("law", ["A", "C", "D"])
+def test_the_multi_precision_reference_follows(texture: Any, law: str) -> None:
+    surface = asp.Surface(texture, law, max_depth=DEPTH)
+    point = [0.31e-3, -0.17e-3, -0.05e-3]
+    force = np.array(exact_force(surface, point).tolist(), dtype=float)[:, 0]
+    np.testing.assert_allclose(surface.force([point])[0], force, atol=1e-12 * 1000.0 * DEPTH)
+    jacobian = np.array(exact_jacobian(surface, point).tolist(), dtype=float)
+    np.testing.assert_allclose(surface.jacobian([point])[0], jacobian, atol=1e-11 * 1000.0)
+
+
+def test_segments_of_a_line_enclose_the_heights(texture: Any) -> None:
+    line = texture.scan_line()
+    pieces = texture.line_segments(line, 64)
+    models = pieces.models(DERIVATIVE_NAMES)
+    for xi in (-1.0, 0.3, 1.0):
+        along = (np.arange(64) + 0.5 + 0.5 * xi) * pieces.length
+        exact = formulas(line.start + along[:, None] * line.direction)
+        for i, name in enumerate(DERIVATIVE_NAMES):
+            model = models[name]
+            assert (np.abs(exact[:, i] - model.c - xi * model.g[0]) <= model.e).all()
+    assert models["h"].e.max() < 2e-3 * A  # and are tight
+
+
+# --- wrong bounds are detected -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", ["A", "C", "G"])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("extremes", (-0.9 * A, 0.9 * A)),
+        ("bounds", (0.9 * A * WAVE, A * WAVE**2)),
+        ("bounds", (A * WAVE, 0.9 * A * WAVE**2)),
+    ],
+)
+def test_bounds_that_are_too_small_are_an_error(
+    own: ModuleType, law: str, name: str, value: tuple[float, float]
+) -> None:
+    wrong = type("Wrong", (own.EggBox,), {name: value})(A, PERIOD)
+    with pytest.raises(InternalError):
+        asp.characteristic_number(asp.Surface(wrong, law, max_depth=DEPTH))
+
+
+def test_a_third_derivative_bound_that_is_too_small_is_an_error(own: ModuleType) -> None:
+    wrong = type("Wrong", (own.EggBox,), {"third_derivative_bound": A * WAVE**3})(A, PERIOD)
+    with pytest.raises(InternalError):
+        asp.characteristic_number(asp.Surface(wrong, "C", max_depth=DEPTH))
+
+
+def test_a_bound_that_is_attained_ends_the_search_for_the_sharpest_crest(texture: Any) -> None:
+    """The tops have the greatest curvature that the kind states: smaller cells add nothing."""
+    cells = texture.cells()
+    found = supremum(CrestProblem(cells), 1e-4)
+    assert found.converged
+    assert found.lower == pytest.approx(A * WAVE**2, rel=1e-9)
+    assert found.lower <= found.upper <= A * WAVE**2 * (1.0 + 1e-8)
+    unaware = texture.cells()
+    unaware.hessian_bound = math.inf
+    rough = supremum(CrestProblem(unaware), 1e-2)
+    assert found.cell_count < 4096 < 50 * 4096 < rough.cell_count
+    assert rough.lower == pytest.approx(found.lower, rel=1e-9)
+    assert rough.upper > found.upper
+
+
+def test_certificates_of_a_user_defined_kind_are_not_cached(texture: Any) -> None:
+    """Its file may change, and so may what the file reads."""
+    surface = asp.Surface(texture, "A", max_depth=DEPTH)
+    assert surface_content(surface) is None
+    assert surface_content(surface.to_texture(asp.Sinusoid(A, PERIOD))) is not None
+
+
+# --- everything else follows ----------------------------------------------------------------------
+
+
+def test_it_works_in_python(texture: Any) -> None:
+    result = asp.compare(texture, device="omega.3", laws="WABCDEFG", max_depth=DEPTH)
+    assert [row.law.letter for row in result.rows] == list("WABCDEFG")
+    data = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    assert data["texture"]["kind"] == "egg-box"
+    assert "egg-box" in html_text(result)
+    surface = asp.Surface(texture, "A", max_depth=DEPTH)
+    found = asp.analyze(surface, device="omega.3")
+    json.dumps(found.to_dict(), allow_nan=False)
+    assert "<svg" in html_text(found)
+    json.dumps(asp.limits(texture, device="omega.3", law="C").to_dict(), allow_nan=False)
+
+
+def test_the_energy_of_a_loop_is_the_stated_one(plain: Any) -> None:
+    surface = asp.Surface(plain, "A", max_depth=DEPTH)
+    worst = asp.worst_loop(surface)
+    assert asp.loop_work(surface, worst.vertices) == pytest.approx(worst.energy, rel=1e-3)
+    assert worst.energy <= worst.upper_per_period
+
+
+def test_its_spectrum_is_sampled(texture: Any) -> None:
+    """Two waves along the diagonals: all the variance at l/√2, of a²/2 with a = A/√2."""
+    from asperity.analysis.limits.spectrum import compute_spectrum
+
+    found = compute_spectrum(texture)
+    assert not found.exact
+    strongest = max(found.waves, key=lambda wave: wave.share)
+    assert strongest.share > 0.99
+    assert strongest.wavelength == pytest.approx(PERIOD / math.sqrt(2.0), rel=1e-3)
+    assert strongest.amplitude == pytest.approx(A / math.sqrt(2.0), rel=1e-2)
+
+
+# --- by name ------------------------------------------------------------------------------------
+
+
+def test_a_name_is_registered_once(registered: TextureKind) -> None:
+    with pytest.raises(ParameterError, match="'egg-box' is taken: bumps and dimples"):
+        catalogue.register(registered)
+
+
+@pytest.mark.parametrize("name", ["sinusoid", "cloth", "file", "Egg", "egg box", "", "e"])
+def test_invalid_names_are_refused(name: str, own: ModuleType) -> None:
+    before = dict(catalogue.CATALOGUE)
+    with pytest.raises(ParameterError, match="kind"):
+        catalogue.register(TextureKind(name, "a kind", own.EggBox, ()))
+    assert before == catalogue.CATALOGUE
+
+
+SPECIFICATION = "egg-box:amplitude=0.1mm,period=2mm"
+MODULE = ("--plugin", str(EXAMPLE))
+
+
+def test_it_works_on_the_command_line(answer: Answer, call: Call, tmp_path: Path) -> None:
+    page = tmp_path / "report.html"
+    given = ("compare", SPECIFICATION, "--laws", "AC", "--html", str(page))
+    assert answer(*given, *MODULE)["texture"]["kind"] == "egg-box"
+    assert "egg-box" in page.read_text(encoding="utf-8")
+    listed = answer("surfaces", "egg-box", *MODULE)["surfaces"]
+    assert [one["specification"] for one in listed] == ["egg-box:amplitude=100um,period=2mm"]
+    assert answer("analyze", SPECIFICATION, "--law", "C", *MODULE)["texture"]["kind"] == "egg-box"
+    assert answer("limits", SPECIFICATION, "--law", "C", *MODULE)["texture"]["kind"] == "egg-box"
+    code, _out, err = call("compare", "egg-box:amplitude=0.1mm", *MODULE)
+    assert code == 2
+    assert "period is missing: a egg-box needs amplitude, period" in err
+
+
+def test_a_kind_is_registered_until_the_command_ends(call: Call) -> None:
+    assert call("surfaces", "egg-box", *MODULE)[0] == 0
+    assert "egg-box" not in catalogue.CATALOGUE
+    code, _out, err = call("surfaces", "egg-box")
+    assert code == 2
+    assert "is unknown: 'egg-box'" in err
+
+
+def test_it_works_in_a_scene(answer: Answer, tmp_path: Path) -> None:
+    scene = tmp_path / "eggs.toml"
+    scene.write_text(
+        '[texture]\nkind = "egg-box"\namplitude = "0.1 mm"\nperiod = "2 mm"\n'
+        '[surface]\nlaw = "C"\nmax_depth = "0.2 mm"\n'
+        '[device]\nid = "omega.3"\napparent_mass = "250 g"\n'
+        '[hand]\nkind = "spring"\nstiffness = "500 N/m"\n'
+        '[motion]\nkind = "strokes"\nstart = "0mm; 0mm; -0.05mm"\n'
+        'end = "1mm; 0.2mm; -0.05mm"\nspeed = "50 mm/s"\n'
+        '[run]\nduration = "20 ms"\n',
+        encoding="utf-8",
+    )
+    assert answer("analyze", str(scene), *MODULE)["texture"]["kind"] == "egg-box"
+    answer("simulate", str(scene), *MODULE)
+
+
+def test_the_example_runs(own: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+    monkeypatch.setattr(catalogue, "CATALOGUE", dict(catalogue.CATALOGUE))
+    own.main()
+    assert "C: q = 1.1006 (certified)" in capsys.readouterr().out
+
+
+def test_the_reference_height_is_good_to_double_precision(texture: Any) -> None:
+    """The default of a kind without a formula in multi-precision arithmetic."""
+    h = texture.exact_height()
+    with mpmath.workdps(40):
+        k, x, y = mpmath.mpf(WAVE), mpmath.mpf("0.123e-3"), mpmath.mpf("0.321e-3")
+        exact = mpmath.mpf(A) * mpmath.cos(k * x) * mpmath.cos(k * y)
+        off = abs(h(x, y, 0, 0) - exact)
+    assert off < 1e-15 * A

@@ -1,0 +1,116 @@
+"""Onsets are kept between runs, under all that they depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.core import cache
+from asperity.core import cache as kept
+from asperity.laws import Law
+from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, find_onset
+from asperity.simulation.batch import BatchSimulation
+from asperity.simulation.limit_cycles.onset import Onset
+from asperity.surface import Surface
+from asperity.textures import Sinusoid
+
+pytestmark = pytest.mark.keeps_answers
+LOOP: dict[str, Any] = {
+    "surface": Surface(Sinusoid(0.2e-3, 2e-3), "W", max_depth=1e-2),
+    "plant": Cartesian(0.05, 3.0),
+    "hand": SpringHand((100.0, 100.0, 0.0), 1.0, 0.0, (0.0, 0.0, -1.0)),
+    "servo": Servo(1e-3),
+    "motion": Stationary((0.0, 0.0, 0.0)),
+    "duration": 0.1,
+    "starts": 1,
+    "lowest": 900.0,
+    "highest": 1000.0,
+}
+
+
+@pytest.fixture(autouse=True)
+def room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """An empty room of answers; compiled code is shared with other tests."""
+    monkeypatch.setattr(kept, "RESULTS_NAMESPACE", f"results-{tmp_path.name}")
+    yield
+    for entry in cache.list_entries():
+        if entry.namespace == kept.RESULTS_NAMESPACE:
+            entry.path.unlink()
+
+
+@pytest.fixture
+def runs(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The stiffnesses that are run."""
+    seen: list[float] = []
+    start = BatchSimulation.new_trajectory
+
+    def noted(loop: BatchSimulation, stiffness: float, *rest: Any) -> Any:
+        seen.append(stiffness)
+        return start(loop, stiffness, *rest)
+
+    monkeypatch.setattr(BatchSimulation, "new_trajectory", noted)
+    return seen
+
+
+def found(**changed: Any) -> Onset:
+    return find_onset(**LOOP | changed)
+
+
+def test_an_onset_is_found_once(runs: list[float]) -> None:
+    first = found()
+    assert runs
+    runs.clear()
+    assert found() == first
+    # Its stiffness does not count, and where the handle starts by default is where it starts.
+    assert found(surface=LOOP["surface"].to_stiffness(3.0), start=np.zeros(3)) == first
+    assert not runs
+
+
+CHANGES: dict[str, Callable[[], Any]] = {
+    "surface": lambda: Surface(Sinusoid(0.21e-3, 2e-3), "W", max_depth=1e-2),
+    "plant": lambda: Cartesian(0.05, np.nextafter(3.0, 4.0)),
+    "hand": lambda: replace(LOOP["hand"], damping=1.1),
+    "servo": lambda: Servo(1e-3, delay=1),
+    "motion": lambda: Stationary((0.0, 0.0, 1e-9)),
+    "start": lambda: (0.0, 0.0, 1e-3),
+    "velocity": lambda: (0.0, 0.0, 1e-3),
+    "duration": lambda: 0.11,
+    "starts": lambda: 2,
+    "tolerance": lambda: 0.03,
+    "threshold": lambda: 14e-3,
+    "lowest": lambda: 901.0,
+    "highest": lambda: 1001.0,
+    "near": lambda: 950.0,
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_whatever_is_changed_is_found_anew(name: str, runs: list[float]) -> None:
+    found()
+    runs.clear()
+    found(**{name: CHANGES[name]()})
+    assert runs
+
+
+class Mine(Stationary):
+    """A motion of one's own: what it does is not known."""
+
+
+def test_the_onset_of_a_user_defined_motion_is_not_cached(runs: list[float]) -> None:
+    for _ in range(2):
+        runs.clear()
+        found(motion=Mine((0.0, 0.0, 0.0)))
+        assert runs
+
+
+def test_the_onset_of_a_user_defined_law_is_cached_by_its_formula(runs: list[float]) -> None:
+    for power in (1, 2):
+        own = Law("U", "own", "vertical", lambda c, n=power: c.k * c.depth**n * c.e_z)
+        runs.clear()
+        found(surface=Surface(Sinusoid(1e-4, 1e-3), own))
+        assert runs

@@ -1,0 +1,105 @@
+"""Hands: a handle that is moved, and an elastic band on a mass in space."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import trapezoid
+
+from asperity.simulation import (
+    BandHand,
+    Cartesian,
+    PrescribedHand,
+    Run,
+    Servo,
+    Stationary,
+    Strokes,
+    Waypoints,
+    simulate,
+)
+from asperity.surface import Surface
+from asperity.textures.kinds.sinusoid import Sinusoid
+
+WAVE = Sinusoid(amplitude=0.3e-3, period=2e-3, phase=0.3)
+JOB: dict[str, Any] = {
+    "surface": Surface(WAVE, "W", 500.0), "plant": Cartesian(0.05, 1.0),
+    "servo": Servo(1e-3, delay=1),
+    "motion": Strokes((0.0, 0.0, -1e-3), (8e-3, 3e-3, -1e-3), 0.08, 3),
+    "duration": 0.4,
+}  # fmt: skip
+
+
+def run_of(**changed: Any) -> Run:
+    return simulate(**{**JOB, **changed})
+
+
+def test_a_moved_handle_meets_the_field_alone() -> None:
+    """The work of a straight stroke through law A's field, by hand: k ∫ (h - z)⁺ e_z · dp."""
+    way = Waypoints([0.0, 0.2], [[0.0, 0.0, 0.0], [0.3e-3, 0.0, -2e-3]])
+    surface = Surface(WAVE, "A", 800.0)
+    run = run_of(
+        surface=surface, hand=PrescribedHand(), motion=way, servo=Servo(1e-5), duration=0.2
+    )
+    t = np.linspace(0.0, 1.0, 200_001)
+    depth = np.maximum(0.3e-3 * np.sin(np.pi * 1e3 * 0.3e-3 * t + 0.3) + 2e-3 * t, 0.0)
+    work = -2e-3 * 800.0 * float(trapezoid(depth, t))
+    assert run.ledger.supplied[2] == pytest.approx(work, rel=1e-4)
+    assert run.ledger.supplied[0] == 0.0
+    assert run.ledger.hand == pytest.approx(-run.ledger.total, rel=1e-12)
+    assert (run.ledger.dissipated, run.ledger.friction) == (0.0, 0.0)
+    np.testing.assert_allclose(run.position, way.at(run.time), atol=1e-15)
+
+
+@pytest.mark.parametrize("letter", ["B", "F"])
+def test_the_law_and_its_state_are_those_of_the_surface(letter: str) -> None:
+    """Along a way that leaves the surface and comes back, forces are those of Surface.trace."""
+    surface = Surface(WAVE, letter, 700.0, friction=0.7, max_deflection=0.4e-3)
+    points = [[0.0, 0.0, -1e-3], [3e-3, 1e-3, -1e-3], [3e-3, 1e-3, 1e-3], [4e-3, 2e-3, -1e-3]]
+    way = Waypoints([0.0, 0.1, 0.15, 0.2], points)
+    run = run_of(surface=surface, hand=PrescribedHand(), motion=way, duration=0.2)
+    expected = surface.trace(run.position)
+    assert 10 < np.count_nonzero(expected[:, 2] == 0.0) < 150
+    np.testing.assert_allclose(run.commanded, expected, rtol=1e-12, atol=1e-15)
+
+
+def test_a_band_pulls_with_its_tension_and_returns_its_energy() -> None:
+    """Statics by hand: at rest in the wall, k depth = pull of the band at that length."""
+    band = BandHand(stiffness=200.0, tension=3.0, length=0.08, damping=3.0)
+    rest = Stationary((0.0, 0.0, 0.0))
+    run = run_of(hand=band, motion=rest, plant=Cartesian(0.02), duration=3.0, servo=Servo(1e-4))
+    depth = 3.0 / (500.0 + 200.0)  # 500 d = 3 - 200 d
+    assert run.state[2] == pytest.approx(-depth, rel=1e-9)
+    ledger = run.ledger
+    assert abs(ledger.closure) < 1e-9 * ledger.exchanged
+    stretch = 3.0 / 200.0
+    assert ledger.stored_before == pytest.approx(0.5 * 200.0 * stretch**2, rel=1e-12)
+    assert ledger.stored_after == pytest.approx(0.5 * 200.0 * (stretch - depth) ** 2, rel=1e-6)
+
+
+def test_a_band_is_not_linearised() -> None:
+    """Aside by as much as it is long, its direction turns: the force by the triangle's sides."""
+    run = run_of(
+        hand=BandHand(damping=0.0), motion=Stationary((0.0, 0.0, 0.0)), plant=Cartesian(1.0),
+        start=(0.06, 0.0, 0.0), duration=1e-3, surface=Surface(WAVE, "W", 1e-6),
+        servo=Servo(1e-3),
+    )  # fmt: skip
+    pull = 200.0 * (0.1 - 0.065)  # 0.06, 0.08 and 0.1 m
+    np.testing.assert_allclose(
+        run.state[3:6], 1e-3 * pull * np.array([-0.6, 0.0, -0.8]), rtol=1e-4, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("period", [1e-4, 1e-3])
+@pytest.mark.parametrize("band", [BandHand(), BandHand(400.0, 0.2)], ids=["taut", "slack"])
+@pytest.mark.parametrize("friction", [0.0, 0.02])
+def test_a_mass_on_a_band_closes(period: float, band: BandHand, friction: float) -> None:
+    coupled = [[0.5, 0.1, 0.0], [0.1, 0.4, 0.0], [0.0, 0.0, 0.3]]
+    run = run_of(
+        hand=band, plant=Cartesian((0.05, 0.04, 0.06), coupled, friction=friction),
+        servo=Servo(period, delay=1), start=(1e-3, 2e-3, 3e-3), surface=Surface(WAVE, "C", 200.0),
+    )  # fmt: skip
+    assert not run.stop_message
+    assert abs(run.ledger.closure) < 1e-9 * run.ledger.exchanged
+    assert (run.ledger.friction < 0.0) == (friction > 0.0)

@@ -1,0 +1,313 @@
+"""The pantograph: inertia against SymPy's own derivation, energies, brakes, workspace."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from functools import cache
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError
+from asperity.devices.five_bar import handle_damping, joint_angles, joint_rates
+from asperity.simulation import (
+    BandHand,
+    Hand,
+    LinkMasses,
+    Pantograph,
+    PrescribedHand,
+    Run,
+    Servo,
+    SpringHand,
+    Stationary,
+    Strokes,
+    Waypoints,
+    sampled_plant,
+    simulate,
+)
+from asperity.simulation.kernels.pantograph_dynamics import (
+    linkage_dynamics,
+    linkage_friction,
+    linkage_rates,
+)
+from asperity.simulation.pantograph import linkage_record
+from asperity.surface import Surface
+from asperity.textures.kinds.sinusoid import Sinusoid
+
+WAVE = Sinusoid(amplitude=0.3e-3, period=2e-3, phase=0.3)
+HEAVY = Pantograph(masses=LinkMasses(0.011, 0.007, 0.009, rotor=2e-6), centre=(0.02, 0.09))
+PLACES = [(0.0, 0.0), (0.013, -0.021), (-0.034, 0.012), (0.009, 0.017)]
+SPRING = SpringHand(300.0, 3.0, mass=0.03, force=(0.1, 0.0, -0.5))
+LINEAR_WAY = Strokes((0.0, 0.0, -1e-3), (8e-3, 0.0, -1e-3), speed=0.08, count=9)
+
+
+@cache
+def lagrangian() -> tuple[Any, Any]:
+    """Kinetic energy of rods and handle by SymPy, and the forces of Lagrange's equations.
+
+    Coordinates are the handle's; the angles follow from triangles. Nothing of the code is used but
+    the lengths and masses. Returns functions of (x, z, x', z', x'', z'').
+    """
+    import sympy as sp
+
+    x, z, dx, dz, ax, az = names = sp.symbols("x z dx dz ax az")
+    bars, masses = HEAVY.linkage, HEAVY.masses
+    place, speed, gain = sp.Matrix([x, z]), sp.Matrix([dx, dz]), sp.Matrix([ax, az])
+    energy = masses.handle * speed.dot(speed) / 2
+    for motor, side in ((0.0, -1), (-bars.base, 1)):
+        reach = sp.sqrt((x - motor) ** 2 + z**2)
+        squares = bars.proximal**2 + reach**2 - bars.distal**2
+        opening = sp.acos(squares / (2 * bars.proximal * reach))
+        angle = sp.atan2(z, x - motor) + side * opening
+        elbow = sp.Matrix([motor + bars.proximal * sp.cos(angle), bars.proximal * sp.sin(angle)])
+        turn = (sp.Matrix([angle]).jacobian(place) * speed)[0]
+        knee = elbow.jacobian(place) * speed
+        energy += masses.rotor * turn**2 / 2
+        for mass, first, last in (
+            (masses.proximal, sp.zeros(2, 1), knee),
+            (masses.distal, knee, speed),
+        ):
+            # Simpson's rule is exact for the square of a velocity that is linear along the rod.
+            ends, middle = first.dot(first) + last.dot(last), (first + last) / 2
+            energy += mass / 2 * (ends + 4 * middle.dot(middle)) / 6
+    momentum = sp.Matrix([energy]).jacobian(speed).T
+    force = momentum.jacobian(speed) * gain + momentum.jacobian(place) * speed
+    force -= sp.Matrix([energy]).jacobian(place).T
+    return (
+        sp.lambdify(names, energy, "math", cse=True),
+        sp.lambdify(names, list(force), "math", cse=True),
+    )
+
+
+def inertia(x: float, z: float, dx: float, dz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Mass matrix, c and JᵀJ of the code under test."""
+    mxx, mxz, mzz, cx, cz, bxx, bxz, bzz = linkage_dynamics(x, z, dx, dz, linkage_record(HEAVY))
+    return (
+        np.array([[mxx, mxz], [mxz, mzz]]),
+        np.array([cx, cz]),
+        np.array([[bxx, bxz], [bxz, bzz]]),
+    )
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_inertia_and_own_forces_are_lagranges(place: tuple[float, float]) -> None:
+    energy, forces = lagrangian()
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        v, a = rng.normal(size=2), 30.0 * rng.normal(size=2)
+        mass, own, _ = inertia(*place, *v)
+        absolute = (HEAVY.centre[0] + place[0], HEAVY.centre[1] + place[1])
+        assert 0.5 * v @ mass @ v == pytest.approx(energy(*absolute, *v, *a), rel=1e-11)
+        expected = np.array(forces(*absolute, *v, *a))
+        np.testing.assert_allclose(mass @ a + own, expected, atol=1e-11 * np.abs(expected).max())
+        # Negative control: the masses' own forces are not small.
+        assert np.abs(own).max() > 1e-4 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_rates_are_the_derivative_of_the_angles(place: tuple[float, float]) -> None:
+    p = np.add(HEAVY.centre, place)
+    step = 1e-6 * np.eye(2)
+    finite = [
+        (joint_angles(HEAVY.linkage, p + d) - joint_angles(HEAVY.linkage, p - d)) / 2e-6
+        for d in step
+    ]
+    rates = joint_rates(HEAVY.linkage, p)
+    np.testing.assert_allclose(rates, np.array(finite).T, rtol=1e-7, atol=1e-7)
+    np.testing.assert_allclose(inertia(*place, 0.0, 0.0)[2], rates.T @ rates, rtol=1e-12)
+
+
+def test_the_guess_is_about_twenty_grams_and_is_labelled() -> None:
+    plant = Pantograph()
+    numbers = linkage_dynamics(0.0, 0.0, 0.0, 0.0, linkage_record(plant))
+    assert numbers[0] == pytest.approx(0.020, abs=1.5e-3)
+    assert numbers[2] == pytest.approx(0.020, abs=1.5e-3)
+    assert "guess" in plant.notes[0]
+    assert not any("guess" in note for note in HEAVY.notes)
+    damping = handle_damping(plant.linkage, plant.joint_damping, plant.centre)
+    np.testing.assert_allclose(
+        plant.joint_damping * np.array([numbers[5], numbers[7]]), np.diag(damping), rtol=1e-12
+    )
+
+
+def run_of(
+    plant: Pantograph, hand: Hand, period: float = 1e-4, letter: str = "C", duration: float = 0.5
+) -> Run:
+    surface = Surface(WAVE, letter, 600.0, max_depth=0.3e-3)
+    servo = Servo(period, delay=1, position_resolution=15e-6)
+    return simulate(
+        surface, plant, hand, servo, LINEAR_WAY, duration, start=(0.0, 0.0, 2e-3),
+        velocity=(0.1, 0.0, -0.1),
+    )  # fmt: skip
+
+
+SLACK = BandHand(stiffness=400.0, tension=0.2)
+
+
+@pytest.mark.parametrize("hand", [SPRING, BandHand(), SLACK], ids=["spring", "band", "slack"])
+@pytest.mark.parametrize("friction", [0.0, 0.02])
+@pytest.mark.parametrize("period", [1e-4, 3e-4])
+def test_energy_closes(hand: Hand, friction: float, period: float) -> None:
+    plant = Pantograph(friction=friction, joint_damping=3e-3, centre=(0.01, 0.1))
+    run = run_of(plant, hand, period)
+    ledger, energies = run.ledger, run.energies
+    assert not run.stop_message
+    assert abs(ledger.closure) < 1e-9 * ledger.exchanged
+    assert ledger.exchanged > 1e-4
+    assert (ledger.friction < 0.0) == (friction > 0.0)
+    flow = energies["supplied"].sum(axis=1) + energies["hand"] + energies["friction"]
+    gap = energies["stored"] - energies["stored"][0] - flow + energies["lost"]
+    assert np.abs(gap).max() < 1e-9 * ledger.exchanged
+    steps = np.diff(run.position, axis=0)
+    np.testing.assert_allclose(
+        energies["supplied"][1:], np.cumsum(run.applied[:-1] * steps, axis=0), atol=1e-13
+    )
+
+
+def test_long_steps_do_not_close(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Negative control: one step where many are needed; and the order of closing is five."""
+    gaps = []
+    for share in (4.0, 1.0, 0.25):
+        monkeypatch.setattr("asperity.simulation.pantograph._MAX_STEP_FRACTION", share)
+        ledger = run_of(Pantograph(inside_only=False, joint_damping=0.05), SPRING, 4e-3).ledger
+        gaps.append(abs(ledger.closure) / ledger.exchanged)
+    assert gaps[0] > gaps[1] > 1e-9 > gaps[2]
+    assert gaps[1] / gaps[2] > 2.0**8
+
+
+def test_a_slack_band_needs_the_kink(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Negative control: without small steps where the band turns slack, energy does not close."""
+    plant = Pantograph(joint_damping=0.0)
+    run = run_of(plant, SLACK)
+    ends = run.anchor - [0.0, 0.0, SLACK.length]
+    taut = np.linalg.norm(ends - run.position, axis=1) > SLACK.rest_length
+    assert np.count_nonzero(np.diff(taut)) > 3
+    assert abs(run.ledger.closure) < 1e-9 * run.ledger.exchanged
+
+    source = "def band_changes_state(sx, sy, sz, tx, ty, tz, hand):\n    return False\n"
+    declared = 'KERNELS = Kernels(provides=("band_changes_state",))'
+    source = f"from asperity.core.compiled import Kernels\n{declared}\n{source}"
+    (tmp_path / "blind_band.py").write_text(source)
+    monkeypatch.syspath_prepend(tmp_path)
+    blind, build = importlib.import_module("blind_band"), Pantograph.sample
+
+    def built(*arguments: Any) -> sampled_plant.SampledPlant:
+        own = build(*arguments)
+        return sampled_plant.SampledPlant(
+            (own.modules[0], blind, *own.modules[1:]), own.record, own.order
+        )
+
+    monkeypatch.setattr(Pantograph, "sample", built)
+    ledger = run_of(plant, SLACK).ledger
+    assert abs(ledger.closure) > 1e-9 * ledger.exchanged
+
+
+def test_free_motion_follows_lagrange() -> None:
+    """Undamped and alone the handle moves as an independent integration of SymPy's equations."""
+    from scipy.integrate import solve_ivp
+
+    _, forces = lagrangian()
+    free = Pantograph(HEAVY.linkage, HEAVY.masses, 0.0, HEAVY.centre)
+    begin, speed = (0.005, 0.0, 0.004), (0.4, 0.0, 0.3)
+    surface = Surface(WAVE, "W", 1.0)
+    run = simulate(
+        surface, free, SpringHand(), Servo(1e-3), Stationary(begin), 0.05, velocity=speed
+    )
+    assert run.applied.max() == 0.0
+
+    def rate(_t: float, y: FloatArray) -> list[float]:
+        place = (y[0] + free.centre[0], y[1] + free.centre[1])
+        rest = np.array(forces(*place, *y[2:], 0.0, 0.0))
+        columns = [np.array(forces(*place, *y[2:], *unit)) - rest for unit in np.eye(2)]
+        return [*y[2:], *np.linalg.solve(np.array(columns).T, -rest)]
+
+    start = [begin[0], begin[2], speed[0], speed[2]]
+    end = solve_ivp(rate, (0.0, 0.05), start, "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+    np.testing.assert_allclose(run.state[[0, 2, 3, 5]], end, rtol=1e-8)
+    # Negative control: it does not move straight on.
+    assert abs(run.state[3] - speed[0]) > 1e-3
+
+
+def test_brakes_act_inside_only() -> None:
+    """Above the wall nothing is lost, in it something is; without the switch it is everywhere."""
+    surface, way = Surface(WAVE, "W", 600.0), Stationary((0.0, 0.0, 0.0))
+    losses = {}
+    for inside_only in (True, False):
+        plant = Pantograph(inside_only=inside_only)
+        run = simulate(
+            surface, plant, SpringHand(), Servo(1e-4), way, 0.05, start=(0.0, 0.0, 0.5e-3),
+            velocity=(0.0, 0.0, -0.1),
+        )  # fmt: skip
+        lost = run.energies["lost"]
+        outside = run.position[:, 2] > 0.0
+        contact = int(np.argmin(outside))
+        assert 10 < contact < len(lost)
+        losses[inside_only] = lost[contact], run.ledger.dissipated
+    assert losses[True][0] == 0.0
+    assert losses[True][1] > 0.0
+    assert losses[False][0] > 0.0
+
+
+def test_brakes_of_a_textured_law_begin_at_the_texture() -> None:
+    """Law C's body begins at h, not at z = 0: above z = 0 and below h the brakes are on."""
+    crest = float(WAVE.height([[0.42e-3, 0.0]])[0])
+    assert crest > 0.2e-3
+    lost = {}
+    for letter in "WC":
+        run = simulate(
+            Surface(WAVE, letter, 600.0), Pantograph(), SpringHand(), Servo(1e-4),
+            Stationary((0.42e-3, 0.0, 0.5 * crest)), 1e-3, velocity=(0.0, 0.0, -0.01),
+        )  # fmt: skip
+        assert run.position[:, 2].min() > 0.0
+        lost[letter] = run.ledger.dissipated
+    assert lost["W"] == 0.0
+    assert lost["C"] > 0.0
+
+
+def test_friction_of_no_limit_is_what_stops_the_handle() -> None:
+    """With it v + a t = 0 by the equations, damping, hand and speeds in both directions counted."""
+    bar, hand, span = linkage_record(HEAVY), SPRING.record(), 1e-3
+    x = np.array([0.004, 0.0, -0.005, 0.3, 0.0, -0.4])
+    given = (0.003, 0.006, 0.2, 0.25, 5.0)  # anchor, its speed, damping of the joints
+    fx, fz = linkage_friction(x, 0.4, 1.1, *given, 1e9, span, bar, hand)
+    rates = linkage_rates(x[0], x[2], x[3], x[5], 0.4 + fx, 1.1 + fz, *given, bar, hand)
+    np.testing.assert_allclose(np.array(rates[:2]) * span, -x[[3, 5]], rtol=1e-9)
+
+
+def test_it_stops_where_the_workspace_ends() -> None:
+    way = Waypoints([0.0, 1.0], [[0.0, 0.0, 0.02], [0.0, 0.0, 0.12]])
+    run = simulate(Surface(WAVE, "W", 500.0), Pantograph(), SPRING, Servo(1e-3), way, 1.0)
+    assert run.stop_message.startswith("left the workspace: at (")
+    assert 0 < run.samples < 1000
+    np.testing.assert_array_equal(run.position[-1], run.state[:3])
+    plant = Pantograph()
+    reach = math.hypot(plant.centre[0] + run.state[0], plant.centre[1] + run.state[2])
+    assert reach < 0.138
+    assert abs(run.ledger.closure) < 1e-9 * run.ledger.exchanged
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [
+        ((0.0, 0.0, 0.1), "stretched"),
+        ((0.0, 0.0, -0.11), "behind the motors"),
+        ((0.0125, 0.0, -0.09), "folded"),
+        ((0.0, 1e-3, 0.0), "y = 0"),
+    ],
+)
+def test_a_start_outside_is_refused(place: tuple[float, float, float], words: str) -> None:
+    with pytest.raises(ParameterError, match=words):
+        simulate(Surface(WAVE, "W"), Pantograph(), SPRING, Servo(1e-3), Stationary(place), 0.1)
+
+
+def test_the_plane_is_kept() -> None:
+    way = Strokes((0.0, 0.0, 0.0), (0.01, 0.01, 0.0), 0.1)
+    with pytest.raises(ParameterError, match="y = 0"):
+        simulate(Surface(WAVE, "W"), Pantograph(), SPRING, Servo(1e-3), way, 0.1)
+    run = simulate(Surface(WAVE, "A"), Pantograph(), PrescribedHand(), Servo(1e-3), LINEAR_WAY, 0.1)
+    np.testing.assert_allclose(run.position, run.anchor, atol=1e-15)
+    assert run.ledger.closure == 0.0

@@ -1,0 +1,242 @@
+"""Windows of cells: what is dropped holds no closer point, and hardly more could be dropped."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from asperity.contacts.closest import plane_search
+from asperity.core.checks import FloatArray
+from asperity.textures import HeightMap
+from asperity.textures.bounds.pyramid import plane_pyramid
+from asperity.textures.spline import heightmap_pruning as pruning
+from asperity.textures.spline import heightmap_sampler as heightmap
+from asperity.textures.spline.heightmap_sampler import HeightMapArguments
+
+PITCH = (50e-6, 70e-6)
+Point = tuple[float, float, float, float, float, float]
+
+
+def rough(seed: int, height: float = 60e-6) -> HeightMap:
+    """Return a map of 25 x 38 nodes that is correlated over a few of them."""
+    from scipy.ndimage import gaussian_filter
+
+    noise = gaussian_filter(np.random.default_rng(seed).standard_normal((25, 38)), 2.0)
+    return HeightMap(height * noise / noise.std(), PITCH, origin=(1e-3, -2e-3))
+
+
+def cells(texture: HeightMap) -> tuple[int, int]:
+    return heightmap.cell_counts(texture.arguments.c)
+
+
+def squares(texture: HeightMap, probe: FloatArray, finer: int = 8) -> FloatArray:
+    """Return the least φ on a grid in each cell (ny, nx)."""
+    nx, ny = cells(texture)
+    share = (np.arange(finer) + 0.5) / finer
+    x = texture.origin[0] + PITCH[0] * (np.arange(nx)[:, None] + share).ravel()
+    y = texture.origin[1] + PITCH[1] * (np.arange(ny)[:, None] + share).ravel()
+    xy = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+    phi = ((np.column_stack([xy, texture.height(xy)]) - probe) ** 2).sum(axis=1)
+    return phi.reshape(ny, finer, nx, finer).min(axis=(1, 3))
+
+
+def outside(phi: FloatArray, left: pruning.Window) -> float:
+    """Return the least φ of the cells that are not in a pruning."""
+    west, east, south, north = left
+    rest = phi.copy()
+    if not pruning.is_empty(left):
+        rest[south : north + 1, west : east + 1] = np.inf
+    return float(rest.min())
+
+
+def probes(texture: HeightMap, rng: np.random.Generator, count: int) -> FloatArray:
+    nx, ny = cells(texture)
+    xy = texture.origin + rng.uniform(-0.1, 1.1, (count, 2)) * np.array([nx, ny]) * PITCH
+    below = rng.uniform(-0.1e-3, 0.7e-3, count)
+    return np.column_stack([xy, texture.height(xy) - below])
+
+
+@pytest.mark.parametrize("by", ["cells", "boxes"])
+def test_narrowing_loses_no_closer_point(by: str) -> None:
+    """For any g and best point; the negative control drops more."""
+    rng = np.random.default_rng(51)
+    dropped, lost = 0, 0
+    for seed in range(4):
+        texture = rough(seed)
+        nx, ny = cells(texture)
+        whole = (0, nx - 1, 0, ny - 1)
+        for probe in probes(texture, rng, 25):
+            phi = squares(texture, probe)
+            threshold = float(phi.min()) * rng.uniform(0.9, 1.3)
+            g = rng.choice([1.0, 0.9, -0.3]) * float(texture.height(probe[None, :2])[0] - probe[2])
+            level = int(rng.integers(1, 4))
+            for share in (1.0, 0.8):
+                ball = (*map(float, probe), share * threshold)
+                if by == "cells":
+                    left = pruning.shrink_to_cells(ball, g, whole, texture.arguments)
+                else:
+                    left = pruning.shrink_to_boxes(ball, level, whole, texture.arguments)
+                least = outside(phi, left)
+                if share == 1.0:
+                    assert least >= threshold
+                    dropped += least < np.inf
+                else:
+                    lost += least < threshold
+    assert dropped > 50
+    assert lost > 5
+
+
+def minimum(probe: FloatArray, start: FloatArray, texture: HeightMapArguments) -> Point:
+    """Return the local minimum of φ found by descent from a start."""
+    return plane_search.descend(*map(float, probe), *map(float, start), texture)
+
+
+@pytest.fixture(autouse=True)
+def linked_sampler(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bind the sampler as the linker does."""
+    monkeypatch.setattr(plane_search, "sample_hessian", heightmap.sample_hessian)
+
+
+def test_a_unique_minimum_is_the_closest_point() -> None:
+    """The negative control ignores crests and third derivatives."""
+    rng = np.random.default_rng(52)
+    claims, wrong = [], 0
+    for seed in range(4):
+        texture = rough(seed)
+        given = texture.arguments
+        blind = given._replace(boxes=given.boxes * np.array([1, 1, 1, 0, 1], np.float32))
+        nx, ny = cells(texture)
+        for probe in probes(texture, rng, 40):
+            best = minimum(probe, probe[:2] + rng.normal(0.0, 2e-4, 2), given)
+            j = math.floor((best[0] - given.x0) * given.ix)
+            i = math.floor((best[1] - given.y0) * given.iy)
+            wide = rng.integers(1, 9, 4)
+            part = (
+                max(j - wide[0], 0), min(j + wide[1], nx - 1),
+                max(i - wide[2], 0), min(i + wide[3], ny - 1),
+            )  # fmt: skip
+            west, east, south, north = part
+            phi = squares(texture, probe)[south : north + 1, west : east + 1]
+            inside = west <= j <= east and south <= i <= north
+            closer = inside and phi.min() < best[2] * (1.0 - 1e-12)
+            claims.append(pruning.is_unique_minimum(*map(float, probe), best, part, given))
+            assert not (claims[-1] and closer)
+            assert inside or not claims[-1]
+            wrong += closer and pruning.is_unique_minimum(*map(float, probe), best, part, blind)
+    assert 0.1 < np.mean(claims) < 0.9
+    assert wrong > 3
+
+
+# --- tight examples -------------------------------------------------------------------------------
+
+CENTRE = (10.3, 9.6)  # in cells
+
+
+def record_of(c: FloatArray) -> HeightMapArguments:
+    """Return the sampler record of a map with these coefficients [m], pitch 1 m."""
+    nodes, levels = plane_pyramid(c, (1.0, 1.0))
+    return HeightMapArguments(c, 1.0, 1.0, 0.0, 0.0, False, nodes, levels)
+
+
+def cubic(turned: bool, second: float, third: float) -> HeightMapArguments:
+    """Return h = second t²/2 + third t³/6 along x or y, t = 0 at the centre; exact as a spline."""
+    t = np.arange(-1, 22) - CENTRE[turned]
+    line = second * (t**2 / 2 - 1 / 6) + third * (t**3 - t) / 6
+    return record_of(np.add.outer(line, 0 * t) if turned else np.add.outer(0 * t, line))
+
+
+def test_the_cell_above_a_probe_stays_in_the_window() -> None:
+    """Between four nodes, each half a cell² farther: their coefficients are a third less."""
+    left = pruning.shrink_to_cells(
+        (10.5, 9.5, -3.0, 9.0 + 0.01), 3.0, (0, 19, 0, 19), record_of(np.zeros((23, 23)))
+    )
+    west, east, south, north = left
+    assert west <= 10 <= east
+    assert south <= 9 <= north
+
+
+def test_one_coefficient_keeps_sixteen_cells() -> None:
+    c = np.zeros((23, 23))
+    c[9, 12] = -0.1
+    threshold = 9.0 - 0.67  # a little less than the coefficient of a flat map above the probe
+    left = pruning.shrink_to_cells((11.0, 8.0, -3.0, threshold), 3.0, (0, 19, 0, 19), record_of(c))
+    assert left == (9, 12, 6, 9)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("back", [False, True])
+def test_the_increase_is_proved_about_as_far_as_it_lasts(
+    turned: bool, sign: float, back: bool
+) -> None:
+    """Below crests and above troughs: ψ = (1 - g b) t² - g c t³/3, 0 again at 3 (1 - g b)/g c."""
+    g, b, c = 5.0, 0.08, 0.06
+    given = cubic(turned, -sign * b, -sign * c * (-1.0 if back else 1.0))
+    best = (*CENTRE, g * g, 0.0, 0.0, 0.0)
+    exact = 3.0 * (1.0 - g * b) / (g * c)
+    claimed = []
+    for cells_ in range(1, 9):
+        j, i = 10, 9
+        part = [j, j, i, i]
+        part[(2 if turned else 0) + (0 if back else 1)] += -cells_ if back else cells_
+        claimed.append(pruning.is_unique_minimum(*CENTRE, -sign * g, best, tuple(part), given))
+    end = (CENTRE[turned] - (9 if turned else 10)) if back else 1 - CENTRE[turned] % 1
+    reach = end + np.arange(1, 9)
+    assert not any(claim for claim, r in zip(claimed, reach, strict=True) if r > exact)
+    assert all(claim for claim, r in zip(claimed, reach, strict=True) if r < 0.8 * exact)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_saddle_is_no_minimum(sign: float) -> None:
+    for share, expected in ((0.95, True), (1.05, False)):
+        given = cubic(False, -sign * share / 5.0, 0.0)
+        best = (*CENTRE, 25.0, 0.0, 0.0, 0.0)
+        assert (
+            pruning.is_unique_minimum(*CENTRE, -sign * 5.0, best, (9, 11, 8, 10), given) == expected
+        )
+
+
+def test_a_point_with_a_gradient_is_no_minimum() -> None:
+    texture = rough(5, 10e-6)
+    probe = np.array([1.9e-3, -1.2e-3, -0.1e-3])
+    best = minimum(probe, probe[:2], texture.arguments)
+    j = math.floor((best[0] - 1e-3) / PITCH[0])
+    i = math.floor((best[1] + 2e-3) / PITCH[1])
+    part = (j - 3, j + 3, i - 3, i + 3)
+    assert pruning.is_unique_minimum(*probe, best, part, texture.arguments)
+    x = best[0] + 1e-9
+    h, hx, hy = heightmap.sample_gradient(x, best[1], texture.arguments)
+    phi = (x - probe[0]) ** 2 + (best[1] - probe[1]) ** 2 + (h - probe[2]) ** 2
+    beside = (x, best[1], phi, h, hx, hy)
+    assert not pruning.is_unique_minimum(*probe, beside, part, texture.arguments)
+
+
+def test_the_least_increase_is_that_of_the_least_second_derivative() -> None:
+    rng = np.random.default_rng(53)
+    for _ in range(30):
+        start, rate, r = rng.uniform(0.1, 2.0), rng.uniform(0.1, 3.0), rng.uniform(0.1, 3.0)
+        least = start - rng.exponential()
+        t = np.linspace(0.0, r, 20_001)
+        second = np.maximum(start - rate * t, least)
+        exact = np.trapezoid((r - t) * second, t)
+        assert pruning.min_increase(start, least, rate, r) == pytest.approx(exact, abs=1e-6)
+    assert pruning.min_increase(1.0, -3.0, 0.0, 2.0) == 2.0
+
+
+def test_a_shallow_probe_needs_no_search_and_one_below_a_crest_does() -> None:
+    """A crest across the map: deep below it both flanks are equally close."""
+    x = PITCH[0] * (np.arange(38) - 18.5)
+    texture = HeightMap(np.tile(-2.0 * np.abs(x), (25, 1)), PITCH)
+    for depth, shallow in ((0.05e-3, True), (0.6e-3, False)):
+        probe = np.array([18.5 * PITCH[0] + 1e-8, 12.3 * PITCH[1], -depth])
+        best = minimum(probe, probe[:2] + np.array([2e-4, 0.0]), texture.arguments)
+        left, budget = pruning.narrow_window(
+            (*map(float, probe), 1.0 - 1e-13), best, (0, 36, 0, 23), 600.0, texture.arguments
+        )
+        assert pruning.is_empty(left) == shallow
+        assert 580.0 < budget < 600.0
+        if not shallow:
+            assert left[0] < 15
+            assert left[1] > 21
