@@ -20,8 +20,7 @@ from asperity.servo.drivers.force_dimension import ForceDimensionDriver
 from asperity.servo.drivers.haply import HaplyDriver
 from asperity.servo.drivers.library import LibraryDriver
 from asperity.servo.drivers.open_haptics import OpenHapticsDriver
-from asperity.servo.drivers.replay_driver import ReplayDriver
-from asperity.servo.drivers.simulated import simulated_driver
+from asperity.servo.drivers.simulated import ReplayDriver, simulated_driver
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary
 from bench.fake_haply import FAULTS, FakeHaply
 from bench.fakes import compile_library

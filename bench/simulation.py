@@ -31,7 +31,7 @@ from asperity.simulation import (
     simulate_many,
 )
 from asperity.simulation.closed_loop import Simulation
-from asperity.simulation.sampled_plant import Plant, sampled_plant
+from asperity.simulation.plants import Plant, sampled_plant
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 from bench.random_scenes import delay_rule

@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from asperity.analysis import loop_work as loop_work
     from asperity.analysis import one_sided_number as one_sided_number
     from asperity.analysis import worst_loop as worst_loop
-    from asperity.analysis.analysis_result import Analysis as Analysis
     from asperity.analysis.analyze import analyze as analyze
     from asperity.analysis.assess_passivity import passivity as passivity
     from asperity.analysis.check_limits import limits as limits
     from asperity.analysis.limits.limit_result import Limits as Limits
+    from asperity.analysis.results import Analysis as Analysis
     from asperity.analysis.split.baked_field import BakedField as BakedField
     from asperity.analysis.split.baked_field import bake as bake
     from asperity.analysis.split.split_state import PopThrough as PopThrough
@@ -62,7 +62,7 @@ _PUBLIC_NAMES = {
         "Bound Comparison Leak Passivity characteristic_number "
         "compare curl_number loop_work one_sided_number worst_loop"
     ),
-    "asperity.analysis.analysis_result": "Analysis",
+    "asperity.analysis.results": "Analysis",
     "asperity.analysis.analyze": "analyze",
     "asperity.analysis.check_limits": "limits",
     "asperity.analysis.assess_passivity": "passivity",

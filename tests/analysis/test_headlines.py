@@ -16,7 +16,7 @@ import pytest
 
 from asperity.analysis.check_limits import limits
 from asperity.analysis.compare import Comparison, compare
-from asperity.analysis.comparison_result import LawRow
+from asperity.analysis.results import LawRow
 from asperity.devices import Device, load_device
 from asperity.scene import load_scene
 from asperity.textures import Sinusoid, load_texture

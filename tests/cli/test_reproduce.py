@@ -153,10 +153,9 @@ def test_the_whole_table_fits_a_terminal(call: Call, monkeypatch: pytest.MonkeyP
     """Its experiments are small stand-ins; the whole is run by hand and takes minutes."""
     import asperity.paper.experiments as home
     from asperity.paper.experiments import experiment_suite as runner
-    from asperity.paper.experiments.bump_runs import bump_experiment
     from asperity.paper.experiments.cycle_counts import passivity_experiment
     from asperity.paper.experiments.device_onsets import DeviceExperiment
-    from asperity.paper.experiments.stroke_energies import scanning_experiment
+    from asperity.paper.experiments.strokes import bump_experiment, scanning_experiment
 
     def small(measured: object = None, progress: object = None) -> runner.Experiments:
         assert measured is None

@@ -15,7 +15,7 @@ import asperity as asp
 from asperity.report import html_text
 from asperity.report.measured_report import measured_sections
 from asperity.report.page import Paragraph, Section, add_section
-from asperity.textures.measurement_summary import MeasurementSummary
+from asperity.textures.texture_loading import MeasurementSummary
 
 Call = Callable[..., tuple[int, str, str]]
 PLAIN = ["--pitch", "2um", "--unit", "m"]

@@ -25,7 +25,7 @@ from asperity.core.errors import ParameterError
 from asperity.report.loop.run_report import search_error_text
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, simulate
 from asperity.simulation.closed_loop import Simulation
-from asperity.simulation.sampled_plant import sampled_plant
+from asperity.simulation.plants import sampled_plant
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid
 from asperity.textures.texture import Texture

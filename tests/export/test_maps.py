@@ -170,7 +170,7 @@ def test_other_libraries_read_the_files() -> None:
     ],
 )  # fmt: skip
 def test_a_size_that_is_none_is_not_taken(chunk: bytes) -> None:
-    from asperity.measured.reading.images.image_scale import png_scale
+    from asperity.measured.reading.images.pixels import png_scale
 
     assert png_scale({b"sCAL": chunk}, 16).pitch is None
 
@@ -182,7 +182,7 @@ def test_a_size_that_is_none_is_not_taken(chunk: bytes) -> None:
     ],
 )  # fmt: skip
 def test_a_calibration_that_is_none_is_not_taken(rest: bytes) -> None:
-    from asperity.measured.reading.images.image_scale import png_scale
+    from asperity.measured.reading.images.pixels import png_scale
 
     head = b"a\0" + struct.pack(">iiBB", 0, 65535, 0, 2)
     found = png_scale({b"pCAL": head + rest}, 16)

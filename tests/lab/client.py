@@ -11,7 +11,7 @@ import numpy as np
 from tests.lab.started import Started
 from websockets.sync.client import ClientConnection, connect
 
-from asperity.lab.frames import frame_layout
+from asperity.lab.messages import frame_layout
 
 LAYOUT = frame_layout()
 STILL = {"cosine": [0, 0, 0], "sine": [0, 0, 0], "speed": 0}

@@ -18,15 +18,18 @@ from asperity.lab.access import (
     MalformedMessageError,
     RateLimit,
 )
-from asperity.lab.frames import (
+from asperity.lab.messages import (
     COLUMN_NAMES,
     FORCE_COLUMNS,
     HEADER,
     MAX_FORCE_ROWS,
+    Message,
+    SteerRequest,
+    ViewRequest,
     encode_frame,
     frame_layout,
+    parse_message,
 )
-from asperity.lab.messages import Message, SteerRequest, ViewRequest, parse_message
 
 DOOR = AccessToken(8137, "secret")
 OURS = "127.0.0.1:8137"

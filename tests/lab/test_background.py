@@ -18,8 +18,13 @@ import asperity as asp
 from asperity.analysis.passivity.criteria import CRITERIA
 from asperity.cli.plugins import load_plugin_files
 from asperity.devices import load_device
-from asperity.lab.background import MAX_CRASHES, BackgroundRenderer
-from asperity.lab.background_worker import BackgroundWorker, render_view, set_surface
+from asperity.lab.background import (
+    MAX_CRASHES,
+    BackgroundRenderer,
+    BackgroundWorker,
+    render_view,
+    set_surface,
+)
 from asperity.lab.messages import ViewRequest
 from asperity.lab.scene_state import make_scene_state
 from asperity.scene import load_scene

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from asperity.lab.frames import COLUMN_NAMES, step_statistics
+from asperity.lab.messages import COLUMN_NAMES, step_statistics
 
 
 def rows(**columns: list[float]) -> np.ndarray:

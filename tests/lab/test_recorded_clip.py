@@ -17,9 +17,8 @@ from tests.lab.started import Started
 import asperity as asp
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
-from asperity.lab.clips import RECORDING_FILE
+from asperity.lab.clips import RECORDING_FILE, find_recording, load_recorded_clip
 from asperity.lab.playback import ANCHOR_COLUMNS, CHUNK_ROWS, FORCE_BINS, Playback
-from asperity.lab.recorded_clip import find_recording, load_recorded_clip
 from asperity.lab.scene_state import SceneState
 from asperity.loop.shared_trace import COLUMNS
 from asperity.recording import recorded_field as field
@@ -298,7 +297,7 @@ def test_the_command_refuses_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "empty.mcap").write_bytes(b"")
     for arguments, words in (
         (["empty.mcap"], "cannot be read: it is empty"),
-        (["run.mcap", "--cutoff", "1mm"], "cutoff means nothing for a recording"),
+        (["run.mcap", "--cutoff", "1mm"], "cutoff has no effect on a recording"),
     ):
         command = [sys.executable, "-m", "asperity", "lab", "--no-browser", *arguments]
         done = subprocess.run(

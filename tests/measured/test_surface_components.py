@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from asperity.core.errors import ParameterError
-from asperity.measured.decomposition import (
+from asperity.measured.form import (
     MAX_TEXTURE_WAVELENGTH,
     HeightStatistics,
     decompose_surface,

@@ -12,13 +12,11 @@ import pytest
 from asperity.paper import get_claim
 from asperity.paper.experiments import (
     SIMULATED_CLAIM_IDS,
-    bump_runs,
     cycle_counts,
     experiment_setups,
     simulated_claims,
-    stroke_energies,
+    strokes,
 )
-from asperity.paper.experiments.bump_runs import simulate_bump
 from asperity.paper.experiments.cycle_counts import count_cycles, passivity_experiment
 from asperity.paper.experiments.device_onsets import (
     PRESSING_HAND,
@@ -28,7 +26,7 @@ from asperity.paper.experiments.device_onsets import (
     usable_devices,
 )
 from asperity.paper.experiments.experiment_suite import Experiments
-from asperity.paper.experiments.stroke_energies import energy_trace, scanning_experiment
+from asperity.paper.experiments.strokes import energy_trace, scanning_experiment, simulate_bump
 from asperity.paper.planar_cases import SAMPLING_PERIOD
 from asperity.simulation import simulate
 from asperity.surface import Surface
@@ -112,7 +110,7 @@ def experiments() -> Experiments:
     return Experiments(
         passivity_experiment("WH", (0, 2), starts=2),
         scanning_experiment("AH"),
-        bump_runs.bump_experiment("AD"),
+        strokes.bump_experiment("AD"),
         DeviceExperiment((found,), tuple(skipped)),
     )
 
@@ -201,7 +199,7 @@ def test_a_count_keeps_its_trace() -> None:
     assert found.z.min() < 0.0
     assert len(found.time) == len(found.x) == len(found.z)
     assert cycle_counts.CYCLE_COUNT_STARTS == 24
-    assert stroke_energies.FIGURE_6_LAWS[0] == "A"
+    assert strokes.FIGURE_6_LAWS[0] == "A"
 
 
 def test_the_bump_closes_its_ledger() -> None:

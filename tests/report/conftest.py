@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from asperity.paper.experiments.bump_runs import bump_experiment
 from asperity.paper.experiments.cycle_counts import passivity_experiment
 from asperity.paper.experiments.device_onsets import DeviceExperiment, device_onset
 from asperity.paper.experiments.experiment_suite import Experiments
-from asperity.paper.experiments.stroke_energies import scanning_experiment
+from asperity.paper.experiments.strokes import bump_experiment, scanning_experiment
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 

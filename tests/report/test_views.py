@@ -30,7 +30,7 @@ from asperity.paper.table_two import TableTwo
 from asperity.report.terminal import print_page
 from asperity.report.views import find_page
 from asperity.simulation import Cartesian, Run, Servo, SpringHand, Stationary, simulate
-from asperity.textures.measurement_summary import MeasurementSummary, summarize_file
+from asperity.textures.texture_loading import MeasurementSummary, summarize_file
 
 WAVE = asp.Sinusoid(2e-4, 2e-3)
 HOSTILE = "<script>alert(1)</script>"

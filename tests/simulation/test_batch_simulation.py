@@ -24,7 +24,7 @@ from asperity.simulation import (
 from asperity.simulation.batch import BatchSimulation, SegmentStatistics, StopRule, Trajectory
 from asperity.simulation.kernels.body_interface import LANES
 from asperity.simulation.limit_cycles.onset_search import limit_cycle_rule
-from asperity.simulation.run import Run, StopReason
+from asperity.simulation.trace import Run, StopReason
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 

@@ -33,8 +33,7 @@ from asperity.simulation import (
     simulate_many,
 )
 from asperity.simulation.limit_cycles.onset_search import CYCLE_SPEED
-from asperity.simulation.run import load_trace
-from asperity.simulation.trace import HEADER, DecimatedTrace
+from asperity.simulation.trace import HEADER, DecimatedTrace, load_trace
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 

@@ -20,7 +20,7 @@ from asperity.simulation import (
 )
 from asperity.simulation.closed_loop import Simulation
 from asperity.simulation.discretization import discretize, linear_body
-from asperity.simulation.sampled_plant import SampledPlant, sampled_plant
+from asperity.simulation.plants import SampledPlant, sampled_plant
 from asperity.simulation.trace import COLUMNS
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid

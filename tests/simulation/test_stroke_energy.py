@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from asperity.simulation import Cartesian, Pantograph, Run, Servo, SpringHand, Strokes, simulate
-from asperity.simulation.sampled_plant import Plant
+from asperity.simulation.plants import Plant
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 

@@ -2,7 +2,6 @@
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.compare import Comparison, compare
-from asperity.analysis.comparison_result import LawRow
 from asperity.analysis.energy.continuity import Continuity, Jump
 from asperity.analysis.energy.leak import Leak, worst_loop
 from asperity.analysis.energy.loop_integral import loop_work
@@ -13,6 +12,7 @@ from asperity.analysis.gain.characteristic import (
 )
 from asperity.analysis.passivity.criteria import Criterion
 from asperity.analysis.passivity.verdict import Passivity
+from asperity.analysis.results import LawRow
 
 __all__ = [
     "Bound",

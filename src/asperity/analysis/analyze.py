@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.assess_passivity import passivity
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
 from asperity.analysis.bounds.measures import NORM, ONE_SIDED
@@ -16,10 +15,8 @@ from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import merit
 from asperity.analysis.gain.characteristic import cached_number, curl_number
-from asperity.analysis.passivity.recommended_stiffness import (
-    at_recommended_stiffness,
-    recommend_stiffness,
-)
+from asperity.analysis.passivity.verdict import at_recommended_stiffness, recommend_stiffness
+from asperity.analysis.results import Analysis
 from asperity.analysis.sentences.analysis_sentences import (
     analysis_assumptions,
     analysis_summary,

@@ -13,7 +13,7 @@ from asperity.analysis.passivity.device_loop import (
     max_proved_delay,
 )
 from asperity.analysis.passivity.verdict import Passivity, decide_verdict, stability_limit
-from asperity.analysis.sentences.passivity_sentences import verdict_reason, with_sentences
+from asperity.analysis.sentences.analysis_sentences import verdict_reason, with_sentences
 from asperity.core.errors import ParameterError
 from asperity.devices import Device, load_device
 from asperity.surface import Surface

@@ -25,12 +25,12 @@ from asperity.analysis.limits.perceptibility import (
     assess_perceptibility,
 )
 from asperity.analysis.limits.spectrum import MIN_SHARE, Spectrum, compute_spectrum, wave_forces
-from asperity.analysis.passivity.recommended_stiffness import (
+from asperity.analysis.passivity.verdict import (
+    StabilityLimit,
     StiffnessRecommendation,
     at_recommended_stiffness,
     recommend_stiffness,
 )
-from asperity.analysis.passivity.verdict import StabilityLimit
 from asperity.analysis.sentences.limits_sentences import limits_assumptions, limits_summary
 from asperity.core.arguments import DEFAULT_STIFFNESS
 from asperity.core.checks import FloatArray, check_positive, check_real

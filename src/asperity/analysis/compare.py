@@ -9,17 +9,14 @@ from typing import Any
 
 from asperity.analysis.assess_passivity import passivity
 from asperity.analysis.bounds.measures import NORM, ONE_SIDED
-from asperity.analysis.comparison_result import LawRow, recommend
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import merit as compute_merit
 from asperity.analysis.gain.characteristic import cached_number
 from asperity.analysis.gain.surface_cache import is_shipped_law, surface_content
 from asperity.analysis.limits.perceptibility import DEFAULT_SPEED, assess_perceptibility
-from asperity.analysis.passivity.recommended_stiffness import (
-    at_recommended_stiffness,
-    recommend_stiffness,
-)
+from asperity.analysis.passivity.verdict import at_recommended_stiffness, recommend_stiffness
+from asperity.analysis.results import LawRow, recommend
 from asperity.analysis.sentences.comparison_sentences import (
     comparison_assumptions,
     recommendation_text,

@@ -212,7 +212,7 @@ def make_driver(name: str, setup: Setup) -> Driver:
         ParameterError: for an unknown driver, or a recording that cannot be replayed.
     """
     if name.startswith(REPLAY_PREFIX):
-        from asperity.servo.drivers.replay_driver import replay_driver
+        from asperity.servo.drivers.simulated import replay_driver
 
         return replay_driver(name.removeprefix(REPLAY_PREFIX), setup.servo.period)
     from asperity.servo.drivers.driver_registry import hardware_driver
@@ -231,7 +231,7 @@ def check_stiffness_limit(setup: Setup) -> None:
     Raises:
         ParameterError: otherwise, with the reason.
     """
-    from asperity.servo.stiffness_check import excess_stiffness_reason
+    from asperity.servo.safety import excess_stiffness_reason
 
     with progress_bar("analyzing the surface"):
         reason = excess_stiffness_reason(setup.surface, setup.device)

@@ -39,9 +39,9 @@ from asperity.core.errors import ParameterError, print_message
 from asperity.devices import load_device
 
 if TYPE_CHECKING:
-    from asperity.lab.handle import Handle
     from asperity.lab.playback import Playback
     from asperity.lab.scene_state import SceneState
+    from asperity.lab.session import Handle
     from asperity.scene.setup import Setup
     from asperity.servo.drivers.driver import Driver
     from asperity.servo.fault import EndReason
@@ -270,7 +270,7 @@ def lab_command(
 
 def _simulated_scene(source: str, values: dict[str, Any]) -> tuple[SceneState, Playback | None]:
     """Return the initial scene on the simulated device, and the playback of a recording."""
-    from asperity.lab.recorded_clip import find_recording, load_recorded_clip
+    from asperity.lab.clips import find_recording, load_recorded_clip
     from asperity.lab.scene_state import DEFAULT_DEVICE, make_scene_state
     from asperity.scene import load_scene
 
@@ -300,9 +300,9 @@ def _device_scene(
         ParameterError: for an unknown driver, a device without a maximum force, a stiffness above
             the limit, or a recording.
     """
-    from asperity.lab.handle import make_handle
-    from asperity.lab.recorded_clip import find_recording
+    from asperity.lab.clips import find_recording
     from asperity.lab.scene_state import make_device_scene_state
+    from asperity.lab.session import make_handle
     from asperity.servo.process import require_max_force
 
     if find_recording(source, _temporary_folder()) is not None:

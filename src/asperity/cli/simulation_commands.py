@@ -54,7 +54,7 @@ def simulate_command(
     setup = load_setup(scene, values, duration)
     setup = setup if every is None else replace(setup, every=every)
     from asperity.report.loop.run_report import run_page
-    from asperity.simulation.run import MAX_ROWS
+    from asperity.simulation.trace import MAX_ROWS
 
     # Rows are needed for figures only.
     max_rows = 0 if outputs.html is None else MAX_ROWS

@@ -97,7 +97,7 @@ def show_command(file: str, outputs: Outputs, **values: Any) -> None:
     ISO 21920-2 (Rq, Ra, Rz ...). The report also shows what each step removed and separates form,
     waviness and texture. FILE may also be an output of asperity prepare.
     """
-    from asperity.textures.measurement_summary import summarize_file
+    from asperity.textures.texture_loading import summarize_file
 
     with preparation_progress() as start_stage:
         summary = summarize_file(file, progress=start_stage, **file_values(values))

@@ -8,8 +8,8 @@ import textwrap
 
 import numpy as np
 
-from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.results import Analysis
 from asperity.analysis.sentences.surface_sentences import depth_range_text, leak_energy_text
 from asperity.core.units import format_quantity
 from asperity.core.version import __version__

@@ -15,11 +15,11 @@ from websockets.asyncio.server import serve
 
 from asperity.core.errors import ParameterError
 from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, respond
-from asperity.lab.background_worker import BackgroundWorker
-from asperity.lab.handle import Handle
+from asperity.lab.background import BackgroundWorker
 from asperity.lab.playback import Playback
 from asperity.lab.scene_state import SceneState
 from asperity.lab.server import LabServer
+from asperity.lab.session import Handle
 from asperity.servo.process import PrestartedProcess
 
 LOOPBACK_ADDRESS = "127.0.0.1"

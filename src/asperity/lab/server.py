@@ -18,18 +18,21 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
 from asperity.devices import device_names
 from asperity.lab.access import MalformedMessageError, RateLimit
-from asperity.lab.background import BackgroundRenderer
-from asperity.lab.background_worker import BackgroundWorker
+from asperity.lab.background import BackgroundRenderer, BackgroundWorker
 from asperity.lab.clips import ClipStore
-from asperity.lab.frames import encode_frame, frame_layout
-from asperity.lab.handle import Handle
-from asperity.lab.messages import SteerRequest, ViewRequest, parse_message
+from asperity.lab.messages import (
+    SteerRequest,
+    ViewRequest,
+    encode_frame,
+    frame_layout,
+    parse_message,
+)
 from asperity.lab.scene_state import RANGES, SceneState
-from asperity.lab.session import Session
+from asperity.lab.session import Handle, Session
 from asperity.laws import REGISTERED_LAWS
 from asperity.servo.loop_memory import LoopStatistics
 from asperity.servo.process import PrestartedProcess
-from asperity.servo.stiffness_check import excess_stiffness_reason
+from asperity.servo.safety import excess_stiffness_reason
 from asperity.textures.catalogue import KINDS
 
 MIN_FRAME_INTERVAL = 5e-3

@@ -21,7 +21,7 @@ from asperity.measured.form import check_degree, fit_form, subtract_form
 from asperity.measured.lengths import Pitch, Shape, format_counts, format_length, format_lengths
 from asperity.measured.outliers import remove_outliers
 from asperity.measured.prepared import PreparedSurface, StageCallback, StageRecorder, resized_stage
-from asperity.measured.reading.raw_surface import RawSurface
+from asperity.measured.reading.reader import RawSurface
 from asperity.measured.stylus import apply_tip, check_tip_radius
 
 MAX_MEAN_SLOPE = 10.0

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.core.files import Serializable, json_text, open_atomic, open_input, to_plain_data
-from asperity.measured.decomposition import HeightStatistics
+from asperity.measured.form import HeightStatistics
 from asperity.measured.lengths import Pitch
 from asperity.measured.parameters import ParameterValues, compute_parameters, find_parameter
-from asperity.measured.reading.raw_surface import MAX_POINTS
+from asperity.measured.reading.reader import MAX_POINTS
 from asperity.measured.reading.unsupported import ARCHIVE_ERRORS, ZIP_MAGIC
 
 

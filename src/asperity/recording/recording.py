@@ -19,8 +19,13 @@ from asperity.core.display import Plottable
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.files import open_input
 from asperity.recording import mcap
-from asperity.recording.named_columns import TraceTable
-from asperity.recording.row_encoding import Columns, message_values, row_type, schema_columns
+from asperity.recording.row_encoding import (
+    Columns,
+    TraceTable,
+    message_values,
+    row_type,
+    schema_columns,
+)
 from asperity.recording.writer import FORMAT, SCHEMA_NAME
 
 # A day of a loop at 10 kHz, and more.

@@ -13,15 +13,15 @@ import numpy as np
 from asperity.core.cache import get_or_compute
 from asperity.core.errors import escape_unprintable
 from asperity.core.units import format_quantity
-from asperity.measured.decomposition import SurfaceDecomposition, decompose_surface
+from asperity.measured.form import SurfaceDecomposition, decompose_surface
 from asperity.measured.lengths import format_counts, format_lengths
 from asperity.measured.parameters import MAX_CORRELATION_POINTS, SurfaceParameter, find_parameter
 from asperity.measured.prepared import PreparationStage, PreparedSurface
 from asperity.report import page
 from asperity.report.page import HEADED, SCREEN, Cell, Media, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import NOT_AVAILABLE
-from asperity.textures.measurement_summary import MeasurementSummary, StepChange, decimate
 from asperity.textures.texture import Texture
+from asperity.textures.texture_loading import MeasurementSummary, StepChange, decimate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

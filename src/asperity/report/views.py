@@ -7,12 +7,12 @@ from typing import Any
 
 from rich.console import RenderableType
 
-from asperity.analysis.analysis_result import Analysis
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.compare import Comparison
 from asperity.analysis.compare_devices import DeviceComparisons
 from asperity.analysis.limits.limit_result import Limits
 from asperity.analysis.passivity.verdict import Passivity
+from asperity.analysis.results import Analysis
 from asperity.core.files import json_text, text_digest
 from asperity.core.units import format_quantity
 from asperity.devices import Device
@@ -33,8 +33,8 @@ from asperity.report.sentences.number_text import interval_text, readable_name, 
 from asperity.report.terminal import page_renderables
 from asperity.simulation import Run
 from asperity.surface import Surface
-from asperity.textures.measurement_summary import MeasurementSummary
 from asperity.textures.texture import Texture
+from asperity.textures.texture_loading import MeasurementSummary
 
 
 @singledispatch

@@ -14,10 +14,16 @@ import numpy as np
 from asperity.core.errors import ParameterError
 from asperity.core.processes import available_cores
 from asperity.scene.setup import Setup
-from asperity.simulation.limit_cycles import prediction
-from asperity.simulation.limit_cycles.onset import MIN_STIFFNESS, Onset, find_onsets
-from asperity.simulation.limit_cycles.prediction import Prediction
-from asperity.simulation.motions import Strokes
+from asperity.simulation.hands import Strokes
+from asperity.simulation.limit_cycles.onset import (
+    MIN_STIFFNESS,
+    Onset,
+    Prediction,
+    expected_onset,
+    find_onsets,
+    predict,
+    smooth_wall_onset,
+)
 from asperity.simulation.scan import Stroke, scan_strokes
 
 DEFAULT_SPEEDS = (0.02, 0.05, 0.1, 0.2)  # m/s
@@ -80,9 +86,9 @@ def sweep_onsets(
     by_law = map_threads(find, [(law,) for law in laws], cancelled)
     found = [onset for onsets in by_law for onset in onsets]
     return tuple(
-        prediction.predict(
+        predict(
             setup.with_law(law).surface, setup.plant, setup.hand, setup.with_delay(delay).servo,
-            onset, prediction.smooth_wall_onset(found, delay),
+            onset, smooth_wall_onset(found, delay),
         )
         for (law, delay), onset in zip(jobs, found, strict=True)
     )  # fmt: skip
@@ -101,9 +107,7 @@ def _law_onsets(
     loop = setup.with_law(law)
     start = loop.motion.at(np.zeros(1))[0] if loop.start is None else loop.start
     nears = [
-        prediction.expected_onset(
-            loop.surface, loop.plant, loop.hand, loop.with_delay(delay).servo, start
-        )
+        expected_onset(loop.surface, loop.plant, loop.hand, loop.with_delay(delay).servo, start)
         for delay in delays
     ]
     return find_onsets(

@@ -196,7 +196,7 @@ class ServoProcess:
         self.change_program(build_program(surface, self._driver))
 
     def _check_stiffness(self, surface: Surface) -> None:
-        from asperity.servo.stiffness_check import excess_stiffness_reason
+        from asperity.servo.safety import excess_stiffness_reason
 
         if self._device is None:
             words = "is not known to the loop, so no limit is: ServoProcess(..., device=...)"

@@ -15,11 +15,15 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from asperity.core.errors import AsperityError
-from asperity.servo.driver_loop import DriverLoop, LoopProgram, system_clock
+from asperity.servo.driver_loop import (
+    DriverLoop,
+    LoopProgram,
+    request_realtime_priority,
+    system_clock,
+)
 from asperity.servo.drivers.driver import Driver
 from asperity.servo.fault import EndReason
 from asperity.servo.loop_memory import LoopMemory
-from asperity.servo.realtime import request_realtime_priority
 from asperity.servo.safety import Safety
 from asperity.simulation.servo import Servo
 

@@ -6,11 +6,15 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
+from asperity.analysis.passivity.verdict import recommend_stiffness
 from asperity.core.arguments import Argument, check_integer
 from asperity.core.checks import check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable
+from asperity.core.units import format_quantity
 from asperity.devices import Device
+from asperity.surface import Surface
 
 DEFAULT_RISE_TIME = 5e-3
 """Time for the force to rise from zero to its maximum, unless a slew limit is given [s]."""
@@ -128,3 +132,29 @@ ARGUMENTS: tuple[Argument, ...] = (
 
 DEFAULT_SAFETY = Safety()
 """Limits by default."""
+
+
+def excess_stiffness_reason(surface: Surface, device: Device) -> str:
+    """Return why a surface at its stiffness may cycle on a device; empty within the limit.
+
+    Args:
+        surface: the surface, with law and stiffness.
+        device: the device.
+
+    Example:
+        >>> from asperity.devices import load_device
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> steep = Surface(Sinusoid(amplitude=0.1e-3, period=2e-3), "C", stiffness=2000.0)
+        >>> excess_stiffness_reason(steep, load_device("touch"))[:43]
+        '2000 N/m is above the limit of 364 N/m for '
+    """
+    q = characteristic_number(surface)
+    allowed = recommend_stiffness(surface, device, q, one_sided_number(surface)).stability_limit
+    context = f"for law {surface.law.letter} on {device.id}"
+    if not allowed.stiffness:
+        return f"no stiffness is known to be quiet {context}: asperity analyze says what is missing"
+    if surface.stiffness <= allowed.stiffness:
+        return ""
+    limit = format_quantity(allowed.stiffness, "N/m", digits=3)
+    given = format_quantity(surface.stiffness, "N/m")
+    return f"{given} is above the limit of {limit} {context} ({allowed.basis}; q = {q.value:.3g})"

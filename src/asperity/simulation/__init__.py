@@ -1,16 +1,23 @@
 """Simulation of texture, device and hand in a closed loop, with an exact energy ledger."""
 
 from asperity.simulation.discretization import Resonance
-from asperity.simulation.hands import BandHand, Hand, PrescribedHand, SpringHand
+from asperity.simulation.hands import (
+    BandHand,
+    Hand,
+    Motion,
+    PrescribedHand,
+    SpringHand,
+    Stationary,
+    Strokes,
+    Waypoints,
+)
 from asperity.simulation.limit_cycles.onset import Onset, find_onset
-from asperity.simulation.motions import Motion, Stationary, Strokes, Waypoints
 from asperity.simulation.pantograph import LinkMasses, Pantograph
-from asperity.simulation.plants import Cartesian
-from asperity.simulation.run import Ledger, Run
-from asperity.simulation.sampled_plant import Plant
+from asperity.simulation.plants import Cartesian, Plant
 from asperity.simulation.scan import Stroke, scan_strokes
 from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import simulate, simulate_many
+from asperity.simulation.trace import Ledger, Run
 
 __all__ = [
     "BandHand",

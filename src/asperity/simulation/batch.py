@@ -19,7 +19,7 @@ from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
 from asperity.loop.loop_program import fuse_loop
 from asperity.simulation.closed_loop import STOP_REASONS, check_delay
-from asperity.simulation.hands import Hand
+from asperity.simulation.hands import Hand, Motion
 from asperity.simulation.kernels import (
     batch_loop,
     pantograph_lanes,
@@ -28,11 +28,10 @@ from asperity.simulation.kernels import (
 )
 from asperity.simulation.kernels.body_interface import LANES, SAMPLES, STOP
 from asperity.simulation.kernels.energy_ledger import FRICTION, LEDGER_SIZE, LOST, SUPPLIED
-from asperity.simulation.motions import Motion
-from asperity.simulation.run import StopReason
-from asperity.simulation.sampled_plant import Plant, sampled_plant
+from asperity.simulation.plants import Plant, sampled_plant
 from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import CHUNK_SAMPLES, anchor_points, check_parts, initial_motion
+from asperity.simulation.trace import StopReason
 from asperity.surface import Surface
 
 # Attributes of a trajectory that the compiled loop changes; rows of its tables.

@@ -17,10 +17,9 @@ from asperity.simulation.kernels.body_interface import LEFT_WORKSPACE
 from asperity.simulation.kernels.energy_ledger import LEDGER_SIZE
 from asperity.simulation.kernels.energy_trace import TraceRows
 from asperity.simulation.kernels.simulated_device import SimulatedDevice
-from asperity.simulation.run import Ledger, StopReason
-from asperity.simulation.sampled_plant import SampledPlant
+from asperity.simulation.plants import SampledPlant
 from asperity.simulation.servo import Servo
-from asperity.simulation.trace import COLUMNS
+from asperity.simulation.trace import COLUMNS, Ledger, StopReason
 from asperity.surface import Surface
 
 # Why the compiled loop stops, by its error code.

@@ -17,7 +17,7 @@ from asperity.simulation.hands import Hand, nonnegative
 from asperity.simulation.kernels import energy_ledger, hand_force, pantograph_lanes
 from asperity.simulation.kernels import pantograph_dynamics as pantograph
 from asperity.simulation.kernels.pantograph_dynamics import LinkageRecord, PantographRecord
-from asperity.simulation.sampled_plant import (
+from asperity.simulation.plants import (
     FRICTION_SUBSTEPS,
     Plant,
     SampledPlant,

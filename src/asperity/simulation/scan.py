@@ -13,12 +13,11 @@ from numpy.typing import ArrayLike
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict
-from asperity.simulation.hands import Hand
-from asperity.simulation.motions import Strokes
-from asperity.simulation.run import Run
-from asperity.simulation.sampled_plant import Plant
+from asperity.simulation.hands import Hand, Strokes
+from asperity.simulation.plants import Plant
 from asperity.simulation.servo import Servo
 from asperity.simulation.simulate import simulate
+from asperity.simulation.trace import Run
 from asperity.surface import Surface
 
 # Share of the work done back and forth that is negligible.

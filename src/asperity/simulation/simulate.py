@@ -18,14 +18,14 @@ from asperity.core.files import to_plain_data
 from asperity.core.processes import available_cores
 from asperity.recording.recorded_field import field_attachments, field_metadata
 from asperity.simulation.closed_loop import Simulation
-from asperity.simulation.hands import Hand
-from asperity.simulation.motions import Motion
-from asperity.simulation.run import Run, StopReason
-from asperity.simulation.sampled_plant import Plant, sampled_plant
+from asperity.simulation.hands import Hand, Motion
+from asperity.simulation.plants import Plant, sampled_plant
 from asperity.simulation.servo import Servo
 from asperity.simulation.trace import (
     DecimatedTrace,
     RecordingTrace,
+    Run,
+    StopReason,
     TailStatistics,
     TextTrace,
     Trace,

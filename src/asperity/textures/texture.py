@@ -21,8 +21,13 @@ from asperity.core.display import Plottable
 from asperity.core.files import to_plain_data
 from asperity.enclosures.cells import Cells
 from asperity.measured.prepared import PreparationStage
-from asperity.textures.bounds.bounded_cells import BoundedCells, DerivativeBounds
-from asperity.textures.bounds.line_segments import LineSegments, equal_segments, wave_segments
+from asperity.textures.bounds.bounded_cells import (
+    BoundedCells,
+    DerivativeBounds,
+    LineSegments,
+    equal_segments,
+    wave_segments,
+)
 from asperity.textures.bounds.wave_cells import WaveCells
 from asperity.textures.domain import Domain, GridValues, ScanLine
 from asperity.textures.plane_waves import PlaneWaves, SingleWave

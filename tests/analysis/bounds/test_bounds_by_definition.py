@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from asperity.analysis.bounds import bound as witnesses
 from asperity.analysis.bounds import branch_and_bound as search
 from asperity.analysis.bounds import sampling
 from asperity.analysis.bounds import sampling as dense
-from asperity.analysis.bounds import witness as witnesses
+from asperity.analysis.bounds.bound import Witness
 from asperity.analysis.bounds.branch_and_bound import Problem
 from asperity.analysis.bounds.measures import NORM, ONE_SIDED, one_sided, spectral_norm
 from asperity.analysis.bounds.problems import LawProblem
 from asperity.analysis.bounds.sampling import highest_point, sample_supremum
-from asperity.analysis.bounds.witness import Witness
 from asperity.analysis.gain import closed_forms as forms
 from asperity.core.checks import FloatArray
 from asperity.core.errors import InternalError

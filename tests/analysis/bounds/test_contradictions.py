@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from asperity.analysis.bounds.bound import Witness, checked_lower_bound, checked_upper_bound
 from asperity.analysis.bounds.measures import NORM
-from asperity.analysis.bounds.witness import Witness, checked_lower_bound, checked_upper_bound
 from asperity.analysis.energy import leak as leaks
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.gain import search_options as search

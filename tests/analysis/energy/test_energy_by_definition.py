@@ -10,7 +10,7 @@ import pytest
 
 from asperity.analysis import loop_work
 from asperity.analysis.energy import curl_columns as columns
-from asperity.analysis.energy import leak, merit, state_loops
+from asperity.analysis.energy import leak, loop_integral, merit
 from asperity.analysis.energy import loop_integral as anchor
 from asperity.analysis.energy import loop_integral as loops
 from asperity.analysis.energy.continuity import _round_up_readable
@@ -322,11 +322,11 @@ def test_the_paths_of_friction_are_the_paper_s() -> None:
     expected = [
         [*start, above], [*start, -light], [*end, -light], [*end, -D], [*start, -D],
     ]  # fmt: skip
-    np.testing.assert_allclose(state_loops.friction_path(FRICTION, start, along), expected)
+    np.testing.assert_allclose(loop_integral.friction_path(FRICTION, start, along), expected)
     line = FRICTION.texture.scan_line()
-    found = state_loops.light_then_deep_loop(FRICTION, line)
+    found = loop_integral.light_then_deep_loop(FRICTION, line)
     works = [
-        loop_work(FRICTION, state_loops.friction_path(FRICTION, one, sign * line.direction))
+        loop_work(FRICTION, loop_integral.friction_path(FRICTION, one, sign * line.direction))
         for one in line.points(64)
         for sign in (1.0, -1.0)
     ]
@@ -339,9 +339,9 @@ def test_the_paths_of_friction_are_the_paper_s() -> None:
 def test_the_best_promise_of_a_plane_is_tried() -> None:
     """Of 64 places and both senses the four that promise most: none of the others gains more."""
     line = FRICTION.texture.scan_line()
-    found = state_loops.in_plane_loop(FRICTION, line)
+    found = loop_integral.in_plane_loop(FRICTION, line)
     outlines = [
-        state_loops._in_plane_outline(FRICTION, line, start, sign)
+        loop_integral._in_plane_outline(FRICTION, line, start, sign)
         for start in line.points(64)
         for sign in (1.0, -1.0)
     ]
@@ -356,7 +356,7 @@ def test_an_outline_stays_where_the_anchor_sticks() -> None:
     """Within the circle of the greatest deflection, at one depth, on one side by the slope."""
     line, anchor = FRICTION.texture.scan_line(), np.array([0.3e-3, 0.0])
     for sign in (1.0, -1.0):
-        promise, vertices = state_loops._in_plane_outline(FRICTION, line, anchor, sign)
+        promise, vertices = loop_integral._in_plane_outline(FRICTION, line, anchor, sign)
         np.testing.assert_allclose(vertices[0], [*anchor, 0.1 * D])
         np.testing.assert_allclose(vertices[1], [*anchor, -D])
         np.testing.assert_allclose(vertices[-1], [*anchor, -D])

@@ -15,7 +15,7 @@ from asperity.analysis.energy.curl_columns import (
     sample_curl_integrals,
 )
 from asperity.analysis.energy.leak import orient_loop, worst_loop
-from asperity.analysis.energy.state_loops import in_plane_loop
+from asperity.analysis.energy.loop_integral import in_plane_loop
 from asperity.core.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier

@@ -20,7 +20,7 @@ from asperity.analysis.limits.perceptibility import (
     assess_perceptibility,
     classify_perceptibility,
 )
-from asperity.analysis.sentences.perceptibility_sentences import (
+from asperity.analysis.sentences.limits_sentences import (
     form_removal_sentences,
     masking_text,
     remedies_text,

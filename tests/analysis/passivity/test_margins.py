@@ -13,8 +13,12 @@ from bench.margins import (
     wall_onset,
 )
 
-from asperity.analysis.passivity.recommended_stiffness import NO_MARGIN, load_margins, safety_margin
-from asperity.analysis.passivity.verdict import StabilityLimit
+from asperity.analysis.passivity.verdict import (
+    NO_MARGIN,
+    StabilityLimit,
+    load_margins,
+    safety_margin,
+)
 from asperity.devices import parse_device
 from asperity.laws import LAWS, Law, find_law
 from asperity.surface import Surface

@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from asperity.analysis.split import baked_field as potential_grid
 from asperity.analysis.split import baked_field as potential_table
-from asperity.analysis.split import field_grid as potential_grid
-from asperity.analysis.split.field_grid import FieldGrid, curvature_bounds
+from asperity.analysis.split.baked_field import FieldGrid, curvature_bounds
 from asperity.kernels import fuse
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid

@@ -16,10 +16,9 @@ from tests.lab.browser import Browser, needs_browser, until
 from tests.lab.client import STILL, column, frames, head, heard, joined, news, refused, say
 from tests.lab.started import Started
 
-from asperity.lab.handle import make_handle
 from asperity.lab.scene_state import make_device_scene_state
 from asperity.lab.server import STEERING_TIMEOUT
-from asperity.lab.session import Session
+from asperity.lab.session import Session, make_handle
 from asperity.scene import load_scene
 from asperity.scene.setup import make_setup
 from asperity.servo.drivers.library import LibraryDriver

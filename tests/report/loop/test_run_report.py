@@ -20,7 +20,7 @@ from asperity.report.loop.run_report import (
 from asperity.scene import load_scene
 from asperity.scene.setup import Setup, make_setup
 from asperity.simulation import Run
-from asperity.simulation.run import StopReason
+from asperity.simulation.trace import StopReason
 
 PRESS = Path(__file__).parents[3] / "examples" / "press.toml"
 

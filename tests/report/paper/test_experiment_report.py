@@ -9,7 +9,7 @@ from asperity.paper.experiments.cycle_counts import passivity_onsets
 from asperity.paper.experiments.experiment_suite import Experiments
 from asperity.report.html import render_page, render_picture
 from asperity.report.page import Page, Picture, Table
-from asperity.report.paper.experiment_report import experiment_sections
+from asperity.report.paper.claims_report import experiment_sections
 from asperity.report.pictures.loop_pictures import onset_figure
 from asperity.report.pictures.paper_pictures import cycles_figure, devices_figure
 

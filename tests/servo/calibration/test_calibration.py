@@ -25,7 +25,10 @@ from asperity.servo.calibration.identification import (
     AxisDynamics,
     DelayEstimate,
     Estimate,
+    WallOnset,
+    find_wall_onset,
     fresh_fraction,
+    measure_oscillation,
     position_step,
     rest_noise,
 )
@@ -37,7 +40,6 @@ from asperity.servo.calibration.test_rig import (
     excitation_renderer,
     frame_axes,
 )
-from asperity.servo.calibration.wall_onset import WallOnset, find_wall_onset, measure_oscillation
 from asperity.servo.drivers.driver import AWAY, RIGHT, TOWARDS, UP, surface_frame
 from asperity.servo.drivers.driver_registry import DRIVER_KINDS, hardware_driver
 from asperity.servo.drivers.simulated import simulated_driver

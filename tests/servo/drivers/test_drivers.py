@@ -21,7 +21,7 @@ from asperity.servo.drivers.driver import RIGHT, TOWARDS, UP, Driver, Frame, sur
 from asperity.servo.drivers.driver_registry import hardware_driver
 from asperity.servo.drivers.force_dimension import LIBRARY, ForceDimensionDriver
 from asperity.servo.drivers.library import LibraryDriver
-from asperity.servo.drivers.replay_driver import replay_driver
+from asperity.servo.drivers.simulated import replay_driver
 from asperity.servo.fault import EndReason
 from asperity.servo.loop_memory import LoopMemory
 from asperity.servo.safety import Safety

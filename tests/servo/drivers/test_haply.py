@@ -19,8 +19,7 @@ from asperity.servo.driver_loop import system_clock
 from asperity.servo.drivers import haply
 from asperity.servo.drivers import threaded as exchanged
 from asperity.servo.drivers.driver_registry import hardware_driver
-from asperity.servo.drivers.haply import SERVICE, HaplyDriver
-from asperity.servo.drivers.haply_exchange import MAX_PENDING
+from asperity.servo.drivers.haply import MAX_PENDING, SERVICE, HaplyDriver
 from asperity.servo.fault import EndReason
 from asperity.servo.kernels.ring_buffer import (
     FAILURE_CODE,

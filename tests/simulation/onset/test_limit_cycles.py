@@ -11,8 +11,7 @@ from tests.simulation.onset.limit_cycle_definition import Shifted, ends_in_cycle
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.simulation import Cartesian, Resonance, Run, Servo, SpringHand, Stationary, simulate
-from asperity.simulation.limit_cycles.onset import Onset, find_onset, start_offsets
-from asperity.simulation.limit_cycles.prediction import predict
+from asperity.simulation.limit_cycles.onset import Onset, find_onset, predict, start_offsets
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 

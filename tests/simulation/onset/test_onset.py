@@ -24,8 +24,12 @@ from asperity.simulation import (
     find_onset,
     simulate,
 )
-from asperity.simulation.limit_cycles.onset import start_offsets
-from asperity.simulation.limit_cycles.prediction import expected_onset, predict, smooth_wall_onset
+from asperity.simulation.limit_cycles.onset import (
+    expected_onset,
+    predict,
+    smooth_wall_onset,
+    start_offsets,
+)
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 

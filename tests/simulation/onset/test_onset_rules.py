@@ -22,8 +22,7 @@ from asperity.simulation.limit_cycles.onset_search import (
     bracket_onset,
     limit_cycle_rule,
 )
-from asperity.simulation.run import StopReason
-from asperity.simulation.trace import COLUMNS, TailStatistics
+from asperity.simulation.trace import COLUMNS, StopReason, TailStatistics
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 

@@ -10,9 +10,8 @@ import pytest
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.simulation import BandHand, Cartesian, Pantograph, Resonance, Servo, SpringHand
-from asperity.simulation.limit_cycles import prediction
-from asperity.simulation.limit_cycles.onset import Onset
-from asperity.simulation.limit_cycles.prediction import predict, smooth_wall_onset
+from asperity.simulation.limit_cycles import onset as onset_module
+from asperity.simulation.limit_cycles.onset import Onset, predict, smooth_wall_onset
 from asperity.surface import Surface
 from asperity.textures import Fourier, Sinusoid
 
@@ -194,8 +193,8 @@ def test_cycles_are_expected_where_the_delay_rule_ends(
     monkeypatch.setattr(Cartesian, "min_damping", least)
     for name, value in (("characteristic_number", q), ("one_sided_number", plus)):
         bound = Bound(value, value, "theorem")
-        monkeypatch.setattr(prediction, name, lambda *_given, bound=bound: bound)
+        monkeypatch.setattr(onset_module, name, lambda *_given, bound=bound: bound)
     servo, start, surface = Servo(PERIOD, delay=delay), (1.0, 2.0, 3.0), Surface(SHARP, "C")
-    found = prediction.expected_onset(surface, PLANT, HAND, servo, start)
+    found = onset_module.expected_onset(surface, PLANT, HAND, servo, start)
     assert found == (rule if rule is None else pytest.approx(rule, rel=1e-12))
     assert told == [(PLANT, start, start, HAND, pytest.approx(TOP))]

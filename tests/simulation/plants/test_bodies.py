@@ -16,8 +16,7 @@ from asperity.simulation import (
     Strokes,
     simulate,
 )
-from asperity.simulation.plants import coupled_plant
-from asperity.simulation.sampled_plant import sampled_plant
+from asperity.simulation.plants import coupled_plant, sampled_plant
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 

@@ -44,8 +44,7 @@ from asperity.simulation.kernels.energy_ledger import (
     SUPPLIED,
 )
 from asperity.simulation.pantograph import linkage_record
-from asperity.simulation.plants import coupled_plant
-from asperity.simulation.sampled_plant import sampled_plant, substep_count
+from asperity.simulation.plants import coupled_plant, sampled_plant, substep_count
 
 MASS = (0.05, 0.04, 0.03)
 COUPLED = np.array([[2.0, 0.5, 0.1], [0.5, 1.0, -0.2], [0.1, -0.2, 0.7]])

@@ -26,7 +26,7 @@ from asperity.simulation import (
     Stationary,
     Strokes,
     Waypoints,
-    sampled_plant,
+    plants,
     simulate,
 )
 from asperity.simulation.kernels.pantograph_dynamics import (
@@ -195,11 +195,9 @@ def test_a_slack_band_needs_the_kink(tmp_path: FilePath, monkeypatch: pytest.Mon
     monkeypatch.syspath_prepend(tmp_path)
     blind, build = importlib.import_module("blind_band"), Pantograph.sample
 
-    def built(*arguments: Any) -> sampled_plant.SampledPlant:
+    def built(*arguments: Any) -> plants.SampledPlant:
         own = build(*arguments)
-        return sampled_plant.SampledPlant(
-            (own.modules[0], blind, *own.modules[1:]), own.record, own.order
-        )
+        return plants.SampledPlant((own.modules[0], blind, *own.modules[1:]), own.record, own.order)
 
     monkeypatch.setattr(Pantograph, "sample", built)
     ledger = run_of(plant, SLACK).ledger

@@ -21,7 +21,7 @@ from asperity.simulation import (
 )
 from asperity.simulation.kernels import pantograph_dynamics as five_bar
 from asperity.simulation.pantograph import linkage_record
-from asperity.simulation.sampled_plant import sampled_plant
+from asperity.simulation.plants import sampled_plant
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 

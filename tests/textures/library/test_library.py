@@ -12,9 +12,9 @@ import asperity
 from asperity.core.errors import ParameterError
 from asperity.textures import HeightMap
 from asperity.textures.catalogue import CATALOGUE
-from asperity.textures.kinds.random_fields import low_pass
 from asperity.textures.library import LIBRARY, NamedSurface, named_surface, surface_names
 from asperity.textures.library.sandpaper import GRAIN_SIZES
+from asperity.textures.synthetic import low_pass
 
 NAMES = ("cloth", "brushed-metal", "sandpaper", "wood", "knurl", "tile")
 every_surface = pytest.mark.parametrize("name", NAMES)

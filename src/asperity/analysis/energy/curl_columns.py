@@ -16,15 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from asperity.analysis.bounds.clamp_zone import ClampKernel
-from asperity.analysis.bounds.problems import as_rows, law_constants, law_kernel
+from asperity.analysis.bounds.problems import ClampKernel, as_rows, law_constants, law_kernel
 from asperity.analysis.bounds.sampling import ContactField
 from asperity.core.checks import FloatArray
 from asperity.derive.facts import law_facts
 from asperity.enclosures.cells import DERIVATIVE_NAMES
 from asperity.enclosures.taylor import TaylorModel, TaylorNumber
 from asperity.surface import Surface
-from asperity.textures.bounds.line_segments import LineSegments
+from asperity.textures.bounds.bounded_cells import LineSegments
 from asperity.textures.texture import ScanLine, Texture
 
 _MIN_PIECES, _MAX_PIECES = 512, 65_536

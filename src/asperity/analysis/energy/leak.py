@@ -17,9 +17,14 @@ from asperity.analysis.energy.curl_columns import (
     positive_interval,
     sample_curl_integrals,
 )
-from asperity.analysis.energy.loop_integral import initial_panels, integrate, loop_work
+from asperity.analysis.energy.loop_integral import (
+    in_plane_loop,
+    initial_panels,
+    integrate,
+    light_then_deep_loop,
+    loop_work,
+)
 from asperity.analysis.energy.merit import scan_height
-from asperity.analysis.energy.state_loops import in_plane_loop, light_then_deep_loop
 from asperity.analysis.gain.surface_cache import at_unit_stiffness, cached_result
 from asperity.core.checks import FloatArray, check_array, check_positive
 from asperity.core.errors import InternalError, ParameterError

@@ -7,18 +7,18 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from asperity.analysis.bounds.bound import Bound, Method
-from asperity.analysis.bounds.branch_and_bound import Problem, Supremum
-from asperity.analysis.bounds.clamp_zone import ClampProblem
-from asperity.analysis.bounds.measures import JacobianMeasure
-from asperity.analysis.bounds.problems import LawProblem
-from asperity.analysis.bounds.sampling import require_depth_contact, sample_supremum
-from asperity.analysis.bounds.witness import (
+from asperity.analysis.bounds.bound import (
+    Bound,
+    Method,
     Witness,
     checked_upper_bound,
     witness_at_depth,
     witness_in_contact,
 )
+from asperity.analysis.bounds.branch_and_bound import Problem, Supremum
+from asperity.analysis.bounds.measures import JacobianMeasure
+from asperity.analysis.bounds.problems import ClampProblem, LawProblem
+from asperity.analysis.bounds.sampling import require_depth_contact, sample_supremum
 from asperity.analysis.gain.search_options import SearchOptions
 from asperity.analysis.gain.theorems import derivative_bound, theorem_of
 from asperity.core.checks import FloatArray

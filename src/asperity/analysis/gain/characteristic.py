@@ -12,11 +12,10 @@ from dataclasses import astuple
 
 import numpy as np
 
-from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.bounds.bound import Bound, bound_from_theorem
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
 from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED, JacobianMeasure
 from asperity.analysis.bounds.sampling import highest_point
-from asperity.analysis.bounds.witness import bound_from_theorem
 from asperity.analysis.gain.certificate import certify, include_clamp
 from asperity.analysis.gain.search_options import SearchOptions
 from asperity.analysis.gain.surface_cache import at_unit_stiffness, cached_result

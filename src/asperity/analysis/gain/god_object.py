@@ -6,15 +6,16 @@ import math
 
 import numpy as np
 
-from asperity.analysis.bounds.bound import Bound, Method
-from asperity.analysis.bounds.measures import NORM
-from asperity.analysis.bounds.problems import CrestProblem
-from asperity.analysis.bounds.sampling import highest_point
-from asperity.analysis.bounds.witness import (
+from asperity.analysis.bounds.bound import (
+    Bound,
+    Method,
     bound_from_theorem,
     checked_upper_bound,
     witness_in_contact,
 )
+from asperity.analysis.bounds.measures import NORM
+from asperity.analysis.bounds.problems import CrestProblem
+from asperity.analysis.bounds.sampling import highest_point
 from asperity.analysis.gain import closed_forms
 from asperity.analysis.gain.medial_axis import sharpest_crest
 from asperity.analysis.gain.search_options import SearchOptions

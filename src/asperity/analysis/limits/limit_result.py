@@ -9,8 +9,7 @@ from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.limits.limit_rules import Limit
 from asperity.analysis.limits.perceptibility import Perceptibility
 from asperity.analysis.limits.spectrum import Spectrum
-from asperity.analysis.passivity.recommended_stiffness import Margin
-from asperity.analysis.passivity.verdict import StabilityLimit
+from asperity.analysis.passivity.verdict import Margin, StabilityLimit
 from asperity.core.display import Plottable, Reportable
 from asperity.core.files import Serializable, attributes_to_dict
 from asperity.devices import Device

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from asperity.analysis.comparison_result import LawRow, Recommendation
 from asperity.analysis.limits.perceptibility import (
     CLEAR_RATIO,
     DEFAULT_SAMPLES,
@@ -16,13 +15,14 @@ from asperity.analysis.limits.perceptibility import (
     Perceptibility,
 )
 from asperity.analysis.passivity.criteria import damping_assumption
-from asperity.analysis.sentences.passivity_sentences import (
+from asperity.analysis.results import LawRow, Recommendation
+from asperity.analysis.sentences.analysis_sentences import (
     buzz_text,
     critical_speed_text,
     stability_limit_text,
     stiffness_limit_text,
 )
-from asperity.analysis.sentences.perceptibility_sentences import (
+from asperity.analysis.sentences.limits_sentences import (
     force_magnitude_text,
     form_removal_sentences,
     masking_text,

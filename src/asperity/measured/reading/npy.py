@@ -10,8 +10,12 @@ import numpy as np
 
 from asperity.core.errors import SurfaceFileError
 from asperity.measured.reading.isolation import describe_exception
-from asperity.measured.reading.raw_surface import RawSurface, check_point_count
-from asperity.measured.reading.reader import ReadingOptions, SurfaceFile
+from asperity.measured.reading.reader import (
+    RawSurface,
+    ReadingOptions,
+    SurfaceFile,
+    check_point_count,
+)
 
 NPY_MAGIC = b"\x93NUMPY"
 

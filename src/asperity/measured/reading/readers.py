@@ -29,8 +29,7 @@ from asperity.measured.reading.metrology.x3p import read_x3p
 from asperity.measured.reading.npy import NPY_MAGIC, read_npy
 from asperity.measured.reading.plain_text.esri import is_esri, read_esri
 from asperity.measured.reading.plain_text.text_reader import read_text
-from asperity.measured.reading.raw_surface import RawSurface
-from asperity.measured.reading.reader import Reader, ReadingOptions, SurfaceFile
+from asperity.measured.reading.reader import RawSurface, Reader, ReadingOptions, SurfaceFile
 
 MAX_BYTES = 2 * 10**9
 _MAX_TEXT_BYTES = 5 * 10**8  # parsing text takes several times the size of the file

@@ -11,7 +11,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.core.units import format_quantity
 from asperity.measured.lengths import format_counts, format_length
-from asperity.measured.reading.raw_surface import MAX_POINTS
+from asperity.measured.reading.reader import MAX_POINTS
 
 # A thousandth of a step does not change a texture and covers positions stored in float32.
 _TOLERANCE = 1e-3

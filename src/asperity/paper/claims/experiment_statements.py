@@ -20,8 +20,12 @@ from asperity.paper.claim import (
     combine_checks,
     declare_claim,
 )
-from asperity.paper.claims.appendices import max_norm_ratio
-from asperity.paper.claims.friction_law import PAPER_CASE, SCANNING_CASE, sticking_norm
+from asperity.paper.claims.friction_law import (
+    PAPER_CASE,
+    SCANNING_CASE,
+    max_norm_ratio,
+    sticking_norm,
+)
 from asperity.paper.claims.passivity_condition import energy_gained
 from asperity.paper.formula_checks import check_zero_outside, compute_q, format_by_name
 from asperity.paper.planar_cases import (

@@ -22,8 +22,7 @@ from asperity.paper.claim import (
     declare_claim,
     relative_error,
 )
-from asperity.paper.claims.appendices import max_norm_ratio
-from asperity.paper.claims.friction_law import PAPER_CASE, sticking_norm
+from asperity.paper.claims.friction_law import PAPER_CASE, max_norm_ratio, sticking_norm
 from asperity.paper.figures import loop_energies
 from asperity.paper.formula_checks import compute_q, format_by_name
 from asperity.paper.planar_cases import SCANNING, ExperimentCase, generic_profile, groove_path

@@ -19,8 +19,7 @@ from asperity.paper.experiments.experiment_setups import (
 )
 from asperity.scene.sweeps import map_threads, sweep_onsets
 from asperity.simulation.batch import BatchSimulation, StopRule
-from asperity.simulation.limit_cycles.onset import run_starts, start_offsets
-from asperity.simulation.limit_cycles.prediction import Prediction
+from asperity.simulation.limit_cycles.onset import Prediction, run_starts, start_offsets
 
 CYCLE_COUNT_STARTS = 24
 STARTS = 8

@@ -13,8 +13,7 @@ from asperity.paper.experiments.experiment_setups import device_setup
 from asperity.scene.setup import Setup
 from asperity.scene.sweeps import map_threads
 from asperity.simulation import SpringHand, find_onset
-from asperity.simulation.limit_cycles.onset import Onset
-from asperity.simulation.limit_cycles.prediction import Prediction, predict
+from asperity.simulation.limit_cycles.onset import Onset, Prediction, predict
 from asperity.surface import Surface
 from asperity.textures import named_surface
 from asperity.textures.kinds.sinusoid import Sinusoid

@@ -8,11 +8,15 @@ from typing import Any
 
 from asperity.core.files import to_plain_data
 from asperity.core.units import format_quantity
-from asperity.paper.experiments.bump_runs import BumpExperiment, bump_experiment
 from asperity.paper.experiments.cycle_counts import PassivityExperiment, passivity_experiment
 from asperity.paper.experiments.device_onsets import DeviceExperiment, device_experiment
 from asperity.paper.experiments.experiment_setups import RESOLUTION
-from asperity.paper.experiments.stroke_energies import ScanningExperiment, scanning_experiment
+from asperity.paper.experiments.strokes import (
+    BumpExperiment,
+    ScanningExperiment,
+    bump_experiment,
+    scanning_experiment,
+)
 from asperity.textures.texture import Texture
 
 STEPS = (

@@ -13,7 +13,6 @@ from asperity.paper.claim import (
     check_statement,
     declare_claim,
 )
-from asperity.paper.experiments.bump_runs import BumpRun, bump_experiment
 from asperity.paper.experiments.cycle_counts import STARTS, count_cycles, passivity_onsets
 from asperity.paper.experiments.experiment_setups import (
     ALL_LAWS,
@@ -22,7 +21,7 @@ from asperity.paper.experiments.experiment_setups import (
     FITTED_SUMMARY_WITHOUT_DELAY,
     HANDS_SUMMARY,
 )
-from asperity.paper.experiments.stroke_energies import scanning_experiment
+from asperity.paper.experiments.strokes import BumpRun, bump_experiment, scanning_experiment
 from asperity.paper.planar_cases import PAPER_LAWS
 from asperity.simulation.scan import Stroke
 

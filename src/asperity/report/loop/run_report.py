@@ -25,7 +25,7 @@ from asperity.scene.setup import Setup
 from asperity.simulation import Run
 from asperity.simulation.limit_cycles.onset import is_at_rest
 from asperity.simulation.limit_cycles.onset_search import CYCLE_SPEED
-from asperity.simulation.run import load_trace
+from asperity.simulation.trace import load_trace
 from asperity.surface import Surface
 
 if TYPE_CHECKING:

@@ -24,8 +24,8 @@ from asperity.report.page import (
 )
 from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE
 from asperity.scene.setup import Setup
+from asperity.simulation.limit_cycles.onset import Prediction
 from asperity.simulation.limit_cycles.onset_search import CYCLE_SPEED
-from asperity.simulation.limit_cycles.prediction import Prediction
 from asperity.simulation.scan import Stroke
 
 if TYPE_CHECKING:

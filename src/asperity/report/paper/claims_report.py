@@ -1,14 +1,29 @@
-"""Report of the paper's claims and their verdicts."""
+"""Report of the paper's claims: verdicts, simulated experiments and figures."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import groupby
 
+from asperity.core.units import format_quantity
 from asperity.paper import VERDICTS, Result, Verdict
 from asperity.paper.claim import Number
 from asperity.paper.experiments import Experiments
+from asperity.paper.experiments.cycle_counts import CycleCount, PassivityExperiment
+from asperity.paper.experiments.device_onsets import DeviceExperiment, DeviceOnset
+from asperity.paper.experiments.strokes import BumpExperiment, ScanningExperiment
+from asperity.paper.figures import loop_energies
+from asperity.report.loop.run_report import energy_text
+from asperity.report.loop.sweep_report import (
+    draw_onsets,
+    millijoules,
+    onset_alt_text,
+    onset_cells,
+    onset_section,
+    stiffness_number,
+)
 from asperity.report.page import (
     HEADED,
     Block,
@@ -22,8 +37,11 @@ from asperity.report.page import (
     Table,
     TableLayout,
     assumption_sections,
+    picture_section,
     user_sections,
 )
+from asperity.report.pictures import paper_pictures
+from asperity.report.pictures.paper_pictures import loop_energy_text
 
 _VERDICT_KINDS: dict[Verdict, str] = {
     "holds": "good",
@@ -61,8 +79,6 @@ def evidence_text(value: Number) -> str:
 
 def claims_page(results: Sequence[Result], experiments: Experiments | None) -> Page:
     """Return the report: counts, claims by section with their evidence, figures, experiments."""
-    from asperity.report.paper.experiment_report import experiment_sections, paper_sections
-
     sections = _terminal_sections(results, experiments)
     sections += [_claims_section(name, members) for name, members in _group_by_section(results)]
     sections += paper_sections()
@@ -157,3 +173,165 @@ def _claim_row(result: Result) -> Row:
         Cell(result.verdict, _VERDICT_KINDS[result.verdict]),
     ]
     return Row(cells, id=result.id)
+
+
+def paper_sections() -> list[Section]:
+    """Return figures 2 and 3 of the paper."""
+    fields = (
+        "The texture of section V.B, 0.8 mm sin(2πx/2 mm), with κ₀ = 1000 N/m. The two handles "
+        "are on either flank of the crest, both 0.6 mm below z = 0: laws differ in the direction "
+        "of the force and in the depth that they compute for a handle."
+    )
+    loops = (
+        "Closed paths, and the energy that a law gives to a probe along one turn. A law that ends "
+        "above zero feeds the hand at every turn. C and D, which the paper does not show, follow "
+        "the path of A."
+    )
+    fields_text = (
+        "Arrows of force below a sinusoid of 0.8 mm by 2 mm, a panel for each law, and larger ones "
+        "at a handle on either flank of the crest."
+    )
+    panels = loop_energies()
+    gained = "; ".join(f"{panel.law} {loop_energy_text(panel)}" for panel in panels)
+    loops_text = f"A closed path and the work along it for each of {len(panels)} laws: {gained}."
+    figure = partial(paper_pictures.figure_three, panels)
+    return [
+        picture_section("Figure 2: forces", paper_pictures.figure_two, fields_text, fields),
+        picture_section("Figure 3: energy around closed paths", figure, loops_text, loops),
+    ]
+
+
+def experiment_sections(experiments: Experiments) -> list[Section]:
+    """Return the sections of the experiments in order."""
+    return [
+        _cycle_section(experiments.passivity),
+        _onset_figure_section(experiments.passivity),
+        onset_section("V.A, onsets in numbers", experiments.passivity.onsets),
+        _energy_section(experiments.scanning),
+        _stroke_section(experiments.scanning),
+        _bump_section(experiments.bump),
+        _device_section(experiments),
+        _device_table_section(experiments.devices),
+    ]
+
+
+def _cycle_section(experiment: PassivityExperiment) -> Section:
+    lag, starts = experiment.counts[0].delay, experiment.counts[0].starts
+    caption = (
+        "Figure 5 in simulation: a rubber band pulls the handle into the wall. Height of the "
+        f"handle after the release, one of {starts} starts, at a loop lag of {lag} samples. "
+        "Cycling: still moving after 2 s without decay."
+    )
+    figure = partial(paper_pictures.cycles_figure, experiment)
+    counts = ", ".join(f"{one.cycles} with {_wall_text(one)}" for one in experiment.counts)
+    text = f"Height of the handle over time. Of {starts} starts cycle: {counts}."
+    notes = _fitted_notes(experiment.fitted)
+    return picture_section("V.A, laws that cycle", figure, text, caption, notes)
+
+
+def _wall_text(wall: CycleCount) -> str:
+    """Return the law of a wall with the divisor of its stiffness."""
+    return wall.law if wall.divisor == 1.0 else f"{wall.law}/{wall.divisor:g}"
+
+
+def _fitted_notes(sentences: Sequence[str]) -> list[str]:
+    return [f"Not stated by the paper: {'; '.join(sentences)}."]
+
+
+def _onset_figure_section(experiment: PassivityExperiment) -> Section:
+    caption = (
+        "Stiffness at which the first start cycles, against the lag, which the paper does not "
+        "state. Solid green: proved for conservative laws and exact positions."
+    )
+    figure, text = partial(draw_onsets, experiment.onsets), onset_alt_text(experiment.onsets)
+    return picture_section("V.A, onset against lag, all laws", figure, text, caption)
+
+
+def _energy_section(experiment: ScanningExperiment) -> Section:
+    caption = (
+        "Figure 6 in simulation: energy that the texture has supplied over one stroke. Solid: work "
+        "of the held force on the true motion. Dashed: the paper's sum of command and step of the "
+        "same sample. Positive energy feeds the hand; the paper plots it downwards."
+    )
+    figure = partial(paper_pictures.energies_figure, experiment)
+    count = len(experiment.traces)
+    text = f"Energy along x and z over one stroke, a panel for each of {count} laws."
+    notes = _fitted_notes(experiment.guessed)
+    return picture_section("V.B, energy of a stroke", figure, text, caption, notes)
+
+
+def _stroke_section(experiment: ScanningExperiment) -> Section:
+    headings = ("law", "hand", "speed", "x", "z", "sum", "field", "±", "paper's", "lost")
+    rows = []
+    for one in experiment.strokes:
+        stroke = one.stroke
+        place: Cells = [Cell(stroke.law, "l"), one.hand, format_quantity(stroke.speed, "m/s")]
+        work = [millijoules(value) for value in (stroke.energy[0], stroke.energy[2], stroke.total)]
+        field = Cell(millijoules(stroke.field), "no" if stroke.gains_energy else "")
+        spread = millijoules(stroke.spread + stroke.error, signed=False)
+        rest = [spread, millijoules(sum(stroke.same_sample)), f"{stroke.lost_contact:.1f}"]
+        rows.append(Row([*place, *work, field, *rest], law=stroke.law))
+    notes = (
+        "Energies in mJ per stroke of 80 mm. Field: work of the field of the law along the true "
+        "path; the rest is due to sampling and encoder steps. Coloured: the field feeds the hand.",
+    )
+    table = Table(headings, rows, numeric_columns=range(2, len(headings)))
+    return Section("V.B, every hand and speed", [table], notes=notes)
+
+
+def _bump_section(experiment: BumpExperiment) -> Section:
+    caption = (
+        "Figure 7 in simulation: over a bump of 20 mm and back. Left the path of the handle, "
+        "right the energy that the texture has supplied. A lifts the hand and feeds it in jumps; D "
+        "and H conserve energy, and stop the hand at the flank instead of lifting it."
+    )
+    figure = partial(paper_pictures.bumps_figure, experiment)
+    gains = "; ".join(
+        f"{one.law} {energy_text(float(one.supplied[-1]))} ({one.entry})"
+        for one in experiment.bumps
+    )
+    text = f"Path of the handle over the bump, and energy supplied at the end: {gains}."
+    notes = _fitted_notes(experiment.guessed)
+    return picture_section("V.C, the enlarged bump", figure, text, caption, notes)
+
+
+def _device_section(experiments: Experiments) -> Section:
+    caption = (
+        "Beyond the paper: stiffness that a rule allows, against the onset of limit cycles in the "
+        "simulation. Below the line the rule was wrong: filled orange. Left K₀/q, with the K₀ of "
+        "the catalogue, or with the onset of the smooth wall for the pantograph of section V.A "
+        "(crosses). Right the delay rule, proved for conservative laws and exact positions."
+    )
+    devices = experiments.devices
+    notes = _fitted_notes(devices.guessed)
+    if devices.wall_summary:
+        notes.append(f"Few misses on the left are weak evidence: {devices.wall_summary}.")
+    notes.append(f"Not simulated for lack of an apparent mass: {', '.join(devices.skipped)}.")
+    missed = sum(one.is_limit_violated for one in devices.onsets)
+    text = (
+        f"Onset against the stiffness that two rules allow. On other devices K₀/q was too much in "
+        f"{missed} of {len(devices.onsets)} cases."
+    )
+    figure, title = partial(paper_pictures.devices_figure, experiments), "Predicted and simulated"
+    return picture_section(f"{title}, every device with data", figure, text, caption, notes)
+
+
+def _device_table_section(experiment: DeviceExperiment) -> Section:
+    headings = ("device", "surface", "law", "q", "K₀/q", "delay rule", "cycles", "starts", "depth")
+    rows = [Row(_device_cells(one), law=one.prediction.onset.law) for one in experiment.onsets]
+    notes = (
+        "Stiffnesses in N/m. q at the depth that the handle reached. Delay rule: with the damping "
+        "of the hand, a proof for conservative laws and exact positions, else in brackets.",
+    )
+    table = Table(headings, rows, numeric_columns=range(3, len(headings)))
+    return Section("Devices in numbers", [table], notes=notes)
+
+
+def _device_cells(device_onset: DeviceOnset) -> Cells:
+    law, _delay, _quiet, cycling, starts, depth, q, _paper, rule, _wall = onset_cells(
+        device_onset.prediction
+    )
+    kind = "no" if device_onset.is_limit_violated else ""
+    allowed = Cell(stiffness_number(device_onset.catalogue_limit), kind)
+    names = [device_onset.device, device_onset.surface]
+    return [*names, law, q, allowed, rule, cycling, starts, depth]

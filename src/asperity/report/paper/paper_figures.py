@@ -15,9 +15,8 @@ from asperity.core.errors import ParameterError
 from asperity.core.files import open_atomic
 from asperity.paper.claim_registry import find_claims
 from asperity.paper.experiments import Experiments
-from asperity.paper.experiments.bump_runs import bump_experiment
 from asperity.paper.experiments.cycle_counts import passivity_experiment
-from asperity.paper.experiments.stroke_energies import scanning_experiment
+from asperity.paper.experiments.strokes import bump_experiment, scanning_experiment
 from asperity.report.pictures import paper_pictures as pictures
 from asperity.report.pictures.loop_pictures import onset_figure
 from asperity.report.pictures.paper_pictures import figure_three, figure_two

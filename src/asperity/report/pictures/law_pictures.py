@@ -13,8 +13,8 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from asperity.analysis.compare import Comparison
-from asperity.analysis.comparison_result import LawRow
 from asperity.analysis.energy.merit import scan_height
+from asperity.analysis.results import LawRow
 from asperity.core.units import format_quantity
 from asperity.report.pictures import style
 from asperity.report.pictures.field_pictures import field_segment

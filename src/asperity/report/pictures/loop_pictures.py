@@ -14,13 +14,13 @@ from matplotlib.ticker import MaxNLocator
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity
-from asperity.recording.named_columns import NamedColumns
 from asperity.recording.recording import Recording
 from asperity.recording.replay import recorded_field
+from asperity.recording.row_encoding import NamedColumns
 from asperity.report.pictures import style
-from asperity.simulation.limit_cycles.prediction import Prediction
-from asperity.simulation.run import MAX_ROWS
+from asperity.simulation.limit_cycles.onset import Prediction
 from asperity.simulation.scan import Stroke
+from asperity.simulation.trace import MAX_ROWS
 
 _MAX_POINTS = 6000
 _AXIS_NAMES = ("x", "y", "z")

@@ -14,10 +14,9 @@ from matplotlib.figure import Figure
 from asperity.core.units import format_quantity
 from asperity.laws import find_law
 from asperity.paper.experiments import Experiments
-from asperity.paper.experiments.bump_runs import BumpExperiment
 from asperity.paper.experiments.cycle_counts import CycleCount, PassivityExperiment
 from asperity.paper.experiments.experiment_setups import bump_setup
-from asperity.paper.experiments.stroke_energies import ScanningExperiment
+from asperity.paper.experiments.strokes import BumpExperiment, ScanningExperiment
 from asperity.paper.figures import ForceField, LoopEnergy, force_fields, loop_energies
 from asperity.report.pictures import style
 from asperity.report.sentences.number_text import readable_name

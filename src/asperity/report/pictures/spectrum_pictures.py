@@ -12,8 +12,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from asperity.analysis.energy.merit import parallel_line_points
 from asperity.analysis.limits.limit_result import Limits
-from asperity.analysis.sentences.limits_sentences import stiffness_text
-from asperity.analysis.sentences.perceptibility_sentences import speed_text
+from asperity.analysis.sentences.limits_sentences import speed_text, stiffness_text
 from asperity.core.checks import FloatArray
 from asperity.core.units import format_quantity
 from asperity.devices import Device

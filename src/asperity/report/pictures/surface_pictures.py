@@ -15,8 +15,8 @@ from matplotlib.figure import Figure, SubFigure
 from asperity.core.checks import FloatArray
 from asperity.report.pictures import style
 from asperity.report.pictures.scan_plane import ScanSegment, choose_segment, feature_length
-from asperity.textures.measurement_summary import StepChange
 from asperity.textures.texture import Texture
+from asperity.textures.texture_loading import StepChange
 
 
 @dataclass(frozen=True)

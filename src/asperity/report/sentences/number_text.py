@@ -8,7 +8,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.compare import Comparison
-from asperity.analysis.comparison_result import LawRow
+from asperity.analysis.results import LawRow
 from asperity.core.units import format_quantity, round_down
 
 INFINITY_SIGN = "∞"

@@ -13,23 +13,21 @@ from asperity.core.errors import AsperityError
 from asperity.core.files import Serializable
 from asperity.devices.device import Axis as AxisName
 from asperity.servo.calibration.identification import (
+    FLOOR_STEPS,
+    MAX_STIFFNESS,
     AxisDynamics,
     DelayEstimate,
     Estimate,
     PushRecord,
+    WallOnset,
+    find_wall_onset,
     fit_dynamics,
     fresh_fraction,
+    measure_oscillation,
     position_step,
     rest_noise,
 )
 from asperity.servo.calibration.test_rig import EXCITATION_COLUMN, CalibrationRig
-from asperity.servo.calibration.wall_onset import (
-    FLOOR_STEPS,
-    MAX_STIFFNESS,
-    WallOnset,
-    find_wall_onset,
-    measure_oscillation,
-)
 from asperity.servo.kernels.excitation import PUSHING, REST, WALL, Excitation
 
 HOLDING_STIFFNESS = 30.0

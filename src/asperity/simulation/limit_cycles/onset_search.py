@@ -15,8 +15,7 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.simulation.batch import BatchSimulation, SegmentStatistics, StopRule, Trajectory
 from asperity.simulation.kernels.body_interface import LANES
-from asperity.simulation.run import StopReason
-from asperity.simulation.trace import SUPPLY_SHARE
+from asperity.simulation.trace import SUPPLY_SHARE, StopReason
 
 # Spread of the velocity above which an oscillation counts; the paper gives none [m/s].
 CYCLE_SPEED = 15e-3

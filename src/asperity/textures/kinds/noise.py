@@ -12,16 +12,16 @@ from asperity.core.arguments import SEED, Argument, check_integer
 from asperity.core.checks import FloatArray, check_fraction, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.memory import require_memory
-from asperity.textures.kinds.random_fields import (
+from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.spline.profile import Profile
+from asperity.textures.spline.spline_texture import MIN_NODES, Spline
+from asperity.textures.synthetic import (
     MIN_NODES_PER_WAVE,
     SelfAffineSpectrum,
     random_field,
     random_profile,
     scale_to_rms,
 )
-from asperity.textures.spline.heightmap import HeightMap
-from asperity.textures.spline.profile import Profile
-from asperity.textures.spline.spline_texture import MIN_NODES, Spline
 from asperity.textures.texture import TextureKind
 
 DEFAULT_HURST = 0.8

@@ -6,8 +6,8 @@ import numpy as np
 
 from asperity.core.arguments import SEED, Argument
 from asperity.core.checks import FloatArray
-from asperity.textures.kinds.random_fields import low_pass
 from asperity.textures.library.named import SyntheticPatch, nodes_around
+from asperity.textures.synthetic import low_pass
 
 SUMMARY = "ground along y, like the door of a lift"
 SOURCE = (

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
-from asperity.textures.kinds.random_fields import MIN_NODES_PER_WAVE, low_pass
 from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.synthetic import MIN_NODES_PER_WAVE, low_pass
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ import numpy as np
 from asperity.core.arguments import SEED, Argument
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
-from asperity.textures.kinds.random_fields import SelfAffineSpectrum, random_field, scale_to_rms
 from asperity.textures.library.named import SyntheticPatch
+from asperity.textures.synthetic import SelfAffineSpectrum, random_field, scale_to_rms
 
 SUMMARY = "glazed square mosaic with sunk, sandy joints"
 SOURCE = "typical of a 25 mm bathroom mosaic, our choice"

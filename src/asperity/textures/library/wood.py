@@ -6,8 +6,8 @@ import numpy as np
 
 from asperity.core.arguments import SEED, Argument
 from asperity.core.checks import FloatArray
-from asperity.textures.kinds.random_fields import SelfAffineSpectrum, random_field, scale_to_rms
 from asperity.textures.library.named import SyntheticPatch, nodes_around
+from asperity.textures.synthetic import SelfAffineSpectrum, random_field, scale_to_rms
 
 SUMMARY = "planed oak, unfinished: pores and rings along y"
 SOURCE = (

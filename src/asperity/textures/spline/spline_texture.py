@@ -14,7 +14,7 @@ from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
 from asperity.core.memory import require_memory
-from asperity.textures.bounds.line_segments import LineSegments, spline_segments
+from asperity.textures.bounds.bounded_cells import LineSegments, spline_segments
 from asperity.textures.bounds.spline_bounds import SplineCells
 from asperity.textures.domain import Domain, GridValues, ScanLine
 from asperity.textures.texture import ExactHeight, Texture, TexturePart
@@ -95,7 +95,7 @@ class Spline(Texture):
         return tuple(np.atleast_1d(self.pitch).tolist())
 
     def texture_part(self) -> TexturePart:
-        """See :class:`Texture` and :func:`~asperity.measured.decomposition.decompose_surface`."""
+        """See :class:`Texture` and :func:`~asperity.measured.form.decompose_surface`."""
         heights, nesting, form, waviness = get_or_compute(
             "texture part", self.digest, self._separate_texture
         )
@@ -103,7 +103,7 @@ class Spline(Texture):
 
     def _separate_texture(self) -> tuple[FloatArray, float, float, float]:
         """Return the heights without form and waviness, the nesting index and both ranges."""
-        from asperity.measured.decomposition import decompose_surface
+        from asperity.measured.form import decompose_surface
 
         parts = decompose_surface(self.heights, self._pitches, periodic=self.periodic)
         return parts.heights, parts.nesting, parts.form.range, parts.waviness.range

@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.errors import SurfaceFileError
-from asperity.measured.reading.images.image_scale import png_scale
-from asperity.measured.reading.images.pixels import Pixels, check_image_size, pixels_to_surface
+from asperity.measured.reading.images.pixels import (
+    Pixels,
+    check_image_size,
+    pixels_to_surface,
+    png_scale,
+)
 from asperity.measured.reading.isolation import reject_on_error
-from asperity.measured.reading.raw_surface import RawSurface
-from asperity.measured.reading.reader import ReadingOptions, SurfaceFile
+from asperity.measured.reading.reader import RawSurface, ReadingOptions, SurfaceFile
 
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 _MAX_COMPRESSION_RATIO = 1032  # deflate packs at most this many bytes into one

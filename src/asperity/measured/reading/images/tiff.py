@@ -10,11 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.core.errors import SurfaceFileError
-from asperity.measured.reading.images.image_scale import ImageScale, imagej_scale, ome_scale
-from asperity.measured.reading.images.pixels import Pixels, check_image_size, pixels_to_surface
+from asperity.measured.reading.images.pixels import (
+    ImageScale,
+    Pixels,
+    check_image_size,
+    imagej_scale,
+    ome_scale,
+    pixels_to_surface,
+)
 from asperity.measured.reading.isolation import reject_on_error
-from asperity.measured.reading.raw_surface import RawSurface, mask_missing
-from asperity.measured.reading.reader import ReadingOptions, SurfaceFile
+from asperity.measured.reading.reader import RawSurface, ReadingOptions, SurfaceFile, mask_missing
 
 TIFF_MAGIC = (b"II*\x00", b"MM\x00*", b"II+\x00", b"MM\x00+")
 _MAX_COMPRESSION_RATIO = 2000  # no compression that is read packs more bytes into one

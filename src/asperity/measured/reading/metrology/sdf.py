@@ -19,8 +19,13 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.core.errors import SurfaceFileError
 from asperity.measured.lengths import parse_number
-from asperity.measured.reading.raw_surface import RawSurface, check_point_count, mask_missing
-from asperity.measured.reading.reader import ReadingOptions, SurfaceFile
+from asperity.measured.reading.reader import (
+    RawSurface,
+    ReadingOptions,
+    SurfaceFile,
+    check_point_count,
+    mask_missing,
+)
 
 _TEXT_SIGNATURE = re.compile(
     rb"\s*a[A-Za-z0-9.\-]{2,15}[ \t]*\r*\n(?:[ \t]*(?:;[^\n]*)?\r*\n)*[ \t]*ManufacID\b"

@@ -16,8 +16,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.lengths import unit_to_metres
 from asperity.measured.reading.isolation import reject_on_error
-from asperity.measured.reading.raw_surface import MAX_POINTS, RawSurface
-from asperity.measured.reading.reader import ReadingOptions, SurfaceFile
+from asperity.measured.reading.reader import MAX_POINTS, RawSurface, ReadingOptions, SurfaceFile
 from asperity.measured.reading.resampling import resample_profile, resampling_hint
 
 LIBRARY = "SurfaceTopography"

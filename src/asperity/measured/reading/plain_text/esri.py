@@ -10,8 +10,13 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.core.errors import SurfaceFileError
 from asperity.measured.lengths import parse_number
-from asperity.measured.reading.raw_surface import RawSurface, check_point_count, mask_missing
-from asperity.measured.reading.reader import ReadingOptions, SurfaceFile
+from asperity.measured.reading.reader import (
+    RawSurface,
+    ReadingOptions,
+    SurfaceFile,
+    check_point_count,
+    mask_missing,
+)
 
 _SIGNATURE = re.compile(rb"\s{0,100}(?:ncols|nrows)\s{1,100}[0-9]")
 _SIZE_KEYS = ("ncols", "nrows", "cellsize", "dx", "dy", "nodata_value")

@@ -13,9 +13,14 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import resampling
 from asperity.measured.reading.plain_text import text_header
-from asperity.measured.reading.plain_text.text_table import TextTable, find_table
-from asperity.measured.reading.raw_surface import RawSurface, check_point_count, mask_missing
-from asperity.measured.reading.reader import ReadingOptions, SurfaceFile
+from asperity.measured.reading.plain_text.text_header import TextTable, find_table
+from asperity.measured.reading.reader import (
+    RawSurface,
+    ReadingOptions,
+    SurfaceFile,
+    check_point_count,
+    mask_missing,
+)
 
 _MIN_POINTS = 4
 _MAX_HEADER_LINE = 1000
