@@ -3,39 +3,35 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import io
 import multiprocessing
 import pickle
 import time
-import warnings
 from multiprocessing.connection import Connection
-from multiprocessing.context import ForkProcess
+from multiprocessing.context import ForkServerProcess
 from typing import IO, Any, Self
 
 from asperity.measured.reading import ReadingOptions, SurfaceFile, isolation
 
 LIBRARIES = ("SurfaceTopography.IO", "trimesh", "tifffile")
 FILES = 500  # files read by one process: libraries may hold memory after each file
-_FORK = multiprocessing.get_context("fork")
+# Forks of a small server: those of a test run would inherit gigabytes and exceed the limit at once.
+_FORK_SERVER = multiprocessing.get_context("forkserver")
 
 
 class ReadingWorker:
-    """A fork of this process that reads one file after the other.
+    """A forked process that reads one file after the other.
 
     Each file has the usual limits. The fork is replaced after a file that exceeds them.
     """
 
     _left: int  # files until the process is replaced
     _pipe: Connection
-    _process: ForkProcess
+    _process: ForkServerProcess
 
     def __enter__(self) -> Self:
-        """Import the libraries of the readers, which every fork then has."""
-        for library in LIBRARIES:
-            with contextlib.suppress(ModuleNotFoundError), warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                importlib.import_module(library)
+        """Import the libraries of the readers in the server, so that every fork has them."""
+        _FORK_SERVER.set_forkserver_preload([*LIBRARIES, __name__])
         self._start_process()
         return self
 
@@ -72,8 +68,8 @@ class ReadingWorker:
 
     def _start_process(self) -> None:
         self._left = FILES
-        self._pipe, there = _FORK.Pipe()
-        self._process = _FORK.Process(target=_serve, args=(self._pipe, there), daemon=True)
+        self._pipe, there = _FORK_SERVER.Pipe()
+        self._process = _FORK_SERVER.Process(target=_serve, args=(there,), daemon=True)
         self._process.start()
         there.close()
 
@@ -83,8 +79,7 @@ class ReadingWorker:
         self._process.join()
 
 
-def _serve(parents: Connection, pipe: Connection) -> None:
-    parents.close()  # otherwise this process would not see the parent's end close
+def _serve(pipe: Connection) -> None:
     with contextlib.suppress(EOFError):
         while True:
             read, file, options, (seconds, memory) = pipe.recv()
