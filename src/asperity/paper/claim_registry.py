@@ -11,6 +11,17 @@ from difflib import get_close_matches
 from asperity.core.errors import ParameterError
 from asperity.core.processes import limit_processes, precompute
 from asperity.paper.claim import DECLARED_CLAIMS, Claim, Result
+from asperity.paper.claims import (  # noqa: F401 - each module declares its claims
+    conclusions,
+    design_limits,
+    experiment_statements,
+    formula_claims,
+    friction_law,
+    god_object_laws,
+    passivity_condition,
+    penetration_laws,
+    tables_and_remarks,
+)
 from asperity.paper.experiments import simulated_claims  # noqa: F401 - declares its claims
 
 Progress = Callable[[Result, int, int], None]
