@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.helpers.pages import page_example
 
 from asperity.core.errors import ParameterError
 from asperity.paper import get_claim, reproduce_claims
@@ -16,22 +17,7 @@ from asperity.paper.claim_registry import CLAIMS, register
 Call = Callable[..., tuple[int, str, str]]
 Answer = Callable[..., Any]
 
-MODULE = '''
-"""Check that a wall without texture has its nominal stiffness."""
-
-import asperity as asp
-from asperity.paper.claim import Claim, check_statement
-
-
-def compute():
-    wall = asp.Surface(asp.Sinusoid(1e-4, 1e-3), "W", stiffness=700.0)
-    force = float(wall.force([[0.0, 0.0, -1e-3]])[0, 2])
-    summary = f"{force:g} N at 1 mm"
-    return check_statement(summary, printed=abs(force - 0.7) < 1e-12, force=force)
-
-
-WALL = Claim("own-wall", ("(own 1)",), "mine", "The smooth wall is a linear spring.", compute)
-'''
+MODULE = page_example("howto/extend.md", "A claim")
 
 
 @pytest.fixture

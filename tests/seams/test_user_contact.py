@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.helpers.pages import page_example
 from tests.helpers.user_modules import imported
 
 import asperity as asp
@@ -21,77 +22,7 @@ from asperity.laws import Law
 from asperity.reference import exact_force, exact_jacobian
 from asperity.simulation import Cartesian, PrescribedHand, Servo, Strokes, simulate
 
-MODULE = '''
-import sys
-
-import numpy as np
-import sympy as sp
-
-from asperity.core.arguments import Argument
-from asperity.core.compiled import Kernels
-from asperity.contacts.contact import Contact, ContactDerivatives
-from asperity.contacts.sampler_interface import sample_height
-from asperity.contacts.symbols import HX, HY
-from asperity.laws import Law
-
-KERNELS = Kernels(provides=("contact_point",))
-
-
-def contact_point(x, y, z, texture):
-    return 0.5 * sample_height(x, y, texture) - z, x, y
-
-
-class Halved(Contact):
-    """Depth h/2 - z."""
-
-    name = "halved"
-    single_valued = True
-    is_above_probe = True
-    clampable = True
-    supports_state = True
-
-    def kernels(self):
-        return (sys.modules[__name__],)
-
-    def derivatives(self):
-        return ContactDerivatives(
-            sp.Matrix([[HX / 2, HY / 2, -1]]), sp.Matrix([[1, 0, 0], [0, 1, 0]])
-        )
-
-    def contact_height(self, texture, xy):
-        return 0.5 * texture.height(xy)
-
-    def extremes(self, texture):
-        return 0.5 * texture.extremes[0], 0.5 * texture.extremes[1]
-
-    def depth(self, texture, points):
-        return self.contact_height(texture, np.ascontiguousarray(points[:, :2])) - points[:, 2]
-
-    def exact_contact(self, texture, h, p):
-        return h(p[0], p[1], 0, 0) / 2 - p[2], p[0], p[1]
-
-    def probe_positions(self, xy, depth, derivatives):
-        return np.column_stack([xy, 0.5 * derivatives[:, 0] - depth])
-
-    def depth_at_height(self, height, derivatives):
-        return 0.5 * derivatives[:, 0] - height
-
-    def lateral_reach(self, max_depth):
-        return 0.0
-
-
-LAW = Law(
-    "half", "half-texture-normal", Halved(),
-    lambda c: c.k * c.parameter("gain") * c.depth * c.normal,
-    clampable=True, parameters={"gain": Argument("gain", "of the force", "1", 0.7, minimum=0.0)},
-)
-PULLED = Law(
-    "pull", "pulled-back", Halved(),
-    lambda c: c.k * c.depth * c.e_z - c.k * c.depth / 1e-3 * c.tangential(c.deflection),
-    stateful=True,
-    parameters={"max_deflection": Argument("max_deflection", "of the anchor", "m", 0.2e-3)},
-)
-'''
+MODULE = page_example("howto/extend.md", "A contact")
 
 TEXTURES = {
     "sinusoid": asp.Sinusoid(0.3e-3, 2e-3, 0.4, (2.0, 1.0)),

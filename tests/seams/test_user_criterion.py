@@ -10,6 +10,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from tests.helpers.pages import page_example
 
 import asperity as asp
 from asperity.analysis.passivity.criteria import CRITERIA, LEAK, Criterion, register_criterion
@@ -20,41 +21,7 @@ from asperity.report import html_text
 
 Call = Callable[..., tuple[int, str, str]]
 
-OWN = '''
-"""Llewellyn's way: half of what the damping takes away, and an amplifier that must not clip."""
-
-from fractions import Fraction
-
-from asperity.analysis.passivity.criteria import (
-    Criterion,
-    StiffnessRule,
-    evaluate_rule,
-    register_criterion,
-)
-
-
-def half(loop):
-    budget = None if loop.damping_gain is None else loop.damping_gain / 2
-    needs = ("update_rate", "damping")
-    rule = StiffnessRule("half the loss", "k q+ <= s/(2T)", Fraction(1), Fraction(0), budget, needs,
-                         "the amplifier is linear")
-    return evaluate_rule(loop, rule)
-
-
-def clips(loop):
-    force = loop.device.value("max_force")
-    if force is None:
-        return Criterion("clipping", "k D <= F", missing=("max_force",), used_fields=("max_force",))
-    limit = force / loop.surface.max_depth
-    return Criterion(
-        "clipping", "k D <= F", holds=bool(loop.stiffness <= limit), limit=limit,
-        margin=limit / float(loop.stiffness), assumptions="static", used_fields=("max_force",),
-    )
-
-
-register_criterion("half the loss", half)
-register_criterion("clipping", clips)
-'''
+OWN = page_example("howto/extend.md", "A passivity criterion")
 RIG = {
     "damping": "2 N*s/m", "update_rate": "4 kHz", "delay_samples": 0, "max_force": "0.5 N",
 }  # fmt: skip

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import socket
+import struct
+import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pytest
+from tests.helpers.pages import page_example
 
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
@@ -20,60 +27,7 @@ from asperity.servo.drivers.open_haptics import OpenHapticsDriver
 
 Call = Callable[..., tuple[int, str, str]]
 
-DRIVER = '''
-"""A rig whose handle stands still, half a millimetre in the surface; its z points down."""
-
-import sys
-from dataclasses import dataclass
-from typing import NamedTuple
-
-from asperity.core.compiled import Kernels
-from asperity.servo.drivers.driver import Driver, DriverKind, Frame
-
-KERNELS = Kernels(provides=("device_read", "device_write"))
-RIGHT, TOWARDS, DOWN = (1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
-
-
-class Rig(NamedTuple):
-    depth: float
-
-
-def device_read(place, device):
-    place[0] = 0.25
-    place[1] = 0.0
-    place[2] = device.depth
-    return 0
-
-
-def device_write(fx, fy, fz, inside, device):
-    return 0
-
-
-@dataclass(frozen=True)
-class RigDriver(Driver):
-    name = "rig"
-    loss_notice = "Nothing moves."
-
-    placed: Frame
-
-    @property
-    def frame(self):
-        return self.placed
-
-    def kernel_modules(self):
-        return (sys.modules[__name__],)
-
-    def placeholder_record(self):
-        return Rig(0.0)
-
-    def open(self):
-        return Rig(0.5)
-
-
-RIG = DriverKind(
-    "rig", (RIGHT, TOWARDS, DOWN), 1e-3, lambda text, frame: RigDriver(frame), "rig"
-)
-'''
+DRIVER = page_example("howto/extend.md", "A driver in Python")
 DEVICE = 'max_force = "3 N"\nmax_stiffness = "500 N/m"\nupdate_rate = "1 kHz"\ndriver = "rig"\n'
 SERVO = '[servo]\nramp = "0 s"\nlateness = "60 s"\nmisses = 1000000\nsilence = "30 s"\n'
 
@@ -130,3 +84,53 @@ def test_a_name_is_given_once(monkeypatch: pytest.MonkeyPatch) -> None:
     assert register_driver(known) is known
     with pytest.raises(ParameterError, match="is registered already, got 'own'"):
         register_driver(known.__class__("own", known.axes, 1.0, known.create, "own"))
+
+
+def serve_board(board: socket.socket, is_over: threading.Event) -> list[float]:
+    """Answer every force with a position 0.5 mm in the surface; return the forces along z."""
+    forces = []
+    board.settimeout(0.1)
+    while not is_over.is_set():
+        with contextlib.suppress(TimeoutError):
+            packet, sender = board.recvfrom(64)
+            forces.append(struct.unpack("<3f", packet)[2])
+            board.sendto(struct.pack("<3f", 0.25, 0.0, -0.5), sender)
+    return forces
+
+
+@pytest.mark.parametrize("is_silent", [False, True])
+def test_a_driver_with_a_thread(call: Call, tmp_path: Path, is_silent: bool) -> None:
+    """The example of the page renders a wall on a board that answers over UDP, or does not."""
+    text = page_example("howto/extend.md", "A driver with a thread")
+    patient = "port: int = 9000\n    max_reading_age: float = 20.0\n    force_timeout: float = 20.0"
+    assert text.count("port: int = 9000") == 1
+    text = text.replace("port: int = 9000", patient)  # a busy machine delays board and thread
+    (tmp_path / "board.py").write_text(text)
+    (tmp_path / "rig.toml").write_text(DEVICE)
+    (tmp_path / "scene.toml").write_text(
+        f'[texture]\nkind = "sinusoid"\namplitude = "0.1mm"\nperiod = "2mm"\n{SERVO}'
+    )
+    path, is_over = str(tmp_path / "run.mcap"), threading.Event()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board, ThreadPoolExecutor() as pool:
+        board.bind(("127.0.0.1", 0))
+        if is_silent:
+            is_over.set()
+        answers = pool.submit(serve_board, board, is_over)
+        code, out, err = call(
+            *("run", str(tmp_path / "scene.toml"), "--plugin", str(tmp_path / "board.py")),
+            *("--device", str(tmp_path / "rig.toml"), "--law", "W", "--stiffness", "100 N/m"),
+            *("--driver", f"board:{board.getsockname()[1]}", "--max-depth", "2mm"),
+            *("--duration", "0.2s", "--record", path, "--accept-risk"),
+        )
+        is_over.set()
+        forces = answers.result()
+    if is_silent:
+        assert code == 2
+        assert "cannot use the device: the board does not answer" in err
+        return
+    assert code == 0, err
+    assert "on rig: done" in out
+    recording = open_recording(path)
+    np.testing.assert_allclose([recording[axis][-1] for axis in "xyz"], [0.25e-3, 0, -0.5e-3])
+    assert max(forces) == pytest.approx(0.05)
+    assert forces[-1] == 0.0  # released at the end

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.helpers.pages import page_example
 
 import asperity as asp
 from asperity.laws import REGISTERED_LAWS
@@ -21,40 +22,14 @@ from asperity.scene.setup import make_setup
 Call = Callable[..., tuple[int, str, str]]
 Answer = Callable[..., Any]
 
-MODULE = '''
-"""The change of height, with a spring that grows softer at depth."""
-
-import sympy as sp
-
-from asperity.core.arguments import Argument
-from asperity.laws import Law
-
-
-def force(c):
-    soft = c.parameter("soft_depth")
-    return c.k * soft * (1 - sp.exp(-c.depth / soft)) * c.w
-
-
-SOFT = Law(
-    letter="X",
-    name="softening-change-of-height",
-    contact="vertical",
-    force=force,
-    summary="gradient of an energy that grows linearly at depth",
-    parameters={
-        "soft_depth": Argument(
-            "soft_depth", "depth at which it softens", "m", 0.5e-3, minimum=1e-5, maximum=1e-2
-        )
-    },
-)
-'''
+MODULE = page_example("tutorials/own_law.md", "Use it on the command line", "{run}").split("'''")[1]
 LOOP = """
 [texture]
 kind = "sinusoid"
 amplitude = "0.1 mm"
 period = "2 mm"
 [surface]
-law = "X"
+law = "Q"
 stiffness = "400 N/m"
 max_depth = "0.4 mm"
 soft_depth = "0.2 mm"
@@ -92,55 +67,55 @@ def scene(tmp_path: Path) -> str:
 def test_compare_gives_the_parameter_to_the_law_that_has_it(
     call: Call, answer: Answer, module: str
 ) -> None:
-    options = ["--plugin", module, "--laws", "WX", "--set", "soft-depth=0.2 mm"]
+    options = ["--plugin", module, "--laws", "WQ", "--set", "soft-depth=0.2 mm"]
     data = answer("compare", SPEC, *options)
-    assert [(row["law"], row["law_parameters"]) for row in data["laws"]] == [("W", {}), ("X", OWN)]
+    assert [(row["law"], row["law_parameters"]) for row in data["laws"]] == [("W", {}), ("Q", OWN)]
     assert data["laws"][1]["conservative"]
-    assert "Given soft depth 200 µm for law X" in data["assumptions"]
+    assert "Given soft depth 200 µm for law Q" in data["assumptions"]
     softer = answer("compare", SPEC, *options[:4])["laws"][1]
     assert softer["law_parameters"] == {"soft_depth": 0.5e-3}
     assert softer["support"] > data["laws"][1]["support"]
     code, page, _err = call("compare", SPEC, *options, "--html", "-")
     assert (code, SAID in page) == (0, True)
     code, out, _err = call("compare", SPEC, *options)
-    assert (code, "X" in [line.split(" ")[0] for line in out.splitlines()]) == (0, True)
+    assert (code, "Q" in [line.split(" ")[0] for line in out.splitlines()]) == (0, True)
 
 
 def test_without_laws_all_are_compared_the_own_one_too(answer: Answer, module: str) -> None:
     data = answer("compare", SPEC, "--plugin", module)
-    assert "".join(row["law"] for row in data["laws"]) == "WABCDEFGHX"
+    assert "".join(row["law"] for row in data["laws"]) == "WABCDEFGHQ"
 
 
 @pytest.mark.parametrize("command", ["analyze", "limits"])
 def test_one_law_at_a_time(call: Call, answer: Answer, module: str, command: str) -> None:
-    options = ["--plugin", module, "--law", "softening change of height"]
+    options = ["--plugin", module, "--law", "saturating change of height"]
     data = answer(command, SPEC, *options, "--set", "soft_depth=200um")
-    assert (data["law"], data["law_parameters"]) == ("X", OWN)
+    assert (data["law"], data["law_parameters"]) == ("Q", OWN)
     code, page, _err = call(command, SPEC, *options, "--set", "soft_depth=200um", "--html", "-")
     assert (code, SAID in page) == (0, True)
 
 
 def test_a_scene_says_the_parameter(call: Call, answer: Answer, module: str, scene: str) -> None:
     data = answer("simulate", scene, "--plugin", module)
-    assert (data["scene"]["surface"]["law"], data["scene"]["surface"]["parameters"]) == ("X", OWN)
+    assert (data["scene"]["surface"]["law"], data["scene"]["surface"]["parameters"]) == ("Q", OWN)
     code, page, _err = call("simulate", scene, "--plugin", module, "--html", "-")
     assert (code, SAID in page) == (0, True)
     data = answer("analyze", scene, "--plugin", module)
     assert data["law_parameters"] == OWN
     data = answer("simulate", scene, "--plugin", module, "--set", "soft_depth=0.3 mm")
     assert data["scene"]["surface"]["parameters"] == {"soft_depth": 3e-4}
-    data = answer("compare", scene, "--plugin", module, "--laws", "CX")
+    data = answer("compare", scene, "--plugin", module, "--laws", "CQ")
     assert [row["law_parameters"] for row in data["laws"]] == [{}, OWN]
 
 
 def test_loops_over_laws_take_it_along(answer: Answer, module: str, scene: str) -> None:
     way = 'kind = "strokes"\nstart = "0mm;0mm;-0.3mm"\nend = "4mm;0mm;-0.3mm"\nspeed = "0.1 m/s"\n'
     Path(scene).write_text(LOOP.replace('kind = "still"\n', way).replace("point = ", "# "), "utf-8")
-    options = ["--plugin", module, "--laws", "WX", "--speeds", "0.1m/s", "--strokes", "1"]
+    options = ["--plugin", module, "--laws", "WQ", "--speeds", "0.1m/s", "--strokes", "1"]
     soft = answer("scan", scene, *options)
     hard = answer("scan", scene, *options, "--set", "soft_depth=10 mm")
-    assert [one["law"] for one in soft["strokes"]] == ["W", "X"]
-    assert f"{SAID} for law X" in soft["scene"]["assumptions"]
+    assert [one["law"] for one in soft["strokes"]] == ["W", "Q"]
+    assert f"{SAID} for law Q" in soft["scene"]["assumptions"]
     assert soft["strokes"][0] == hard["strokes"][0]
     assert soft["strokes"][1] != hard["strokes"][1]
 
@@ -148,12 +123,12 @@ def test_loops_over_laws_take_it_along(answer: Answer, module: str, scene: str) 
 def test_python_reaches_the_same(scene: str) -> None:
     names: dict[str, Any] = {}
     exec(MODULE, names)
-    law = names["SOFT"]
+    law = names["SATURATING"]
     texture = asp.Sinusoid(amplitude=0.1e-3, period=2e-3)
     result = asp.compare(texture, laws=["C", law], max_depth=4e-4, law_parameters=OWN)
     assert [dict(row.surface.law_parameters) for row in result.rows] == [{}, OWN]
     with pytest.raises(
-        asp.ParameterError, match="'soft_dept', which is no parameter of the laws C, X; did you"
+        asp.ParameterError, match="'soft_dept', which is no parameter of the laws C, Q; did you"
     ):
         asp.compare(texture, laws=["C", law], law_parameters={"soft_dept": 2e-4})
     from asperity.laws import register
@@ -162,19 +137,19 @@ def test_python_reaches_the_same(scene: str) -> None:
         register(law)
         setup = make_setup(load_scene(scene))
         assert dict(setup.surface.law_parameters) == OWN
-        assert asp.limits(texture, law="X", law_parameters=OWN).surface.law is law
+        assert asp.limits(texture, law="Q", law_parameters=OWN).surface.law is law
     finally:
-        REGISTERED_LAWS.pop("X", None)
+        REGISTERED_LAWS.pop("Q", None)
 
 
 BAD = [
-    (["--laws", "X", "--set", "soft_dept=1mm"], "set names 'soft_dept', which is a parameter of no"
+    (["--laws", "Q", "--set", "soft_dept=1mm"], "set names 'soft_dept', which is a parameter of no"
      " law and no field of a device; did you mean 'soft_depth'?"),
-    (["--laws", "W", "--set", "soft_depth=1mm"], "law W does not take it; law X does"),
-    (["--laws", "X", "--set", "soft_depth=1N"], "soft_depth must be a quantity such as '1.5 m'"),
-    (["--laws", "X", "--set", "soft_depth=1m"], "soft_depth must be 10 µm to 10 mm"),
-    (["--laws", "X", "--set", "soft_depth"], "set must be NAME=VALUE"),
-    (["--laws", "X", "--set", "soft_depth=1mm", "--set", "soft-depth=2mm"], "given twice"),
+    (["--laws", "W", "--set", "soft_depth=1mm"], "law W does not take it; law Q does"),
+    (["--laws", "Q", "--set", "soft_depth=1N"], "soft_depth must be a quantity such as '1.5 m'"),
+    (["--laws", "Q", "--set", "soft_depth=1m"], "soft_depth must be 10 µm to 10 mm"),
+    (["--laws", "Q", "--set", "soft_depth"], "set must be NAME=VALUE"),
+    (["--laws", "Q", "--set", "soft_depth=1mm", "--set", "soft-depth=2mm"], "given twice"),
     (["--laws", "F", "--friction", "1", "--set", "friction=1"], "friction is given twice"),
     (["--laws", "Y"], "'Y'"),
 ]  # fmt: skip
@@ -188,29 +163,29 @@ def test_what_cannot_be_is_one_line(
     assert (code, out) == (2, "")
     assert message in err
     assert len(err.strip().splitlines()) == 1
-    assert "X" not in REGISTERED_LAWS
+    assert "Q" not in REGISTERED_LAWS
 
 
 FILES = {
     "x = (": "line 1: SyntaxError: '(' was never closed",
     "\n1 / 0": "line 2: ZeroDivisionError: division by zero",
     "import sys\nsys.exit('no')": "line 2: SystemExit: no",
-    "from asperity.laws import Law\n\nL = Law('X', 'x', 'sideways', print)":
-        "line 3: law X: contact must be one of nominal",
+    "from asperity.laws import Law\n\nL = Law('Q', 'x', 'sideways', print)":
+        "line 3: law Q: contact must be one of nominal",
     "from asperity.laws import Law\nL = Law('C', 'x', 'nominal', print)":
         "line 2: law C (x): 'C' is taken by law C (change-of-height)",
-    "from asperity.laws import Law\nL = Law('X', 'God object', 'nominal', print)":
-        "line 2: law X (God object): 'God object' is taken by law D",
+    "from asperity.laws import Law\nL = Law('Q', 'God object', 'nominal', print)":
+        "line 2: law Q (God object): 'God object' is taken by law D",
     "from asperity.laws import Law\n"
-    "L = Law('X', 'x', 'nominal', print, parameters={'max_deflection': 1e-3})":
-        "line 2: law X (x): its parameter 'max_deflection' is in [1], that of another law in [m]",
+    "L = Law('Q', 'x', 'nominal', print, parameters={'max_deflection': 1e-3})":
+        "line 2: law Q (x): its parameter 'max_deflection' is in [1], that of another law in [m]",
     "from asperity.laws import LAWS, find_law\nC = find_law('C')": "registers nothing: no Law, ",
     "\x00": "line 1: ",
     "from asperity.laws import Law\n\ndef force(c):\n    return c.k * nothing\n\n"
-    "L = Law('X', 'x', 'vertical', force)": "line 4: law X: its force is not a symbolic formula "
+    "L = Law('Q', 'x', 'vertical', force)": "line 4: law Q: its force is not a symbolic formula "
     "(name 'nothing' is not defined)",
-    "from asperity.laws import Law\nL = Law('X', 'x', 'vertical', lambda c: [c.k, 0])":
-        "line 2: law X: force must have 3 components",
+    "from asperity.laws import Law\nL = Law('Q', 'x', 'vertical', lambda c: [c.k, 0])":
+        "line 2: law Q: force must have 3 components",
 }  # fmt: skip
 
 
@@ -246,15 +221,15 @@ def test_a_file_that_is_not_there(call: Call) -> None:
 
 
 def test_two_files_can_import_each_other(answer: Answer, tmp_path: Path) -> None:
-    (tmp_path / "parts_of_mine.py").write_text("LETTER = 'X'\n")
-    first = MODULE.replace('letter="X"', "letter=LETTER")
+    (tmp_path / "parts_of_mine.py").write_text("LETTER = 'Q'\n")
+    first = MODULE.replace('letter="Q"', "letter=LETTER")
     (tmp_path / "first.py").write_text("from parts_of_mine import LETTER\n" + first, "utf-8")
     second = "Y = Law('Y', 'y', 'nominal', lambda c: c.k * c.depth * c.e_z)\n"
     second = "from asperity.laws import Law\n" + second
     (tmp_path / "second.py").write_text(second, encoding="utf-8")
     files = ["--plugin", str(tmp_path / "first.py"), "--plugin", str(tmp_path / "second.py")]
-    data = answer("compare", SPEC, *files, "--laws", "YX")
-    assert [row["law"] for row in data["laws"]] == ["Y", "X"]
+    data = answer("compare", SPEC, *files, "--laws", "YQ")
+    assert [row["law"] for row in data["laws"]] == ["Y", "Q"]
 
 
 def test_the_file_may_define_a_texture_kind_too(call: Call, answer: Answer, tmp_path: Path) -> None:

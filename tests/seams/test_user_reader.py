@@ -11,31 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.helpers.pages import page_example
 
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import RawSurface, Reader, read_surface, register
 from asperity.measured.reading import readers as registry
 
-READER = '''
-"""Reads WAFFLE files: the mark, rows, columns, pitch [m], heights in micrometres."""
-
-import struct
-
-import numpy as np
-
-from asperity.measured.reading import RawSurface, Reader
-
-
-def read(file, options):
-    content = file.content
-    rows, columns, pitch = struct.unpack_from("<IId", content, 8)
-    heights = np.frombuffer(content, "<f8", rows * columns, 24).reshape(rows, columns)
-    unit = 1e-6 if options.metres_per_unit is None else options.metres_per_unit
-    return RawSurface(unit * heights, (pitch, pitch), file.name, ("a waffle",))
-
-
-WAFFLE = Reader("a WAFFLE file", lambda file: file.head[:8] == b"WAFFLE\\x00\\x01", read, ("unit",))
-'''
+READER = page_example("howto/readers.md", "Add a file format", "{run}")
 POINTS = "[asperity.readers]\nwaffle = waffles:WAFFLE\n"
 HEIGHTS = np.random.default_rng(7).normal(size=(6, 8)).round(3)
 
