@@ -79,6 +79,26 @@ def import_circles(texts: Mapping[str, str]) -> list[str]:
     return circles
 
 
+def hidden_imports(text: str) -> list[int]:
+    """Return the lines that import a module of the package by a string."""
+    return [
+        node.lineno
+        for node in ast.walk(parsed(text))
+        if isinstance(node, ast.Call)
+        and ast.unparse(node.func).endswith(("import_module", "__import__"))
+        and isinstance(node.args[0], ast.Constant)
+        and str(node.args[0].value).startswith("asperity")
+    ]
+
+
+def test_hidden_imports_are_counted() -> None:
+    assert hidden_imports("import_module('asperity.report')\nimport_module('numba')") == [1]
+
+
+def test_no_import_hides_in_a_string() -> None:
+    assert found_in(modules(), hidden_imports) == []
+
+
 def test_no_imports_go_in_a_circle() -> None:
     assert import_circles(modules()) == []
 

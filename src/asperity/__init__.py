@@ -12,6 +12,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from asperity.core import display as _display
+
 _STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 _MODULE_OF_NAME = {
     name: module for module, name in re.findall(r"^from (\S+) import (\w+)", _STUB, re.MULTILINE)
@@ -28,3 +30,12 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return __all__
+
+
+def _load_report() -> Any:
+    from asperity import report  # at the first use: it imports every room of the package
+
+    return report
+
+
+_display.set_renderer(_load_report)

@@ -1,14 +1,13 @@
 """Notebook, terminal, figure and page representations of results.
 
-Results know nothing of their representations: :mod:`asperity.report` renders them, and is loaded
-by its name at the first use, since it imports every room of the package.
+Results know nothing of their representations: the package registers the module that renders them
+with :func:`set_renderer`, and it is loaded at the first use.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from importlib import import_module
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, overload
 
 from asperity.core.files import write_bytes
@@ -16,9 +15,13 @@ from asperity.core.files import write_bytes
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_load_renderer: Callable[[], Any]
 
-def _renderer() -> Any:
-    return import_module("asperity.report")
+
+def set_renderer(load: Callable[[], Any]) -> None:
+    """Set the function that loads the renderer of results; see :mod:`asperity.report`."""
+    global _load_renderer  # noqa: PLW0603  # set once, when the package is imported
+    _load_renderer = load
 
 
 class Displayable:
@@ -27,7 +30,7 @@ class Displayable:
     def _repr_html_(self) -> str | None:
         """Return HTML without scripts; ``None`` where the ``repr`` suffices."""
         try:
-            text: str | None = _renderer().notebook_html(self)
+            text: str | None = _load_renderer().notebook_html(self)
         except Exception:  # a failure to display a result must not hide the result
             return None
         return text
@@ -55,7 +58,7 @@ class Plottable(Displayable):
             >>> [axes.get_ylabel() for axes in result.plot("merit").axes]
             ['support S']
         """
-        figure: Figure = _renderer().plot(self, picture)
+        figure: Figure = _load_renderer().plot(self, picture)
         return figure
 
 
@@ -82,7 +85,7 @@ class Reportable(Displayable):
             >>> result.to_html()[:15]
             '<!DOCTYPE html>'
         """
-        text: str = _renderer().html_text(self)
+        text: str = _load_renderer().html_text(self)
         if path is None:
             return text
         write_bytes("path", path, text.encode())
@@ -91,4 +94,4 @@ class Reportable(Displayable):
     def __rich_console__(self, console: Any, options: Any) -> Iterator[Any]:
         """Yield the output of the command line, for a console of this width."""
         del console  # the options contain its width
-        yield from _renderer().rich_renderables(self, options.max_width)
+        yield from _load_renderer().rich_renderables(self, options.max_width)
