@@ -108,10 +108,11 @@ def sources() -> dict[str, str]:
 
 
 def pages() -> list[Path]:
-    """Return the pages of the documentation."""
+    """Return the pages of the documentation, and the texts of the reports."""
     built = {"_build", "_generated", "gallery"}
     return [
         *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")),
+        ROOT / "src/asperity/report/texts.toml",
         *(p for p in sorted((ROOT / "docs").rglob("*.md")) if not built & {*p.parts}),
     ]
 

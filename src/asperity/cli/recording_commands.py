@@ -29,7 +29,7 @@ def recording_command() -> None:
 def info_command(file: str, outputs: Outputs) -> None:
     """Show surface, law and device of the recording FILE, and the range of each column."""
     from asperity.recording.recording import open_recording
-    from asperity.report.loop.recording_report import recording_page
+    from asperity.report.loop.run_report import recording_page
 
     recording = open_recording(file)
     with progress_bar("reading the rows"):
@@ -66,7 +66,7 @@ def _output_option(help_text: str) -> Callable[[Callable[..., None]], Callable[.
 def plot_command(file: str, output: str) -> None:
     """Plot motion, force, energy and phase of the recording FILE."""
     from asperity.recording.recording import open_recording
-    from asperity.report.loop.recording_report import write_recording_report
+    from asperity.report.loop.run_report import write_recording_report
 
     with progress_bar("plotting"):
         write_recording_report(open_recording(file), output)
@@ -102,7 +102,7 @@ def replay_command(file: str, outputs: Outputs, surface: str | None) -> None:
     """
     from asperity.recording.recording import open_recording
     from asperity.recording.replay import recorded_surface_on, replay
-    from asperity.report.loop.recording_report import replay_page
+    from asperity.report.loop.run_report import replay_page
 
     recording = open_recording(file)
     other = None

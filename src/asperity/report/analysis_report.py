@@ -13,7 +13,6 @@ from asperity.core.units import format_quantity
 from asperity.report import page
 from asperity.report.device_report import device_numbers_table
 from asperity.report.page import HEADED, Cell, Media, Row, Section, Table, TableLayout
-from asperity.report.sentences import glossary
 from asperity.report.sentences.alt_text import analysis_alt_text, analysis_figure_names
 from asperity.report.sentences.number_text import (
     NOT_AVAILABLE,
@@ -29,6 +28,7 @@ from asperity.report.sentences.number_text import (
     witness_text,
 )
 from asperity.report.sentences.reproduction_code import reproduction_lines
+from asperity.report.sentences.texts import figure_text, glossary
 
 _BOUND_HEADINGS = ("number", "lower", "upper", "method", "attained at")
 _CRITERIA_HEADINGS = ("criterion", "condition", "holds", "limit", "margin", "conclusion, premises")
@@ -229,7 +229,7 @@ def analysis_page(analysis: Analysis, texture_code: str = "") -> page.Page:
             *page.assumption_sections(
                 analysis.assumptions, device_numbers_table(analysis.device, _CRITERIA_FIELDS)
             ),
-            Section("How to read it", [page.DefinitionList(glossary.ANALYSIS)]),
+            Section("How to read it", [page.DefinitionList(glossary("analysis"))]),
         ],
         footer=f"{page.PAPER_CITATION}. {page.NO_PERCEPTUAL_TEST}",
     )
@@ -294,43 +294,10 @@ def _figure_sections(analysis: Analysis, *names: str) -> list[Section]:
     sections = []
     for name in names:
         if name in analysis_figure_names(analysis):
-            title, caption = _CAPTIONS[name]
+            title, caption = figure_text(f"analysis.{name}")
             picture = page.Picture(
                 page.plot_later(analysis, name), analysis_alt_text(analysis, name)
             )
             media = Media.HTML | Media.NOTEBOOK if name == "gain" else Media.HTML
             sections.append(Section(title, [picture], caption, level=3, media=media))
     return sections
-
-
-_CAPTIONS = {
-    "field": (
-        "The field and the worst loop",
-        "Arrows: force on the probe. Colour: curl; the probe gains energy on a loop around one "
-        "colour. White everywhere: conservative. Blue: the worst loop, in the direction of its "
-        "arrows, projected on the plane. The dashed line is the scan; points deeper than the "
-        "working region are faded. A law with state is drawn sliding at full deflection; its worst "
-        "loop may lie in a horizontal plane and is then seen from the side.",
-    ),
-    "gain": (
-        "Where the loop gain is",
-        "‖J‖/k in the vertical plane through the witness of q: the factor by which the law "
-        "multiplies the stiffness of the smooth wall at each point. Computed on a grid, which "
-        "samples thin ridges of the medial axis only in places.",
-    ),
-    "top": (
-        "The loop gain from above",
-        "The greatest ‖J‖/k of five depths below each point, sampled on a grid: greater values "
-        "may lie between. The bounds of q above are not sampled.",
-    ),
-    "depth": (
-        "Singular values over depth",
-        "Singular values of J/k on the line down to the witness of q; the greatest is ‖J‖/k. The "
-        "horizontal lines are the bounds of q.",
-    ),
-    "jumps": (
-        "Force jumps",
-        "At each depth the difference of the force at two points on either side of the medial "
-        "axis, closer together than 1e-9 of the texture.",
-    ),
-}

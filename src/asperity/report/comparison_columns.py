@@ -29,6 +29,7 @@ from asperity.report.sentences.number_text import (
     strength_has_unit,
     yes_no_text,
 )
+from asperity.report.sentences.texts import column_meanings
 from asperity.textures.catalogue import CATALOGUE
 
 VERDICT_MIN_CONSOLE = 72
@@ -162,26 +163,6 @@ def _bound_cell(bound: Bound) -> Cell:
     return Cell(bound_text(bound), note=f"{bound.method}: {bound.note}")
 
 
-_MEANINGS = {
-    "start at": "recommended stiffness on this device; none: no stable stiffness is known",
-    "texture": "RMS of the texture force that the device resolves, at that stiffness",
-    "felt?": "whether a hand perceives that force on this device",
-    "feeds?": "energy per loop given to the hand: the surface feels alive; 0: proved none",
-    "clicks?": "whether the force jumps",
-    "q": "greatest factor by which the law multiplies stiffness; smaller is better",
-    "q⁺": "the same for the stiffening part alone: no delay",
-    "stiffness up to": "stability limit on this device; the recommended stiffness is at most this",
-    "basis": "basis of the limit: proved passive; bounded: proved except for encoder steps; "
-    "plausible: a smooth wall of that gain was stable, no proof; quiet: the same for a law that "
-    "delivers energy below v*",
-    "verdict": "v* is the speed below which the device dissipates less than the field delivers",
-    "conservative": "no closed path of the field gains energy",
-    "worst leak": "energy that one loop can give to the hand",
-    "continuous": "the force does not jump",
-    "T": "strength of the texture at equal q",
-    "S": "support of the hand at equal q",
-    "texture force": "RMS of the oscillating force, at the recommended stiffness",
-}
 _LETTER_COLUMN = LawColumn("law", lambda row, _: Cell(row.law.letter, "l"))
 NAME_COLUMN = LawColumn("name", lambda row, _: Cell(readable_name(row.law.name)), False, 112)
 VERDICT_COLUMN = LawColumn("verdict", lambda row, _: Cell(row.verdict), False, VERDICT_MIN_CONSOLE)
@@ -233,7 +214,7 @@ def laws_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
     """Return one row per law with these columns."""
     rows = _law_rows(comparison, lambda row: [one.cell(row, comparison) for one in columns])
     names = [single_line(one.heading) for one in columns]
-    meanings = dict(_MEANINGS)
+    meanings = column_meanings()
     if not any("v*" in row.verdict for row in comparison.rows):
         del meanings["verdict"]
     layout = TableLayout(

@@ -32,14 +32,14 @@ from asperity.report.comparison_columns import (
 from asperity.report.device_report import datum_text, device_numbers_table
 from asperity.report.measured_report import measured_sections
 from asperity.report.page import Cell, Media, Page, Row, Section, Table, TableLayout
-from asperity.report.sentences import glossary
-from asperity.report.sentences.alt_text import comparison_alt_text
+from asperity.report.sentences.alt_text import COMPARISON_FIGURES, comparison_alt_text
 from asperity.report.sentences.number_text import (
     NOT_AVAILABLE,
     bound_text,
     limit_text,
     position_text,
 )
+from asperity.report.sentences.texts import figure_text, glossary
 
 _FOOTER = f"{page.PAPER_CITATION}. {page.NO_PERCEPTUAL_TEST}"
 _SAMPLED_NOTE = (
@@ -85,7 +85,7 @@ def comparison_page(comparison: Comparison, full: bool = False) -> Page:
                 device_numbers_table(comparison.device, list(comparison.device.data)),
             ),
             _provenance_section(comparison),
-            Section("How to read it", [page.DefinitionList(glossary.COMPARISON)]),
+            Section("How to read it", [page.DefinitionList(glossary("comparison"))]),
         ],
         footer=_FOOTER,
     )
@@ -150,12 +150,12 @@ def _figure_sections(comparison: Comparison) -> list[Section]:
     stiffness = _requested_stiffness_text(comparison)
     digest = _figure_digest(comparison)
     sections = []
-    for name, (title, caption) in _CAPTIONS.items():
+    for name in COMPARISON_FIGURES:
         text = partial(comparison_alt_text, comparison, name)
         picture = page.Picture(page.plot_later(comparison, name), text, name, digest)
         media = Media.HTML | Media.NOTEBOOK if name == "merit" else Media.HTML
-        words = caption.format(depth=depth, stiffness=stiffness)
-        sections.append(Section(title, [picture], words, media=media))
+        title, caption = figure_text(f"comparison.{name}", depth=depth, stiffness=stiffness)
+        sections.append(Section(title, [picture], caption, media=media))
     return sections
 
 
@@ -186,36 +186,6 @@ def _provenance_section(comparison: Comparison) -> Section:
         for row in comparison.rows
     ]
     return Section("Provenance of the numbers", [Table(headings, rows)])
-
-
-_CAPTIONS = {
-    "surface": ("The surface", "As it is rendered, after preparation."),
-    "spectrum": (
-        "Its spectrum",
-        "Amplitude against wavelength along the scan line, with what the device can resolve.",
-    ),
-    "force": (
-        "Force along a scan",
-        "Straight scan at constant height, {depth} below the highest point (below the smooth wall "
-        "for laws that act below it). Stiffness: {stiffness}.",
-    ),
-    "field": (
-        "Force field over its curl",
-        "Arrows: force on the probe in the vertical plane of the scan. Colour: curl; the probe "
-        "gains energy on a loop around one colour. White everywhere: conservative. The dashed "
-        "line is the scan. A law with state is drawn sliding at full deflection.",
-    ),
-    "gain": (
-        "Loop gain",
-        "‖J‖/k in the same plane: the factor by which the law multiplies the stiffness of the "
-        "smooth wall at each point. The cross is the witness of q, if it lies in the picture.",
-    ),
-    "merit": (
-        "Strength and support",
-        "Texture and support that each law gives for the loop gain that it costs. Up and to the "
-        "right is better.",
-    ),
-}
 
 
 # --- several devices and depths -------------------------------------------------------------------

@@ -15,13 +15,13 @@ from asperity.core.units import format_quantity
 from asperity.report import page
 from asperity.report.device_report import device_numbers_table
 from asperity.report.page import SCREEN, Cell, Media, Row, Section, Table, TableLayout
-from asperity.report.sentences import glossary
 from asperity.report.sentences.number_text import (
     INFINITY_SIGN,
     NOT_AVAILABLE,
     readable_name,
     yes_no_text,
 )
+from asperity.report.sentences.texts import glossary
 
 _LIMIT_HEADINGS = ("", "limit", "condition", "left", "right", "holds", "for", "at speeds")
 _NAME_COLUMN, _SHARE_COLUMN, _SPEEDS_COLUMN = 1, 6, 7
@@ -149,7 +149,7 @@ def limits_page(result: Limits) -> page.Page:
             *page.assumption_sections(
                 result.assumptions, device_numbers_table(result.device, fields)
             ),
-            Section("How to read it", [page.DefinitionList(glossary.LIMITS)]),
+            Section("How to read it", [page.DefinitionList(glossary("limits"))]),
         ],
         footer=f"{page.PAPER_CITATION}, section II.B. {page.NO_PERCEPTUAL_TEST}",
     )
@@ -171,17 +171,10 @@ def _facts(result: Limits) -> list[tuple[str, str]]:
 
 
 def _figure_section(result: Limits) -> Section:
-    caption = (
-        "Amplitude of the waves of the texture, and the force of each, against wavelength. Waves "
-        "to the left of a dashed line are too short for the device at this speed; below a dashed "
-        "line they are too weak. Filled: the wave meets every limit that could be decided."
-    )
     met = sum(all(wave.holds.values()) for wave in result.waves)
     description = f"{len(result.waves)} waves, of which {met} meet every limit."
-
-    title, media = "The waves and their forces", Media.HTML | Media.NOTEBOOK
-    figure = page.plot_later(result)
-    return page.picture_section(title, figure, description, caption, media=media)
+    figure, media = page.plot_later(result), Media.HTML | Media.NOTEBOOK
+    return page.figure_section("limits.waves", figure, description, media=media)
 
 
 def _waves_sections(result: Limits) -> list[Section]:

@@ -14,6 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from asperity.report.sentences.number_text import yes_no_text
+from asperity.report.sentences.texts import figure_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -282,6 +283,28 @@ def picture_section(
 ) -> Section:
     """Return a section that shows a figure; see :class:`Picture`."""
     return Section(title, [Picture(figure, description)], caption, notes, level, media=media)
+
+
+def figure_section(
+    name: str,
+    figure: Figure | Callable[[], Figure],
+    description: str,
+    notes: Sequence[str] = (),
+    media: Media = Media.HTML,
+    **values: object,
+) -> Section:
+    """Return a section that shows a figure with its title and caption.
+
+    Args:
+        name: of the text; see :func:`asperity.report.sentences.texts.figure_text`.
+        figure: see :class:`Picture`.
+        description: see :class:`Picture`.
+        notes: below the figure.
+        media: where it is shown.
+        values: that replace the names in braces in the caption.
+    """
+    title, caption = figure_text(name, **values)
+    return picture_section(title, figure, description, caption, notes, media=media)
 
 
 def facts_section(facts: Sequence[tuple[str, str]]) -> Section:

@@ -25,8 +25,13 @@ from asperity.report.comparison_report import comparison_page, comparisons_page
 from asperity.report.device_report import device_page
 from asperity.report.html import Origin, render_notebook, render_page
 from asperity.report.limits_report import limits_page
-from asperity.report.loop.recording_report import recording_page, replay_page
-from asperity.report.loop.run_report import figure_sections, ledger_table, work_text
+from asperity.report.loop.run_report import (
+    figure_sections,
+    ledger_table,
+    recording_page,
+    replay_page,
+    work_text,
+)
 from asperity.report.measured_report import surface_summary_page
 from asperity.report.page import Block, Media, Page, Picture, Row, Section, Table, plot_later
 from asperity.report.sentences.number_text import interval_text, readable_name, witness_text

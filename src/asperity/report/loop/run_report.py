@@ -1,25 +1,24 @@
-"""Report of a simulated run."""
+"""Reports of a simulated run, of a recording and of its replay."""
 
 from __future__ import annotations
 
+import io
 import math
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+from asperity.core.checks import FloatArray
+from asperity.core.errors import ParameterError
+from asperity.core.files import json_text, text_digest, write_bytes
 from asperity.core.units import format_quantity
-from asperity.report.page import (
-    PAPER_CITATION,
-    Media,
-    Page,
-    Row,
-    Section,
-    Table,
-    TableLayout,
-    assumption_sections,
-    facts_section,
-    picture_section,
-    user_sections,
-)
+from asperity.recording.recording import Recording
+from asperity.recording.replay import Replay
+from asperity.report import page
+from asperity.report.comparison_columns import describe_texture
+from asperity.report.html import Origin, render_page
+from asperity.report.page import SCREEN, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import readable_name
 from asperity.scene.setup import Setup
 from asperity.simulation import Run
@@ -31,7 +30,7 @@ from asperity.surface import Surface
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-LOOP_FOOTER = f"{PAPER_CITATION}, section V"
+LOOP_FOOTER = f"{page.PAPER_CITATION}, section V"
 _LEDGER_HEADINGS = ("energy", "x", "y", "z", "sum")
 
 
@@ -180,9 +179,9 @@ def run_page(setup: Setup, run: Run) -> Page:
             *figure_sections(run),
             Section("Energy ledger", [ledger], caption),
             Section("", [ledger], notes=[caption], media=Media.TERMINAL),
-            facts_section(run_facts(setup, run)),
-            *user_sections(Run, setup, run),
-            *assumption_sections(setup.assumptions),
+            page.facts_section(run_facts(setup, run)),
+            *page.user_sections(Run, setup, run),
+            *page.assumption_sections(setup.assumptions),
         ],
         footer=LOOP_FOOTER,
     )
@@ -192,11 +191,9 @@ def figure_sections(run: Run) -> list[Section]:
     """Return the figure of a run with its trace; none without one."""
     if not run.path and len(run.time) < 2:
         return []
-    caption, text = run_caption(run.duration)
-    text += f". At the end the texture has supplied {energy_text(run.ledger.total)}."
-    media = Media.HTML | (Media.NOTEBOOK if len(run.time) > 1 else Media.HTML)
-    figure = partial(_draw_run, run)
-    return [picture_section("Motion, force, energy, phase", figure, text, caption, media=media)]
+    end = f". At the end the texture has supplied {energy_text(run.ledger.total)}"
+    media = Media.HTML | Media.NOTEBOOK if len(run.time) > 1 else Media.HTML
+    return [_motion_section(partial(_draw_run, run), run.duration, end, media)]
 
 
 def _draw_run(run: Run) -> Figure:
@@ -206,12 +203,151 @@ def _draw_run(run: Run) -> Figure:
     return run_figure(traced, run.surface.texture.height)
 
 
-def run_caption(duration: float) -> tuple[str, str]:
-    """Return caption and description of the figure of a loop."""
-    caption = (
-        "Brown: the body below the handle. The exact energy is the work of the held force on the "
-        "true motion; the paper's sum multiplies command and step of the same sample, which "
-        "reverses the sign of the energy that sampling adds."
-    )
+def _motion_section(
+    figure: Callable[[], Figure], duration: float, end: str, media: Media
+) -> Section:
+    """Return the figure of a loop with its description, which ends in a text."""
     span = format_quantity(duration, "s")
-    return caption, f"Height, force and energy over {span}, the path, and two phase portraits"
+    text = f"Height, force and energy over {span}, the path, and two phase portraits{end}."
+    return page.figure_section("loop.run", figure, text, media=media)
+
+
+# --- recordings -----------------------------------------------------------------------------------
+
+_FIGURE_SUFFIXES = (".svg", ".png", ".pdf")
+
+
+def recording_answer(recording: Recording) -> str:
+    """Return size, surface and completeness of a recording in one or two sentences."""
+    period, surface = _row_period(recording.metadata), _surface_metadata(recording.metadata)
+    rate = f" at {format_quantity(1.0 / period, 'Hz')}" if period else ""
+    text = f"{recording.rows} rows, {format_quantity(recording.duration, 's')}{rate}"
+    if surface is not None:
+        stiffness = format_quantity(float(surface["stiffness"]), "N/m")
+        text += f": law {surface['law']} at {stiffness} on {describe_texture(surface['texture'])}"
+    return f"{text}. {_truncation_text(recording)}".rstrip()
+
+
+def _truncation_text(recording: Recording) -> str:
+    """Return why samples may be missing; nothing for a complete recording."""
+    if recording.is_complete:
+        return "" if recording.rows else "Nothing was recorded."
+    if not recording.rows:
+        return "The recording was not closed, and contains no complete block."
+    count = recording.unread_bytes
+    lost = f" ({count} bytes after it are an incomplete block)" if count else ""
+    return f"The recording was not closed: it ends with the last complete block{lost}."
+
+
+def _surface_metadata(metadata: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """Return the surface of a recording; ``None`` if its description is incomplete."""
+    surface = metadata.get("surface")
+    names = {"texture", "law", "law_name", "stiffness", "max_depth", "content"}
+    if not isinstance(surface, Mapping) or not surface.keys() >= names:
+        return None
+    has_kind = isinstance(surface["texture"], Mapping) and "kind" in surface["texture"]
+    numbers = surface["stiffness"], surface["max_depth"]
+    return surface if has_kind and _are_positive_numbers(*numbers) else None
+
+
+def _row_period(metadata: Mapping[str, Any]) -> float:
+    """Return the time from row to row [s]; 0 if it is not recorded."""
+    servo, every = metadata.get("servo"), metadata.get("every", 1)
+    period: Any = servo.get("period") if isinstance(servo, Mapping) else None
+    return float(period) * every if _are_positive_numbers(period, every) else 0.0
+
+
+def _are_positive_numbers(*values: Any) -> bool:
+    return all(isinstance(value, (int, float)) and value > 0 for value in values)
+
+
+def recording_facts(recording: Recording) -> list[tuple[str, str]]:
+    """Return names and values of surface, device, hand and motion."""
+    about = recording.metadata
+    surface, device = _surface_metadata(about), about.get("device")
+    rows = [("Recorded by", f"asperity {recording.version}, {about.get('made_by', 'unknown')}")]
+    if surface is not None:
+        law = f"{surface['law']}, {readable_name(str(surface['law_name']))}"
+        rows += [("Surface", describe_texture(surface["texture"])), ("Law", law)]
+        rows += [("Stiffness", format_quantity(float(surface["stiffness"]), "N/m"))]
+        rows += [("Pressed to", format_quantity(float(surface["max_depth"]), "m"))]
+        rows += [("Content", str(surface["content"]))]
+    if isinstance(device, Mapping):
+        rows += [("Device", str(device.get("name")))]
+    kinds = [(name.capitalize(), about.get(name)) for name in ("hand", "motion")]
+    rows += [(name, str(one.get("kind"))) for name, one in kinds if isinstance(one, Mapping)]
+    if period := _row_period(about):
+        rows += [("From row to row", format_quantity(period, "s"))]
+    return rows
+
+
+def columns_table(recording: Recording, ranges: tuple[FloatArray, FloatArray]) -> Table:
+    """Return the columns with their least and greatest values, empty without rows."""
+    rows = [
+        Row([name, *(f"{one:.6g}" if recording.rows else "" for one in (low, high)), unit])
+        for (name, unit), low, high in zip(recording.columns, *ranges, strict=True)
+    ]
+    headings = ("column", "least", "greatest", "unit")
+    return Table(headings, rows, (1, 2), TableLayout(gap=2))
+
+
+def replay_answer(replay: Replay) -> str:
+    """Return the result of a replay in one or two sentences."""
+    if replay.first_difference is None:
+        return f"All {replay.rows} rows are reproduced bit for bit."
+    one = replay.first_difference
+    unit = "N" if one.column.startswith("commanded") else "m" if "anchor" in one.column else ""
+    values = f"{one.replayed_value!r} instead of {one.recorded_value!r}".replace("'", "")
+    where = f"row {one.row}, at {format_quantity(one.time, 's')}"
+    first = f"the first is {where}: {one.column} is {values} {unit}".rstrip()
+    largest = format_quantity(replay.max_force_difference, "N", digits=3)
+    count = f"{replay.differing_rows} of {replay.rows} rows differ"
+    return f"{count}; {first}. The largest difference of a force is {largest}."
+
+
+def replay_page(replay: Replay) -> Page:
+    """Return the result of a replay and its notes, for a terminal and a notebook."""
+    notes = [page.Paragraph(note) for note in replay.notes]
+    media = Media.TERMINAL | Media.NOTEBOOK
+    return Page("", replay_answer(replay), (), [Section("", notes, media=media)] if notes else [])
+
+
+def recording_page(
+    recording: Recording, ranges: tuple[FloatArray, FloatArray] | None = None
+) -> Page:
+    """Return the report of a recording; ``ranges`` of its columns are read from it by default."""
+    columns = columns_table(recording, ranges or recording.ranges())
+    facts, media = recording_facts(recording), Media.HTML | Media.NOTEBOOK
+    figure = _motion_section(page.plot_later(recording), recording.duration, "", media)
+    return Page(
+        title=f"Recording {recording.path.name}",
+        answer=recording_answer(recording),
+        facts=facts,
+        sections=[
+            *([figure] if recording.rows > 1 else ()),
+            Section("Columns", [columns], media=SCREEN | Media.NOTEBOOK),
+            page.facts_section(facts),
+            *page.assumption_sections(recording.metadata.get("assumptions", ())),
+        ],
+    )
+
+
+def write_recording_report(recording: Recording, path: str) -> None:
+    """Write the page of a recording, or its figure alone, by the suffix of the path.
+
+    Raises:
+        ParameterError: for another suffix, a recording without enough rows, or a file that cannot
+            be written.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".html", *_FIGURE_SUFFIXES):
+        raise ParameterError("output", f"must end in .html, {', '.join(_FIGURE_SUFFIXES)}", path)
+    if suffix == ".html":
+        origin = Origin(content=text_digest(json_text(recording)))
+        content = render_page(recording_page(recording), origin).encode()
+    else:
+        image = io.BytesIO()
+        with page.default_style():
+            recording.plot().savefig(image, format=suffix[1:])
+        content = image.getvalue()
+    write_bytes("output", path, content)

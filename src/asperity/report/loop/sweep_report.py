@@ -4,25 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 from asperity.core.units import format_quantity
+from asperity.report import page
 from asperity.report.loop.run_report import LOOP_FOOTER, loop_facts
-from asperity.report.page import (
-    Cell,
-    Cells,
-    Media,
-    Page,
-    Row,
-    Section,
-    Table,
-    TableLayout,
-    assumption_sections,
-    picture_section,
-    user_sections,
-)
+from asperity.report.page import Cell, Cells, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import INFINITY_SIGN, NOT_AVAILABLE
+from asperity.report.sentences.texts import table_notes
 from asperity.scene.setup import Setup
 from asperity.simulation.limit_cycles.onset import Prediction
 from asperity.simulation.limit_cycles.onset_search import CYCLE_SPEED
@@ -42,14 +33,6 @@ ONSET_HEADINGS = (
     "paper (1)",
     "delay rule",
     "K₀/q",
-)
-ONSET_NOTES = (
-    "Stiffnesses in N/m, d the delay in samples. Quiet to, cycles: the bracket of the onset over "
-    "all starts. Starts: how many of them end in a limit cycle at the onset. Depth: of the handle "
-    "at the onset; q is computed for this depth.",
-    "Paper (1): σ₀/(2Tq). Delay rule: σ₀/(T(q⁺/2 + dq)), a proof for conservative laws and exact "
-    "positions; in brackets for other laws, where it proves nothing. K₀/q: onset of the smooth "
-    "wall at that delay, over q; the paper's rule of thumb, not a proof.",
 )
 
 
@@ -123,24 +106,20 @@ def _case_name(prediction: Prediction) -> str:
 
 def onset_page(setup: Setup, predictions: Sequence[Prediction]) -> Page:
     """Return the report of the onsets."""
-    caption = (
-        "Stiffness at which the first of the starts ends in a limit cycle, and the limits of the "
-        "criteria. A solid green line is a proof: no blue point may lie below it."
-    )
     limit = format_quantity(CYCLE_SPEED, "m/s")
     cycle = f"A limit cycle: the velocity varies by more than {limit} RMS in the last quarter."
     figure, text = partial(draw_onsets, predictions), onset_alt_text(predictions)
-    terminal = Section("", [_onset_table(predictions)], notes=ONSET_NOTES, media=Media.TERMINAL)
+    in_numbers = onset_section("In numbers, N/m", predictions, cycle)
     return Page(
         title=f"Onset of limit cycles, {setup.device.name}",
         answer=onset_answer(setup, predictions),
         facts=loop_facts(setup),
         sections=[
-            terminal,
-            picture_section("Onset against delay", figure, text, caption),
-            onset_section("In numbers, N/m", predictions, cycle),
-            *user_sections(Prediction, setup, predictions),
-            *assumption_sections(setup.assumptions),
+            replace(in_numbers, title="", caption="", media=Media.TERMINAL),
+            page.figure_section("loop.onsets", figure, text),
+            in_numbers,
+            *page.user_sections(Prediction, setup, predictions),
+            *page.assumption_sections(setup.assumptions),
         ],
         footer=LOOP_FOOTER,
     )
@@ -161,18 +140,10 @@ def onset_alt_text(predictions: Sequence[Prediction]) -> str:
 
 def onset_section(title: str, predictions: Sequence[Prediction], caption: str = "") -> Section:
     """Return onsets and limits in numbers."""
-    return Section(title, [_onset_table(predictions)], caption, ONSET_NOTES)
+    return Section(title, [_onset_table(predictions)], caption, table_notes("onsets"))
 
 
 STROKE_HEADINGS = ("law", "speed", "depth", "x", "y", "z", "sum", "field", "±", "paper's", "lost")
-STROKE_NOTE = (
-    "Energies in mJ per stroke: work of the held force on the true motion, mean over whole turns, "
-    "forth and back, after the first stroke; positive feeds the hand. Field: work of the field of "
-    "the law along the true path, without sampling, delay and encoder steps, which account for the "
-    "rest; ±: variation from turn to turn and quadrature error. Paper's: its sum of force and step "
-    "of the same sample. Depth: mean depth of the handle below z = 0. Lost: losses of contact per "
-    "stroke."
-)
 
 
 def millijoules(value: float, *, signed: bool = True) -> str:
@@ -223,14 +194,11 @@ def _group_laws(strokes: Sequence[Stroke], gains_energy: Callable[[Stroke], bool
 
 def strokes_page(setup: Setup, strokes: Sequence[Stroke]) -> Page:
     """Return the report of the strokes."""
-    caption = (
-        "Energy that the texture supplies per stroke: thick the sum, orange along x, blue along z. "
-        "Above the line it feeds the hand."
-    )
     laws = ", ".join(dict.fromkeys(stroke.law for stroke in strokes))
     text = f"Energy of a stroke over its speed, a panel for each of the laws {laws}."
     stops = sorted({stroke.stop_message for stroke in strokes if stroke.stop_message})
-    notes = [f"{STROKE_NOTE} The y axis: --html, --json.", *(f"Stopped: it {one}" for one in stops)]
+    (note,) = table_notes("strokes")
+    notes = [f"{note} The y axis: --html, --json.", *(f"Stopped: it {one}" for one in stops)]
     table = _stroke_table(strokes)
     return Page(
         title=f"Energy per stroke, {setup.device.name}",
@@ -238,10 +206,10 @@ def strokes_page(setup: Setup, strokes: Sequence[Stroke]) -> Page:
         facts=loop_facts(setup),
         sections=[
             Section("", [table], notes=notes, media=Media.TERMINAL),
-            picture_section("Energy per stroke", partial(_draw_strokes, strokes), text, caption),
-            Section("In numbers", [table], notes=[STROKE_NOTE]),
-            *user_sections(Stroke, setup, strokes),
-            *assumption_sections(setup.assumptions),
+            page.figure_section("loop.strokes", partial(_draw_strokes, strokes), text),
+            Section("In numbers", [table], notes=[note]),
+            *page.user_sections(Stroke, setup, strokes),
+            *page.assumption_sections(setup.assumptions),
         ],
         footer=LOOP_FOOTER,
     )

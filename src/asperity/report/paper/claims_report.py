@@ -15,6 +15,7 @@ from asperity.paper.experiments.cycle_counts import CycleCount, PassivityExperim
 from asperity.paper.experiments.device_onsets import DeviceExperiment, DeviceOnset
 from asperity.paper.experiments.strokes import BumpExperiment, ScanningExperiment
 from asperity.paper.figures import loop_energies
+from asperity.report import page
 from asperity.report.loop.run_report import energy_text
 from asperity.report.loop.sweep_report import (
     draw_onsets,
@@ -24,24 +25,10 @@ from asperity.report.loop.sweep_report import (
     onset_section,
     stiffness_number,
 )
-from asperity.report.page import (
-    HEADED,
-    Block,
-    Cell,
-    Cells,
-    Media,
-    Page,
-    Paragraph,
-    Row,
-    Section,
-    Table,
-    TableLayout,
-    assumption_sections,
-    picture_section,
-    user_sections,
-)
+from asperity.report.page import HEADED, Cell, Cells, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.pictures import paper_pictures
 from asperity.report.pictures.paper_pictures import loop_energy_text
+from asperity.report.sentences.texts import table_notes
 
 _VERDICT_KINDS: dict[Verdict, str] = {
     "holds": "good",
@@ -87,8 +74,8 @@ def claims_page(results: Sequence[Result], experiments: Experiments | None) -> P
         sections += experiment_sections(experiments)
         guesses += [*experiments.passivity.fitted, *experiments.scanning.guessed]
         guesses += [*experiments.bump.guessed, *experiments.devices.guessed]
-    sections += user_sections(Result, results, experiments)
-    sections += [one for one in assumption_sections(guesses) if Media.HTML in one.media]
+    sections += page.user_sections(Result, results, experiments)
+    sections += [one for one in page.assumption_sections(guesses) if Media.HTML in one.media]
     title = "“On the Synthesis of Haptic Textures”, claim by claim"
     return Page(title, verdict_counts_text(results), _VERDICT_FACTS, sections, _FOOTER)
 
@@ -108,7 +95,7 @@ def _terminal_sections(results: Sequence[Result], experiments: Experiments | Non
     layout = TableLayout(wrap=(2,), gap=2, has_rule=False)
     table = Table(("claim", "verdict", "states"), rows, layout=layout)
     lines = experiments.summary_lines if experiments is not None else ()
-    summary = [Paragraph(f"{name}: {text}") for name, text in lines]
+    summary = [page.Paragraph(f"{name}: {text}") for name, text in lines]
     return [
         Section("", [table], media=Media.TERMINAL),
         *([Section("", summary, media=Media.TERMINAL)] if summary else ()),
@@ -118,20 +105,20 @@ def _terminal_sections(results: Sequence[Result], experiments: Experiments | Non
 
 def evidence_page(results: Sequence[Result]) -> Page:
     """Return the report of chosen claims; a terminal shows everything that a verdict rests on."""
-    page, evidence = claims_page(results, None), map(_evidence_section, results)
-    sections = [section for section in page.sections if Media.HTML in section.media]
-    return replace(page, answer="", sections=[*evidence, *sections])
+    whole, evidence = claims_page(results, None), map(_evidence_section, results)
+    sections = [section for section in whole.sections if Media.HTML in section.media]
+    return replace(whole, answer="", sections=[*evidence, *sections])
 
 
 def _evidence_section(result: Result) -> Section:
     places = ", ".join((*result.equations, f"section {result.section}"))
     verdict = Row([Cell(result.verdict, _VERDICT_KINDS[result.verdict])])
     details = _evidence_details(result)[1:]
-    blocks: list[Block] = [
-        Paragraph(result.statement),
+    blocks: list[page.Block] = [
+        page.Paragraph(result.statement),
         Table((), [verdict]),
-        Paragraph(result.evidence.summary),
-        *[Paragraph(f"{name[0].upper()}{name[1:]}: {text}") for name, text in details],
+        page.Paragraph(result.evidence.summary),
+        *[page.Paragraph(f"{name[0].upper()}{name[1:]}: {text}") for name, text in details],
     ]
     numbers = result.evidence.numbers.items()
     notes = [f"  {name}: {evidence_text(value)}" for name, value in numbers]
@@ -177,16 +164,6 @@ def _claim_row(result: Result) -> Row:
 
 def paper_sections() -> list[Section]:
     """Return figures 2 and 3 of the paper."""
-    fields = (
-        "The texture of section V.B, 0.8 mm sin(2πx/2 mm), with κ₀ = 1000 N/m. The two handles "
-        "are on either flank of the crest, both 0.6 mm below z = 0: laws differ in the direction "
-        "of the force and in the depth that they compute for a handle."
-    )
-    loops = (
-        "Closed paths, and the energy that a law gives to a probe along one turn. A law that ends "
-        "above zero feeds the hand at every turn. C and D, which the paper does not show, follow "
-        "the path of A."
-    )
     fields_text = (
         "Arrows of force below a sinusoid of 0.8 mm by 2 mm, a panel for each law, and larger ones "
         "at a handle on either flank of the crest."
@@ -194,10 +171,10 @@ def paper_sections() -> list[Section]:
     panels = loop_energies()
     gained = "; ".join(f"{panel.law} {loop_energy_text(panel)}" for panel in panels)
     loops_text = f"A closed path and the work along it for each of {len(panels)} laws: {gained}."
-    figure = partial(paper_pictures.figure_three, panels)
+    loops = partial(paper_pictures.figure_three, panels)
     return [
-        picture_section("Figure 2: forces", paper_pictures.figure_two, fields_text, fields),
-        picture_section("Figure 3: energy around closed paths", figure, loops_text, loops),
+        page.figure_section("paper.forces", paper_pictures.figure_two, fields_text),
+        page.figure_section("paper.loops", loops, loops_text),
     ]
 
 
@@ -217,16 +194,11 @@ def experiment_sections(experiments: Experiments) -> list[Section]:
 
 def _cycle_section(experiment: PassivityExperiment) -> Section:
     lag, starts = experiment.counts[0].delay, experiment.counts[0].starts
-    caption = (
-        "Figure 5 in simulation: a rubber band pulls the handle into the wall. Height of the "
-        f"handle after the release, one of {starts} starts, at a loop lag of {lag} samples. "
-        "Cycling: still moving after 2 s without decay."
-    )
     figure = partial(paper_pictures.cycles_figure, experiment)
     counts = ", ".join(f"{one.cycles} with {_wall_text(one)}" for one in experiment.counts)
     text = f"Height of the handle over time. Of {starts} starts cycle: {counts}."
     notes = _fitted_notes(experiment.fitted)
-    return picture_section("V.A, laws that cycle", figure, text, caption, notes)
+    return page.figure_section("paper.cycles", figure, text, notes, lag=lag, starts=starts)
 
 
 def _wall_text(wall: CycleCount) -> str:
@@ -239,25 +211,16 @@ def _fitted_notes(sentences: Sequence[str]) -> list[str]:
 
 
 def _onset_figure_section(experiment: PassivityExperiment) -> Section:
-    caption = (
-        "Stiffness at which the first start cycles, against the lag, which the paper does not "
-        "state. Solid green: proved for conservative laws and exact positions."
-    )
     figure, text = partial(draw_onsets, experiment.onsets), onset_alt_text(experiment.onsets)
-    return picture_section("V.A, onset against lag, all laws", figure, text, caption)
+    return page.figure_section("paper.onsets", figure, text)
 
 
 def _energy_section(experiment: ScanningExperiment) -> Section:
-    caption = (
-        "Figure 6 in simulation: energy that the texture has supplied over one stroke. Solid: work "
-        "of the held force on the true motion. Dashed: the paper's sum of command and step of the "
-        "same sample. Positive energy feeds the hand; the paper plots it downwards."
-    )
     figure = partial(paper_pictures.energies_figure, experiment)
     count = len(experiment.traces)
     text = f"Energy along x and z over one stroke, a panel for each of {count} laws."
     notes = _fitted_notes(experiment.guessed)
-    return picture_section("V.B, energy of a stroke", figure, text, caption, notes)
+    return page.figure_section("paper.energies", figure, text, notes)
 
 
 def _stroke_section(experiment: ScanningExperiment) -> Section:
@@ -271,20 +234,11 @@ def _stroke_section(experiment: ScanningExperiment) -> Section:
         spread = millijoules(stroke.spread + stroke.error, signed=False)
         rest = [spread, millijoules(sum(stroke.same_sample)), f"{stroke.lost_contact:.1f}"]
         rows.append(Row([*place, *work, field, *rest], law=stroke.law))
-    notes = (
-        "Energies in mJ per stroke of 80 mm. Field: work of the field of the law along the true "
-        "path; the rest is due to sampling and encoder steps. Coloured: the field feeds the hand.",
-    )
     table = Table(headings, rows, numeric_columns=range(2, len(headings)))
-    return Section("V.B, every hand and speed", [table], notes=notes)
+    return Section("V.B, every hand and speed", [table], notes=table_notes("paper_strokes"))
 
 
 def _bump_section(experiment: BumpExperiment) -> Section:
-    caption = (
-        "Figure 7 in simulation: over a bump of 20 mm and back. Left the path of the handle, "
-        "right the energy that the texture has supplied. A lifts the hand and feeds it in jumps; D "
-        "and H conserve energy, and stop the hand at the flank instead of lifting it."
-    )
     figure = partial(paper_pictures.bumps_figure, experiment)
     gains = "; ".join(
         f"{one.law} {energy_text(float(one.supplied[-1]))} ({one.entry})"
@@ -292,16 +246,10 @@ def _bump_section(experiment: BumpExperiment) -> Section:
     )
     text = f"Path of the handle over the bump, and energy supplied at the end: {gains}."
     notes = _fitted_notes(experiment.guessed)
-    return picture_section("V.C, the enlarged bump", figure, text, caption, notes)
+    return page.figure_section("paper.bumps", figure, text, notes)
 
 
 def _device_section(experiments: Experiments) -> Section:
-    caption = (
-        "Beyond the paper: stiffness that a rule allows, against the onset of limit cycles in the "
-        "simulation. Below the line the rule was wrong: filled orange. Left K₀/q, with the K₀ of "
-        "the catalogue, or with the onset of the smooth wall for the pantograph of section V.A "
-        "(crosses). Right the delay rule, proved for conservative laws and exact positions."
-    )
     devices = experiments.devices
     notes = _fitted_notes(devices.guessed)
     if devices.wall_summary:
@@ -312,19 +260,15 @@ def _device_section(experiments: Experiments) -> Section:
         f"Onset against the stiffness that two rules allow. On other devices K₀/q was too much in "
         f"{missed} of {len(devices.onsets)} cases."
     )
-    figure, title = partial(paper_pictures.devices_figure, experiments), "Predicted and simulated"
-    return picture_section(f"{title}, every device with data", figure, text, caption, notes)
+    figure = partial(paper_pictures.devices_figure, experiments)
+    return page.figure_section("paper.devices", figure, text, notes)
 
 
 def _device_table_section(experiment: DeviceExperiment) -> Section:
     headings = ("device", "surface", "law", "q", "K₀/q", "delay rule", "cycles", "starts", "depth")
     rows = [Row(_device_cells(one), law=one.prediction.onset.law) for one in experiment.onsets]
-    notes = (
-        "Stiffnesses in N/m. q at the depth that the handle reached. Delay rule: with the damping "
-        "of the hand, a proof for conservative laws and exact positions, else in brackets.",
-    )
     table = Table(headings, rows, numeric_columns=range(3, len(headings)))
-    return Section("Devices in numbers", [table], notes=notes)
+    return Section("Devices in numbers", [table], notes=table_notes("paper_devices"))
 
 
 def _device_cells(device_onset: DeviceOnset) -> Cells:

@@ -100,6 +100,10 @@ _COMPARISON_ALT_TEXTS: dict[str, Callable[[Comparison], str]] = {
 }
 
 
+COMPARISON_FIGURES = tuple(_COMPARISON_ALT_TEXTS)
+"""Names of the figures of a comparison, in the order of its page."""
+
+
 def comparison_alt_text(comparison: Comparison, name: str) -> str:
     """Return the text alternative of a figure of a comparison by its name."""
     return _COMPARISON_ALT_TEXTS[name](comparison)

@@ -1,0 +1,42 @@
+"""Texts of the pages that contain no results, read from ``texts.toml``."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import lru_cache
+from importlib import resources
+from typing import Any
+
+
+@lru_cache(maxsize=1)
+def _load_texts() -> dict[str, Any]:
+    return tomllib.loads(
+        resources.files("asperity.report").joinpath("texts.toml").read_text("utf-8")
+    )
+
+
+def glossary(result: str) -> list[tuple[str, str]]:
+    """Return terms and definitions for a kind of result: "comparison", "analysis" or "limits"."""
+    return list(_load_texts()["glossary"][result].items())
+
+
+def column_meanings() -> dict[str, str]:
+    """Return the meanings of the columns of the table of laws, by heading."""
+    return dict(_load_texts()["columns"])
+
+
+def table_notes(table: str) -> list[str]:
+    """Return the notes below a table, by its name in ``texts.toml``."""
+    return list(_load_texts()["notes"][table])
+
+
+def figure_text(name: str, **values: object) -> tuple[str, str]:
+    """Return title and caption of a figure.
+
+    Args:
+        name: of its report and of the figure, "comparison.force".
+        values: that replace the names in braces in the caption.
+    """
+    report, figure = name.split(".")
+    text = _load_texts()["figures"][report][figure]
+    return text["title"], text["caption"].format(**values)
