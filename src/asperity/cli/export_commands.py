@@ -50,7 +50,8 @@ _REQUEST_ARGUMENTS = (
         example="1000",
     ),
 )
-_FORMER_NAMES = {"max_data": "largest", "max_evaluations": "looks"}
+# Former names of options are accepted, but not shown.
+_FORMER_NAMES = {"largest": "max-data", "looks": "max-evaluations"}
 _CLAMP = Argument(
     "clamp",
     "depth clamp beyond max_depth: none, whole, backed or lateral",
@@ -60,7 +61,10 @@ _CLAMP = Argument(
 )
 
 
-@click.command("export")
+@click.command(
+    "export",
+    context_settings={"token_normalize_func": lambda name: _FORMER_NAMES.get(name, name)},
+)
 @click.option("-o", "--output", metavar="PATH", required=True, help="The file to write, texture.h.")
 @click.option(
     "--exact",
@@ -69,7 +73,7 @@ _CLAMP = Argument(
 )
 @click.option("--shared", is_flag=True, help="Write a library: header, source and CMakeLists.txt.")
 @click.option("--force", is_flag=True, help="Replace existing files.")
-@options.argument_options((_LANG, *_REQUEST_ARGUMENTS, _CLAMP), former_names=_FORMER_NAMES)
+@options.argument_options((_LANG, *_REQUEST_ARGUMENTS, _CLAMP))
 @options.surface_options(
     "Law, by letter or name.  [default: the scene's, or the recommended law]",
     replace(REQUESTED_STIFFNESS, description="stiffness of the exported force"),

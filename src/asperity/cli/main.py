@@ -12,7 +12,7 @@ import click
 import asperity
 from asperity.cli.plugins import plugin_error_text
 from asperity.core.cache import CacheWarning, size_limit
-from asperity.core.errors import AsperityError, InternalError, ParameterError, print_message
+from asperity.core.errors import AsperityError, ParameterError, print_message
 
 
 def check_not_repeated(
@@ -29,7 +29,8 @@ def check_not_repeated(
         ParameterError: for an option that is given twice and may not be repeated.
     """
     # With resilient parsing other errors are left to the parsing of the command itself.
-    with click.Context(command, parent=group, resilient_parsing=True) as trial:
+    settings = command.context_settings
+    with click.Context(command, parent=group, resilient_parsing=True, **settings) as trial:
         _, _, parsed = command.make_parser(trial).parse_args(list(arguments))
     for option in parsed:
         if isinstance(option, click.Option) and not option.multiple and parsed.count(option) > 1:
@@ -51,8 +52,7 @@ class StrictGroup(click.Group):
         return name, command, rest
 
 
-BAD_INPUT = 2
-INTERNAL_ERROR = 70  # as sysexits.h has it
+BAD_INPUT = AsperityError.exit_code
 
 COMMANDS = {
     "analyze": ("analysis_commands", "Analyze one law on a surface and a device."),
@@ -140,8 +140,6 @@ def main() -> None:
     except click.ClickException as error:
         error.show()
         sys.exit(BAD_INPUT)
-    except InternalError as error:
-        _exit_with_message(error, INTERNAL_ERROR)
     except AsperityError as error:
         _exit_with_message(error, error.exit_code)
     except MemoryError:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -136,23 +135,10 @@ def option_help(argument: Argument) -> str:
     return f"{words}{example}.{default}"
 
 
-class _RenamedOption(click.Option):
-    """Option whose former names are accepted but not shown."""
-
-    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        """Return the help of the option under its first name."""
-        names, self.opts = self.opts, self.opts[:1]
-        try:
-            return super().get_help_record(ctx)
-        finally:
-            self.opts = names
-
-
 def argument_options(
     arguments: Iterable[Argument],
     make_parser: Callable[[Argument], Parser] | None = None,
     *,
-    former_names: Mapping[str, str] = MappingProxyType({}),
     hidden: Collection[Argument] = (),
 ) -> Callable[[Command], Command]:
     """Return a decorator that adds an option for each argument.
@@ -160,7 +146,6 @@ def argument_options(
     Args:
         arguments: declarations of the arguments.
         make_parser: returns the parser of an argument; default: the one of its declaration.
-        former_names: former names of arguments, which are accepted but not shown.
         hidden: arguments whose options are not shown.
     """
 
@@ -173,18 +158,14 @@ def argument_options(
             parse = argument.parse if make_parser is None else make_parser(argument)
             is_list = make_parser is list_parser or argument.form == "items"
             metavar = "LIST" if is_list else "N" if argument.form == "integer" else "TEXT"
-            former = former_names.get(argument.name)
-            option = click.option(
+            command = click.option(
                 flag,
-                *([] if former is None else [f"--{former}"]),
                 argument.name,
-                cls=_RenamedOption,
                 metavar=metavar,
                 callback=parser_callback(parse),
                 help=words,
                 hidden=argument in hidden,
-            )
-            command = option(command)
+            )(command)
         return command
 
     return decorate

@@ -76,6 +76,8 @@ class InternalError(AsperityError, RuntimeError):
     The cause is an error in the code, or in the bounds of a user-defined texture kind.
     """
 
+    exit_code = 70  # as in sysexits.h
+
 
 def escape_unprintable(text: object) -> str:
     r"""Return a text with control characters escaped: a file name could control the terminal.

@@ -159,5 +159,5 @@ def test_the_command_line_has_an_exit_code_for_contradictions(
     monkeypatch.setattr(commands, "cli", contradict)
     with pytest.raises(SystemExit) as stop:
         commands.main()
-    assert stop.value.code == commands.INTERNAL_ERROR
+    assert stop.value.code == InternalError.exit_code
     assert "at most 1, but 2" in capsys.readouterr().err
