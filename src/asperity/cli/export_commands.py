@@ -62,8 +62,7 @@ _CLAMP = Argument(
 
 
 @click.command(
-    "export",
-    context_settings={"token_normalize_func": lambda name: _FORMER_NAMES.get(name, name)},
+    "export", context_settings={"token_normalize_func": lambda name: _FORMER_NAMES.get(name, name)}
 )
 @click.option("-o", "--output", metavar="PATH", required=True, help="The file to write, texture.h.")
 @click.option(

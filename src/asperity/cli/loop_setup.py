@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -62,11 +62,12 @@ def load_setup(
     laws: Sequence[Law] = (),
     *,
     include_delay: bool = True,
-    defaults: Mapping[str, Any] | None = None,
-    simulated: bool = True,
-    allow_bare_surface: bool = False,
+    driver: str | None = None,
 ) -> Setup:
     """Return the closed loop of a scene file and the options.
+
+    A loop in real time accepts a surface without a scene: it has a default hand, a clamp, and the
+    recommended law and stiffness where they are not set.
 
     Args:
         source: path of the scene.
@@ -74,10 +75,7 @@ def load_setup(
         duration: duration of the run [s], in place of the scene's.
         laws: laws that replace the one of the scene.
         include_delay: whether to include the delay of the device.
-        defaults: surface arguments that neither the options nor the scene set.
-        simulated: whether device and hand are simulated; otherwise any surface can be a scene.
-        allow_bare_surface: whether a simulated loop accepts a surface without a scene, with a
-            default hand, and the recommended law and stiffness where they are not set.
+        driver: driver of a loop in real time; ``None`` for a simulation.
 
     Raises:
         ParameterError: for a missing, unknown or invalid value.
@@ -85,27 +83,26 @@ def load_setup(
     from asperity.scene import load_scene
     from asperity.scene.setup import make_setup
 
-    if simulated and not allow_bare_surface and not source.lower().endswith(".toml"):
+    if driver is None and not source.lower().endswith(".toml"):
         words = "must be a scene file (.toml) with [texture], [hand] and [motion]"
         raise ParameterError("scene", words, source)
-    surface = options.surface_values(values)
+    requested = options.surface_values(values)
     if laws:
-        surface.setdefault("law", find_law("W"))
+        requested.setdefault("law", find_law("W"))
     with progress_bar("reading the surface"):
         scene = load_scene(source, file_values(values))
-    loop = scene.loop
-    if not simulated:
-        servo = {name: section for name, section in loop.items() if name == "servo"}
+    device, note = options.select_device(values["device"], scene, values), ""
+    surface = {**scene.surface, **requested}
+    if driver is not None:
+        # A clamp bounds the force, and the analysis then holds at every depth.
+        surface = {"clamp": BACKED.name, **surface}
+        if not {"law", "stiffness"} <= surface.keys() and "hand" not in scene.loop:
+            surface, note = _recommend_law_and_stiffness(scene.texture, device, surface)
+    if driver not in (None, SIMULATED):
+        servo = {name: section for name, section in scene.loop.items() if name == "servo"}
         scene = replace(scene, loop={**_NO_HAND, **servo})
-    unset = (defaults or {}).keys() - scene.surface.keys() - surface.keys()
-    surface |= {name: (defaults or {})[name] for name in unset}
-    device = options.select_device(values["device"], scene, values)
-    merged, note = {**scene.surface, **surface}, ""
-    if allow_bare_surface and not {"law", "stiffness"} <= merged.keys() and "hand" not in loop:
-        chosen, note = recommend_law_and_stiffness(scene.texture, device, merged)
-        surface, merged = {**surface, **chosen}, {**merged, **chosen}
-    if laws or "law" in merged:
-        options.check_parameters_apply(surface, laws or (find_law(merged["law"]),))
+    if laws or "law" in surface:
+        options.check_parameters_apply(requested, laws or (find_law(surface["law"]),))
     setup = make_setup(
         scene,
         surface=surface,
@@ -113,20 +110,17 @@ def load_setup(
         duration=duration,
         laws=laws,
         uses_delay=include_delay,
-        use_defaults=allow_bare_surface,
+        use_defaults=driver is not None,
     )
     return replace(setup, assumptions=(note, *setup.assumptions)) if note else setup
 
 
-def recommend_law_and_stiffness(
-    texture: Texture, device: Device, specified: Mapping[str, Any]
+def _recommend_law_and_stiffness(
+    texture: Texture, device: Device, surface: dict[str, Any]
 ) -> tuple[dict[str, Any], str]:
-    """Return the recommended law and stiffness with a note for the assumptions.
+    """Return surface arguments with the recommended law and stiffness, and a note about them.
 
-    Args:
-        texture: the texture.
-        device: the device.
-        specified: surface arguments that are set; a law or stiffness among them is used.
+    A law or a stiffness among the arguments is not replaced.
 
     Raises:
         ParameterError: if nothing can be recommended.
@@ -134,17 +128,17 @@ def recommend_law_and_stiffness(
     from asperity.analysis.compare import compare
     from asperity.scene.sections import surface_keywords
 
-    laws = [find_law(specified["law"])] if "law" in specified else list(REGISTERED_LAWS.values())
-    keywords = surface_keywords(specified, *laws)
+    laws = [find_law(surface["law"])] if "law" in surface else list(REGISTERED_LAWS.values())
+    keywords = surface_keywords(surface, *laws)
     keywords.pop("law", None)
     with step_bar("comparing the laws", len(laws)) as step:
         result = compare(texture, device, laws, progress=step, **keywords)
-    row = result.rows[0] if "law" in specified else result.recommended_row or result.nearest_row
+    row = result.rows[0] if "law" in surface else result.recommended_row or result.nearest_row
     if row is None:
         reason = f"is missing, and none can be recommended: {result.recommendation}"
         raise ParameterError("law", reason)
-    chosen: dict[str, Any] = {"law": row.law}
-    if "stiffness" in specified:
+    chosen = {**surface, "law": row.law}
+    if "stiffness" in surface:
         return chosen, f"Law {row.law.letter}, as asperity compare recommends"
     if not row.recommended_stiffness:
         reason = f"is missing, and none is known to be stable for law {row.law.letter}"
@@ -168,8 +162,6 @@ def select_laws(laws: tuple[Law, ...] | None, law: Law | None) -> tuple[Law, ...
 
 SIMULATED = "simulated"
 REPLAY_PREFIX = "replay:"
-# A clamp bounds the force, and the analysis then holds at every depth.
-DEFAULT_CLAMP = {"clamp": BACKED.name}
 
 
 def driver_options(command: Command) -> Command:
@@ -196,10 +188,8 @@ def driver_setup(
     Raises:
         ParameterError: for a missing, unknown or invalid value.
     """
-    setup = load_setup(
-        source, values, duration, defaults=DEFAULT_CLAMP, simulated=False, allow_bare_surface=True
-    )
-    if name.startswith(REPLAY_PREFIX):
+    setup = load_setup(source, values, duration, driver=name)
+    if name == SIMULATED or name.startswith(REPLAY_PREFIX):
         return setup, setup.servo
     servo = replace(setup.servo, delay=0, position_resolution=0.0, force_resolution=0.0)
     return replace(setup, servo=servo), setup.servo

@@ -19,13 +19,11 @@ import click
 
 from asperity.cli import options
 from asperity.cli.loop_setup import (
-    DEFAULT_CLAMP,
     REPLAY_PREFIX,
     SIMULATED,
     check_stiffness_limit,
     driver_options,
     driver_setup,
-    load_setup,
     loop_options,
     make_driver,
     prestarted_process,
@@ -85,10 +83,7 @@ def run_command(
     """
     check_outputs(json=outputs.json, record=record)
     process = click.get_current_context().with_resource(prestarted_process())
-    if driver == SIMULATED:
-        setup = load_setup(scene, values, duration, defaults=DEFAULT_CLAMP, allow_bare_surface=True)
-    else:
-        setup, _servo = driver_setup(scene, values, driver, duration)
+    setup, _servo = driver_setup(scene, values, driver, duration)
     hashes = setup.file_hashes()
     if not accept_risk:
         check_stiffness_limit(setup)
