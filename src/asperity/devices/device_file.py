@@ -10,7 +10,6 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from asperity.core.units import parse_quantity
 from asperity.devices.device import FIELD_TABLE, TEXT_FIELDS, WALL_KEYS, Datum, Device, WallTest
 
 Table = Mapping[str, Any]
+_FOLDER = Path(__file__).parent
 _DATUM_KEYS = ("value", "unit", "source", "verified", "also")
 _WALL_UNITS = {"cycled": "N/m", "update_rate": "Hz", "lightest": ""}
 _CONTROL_CHARACTERS = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
@@ -35,9 +35,8 @@ def device_names() -> list[str]:
 @lru_cache(maxsize=1)
 def _catalogue() -> dict[str, dict[str, Any]]:
     """Return the content of all catalogue files by id."""
-    folder = resources.files("asperity.devices") / "catalogue"
-    texts = [item.read_text("utf-8") for item in folder.iterdir() if item.name.endswith(".toml")]
-    contents = [tomllib.loads(text) for text in texts]
+    files = (_FOLDER / "catalogue").glob("*.toml")
+    contents = [tomllib.loads(file.read_text("utf-8")) for file in files]
     return {str(content["id"]): content for content in contents}
 
 
@@ -233,10 +232,8 @@ def to_device_toml(device: Device) -> str:
         >>> print(to_device_toml(load_device("2diy")).splitlines()[0])
         id = "2diy"
     """
-    lines = [_toml_line("id", device.id), _toml_line("name", device.name)]
-    lines += [_toml_line("driver", device.driver)] if device.driver else []
-    lines += [_toml_line("axes", device.axes)] if device.axes else []
-    lines += [_toml_line("notes", list(device.notes))] if device.notes else []
+    texts = {key: getattr(device, key) for key in ("id", "name", "driver", "axes", "notes")}
+    lines = [_toml_line(key, text) for key, text in texts.items() if text]
     for field, datum in device.data.items():
         lines += ["", f"[{field}]", *_datum_lines(datum)]
         for other in datum.also:
@@ -258,32 +255,6 @@ def _toml_line(key: str, value: Any) -> str:
     return f"{key} = {json.dumps(value, ensure_ascii=False)}"
 
 
-_TEMPLATE_HEADER = """\
-# Your device. Remove the "# " in front of the numbers that you know and replace the examples; leave
-# all other lines as they are: unknown numbers are reported as unknown. Every number needs its unit.
-# Then: asperity compare cloth --device mine.toml
-
-id = "mine"
-name = "My device"
-# axes = "x to the right, y away from the user, z up"
-# driver = "./device.so"  # driver of `asperity run --driver real`
-# notes = ["further remarks, in sentences"]
-
-"""
-_TABLE_HELP = """
-# A number may have more details, in a table at the end of the file instead of the line above:
-# [max_stiffness]
-# value = "1.8 N/mm"
-# source = "smooth wall, raised until it buzzed"  # source of the number
-# verified = "measured"  # or "read" in an accessible source, or false
-# cycled = "2 N/mm"  # the least stiffness with a limit cycle
-# directions = ["x", "z"]  # axes along which it was pushed
-# update_rate = "1 kHz"  # update rate of this test
-# positions = "stepped"  # by an encoder, or "exact"
-# lightest = 0.8  # damping in the lightest direction relative to that along directions
-"""
-
-
 def device_template() -> str:
     """Return a template of a device file (TOML), valid as it is and with all lines uncommented.
 
@@ -294,8 +265,9 @@ def device_template() -> str:
     lines = []
     for name, field in FIELD_TABLE.items():
         unit = f" [{field.unit}]" if field.unit else ""
-        lines.append(f"# {name} = {_example_value(field)}  # {field.description}{unit}\n")
-    return "".join([_TEMPLATE_HEADER, *lines, _TABLE_HELP])
+        lines.append(f"# {name} = {_example_value(field)}  # {field.description}{unit}")
+    template = (_FOLDER / "device_template.toml").read_text("utf-8")
+    return template.replace("# {fields}", "\n".join(lines))
 
 
 def _example_value(field: Argument) -> str:
