@@ -22,37 +22,7 @@ if TYPE_CHECKING:
     from asperity.textures import Texture
 
 
-_BOUND_SEARCH = (
-    Argument(
-        "tolerance",
-        "relative distance between lower and upper bound at which a search stops",
-        default_description="1e-6 for waves, 1e-3 for maps",
-        must_be_positive=True,
-        example="1e-4",
-    ),
-    Argument(
-        "work_limit",
-        "maximum number of cells that branch and bound examines",
-        default=20_000_000,
-        form="integer",
-        minimum=1,
-    ),
-    Argument(
-        "direction",
-        "direction of the vertical plane in which the worst closed path is searched: x, y,"
-        " or '1,0.5'",
-        default_description="the scan line of the texture",
-        form="direction",
-    ),
-    Argument(
-        "extent",
-        "rectangle on which a non-periodic sum of more than four waves is certified",
-        "m",
-        form="pair",
-        must_be_positive=True,
-        example="10mm; 5mm",
-    ),
-)
+_BOUND_SEARCH = options.command_arguments("analyze")
 
 
 def _validated_parser(argument: Argument) -> Callable[[str], Any]:
@@ -179,16 +149,7 @@ def _write_comparisons(result: DeviceComparisons, outputs: Outputs, full: bool) 
         raise ParameterError("device", f"lacks data to compare laws: {reasons}")
 
 
-# The paper recommends 5 to 10 samples per wave or amplitude.
-_SAMPLING = (
-    Argument(
-        "time_samples", "minimum number of updates per wavelength (α of the paper)", default=5.0
-    ),
-    Argument(
-        "position_samples", "minimum number of position steps per wavelength (β)", default=5.0
-    ),
-    Argument("force_steps", "minimum number of force steps per amplitude (γ)", default=5.0),
-)
+_SAMPLING = options.command_arguments("limits")
 
 
 @click.command("limits")

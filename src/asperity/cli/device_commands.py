@@ -11,17 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from asperity.cli import options
 from asperity.cli.loop_setup import SIMULATED
-from asperity.cli.options import (
-    Overrides,
-    argument_options,
-    device_option,
-    plugin_option,
-    set_option,
-)
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar, write_output
 from asperity.cli.servo_commands import collect_signals
-from asperity.core.arguments import Argument
 from asperity.core.errors import ParameterError, print_message
 
 if TYPE_CHECKING:
@@ -63,29 +56,25 @@ MAX_CALIBRATION_FORCE = 3.0
 _FORCE_FRACTION = 1.0 / 3.0  # of the device's maximum force
 _DEFAULT_RATE = 1000.0  # [Hz] for a device without an update rate
 
-_CALIBRATE = (
-    Argument("force", "maximum force of the calibration", "N", must_be_positive=True, example="1N",
-             default_description="a third of the maximum force of the device, at most 3 N and at"
-             " most its continuous force"),
-)  # fmt: skip
+_CALIBRATE = options.command_arguments("calibrate")
 
 
 @click.command("calibrate")
-@device_option("The device with its known values: ID of the catalogue, or a TOML file.")
+@options.device_option("The device with its known values: ID of the catalogue, or a TOML file.")
 @click.option(
     "--driver", metavar="NAME", default=SIMULATED,
     help="'simulated', 'real' (the driver named in the device entry), or another driver of asperity"
     " run.  [default: simulated: no device is measured]",
 )  # fmt: skip
-@argument_options(_CALIBRATE)
-@set_option
-@plugin_option
+@options.argument_options(_CALIBRATE)
+@options.set_option
+@options.plugin_option
 @click.option("-o", "--output", metavar="FILE", required=True, help="Device file (TOML) to write.")
 @click.option("--yes", is_flag=True, help="Start without confirmation: the handle will move.")
 @output_options(html=False)
 def calibrate_command(
     outputs: Outputs, device: Device | None, driver: str, force: float | None,
-    settings: Overrides, output: str, *, yes: bool,
+    settings: options.Overrides, output: str, *, yes: bool,
 ) -> None:  # fmt: skip
     """Calibrate a device: noise, resolution, rate, delay, mass, damping, friction, stiffest wall.
 

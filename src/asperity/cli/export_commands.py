@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.clamps import BACKED, CLAMPS
+from asperity.clamps import BACKED
 from asperity.cli import options
 from asperity.cli.output import check_not_existing, check_output, progress_bar, step_bar
-from asperity.core.arguments import REQUESTED_STIFFNESS, STIFFNESS, Argument
+from asperity.core.arguments import REQUESTED_STIFFNESS, STIFFNESS
 from asperity.core.errors import ParameterError, escape_unprintable
 from asperity.core.files import write_bytes
 
@@ -22,43 +22,9 @@ if TYPE_CHECKING:
     from asperity.textures.texture import Texture
 
 
-_LANG = Argument("lang", "export target: c99, or one of a plugin", default="c99", form="text")
-_REQUEST_ARGUMENTS = (
-    Argument("name", "prefix of all names in the exported code", default="texture", form="text"),
-    Argument(
-        "precision",
-        "floating-point type: double or float",
-        default="double",
-        form="text",
-        choices=("double", "float"),
-    ),
-    Argument(
-        "max_data",
-        "maximum size of the exported data",
-        "B",
-        default_description="64 MB",
-        form="size",
-        example="512kB",
-        keyword="max_data_size",
-    ),
-    Argument(
-        "max_evaluations",
-        "maximum number of surface evaluations per tick",
-        default_description="600 for D and E, 1800 for H",
-        form="integer",
-        minimum=1,
-        example="1000",
-    ),
-)
+_LANG, *_REQUEST_ARGUMENTS, _CLAMP = options.command_arguments("export")
 # Former names of options are accepted, but not shown.
 _FORMER_NAMES = {"largest": "max-data", "looks": "max-evaluations"}
-_CLAMP = Argument(
-    "clamp",
-    "depth clamp beyond max_depth: none, whole, backed or lateral",
-    default_description="the scene's, or backed",
-    form="text",
-    choices=tuple(CLAMPS),
-)
 
 
 @click.command(
@@ -133,24 +99,7 @@ def export_command(
     click.echo(f"{order.name}_force() is law {analysis.surface.law}. {analysis.answer}")
 
 
-_GRID_ARGUMENTS = (
-    Argument(
-        "extent",
-        "size of the map, one value or one each for x and y",
-        "m",
-        form="pair",
-        example="10mm; 5mm",
-        default_description="one period, or the whole surface",
-    ),
-    Argument(
-        "spacing",
-        "distance between points, one value or one each for x and y",
-        "m",
-        form="pair",
-        example="20um",
-        default_description="the surface's own, or an eighth of its shortest wave",
-    ),
-)
+_GRID_ARGUMENTS = options.command_arguments("maps")
 
 
 @click.command("maps")

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import tomllib
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -133,6 +136,17 @@ def option_help(argument: Argument) -> str:
     example = f", '{argument.example}'" if argument.example else ""
     default = f"  [default: {argument.default_text}]" if argument.default_text else ""
     return f"{words}{example}.{default}"
+
+
+def command_arguments(command: str) -> tuple[Argument, ...]:
+    """Return the declarations of the options that only one command has."""
+    return tuple(Argument(name, **table) for name, table in _command_tables()[command].items())
+
+
+@lru_cache(maxsize=1)
+def _command_tables() -> dict[str, Any]:
+    path = Path(__file__).with_name("command_options.toml")
+    return tomllib.loads(path.read_text("utf-8"))
 
 
 def argument_options(

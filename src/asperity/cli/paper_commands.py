@@ -11,7 +11,6 @@ import click
 
 from asperity.cli import options
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar, step_bar
-from asperity.core.arguments import Argument
 from asperity.core.errors import ParameterError, escape_unprintable
 
 if TYPE_CHECKING:
@@ -22,13 +21,7 @@ if TYPE_CHECKING:
 
 # Fraction of the progress bar for the claims; the rest is for the experiments.
 _CLAIMS_FRACTION = 0.35
-_FORMAT = Argument(
-    "format",
-    "format of the figures: svg or png",
-    default="svg",
-    form="text",
-    choices=("svg", "png"),
-)
+(_FORMAT,) = options.command_arguments("reproduce")
 
 
 @click.command("reproduce")

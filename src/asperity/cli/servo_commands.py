@@ -32,7 +32,6 @@ from asperity.cli.loop_setup import (
 from asperity.cli.options import file_values, surface_values
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
 from asperity.cli.plugins import load_plugin_files, plugin_contents, plugin_files
-from asperity.core.arguments import Argument
 from asperity.core.errors import ParameterError, print_message
 from asperity.devices import load_device
 
@@ -49,10 +48,7 @@ if TYPE_CHECKING:
 POLL_INTERVAL = 0.05
 """Interval at which the loop is polled [s]."""
 
-_RUN_ARGUMENTS = (
-    Argument("duration", "duration of the run", "s", default_description="the scene's",
-             example="10s", must_be_positive=True),
-)  # fmt: skip
+_RUN_ARGUMENTS = options.command_arguments("run")
 
 
 @click.command("run")
@@ -206,10 +202,7 @@ def show_live_state() -> Iterator[Any]:
         yield lambda loop: live.update(status_line(loop))
 
 
-_LAB_ARGUMENTS = (
-    Argument("port", "port of the page on this machine", "", form="integer", example="8137",
-             default_description="8137, or the next free port"),
-)  # fmt: skip
+_LAB_ARGUMENTS = options.command_arguments("lab")
 
 
 @click.command("lab")

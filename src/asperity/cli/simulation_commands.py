@@ -11,7 +11,6 @@ import click
 from asperity.cli import options
 from asperity.cli.loop_setup import load_setup, loop_options, select_laws, stiffness_option
 from asperity.cli.output import Outputs, output_options, progress_bar
-from asperity.core.arguments import Argument
 from asperity.core.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -19,17 +18,7 @@ if TYPE_CHECKING:
 
 
 _STIFFNESS = stiffness_option("the scene's, else 1000 N/m")
-_SIMULATE_ARGUMENTS = (
-    Argument(
-        "duration", "duration of the run", "s", default_description="the scene's", example="2s"
-    ),
-    Argument(
-        "every",
-        "write every N-th sample to trace and figures",
-        default_description="the scene's, 1",
-        form="integer",
-    ),
-)
+_SIMULATE_ARGUMENTS = options.command_arguments("simulate")
 
 
 @click.command("simulate")
@@ -64,27 +53,7 @@ def simulate_command(
     outputs.write({"schema": 2, "scene": setup, "run": run}, run_page(setup, run))
 
 
-_DELAYS = Argument(
-    "delays",
-    "delays to simulate, in samples",
-    default_description="0 to 5",
-    form="integer",
-    example="0; 2; 5",
-)
-_ONSET_SEARCH = (
-    Argument(
-        "starts",
-        "number of initial positions, spread over a period of the texture",
-        default=12,
-        form="integer",
-        keyword="n_phases",
-    ),
-    Argument("tolerance", "relative width at which bisection stops", default=0.05),
-    Argument("lowest", "lowest stiffness to try", "N/m", 1.0, keyword="min_stiffness"),
-)
-_DURATION = Argument(
-    "duration", "duration of each run", "s", default_description="the scene's", example="0.4s"
-)
+_DELAYS, *_ONSET_SEARCH, _DURATION = options.command_arguments("onset")
 _laws_option = options.laws_option("Laws to simulate.  [default: all]")
 _report_options = output_options()
 
@@ -129,25 +98,7 @@ def onset_command(
     outputs.write(data, onset_page(setup, onsets))
 
 
-_SCAN_LISTS = (
-    Argument(
-        "speeds",
-        "speeds of the hand",
-        "m/s",
-        default_description="0.02 to 0.2 m/s",
-        example="0.05m/s; 0.1m/s",
-    ),
-    Argument(
-        "depths",
-        "depths of the hand below z = 0",
-        "m",
-        default_description="the scene's",
-        example="0.5mm; 1mm",
-    ),
-)
-_STROKES = Argument(
-    "strokes", "strokes per run", default_description="the scene's, at least 5", form="integer"
-)
+*_SCAN_LISTS, _STROKES = options.command_arguments("scan")
 
 
 @click.command("scan")
