@@ -11,10 +11,10 @@ import click
 
 from asperity.clamps import BACKED
 from asperity.cli import options
-from asperity.cli.output import check_not_existing, check_output, progress_bar, step_bar
+from asperity.cli.output import check_output, progress_bar, step_bar
 from asperity.core.arguments import REQUESTED_STIFFNESS, STIFFNESS
 from asperity.core.errors import ParameterError, escape_unprintable
-from asperity.core.files import write_bytes
+from asperity.core.files import check_not_existing, write_bytes
 
 if TYPE_CHECKING:
     from asperity.devices import Device

@@ -254,13 +254,3 @@ def write_output(name: str, path: str, text: str) -> None:
         click.echo(text, nl=not text.endswith("\n"))
     else:
         write_bytes(name, path, text.encode())
-
-
-def check_not_existing(name: str, path: str | os.PathLike[str], *, force: bool) -> None:
-    """Check that a file does not exist, or may be replaced.
-
-    Raises:
-        ParameterError: if it exists and ``force`` is false.
-    """
-    if not force and os.path.lexists(path):
-        raise ParameterError(name, f"exists: {escape_unprintable(path)}; --force replaces it")

@@ -17,7 +17,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import IO, Any, ClassVar, overload
 
-from asperity.core.errors import ParameterError
+from asperity.core.errors import ParameterError, escape_unprintable
 
 _MAX_DOTS = 10_000  # in a line of TOML
 
@@ -266,3 +266,13 @@ class Serializable:
     def to_dict(self) -> dict[str, Any]:
         """Return plain data in SI units; infinity is the string "inf", an unknown value None."""
         return attributes_to_dict(self, *self.serialized_attributes.split())
+
+
+def check_not_existing(name: str, path: str | os.PathLike[str], *, force: bool) -> None:
+    """Check that a file does not exist, or may be replaced.
+
+    Raises:
+        ParameterError: if it exists and ``force`` is false.
+    """
+    if not force and os.path.lexists(path):
+        raise ParameterError(name, f"exists: {escape_unprintable(path)}; --force replaces it")

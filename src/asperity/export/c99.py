@@ -6,11 +6,7 @@ The data of large maps are written to a source file beside the header.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
-from importlib import resources
 
 from asperity.contacts.contact import Contact
 from asperity.contacts.warm_start import BUDGET, ERROR_BOUND, UNLIMITED, WARM_START_SIZE
@@ -18,71 +14,15 @@ from asperity.core.errors import ParameterError
 from asperity.export.export_request import ExportRequest
 from asperity.export.expressions import real_literal
 from asperity.export.program import block_comment
+from asperity.export.program_data import ProgramData
 from asperity.export.surface_functions import SurfaceFunctions, surface_functions
+from asperity.export.template_files import fill_template, load_template
 
 MAX_POSITION = 1000.0
 """Limit of the coordinates [m]; the force is zero beyond, where cell indices would overflow."""
 MAX_HEADER_DATA = 256 * 2**10
 """Size of the data [bytes] above which they are written to a source file."""
 _UNLIMITED_COMMENT = "\n * The search has no limit of evaluations: not for a real-time loop."
-
-
-@lru_cache(maxsize=16)
-def load_template(name: str) -> str:
-    """Return a file of the folder ``templates``."""
-    return resources.files("asperity.export").joinpath("templates", name).read_text("utf-8")
-
-
-def fill_template(text: str, values: Mapping[str, str]) -> str:
-    """Return a template with its placeholders, such as ``@name@``, replaced.
-
-    Example:
-        >>> fill_template("void @name@_reset(void);", {"name": "texture"})
-        'void texture_reset(void);'
-    """
-    return re.sub(r"@(\w+)@", lambda found: values[found[1]], text)
-
-
-@dataclass(frozen=True)
-class ProgramParts:
-    """Parts of a program.
-
-    Attributes:
-        substitutions: values of the placeholders of the templates.
-        array_definitions: definitions of the arrays, without storage class.
-        array_declarations: declarations of the arrays, without storage class.
-        record_definitions: definitions of the constant records.
-        functions: the private functions.
-    """
-
-    substitutions: dict[str, str]
-    array_definitions: tuple[str, ...]
-    array_declarations: tuple[str, ...]
-    record_definitions: tuple[str, ...]
-    functions: SurfaceFunctions
-
-    def render(self, name: str, linkage: str, data: str) -> str:
-        """Return a template filled with the parts.
-
-        Args:
-            name: name of the template.
-            linkage: storage class of the public functions.
-            data: definitions or declarations of the arrays.
-        """
-        energy = bool(self.functions.energy_name)
-        contract, public = ["contract.h", "energy.h"], ["public.c", "energy.c"]
-        words = self.substitutions | {"link": linkage}
-        words["guards"] = fill_template(load_template("guards.h"), words)
-        words["contract"] = _fill_templates(contract[: 1 + energy], words)
-        public_code = _fill_templates(public[: 1 + energy], words)
-        words["inside"] = "\n".join(
-            [data, *self.record_definitions, self.functions.code, public_code]
-        )
-        return fill_template(load_template(name), words)
-
-
-def _fill_templates(names: Sequence[str], values: Mapping[str, str]) -> str:
-    return "".join(fill_template(load_template(name), values) for name in names)
 
 
 def c99_files(request: ExportRequest, stem: str) -> dict[str, str]:
@@ -98,17 +38,52 @@ def c99_files(request: ExportRequest, stem: str) -> dict[str, str]:
     functions = surface_functions(request.surface, request.name, single=request.is_single_precision)
     store = functions.data
     places, records = store.used_by(functions.code)
-    size = sum(store.size_in_bytes(place) for place in places)
+    size = sum(map(store.size_in_bytes, places))
     if size > request.max_data_size:
-        raise _size_error(request, functions, places, size)
-    arrays = tuple(store.definition(place) for place in places)
-    heads = tuple(store.declaration(place) for place in places)
-    parts = ProgramParts(
-        _substitutions(request, functions, stem), arrays, heads, tuple(records), functions
-    )
+        raise _size_error(request, store, places, size)
+    words = _substitutions(request, functions, stem)
+    arrays = [store.definition(place) for place in places]
+    if request.as_library or size <= MAX_HEADER_DATA:
+        data = "\n".join(f"static {array}" for array in arrays)
+        return _program_files(request, functions, words, "\n".join([data, *records]))
+    declared = "".join(f"extern {store.declaration(place)};\n" for place in places)
+    data = _render("extern.h", words | {"declared": declared})
+    files = _program_files(request, functions, words, "\n".join([data, *records]))
+    head = f"{words['note']}#include <stdint.h>\n\n{declared}\n"
+    return {**files, f"{stem}_data.c": head + "\n".join(arrays)}
+
+
+def _render(name: str, words: Mapping[str, str]) -> str:
+    return fill_template(load_template(name), words)
+
+
+def _program_files(
+    request: ExportRequest, functions: SurfaceFunctions, words: Mapping[str, str], data: str
+) -> dict[str, str]:
+    """Return the header, or header, source and CMake file of a library.
+
+    Args:
+        request: the export request.
+        functions: the private functions.
+        words: values of the placeholders of the templates.
+        data: definitions or declarations of the data.
+    """
+    link = f"{words['NAME']}_API" if request.as_library else "static inline"
+    words = {**words, "link": link}
+    contract, public = _render("contract.h", words), _render("public.c", words)
+    if functions.energy_name:
+        contract += _render("energy.h", words)
+        public += _render("energy.c", words)
+    words |= {"contract": contract, "inside": "\n".join([data, functions.code, public])}
+    words["guards"] = _render("guards.h", words)
+    files = {"@stem@.h": "header.h"}
     if request.as_library:
-        return _library(parts, stem)
-    return _header(parts, stem, separate_data=size > MAX_HEADER_DATA)
+        files = {
+            "@stem@.h": "library.h",
+            "@stem@.c": "library.c",
+            "CMakeLists.txt": "CMakeLists.txt",
+        }
+    return {fill_template(file, words): _render(name, words) for file, name in files.items()}
 
 
 def _substitutions(
@@ -156,33 +131,10 @@ def _bound_literal(value: float) -> str:
     return repr(value) if math.isfinite(value) else "HUGE_VAL"
 
 
-def _header(parts: ProgramParts, stem: str, *, separate_data: bool) -> dict[str, str]:
-    """Return a header, with a source file for large arrays."""
-    if not separate_data:
-        data = "\n".join(f"static {array}" for array in parts.array_definitions)
-        return {f"{stem}.h": parts.render("header.h", "static inline", data)}
-    declared = "".join(f"extern {head};\n" for head in parts.array_declarations)
-    data = fill_template(load_template("extern.h"), parts.substitutions | {"declared": declared})
-    head = f"{parts.substitutions['note']}#include <stdint.h>\n\n{declared}\n"
-    return {
-        f"{stem}.h": parts.render("header.h", "static inline", data),
-        f"{stem}_data.c": head + "\n".join(parts.array_definitions),
-    }
-
-
-def _library(parts: ProgramParts, stem: str) -> dict[str, str]:
-    """Return header, source and CMake file of a library."""
-    data = "\n".join(f"static {array}" for array in parts.array_definitions)
-    names = {f"{stem}.h": "library.h", f"{stem}.c": "library.c", "CMakeLists.txt": "CMakeLists.txt"}
-    link = f"{parts.substitutions['NAME']}_API"
-    return {file: parts.render(name, link, data) for file, name in names.items()}
-
-
 def _size_error(
-    request: ExportRequest, functions: SurfaceFunctions, names: Sequence[str], size: int
+    request: ExportRequest, store: ProgramData, names: Sequence[str], size: int
 ) -> ParameterError:
     """Return the error of a program that would be too large, with the resolution that fits."""
-    store = functions.data
     # Heights are double, in contrast to the search tree, which may be longer.
     arrays = [store.values[place] for place in names]
     doubles = [array for array in arrays if array.dtype.name == "float64"]

@@ -11,10 +11,13 @@ power is a product by repeated squaring.
 
 from __future__ import annotations
 
+import ast
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from asperity.core.errors import ParameterError
+from asperity.export.template_files import load_template
 
 
 class NotExportableError(ParameterError):
@@ -24,22 +27,20 @@ class NotExportableError(ParameterError):
         super().__init__("law", f"cannot be exported: the function {function!r} {construct}")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, order=True)
 class ScalarType:
-    """Type of a scalar.
+    """Type of a scalar; the common type of two scalars is the greater one.
 
     Attributes:
+        rank: place in the order of the types.
         name: name of the type in Numba: ``float64``, ``float32``, ``int64`` or ``bool``.
-        rank: the common type of two scalars is the one of higher rank.
     """
 
-    name: str
     rank: int
+    name: str
 
 
-BOOL, INT, SINGLE, FLOAT = (
-    ScalarType(name, rank) for rank, name in enumerate(("bool", "int64", "float32", "float64"))
-)
+BOOL, INT, SINGLE, FLOAT = map(ScalarType, range(4), ("bool", "int64", "float32", "float64"))
 
 
 @dataclass(frozen=True)
@@ -59,51 +60,54 @@ class TupleType:
         """Whether all items have one type, so that an index may be computed."""
         return len(set(self.items)) == 1
 
+    def item_expression(self, value: str, index: int) -> str:
+        """Return the C expression of an item of a value.
 
-@dataclass(frozen=True)
-class WorkArray:
-    """Type of a float64 work array on the stack.
-
-    Attributes:
-        shape: shape of the array.
-    """
-
-    shape: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class ConstantArray:
-    """A constant array, which is data of the program.
-
-    Attributes:
-        c_name: name in the program.
-        shape: shape of the array.
-        element: type of the elements.
-    """
-
-    c_name: str
-    shape: tuple[int, ...]
-    element: ScalarType
+        Example:
+            >>> TupleType((FLOAT, FLOAT)).item_expression("t", 1)
+            't.v[1]'
+            >>> TupleType((FLOAT, INT)).item_expression("t", 1)
+            't.f1'
+        """
+        return f"{value}.v[{index}]" if self.is_uniform else f"{value}.f{index}"
 
 
 @dataclass(frozen=True)
-class ConstantRecord:
+class ConstantRecord(TupleType):
     """A constant record of numbers and arrays, which is data of the program.
 
     Attributes:
         c_name: name in the program.
-        fields: names and types of the fields.
         read_macro: macro that hides the value of a real number from the compiler; empty for none.
     """
 
-    c_name: str
-    fields: tuple[tuple[str, ValueType], ...]
+    c_name: str = ""
     read_macro: str = ""
 
-    def field_expression(self, name: str) -> str:
-        """Return the C expression of a field."""
-        place = f"{self.c_name}.{name}"
+    @property
+    def is_uniform(self) -> bool:
+        """False: items have names in C."""
+        return False
+
+    def item_expression(self, value: str, index: int) -> str:
+        """Return the C expression of an item of the record."""
+        place = f"{value}.{self.names[index]}"
         return f"{self.read_macro}({place})" if self.read_macro else place
+
+
+@dataclass(frozen=True)
+class ArrayType:
+    """Type of a work array on the stack, or of a constant array, which is data of the program.
+
+    Attributes:
+        shape: shape of the array.
+        element: type of the elements.
+        c_name: name of a constant array in the program; empty for a work array.
+    """
+
+    shape: tuple[int, ...]
+    element: ScalarType = FLOAT
+    c_name: str = ""
 
 
 @dataclass(frozen=True)
@@ -113,31 +117,37 @@ class VoidType:
 
 VOID = VoidType()
 
-ValueType = ScalarType | TupleType | WorkArray | ConstantArray | ConstantRecord | VoidType
+ValueType = ScalarType | TupleType | ArrayType | VoidType
+
+
+def constant_name(value_type: ValueType) -> str:
+    """Return the name of a constant, which is not passed to C functions; empty for a variable."""
+    return value_type.c_name if isinstance(value_type, (ArrayType, ConstantRecord)) else ""
 
 
 def is_constant(value_type: ValueType) -> bool:
     """Return whether a type is a constant, which is not passed to C functions."""
-    return isinstance(value_type, (ConstantArray, ConstantRecord))
+    return bool(constant_name(value_type))
 
 
 def common_type(first: ValueType, second: ValueType) -> ValueType | None:
     """Return the type of a variable that holds values of both types, ``None`` if there is none.
 
     Example:
-        >>> common_type(INT, FLOAT).name, common_type(INT, WorkArray((3,)))
+        >>> common_type(INT, FLOAT).name, common_type(INT, ArrayType((3,)))
         ('float64', None)
     """
     if first == second:
         return first
     if isinstance(first, ScalarType) and isinstance(second, ScalarType):
-        return max(first, second, key=lambda number: number.rank)
-    if isinstance(first, TupleType) and isinstance(second, TupleType):
-        items = [common_type(a, b) for a, b in zip(first.items, second.items, strict=False)]
-        if len(first.items) == len(second.items) and first.names == second.names:
-            known = tuple(item for item in items if item is not None)
-            return TupleType(known, first.names) if len(known) == len(items) else None
-    return None
+        return max(first, second)
+    if not (isinstance(first, TupleType) and isinstance(second, TupleType)):
+        return None
+    common = map(common_type, first.items, second.items)
+    items = tuple(item for item in common if item is not None)
+    same_names = first.names == second.names
+    complete = len(items) == len(first.items) == len(second.items)
+    return TupleType(items, first.names) if complete and same_names else None
 
 
 def c_scalar_type(value_type: ValueType, real: str) -> str:
@@ -151,133 +161,57 @@ def c_scalar_type(value_type: ValueType, real: str) -> str:
     return known.get(value_type, real)
 
 
-_RENAMED_FUNCTIONS = {"arccos": "acos", "arcsin": "asin", "arctan": "atan", "arctan2": "atan2"}
-
-REAL_FUNCTIONS = frozenset(_RENAMED_FUNCTIONS) | frozenset(
-    [
-        "acos",
-        "acosh",
-        "asin",
-        "asinh",
-        "atan",
-        "atan2",
-        "atanh",
-        "cbrt",
-        "copysign",
-        "cos",
-        "cosh",
-        "exp",
-        "exp2",
-        "expm1",
-        "fabs",
-        "hypot",
-        "log",
-        "log10",
-        "log1p",
-        "log2",
-        "pow",
-        "sin",
-        "sinh",
-        "sqrt",
-        "tan",
-        "tanh",
-    ]
-)
-"""Functions of ``math`` and ``numpy`` from real numbers to a real number."""
+REAL_FUNCTIONS = {"arccos": "acos", "arcsin": "asin", "arctan": "atan", "arctan2": "atan2"} | {
+    name: name
+    for line in (
+        "acos acosh asin asinh atan atan2 atanh cbrt copysign cos cosh exp exp2 expm1 fabs hypot",
+        "log log10 log1p log2 pow sin sinh sqrt tan tanh",
+    )
+    for name in line.split()
+}
+"""C functions of the functions of ``math`` and ``numpy`` from real numbers to a real number."""
 
 REAL_CONSTANTS = {name: float(getattr(math, name)) for name in ("e", "inf", "nan", "pi", "tau")}
 """Constants of ``math`` and ``numpy``."""
+
+BIT_OPERATORS: dict[type[ast.operator], str] = {
+    ast.LShift: "<<",
+    ast.RShift: ">>",
+    ast.BitAnd: "&",
+    ast.BitOr: "|",
+    ast.BitXor: "^",
+}
 
 MODULE_ALIASES = ("math", "np", "numpy")
 """Names of ``math`` and ``numpy`` in compiled functions."""
 
 
-def c_function_name(name: str) -> str:
-    """Return the C name of a function from real numbers to a real number."""
-    return _RENAMED_FUNCTIONS.get(name, name)
-
-
-@dataclass(frozen=True)
-class HelperFunction:
+class HelperFunction(NamedTuple):
     """A C function that implements an operator or a built-in function of Python.
 
     Attributes:
         name: name in C, after the prefix.
-        result_type: type of the result.
         definition: C code; ``@`` stands for the prefix, ``real`` for the type of real
             numbers, and a call like ``fmod!(`` for a library function in its precision.
     """
 
     name: str
-    result_type: ScalarType
     definition: str
 
 
-def _make_helper(
-    name: str, parameters: str, body: str, result_type: ScalarType = FLOAT
-) -> HelperFunction:
-    kind = "real" if result_type == FLOAT else "int64_t"
-    lines = "".join(f"    {line}\n" for line in body.strip().splitlines())
-    return HelperFunction(
-        name, result_type, f"static inline {kind} @{name}({parameters})\n{{\n{lines}}}\n"
-    )
+def find_helper(name: str) -> HelperFunction:
+    """Return a helper function of the template ``helpers.c``.
 
-
-_DIVMOD_BODY = """real rest = fmod!(a, b);
-real whole = (a - rest) / b;
-real below;
-if (rest != 0) {
-    if ((b < 0) != (rest < 0)) {
-        rest += b;
-        whole -= 1;
-    }
-} else {
-    rest = copysign!(0, b);
-}
-below = floor!(whole);
-if (whole - below > (real)0.5) {
-    below += 1;
-}
-"""
-
-HELPERS = {
-    helper.name: helper
-    for helper in (
-        _make_helper("max", "real a, real b", "return b > a ? b : a;"),
-        _make_helper("min", "real a, real b", "return b < a ? b : a;"),
-        _make_helper("max_int", "int64_t a, int64_t b", "return b > a ? b : a;", INT),
-        _make_helper("min_int", "int64_t a, int64_t b", "return b < a ? b : a;", INT),
-        _make_helper("abs_int", "int64_t a", "return a < 0 ? -a : a;", INT),
-        _make_helper(
-            "floor", "real x",
-            "const int64_t whole = (int64_t)x;\nreturn whole - (x < (real)whole);", INT,
-        ),
-        _make_helper(
-            "ceil", "real x",
-            "const int64_t whole = (int64_t)x;\nreturn whole + (x > (real)whole);", INT,
-        ),
-        _make_helper("round", "real x", "return (int64_t)rint!(x);", INT),
-        _make_helper(
-            "quotient_int", "int64_t a, int64_t b",
-            "if (b == 0) {\n    return 0;\n}\n"
-            "return a / b - (a % b != 0 && (a < 0) != (b < 0));", INT,
-        ),
-        _make_helper(
-            "rest_int", "int64_t a, int64_t b",
-            "if (b == 0) {\n    return 0;\n}\n"
-            "return a % b + (a % b != 0 && (a < 0) != (b < 0) ? b : 0);", INT,
-        ),
-        _make_helper("quotient", "real a, real b", _DIVMOD_BODY + "(void)rest;\nreturn below;"),
-        _make_helper("rest", "real a, real b", _DIVMOD_BODY + "(void)below;\nreturn rest;"),
-        _make_helper(
-            "power", "real a, int64_t n",
-            "real result = 1;\nint64_t left = n < 0 ? -n : n;\n"
-            "while (left != 0) {\n    if (left & 1) {\n        result *= a;\n    }\n"
-            "    left >>= 1;\n    a *= a;\n}\nreturn n < 0 ? 1 / result : result;",
-        ),
-    )
-}  # fmt: skip
-"""C functions for operators and built-in functions of Python, by name."""
+    Example:
+        >>> print(find_helper("abs_int").definition, end="")
+        static inline int64_t @abs_int(int64_t a)
+        {
+            return a < 0 ? -a : a;
+        }
+    """
+    definitions = load_template("helpers.c").split("\n\n")
+    found = next(text for text in definitions if f"@{name}(" in text)
+    return HelperFunction(name, found.rstrip() + "\n")
 
 
 def power_helper(exponent: int, base: ScalarType) -> HelperFunction:
@@ -304,7 +238,7 @@ def power_helper(exponent: int, base: ScalarType) -> HelperFunction:
             name = f"a{step}"
     product = " * ".join(factors) or "1"
     lines.append(f"return 1 / ({product});" if exponent < 0 else f"return {product};")
-    sign = "minus_" if exponent < 0 else ""
     suffix = "" if base == FLOAT else "_int"
-    whole = f"power{suffix}_{sign}{abs(exponent)}"
-    return _make_helper(whole, f"{kind} a", "\n".join(lines), base)
+    whole = f"power{suffix}_{'minus_' if exponent < 0 else ''}{abs(exponent)}"
+    body = "".join(f"    {line}\n" for line in lines)
+    return HelperFunction(whole, f"static inline {kind} @{whole}({kind} a)\n{{\n{body}}}\n")

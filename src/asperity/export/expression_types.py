@@ -11,6 +11,10 @@ from asperity.export import c_language as c
 from asperity.export.c_language import NotExportableError, ValueType
 
 
+class UnknownTypeError(NotExportableError):
+    """A name whose type is not known yet, or that never has a value."""
+
+
 class ProgramContext(Protocol):
     """Interface of a program for the conversion of its functions.
 
@@ -78,26 +82,38 @@ class ExpressionTypes:
         text = "" if node is None else f" ({ast.unparse(node).splitlines()[0]})"
         return NotExportableError(self.node.name, construct + text)
 
-    def infer(self, node: ast.expr) -> ValueType | None:
-        """Return the type of an expression, ``None`` if it is not known yet.
+    def infer(self, node: ast.expr) -> ValueType:
+        """Return the type of an expression.
 
         Raises:
+            UnknownTypeError: for a name whose type is not known yet.
             NotExportableError: for a construct that cannot be exported.
         """
-        find = _INFERENCE_RULES.get(type(node))
-        if find is None:
+        rule = _INFERENCE_RULES.get(type(node))
+        if rule is None:
             raise self.not_exportable(f"uses {type(node).__name__}", node)
-        return find(self, node)
+        return rule(self, node)
 
-    def require_type(self, node: ast.expr) -> ValueType:
-        """Return the type of an expression after the type inference.
+    def infer_scalar(self, node: ast.expr) -> c.ScalarType:
+        """Return the type of an expression that must be a number.
 
         Raises:
-            NotExportableError: for an expression of unknown type.
+            NotExportableError: for another type.
         """
         kind = self.infer(node)
-        if kind is None:
-            raise self.not_exportable("uses a name before it has a value", node)
+        if not isinstance(kind, c.ScalarType):
+            raise self.not_exportable("computes with a value that is not a number", node)
+        return kind
+
+    def infer_tuple(self, node: ast.expr) -> c.TupleType:
+        """Return the type of an expression that must be a tuple or a record.
+
+        Raises:
+            NotExportableError: for another type.
+        """
+        kind = self.infer(node)
+        if not isinstance(kind, c.TupleType):
+            raise self.not_exportable("unpacks a value that is not a tuple", node)
         return kind
 
     def constant_integer(self, node: ast.expr) -> int | None:
@@ -108,53 +124,37 @@ class ExpressionTypes:
             value = self.constant_integer(node.operand)
             return None if value is None else -value
         if isinstance(node, ast.Attribute) and node.attr in {"size", "ndim"}:
-            shape = self._shape_of(node.value)
-            if shape is None:
-                return None
-            return math.prod(shape) if node.attr == "size" else len(shape)
-        if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Attribute):
-            index, shape = self.constant_integer(node.slice), None
-            if node.value.attr == "shape" and index is not None:
-                shape = self._shape_of(node.value.value)
-            if shape is not None and index is not None and -len(shape) <= index < len(shape):
-                return shape[index]
+            kind = self.infer(node.value)
+            if isinstance(kind, c.ArrayType):
+                return math.prod(kind.shape) if node.attr == "size" else len(kind.shape)
+        if isinstance(node, ast.Subscript) and getattr(node.value, "attr", "") == "shape":
+            assert isinstance(node.value, ast.Attribute)  # only that has an attribute
+            index, kind = self.constant_integer(node.slice), self.infer(node.value.value)
+            if index is not None and isinstance(kind, c.ArrayType):
+                return kind.shape[index] if -len(kind.shape) <= index < len(kind.shape) else None
         return None
 
-    def _shape_of(self, node: ast.expr) -> tuple[int, ...] | None:
-        kind = self.infer(node)
-        return kind.shape if isinstance(kind, (c.WorkArray, c.ConstantArray)) else None
-
-    def infer_scalar(self, node: ast.expr) -> c.ScalarType | None:
-        """Return the type of an expression that must be a number.
-
-        Raises:
-            NotExportableError: for another type.
-        """
-        kind = self.infer(node)
-        if kind is not None and not isinstance(kind, c.ScalarType):
-            raise self.not_exportable("computes with a value that is not a number", node)
-        return kind
-
-    def _name(self, node: ast.Name) -> ValueType | None:
+    def _name(self, node: ast.Name) -> ValueType:
         if node.id in self.types:
             return self.types[node.id]
         if node.id in self.program.numbers:
             return _type_of_value(self.program.numbers[node.id])
-        return None
+        construct = f"uses a name before it has a value ({node.id})"
+        raise UnknownTypeError(self.node.name, construct)
 
-    def _constant(self, node: ast.Constant) -> ValueType | None:
+    def _constant(self, node: ast.Constant) -> ValueType:
         if isinstance(node.value, (bool, int, float)):
             return _type_of_value(node.value)
         raise self.not_exportable("uses a value that is not a number", node)
 
-    def _tuple(self, node: ast.Tuple) -> ValueType | None:
-        items = [self.infer(item) for item in node.elts]
-        known = tuple(item for item in items if item is not None)
-        if any(not isinstance(item, (c.ScalarType, c.TupleType)) for item in known):
-            raise self.not_exportable("puts an array or a record into a tuple", node)
-        return c.TupleType(known) if len(known) == len(items) else None
+    def _tuple(self, node: ast.Tuple) -> ValueType:
+        items = tuple(map(self.infer, node.elts))
+        for item in items:
+            if not isinstance(item, (c.ScalarType, c.TupleType)) or c.is_constant(item):
+                raise self.not_exportable("puts an array or a record into a tuple", node)
+        return c.TupleType(items)
 
-    def _attribute(self, node: ast.Attribute) -> ValueType | None:
+    def _attribute(self, node: ast.Attribute) -> ValueType:
         if isinstance(node.value, ast.Name) and node.value.id in c.MODULE_ALIASES:
             if node.attr in c.REAL_CONSTANTS:
                 return c.FLOAT
@@ -162,32 +162,26 @@ class ExpressionTypes:
         if self.constant_integer(node) is not None:
             return c.INT
         kind = self.infer(node.value)
-        if isinstance(kind, (c.WorkArray, c.ConstantArray)) and node.attr == "shape":
+        if isinstance(kind, c.ArrayType) and node.attr == "shape":
             return c.TupleType((c.INT,) * len(kind.shape))
-        fields = dict(kind.fields) if isinstance(kind, c.ConstantRecord) else {}
-        if isinstance(kind, c.TupleType):
-            fields = dict(zip(kind.names, kind.items, strict=False))
-        if kind is not None and node.attr not in fields:
+        if not isinstance(kind, c.TupleType) or node.attr not in kind.names:
             raise self.not_exportable("uses an unknown attribute", node)
-        return fields.get(node.attr)
+        return kind.items[kind.names.index(node.attr)]
 
-    def _subscript(self, node: ast.Subscript) -> ValueType | None:
+    def _subscript(self, node: ast.Subscript) -> ValueType:
         if self.constant_integer(node) is not None:
             return c.INT
         kind = self.infer(node.value)
-        if kind is None:
-            return None
         if isinstance(kind, c.TupleType):
             return self._item(node, kind)
-        if not isinstance(kind, (c.WorkArray, c.ConstantArray)):
+        if not isinstance(kind, c.ArrayType):
             raise self.not_exportable("indexes a value that is not a tuple or an array", node)
         indices = indices_of(node)
         if len(indices) != len(kind.shape):
             raise self.not_exportable("takes a part of an array", node)
-        for index in indices:
-            if self.infer_scalar(index) not in {c.INT, c.BOOL, None}:
-                raise self.not_exportable("has an index that is not an integer", node)
-        return c.FLOAT if isinstance(kind, c.WorkArray) else kind.element
+        if not {self.infer_scalar(index) for index in indices} <= {c.INT, c.BOOL}:
+            raise self.not_exportable("has an index that is not an integer", node)
+        return kind.element
 
     def _item(self, node: ast.Subscript, tuple_type: c.TupleType) -> ValueType:
         index = self.constant_integer(node.slice)
@@ -199,25 +193,24 @@ class ExpressionTypes:
             raise self.not_exportable("has an index beyond the end of a tuple", node)
         return tuple_type.items[index]
 
-    def _binary(self, node: ast.BinOp) -> ValueType | None:
+    def _binary(self, node: ast.BinOp) -> ValueType:
         left, right = self.infer_scalar(node.left), self.infer_scalar(node.right)
-        if left is None or right is None:
-            return None
+        both = max(left, right)
         if left == right == c.SINGLE:
             raise self.not_exportable(
                 "computes with two numbers of single precision: use float()", node
             )
         if isinstance(node.op, ast.Div):
             return c.FLOAT
-        both = max(left, right, key=lambda number: number.rank)
-        if isinstance(node.op, (ast.BitAnd, ast.BitOr, ast.BitXor)) and both in {c.BOOL, c.INT}:
-            return both
         if isinstance(node.op, ast.Pow):
             return self._power(node, left)
-        integral = isinstance(node.op, (ast.LShift, ast.RShift, ast.BitAnd, ast.BitOr, ast.BitXor))
-        if (integral and both not in {c.BOOL, c.INT}) or isinstance(node.op, ast.MatMult):
-            raise self.not_exportable("has an operator that is not defined for its operands", node)
-        return c.FLOAT if both == c.SINGLE else max(both, c.INT, key=lambda number: number.rank)
+        if isinstance(node.op, (ast.MatMult, *c.BIT_OPERATORS)):
+            if isinstance(node.op, ast.MatMult) or both not in {c.BOOL, c.INT}:
+                words = "has an operator that is not defined for its operands"
+                raise self.not_exportable(words, node)
+            shifts = isinstance(node.op, (ast.LShift, ast.RShift))
+            return c.INT if shifts else both
+        return c.FLOAT if both == c.SINGLE else max(both, c.INT)
 
     def _power(self, node: ast.BinOp, base: c.ScalarType) -> ValueType:
         exponent = self.constant_integer(node.right)
@@ -227,62 +220,47 @@ class ExpressionTypes:
             raise self.not_exportable("raises an integer to a power that is not a literal", node)
         return c.INT
 
-    def _unary(self, node: ast.UnaryOp) -> ValueType | None:
+    def _unary(self, node: ast.UnaryOp) -> ValueType:
         kind = self.infer_scalar(node.operand)
         if isinstance(node.op, ast.Not):
             return c.BOOL
-        if isinstance(node.op, ast.Invert) and kind not in {c.INT, None}:
+        if isinstance(node.op, ast.Invert) and kind != c.INT:
             raise self.not_exportable("has an operator that is not defined for its operand", node)
         return c.INT if kind == c.BOOL else kind
 
-    def _compare(self, node: ast.Compare) -> ValueType | None:
+    def _compare(self, node: ast.Compare) -> ValueType:
         if any(isinstance(op, (ast.Is, ast.IsNot, ast.In, ast.NotIn)) for op in node.ops):
             raise self.not_exportable("compares by 'is' or 'in'", node)
-        for middle in node.comparators[:-1]:
-            if not isinstance(middle, (ast.Name, ast.Constant)):
-                raise self.not_exportable(
-                    "chains comparisons of an expression that is not a name", node
-                )
+        if not all(isinstance(one, (ast.Name, ast.Constant)) for one in node.comparators[:-1]):
+            words = "chains comparisons of an expression that is not a name"
+            raise self.not_exportable(words, node)
         for side in (node.left, *node.comparators):
             self.infer_scalar(side)
         return c.BOOL
 
-    def _boolean(self, node: ast.BoolOp) -> ValueType | None:
-        for part in node.values:
-            if self.infer(part) not in {c.BOOL, None} and node not in self._conditions:
-                raise self.not_exportable(
-                    "uses 'and' or 'or' for values that are not booleans", node
-                )
+    def _boolean(self, node: ast.BoolOp) -> ValueType:
+        kinds = {self.infer(part) for part in node.values}
+        if kinds != {c.BOOL} and node not in self._conditions:
+            raise self.not_exportable("uses 'and' or 'or' for values that are not booleans", node)
         return c.BOOL
 
-    def _conditional(self, node: ast.IfExp) -> ValueType | None:
-        first, second = self.infer(node.body), self.infer(node.orelse)
-        if first is None or second is None:
-            return first or second
-        both = c.common_type(first, second)
+    def _conditional(self, node: ast.IfExp) -> ValueType:
+        both = c.common_type(self.infer(node.body), self.infer(node.orelse))
         if both is None:
             raise self.not_exportable("chooses between values of different types", node)
         return both
 
-    def _call(self, node: ast.Call) -> ValueType | None:
+    def _call(self, node: ast.Call) -> ValueType:
         name = called_name(node)
         if self.is_compiled_call(node):
-            kinds = [self.infer(argument) for argument in self.call_arguments(node)]
-            known = tuple(kind for kind in kinds if kind is not None)
-            if len(known) < len(kinds):
-                return None
-            return self.program.infer_types(name, known).result_type
-        if node.keywords and name not in self.program.records:
-            raise self.not_exportable("calls a built-in function with keyword arguments", node)
+            kinds = tuple(map(self.infer, self.call_arguments(node)))
+            return self.program.infer_types(name, kinds).result_type
         if name in self.program.records:
-            return self._record(node, name)
+            names = self.program.records[name]
+            return c.TupleType(tuple(map(self.infer, self.match_arguments(node, names))), names)
+        if node.keywords:
+            raise self.not_exportable("calls a built-in function with keyword arguments", node)
         return self._builtin(node, name)
-
-    def _record(self, node: ast.Call, name: str) -> ValueType | None:
-        names = self.program.records[name]
-        items = [self.infer(item) for item in self.match_arguments(node, names)]
-        known = tuple(item for item in items if item is not None)
-        return c.TupleType(known, names) if len(known) == len(items) else None
 
     def match_arguments(self, node: ast.Call, names: Sequence[str]) -> list[ast.expr]:
         """Return the arguments of a call in the order of the names.
@@ -310,31 +288,19 @@ class ExpressionTypes:
         plain = isinstance(node.func, ast.Name)
         return plain and self.program.parameter_names(called_name(node)) is not None
 
-    def _builtin(self, node: ast.Call, name: str) -> ValueType | None:
+    def _builtin(self, node: ast.Call, name: str) -> ValueType:
         if name == "local_array":
-            return c.WorkArray(self._work_array_shape(node))
-        library = isinstance(node.func, ast.Attribute)
-        kinds = [self.infer_scalar(argument) for argument in node.args if name != "len"]
-        if library and name in c.REAL_FUNCTIONS:
+            return c.ArrayType(self._work_array_shape(node))
+        kinds = [self.infer_scalar(argument) for argument in node.args]
+        whole = ast.unparse(node.func)
+        if name in _CONVERSIONS:
+            return _CONVERSIONS[name]
+        if whole != name and name in c.REAL_FUNCTIONS:
             return c.FLOAT
-        if (
-            name in {"floor", "ceil"}
-            and getattr(getattr(node.func, "value", 0), "id", "") == "math"
-        ):
+        if whole in {"math.floor", "math.ceil"} or (name == "round" and len(kinds) == 1):
             return c.INT
-        fixed: dict[str, ValueType] = {
-            "int": c.INT,
-            "int64": c.INT,
-            "float": c.FLOAT,
-            "float64": c.FLOAT,
-        }
-        fixed |= {"bool": c.BOOL, "len": c.INT, "pow": c.FLOAT}
-        if name in fixed or (name == "round" and len(node.args) == 1):
-            return fixed.get(name, c.INT)
-        if name in {"abs", "min", "max"} and not library:
-            if any(kind is None for kind in kinds):
-                return None
-            top = max((kind for kind in kinds if kind), key=lambda number: number.rank)
+        if whole in {"abs", "min", "max"}:
+            top = max(kinds)
             return {c.BOOL: c.INT, c.SINGLE: c.FLOAT}.get(top, top)
         raise self.not_exportable("calls a function without an equivalent in C", node)
 
@@ -347,7 +313,7 @@ class ExpressionTypes:
         raise self.not_exportable("makes a work array without a constant shape", node)
 
 
-_INFERENCE_RULES: dict[type[ast.expr], Callable[[ExpressionTypes, Any], ValueType | None]] = {
+_INFERENCE_RULES: dict[type[ast.expr], Callable[[ExpressionTypes, Any], ValueType]] = {
     ast.Name: ExpressionTypes._name,
     ast.Constant: ExpressionTypes._constant,
     ast.Tuple: ExpressionTypes._tuple,
@@ -359,6 +325,11 @@ _INFERENCE_RULES: dict[type[ast.expr], Callable[[ExpressionTypes, Any], ValueTyp
     ast.BoolOp: ExpressionTypes._boolean,
     ast.IfExp: ExpressionTypes._conditional,
     ast.Call: ExpressionTypes._call,
+}
+
+_CONVERSIONS = {"bool": c.BOOL, "pow": c.FLOAT, "float": c.FLOAT, "float64": c.FLOAT} | {
+    "int": c.INT,
+    "int64": c.INT,
 }
 
 

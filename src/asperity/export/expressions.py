@@ -32,13 +32,6 @@ _BINARY: dict[type[ast.operator], tuple[str, int]] = {
     ast.Mult: ("*", _PRODUCT),
     ast.Div: ("/", _PRODUCT),
 }
-_BITS: dict[type[ast.operator], str] = {
-    ast.LShift: "<<",
-    ast.RShift: ">>",
-    ast.BitAnd: "&",
-    ast.BitOr: "|",
-    ast.BitXor: "^",
-}
 _COMPARE: dict[type[ast.cmpop], tuple[str, int]] = {
     ast.Lt: ("<", _ORDER),
     ast.LtE: ("<=", _ORDER),
@@ -77,11 +70,11 @@ class ExpressionPrinter:
 
     def as_type(self, node: ast.expr, value_type: ValueType, min_precedence: int = 0) -> str:
         """Return an expression converted to a type."""
-        own = self.types.require_type(node)
+        own = self.types.infer(node)
         if own == value_type or (own == c.BOOL and value_type == c.INT):
             return self.text(node, min_precedence)
         if isinstance(value_type, c.TupleType):
-            return self._converted_tuple(node, value_type)
+            return self._tuple_of(node, value_type).text
         if value_type == c.FLOAT:
             length = self.types.constant_integer(node)
             if length is not None:
@@ -116,32 +109,30 @@ class ExpressionPrinter:
     def _attribute(self, node: ast.Attribute) -> CExpression:
         if isinstance(node.value, ast.Name) and node.value.id in c.MODULE_ALIASES:
             return self._constant(ast.Constant(c.REAL_CONSTANTS[node.attr]))
-        kind = self.types.require_type(node.value)
-        if isinstance(kind, c.ConstantRecord):
-            return CExpression(kind.field_expression(node.attr), _PRIMARY)
-        if isinstance(kind, (c.WorkArray, c.ConstantArray)):
-            return self._constructor_call(
-                c.TupleType((c.INT,) * len(kind.shape)), [str(n) for n in kind.shape]
-            )
+        kind = self.types.infer(node.value)
+        if isinstance(kind, c.ArrayType):
+            lengths = c.TupleType((c.INT,) * len(kind.shape))
+            return self._constructor_call(lengths, [str(length) for length in kind.shape])
         assert isinstance(kind, c.TupleType)  # no other type has attributes
-        place = field_access(kind, kind.names.index(node.attr))
-        return CExpression(f"{self.text(node.value, _PRIMARY)}{place}", _PRIMARY)
+        return self._item(node.value, kind, kind.names.index(node.attr))
+
+    def _item(self, value: ast.expr, kind: c.TupleType, index: int) -> CExpression:
+        return CExpression(kind.item_expression(self.text(value, _PRIMARY), index), _PRIMARY)
 
     def _tuple(self, node: ast.Tuple) -> CExpression:
-        kind = self.types.require_type(node)
-        assert isinstance(kind, c.TupleType)  # the type of a tuple
-        return CExpression(self._converted_tuple(node, kind), _PRIMARY)
+        return self._tuple_of(node, self.types.infer_tuple(node))
 
-    def _converted_tuple(self, node: ast.expr, value_type: c.TupleType) -> str:
-        """Return a tuple with the items converted to other types."""
-        if not isinstance(node, ast.Tuple):
+    def _tuple_of(self, node: ast.expr, value_type: c.TupleType) -> CExpression:
+        """Return a tuple or a record with its items converted to other types."""
+        if isinstance(node, ast.Tuple):
+            items = node.elts
+        elif isinstance(node, ast.Call) and called_name(node) in self.program.records:
+            items = self.types.match_arguments(node, value_type.names)
+        else:
             raise self.types.not_exportable(
                 "uses a tuple in place of one with other item types", node
             )
-        pairs = zip(node.elts, value_type.items, strict=True)
-        return self._constructor_call(
-            value_type, [self.as_type(item, one) for item, one in pairs]
-        ).text
+        return self._constructor_call(value_type, list(map(self.as_type, items, value_type.items)))
 
     def _constructor_call(self, value_type: c.TupleType, items: list[str]) -> CExpression:
         return CExpression(
@@ -149,37 +140,33 @@ class ExpressionPrinter:
         )
 
     def _subscript(self, node: ast.Subscript) -> CExpression:
-        kind = self.types.require_type(node.value)
+        kind = self.types.infer(node.value)
         if isinstance(kind, c.TupleType):
             index = self.types.constant_integer(node.slice)
+            if index is not None:
+                return self._item(node.value, kind, index % len(kind.items))
             base = self.text(node.value, _PRIMARY)
-            if index is None:
-                return CExpression(f"{base}.v[{self.text(node.slice)}]", _PRIMARY)
-            return CExpression(f"{base}{field_access(kind, index % len(kind.items))}", _PRIMARY)
-        assert isinstance(kind, (c.WorkArray, c.ConstantArray))  # checked by the type inference
-        parts = []
+            return CExpression(f"{base}.v[{self.text(node.slice)}]", _PRIMARY)
+        assert isinstance(kind, c.ArrayType)  # checked by the type inference
+        text = c.constant_name(kind) or self.text(node.value, _PRIMARY)
         for index_node, length in zip(indices_of(node), kind.shape, strict=True):
             fixed = self.types.constant_integer(index_node)
-            parts.append(self.text(index_node) if fixed is None else str(fixed % max(length, 1)))
-        place = (
-            kind.c_name if isinstance(kind, c.ConstantArray) else self.text(node.value, _PRIMARY)
-        )
-        return CExpression(place + "".join(f"[{part}]" for part in parts), _PRIMARY)
+            text += f"[{self.text(index_node) if fixed is None else fixed % max(length, 1)}]"
+        return CExpression(text, _PRIMARY)
 
     # --- operators -------------------------------------------------------------------------------
 
     def _binary(self, node: ast.BinOp) -> CExpression:
-        kind = self.types.require_type(node)
+        kind = self.types.infer(node)
         if isinstance(node.op, ast.Pow):
             return self._power(node, kind)
-        if type(node.op) in _BITS:
+        if type(node.op) in c.BIT_OPERATORS:
             # An expression of literals would have 32 bits.
             left = self.text(node.left, _UNARY)
             if self.types.constant_integer(node.left) is not None:
                 left = f"(int64_t){left}"
-            return CExpression(
-                f"{left} {_BITS[type(node.op)]} {self.text(node.right, _UNARY)}", _SHIFT - 4
-            )
+            text = f"{left} {c.BIT_OPERATORS[type(node.op)]} {self.text(node.right, _UNARY)}"
+            return CExpression(text, _SHIFT - 4)
         if type(node.op) not in _BINARY:
             return self._floor_division(node, kind)
         sign, rank = _BINARY[type(node.op)]
@@ -188,15 +175,15 @@ class ExpressionPrinter:
 
     def _floor_division(self, node: ast.BinOp, value_type: ValueType) -> CExpression:
         name = "quotient" if isinstance(node.op, ast.FloorDiv) else "rest"
-        helper = c.HELPERS[name if value_type == c.FLOAT else f"{name}_int"]
+        helper = c.find_helper(name if value_type == c.FLOAT else f"{name}_int")
         return self._helper_call(helper, [node.left, node.right], value_type)
 
     def _power(self, node: ast.BinOp, value_type: ValueType) -> CExpression:
         exponent = self.types.constant_integer(node.right)
         if exponent is not None and isinstance(value_type, c.ScalarType):
             return self._helper_call(c.power_helper(exponent, value_type), [node.left], value_type)
-        if self.types.require_type(node.right) == c.INT:
-            name = self.program.helper_name(c.HELPERS["power"])
+        if self.types.infer(node.right) == c.INT:
+            name = self.program.helper_name(c.find_helper("power"))
             base = self.as_type(node.left, c.FLOAT)
             return CExpression(f"{name}({base}, {self.text(node.right)})", _PRIMARY)
         return self._library_call("pow", [node.left, node.right])
@@ -229,7 +216,7 @@ class ExpressionPrinter:
         return CExpression(f" {sign} ".join(parts), rank)
 
     def _conditional(self, node: ast.IfExp) -> CExpression:
-        kind = self.types.require_type(node)
+        kind = self.types.infer(node)
         first, second = (self.as_type(one, kind, _OR) for one in (node.body, node.orelse))
         return CExpression(f"{self.condition(node.test, _OR)} ? {first} : {second}", _CHOICE)
 
@@ -240,20 +227,14 @@ class ExpressionPrinter:
         if self.types.is_compiled_call(node):
             return self._compiled_call(node, name)
         if name in self.program.records:
-            kind = self.types.require_type(node)
-            assert isinstance(kind, c.TupleType)  # the type of a record
-            pairs = zip(self.types.match_arguments(node, kind.names), kind.items, strict=True)
-            return self._constructor_call(kind, [self.as_type(item, one) for item, one in pairs])
-        printer = _BUILTINS.get(name)
-        return (
-            printer(self, node)
-            if printer
-            else self._library_call(c.c_function_name(name), node.args)
-        )
+            return self._tuple_of(node, self.types.infer_tuple(node))
+        if name in _BUILTINS:
+            return _BUILTINS[name](self, node)
+        return self._library_call(c.REAL_FUNCTIONS[name], node.args)
 
     def _compiled_call(self, node: ast.Call, name: str) -> CExpression:
         arguments = self.types.call_arguments(node)
-        kinds = tuple(self.types.require_type(argument) for argument in arguments)
+        kinds = tuple(self.types.infer(argument) for argument in arguments)
         callee = self.program.function_name(name, kinds)
         given = [
             self.text(argument)
@@ -263,22 +244,22 @@ class ExpressionPrinter:
         return CExpression(f"{callee}({', '.join(given)})", _PRIMARY)
 
     def _minimum_or_maximum(self, node: ast.Call) -> CExpression:
-        name, kind = called_name(node), self.types.require_type(node)
-        helper = self.program.helper_name(c.HELPERS[name if kind == c.FLOAT else f"{name}_int"])
+        name, kind = called_name(node), self.types.infer(node)
+        helper = self.program.helper_name(c.find_helper(name if kind == c.FLOAT else f"{name}_int"))
         text = self.as_type(node.args[0], kind)
         for argument in node.args[1:]:
             text = f"{helper}({text}, {self.as_type(argument, kind)})"
         return CExpression(text, _PRIMARY)
 
     def _absolute(self, node: ast.Call) -> CExpression:
-        if self.types.require_type(node) == c.FLOAT:
+        if self.types.infer(node) == c.FLOAT:
             return self._library_call("fabs", node.args)
-        return self._helper_call(c.HELPERS["abs_int"], node.args, c.INT)
+        return self._helper_call(c.find_helper("abs_int"), node.args, c.INT)
 
     def _round(self, node: ast.Call) -> CExpression:
         if self.types.infer_scalar(node.args[0]) in {c.INT, c.BOOL}:
             return self.to_c(node.args[0])
-        return self._helper_call(c.HELPERS[called_name(node)], node.args, c.FLOAT)
+        return self._helper_call(c.find_helper(called_name(node)), node.args, c.FLOAT)
 
     def _to_integer(self, node: ast.Call) -> CExpression:
         if self.types.infer_scalar(node.args[0]) in {c.INT, c.BOOL}:
@@ -330,18 +311,6 @@ _BUILTINS: dict[str, Callable[[ExpressionPrinter, ast.Call], CExpression]] = {
     "min": ExpressionPrinter._minimum_or_maximum,
     "round": ExpressionPrinter._round,
 }
-
-
-def field_access(tuple_type: c.TupleType, index: int) -> str:
-    """Return the C access to an item of a tuple.
-
-    Example:
-        >>> field_access(c.TupleType((c.FLOAT, c.FLOAT)), 1)
-        '.v[1]'
-        >>> field_access(c.TupleType((c.FLOAT, c.INT)), 1)
-        '.f1'
-    """
-    return f".v[{index}]" if tuple_type.is_uniform else f".f{index}"
 
 
 def real_literal(value: float, single: bool) -> str:

@@ -119,8 +119,11 @@ class Program:
             if name in self._in_progress:
                 raise NotExportableError(name, "calls itself")
             self._in_progress.append(name)
-            self._inferred[key] = FunctionTypes(self.linked.functions[name], argument_types, self)
-            self._in_progress.pop()
+            try:
+                node = self.linked.functions[name]
+                self._inferred[key] = FunctionTypes(node, argument_types, self)
+            finally:
+                self._in_progress.pop()
         return self._inferred[key]
 
     # --- names --------------------------------------------------------------------------------

@@ -49,25 +49,20 @@ class ProgramData:
     def used_by(self, code: str) -> tuple[list[str], list[str]]:
         """Return the arrays and the definitions of the records that C code uses."""
         words = set(re.findall(r"\w+(?:\.\w+)?", code))
-        arrays = [place for place in self.values if "." not in place and place in words]
-        return arrays, [
-            self._record_definition(record, words)
-            for record in (self.texture, self.law)
-            if any(f"{record.c_name}.{name}" in words for name, _kind in record.fields)
-        ]
+        used = [place for place in self.values if place in words]
+        definitions = [self._record_definition(record, used) for record in (self.texture, self.law)]
+        return [place for place in used if "." not in place], list(filter(None, definitions))
 
-    def _record_definition(self, record: c.ConstantRecord, words: set[str]) -> str:
-        used = [
-            (name, kind)
-            for name, kind in record.fields
-            if f"{record.c_name}.{name}" in words and isinstance(kind, c.ScalarType)
-        ]
-        fields = "".join(f"    {self._c_type(kind)} {name};\n" for name, kind in used)
-        values = (self.values[f"{record.c_name}.{name}"] for name, _kind in used)
-        texts = [
-            self._literal(value, kind) for value, (_name, kind) in zip(values, used, strict=True)
-        ]
-        return f"static const struct {{\n{fields}}} {record.c_name} = {{{', '.join(texts)}}};\n"
+    def _record_definition(self, record: c.ConstantRecord, places: Sequence[str]) -> str:
+        """Return the definition of a record with the used fields; empty if there are none."""
+        fields, values = "", []
+        for name, kind in zip(record.names, record.items, strict=True):
+            place = f"{record.c_name}.{name}"
+            if place in places and isinstance(kind, c.ScalarType):
+                fields += f"    {self._c_type(kind)} {name};\n"
+                values.append(self._literal(self.values[place], kind))
+        initializer = f"{record.c_name} = {{{', '.join(values)}}};\n"
+        return f"static const struct {{\n{fields}}} {initializer}" if values else ""
 
     def declaration(self, name: str) -> str:
         """Return the declaration of an array, without storage class and semicolon."""
@@ -128,27 +123,20 @@ def make_program_data(surface: Surface, prefix: str, *, single: bool) -> Program
 def _constant_record(
     c_name: str, names: Sequence[str], items: Sequence[Any], prefix: str, values: dict[str, Any]
 ) -> c.ConstantRecord:
-    fields: list[tuple[str, ValueType]] = []
+    kinds: list[ValueType] = []
     for name, item in zip(names, items, strict=True):
-        if isinstance(item, np.ndarray) and item.dtype.name in _SCALAR_TYPES:
-            array = f"{prefix}_data_{name}"
-            values[array] = item
-            fields.append(
-                (name, c.ConstantArray(array, item.shape, _SCALAR_TYPES[item.dtype.name]))
-            )
-        elif isinstance(item, (bool, int, float, np.bool_, np.integer, np.floating)):
-            values[f"{c_name}.{name}"] = item
-            fields.append((name, _scalar_type(item)))
-        else:
+        kind = _SCALAR_TYPES.get(np.asarray(item).dtype.name)
+        if kind is None:
             words = f"cannot be exported: its record holds {name!r}, a {type(item).__name__}"
             raise ParameterError("texture", words)
-    return c.ConstantRecord(c_name, tuple(fields))
-
-
-def _scalar_type(value: Any) -> c.ScalarType:
-    if isinstance(value, (bool, np.bool_)):
-        return c.BOOL
-    return c.INT if isinstance(value, (int, np.integer)) else c.FLOAT
+        if isinstance(item, np.ndarray):
+            array = f"{prefix}_data_{name}"
+            values[array] = item
+            kinds.append(c.ArrayType(item.shape, kind, array))
+        else:
+            values[f"{c_name}.{name}"] = item
+            kinds.append(kind)
+    return c.ConstantRecord(tuple(kinds), tuple(names), c_name)
 
 
 def _element_type(values: NDArray[Any]) -> c.ScalarType:

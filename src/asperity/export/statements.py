@@ -9,7 +9,7 @@ from typing import Any
 from asperity.export import c_language as c
 from asperity.export.c_language import ValueType
 from asperity.export.expression_types import ProgramContext, called_name, to_load
-from asperity.export.expressions import ExpressionPrinter, field_access
+from asperity.export.expressions import ExpressionPrinter
 from asperity.export.liveness import (
     declaring_statements,
     expressions_in,
@@ -61,7 +61,10 @@ class FunctionPrinter:
 
     def __init__(self, types: FunctionTypes, program: ProgramContext) -> None:
         self.types, self.program = types, program
-        self.names = {name: f"{name}_" if name in _RESERVED_WORDS else name for name in types.types}
+        self.names = {
+            name: c.constant_name(kind) or (f"{name}_" if name in _RESERVED_WORDS else name)
+            for name, kind in types.types.items()
+        }
         self.expressions = ExpressionPrinter(types, program, self.names)
         self._temporaries = 0
         self._live = live_names(types)
@@ -92,7 +95,7 @@ class FunctionPrinter:
         return result
 
     def _declaration(self, value_type: ValueType, name: str) -> str:
-        if isinstance(value_type, c.WorkArray):
+        if isinstance(value_type, c.ArrayType):
             lengths = "".join(f"[{length}]" for length in value_type.shape)
             return f"{self.program.c_type(c.FLOAT)} {name}{lengths}"
         return f"{self.program.c_type(value_type)} {name}"
@@ -189,8 +192,8 @@ class FunctionPrinter:
         if isinstance(node.target, ast.Name) and node.target.id not in self._live:
             return []
         value = ast.BinOp(to_load(node.target), node.op, node.value)
-        kind = self.types.require_type(node.target)
-        if type(node.op) in _AUGMENTED_OPERATORS and self.types.require_type(value) == kind:
+        kind = self.types.infer(node.target)
+        if type(node.op) in _AUGMENTED_OPERATORS and self.types.infer(value) == kind:
             place = self.expressions.text(to_load(node.target))
             change = self.expressions.as_type(node.value, kind)
             return [f"{place} {_AUGMENTED_OPERATORS[type(node.op)]} {change};"]
@@ -230,7 +233,7 @@ class FunctionPrinter:
         raise self.types.not_exportable("makes a work array inside a loop or a branch", value)
 
     def _store(self, node: ast.stmt, target: ast.expr, value: ast.expr) -> list[str]:
-        kind = self.types.require_type(to_load(target))
+        kind = self.types.infer(to_load(target))
         if c.is_constant(kind):
             return []
         if isinstance(target, ast.Name) and target.id not in self._live:
@@ -266,7 +269,7 @@ class FunctionPrinter:
         for target, value in zip(targets, values, strict=True):
             if isinstance(target, ast.Name) and target.id not in self._live:
                 continue
-            kind = self.types.require_type(to_load(target))
+            kind = self.types.infer(to_load(target))
             name = self._temporary("new")
             lines.append(
                 f"const {self._declaration(kind, name)} = {self.expressions.as_type(value, kind)};"
@@ -275,51 +278,41 @@ class FunctionPrinter:
         return lines + later
 
     def _unpack(self, node: ast.stmt, targets: Sequence[ast.expr], value: ast.expr) -> list[str]:
-        kind = self.types.require_type(value)
-        pairs = list(enumerate(targets))
-        if isinstance(kind, c.ConstantRecord):
-            places = [kind.field_expression(name) for name, _item in kind.fields]
-            items: Sequence[ValueType] = [item for _name, item in kind.fields]
-        else:
-            assert isinstance(kind, c.TupleType)  # checked by the type inference
-            items = kind.items
-        wanted = [
-            (index, target)
-            for index, target in pairs
-            if (not isinstance(target, ast.Name) or target.id in self._live)
-            and not c.is_constant(items[index])
-        ]
-        lines = []
-        if isinstance(kind, c.TupleType):
-            if not wanted:
-                return self._discard(value)
-            name = self._temporary("values")
-            lines.append(
-                f"const {self.program.c_type(kind)} {name} = {self.expressions.text(value)};"
-            )
-            places = [f"{name}{field_access(kind, index)}" for index, _target in pairs]
-        for index, target in wanted:
-            lines += self._unpack_item(node, target, items[index], places[index])
-        return lines
+        kind = self.types.infer_tuple(value)
+        if c.is_constant(kind):
+            return self._unpack_items(node, targets, kind, self.expressions.text(value))
+        if not self._wanted_items(targets, kind):
+            return self._discard(value)
+        name = self._temporary("values")
+        line = f"const {self.program.c_type(kind)} {name} = {self.expressions.text(value)};"
+        return [line, *self._unpack_items(node, targets, kind, name)]
 
-    def _unpack_item(
-        self, node: ast.stmt, target: ast.expr, value_type: ValueType, source: str
+    def _wanted_items(
+        self, targets: Sequence[ast.expr], tuple_type: c.TupleType
+    ) -> list[tuple[int, ast.expr]]:
+        """Return the targets that need an assignment, with the indices of their items."""
+        return [
+            (index, target)
+            for index, target in enumerate(targets)
+            if (not isinstance(target, ast.Name) or target.id in self._live)
+            and not c.is_constant(tuple_type.items[index])
+        ]
+
+    def _unpack_items(
+        self, node: ast.stmt, targets: Sequence[ast.expr], tuple_type: c.TupleType, source: str
     ) -> list[str]:
-        """Return the lines that assign an item of a tuple to a target or its parts."""
-        if isinstance(target, ast.Tuple) and isinstance(value_type, c.TupleType):
-            parts = enumerate(zip(target.elts, value_type.items, strict=True))
-            return [
-                line
-                for index, (part, item) in parts
-                if not isinstance(part, ast.Name) or part.id in self._live
-                for line in self._unpack_item(
-                    node, part, item, f"{source}{field_access(value_type, index)}"
-                )
-            ]
-        own = self.types.require_type(to_load(target))
-        if own != value_type and isinstance(own, c.ScalarType):
-            source = f"({self.program.c_type(own)}){source}"
-        return [self._assignment_line(node, target, source)]
+        """Return the lines that assign the items of a tuple to targets or their parts."""
+        lines = []
+        for index, target in self._wanted_items(targets, tuple_type):
+            item, place = tuple_type.items[index], tuple_type.item_expression(source, index)
+            if isinstance(target, ast.Tuple) and isinstance(item, c.TupleType):
+                lines += self._unpack_items(node, target.elts, item, place)
+                continue
+            own = self.types.infer(to_load(target))
+            if own != item and isinstance(own, c.ScalarType):
+                place = f"({self.program.c_type(own)}){place}"
+            lines.append(self._assignment_line(node, target, place))
+        return lines
 
     def _temporary(self, prefix: str) -> str:
         self._temporaries += 1

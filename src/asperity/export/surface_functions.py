@@ -8,7 +8,7 @@ from functools import lru_cache
 from asperity.clamps import Clamp
 from asperity.contacts.warm_start import WARM_START_SIZE
 from asperity.derive.facts import clamped_facts
-from asperity.export.c_language import BOOL, FLOAT, ValueType, WorkArray
+from asperity.export.c_language import BOOL, FLOAT, ArrayType, ValueType
 from asperity.export.program import LinkedSource, Program
 from asperity.export.program_data import ProgramData, make_program_data
 from asperity.kernels.fuse import law_units, link_on_texture
@@ -97,7 +97,7 @@ def surface_functions(surface: Surface, prefix: str, *, single: bool) -> Surface
     store = make_program_data(surface, prefix, single=single)
     constants: tuple[ValueType, ValueType] = (store.texture, store.law)
     place = (FLOAT, FLOAT, FLOAT)
-    kinds = (*place, FLOAT, FLOAT, BOOL, WorkArray((WARM_START_SIZE,)), *constants)
+    kinds = (*place, FLOAT, FLOAT, BOOL, ArrayType((WARM_START_SIZE,)), *constants)
     tick = program.function_name("probe_tick", kinds)
     tick_type = program.c_type(program.infer_types("probe_tick", kinds).result_type)
     stored = program.function_name("probe_energy", (*place, *constants)) if energy else ""

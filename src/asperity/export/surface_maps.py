@@ -21,6 +21,7 @@ from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.units import format_quantity
 from asperity.core.version import __version__
+from asperity.export.template_files import fill_template, load_template
 from asperity.textures.texture import Texture
 
 # Number of equal rows in the map of a profile.
@@ -311,26 +312,9 @@ def _png_chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def _x3p_main_xml(surface_map: SampledMap, digest: str) -> bytes:
-    ny, nx = surface_map.heights.shape
-    axes = "".join(
-        f"<C{name}><AxisType>I</AxisType><DataType>D</DataType>"
-        f"<Increment>{step!r}</Increment><Offset>0</Offset></C{name}>"
-        for name, step in zip("XY", surface_map.spacing, strict=True)
-    )
-    axes += "<CZ><AxisType>A</AxisType><DataType>D</DataType></CZ>"
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n'
-        '<p:ISO5436_2 xmlns:p="http://www.opengps.eu/2008/ISO5436_2">'
-        "<Record1><Revision>ISO5436 - 2000</Revision><FeatureType>SUR</FeatureType>"
-        f"<Axes>{axes}</Axes></Record1>"
-        "<Record2><Date>1970-01-01T00:00:00</Date><Creator>asperity</Creator>"
-        "<Instrument><Manufacturer>asperity</Manufacturer><Model>computed</Model>"
-        f"<Serial>none</Serial><Version>{__version__}</Version></Instrument>"
-        "<CalibrationDate>1970-01-01T00:00:00</CalibrationDate>"
-        "<ProbingSystem><Type>Software</Type><Identification>asperity</Identification>"
-        f"</ProbingSystem><Comment>{surface_map.description}</Comment></Record2>"
-        f"<Record3><MatrixDimension><SizeX>{nx}</SizeX><SizeY>{ny}</SizeY><SizeZ>1</SizeZ>"
-        "</MatrixDimension><DataLink><PointDataLink>bindata/data.bin</PointDataLink>"
-        f"<MD5ChecksumPointData>{digest.upper()}</MD5ChecksumPointData></DataLink></Record3>"
-        "<Record4><ChecksumFile>md5checksum.hex</ChecksumFile></Record4></p:ISO5436_2>\n"
-    ).encode()
+    (ny, nx), (dx, dy) = surface_map.heights.shape, surface_map.spacing
+    values = {"nx": str(nx), "ny": str(ny), "dx": repr(dx), "dy": repr(dy)}
+    values |= {"version": __version__, "comment": surface_map.description}
+    declaration, *lines = load_template("x3p_main.xml").splitlines()
+    text = f"{declaration}\n{''.join(map(str.strip, lines))}\n"
+    return fill_template(text, values | {"checksum": digest.upper()}).encode()

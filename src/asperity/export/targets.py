@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 from asperity.core.errors import ParameterError, escape_unprintable, suggest_names
-from asperity.core.files import open_atomic
+from asperity.core.files import check_not_existing, open_atomic
 from asperity.export.c99 import c99_files
 from asperity.export.export_request import ExportRequest
 
@@ -58,18 +58,6 @@ def find_target(name: str) -> ExportTarget:
     return TARGETS[name.lower()]
 
 
-def check_not_existing(path: Path, names: Mapping[str, str]) -> None:
-    """Check that none of the files exists.
-
-    Raises:
-        ParameterError: for the first file that exists.
-    """
-    for name in names:
-        if (path.parent / name).exists() or (path.parent / name).is_symlink():
-            words = f"exists: {escape_unprintable(path.parent / name)}; --force replaces it"
-            raise ParameterError("output", words)
-
-
 def check_name(path: Path, target: ExportTarget) -> None:
     """Check that the file name has the suffix of the target.
 
@@ -98,8 +86,8 @@ def write_files(
     place = Path(path)
     check_name(place, target)
     files = target.files(request, place.stem)
-    if not force:
-        check_not_existing(place, files)
+    for name in files:
+        check_not_existing("output", place.parent / name, force=force)
     try:
         with ExitStack() as written:
             for name, text in files.items():

@@ -11,7 +11,13 @@ from collections.abc import Iterator, Sequence
 
 from asperity.export import c_language as c
 from asperity.export.c_language import ValueType
-from asperity.export.expression_types import ExpressionTypes, ProgramContext, called_name, to_load
+from asperity.export.expression_types import (
+    ExpressionTypes,
+    ProgramContext,
+    UnknownTypeError,
+    called_name,
+    to_load,
+)
 
 
 class FunctionTypes(ExpressionTypes):
@@ -39,14 +45,24 @@ class FunctionTypes(ExpressionTypes):
         self.argument_names = tuple(argument.arg for argument in node.args.args)
         self.argument_types = dict(zip(self.argument_names, argument_types, strict=True))
         self.types |= self.argument_types
-        self._changed = True
         self._check_arguments()
-        while self._changed:
-            self._changed = False
-            for statement in _iterate_statements(node.body):
-                self._infer_statement(statement)
+        self._infer_variables()
         self.result_type = self.types.pop("return", c.VOID)
         self.written_arguments = self._find_written()
+
+    def _infer_variables(self) -> None:
+        """Follow the assignments until no type changes; types that are not known yet wait."""
+        unknown: UnknownTypeError | None = None
+        self._changed = True
+        while self._changed:
+            self._changed, unknown = False, None
+            for statement in _iterate_statements(self.node.body):
+                try:
+                    self._infer_statement(statement)
+                except UnknownTypeError as error:
+                    unknown = error
+        if unknown is not None:
+            raise unknown
 
     def _check_arguments(self) -> None:
         given = self.node.args
@@ -58,13 +74,12 @@ class FunctionTypes(ExpressionTypes):
     def _infer_statement(self, node: ast.stmt) -> None:
         if isinstance(node, ast.Assign):
             for target in node.targets:
-                self._assign(target, self.infer(node.value), node.value)
+                self._assign(target, node.value)
         elif isinstance(node, ast.AnnAssign):
             if node.value is not None:
-                self._assign(node.target, self.infer(node.value), node.value)
+                self._assign(node.target, node.value)
         elif isinstance(node, ast.AugAssign):
-            value = ast.BinOp(to_load(node.target), node.op, node.value)
-            self._assign(node.target, self.infer(value), value)
+            self._assign(node.target, ast.BinOp(to_load(node.target), node.op, node.value))
         elif isinstance(node, ast.For):
             self._infer_loop(node)
         elif isinstance(node, ast.While) and node.orelse:
@@ -77,15 +92,23 @@ class FunctionTypes(ExpressionTypes):
         elif not isinstance(node, _CONTROL_FLOW):
             raise self.not_exportable(f"uses {type(node).__name__}", node)
 
-    def _assign(self, target: ast.expr, value_type: ValueType | None, value: ast.expr) -> None:
+    def _assign(self, target: ast.expr, value: ast.expr) -> None:
+        value_type = self.infer(value)
+        parts = target.elts if isinstance(target, ast.Tuple) else []
+        if isinstance(value, ast.Tuple) and len(value.elts) == len(parts):
+            for part, item in zip(parts, value.elts, strict=True):
+                self._assign(part, item)
+        else:
+            self._assign_type(target, value_type, value)
+
+    def _assign_type(self, target: ast.expr, value_type: ValueType, value: ast.expr) -> None:
         if isinstance(target, ast.Tuple):
             self._unpack(target, value_type, value)
         elif isinstance(target, ast.Subscript):
-            if isinstance(self.infer(target.value), (c.ConstantArray, c.ConstantRecord)):
+            if c.is_constant(self.infer(target.value)):
                 raise self.not_exportable("writes to the texture or the law", target)
         elif isinstance(target, ast.Name):
-            if value_type is not None:
-                self._unify(target.id, value_type)
+            self._unify(target.id, value_type)
         else:
             raise self.not_exportable("assigns to a target that is not a variable", target)
 
@@ -101,24 +124,14 @@ class FunctionTypes(ExpressionTypes):
         if self.types.get(name) != both:
             self.types[name], self._changed = both, True
 
-    def _unpack(self, target: ast.Tuple, value_type: ValueType | None, value: ast.expr) -> None:
-        if isinstance(value, ast.Tuple) and len(value.elts) == len(target.elts):
-            for part, single in zip(target.elts, value.elts, strict=True):
-                self._assign(part, self.infer(single), single)
-            return
-        if value_type is None:
-            return
-        if isinstance(value_type, c.ConstantRecord):
-            items: Sequence[ValueType] = [item for _name, item in value_type.fields]
-        elif isinstance(value_type, c.TupleType):
-            items = value_type.items
-        else:
+    def _unpack(self, target: ast.Tuple, value_type: ValueType, value: ast.expr) -> None:
+        if not isinstance(value_type, c.TupleType):
             raise self.not_exportable("unpacks a value that is not a tuple", value)
-        if len(items) != len(target.elts):
-            words = f"unpacks {len(items)} values into {len(target.elts)} names"
+        if len(value_type.items) != len(target.elts):
+            words = f"unpacks {len(value_type.items)} values into {len(target.elts)} names"
             raise self.not_exportable(words, target)
-        for part, item in zip(target.elts, items, strict=True):
-            self._assign(part, item, value)
+        for part, item in zip(target.elts, value_type.items, strict=True):
+            self._assign_type(part, item, value)
 
     def _infer_loop(self, node: ast.For) -> None:
         call = node.iter
@@ -129,11 +142,10 @@ class FunctionTypes(ExpressionTypes):
             raise self.not_exportable("has a loop with 'else'")
         self._unify(node.target.id, c.INT)
 
-    def _infer_return(self, value_type: ValueType | None) -> None:
-        if isinstance(value_type, c.WorkArray):
+    def _infer_return(self, value_type: ValueType) -> None:
+        if isinstance(value_type, c.ArrayType) and not value_type.c_name:
             raise self.not_exportable("returns a work array, which lies on its stack")
-        if value_type is not None:
-            self._unify("return", value_type)
+        self._unify("return", value_type)
 
     # --- effects ---------------------------------------------------------------------------------
 
@@ -157,9 +169,7 @@ class FunctionTypes(ExpressionTypes):
         if not self.is_compiled_call(node):
             return set()
         arguments = self.call_arguments(node)
-        callee = self.program.infer_types(
-            called_name(node), tuple(self.require_type(one) for one in arguments)
-        )
+        callee = self.program.infer_types(called_name(node), tuple(map(self.infer, arguments)))
         pairs = zip(callee.argument_names, arguments, strict=True)
         return {
             argument.id
