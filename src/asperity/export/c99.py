@@ -14,8 +14,7 @@ from asperity.core.errors import ParameterError
 from asperity.export.export_request import ExportRequest
 from asperity.export.expressions import real_literal
 from asperity.export.program import block_comment
-from asperity.export.program_data import ProgramData
-from asperity.export.surface_functions import SurfaceFunctions, surface_functions
+from asperity.export.surface_functions import ProgramData, SurfaceFunctions, surface_functions
 from asperity.export.template_files import fill_template, load_template
 
 MAX_POSITION = 1000.0
