@@ -21,11 +21,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.bounds.measures import NORM
+from asperity.analysis.bounds.bound import NORM, Bound
 from asperity.analysis.gain.certificate import certify
 from asperity.analysis.gain.characteristic import characteristic_number
-from asperity.analysis.gain.search_options import SearchOptions
+from asperity.analysis.gain.medial_axis import SearchOptions
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Sinusoid

@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.bounds.measures import curl_norm, precise_norm, precise_one_sided
+from asperity.analysis.bounds.bound import Bound, curl_norm, precise_norm, precise_one_sided
 from asperity.analysis.gain.characteristic import (
     characteristic_number,
     curl_number,

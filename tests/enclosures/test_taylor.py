@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.bounds.measures import NORM
+from asperity.analysis.bounds.bound import NORM
 from asperity.analysis.bounds.problems import _stack_entries, law_constants, law_kernel
 from asperity.enclosures.cells import DERIVATIVE_NAMES, cells_with_depth
 from asperity.enclosures.taylor import TaylorMath, TaylorModel, reciprocal

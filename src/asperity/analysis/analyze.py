@@ -2,35 +2,130 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
-from asperity.analysis.assess_passivity import passivity
+import numpy as np
+
+from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
-from asperity.analysis.bounds.measures import NORM, ONE_SIDED
 from asperity.analysis.compare import DEFAULT_DEVICE, recommended_law
-from asperity.analysis.energy.continuity import continuity
-from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.energy.merit import merit
+from asperity.analysis.energy.continuity import Continuity, continuity
+from asperity.analysis.energy.leak import Leak, worst_loop
+from asperity.analysis.energy.merit import Merit, merit
 from asperity.analysis.gain.characteristic import cached_number, curl_number
-from asperity.analysis.passivity.verdict import at_recommended_stiffness, recommend_stiffness
-from asperity.analysis.results import Analysis
-from asperity.analysis.sentences.analysis_sentences import (
-    analysis_assumptions,
-    analysis_summary,
-    surface_width,
+from asperity.analysis.passivity.assess_passivity import (
+    buzz_text,
+    energy_gained_text,
+    passivity,
+    stability_limit_text,
+    stiffness_limit_text,
 )
+from asperity.analysis.passivity.criteria import LEAK
+from asperity.analysis.passivity.verdict import (
+    Passivity,
+    at_recommended_stiffness,
+    recommend_stiffness,
+)
+from asperity.analysis.surface_sentences import (
+    SCOPE_SENTENCE,
+    default_depth_text,
+    depth_range_text,
+    law_parameter_sentences,
+    unverified_sentences,
+)
+from asperity.core.arguments import DEFAULT_STIFFNESS
+from asperity.core.display import Plottable, Reportable
 from asperity.core.errors import ParameterError
+from asperity.core.files import attributes_to_dict, to_plain_data
 from asperity.core.units import format_quantity
 from asperity.devices import Device, load_device
 from asperity.surface import Surface, default_max_depth
 from asperity.textures.catalogue import TextureLike, as_texture
+from asperity.textures.texture import Texture
 
 STEPS = ("q", "q⁺", "curl", "worst loop", "continuity", "strength and support", "passivity")
 
 Progress = Callable[[str], None]
+SCHEMA = 2
+
+
+@dataclass(frozen=True)
+class Analysis(Plottable, Reportable):
+    """Results of one law on one surface and one device.
+
+    Attributes:
+        surface: the surface, with its law, stiffness and depth.
+        device: the device.
+        q: characteristic number [1].
+        one_sided: one-sided number q⁺ [1].
+        curl: sup |curl f|/k [1]; ``None`` for a law with state, whose force is no field.
+        conservative: whether the work around every closed path is zero.
+        conservative_reason: the reason, in one sentence.
+        leak: the worst simple loop, in a vertical plane.
+        continuity: whether the force jumps inside the working region, and where.
+        passivity: every criterion on the device, and the deciding one.
+        merit: strength and support on a straight scan.
+        answer: the verdict in one sentence.
+        assumptions: used defaults, unverified device data and preparation steps of the surface,
+            in sentences.
+    """
+
+    surface: Surface
+    device: Device
+    q: Bound
+    one_sided: Bound
+    curl: Bound | None
+    conservative: bool
+    conservative_reason: str
+    leak: Leak
+    continuity: Continuity
+    passivity: Passivity
+    merit: Merit
+    answer: str = ""
+    assumptions: tuple[str, ...] = ()
+
+    @property
+    def curl_density(self) -> Bound | None:
+        """Sup |curl f| [N/m]: the greatest work of a small loop per area [J/m²]."""
+        if self.curl is None:
+            return None
+        k, upper = self.surface.stiffness, self.curl.upper
+        # One unit in the last place covers the rounding of the product.
+        top = math.nextafter(k * upper, math.inf) if upper > 0.0 else 0.0
+        return replace(self.curl, lower=k * self.curl.lower, upper=top)
+
+    @property
+    def v_star(self) -> float | None:
+        """v* [m/s], the speed below which damping does not absorb the worst loop.
+
+        0 for a conservative law; ``None`` where the device's damping is not known.
+        """
+        return self.passivity.critical_speed
+
+    def __repr__(self) -> str:
+        law, verdict = self.surface.law.letter, self.passivity.verdict
+        return f"<Analysis of law {law} on {self.device.id}: q = {self.q.value:.4g}, {verdict}>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units, with a schema number; infinity is the string "inf"."""
+        surface = self.surface
+        fields = (
+            "device q one_sided curl curl_density conservative conservative_reason leak v_star "
+            "continuity passivity merit assumptions"
+        )
+        return {
+            "schema": SCHEMA,
+            "answer": self.answer,
+            "texture": to_plain_data(surface.texture.describe()),
+            "law": surface.law.letter,
+            "law_name": surface.law.name,
+            **attributes_to_dict(surface, "law_parameters", "clamp", "stiffness", "max_depth"),
+            **attributes_to_dict(self, *fields.split()),
+        }
 
 
 def analyze(
@@ -153,3 +248,97 @@ def _check_depth(surface: Surface) -> None:
         limit = f"must not exceed the width of the surface, {format_quantity(width, 'm')}"
         reason = "further down only its mirror images are in contact"
         raise ParameterError("max_depth", f"{limit}: {reason} [m]", surface.max_depth)
+
+
+# Device data used by the criteria of passivity.
+_PASSIVITY_FIELDS = (
+    *("max_stiffness", "update_rate", "damping", "delay_samples", "virtual_damping"),
+    *("position_resolution", "force_resolution", "least_friction"),
+)
+
+
+def surface_width(texture: Texture) -> float:
+    """Return the shorter side of a finite surface [m]; infinity for an unbounded one."""
+    if not texture.is_mirrored:
+        return math.inf
+    return float(np.hypot(*texture.domain.spans.T).min())
+
+
+def analysis_summary(result: Analysis) -> str:
+    """Return the verdict in one sentence."""
+    surface, passivity = result.surface, result.passivity
+    depth = format_quantity(surface.max_depth, "m")
+    subject = f"law {surface.law.letter} at {surface.stiffness:g} N/m, pressed to {depth}, "
+    subject += f"on the {result.device.name}"
+    title = subject[:1].upper() + subject[1:]
+    rule = passivity.criterion(passivity.decided_by)
+    limit = stiffness_limit_text(rule.limit or 0.0)
+    if passivity.verdict == "passive":
+        text = f"{title} is passive by {rule.formula}, whose limit is {limit}"
+    elif passivity.verdict == "plausible":
+        text = f"That {subject} is passive is plausible, not proved: {rule.formula}, limit {limit}"
+    elif passivity.verdict == "bounded" and passivity.buzz is not None:
+        text = f"{title} is passive but for steps: {buzz_text(passivity.buzz)}"
+    elif passivity.verdict == "not passive":
+        reason = passivity.reason
+        if rule.name == LEAK:
+            speed = passivity.critical_speed
+            gain = energy_gained_text(result.leak.energy, speed)
+            reason = f"{gain}; {stability_limit_text(passivity.stability_limit, speed)}"
+        text = f"{title} is not passive: {reason}"
+    else:
+        text = f"Whether {subject} is passive is undecided: {passivity.reason}"
+    return f"{text}; {_jumps_clause(result)}."
+
+
+def _jumps_clause(result: Analysis) -> str:
+    force = result.continuity
+    if force.continuous:
+        return "its force is continuous"
+    if not force.jumps:
+        return f"its force is not continuous ({force.reason})"
+    largest = format_quantity(max(jump.size for jump in force.jumps), "N")
+    return f"its force jumps, by up to {largest} where that was located"
+
+
+def analysis_assumptions(result: Analysis, extent: tuple[float, float] | None) -> tuple[str, ...]:
+    """Return the assumptions of an analysis, in sentences.
+
+    Args:
+        result: the analysis.
+        extent: the searched part of the plane [m], if one was given.
+    """
+    surface, leak = result.surface, result.leak
+    texture, depth = surface.texture, format_quantity(surface.max_depth, "m")
+    sentences = [*texture.preparation, *_default_sentences(surface)]
+    region = texture.domain.description
+    if extent is not None:
+        region = " x ".join(format_quantity(side, "m") for side in extent) + " from the origin"
+    sentences.append(f"The numbers are suprema over {region} and {depth_range_text(surface)}")
+    if surface.effective_clamp.changes_force:
+        clamp = f"The {surface.effective_clamp} clamp holds the depth from {depth} down"
+        lowest = format_quantity(surface.clamped_depth, "m")
+        sentences.append(f"{clamp}; loops are compared down to depths of {lowest}")
+    x, y = (float(part) for part in leak.line.direction)
+    sentences.append(f"Loops in the vertical plane along ({x:g}, {y:g}) are compared")
+    bounds = (result.q, result.one_sided, result.curl)
+    if any(bound is not None and math.isinf(bound.upper - bound.lower) for bound in bounds):
+        sentences.append("A number without an upper bound is the greatest one found, not a proof")
+    if not result.continuity.continuous:
+        sentences.append("Jumps are located where contact begins and below the sharpest crest only")
+    sentences += unverified_sentences(result.device, _PASSIVITY_FIELDS)
+    return (*sentences, SCOPE_SENTENCE)
+
+
+def _default_sentences(surface: Surface) -> list[str]:
+    sentences = []
+    if surface.stiffness == DEFAULT_STIFFNESS:
+        sentences.append(f"Default stiffness {surface.stiffness:g} N/m")
+    if surface.max_depth == default_max_depth(surface.texture):
+        sentences.append(default_depth_text(surface))
+    if surface.max_depth > surface_width(surface.texture):
+        width = format_quantity(surface_width(surface.texture), "m")
+        sentences.append(
+            f"Below {width}, the surface's width, only its mirror images are in contact"
+        )
+    return sentences + law_parameter_sentences(surface)

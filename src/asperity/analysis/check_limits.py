@@ -11,12 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.bounds.measures import NORM, ONE_SIDED
+from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound
 from asperity.analysis.compare import DEFAULT_DEVICE, recommended_law
 from asperity.analysis.energy.merit import merit
 from asperity.analysis.gain.characteristic import cached_number
-from asperity.analysis.limits.limit_result import Limits, RenderedWave
+from asperity.analysis.limits.limit_result import (
+    Limits,
+    RenderedWave,
+    limits_assumptions,
+    limits_summary,
+)
 from asperity.analysis.limits.limit_rules import LIMIT_RULES, Decision, LimitCase, evaluate_limit
 from asperity.analysis.limits.perceptibility import (
     DEFAULT_SAMPLES,
@@ -31,7 +35,6 @@ from asperity.analysis.passivity.verdict import (
     at_recommended_stiffness,
     recommend_stiffness,
 )
-from asperity.analysis.sentences.limits_sentences import limits_assumptions, limits_summary
 from asperity.core.arguments import DEFAULT_STIFFNESS
 from asperity.core.checks import FloatArray, check_positive, check_real
 from asperity.core.errors import ParameterError

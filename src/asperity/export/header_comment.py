@@ -8,9 +8,9 @@ import textwrap
 
 import numpy as np
 
+from asperity.analysis.analyze import Analysis
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.results import Analysis
-from asperity.analysis.sentences.surface_sentences import depth_range_text, leak_energy_text
+from asperity.analysis.surface_sentences import depth_range_text, leak_energy_text
 from asperity.core.units import format_quantity
 from asperity.core.version import __version__
 from asperity.laws import Law

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.analysis.bounds.measures import spectral_norm
+from asperity.analysis.bounds.bound import spectral_norm
 from asperity.analysis.bounds.sampling import dense_maximum
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.loop_integral import integrate, loop_work

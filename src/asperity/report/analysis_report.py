@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from asperity.analysis.analyze import Analysis
 from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.passivity.assess_passivity import stability_limit_text
 from asperity.analysis.passivity.verdict import Passivity
-from asperity.analysis.results import Analysis
-from asperity.analysis.sentences.analysis_sentences import stability_limit_text
 from asperity.core.units import format_quantity
 from asperity.report import page
 from asperity.report.device_report import device_numbers_table

@@ -8,10 +8,10 @@ from typing import Any
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.compare import Comparison
+from asperity.analysis.limits.perceptibility import tier_text
+from asperity.analysis.passivity.assess_passivity import stability_limit_text
 from asperity.analysis.passivity.verdict import Basis
 from asperity.analysis.results import LawRow
-from asperity.analysis.sentences.analysis_sentences import stability_limit_text
-from asperity.analysis.sentences.limits_sentences import tier_text
 from asperity.core.arguments import Argument
 from asperity.core.units import format_quantity, round_down
 from asperity.report.page import Cell, Row, Table, TableLayout

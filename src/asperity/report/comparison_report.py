@@ -8,10 +8,9 @@ from functools import partial
 
 from rich.table import Table as RichTable
 
-from asperity.analysis.compare import Comparison
-from asperity.analysis.compare_devices import DeviceComparisons
+from asperity.analysis.compare import Comparison, DeviceComparisons
 from asperity.analysis.gain.surface_cache import surface_content
-from asperity.analysis.sentences.limits_sentences import force_magnitude_text, speed_text, tier_text
+from asperity.analysis.limits.perceptibility import force_magnitude_text, speed_text, tier_text
 from asperity.core.cache import content_digest
 from asperity.core.files import json_text
 from asperity.core.units import format_quantity

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from asperity.analysis.limits.limit_result import Limits, RenderedWave
-from asperity.analysis.limits.limit_rules import LIMIT_RULES
-from asperity.analysis.sentences.limits_sentences import (
+from asperity.analysis.limits.limit_result import (
+    Limits,
+    RenderedWave,
     percent,
-    speed_text,
     speeds_text,
     stiffness_text,
-    texture_amount_text,
 )
+from asperity.analysis.limits.limit_rules import LIMIT_RULES
+from asperity.analysis.limits.perceptibility import speed_text, texture_amount_text
 from asperity.core.units import format_quantity
 from asperity.report import page
 from asperity.report.device_report import device_numbers_table

@@ -7,12 +7,11 @@ from typing import Any
 
 from rich.console import RenderableType
 
+from asperity.analysis.analyze import Analysis
 from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.compare import Comparison
-from asperity.analysis.compare_devices import DeviceComparisons
+from asperity.analysis.compare import Comparison, DeviceComparisons
 from asperity.analysis.limits.limit_result import Limits
 from asperity.analysis.passivity.verdict import Passivity
-from asperity.analysis.results import Analysis
 from asperity.core.files import json_text, text_digest
 from asperity.core.units import format_quantity
 from asperity.devices import Device

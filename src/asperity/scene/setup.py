@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from asperity.analysis.sentences.surface_sentences import law_parameter_sentences
+from asperity.analysis.surface_sentences import law_parameter_sentences
 from asperity.core.arguments import parse_arguments
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict, to_plain_data

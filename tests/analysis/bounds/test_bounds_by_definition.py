@@ -12,9 +12,8 @@ from asperity.analysis.bounds import bound as witnesses
 from asperity.analysis.bounds import branch_and_bound as search
 from asperity.analysis.bounds import sampling
 from asperity.analysis.bounds import sampling as dense
-from asperity.analysis.bounds.bound import Witness
+from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Witness, one_sided, spectral_norm
 from asperity.analysis.bounds.branch_and_bound import Problem
-from asperity.analysis.bounds.measures import NORM, ONE_SIDED, one_sided, spectral_norm
 from asperity.analysis.bounds.problems import LawProblem
 from asperity.analysis.bounds.sampling import highest_point, sample_supremum
 from asperity.analysis.gain import closed_forms as forms

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.bounds.branch_and_bound import Problem, Supremum, polish, supremum
-from asperity.analysis.bounds.measures import (
+from asperity.analysis.bounds.bound import (
     CURL,
     NORM,
     ONE_SIDED,
@@ -20,14 +19,15 @@ from asperity.analysis.bounds.measures import (
     precise_norm,
     precise_one_sided,
 )
+from asperity.analysis.bounds.branch_and_bound import Problem, Supremum, polish, supremum
 from asperity.analysis.bounds.problems import CrestProblem, SlopeProblem, normal_change_problem
 from asperity.analysis.bounds.sampling import HeightProblem
-from asperity.analysis.gain.friction import (
+from asperity.analysis.gain.medial_axis import crest_curvature
+from asperity.analysis.gain.theorems import (
     FrictionProblem,
     largest_singular_value,
     largest_symmetric_eigenvalue,
 )
-from asperity.analysis.gain.medial_axis import crest_curvature
 from asperity.core.checks import FloatArray
 from asperity.core.errors import InternalError
 from asperity.enclosures.cells import Cells

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.bounds.bound import Witness, checked_lower_bound, checked_upper_bound
-from asperity.analysis.bounds.measures import NORM
+from asperity.analysis.bounds.bound import NORM, Witness, checked_lower_bound, checked_upper_bound
 from asperity.analysis.energy import leak as leaks
 from asperity.analysis.energy.leak import worst_loop
-from asperity.analysis.gain import search_options as search
+from asperity.analysis.gain import medial_axis as search
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.analysis.gain.theorems import ClosedForm, Constant, Theorem, register_theorem
 from asperity.core.errors import AsperityError, InternalError

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from asperity.analysis import characteristic_number, one_sided_number
-from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.bounds.measures import curl_norm, precise_norm, precise_one_sided
+from asperity.analysis.bounds.bound import Bound, curl_norm, precise_norm, precise_one_sided
 from asperity.analysis.gain.characteristic import curl_number
 from asperity.surface import Surface
 from asperity.textures import Fourier, Sinusoid

@@ -20,14 +20,13 @@ from hypothesis import strategies as st
 from tests.analysis.gain.bound_checks import MEASURES, as_sum, check, fixed
 
 from asperity.analysis import characteristic_number, one_sided_number
-from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED, precise_norm
-from asperity.analysis.gain import closed_forms, friction
+from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, Bound, precise_norm
+from asperity.analysis.gain import closed_forms
+from asperity.analysis.gain import theorems as friction
 from asperity.analysis.gain.certificate import certify
 from asperity.analysis.gain.characteristic import curl_number
-from asperity.analysis.gain.friction import largest_singular_value
-from asperity.analysis.gain.search_options import SearchOptions
-from asperity.analysis.gain.theorems import derivative_bound
+from asperity.analysis.gain.medial_axis import SearchOptions
+from asperity.analysis.gain.theorems import derivative_bound, largest_singular_value
 from asperity.reference import exact_jacobian
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid, Texture

@@ -17,9 +17,8 @@ from asperity.analysis import characteristic_number, one_sided_number
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.bounds.sampling import worst_deflection
 from asperity.analysis.gain.characteristic import curl_number
-from asperity.analysis.gain.friction import largest_singular_value
-from asperity.analysis.gain.god_object import gain_above_crest
-from asperity.analysis.gain.medial_axis import crest_curvature, sharpest_crest
+from asperity.analysis.gain.medial_axis import crest_curvature, gain_above_crest, sharpest_crest
+from asperity.analysis.gain.theorems import largest_singular_value
 from asperity.core.errors import ParameterError
 from asperity.laws import Law
 from asperity.surface import Surface

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from asperity.analysis import characteristic_number, curl_number, loop_work, one_sided_number
-from asperity.analysis.assess_passivity import passivity
-from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED
+from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.gain import certificate, characteristic
+from asperity.analysis.passivity.assess_passivity import passivity
 from asperity.clamps import NONE
 from asperity.derive.facts import law_facts
 from asperity.devices import parse_device

@@ -10,18 +10,18 @@ import pytest
 from tests.analysis.gain.bound_checks import MEASURES, as_sum
 
 from asperity.analysis import characteristic_number
+from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, precise_norm, precise_one_sided
 from asperity.analysis.bounds.branch_and_bound import supremum
-from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED, precise_norm, precise_one_sided
 from asperity.analysis.bounds.problems import LawProblem
 from asperity.analysis.gain import closed_forms as forms
-from asperity.analysis.gain.friction import (
+from asperity.analysis.gain.medial_axis import crest_curvature, gain_above_crest, sharpest_crest
+from asperity.analysis.gain.theorems import (
     FrictionProblem,
+    derivative_bound,
     largest_singular_value,
     largest_symmetric_eigenvalue,
+    theorem_of,
 )
-from asperity.analysis.gain.god_object import gain_above_crest
-from asperity.analysis.gain.medial_axis import crest_curvature, sharpest_crest
-from asperity.analysis.gain.theorems import derivative_bound, theorem_of
 from asperity.enclosures.cells import Cells
 from asperity.enclosures.taylor import TaylorModel
 from asperity.surface import Surface

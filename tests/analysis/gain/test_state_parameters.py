@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from asperity.analysis.bounds.measures import NORM, precise_norm, precise_one_sided
+from asperity.analysis.bounds.bound import NORM, precise_norm, precise_one_sided
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import merit
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number

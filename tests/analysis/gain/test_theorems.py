@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tests.analysis.gain.test_gain_by_definition import LINES
 
-from asperity.analysis.bounds.measures import NORM
+from asperity.analysis.bounds.bound import NORM
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.merit import merit
 from asperity.analysis.gain.characteristic import (

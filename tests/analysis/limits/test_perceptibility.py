@@ -19,8 +19,6 @@ from asperity.analysis.limits.perceptibility import (
     Perceptibility,
     assess_perceptibility,
     classify_perceptibility,
-)
-from asperity.analysis.sentences.limits_sentences import (
     form_removal_sentences,
     masking_text,
     remedies_text,

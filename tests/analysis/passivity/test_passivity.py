@@ -14,10 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
-from asperity.analysis.assess_passivity import passivity
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import Leak, worst_loop
 from asperity.analysis.passivity import criteria
+from asperity.analysis.passivity.assess_passivity import passivity
 from asperity.analysis.passivity.criteria import Criterion
 from asperity.analysis.passivity.device_loop import make_device_loop
 from asperity.analysis.passivity.verdict import Passivity

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from asperity.analysis import characteristic_number, loop_work, one_sided_number
-from asperity.analysis.assess_passivity import passivity
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.leak import worst_loop
+from asperity.analysis.passivity.assess_passivity import passivity
 from asperity.analysis.passivity.verdict import Passivity
 from asperity.analysis.split.split_state import split_state
 from asperity.devices import parse_device

@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asperity.analysis.analyze import analyze
-from asperity.analysis.assess_passivity import passivity
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.check_limits import limits
 from asperity.analysis.compare import compare
 from asperity.analysis.energy.leak import worst_loop
+from asperity.analysis.passivity.assess_passivity import passivity
 from asperity.analysis.passivity.verdict import Passivity
 from asperity.core.errors import ParameterError
 from asperity.devices import Device, parse_device

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
 
-from asperity.analysis.analyze import analyze
-from asperity.analysis.results import Analysis
+from asperity.analysis.analyze import Analysis, analyze
 from asperity.core.errors import ParameterError
 from asperity.devices import parse_device
 from asperity.report import plot

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from asperity.analysis.bounds.bound import NORM, ONE_SIDED, JacobianMeasure
 from asperity.analysis.bounds.branch_and_bound import Contacts, Problem
-from asperity.analysis.bounds.measures import NORM, ONE_SIDED, JacobianMeasure
 from asperity.analysis.bounds.sampling import ContactField
 from asperity.contacts.contact import parameter_name
 from asperity.core.checks import FloatArray

@@ -14,13 +14,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.analysis.bounds.bound import Measure, precise_norm, precise_one_sided, spectral_norm
 from asperity.analysis.bounds.branch_and_bound import Problem, Supremum, polish
-from asperity.analysis.bounds.measures import (
-    Measure,
-    precise_norm,
-    precise_one_sided,
-    spectral_norm,
-)
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.enclosures.cells import Cells
@@ -141,7 +136,7 @@ def dense_maximum(surface: Surface, measure: Measure, depth_limit: DepthLimit) -
 
     Args:
         surface: the surface, without its clamp.
-        measure: :func:`~asperity.analysis.bounds.measures.spectral_norm` or ``one_sided``.
+        measure: :func:`~asperity.analysis.bounds.bound.spectral_norm` or ``one_sided``.
         depth_limit: greatest depth [m] of each contact from its height derivatives (n, 6).
 
     Raises:

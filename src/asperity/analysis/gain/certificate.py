@@ -9,6 +9,7 @@ from functools import partial
 
 from asperity.analysis.bounds.bound import (
     Bound,
+    JacobianMeasure,
     Method,
     Witness,
     checked_upper_bound,
@@ -16,10 +17,9 @@ from asperity.analysis.bounds.bound import (
     witness_in_contact,
 )
 from asperity.analysis.bounds.branch_and_bound import Problem, Supremum
-from asperity.analysis.bounds.measures import JacobianMeasure
 from asperity.analysis.bounds.problems import ClampProblem, LawProblem
 from asperity.analysis.bounds.sampling import require_depth_contact, sample_supremum
-from asperity.analysis.gain.search_options import SearchOptions
+from asperity.analysis.gain.medial_axis import SearchOptions
 from asperity.analysis.gain.theorems import derivative_bound, theorem_of
 from asperity.core.checks import FloatArray
 from asperity.enclosures.cells import Cells

@@ -12,12 +12,18 @@ from dataclasses import astuple
 
 import numpy as np
 
-from asperity.analysis.bounds.bound import Bound, bound_from_theorem
+from asperity.analysis.bounds.bound import (
+    CURL,
+    NORM,
+    ONE_SIDED,
+    Bound,
+    JacobianMeasure,
+    bound_from_theorem,
+)
 from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
-from asperity.analysis.bounds.measures import CURL, NORM, ONE_SIDED, JacobianMeasure
 from asperity.analysis.bounds.sampling import highest_point
 from asperity.analysis.gain.certificate import certify, include_clamp
-from asperity.analysis.gain.search_options import SearchOptions
+from asperity.analysis.gain.medial_axis import SearchOptions
 from asperity.analysis.gain.surface_cache import at_unit_stiffness, cached_result
 from asperity.analysis.gain.theorems import theorem_of
 from asperity.core.checks import check_positive

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.analysis.bounds.bound import Bound
-from asperity.analysis.bounds.measures import spectral_norm
+from asperity.analysis.analyze import Analysis
+from asperity.analysis.bounds.bound import Bound, spectral_norm
 from asperity.analysis.bounds.sampling import highest_point
-from asperity.analysis.results import Analysis
 from asperity.core.checks import FloatArray
 from asperity.report.pictures.field_pictures import Window
 from asperity.report.pictures.scan_plane import ScanSegment, choose_segment, feature_length

@@ -8,9 +8,9 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from asperity.analysis.analyze import Analysis
 from asperity.analysis.compare import Comparison
 from asperity.analysis.limits.limit_result import Limits
-from asperity.analysis.results import Analysis
 from asperity.core.errors import ParameterError
 from asperity.recording.recording import Recording
 from asperity.report.pictures import style
@@ -33,7 +33,7 @@ def plot(result: Any, picture: str | None = None) -> Figure:
     Args:
         result: a :class:`~asperity.analysis.compare.Comparison` (the surface, the forces and
             the fields of all laws), a :class:`~asperity.surface.Surface` (forces and field of its
-            law), a texture (the surface), an :class:`~asperity.analysis.results.Analysis`
+            law), a texture (the surface), an :class:`~asperity.analysis.analyze.Analysis`
             (the field with the worst loop, the loop gain, the singular values), the
             :class:`~asperity.analysis.limits.limit_result.Limits` (waves and their forces), a
             :class:`~asperity.simulation.Run` or a :class:`~asperity.Recording` (motion, force,

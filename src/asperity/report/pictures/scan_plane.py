@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.analysis.bounds.measures import spectral_norm
+from asperity.analysis.bounds.bound import spectral_norm
 from asperity.analysis.energy.merit import scan_height
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from asperity.analysis.energy.merit import parallel_line_points
-from asperity.analysis.limits.limit_result import Limits
-from asperity.analysis.sentences.limits_sentences import speed_text, stiffness_text
+from asperity.analysis.limits.limit_result import Limits, stiffness_text
+from asperity.analysis.limits.perceptibility import speed_text
 from asperity.core.checks import FloatArray
 from asperity.core.units import format_quantity
 from asperity.devices import Device

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
+from asperity.analysis.analyze import Analysis
 from asperity.analysis.compare import Comparison
-from asperity.analysis.results import Analysis
 from asperity.core.units import format_quantity
 from asperity.report.sentences.number_text import bound_text, interval_text, range_text
 from asperity.textures.texture import Texture

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from asperity.analysis.results import Analysis
+from asperity.analysis.analyze import Analysis
 from asperity.clamps import NONE
 from asperity.laws import LAWS, SHIPPED_LAW_ARGUMENTS
 from asperity.report.sentences.number_text import interval_text

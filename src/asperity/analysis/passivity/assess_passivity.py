@@ -1,32 +1,39 @@
-"""Sentences of an analysis: verdict, criteria of passivity and assumptions."""
+"""Passivity of a surface on a device: every criterion and the verdict, with their sentences."""
 
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import replace
 
-import numpy as np
-
-from asperity.analysis.passivity.criteria import LEAK, BuzzBound, Criterion
+from asperity.analysis.bounds.bound import Bound
+from asperity.analysis.energy.leak import Leak
+from asperity.analysis.passivity.criteria import (
+    LEAK,
+    BuzzBound,
+    Criterion,
+    buzz_bound,
+    evaluate_criteria,
+)
 from asperity.analysis.passivity.device_loop import (
     DeviceLoop,
     Obstacle,
     critical_speed,
+    make_device_loop,
     max_proved_delay,
 )
-from asperity.analysis.passivity.verdict import Ground, StabilityLimit
-from asperity.analysis.results import Analysis
-from asperity.analysis.sentences.surface_sentences import (
-    SCOPE_SENTENCE,
-    default_depth_text,
-    depth_range_text,
-    law_parameter_sentences,
-    unverified_sentences,
+from asperity.analysis.passivity.verdict import (
+    Ground,
+    Passivity,
+    StabilityLimit,
+    decide_verdict,
+    stability_limit,
 )
-from asperity.core.arguments import DEFAULT_STIFFNESS
+from asperity.analysis.surface_sentences import depth_range_text
+from asperity.core.errors import ParameterError
 from asperity.core.units import format_quantity, round_down
-from asperity.surface import Surface, default_max_depth
-from asperity.textures.texture import Texture
+from asperity.devices import Device, load_device
+from asperity.surface import Surface
 
 
 def with_sentences(loop: DeviceLoop, criterion: Criterion) -> Criterion:
@@ -195,95 +202,76 @@ def _criterion_assumptions(loop: DeviceLoop, criterion: Criterion) -> str:
     return "; ".join(filter(None, (criterion.assumptions, depth, numbers)))
 
 
-# Device data used by the criteria of passivity.
-_PASSIVITY_FIELDS = (
-    *("max_stiffness", "update_rate", "damping", "delay_samples", "virtual_damping"),
-    *("position_resolution", "force_resolution", "least_friction"),
-)
+def passivity(
+    surface: Surface,
+    device: str | os.PathLike[str] | Device,
+    q: Bound,
+    one_sided: Bound,
+    leak: Leak,
+) -> Passivity:
+    """Return whether the loop of hand, device and texture is passive, with every criterion.
 
+    With T the period of the update rate, σ₀ the device's damping, b_v its virtual damping, d its
+    whole samples of delay and K₀ the stiffest smooth wall that it renders, the criteria are:
 
-def surface_width(texture: Texture) -> float:
-    """Return the shorter side of a finite surface [m]; infinity for an unbounded one."""
-    if not texture.is_mirrored:
-        return math.inf
-    return float(np.hypot(*texture.domain.spans.T).min())
+    * paper (1): k q <= σ₀/(2T), as printed;
+    * one-sided: k q⁺ <= 2σ₀/T, for a conservative law without delay;
+    * delay: k (q⁺/2 + d q) <= σ₀/T, for a conservative law;
+    * virtual damping: k (q⁺/2 + d q) T + |b_v| <= σ₀, for a conservative law;
+    * steps and friction: k q |δ|/2 + |b|/2 <= f_c, for a conservative law, beside one of these;
+    * smooth-wall rule: k q <= K₀, as printed in the paper's III.B: a rule of thumb;
+    * wall test: k (q⁺/2 + d q) <= K₀ (1/2 + d), k q <= K₀ for any delay, for a conservative law:
+      plausible, not proved;
+    * leak: no loop of the field gains energy.
 
-
-def analysis_summary(result: Analysis) -> str:
-    """Return the verdict in one sentence."""
-    surface, passivity = result.surface, result.passivity
-    depth = format_quantity(surface.max_depth, "m")
-    subject = f"law {surface.law.letter} at {surface.stiffness:g} N/m, pressed to {depth}, "
-    subject += f"on the {result.device.name}"
-    title = subject[:1].upper() + subject[1:]
-    rule = passivity.criterion(passivity.decided_by)
-    limit = stiffness_limit_text(rule.limit or 0.0)
-    if passivity.verdict == "passive":
-        text = f"{title} is passive by {rule.formula}, whose limit is {limit}"
-    elif passivity.verdict == "plausible":
-        text = f"That {subject} is passive is plausible, not proved: {rule.formula}, limit {limit}"
-    elif passivity.verdict == "bounded" and passivity.buzz is not None:
-        text = f"{title} is passive but for steps: {buzz_text(passivity.buzz)}"
-    elif passivity.verdict == "not passive":
-        reason = passivity.reason
-        if rule.name == LEAK:
-            speed = passivity.critical_speed
-            gain = energy_gained_text(result.leak.energy, speed)
-            reason = f"{gain}; {stability_limit_text(passivity.stability_limit, speed)}"
-        text = f"{title} is not passive: {reason}"
-    else:
-        text = f"Whether {subject} is passive is undecided: {passivity.reason}"
-    return f"{text}; {_jumps_clause(result)}."
-
-
-def _jumps_clause(result: Analysis) -> str:
-    force = result.continuity
-    if force.continuous:
-        return "its force is continuous"
-    if not force.jumps:
-        return f"its force is not continuous ({force.reason})"
-    largest = format_quantity(max(jump.size for jump in force.jumps), "N")
-    return f"its force jumps, by up to {largest} where that was located"
-
-
-def analysis_assumptions(result: Analysis, extent: tuple[float, float] | None) -> tuple[str, ...]:
-    """Return the assumptions of an analysis, in sentences.
+    Missing data of the device are never guessed: an unknown delay, damping or rate decides
+    nothing. Virtual damping, quantisation and dry friction that are not given count as none.
 
     Args:
-        result: the analysis.
-        extent: the searched part of the plane [m], if one was given.
+        surface: the surface.
+        device: id of the catalogue, TOML file, or a :class:`~asperity.devices.Device`.
+        q: its characteristic number.
+        one_sided: its one-sided number.
+        leak: its worst loop.
+
+    Raises:
+        ParameterError: for another type, or device data out of range.
+
+    Reference:
+        The paper's (1) and III.B; Colgate and Schenkel (the paper's [25]); MATH section 4.
+
+    Example:
+        >>> from asperity.analysis import characteristic_number, one_sided_number
+        >>> from asperity.analysis.energy.leak import worst_loop
+        >>> from asperity.devices import parse_device
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> rig = {"damping": "2 N*s/m", "update_rate": "4 kHz", "delay_samples": 1}
+        >>> surface = Surface(Sinusoid(amplitude=0.1e-3, period=1e-3), "H")
+        >>> numbers = characteristic_number(surface), one_sided_number(surface)
+        >>> leak = worst_loop(surface)
+        >>> result = passivity(surface, parse_device(rig, "mine"), *numbers, leak)
+        >>> result.verdict, result.decided_by, round(result.safe_stiffness, 3)
+        ('passive', 'delay', 5333.333)
     """
-    surface, leak = result.surface, result.leak
-    texture, depth = surface.texture, format_quantity(surface.max_depth, "m")
-    sentences = [*texture.preparation, *_default_sentences(surface)]
-    region = texture.domain.description
-    if extent is not None:
-        region = " x ".join(format_quantity(side, "m") for side in extent) + " from the origin"
-    sentences.append(f"The numbers are suprema over {region} and {depth_range_text(surface)}")
-    if surface.effective_clamp.changes_force:
-        clamp = f"The {surface.effective_clamp} clamp holds the depth from {depth} down"
-        lowest = format_quantity(surface.clamped_depth, "m")
-        sentences.append(f"{clamp}; loops are compared down to depths of {lowest}")
-    x, y = (float(part) for part in leak.line.direction)
-    sentences.append(f"Loops in the vertical plane along ({x:g}, {y:g}) are compared")
-    bounds = (result.q, result.one_sided, result.curl)
-    if any(bound is not None and math.isinf(bound.upper - bound.lower) for bound in bounds):
-        sentences.append("A number without an upper bound is the greatest one found, not a proof")
-    if not result.continuity.continuous:
-        sentences.append("Jumps are located where contact begins and below the sharpest crest only")
-    sentences += unverified_sentences(result.device, _PASSIVITY_FIELDS)
-    return (*sentences, SCOPE_SENTENCE)
-
-
-def _default_sentences(surface: Surface) -> list[str]:
-    sentences = []
-    if surface.stiffness == DEFAULT_STIFFNESS:
-        sentences.append(f"Default stiffness {surface.stiffness:g} N/m")
-    if surface.max_depth == default_max_depth(surface.texture):
-        sentences.append(default_depth_text(surface))
-    if surface.max_depth > surface_width(surface.texture):
-        width = format_quantity(surface_width(surface.texture), "m")
-        sentences.append(
-            f"Below {width}, the surface's width, only its mirror images are in contact"
-        )
-    return sentences + law_parameter_sentences(surface)
+    types = (("surface", surface, Surface), ("q", q, Bound), ("one_sided", one_sided, Bound))
+    for name, value, kind in (*types, ("leak", leak, Leak)):
+        if not isinstance(value, kind):
+            raise ParameterError(name, f"must be a {kind.__name__}", value)
+    loop = make_device_loop(surface, load_device(device), q, one_sided, leak)
+    criteria = {
+        name: with_sentences(loop, criterion) for name, criterion in evaluate_criteria(loop).items()
+    }
+    buzz = buzz_bound(loop)
+    verdict, decisive, ground = decide_verdict(loop, criteria, buzz)
+    return Passivity(
+        criteria=tuple(criteria.values()),
+        decided_by=decisive,
+        verdict=verdict,
+        ground=ground,
+        reason=verdict_reason(loop, criteria[decisive], ground, buzz),
+        stiffness=surface.stiffness,
+        stability_limit=stability_limit(loop, criteria),
+        critical_speed=critical_speed(loop),
+        greatest_delay=max_proved_delay(loop),
+        buzz=buzz,
+    )

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from asperity.analysis.limits.perceptibility import (
     CLEAR_RATIO,
@@ -13,16 +11,6 @@ from asperity.analysis.limits.perceptibility import (
     DEFAULT_SPEED,
     HAND_THRESHOLD,
     Perceptibility,
-)
-from asperity.analysis.passivity.criteria import damping_assumption
-from asperity.analysis.results import LawRow, Recommendation
-from asperity.analysis.sentences.analysis_sentences import (
-    buzz_text,
-    critical_speed_text,
-    stability_limit_text,
-    stiffness_limit_text,
-)
-from asperity.analysis.sentences.limits_sentences import (
     force_magnitude_text,
     form_removal_sentences,
     masking_text,
@@ -30,7 +18,15 @@ from asperity.analysis.sentences.limits_sentences import (
     speed_text,
     texture_amount_text,
 )
-from asperity.analysis.sentences.surface_sentences import (
+from asperity.analysis.passivity.assess_passivity import (
+    buzz_text,
+    critical_speed_text,
+    stability_limit_text,
+    stiffness_limit_text,
+)
+from asperity.analysis.passivity.criteria import damping_assumption
+from asperity.analysis.results import LawRow, Recommendation
+from asperity.analysis.surface_sentences import (
     SCOPE_SENTENCE,
     default_depth_text,
     law_parameter_sentences,
@@ -325,63 +321,3 @@ def _default_sentences(rows: Sequence[LawRow], defaults: Mapping[str, bool]) -> 
         for row in rows
         for parameter in law_parameter_sentences(row.surface)
     ]
-
-
-_NO_LAW = "no law"
-
-
-@dataclass(frozen=True)
-class DeviceCase:
-    """The outcome of a comparison on one device at one depth.
-
-    Attributes:
-        device: name of the device.
-        max_depth: depth to which the surface is pressed [m].
-        row: row of the recommended or the nearest law; ``None`` if there is none.
-        recommended: whether the law is recommended.
-    """
-
-    device: str
-    max_depth: float
-    row: LawRow | None
-    recommended: bool
-
-    @property
-    def tier(self) -> str:
-        """Perceptibility tier of the texture."""
-        return _NO_LAW if self.row is None or self.row.tier is None else self.row.tier
-
-
-def devices_summary(cases: Sequence[DeviceCase], devices_without_data: Sequence[str]) -> str:
-    """Return the best device and law for the texture, and the number of cases by tier.
-
-    Args:
-        cases: the cases compared.
-        devices_without_data: ids of devices with too little data.
-    """
-    recommended = [(case, case.row) for case in cases if case.recommended and case.row is not None]
-    sentences = []
-    if recommended:
-        best, row = max(
-            recommended, key=lambda pair: (pair[0].tier == "felt", pair[1].resolved_force)
-        )
-        depth = format_quantity(best.max_depth, "m")
-        sentences.append(f"Best on the {best.device}, pressed to {depth}: {_best_row_text(row)}.")
-    if cases:
-        found = Counter(case.tier for case in cases)
-        order = ("felt", "borderline", "not felt", _NO_LAW)
-        counts = ", ".join(f"{tier} in {found[tier]}" for tier in order if found[tier])
-        sentences.append(f"Of {len(cases)} case{'s' * (len(cases) > 1)}: {counts}.")
-    if devices_without_data:
-        names = ", ".join(devices_without_data)
-        sentences.append(f"No smooth wall is known to have held on {names}.")
-    return " ".join(sentences)
-
-
-def _best_row_text(row: LawRow) -> str:
-    text = f"law {row.law.letter}"
-    if row.recommended_stiffness:
-        text += f" from {format_quantity(row.recommended_stiffness, 'N/m')}"
-    if row.perceptibility is not None:
-        text += f", {row.tier}, {texture_amount_text(row.perceptibility)}"
-    return text

@@ -1,1 +1,0 @@
-"""Sentences of the results: verdicts, reasons, recommendations and assumptions."""
