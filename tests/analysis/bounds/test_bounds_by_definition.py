@@ -193,7 +193,7 @@ class Peaks(Problem):
     def upper_bounds(
         self,
         centres: FloatArray,
-        half_widths: FloatArray,  # noqa: ARG002 - of the interface
+        half: FloatArray,  # noqa: ARG002 - of the interface
         threshold: float,  # noqa: ARG002 - of the interface
     ) -> FloatArray:
         return np.full(len(centres), self._heights.max() * (1.0 - self._short))

@@ -214,11 +214,9 @@ class Hill(Problem):
         distance = np.linalg.norm(coordinates - self._top, axis=1)
         return np.asarray(1.0 - distance**self._power)
 
-    def upper_bounds(
-        self, centres: FloatArray, half_widths: FloatArray, threshold: float
-    ) -> FloatArray:
+    def upper_bounds(self, centres: FloatArray, half: FloatArray, threshold: float) -> FloatArray:
         self.evaluated += len(centres)
-        rise = self._slope * float(np.linalg.norm(half_widths)) * (1.0 - self._spoil)
+        rise = self._slope * float(np.linalg.norm(half)) * (1.0 - self._spoil)
         assert threshold >= self.floor
         return self.values(centres) + rise
 
@@ -278,12 +276,8 @@ def test_bounds_at_the_work_limit_are_valid_and_noted(limit: int) -> None:
 class Unknown(Hill):
     """A hill with a bound, or a value, that is no number in one half."""
 
-    def upper_bounds(
-        self, centres: FloatArray, half_widths: FloatArray, threshold: float
-    ) -> FloatArray:
-        return np.where(
-            centres[:, 0] > 0.5, np.nan, super().upper_bounds(centres, half_widths, threshold)
-        )
+    def upper_bounds(self, centres: FloatArray, half: FloatArray, threshold: float) -> FloatArray:
+        return np.where(centres[:, 0] > 0.5, np.nan, super().upper_bounds(centres, half, threshold))
 
     def values(self, coordinates: FloatArray) -> FloatArray:
         return np.where(coordinates[:, 0] > 0.5, np.nan, super().values(coordinates))

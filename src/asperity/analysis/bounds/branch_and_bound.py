@@ -57,11 +57,17 @@ class Problem(ABC):
     cells: Cells
     floor: float = 0.0
 
-    @abstractmethod
     def upper_bounds(
-        self, centres: FloatArray, half_widths: FloatArray, threshold: float
+        self,
+        centres: FloatArray,
+        half: FloatArray,  # noqa: ARG002 - of a default
+        threshold: float,  # noqa: ARG002 - of a default
     ) -> FloatArray:
-        """Return proved upper bounds on cells, shape (n,), coarse ones below ``threshold``."""
+        """Return proved upper bounds on cells, shape (n,), coarse ones below ``threshold``.
+
+        Infinite for a problem that is only sampled.
+        """
+        return np.full(len(centres), np.inf)
 
     @abstractmethod
     def values(self, coordinates: FloatArray) -> FloatArray:
@@ -163,7 +169,7 @@ def supremum(
 def _improve_in_cells(
     problem: Problem,
     centres: FloatArray,
-    half_widths: FloatArray,
+    half: FloatArray,
     upper: FloatArray,
     best: float,
     at: FloatArray | None,
@@ -173,9 +179,9 @@ def _improve_in_cells(
     top = top[upper[top] > best]
     if len(top) == 0:
         return best, at
-    points = centres[top, None] + _cell_stencil(len(half_widths)) * half_widths
+    points = centres[top, None] + _cell_stencil(len(half)) * half
     return _improve_at_points(
-        problem, problem.cells.clip_to_region(points.reshape(-1, len(half_widths))), best, at
+        problem, problem.cells.clip_to_region(points.reshape(-1, len(half))), best, at
     )
 
 
@@ -209,27 +215,27 @@ def _subdivision_count(cells: int, dimensions: int) -> int:
 
 
 def _subdivide(
-    centres: FloatArray, half_widths: FloatArray, parts: int, chunk: int
+    centres: FloatArray, half: FloatArray, parts: int, chunk: int
 ) -> Iterator[FloatArray]:
-    """Yield the subcells, of half widths ``half_widths``, of cells, chunk by chunk."""
+    """Yield the subcells, of half widths ``half``, of cells, chunk by chunk."""
     ticks = 2.0 * np.arange(parts) + 1.0 - parts
-    grid = np.stack(np.meshgrid(*[ticks] * len(half_widths), indexing="ij"), axis=-1)
-    offsets = grid.reshape(-1, len(half_widths)) * half_widths
+    grid = np.stack(np.meshgrid(*[ticks] * len(half), indexing="ij"), axis=-1)
+    offsets = grid.reshape(-1, len(half)) * half
     step = max(1, chunk // len(offsets))
     for first in range(0, len(centres), step):
-        yield (centres[first : first + step, None] + offsets).reshape(-1, len(half_widths))
+        yield (centres[first : first + step, None] + offsets).reshape(-1, len(half))
 
 
 def polish(
-    problem: Problem, at: FloatArray, half_widths: FloatArray, best: float
+    problem: Problem, at: FloatArray, half: FloatArray, best: float
 ) -> tuple[float, FloatArray]:
     """Return the local maximum near a point, by pattern search with several step sizes."""
-    size = len(half_widths)
+    size = len(half)
     offsets = np.concatenate([_cell_stencil(size)[1:], np.eye(size), -np.eye(size)])
     offsets = (_POLISH_SCALES[:, None, None] * offsets).reshape(-1, size)
     scale, step = np.repeat(_POLISH_SCALES, len(offsets) // len(_POLISH_SCALES)), 2.0
     for _ in range(_POLISH_STEPS):
-        points = problem.cells.clip_to_region(at + offsets * (step * half_widths))
+        points = problem.cells.clip_to_region(at + offsets * (step * half))
         values = problem.values(points)
         first = _argmax_ignoring_nan(values)
         if values[first] > best:

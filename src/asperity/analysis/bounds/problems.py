@@ -16,7 +16,7 @@ import numpy as np
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED, JacobianMeasure
 from asperity.analysis.bounds.branch_and_bound import Contacts, Problem
-from asperity.analysis.bounds.sampling import ContactField
+from asperity.analysis.bounds.sampling import contact_jacobians
 from asperity.contacts.contact import parameter_name
 from asperity.core.checks import FloatArray
 from asperity.enclosures.cells import (
@@ -68,14 +68,12 @@ class MatrixProblem(Problem):
     def exact_matrices(self, coordinates: FloatArray) -> list[FloatArray]:
         """Return the same matrices at coordinates (n, d), each of shape (n, 3, 3)."""
 
-    def upper_bounds(
-        self, centres: FloatArray, half_widths: FloatArray, threshold: float
-    ) -> FloatArray:
+    def upper_bounds(self, centres: FloatArray, half: FloatArray, threshold: float) -> FloatArray:
         """See :class:`Problem`."""
-        n, d = len(centres), len(half_widths)
+        n, d = len(centres), len(half)
         best = np.full(n, -np.inf)
         with np.errstate(all="ignore"):
-            models = self.cells.enclosures(centres, half_widths, self._names)
+            models = self.cells.enclosures(centres, half, self._names)
             for entries in self.matrices(models):
                 c, g, e = _stack_entries(entries, n, d)
                 best = np.maximum(best, self._measure.upper_bounds(c, g, e, threshold))
@@ -125,6 +123,38 @@ def law_constants(surface: Surface) -> dict[str, float]:
     return {"k": 1.0, "h_mid": middle, "h_half": half, **own}
 
 
+class LawKernel:
+    """The Jacobian over k of a law, or with its depth held by a clamp.
+
+    Args:
+        surface: the surface.
+        name: the generated kernel, ``law_jacobian`` or ``law_jacobian_saturated``.
+        math: the ``math`` module of the kernel: enclosures, or NumPy for arrays.
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        name: str = "law_jacobian",
+        math: type[TaylorMath] | ModuleType = TaylorMath,
+    ) -> None:
+        self._function, self._arguments = law_kernel(surface.law, name, math)
+        self._constants = law_constants(surface)
+        self.names = [name for name in DERIVATIVE_NAMES if name in self._arguments]
+
+    def rows_at_depth(self, values: dict[str, Any], depth: Any) -> Entries:
+        """Return the rows of J/k from the height's derivatives, and the state of an anchor.
+
+        Raises:
+            TypeError: for a kernel that takes anything else, or branches on comparisons.
+        """
+        known = {**self._constants, **values, DEPTH_COORDINATE: depth}
+        if not known.keys() >= set(self._arguments):
+            raise TypeError("the force depends on the position itself")
+        entries = self._function(**{name: known[name] for name in self._arguments})[-9:]
+        return [entries[0:3], entries[3:6], entries[6:9]]
+
+
 class LawProblem(MatrixProblem):
     """A measure of J/k itself, over contacts, depths in [0, D] and states of an anchor.
 
@@ -133,11 +163,7 @@ class LawProblem(MatrixProblem):
     """
 
     def __init__(self, surface: Surface, cells: Cells, measure: JacobianMeasure) -> None:
-        self._surface, self._field = surface, ContactField(surface)
-        self._kernel, arguments = law_kernel(surface.law)
-        self._constants = {n: v for n, v in law_constants(surface).items() if n in arguments}
-        self._argument_names = arguments
-        depth = surface.max_depth
+        self._surface, self._kernel, depth = surface, LawKernel(surface), surface.max_depth
         self._depths = (0.0, depth) if surface.facts.affine_in_depth else (None,)
         if surface.law.stateful:
             level = None if self._depths[0] is not None else depth
@@ -146,8 +172,7 @@ class LawProblem(MatrixProblem):
         elif self._depths[0] is None:
             cells = cells_with_depth(cells, depth)
         self._sliding_states = (False, True) if surface.law.stateful else (False,)
-        names = [name for name in DERIVATIVE_NAMES if name in arguments]
-        super().__init__(cells, names, measure)
+        super().__init__(cells, self._kernel.names, measure)
 
     def matrices(self, models: dict[str, TaylorNumber]) -> list[Entries]:
         """See :class:`MatrixProblem`."""
@@ -157,11 +182,8 @@ class LawProblem(MatrixProblem):
             if self._surface.law.stateful:
                 state = anchor_enclosures(models, self._max_deflection, sliding=sliding)
             for end in self._depths:
-                known = {**models, **state, **({} if end is None else {DEPTH_COORDINATE: end})}
-                taken = {name: known[name] for name in self._argument_names if name in known}
-                if len(taken) + len(self._constants) < len(self._argument_names):
-                    raise TypeError("the force depends on the position itself")
-                result.append(as_rows(self._kernel(**taken, **self._constants)[3:]))
+                depth = models[DEPTH_COORDINATE] if end is None else end
+                result.append(self._kernel.rows_at_depth({**models, **state}, depth))
         return result
 
     def contacts(self, coordinates: FloatArray) -> list[Contacts]:
@@ -187,16 +209,11 @@ class LawProblem(MatrixProblem):
     def exact_matrices(self, coordinates: FloatArray) -> list[FloatArray]:
         """See :class:`MatrixProblem`."""
         derivatives = self.cells.derivatives(coordinates)
-        nowhere = np.zeros((len(coordinates), 2))
+        known = self._surface, np.zeros((len(coordinates), 2))
         return [
-            self._field.jacobians(nowhere, at.depth, derivatives, at.deflection, sliding=at.sliding)
+            contact_jacobians(*known, at.depth, derivatives, at.deflection, sliding=at.sliding)
             for at in self.contacts(coordinates)
         ]
-
-
-def as_rows(entries: Sequence[Any]) -> Entries:
-    """Return nine entries as three rows."""
-    return [entries[0:3], entries[3:6], entries[6:9]]
 
 
 class SurfaceProblem(MatrixProblem):
@@ -299,13 +316,9 @@ class CrestProblem(SurfaceProblem):
         # The missing third curvature is zero, which is never the greatest at a crest.
         super().__init__(cells, DERIVATIVE_NAMES[1:], _shape_operator, ONE_SIDED, floor)
 
-    def upper_bounds(
-        self, centres: FloatArray, half_widths: FloatArray, threshold: float
-    ) -> FloatArray:
+    def upper_bounds(self, centres: FloatArray, half: FloatArray, threshold: float) -> FloatArray:
         """See :class:`Problem`: S = G⁻¹ H / s with G >= 1, s >= 1, so no curvature is above ‖H‖."""
-        return np.minimum(
-            super().upper_bounds(centres, half_widths, threshold), self.cells.hessian_bound
-        )
+        return np.minimum(super().upper_bounds(centres, half, threshold), self.cells.hessian_bound)
 
     def prune_threshold(self, best: float, tolerance: float) -> float:
         """See :class:`Problem`: y/(1 - y) within the tolerance, y = depth times curvature."""
@@ -337,21 +350,18 @@ class ClampKernel:
 
     def __init__(self, surface: Surface, math: type[TaylorMath] | ModuleType = TaylorMath) -> None:
         self._surface = surface
-        self._constants = law_constants(surface)
-        self._jacobian_kernel = law_kernel(surface.law, "law_jacobian", math)
-        self._saturated_kernel = law_kernel(surface.law, "law_jacobian_saturated", math)
-        arguments = {*self._jacobian_kernel[1], *self._saturated_kernel[1]}
-        self.names = [name for name in DERIVATIVE_NAMES if name in arguments]
+        self._full = LawKernel(surface, "law_jacobian", math)
+        self._clamped = LawKernel(surface, "law_jacobian_saturated", math)
+        used = {*self._full.names, *self._clamped.names}
+        self.names = [name for name in DERIVATIVE_NAMES if name in used]
 
     def rows_at_depth(self, derivatives: dict[str, Any], depth: Any) -> Entries:
         """Return the rows above a backing wall, from the height's derivatives at a depth [m]."""
-        clamped = as_rows(
-            self._evaluate_kernel(self._saturated_kernel, derivatives, self._surface.max_depth)
-        )
         clamp = self._surface.effective_clamp
+        clamped = self._clamped.rows_at_depth(derivatives, self._surface.max_depth)
         if clamp.holds_whole_force:
             return clamped
-        full = as_rows(self._evaluate_kernel(self._jacobian_kernel, derivatives, depth)[3:])
+        full = self._full.rows_at_depth(derivatives, depth)
         return [(clamped if i in clamp.held_components else full)[i] for i in range(3)]
 
     def zone_rows(self, derivatives: dict[str, Any]) -> list[Entries]:
@@ -367,18 +377,6 @@ class ClampKernel:
         above = [self.rows_at_depth(derivatives, depth) for depth in depths]
         below = [[x, y, [*z[:2], z[2] - 1.0]] for x, y, z in above if clamp.has_backing_wall]
         return above + below
-
-    def _evaluate_kernel(
-        self,
-        kernel: tuple[Callable[..., Any], tuple[str, ...]],
-        derivatives: dict[str, Any],
-        depth: Any,
-    ) -> Any:
-        function, arguments = kernel
-        values = {**self._constants, **derivatives, DEPTH_COORDINATE: depth}
-        if not values.keys() >= set(arguments):
-            raise TypeError("the force depends on the position itself, or on an anchor")
-        return function(**{name: values[name] for name in arguments})
 
 
 class ClampProblem(MatrixProblem):
@@ -411,14 +409,8 @@ class ClampProblem(MatrixProblem):
         known: dict[str, Any] = dict(zip(DERIVATIVE_NAMES, derivatives, strict=True))
         if isinstance(self.cells, ProductCells):
             known |= self.cells.extra_coordinates(coordinates)
-        result = []
-        for entries in self._numbers.zone_rows(known):
-            matrices = np.empty((len(coordinates), 3, 3))
-            for i, row in enumerate(entries):
-                for j, entry in enumerate(row):
-                    matrices[:, i, j] = entry
-            result.append(matrices)
-        return result
+        rows = self._numbers.zone_rows(known)
+        return [_stack_entries(entries, len(coordinates), 0)[0] for entries in rows]
 
     def depths(self, at: FloatArray, surface: Surface) -> tuple[float, ...]:
         """Return depths [m] at which the surface renders these matrices, at least nearly."""

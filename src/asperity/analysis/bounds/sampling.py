@@ -46,51 +46,24 @@ class DenseMaximum:
     depth: float
 
 
-class ContactField:
-    """The Jacobian of a surface as a function of the contact, in units of the stiffness."""
-
-    def __init__(self, surface: Surface) -> None:
-        self.surface = surface
-        self.texture = surface.texture
-        self._loops = fuse_contact(surface.law)
-        self._reads_position = uses_position(surface.law)
-        self._law = (1.0, *surface.law_arguments[1:])
-
-    def jacobians(
-        self,
-        xy: FloatArray,
-        depth: FloatArray,
-        derivatives: FloatArray,
-        deflection: FloatArray,
-        *,
-        sliding: bool = False,
-    ) -> FloatArray:
-        """Return J/k at contacts, shape (n, 3, 3)."""
-        n = len(xy)
-        force, jacobian = np.empty((n, 3)), np.empty((n, 3, 3))
-        slides = np.full(n, sliding)
-        contact = self.surface.law.contact
-        points = (
-            contact.probe_positions(xy, depth, derivatives)
-            if self._reads_position
-            else np.zeros((n, 3))
-        )
-        self._loops.contact_batch(
-            points, depth, derivatives, deflection, slides, force, jacobian, self._law
-        )
-        return jacobian
-
-    def contacts(
-        self, rows: FloatArray, depth_limit: DepthLimit
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Return points, depths, derivatives and deflections of rows (fractions, depth part)."""
-        xy = self.texture.domain.points(rows[:, :-1])
-        derivatives = self.texture.derivatives(xy)
-        depth = np.ascontiguousarray(rows[:, -1] * np.maximum(depth_limit(derivatives), 0.0))
-        deflection = np.zeros((len(xy), 2))
-        if self.surface.law.stateful:
-            deflection = worst_deflection(self.surface, derivatives[:, 1:3])
-        return xy, depth, derivatives, deflection
+def contact_jacobians(
+    surface: Surface,
+    xy: FloatArray,
+    depth: FloatArray,
+    derivatives: FloatArray,
+    deflection: FloatArray,
+    *,
+    sliding: bool = False,
+) -> FloatArray:
+    """Return J/k of a surface at contacts, shape (n, 3, 3)."""
+    n, law = len(xy), surface.law
+    points, force, jacobian = np.zeros((n, 3)), np.empty((n, 3)), np.empty((n, 3, 3))
+    if uses_position(law):
+        points = law.contact.probe_positions(xy, depth, derivatives)
+    contact = points, depth, derivatives, deflection, np.full(n, sliding)
+    arguments = (1.0, *surface.law_arguments[1:])
+    fuse_contact(law).contact_batch(*contact, force, jacobian, arguments)
+    return jacobian
 
 
 def worst_deflection(surface: Surface, slope: FloatArray) -> FloatArray:
@@ -143,24 +116,32 @@ def dense_maximum(surface: Surface, measure: Measure, depth_limit: DepthLimit) -
         ParameterError: for a user-defined law on the split contact.
     """
     require_depth_contact(surface)
-    field = ContactField(surface)
+    texture = surface.texture
+
+    def contacts(rows: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        xy = texture.domain.points(rows[:, :-1])
+        derivatives = texture.derivatives(xy)
+        depth = np.ascontiguousarray(rows[:, -1] * np.maximum(depth_limit(derivatives), 0.0))
+        deflection = np.zeros((len(xy), 2))
+        if surface.law.stateful:
+            deflection = worst_deflection(surface, derivatives[:, 1:3])
+        return xy, depth, derivatives, deflection
 
     def values(rows: FloatArray) -> FloatArray:
-        return measure(field.jacobians(*field.contacts(rows, depth_limit)))
+        return measure(contact_jacobians(surface, *contacts(rows)))
 
-    fractions, spacing = sample_fractions(surface.texture)
+    fractions, spacing = sample_fractions(texture)
     levels = (0.0, 1.0) if surface.facts.affine_in_depth else DEPTH_FRACTIONS
     sampled = _sample_values(values, fractions, levels)
     point = _best_of_blocks(sampled.max(axis=1))
     level = np.argmax(sampled[point], axis=1)
     centres = np.column_stack([fractions[point], np.array(levels)[level]])
-    bounded = slice(-1 if surface.texture.domain.periodic else 0, None)
+    bounded = slice(-1 if texture.domain.periodic else 0, None)
     centres = _zoom_in(values, centres, np.append(spacing, 0.25), bounded)
-    best = centres[int(np.argmax(values(centres)))]
-    xy, depth, derivatives, deflection = field.contacts(best[None, :], depth_limit)
+    best = contacts(centres[[int(np.argmax(values(centres)))]])
     accurate = precise_norm if measure is spectral_norm else precise_one_sided
-    value = accurate(field.jacobians(xy, depth, derivatives, deflection))[0]
-    return DenseMaximum(float(value), (float(xy[0, 0]), float(xy[0, 1])), float(depth[0]))
+    value, ((x, y),) = accurate(contact_jacobians(surface, *best))[0], best[0].tolist()
+    return DenseMaximum(float(value), (x, y), float(best[1][0]))
 
 
 def _sample_values(values: Measure, fractions: FloatArray, levels: Sequence[float]) -> FloatArray:
@@ -215,30 +196,13 @@ def sample_supremum(problem: Problem) -> Supremum:
     return Supremum(best, math.inf, at, len(points), converged=False)
 
 
-def sample_on_texture(
-    texture: Texture, make_problem: Callable[[Cells], Problem]
-) -> tuple[Cells, Supremum]:
-    """Return the sampled cells and the greatest value found of a problem on them."""
-    cells = texture.sampling_cells()
-    return cells, sample_supremum(make_problem(cells))
-
-
 class HeightProblem(Problem):
-    """The height [m], of which only values are used."""
+    """The height [m]; the textures themselves certify its extremes."""
 
     floor = -np.inf
 
     def __init__(self, cells: Cells) -> None:
         self.cells = cells
-
-    def upper_bounds(
-        self,
-        centres: FloatArray,
-        half_widths: FloatArray,  # noqa: ARG002 - of the interface
-        threshold: float,  # noqa: ARG002 - of the interface
-    ) -> FloatArray:
-        """See :class:`Problem`; infinite: extremes are certified by the textures."""
-        return np.full(len(centres), np.inf)
 
     def values(self, coordinates: FloatArray) -> FloatArray:
         """See :class:`Problem`."""
@@ -248,6 +212,7 @@ class HeightProblem(Problem):
 @lru_cache(maxsize=16)
 def highest_point(texture: Texture) -> FloatArray:
     """Return a point of the plane (2,) [m] at a local maximum of the height."""
-    cells, found = sample_on_texture(texture, HeightProblem)
+    cells = texture.sampling_cells()
+    found = sample_supremum(HeightProblem(cells))
     assert found.at is not None
     return np.asarray(cells.to_plane(found.at[None])[0])

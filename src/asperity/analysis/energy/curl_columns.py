@@ -16,11 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from asperity.analysis.bounds.problems import ClampKernel, as_rows, law_constants, law_kernel
-from asperity.analysis.bounds.sampling import ContactField
+from asperity.analysis.bounds.problems import ClampKernel, LawKernel
+from asperity.analysis.bounds.sampling import contact_jacobians
 from asperity.core.checks import FloatArray
 from asperity.derive.facts import law_facts
-from asperity.enclosures.cells import DERIVATIVE_NAMES
 from asperity.enclosures.taylor import TaylorModel, TaylorNumber
 from asperity.surface import Surface
 from asperity.textures.bounds.bounded_cells import LineSegments
@@ -166,18 +165,12 @@ def _curl_model(
     is_clamped: bool,
 ) -> TaylorModel:
     """Return the enclosure of the curl over k on every piece at a depth."""
-    zone = ClampKernel(surface) if is_clamped else None
-    kernel, arguments = law_kernel(surface.law)
-    names = [name for name in DERIVATIVE_NAMES if name in arguments] if zone is None else zone.names
-    models, dimensions = pieces.models(names), 1
+    kernel = ClampKernel(surface) if is_clamped else LawKernel(surface)
+    models, dimensions = pieces.models(kernel.names), 1
     if isinstance(depth, TaylorModel):
         dimensions = 2
         models = {name: _with_depth_axis(model) for name, model in models.items()}
-    if zone is None:
-        known: dict[str, Any] = {**models, **law_constants(surface), "depth": depth}
-        rows = as_rows(kernel(**{name: known[name] for name in arguments})[3:])
-    else:
-        rows = zone.rows_at_depth(models, depth)
+    rows = kernel.rows_at_depth(models, depth)
     tx, ty = (float(part) for part in line.direction)
     curl: TaylorNumber = tx * rows[0][2] + ty * rows[1][2] - (tx * rows[2][0] + ty * rows[2][1])
     if isinstance(curl, TaylorModel):
@@ -219,8 +212,7 @@ def _curls_at_layer_ends(
             below = surface.law.contact.probe_positions(xy, depth * (1.0 + 1e-9), derivatives)
             result.append(plane_curl(surface.jacobian(below), line))
         else:
-            field = ContactField(surface)
-            jacobians = field.jacobians(xy, depth, derivatives, np.zeros((n, 2)))
+            jacobians = contact_jacobians(surface, xy, depth, derivatives, np.zeros((n, 2)))
             result.append(surface.stiffness * plane_curl(jacobians, line))
     return result
 

@@ -31,7 +31,7 @@ from asperity.analysis.bounds.branch_and_bound import (
     supremum,
 )
 from asperity.analysis.bounds.problems import CrestProblem
-from asperity.analysis.bounds.sampling import highest_point, sample_on_texture
+from asperity.analysis.bounds.sampling import highest_point, sample_supremum
 from asperity.analysis.gain import closed_forms
 from asperity.core.checks import FloatArray
 from asperity.enclosures.cells import Cells
@@ -92,9 +92,9 @@ def sharpest_crest(
     if texture.single_wave is not None and extent is None:
         return _crest_of_wave(texture, texture.single_wave)
     cells = texture.cells(extent, margin)
-    found: Supremum
     if cells is None:
-        cells, found = sample_on_texture(texture, CrestProblem)
+        cells = texture.sampling_cells()
+        found = sample_supremum(CrestProblem(cells))
     else:
         # Cells without a refined gap reach only their default gap in reasonable time.
         gap = tolerance if cells.refined_gap else max(tolerance, cells.default_gap)

@@ -172,12 +172,12 @@ class FrictionProblem(Problem):
     def upper_bounds(
         self,
         centres: FloatArray,
-        half_widths: FloatArray,
+        half: FloatArray,
         threshold: float,  # noqa: ARG002 - the only bound is cheap
     ) -> FloatArray:
         """See :class:`Problem`."""
-        models = self.cells.enclosures(centres, half_widths, ("h", "hx", "hy"))
-        n, d = len(centres), len(half_widths)
+        models = self.cells.enclosures(centres, half, ("h", "hx", "hy"))
+        n, d = len(centres), len(half)
         zero = TaylorModel(np.zeros(n), np.zeros((d, n)), np.zeros(n))
         h, x, y = (m if isinstance(m, TaylorModel) else zero for m in models.values())
         rest = np.hypot(x.e, y.e) * (1.0 + 1e-12)
