@@ -79,7 +79,7 @@ ROOMS = {
          "tests/enclosures/test_taylor.py"),
     ),
     "passivity": Room(
-        ("analysis/passivity", "analysis/assess_passivity.py"),
+        ("analysis/passivity",),
         ("tests/analysis/passivity/test_passivity_by_definition.py",
          "tests/analysis/passivity/test_passivity.py",
          "tests/analysis/passivity/test_wall_test_criterion.py",
@@ -92,7 +92,7 @@ ROOMS = {
         ("tests/analysis/limits/test_limits_by_definition.py",
          "tests/analysis/limits/test_limits.py", "tests/analysis/limits/test_spectrum.py",
          "tests/analysis/limits/test_wave_force.py", "tests/analysis/limits/test_perceptibility.py",
-         "tests/analysis/sentences/test_limit_sentences.py"),
+         "tests/analysis/limits/test_limit_sentences.py"),
     ),
     "bounds": Room(
         ("analysis/bounds",),

@@ -10,14 +10,14 @@ import pytest
 
 from asperity.analysis import loop_work
 from asperity.analysis.energy import curl_columns as columns
-from asperity.analysis.energy import leak, loop_integral, merit
+from asperity.analysis.energy import leak, merit
 from asperity.analysis.energy import loop_integral as anchor
 from asperity.analysis.energy import loop_integral as loops
-from asperity.analysis.energy.continuity import _round_up_readable
 from asperity.analysis.energy.curl_columns import Layer, column_polygon, positive_interval
 from asperity.analysis.energy.leak import worst_loop
 from asperity.core.checks import FloatArray
 from asperity.core.errors import InternalError
+from asperity.core.units import round_up
 from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Sinusoid
@@ -322,11 +322,11 @@ def test_the_paths_of_friction_are_the_paper_s() -> None:
     expected = [
         [*start, above], [*start, -light], [*end, -light], [*end, -D], [*start, -D],
     ]  # fmt: skip
-    np.testing.assert_allclose(loop_integral.friction_path(FRICTION, start, along), expected)
+    np.testing.assert_allclose(leak.friction_path(FRICTION, start, along), expected)
     line = FRICTION.texture.scan_line()
-    found = loop_integral.light_then_deep_loop(FRICTION, line)
+    found = leak.light_then_deep_loop(FRICTION, line)
     works = [
-        loop_work(FRICTION, loop_integral.friction_path(FRICTION, one, sign * line.direction))
+        loop_work(FRICTION, leak.friction_path(FRICTION, one, sign * line.direction))
         for one in line.points(64)
         for sign in (1.0, -1.0)
     ]
@@ -339,9 +339,9 @@ def test_the_paths_of_friction_are_the_paper_s() -> None:
 def test_the_best_promise_of_a_plane_is_tried() -> None:
     """Of 64 places and both senses the four that promise most: none of the others gains more."""
     line = FRICTION.texture.scan_line()
-    found = loop_integral.in_plane_loop(FRICTION, line)
+    found = leak.in_plane_loop(FRICTION, line)
     outlines = [
-        loop_integral._in_plane_outline(FRICTION, line, start, sign)
+        leak._in_plane_outline(FRICTION, line, start, sign)
         for start in line.points(64)
         for sign in (1.0, -1.0)
     ]
@@ -356,7 +356,7 @@ def test_an_outline_stays_where_the_anchor_sticks() -> None:
     """Within the circle of the greatest deflection, at one depth, on one side by the slope."""
     line, anchor = FRICTION.texture.scan_line(), np.array([0.3e-3, 0.0])
     for sign in (1.0, -1.0):
-        promise, vertices = loop_integral._in_plane_outline(FRICTION, line, anchor, sign)
+        promise, vertices = leak._in_plane_outline(FRICTION, line, anchor, sign)
         np.testing.assert_allclose(vertices[0], [*anchor, 0.1 * D])
         np.testing.assert_allclose(vertices[1], [*anchor, -D])
         np.testing.assert_allclose(vertices[-1], [*anchor, -D])
@@ -423,13 +423,13 @@ def test_a_constant_force_has_no_ripple(stiffness: float, monkeypatch: pytest.Mo
 
 def test_three_digits_are_never_less() -> None:
     for value in 10.0 ** RNG.uniform(-3, 6, 500):
-        rounded = _round_up_readable(value)
+        rounded = round_up(value)
         digits = 10.0 ** (math.floor(math.log10(value)) - 2)
         assert value * (1.0 - 1e-11) <= rounded <= value + digits * (1.0 + 1e-9)
         assert abs(rounded / digits - round(rounded / digits)) < 1e-6
-    assert _round_up_readable(1230.0) == 1230.0
-    assert _round_up_readable(1230.0 * (1.0 + 1e-9)) == 1240.0
-    assert _round_up_readable(0.0) == 0.0
+    assert round_up(1230.0) == 1230.0
+    assert round_up(1230.0 * (1.0 + 1e-9)) == 1240.0
+    assert round_up(0.0) == 0.0
 
 
 def test_a_way_over_a_plane_has_a_panel() -> None:

@@ -14,8 +14,7 @@ from asperity.analysis.energy.curl_columns import (
     curl_integral_bounds,
     sample_curl_integrals,
 )
-from asperity.analysis.energy.leak import orient_loop, worst_loop
-from asperity.analysis.energy.loop_integral import in_plane_loop
+from asperity.analysis.energy.leak import in_plane_loop, orient_loop, worst_loop
 from asperity.core.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier

@@ -137,10 +137,10 @@ def test_theorems_and_closed_forms_are_not_cached(folder: Path) -> None:
 _SECOND_PROCESS = """
 import sys, numpy as np
 from asperity import HeightMap, Surface, characteristic_number
-from asperity.analysis.gain import search_options
+from asperity.analysis.gain import medial_axis
 def refuse(*_arguments):
     raise SystemExit("computed again")
-search_options.supremum = refuse
+medial_axis.supremum = refuse
 heights = 1e-4 * np.random.default_rng(1).normal(size=(8, 9))
 print(repr(characteristic_number(Surface(HeightMap(heights, 3e-4), "B", max_depth=1e-4))))
 """

@@ -11,6 +11,7 @@ import pytest
 from asperity.analysis.split import baked_field as potential_grid
 from asperity.analysis.split import baked_field as potential_table
 from asperity.analysis.split.baked_field import FieldGrid, curvature_bounds
+from asperity.core.units import round_up
 from asperity.kernels import fuse
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -136,7 +137,7 @@ def test_the_finest_resolution_that_fits_is_found_to_three_digits(most: int) -> 
 
 def test_three_digits_are_never_finer() -> None:
     for value in 10.0 ** np.random.default_rng(3).uniform(-8.0, 2.0, 300):
-        found = potential_table._round_up_digits(value)
+        found = round_up(value)
         unit = 10.0 ** (math.floor(math.log10(value)) - 2)
         assert value <= found <= value + unit * (1.0 + 1e-9)
         assert abs(found / unit - round(found / unit)) < 1e-6

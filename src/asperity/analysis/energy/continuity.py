@@ -15,7 +15,7 @@ from asperity.analysis.gain.surface_cache import cached_result
 from asperity.analysis.gain.theorems import theorem_of
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
-from asperity.core.units import format_quantity, round_down
+from asperity.core.units import format_quantity, round_down, round_up
 from asperity.surface import Surface
 from asperity.textures.texture import Texture
 
@@ -160,14 +160,8 @@ def _continuous_force(surface: Surface, q: Bound, reason: str) -> Continuity:
     slope = replace(q, lower=k * q.lower, upper=upper, note=f"k q [N/m]; q: {q.note}")
     if math.isinf(upper):
         return Continuity(True, reason, slope, surface)
-    text = f"{reason}; Lipschitz constant at most {_round_up_readable(upper):.10g} N/m"
+    text = f"{reason}; Lipschitz constant at most {round_up(upper):.10g} N/m"
     return Continuity(True, text, slope, surface)
-
-
-def _round_up_readable(value: float) -> float:
-    """Return the value rounded up to three digits, up to floating-point rounding."""
-    step = 10.0 ** (math.floor(math.log10(value)) - 2) if value > 0.0 else 1.0
-    return round(math.ceil(value / step * (1.0 - 1e-12)) * step, 12)
 
 
 # --- jumps ----------------------------------------------------------------------------------------

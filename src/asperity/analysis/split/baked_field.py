@@ -19,6 +19,7 @@ from asperity.contacts.split.potential_spline import PotentialSpline
 from asperity.core.checks import FloatArray, Points, check_points, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.processes import available_cores
+from asperity.core.units import round_up
 from asperity.devices import Device, load_device
 from asperity.laws.h_split_god_object import LAW as SPLIT_GOD_OBJECT
 from asperity.surface import Surface
@@ -404,19 +405,13 @@ def _check_size(surface: Surface, grid: FieldGrid, limit: int) -> None:
         fits = f"even the coarsest one takes {least.bytes} byte"
     else:
         # Rounded up, so that the resolution in the message fits.
-        fits = f"{_round_up_digits(_finest_resolution(surface, limit)):.3g} m fits"
+        fits = f"{round_up(_finest_resolution(surface, limit)):.3g} m fits"
     raise ParameterError(
         "resolution",
         f"would need a field of {nodes} nodes, {grid.bytes / 1e6:,.1f} MB, more than max_bytes = "
         f"{limit / 1e6:,.1f} MB; {fits}",
         max(grid.spacing),
     )
-
-
-def _round_up_digits(value: float) -> float:
-    """Return the value rounded up to three digits."""
-    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
-    return math.ceil(value / unit) * unit
 
 
 def _bake_on_grid(surface: Surface, grid: FieldGrid, coefficients: FloatArray) -> BakedField:
