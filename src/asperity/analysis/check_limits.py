@@ -21,13 +21,15 @@ from asperity.analysis.limits.limit_result import (
     limits_assumptions,
     limits_summary,
 )
-from asperity.analysis.limits.limit_rules import LIMIT_RULES, Decision, LimitCase, evaluate_limit
-from asperity.analysis.limits.perceptibility import (
+from asperity.analysis.limits.limit_rules import (
     DEFAULT_SAMPLES,
     DEFAULT_SPEED,
-    Perceptibility,
-    assess_perceptibility,
+    LIMIT_RULES,
+    Decision,
+    LimitCase,
+    evaluate_limit,
 )
+from asperity.analysis.limits.perceptibility import Perceptibility, assess_perceptibility
 from asperity.analysis.limits.spectrum import MIN_SHARE, Spectrum, compute_spectrum, wave_forces
 from asperity.analysis.passivity.verdict import (
     StabilityLimit,
@@ -118,7 +120,7 @@ def limits(
         **settings,
     )
     gain = _limiting_number(q, one_sided, recommended.stability_limit)
-    result = _evaluate_limits(surface, device, recommended, gain, perceptibility, settings)
+    result = _evaluate_limits(surface, device, recommended, *gain, perceptibility, settings)
     given = {"speed": speed, "stiffness": stiffness, "max_depth": max_depth}
     defaults = {name: value is None for name, value in given.items()}
     defaults["samples"] = None in {time_samples, position_samples, force_steps}
@@ -130,12 +132,12 @@ def _evaluate_limits(
     surface: Surface,
     device: Device,
     recommended: StiffnessRecommendation,
-    limiting_number: tuple[Bound, str],
+    gain: Bound,
+    gain_symbol: str,
     perceptibility: Perceptibility,
     settings: dict[str, float],
 ) -> Limits:
     """Return the six limits, without sentences."""
-    gain, symbol = limiting_number
     spectrum = compute_spectrum(surface.texture)
     forces = wave_forces(surface, spectrum)
     is_significant = _significant_waves(spectrum, forces)
@@ -152,7 +154,7 @@ def _evaluate_limits(
         **settings,
     )
     decisions = [
-        evaluate_limit(rule, case, f"{symbol} k ≤ K₀" if rule.number == 5 else None)
+        evaluate_limit(rule, case, f"{gain_symbol} k ≤ K₀" if rule.number == 5 else None)
         for rule in LIMIT_RULES
     ]
     six = tuple(decision.limit for decision in decisions)
@@ -161,7 +163,7 @@ def _evaluate_limits(
         surface=surface,
         device=device,
         gain=gain,
-        gain_symbol=symbol,
+        gain_symbol=gain_symbol,
         stability_limit=recommended.stability_limit,
         margin=recommended.margin,
         limits=six,

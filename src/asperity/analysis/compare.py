@@ -19,11 +19,8 @@ from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import merit as compute_merit
 from asperity.analysis.gain.characteristic import cached_number
 from asperity.analysis.gain.surface_cache import is_shipped_law, surface_content
-from asperity.analysis.limits.perceptibility import (
-    DEFAULT_SPEED,
-    assess_perceptibility,
-    texture_amount_text,
-)
+from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
+from asperity.analysis.limits.perceptibility import assess_perceptibility, texture_amount_text
 from asperity.analysis.passivity.assess_passivity import passivity
 from asperity.analysis.passivity.verdict import at_recommended_stiffness, recommend_stiffness
 from asperity.analysis.results import LawRow, recommend

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from asperity.analysis.limits.limit_rules import DEFAULT_SAMPLES, DEFAULT_SPEED
 from asperity.analysis.limits.perceptibility import (
     CLEAR_RATIO,
-    DEFAULT_SAMPLES,
-    DEFAULT_SPEED,
     HAND_THRESHOLD,
     Perceptibility,
     force_magnitude_text,

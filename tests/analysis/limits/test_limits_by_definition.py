@@ -34,7 +34,7 @@ def case(known: dict[str, float] | None = None, **more: Any) -> LimitCase:
         "speed": 1.0, "time_samples": 5.0, "position_samples": 4.0, "force_steps": 8.0,
         "wavelengths": LENGTHS, "forces": FORCES, "shares": SHARES, "gain": 2.0, "stiffness": 16.0,
     }  # fmt: skip
-    return LimitCase(known or {}, *(plain | more).values())
+    return LimitCase(known or {}, **(plain | more))
 
 
 # --- the six limits -------------------------------------------------------------------------------

@@ -132,14 +132,12 @@ def test_only_the_waves_that_come_through_count() -> None:
 def test_a_slower_scan_brings_the_share_through_that_is_needed() -> None:
     """Of three waves, 1/2, 1/3 and 1/6 of the variance: of an amplitude the square."""
     lengths, shares = np.array([4e-3, 2e-3, 1e-3]), np.array([1 / 2, 1 / 3, 1 / 6])
-    k, rms = 1000.0, 1.0
+    rms = 1.0
     whole = math.sqrt(2.0) * rms
     for part, expected in ((0.6, 4e-3), (0.75, 2e-3), (0.93, 1e-3)):
         known = device(bandwidth="100 Hz", friction=f"{0.5 * part * whole} N")
-        case = LimitCase(
-            {name: datum.value for name, datum in known.data.items()}, 1.0, 5.0, 5.0, 5.0, lengths,
-            np.sqrt(shares), shares, math.nan, k,
-        )  # fmt: skip
+        values = {name: datum.value for name, datum in known.data.items()}
+        case = LimitCase(values, lengths, np.sqrt(shares), shares, speed=1.0)
         found = classify_perceptibility(case, rms, rms, None)
         assert found.clear_threshold == pytest.approx(part * whole)
         (slower,) = (cure for cure in found.remedies if cure.kind == "slower")

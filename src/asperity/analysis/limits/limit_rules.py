@@ -22,6 +22,9 @@ from numpy.typing import NDArray
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
 
+DEFAULT_SPEED = 0.1  # [m/s], a fast stroke
+DEFAULT_SAMPLES = 5.0  # "typically 5 to 10"
+
 
 @dataclass(frozen=True)
 class LimitCase:
@@ -29,27 +32,27 @@ class LimitCase:
 
     Attributes:
         device: known data of the device [SI] by field.
-        speed: v [m/s].
-        time_samples: α.
-        position_samples: β.
-        force_steps: γ.
         wavelengths: l [m], shape (n,).
         forces: A_F [N], shape (n,).
         shares: shares of the variance of the heights, shape (n,).
-        gain: q, or q⁺ where that decides.
-        stiffness: k [N/m].
+        gain: q, or q⁺ where that decides; only for limit 5.
+        stiffness: k [N/m]; only for limit 5.
+        speed: v [m/s].
+        time_samples: α, updates that a wave needs.
+        position_samples: β, position steps that a wave needs.
+        force_steps: γ, force steps that an amplitude needs.
     """
 
     device: Mapping[str, float]
-    speed: float
-    time_samples: float
-    position_samples: float
-    force_steps: float
     wavelengths: FloatArray
     forces: FloatArray
     shares: FloatArray
-    gain: float
-    stiffness: float
+    gain: float = math.nan
+    stiffness: float = math.nan
+    speed: float = DEFAULT_SPEED
+    time_samples: float = DEFAULT_SAMPLES
+    position_samples: float = DEFAULT_SAMPLES
+    force_steps: float = DEFAULT_SAMPLES
 
 
 Side = FloatArray | float

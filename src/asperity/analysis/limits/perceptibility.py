@@ -24,8 +24,6 @@ from asperity.devices import Device
 from asperity.surface import Surface, default_max_depth
 from asperity.textures.texture import TexturePart
 
-DEFAULT_SPEED = 0.1  # [m/s], a fast stroke
-DEFAULT_SAMPLES = 5.0  # "typically 5 to 10"
 MIN_SAMPLES = 2.0
 """Least samples of a wave by the sampling theorem; with more, but fewer than α and β, the wave is
 distorted and borderline at best."""
@@ -124,11 +122,8 @@ def assess_perceptibility(
     part: TexturePart,
     *,
     rms: float,
-    speed: float = DEFAULT_SPEED,
-    time_samples: float = DEFAULT_SAMPLES,
-    position_samples: float = DEFAULT_SAMPLES,
-    force_steps: float = DEFAULT_SAMPLES,
     explicit_depth: bool = False,
+    **scan: float,
 ) -> Perceptibility:
     """Assess whether the texture of a surface is felt on a device.
 
@@ -138,12 +133,10 @@ def assess_perceptibility(
             unknown data mask nothing.
         part: the part of the surface that is texture, not form.
         rms: RMS of the oscillating force of the surface [N].
-        speed: speed of the scan [m/s].
-        time_samples: α, updates that a wave needs.
-        position_samples: β, position steps that a wave needs.
-        force_steps: γ, force steps that an amplitude needs to be felt clearly.
         explicit_depth: whether max_depth was given; by default the texture without form is
             pressed as deep as it is high.
+        **scan: speed [m/s], time_samples, position_samples and force_steps, as in
+            :class:`~asperity.analysis.limits.limit_rules.LimitCase`.
 
     Example:
         >>> from asperity.devices import load_device
@@ -164,16 +157,11 @@ def assess_perceptibility(
         texture_rms = merit(surface).ripple * surface.stiffness
     spectrum = compute_spectrum(part.texture)
     case = LimitCase(
-        device={field: datum.value for field, datum in device.data.items()},
-        speed=speed,
-        time_samples=time_samples,
-        position_samples=position_samples,
-        force_steps=force_steps,
-        wavelengths=spectrum.wavelengths,
-        forces=wave_forces(surface, spectrum),
-        shares=spectrum.shares,
-        gain=math.nan,
-        stiffness=surface.stiffness,
+        {field: datum.value for field, datum in device.data.items()},
+        spectrum.wavelengths,
+        wave_forces(surface, spectrum),
+        spectrum.shares,
+        **scan,
     )
     return classify_perceptibility(case, rms, texture_rms, part.nesting)
 
