@@ -17,7 +17,7 @@ import pytest
 from asperity.analysis import characteristic_number, compare
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import merit
-from asperity.analysis.gain import surface_cache as answers
+from asperity.analysis.gain import characteristic as answers
 from asperity.core import cache
 from asperity.core.files import json_text
 from asperity.laws import LAWS, Law

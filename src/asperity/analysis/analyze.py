@@ -183,15 +183,14 @@ def analyze(
     device = load_device(device)
     surface = _resolve_surface(surface, device, surface_arguments)
     _check_depth(surface)
+    search: dict[str, Any] = {"tolerance": tolerance, "work_limit": work_limit, "extent": extent}
     report_step: Progress = progress or (lambda _step: None)
     report_step(STEPS[0])
-    q = cached_number(surface, NORM, tolerance, work_limit, extent)
+    q = cached_number(surface, NORM, **search)
     report_step(STEPS[1])
-    one_sided = cached_number(surface, ONE_SIDED, tolerance, work_limit, extent)
+    one_sided = cached_number(surface, ONE_SIDED, **search)
     report_step(STEPS[2])
-    curl = None
-    if not surface.law.stateful:
-        curl = curl_number(surface, tolerance, work_limit, extent)
+    curl = None if surface.law.stateful else curl_number(surface, **search)
     report_step(STEPS[3])
     leak = worst_loop(surface, direction)
     report_step(STEPS[4])

@@ -9,21 +9,21 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED
-from asperity.analysis.comparison_sentences import (
-    comparison_assumptions,
-    recommendation_text,
-    row_verdict,
-)
 from asperity.analysis.energy.continuity import continuity
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.merit import merit as compute_merit
-from asperity.analysis.gain.characteristic import cached_number
-from asperity.analysis.gain.surface_cache import is_shipped_law, surface_content
+from asperity.analysis.gain.characteristic import cached_number, is_shipped_law, surface_content
 from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
 from asperity.analysis.limits.perceptibility import assess_perceptibility, texture_amount_text
 from asperity.analysis.passivity.assess_passivity import passivity
 from asperity.analysis.passivity.verdict import at_recommended_stiffness, recommend_stiffness
-from asperity.analysis.results import LawRow, recommend
+from asperity.analysis.results import (
+    LawRow,
+    comparison_assumptions,
+    recommend,
+    recommendation_text,
+    row_verdict,
+)
 from asperity.core.arguments import DEFAULT_STIFFNESS
 from asperity.core.checks import check_positive
 from asperity.core.display import Plottable, Reportable

@@ -173,7 +173,7 @@ SUMMARY_COLUMNS = (
     LawColumn("texture", _texture_force_cell, True, 44),
     LawColumn("felt?", lambda row, _: Cell(tier_text(row.perceptibility))),
     LawColumn("feeds?", _leak_cell, True, 44),
-    LawColumn("clicks?", lambda row, _: _continuity_cell(row, row.has_jumps), False, 36),
+    LawColumn("clicks?", lambda row, _: _continuity_cell(row, not row.continuous), False, 36),
 )
 FULL_COLUMNS = (
     _LETTER_COLUMN,

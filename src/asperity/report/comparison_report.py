@@ -9,7 +9,7 @@ from functools import partial
 from rich.table import Table as RichTable
 
 from asperity.analysis.compare import Comparison, DeviceComparisons
-from asperity.analysis.gain.surface_cache import surface_content
+from asperity.analysis.gain.characteristic import surface_content
 from asperity.analysis.limits.perceptibility import force_magnitude_text, speed_text, tier_text
 from asperity.core.cache import content_digest
 from asperity.core.files import json_text

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.analysis.bounds.branch_and_bound import DIFFERENCE_AMPLIFICATION, ROUNDING_ERROR
 from asperity.core.checks import FloatArray
@@ -256,25 +257,20 @@ def _largest_eigenvalue(
 
 def precise_norm(matrices: FloatArray) -> FloatArray:
     """Return the largest singular values by LAPACK, NaN for a matrix that is not finite."""
-    return _apply_to_finite(
-        lambda m: np.asarray(np.linalg.svd(m, compute_uv=False)[..., 0]), matrices
-    )
+    finite, known = _finite_matrices(matrices)
+    return np.where(finite, np.linalg.svd(known, compute_uv=False)[..., 0], np.nan)
 
 
 def precise_one_sided(matrices: FloatArray) -> FloatArray:
     """Return λ_max of minus the symmetric part by LAPACK, NaN where it is not finite."""
-    symmetric = -0.5 * (matrices + np.swapaxes(matrices, -1, -2))
-    return _apply_to_finite(lambda m: np.asarray(np.linalg.eigvalsh(m)[..., -1]), symmetric)
+    finite, known = _finite_matrices(-0.5 * (matrices + np.swapaxes(matrices, -1, -2)))
+    return np.where(finite, np.linalg.eigvalsh(known)[..., -1], np.nan)
 
 
-def _apply_to_finite(measure: Measure, matrices: FloatArray) -> FloatArray:
-    """Return a measure of the matrices that are finite: LAPACK fails on any other."""
-    finite = np.isfinite(matrices).all(axis=(-2, -1))
-    if finite.all():
-        return np.asarray(measure(matrices))
-    result = np.full(finite.shape, np.nan)
-    result[finite] = measure(matrices[finite])
-    return result
+def _finite_matrices(matrices: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Return which matrices are finite, and the others as zeros, on which LAPACK does not fail."""
+    finite = np.asarray(np.isfinite(matrices).all(axis=(-2, -1)))
+    return finite, np.where(finite[..., None, None], matrices, 0.0)
 
 
 @dataclass(frozen=True)

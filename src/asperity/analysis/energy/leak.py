@@ -19,7 +19,7 @@ from asperity.analysis.energy.curl_columns import (
 )
 from asperity.analysis.energy.loop_integral import initial_panels, integrate, loop_work
 from asperity.analysis.energy.merit import scan_height
-from asperity.analysis.gain.surface_cache import at_unit_stiffness, cached_result
+from asperity.analysis.gain.characteristic import at_unit_stiffness, cached_result
 from asperity.core.checks import FloatArray, check_array, check_positive
 from asperity.core.errors import InternalError, ParameterError
 from asperity.core.files import Serializable

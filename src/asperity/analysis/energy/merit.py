@@ -9,7 +9,7 @@ import numpy as np
 
 from asperity.analysis.bounds.bound import spectral_norm
 from asperity.analysis.bounds.sampling import dense_maximum
-from asperity.analysis.gain.surface_cache import at_unit_stiffness, cached_result
+from asperity.analysis.gain.characteristic import at_unit_stiffness, cached_result
 from asperity.analysis.gain.theorems import theorem_of
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 from asperity.analysis.bounds.bound import (
     Bound,
@@ -20,9 +18,8 @@ from asperity.analysis.bounds.branch_and_bound import Problem, Supremum
 from asperity.analysis.bounds.problems import ClampProblem, LawProblem
 from asperity.analysis.bounds.sampling import require_depth_contact, sample_supremum
 from asperity.analysis.gain.medial_axis import SearchOptions
-from asperity.analysis.gain.theorems import derivative_bound, theorem_of
+from asperity.analysis.gain.theorems import Reduction, derivative_bound, theorem_of
 from asperity.core.checks import FloatArray
-from asperity.enclosures.cells import Cells
 from asperity.surface import Surface
 
 # Rounding of the few operations between a problem's bound and the number.
@@ -30,7 +27,6 @@ _ROUNDING_FACTOR = 1.0 + 1e-14
 _ABOVE_MEDIAL_AXIS = 0.999
 # Below this a number counts as zero and has no relative gap.
 _ZERO_THRESHOLD = 1e-8
-ToNumber = Callable[[float], float]
 
 
 def certify(surface: Surface, measure: JacobianMeasure, options: SearchOptions) -> Bound:
@@ -43,9 +39,12 @@ def certify(surface: Surface, measure: JacobianMeasure, options: SearchOptions) 
         ParameterError: for a user-defined law on the split contact.
     """
     require_depth_contact(surface)
+    reduction = theorem_of(surface.law).reductions.get(measure) or Reduction(
+        lambda surface, cells: LawProblem(surface, cells, measure)
+    )
     cells = surface.texture.cells(options.extent, options.margin(surface))
     if cells is None:
-        problem, _to_number = _make_problem(surface, surface.texture.sampling_cells(), measure)
+        problem = reduction.problem(surface, surface.texture.sampling_cells())
         text = "more than four independent waves: certified numbers need an extent"
         upper = derivative_bound(surface, measure)
         return _make_bound(surface, measure, problem, sample_supremum(problem), upper, text)
@@ -55,17 +54,18 @@ def certify(surface: Surface, measure: JacobianMeasure, options: SearchOptions) 
         shallow = certify(surface.to_depth(above), measure, options)
         text = "attained above the medial axis; nothing is proved where the contact point jumps"
         return replace(shallow, upper=math.inf, method="sampled", note=text)
-    problem, to_number = _make_problem(surface, cells, measure)
+    problem = reduction.problem(surface, cells)
     direct = _direct_bound(problem, options)
     if direct is not None:
         text = f"convex on an ellipse, within {direct.cell_count} of its tangents"
-        return _make_bound(surface, measure, problem, direct, to_number(direct.upper), text)
+        upper = reduction.to_number(surface, direct.upper)
+        return _make_bound(surface, measure, problem, direct, upper, text)
     try:
         found = options.supremum(problem)
     except TypeError as error:
         text = f"the law has no interval kernel ({error}); not a proof"
         return _make_bound(surface, measure, problem, sample_supremum(problem), math.inf, text)
-    upper = to_number(found.upper) * _ROUNDING_FACTOR
+    upper = reduction.to_number(surface, found.upper) * _ROUNDING_FACTOR
     text = f"branch and bound, {found.cell_count} cells"
     if not found.converged:
         text += "; the work limit was reached before the tolerance"
@@ -85,16 +85,6 @@ def _direct_bound(problem: Problem, options: SearchOptions) -> Supremum | None:
     found = problem.direct_bound() if options.extent is None else None
     gap = options.cheap_tolerance(problem.cells) or options.relative_tolerance(problem.cells)
     return found if found is not None and found.upper <= found.lower * (1.0 + gap) else None
-
-
-def _make_problem(
-    surface: Surface, cells: Cells, measure: JacobianMeasure
-) -> tuple[Problem, ToNumber]:
-    """Return the problem and the function from its supremum to the number."""
-    reduction = theorem_of(surface.law).reductions.get(measure)
-    if reduction is None:
-        return LawProblem(surface, cells, measure), lambda value: value
-    return reduction.problem(surface, cells), partial(reduction.to_number, surface)
 
 
 def _unique_depth(surface: Surface, options: SearchOptions) -> float:

@@ -7,8 +7,9 @@ section 4). Both are taken over the working region: depths up to the surface's m
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,10 +25,12 @@ from asperity.analysis.bounds.branch_and_bound import DEFAULT_WORK_LIMIT
 from asperity.analysis.bounds.sampling import highest_point
 from asperity.analysis.gain.certificate import certify, include_clamp
 from asperity.analysis.gain.medial_axis import SearchOptions
-from asperity.analysis.gain.surface_cache import at_unit_stiffness, cached_result
-from asperity.analysis.gain.theorems import theorem_of
+from asperity.analysis.gain.theorems import THEOREMS, theorem_of
+from asperity.core.cache import content_digest, get_or_compute, is_shipped
 from asperity.core.checks import check_positive
 from asperity.core.errors import ParameterError
+from asperity.kernels.fuse import kernel_source
+from asperity.laws import LAWS, Law
 from asperity.surface import Surface
 
 
@@ -124,7 +127,10 @@ def curl_number(
 
 
 def _make_options(
-    surface: Surface, tolerance: float | None, work_limit: int, extent: tuple[float, float] | None
+    surface: Surface,
+    tolerance: float | None = None,
+    work_limit: int = DEFAULT_WORK_LIMIT,
+    extent: tuple[float, float] | None = None,
 ) -> SearchOptions:
     if not isinstance(surface, Surface):
         raise ParameterError("surface", "must be a Surface", surface)
@@ -139,18 +145,17 @@ def _make_options(
     return SearchOptions(tolerance, limit, extent)
 
 
-def cached_number(
-    surface: Surface,
-    measure: JacobianMeasure,
-    tolerance: float | None = None,
-    work_limit: int = DEFAULT_WORK_LIMIT,
-    extent: tuple[float, float] | None = None,
-) -> Bound:
+def cached_number(surface: Surface, measure: JacobianMeasure, **search: Any) -> Bound:
     """Return a number from the cache, also where it is a theorem or a closed form.
 
     Reading the cache is faster than importing the compiled kernels that evaluate a witness.
+
+    Args:
+        surface: the surface.
+        measure: the measure of the Jacobian.
+        **search: tolerance, work_limit and extent; see :func:`characteristic_number`.
     """
-    return _cached_bound(surface, measure, _make_options(surface, tolerance, work_limit, extent))
+    return _cached_bound(surface, measure, _make_options(surface, **search))
 
 
 def _compute_bound(surface: Surface, measure: JacobianMeasure, options: SearchOptions) -> Bound:
@@ -197,3 +202,57 @@ def _bound_without_search(
     depth = surface.max_depth if surface.law.contact.single_valued else 0.0
     note = "formula on a sinusoid"
     return bound_from_theorem(surface, measure, value, "closed form", note, xy, [depth])
+
+
+# --- results cached between runs ------------------------------------------------------------------
+#
+# Every shipped law is k times a function of position: its numbers are computed at 1 N/m, cached
+# without the stiffness, and scaled, so a cached result equals a fresh one to the last bit. A
+# user-defined law need not be proportional to k: its results hold at its own stiffness only.
+# Results that rest on code of the user, in a texture kind, a contact or a theorem, are not cached:
+# what that code reads is unknown.
+
+Result = TypeVar("Result")
+
+
+def is_shipped_law(law: Law) -> bool:
+    """Return whether a law belongs to this package: its force is then proportional to k."""
+    return LAWS.get(law.letter) is law
+
+
+def at_unit_stiffness(surface: Surface) -> Surface:
+    """Return the surface at 1 N/m; a surface with a user-defined law is returned unchanged."""
+    return surface.to_stiffness(1.0) if is_shipped_law(surface.law) else surface
+
+
+def cached_result(
+    name: str, surface: Surface, compute: Callable[[], Result], *extra: str
+) -> Result:
+    """Return a result about a surface from the cache, or compute and cache it.
+
+    Args:
+        name: name of the result.
+        surface: the surface; for a shipped law the result must not depend on its stiffness.
+        compute: computes the result.
+        extra: everything else the result depends on.
+    """
+    return get_or_compute(name, surface_content(surface, *extra), compute)
+
+
+def surface_content(surface: Surface, *extra: str) -> str | None:
+    """Return a digest of a surface, without the stiffness for a shipped law.
+
+    ``None`` where code of the user takes part.
+    """
+    law, texture = surface.law, surface.texture.digest
+    formula: tuple[str | float, ...] = (law.letter,)
+    if not is_shipped_law(law):
+        if law in THEOREMS or not is_shipped(type(law.contact)):
+            return None
+        formula = (kernel_source(law), law.contact.name, surface.stiffness)
+    if texture is None:
+        return None
+    parameters = tuple(surface.law_parameters.items())
+    return content_digest(
+        texture, formula, surface.max_depth, surface.effective_clamp.name, parameters, *extra
+    )

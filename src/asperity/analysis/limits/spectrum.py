@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.analysis.energy.merit import scan_height
-from asperity.analysis.gain.surface_cache import at_unit_stiffness, cached_result
+from asperity.analysis.gain.characteristic import at_unit_stiffness, cached_result
 from asperity.core.cache import get_or_compute
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable

@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
-from asperity.analysis.gain.surface_cache import surface_content
+from asperity.analysis.gain.characteristic import (
+    characteristic_number,
+    one_sided_number,
+    surface_content,
+)
 from asperity.core.cache import get_or_compute_each, is_shipped
 from asperity.core.checks import FloatArray, check_array, check_positive
 from asperity.core.errors import ParameterError
