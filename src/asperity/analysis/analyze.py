@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -69,9 +70,7 @@ class Analysis(Plottable, Reportable):
         continuity: whether the force jumps inside the working region, and where.
         passivity: every criterion on the device, and the deciding one.
         merit: strength and support on a straight scan.
-        answer: the verdict in one sentence.
-        assumptions: used defaults, unverified device data and preparation steps of the surface,
-            in sentences.
+        extent: width and depth [m] of the searched part of the plane, if they were given.
     """
 
     surface: Surface
@@ -85,8 +84,7 @@ class Analysis(Plottable, Reportable):
     continuity: Continuity
     passivity: Passivity
     merit: Merit
-    answer: str = ""
-    assumptions: tuple[str, ...] = ()
+    extent: tuple[float, float] | None = None
 
     @property
     def curl_density(self) -> Bound | None:
@@ -105,6 +103,63 @@ class Analysis(Plottable, Reportable):
         0 for a conservative law; ``None`` where the device's damping is not known.
         """
         return self.passivity.critical_speed
+
+    @cached_property
+    def answer(self) -> str:
+        """The verdict in one sentence."""
+        surface, passivity = self.surface, self.passivity
+        depth = format_quantity(surface.max_depth, "m")
+        subject = f"law {surface.law.letter} at {surface.stiffness:g} N/m, pressed to {depth}, "
+        subject += f"on the {self.device.name}"
+        title = subject[:1].upper() + subject[1:]
+        rule = passivity.criterion(passivity.decided_by)
+        limit = stiffness_limit_text(rule.limit or 0.0)
+        if passivity.verdict == "passive":
+            text = f"{title} is passive by {rule.formula}, whose limit is {limit}"
+        elif passivity.verdict == "plausible":
+            proof = f"plausible, not proved: {rule.formula}, limit {limit}"
+            text = f"That {subject} is passive is {proof}"
+        elif passivity.verdict == "bounded" and passivity.buzz is not None:
+            text = f"{title} is passive but for steps: {buzz_text(passivity.buzz)}"
+        elif passivity.verdict == "not passive":
+            reason = passivity.reason
+            if rule.name == LEAK:
+                speed = passivity.critical_speed
+                gain = energy_gained_text(self.leak.energy, speed)
+                reason = f"{gain}; {stability_limit_text(passivity.stability_limit, speed)}"
+            text = f"{title} is not passive: {reason}"
+        else:
+            text = f"Whether {subject} is passive is undecided: {passivity.reason}"
+        return f"{text}; {_jumps_clause(self)}."
+
+    @cached_property
+    def assumptions(self) -> tuple[str, ...]:
+        """Used defaults, unverified device data and preparation of the surface, in sentences."""
+        surface, leak = self.surface, self.leak
+        texture, depth = surface.texture, format_quantity(surface.max_depth, "m")
+        sentences = [*texture.preparation, *_default_sentences(surface)]
+        region = texture.domain.description
+        if self.extent is not None:
+            sides = " x ".join(format_quantity(side, "m") for side in self.extent)
+            region = f"{sides} from the origin"
+        sentences.append(f"The numbers are suprema over {region} and {depth_range_text(surface)}")
+        if surface.effective_clamp.changes_force:
+            clamp = f"The {surface.effective_clamp} clamp holds the depth from {depth} down"
+            lowest = format_quantity(surface.clamped_depth, "m")
+            sentences.append(f"{clamp}; loops are compared down to depths of {lowest}")
+        x, y = (float(part) for part in leak.line.direction)
+        sentences.append(f"Loops in the vertical plane along ({x:g}, {y:g}) are compared")
+        bounds = (self.q, self.one_sided, self.curl)
+        if any(bound is not None and math.isinf(bound.upper - bound.lower) for bound in bounds):
+            sentences.append(
+                "A number without an upper bound is the greatest one found, not a proof"
+            )
+        if not self.continuity.continuous:
+            sentences.append(
+                "Jumps are located where contact begins and below the sharpest crest only"
+            )
+        sentences += unverified_sentences(self.device, _PASSIVITY_FIELDS)
+        return (*sentences, SCOPE_SENTENCE)
 
     def __repr__(self) -> str:
         law, verdict = self.surface.law.letter, self.passivity.verdict
@@ -199,7 +254,7 @@ def analyze(
     report_step(STEPS[5])
     scan = merit(surface)
     report_step(STEPS[6])
-    result = Analysis(
+    return Analysis(
         surface=surface,
         device=device,
         q=q,
@@ -211,9 +266,8 @@ def analyze(
         continuity=force,
         passivity=passivity(surface, device, q, one_sided, leak),
         merit=scan,
+        extent=extent,
     )
-    answer, assumptions = analysis_summary(result), analysis_assumptions(result, extent)
-    return replace(result, answer=answer, assumptions=assumptions)
 
 
 def _resolve_surface(
@@ -263,33 +317,6 @@ def surface_width(texture: Texture) -> float:
     return float(np.hypot(*texture.domain.spans.T).min())
 
 
-def analysis_summary(result: Analysis) -> str:
-    """Return the verdict in one sentence."""
-    surface, passivity = result.surface, result.passivity
-    depth = format_quantity(surface.max_depth, "m")
-    subject = f"law {surface.law.letter} at {surface.stiffness:g} N/m, pressed to {depth}, "
-    subject += f"on the {result.device.name}"
-    title = subject[:1].upper() + subject[1:]
-    rule = passivity.criterion(passivity.decided_by)
-    limit = stiffness_limit_text(rule.limit or 0.0)
-    if passivity.verdict == "passive":
-        text = f"{title} is passive by {rule.formula}, whose limit is {limit}"
-    elif passivity.verdict == "plausible":
-        text = f"That {subject} is passive is plausible, not proved: {rule.formula}, limit {limit}"
-    elif passivity.verdict == "bounded" and passivity.buzz is not None:
-        text = f"{title} is passive but for steps: {buzz_text(passivity.buzz)}"
-    elif passivity.verdict == "not passive":
-        reason = passivity.reason
-        if rule.name == LEAK:
-            speed = passivity.critical_speed
-            gain = energy_gained_text(result.leak.energy, speed)
-            reason = f"{gain}; {stability_limit_text(passivity.stability_limit, speed)}"
-        text = f"{title} is not passive: {reason}"
-    else:
-        text = f"Whether {subject} is passive is undecided: {passivity.reason}"
-    return f"{text}; {_jumps_clause(result)}."
-
-
 def _jumps_clause(result: Analysis) -> str:
     force = result.continuity
     if force.continuous:
@@ -298,35 +325,6 @@ def _jumps_clause(result: Analysis) -> str:
         return f"its force is not continuous ({force.reason})"
     largest = format_quantity(max(jump.size for jump in force.jumps), "N")
     return f"its force jumps, by up to {largest} where that was located"
-
-
-def analysis_assumptions(result: Analysis, extent: tuple[float, float] | None) -> tuple[str, ...]:
-    """Return the assumptions of an analysis, in sentences.
-
-    Args:
-        result: the analysis.
-        extent: the searched part of the plane [m], if one was given.
-    """
-    surface, leak = result.surface, result.leak
-    texture, depth = surface.texture, format_quantity(surface.max_depth, "m")
-    sentences = [*texture.preparation, *_default_sentences(surface)]
-    region = texture.domain.description
-    if extent is not None:
-        region = " x ".join(format_quantity(side, "m") for side in extent) + " from the origin"
-    sentences.append(f"The numbers are suprema over {region} and {depth_range_text(surface)}")
-    if surface.effective_clamp.changes_force:
-        clamp = f"The {surface.effective_clamp} clamp holds the depth from {depth} down"
-        lowest = format_quantity(surface.clamped_depth, "m")
-        sentences.append(f"{clamp}; loops are compared down to depths of {lowest}")
-    x, y = (float(part) for part in leak.line.direction)
-    sentences.append(f"Loops in the vertical plane along ({x:g}, {y:g}) are compared")
-    bounds = (result.q, result.one_sided, result.curl)
-    if any(bound is not None and math.isinf(bound.upper - bound.lower) for bound in bounds):
-        sentences.append("A number without an upper bound is the greatest one found, not a proof")
-    if not result.continuity.continuous:
-        sentences.append("Jumps are located where contact begins and below the sharpest crest only")
-    sentences += unverified_sentences(result.device, _PASSIVITY_FIELDS)
-    return (*sentences, SCOPE_SENTENCE)
 
 
 def _default_sentences(surface: Surface) -> list[str]:

@@ -15,12 +15,7 @@ from asperity.analysis.bounds.bound import NORM, ONE_SIDED, Bound
 from asperity.analysis.compare import DEFAULT_DEVICE, recommended_law
 from asperity.analysis.energy.merit import merit
 from asperity.analysis.gain.characteristic import cached_number
-from asperity.analysis.limits.limit_result import (
-    Limits,
-    RenderedWave,
-    limits_assumptions,
-    limits_summary,
-)
+from asperity.analysis.limits.limit_result import Limits, RenderedWave, limits_assumptions
 from asperity.analysis.limits.limit_rules import (
     DEFAULT_SAMPLES,
     DEFAULT_SPEED,
@@ -125,7 +120,7 @@ def limits(
     defaults = {name: value is None for name, value in given.items()}
     defaults["samples"] = None in {time_samples, position_samples, force_steps}
     assumptions = limits_assumptions(result, defaults, scan.contact_lost)
-    return replace(result, answer=limits_summary(result), assumptions=assumptions)
+    return replace(result, assumptions=assumptions)
 
 
 def _evaluate_limits(
@@ -171,7 +166,6 @@ def _evaluate_limits(
         spectrum=spectrum,
         perceptibility=perceptibility,
         speeds=(0.0, top),
-        answer="",
         assumptions=(),
         **settings,
     )

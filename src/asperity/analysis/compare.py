@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from asperity.analysis.bounds.bound import NORM, ONE_SIDED
@@ -17,13 +17,7 @@ from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
 from asperity.analysis.limits.perceptibility import assess_perceptibility, texture_amount_text
 from asperity.analysis.passivity.assess_passivity import passivity
 from asperity.analysis.passivity.verdict import at_recommended_stiffness, recommend_stiffness
-from asperity.analysis.results import (
-    LawRow,
-    comparison_assumptions,
-    recommend,
-    recommendation_text,
-    row_verdict,
-)
+from asperity.analysis.results import LawRow, comparison_assumptions, recommend, recommendation_text
 from asperity.core.arguments import DEFAULT_STIFFNESS
 from asperity.core.checks import check_positive
 from asperity.core.display import Plottable, Reportable
@@ -152,7 +146,10 @@ def compare(
     if stiffness is not None:
         stiffness = check_positive("stiffness", stiffness, "N/m")
     scan_speed = DEFAULT_SPEED if speed is None else check_positive("speed", speed, "m/s")
-    _require_device_data(device)
+    if hint := missing_data_hint(device):
+        others = "damping, update_rate and delay_samples"
+        needs = f"needs max_stiffness to compare laws: add {hint}, the stiffest smooth wall"
+        raise ParameterError("device", f"{device.id} {needs} that held, to its file; or {others}")
     parameters = distribute_parameters(law_parameters or {}, laws)
     texture = as_texture(texture)
     surface_arguments |= {"stiffness": stiffness or DEFAULT_STIFFNESS, "max_depth": max_depth}
@@ -232,14 +229,6 @@ class _ComparisonQuery:
     explicit_depth: bool
 
 
-def _require_device_data(device: Device) -> None:
-    """Refuse a device whose data give no stiffness limit for any law."""
-    if hint := missing_data_hint(device):
-        others = "damping, update_rate and delay_samples"
-        needs = f"needs max_stiffness to compare laws: add {hint}, the stiffest smooth wall"
-        raise ParameterError("device", f"{device.id} {needs} that held, to its file; or {others}")
-
-
 Task = tuple[Surface, _ComparisonQuery]
 
 
@@ -276,7 +265,7 @@ def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
             speed=query.speed,
             explicit_depth=query.explicit_depth,
         )
-    row = LawRow(
+    return LawRow(
         surface=surface,
         q=q,
         one_sided=one_sided,
@@ -294,7 +283,6 @@ def _compute_row(surface: Surface, query: _ComparisonQuery) -> LawRow:
         contact_lost=merit.contact_lost,
         ripple=merit.ripple,
     )
-    return replace(row, verdict=row_verdict(row))
 
 
 # Called with the device, the given depth if any, and the letter of the next law.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from asperity.analysis.bounds.bound import Bound
@@ -69,7 +70,6 @@ class LawRow:
         support: S, slope of the mean normal force over sup‖J‖ [1].
         contact_lost: fraction of the scan without contact.
         ripple: RMS of the oscillating force per stiffness [m].
-        verdict: one line.
     """
 
     surface: Surface
@@ -88,7 +88,6 @@ class LawRow:
     support: float
     contact_lost: float
     ripple: float
-    verdict: str = ""
 
     def __repr__(self) -> str:
         start = f"start at {self.recommended_stiffness:g} N/m"
@@ -143,6 +142,32 @@ class LawRow:
     def recommended_leak(self) -> float:
         """Energy gained on the worst loop of one period at ``recommended_stiffness`` [J]."""
         return self.leak.worst_per_period * self.recommended_stiffness / self.surface.stiffness
+
+    @cached_property
+    def verdict(self) -> str:
+        """Artefacts to expect from the law, in one line."""
+        k, parts = stiffness_limit_text(self.surface.stiffness), []
+        stability = stability_limit_text(self.stability_limit, self.passivity.critical_speed)
+        if self.passivity.verdict == "not passive" and self.conservative:
+            parts.append(f"not passive at {k}; {stability}")
+        elif not self.recommended_stiffness:
+            parts.append(stability)
+        elif self.may_buzz:
+            parts.append(f"may buzz at {k}; {stability}")
+        elif self.conservative:
+            parts.append(_passivity_text(self, k, stability))
+        if not self.conservative:
+            quiet = f"; {stability}" if self.recommended_stiffness and not self.may_buzz else ""
+            parts.append(f"feels alive: gains up to {leak_energy_text(self.leak)}{quiet}")
+        if not self.continuous:
+            parts.append("clicks: " + self.continuous_reason)
+        if self.is_textureless:
+            parts.append("no texture")
+        elif self.perceptibility is not None and self.tier != "felt":
+            parts.append(f"{self.tier}: {texture_amount_text(self.perceptibility)}")
+        if self.loses_contact:
+            parts.append(f"no contact on {100.0 * self.contact_lost:.0f} % of the scan")
+        return "; ".join(parts)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data, SI units."""
@@ -229,32 +254,6 @@ def _strongest(rows: Sequence[LawRow]) -> LawRow:
 def _relative_leak(row: LawRow) -> float:
     """Return the leak over texture force times length [1], at the recommended stiffness."""
     return row.recommended_leak / (row.texture_force * row.leak.line.length)
-
-
-def row_verdict(row: LawRow) -> str:
-    """Return the artefacts to expect from a law, in one line."""
-    k, parts = stiffness_limit_text(row.surface.stiffness), []
-    stability = stability_limit_text(row.stability_limit, row.passivity.critical_speed)
-    if row.passivity.verdict == "not passive" and row.conservative:
-        parts.append(f"not passive at {k}; {stability}")
-    elif not row.recommended_stiffness:
-        parts.append(stability)
-    elif row.may_buzz:
-        parts.append(f"may buzz at {k}; {stability}")
-    elif row.conservative:
-        parts.append(_passivity_text(row, k, stability))
-    if not row.conservative:
-        quiet = f"; {stability}" if row.recommended_stiffness and not row.may_buzz else ""
-        parts.append(f"feels alive: gains up to {leak_energy_text(row.leak)}{quiet}")
-    if not row.continuous:
-        parts.append("clicks: " + row.continuous_reason)
-    if row.is_textureless:
-        parts.append("no texture")
-    elif row.perceptibility is not None and row.tier != "felt":
-        parts.append(f"{row.tier}: {texture_amount_text(row.perceptibility)}")
-    if row.loses_contact:
-        parts.append(f"no contact on {100.0 * row.contact_lost:.0f} % of the scan")
-    return "; ".join(parts)
 
 
 def _passivity_text(row: LawRow, stiffness: str, stability: str) -> str:

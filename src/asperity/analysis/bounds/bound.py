@@ -220,8 +220,7 @@ def spectral_norm(matrices: FloatArray) -> FloatArray:
 
 
 def _dot_rows(a: FloatArray, b: FloatArray) -> FloatArray:
-    result: FloatArray = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    return result
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 def one_sided(matrices: FloatArray) -> FloatArray:
@@ -251,8 +250,7 @@ def _largest_eigenvalue(
     det = x * (y * z - yz * yz) - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz)
     cube = np.where(spread > 0.0, spread, 1.0) ** 3
     angle = np.arccos(np.clip(0.5 * det / cube, -1.0, 1.0)) / 3.0
-    result: FloatArray = centre + 2.0 * spread * np.cos(angle)
-    return result
+    return np.asarray(centre + 2.0 * spread * np.cos(angle))
 
 
 def precise_norm(matrices: FloatArray) -> FloatArray:

@@ -220,8 +220,7 @@ def _curls_at_layer_ends(
 def plane_curl(jacobian: FloatArray, line: ScanLine) -> FloatArray:
     """∂f_t/∂z - ∂f_z/∂t in the vertical plane along the line."""
     direction = line.direction
-    result: FloatArray = jacobian[:, :2, 2] @ direction - jacobian[:, 2, :2] @ direction
-    return result
+    return np.asarray(jacobian[:, :2, 2] @ direction - jacobian[:, 2, :2] @ direction)
 
 
 def curl_region_loop(surface: Surface, line: ScanLine, sign: float) -> FloatArray:

@@ -170,8 +170,7 @@ def _clenshaw_curtis(order: int) -> FloatArray:
     factor = np.where(k == order // 2, 1.0, 2.0) / (4.0 * k * k - 1.0)
     weights = 1.0 - np.cos(2.0 * np.pi * np.outer(j, k) / order) @ factor
     ends = np.where((j == 0) | (j == order), 1.0, 2.0)
-    result: FloatArray = 0.5 * ends * weights / order
-    return result
+    return np.asarray(0.5 * ends * weights / order)
 
 
 _QUADRATURE_NODES = 0.5 * (1.0 - np.cos(np.pi * np.arange(_ORDER + 1) / _ORDER))

@@ -71,8 +71,7 @@ def crest_curvature(derivatives: FloatArray) -> FloatArray:
     w = 1.0 + p * p + q * q
     mean = ((1.0 + q * q) * r - 2.0 * p * q * s + (1.0 + p * p) * t) / (2.0 * w**1.5)
     gauss = (r * t - s * s) / (w * w)
-    result: FloatArray = np.sqrt(np.maximum(mean * mean - gauss, 0.0)) - mean
-    return result
+    return np.asarray(np.sqrt(np.maximum(mean * mean - gauss, 0.0)) - mean)
 
 
 @lru_cache(maxsize=16)

@@ -127,14 +127,12 @@ def largest_singular_value(a: FloatArray, b: FloatArray) -> FloatArray:
     t = 1.0 + a * a + b * b
     # T² - 4a² as a product: no cancellation.
     root = np.sqrt(np.maximum((t - 2.0 * a) * (t + 2.0 * a), 0.0))
-    result: FloatArray = np.sqrt(0.5 * (t + root))
-    return result
+    return np.asarray(np.sqrt(0.5 * (t + root)))
 
 
 def largest_symmetric_eigenvalue(a: FloatArray, b: FloatArray) -> FloatArray:
     """λ_max of the symmetric part of [[a, b], [0, 1]]."""
-    result: FloatArray = 0.5 * (1.0 + a + np.hypot(1.0 - a, b))
-    return result
+    return np.asarray(0.5 * (1.0 + a + np.hypot(1.0 - a, b)))
 
 
 def norm_bound_f(surface: Surface) -> float:

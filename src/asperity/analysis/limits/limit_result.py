@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from asperity.analysis.bounds.bound import Bound
@@ -79,7 +80,6 @@ class Limits(Plottable, Reportable):
         perceptibility: perceptibility at this stiffness and speed.
         speeds: scanning speeds [m/s] at which all decidable limits hold, from the first up to but
             excluding the second.
-        answer: the result in words.
         assumptions: the assumptions, in sentences.
     """
 
@@ -98,7 +98,6 @@ class Limits(Plottable, Reportable):
     spectrum: Spectrum
     perceptibility: Perceptibility
     speeds: tuple[float, float]
-    answer: str = ""
     assumptions: tuple[str, ...] = ()
 
     @property
@@ -117,6 +116,32 @@ class Limits(Plottable, Reportable):
         total = sum(wave.share for wave in self.waves)
         met = sum(wave.share for wave in self.waves if all(wave.holds.values()))
         return met / total if total > 0.0 else 0.0
+
+    @cached_property
+    def answer(self) -> str:
+        """Which limits hold and whether the texture is felt, in a few sentences."""
+        if not self.waves:
+            return "The surface is flat: there is no texture to feel."
+        speed = speed_text(self.speed)
+        failing = [limit for limit in self.limits if limit.holds is False]
+        undecided = [limit for limit in self.limits if limit.holds is None]
+        if failing:
+            failures = "; ".join(_failure_text(limit) for limit in failing)
+            advice = _speed_advice(self, failing)
+            text = f"{_met_share_text(self, failing)} at {speed}: {failures}.{advice}"
+        elif len(undecided) == len(self.limits):
+            text = "No limit can be decided."
+        elif undecided:
+            holding = [limit for limit in self.limits if limit.holds]
+            verb = "hold" if len(holding) > 1 else "holds"
+            text = f"As far as can be decided: {_limit_numbers(holding)} {verb} at {speed}."
+        else:
+            text = f"Yes: all six limits hold at {speed}."
+        if undecided:
+            missing = dict.fromkeys(one for limit in undecided for one in limit.missing_data)
+            numbers, data = _limit_numbers(undecided), _join_words([*missing])
+            text += f" Not decidable: {numbers}; missing: {data}."
+        return f"{text} {texture_force_text(self)}"
 
     def limit(self, number: int) -> Limit:
         """Return a limit by the paper's number.
@@ -148,31 +173,6 @@ class Limits(Plottable, Reportable):
             "gain": {"symbol": self.gain_symbol} | self.gain.to_dict(),
             **attributes_to_dict(self, *after_gain.split()),
         }
-
-
-def limits_summary(result: Limits) -> str:
-    """Return which limits hold and whether the texture is felt, in a few sentences."""
-    if not result.waves:
-        return "The surface is flat: there is no texture to feel."
-    speed = speed_text(result.speed)
-    failing = [limit for limit in result.limits if limit.holds is False]
-    undecided = [limit for limit in result.limits if limit.holds is None]
-    if failing:
-        failures = "; ".join(_failure_text(limit) for limit in failing)
-        advice = _speed_advice(result, failing)
-        text = f"{_met_share_text(result, failing)} at {speed}: {failures}.{advice}"
-    elif len(undecided) == len(result.limits):
-        text = "No limit can be decided."
-    elif undecided:
-        holding = [limit for limit in result.limits if limit.holds]
-        verb = "hold" if len(holding) > 1 else "holds"
-        text = f"As far as can be decided: {_limit_numbers(holding)} {verb} at {speed}."
-    else:
-        text = f"Yes: all six limits hold at {speed}."
-    if undecided:
-        missing = dict.fromkeys(data for limit in undecided for data in limit.missing_data)
-        text += f" Not decidable: {_limit_numbers(undecided)}; missing: {_join_words([*missing])}."
-    return f"{text} {texture_force_text(result)}"
 
 
 def speeds_text(speeds: tuple[float, float] | None) -> str:
