@@ -115,9 +115,9 @@ def evaluate_rule(loop: DeviceLoop, rule: StiffnessRule) -> Criterion:
 
 def _max_stiffness(budget: Fraction, gain: Number) -> Number:
     """Return the greatest k with k · gain <= budget."""
-    if gain == 0 and budget >= 0:
-        return math.inf
-    return Fraction(0) if budget <= 0 or gain == math.inf else budget / gain
+    if budget <= 0 or gain == math.inf:
+        return Fraction(0)
+    return budget / gain if gain > 0 else math.inf
 
 
 def _round_down(value: Number) -> float:
@@ -239,8 +239,18 @@ def _quantization_criterion(loop: DeviceLoop) -> Criterion:
         return replace(result, holds=True, limit=math.inf, margin=math.inf, assumptions=note)
     rest = loop.friction - loop.force_step / 2 - abs(loop.virtual_damping_gain) * step
     all_fields = (*fields, "least_friction", "virtual_damping")
-    rule = (QUANTIZATION, formula, _ZERO, step / 2, rest, (), note, loop.obstacle, all_fields)
-    return evaluate_rule(loop, StiffnessRule(*rule))
+    if step or loop.obstacle:
+        rule = (QUANTIZATION, formula, _ZERO, step / 2, rest, (), note, loop.obstacle, all_fields)
+        return evaluate_rule(loop, StiffnessRule(*rule))
+    limit = math.inf if rest >= 0 else 0.0
+    return replace(
+        result,
+        holds=rest >= 0,
+        limit=limit,
+        margin=limit,
+        upper_limit=limit,
+        used_fields=all_fields,
+    )
 
 
 @dataclass(frozen=True)
