@@ -9,11 +9,11 @@ from asperity.analysis import curl_number as curl_number
 from asperity.analysis import loop_work as loop_work
 from asperity.analysis import one_sided_number as one_sided_number
 from asperity.analysis import worst_loop as worst_loop
+from asperity.analysis.analyze import Analysis as Analysis
 from asperity.analysis.analyze import analyze as analyze
-from asperity.analysis.passivity.assess_passivity import passivity as passivity
 from asperity.analysis.check_limits import limits as limits
 from asperity.analysis.limits.limit_result import Limits as Limits
-from asperity.analysis.analyze import Analysis as Analysis
+from asperity.analysis.passivity.assess_passivity import passivity as passivity
 from asperity.analysis.split.baked_field import BakedField as BakedField
 from asperity.analysis.split.baked_field import bake as bake
 from asperity.analysis.split.split_state import PopThrough as PopThrough
