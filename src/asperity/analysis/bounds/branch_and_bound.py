@@ -131,67 +131,64 @@ def supremum(
     limit = min(work_limit, problem.cells.max_cells or work_limit)
     chunks, half = problem.cells.initial_cells()
     # A few samples first, so that most cells are pruned at once.
-    best, at = _improve_at_points(problem, problem.cells.sample_coordinates(), problem.floor, None)
+    best = _BestValue(problem)
+    best.try_points(problem.cells.sample_coordinates())
     pruned, evaluated = problem.floor, 0
     while True:
         remaining, bounds = [], []
         for centres in chunks:
             evaluated += len(centres)
-            upper = problem.upper_bounds(centres, half, problem.prune_threshold(best, goal))
+            upper = problem.upper_bounds(centres, half, problem.prune_threshold(best.value, goal))
             upper = np.where(np.isnan(upper), np.inf, upper)
-            best, at = _improve_in_cells(problem, centres, half, upper, best, at)
-            keep = upper > problem.prune_threshold(best, goal)
+            best.try_cells(centres, half, upper)
+            keep = upper > problem.prune_threshold(best.value, goal)
             pruned = max(pruned, float(upper[~keep].max(initial=0.0)))
             remaining.append(centres[keep])
             bounds.append(upper[keep])
         centres, upper = np.concatenate(remaining), np.concatenate(bounds)
-        keep = upper > problem.prune_threshold(best, goal)
+        keep = upper > problem.prune_threshold(best.value, goal)
         pruned = max(pruned, float(upper[~keep].max(initial=0.0)))
         centres, upper = centres[keep], upper[keep]
         left = float(upper.max(initial=0.0))
         parts = _subdivision_count(len(centres), problem.cells.dimensions)
         children = len(centres) * parts**problem.cells.dimensions
-        converged = left <= problem.prune_threshold(best, tolerance)
+        converged = left <= problem.prune_threshold(best.value, tolerance)
         done = len(centres) == 0 or (converged and children > _CHEAP_CELLS)
         if done or evaluated + children > limit or float(half.max()) < _MIN_HALF_WIDTH:
             break
         half = half / parts
         chunks = _subdivide(centres, half, parts, problem.cells.chunk_size())
+    value, at = best.value, best.at
     if at is not None:
-        best, at = polish(problem, at, half, best)
+        value, at = polish(problem, at, half, value)
     proved = max(pruned, left)
-    if best > proved + ROUNDING_ERROR * DIFFERENCE_AMPLIFICATION * abs(proved):
+    if value > proved + ROUNDING_ERROR * DIFFERENCE_AMPLIFICATION * abs(proved):
         cause = "the enclosures, or the bounds declared by the texture, are wrong"
-        raise InternalError(f"{best:g} is attained, above the proved bound {proved:g}: {cause}")
-    return Supremum(best, max(best, proved), at, evaluated, converged)
+        raise InternalError(f"{value:g} is attained, above the proved bound {proved:g}: {cause}")
+    return Supremum(value, max(value, proved), at, evaluated, converged)
 
 
-def _improve_in_cells(
-    problem: Problem,
-    centres: FloatArray,
-    half: FloatArray,
-    upper: FloatArray,
-    best: float,
-    at: FloatArray | None,
-) -> tuple[float, FloatArray | None]:
-    """Return the best value and its place after evaluating the most promising cells."""
-    top = np.argpartition(-upper, min(_PROBED_CELLS, len(upper) - 1))[:_PROBED_CELLS]
-    top = top[upper[top] > best]
-    if len(top) == 0:
-        return best, at
-    points = centres[top, None] + _cell_stencil(len(half)) * half
-    return _improve_at_points(
-        problem, problem.cells.clip_to_region(points.reshape(-1, len(half))), best, at
-    )
+class _BestValue:
+    """The greatest value attained so far, and where."""
 
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.value = problem, problem.floor
+        self.at: FloatArray | None = None
 
-def _improve_at_points(
-    problem: Problem, points: FloatArray, best: float, at: FloatArray | None
-) -> tuple[float, FloatArray | None]:
-    """Return the best value and its place after evaluating some points."""
-    values = problem.values(points)
-    first = _argmax_ignoring_nan(values)
-    return (float(values[first]), points[first]) if values[first] > best else (best, at)
+    def try_cells(self, centres: FloatArray, half: FloatArray, upper: FloatArray) -> None:
+        """Evaluate the most promising cells."""
+        top = np.argpartition(-upper, min(_PROBED_CELLS, len(upper) - 1))[:_PROBED_CELLS]
+        top = top[upper[top] > self.value]
+        if len(top):
+            points = centres[top, None] + _cell_stencil(len(half)) * half
+            self.try_points(self.problem.cells.clip_to_region(points.reshape(-1, len(half))))
+
+    def try_points(self, points: FloatArray) -> None:
+        """Evaluate some points."""
+        values = self.problem.values(points)
+        first = _argmax_ignoring_nan(values)
+        if values[first] > self.value:
+            self.value, self.at = float(values[first]), points[first]
 
 
 def _argmax_ignoring_nan(values: FloatArray) -> int:
