@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from asperity.core.checks import check_positive
 from asperity.core.errors import ParameterError
-from asperity.export.statements import is_reserved
+from asperity.export.statements import RESERVED_WORDS
 from asperity.surface import Surface
 
 PRECISIONS = ("double", "float")
@@ -58,7 +58,7 @@ class ExportRequest:
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) or "__" in name:
             words = "must be a C identifier: letters, digits and single _, a letter first"
             raise ParameterError("name", words, name)
-        if is_reserved(name):
+        if name in RESERVED_WORDS:
             raise ParameterError("name", "must not be a reserved word of C or C++", name)
         if precision not in PRECISIONS:
             words = f"must be one of {', '.join(PRECISIONS)}"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, Protocol
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Protocol
 
 from asperity.export import c_language as c
 from asperity.export.c_language import NotExportableError, ValueType
@@ -53,7 +53,7 @@ class ProgramContext(Protocol):
         """Return the name of the constructor of a tuple."""
 
 
-class ExpressionTypes:
+class ExpressionTypes(ast.NodeVisitor):
     """Types of the expressions of a function, derived from those of its variables.
 
     Args:
@@ -89,10 +89,12 @@ class ExpressionTypes:
             UnknownTypeError: for a name whose type is not known yet.
             NotExportableError: for a construct that cannot be exported.
         """
-        rule = _INFERENCE_RULES.get(type(node))
-        if rule is None:
-            raise self.not_exportable(f"uses {type(node).__name__}", node)
-        return rule(self, node)
+        kind: ValueType = self.visit(node)
+        return kind
+
+    def generic_visit(self, node: ast.AST) -> ValueType:
+        """Refuse an expression without an equivalent in C."""
+        raise self.not_exportable(f"uses {type(node).__name__}", node)
 
     def infer_scalar(self, node: ast.expr) -> c.ScalarType:
         """Return the type of an expression that must be a number.
@@ -134,7 +136,8 @@ class ExpressionTypes:
                 return kind.shape[index] if -len(kind.shape) <= index < len(kind.shape) else None
         return None
 
-    def _name(self, node: ast.Name) -> ValueType:
+    def visit_Name(self, node: ast.Name) -> ValueType:
+        """Return the type of a variable or a number of a module."""
         if node.id in self.types:
             return self.types[node.id]
         if node.id in self.program.numbers:
@@ -142,19 +145,22 @@ class ExpressionTypes:
         construct = f"uses a name before it has a value ({node.id})"
         raise UnknownTypeError(self.node.name, construct)
 
-    def _constant(self, node: ast.Constant) -> ValueType:
+    def visit_Constant(self, node: ast.Constant) -> ValueType:
+        """Return the type of a literal."""
         if isinstance(node.value, (bool, int, float)):
             return _type_of_value(node.value)
         raise self.not_exportable("uses a value that is not a number", node)
 
-    def _tuple(self, node: ast.Tuple) -> ValueType:
+    def visit_Tuple(self, node: ast.Tuple) -> ValueType:
+        """Return the type of a tuple."""
         items = tuple(map(self.infer, node.elts))
         for item in items:
             if not isinstance(item, (c.ScalarType, c.TupleType)) or c.is_constant(item):
                 raise self.not_exportable("puts an array or a record into a tuple", node)
         return c.TupleType(items)
 
-    def _attribute(self, node: ast.Attribute) -> ValueType:
+    def visit_Attribute(self, node: ast.Attribute) -> ValueType:
+        """Return the type of a field, a constant of a module, or the shape of an array."""
         if isinstance(node.value, ast.Name) and node.value.id in c.MODULE_ALIASES:
             if node.attr in c.REAL_CONSTANTS:
                 return c.FLOAT
@@ -168,7 +174,8 @@ class ExpressionTypes:
             raise self.not_exportable("uses an unknown attribute", node)
         return kind.items[kind.names.index(node.attr)]
 
-    def _subscript(self, node: ast.Subscript) -> ValueType:
+    def visit_Subscript(self, node: ast.Subscript) -> ValueType:
+        """Return the type of an item of a tuple or an element of an array."""
         if self.constant_integer(node) is not None:
             return c.INT
         kind = self.infer(node.value)
@@ -193,7 +200,8 @@ class ExpressionTypes:
             raise self.not_exportable("has an index beyond the end of a tuple", node)
         return tuple_type.items[index]
 
-    def _binary(self, node: ast.BinOp) -> ValueType:
+    def visit_BinOp(self, node: ast.BinOp) -> ValueType:
+        """Return the type of a binary operation."""
         left, right = self.infer_scalar(node.left), self.infer_scalar(node.right)
         both = max(left, right)
         if left == right == c.SINGLE:
@@ -220,7 +228,8 @@ class ExpressionTypes:
             raise self.not_exportable("raises an integer to a power that is not a literal", node)
         return c.INT
 
-    def _unary(self, node: ast.UnaryOp) -> ValueType:
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ValueType:
+        """Return the type of a unary operation."""
         kind = self.infer_scalar(node.operand)
         if isinstance(node.op, ast.Not):
             return c.BOOL
@@ -228,7 +237,8 @@ class ExpressionTypes:
             raise self.not_exportable("has an operator that is not defined for its operand", node)
         return c.INT if kind == c.BOOL else kind
 
-    def _compare(self, node: ast.Compare) -> ValueType:
+    def visit_Compare(self, node: ast.Compare) -> ValueType:
+        """Return the type of a comparison."""
         if any(isinstance(op, (ast.Is, ast.IsNot, ast.In, ast.NotIn)) for op in node.ops):
             raise self.not_exportable("compares by 'is' or 'in'", node)
         if not all(isinstance(one, (ast.Name, ast.Constant)) for one in node.comparators[:-1]):
@@ -238,19 +248,22 @@ class ExpressionTypes:
             self.infer_scalar(side)
         return c.BOOL
 
-    def _boolean(self, node: ast.BoolOp) -> ValueType:
+    def visit_BoolOp(self, node: ast.BoolOp) -> ValueType:
+        """Return the type of a conjunction or a disjunction."""
         kinds = {self.infer(part) for part in node.values}
         if kinds != {c.BOOL} and node not in self._conditions:
             raise self.not_exportable("uses 'and' or 'or' for values that are not booleans", node)
         return c.BOOL
 
-    def _conditional(self, node: ast.IfExp) -> ValueType:
+    def visit_IfExp(self, node: ast.IfExp) -> ValueType:
+        """Return the type of a conditional expression."""
         both = c.common_type(self.infer(node.body), self.infer(node.orelse))
         if both is None:
             raise self.not_exportable("chooses between values of different types", node)
         return both
 
-    def _call(self, node: ast.Call) -> ValueType:
+    def visit_Call(self, node: ast.Call) -> ValueType:
+        """Return the type of a call."""
         name = called_name(node)
         if self.is_compiled_call(node):
             kinds = tuple(map(self.infer, self.call_arguments(node)))
@@ -312,20 +325,6 @@ class ExpressionTypes:
                 return known
         raise self.not_exportable("makes a work array without a constant shape", node)
 
-
-_INFERENCE_RULES: dict[type[ast.expr], Callable[[ExpressionTypes, Any], ValueType]] = {
-    ast.Name: ExpressionTypes._name,
-    ast.Constant: ExpressionTypes._constant,
-    ast.Tuple: ExpressionTypes._tuple,
-    ast.Attribute: ExpressionTypes._attribute,
-    ast.Subscript: ExpressionTypes._subscript,
-    ast.BinOp: ExpressionTypes._binary,
-    ast.UnaryOp: ExpressionTypes._unary,
-    ast.Compare: ExpressionTypes._compare,
-    ast.BoolOp: ExpressionTypes._boolean,
-    ast.IfExp: ExpressionTypes._conditional,
-    ast.Call: ExpressionTypes._call,
-}
 
 _CONVERSIONS = {"bool": c.BOOL, "pow": c.FLOAT, "float": c.FLOAT, "float64": c.FLOAT} | {
     "int": c.INT,

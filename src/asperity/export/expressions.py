@@ -5,28 +5,28 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from asperity.export import c_language as c
 from asperity.export.c_language import ValueType
 from asperity.export.expression_types import ProgramContext, called_name, indices_of
 from asperity.export.type_inference import FunctionTypes
 
+_PRIMARY, _UNARY, _PRODUCT, _SUM, _SHIFT, _ORDER, _EQUAL, _AND, _OR, _CHOICE = (
+    12, 11, 10, 9, 8, 7, 6, 3, 2, 1,
+)  # fmt: skip
+
 
 class CExpression(NamedTuple):
     """A C expression and the precedence of its outermost operator."""
 
     text: str
-    precedence: int
+    precedence: int = _PRIMARY
 
-
-_PRIMARY, _UNARY, _PRODUCT, _SUM, _SHIFT, _ORDER, _EQUAL, _AND, _OR, _CHOICE = (
-    12, 11, 10, 9, 8, 7, 6, 3, 2, 1,
-)  # fmt: skip
 
 # Operator and precedence of binary operators. Compilers warn about operands of bit operators
 # without parentheses.
-_BINARY: dict[type[ast.operator], tuple[str, int]] = {
+BINARY_OPERATORS: dict[type[ast.operator], tuple[str, int]] = {
     ast.Add: ("+", _SUM),
     ast.Sub: ("-", _SUM),
     ast.Mult: ("*", _PRODUCT),
@@ -42,7 +42,7 @@ _COMPARE: dict[type[ast.cmpop], tuple[str, int]] = {
 }
 
 
-class ExpressionPrinter:
+class ExpressionPrinter(ast.NodeVisitor):
     """Converter of the expressions of one function.
 
     Args:
@@ -66,7 +66,8 @@ class ExpressionPrinter:
         length = self.types.constant_integer(node)
         if length is not None:
             return CExpression(str(length), _PRIMARY if length >= 0 else _UNARY)
-        return _PRINTERS[type(node)](self, node)
+        value: CExpression = self.visit(node)
+        return value
 
     def as_type(self, node: ast.expr, value_type: ValueType, min_precedence: int = 0) -> str:
         """Return an expression converted to a type."""
@@ -93,22 +94,25 @@ class ExpressionPrinter:
 
     # --- names and literals ----------------------------------------------------------------------
 
-    def _name(self, node: ast.Name) -> CExpression:
+    def visit_Name(self, node: ast.Name) -> CExpression:
+        """Return the C expression of a variable or a number of a module."""
         if node.id not in self.types.types:
             value = self.program.numbers[node.id]
-            return self._constant(ast.Constant(value))
-        return CExpression(self.names[node.id], _PRIMARY)
+            return self.visit_Constant(ast.Constant(value))
+        return CExpression(self.names[node.id])
 
-    def _constant(self, node: ast.Constant) -> CExpression:
+    def visit_Constant(self, node: ast.Constant) -> CExpression:
+        """Return the C expression of a literal."""
         if isinstance(node.value, float):
             text = self.program.real_text(node.value)
         elif isinstance(node.value, int):
             text = str(int(node.value))
         return CExpression(text, _UNARY if text.startswith("-") else _PRIMARY)
 
-    def _attribute(self, node: ast.Attribute) -> CExpression:
+    def visit_Attribute(self, node: ast.Attribute) -> CExpression:
+        """Return the C expression of a field, a constant of a module, or the shape of an array."""
         if isinstance(node.value, ast.Name) and node.value.id in c.MODULE_ALIASES:
-            return self._constant(ast.Constant(c.REAL_CONSTANTS[node.attr]))
+            return self.visit_Constant(ast.Constant(c.REAL_CONSTANTS[node.attr]))
         kind = self.types.infer(node.value)
         if isinstance(kind, c.ArrayType):
             lengths = c.TupleType((c.INT,) * len(kind.shape))
@@ -117,9 +121,10 @@ class ExpressionPrinter:
         return self._item(node.value, kind, kind.names.index(node.attr))
 
     def _item(self, value: ast.expr, kind: c.TupleType, index: int) -> CExpression:
-        return CExpression(kind.item_expression(self.text(value, _PRIMARY), index), _PRIMARY)
+        return CExpression(kind.item_expression(self.text(value, _PRIMARY), index))
 
-    def _tuple(self, node: ast.Tuple) -> CExpression:
+    def visit_Tuple(self, node: ast.Tuple) -> CExpression:
+        """Return the C expression of a tuple."""
         return self._tuple_of(node, self.types.infer_tuple(node))
 
     def _tuple_of(self, node: ast.expr, value_type: c.TupleType) -> CExpression:
@@ -135,28 +140,28 @@ class ExpressionPrinter:
         return self._constructor_call(value_type, list(map(self.as_type, items, value_type.items)))
 
     def _constructor_call(self, value_type: c.TupleType, items: list[str]) -> CExpression:
-        return CExpression(
-            f"{self.program.constructor_name(value_type)}({', '.join(items)})", _PRIMARY
-        )
+        return CExpression(f"{self.program.constructor_name(value_type)}({', '.join(items)})")
 
-    def _subscript(self, node: ast.Subscript) -> CExpression:
+    def visit_Subscript(self, node: ast.Subscript) -> CExpression:
+        """Return the C expression of an item of a tuple or an element of an array."""
         kind = self.types.infer(node.value)
         if isinstance(kind, c.TupleType):
             index = self.types.constant_integer(node.slice)
             if index is not None:
                 return self._item(node.value, kind, index % len(kind.items))
             base = self.text(node.value, _PRIMARY)
-            return CExpression(f"{base}.v[{self.text(node.slice)}]", _PRIMARY)
+            return CExpression(f"{base}.v[{self.text(node.slice)}]")
         assert isinstance(kind, c.ArrayType)  # checked by the type inference
         text = c.constant_name(kind) or self.text(node.value, _PRIMARY)
         for index_node, length in zip(indices_of(node), kind.shape, strict=True):
             fixed = self.types.constant_integer(index_node)
             text += f"[{self.text(index_node) if fixed is None else fixed % max(length, 1)}]"
-        return CExpression(text, _PRIMARY)
+        return CExpression(text)
 
     # --- operators -------------------------------------------------------------------------------
 
-    def _binary(self, node: ast.BinOp) -> CExpression:
+    def visit_BinOp(self, node: ast.BinOp) -> CExpression:
+        """Return the C expression of a binary operation."""
         kind = self.types.infer(node)
         if isinstance(node.op, ast.Pow):
             return self._power(node, kind)
@@ -167,9 +172,9 @@ class ExpressionPrinter:
                 left = f"(int64_t){left}"
             text = f"{left} {c.BIT_OPERATORS[type(node.op)]} {self.text(node.right, _UNARY)}"
             return CExpression(text, _SHIFT - 4)
-        if type(node.op) not in _BINARY:
+        if type(node.op) not in BINARY_OPERATORS:
             return self._floor_division(node, kind)
-        sign, rank = _BINARY[type(node.op)]
+        sign, rank = BINARY_OPERATORS[type(node.op)]
         left, right = self.as_type(node.left, kind, rank), self.as_type(node.right, kind, rank + 1)
         return CExpression(f"{left} {sign} {right}", rank)
 
@@ -185,10 +190,11 @@ class ExpressionPrinter:
         if self.types.infer(node.right) == c.INT:
             name = self.program.helper_name(c.find_helper("power"))
             base = self.as_type(node.left, c.FLOAT)
-            return CExpression(f"{name}({base}, {self.text(node.right)})", _PRIMARY)
+            return CExpression(f"{name}({base}, {self.text(node.right)})")
         return self._library_call("pow", [node.left, node.right])
 
-    def _unary(self, node: ast.UnaryOp) -> CExpression:
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> CExpression:
+        """Return the C expression of a unary operation."""
         if isinstance(node.op, ast.Not):
             return CExpression(f"!{self.condition(node.operand, _UNARY)}", _UNARY)
         sign = {ast.USub: "-", ast.UAdd: "", ast.Invert: "~"}[type(node.op)]
@@ -196,7 +202,8 @@ class ExpressionPrinter:
         # Two minus signs would be a decrement.
         return CExpression(f"{sign}({text})" if text.startswith("-") else f"{sign}{text}", _UNARY)
 
-    def _compare(self, node: ast.Compare) -> CExpression:
+    def visit_Compare(self, node: ast.Compare) -> CExpression:
+        """Return the C expression of a comparison."""
         sides = [node.left, *node.comparators]
         parts = []
         for left, op, right in zip(sides[:-1], node.ops, sides[1:], strict=True):
@@ -209,20 +216,23 @@ class ExpressionPrinter:
             )
         return CExpression(" && ".join(parts), rank if len(parts) == 1 else _AND)
 
-    def _boolean(self, node: ast.BoolOp) -> CExpression:
+    def visit_BoolOp(self, node: ast.BoolOp) -> CExpression:
+        """Return the C expression of a conjunction or a disjunction."""
         sign, rank = ("&&", _AND) if isinstance(node.op, ast.And) else ("||", _OR)
         # Compilers warn about mixed && and || without parentheses.
         parts = [self.condition(part, rank if sign == "&&" else _AND + 1) for part in node.values]
         return CExpression(f" {sign} ".join(parts), rank)
 
-    def _conditional(self, node: ast.IfExp) -> CExpression:
+    def visit_IfExp(self, node: ast.IfExp) -> CExpression:
+        """Return the C expression of a conditional expression."""
         kind = self.types.infer(node)
         first, second = (self.as_type(one, kind, _OR) for one in (node.body, node.orelse))
         return CExpression(f"{self.condition(node.test, _OR)} ? {first} : {second}", _CHOICE)
 
     # --- calls -----------------------------------------------------------------------------------
 
-    def _call(self, node: ast.Call) -> CExpression:
+    def visit_Call(self, node: ast.Call) -> CExpression:
+        """Return the C expression of a call."""
         name = called_name(node)
         if self.types.is_compiled_call(node):
             return self._compiled_call(node, name)
@@ -241,7 +251,7 @@ class ExpressionPrinter:
             for argument, kind in zip(arguments, kinds, strict=True)
             if not c.is_constant(kind)
         ]
-        return CExpression(f"{callee}({', '.join(given)})", _PRIMARY)
+        return CExpression(f"{callee}({', '.join(given)})")
 
     def _minimum_or_maximum(self, node: ast.Call) -> CExpression:
         name, kind = called_name(node), self.types.infer(node)
@@ -249,67 +259,50 @@ class ExpressionPrinter:
         text = self.as_type(node.args[0], kind)
         for argument in node.args[1:]:
             text = f"{helper}({text}, {self.as_type(argument, kind)})"
-        return CExpression(text, _PRIMARY)
+        return CExpression(text)
 
     def _absolute(self, node: ast.Call) -> CExpression:
         if self.types.infer(node) == c.FLOAT:
             return self._library_call("fabs", node.args)
         return self._helper_call(c.find_helper("abs_int"), node.args, c.INT)
 
-    def _round(self, node: ast.Call) -> CExpression:
-        if self.types.infer_scalar(node.args[0]) in {c.INT, c.BOOL}:
-            return self.to_c(node.args[0])
-        return self._helper_call(c.find_helper(called_name(node)), node.args, c.FLOAT)
-
     def _to_integer(self, node: ast.Call) -> CExpression:
-        if self.types.infer_scalar(node.args[0]) in {c.INT, c.BOOL}:
-            return self.to_c(node.args[0])
-        return CExpression(f"(int64_t){self.text(node.args[0], _UNARY)}", _UNARY)
+        argument = node.args[0]
+        if self.types.infer_scalar(argument) in {c.INT, c.BOOL}:
+            return self.to_c(argument)
+        if called_name(node) in {"int", "int64"}:
+            return CExpression(f"(int64_t){self.text(argument, _UNARY)}", _UNARY)
+        return self._helper_call(c.find_helper(called_name(node)), node.args, c.FLOAT)
 
     def _to_real(self, node: ast.Call) -> CExpression:
         return CExpression(self.as_type(node.args[0], c.FLOAT, _UNARY), _UNARY)
 
     def _to_boolean(self, node: ast.Call) -> CExpression:
-        return CExpression(self.condition(node.args[0], _PRIMARY), _PRIMARY)
+        return CExpression(self.condition(node.args[0], _PRIMARY))
 
     def _helper_call(
         self, helper: c.HelperFunction, arguments: list[ast.expr], value_type: ValueType
     ) -> CExpression:
         given = ", ".join(self.as_type(argument, value_type) for argument in arguments)
-        return CExpression(f"{self.program.helper_name(helper)}({given})", _PRIMARY)
+        return CExpression(f"{self.program.helper_name(helper)}({given})")
 
     def _library_call(self, name: str, arguments: list[ast.expr]) -> CExpression:
         given = ", ".join(self.as_type(argument, c.FLOAT) for argument in arguments)
-        return CExpression(f"{self.program.library_name(name)}({given})", _PRIMARY)
-
-
-_PRINTERS: dict[type[ast.expr], Callable[[ExpressionPrinter, Any], CExpression]] = {
-    ast.Name: ExpressionPrinter._name,
-    ast.Constant: ExpressionPrinter._constant,
-    ast.Tuple: ExpressionPrinter._tuple,
-    ast.Attribute: ExpressionPrinter._attribute,
-    ast.Subscript: ExpressionPrinter._subscript,
-    ast.BinOp: ExpressionPrinter._binary,
-    ast.UnaryOp: ExpressionPrinter._unary,
-    ast.Compare: ExpressionPrinter._compare,
-    ast.BoolOp: ExpressionPrinter._boolean,
-    ast.IfExp: ExpressionPrinter._conditional,
-    ast.Call: ExpressionPrinter._call,
-}
+        return CExpression(f"{self.program.library_name(name)}({given})")
 
 
 _BUILTINS: dict[str, Callable[[ExpressionPrinter, ast.Call], CExpression]] = {
     "abs": ExpressionPrinter._absolute,
     "bool": ExpressionPrinter._to_boolean,
-    "ceil": ExpressionPrinter._round,
+    "ceil": ExpressionPrinter._to_integer,
     "float": ExpressionPrinter._to_real,
     "float64": ExpressionPrinter._to_real,
-    "floor": ExpressionPrinter._round,
+    "floor": ExpressionPrinter._to_integer,
     "int": ExpressionPrinter._to_integer,
     "int64": ExpressionPrinter._to_integer,
     "max": ExpressionPrinter._minimum_or_maximum,
     "min": ExpressionPrinter._minimum_or_maximum,
-    "round": ExpressionPrinter._round,
+    "round": ExpressionPrinter._to_integer,
 }
 
 

@@ -11,8 +11,6 @@ import ast
 import importlib
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
 
 from asperity.export import c_language as c
 from asperity.export.c_language import NotExportableError, ValueType
@@ -24,41 +22,31 @@ _SINGLE_PRECISION_ROUNDINGS = {"EPS": 2.0**-23, "SQRT_EPS": 2.0**-11.5}
 """Constants of :mod:`asperity.core.compiled` in single precision."""
 
 
-@dataclass(frozen=True)
 class LinkedSource:
     """Functions and constants of a linked source.
 
-    Attributes:
+    Args:
         text: the source.
+
+    Attributes:
+        functions: functions by name.
+        numbers: numbers of the modules, by name.
+        records: field names of the records, by name of the record.
     """
 
-    text: str
-
-    @cached_property
-    def functions(self) -> dict[str, ast.FunctionDef]:
-        """Functions by name."""
-        nodes = ast.parse(self.text).body
-        return {node.name: node for node in nodes if isinstance(node, ast.FunctionDef)}
-
-    @cached_property
-    def numbers(self) -> dict[str, float]:
-        """Numbers of the modules, by name."""
-        found = {}
-        for node in ast.parse(self.text).body:
-            if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
-                found[node.targets[0].id] = ast.literal_eval(node.value)
-        return found
-
-    @cached_property
-    def records(self) -> dict[str, tuple[str, ...]]:
-        """Field names of the records, by name of the record."""
-        found = {}
-        for node in ast.parse(self.text).body:
-            if isinstance(node, ast.ImportFrom) and node.module is not None:
+    def __init__(self, text: str) -> None:
+        self.functions: dict[str, ast.FunctionDef] = {}
+        self.numbers: dict[str, float] = {}
+        self.records: dict[str, tuple[str, ...]] = {}
+        for node in ast.parse(text).body:
+            if isinstance(node, ast.FunctionDef):
+                self.functions[node.name] = node
+            elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+                self.numbers[node.targets[0].id] = ast.literal_eval(node.value)
+            elif isinstance(node, ast.ImportFrom) and node.module is not None:
                 module = importlib.import_module(node.module)
                 for alias in node.names:
-                    found[alias.name] = tuple(getattr(module, alias.name)._fields)
-        return found
+                    self.records[alias.name] = tuple(getattr(module, alias.name)._fields)
 
 
 class Program:

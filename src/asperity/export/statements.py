@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 from asperity.export import c_language as c
 from asperity.export.c_language import ValueType
 from asperity.export.expression_types import ProgramContext, called_name, to_load
-from asperity.export.expressions import ExpressionPrinter
+from asperity.export.expressions import BINARY_OPERATORS, ExpressionPrinter
 from asperity.export.liveness import (
     declaring_statements,
     expressions_in,
@@ -22,15 +21,7 @@ from asperity.export.liveness import (
 )
 from asperity.export.type_inference import FunctionTypes
 
-_AUGMENTED_OPERATORS: dict[type[ast.operator], str] = {
-    ast.Add: "+=",
-    ast.Sub: "-=",
-    ast.Mult: "*=",
-    ast.Div: "/=",
-}
-
-# Keywords of C and C++, and names that system headers define as macros.
-_RESERVED_WORDS = frozenset(
+RESERVED_WORDS = frozenset(
     word
     for line in (
         "auto break case char const continue default do double else enum extern float for goto if",
@@ -44,14 +35,10 @@ _RESERVED_WORDS = frozenset(
     )
     for word in line.split()
 )
+"""Keywords of C and C++, and names that system headers define as macros."""
 
 
-def is_reserved(name: str) -> bool:
-    """Return whether a name is a keyword of C or C++, or a common macro."""
-    return name in _RESERVED_WORDS
-
-
-class FunctionPrinter:
+class FunctionPrinter(ast.NodeVisitor):
     """Converter of one function.
 
     Args:
@@ -62,7 +49,7 @@ class FunctionPrinter:
     def __init__(self, types: FunctionTypes, program: ProgramContext) -> None:
         self.types, self.program = types, program
         self.names = {
-            name: c.constant_name(kind) or (f"{name}_" if name in _RESERVED_WORDS else name)
+            name: c.constant_name(kind) or (f"{name}_" if name in RESERVED_WORDS else name)
             for name, kind in types.types.items()
         }
         self.expressions = ExpressionPrinter(types, program, self.names)
@@ -126,38 +113,47 @@ class FunctionPrinter:
 
     def _statement(self, node: ast.stmt) -> list[str]:
         self._check_evaluation_order(node)
-        return _PRINTERS[type(node)](self, node)
+        lines: list[str] = self.visit(node)
+        return lines
 
-    def _expression(self, node: ast.Expr) -> list[str]:
+    def visit_Expr(self, node: ast.Expr) -> list[str]:
+        """Return the lines of a call without a result."""
         if isinstance(node.value, ast.Constant):
             return []
         return [f"{self.expressions.text(node.value)};"]
 
-    def _jump(self, node: ast.stmt) -> list[str]:
-        return {ast.Break: ["break;"], ast.Continue: ["continue;"]}.get(type(node), [])
+    def generic_visit(self, node: ast.AST) -> list[str]:
+        """Return the line of ``break`` or ``continue``; ``pass`` has none."""
+        if isinstance(node, (ast.Break, ast.Continue)):
+            return ["break;" if isinstance(node, ast.Break) else "continue;"]
+        return []
 
-    def _while(self, node: ast.While) -> list[str]:
+    def visit_While(self, node: ast.While) -> list[str]:
+        """Return the lines of a loop with a condition."""
         inside = _indent(self._block(node.body))
         return [f"while ({self.expressions.condition(node.test)}) {{", *inside, "}"]
 
-    def _return(self, node: ast.Return) -> list[str]:
+    def visit_Return(self, node: ast.Return) -> list[str]:
+        """Return the lines of a return."""
         if node.value is None:
             return ["return;"]
         return [f"return {self.expressions.as_type(node.value, self.types.result_type)};"]
 
-    def _if(self, node: ast.If) -> list[str]:
+    def visit_If(self, node: ast.If) -> list[str]:
+        """Return the lines of a branch."""
         test = self.expressions.condition(node.test)
         if _returns_zeros(node.body[0]):
             test = f"{self.program.prefix.upper()}_RARE({test})"
         lines = [f"if ({test}) {{", *_indent(self._block(node.body))]
         if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
-            first, *rest = self._if(node.orelse[0])
+            first, *rest = self.visit_If(node.orelse[0])
             return [*lines, f"}} else {first}", *rest]
         if node.orelse:
             lines += ["} else {", *_indent(self._block(node.orelse))]
         return [*lines, "}"]
 
-    def _for(self, node: ast.For) -> list[str]:
+    def visit_For(self, node: ast.For) -> list[str]:
+        """Return the lines of a loop over a range."""
         assert isinstance(node.iter, ast.Call)  # checked by the type inference
         assert isinstance(node.target, ast.Name)
         given = node.iter.args
@@ -188,23 +184,26 @@ class FunctionPrinter:
         name = self._temporary("end")
         return name, [f"const int64_t {name} = {text};"]
 
-    def _augmented_assignment(self, node: ast.AugAssign) -> list[str]:
+    def visit_AugAssign(self, node: ast.AugAssign) -> list[str]:
+        """Return the lines of an augmented assignment."""
         if isinstance(node.target, ast.Name) and node.target.id not in self._live:
             return []
         value = ast.BinOp(to_load(node.target), node.op, node.value)
         kind = self.types.infer(node.target)
-        if type(node.op) in _AUGMENTED_OPERATORS and self.types.infer(value) == kind:
+        if type(node.op) in BINARY_OPERATORS and self.types.infer(value) == kind:
             place = self.expressions.text(to_load(node.target))
             change = self.expressions.as_type(node.value, kind)
-            return [f"{place} {_AUGMENTED_OPERATORS[type(node.op)]} {change};"]
+            return [f"{place} {BINARY_OPERATORS[type(node.op)][0]}= {change};"]
         return self._assign(node, [node.target], value)
 
     # --- assignments -----------------------------------------------------------------------------
 
-    def _assignment(self, node: ast.Assign) -> list[str]:
+    def visit_Assign(self, node: ast.Assign) -> list[str]:
+        """Return the lines of an assignment."""
         return self._assign(node, node.targets, node.value)
 
-    def _annotated(self, node: ast.AnnAssign) -> list[str]:
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> list[str]:
+        """Return the lines of an annotated assignment."""
         return [] if node.value is None else self._assign(node, [node.target], node.value)
 
     def _assign(self, node: ast.stmt, targets: Sequence[ast.expr], value: ast.expr) -> list[str]:
@@ -340,21 +339,6 @@ class FunctionPrinter:
                     raise self.types.not_exportable(
                         "depends on an evaluation order that C leaves open", value
                     )
-
-
-_PRINTERS: dict[type[ast.stmt], Callable[[FunctionPrinter, Any], list[str]]] = {
-    ast.AnnAssign: FunctionPrinter._annotated,
-    ast.Assign: FunctionPrinter._assignment,
-    ast.AugAssign: FunctionPrinter._augmented_assignment,
-    ast.Break: FunctionPrinter._jump,
-    ast.Continue: FunctionPrinter._jump,
-    ast.Expr: FunctionPrinter._expression,
-    ast.For: FunctionPrinter._for,
-    ast.If: FunctionPrinter._if,
-    ast.Pass: FunctionPrinter._jump,
-    ast.Return: FunctionPrinter._return,
-    ast.While: FunctionPrinter._while,
-}
 
 
 def _returns_zeros(node: ast.stmt) -> bool:
