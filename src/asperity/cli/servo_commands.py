@@ -235,8 +235,9 @@ def lab_command(
     """
     # Started first, since it takes long in another process.
     process = click.get_current_context().with_resource(prestarted_process())
-    from asperity.lab.launch import LabOptions, bind_socket, run_lab
+    from asperity.lab.launch import bind_socket, run_lab
     from asperity.lab.scene_state import DEFAULT_SURFACE
+    from asperity.lab.server import LabOptions
 
     source = surface or DEFAULT_SURFACE
     playback = handle = None

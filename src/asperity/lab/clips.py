@@ -18,6 +18,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.core.files import to_plain_data
 from asperity.devices import Device, load_device
+from asperity.lab.messages import COLUMN_NAMES, POSITION
 from asperity.lab.playback import ANCHOR_COLUMNS, Playback, load_playback, make_playback
 from asperity.lab.scene_state import DEFAULT_DEVICE, SceneState, format_scene, make_scene_state
 from asperity.lab.session import Session
@@ -39,10 +40,8 @@ besides the plugins of the user."""
 MAX_CLIP_ROWS = HISTORY_SAMPLES - 4000
 """Greatest number of rows of a clip: more may be overwritten while they are read."""
 
-_COLUMN_NAMES = [name for name, _unit in COLUMNS]
-_POSITION = slice(_COLUMN_NAMES.index("x"), _COLUMN_NAMES.index("z") + 1)
-_FORCES = slice(_COLUMN_NAMES.index("commanded x"), _COLUMN_NAMES.index("applied z") + 1)
-_LAW_ANCHOR = slice(_COLUMN_NAMES.index("law anchor x"), _COLUMN_NAMES.index("law anchor y") + 1)
+_FORCES = slice(COLUMN_NAMES.index("commanded x"), COLUMN_NAMES.index("applied z") + 1)
+_LAW_ANCHOR = slice(COLUMN_NAMES.index("law anchor x"), COLUMN_NAMES.index("law anchor y") + 1)
 _MAX_CHANGES = 10_000  # of the surface since the start of the loop
 _MIN_DURATION = 0.2  # of a clip [s]
 
@@ -92,7 +91,7 @@ class Clip:
             writer.append(self._table)
         path, header = np.column_stack([self.rows[:, 0], self.anchors]), ",".join(PATH_COLUMNS)
         np.savetxt(folder / HAND_FILE, path, "%.17g", ",", header=header, comments="")
-        start = self.duration, self.rows[0, _POSITION], self.velocity
+        start = self.duration, self.rows[0, POSITION], self.velocity
         text = format_scene(self.scene_state, HAND_FILE, RECORDING_FILE if field else "", *start)
         (folder / SCENE_FILE).write_text(text, "utf-8")
         for name, content in self.scene_state.plugin_files.items():
@@ -123,25 +122,25 @@ def extract_clip(scene_state: SceneState, shared: LoopMemory, pointer_hand: Poin
     if end - start < _MIN_DURATION / scene_state.setup.servo.period:
         raise ParameterError("recording", "must start with a free probe: lift it, then continue")
     rows = rows[start:end].copy()
-    places = _track_indices(rows[:, _POSITION], first + start, track)
+    places = _track_indices(rows[:, POSITION], first + start, track)
     rows[:, 0] = np.arange(len(rows)) * scene_state.setup.servo.period
-    supplied = _COLUMN_NAMES.index("supplied")
+    supplied = COLUMN_NAMES.index("supplied")
     rows[:, supplied] -= rows[0, supplied]
     # A simulation from here starts without an anchor of the law.
-    anchored = rows[:, _COLUMN_NAMES.index("law held")].argmax()
+    anchored = rows[:, COLUMN_NAMES.index("law held")].argmax()
     rows[: anchored or len(rows), _LAW_ANCHOR] = 0.0
     return Clip(scene_state, rows, track[places, 0], track[places[0], 1])
 
 
 def _find_segment(rows: FloatArray, delay: int) -> tuple[int, int]:
     """Return first and last index of the newest rows with the whole force, from a free sample."""
-    whole = rows[:, _COLUMN_NAMES.index("share")] == 1.0
+    whole = rows[:, COLUMN_NAMES.index("share")] == 1.0
     end = int(whole.nonzero()[0][-1]) + 1 if whole.any() else 0
     ramped = np.flatnonzero(~whole[:end])
     changed = int(ramped[-1]) + 1 if len(ramped) else 0
     busy = (rows[:, _FORCES] != 0.0).any(axis=1)
-    busy |= (rows[:, _COLUMN_NAMES.index("inside")] != 0.0) | (
-        rows[:, _COLUMN_NAMES.index("law held")] != 0.0
+    busy |= (rows[:, COLUMN_NAMES.index("inside")] != 0.0) | (
+        rows[:, COLUMN_NAMES.index("law held")] != 0.0
     )
     # Commands of the last samples are still delayed.
     waits = np.convolve(busy, np.ones(delay + 2))[: len(rows)] > 0.5

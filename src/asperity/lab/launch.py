@@ -7,20 +7,15 @@ import signal
 import socket
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from multiprocessing import active_children
-from pathlib import Path
 
 from websockets.asyncio.server import serve
 
 from asperity.core.errors import ParameterError
 from asperity.lab.access import MAX_MESSAGE_BYTES, AccessToken, respond
 from asperity.lab.background import BackgroundWorker
-from asperity.lab.playback import Playback
 from asperity.lab.scene_state import SceneState
-from asperity.lab.server import LabServer
-from asperity.lab.session import Handle
-from asperity.servo.process import PrestartedProcess
+from asperity.lab.server import LabOptions, LabServer
 
 LOOPBACK_ADDRESS = "127.0.0.1"
 DEFAULT_PORT = 8137
@@ -56,30 +51,11 @@ def bind_socket(port: int | None) -> socket.socket:
     raise ParameterError("port", "is not available, nor are the next ones", wanted)
 
 
-@dataclass(frozen=True)
-class LabOptions:
-    """Options of the lab.
-
-    Attributes:
-        load_plugins: registers user-defined laws in another process.
-        prestarted: the process of the first loop.
-        playback: recorded rows of the initial scene, to be replayed.
-        handle: of a real device; ``None`` for the simulated device.
-        accept_risk: whether a real device renders a stiffness above the limit.
-    """
-
-    load_plugins: Callable[[], None] | None = None
-    prestarted: PrestartedProcess | None = None
-    playback: Playback | None = None
-    handle: Handle | None = None
-    accept_risk: bool = False
-
-
 def run_lab(
     scene_state: SceneState,
     listener: socket.socket,
     on_ready: Callable[[str], None],
-    options: LabOptions = LabOptions(),  # frozen
+    options: LabOptions,
 ) -> None:
     """Serve the lab until Ctrl-C.
 
@@ -89,10 +65,10 @@ def run_lab(
         on_ready: called with the address once the server answers.
         options: see :class:`LabOptions`.
     """
-    asyncio.run(serve_lab(scene_state, listener, on_ready, options))
+    asyncio.run(_serve(scene_state, listener, on_ready, options))
 
 
-async def serve_lab(
+async def _serve(
     scene_state: SceneState,
     listener: socket.socket,
     on_ready: Callable[[str], None],
@@ -107,17 +83,7 @@ async def serve_lab(
             asyncio.get_running_loop().add_signal_handler(number, stopped.set)
     plugins = options.load_plugins
     with BackgroundWorker(plugins) as pictures, BackgroundWorker(plugins) as limits:
-        lab = LabServer(
-            scene_state,
-            pictures,
-            limits,
-            options.prestarted,
-            options.handle,
-            accept_risk=options.accept_risk,
-        )
-        if options.playback is not None:
-            title = Path(scene_state.source).name
-            lab.clip_store.add_recording("recording", options.playback, scene_state, title)
+        lab = LabServer(scene_state, pictures, limits, options)
         tasks = [asyncio.create_task(work()) for work in (lab.watch_session, lab.watch_steering)]
         fetch = lab.clip_store.fetch
         try:

@@ -150,15 +150,15 @@ _PARSERS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
 STATE, RELIEF, SECTION = 1.0, 2.0, 3.0
 """First number of a message: its kind."""
 
-COLUMN_NAMES = tuple(name for name, _unit in COLUMNS)
+COLUMN_NAMES = [name for name, _unit in COLUMNS]
 FORCE_COLUMNS = slice(COLUMN_NAMES.index("applied x"), COLUMN_NAMES.index("applied z") + 1)
-_POSITION = slice(COLUMN_NAMES.index("x"), COLUMN_NAMES.index("z") + 1)
+POSITION = slice(COLUMN_NAMES.index("x"), COLUMN_NAMES.index("z") + 1)
 _LAW_FORCE = slice(COLUMN_NAMES.index("commanded x"), COLUMN_NAMES.index("commanded z") + 1)
 HEADER = (
     *("kind", "frame", "rows", "first", "acknowledged", "late", "skipped", "forces"),
     *("way", "squares", "jump", "moved"),
 )
-POSITION_NAMES = ("god x", "god y", "god z", "hand x", "hand y", "hand z")
+_POSITION_NAMES = ("god x", "god y", "god z", "hand x", "hand y", "hand z")
 MAX_FORCE_ROWS = 2048
 """Greatest number of rows whose forces are in a frame, the newest."""
 
@@ -166,9 +166,9 @@ MAX_FORCE_ROWS = 2048
 def frame_layout() -> dict[str, Any]:
     """Return the index of each number of a frame, for the page."""
     columns = len(COLUMN_NAMES)
-    after = len(HEADER) + len(POSITION_NAMES)
+    after = len(HEADER) + len(_POSITION_NAMES)
     return {
-        "head": {name: place for place, name in enumerate((*HEADER, *POSITION_NAMES))},
+        "head": {name: place for place, name in enumerate((*HEADER, *_POSITION_NAMES))},
         "columns": {name: place for place, name in enumerate(COLUMN_NAMES)},
         "newest": after,
         "least": after + columns,
@@ -200,7 +200,7 @@ def step_statistics(rows: FloatArray) -> dict[str, float]:
     """Return statistics of the steps from row to row: ``way``, ``squares``, ``jump``, ``moved``."""
     if len(rows) < 2:
         return {"way": 0.0, "squares": 0.0, "jump": 0.0, "moved": 0.0}
-    squares = np.square(np.diff(rows[:, _POSITION], axis=0)).sum(axis=1)
+    squares = np.square(np.diff(rows[:, POSITION], axis=0)).sum(axis=1)
     jumps = np.square(np.diff(rows[:, _LAW_FORCE], axis=0)).sum(axis=1)
     most = int(jumps.argmax())
     return {

@@ -11,6 +11,7 @@ import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
+from asperity.lab.messages import COLUMN_NAMES
 from asperity.loop.shared_trace import COLUMNS
 from asperity.recording.recording import Recording
 from asperity.recording.row_encoding import Columns
@@ -27,7 +28,6 @@ ANCHOR_COLUMNS = tuple((f"anchor {axis}", "m") for axis in "xyz")
 """Columns of the hand, which follow those of the loop."""
 
 _POSITION_COLUMNS, _FORCE_COLUMNS = ("x", "y", "z"), ("applied x", "applied y", "applied z")
-_COLUMN_NAMES = tuple(name for name, _unit in COLUMNS)
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Playback:
 def make_playback(table: FloatArray, period: float, texture: Texture) -> Playback:
     """Return rows in memory, with ``COLUMNS`` and ``ANCHOR_COLUMNS``, shape (n, columns)."""
     force = _ForceRange(len(table))
-    force.update(table, [_COLUMN_NAMES.index(name) for name in _FORCE_COLUMNS])
+    force.update(table, [COLUMN_NAMES.index(name) for name in _FORCE_COLUMNS])
     return Playback(texture, period, len(table), lambda first, end: table[first:end], force.bins)
 
 

@@ -18,9 +18,10 @@ from asperity.devices import Device, load_device, override_device
 from asperity.devices.device_file import to_device_toml
 from asperity.laws import find_law
 from asperity.measured.file_arguments import FILE_ARGUMENTS
+from asperity.scene.recorded_scene import hand_section, run_section
 from asperity.scene.scene_defaults import with_assumed_mass
 from asperity.scene.scene_file import RECORDING_KIND, Scene, load_scene
-from asperity.scene.sections import HANDS, RUN_ARGUMENTS, SURFACE_FIELDS, to_scene_values
+from asperity.scene.sections import RUN_ARGUMENTS, SURFACE_FIELDS, to_scene_values
 from asperity.scene.setup import Setup, make_setup
 from asperity.servo.safety import Safety
 from asperity.simulation import Servo
@@ -342,25 +343,18 @@ def format_scene(
         start: of the handle [m], shape (3,).
         velocity: of the handle at the start [m/s], shape (3,).
     """
-    setup = scene_state.setup
-    surface = setup.surface
-    hand = {name: value for name, value in setup.hand.to_dict().items() if value is not None}
-    numbers = {name: getattr(surface, name) for name in ("stiffness", "max_depth", "clamp")}
-    run = {
-        "duration": duration,
-        "start": list(start),
-        "velocity": list(velocity),
-        "velocity_share": setup.servo.velocity_share,
-        **_plant_arguments(setup.plant),
-    }
+    setup, surface = scene_state.setup, scene_state.setup.surface
+    values = {name: getattr(surface, name) for name in ("stiffness", "max_depth", "clamp")}
     surface_fields = (*SURFACE_FIELDS, *surface.law.arguments.values())
+    course = {"duration": duration, "start": list(start), "velocity": list(velocity)}
     sections = {
         "texture": texture_section(scene_state, recording_file),
         "surface": {"law": surface.law.letter}
-        | to_scene_values(numbers | dict(surface.law_parameters), surface_fields),
-        "hand": {"kind": hand["kind"]} | to_scene_values(hand, HANDS[hand["kind"]].arguments),
+        | to_scene_values(values | dict(surface.law_parameters), surface_fields),
+        "hand": hand_section(setup.hand.to_dict()),
         "motion": {"kind": "path", "file": path_file},
-        "run": to_scene_values(run, RUN_ARGUMENTS),
+        "run": to_scene_values(course, RUN_ARGUMENTS)
+        | run_section(setup.plant.to_dict(), setup.servo),
     }
     parts = [f"[{name}]\n{_format_values(values)}" for name, values in sections.items()]
     device = _format_device(scene_state.rated_device)
@@ -413,13 +407,6 @@ def source_section(source: str) -> dict[str, Any]:
     if "path" in section:
         section["path"] = str((Path(source).parent / section["path"]).resolve())
     return section
-
-
-def _plant_arguments(plant: Any) -> dict[str, Any]:
-    """Return the arguments of a plant besides its device."""
-    if not hasattr(plant, "inside_only"):
-        return {"resonance": True} if plant.resonance is not None else {}
-    return {"centre": plant.centre, "brakes": "inside" if plant.inside_only else "always"}
 
 
 def _format_device(device: Device) -> str:

@@ -7,7 +7,9 @@ import json
 import time
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +29,7 @@ from asperity.lab.messages import (
     frame_layout,
     parse_message,
 )
+from asperity.lab.playback import Playback
 from asperity.lab.scene_state import RANGES, SceneState
 from asperity.lab.session import Handle, Session
 from asperity.laws import REGISTERED_LAWS
@@ -48,6 +51,25 @@ _MAX_BLOCKING_WAIT = 5e-4
 _POLL_INTERVAL = 0.1  # of the silence of the controlling page [s]
 _SEND_TIMEOUT = 10.0  # after which a page that does not receive is disconnected [s]
 _MAX_REASON_BYTES = 120  # of the reason in a closing frame
+
+
+@dataclass(frozen=True)
+class LabOptions:
+    """Options of the lab.
+
+    Attributes:
+        load_plugins: registers user-defined laws in another process.
+        prestarted: the process of the first loop.
+        playback: recorded rows of the initial scene, to be replayed.
+        handle: of a real device; ``None`` for the simulated device.
+        accept_risk: whether a real device renders a stiffness above the limit.
+    """
+
+    load_plugins: Callable[[], None] | None = None
+    prestarted: PrestartedProcess | None = None
+    playback: Playback | None = None
+    handle: Handle | None = None
+    accept_risk: bool = False
 
 
 class Client:
@@ -105,9 +127,7 @@ class LabServer:
         scene_state: the initial scene.
         picture_worker: process for pictures, see ``background_worker``.
         limit_worker: process for limits.
-        prestarted: the process of the first loop.
-        handle: of a real device; ``None`` for the simulated device.
-        accept_risk: whether a real device renders a stiffness above the limit.
+        options: see :class:`LabOptions`.
     """
 
     def __init__(
@@ -115,22 +135,22 @@ class LabServer:
         scene_state: SceneState,
         picture_worker: BackgroundWorker,
         limit_worker: BackgroundWorker,
-        prestarted: PrestartedProcess | None = None,
-        handle: Handle | None = None,
-        *,
-        accept_risk: bool = False,
+        options: LabOptions,
     ) -> None:
         self._loop = asyncio.get_running_loop()
         self._clients: list[Client] = []
         self._controller: Client | None = None
         self._state_changed = asyncio.Event()
         self._last_contact = 0.0  # time of the last message of the controlling page [s]
-        assess_risk = None
-        if handle is not None and not accept_risk:
+        handle, assess_risk = options.handle, None
+        if handle is not None and not options.accept_risk:
             assess_risk = partial(limit_worker.submit, excess_stiffness_reason)
-        self.session = Session(scene_state, self._notify, prestarted, handle, assess_risk)
+        self.session = Session(scene_state, self._notify, options.prestarted, handle, assess_risk)
         self.background = BackgroundRenderer(picture_worker, limit_worker, self._broadcast_state)
         self.clip_store = ClipStore(self.session)
+        if options.playback is not None:
+            title = Path(scene_state.source).name
+            self.clip_store.add_recording("recording", options.playback, scene_state, title)
         self._save_tasks: set[asyncio.Task[None]] = set()
 
     def _notify(self) -> None:

@@ -45,7 +45,7 @@ def load_recorded_scene(recording: Recording) -> tuple[Scene, tuple[str, ...]]:
         notes.append("The recording names no known device; the default one is simulated")
     elif metadata.get("driver", SIMULATED_DRIVER) == SIMULATED_DRIVER:
         device = _with_servo(device, servo)  # a real device has its own servo
-    hand, run = _hand_section(metadata.get("hand")), _run_section(metadata.get("plant"), servo)
+    hand, run = hand_section(metadata.get("hand")), run_section(metadata.get("plant"), servo)
     if not hand:
         notes.append("The recording has no hand that can be simulated; the default one is")
     values = {"law": surface.law, **numbers, **clamp, **surface.law_parameters}
@@ -86,7 +86,7 @@ def _parse_servo(metadata: Mapping[str, Any]) -> Servo:
         raise ParameterError("recording", "has no settings of its servo") from None
 
 
-def _hand_section(description: Any) -> dict[str, Any]:
+def hand_section(description: Any) -> dict[str, Any]:
     """Return the section [hand] of a hand simulated as a spring or a band."""
     kind = description.get("kind") if isinstance(description, Mapping) else None
     if kind not in HANDS or not HANDS[kind].arguments:
@@ -94,7 +94,7 @@ def _hand_section(description: Any) -> dict[str, Any]:
     return {"kind": kind} | to_scene_values(description, HANDS[kind].arguments)
 
 
-def _run_section(plant: Any, servo: Servo) -> dict[str, Any]:
+def run_section(plant: Any, servo: Servo) -> dict[str, Any]:
     """Return the section [run] of a plant and a servo."""
     values: dict[str, Any] = {"velocity_share": servo.velocity_share}
     if isinstance(plant, Mapping) and "centre" in plant:
