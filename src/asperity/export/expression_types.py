@@ -337,11 +337,6 @@ def called_name(node: ast.Call) -> str:
     return node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
 
 
-def to_load(target: ast.expr) -> ast.expr:
-    """Return the target of an assignment as an expression of its value."""
-    return ast.parse(ast.unparse(target), mode="eval").body
-
-
 def indices_of(node: ast.Subscript) -> list[ast.expr]:
     """Return the indices of an array element."""
     return list(node.slice.elts) if isinstance(node.slice, ast.Tuple) else [node.slice]

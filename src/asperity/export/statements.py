@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from asperity.export import c_language as c
 from asperity.export.c_language import ValueType
-from asperity.export.expression_types import ProgramContext, called_name, to_load
+from asperity.export.expression_types import ProgramContext, called_name
 from asperity.export.expressions import BINARY_OPERATORS, ExpressionPrinter
 from asperity.export.liveness import (
     declaring_statements,
@@ -69,7 +69,7 @@ class FunctionPrinter(ast.NodeVisitor):
         ]
         body = without_docstring(self.types.node.body)
         inside = [*self._argument_conversions(), *self._declarations(), *unused, *self._block(body)]
-        return [f"{signature}", "{", *_indent(inside), "}"]
+        return [signature, "{", *_indent(inside), "}"]
 
     def parameter_declarations(self) -> list[str]:
         """Return the parameters; constants are not passed."""
@@ -163,13 +163,12 @@ class FunctionPrinter(ast.NodeVisitor):
             raise self.types.not_exportable("loops with a step that is not a literal", node.iter)
         end, before = self._loop_end(node, given[1] if len(given) > 1 else given[0])
         owned = node in self._loop_variables
-        name = self.names[node.target.id] if owned else self._temporary("turn")
-        if node.target.id.startswith("_"):
-            name = self._temporary("turn")
+        named = owned and not node.target.id.startswith("_")
+        name = self.names[node.target.id] if named else self._temporary("turn")
         sign, change = ("<", f"{name} += {step}") if step > 0 else (">", f"{name} -= {-step}")
         change = {1: f"{name}++", -1: f"{name}--"}.get(step, change)
-        inside = [] if owned else [f"{self.names[node.target.id]} = {name};"]
-        inside = [] if node.target.id not in self._live else inside
+        copied = not owned and node.target.id in self._live
+        inside = [f"{self.names[node.target.id]} = {name};"] if copied else []
         head = f"for (int64_t {name} = {start}; {name} {sign} {end}; {change}) {{"
         return [*before, head, *_indent([*inside, *self._block(node.body)]), "}"]
 
@@ -188,10 +187,10 @@ class FunctionPrinter(ast.NodeVisitor):
         """Return the lines of an augmented assignment."""
         if isinstance(node.target, ast.Name) and node.target.id not in self._live:
             return []
-        value = ast.BinOp(to_load(node.target), node.op, node.value)
+        value = ast.BinOp(node.target, node.op, node.value)
         kind = self.types.infer(node.target)
         if type(node.op) in BINARY_OPERATORS and self.types.infer(value) == kind:
-            place = self.expressions.text(to_load(node.target))
+            place = self.expressions.text(node.target)
             change = self.expressions.as_type(node.value, kind)
             return [f"{place} {BINARY_OPERATORS[type(node.op)][0]}= {change};"]
         return self._assign(node, [node.target], value)
@@ -217,7 +216,7 @@ class FunctionPrinter(ast.NodeVisitor):
         if len(targets) > 1 and not isinstance(value, ast.Constant):
             lines = self._store(node, first, value)
             for other in others:
-                lines += self._store(node, other, to_load(first))
+                lines += self._store(node, other, first)
             return lines
         return [line for target in targets for line in self._store(node, target, value)]
 
@@ -232,7 +231,7 @@ class FunctionPrinter(ast.NodeVisitor):
         raise self.types.not_exportable("makes a work array inside a loop or a branch", value)
 
     def _store(self, node: ast.stmt, target: ast.expr, value: ast.expr) -> list[str]:
-        kind = self.types.infer(to_load(target))
+        kind = self.types.infer(target)
         if c.is_constant(kind):
             return []
         if isinstance(target, ast.Name) and target.id not in self._live:
@@ -249,7 +248,7 @@ class FunctionPrinter(ast.NodeVisitor):
         if isinstance(target, ast.Name) and self._declaring.get(target.id) is node:
             kind = self.types.types[target.id]
             return f"{self._declaration(kind, self.names[target.id])} = {text};"
-        return f"{self.expressions.text(to_load(target))} = {text};"
+        return f"{self.expressions.text(target)} = {text};"
 
     def _assign_each(
         self, node: ast.stmt, targets: Sequence[ast.expr], values: Sequence[ast.expr]
@@ -268,7 +267,7 @@ class FunctionPrinter(ast.NodeVisitor):
         for target, value in zip(targets, values, strict=True):
             if isinstance(target, ast.Name) and target.id not in self._live:
                 continue
-            kind = self.types.infer(to_load(target))
+            kind = self.types.infer(target)
             name = self._temporary("new")
             lines.append(
                 f"const {self._declaration(kind, name)} = {self.expressions.as_type(value, kind)};"
@@ -307,7 +306,7 @@ class FunctionPrinter(ast.NodeVisitor):
             if isinstance(target, ast.Tuple) and isinstance(item, c.TupleType):
                 lines += self._unpack_items(node, target.elts, item, place)
                 continue
-            own = self.types.infer(to_load(target))
+            own = self.types.infer(target)
             if own != item and isinstance(own, c.ScalarType):
                 place = f"({self.program.c_type(own)}){place}"
             lines.append(self._assignment_line(node, target, place))

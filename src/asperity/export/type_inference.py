@@ -16,7 +16,6 @@ from asperity.export.expression_types import (
     ProgramContext,
     UnknownTypeError,
     called_name,
-    to_load,
 )
 
 
@@ -79,7 +78,7 @@ class FunctionTypes(ExpressionTypes):
             if node.value is not None:
                 self._assign(node.target, node.value)
         elif isinstance(node, ast.AugAssign):
-            self._assign(node.target, ast.BinOp(to_load(node.target), node.op, node.value))
+            self._assign(node.target, ast.BinOp(node.target, node.op, node.value))
         elif isinstance(node, ast.For):
             self._infer_loop(node)
         elif isinstance(node, ast.While) and node.orelse:
