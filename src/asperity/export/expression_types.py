@@ -22,23 +22,18 @@ class ProgramContext(Protocol):
         prefix: prefix of all names.
         numbers: numbers of the modules, by name.
         records: field names of the records, by name.
+        signatures: argument names of the compiled functions, by name.
+        single: whether real numbers are of single precision.
     """
 
     prefix: str
+    single: bool
+    signatures: Mapping[str, tuple[str, ...]]
     numbers: Mapping[str, float]
     records: Mapping[str, tuple[str, ...]]
 
-    def parameter_names(self, name: str) -> tuple[str, ...] | None:
-        """Return the argument names of a compiled function, ``None`` if there is none."""
-
     def infer_types(self, name: str, argument_types: tuple[ValueType, ...]) -> ExpressionTypes:
         """Return the types of a compiled function for given argument types."""
-
-    def real_text(self, value: float) -> str:
-        """Return a real number as a C literal."""
-
-    def library_name(self, name: str) -> str:
-        """Return the name of a C library function in the precision of the program."""
 
     def helper_name(self, helper: c.HelperFunction) -> str:
         """Return the name of a helper function, which is added to the program."""
@@ -294,12 +289,11 @@ class ExpressionTypes(ast.NodeVisitor):
         Raises:
             NotExportableError: unless each argument is given once, in order.
         """
-        return self.match_arguments(node, self.program.parameter_names(called_name(node)) or ())
+        return self.match_arguments(node, self.program.signatures[called_name(node)])
 
     def is_compiled_call(self, node: ast.Call) -> bool:
         """Return whether a compiled function is called."""
-        plain = isinstance(node.func, ast.Name)
-        return plain and self.program.parameter_names(called_name(node)) is not None
+        return isinstance(node.func, ast.Name) and node.func.id in self.program.signatures
 
     def _builtin(self, node: ast.Call, name: str) -> ValueType:
         if name == "local_array":

@@ -79,7 +79,7 @@ class ExpressionPrinter(ast.NodeVisitor):
         if value_type == c.FLOAT:
             length = self.types.constant_integer(node)
             if length is not None:
-                return self.program.real_text(float(length))
+                return real_literal(float(length), self.program.single)
             cast = f"({self.program.c_type(c.FLOAT)}){self.text(node, _UNARY)}"
             return cast if min_precedence <= _UNARY else f"({cast})"
         if value_type == c.BOOL and isinstance(own, c.ScalarType):
@@ -104,7 +104,7 @@ class ExpressionPrinter(ast.NodeVisitor):
     def visit_Constant(self, node: ast.Constant) -> CExpression:
         """Return the C expression of a literal."""
         if isinstance(node.value, float):
-            text = self.program.real_text(node.value)
+            text = real_literal(node.value, self.program.single)
         elif isinstance(node.value, int):
             text = str(int(node.value))
         return CExpression(text, _UNARY if text.startswith("-") else _PRIMARY)
@@ -288,7 +288,8 @@ class ExpressionPrinter(ast.NodeVisitor):
 
     def _library_call(self, name: str, arguments: list[ast.expr]) -> CExpression:
         given = ", ".join(self.as_type(argument, c.FLOAT) for argument in arguments)
-        return CExpression(f"{self.program.library_name(name)}({given})")
+        suffix = "f" if self.program.single else ""
+        return CExpression(f"{name}{suffix}({given})")
 
 
 _BUILTINS: dict[str, Callable[[ExpressionPrinter, ast.Call], CExpression]] = {

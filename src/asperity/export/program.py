@@ -14,7 +14,6 @@ from collections.abc import Mapping
 
 from asperity.export import c_language as c
 from asperity.export.c_language import NotExportableError, ValueType
-from asperity.export.expressions import real_literal
 from asperity.export.statements import FunctionPrinter
 from asperity.export.type_inference import FunctionTypes
 
@@ -76,6 +75,10 @@ class Program:
         own = _SINGLE_PRECISION_ROUNDINGS if single else {}
         self.numbers: Mapping[str, float] = linked.numbers | own
         self.records: Mapping[str, tuple[str, ...]] = linked.records
+        self.signatures: Mapping[str, tuple[str, ...]] = {
+            name: tuple(argument.arg for argument in node.args.args)
+            for name, node in linked.functions.items()
+        }
         self.types: list[str] = []
         self.helpers: list[str] = []
         self.functions: list[str] = []
@@ -90,11 +93,6 @@ class Program:
         return "float" if self.single else "double"
 
     # --- type inference -----------------------------------------------------------------------
-
-    def parameter_names(self, name: str) -> tuple[str, ...] | None:
-        """Return the argument names of a compiled function, ``None`` if there is none."""
-        node = self.linked.functions.get(name)
-        return None if node is None else tuple(argument.arg for argument in node.args.args)
 
     def infer_types(self, name: str, argument_types: tuple[ValueType, ...]) -> FunctionTypes:
         """Return the types of a compiled function for given argument types.
@@ -115,14 +113,6 @@ class Program:
         return self._inferred[key]
 
     # --- names --------------------------------------------------------------------------------
-
-    def real_text(self, value: float) -> str:
-        """Return a real number as a C literal."""
-        return real_literal(value, self.single)
-
-    def library_name(self, name: str) -> str:
-        """Return the name of a C library function in the precision of the program."""
-        return f"{name}f" if self.single else name
 
     def helper_name(self, helper: c.HelperFunction) -> str:
         """Return the name of a helper function, which is added to the program."""
