@@ -12,7 +12,7 @@ from asperity.analysis.analyze import Analysis, analyze
 from asperity.core.errors import ParameterError
 from asperity.devices import parse_device
 from asperity.report import plot
-from asperity.report.pictures.analysis_pictures import analysis_figure, available_pictures
+from asperity.report.pictures.analysis_pictures import available_pictures
 from asperity.report.pictures.analysis_windows import (
     gain_window,
     loop_window,
@@ -72,7 +72,7 @@ def test_every_picture_can_be_had_alone(
 
 def test_the_worst_loop_is_drawn_where_it_is(groove: Analysis) -> None:
     """The drawn line is the polygon: its area times curl is its energy, for a field like A's."""
-    axes = analysis_figure(groove, "field").axes[0]
+    axes = plot(groove, "field").axes[0]
     vertices, window = groove.leak.vertices, loop_window(groove)
     drawn = [line for line in axes.lines if len(line.get_xdata()) == len(vertices) + 1]
     assert len(drawn) == 1
@@ -89,7 +89,7 @@ def test_the_worst_loop_is_drawn_where_it_is(groove: Analysis) -> None:
 
 
 def test_a_conservative_field_has_no_loop_in_its_picture() -> None:
-    axes = analysis_figure(analysis("C"), "field").axes[0]
+    axes = plot(analysis("C"), "field").axes[0]
     assert axes.get_title(loc="left") == "conservative: no loop gains energy"
     mesh = next(item for item in axes.collections if isinstance(item, QuadMesh))
     assert float(np.abs(mesh.get_array()).max()) < 1e-6
@@ -98,7 +98,7 @@ def test_a_conservative_field_has_no_loop_in_its_picture() -> None:
 @pytest.mark.parametrize("law", ["A", "B", "C", "G"])
 def test_the_cross_is_on_the_witness_and_nothing_is_above_q(law: str) -> None:
     result = analysis(law, max_depth=0.25e-3)
-    axes = analysis_figure(result, "gain").axes[0]
+    axes = plot(result, "gain").axes[0]
     crosses = [line for line in axes.lines if line.get_marker() == "x"]
     window = gain_window(result)
     at = project_on_window(window, np.array(result.q.at))
@@ -163,7 +163,7 @@ def test_from_above_a_is_its_slope(hills: Analysis) -> None:
 
 
 def test_the_jumps_are_drawn(god_object: Analysis) -> None:
-    axes = analysis_figure(god_object, "jumps").axes[0]
+    axes = plot(god_object, "jumps").axes[0]
     depth, size = axes.lines[0].get_data()
     jumps = god_object.continuity.jumps
     unit = 1e3 if "mN" in axes.get_ylabel() else 1.0

@@ -35,7 +35,7 @@ def two_panels() -> Figure:
     mesh = right.pcolormesh(x, z, middles, rasterized=True)
     right.set_xlim(0.0, 2.0)
     right.set_ylim(-1.0, 1.0)
-    style.style_colorbar(figure.colorbar(mesh, ax=right), "curl [N/m]: white is none")
+    style.add_colorbar(figure, mesh, right, "curl [N/m]: white is none")
     return figure
 
 

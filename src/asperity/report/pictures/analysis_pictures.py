@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,6 @@ from asperity.report.sentences.alt_text import analysis_figure_names
 from asperity.report.sentences.number_text import interval_text, range_text
 
 FigureArea = Figure | SubFigure
-PictureSpec = tuple[Callable[[FigureArea, Analysis], None], Callable[[Analysis], float]]
 
 _WIDTH = 10.0
 # Width and greatest and least height of a panel [inch].
@@ -53,16 +53,20 @@ _MAX_GAIN = 1e3
 _ARROW_COUNT = 5
 
 
-def available_pictures(analysis: Analysis) -> dict[str, PictureSpec]:
-    """Return drawing function and height [inch] of the figures of an analysis, by name."""
-    specs: dict[str, PictureSpec] = {
-        "field": (draw_field, lambda result: _plane_height(loop_window(result))),
-        "gain": (draw_gain, lambda result: _plane_height(gain_window(result))),
-        "top": (draw_top_view, _map_height),
-        "depth": (draw_depth, lambda _result: _GRAPH_HEIGHT),
-        "jumps": (draw_jumps, lambda _result: _GRAPH_HEIGHT),
+def available_pictures(analysis: Analysis) -> dict[str, style.SizedDrawing]:
+    """Return size [inch] and drawing function of the figures of an analysis, by name."""
+    drawings: dict[str, tuple[Callable[..., None], Callable[[], float]]] = {
+        "field": (draw_field, lambda: _plane_height(loop_window(analysis))),
+        "gain": (draw_gain, lambda: _plane_height(gain_window(analysis))),
+        "top": (draw_top_view, lambda: _map_height(analysis)),
+        "depth": (draw_depth, lambda: _GRAPH_HEIGHT),
+        "jumps": (draw_jumps, lambda: _GRAPH_HEIGHT),
     }
-    return {name: specs[name] for name in analysis_figure_names(analysis)}
+    pictures: dict[str, style.SizedDrawing] = {}
+    for name in analysis_figure_names(analysis):
+        draw, height = drawings[name]
+        pictures[name] = (_WIDTH, height()), partial(draw, analysis=analysis)
+    return pictures
 
 
 def _plane_height(window: Window) -> float:
@@ -73,18 +77,6 @@ def _plane_height(window: Window) -> float:
 def _map_height(analysis: Analysis) -> float:
     spans = np.abs(analysis.surface.texture.domain.spans).sum(axis=0)
     return min(_PANEL_WIDTH * float(spans[1] / spans[0]), 6.5) + _PANEL_MARGIN
-
-
-def picture_size(analysis: Analysis, name: str) -> tuple[float, float]:
-    """Return width and height of a figure [inch]."""
-    return _WIDTH, available_pictures(analysis)[name][1](analysis)
-
-
-def analysis_figure(analysis: Analysis, name: str) -> Figure:
-    """Return one picture of an analysis."""
-    figure = style.new_figure(*picture_size(analysis, name))
-    available_pictures(analysis)[name][0](figure, analysis)
-    return figure
 
 
 # --- the field and the worst loop -----------------------------------------------------------------
@@ -107,21 +99,27 @@ def draw_field(figure: FigureArea, analysis: Analysis) -> None:
     for arrows in axes.findobj(Quiver):
         # A halo, for dark colours of the curl.
         arrows.set_path_effects([withStroke(linewidth=1.2, foreground=_WHITE)])
-    wide, high = window.units
-    if not _is_true_to_scale(window):
-        axes.set_aspect("auto")
-    style.label_axes(axes, f"{_horizontal_axis_text(window)} [{wide.name}]", f"z [{high.name}]")
+    _scale_axes(axes, window)
     field = curl_field(analysis.surface, window.segment, window.bottom, *_GRID_CELLS)
     _fade_beyond_depth(axes, analysis, window, field)
     if len(leak.vertices):
         offset = leak.vertices[:, :2] - window.segment.xy(np.zeros(1))[0]
         along = offset @ window.segment.line.direction
+        wide, high = window.units
         _draw_loop(axes, along * wide.scale, leak.vertices[:, 2] * high.scale)
 
 
 def _is_true_to_scale(window: Window) -> bool:
     """Return whether a figure true to scale fills its panel well."""
     return _PANEL_WIDTH / _MAX_PANEL_HEIGHT <= window.aspect <= _MAX_ASPECT
+
+
+def _scale_axes(axes: Axes, window: Window) -> None:
+    """Limit and label axes in the units of a window, true to scale where that fills the panel."""
+    wide, high = window.units
+    window.limit_axes(axes)
+    axes.set_aspect("equal" if wide == high and _is_true_to_scale(window) else "auto")
+    style.label_axes(axes, f"{_horizontal_axis_text(window)} [{wide.name}]", f"z [{high.name}]")
 
 
 def _draw_loop(axes: Axes, x: FloatArray, z: FloatArray) -> None:
@@ -181,15 +179,12 @@ def draw_gain(figure: FigureArea, analysis: Analysis) -> None:
     field = curl_field(surface, window.segment, window.bottom, *_GRID_CELLS)
     scale = _gain_scale(analysis, field.gain)
     axes = style.single_axes(figure)
-    mesh = draw_gain_field(axes, field, scale, (wide, high))
+    mesh = draw_gain_field(axes, field, scale, window)
     _fade_beyond_depth(axes, analysis, window, field)
     at = project_on_window(window, witness_point(analysis)) if analysis.q.at is not None else None
     if at is not None:
         _draw_cross(axes, at[0] * wide.scale, at[1] * high.scale)
-    axes.set_xlim(0.0, window.segment.length * wide.scale)
-    axes.set_ylim(window.bottom * high.scale, window.top * high.scale)
-    axes.set_aspect("equal" if wide == high and _is_true_to_scale(window) else "auto")
-    style.label_axes(axes, f"{_horizontal_axis_text(window)} [{wide.name}]", f"z [{high.name}]")
+    _scale_axes(axes, window)
     style.title_law(axes, surface.law, _gain_remark(analysis))
     add_gain_colorbar(figure, mesh, axes, "‖J‖ / k [1]")
 
@@ -225,8 +220,7 @@ def draw_top_view(figure: FigureArea, analysis: Analysis) -> None:
         _draw_cross(axes, float(x), float(y))
         dx, dy = analysis.leak.line.direction
         axes.axline((x, y), (x + dx, y + dy), color=_BLUE, lw=0.8, ls=":", zorder=3)
-        axes.set_xlim(x0, x1)
-        axes.set_ylim(y0, y1)
+        axes.set(xlim=(x0, x1), ylim=(y0, y1))
     style.label_axes(axes, f"x [{unit.name}]", f"y [{unit.name}]")
     remark = "greatest of five depths, sampled; dotted: the vertical plane of the other figure"
     style.set_panel_title(axes, surface.law.letter, "seen from above", remark)
@@ -304,11 +298,10 @@ def draw_jumps(figure: FigureArea, analysis: Analysis) -> None:
     size = np.array([jump.size for jump in jumps])
     wide, high = style.length_unit(float(depth.max())), style.force_unit(float(size.max()))
     axes = style.single_axes(figure)
-    axes.plot(
-        depth * wide.scale, size * high.scale, "o-", color=style.BLUE, lw=1.0, ms=5.5, label="jump"
-    )
-    axes.set_xlim(0.0, 1.05 * max(float(depth.max()), 1e-12) * wide.scale)
-    axes.set_ylim(0.0, 1.12 * float(size.max()) * high.scale)
+    x, y = depth * wide.scale, size * high.scale
+    axes.plot(x, y, "o-", color=style.BLUE, lw=1.0, ms=5.5, label="jump")
+    right = 1.05 * max(float(depth.max()), 1e-12) * wide.scale
+    axes.set(xlim=(0.0, right), ylim=(0.0, 1.12 * float(y.max())))
     axes.grid(color=style.FAINT, lw=0.5)
     style.label_axes(axes, f"depth [{wide.name}]", f"jump of the force [{high.name}]")
     surface = analysis.surface

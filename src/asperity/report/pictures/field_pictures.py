@@ -57,16 +57,11 @@ class Window:
         """Width over height."""
         return self.segment.length / (self.top - self.bottom)
 
-
-@dataclass(frozen=True)
-class _PanelLayout:
-    """Window and scales shared by all panels."""
-
-    window: Window
-    x_unit: style.AxisUnit
-    z_unit: style.AxisUnit
-    curl_limit: float
-    force_per_inch: float
+    def limit_axes(self, axes: Axes) -> None:
+        """Limit axes, which are in its units, to the window."""
+        wide, high = self.units
+        top = self.top * high.scale
+        axes.set(xlim=(0.0, self.segment.length * wide.scale), ylim=(self.bottom * high.scale, top))
 
 
 def field_segment(surfaces: Sequence[Surface]) -> ScanSegment:
@@ -123,105 +118,72 @@ def draw_fields(
     segment, bottom, top = window.segment, window.bottom, window.top
     curls = [curl_field(surface, segment, bottom) for surface in surfaces]
     arrows = [arrow_field(surface, segment, bottom, top) for surface in surfaces]
-    layout = _make_layout(surfaces, window, curls, arrows)
-    x, y = f"along the scan line [{layout.x_unit.name}]", f"z [{layout.z_unit.name}]"
-    panels = style.axes_grid(figure, len(surfaces), _column_count(len(surfaces)), x=x, y=y)
-    mesh: Any = None
-    quiver: Any = None
+    curl_limit, force_per_inch = _choose_scales(surfaces, curls, arrows)
+    (wide, high), columns = window.units, _column_count(len(surfaces))
+    x, y = f"along the scan line [{wide.name}]", f"z [{high.name}]"
+    panels = style.axes_grid(figure, len(surfaces), columns, x=x, y=y)
+    is_true_to_scale = wide == high and _MIN_ASPECT <= window.aspect <= _MAX_ASPECT
     for index, (axes, surface) in enumerate(zip(panels, surfaces, strict=True)):
-        mesh = _draw_curl(axes, curls[index], layout)
-        quiver = _draw_arrows(axes, arrows[index], layout)
-        _draw_outline(axes, surface, layout)
-        remark = remarks[index] if index < len(remarks) else ""
-        style.title_law(axes, surface.law, remark)
-    _finish_figure(figure, panels, layout, (mesh, quiver))
+        mesh = _draw_curl(axes, curls[index], window, curl_limit)
+        quiver = _draw_arrows(axes, arrows[index], window, force_per_inch)
+        _draw_outline(axes, surface, window)
+        style.title_law(axes, surface.law, remarks[index] if index < len(remarks) else "")
+        window.limit_axes(axes)
+        axes.set_aspect("equal" if is_true_to_scale else "auto")
+    label = "curl [N/m]: white is conservative"
+    bar = style.add_colorbar(figure, mesh, panels, label, **style.WIDE_COLORBAR)
+    _draw_force_key(bar, quiver, style.nice_length(0.35 * force_per_inch))
     return panels
 
 
-def _make_layout(
-    surfaces: Sequence[Surface],
-    window: Window,
-    curls: Sequence[CurlField],
-    arrows: Sequence[PlaneForces],
-) -> _PanelLayout:
+def _choose_scales(
+    surfaces: Sequence[Surface], curls: Sequence[CurlField], arrows: Sequence[PlaneForces]
+) -> tuple[float, float]:
+    """Return the greatest curl of the colours [N/m] and the force of an inch of arrow [N]."""
     strong = [np.abs(c.curl).ravel() for c in curls if np.abs(c.curl).max() > 1e-9 * c.max_norm]
     limit = float(np.quantile(np.concatenate(strong), 0.97)) if strong else surfaces[0].stiffness
     sizes = np.concatenate([np.hypot(a.tangential, a.normal) for a in arrows])
     usual = float(np.quantile(sizes, 0.9)) if sizes.size else 1.0
     rounded = 2.0 * style.nice_length(0.5 * limit) if limit > 0.0 else 1.0
-    return _PanelLayout(window, *window.units, rounded, usual / 0.32)
+    return rounded, usual / 0.32
 
 
-def _draw_curl(axes: Axes, field: CurlField, layout: _PanelLayout) -> Any:
-    mesh = axes.pcolormesh(
-        field.along * layout.x_unit.scale,
-        field.z * layout.z_unit.scale,
-        field.curl,
-        cmap=style.CURL,
-        vmin=-layout.curl_limit,
-        vmax=layout.curl_limit,
-        shading="flat",
-        rasterized=True,
-        zorder=1,
-    )
+def _draw_curl(axes: Axes, field: CurlField, window: Window, limit: float) -> Any:
     axes.set_facecolor(style.FREE_SPACE)
-    return mesh
+    wide, high = window.units
+    places = (field.along * wide.scale, field.z * high.scale)
+    colours: dict[str, Any] = {"cmap": style.CURL, "vmin": -limit, "vmax": limit, "zorder": 1}
+    return axes.pcolormesh(*places, field.curl, shading="flat", rasterized=True, **colours)
 
 
-def _draw_arrows(axes: Axes, field: PlaneForces, layout: _PanelLayout) -> Any:
-    return axes.quiver(
-        field.along * layout.x_unit.scale,
-        field.z * layout.z_unit.scale,
-        field.tangential,
-        field.normal,
-        scale=layout.force_per_inch,
-        color=style.unthemed_colour(style.INK),
-        zorder=4,
-        **_ARROWS,
-    )
+def _draw_arrows(axes: Axes, field: PlaneForces, window: Window, force_per_inch: float) -> Any:
+    wide, high = window.units
+    places = (field.along * wide.scale, field.z * high.scale)
+    options = _ARROWS | {"scale": force_per_inch, "color": style.unthemed_colour(style.INK)}
+    return axes.quiver(*places, field.tangential, field.normal, zorder=4, **options)
 
 
-def _draw_outline(axes: Axes, surface: Surface, layout: _PanelLayout) -> None:
+def _draw_outline(axes: Axes, surface: Surface, window: Window) -> None:
     """Draw the textured body, the contact surface if it is another, and the scan."""
-    along = layout.window.segment.distances(600)
-    x = along * layout.x_unit.scale
-    xy = layout.window.segment.xy(along)
-    heights = surface.texture.height(xy) * layout.z_unit.scale
+    wide, high = window.units
+    along = window.segment.distances(600)
+    x = along * wide.scale
+    xy = window.segment.xy(along)
+    heights = surface.texture.height(xy) * high.scale
     contact = surface.law.contact
     on_texture = contact.begins_on_texture
     ink, green = style.unthemed_colour(style.INK), style.unthemed_colour(style.GREEN)
     axes.plot(x, heights, color=ink, linewidth=1.3, linestyle="-" if on_texture else ":")
     if not on_texture:
-        tops = contact.contact_height(surface.texture, xy) * layout.z_unit.scale
+        tops = contact.contact_height(surface.texture, xy) * high.scale
         axes.plot(x, tops, color=ink, linewidth=1.3)
-    axes.axhline(scan_height(surface) * layout.z_unit.scale, color=green, lw=1.0, ls="--")
+    axes.axhline(scan_height(surface) * high.scale, color=green, lw=1.0, ls="--")
 
 
-def _finish_figure(
-    figure: Figure | SubFigure, panels: list[Axes], layout: _PanelLayout, artists: Any
-) -> None:
-    mesh, quiver = artists
-    window = layout.window
-    for axes in panels:
-        axes.set_xlim(0.0, window.segment.length * layout.x_unit.scale)
-        axes.set_ylim(window.bottom * layout.z_unit.scale, window.top * layout.z_unit.scale)
-        if layout.x_unit == layout.z_unit and _MIN_ASPECT <= window.aspect <= _MAX_ASPECT:
-            axes.set_aspect("equal")
-    bar = figure.colorbar(
-        mesh, ax=panels, location="bottom", shrink=0.5, aspect=40, extend="both", pad=0.02
-    )
-    style.style_colorbar(bar, "curl [N/m]: white is conservative")
-    force = style.nice_length(0.35 * layout.force_per_inch)
+def _draw_force_key(bar: Any, quiver: Any, force: float) -> None:
+    """Draw an arrow of a force [N] in the axes of a colour bar, which no law hides."""
     unit = style.force_unit(force)
-    # In the axes of the bar, which are not hidden with a law.
-    bar.ax.quiverkey(
-        quiver,
-        0.92,
-        1.04,
-        force,
-        f"{force * unit.scale:g} {unit.name}",
-        labelpos="W",
-        color=style.INK,
-        fontproperties={"size": style.TICK},
-        labelcolor=style.INK,
-    )
+    text = f"{force * unit.scale:g} {unit.name}"
+    options: dict[str, Any] = {"color": style.INK, "labelcolor": style.INK, "labelpos": "W"}
+    font = {"size": style.TICK}
+    bar.ax.quiverkey(quiver, 0.92, 1.04, force, text, fontproperties=font, **options)

@@ -17,7 +17,7 @@ from asperity.analysis.energy.merit import scan_height
 from asperity.analysis.results import LawRow
 from asperity.core.units import format_quantity
 from asperity.report.pictures import style
-from asperity.report.pictures.field_pictures import field_segment
+from asperity.report.pictures.field_pictures import Window, field_window
 from asperity.report.pictures.scan_plane import (
     CurlField,
     PlaneForces,
@@ -25,7 +25,6 @@ from asperity.report.pictures.scan_plane import (
     choose_segment,
     curl_field,
     feature_length,
-    field_range,
     scan_forces,
 )
 from asperity.report.sentences.number_text import bound_text, number_text, strength_has_unit
@@ -61,8 +60,8 @@ def draw_forces(figure: Figure | SubFigure, surfaces: Sequence[Surface]) -> None
     for axes, surface, force in zip(panels, surfaces, forces, strict=True):
         _draw_force_panel(axes, surface, force, (wide, unit))
         _annotate_clipping(axes, force, limits, unit)
-    panels[0].set_ylim(limits[0] * unit.scale, limits[1] * unit.scale)
-    panels[0].set_xlim(0.0, segment.length * wide.scale)
+    low, high = (limit * unit.scale for limit in limits)
+    panels[0].set(xlim=(0.0, segment.length * wide.scale), ylim=(low, high))
     _draw_force_legend(figure, panels[0])
 
 
@@ -112,15 +111,9 @@ def _annotate_clipping(
 
 def _draw_force_legend(figure: Figure | SubFigure, axes: Axes) -> None:
     handles, names = axes.get_legend_handles_labels()
-    figure.legend(
-        handles,
-        [f"{name} force" for name in names],
-        loc="outside upper left",
-        ncols=2,
-        fontsize=style.LABEL,
-        frameon=False,
-        labelcolor=style.INK,
-    )
+    texts = [f"{name} force" for name in names]
+    options: dict[str, Any] = {"fontsize": style.LABEL, "labelcolor": style.INK}
+    style.add_legend(figure, handles, texts, loc="outside upper left", ncols=2, **options)
 
 
 _GAIN_CELLS = (120, 60)
@@ -132,42 +125,41 @@ def gain_figure(comparison: Comparison) -> Figure:
     The witness is a cross, if it is in the part of the plane that is shown.
     """
     surfaces = [row.surface for row in comparison.rows]
-    segment = field_segment(surfaces)
-    bottom, top = field_range(surfaces, segment)
-    fields = [curl_field(surface, segment, bottom, *_GAIN_CELLS) for surface in surfaces]
+    window = field_window(surfaces)
+    fields = [
+        curl_field(surface, window.segment, window.bottom, *_GAIN_CELLS) for surface in surfaces
+    ]
     values = np.concatenate([field.gain.ravel() for field in fields])
     highest = max(float(np.quantile(values[np.isfinite(values)], 0.995)), 2.0)
     scale = LogNorm(min(0.5, float(np.quantile(values[values > 0.0], 0.02))), highest)
-    wide, high = style.length_unit(segment.length), style.length_unit(top - bottom)
+    wide, high = window.units
     x, y = f"along the scan line [{wide.name}]", f"z [{high.name}]"
     figure, panels = style.law_panels(len(surfaces), 2.2, 0.9, x=x, y=y)
     for axes, row, field in zip(panels, comparison.rows, fields, strict=True):
-        mesh = draw_gain_field(axes, field, scale, (wide, high))
+        mesh = draw_gain_field(axes, field, scale, window)
         style.title_law(axes, row.law, f"q = {bound_text(row.q)}")
-        _draw_witness(axes, row, segment, (wide, high))
-        axes.set_ylim(bottom * high.scale, top * high.scale)
+        _draw_witness(axes, row, window)
+        axes.set_ylim(window.bottom * high.scale, window.top * high.scale)
     add_gain_colorbar(figure, mesh, panels, "‖J‖ / k: loop gain over that of the smooth wall [1]")
     return figure
 
 
-def _draw_witness(
-    axes: Axes, row: LawRow, segment: ScanSegment, units: tuple[style.AxisUnit, style.AxisUnit]
-) -> None:
+def _draw_witness(axes: Axes, row: LawRow, window: Window) -> None:
     """Draw a cross at the witness of q, if it is in the part of the plane that is shown."""
     if row.q.at is None:
         return
+    segment, (wide, high) = window.segment, window.units
     along, aside = segment.project(np.array(row.q.at[:2]))
     if 0.0 <= along <= segment.length and aside < 0.01 * segment.length:
-        x, y = along * units[0].scale, row.q.at[2] * units[1].scale
+        x, y = along * wide.scale, row.q.at[2] * high.scale
         axes.plot(x, y, "x", color=style.unthemed_colour(style.BLUE), ms=7, mew=2, zorder=5)
 
 
-def draw_gain_field(
-    axes: Axes, field: CurlField, scale: LogNorm, units: tuple[style.AxisUnit, style.AxisUnit]
-) -> Any:
+def draw_gain_field(axes: Axes, field: CurlField, scale: LogNorm, window: Window) -> Any:
     """Draw ‖J‖/k of the cells of a vertical plane; return the mesh for a colour bar."""
     axes.set_facecolor(style.FREE_SPACE)
-    x, z = field.along * units[0].scale, field.z * units[1].scale
+    wide, high = window.units
+    x, z = field.along * wide.scale, field.z * high.scale
     gain = np.maximum(field.gain, scale.vmin or 0.0)
     return axes.pcolormesh(x, z, gain, norm=scale, cmap="magma_r", shading="flat", rasterized=True)
 
@@ -176,13 +168,11 @@ def add_gain_colorbar(
     figure: Figure | SubFigure, mesh: Any, axes: Axes | list[Axes], label: str
 ) -> None:
     """Draw the colour bar of ‖J‖/k."""
-    bar = figure.colorbar(
-        mesh, ax=axes, location="bottom", shrink=0.5, aspect=40, pad=0.02, extend="both",
-        ticks=LogLocator(subs=(1.0, 2.0, 5.0)),
-        format=FuncFormatter(lambda value, _place: number_text(value)),
-    )  # fmt: skip
+    ticks = LogLocator(subs=(1.0, 2.0, 5.0))
+    text = FuncFormatter(lambda value, _place: number_text(value))
+    options = style.WIDE_COLORBAR | {"ticks": ticks, "format": text}
+    bar = style.add_colorbar(figure, mesh, axes, label, **options)
     bar.ax.xaxis.set_minor_locator(NullLocator())
-    style.style_colorbar(bar, label)
 
 
 def merit_figure(comparison: Comparison) -> Figure:
@@ -212,8 +202,7 @@ def merit_figure(comparison: Comparison) -> Figure:
         )
         for artist in (point, letter):
             style.mark_law(artist, row.law.letter)
-    axes.set_xlim(0.0, 1.15 * widest)
-    axes.set_ylim(0.0, 1.15)
+    axes.set(xlim=(0.0, 1.15 * widest), ylim=(0.0, 1.15))
     axes.grid(color=style.FAINT, lw=0.5)
     style.label_axes(axes, f"strength T{unit}", "support S")
     axes.plot([], [], "o", color=style.GREEN, label="conservative and continuous")

@@ -14,7 +14,7 @@ from asperity.analysis.limits.limit_result import Limits
 from asperity.core.errors import ParameterError
 from asperity.recording.recording import Recording
 from asperity.report.pictures import style
-from asperity.report.pictures.analysis_pictures import available_pictures, picture_size
+from asperity.report.pictures.analysis_pictures import available_pictures
 from asperity.report.pictures.field_pictures import draw_fields, field_size
 from asperity.report.pictures.law_pictures import draw_forces, force_size, gain_figure, merit_figure
 from asperity.report.pictures.loop_pictures import recording_figure, run_figure
@@ -85,7 +85,7 @@ def _plot_analysis(result: Analysis, picture: str | None = None) -> Figure:
     drawings = available_pictures(result)
     _check_picture_name(picture, *drawings)
     names = list(drawings) if picture is None else [picture]
-    return _stacked_figure(*[_analysis_drawing(result, name) for name in names])
+    return _stacked_figure(*[drawings[name] for name in names])
 
 
 @plot.register
@@ -108,27 +108,18 @@ def _plot_recording(result: Recording, picture: str | None = None) -> Figure:
     return recording_figure(result)
 
 
-# Width and height [inch], and a function that draws into a figure or a part of one.
-_SizedDrawing = tuple[tuple[float, float], Callable[[Any], object]]
-
-
-def _texture_drawing(texture: Texture) -> _SizedDrawing:
+def _texture_drawing(texture: Texture) -> style.SizedDrawing:
     return surface_size(texture), partial(draw_surface, texture=texture)
 
 
-def _forces_drawing(surfaces: Sequence[Surface]) -> _SizedDrawing:
+def _forces_drawing(surfaces: Sequence[Surface]) -> style.SizedDrawing:
     """Return the forces along the scan, one panel per law, on shared axes."""
     return force_size(len(surfaces)), partial(draw_forces, surfaces=surfaces)
 
 
-def _fields_drawing(surfaces: Sequence[Surface], remarks: Sequence[str] = ()) -> _SizedDrawing:
+def _fields_drawing(surfaces: Sequence[Surface], remarks: Sequence[str] = ()) -> style.SizedDrawing:
     """Return the force fields over their curl, one panel per law, on shared scales."""
     return field_size(surfaces), partial(draw_fields, surfaces=surfaces, remarks=remarks)
-
-
-def _analysis_drawing(analysis: Analysis, name: str) -> _SizedDrawing:
-    draw = available_pictures(analysis)[name][0]
-    return picture_size(analysis, name), lambda part: draw(part, analysis)
 
 
 def _conservation_remarks(comparison: Comparison) -> list[str]:
@@ -138,7 +129,7 @@ def _conservation_remarks(comparison: Comparison) -> list[str]:
     ]
 
 
-def _stacked_figure(*drawings: _SizedDrawing) -> Figure:
+def _stacked_figure(*drawings: style.SizedDrawing) -> Figure:
     """Return a figure with one drawing below the other."""
     heights = [height for (_, height), _ in drawings]
     figure = style.new_figure(max(width for (width, _), _ in drawings), sum(heights))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,6 +34,13 @@ colours above.
 """
 TITLE, LABEL, TICK = 10.0, 9.0, 8.0
 HEIGHTS = "cividis"
+WIDE_COLORBAR: dict[str, Any] = {
+    "location": "bottom",
+    "shrink": 0.5,
+    "aspect": 40,
+    "extend": "both",
+}
+"""Options of a colour bar below all panels."""
 INCH_ARROWS: dict[str, Any] = {"angles": "uv", "units": "inches", "scale_units": "inches"}
 
 # ColorBrewer's PuOr with a pure white centre, which means no curl.
@@ -52,6 +60,10 @@ def unthemed_colour(colour: str) -> str:
     """
     value = int(colour[1:], 16)
     return f"#{value - 1 if value & 1 else value + 1:06x}"
+
+
+SizedDrawing = tuple[tuple[float, float], Callable[[Any], object]]
+"""Width and height [inch], and a function that draws into a figure or a part of one."""
 
 
 @dataclass(frozen=True)
@@ -190,9 +202,9 @@ def axes_grid(
     return list(grid.ravel()[:count])
 
 
-def add_legend(axes: Axes, **options: Any) -> None:
-    """Add a legend without a frame."""
-    axes.legend(**{"fontsize": TICK, "frameon": False, "labelcolor": MUTED, **options})
+def add_legend(owner: Axes | Figure | SubFigure, *entries: Any, **options: Any) -> None:
+    """Add a legend without a frame; entries and options are those of Matplotlib."""
+    owner.legend(*entries, **{"fontsize": TICK, "frameon": False, "labelcolor": MUTED, **options})
 
 
 def add_note(axes: Axes, text: str, position: tuple[float, float], **options: Any) -> None:
@@ -242,9 +254,13 @@ def label_axes(axes: Axes, x: str = "", y: str = "") -> None:
     axes.set_ylabel(y, fontsize=LABEL, color=MUTED)
 
 
-def style_colorbar(bar: Any, text: str) -> None:
-    """Apply the common style to a colour bar."""
+def add_colorbar(
+    figure: Figure | SubFigure, artist: Any, axes: Axes | list[Axes], label: str, **options: Any
+) -> Any:
+    """Return a new colour bar on the right of axes; options are those of Matplotlib."""
+    bar: Any = figure.colorbar(artist, ax=axes, **{"pad": 0.02, "aspect": 18, **options})
     bar.ax.tick_params(labelsize=TICK, colors=MUTED, length=3, width=0.6)
     bar.outline.set_edgecolor(FAINT)
     bar.solids.set_rasterized(True)  # its colours are data and do not follow the theme
-    bar.set_label(text, fontsize=LABEL, color=MUTED)
+    bar.set_label(label, fontsize=LABEL, color=MUTED)
+    return bar

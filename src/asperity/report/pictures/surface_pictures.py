@@ -89,8 +89,7 @@ def draw_section(axes: Axes, texture: Texture, segment: ScanSegment) -> None:
     margin = 0.12 * max(top - low, 1e-9)
     style.fill_below(axes, x, z, low - 3.0 * margin)
     axes.plot(x, z, color=style.INK, linewidth=1.1, label="height")
-    axes.set_xlim(x[0], x[-1])
-    axes.set_ylim(low - 3.0 * margin, top + margin)
+    axes.set(xlim=(x[0], x[-1]), ylim=(low - 3.0 * margin, top + margin))
     axes.set_facecolor(style.BACKGROUND)
     style.style_axes(axes)
     style.label_axes(axes, f"along the scan line [{wide.name}]", f"height [{high.name}]")
@@ -118,8 +117,7 @@ def _draw_map(figure: Figure | SubFigure, axes: Axes, texture: Texture) -> None:
     style.label_axes(axes, f"x [{wide.name}]", f"y [{wide.name}]")
     _draw_scan_line(axes, texture, wide)
     _draw_scale_bar(axes, float(grid.size[0]))
-    bar: Any = figure.colorbar(known, ax=axes, pad=0.02, aspect=18)
-    style.style_colorbar(bar, f"height [{high.name}]")
+    style.add_colorbar(figure, known, axes, f"height [{high.name}]")
 
 
 def _shade_relief(
@@ -217,8 +215,7 @@ def _draw_card_section(axes: Axes, texture: Texture) -> None:
     margin = 0.15 * float(np.ptp(z))
     style.fill_below(axes, x, z, z.min() - margin)
     axes.plot(x, z, color=style.INK, linewidth=0.9, label="height")
-    axes.set_xlim(x[0], x[-1])
-    axes.set_ylim(float(z.min()) - margin, float(z.max()) + margin)
+    axes.set(xlim=(x[0], x[-1]), ylim=(float(z.min()) - margin, float(z.max()) + margin))
     style.style_axes(axes)
     style.label_axes(axes, f"[{wide.name}]", f"[{high.name}]")
 
@@ -289,5 +286,4 @@ def _draw_height_map(
     style.style_axes(axes)
     _add_title(axes, title)
     style.label_axes(axes, f"x [{wide.name}]", f"y [{wide.name}]")
-    bar: Any = figure.colorbar(image, ax=axes, pad=0.02, aspect=18, extend="both")
-    style.style_colorbar(bar, f"height [{high.name}]")
+    style.add_colorbar(figure, image, axes, f"height [{high.name}]", extend="both")
