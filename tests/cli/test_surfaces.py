@@ -18,8 +18,8 @@ from asperity.cli.surface_commands import surfaces_command
 from asperity.core.errors import ParameterError
 from asperity.core.units import parse_quantity
 from asperity.report.html import render_page
+from asperity.report.pictures.style import svg_text
 from asperity.report.pictures.surface_pictures import gallery_figure
-from asperity.report.pictures.svg import svg_text
 from asperity.report.surface_gallery import find_surfaces, surfaces_page
 from asperity.scene import TEXTURE_KINDS, load_scene
 from asperity.textures import Sinusoid

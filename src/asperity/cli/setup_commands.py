@@ -71,9 +71,9 @@ def cache_command(outputs: output.Outputs, *, clear: bool) -> None:
         {"name": name, "entries": len(parts), "size": sum(parts)} for name, parts in sizes.items()
     ]
     data = {"schema": 1, "folder": str(folder), "limit": limit, "rooms": rooms}
-    from asperity.report.page import text_page
+    from asperity.report.page import Paragraph, terminal_page
 
-    outputs.write(data, text_page("\n".join(lines)))
+    outputs.write(data, terminal_page(Paragraph("\n".join(lines), "code")))
     if clear and entries:
         raise AsperityError(f"{len(entries)} entries of {folder} cannot be deleted")
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from asperity.analysis.analyze import Analysis
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.passivity.assess_passivity import stability_limit_text
 from asperity.analysis.passivity.verdict import Passivity
+from asperity.clamps import NONE
 from asperity.core.units import format_quantity
+from asperity.laws import LAWS, SHIPPED_LAW_ARGUMENTS
 from asperity.report import page
 from asperity.report.device_report import device_numbers_table
 from asperity.report.page import HEADED, Cell, Media, Row, Section, Table, TableLayout
@@ -27,8 +31,8 @@ from asperity.report.sentences.number_text import (
     upper_bound_text,
     witness_text,
 )
-from asperity.report.sentences.reproduction_code import reproduction_lines
 from asperity.report.sentences.texts import figure_text, glossary
+from asperity.surface import Surface
 
 _BOUND_HEADINGS = ("number", "lower", "upper", "method", "attained at")
 _CRITERIA_HEADINGS = ("criterion", "condition", "holds", "limit", "margin", "conclusion, premises")
@@ -47,15 +51,6 @@ _CRITERIA_FIELDS = (
 )
 
 
-def named_bounds(analysis: Analysis) -> list[tuple[str, Bound]]:
-    """Return the numbers of an analysis with their symbols."""
-    density = analysis.curl_density
-    bounds = _computed_bounds(analysis)
-    if density is not None and density.upper > 0.0:
-        bounds.append(("|curl f| [N/m]", density))
-    return bounds
-
-
 def _computed_bounds(analysis: Analysis) -> list[tuple[str, Bound]]:
     """Return the numbers that were searched for, from which the others follow."""
     curl = [] if analysis.curl is None else [("|curl f|/k", analysis.curl)]
@@ -69,13 +64,6 @@ def undecided_criteria(analysis: Analysis) -> list[tuple[str, str]]:
         if criterion.holds is None:
             names.setdefault(criterion.conclusion, []).append(criterion.name)
     return [("; ".join(group), reason) for reason, group in names.items()]
-
-
-def stiffness_text(analysis: Analysis) -> str:
-    """Return the stability limit of the stiffness with its basis, as in a comparison."""
-    return stability_limit_text(
-        analysis.passivity.stability_limit, analysis.passivity.critical_speed
-    )
 
 
 def bound_notes(analysis: Analysis) -> list[str]:
@@ -113,15 +101,6 @@ def thrust_text(analysis: Analysis) -> str:
     # Smaller values are rounding errors of forces up to stiffness times depth.
     is_zero = abs(thrust) <= 1e-12 * surface.stiffness * surface.max_depth
     return f"{'0 N' if is_zero else format_quantity(thrust, 'N')} on a straight scan"
-
-
-def jump_rows(analysis: Analysis) -> list[tuple[str, str, str]]:
-    """Return depth, size and position of every located jump, in common units."""
-    jumps = analysis.continuity.jumps
-    depths = format_in_one_unit([jump.depth for jump in jumps], "m")
-    sizes = format_in_one_unit([jump.size for jump in jumps], "N")
-    places = [position_text(jump.before) for jump in jumps]
-    return list(zip(depths, sizes, places, strict=True))
 
 
 def leak_facts(analysis: Analysis) -> list[tuple[str, str]]:
@@ -168,8 +147,11 @@ def merit_facts(analysis: Analysis) -> list[tuple[str, str]]:
 
 def bounds_table(analysis: Analysis) -> Table:
     """Return one row per number: lower, upper, method and the point that attains lower."""
+    bounds, density = _computed_bounds(analysis), analysis.curl_density
+    if density is not None and density.upper > 0.0:
+        bounds.append(("|curl f| [N/m]", density))
     rows = []
-    for name, bound in named_bounds(analysis):
+    for name, bound in bounds:
         ends = [lower_bound_text(bound.lower), upper_bound_text(bound.upper)]
         rows.append(Row([Cell(name, "l"), *ends, bound.method, witness_text(bound)]))
     return Table(_BOUND_HEADINGS, rows, (1, 2), TableLayout(wrap=(4,)))
@@ -195,7 +177,11 @@ def criteria_table(passivity: Passivity) -> Table:
 
 def _jumps_table(analysis: Analysis) -> Table:
     """Return one row per depth at which a jump was located."""
-    rows = [Row(cells) for cells in jump_rows(analysis)]
+    jumps = analysis.continuity.jumps
+    depths = format_in_one_unit([jump.depth for jump in jumps], "m")
+    sizes = format_in_one_unit([jump.size for jump in jumps], "N")
+    places = [position_text(jump.before) for jump in jumps]
+    rows = [Row(cells) for cells in zip(depths, sizes, places, strict=True)]
     return Table(_JUMP_HEADINGS, rows, (0, 1), TableLayout(wrap=(2,)))
 
 
@@ -208,7 +194,7 @@ def analysis_page(analysis: Analysis, texture_code: str = "") -> page.Page:
     Args:
         analysis: the result.
         texture_code: a Python expression of the texture; see
-            :func:`asperity.report.sentences.reproduction_code.reproduction_lines`.
+            :func:`reproduction_lines`.
     """
     law, code = analysis.surface.law, "\n".join(reproduction_lines(analysis, texture_code))
     return page.Page(
@@ -267,7 +253,8 @@ def _criteria_sections(analysis: Analysis) -> list[Section]:
     marked = [replace(one, cells=["→" if one.kind else "", *one.cells]) for one in table.rows]
     layout = TableLayout(wrap=(1,), max_widths={1: 18}, omit=(6,))
     short = Table(("", *table.headings), marked, (4, 5), layout)
-    stiffness = f"Stiffness: {stiffness_text(analysis)}"
+    limit = stability_limit_text(passivity.stability_limit, passivity.critical_speed)
+    stiffness = f"Stiffness: {limit}"
     caption = (
         f"Verdict: {passivity.verdict}. It rests on: {passivity.decided_by}. {stiffness}. T is the "
         "update period, σ₀ the least damping of the device, b_v virtual damping, d the delay in "
@@ -301,3 +288,74 @@ def _figure_sections(analysis: Analysis, *names: str) -> list[Section]:
             media = Media.HTML | Media.NOTEBOOK if name == "gain" else Media.HTML
             sections.append(Section(title, [picture], caption, level=3, media=media))
     return sections
+
+
+# --- Python code that reproduces q ----------------------------------------------------------------
+
+# Distance from the onset of the medial axis, as a fraction of the distance to the surface.
+_ONSET_OFFSET = 1e-6
+_UNBOUNDED_TEXT = "grows without bound towards the onset"
+
+
+def reproduction_lines(analysis: Analysis, texture_code: str = "") -> list[str]:
+    """Return three lines of Python that evaluate ‖J‖/k where it attains q.
+
+    Where q is infinite they evaluate it just above the onset, where it is large.
+
+    Args:
+        analysis: the result.
+        texture_code: an expression of the texture; by default its ``repr`` if that is one.
+    """
+    surface = analysis.surface
+    lines = ["import asperity as asp, numpy as np"]
+    if "load_scene(" in texture_code:
+        lines[0] += "; from asperity.scene import load_scene"
+    texture = _texture_expression(surface, texture_code)
+    lines.append(f"s = asp.Surface({texture}, {_surface_arguments(surface)})")
+    evaluation = _evaluate_witness(analysis)
+    if evaluation is None:
+        q = interval_text(analysis.q)
+        return [*lines, f"print(asp.characteristic_number(s))  # {q}, {analysis.q.method}"]
+    point, value, remark = evaluation
+    arguments = f"[{[float(v) for v in point]}]"
+    if analysis.q.deflection is not None:
+        deflection = list(analysis.q.deflection)
+        arguments += f", [{deflection}], np.array([{analysis.q.sliding}])"
+    call = f"np.linalg.norm(s.jacobian({arguments})[0], 2) / s.stiffness"
+    return [*lines, f"print({call})  # {value:.12g}{remark}"]
+
+
+def _evaluate_witness(analysis: Analysis) -> tuple[np.ndarray, float, str] | None:
+    """Return the point of the evaluation, its value and a remark; ``None`` without a witness."""
+    surface, q = analysis.surface, analysis.q
+    if q.at is None:
+        return None
+    at, remark = np.array(q.at), ""
+    if math.isinf(q.lower):
+        closest = surface.texture.nearest(at[None])[0]
+        at, remark = at + _ONSET_OFFSET * (closest - at), f": {_UNBOUNDED_TEXT}"
+    state = () if q.deflection is None else (np.array([q.deflection]), np.array([q.sliding]))
+    jacobian = surface.jacobian(at[None], *state)[0]
+    return at, float(np.linalg.norm(jacobian, 2)) / surface.stiffness, remark
+
+
+def _texture_expression(surface: Surface, texture_code: str) -> str:
+    if texture_code:
+        return texture_code
+    written = repr(surface.texture)
+    return "texture" if written.startswith("<") else f"asp.{written}"
+
+
+def _surface_arguments(surface: Surface) -> str:
+    law = surface.law
+    shipped = LAWS.get(law.letter) is law
+    parts = [repr(law.letter) if shipped else "law"]
+    parts += [f"stiffness={surface.stiffness!r}", f"max_depth={surface.max_depth!r}"]
+    own = {name: v for name, v in surface.law_parameters.items() if v != law.parameters[name]}
+    parts += [f"{name}={v!r}" for name, v in own.items() if name in SHIPPED_LAW_ARGUMENTS]
+    rest = {name: v for name, v in own.items() if name not in SHIPPED_LAW_ARGUMENTS}
+    if rest:
+        parts.append(f"law_parameters={rest!r}")
+    if surface.clamp != NONE.name:
+        parts.append(f"clamp={surface.clamp!r}")
+    return ", ".join(parts)

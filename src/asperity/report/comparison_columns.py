@@ -1,10 +1,12 @@
-"""Columns of the tables that compare laws."""
+"""Tables that compare laws, and their columns."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
+
+from rich.table import Table as RichTable
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.compare import Comparison
@@ -14,7 +16,7 @@ from asperity.analysis.passivity.verdict import Basis
 from asperity.analysis.results import LawRow
 from asperity.core.arguments import Argument
 from asperity.core.units import format_quantity, round_down
-from asperity.report.page import Cell, Row, Table, TableLayout
+from asperity.report.page import Cell, Media, Row, Section, Table, TableLayout, terminal_section
 from asperity.report.sentences.number_text import (
     NOT_AVAILABLE,
     SAMPLED_MARK,
@@ -29,7 +31,8 @@ from asperity.report.sentences.number_text import (
     strength_has_unit,
     yes_no_text,
 )
-from asperity.report.sentences.texts import column_meanings
+from asperity.report.sentences.texts import column_meanings, table_notes
+from asperity.report.terminal import rich_table
 from asperity.textures.catalogue import CATALOGUE
 
 VERDICT_MIN_CONSOLE = 72
@@ -175,6 +178,7 @@ SUMMARY_COLUMNS = (
     LawColumn("feeds?", _leak_cell, True, 44),
     LawColumn("clicks?", lambda row, _: _continuity_cell(row, not row.continuous), False, 36),
 )
+_CONSOLE_COLUMNS = (*SUMMARY_COLUMNS, VERDICT_COLUMN)
 FULL_COLUMNS = (
     _LETTER_COLUMN,
     NAME_COLUMN,
@@ -201,7 +205,7 @@ def single_line(heading: str) -> str:
     return heading.replace("-\n", "").replace("\n", " ")
 
 
-def _law_rows(comparison: Comparison, cells: Callable[[LawRow], Sequence[str | Cell]]) -> list[Row]:
+def law_rows(comparison: Comparison, cells: Callable[[LawRow], Sequence[str | Cell]]) -> list[Row]:
     """Return a row per law, the recommended one marked."""
     best = comparison.recommended_row
     return [
@@ -212,7 +216,7 @@ def _law_rows(comparison: Comparison, cells: Callable[[LawRow], Sequence[str | C
 
 def laws_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
     """Return one row per law with these columns."""
-    rows = _law_rows(comparison, lambda row: [one.cell(row, comparison) for one in columns])
+    rows = law_rows(comparison, lambda row: [one.cell(row, comparison) for one in columns])
     names = [single_line(one.heading) for one in columns]
     meanings = column_meanings()
     if not any("v*" in row.verdict for row in comparison.rows):
@@ -228,7 +232,59 @@ def laws_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
     return Table([_heading(one, comparison) for one in columns], rows, numeric, layout)
 
 
-def verdicts_table(comparison: Comparison) -> Table:
-    """Return the letter and the verdict of each law."""
-    rows = _law_rows(comparison, lambda row: [Cell(row.law.letter, "l"), row.verdict])
-    return Table((), rows)
+def verdicts_table(comparison: Comparison, max_console: int | None = None) -> Table:
+    """Return letter and verdict of each law, for consoles up to a width [characters]."""
+    rows = law_rows(comparison, lambda row: [Cell(row.law.letter, "l"), row.verdict])
+    return Table((), rows, layout=TableLayout(wrap=(1,), max_console=max_console))
+
+
+# --- sections -------------------------------------------------------------------------------------
+
+
+def comparison_table(comparison: Comparison, width: int = 120, full: bool = False) -> RichTable:
+    """Return one row per law, the first column the letter of the law alone.
+
+    Args:
+        comparison: the result.
+        width: of the console [characters]; on a narrow one columns are left out.
+        full: whether to show q, q⁺, the limit with its basis, leak, T and S instead of the summary.
+
+    Returns:
+        A Rich table.
+    """
+    columns = FULL_COLUMNS if full else _CONSOLE_COLUMNS
+    return rich_table(laws_table(comparison, columns), width)
+
+
+def terminal_sections(comparison: Comparison, full: bool) -> list[Section]:
+    """Return the tables of a terminal and of a notebook; ``full`` for every number."""
+    table = laws_table(comparison, FULL_COLUMNS if full else _CONSOLE_COLUMNS)
+    if has_sampled(comparison):
+        mark = ("~", "sampled, not proved: leak and q may be larger, the limit lower")
+        legend = {**table.layout.legend, len(table.headings): mark}
+        table = replace(table, layout=replace(table.layout, legend=legend))
+    widest = None if full else VERDICT_MIN_CONSOLE - 1
+    summary = _single_line_table(comparison, _CONSOLE_COLUMNS)
+    return [
+        terminal_section(table),
+        terminal_section(verdicts_table(comparison, widest)),
+        Section("", [summary], media=Media.NOTEBOOK),
+    ]
+
+
+def _single_line_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
+    """Return a table whose headings are not broken into lines."""
+    table = laws_table(comparison, columns)
+    return replace(table, headings=[single_line(heading) for heading in table.headings])
+
+
+def law_sections(comparison: Comparison) -> list[Section]:
+    """Return the tables of an HTML page."""
+    summary = _single_line_table(comparison, SUMMARY_COLUMNS)
+    full = _single_line_table(comparison, FULL_COLUMNS)
+    notes = table_notes("sampled") if has_sampled(comparison) else []
+    return [
+        Section("The laws compared", [summary]),
+        Section("What will go wrong", [verdicts_table(comparison)]),
+        Section("Every number", [full], notes=notes),
+    ]

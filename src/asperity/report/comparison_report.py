@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
-
-from rich.table import Table as RichTable
 
 from asperity.analysis.compare import Comparison, DeviceComparisons
 from asperity.analysis.gain.characteristic import surface_content
 from asperity.analysis.limits.perceptibility import force_magnitude_text, speed_text, tier_text
+from asperity.analysis.results import LawRow
 from asperity.core.cache import content_digest
 from asperity.core.files import json_text
 from asperity.core.units import format_quantity
-from asperity.report import page, terminal
+from asperity.report import page
 from asperity.report.comparison_columns import (
-    FULL_COLUMNS,
-    SUMMARY_COLUMNS,
-    VERDICT_COLUMN,
-    VERDICT_MIN_CONSOLE,
-    LawColumn,
     describe_texture,
-    has_sampled,
-    laws_table,
+    law_rows,
+    law_sections,
     recommended_stiffness_text,
-    single_line,
-    verdicts_table,
+    terminal_sections,
 )
 from asperity.report.device_report import datum_text, device_numbers_table
 from asperity.report.measured_report import measured_sections
@@ -41,25 +32,6 @@ from asperity.report.sentences.number_text import (
 from asperity.report.sentences.texts import figure_text, glossary
 
 _FOOTER = f"{page.PAPER_CITATION}. {page.NO_PERCEPTUAL_TEST}"
-_SAMPLED_NOTE = (
-    "~ found by sampling, not proved: the true q, q⁺ and leak may be larger, "
-    "the true safe stiffness smaller."
-)
-
-
-def comparison_table(comparison: Comparison, width: int = 120, full: bool = False) -> RichTable:
-    """Return one row per law, the first column the letter of the law alone.
-
-    Args:
-        comparison: the result.
-        width: of the console [characters]; on a narrow one columns are left out.
-        full: whether to show q, q⁺, the limit with its basis, leak, T and S instead of the summary.
-
-    Returns:
-        A Rich table.
-    """
-    columns = FULL_COLUMNS if full else (*SUMMARY_COLUMNS, VERDICT_COLUMN)
-    return terminal.rich_table(laws_table(comparison, columns), width)
 
 
 def comparison_page(comparison: Comparison, full: bool = False) -> Page:
@@ -74,8 +46,8 @@ def comparison_page(comparison: Comparison, full: bool = False) -> Page:
         answer=comparison.recommendation,
         facts=_facts(comparison),
         sections=[
-            *_terminal_sections(comparison, full),
-            *_law_sections(comparison),
+            *terminal_sections(comparison, full),
+            *law_sections(comparison),
             *_figure_sections(comparison),
             *measured_sections(comparison.texture),
             *page.user_sections(Comparison, comparison),
@@ -105,43 +77,8 @@ def _facts(comparison: Comparison) -> list[tuple[str, str]]:
 
 def _requested_stiffness_text(comparison: Comparison) -> str:
     stiffness = comparison.stiffness
-    if stiffness is None:
-        return "the recommended one of each law"
-    return format_quantity(stiffness, "N/m")
-
-
-def _terminal_sections(comparison: Comparison, full: bool) -> list[Section]:
-    summary_columns = (*SUMMARY_COLUMNS, VERDICT_COLUMN)
-    table = laws_table(comparison, FULL_COLUMNS if full else summary_columns)
-    if has_sampled(comparison):
-        mark = ("~", "sampled, not proved: leak and q may be larger, the limit lower")
-        legend = {**table.layout.legend, len(table.headings): mark}
-        table = replace(table, layout=replace(table.layout, legend=legend))
-    widest = None if full else VERDICT_MIN_CONSOLE - 1
-    layout = TableLayout(wrap=(1,), max_console=widest)
-    verdicts = replace(verdicts_table(comparison), layout=layout)
-    summary = _single_line_table(comparison, summary_columns)
-    return [
-        Section("", [table], media=Media.TERMINAL),
-        Section("", [verdicts], media=Media.TERMINAL),
-        Section("", [summary], media=Media.NOTEBOOK),
-    ]
-
-
-def _single_line_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
-    """Return a table whose headings are not broken into lines."""
-    table = laws_table(comparison, columns)
-    return replace(table, headings=[single_line(heading) for heading in table.headings])
-
-
-def _law_sections(comparison: Comparison) -> list[Section]:
-    summary = _single_line_table(comparison, SUMMARY_COLUMNS)
-    full = _single_line_table(comparison, FULL_COLUMNS)
-    return [
-        Section("The laws compared", [summary]),
-        Section("What will go wrong", [verdicts_table(comparison)]),
-        Section("Every number", [full], notes=[_SAMPLED_NOTE] if has_sampled(comparison) else []),
-    ]
+    recommended = "the recommended one of each law"
+    return recommended if stiffness is None else format_quantity(stiffness, "N/m")
 
 
 def _figure_sections(comparison: Comparison) -> list[Section]:
@@ -244,11 +181,8 @@ def comparisons_page(comparisons: DeviceComparisons) -> Page:
             ("Peak to valley", format_quantity(texture.peak_to_valley, "m")),
         ],
         sections=[
-            Section("", [table], media=Media.TERMINAL),
-            *[
-                Section("", [page.Paragraph(text)], media=Media.TERMINAL)
-                for text in (*answers, *missing)
-            ],
+            page.terminal_section(table),
+            *[page.terminal_section(page.Paragraph(text)) for text in (*answers, *missing)],
             *assumed,
             Section("", [table, *map(page.Paragraph, missing)], media=Media.NOTEBOOK),
             Section("Summary", [table, page.DefinitionList(list(_CASE_MEANINGS.values()))]),
@@ -266,19 +200,12 @@ def _case_title(comparison: Comparison) -> str:
 
 def _case_section(comparison: Comparison) -> Section:
     """Return answer, laws and assumptions of one device and depth."""
-    rows = [
-        Row(
-            [
-                Cell(row.law.letter, "l"),
-                recommended_stiffness_text(row),
-                tier_text(row.perceptibility),
-                row.verdict,
-            ],
-            "best" if row is comparison.recommended_row else "",
-            law=row.law.letter,
-        )
-        for row in comparison.rows
-    ]
+
+    def cells(row: LawRow) -> list[str | Cell]:
+        felt = tier_text(row.perceptibility)
+        return [Cell(row.law.letter, "l"), recommended_stiffness_text(row), felt, row.verdict]
+
+    rows = law_rows(comparison, cells)
     table = Table(("law", "start at", "felt?", "verdict"), rows, (1,))
     answer, assumptions = comparison.recommendation, comparison.assumptions
     return Section(

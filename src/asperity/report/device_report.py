@@ -6,18 +6,8 @@ from collections.abc import Sequence
 
 from asperity.core.units import format_quantity
 from asperity.devices import FIELD_TABLE, FIELD_UNITS, Datum, Device, WallTest
-from asperity.report.page import (
-    HEADED,
-    Block,
-    Cell,
-    Media,
-    Page,
-    Paragraph,
-    Row,
-    Section,
-    Table,
-    TableLayout,
-)
+from asperity.report import page
+from asperity.report.page import HEADED, Cell, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import NOT_AVAILABLE, readable_name
 
 UNVERIFIED_MARK = "?"
@@ -89,15 +79,8 @@ def devices_page(devices: Sequence[Device], *, detailed: bool = False) -> Page:
         return Page("", "", (), [part for device in devices for part in _device_sections(device)])
     has_unverified = any(not datum.verified for device in devices for datum in device.data.values())
     notes = [UNVERIFIED_NOTE] if has_unverified else []
-    return Page(
-        "",
-        "",
-        (),
-        [
-            Section("", [_devices_table(devices)], media=Media.TERMINAL),
-            Section("", (), notes=[*notes, _MORE_NOTE], media=Media.TERMINAL),
-        ],
-    )
+    last = page.terminal_section(notes=[*notes, _MORE_NOTE])
+    return Page("", "", (), [page.terminal_section(_devices_table(devices)), last])
 
 
 def _devices_table(devices: Sequence[Device]) -> Table:
@@ -172,13 +155,13 @@ def _device_sections(device: Device) -> list[Section]:
     text = [f"Axes: {device.axes}"] if device.axes else []
     if device.driver:
         text.append(f"Driver: {device.driver} (asperity run ... --driver real)")
-    parts: list[list[Block]] = [[Paragraph(line) for line in text]] if text else []
-    parts += [[Paragraph(note)] for note in device.notes]
+    parts = [text] if text else []
+    parts += [[note] for note in device.notes]
     if missing := missing_fields(device):
         heading = "Missing data, without which some results are undecided:"
-        parts.append([Paragraph(line) for line in (heading, *(f"  {one}" for one in missing))])
+        parts.append([heading, *(f"  {one}" for one in missing)])
     return [
         Section(title, (), media=HEADED),
-        Section("", [_device_table(device)], media=Media.TERMINAL),
-        *[Section("", blocks, media=Media.TERMINAL) for blocks in parts],
+        page.terminal_section(_device_table(device)),
+        *[page.terminal_section(*map(page.Paragraph, lines)) for lines in parts],
     ]

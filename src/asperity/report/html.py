@@ -50,7 +50,7 @@ class RenderedPicture:
     """A figure as it is embedded in a page.
 
     Attributes:
-        svg: SVG text of :func:`asperity.report.pictures.svg.svg_text`, embedded unescaped: it never
+        svg: text of :func:`asperity.report.pictures.style.svg_text`, embedded unescaped: it never
             contains text from elsewhere.
         alt_text: the description of the figure with its ranges.
         panel_json: the plotted numbers as JSON, for the script of the page.
@@ -64,7 +64,7 @@ class RenderedPicture:
 def render_picture(picture: Picture) -> RenderedPicture:
     """Return a picture as SVG with its numbers, drawn with Matplotlib's defaults."""
     from asperity.report.pictures.panel_data import extract_panels, panels_to_json, ranges_text
-    from asperity.report.pictures.svg import svg_text
+    from asperity.report.pictures.style import svg_text
 
     with default_style():
         figure = picture.draw()
@@ -123,7 +123,7 @@ def render_page(page: Page, origin: Origin | None = None) -> str:
             picture_of=lambda picture: pictures[id(picture)],
             style=style,
             script=script,
-            script_digest=_sha256(script),
+            script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
             version=__version__,
             date=_build_date(),
             origin=origin or Origin(),
@@ -163,11 +163,6 @@ def _encode_png(picture: Picture) -> str:
 
 def _read_template(name: str) -> str:
     return resources.files("asperity.report").joinpath("templates", name).read_text("utf-8")
-
-
-def _sha256(script: str) -> str:
-    """Return the digest that a content security policy allows the script by."""
-    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
 
 
 def _build_date() -> str:

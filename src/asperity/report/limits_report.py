@@ -21,7 +21,7 @@ from asperity.report.sentences.number_text import (
     readable_name,
     yes_no_text,
 )
-from asperity.report.sentences.texts import glossary
+from asperity.report.sentences.texts import glossary, table_notes
 
 _LIMIT_HEADINGS = ("", "limit", "condition", "left", "right", "holds", "for", "at speeds")
 _NAME_COLUMN, _SHARE_COLUMN, _SPEEDS_COLUMN = 1, 6, 7
@@ -34,10 +34,6 @@ _LIMITS_LAYOUT = TableLayout(
     min_console={_SHARE_COLUMN: _WIDE_CONSOLE},
 )
 _WAVE_HEADINGS = ("wavelength", "amplitude", "share", "frequency", "force")
-_SIDES_NOTE = (
-    "Left and right: of the wave that comes closest to breaking the limit. For: share of the "
-    "height variance in waves that meet it."
-)
 MAX_WAVES = 16
 """Number of waves listed: those with the greatest share of the height variance."""
 WAVE_LIMITS = tuple(rule.number for rule in LIMIT_RULES if rule.number != 5)
@@ -135,7 +131,7 @@ def symbol_lines(result: Limits) -> list[str]:
 def limits_page(result: Limits) -> page.Page:
     """Return the report: answer, limits, figure, waves and assumptions."""
     fields = [*dict.fromkeys(limit.device_field for limit in result.limits), "friction"]
-    notes = [*symbol_lines(result), _SIDES_NOTE]
+    notes = [*symbol_lines(result), *table_notes("limits")]
     limits = [six_limits_table(result)]
     return page.Page(
         title=f"Rendering limits of law {result.surface.law.letter} on {result.device.name}",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asperity.core.cache import get_or_compute
+from asperity.core.checks import FloatArray
 from asperity.core.errors import escape_unprintable
 from asperity.core.units import format_quantity
 from asperity.measured.form import SurfaceDecomposition, decompose_surface
@@ -21,7 +22,7 @@ from asperity.report import page
 from asperity.report.page import HEADED, SCREEN, Cell, Media, Row, Section, Table, TableLayout
 from asperity.report.sentences.number_text import NOT_AVAILABLE
 from asperity.textures.texture import Texture
-from asperity.textures.texture_loading import MeasurementSummary, StepChange, decimate
+from asperity.textures.texture_loading import MeasurementSummary, decimate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,50 +38,51 @@ _COLUMN_PRIORITY = (
     *["t", "Sp", "p", "Sv", "v"],
 )
 _LENGTH_UNITS = (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9))
+_Column = tuple[str, list[Cell]]  # heading and cells
 _REMOVED_MEANING = ("removed", "deviation that the step removed: RMS about the mean, and range")
 
 
 def stages_table(stages: Sequence[PreparationStage]) -> Table:
     """Return the parameters after each step, and what it removed; one unit per column."""
     kinds = "/".join(dict.fromkeys(next(iter(stage.values))[0] for stage in stages))
-    headings, columns = ["after"], [[Cell(stage.name, "l") for stage in stages]]
+    columns = [("after", [Cell(stage.name, "l") for stage in stages])]
     keys, legend = [""], {}
     for index, symbol in enumerate(stages[-1].values):
         parameter, name = find_parameter(symbol), kinds + symbol[1:]
         numbers = [list(stage.values.values())[index] for stage in stages]
-        _add_column(headings, columns, name, parameter, numbers)
+        legend[len(columns)] = (name, parameter.description)
+        columns.append(_number_column(name, parameter, numbers))
         keys.append(parameter.symbol)
-        legend[len(columns) - 1] = (name, parameter.description)
     removed = [(s.removed.rms, s.removed.range) if s.removed else (None, None) for s in stages]
     for name, values in zip(_REMOVED, zip(*removed, strict=True), strict=True):
-        _add_column(headings, columns, name, _RMS, values)
+        columns.append(_number_column(name, _RMS, values))
     keys += _REMOVED
     layout = TableLayout(
         drop_order=sorted(range(1, len(keys)), key=lambda i: _COLUMN_PRIORITY.index(keys[i])),
         legend={**legend, len(keys): _REMOVED_MEANING},
         dropped_note="More in a wider terminal, and with --json.",
     )
-    rows = [Row(cells) for cells in zip(*columns, strict=True)]
+    return _columns_table(columns, layout)
+
+
+def _columns_table(columns: Sequence[_Column], layout: TableLayout) -> Table:
+    headings, cells = zip(*columns, strict=True)
+    rows = [Row(row) for row in zip(*cells, strict=True)]
     return Table(headings, rows, range(1, len(headings)), layout)
 
 
-def _add_column(
-    headings: list[str],
-    columns: list[list[Cell]],
-    name: str,
-    parameter: SurfaceParameter,
-    values: Sequence[float | None],
-) -> None:
-    """Add a column of values in their best unit, its heading broken into lines."""
+def _number_column(
+    name: str, parameter: SurfaceParameter, values: Sequence[float | None]
+) -> _Column:
+    """Return a column of values in their best unit, its heading broken into lines."""
     unit, size = "", 1.0
     if parameter.symbol == "Sdr":
         unit, size = "%", 0.01
     elif parameter.unit:
         unit, size = _choose_unit(values)
     texts = [NOT_AVAILABLE if value is None else decimal_text(value / size) for value in values]
-    columns.append([Cell(text) for text in texts])
     heading = f"{name} [{unit}]" if unit else name
-    headings.append(heading.replace(", ", ",\n").replace(" [", "\n["))
+    return heading.replace(", ", ",\n").replace(" [", "\n["), [Cell(text) for text in texts]
 
 
 def _choose_unit(values: Iterable[float | None]) -> tuple[str, float]:
@@ -119,10 +121,12 @@ def _parameter_definitions(stages: Sequence[PreparationStage]) -> Table:
 def parts_table(parts: SurfaceDecomposition) -> Table:
     """Return RMS and range of form, waviness and texture."""
     named = {"form": parts.form, "waviness": parts.waviness, "texture": parts.texture}
-    headings, columns = ["part"], [[Cell(name, "l") for name in named]]
-    _add_column(headings, columns, "RMS", _RMS, [part.rms for part in named.values()])
-    _add_column(headings, columns, "range", _RMS, [part.range for part in named.values()])
-    return Table(headings, [Row(cells) for cells in zip(*columns, strict=True)], (1, 2))
+    columns = [
+        ("part", [Cell(name, "l") for name in named]),
+        _number_column("RMS", _RMS, [part.rms for part in named.values()]),
+        _number_column("range", _RMS, [part.range for part in named.values()]),
+    ]
+    return _columns_table(columns, TableLayout())
 
 
 def measured_sections(texture: Texture) -> list[Section]:
@@ -205,7 +209,7 @@ def surface_summary_page(summary: MeasurementSummary) -> page.Page:
     prepared, title = summary.prepared, "After each step"
     definitions = [_parameter_definitions(prepared.history)] if prepared.history else []
     sections = [
-        Section("", [page.Paragraph(surface_summary_text(prepared))], media=Media.TERMINAL),
+        page.terminal_section(page.Paragraph(surface_summary_text(prepared))),
         *_stage_sections(prepared, title),
         _parts_section(summary),
         *_figure_sections(summary),
@@ -227,7 +231,7 @@ def preparation_page(prepared: PreparedSurface, path: str) -> page.Page:
         page.Paragraph(surface_summary_text(prepared), "code"),
         page.Paragraph(f"Saved: {escape_unprintable(path)}", "code"),
     ]
-    last = Section("", blocks, media=Media.TERMINAL)
+    last = page.terminal_section(*blocks)
     return page.Page("", "", (), [*_step_sections(prepared), *_stage_sections(prepared, ""), last])
 
 
@@ -258,28 +262,25 @@ def _figure_sections(summary: MeasurementSummary) -> list[Section]:
     if not summary.changes:
         size = surface_summary_text(summary.prepared)
         description = f"The surface after preparation: {size}."
-        figure = partial(_draw_heights, summary)
+        heights = {"heights": decimate(summary.prepared.heights)}
+        figure = partial(_draw_heights, heights, summary.sides)
         return [page.picture_section("The surface", figure, description, "After preparation.")]
     sections = []
     for number, change in enumerate(summary.changes):
         caption = f"Before, after, and what the step removed: {removed_text(change.stage)}"
         title = change.stage.name[0].upper() + change.stage.name[1:]
-        figure, text = partial(_draw_step, change), f"{title}. {caption}."
+        removed = change.before - change.after
+        maps = {"before": change.before, "after": change.after, "removed": removed}
+        figure, text = partial(_draw_heights, maps, change.sides), f"{title}. {caption}."
         level = 3 if number else 2
         sections.append(page.picture_section(title, figure, text, caption, level=level))
     return sections
 
 
-def _draw_heights(summary: MeasurementSummary) -> Figure:
+def _draw_heights(heights_by_title: Mapping[str, FloatArray], sides: tuple[float, ...]) -> Figure:
     from asperity.report.pictures.surface_pictures import heights_figure
 
-    return heights_figure({"heights": decimate(summary.prepared.heights)}, summary.sides)
-
-
-def _draw_step(change: StepChange) -> Figure:
-    from asperity.report.pictures.surface_pictures import step_figure
-
-    return step_figure(change)
+    return heights_figure(heights_by_title, sides)
 
 
 def removed_text(stage: PreparationStage) -> str:

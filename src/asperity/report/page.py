@@ -256,9 +256,14 @@ def pairs_table(rows: Sequence[tuple[str, str]]) -> Table:
     return Table((), [Row([Cell(name, "l"), text]) for name, text in rows], layout=layout)
 
 
-def text_page(text: str) -> Page:
-    """Return lines that a terminal does not wrap, as a page."""
-    return Page("", "", (), [Section("", [Paragraph(text, "code")], media=Media.TERMINAL)])
+def terminal_section(*blocks: Block, notes: Sequence[str] = ()) -> Section:
+    """Return a section without a title that only a terminal shows."""
+    return Section("", blocks, notes=notes, media=Media.TERMINAL)
+
+
+def terminal_page(*blocks: Block) -> Page:
+    """Return a page of one section that only a terminal shows."""
+    return Page("", "", (), [terminal_section(*blocks)])
 
 
 def plot_later(result: Any, picture: str | None = None) -> Callable[[], Figure]:
@@ -309,8 +314,7 @@ def figure_section(
 
 def facts_section(facts: Sequence[tuple[str, str]]) -> Section:
     """Return the facts of a page for a terminal, one faint line each."""
-    notes = [f"{name}: {value}" for name, value in facts]
-    return Section("", (), notes=notes, media=Media.TERMINAL)
+    return terminal_section(notes=[f"{name}: {value}" for name, value in facts])
 
 
 def assumption_sections(sentences: Sequence[str], *blocks: Block) -> list[Section]:

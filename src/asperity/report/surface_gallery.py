@@ -10,20 +10,9 @@ from typing import TYPE_CHECKING, Any
 from asperity.core.arguments import Argument
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.units import format_quantity
-from asperity.report.page import (
-    Block,
-    Cards,
-    Cell,
-    Media,
-    Page,
-    Paragraph,
-    Picture,
-    Row,
-    Section,
-    Table,
-    TableLayout,
-    user_sections,
-)
+from asperity.report import page
+from asperity.report.page import Cell, Page, Row, Section, Table, TableLayout
+from asperity.report.sentences.texts import table_notes
 from asperity.textures.catalogue import CATALOGUE
 from asperity.textures.library import LIBRARY
 from asperity.textures.texture import Texture, TextureKind
@@ -156,13 +145,9 @@ def _list_sections(entries: Sequence[SurfaceEntry], *, detailed: bool) -> list[S
             rows.append(Row(["", one.specification, "", ""]))
     headings = ("name", "summary and arguments", "size", "height")
     table = Table(headings, rows, (2, 3), TableLayout(wrap=(1,), gap=2))
-    note = (
-        "Size and height are those of the defaults, or of the example for a kind with required "
-        "arguments. Details: asperity surfaces NAME"
-    )
     details = [_arguments_section(one) for one in entries] if detailed else []
-    last = details or [Section("", [Paragraph(note)], media=Media.TERMINAL)]
-    return [Section("", [table], media=Media.TERMINAL), *last]
+    last = details or [page.terminal_section(*map(page.Paragraph, table_notes("surfaces")))]
+    return [page.terminal_section(table), *last]
 
 
 def _arguments_section(entry: SurfaceEntry) -> Section:
@@ -172,36 +157,27 @@ def _arguments_section(entry: SurfaceEntry) -> Section:
     ]
     headings = ("argument", "unit", "default", "meaning")
     table = Table(headings, rows, layout=TableLayout(wrap=(2, 3), gap=2))
-    source = [Paragraph(f"Sizes: {entry.kind.source}.")] if entry.kind.source else []
-    return Section("", [table, *source], media=Media.TERMINAL)
+    source = [page.Paragraph(f"Sizes: {entry.kind.source}.")] if entry.kind.source else []
+    return page.terminal_section(table, *source)
 
 
 def surfaces_page(entries: Sequence[SurfaceEntry], *, detailed: bool = False) -> Page:
     """Return a card with a picture of every surface; in detail, a terminal lists arguments."""
-    groups = (
-        ("Named surfaces", [one for one in entries if one.is_named]),
-        ("Kinds of textures", [one for one in entries if not one.is_named]),
-    )
-    sections = [
-        Section(title, [Cards([_card(one) for one in group])]) for title, group in groups if group
-    ]
+    groups = {
+        "Named surfaces": [_card(one) for one in entries if one.is_named],
+        "Kinds of textures": [_card(one) for one in entries if not one.is_named],
+    }
+    sections = [Section(title, [page.Cards(cards)]) for title, cards in groups.items() if cards]
     return Page(
         title="Named surfaces and kinds of textures",
         answer="",
         sections=[
             *_list_sections(entries, detailed=detailed),
-            Section("", [Paragraph(_CARDS_CAPTION)]),
+            Section("", [*map(page.Paragraph, table_notes("cards"))]),
             *sections,
-            *user_sections(SurfaceEntry, entries),
+            *page.user_sections(SurfaceEntry, entries),
         ],
     )
-
-
-_CARDS_CAPTION = (
-    "Every surface is periodic without a seam. The maps are lit from the upper left, with slopes "
-    "scaled for contrast; the section below each runs along x through the middle of the map, with "
-    "heights scaled to fill the frame."
-)
 
 
 def _draw_card(texture: Texture) -> Figure:
@@ -217,10 +193,10 @@ def _card(entry: SurfaceEntry) -> Section:
         unit = f" [{argument.unit}]" if argument.unit else ""
         name = Cell(f"{argument.name}{unit}", "mono")
         rows.append(Row([name, argument.default_text, _argument_text(argument)]))
-    blocks: list[Block] = [
-        Picture(partial(_draw_card, entry.texture), f"{kind.name}: {kind.summary}.", dpi=110),
-        Paragraph(f"{entry.size_text}, {entry.height_text} from peak to valley", "note"),
-        Paragraph(f"asperity compare {_shell_quote(entry.specification)}", "mono"),
+    blocks: list[page.Block] = [
+        page.Picture(partial(_draw_card, entry.texture), f"{kind.name}: {kind.summary}.", dpi=110),
+        page.Paragraph(f"{entry.size_text}, {entry.height_text} from peak to valley", "note"),
+        page.Paragraph(f"asperity compare {_shell_quote(entry.specification)}", "mono"),
         Table(("argument", "default", "meaning"), rows),
     ]
     notes = [f"Sizes: {kind.source}."] if kind.source else []

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from asperity.report.pictures import style
 from asperity.report.pictures.panel_data import extract_panels, panels_to_json, ranges_text
-from asperity.report.pictures.svg import svg_text
+from asperity.report.pictures.style import svg_text
 
 HOSTILE = "</script><b>"
 

@@ -178,7 +178,7 @@ def run_page(setup: Setup, run: Run) -> Page:
         sections=[
             *figure_sections(run),
             Section("Energy ledger", [ledger], caption),
-            Section("", [ledger], notes=[caption], media=Media.TERMINAL),
+            page.terminal_section(ledger, notes=[caption]),
             page.facts_section(run_facts(setup, run)),
             *page.user_sections(Run, setup, run),
             *page.assumption_sections(setup.assumptions),

@@ -9,7 +9,7 @@ from asperity.core.errors import escape_unprintable
 from asperity.core.units import format_quantity
 from asperity.devices import Device
 from asperity.report.loop.run_report import energy_text
-from asperity.report.page import Block, Media, Page, Paragraph, Row, Section, Table
+from asperity.report.page import Page, Paragraph, Row, Table, terminal_page
 from asperity.report.sentences.number_text import readable_name
 from asperity.scene.setup import Setup
 from asperity.servo.calibration.calibrator import AxisCalibration, Calibration
@@ -28,13 +28,12 @@ def calibration_page(device: Device, calibration: Calibration, path: str) -> Pag
     force = format_quantity(calibration.max_force, "N")
     rows = [Row(_calibration_cells(axis)) for axis in calibration.axes]
     numeric = range(1, len(_CALIBRATION_HEADINGS))
-    blocks: list[Block] = [
+    return terminal_page(
         Paragraph(f"{device.name}: {len(calibration.axes)} axes, with up to {force}"),
         Table(_CALIBRATION_HEADINGS, rows, numeric),
         *map(Paragraph, _calibration_lines(calibration)),
         Paragraph(f"Written: {escape_unprintable(path)}", "code"),
-    ]
-    return Page("", "", (), [Section("", blocks, media=Media.TERMINAL)])
+    )
 
 
 def _calibration_cells(axis: AxisCalibration) -> tuple[str, ...]:
@@ -136,4 +135,4 @@ def device_run_page(setup: Setup, loop: ServoProcess, cause: EndReason, path: st
     blocks = [Paragraph(line) for line in lines]
     if path is not None:
         blocks.append(Paragraph(f"Recording: {escape_unprintable(path)}", "code"))
-    return Page("", "", (), [Section("", blocks, media=Media.TERMINAL)])
+    return terminal_page(*blocks)

@@ -108,7 +108,6 @@ def onset_page(setup: Setup, predictions: Sequence[Prediction]) -> Page:
     """Return the report of the onsets."""
     limit = format_quantity(CYCLE_SPEED, "m/s")
     cycle = f"A limit cycle: the velocity varies by more than {limit} RMS in the last quarter."
-    figure, text = partial(draw_onsets, predictions), onset_alt_text(predictions)
     in_numbers = onset_section("In numbers, N/m", predictions, cycle)
     return Page(
         title=f"Onset of limit cycles, {setup.device.name}",
@@ -116,7 +115,7 @@ def onset_page(setup: Setup, predictions: Sequence[Prediction]) -> Page:
         facts=loop_facts(setup),
         sections=[
             replace(in_numbers, title="", caption="", media=Media.TERMINAL),
-            page.figure_section("loop.onsets", figure, text),
+            onset_figure_section("loop.onsets", predictions),
             in_numbers,
             *page.user_sections(Prediction, setup, predictions),
             *page.assumption_sections(setup.assumptions),
@@ -125,17 +124,17 @@ def onset_page(setup: Setup, predictions: Sequence[Prediction]) -> Page:
     )
 
 
-def draw_onsets(predictions: Sequence[Prediction]) -> Figure:
-    """Return the figure of the onsets."""
+def onset_figure_section(name: str, predictions: Sequence[Prediction]) -> Section:
+    """Return the figure of the onsets, with the title and caption of a name."""
+    laws = ", ".join(dict.fromkeys(one.onset.law for one in predictions))
+    text = f"Onset of limit cycles and the limits of the criteria, over delay: laws {laws}."
+    return page.figure_section(name, partial(_draw_onsets, predictions), text)
+
+
+def _draw_onsets(predictions: Sequence[Prediction]) -> Figure:
     from asperity.report.pictures.loop_pictures import onset_figure
 
     return onset_figure(predictions)
-
-
-def onset_alt_text(predictions: Sequence[Prediction]) -> str:
-    """Return the description of the figure of the onsets, without its numbers."""
-    laws = ", ".join(dict.fromkeys(one.onset.law for one in predictions))
-    return f"Onset of limit cycles and the limits of the criteria, over delay: laws {laws}."
 
 
 def onset_section(title: str, predictions: Sequence[Prediction], caption: str = "") -> Section:
@@ -154,7 +153,8 @@ def millijoules(value: float, *, signed: bool = True) -> str:
     return "0" if not text.strip("+-0.") else text
 
 
-def _stroke_cells(stroke: Stroke) -> Cells:
+def stroke_cells(stroke: Stroke) -> Cells:
+    """Return the cells of a row of energies per stroke."""
     depth = format_quantity(stroke.mean_depth, "m", digits=2)
     prefix: Cells = [Cell(stroke.law, "l"), format_quantity(stroke.speed, "m/s"), depth]
     if stroke.stop_message:
@@ -172,7 +172,7 @@ def _stroke_cells(stroke: Stroke) -> Cells:
 
 
 def _stroke_table(strokes: Sequence[Stroke]) -> Table:
-    rows = [Row(_stroke_cells(one), law=one.law) for one in strokes]
+    rows = [Row(stroke_cells(one), law=one.law) for one in strokes]
     return _sweep_table(STROKE_HEADINGS, rows, omit=(STROKE_HEADINGS.index("y"),))
 
 
@@ -205,7 +205,7 @@ def strokes_page(setup: Setup, strokes: Sequence[Stroke]) -> Page:
         answer=stroke_answer(strokes),
         facts=loop_facts(setup),
         sections=[
-            Section("", [table], notes=notes, media=Media.TERMINAL),
+            page.terminal_section(table, notes=notes),
             page.figure_section("loop.strokes", partial(_draw_strokes, strokes), text),
             Section("In numbers", [table], notes=[note]),
             *page.user_sections(Stroke, setup, strokes),

@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import partial
 from itertools import groupby
 
-from asperity.core.units import format_quantity
 from asperity.paper import VERDICTS, Result, Verdict
 from asperity.paper.claim import Number
 from asperity.paper.experiments import Experiments
@@ -18,12 +17,11 @@ from asperity.paper.figures import loop_energies
 from asperity.report import page
 from asperity.report.loop.run_report import energy_text
 from asperity.report.loop.sweep_report import (
-    draw_onsets,
-    millijoules,
-    onset_alt_text,
     onset_cells,
+    onset_figure_section,
     onset_section,
     stiffness_number,
+    stroke_cells,
 )
 from asperity.report.page import HEADED, Cell, Cells, Media, Page, Row, Section, Table, TableLayout
 from asperity.report.pictures import paper_pictures
@@ -97,9 +95,9 @@ def _terminal_sections(results: Sequence[Result], experiments: Experiments | Non
     lines = experiments.summary_lines if experiments is not None else ()
     summary = [page.Paragraph(f"{name}: {text}") for name, text in lines]
     return [
-        Section("", [table], media=Media.TERMINAL),
-        *([Section("", summary, media=Media.TERMINAL)] if summary else ()),
-        Section("", (), notes=[_MORE_NOTE], media=Media.TERMINAL),
+        page.terminal_section(table),
+        *([page.terminal_section(*summary)] if summary else ()),
+        page.terminal_section(notes=[_MORE_NOTE]),
     ]
 
 
@@ -182,7 +180,7 @@ def experiment_sections(experiments: Experiments) -> list[Section]:
     """Return the sections of the experiments in order."""
     return [
         _cycle_section(experiments.passivity),
-        _onset_figure_section(experiments.passivity),
+        onset_figure_section("paper.onsets", experiments.passivity.onsets),
         onset_section("V.A, onsets in numbers", experiments.passivity.onsets),
         _energy_section(experiments.scanning),
         _stroke_section(experiments.scanning),
@@ -210,11 +208,6 @@ def _fitted_notes(sentences: Sequence[str]) -> list[str]:
     return [f"Not stated by the paper: {'; '.join(sentences)}."]
 
 
-def _onset_figure_section(experiment: PassivityExperiment) -> Section:
-    figure, text = partial(draw_onsets, experiment.onsets), onset_alt_text(experiment.onsets)
-    return page.figure_section("paper.onsets", figure, text)
-
-
 def _energy_section(experiment: ScanningExperiment) -> Section:
     figure = partial(paper_pictures.energies_figure, experiment)
     count = len(experiment.traces)
@@ -227,13 +220,9 @@ def _stroke_section(experiment: ScanningExperiment) -> Section:
     headings = ("law", "hand", "speed", "x", "z", "sum", "field", "±", "paper's", "lost")
     rows = []
     for one in experiment.strokes:
-        stroke = one.stroke
-        place: Cells = [Cell(stroke.law, "l"), one.hand, format_quantity(stroke.speed, "m/s")]
-        work = [millijoules(value) for value in (stroke.energy[0], stroke.energy[2], stroke.total)]
-        field = Cell(millijoules(stroke.field), "no" if stroke.gains_energy else "")
-        spread = millijoules(stroke.spread + stroke.error, signed=False)
-        rest = [spread, millijoules(sum(stroke.same_sample)), f"{stroke.lost_contact:.1f}"]
-        rows.append(Row([*place, *work, field, *rest], law=stroke.law))
+        law, speed, _depth, x, _y, *rest, _lost = stroke_cells(one.stroke)
+        lost = f"{one.stroke.lost_contact:.1f}"
+        rows.append(Row([law, one.hand, speed, x, *rest, lost], law=one.stroke.law))
     table = Table(headings, rows, numeric_columns=range(2, len(headings)))
     return Section("V.B, every hand and speed", [table], notes=table_notes("paper_strokes"))
 

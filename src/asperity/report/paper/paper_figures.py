@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -12,11 +13,12 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from asperity.core.errors import ParameterError
-from asperity.core.files import open_atomic
+from asperity.core.files import write_bytes
 from asperity.paper.claim_registry import find_claims
 from asperity.paper.experiments import Experiments
 from asperity.paper.experiments.cycle_counts import passivity_experiment
 from asperity.paper.experiments.strokes import bump_experiment, scanning_experiment
+from asperity.report.page import default_style
 from asperity.report.pictures import paper_pictures as pictures
 from asperity.report.pictures.loop_pictures import onset_figure
 from asperity.report.pictures.paper_pictures import figure_three, figure_two
@@ -151,8 +153,7 @@ def write_figures(
         ParameterError: if a file cannot be written.
     """
     paths = []
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
+    with default_style():
         matplotlib.rcParams["svg.hashsalt"] = _HASH_SALT
         for figure in figures:
             progress(figure.name)
@@ -163,16 +164,7 @@ def write_figures(
 
 def _write_figure(figure: Figure, path: Path, file_format: FileFormat) -> None:
     metadata: dict[str, Any] = {"svg": {"Date": None, "Creator": None}, "png": {"Software": None}}
-    try:
-        with open_atomic(path) as stream:
-            figure.savefig(
-                stream,
-                format=file_format,
-                dpi=_DPI,
-                metadata=metadata[file_format],
-                bbox_inches="tight",
-                pad_inches=_MARGIN,
-            )
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise ParameterError("figures", f"cannot be written: {reason}", str(path)) from None
+    options: dict[str, Any] = {"dpi": _DPI, "bbox_inches": "tight", "pad_inches": _MARGIN}
+    image = io.BytesIO()
+    figure.savefig(image, format=file_format, metadata=metadata[file_format], **options)
+    write_bytes("figures", path, image.getvalue())

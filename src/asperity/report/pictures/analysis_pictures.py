@@ -29,8 +29,12 @@ from asperity.report.pictures.analysis_windows import (
     witness_profile,
     working_depth,
 )
-from asperity.report.pictures.field_pictures import Window, draw_fields
-from asperity.report.pictures.law_pictures import add_gain_colorbar, draw_gain_field
+from asperity.report.pictures.law_pictures import (
+    Window,
+    add_gain_colorbar,
+    draw_fields,
+    draw_gain_field,
+)
 from asperity.report.pictures.scan_plane import CurlField, curl_field
 from asperity.report.sentences.alt_text import analysis_figure_names
 from asperity.report.sentences.number_text import interval_text, range_text

@@ -11,7 +11,7 @@ from asperity.analysis.analyze import Analysis
 from asperity.analysis.bounds.bound import Bound, spectral_norm
 from asperity.analysis.bounds.sampling import highest_point
 from asperity.core.checks import FloatArray
-from asperity.report.pictures.field_pictures import Window
+from asperity.report.pictures.law_pictures import Window
 from asperity.report.pictures.scan_plane import ScanSegment, choose_segment, feature_length
 from asperity.report.pictures.surface_pictures import MapGrid, map_grid
 from asperity.surface import Surface

@@ -112,12 +112,10 @@ def _neighbour_label(figure: Figure, axes: Axes, axis_name: str) -> str:
             return None
         return spec.colspan.start if axis_name == "x" else spec.rowspan.start
 
-    labels = (
-        one.get_xlabel() if axis_name == "x" else one.get_ylabel()
-        for one in figure.axes
-        if one.get_label() != _COLORBAR_LABEL and place(one) == place(axes)
-    )  # fmt: skip
-    return next((label for label in labels if label), "")
+    panels = [one for one in figure.axes if one.get_label() != _COLORBAR_LABEL]
+    neighbours = [one for one in panels if place(one) == place(axes)]
+    labels = [getattr(one, f"get_{axis_name}label")() for one in neighbours]
+    return next(filter(None, labels), "")
 
 
 # --- lines ----------------------------------------------------------------------------------------
@@ -152,14 +150,10 @@ def _extract_field(figure: Figure, axes: Axes) -> FieldData | None:
     )
     values = _resample_mesh(meshes[0], x, y) if meshes else _resample_image(images[0], x, y)
     drawn = (meshes or images)[0]
-    bar = drawn.colorbar.ax if drawn.colorbar else _find_colorbar(figure)
+    shared = (one for one in figure.axes if one.get_label() == _COLORBAR_LABEL)
+    bar = drawn.colorbar.ax if drawn.colorbar else next(shared, None)
     words = "" if bar is None else bar.get_xlabel() or bar.get_ylabel()
     return FieldData(f"{words.split(']')[0]}]" if "]" in words else words, values)
-
-
-def _find_colorbar(figure: Figure) -> Axes | None:
-    """Return the colour bar shared by panels."""
-    return next((one for one in figure.axes if one.get_label() == _COLORBAR_LABEL), None)
 
 
 def _resample_mesh(mesh: QuadMesh, x: FloatArray, y: FloatArray) -> FloatArray:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -20,6 +19,7 @@ from asperity.paper.experiments.strokes import BumpExperiment, ScanningExperimen
 from asperity.paper.figures import ForceField, LoopEnergy, force_fields, loop_energies
 from asperity.report.pictures import style
 from asperity.report.sentences.number_text import readable_name
+from asperity.simulation.limit_cycles.onset import Prediction
 
 _COLUMNS = 4
 _MILLI, _MICRO = 1e3, 1e6
@@ -72,8 +72,8 @@ def _draw_body(axes: Axes, panel: ForceField) -> None:
     """Draw the body, and limit the axes to the field."""
     low, high = panel.points[..., 1].min() * _MILLI, panel.points[..., 1].max() * _MILLI
     _draw_solid(axes, panel, low, 1.2)
-    axes.set_xlim(panel.points[..., 0].min() * _MILLI, panel.points[..., 0].max() * _MILLI)
-    axes.set_ylim(low, high + 0.15)
+    x = panel.points[..., 0] * _MILLI
+    axes.set(xlim=(x.min(), x.max()), ylim=(low, high + 0.15))
 
 
 def _draw_solid(axes: Axes, panel: ForceField | LoopEnergy, low: float, width: float) -> None:
@@ -163,8 +163,8 @@ def _draw_path(axes: Axes, panel: LoopEnergy) -> None:
     head = {"width": 0.02, "headwidth": 5.0, "headlength": 6.0, "minlength": 0.0, "minshaft": 0.0}
     options = style.INCH_ARROWS | head | {"angles": "xy", "scale": 1e6, "pivot": "middle"}
     axes.quiver(*middle.T, *leg.T, color=style.ORANGE, zorder=4, **options)
-    axes.set_xlim(x.min(), x.max())
-    axes.set_ylim(low, max(float(closed[:, 1].max()), float(height.max())) + 0.2)
+    top = max(float(closed[:, 1].max()), float(height.max())) + 0.2
+    axes.set(xlim=(x.min(), x.max()), ylim=(low, top))
     style.set_panel_title(axes, panel.law, readable_name(panel.name))
 
 
@@ -274,13 +274,11 @@ def bumps_figure(experiment: BumpExperiment) -> Figure:
 _PAPER_DEVICE = "section V.A"
 
 
-@dataclass(frozen=True)
-class _OnsetPoint:
-    """One case: the stiffness that a rule allows and the onset of cycles [N/m]."""
+class _OnsetPoint(NamedTuple):
+    """One case: the stiffness that a rule allows [N/m], and the onset of cycles."""
 
-    predicted: float
-    onset: float
-    law: str
+    allowed: float
+    prediction: Prediction
     device: str
     is_missed: bool
 
@@ -291,22 +289,20 @@ def devices_figure(experiments: Experiments) -> Figure:
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     devices = dict.fromkeys(one.device for one in experiments.devices.onsets)
     markers = {**dict(zip(devices, "osD^vP*" * len(devices), strict=False)), _PAPER_DEVICE: "X"}
-    cases = [
-        (one.prediction, one.device, one.catalogue_limit, one.is_limit_violated)
+    wall_rule = [
+        _OnsetPoint(one.catalogue_limit, one.prediction, one.device, one.is_limit_violated)
         for one in experiments.devices.onsets
     ]
-    cases += [
-        (one, _PAPER_DEVICE, one.wall_rule or math.nan, one.violates_wall_rule)
+    wall_rule += [
+        _OnsetPoint(one.wall_rule or math.nan, one, _PAPER_DEVICE, one.violates_wall_rule)
         for one in experiments.passivity.onsets
     ]
-    rules: tuple[list[_OnsetPoint], list[_OnsetPoint]] = ([], [])
-    for one, device, allowed, violated in cases:
-        case = one.onset.value, one.onset.law, device
-        rules[0].append(_OnsetPoint(allowed, *case, violated))
-        if one.conservative:
-            rules[1].append(_OnsetPoint(one.delay_rule, *case, one.violates_delay_rule))
-    names = ("K₀/q", "delay rule")
-    for axes, points, name in zip((left, right), rules, names, strict=True):
+    delay_rule = [
+        _OnsetPoint(one.delay_rule, one, device, one.violates_delay_rule)
+        for _allowed, one, device, _missed in wall_rule
+        if one.conservative
+    ]
+    for axes, points, name in ((left, wall_rule, "K₀/q"), (right, delay_rule, "delay rule")):
         _draw_rule(axes, points, markers)
         y = "cycles from [N/m]" if axes is left else ""
         style.label_axes(axes, f"allowed by {name} [N/m]", y)
@@ -320,27 +316,24 @@ def devices_figure(experiments: Experiments) -> Figure:
 
 def _draw_rule(axes: Axes, points: Sequence[_OnsetPoint], markers: Mapping[str, str]) -> None:
     style.style_axes(axes)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    axes.set(xscale="log", yscale="log")
     named: dict[tuple[int, int], list[_OnsetPoint]] = {}  # by position
     for point in points:
-        allowed, onset = point.predicted, point.onset
-        if not (math.isfinite(onset) and math.isfinite(allowed) and allowed > 0.0):
+        allowed, onset = point.allowed, point.prediction.onset
+        if not (math.isfinite(onset.value) and math.isfinite(allowed) and allowed > 0.0):
             continue
-        place = round(3.0 * math.log10(allowed)), round(8.0 * math.log10(onset))
+        place = round(3.0 * math.log10(allowed)), round(8.0 * math.log10(onset.value))
         named.setdefault(place, []).append(point)
         edge = style.ORANGE if point.is_missed else style.BLUE
-        options: dict[str, Any] = {
-            "mec": edge,
-            "mfc": edge if point.is_missed else style.BACKGROUND,
-        }
-        label = f"_{point.law}, {point.device}"
-        marker = markers[point.device]
-        (drawn,) = axes.plot(allowed, onset, marker, ms=5.5, mew=0.9, label=label, **options)
-        style.mark_law(drawn, point.law)
+        face = edge if point.is_missed else style.BACKGROUND
+        options: dict[str, Any] = {"mec": edge, "mfc": face, "mew": 0.9, "ms": 5.5}
+        label, marker = f"_{onset.law}, {point.device}", markers[point.device]
+        (drawn,) = axes.plot(allowed, onset.value, marker, label=label, **options)
+        style.mark_law(drawn, onset.law)
     for near in named.values():
-        letters = "".join(dict.fromkeys(point.law for point in near))
-        last = max(near, key=lambda point: point.predicted)
+        letters = "".join(dict.fromkeys(point.prediction.onset.law for point in near))
+        last = max(near, key=lambda point: point.allowed)
         note: dict[str, Any] = {"textcoords": "offset points", "color": style.MUTED}
-        axes.annotate(letters, (last.predicted, last.onset), (5, 3), fontsize=7.0, **note)
+        corner = (last.allowed, last.prediction.onset.value)
+        axes.annotate(letters, corner, (5, 3), fontsize=7.0, **note)
     axes.plot([1.0, 1e5], [1.0, 1e5], color=style.FAINT, lw=1.2, zorder=0.0)

@@ -15,8 +15,14 @@ from asperity.core.errors import ParameterError
 from asperity.recording.recording import Recording
 from asperity.report.pictures import style
 from asperity.report.pictures.analysis_pictures import available_pictures
-from asperity.report.pictures.field_pictures import draw_fields, field_size
-from asperity.report.pictures.law_pictures import draw_forces, force_size, gain_figure, merit_figure
+from asperity.report.pictures.law_pictures import (
+    draw_fields,
+    draw_forces,
+    field_size,
+    force_size,
+    gain_figure,
+    merit_figure,
+)
 from asperity.report.pictures.loop_pictures import recording_figure, run_figure
 from asperity.report.pictures.spectrum_pictures import limits_figure, spectrum_figure
 from asperity.report.pictures.surface_pictures import draw_surface, surface_size

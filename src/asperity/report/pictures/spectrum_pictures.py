@@ -86,8 +86,7 @@ def spectrum_figure(texture: Texture, device: Device) -> Figure:
         axes.vlines(x, 0.0, y, color=style.BLUE)
     marker = {"lw": 1.0} if shown.sum() > 40 else {"marker": "o", "ls": ""}
     axes.plot(x, y, color=style.BLUE, label="amplitude", **marker)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    axes.set(xscale="log", yscale="log")
     for level, (least, text) in enumerate(limits):
         _draw_wavelength_limit([axes], least, text, 0.96 - 0.1 * level)
     edges = [*wavelength[shown], *(least for least, _text in limits)]
@@ -121,14 +120,12 @@ def limits_figure(result: Limits) -> Figure:
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.15, 1.0])
     for axes in (upper, lower):
         style.style_axes(axes)
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+        axes.set(xscale="log", yscale="log")
     if not result.waves:
         style.add_note(upper, "flat: no waves", (0.5, 0.5), ha="center")
         return figure
-    lengths = np.array([wave.wavelength for wave in result.waves])
-    heights = np.array([wave.amplitude for wave in result.waves])
-    forces = np.array([wave.force for wave in result.waves])
+    waves = np.array([(wave.wavelength, wave.amplitude, wave.force) for wave in result.waves])
+    lengths, heights, forces = waves.T
     met = [all(wave.holds.values()) for wave in result.waves]
     unit, push = style.length_unit(float(heights.max())), style.force_unit(float(forces.max()))
     _draw_waves(upper, lengths, heights * unit.scale, met, result.spectrum.exact)
@@ -193,10 +190,9 @@ def _draw_force_limits(result: Limits, axes: Axes, scale: float) -> None:
     """Draw the forces below which a wave is not rendered, or masked by friction."""
     device = result.device
     step, friction = device.value("force_resolution"), device.value("friction")
-    lines = []
+    steps, lines = result.force_steps, []
     if step is not None:
-        words = f"4: {result.force_steps:g} steps of force"
-        lines.append((result.force_steps * step, words, style.ORANGE))
+        lines.append((steps * step, f"4: {steps:g} steps of force", style.ORANGE))
     if friction:
         lines.append((friction, "dry friction of the device", style.GREEN))
     for force, words, colour in lines:

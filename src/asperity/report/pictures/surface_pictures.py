@@ -16,7 +16,6 @@ from asperity.core.checks import FloatArray
 from asperity.report.pictures import style
 from asperity.report.pictures.scan_plane import ScanSegment, choose_segment, feature_length
 from asperity.textures.texture import Texture
-from asperity.textures.texture_loading import StepChange
 
 
 @dataclass(frozen=True)
@@ -80,20 +79,40 @@ def draw_surface(figure: Figure | SubFigure, texture: Texture) -> None:
 
 def draw_section(axes: Axes, texture: Texture, segment: ScanSegment) -> None:
     """Draw a section of the body along a segment."""
-    along = segment.distances(_SECTION_POINTS)
-    heights = texture.height(segment.xy(along))
-    wide = style.length_unit(segment.length)
-    high = style.length_unit(texture.peak_to_valley)
-    x, z = along * wide.scale, heights * high.scale
-    low, top = float(z.min()), float(z.max())
-    margin = 0.12 * max(top - low, 1e-9)
-    style.fill_below(axes, x, z, low - 3.0 * margin)
-    axes.plot(x, z, color=style.INK, linewidth=1.1, label="height")
-    axes.set(xlim=(x[0], x[-1]), ylim=(low - 3.0 * margin, top + margin))
+    wide, high = _draw_body(axes, texture, segment, _SECTION_POINTS, (0.36, 0.12))
     axes.set_facecolor(style.BACKGROUND)
-    style.style_axes(axes)
     style.label_axes(axes, f"along the scan line [{wide.name}]", f"height [{high.name}]")
     _add_title(axes, f"section along the scan line: {segment.description}")
+
+
+def _draw_body(
+    axes: Axes,
+    texture: Texture,
+    segment: ScanSegment,
+    count: int,
+    margins: tuple[float, float],
+    width: float = 1.1,
+) -> tuple[style.AxisUnit, style.AxisUnit]:
+    """Draw a section of the body; return the units of the axes.
+
+    Args:
+        axes: receive the section.
+        texture: the surface.
+        segment: of its scan line.
+        count: number of points.
+        margins: below and above the surface, as fractions of its height.
+        width: of the line [points].
+    """
+    along = segment.distances(count)
+    wide, high = style.length_unit(segment.length), style.length_unit(texture.peak_to_valley)
+    x, z = along * wide.scale, texture.height(segment.xy(along)) * high.scale
+    low, top = float(z.min()), float(z.max())
+    below, above = (margin * max(top - low, 1e-9) for margin in margins)
+    style.fill_below(axes, x, z, low - below)
+    axes.plot(x, z, color=style.INK, linewidth=width, label="height")
+    axes.set(xlim=(x[0], x[-1]), ylim=(low - below, top + above))
+    style.style_axes(axes)
+    return wide, high
 
 
 def _add_title(axes: Axes, text: str) -> None:
@@ -208,26 +227,12 @@ def _draw_card_map(axes: Axes, texture: Texture) -> None:
 def _draw_card_section(axes: Axes, texture: Texture) -> None:
     line = texture.scan_line()
     periods = 3.0 if texture.is_profile and texture.peak_to_valley > 0.05 * line.length else 1.0
-    along = np.linspace(0.0, periods * line.length, _CARD_SECTION_POINTS)
-    heights = texture.height(line.start + along[:, None] * line.direction)
-    wide, high = style.length_unit(float(along[-1])), style.length_unit(texture.peak_to_valley)
-    x, z = along * wide.scale, heights * high.scale
-    margin = 0.15 * float(np.ptp(z))
-    style.fill_below(axes, x, z, z.min() - margin)
-    axes.plot(x, z, color=style.INK, linewidth=0.9, label="height")
-    axes.set(xlim=(x[0], x[-1]), ylim=(float(z.min()) - margin, float(z.max()) + margin))
-    style.style_axes(axes)
+    segment = ScanSegment(line, 0.0, periods * line.length)
+    wide, high = _draw_body(axes, texture, segment, _CARD_SECTION_POINTS, (0.15, 0.15), 0.9)
     style.label_axes(axes, f"[{wide.name}]", f"[{high.name}]")
 
 
-_STEP_TITLES = ("before", "after", "removed")
 _MAX_MAP_HEIGHT = 4.2
-
-
-def step_figure(change: StepChange) -> Figure:
-    """Return three maps, or three profiles: before, after, removed."""
-    three = (change.before, change.after, change.before - change.after)
-    return heights_figure(dict(zip(_STEP_TITLES, three, strict=True)), change.sides)
 
 
 def heights_figure(heights_by_title: Mapping[str, FloatArray], sides: tuple[float, ...]) -> Figure:

@@ -26,7 +26,7 @@ def column_meanings() -> dict[str, str]:
 
 
 def table_notes(table: str) -> list[str]:
-    """Return the notes below a table, by its name in ``texts.toml``."""
+    """Return the notes of a table or page, by their name in ``texts.toml``."""
     return list(_load_texts()["notes"][table])
 
 
