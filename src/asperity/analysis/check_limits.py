@@ -215,13 +215,7 @@ def _rendered_waves(
     decisions: Sequence[Decision],
 ) -> tuple[RenderedWave, ...]:
     """Return the significant waves, each with its limits."""
-    on_waves = [
-        (decision.limit.number, decision.holds, decision.top_speeds)
-        for decision in decisions
-        if decision.holds is not None
-        and decision.top_speeds is not None
-        and decision.limit.number != 5
-    ]
+    on_waves = [one for one in decisions if one.limit.holds is not None and one.limit.number != 5]
     waves = [spectrum.waves[i] for i in np.flatnonzero(is_significant)]
     return tuple(
         RenderedWave(
@@ -230,8 +224,8 @@ def _rendered_waves(
             share=wave.share,
             frequency=case.speed / wave.wavelength,
             force=float(case.forces[i]),
-            holds={number: bool(holds[i]) for number, holds, _top in on_waves},
-            top_speed=min((float(top[i]) for _number, _holds, top in on_waves), default=math.inf),
+            holds={one.limit.number: bool(one.holds[i]) for one in on_waves},
+            top_speed=min((float(one.top_speeds[i]) for one in on_waves), default=math.inf),
         )
         for i, wave in enumerate(waves)
     )

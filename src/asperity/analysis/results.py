@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -26,6 +25,7 @@ from asperity.analysis.limits.perceptibility import (
 from asperity.analysis.passivity.assess_passivity import (
     buzz_text,
     critical_speed_text,
+    delay_clause,
     stability_limit_text,
     stiffness_limit_text,
 )
@@ -341,7 +341,7 @@ def _limit_basis_text(row: LawRow, device: Device) -> str:
     proved = "not proved"
     if limit.proved_stiffness:
         proved = f"proved only up to {stiffness_limit_text(limit.proved_stiffness)}"
-    plausible = f"is therefore plausible{_delay_clause(limit.delay)}, but {proved}"
+    plausible = f"is therefore plausible{delay_clause(limit.delay)}, but {proved}"
     return (
         f"{_wall_text(device)} A limit of {at_most} for law {row.law.letter} {plausible}. "
         f"{_margin_text(row)}"
@@ -357,12 +357,6 @@ def _wall_text(device: Device) -> str:
     if test.pedigree == "measured":
         return f"A smooth wall of {stiffness} was stable on this device."
     return f"The stiffest wall known to be stable on this device is {stiffness}."
-
-
-def _delay_clause(delay: float | None) -> str:
-    if delay is None:
-        return ""
-    return ", with any delay" if math.isinf(delay) else f", with a delay up to {delay:.3g} samples"
 
 
 def _margin_text(row: LawRow) -> str:

@@ -60,7 +60,6 @@ def test_a_limit_is_strict_wave_by_wave(
     holds = left < right
     assert 0 < holds.sum() < 3
     assert found.holds is not None
-    assert found.top_speeds is not None
     np.testing.assert_array_equal(found.holds, holds)
     expected = np.where(holds, math.inf, 0.0) if top is None else top
     np.testing.assert_allclose(found.top_speeds, expected, rtol=1e-15)

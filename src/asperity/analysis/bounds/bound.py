@@ -216,11 +216,8 @@ def spectral_norm(matrices: FloatArray) -> FloatArray:
     """Return the largest singular values, shape (n,), of matrices (n, 3, 3)."""
     a, b, c = matrices[:, :, 0].T, matrices[:, :, 1].T, matrices[:, :, 2].T
     pairs = ((a, a), (b, b), (c, c), (a, b), (a, c), (b, c))
-    return np.sqrt(_largest_eigenvalue(*(_dot_rows(x, y) for x, y in pairs)))
-
-
-def _dot_rows(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+    products = (x[0] * y[0] + x[1] * y[1] + x[2] * y[2] for x, y in pairs)
+    return np.sqrt(_largest_eigenvalue(*products))
 
 
 def one_sided(matrices: FloatArray) -> FloatArray:

@@ -139,18 +139,14 @@ def _jump_onset(surface: Surface, q: Bound) -> tuple[float, bool]:
     if theorem_of(surface.law).detects_medial_axis:
         onset = math.inf
         if math.isinf(q.lower) and q.at is not None:
-            onset = min(_distance_to_surface(surface, q.at), depth)
+            distance = np.linalg.norm(surface.texture.nearest([q.at])[0] - np.array(q.at))
+            onset = min(float(distance), depth)
         proved = math.isfinite(q.upper)
     else:
         crest = sharpest_crest(surface.texture)
         onset = math.inf if crest is None else crest.radius
         proved = crest is not None and depth < crest.min_radius
     return onset, proved
-
-
-def _distance_to_surface(surface: Surface, point: Point) -> float:
-    """Return the distance to the surface [m]."""
-    return float(np.linalg.norm(surface.texture.nearest([point])[0] - np.array(point)))
 
 
 def _continuous_force(surface: Surface, q: Bound, reason: str) -> Continuity:

@@ -75,14 +75,6 @@ def scan_height(surface: Surface) -> float:
     return surface.law.contact.extremes(surface.texture)[1] - surface.max_depth
 
 
-def scan_points(surface: Surface, line: ScanLine, height: float) -> FloatArray:
-    """Return the probe points of the scan, shape (lines, points, 3) [m]."""
-    costly = surface.law.contact.requires_search
-    count = _NEAREST_SCAN_POINTS[surface.texture.is_profile] if costly else _SCAN_POINTS_PER_LINE
-    xy = parallel_line_points(surface.texture, line, count)
-    return np.concatenate([xy, np.full((*xy.shape[:2], 1), height)], axis=2)
-
-
 def parallel_line_points(texture: Texture, line: ScanLine, count: int) -> FloatArray:
     """Return points (lines, count, 2) [m] of the scan line of a profile, or 16 lines of a map.
 
@@ -103,8 +95,11 @@ def _scan_forces_and_slopes(
     surface: Surface, line: ScanLine, height: float
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return f/k and -J_zz/k on the scan, and the fraction without contact."""
-    points = scan_points(surface, line, height)
-    flat = points.reshape(-1, 3)
+    costly = surface.law.contact.requires_search
+    count = _NEAREST_SCAN_POINTS[surface.texture.is_profile] if costly else _SCAN_POINTS_PER_LINE
+    xy = parallel_line_points(surface.texture, line, count)
+    shape = xy.shape[:2]
+    flat = np.column_stack([xy.reshape(-1, 2), np.full(math.prod(shape), height)])
     if surface.law.stateful:
         trailing = np.tile(surface.parameter("max_deflection") * line.direction, (len(flat), 1))
         sliding = np.ones(len(flat), dtype=bool)
@@ -112,7 +107,6 @@ def _scan_forces_and_slopes(
     else:
         forces, jacobians = surface.force_and_jacobian(flat)
     lost = float(np.mean(~jacobians.any(axis=(1, 2))))
-    shape = points.shape[:2]
     slopes = -jacobians[:, 2, 2].reshape(shape) / surface.stiffness
     return forces.reshape(*shape, 3) / surface.stiffness, slopes, lost
 

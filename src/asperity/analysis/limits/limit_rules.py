@@ -139,13 +139,13 @@ class Decision:
 
     Attributes:
         limit: the result for all waves.
-        holds: whether it holds for each wave, shape (n,); ``None`` if undecidable.
+        holds: whether it holds for each wave, shape (n,); true if undecidable.
         top_speeds: speed [m/s] below which it holds for each wave, shape (n,).
     """
 
     limit: Limit
-    holds: NDArray[np.bool_] | None
-    top_speeds: FloatArray | None
+    holds: NDArray[np.bool_]
+    top_speeds: FloatArray
 
 
 def evaluate_limit(rule: LimitRule, case: LimitCase, inequality: str | None = None) -> Decision:
@@ -162,7 +162,8 @@ def evaluate_limit(rule: LimitRule, case: LimitCase, inequality: str | None = No
     if on_waves and not len(case.wavelengths):
         missing.append("waves: the surface is flat")
     if missing:
-        return Decision(replace(limit, missing_data=tuple(missing)), None, None)
+        limit, n = replace(limit, missing_data=tuple(missing)), len(case.wavelengths)
+        return Decision(limit, np.full(n, True), np.full(n, math.inf))
     number = case.device[field]
     left, right = np.broadcast_arrays(*map(np.atleast_1d, rule.sides(case, number)))
     # A stiffness of K₀/q may exceed it by rounding; the other limits are strict.

@@ -203,21 +203,15 @@ def classify_perceptibility(
     )
 
 
-def _decided_limits(case: LimitCase) -> list[Decision]:
-    """Return the decisions of the sampling limits that can be decided."""
-    decisions = [
-        evaluate_limit(rule, case) for rule in LIMIT_RULES if rule.number in _SAMPLING_LIMITS
-    ]
-    return [decision for decision in decisions if decision.holds is not None]
+def _sampling_decisions(case: LimitCase) -> list[Decision]:
+    return [evaluate_limit(rule, case) for rule in LIMIT_RULES if rule.number in _SAMPLING_LIMITS]
 
 
 def _resolved_share(case: LimitCase) -> float:
     """Return the share of the force's variance that the device resolves; 1 without force."""
     squares = case.forces**2
     total = float(squares.sum())
-    is_resolved = np.ones(len(squares), dtype=bool)
-    for decision in _decided_limits(case):
-        is_resolved &= decision.holds
+    is_resolved = np.all([decision.holds for decision in _sampling_decisions(case)], axis=0)
     return float(squares[is_resolved].sum()) / total if total > 0.0 else 1.0
 
 
@@ -277,8 +271,7 @@ def _required_magnification(case: LimitCase, texture_rms: float, clear: float) -
 def _resolution_remedy(case: LimitCase, share: float) -> Remedy:
     """Return the scan speed, or the position resolution, that resolves a share of the force."""
     squares = case.forces**2
-    tops = [limit.top_speeds for limit in _decided_limits(case) if limit.top_speeds is not None]
-    # Without any such limit the force is fully resolved and needs no remedy.
+    tops = [decision.top_speeds for decision in _sampling_decisions(case)]
     speed = _weighted_quantile(np.min(tops, axis=0), squares, share)
     if speed > 0.0:
         return Remedy("slower", speed)

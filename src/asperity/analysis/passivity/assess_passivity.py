@@ -115,10 +115,14 @@ def stability_limit_text(limit: StabilityLimit, speed: float | None = None) -> s
     if limit.basis == "quiet against buzz":
         delivers = f"delivers energy below the speed {critical_speed_text(speed)}"
         return f"no buzz expected up to {at_most}, {delivers}"
-    if limit.basis == "proved" or limit.delay is None:
-        return f"{limit.basis} up to {at_most}"
-    delay = "any delay" if math.isinf(limit.delay) else f"a delay up to {limit.delay:.3g} samples"
-    return f"plausible up to {at_most}, with {delay}"
+    return f"{limit.basis} up to {at_most}{delay_clause(limit.delay)}"
+
+
+def delay_clause(delay: float | None) -> str:
+    """Return the admissible delay [samples], to be appended to a limit; empty for ``None``."""
+    if delay is None:
+        return ""
+    return ", with any delay" if math.isinf(delay) else f", with a delay up to {delay:.3g} samples"
 
 
 def stiffness_limit_text(stiffness: float) -> str:
