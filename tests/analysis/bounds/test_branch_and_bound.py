@@ -20,7 +20,7 @@ from asperity.analysis.bounds.bound import (
     precise_one_sided,
 )
 from asperity.analysis.bounds.branch_and_bound import Problem, Supremum, polish, supremum
-from asperity.analysis.bounds.problems import CrestProblem, SlopeProblem, normal_change_problem
+from asperity.analysis.bounds.problems import CrestProblem, NormalChangeProblem, SlopeProblem
 from asperity.analysis.bounds.sampling import HeightProblem
 from asperity.analysis.gain.medial_axis import crest_curvature
 from asperity.analysis.gain.theorems import (
@@ -310,7 +310,7 @@ def problems(texture: Texture) -> list[Problem]:
     return [
         SlopeProblem(cells, 1.0),
         SlopeProblem(cells, 0.0),
-        normal_change_problem(cells, 1.0),
+        NormalChangeProblem(cells, 1.0),
         CrestProblem(cells),
         CrestProblem(cells, 1e-5),
         FrictionProblem(surface, cells, largest_singular_value),
@@ -378,7 +378,7 @@ def test_the_normal_turns_as_fast_as_differences_say() -> None:
     moves = [np.array([step, 0.0]), np.array([0.0, step])]
     turned = [(normal(xy + m) - normal(xy - m)) / (2 * step) for m in moves]
     expected = np.linalg.norm(np.stack(turned, axis=-1), 2, axis=(1, 2))
-    np.testing.assert_allclose(normal_change_problem(cells, 1.0).values(at), expected, rtol=1e-6)
+    np.testing.assert_allclose(NormalChangeProblem(cells, 1.0).values(at), expected, rtol=1e-6)
 
 
 # --- law F in two entries -------------------------------------------------------------------------

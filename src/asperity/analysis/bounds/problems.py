@@ -35,7 +35,6 @@ from asperity.laws import Law
 from asperity.surface import Surface
 
 Entries = Sequence[Sequence[Any]]
-Formula = Callable[[Sequence[Any], Callable[[Any], Any]], Entries]
 # Numbers of J/k below this are not resolved: a flat surface has no relative gap.
 _RESOLUTION = 1e-9
 
@@ -217,35 +216,23 @@ class LawProblem(MatrixProblem):
 
 
 class SurfaceProblem(MatrixProblem):
-    """The greatest measure of a matrix that is a formula in derivatives of the height alone.
+    """The greatest measure of a matrix that is a formula in derivatives of the height alone."""
 
-    Args:
-        cells: of the texture.
-        names: names of the derivatives that the formula takes, see ``DERIVATIVE_NAMES``.
-        formula: rows of entries from the derivatives and a square root, for models or numbers.
-        measure: the measure.
-        floor: see :class:`Problem`.
-    """
+    @abstractmethod
+    def formula(self, derivatives: Sequence[Any], root: Callable[[Any], Any]) -> Entries:
+        """Return rows of entries from derivatives and a square root, of models or of arrays.
 
-    def __init__(
-        self,
-        cells: Cells,
-        names: Sequence[str],
-        formula: Formula,
-        measure: JacobianMeasure,
-        floor: float = _RESOLUTION,
-    ) -> None:
-        super().__init__(cells, names, measure, floor)
-        self._formula = formula
+        Entries that are left out are zero.
+        """
 
     def matrices(self, models: dict[str, TaylorNumber]) -> list[Entries]:
         """See :class:`MatrixProblem`."""
-        return [self._formula([models[name] for name in self._names], TaylorMath.sqrt)]
+        return [self.formula([models[name] for name in self._names], TaylorMath.sqrt)]
 
     def exact_matrices(self, coordinates: FloatArray) -> list[FloatArray]:
-        """See :class:`MatrixProblem`; the entries that a formula leaves out are zero."""
+        """See :class:`MatrixProblem`."""
         derivatives = self.cells.derivatives(coordinates).T[1 : 1 + len(self._names)]
-        return [_stack_entries(self._formula(list(derivatives), np.sqrt), len(coordinates), 0)[0]]
+        return [_stack_entries(self.formula(list(derivatives), np.sqrt), len(coordinates), 0)[0]]
 
 
 class SlopeProblem(SurfaceProblem):
@@ -258,9 +245,11 @@ class SlopeProblem(SurfaceProblem):
 
     def __init__(self, cells: Cells, offset: float) -> None:
         self._offset = offset
-        super().__init__(
-            cells, DERIVATIVE_NAMES[1:3], lambda slope, _root: [[part] for part in slope], NORM
-        )
+        super().__init__(cells, DERIVATIVE_NAMES[1:3], NORM)
+
+    def formula(self, derivatives: Sequence[Any], _root: Callable[[Any], Any]) -> Entries:
+        """See :class:`SurfaceProblem`."""
+        return [[part] for part in derivatives]
 
     def prune_threshold(self, best: float, tolerance: float) -> float:
         """See :class:`Problem`."""
@@ -268,37 +257,22 @@ class SlopeProblem(SurfaceProblem):
         return math.sqrt((whole - self._offset) * (whole + self._offset))
 
 
-def _normal_derivatives(derivatives: Sequence[Any], root: Callable[[Any], Any]) -> Entries:
-    """∂n/∂x and ∂n/∂y as columns: (∂w - n (n · ∂w))/s with w = (-h_x, -h_y, 1)."""
-    hx, hy, hxx, hxy, hyy = derivatives
-    s = root(1.0 + hx * hx + hy * hy)
-    square = 1.0 / (s * s)
-    columns = []
-    for a, b in ((hxx, hxy), (hxy, hyy)):
-        along = (hx * a + hy * b) * square
-        columns.append([(hx * along - a) / s, (hy * along - b) / s, -along / s])
-    return [[column[row] for column in columns] for row in range(3)]
+class NormalChangeProblem(SurfaceProblem):
+    """The greatest ‖∂n/∂(x, y)‖, the change of the surface normal [1/m]."""
 
+    def __init__(self, cells: Cells, floor: float) -> None:
+        super().__init__(cells, DERIVATIVE_NAMES[1:], NORM, floor)
 
-def normal_change_problem(cells: Cells, floor: float) -> MatrixProblem:
-    """Return the problem of ‖∂n/∂(x, y)‖, the change of the surface normal [1/m]."""
-    return SurfaceProblem(cells, DERIVATIVE_NAMES[1:], _normal_derivatives, NORM, floor)
-
-
-def _shape_operator(derivatives: Sequence[Any], root: Callable[[Any], Any]) -> Entries:
-    """G^(-1/2) H G^(-1/2)/s, whose eigenvalues are the principal curvatures; G = I + g gᵀ.
-
-    G^(-1/2) = I - g gᵀ/(s (1 + s)).
-    """
-    hx, hy, hxx, hxy, hyy = derivatives
-    square = 1.0 + hx * hx + hy * hy
-    s = root(square)
-    share = 1.0 / (square + s)
-    a, b, c = 1.0 - hx * hx * share, -(hx * hy * share), 1.0 - hy * hy * share
-    # Columns of H G^(-1/2), then G^(-1/2) from the left.
-    p, q = hxx * a + hxy * b, hxx * b + hxy * c
-    r, t = hxy * a + hyy * b, hxy * b + hyy * c
-    return [[(a * p + b * r) / s, (a * q + b * t) / s], [(b * p + c * r) / s, (b * q + c * t) / s]]
+    def formula(self, derivatives: Sequence[Any], root: Callable[[Any], Any]) -> Entries:
+        """∂n/∂x and ∂n/∂y as columns: (∂w - n (n · ∂w))/s with w = (-h_x, -h_y, 1)."""
+        hx, hy, hxx, hxy, hyy = derivatives
+        s = root(1.0 + hx * hx + hy * hy)
+        square = 1.0 / (s * s)
+        columns = []
+        for a, b in ((hxx, hxy), (hxy, hyy)):
+            along = (hx * a + hy * b) * square
+            columns.append([(hx * along - a) / s, (hy * along - b) / s, -along / s])
+        return [[column[row] for column in columns] for row in range(3)]
 
 
 class CrestProblem(SurfaceProblem):
@@ -314,7 +288,25 @@ class CrestProblem(SurfaceProblem):
         self._depth = depth
         floor = _RESOLUTION if depth is None else 0.5 / depth
         # The missing third curvature is zero, which is never the greatest at a crest.
-        super().__init__(cells, DERIVATIVE_NAMES[1:], _shape_operator, ONE_SIDED, floor)
+        super().__init__(cells, DERIVATIVE_NAMES[1:], ONE_SIDED, floor)
+
+    def formula(self, derivatives: Sequence[Any], root: Callable[[Any], Any]) -> Entries:
+        """G^(-1/2) H G^(-1/2)/s, whose eigenvalues are the principal curvatures; G = I + g gᵀ.
+
+        G^(-1/2) = I - g gᵀ/(s (1 + s)).
+        """
+        hx, hy, hxx, hxy, hyy = derivatives
+        square = 1.0 + hx * hx + hy * hy
+        s = root(square)
+        share = 1.0 / (square + s)
+        a, b, c = 1.0 - hx * hx * share, -(hx * hy * share), 1.0 - hy * hy * share
+        # Columns of H G^(-1/2), then G^(-1/2) from the left.
+        p, q = hxx * a + hxy * b, hxx * b + hxy * c
+        r, t = hxy * a + hyy * b, hxy * b + hyy * c
+        return [
+            [(a * p + b * r) / s, (a * q + b * t) / s],
+            [(b * p + c * r) / s, (b * q + c * t) / s],
+        ]
 
     def upper_bounds(self, centres: FloatArray, half: FloatArray, threshold: float) -> FloatArray:
         """See :class:`Problem`: S = G⁻¹ H / s with G >= 1, s >= 1, so no curvature is above ‖H‖."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from asperity.analysis.bounds.bound import CURL, NORM, ONE_SIDED, Bound, JacobianMeasure
 from asperity.analysis.bounds.branch_and_bound import Contacts, Problem, Supremum
-from asperity.analysis.bounds.problems import SlopeProblem, normal_change_problem
+from asperity.analysis.bounds.problems import NormalChangeProblem, SlopeProblem
 from asperity.analysis.bounds.sampling import worst_deflection
 from asperity.analysis.gain import closed_forms as forms
 from asperity.analysis.gain.medial_axis import (
@@ -332,7 +332,7 @@ THEOREMS: dict[Law, Theorem] = {
         closed_forms={NORM: ClosedForm(forms.q_g, forms.phase_trough)},
         reductions={
             NORM: Reduction(
-                lambda surface, cells: normal_change_problem(cells, 1.0 / surface.max_depth),
+                lambda surface, cells: NormalChangeProblem(cells, 1.0 / surface.max_depth),
                 lambda surface, change: max(1.0, surface.max_depth * change),
             )
         },
