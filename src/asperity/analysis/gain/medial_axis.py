@@ -76,17 +76,13 @@ def crest_curvature(derivatives: FloatArray) -> FloatArray:
 
 @lru_cache(maxsize=16)
 def sharpest_crest(
-    texture: Texture,
-    tolerance: float = _CURVATURE_TOLERANCE,
-    work_limit: int = DEFAULT_WORK_LIMIT,
-    extent: tuple[float, float] | None = None,
-    margin: float = 0.0,
+    texture: Texture, extent: tuple[float, float] | None = None, margin: float = 0.0
 ) -> Crest | None:
     """Return the crest of least radius, certified; ``None`` for a surface without crests.
 
-    Exact for a sinusoid; else by branch and bound to a relative tolerance of the curvature. A sum
-    of more than four independent waves is sampled unless an extent is given, which is then
-    searched with a margin on every side.
+    Exact for a sinusoid; else by branch and bound to 1e-4 of the curvature. A sum of more than four
+    independent waves is sampled unless an extent is given, which is then searched with a margin on
+    every side.
     """
     if texture.single_wave is not None and extent is None:
         return _crest_of_wave(texture, texture.single_wave)
@@ -96,8 +92,9 @@ def sharpest_crest(
         found = sample_supremum(CrestProblem(cells))
     else:
         # Cells without a refined gap reach only their default gap in reasonable time.
-        gap = tolerance if cells.refined_gap else max(tolerance, cells.default_gap)
-        found = supremum(CrestProblem(cells), gap, work_limit, cells.refined_gap)
+        least_gap = 0.0 if cells.refined_gap else cells.default_gap
+        gap = max(_CURVATURE_TOLERANCE, least_gap)
+        found = supremum(CrestProblem(cells), gap, cheap_gap=cells.refined_gap)
     if found.at is None:
         return None
     return _make_crest(texture, cells.to_plane(found.at[None])[0], found.upper)
@@ -147,8 +144,7 @@ class SearchOptions:
 
     def crest(self, surface: Surface) -> Crest | None:
         """Return the sharpest crest in reach; ``None`` for a surface without crests."""
-        margin = self.margin(surface)
-        return sharpest_crest(surface.texture, extent=self.extent, margin=margin)
+        return sharpest_crest(surface.texture, self.extent, self.margin(surface))
 
     def cheap_tolerance(self, cells: Cells) -> float | None:
         """Return the relative gap to reach where it costs little."""
