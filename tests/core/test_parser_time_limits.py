@@ -20,7 +20,7 @@ from asperity.devices.device_file import load_device
 from asperity.measured.reading import ReadingOptions, SurfaceFile
 from asperity.measured.reading.images.pixels import ome_scale
 from asperity.measured.reading.metrology.sdf import read_sdf
-from asperity.measured.reading.metrology.x3p import parse_document
+from asperity.measured.reading.metrology.x3p import parse_header
 from asperity.measured.reading.plain_text.esri import read_esri
 from asperity.measured.reading.plain_text.text_reader import read_text
 from asperity.measured.reading.readers import SIGNATURE_READERS
@@ -123,7 +123,7 @@ PARSERS: dict[str, tuple[Callable[[str], object], tuple[str, ...]]] = {
     "OME": (ome_scale, ("", "<Pixels ", '<a:Pixels PhysicalSizeX="1" ')),
     "SDF": (lambda text: read_sdf(file_of(text), ReadingOptions()), ("aISO-1.0\n", SDF, SDF + "*")),
     "XML of an X3P": (
-        lambda text: parse_document(text.encode()),
+        lambda text: parse_header(text.encode(), []),
         ("", "<ISO5436_2>", '<?xml version="1.0"?>', BOMB, f"{BOMB}]><ISO5436_2>&a11;", "<a b='"),
     ),
 }
