@@ -12,7 +12,7 @@ import math
 import re
 import struct
 import warnings
-from dataclasses import dataclass
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 
@@ -49,13 +49,18 @@ _DATA_TYPES = {
 }
 
 
-@dataclass(frozen=True)
-class _Header:
+class _Header(NamedTuple):
+    """The entries of a header, in the order of a binary one; scales in metres."""
+
     points: int
     profiles: int
-    scale: tuple[float, float, float]
-    dtype: str
-    missing: float
+    x_scale: float
+    y_scale: float
+    z_scale: float
+    z_resolution: float
+    compression: int
+    data_type: int
+    check_type: int
 
 
 def is_sdf(head: bytes) -> bool:
@@ -86,59 +91,48 @@ def read_sdf(file: SurfaceFile, _options: ReadingOptions) -> RawSurface:
     content = file.content
     parse = _parse_binary if _BINARY_SIGNATURE.match(content) else _parse_text
     header, stored = parse(content)
-    stored, notes = mask_missing(stored, header.missing)
-    x, y, z = header.scale
+    stored, notes = mask_missing(stored, _DATA_TYPES[header.data_type][1])
     with np.errstate(over="ignore", invalid="ignore"):  # infinities are refused by the caller
-        heights = stored * z
+        heights = stored * header.z_scale
     if header.profiles == 1:
-        return RawSurface(heights, (x,), file.name, notes)
+        return RawSurface(heights, (header.x_scale,), file.name, notes)
     heights = heights.reshape(header.profiles, header.points)
-    return RawSurface(heights, (x, y), file.name, notes)
+    return RawSurface(heights, (header.x_scale, header.y_scale), file.name, notes)
 
 
-def _make_header(
-    points: int,
-    profiles: int,
-    scale: tuple[float, float, float],
-    type_code: int,
-    options: dict[str, int],
-) -> _Header:
+def _check_header(header: _Header) -> _Header:
+    points, profiles = header.points, header.profiles
     if points < 1 or profiles < 1:
         raise SurfaceFileError(f"NumPoints is {points}, NumProfiles {profiles}: both must be > 0")
     check_point_count(points, profiles)
-    if type_code not in _DATA_TYPES:
-        raise SurfaceFileError(f"DataType is {type_code}; 0 to 7 are defined")
-    for key, value in options.items():
+    if header.data_type not in _DATA_TYPES:
+        raise SurfaceFileError(f"DataType is {header.data_type}; 0 to 7 are defined")
+    for key, value in (("Compression", header.compression), ("CheckType", header.check_type)):
         if value != 0:
             raise SurfaceFileError(f"{key} is {value}; only files without (0) are read")
-    needed = {"Xscale": scale[0], "Zscale": scale[2]}
+    scales = {"Xscale": header.x_scale, "Zscale": header.z_scale}
     if profiles > 1:  # one profile has no distance to the next
-        needed["Yscale"] = scale[1]
-    for key, length in needed.items():
-        if not (math.isfinite(length) and length > 0):
+        scales["Yscale"] = header.y_scale
+    for key, length in scales.items():
+        if not 0.0 < length < math.inf:
             raise SurfaceFileError(f"{key} is {length:g}; it must be positive [m]")
-    return _Header(points, profiles, scale, *_DATA_TYPES[type_code])
+    return header
 
 
 def _parse_binary(content: bytes) -> tuple[_Header, FloatArray]:
     layout = _HEADER_2 if content[5:8] == b"2.0" else _HEADER_1
-    if len(content) < layout.size:
-        raise SurfaceFileError(f"truncated: {len(content)} bytes; the header has {layout.size}")
-    fields = layout.unpack_from(content)
-    points, profiles, x, y, z = fields[4:9]
-    compression, code, check = fields[10:]
-    options = {"Compression": compression, "CheckType": check}
-    header = _make_header(points, profiles, (x, y, z), code, options)
-    dtype = np.dtype(header.dtype)
-    expected, rest = points * profiles * dtype.itemsize, len(content) - layout.size
+    start = layout.size
+    if len(content) < start:
+        raise SurfaceFileError(f"truncated: {len(content)} bytes; the header has {start}")
+    header = _check_header(_Header(*layout.unpack_from(content)[4:]))
+    dtype, count = np.dtype(_DATA_TYPES[header.data_type][0]), header.points * header.profiles
+    expected, rest = count * dtype.itemsize, len(content) - start
     if rest < expected:
         raise SurfaceFileError(f"truncated: {rest} bytes of heights, {expected} are expected")
-    start = layout.size
     if rest == expected + _OLYMPUS_PADDING and content.startswith(b"bISO-1.0"):
         start += _OLYMPUS_PADDING
-    stored = np.frombuffer(content, dtype, points * profiles, start)
     with np.errstate(invalid="ignore"):  # a signalling NaN is a missing point too
-        return header, stored.astype(np.float64)
+        return header, np.frombuffer(content, dtype, count, start).astype(np.float64)
 
 
 def _parse_text(content: bytes) -> tuple[_Header, FloatArray]:
@@ -146,15 +140,15 @@ def _parse_text(content: bytes) -> tuple[_Header, FloatArray]:
     if not star:
         raise SurfaceFileError("no '*' ends the header")
     fields = _parse_fields(head.decode("latin-1"))
-    options = {key: _field_integer(fields, key, 0) for key in ("Compression", "CheckType")}
-    sets = _field_integer(fields, "NumDataSet", 1)
+    sets = _parse_integer(fields, "NumDataSet", "1")
     if sets != 1:
         raise SurfaceFileError(f"holds {sets} data sets; one is expected")
-    x, y, z = (parse_number(_field_text(fields, f"{axis}scale"), f"{axis}scale") for axis in "XYZ")
-    points, profiles = _field_integer(fields, "NumPoints"), _field_integer(fields, "NumProfiles")
-    code = _field_integer(fields, "DataType", 7)
-    header = _make_header(points, profiles, (x, y, z), code, options)
-    return header, _parse_heights(rest.partition(b"*")[0], points * profiles)
+    counts = [_parse_integer(fields, key) for key in ("NumPoints", "NumProfiles")]
+    scales = [parse_number(_field(fields, f"{axis}scale"), f"{axis}scale") for axis in "XYZ"]
+    defaults = {"Compression": "0", "DataType": "7", "CheckType": "0"}
+    codes = [_parse_integer(fields, key, default) for key, default in defaults.items()]
+    header = _check_header(_Header._make((*counts, *scales, 0.0, *codes)))
+    return header, _parse_heights(rest.partition(b"*")[0], header.points * header.profiles)
 
 
 def _parse_fields(head: str) -> dict[str, str]:
@@ -169,17 +163,15 @@ def _parse_fields(head: str) -> dict[str, str]:
     return fields
 
 
-def _field_text(fields: dict[str, str], key: str) -> str:
-    value = fields.get(key.lower(), "")
+def _field(fields: dict[str, str], key: str, default: str = "") -> str:
+    value = fields.get(key.lower()) or default
     if not value:
         raise SurfaceFileError(f"the header has no {key}")
     return value
 
 
-def _field_integer(fields: dict[str, str], key: str, default: int | None = None) -> int:
-    if default is not None and not fields.get(key.lower()):
-        return default
-    text = _field_text(fields, key)
+def _parse_integer(fields: dict[str, str], key: str, default: str = "") -> int:
+    text = _field(fields, key, default)
     if not re.fullmatch(r"[0-9]{1,12}", text, re.ASCII):
         raise SurfaceFileError(f"{key} is {text[:40]!r}; a whole number is expected")
     return int(text)
@@ -195,20 +187,17 @@ def _parse_heights(area: bytes, count: int) -> FloatArray:
         warnings.simplefilter("error")
         try:
             values = np.fromstring(plain.decode("latin-1"), dtype=np.float64, sep=" ")
-        except (DeprecationWarning, ValueError) as error:
-            raise _bad_height_error(plain) from error
+        except (DeprecationWarning, ValueError):
+            _reject_height(plain)
     if len(values) != count:
         raise SurfaceFileError(f"{len(values)} heights; NumPoints times NumProfiles is {count}")
     return values
 
 
-def _bad_height_error(area: bytes) -> SurfaceFileError:
+def _reject_height(area: bytes) -> NoReturn:
+    """Raise the error for the first height that is no number."""
     for index, match in enumerate(re.finditer(rb"\S+", area), 1):
         word = match.group().decode("latin-1")
-        if word.lower() in ("nan", "-nan"):
-            continue
-        try:
+        if word.lower() not in ("nan", "-nan"):
             parse_number(word, f"height {index}")
-        except SurfaceFileError as error:
-            return error
-    return SurfaceFileError("the heights are not numbers")
+    raise SurfaceFileError("the heights are not numbers")
