@@ -6,7 +6,8 @@ import math
 import re
 from array import array
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -73,9 +74,10 @@ def find_table(text: str) -> TextTable:
     lines = re.split(r"(?<!\r)\r*\n|\r", text)
     dialect = _detect_dialect(lines)
     blocks = _split_blocks(lines, dialect)
-    chosen = _find_longest_block(blocks)
-    _check_neighbours(blocks, chosen)
-    _check_text(blocks, chosen, dialect)
+    chosen = max(range(len(blocks)), key=lambda k: blocks[k].row_count, default=0)
+    if not blocks or not blocks[chosen].width:
+        raise SurfaceFileError("no row of numbers")
+    _check_other_blocks(blocks, chosen, dialect)
     block = blocks[chosen]
     between = lines[block.line_numbers[0] : block.line_numbers[-1]]
     return TextTable(
@@ -104,6 +106,11 @@ class _Block:
     line_numbers: list[int] = field(default_factory=list)
     row_texts: list[str] = field(default_factory=list)
     values: array[float] = field(default_factory=lambda: array("d"))
+
+    @property
+    def row_count(self) -> int:
+        """Number of rows of numbers; 0 for text."""
+        return len(self.line_numbers) if self.width else 0
 
 
 def _strip_comment(line: str) -> str:
@@ -135,19 +142,14 @@ def _parse_row(text: str, dialect: Dialect) -> list[float]:
             return []
         text = text.replace(",", ".")
     cells = text.split(dialect.separator)
-    try:
+    with suppress(ValueError):
         return list(map(float, cells))
-    except ValueError:
-        return _parse_row_with_missing([cell.strip().lower() for cell in cells])
-
-
-def _parse_row_with_missing(cells: list[str]) -> list[float]:
+    cells = [cell.strip().lower() for cell in cells]
     if _MISSING_MARKERS.isdisjoint(cells) or _MISSING_MARKERS.issuperset(cells):
         return []
-    try:
+    with suppress(ValueError):
         return [math.nan if cell in _MISSING_MARKERS else float(cell) for cell in cells]
-    except ValueError:
-        return []
+    return []
 
 
 def _detect_dialect(lines: list[str]) -> Dialect:
@@ -165,35 +167,21 @@ def _detect_dialect(lines: list[str]) -> Dialect:
     return best
 
 
-def _find_longest_block(blocks: list[_Block]) -> int:
-    """Return the index of the longest block of numbers."""
-    rows = [len(block.line_numbers) if block.width else 0 for block in blocks]
-    if not any(rows):
-        raise SurfaceFileError("no row of numbers")
-    return rows.index(max(rows))
-
-
-def _check_neighbours(blocks: list[_Block], index: int) -> None:
-    """Refuse a block that is a part of a longer table."""
-    inside, after = blocks[index], blocks[index + 1 :]
-    if index > 0 and blocks[index - 1].width:
-        raise _ragged_error(blocks[index - 1], -1, inside)
-    for k, block in enumerate(blocks[:index]):
-        if block.width == inside.width > 1:
-            raise _interrupted_error(next(b for b in blocks[k:] if not b.width), 0)
-    if after and after[0].width:
-        raise _ragged_error(after[0], 0, inside)
+def _check_other_blocks(blocks: list[_Block], index: int, dialect: Dialect) -> None:
+    """Refuse a block that is a part of a longer table, or has a damaged first or last row."""
+    table, before, after = blocks[index], blocks[:index], blocks[index + 1 :]
+    neighbours = [(block, -1) for block in before[-1:]] + [(block, 0) for block in after[:1]]
+    for block, line in neighbours:
+        if block.width:
+            raise _ragged_error(block, line, table)
+    parts = [k for k, block in enumerate(before) if block.width == table.width > 1]
+    if parts:
+        raise _interrupted_error(next(block for block in before[parts[0] :] if not block.width), 0)
     if any(block.width for block in after):
         raise _interrupted_error(after[0], 0)
-
-
-def _check_text(blocks: list[_Block], index: int, dialect: Dialect) -> None:
-    """Refuse a damaged first or last row, which looks like a header or a footer."""
-    for k, line in ((index - 1, -1), (index + 1, 0)):
-        if not 0 <= k < len(blocks):
-            continue
-        if _is_damaged_row(blocks[k].row_texts[line], dialect, blocks[index].width):
-            raise _interrupted_error(blocks[k], line)
+    for block, line in neighbours:
+        if _is_damaged_row(block.row_texts[line], dialect, table.width):
+            raise _interrupted_error(block, line)
 
 
 def _is_damaged_row(text: str, dialect: Dialect, width: int) -> bool:
@@ -265,14 +253,7 @@ class MapHeader:
     @property
     def describes_map(self) -> bool:
         """Whether the header is that of a map, whatever the number of its columns."""
-        return not (self.pitch is None and self.size is None)
-
-    @property
-    def point_units(self) -> tuple[float, float, float] | None:
-        """Metres per number of x, y and z; None if one is unknown."""
-        if self.lateral_unit is None or self.unit is None:
-            return None
-        return self.lateral_unit, self.lateral_unit, self.unit
+        return self.pitch is not None or self.size is not None
 
     def find_pitch(self, rows: int, columns: int) -> tuple[float, float] | None:
         """Return the pitch [m] of a matrix with these numbers of rows and columns."""
@@ -481,51 +462,55 @@ def drop_auxiliary_columns(table: TextTable) -> tuple[TextTable, list[str]]:
         SurfaceFileError: the validity column has other values than 0 and 1.
     """
     notes = []
-    validity = next((k for k, name in _named_columns(table) if name in _VALIDITY_NAMES), None)
+    names = _column_names(table)
+    validity = next((k for k, found in enumerate(names) if found & _VALIDITY_NAMES), None)
     if validity is not None:
         valid = table.values[:, validity]
-        if not np.isin(valid, (0.0, 1.0)).all():
-            line = table.line_numbers[int(np.argmin(np.isin(valid, (0.0, 1.0))))]
+        wrong = ~np.isin(valid, (0.0, 1.0))
+        if wrong.any():
+            line = table.line_numbers[int(np.argmax(wrong))]
             raise SurfaceFileError(f"line {line}: validity must be 0 or 1")
         table = _drop_column(table, validity)
         table.values[valid == 0.0, -1] = np.nan
         count = int((valid == 0.0).sum())
         notes.append(f"{count} of {len(valid)} points are marked as not valid: missing")
-    numbering = any(k == 0 and name in _NUMBERING_NAMES for k, name in _named_columns(table))
+        names = _column_names(table)
     first = table.values[:, 0]
-    if numbering and first[0] in (0.0, 1.0) and np.all(np.diff(first) == 1.0):
+    is_numbering = first[0] in (0.0, 1.0) and np.all(np.diff(first) == 1.0)
+    if is_numbering and names[0] & _NUMBERING_NAMES:
         table = _drop_column(table, 0)
         notes.append("the first column numbers the points: left out")
     return table, notes
 
 
-def _named_columns(table: TextTable) -> Iterator[tuple[int, str]]:
-    """Yield index and lower-case name of each named column of a list of points."""
+def _column_names(table: TextTable) -> list[set[str]]:
+    """Return the lower-case names of each column of a list of points."""
     columns = table.values.shape[1]
-    if not 3 <= columns <= _MAX_COLUMNS:
-        return
+    names: list[set[str]] = [set() for _ in range(columns)]
     lines = [line for line in table.header if line.strip(" \t,;")]
-    for line in lines[-_MAX_HEADER_LINES:]:
-        names = [cell.strip("\"' ").lower() for cell in table.dialect.cells(line[:_MAX_LINE])]
-        if len(names) == columns:
-            yield from enumerate(names)
+    for line in lines[-_MAX_HEADER_LINES:] if 3 <= columns <= _MAX_COLUMNS else ():
+        cells = [cell.strip("\"' ").lower() for cell in table.dialect.cells(line[:_MAX_LINE])]
+        if len(cells) == columns:
+            for known, cell in zip(names, cells, strict=True):
+                known.add(cell)
         elif table.dialect.separator is None:  # a name such as "x [um]" is two cells
-            yield columns - 1, names[-1]
+            names[-1].add(cells[-1])
+    return names
 
 
 def _drop_column(table: TextTable, column: int) -> TextTable:
     """Return a table without a column, in its rows and its header."""
     columns = table.values.shape[1]
-    header = [_drop_cell(table, line, column, columns) for line in table.header]
-    texts = [_drop_cell(table, line, column, columns) for line in table.row_texts]
-    values = np.delete(table.values, column, axis=1)
-    return replace(table, values=values, header=header, row_texts=texts)
 
+    def drop_cell(line: str) -> str:
+        cells = table.dialect.cells(line)
+        if len(cells) != columns:
+            return line
+        return (table.dialect.separator or " ").join(cells[:column] + cells[column + 1 :])
 
-def _drop_cell(table: TextTable, line: str, column: int, columns: int) -> str:
-    cells = table.dialect.cells(line)
-    if table.dialect.separator is None and cells and cells[-1].lower() in _VALIDITY_NAMES:
-        return " ".join(cells[:-1])
-    if len(cells) != columns:
-        return line
-    return (table.dialect.separator or " ").join(cells[:column] + cells[column + 1 :])
+    return replace(
+        table,
+        values=np.delete(table.values, column, axis=1),
+        header=[drop_cell(line) for line in table.header],
+        row_texts=[drop_cell(line) for line in table.row_texts],
+    )

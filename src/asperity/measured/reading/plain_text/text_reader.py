@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from decimal import Decimal, InvalidOperation
 
@@ -135,13 +136,15 @@ def _read_points(
     table: TextTable, header: text_header.MapHeader, name: str, options: ReadingOptions
 ) -> RawSurface:
     """Return the map, or the profile along one axis, of a list of points."""
-    own = header.point_units or _column_units(table, options)
+    if header.lateral_unit is None or header.unit is None:
+        own = _column_units(table, options)
+    else:
+        own = header.lateral_unit, header.lateral_unit, header.unit
     units, notes = _resolve_units(table, own, name, options)
-    scale = np.array(units or (1.0, 1.0, 1.0))
     if np.isnan(table.values[:, :2]).any():
         raise SurfaceFileError(f"a position is missing; {_EXPECTED_LAYOUT}")
-    points = table.values * scale
-    has_units = units is not None
+    scale = np.array(units or (1.0, 1.0, 1.0))
+    points, has_units = table.values * scale, units is not None
     _check_length(float(np.ptp(points[:, :2], axis=0).max()), has_units=has_units)
     if options.resample is not None:
         heights, note = resampling.resample_points(points, options.resample)
@@ -151,13 +154,17 @@ def _read_points(
         resolution = _printed_resolution(table, 0), _printed_resolution(table, 1)
         heights, steps = points_to_grid(table.values, resolution)
     except _NoGridError as error:
-        raise SurfaceFileError(f"{error}; {_grid_hint(points)}") from None
+        suited = resampling.suggest_pitch(points[:, :2])
+        hint = f"{error}; {_EXPECTED_LAYOUT}"
+        if suited is not None:
+            hint += f"; {resampling.resampling_hint(suited)}, one grid point for each of theirs"
+        raise SurfaceFileError(hint) from None
     pitch = (steps[0] * float(scale[0]), steps[1] * float(scale[1]))
-    heights = np.ascontiguousarray(heights * scale[2])
-    if 1 in heights.shape:
-        axis = 0 if heights.shape[0] == 1 else 1
-        return RawSurface(heights.ravel(), (pitch[axis],), name, notes, has_units=has_units)
-    return RawSurface(heights, pitch, name, notes, has_units=has_units)
+    raw = RawSurface(heights * scale[2], pitch, name, notes, has_units=has_units)
+    if 1 not in heights.shape:
+        return raw
+    axis = 0 if heights.shape[0] == 1 else 1
+    return replace(raw, heights=raw.heights.ravel(), pitch=(pitch[axis],))
 
 
 def _read_matrix(
@@ -167,12 +174,12 @@ def _read_matrix(
     # NaN is no code: it equals nothing.
     code = math.nan if header.missing_code is None else header.missing_code
     values, marked = mask_missing(table.values, code)
-    last, own = _last_header_line(table), header.unit
-    if own is None and not text_header.is_lateral_entry(last):
-        own = text_header.find_single_unit(*_header_cells(table))
-        if own is None and options.unit is None:
-            text_header.require_unit(last)
-    units, notes = _resolve_units(table, None if own is None else (own,), name, options)
+    own = [] if header.unit is None else [header.unit]
+    if not own and not text_header.is_lateral_entry(_last_header_line(table)):
+        own = sorted(set(_named_units(table, options)))
+    if len(own) > 1:
+        raise SurfaceFileError(f"the header {_last_header_line(table)[:60]!r} names several units")
+    units, notes = _resolve_units(table, own, name, options)
     heights = np.ascontiguousarray(values * (units or (1.0,))[0])
     pitch: tuple[float, ...] | None = header.find_pitch(*values.shape)
     if heights.shape[1] == 1:
@@ -191,45 +198,41 @@ def _header_cells(table: TextTable) -> list[str]:
 
 
 def _resolve_units(
-    table: TextTable, own: tuple[float, ...] | None, name: str, options: ReadingOptions
+    table: TextTable, own: Sequence[float], name: str, options: ReadingOptions
 ) -> tuple[tuple[float, ...] | None, tuple[str, ...]]:
     """Return the units of the columns [m], None if unknown, and the notes on reading."""
-    unit, assumed = options.resolve_unit(name, None if own is None else own[0])
+    unit, assumed = options.resolve_unit(name, own[0] if own else None)
     notes = list(assumed)
     if table.n_footer_lines:
         notes.append(f"{table.n_footer_lines} lines of text after the numbers ignored")
     if table.dialect.decimal == ",":
         notes.append("a comma is read as the decimal sign")
-    return own if own or unit is None else (unit,) * table.values.shape[1], tuple(notes)
+    if own or unit is None:
+        return tuple(own) or None, tuple(notes)
+    return (unit,) * table.values.shape[1], tuple(notes)
 
 
-def _column_units(table: TextTable, options: ReadingOptions) -> tuple[float, ...] | None:
-    """Return the units of the columns [m] in the last header line, None if it names none."""
-    line, found = _last_header_line(table), text_header.find_units(_header_cells(table))
-    if not found:
-        if options.unit is None:
-            text_header.require_unit(line)
-        return None
-    count = table.values.shape[1]
+def _named_units(table: TextTable, options: ReadingOptions) -> list[float]:
+    """Return the units [m] that the last header line names; ask for one that is not clear."""
+    found = text_header.find_units(_header_cells(table))
+    if not found and options.unit is None:
+        text_header.require_unit(_last_header_line(table))
+    return found
+
+
+def _column_units(table: TextTable, options: ReadingOptions) -> Sequence[float]:
+    """Return the units of the columns [m] in the last header line, none if it names none."""
+    found, count = _named_units(table, options), table.values.shape[1]
     if count == 3 and len(found) == 1:
-        return (found[0],) * 3
-    if len(found) != count:
-        columns = f"all {count} columns or of none"
+        return found * 3
+    if len(found) not in (0, count):
+        line, columns = _last_header_line(table), f"all {count} columns or of none"
         raise SurfaceFileError(f"the header {line[:60]!r} must name the unit of {columns}")
-    return tuple(found)
+    return found
 
 
 class _NoGridError(SurfaceFileError):
     """Points that are on no regular grid, but may be interpolated."""
-
-
-def _grid_hint(points: FloatArray) -> str:
-    """Return the advice for points that are on no grid."""
-    pitch = resampling.suggest_pitch(points[:, :2])
-    if pitch is None:
-        return _EXPECTED_LAYOUT
-    hint = f"{resampling.resampling_hint(pitch)}, one grid point for each of theirs"
-    return f"{_EXPECTED_LAYOUT}; {hint}"
 
 
 def _reject_numbering(values: FloatArray) -> None:
