@@ -10,6 +10,7 @@ Reference:
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
@@ -50,38 +51,50 @@ class DamagedError(ValueError):
 # --- writing --------------------------------------------------------------------------------------
 
 
-def encode_record(op: Opcode, content: bytes) -> bytes:
-    """Return a record."""
+def encode_record(op: Opcode, *parts: bytes | str | Mapping[str, str]) -> bytes:
+    """Return a record; the length of a text and of a map of texts precedes it."""
+    content = b"".join(map(_encode_part, parts))
     return _RECORD.pack(op, len(content)) + content
 
 
-def encode_header(library: str) -> bytes:
-    """Return what a file begins with."""
-    return MAGIC + encode_record(Opcode.HEADER, _encode_text("") + _encode_text(library))
+def _encode_part(part: bytes | str | Mapping[str, str]) -> bytes:
+    if isinstance(part, bytes):
+        return part
+    if isinstance(part, str):
+        data = part.encode()
+    else:
+        data = b"".join(_encode_part(text) for item in part.items() for text in item)
+    return struct.pack("<I", len(data)) + data
 
 
-def encode_schema(name: str, text: str) -> bytes:
-    """Return the schema of the rows, a message definition of ROS 2."""
-    data = _encode_text(name) + _encode_text("ros2msg") + _encode_text(text)
-    return encode_record(Opcode.SCHEMA, struct.pack("<H", CHANNEL) + data)
+def encode_head(
+    name: str, library: str, schema: str, texts: Mapping[str, str], attachments: Mapping[str, bytes]
+) -> bytes:
+    """Return the records before the rows.
+
+    Args:
+        name: name of the topic, of the schema and of the metadata.
+        library: name and version of the writer.
+        schema: message definition of the rows (ROS 2).
+        texts: metadata by name.
+        attachments: files inside the file, by name.
+    """
+    channel = struct.pack("<H", CHANNEL)
+    records = [
+        encode_record(Opcode.HEADER, "", library),
+        encode_record(Opcode.SCHEMA, channel, f"{name}/Row", "ros2msg", schema),
+        encode_record(Opcode.CHANNEL, channel, channel, f"/{name}", "cdr", {}),
+        encode_record(Opcode.METADATA, name, texts),
+        *(_encode_attachment(file, data) for file, data in attachments.items()),
+    ]
+    return MAGIC + b"".join(records)
 
 
-def encode_channel(topic: str) -> bytes:
-    """Return the channel of the rows."""
-    data = _encode_text(topic) + _encode_text("cdr") + _encode_texts({})
-    return encode_record(Opcode.CHANNEL, struct.pack("<HH", CHANNEL, CHANNEL) + data)
-
-
-def encode_metadata(name: str, texts: Mapping[str, str]) -> bytes:
-    """Return a record of texts by name."""
-    return encode_record(Opcode.METADATA, _encode_text(name) + _encode_texts(texts))
-
-
-def encode_attachment(name: str, kind: str, data: bytes) -> bytes:
-    """Return a file inside the file."""
-    content = struct.pack("<QQ", 0, 0) + _encode_text(name) + _encode_text(kind)
+def _encode_attachment(name: str, data: bytes) -> bytes:
+    times = bytes(16)  # unused
+    content = times + _encode_part(name) + _encode_part("application/octet-stream")
     content += struct.pack("<Q", len(data)) + data
-    return encode_record(Opcode.ATTACHMENT, content + struct.pack("<I", zlib.crc32(content)))
+    return encode_record(Opcode.ATTACHMENT, content, struct.pack("<I", zlib.crc32(content)))
 
 
 @dataclass(frozen=True)
@@ -125,85 +138,57 @@ def encode_chunk(
     head = _CHUNK.pack(*times, len(rows), checksum, 0, len(rows))
     # The length of the content, before the content is put together: rows are many.
     front = _RECORD.pack(Opcode.CHUNK, len(head) + len(rows)) + head
-    listed = encode_record(Opcode.MESSAGE_INDEX, struct.pack("<HI", CHANNEL, len(index)) + index)
+    listed = encode_record(Opcode.MESSAGE_INDEX, struct.pack("<HI", CHANNEL, len(index)), index)
     place = Chunk(start, start + len(front), len(rows), checksum, times, len(listed))
     return place, (front, rows, listed)
 
 
 def encode_summary(head: bytes, chunks: list[Chunk], rows: int, offset: int) -> bytes:
-    """Return what a whole file ends with.
+    """Return the end of a complete file: an index of its records.
 
     Args:
-        head: what the file begins with.
-        chunks: where they lie.
-        rows: how many there are.
-        offset: where the ending begins in the file.
+        head: result of :func:`encode_head`.
+        chunks: positions of the chunks.
+        rows: number of rows.
+        offset: position of the result in the file.
     """
-    data_end = encode_record(Opcode.DATA_END, struct.pack("<I", 0))
-    summary = b"".join(
-        head[at : at + size]
-        for op, at, size in _record_positions(head)
-        if op in {Opcode.SCHEMA, Opcode.CHANNEL}
-    )
-    summary += _statistics(head, chunks, rows)
+    data_end = encode_record(Opcode.DATA_END, bytes(4))
+    records = [(op, at, head[at - _RECORD.size : at + length])
+               for op, at, length in iterate_records(io.BytesIO(head), len(head))]  # fmt: skip
+    summary = b"".join(record for op, _, record in records if op in (Opcode.SCHEMA, Opcode.CHANNEL))
+    summary += _statistics([op for op, _, _ in records], chunks, rows)
     summary += b"".join(map(_chunk_index, chunks))
-    summary += b"".join(_head_index(head))
-    start = offset + len(data_end)
-    footer = _RECORD.pack(Opcode.FOOTER, 20) + struct.pack("<QQ", start, 0)
+    summary += b"".join(_index_entry(op, at - _RECORD.size, record) for op, at, record in records)
+    footer = _RECORD.pack(Opcode.FOOTER, 20) + struct.pack("<QQ", offset + len(data_end), 0)
     checksum = zlib.crc32(footer, zlib.crc32(summary))
     return data_end + summary + footer + struct.pack("<I", checksum) + MAGIC
 
 
-def _statistics(head: bytes, chunks: list[Chunk], rows: int) -> bytes:
-    ops = [op for op, _, _ in _record_positions(head)]
+def _statistics(ops: list[int], chunks: list[Chunk], rows: int) -> bytes:
     first, last = (chunks[0].times[0], chunks[-1].times[1]) if chunks else (0, 0)
     counts = rows, 1, 1, ops.count(Opcode.ATTACHMENT), ops.count(Opcode.METADATA), len(chunks)
     each = struct.pack("<IHQ", 10, CHANNEL, rows)
-    return encode_record(Opcode.STATISTICS, struct.pack("<QHIIIIQQ", *counts, first, last) + each)
+    return encode_record(Opcode.STATISTICS, struct.pack("<QHIIIIQQ", *counts, first, last), each)
 
 
 def _chunk_index(chunk: Chunk) -> bytes:
     begin, end = chunk.start, chunk.end
     data = struct.pack("<QQQQ", *chunk.times, begin, end - begin)
     data += struct.pack("<IHQQ", 10, CHANNEL, end, chunk.index_size)
-    return encode_record(Opcode.CHUNK_INDEX, data + struct.pack("<IQQ", 0, chunk.size, chunk.size))
+    return encode_record(Opcode.CHUNK_INDEX, data, struct.pack("<IQQ", 0, chunk.size, chunk.size))
 
 
-def _head_index(head: bytes) -> Iterator[bytes]:
-    for op, at, size in _record_positions(head):
-        content = memoryview(head)[at + _RECORD.size : at + size]
-        if op == Opcode.METADATA:
-            name = ContentReader(content).text()
-            yield encode_record(
-                Opcode.METADATA_INDEX, struct.pack("<QQ", at, size) + _encode_text(name)
-            )
-        elif op == Opcode.ATTACHMENT:
-            name, kind, data = read_attachment(content)
-            index = (
-                struct.pack("<QQQQQ", at, size, 0, 0, len(data))
-                + _encode_text(name)
-                + _encode_text(kind)
-            )
-            yield encode_record(Opcode.ATTACHMENT_INDEX, index)
-
-
-def _record_positions(head: bytes) -> Iterator[tuple[int, int, int]]:
-    """Yield code, place and size of the records at the beginning of a file."""
-    at = len(MAGIC)
-    while at < len(head):
-        op, length = _RECORD.unpack_from(head, at)
-        yield op, at, _RECORD.size + length
-        at += _RECORD.size + length
-
-
-def _encode_text(text: str) -> bytes:
-    data = text.encode()
-    return struct.pack("<I", len(data)) + data
-
-
-def _encode_texts(texts: Mapping[str, str]) -> bytes:
-    data = b"".join(_encode_text(name) + _encode_text(value) for name, value in texts.items())
-    return struct.pack("<I", len(data)) + data
+def _index_entry(op: int, at: int, record: bytes) -> bytes:
+    """Return the entry of a metadata record or of an attachment in the index; else nothing."""
+    content = memoryview(record)[_RECORD.size :]
+    place = struct.pack("<QQ", at, len(record))
+    if op == Opcode.METADATA:
+        return encode_record(Opcode.METADATA_INDEX, place, ContentReader(content).text())
+    if op == Opcode.ATTACHMENT:
+        name, kind, data = read_attachment(content)
+        sizes = struct.pack("<QQQ", 0, 0, len(data))
+        return encode_record(Opcode.ATTACHMENT_INDEX, place, sizes, name, kind)
+    return b""
 
 
 # --- reading --------------------------------------------------------------------------------------

@@ -32,6 +32,7 @@ from asperity.recording.writer import FORMAT, SCHEMA_NAME
 _MAX_BYTES = 2**40
 # Of one of the records before the rows: a map of 11000 x 11000 points.
 _MAX_RECORD_BYTES = 2**30
+_MAX_NAME = 2**10  # of an attachment [bytes]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,12 +81,12 @@ class Recording(Plottable):
         Raises:
             ParameterError: if the file is gone, or a block is damaged.
         """
+        return self._read_blocks(0, len(self._chunks))
+
+    def _read_blocks(self, start: int, end: int) -> Iterator[FloatArray]:
         with _open_file(self.path) as stream:
-            seen = 0
-            for chunk in self._chunks:
-                table = self._block(stream, chunk, seen)
-                seen += len(table)
-                yield table
+            for number in range(start, end):
+                yield self._read_block(stream, number)
 
     def row_range(self, start: int, end: int) -> FloatArray:
         """Return the rows from one to another, which is not among them; no others are read.
@@ -97,13 +98,9 @@ class Recording(Plottable):
         if start >= end:
             return np.empty((0, len(self.columns)))
         least, most = self._chunk_starts.searchsorted([start, end - 1], "right")
-        parts = []
-        with _open_file(self.path) as stream:
-            for number in range(int(least) - 1, int(most)):
-                begin = int(self._chunk_starts[number])
-                table = self._block(stream, self._chunks[number], begin)
-                parts.append(table[max(start - begin, 0) : end - begin])
-        return np.concatenate(parts)
+        begin = int(self._chunk_starts[least - 1])
+        table = np.concatenate([*self._read_blocks(int(least) - 1, int(most))])
+        return table[start - begin : end - begin]
 
     @cached_property
     def _chunk_starts(self) -> NDArray[np.int64]:
@@ -112,8 +109,9 @@ class Recording(Plottable):
         ends = np.cumsum([chunk.size // size for chunk in self._chunks], dtype=np.int64)
         return np.concatenate([np.zeros(1, np.int64), ends])[:-1]
 
-    def _block(self, stream: IO[bytes], chunk: mcap.Chunk, first_row: int) -> FloatArray:
-        """Return the rows of a block, before which so many were."""
+    def _read_block(self, stream: IO[bytes], number: int) -> FloatArray:
+        """Return the rows of a block."""
+        chunk, first_row = self._chunks[number], self._chunk_starts[number]
         stream.seek(chunk.rows_start)
         data = stream.read(chunk.size)
         if zlib.crc32(data) != chunk.checksum:
@@ -259,7 +257,9 @@ def _read(path: Path, stream: IO[bytes], size: int) -> Recording:
             content = _record_content(stream, at, length)
             texts = content.texts() if content.text() == SCHEMA_NAME else texts
         elif op == mcap.Opcode.ATTACHMENT:
-            attached[_attachment_name(stream, at)] = at, length
+            content = _record_content(stream, at, min(length, _MAX_NAME))
+            content.read(16)  # times: unused
+            attached[content.text()] = at, length
         end = at + length
     about = _parse_metadata(texts, whole or foreign)
     if not columns:
@@ -288,12 +288,6 @@ def _columns(content: mcap.ContentReader) -> Columns:
     return schema_columns(content.text())
 
 
-def _attachment_name(stream: IO[bytes], at: int) -> str:
-    stream.seek(at + 16)
-    size = int.from_bytes(stream.read(4), "little")
-    return mcap.ContentReader(size.to_bytes(4, "little") + stream.read(min(size, 1024))).text()
-
-
 def _is_intact(stream: IO[bytes], chunk: mcap.Chunk) -> bool:
     stream.seek(chunk.rows_start)
     return zlib.crc32(stream.read(chunk.size)) == chunk.checksum
@@ -319,10 +313,8 @@ def _parse_metadata(texts: Mapping[str, str], foreign: bool) -> dict[str, Any]:
 def _open_file(path: Path) -> IO[bytes]:
     try:
         return open_input(path, _MAX_BYTES)
-    except OSError as error:
-        raise _unreadable_error(path, error.strerror or str(error)) from None
-    except ValueError as error:  # a name that no file can have
-        raise _unreadable_error(path, str(error)) from None
+    except (OSError, ValueError) as error:  # the latter for a name that no file can have
+        raise _unreadable_error(path, getattr(error, "strerror", "") or str(error)) from None
 
 
 def _unreadable_error(path: Path, reason: str) -> ParameterError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -111,21 +111,15 @@ def replay(recording: Recording, surface: Surface | None = None) -> Replay:
         raise ParameterError("recording", "has no rows to replay")
     settings = _servo_settings(recording.metadata)
     field = _load_field(recording, surface_data) if surface is None else surface_field(surface)
-    found = _Comparison()
+    notes = [*describe_changes(recording, field.law)]
+    recorded = str(surface_data.get("content"))
+    # The digests of older recordings, of 12 digits, cannot be compared.
+    if surface is not None and len(recorded) != 12 and surface.digest != recorded:
+        notes.append(f"Recorded on another surface: content {recorded}, this is {surface.digest}.")
+    result = Replay(str(recording.path), 0, 0, None, 0.0, tuple(notes))
     for first, block, forces in _replay_blocks(recording, field, settings):
-        found.compare(first, block, forces)
-    notes = (
-        *describe_changes(recording, field.law),
-        *_describe_other_surface(surface_data, surface),
-    )
-    return Replay(
-        str(recording.path),
-        found.rows,
-        found.differing_rows,
-        found.first_difference,
-        found.max_force_difference,
-        notes,
-    )
+        result = _compare(result, first, block, forces)
+    return result
 
 
 def recorded_surface_on(recording: Recording, texture: Texture) -> Surface:
@@ -239,34 +233,25 @@ def _check_times(times: FloatArray, first: int, period: float) -> None:
         raise ParameterError("recording", f"cannot be replayed: {words}")
 
 
-class _Comparison:
-    """Counts the rows that differ."""
-
-    def __init__(self) -> None:
-        self.rows = self.differing_rows = 0
-        self.first_difference: Difference | None = None
-        self.max_force_difference = 0.0
-
-    def compare(self, first: int, block: FloatArray, replayed: FloatArray) -> None:
-        """Compare a block, its time first, with what was computed again."""
-        recorded = np.ascontiguousarray(block[:, 1:])
-        differs = recorded.view(np.int64) != replayed.view(np.int64)
-        rows = np.flatnonzero(differs.any(axis=1))
-        self.rows += len(block)
-        self.differing_rows += len(rows)
-        if not len(rows):
-            return
-        forces = np.abs(recorded[rows, :3] - replayed[rows, :3])
-        self.max_force_difference = max(
-            self.max_force_difference, float(np.nanmax(forces, initial=0.0))
-        )
-        if self.first_difference is None:
-            row = int(rows[0])
-            column = int(np.flatnonzero(differs[row])[0])
-            self.first_difference = Difference(
-                first + row, float(block[row, 0]), COMPARED_COLUMNS[column],
-                float(recorded[row, column]), float(replayed[row, column]),
-            )  # fmt: skip
+def _compare(result: Replay, first: int, block: FloatArray, replayed: FloatArray) -> Replay:
+    """Return a result with a block, its time first, compared with what was computed again."""
+    recorded = np.ascontiguousarray(block[:, 1:])
+    differs = recorded.view(np.int64) != replayed.view(np.int64)
+    rows = np.flatnonzero(differs.any(axis=1))
+    result = replace(
+        result, rows=result.rows + len(block), differing_rows=result.differing_rows + len(rows)
+    )
+    if not len(rows):
+        return result
+    greatest = np.nanmax(np.abs(recorded[rows, :3] - replayed[rows, :3]), initial=0.0)
+    difference, row = result.first_difference, int(rows[0])
+    if difference is None:
+        column = int(np.flatnonzero(differs[row])[0])
+        values = float(recorded[row, column]), float(replayed[row, column])
+        time, name = float(block[row, 0]), COMPARED_COLUMNS[column]
+        difference = Difference(first + row, time, name, *values)
+    force = max(result.max_force_difference, float(greatest))
+    return replace(result, first_difference=difference, max_force_difference=force)
 
 
 def describe_changes(recording: Recording, law: Law) -> Iterator[str]:
@@ -281,13 +266,6 @@ def describe_changes(recording: Recording, law: Law) -> Iterator[str]:
         now = file_digest(name)
         if now is not None and now != content:
             yield f"The file {name} has changed since; the recording holds its own copy."
-
-
-def _describe_other_surface(metadata: Mapping[str, Any], surface: Surface | None) -> Iterator[str]:
-    recorded = str(metadata.get("content"))
-    # The digests of older recordings, of 12 digits, cannot be compared.
-    if surface is not None and len(recorded) != 12 and surface.digest != recorded:
-        yield f"Recorded on another surface: content {recorded}, this is {surface.digest}."
 
 
 def file_digest(path: str | Path) -> str | None:

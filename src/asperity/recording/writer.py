@@ -77,7 +77,11 @@ class RecordingWriter:
         argument: str = "path",
     ) -> None:
         self._path, self._columns, self._argument = Path(path), columns, argument
-        self._head = _encode_head(columns, metadata or {}, attachments or {})
+        texts = {"format": str(FORMAT), "version": __version__, "about": json_text(metadata or {})}
+        library = f"asperity {__version__}"
+        self._head = mcap.encode_head(
+            SCHEMA_NAME, library, schema_text(columns), texts, attachments or {}
+        )
         self._messages = message_template(_BLOCK_ROWS, len(columns))
         self._pending_rows, self._last_flush = 0, time.monotonic()
         self._chunks: list[mcap.Chunk] = []
@@ -168,17 +172,3 @@ class RecordingWriter:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def _encode_head(
-    columns: Columns, metadata: Mapping[str, Any], attachments: Mapping[str, bytes]
-) -> bytes:
-    texts = {"format": str(FORMAT), "version": __version__, "about": json_text(metadata)}
-    head = mcap.encode_header(f"asperity {__version__}")
-    head += mcap.encode_schema(f"{SCHEMA_NAME}/Row", schema_text(columns)) + mcap.encode_channel(
-        f"/{SCHEMA_NAME}"
-    )
-    head += mcap.encode_metadata(SCHEMA_NAME, texts)
-    for name, data in attachments.items():
-        head += mcap.encode_attachment(name, "application/octet-stream", data)
-    return head

@@ -6,7 +6,6 @@ import io
 import math
 import re
 import struct
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -28,24 +27,7 @@ _RIM_TOLERANCE = 0.1  # the same for points outside all triangles: a tilted patc
 _FOLD_TOLERANCE = 1e-6  # heights that differ by less, relative to the patch's size, are equal
 
 
-@dataclass(frozen=True, eq=False)
-class RasterGrid:
-    """Heights on a grid.
-
-    Attributes:
-        heights: [m], shape (ny, nx), NaN outside all triangles.
-        pitch: (px, py) [m].
-        n_folded: number of grid points with two different heights.
-        notes: how the grid was chosen, and its deviation from the mesh.
-    """
-
-    heights: FloatArray
-    pitch: tuple[float, float]
-    n_folded: int
-    notes: tuple[str, ...]
-
-
-def rasterise(corners: FloatArray) -> RasterGrid:
+def rasterise(corners: FloatArray) -> tuple[FloatArray, tuple[float, float], tuple[str, ...]]:
     """Return the heights of triangles on a grid, interpolated linearly in each.
 
     The pitch is about the median, over the triangles, of the shortest edge: on a triangulated
@@ -55,10 +37,12 @@ def rasterise(corners: FloatArray) -> RasterGrid:
         corners: triangles [m], shape (n, 3, 3), z the height.
 
     Returns:
-        The grid; its first and last points lie on the patch's borders.
+        Heights [m], shape (ny, nx), NaN outside all triangles; the pitch (px, py) [m]; and notes on
+        the grid and its deviation from the mesh. The first and last points of the grid, before
+        ragged borders are cut off, lie on the patch's borders.
 
     Raises:
-        SurfaceFileError: the mesh is too coarse or too uneven for a grid.
+        SurfaceFileError: the mesh is too coarse or too uneven for a grid, or lies above itself.
     """
     flat = corners[..., :2]
     edges = np.linalg.norm(flat - np.roll(flat, 1, axis=1), axis=-1)
@@ -74,22 +58,23 @@ def rasterise(corners: FloatArray) -> RasterGrid:
     lowest, highest = _extreme_heights(local, shape, _EDGE_TOLERANCE)
     known = np.isfinite(lowest)
     spread = np.where(known, highest, 0.0) - np.where(known, lowest, 0.0)
-    folded = int(np.count_nonzero(spread > _FOLD_TOLERANCE * float(extent.max())))
+    n_folded = int(np.count_nonzero(spread > _FOLD_TOLERANCE * float(extent.max())))
+    if n_folded:
+        raise SurfaceFileError(
+            f"the mesh lies above itself at {n_folded} grid points, about"
+            f" {1e6 * n_folded * pitch.prod():.4g} mm²; a height field has one height at each point"
+        )
     if not known.all():
         rim, _ = _extreme_heights(local, shape, _RIM_TOLERANCE)
         lowest = np.where(known, lowest, rim)
-    heights, trimmed = _trim_border(np.where(np.isfinite(lowest), lowest, np.nan))
+    covered = np.where(np.isfinite(lowest), lowest, np.nan)
+    heights, trimmed = _trim_border(covered)
     px, py = float(pitch[0]), float(pitch[1])
-    notes = (
-        *trimmed,
+    note = (
         f"{len(corners)} triangles resampled at {shape[1]} x {shape[0]} points,"
-        f" pitch {1e6 * px:.5g} x {1e6 * py:.5g} µm from the median edge ({1e6 * target:.5g} µm)",
-        _describe_fit(
-            np.where(np.isfinite(lowest), lowest, np.nan),
-            (corners.reshape(-1, 3) - (*low, 0.0)) / (px, py, 1.0),
-        ),
+        f" pitch {1e6 * px:.5g} x {1e6 * py:.5g} µm from the median edge ({1e6 * target:.5g} µm)"
     )
-    return RasterGrid(heights, (px, py), folded, notes)
+    return heights, (px, py), (*trimmed, note, _describe_fit(covered, local.reshape(-1, 3)))
 
 
 def _grid_steps(extent: FloatArray, target_pitch: float, n_triangles: int) -> FloatArray:
@@ -326,20 +311,17 @@ def _to_surface(corners: FloatArray, name: str) -> RawSurface:
         corners, cross, areas = corners[valid], cross[valid], areas[valid]
     if len(corners) < 2:
         raise SurfaceFileError(f"a mesh of {len(corners)} triangles is no surface")
-    plane = fit_plane(corners, cross, areas)
-    _check_overhangs(cross, areas, plane)
-    grid = rasterise(plane.to_local(corners))
-    notes.extend(plane.notes)
-    notes.extend(grid.notes)
-    _check_folds(grid)
-    longest = max(n * p for n, p in zip(grid.heights.shape[::-1], grid.pitch, strict=True))
+    centre, axes, note = fit_plane(corners, cross, areas)
+    _check_overhangs(areas, cross @ axes[2] < 0.0)
+    heights, pitch, found = rasterise((corners - centre) @ axes.T)
+    notes.extend((note, *found))
+    longest = max(n * p for n, p in zip(heights.shape[::-1], pitch, strict=True))
     if longest > _MAX_EXPECTED_LENGTH:
         notes.append(f"the patch is {longest:.3g} m long: check the unit")
-    return RawSurface(grid.heights, grid.pitch, name, tuple(notes))
+    return RawSurface(heights, pitch, name, tuple(notes))
 
 
-def _check_overhangs(cross: FloatArray, areas: FloatArray, plane: ReferencePlane) -> None:
-    overhanging = cross @ plane.normal < 0.0
+def _check_overhangs(areas: FloatArray, overhanging: NDArray[np.bool_]) -> None:
     if not overhanging.any():
         return
     area, total = float(areas[overhanging].sum()), float(areas.sum())
@@ -354,43 +336,12 @@ def _check_overhangs(cross: FloatArray, areas: FloatArray, plane: ReferencePlane
     )
 
 
-def _check_folds(grid: RasterGrid) -> None:
-    if grid.n_folded:
-        area = grid.n_folded * grid.pitch[0] * grid.pitch[1]
-        raise SurfaceFileError(
-            f"the mesh lies above itself at {grid.n_folded} grid points, about"
-            f" {1e6 * area:.4g} mm²; a height field has one height at each point"
-        )
-
-
 _MIN_AREA_SAVING = 0.02  # least relative saving of area for which the axes are turned
 
 
-@dataclass(frozen=True, eq=False)
-class ReferencePlane:
-    """An orthonormal frame: rows are the x axis, the y axis and the normal.
-
-    Attributes:
-        centre: area-weighted centre of the mesh [m], shape (3,).
-        axes: shape (3, 3).
-        notes: description of the plane.
-    """
-
-    centre: FloatArray
-    axes: FloatArray
-    notes: tuple[str, ...]
-
-    @property
-    def normal(self) -> FloatArray:
-        """The unit normal, on the side that the triangles face."""
-        return np.asarray(self.axes[2])
-
-    def to_local(self, points: FloatArray) -> FloatArray:
-        """Return points, shape (..., 3), in the frame [m]."""
-        return np.asarray((points - self.centre) @ self.axes.T)
-
-
-def fit_plane(corners: FloatArray, cross: FloatArray, areas: FloatArray) -> ReferencePlane:
+def fit_plane(
+    corners: FloatArray, cross: FloatArray, areas: FloatArray
+) -> tuple[FloatArray, FloatArray, str]:
     """Return the plane with the least mean square distance from the surface (not its vertices).
 
     The second moment of a triangle about a point is exact from its corners and centre:
@@ -402,8 +353,9 @@ def fit_plane(corners: FloatArray, cross: FloatArray, areas: FloatArray) -> Refe
         areas: their areas [m²], shape (n,).
 
     Returns:
-        The plane; x is the projection of the file's x axis, turned in the plane so that the patch
-        fits its rectangle.
+        The area-weighted centre [m], shape (3,); the x axis, the y axis and the normal on the side
+        that the triangles face, shape (3, 3); and a description of the plane. x is the projection
+        of the file's x axis, turned in the plane so that the patch fits its rectangle.
 
     Raises:
         SurfaceFileError: the triangles face in all directions, as those of a closed body.
@@ -426,7 +378,9 @@ def fit_plane(corners: FloatArray, cross: FloatArray, areas: FloatArray) -> Refe
     angle = _min_rectangle_angle(moved.reshape(-1, 3) @ axes[:2].T)
     turn = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     axes[:2] = turn @ axes[:2]
-    return ReferencePlane(centre, axes, (_describe_plane(normal, angle),))
+    text = ", ".join(f"{value:.4g}" for value in normal + 0.0)
+    turned = f", axes turned by {math.degrees(angle):.3g}° in it" if angle else ""
+    return centre, axes, f"heights are over the mesh's best plane, normal ({text}){turned}"
 
 
 def _plane_axes(normal: FloatArray) -> FloatArray:
@@ -435,12 +389,6 @@ def _plane_axes(normal: FloatArray) -> FloatArray:
     x = first - (first @ normal) * normal
     x /= np.linalg.norm(x)
     return np.stack((x, np.cross(normal, x), normal))
-
-
-def _describe_plane(normal: FloatArray, angle: float) -> str:
-    text = ", ".join(f"{value:.4g}" for value in normal + 0.0)
-    turned = f", axes turned by {math.degrees(angle):.3g}° in it" if angle else ""
-    return f"heights are over the mesh's best plane, normal ({text}){turned}"
 
 
 def _min_rectangle_angle(points: FloatArray) -> float:

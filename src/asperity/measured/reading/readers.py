@@ -19,8 +19,7 @@ import numpy as np
 from asperity.core.checks import check_positive
 from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError
 from asperity.measured.reading import unsupported
-from asperity.measured.reading.images.png import PNG_MAGIC, read_png
-from asperity.measured.reading.images.tiff import TIFF_MAGIC, read_tiff
+from asperity.measured.reading.images.image_files import PNG_MAGIC, TIFF_MAGIC, read_png, read_tiff
 from asperity.measured.reading.isolation import describe_exception, read_isolated
 from asperity.measured.reading.mesh import is_binary_stl, is_obj, is_text_stl, read_mesh
 from asperity.measured.reading.metrology import surface_topography

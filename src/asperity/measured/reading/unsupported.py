@@ -8,7 +8,7 @@ import zlib
 from pathlib import Path
 
 from asperity.core.errors import SurfaceFileError
-from asperity.measured.reading.images.tiff import TIFF_MAGIC
+from asperity.measured.reading.images.image_files import TIFF_MAGIC
 from asperity.measured.reading.metrology.surface_topography import has_library
 from asperity.measured.reading.reader import ReadingOptions, SurfaceFile
 

@@ -197,23 +197,6 @@ def _parse_float(text: str) -> float:
     return value if math.isfinite(value) else math.nan
 
 
-@dataclass(frozen=True, eq=False)
-class Pixels:
-    """Pixels as stored in a file.
-
-    Attributes:
-        values: shape (rows, columns, channels), unsigned, signed or float.
-        has_alpha: whether the last channel is opacity.
-        notes: peculiarities of the file.
-        scale: lengths that the file names.
-    """
-
-    values: NDArray[Any]
-    has_alpha: bool
-    notes: tuple[str, ...] = ()
-    scale: ImageScale = NO_SCALE
-
-
 def check_image_size(rows: int, columns: int) -> None:
     """Refuse an image without pixels or with too many, before any memory is allocated.
 
@@ -225,15 +208,26 @@ def check_image_size(rows: int, columns: int) -> None:
     check_point_count(columns, rows)
 
 
-def pixels_to_surface(pixels: Pixels, name: str, options: ReadingOptions) -> RawSurface:
+def pixels_to_surface(
+    values: NDArray[Any],
+    scale: ImageScale,
+    name: str,
+    options: ReadingOptions,
+    *,
+    has_alpha: bool,
+    notes: tuple[str, ...] = (),
+) -> RawSurface:
     """Convert pixels to heights: their values, or the integrated slopes of a normal map.
 
     Row i is row i of the image from the top, so that y runs down the image.
 
     Args:
-        pixels: the image.
+        values: pixels, shape (rows, columns, channels), unsigned, signed or float.
+        scale: lengths that the file names.
         name: name of the file.
         options: ``integrate_normals``, without which a normal map is refused, and ``unit``.
+        has_alpha: whether the last channel is opacity.
+        notes: peculiarities of the file.
 
     Returns:
         Heights, without a unit unless the file or the options name one; the pitch if the file
@@ -244,10 +238,12 @@ def pixels_to_surface(pixels: Pixels, name: str, options: ReadingOptions) -> Raw
         ParameterError: ``integrate_normals`` for an image that is no normal map; a unit for slopes,
             or for a file that names its own.
     """
-    values, notes = _drop_alpha(pixels)
-    pitch, integrate = pixels.scale.pitch, options.integrate_normals
+    notes = (*notes, *scale.notes)
+    if has_alpha:
+        _check_opaque(values[..., -1])
+        values, notes = values[..., :-1], (*notes, "alpha channel dropped: opaque everywhere")
     if is_normal_map(values):
-        if not integrate:
+        if not options.integrate_normals:
             raise SurfaceFileError(
                 "looks like a normal map (slopes as colours), not like heights;"
                 " have it integrated to heights with integrate_normals=True (--integrate-normals)"
@@ -257,28 +253,25 @@ def pixels_to_surface(pixels: Pixels, name: str, options: ReadingOptions) -> Raw
         heights, found = integrate_normal_map(values)
         notes = (*notes, *found)
         return RawSurface(
-            heights, pitch, name, notes, has_units=False, relative=True, per_pitch=True
+            heights, scale.pitch, name, notes, has_units=False, relative=True, per_pitch=True
         )
-    if integrate:
+    if options.integrate_normals:
         requirement = f"must be False: {name} is not a normal map"
-        raise ParameterError("integrate_normals", requirement, integrate)
+        raise ParameterError("integrate_normals", requirement, True)
     grey, notes = _to_grey(values, notes)
     with np.errstate(invalid="ignore"):  # a signalling NaN is a missing point too
-        heights = grey.astype(np.float64)
-    heights = pixels.scale.factor * heights + pixels.scale.offset
-    unit, assumed = options.resolve_unit(name, pixels.scale.metres_per_value)
+        heights = scale.factor * grey.astype(np.float64) + scale.offset
+    unit, assumed = options.resolve_unit(name, scale.metres_per_value)
     if unit is None:
         note = "an image has no unit: heights are pixel values, y runs down the image"
-        return RawSurface(heights, pitch, name, (*notes, note), has_units=False, relative=True)
-    return RawSurface(unit * heights, pitch, name, (*notes, *assumed, "y runs down the image"))
+        return RawSurface(
+            heights, scale.pitch, name, (*notes, note), has_units=False, relative=True
+        )
+    notes = (*notes, *assumed, "y runs down the image")
+    return RawSurface(unit * heights, scale.pitch, name, notes)
 
 
-def _drop_alpha(pixels: Pixels) -> tuple[NDArray[Any], tuple[str, ...]]:
-    """Return the pixels without an alpha channel, which must be opaque everywhere."""
-    values = pixels.values
-    if not pixels.has_alpha:
-        return values, pixels.notes
-    alpha = values[..., -1]
+def _check_opaque(alpha: NDArray[Any]) -> None:
     opaque = np.iinfo(alpha.dtype).max if alpha.dtype.kind in "iu" else 1.0
     transparent = int(np.count_nonzero(alpha != opaque))
     if transparent:
@@ -286,7 +279,6 @@ def _drop_alpha(pixels: Pixels) -> tuple[NDArray[Any], tuple[str, ...]]:
             f"{transparent} of {alpha.size} pixels are transparent; transparency has no height:"
             " save the image without an alpha channel"
         )
-    return values[..., :-1], (*pixels.notes, "alpha channel dropped: opaque everywhere")
 
 
 def _to_grey(values: NDArray[Any], notes: tuple[str, ...]) -> tuple[NDArray[Any], tuple[str, ...]]:

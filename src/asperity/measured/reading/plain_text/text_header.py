@@ -170,16 +170,16 @@ def _detect_dialect(lines: list[str]) -> Dialect:
 def _check_other_blocks(blocks: list[_Block], index: int, dialect: Dialect) -> None:
     """Refuse a block that is a part of a longer table, or has a damaged first or last row."""
     table, before, after = blocks[index], blocks[:index], blocks[index + 1 :]
-    neighbours = [(block, -1) for block in before[-1:]] + [(block, 0) for block in after[:1]]
-    for block, line in neighbours:
-        if block.width:
-            raise _ragged_error(block, line, table)
-    parts = [k for k, block in enumerate(before) if block.width == table.width > 1]
-    if parts:
-        raise _interrupted_error(next(block for block in before[parts[0] :] if not block.width), 0)
+    if before and before[-1].width:
+        raise _ragged_error(before[-1], -1, table)
+    for k, block in enumerate(before):
+        if block.width == table.width > 1:
+            raise _interrupted_error(next(b for b in before[k:] if not b.width), 0)
+    if after and after[0].width:
+        raise _ragged_error(after[0], 0, table)
     if any(block.width for block in after):
         raise _interrupted_error(after[0], 0)
-    for block, line in neighbours:
+    for block, line in [(block, -1) for block in before[-1:]] + [(block, 0) for block in after[:1]]:
         if _is_damaged_row(block.row_texts[line], dialect, table.width):
             raise _interrupted_error(block, line)
 

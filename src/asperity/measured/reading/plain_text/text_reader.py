@@ -178,7 +178,8 @@ def _read_matrix(
     if not own and not text_header.is_lateral_entry(_last_header_line(table)):
         own = sorted(set(_named_units(table, options)))
     if len(own) > 1:
-        raise SurfaceFileError(f"the header {_last_header_line(table)[:60]!r} names several units")
+        line = " ".join(_last_header_line(table).split())
+        raise SurfaceFileError(f"the header {line[:60]!r} names several units")
     units, notes = _resolve_units(table, own, name, options)
     heights = np.ascontiguousarray(values * (units or (1.0,))[0])
     pitch: tuple[float, ...] | None = header.find_pitch(*values.shape)
