@@ -9,10 +9,10 @@ import pytest
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
-from asperity.measured import stylus
+from asperity.measured import filters
+from asperity.measured.filters import dilate
 from asperity.measured.preparation import prepare
 from asperity.measured.reading import RawSurface
-from asperity.measured.stylus import dilate
 
 PITCH = (1e-6, 1.5e-6)
 
@@ -49,7 +49,7 @@ def slow_dilation(heights: Any, pitch: tuple[float, ...], radius: float) -> Any:
 @pytest.mark.parametrize("radius", [2.1e-6, 7.2e-6, 3e-5])
 @pytest.mark.parametrize("tile", [256, 7])
 def test_map_against_a_slow_loop(monkeypatch: pytest.MonkeyPatch, radius: float, tile: int) -> None:
-    monkeypatch.setattr(stylus, "_TILE", tile)
+    monkeypatch.setattr(filters, "_TILE", tile)
     heights = rough()
     expected = slow_dilation(heights, PITCH, radius)
     np.testing.assert_allclose(dilate(heights, PITCH, radius), expected, atol=1e-18)
@@ -157,6 +157,6 @@ def test_radii_that_are_refused(radius: float, match: str) -> None:
 
 
 def test_too_much_work_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stylus, "_MAX_COMPARISONS", 1e4)
+    monkeypatch.setattr(filters, "_MAX_COMPARISONS", 1e4)
     with pytest.raises(ParameterError, match=r"tip_radius needs .* comparisons at each of 744"):
         dilate(rough(), PITCH, 1e-5)

@@ -105,8 +105,7 @@ def test_the_sign_of_zero_counts_and_what_is_no_number() -> None:
     block[:, 0] = np.arange(4)
     replayed = np.zeros((4, len(COMPARED_COLUMNS)))
     block[1, 2], block[2, 3], replayed[2, 2] = -0.0, np.nan, np.nan
-    found = replay._Comparison()
-    found.compare(100, block, replayed)
+    found = replay._compare(replay.Replay("", 0, 0, None, 0.0), 100, block, replayed)
     assert (found.rows, found.differing_rows, found.max_force_difference) == (4, 1, 0.0)
     assert found.first_difference is not None
     assert (found.first_difference.row, found.first_difference.column) == (101, "commanded y")

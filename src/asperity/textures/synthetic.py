@@ -17,10 +17,15 @@ from asperity.core.arguments import document_arguments
 from asperity.core.checks import FloatArray, check_positive
 from asperity.core.errors import ParameterError
 from asperity.measured.file_arguments import SYNTHETIC_ARGUMENTS
-from asperity.measured.filters import ALPHA, find_cutoffs, gaussian_filter
+from asperity.measured.filters import (
+    ALPHA,
+    apply_tip,
+    check_tip_radius,
+    find_cutoffs,
+    gaussian_filter,
+)
 from asperity.measured.lengths import format_length
 from asperity.measured.preparation import describe_magnification, magnification_factors
-from asperity.measured.stylus import apply_tip, check_tip_radius
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid
 from asperity.textures.plane_waves import PlaneWaves

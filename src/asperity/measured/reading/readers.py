@@ -19,14 +19,13 @@ import numpy as np
 from asperity.core.checks import check_positive
 from asperity.core.errors import AsperityError, ParameterError, SurfaceFileError
 from asperity.measured.reading import unsupported
+from asperity.measured.reading.grids import NPY_MAGIC, is_esri, read_esri, read_npy
 from asperity.measured.reading.images.image_files import PNG_MAGIC, TIFF_MAGIC, read_png, read_tiff
 from asperity.measured.reading.isolation import describe_exception, read_isolated
 from asperity.measured.reading.mesh import is_binary_stl, is_obj, is_text_stl, read_mesh
 from asperity.measured.reading.metrology import surface_topography
 from asperity.measured.reading.metrology.sdf import is_sdf, read_sdf
 from asperity.measured.reading.metrology.x3p import read_x3p
-from asperity.measured.reading.npy import NPY_MAGIC, read_npy
-from asperity.measured.reading.plain_text.esri import is_esri, read_esri
 from asperity.measured.reading.plain_text.text_reader import read_text
 from asperity.measured.reading.reader import RawSurface, Reader, ReadingOptions, SurfaceFile
 
