@@ -11,8 +11,10 @@ wave of n samples per period Sdq is too small by the factor sin(π/n)/(π/n): by
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -48,42 +50,12 @@ class SurfaceParameter:
         return f"{standard}, {self.clause}"
 
 
-_SKEWNESS = "skewness: below 0 pits, above 0 peaks prevail"
-_KURTOSIS = "kurtosis: 3 for Gaussian heights, more for single spikes"
-_AREA_RATIO = "developed interfacial area ratio: area beyond that of the plane"
-_PEAK, _PIT = "peak height, mean over the sections", "pit depth, mean over the sections"
-_CROSSINGS = (
-    "mean distance of rising crossings of the mean line between a pit and a peak deeper and higher"
-    " than a tenth of z"
-)
-
-
-AREAL_PARAMETERS = (
-    SurfaceParameter("Sq", "root mean square height", "√⟨z²⟩", "4.2.2"),
-    SurfaceParameter("Sa", "arithmetic mean height", "⟨|z|⟩", "4.2.8"),
-    SurfaceParameter("Sz", "maximum height", "Sp + Sv", "4.2.7"),
-    SurfaceParameter("Sp", "maximum peak height", "max z", "4.2.5"),
-    SurfaceParameter("Sv", "maximum pit depth", "-min z", "4.2.6"),
-    SurfaceParameter("Ssk", _SKEWNESS, "⟨z³⟩/Sq³", "4.2.3", ""),
-    SurfaceParameter("Sku", _KURTOSIS, "⟨z⁴⟩/Sq⁴", "4.2.4", ""),
-    SurfaceParameter("Sdq", "root mean square gradient", "√⟨z_x² + z_y²⟩", "4.4.2", ""),
-    SurfaceParameter("Sdr", _AREA_RATIO, "⟨√(1 + z_x² + z_y²)⟩ - 1", "4.4.3", ""),
-)
+_TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+AREAL_PARAMETERS = tuple(SurfaceParameter(key, **entry) for key, entry in _TABLES["areal"].items())
 """Parameters of maps, in the order in which they are listed."""
 
-PROFILE_PARAMETERS = (
-    SurfaceParameter("q", "root mean square height", "√⟨z²⟩", "4.2.2"),
-    SurfaceParameter("a", "arithmetic mean height", "⟨|z|⟩", "4.2.1"),
-    SurfaceParameter(
-        "z", "maximum height, mean over the sections", "⟨p + v⟩ of the sections", "4.1.3"
-    ),
-    SurfaceParameter("p", _PEAK, "⟨max z⟩ of the sections", "4.1.1"),
-    SurfaceParameter("v", _PIT, "⟨-min z⟩ of the sections", "4.1.2"),
-    SurfaceParameter("t", "total height", "max z - min z", "4.1.5"),
-    SurfaceParameter("sk", _SKEWNESS, "⟨z³⟩/q³", "4.2.3", ""),
-    SurfaceParameter("ku", _KURTOSIS, "⟨z⁴⟩/q⁴", "4.2.4", ""),
-    SurfaceParameter("Sm", "mean spacing of profile elements", _CROSSINGS, "4.3.1"),
-    SurfaceParameter("dq", "root mean square slope", "√⟨z_x²⟩", "4.4.1", ""),
+PROFILE_PARAMETERS = tuple(
+    SurfaceParameter(key, **entry) for key, entry in _TABLES["profile"].items()
 )
 """Parameters of profiles; their symbols begin with P, after an L-filter with R."""
 
