@@ -270,10 +270,8 @@ def magnification_factors(magnify: float, magnify_height: float | None) -> tuple
     Raises:
         ParameterError: a factor is not positive.
     """
-    lateral = check_positive("magnify", magnify)
-    if magnify_height is None:
-        return lateral, lateral
-    return lateral, check_positive("magnify_height", magnify_height)
+    vertical = magnify if magnify_height is None else magnify_height
+    return check_positive("magnify", magnify), check_positive("magnify_height", vertical)
 
 
 def _check_shape(heights: FloatArray, max_missing: float) -> None:
@@ -308,25 +306,21 @@ def _check_missing(heights: FloatArray, max_missing: float) -> None:
 
 
 def _resolve_pitch(raw: RawSurface, pitch: GivenPitch, steps: list[str]) -> Pitch:
-    axes = raw.heights.ndim
-    if pitch is None:
-        if raw.pitch is None:
-            raise ParameterError("pitch", f"must be given [m]: {raw.source} has none")
-        return _check_pitch(raw.pitch, axes)
-    given = _check_pitch(pitch, axes)
-    before = "" if raw.pitch is None else f" instead of the file's {format_lengths(raw.pitch)}"
-    steps.append(f"pitch {format_lengths(given)} as given{before}")
-    return given
-
-
-def _check_pitch(pitch: float | Sequence[float], n_axes: int) -> Pitch:
-    values = np.atleast_1d(np.asarray(pitch, dtype=np.float64))
-    if values.ndim != 1 or len(values) not in (1, n_axes):
-        wanted = "one number [m]" if n_axes == 1 else "one number or (px, py) [m]"
-        raise ParameterError("pitch", f"must be {wanted}", pitch)
+    """Return the given pitch or that of the file [m], one value for each axis."""
+    axes, chosen = raw.heights.ndim, raw.pitch if pitch is None else pitch
+    if chosen is None:
+        raise ParameterError("pitch", f"must be given [m]: {raw.source} has none")
+    values = np.atleast_1d(np.asarray(chosen, dtype=np.float64))
+    if values.ndim != 1 or len(values) not in (1, axes):
+        wanted = "one number [m]" if axes == 1 else "one number or (px, py) [m]"
+        raise ParameterError("pitch", f"must be {wanted}", chosen)
     for value in values:
         check_positive("pitch", value, "m")
-    return tuple(float(v) for v in np.broadcast_to(values, (n_axes,)))
+    lateral = tuple(float(v) for v in np.broadcast_to(values, (axes,)))
+    if pitch is not None:
+        before = "" if raw.pitch is None else f" instead of the file's {format_lengths(raw.pitch)}"
+        steps.append(f"pitch {format_lengths(lateral)} as given{before}")
+    return lateral
 
 
 def _scale_heights(

@@ -8,9 +8,11 @@ from __future__ import annotations
 import importlib
 import io
 import sys
+import tomllib
 import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -31,26 +33,9 @@ TEXTURE_FILE = "texture.npz"
 MAX_BYTES = 2**26
 _PACKAGE_PREFIX = "asperity."
 # Modules of samplers in recordings of earlier versions, and their modules now.
-MOVED_MODULES = {
-    "asperity.contacts.nearest.line_search": "asperity.contacts.closest.line_search",
-    "asperity.contacts.nearest.line_within": "asperity.contacts.closest.line_budget",
-    "asperity.contacts.nearest.plane_search": "asperity.contacts.closest.plane_search",
-    "asperity.contacts.nearest.plane_within": "asperity.contacts.closest.plane_budget",
-    "asperity.textures.samplers.fourier": "asperity.textures.kinds.fourier_sampler",
-    "asperity.textures.samplers.fourier_line": "asperity.textures.kinds.fourier_line_sampler",
-    "asperity.textures.samplers.heightmap": "asperity.textures.spline.heightmap_sampler",
-    "asperity.textures.samplers.heightmap_block": (
-        "asperity.textures.spline.heightmap_block_sampler"
-    ),
-    "asperity.textures.samplers.heightmap_cells": "asperity.textures.spline.heightmap_pruning",
-    "asperity.textures.samplers.heightmap_search": "asperity.textures.spline.heightmap_search",
-    "asperity.textures.samplers.heightmap_window": "asperity.textures.spline.heightmap_search",
-    "asperity.textures.samplers.profile": "asperity.textures.spline.profile_sampler",
-    "asperity.textures.samplers.sine": "asperity.textures.kinds.sine",
-    "asperity.textures.samplers.sinusoid": "asperity.textures.kinds.sinusoid_sampler",
-    "asperity.textures.samplers.sinusoid_split": "asperity.textures.kinds.sinusoid_sampler",
-    "asperity.textures.samplers.spline": "asperity.textures.spline.bspline_kernels",
-}
+MOVED_MODULES: dict[str, str] = tomllib.loads(
+    Path(__file__).with_name("moved_modules.toml").read_text("utf-8")
+)
 _DAMAGE_ERRORS = (ValueError, KeyError, EOFError, OSError, TypeError, zipfile.BadZipFile)
 
 
