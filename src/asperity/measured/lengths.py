@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from collections.abc import Sequence
+from typing import NoReturn
 
+import numpy as np
+
+from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 
 Pitch = tuple[float, ...]
@@ -99,3 +104,29 @@ def parse_number(text: str, what: str) -> float:
     if not math.isfinite(value):
         raise SurfaceFileError(f"{what} is {text[:40]!r}; a finite number is expected")
     return value
+
+
+def parse_heights(text: str) -> FloatArray:
+    """Return the numbers of a text, apart by white space; "nan" is a missing one.
+
+    NumPy's parser needs little memory.
+
+    Raises:
+        SurfaceFileError: a word is not a number.
+    """
+    if not text.strip():  # which NumPy reads as a number
+        return np.empty(0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            return np.fromstring(text, dtype=np.float64, sep=" ")
+        except (DeprecationWarning, ValueError):
+            _reject_height(text)
+
+
+def _reject_height(text: str) -> NoReturn:
+    """Raise the error for the first height that is no number."""
+    for index, match in enumerate(re.finditer(r"\S+", text), 1):
+        if match.group().lower() not in ("nan", "-nan"):
+            parse_number(match.group(), f"height {index}")
+    raise SurfaceFileError("the heights are not numbers")

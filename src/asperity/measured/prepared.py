@@ -107,9 +107,8 @@ def _parse_stage(data: dict[str, Any]) -> PreparationStage:
         return None if value is None else float(value)
 
     values = {name: number(v) for name, v in data["values"].items() if find_parameter(name)}
-    removed = data["removed"]
-    if removed is not None:
-        removed = HeightStatistics(float(removed["rms"]), float(removed["range"]))
+    part = data["removed"]
+    removed = part and HeightStatistics(float(part["rms"]), float(part["range"]))
     return PreparationStage(str(data["name"]), values, removed, number(data["nesting"]))
 
 

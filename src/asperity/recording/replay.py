@@ -110,7 +110,7 @@ def replay(recording: Recording, surface: Surface | None = None) -> Replay:
     if not recording.rows:
         raise ParameterError("recording", "has no rows to replay")
     settings = _servo_settings(recording.metadata)
-    field = _load_field(recording, surface_data) if surface is None else surface_field(surface)
+    field = recorded_field(recording) if surface is None else surface_field(surface)
     notes = [*describe_changes(recording, field.law)]
     recorded = str(surface_data.get("content"))
     # The digests of older recordings, of 12 digits, cannot be compared.
@@ -149,7 +149,7 @@ def recorded_texture(recording: Recording) -> Texture:
         ParameterError: if it holds none, or one that cannot be had here.
     """
     surface_data = _surface_metadata(recording)
-    field = _load_field(recording, surface_data)
+    field = recorded_field(recording)
     described = surface_data.get("texture")
     described = described if isinstance(described, Mapping) else {}
     texture = rebuild_texture(field.texture, field.sampler, described)
@@ -172,11 +172,7 @@ def recorded_field(recording: Recording) -> RecordedField:
     Raises:
         ParameterError: if it holds none, or one that is not known here.
     """
-    return _load_field(recording, _surface_metadata(recording))
-
-
-def _load_field(recording: Recording, metadata: Mapping[str, Any]) -> RecordedField:
-    data = recording.attachment(TEXTURE_FILE)
+    metadata, data = _surface_metadata(recording), recording.attachment(TEXTURE_FILE)
     if data is None:
         words = "does not hold its surface, which was too large: name it, --surface SURFACE"
         raise ParameterError("recording", words)

@@ -172,8 +172,8 @@ def test_variants_of_an_esri_grid(tmp_path: Path) -> None:
         (GRID.replace("cellsize 30\n", "") + NUMBERS, "must be positive"),
         (GRID.replace("size 30", "size thirty") + NUMBERS, "a finite number is expected"),
         (GRID.replace("size 30", "size 30 40") + NUMBERS, "must have one value"),
-        (GRID + NUMBERS.replace("7", "x"), "a height is no number"),
-        (GRID + NUMBERS.replace("7", "7_0"), "a height is no number"),
+        (GRID + NUMBERS.replace("7", "x"), "height 6 is '-32x68'; a finite number"),
+        (GRID + NUMBERS.replace("7", "7_0"), "height 6 is '-327_068'"),
         (GRID + NUMBERS.replace("11", "inf"), "infinite height"),
     ],
 )  # fmt: skip

@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from asperity.core.checks import FloatArray
 from asperity.core.errors import SurfaceFileError
-from asperity.measured.lengths import parse_number
+from asperity.measured.lengths import parse_heights, parse_number
 from asperity.measured.reading.isolation import describe_exception
 from asperity.measured.reading.reader import (
     RawSurface,
@@ -104,9 +103,14 @@ def read_esri(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
     header, start = _parse_header(text)
     rows, columns = _header_count(header, "nrows"), _header_count(header, "ncols")
     check_point_count(columns, rows)
-    heights, notes = mask_missing(
-        _parse_heights(text[start:], (rows, columns)), header.get("nodata_value", _DEFAULT_NODATA)
-    )
+    body = text[start:] if "." in text[start:] else text[start:].replace(",", ".")
+    stored = parse_heights(body)
+    if len(stored) != rows * columns:
+        raise SurfaceFileError(
+            f"the header says {rows} rows of {columns} heights, there are {len(stored)} numbers"
+        )
+    code = header.get("nodata_value", _DEFAULT_NODATA)
+    heights, notes = mask_missing(stored.reshape(rows, columns), code)
     unit, assumed = options.resolve_unit(file.name)
     scale = unit or 1.0
     pitch = (_header_cell_size(header, "dx") * scale, _header_cell_size(header, "dy") * scale)
@@ -142,21 +146,3 @@ def _header_cell_size(header: dict[str, float], name: str) -> float:
     if not (math.isfinite(value) and value > 0.0):
         raise SurfaceFileError("the header's cellsize (or dx and dy) must be positive")
     return value
-
-
-def _parse_heights(text: str, shape: tuple[int, int]) -> FloatArray:
-    words = text.split()
-    if len(words) != shape[0] * shape[1]:
-        raise SurfaceFileError(
-            f"the header says {shape[0]} rows of {shape[1]} heights, there are {len(words)} numbers"
-        )
-    if "." not in text:
-        words = [word.replace(",", ".") for word in words]
-    try:
-        if "_" in text:  # float accepts 1_000
-            raise ValueError("1_000")
-        heights = np.array(words, dtype=np.float64)
-    except ValueError as error:
-        reason = str(error)[-40:]
-        raise SurfaceFileError(f"a height is no number ({reason})") from None
-    return heights.reshape(shape)

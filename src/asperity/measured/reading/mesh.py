@@ -109,14 +109,9 @@ def _extreme_heights(
     counts = width[:, 0] * width[:, 1]
     if float(np.sum(counts, dtype=np.float64)) > 64.0 * shape[0] * shape[1] + 2.0**24:
         raise SurfaceFileError("too uneven a mesh: its triangles overlap many times; remesh it")
-    ends = np.cumsum(counts)
-    start = 0
-    while start < len(corners):
-        offset = int(ends[start - 1]) if start else 0
-        stop = max(int(np.searchsorted(ends, offset + _BLOCK)), start + 1)
-        part = slice(start, stop)
+    splits = np.searchsorted(np.cumsum(counts), np.arange(_BLOCK, counts.sum(), _BLOCK))
+    for part in np.split(np.arange(len(corners)), np.unique(splits)):
         _sample_triangles(corners[part], first[part], width[part], tolerance, lowest, highest)
-        start = stop
     return lowest, highest
 
 

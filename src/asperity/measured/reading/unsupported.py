@@ -83,20 +83,11 @@ def reject_unsupported(file: SurfaceFile, _options: ReadingOptions) -> None:
             f"{file.name} is an NPZ archive that asperity did not prepare;"
             " save one array of heights as NPY"
         )
-    found = _match_signature(file)
-    if found is not None:
-        raise _unsupported_error(file, f"a {found[0]}", found[1])
-
-
-def _match_signature(file: SurfaceFile) -> tuple[str, str] | None:
-    """Return the format and a remedy for a file with a known signature."""
     for magic, kind, advice in _SIGNATURES:
         # Text may start with the same two letters ("BMS profile ..."): require a binary byte too.
-        if file.head.startswith(magic) and (
-            len(magic) > 2 or b"\x00" in file.head[:64] or magic[0] < 32  # a control character
-        ):
-            return kind, advice
-    return None
+        is_binary = len(magic) > 2 or b"\x00" in file.head[:64] or magic[0] < 32
+        if file.head.startswith(magic) and is_binary:
+            raise _unsupported_error(file, f"a {kind}", advice)
 
 
 def unrecognised_error(file: SurfaceFile) -> SurfaceFileError:

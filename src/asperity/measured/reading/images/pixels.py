@@ -70,10 +70,11 @@ def imagej_scale(metadata: Mapping[str, Any], resolution: tuple[float, float] | 
     pitch = None
     if lateral and across and resolution is not None and all(resolution):
         pitch = _valid_pitch((lateral / resolution[0], across / resolution[1]))
-    factor: Any = metadata.get("c1")
-    offset: Any = metadata.get("c0") or 0.0
-    is_calibrated = metadata.get("cf") == _IMAGEJ_LINEAR and _is_finite(factor, offset) and factor
-    factor, offset = (float(factor), float(offset)) if is_calibrated else (1.0, 0.0)
+    factor = _parse_float(str(metadata.get("c1")))
+    offset = _parse_float(str(metadata.get("c0") or 0.0))
+    is_linear = metadata.get("cf") == _IMAGEJ_LINEAR and factor != 0.0
+    if not (is_linear and math.isfinite(factor) and math.isfinite(offset)):
+        factor, offset = 1.0, 0.0
     notes = []
     if pitch is not None:
         notes.append(f"pixel size {format_lengths(pitch)} from ImageJ's metadata")
@@ -121,11 +122,6 @@ def _find_metres_per_unit(unit: Any) -> float | None:
         return unit_to_metres(text.strip().strip("\x00"))
     except ParameterError:
         return None
-
-
-def _is_finite(*values: Any) -> bool:
-    numbers = [v for v in values if isinstance(v, (int, float)) and not isinstance(v, bool)]
-    return len(numbers) == len(values) and all(map(math.isfinite, numbers))
 
 
 def _valid_pitch(pitch: tuple[float, float]) -> tuple[float, float] | None:

@@ -11,14 +11,13 @@ from __future__ import annotations
 import math
 import re
 import struct
-import warnings
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple
 
 import numpy as np
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import SurfaceFileError
-from asperity.measured.lengths import parse_number
+from asperity.measured.lengths import parse_heights, parse_number
 from asperity.measured.reading.reader import (
     RawSurface,
     ReadingOptions,
@@ -148,7 +147,7 @@ def _parse_text(content: bytes) -> tuple[_Header, FloatArray]:
     defaults = {"Compression": "0", "DataType": "7", "CheckType": "0"}
     codes = [_parse_integer(fields, key, default) for key, default in defaults.items()]
     header = _check_header(_Header._make((*counts, *scales, 0.0, *codes)))
-    return header, _parse_heights(rest.partition(b"*")[0], header.points * header.profiles)
+    return header, _parse_data(rest.partition(b"*")[0], header.points * header.profiles)
 
 
 def _parse_fields(head: str) -> dict[str, str]:
@@ -177,27 +176,12 @@ def _parse_integer(fields: dict[str, str], key: str, default: str = "") -> int:
     return int(text)
 
 
-def _parse_heights(area: bytes, count: int) -> FloatArray:
-    """Return the heights of the data area, by NumPy's parser, which needs little memory."""
-    # At least a digit and a blank for each; NumPy reads white space alone as a number.
+def _parse_data(area: bytes, count: int) -> FloatArray:
+    """Return the heights of the data area."""
+    # At least a digit and a blank for each.
     if len(area) < 2 * count - 1 or not area.strip():
         raise SurfaceFileError(f"truncated: {len(area)} bytes cannot hold {count} heights")
-    plain = re.sub(rb"(?i)\bBAD\b", b"nan", area)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        try:
-            values = np.fromstring(plain.decode("latin-1"), dtype=np.float64, sep=" ")
-        except (DeprecationWarning, ValueError):
-            _reject_height(plain)
+    values = parse_heights(re.sub(r"(?i)\bBAD\b", "nan", area.decode("latin-1")))
     if len(values) != count:
         raise SurfaceFileError(f"{len(values)} heights; NumPoints times NumProfiles is {count}")
     return values
-
-
-def _reject_height(area: bytes) -> NoReturn:
-    """Raise the error for the first height that is no number."""
-    for index, match in enumerate(re.finditer(rb"\S+", area), 1):
-        word = match.group().decode("latin-1")
-        if word.lower() not in ("nan", "-nan"):
-            parse_number(word, f"height {index}")
-    raise SurfaceFileError("the heights are not numbers")

@@ -166,8 +166,6 @@ def _read_channel(
         raise ParameterError("resample", "must not be given: the points are on a grid", resample)
     stored = np.ma.masked_array(topography.heights(), dtype=np.float64)
     heights = np.ascontiguousarray(stored.filled(np.nan).T)
-    if heights.ndim not in (1, 2) or heights.size == 0:
-        raise SurfaceFileError(f"heights of shape {heights.shape}")
     if channel.physical_sizes is None:
         return heights, None, []
     sizes = np.atleast_1d(np.asarray(channel.physical_sizes, dtype=np.float64))
