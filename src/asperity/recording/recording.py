@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.display import Plottable
-from asperity.core.errors import ParameterError, suggest_names
+from asperity.core.errors import ParameterError
 from asperity.core.files import open_input
 from asperity.recording import mcap
 from asperity.recording.row_encoding import (
     Columns,
     TraceTable,
+    find_column,
     message_values,
     row_type,
     schema_columns,
@@ -147,10 +148,7 @@ class Recording(Plottable):
         Raises:
             ParameterError: for a name that there is not; the nearest are offered.
         """
-        if name not in self.names:
-            hint = suggest_names(name, self.names)
-            raise ParameterError("column", f"is unknown: {name!r}; {hint}")
-        at = self.names.index(name)
+        at = find_column(self.columns, name)
         return np.concatenate([np.empty(0), *(block[:, at] for block in self.blocks())])
 
     def ranges(self) -> tuple[FloatArray, FloatArray]:

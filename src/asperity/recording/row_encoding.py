@@ -129,6 +129,18 @@ def check_table(table: FloatArray, columns: Sequence[object]) -> FloatArray:
     return values
 
 
+def find_column(columns: Columns, name: str) -> int:
+    """Return the number of a column.
+
+    Raises:
+        ParameterError: for a name that no column has; the nearest are offered.
+    """
+    names = [known for known, _unit in columns]
+    if name not in names:
+        raise ParameterError("column", f"is unknown: {name!r}; {suggest_names(name, names)}")
+    return names.index(name)
+
+
 class NamedColumns:
     """What has rows of a loop, and their parts by name.
 
@@ -150,12 +162,7 @@ class NamedColumns:
         Raises:
             ParameterError: for a name that there is not; the nearest are offered.
         """
-        known = [name for name, _unit in self.columns]
-        for name in names:
-            if name not in known:
-                hint = suggest_names(name, known)
-                raise ParameterError("column", f"is unknown: {name!r}; {hint}")
-        return self.table[:, [known.index(name) for name in names]]
+        return self.table[:, [find_column(self.columns, name) for name in names]]
 
     @property
     def time(self) -> FloatArray:

@@ -230,7 +230,8 @@ def read_mesh(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
         ParameterError: no unit is given; neither format has one.
         SurfaceFileError: the mesh is damaged, overhanging or folded.
     """
-    mesh_format = "STL" if is_binary_stl(file) or is_text_stl(file) else "OBJ"
+    is_binary = is_binary_stl(file)
+    mesh_format = "STL" if is_binary or is_text_stl(file) else "OBJ"
     unit = options.metres_per_unit
     if unit is None:
         raise ParameterError(
@@ -239,10 +240,7 @@ def read_mesh(file: SurfaceFile, options: ReadingOptions) -> RawSurface:
             " coordinates are in, such as 'mm'",
         )
     content = file.content
-    if is_binary_stl(file):
-        corners = _parse_binary_stl(content)
-    else:
-        corners = _parse_text_mesh(content, mesh_format)
+    corners = _parse_binary_stl(content) if is_binary else _parse_text_mesh(content, mesh_format)
     with np.errstate(invalid="ignore"):  # refused below
         corners = corners.astype(np.float64)
     if not np.isfinite(corners).all():
@@ -267,8 +265,6 @@ def _parse_text_mesh(content: bytes, mesh_format: str) -> FloatArray:
         meshes = [loaded] if isinstance(loaded, trimesh.Trimesh) else loaded.dump()
         parts = [np.asarray(part.triangles, dtype=np.float64) for part in meshes]
         triangles = np.concatenate(parts) if parts else np.empty((0, 3, 3))
-    if triangles.ndim != 3 or triangles.shape[1:] != (3, 3):
-        raise SurfaceFileError(f"damaged {mesh_format} mesh (its faces are no triangles)")
     if mesh_format == "OBJ":
         expected = _count_obj_triangles(content)
     else:
