@@ -1,8 +1,9 @@
-"""The container of a recording: MCAP, of which this writes and reads what a recording needs.
+"""The part of the MCAP file format that recordings use.
 
-Records follow one another: an operation code, a length, a content. Rows stand in *chunks*, which
-are plain (not compressed) and have a checksum; a reader takes whole chunks, so a file that ends
-anywhere is read to its last whole one. The summary at the end is an index for readers that seek.
+A file is a sequence of records: operation code, length, content. The rows are in *chunks*, which
+are not compressed and have a checksum. A reader takes complete chunks, so that a file that ends
+anywhere is read up to its last complete one. The summary at the end is an index for readers that
+seek.
 
 Reference:
     The MCAP format specification, version 0, https://mcap.dev/spec.
@@ -20,7 +21,7 @@ from typing import IO
 
 MAGIC = b"\x89MCAP0\r\n"
 CHANNEL = 1
-"""Number of the one channel, and of its schema."""
+"""Number of the only channel and of its schema."""
 # Before the rows of a chunk: first and last time, size, checksum, no compression, size again.
 _CHUNK = struct.Struct("<QQQIIQ")
 _RECORD = struct.Struct("<BQ")
@@ -99,15 +100,15 @@ def _encode_attachment(name: str, data: bytes) -> bytes:
 
 @dataclass(frozen=True)
 class Chunk:
-    """Where a chunk lies.
+    """Position of a chunk in a file.
 
     Attributes:
-        start: of the record in the file.
-        rows_start: where its rows begin.
-        size: of its rows [bytes].
-        checksum: of its rows.
-        times: of the first and the last row [ns].
-        index_size: of the index of its rows, which follows [bytes].
+        start: position of the record.
+        rows_start: position of its rows.
+        size: size of its rows [bytes].
+        checksum: CRC-32 of its rows.
+        times: times of the first and the last row [ns].
+        index_size: size of the index of its rows, which follows [bytes].
     """
 
     start: int
@@ -119,24 +120,24 @@ class Chunk:
 
     @property
     def end(self) -> int:
-        """Where the record ends."""
+        """Position after the record."""
         return self.rows_start + self.size
 
 
 def encode_chunk(
     start: int, rows: memoryview, times: tuple[int, int], index: bytes
 ) -> tuple[Chunk, tuple[bytes, memoryview, bytes]]:
-    """Return where a chunk lies, and its parts: front, rows as they are, index.
+    """Return the position of a chunk, and its parts: head, unchanged rows, index.
 
     Args:
-        start: where it will begin in the file.
-        rows: bytes of whole message records.
-        times: of the first and the last [ns].
-        index: time [ns] and place in ``rows`` of each, 64-bit integers.
+        start: its future position in the file.
+        rows: bytes of complete message records.
+        times: times of the first and the last row [ns].
+        index: time [ns] and offset in ``rows`` of each row, 64-bit integers.
     """
     checksum = zlib.crc32(rows)
     head = _CHUNK.pack(*times, len(rows), checksum, 0, len(rows))
-    # The length of the content, before the content is put together: rows are many.
+    # The rows are many: they are not copied into one content.
     front = _RECORD.pack(Opcode.CHUNK, len(head) + len(rows)) + head
     listed = encode_record(Opcode.MESSAGE_INDEX, struct.pack("<HI", CHANNEL, len(index)), index)
     place = Chunk(start, start + len(front), len(rows), checksum, times, len(listed))
@@ -195,24 +196,24 @@ def _index_entry(op: int, at: int, record: bytes) -> bytes:
 
 
 class ContentReader:
-    """Reads the parts of a record's content, one after the other.
+    """Reads the fields of a record's content in order.
 
     Raises:
-        DamagedError: for a part that goes beyond the end, or a text that is none.
+        DamagedError: a field exceeds the content, or a text is not UTF-8.
     """
 
     def __init__(self, content: bytes | memoryview) -> None:
         self._remaining = memoryview(content)
 
     def read(self, size: int) -> memoryview:
-        """Return so many bytes."""
+        """Return a number of bytes."""
         if size > len(self._remaining):
             raise DamagedError("a record ends within a field")
         part, self._remaining = self._remaining[:size], self._remaining[size:]
         return part
 
     def number(self, size: int) -> int:
-        """Return an integer of so many bytes."""
+        """Return an unsigned integer of a size in bytes."""
         return int.from_bytes(self.read(size), "little")
 
     def text(self) -> str:
@@ -235,7 +236,7 @@ def read_attachment(content: bytes | memoryview) -> tuple[str, str, bytes]:
     """Return name, kind and data of a file inside the file.
 
     Raises:
-        DamagedError: if its checksum is another.
+        DamagedError: its checksum differs.
     """
     reader = ContentReader(content)
     reader.read(16)  # times: unused
@@ -248,11 +249,11 @@ def read_attachment(content: bytes | memoryview) -> tuple[str, str, bytes]:
 
 
 def iterate_records(stream: IO[bytes], size: int) -> Iterator[tuple[int, int, int]]:
-    """Yield code, place and length of the content of each whole record; it begins after MAGIC.
+    """Yield code, position of the content and its length for each complete record.
 
     Args:
-        stream: that seeks.
-        size: of the file: a record that goes beyond is none.
+        stream: stream that seeks; records begin after MAGIC.
+        size: size of the file [bytes].
     """
     at = len(MAGIC)
     while at + _RECORD.size <= size:
@@ -266,10 +267,10 @@ def iterate_records(stream: IO[bytes], size: int) -> Iterator[tuple[int, int, in
 
 
 def read_chunk(stream: IO[bytes], at: int, length: int) -> Chunk:
-    """Return where the chunk lies whose content begins at a place.
+    """Return the chunk whose content begins at a position.
 
     Raises:
-        DamagedError: for one that is compressed, or whose sizes contradict each other.
+        DamagedError: the chunk is compressed, or its sizes contradict each other.
     """
     stream.seek(at)
     head = stream.read(min(_CHUNK.size, length))

@@ -1,4 +1,4 @@
-"""Reading a recording: a whole one, or one that ends where its process did."""
+"""Read a recording, also an incomplete one whose process was killed."""
 
 from __future__ import annotations
 
@@ -190,7 +190,7 @@ class Recording(Plottable):
 
 
 def is_recording(path: str | os.PathLike[str]) -> bool:
-    """Tell by its first bytes whether a file is MCAP."""
+    """Whether the first bytes of a file are those of MCAP."""
     try:
         with open_input(path, _MAX_BYTES) as stream:
             return stream.read(len(mcap.MAGIC)) == mcap.MAGIC

@@ -126,7 +126,7 @@ def recorded_surface_on(recording: Recording, texture: Texture) -> Surface:
     """Return the surface that a recording names, on another texture.
 
     Raises:
-        ParameterError: if it names none, or one that cannot be had here.
+        ParameterError: it names none, or one that is not available.
     """
     surface_data = _surface_metadata(recording)
     try:
@@ -143,10 +143,10 @@ def recorded_surface_on(recording: Recording, texture: Texture) -> Surface:
 
 
 def recorded_texture(recording: Recording) -> Texture:
-    """Return the texture that a recording holds: its very numbers, no file is read again.
+    """Return the texture stored in a recording, bit for bit.
 
     Raises:
-        ParameterError: if it holds none, or one that cannot be had here.
+        ParameterError: it holds none, or one that cannot be rebuilt.
     """
     surface_data = _surface_metadata(recording)
     field = recorded_field(recording)

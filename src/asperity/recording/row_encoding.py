@@ -1,6 +1,6 @@
-"""Rows of a recording: a message of ROS 2 for each, all of one size: NumPy moves them whole.
+"""Rows of a recording as ROS 2 messages of one size, which NumPy encodes and decodes at once.
 
-A row is a sequence of 64-bit numbers, whose names and units the schema of the file says.
+A row is a sequence of 64-bit numbers; the schema of the file has their names and units.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Columns = tuple[tuple[str, str], ...]
 """Names and units; the first is the time in seconds."""
 
 _MESSAGE = 0x05
-# What stands before the numbers of a message in CDR: little-endian.
+# Header of a message in CDR: little-endian.
 _CDR_HEADER = np.frombuffer(b"\x00\x01\x00\x00", np.dtype("V4"))[0]
 _COLUMN_NAME = re.compile(r"[a-z]+( ?[a-z0-9]+)*")
 _FIELD_LINE = re.compile(r"float64 ([a-z][a-z0-9_]*) # \[([^\]]*)\]")
@@ -30,7 +30,7 @@ def schema_text(columns: Columns) -> str:
     r"""Return the definition of a message with these columns.
 
     Raises:
-        ParameterError: for a name that cannot stand in one, or a first column that is no time.
+        ParameterError: a name is not allowed in a message, or the first column is not the time.
 
     Example:
         >>> schema_text((("time", "s"), ("applied x", "N")))
@@ -45,10 +45,10 @@ def schema_text(columns: Columns) -> str:
 
 
 def schema_columns(text: str) -> Columns:
-    """Return the columns of a definition that :func:`schema_text` has written.
+    """Return the columns of a definition written by :func:`schema_text`.
 
     Raises:
-        DamagedError: for another one.
+        DamagedError: any other definition.
     """
     found = [_FIELD_LINE.fullmatch(line) for line in text.splitlines()]
     columns = tuple((one[1].replace("_", " "), one[2]) for one in found if one is not None)
@@ -58,7 +58,7 @@ def schema_columns(text: str) -> Columns:
 
 
 def row_type(column_count: int) -> np.dtype[np.void]:
-    """Return how the message record of a row with so many numbers lies in the file."""
+    """Return the layout of the message record of a row with a number of columns."""
     return np.dtype(
         [
             ("op", "u1"),
@@ -74,7 +74,7 @@ def row_type(column_count: int) -> np.dtype[np.void]:
 
 
 def message_template(row_count: int, column_count: int) -> NDArray[np.void]:
-    """Return message records in which number, time and values are still to be written."""
+    """Return message records without number, time and values."""
     kind = row_type(column_count)
     blank = np.zeros(row_count, kind)
     blank["op"], blank["channel"], blank["cdr"] = _MESSAGE, CHANNEL, _CDR_HEADER
@@ -83,7 +83,7 @@ def message_template(row_count: int, column_count: int) -> NDArray[np.void]:
 
 
 def write_messages(messages: NDArray[np.void], first: int, table: FloatArray) -> None:
-    """Write number, time and values of rows into as many message records.
+    """Write number, time and values of rows into message records.
 
     Args:
         messages: the records.
@@ -142,7 +142,7 @@ def find_column(columns: Columns, name: str) -> int:
 
 
 class NamedColumns:
-    """What has rows of a loop, and their parts by name.
+    """Base class of results with rows of a loop, whose columns have names.
 
     Attributes:
         columns: names and units.
@@ -153,7 +153,7 @@ class NamedColumns:
     table: FloatArray
 
     def has_columns(self, *names: str) -> bool:
-        """Return whether there are columns of all these names."""
+        """Whether all these columns exist."""
         return {*names} <= {name for name, _unit in self.columns}
 
     def select(self, *names: str) -> FloatArray:
@@ -166,7 +166,7 @@ class NamedColumns:
 
     @property
     def time(self) -> FloatArray:
-        """Of the samples [s], shape (k,)."""
+        """Times of the samples [s], shape (k,)."""
         return self.table[:, 0]
 
     @property
@@ -191,7 +191,7 @@ class NamedColumns:
 
     @property
     def anchor(self) -> FloatArray:
-        """Of the hand at the samples [m], shape (k, 3)."""
+        """Position of the hand at the samples [m], shape (k, 3)."""
         return self._axes("anchor")
 
     @property

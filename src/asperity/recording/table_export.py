@@ -1,4 +1,4 @@
-"""The rows of a recording for other tools: CSV, MATLAB, Parquet."""
+"""Export of the rows of a recording as CSV, MATLAB or Parquet."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ _MAX_MAT_BYTES = 2**31 - 1
 def export_recording(
     recording: Recording, path: str | os.PathLike[str], progress: Progress | None = None
 ) -> None:
-    """Write the rows to a file that is whole or not there, its format by its suffix.
+    """Write the rows to a file, atomically; the suffix decides the format.
 
-    No digit is lost: text has 17 of them, the others keep the numbers as they are. Names of columns
-    are those of the recording with underscores, in CSV followed by their units as in a trace.
+    No digit is lost: text has 17 digits, the other formats are binary. Columns are named as in the
+    recording: in CSV with their units, in the other formats with underscores for blanks.
 
     Args:
-        recording: what is written.
-        path: ends in .csv, .mat or .parquet.
-        progress: is told the part that is done, in [0, 1], now and then.
+        recording: the recording.
+        path: file that ends in .csv, .mat or .parquet.
+        progress: called now and then with the completed fraction, in [0, 1].
 
     Raises:
         ParameterError: for another suffix, a file that cannot be written, a library that is
@@ -37,7 +37,7 @@ def export_recording(
     if suffix not in TABLE_WRITERS:
         raise ParameterError("output", f"must end in {', '.join(TABLE_WRITERS)}", str(path))
     if suffix == ".parquet":
-        _import_pyarrow()  # said before anything is written
+        _import_pyarrow()  # an error before anything is written
     try:
         with open_atomic(path) as stream:
             TABLE_WRITERS[suffix](recording, stream, progress or (lambda _part: None))
@@ -107,4 +107,4 @@ TABLE_WRITERS: Mapping[str, Callable[[Recording, IO[bytes], Progress], None]] = 
     ".mat": _write_mat,
     ".parquet": _write_parquet,
 }
-"""What writes a file, by its suffix."""
+"""Writers by suffix."""
