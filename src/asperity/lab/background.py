@@ -73,20 +73,17 @@ def set_surface(surface: Surface) -> None:
 
 
 def render_view(kind: str, numbers: tuple[float, ...]) -> bytes:
-    """Return a picture of the surface as a message, see ``frames``; empty without a surface.
+    """Return a picture of the surface as a message; empty without a surface.
 
     Args:
         kind: "relief" or "cut".
-        numbers: the arguments of the encoder, see ``frames``.
+        numbers: the arguments of ``encode_relief`` or ``encode_section`` after the surface.
     """
     surface = _STATE.get("surface")
     if surface is None:
         return b""
-    if kind == "relief":
-        x, y, size = numbers
-        return encode_relief(surface, x, y, size)
-    left, right, bottom, top, y = numbers
-    return encode_section(surface, (left, right, bottom, top, y))
+    encode = encode_relief if kind == "relief" else encode_section
+    return encode(surface, *numbers)
 
 
 def compute_limit(surface: Surface, device: Device) -> dict[str, Any]:

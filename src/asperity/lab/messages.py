@@ -236,7 +236,9 @@ def encode_relief(surface: Surface, x: float, y: float, size: float) -> bytes:
     return np.concatenate([[RELIEF, RELIEF_POINTS, x, y, size], heights]).tobytes()
 
 
-def encode_section(surface: Surface, box: tuple[float, float, float, float, float]) -> bytes:
+def encode_section(
+    surface: Surface, left: float, right: float, bottom: float, top: float, y: float
+) -> bytes:
     """Return a section along x, with the field and its curl, as a message.
 
     SECTION, PROFILE_POINTS, SECTION_COLUMNS, SECTION_ROWS, y and the box, then the heights [m],
@@ -245,9 +247,12 @@ def encode_section(surface: Surface, box: tuple[float, float, float, float, floa
 
     Args:
         surface: the surface.
-        box: least and greatest x, least and greatest z, and y [m].
+        left: least x [m].
+        right: greatest x [m].
+        bottom: least z [m].
+        top: greatest z [m].
+        y: of the section [m].
     """
-    left, right, bottom, top, y = box
     line = np.linspace(left, right, PROFILE_POINTS)
     heights = surface.texture.height(np.column_stack([line, np.full(PROFILE_POINTS, y)]))
     xs, zs = np.meshgrid(
