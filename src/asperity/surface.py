@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from asperity.clamps import CLAMPS, NONE, Clamp, find_clamp
 from asperity.contacts.warm_start import UNLIMITED, check_warm_start, new_warm_start
 from asperity.core.arguments import DEFAULT_STIFFNESS, MAX_DEPTH, STIFFNESS, Argument
-from asperity.core.cache import content_digest
 from asperity.core.checks import FloatArray, Points, check_array, check_points, check_positive
+from asperity.core.digests import content_digest
 from asperity.core.display import Plottable
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.derive.facts import LawFacts, clamped_facts

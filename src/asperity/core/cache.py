@@ -18,23 +18,20 @@ import errno
 import hashlib
 import os
 import pickle
-import platform
 import re
 import stat
-import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass
-from functools import lru_cache
-from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from filelock import FileLock, Timeout
 
+from asperity.core.digests import package_digest
 from asperity.core.files import open_atomic, open_input
 from asperity.core.units import parse_size
 
@@ -120,14 +117,12 @@ class CacheEntry:
 def list_entries() -> list[CacheEntry]:
     """Return the entries of the cache that can be read."""
     entries = []
-    with suppress(OSError):
-        for folder in sorted(path for path in cache_folder().iterdir() if path.is_dir()):
-            with suppress(OSError):
-                for path in folder.iterdir():
-                    if _ENTRY_NAME.fullmatch(path.name):
-                        status = path.stat()
-                        entry = CacheEntry(folder.name, path, status.st_size, status.st_mtime_ns)
-                        entries.append(entry)
+    for path in cache_folder().glob("*/*"):
+        if _ENTRY_NAME.fullmatch(path.name):
+            with suppress(OSError):  # another process may have deleted it
+                status = path.stat()
+                size, last_used = status.st_size, status.st_mtime_ns
+                entries.append(CacheEntry(path.parent.name, path, size, last_used))
     return entries
 
 
@@ -206,11 +201,11 @@ def _evict(written: int) -> None:
     limit, entries = size_limit(), list_entries()
     size = sum(entry.size for entry in entries)
     if size > limit:
-        entries.sort(key=lambda entry: entry.last_used)
-        while entries and size > _FRACTION_AFTER_EVICTION * limit:
-            oldest = entries.pop(0)
+        for oldest in sorted(entries, key=lambda entry: entry.last_used):
             _delete([oldest])
             size -= oldest.size
+            if size <= _FRACTION_AFTER_EVICTION * limit:
+                break
     # Other processes write too, so the folder is measured again after a part of the rest.
     _unchecked_bytes["left"] = (limit - size) // _ENTRIES_PER_LIMIT
 
@@ -342,8 +337,6 @@ RESULTS_NAMESPACE = "results"
 Value = TypeVar("Value")
 
 _BYPASS_RESULTS: ContextVar[bool] = ContextVar("bypass_results", default=False)
-_PACKAGE = Path(__file__).parents[1]
-_SOURCE_SUFFIXES = (".py", ".toml")
 
 
 def get_or_compute(name: str, content: str | None, compute: Callable[[], Value]) -> Value:
@@ -351,8 +344,8 @@ def get_or_compute(name: str, content: str | None, compute: Callable[[], Value])
 
     Args:
         name: name of the result.
-        content: digest of all that the result depends on besides the package, see
-            :func:`content_digest`; ``None`` if it is unknown: then nothing is stored.
+        content: :func:`~asperity.core.digests.content_digest` of all that the result depends on
+            besides the package; ``None`` if it is unknown: then nothing is stored.
         compute: computes the result.
     """
     return get_or_compute_each(name, [content], lambda _indices: iter([(0, compute())]))[0]
@@ -391,8 +384,9 @@ def get_or_compute_each(
 
 
 def _result_key(name: str, content: str | None) -> str | None:
-    package = None if content is None or _BYPASS_RESULTS.get() else package_digest()
-    return None if package is None else f"{name}\n{content}\n{package}"
+    if content is None or _BYPASS_RESULTS.get():
+        return None
+    return f"{name}\n{content}\n{package_digest()}"
 
 
 @contextmanager
@@ -403,61 +397,3 @@ def bypass_results() -> Iterator[None]:
         yield
     finally:
         _BYPASS_RESULTS.reset(token)
-
-
-def content_digest(*parts: Any) -> str:
-    """Return a digest of numbers, strings, arrays and tuples of them; -0.0 differs from 0.0.
-
-    Example:
-        >>> content_digest(1.0, "a") == content_digest(1.0, "a")
-        True
-        >>> len({content_digest(*parts) for parts in [(1.0, 2.0), ((1.0, 2.0),), (1, 2.0), (1.0,)]})
-        4
-    """
-    digest = hashlib.sha256()
-    for part in parts:
-        if isinstance(part, tuple):
-            text = f"tuple {content_digest(*part)}"
-        elif hasattr(part, "tobytes"):  # NumPy arrays
-            # Copied only if it is not contiguous.
-            data = part.data if part.flags.c_contiguous else part.tobytes()
-            text = f"{part.dtype} {part.shape} {hashlib.sha256(data).hexdigest()}"
-        elif part is None or isinstance(part, (str, float, int)):
-            text = f"{type(part).__name__} {part!r}"
-        else:
-            raise TypeError(f"cannot compute a content digest of {part!r}")
-        digest.update(f"{len(text)} {text}".encode())
-    return digest.hexdigest()
-
-
-def is_shipped(cls: type) -> bool:
-    """Return whether a class and its bases belong to this package or to Python."""
-    packages = {base.__module__.partition(".")[0] for base in cls.__mro__}
-    return packages <= {_PACKAGE.name} | sys.stdlib_module_names
-
-
-@lru_cache(maxsize=1)
-def package_digest() -> str | None:
-    """Return a digest of this package, of Python, NumPy, SciPy, Numba and the processor type.
-
-    ``None`` if the files of the package are not found.
-    """
-    import numpy as np
-    import scipy
-
-    digest = hashlib.sha256()
-    count = 0
-    for folder, inner, names in os.walk(_PACKAGE):
-        inner.sort()
-        for name in sorted(names):
-            if name.endswith(_SOURCE_SUFFIXES):
-                path = Path(folder, name)
-                content = path.read_bytes()
-                header = f"{path.relative_to(_PACKAGE).as_posix()} {len(content)}\n"
-                digest.update(header.encode() + content)
-                count += 1
-    # Versions of Numba and LLVM come from metadata, since importing Numba is slow.
-    libraries = np.__version__, scipy.__version__, version("numba"), version("llvmlite")
-    machine = sys.version, platform.machine(), sys.byteorder
-    digest.update(repr((libraries, machine)).encode())
-    return digest.hexdigest() if count else None

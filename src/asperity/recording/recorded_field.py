@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from asperity.clamps import Clamp, find_clamp
-from asperity.core.cache import content_digest
 from asperity.core.checks import FloatArray
+from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError
 from asperity.core.files import text_digest, to_plain_data
 from asperity.kernels.fuse import kernel_source

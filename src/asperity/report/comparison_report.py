@@ -8,7 +8,7 @@ from asperity.analysis.compare import Comparison, DeviceComparisons
 from asperity.analysis.gain.characteristic import surface_content
 from asperity.analysis.limits.perceptibility import force_magnitude_text, speed_text, tier_text
 from asperity.analysis.results import LawRow
-from asperity.core.cache import content_digest
+from asperity.core.digests import content_digest
 from asperity.core.files import json_text
 from asperity.core.units import format_quantity
 from asperity.report import page

@@ -14,7 +14,8 @@ from importlib import resources
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from asperity.core.cache import content_digest, get_or_compute
+from asperity.core.cache import get_or_compute
+from asperity.core.digests import content_digest
 from asperity.core.processes import precompute
 from asperity.core.version import __version__
 from asperity.report.page import (

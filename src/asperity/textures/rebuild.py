@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping
 from types import ModuleType
 from typing import Any
 
-from asperity.core.cache import content_digest
 from asperity.core.checks import FloatArray
+from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError
 from asperity.textures.catalogue import CATALOGUE
 from asperity.textures.spline.heightmap import HeightMap

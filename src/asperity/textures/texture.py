@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from asperity.contacts.contact import ExactHeight
 from asperity.core.arguments import Argument
-from asperity.core.cache import content_digest, is_shipped
 from asperity.core.checks import FloatArray, Points, check_points
+from asperity.core.digests import content_digest, is_shipped
 from asperity.core.display import Plottable
 from asperity.core.files import to_plain_data
 from asperity.enclosures.cells import Cells

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.core.arguments import document_arguments
-from asperity.core.cache import content_digest, get_or_compute
+from asperity.core.cache import get_or_compute
+from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError
 from asperity.core.files import open_input
 from asperity.measured.file_arguments import FILE_ARGUMENTS, READING_ARGUMENTS

@@ -26,8 +26,9 @@ from asperity.analysis.bounds.sampling import highest_point
 from asperity.analysis.gain.certificate import certify, include_clamp
 from asperity.analysis.gain.medial_axis import SearchOptions
 from asperity.analysis.gain.theorems import THEOREMS, theorem_of
-from asperity.core.cache import content_digest, get_or_compute, is_shipped
+from asperity.core.cache import get_or_compute
 from asperity.core.checks import check_positive
+from asperity.core.digests import content_digest, is_shipped
 from asperity.core.errors import ParameterError
 from asperity.kernels.fuse import kernel_source
 from asperity.laws import LAWS, Law

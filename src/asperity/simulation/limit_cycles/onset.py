@@ -15,8 +15,9 @@ from asperity.analysis.gain.characteristic import (
     one_sided_number,
     surface_content,
 )
-from asperity.core.cache import get_or_compute_each, is_shipped
+from asperity.core.cache import get_or_compute_each
 from asperity.core.checks import FloatArray, check_array, check_positive
+from asperity.core.digests import is_shipped
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, attributes_to_dict, json_text, to_plain_data
 from asperity.laws.w_smooth_wall import LAW as SMOOTH_WALL
