@@ -10,12 +10,11 @@ from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
-from asperity.core.errors import print_message
+from asperity.core.errors import InternalError, print_message
 from asperity.core.processes import SINGLE_THREADED
 
 INTERRUPTED = 130  # 128 + SIGINT, as in shells
 IO_ERROR = 74  # as in sysexits.h
-INTERNAL_ERROR = 70  # likewise
 BROKEN_PIPE = 141  # 128 + SIGPIPE
 _TRACEBACK = "ASPERITY_TRACEBACK"
 _REPEAT_INTERVAL = 1.0  # [s] after which an interrupt is raised again
@@ -29,7 +28,9 @@ def main() -> NoReturn:
     with suppress(KeyboardInterrupt):
         signal.signal(signal.SIGINT, _handle_interrupt)
         status = _run()
-    _ignore_interrupts()
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     if _received_signals:
         print_message("interrupted")
     # Run with -m, Python ends by the signal instead of the exit code after an interrupt inside an
@@ -70,12 +71,6 @@ def _handle_interrupt(number: int, _frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
-def _ignore_interrupts() -> None:
-    if hasattr(signal, "setitimer"):
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
 def _prepare_streams() -> None:
     """Make the standard streams accept any output, including closed streams."""
     for descriptor in range(3):
@@ -89,9 +84,8 @@ def _prepare_streams() -> None:
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="asperity")  # type: ignore[union-attr]  # both are text files
     os.environ |= {"MPLBACKEND": "agg"} | SINGLE_THREADED  # figures go to files
-    sys.unraisablehook = lambda _error: (
-        None
-    )  # an interrupt in a finalizer: the exit code reports it
+    # The exit code reports an interrupt in a finalizer.
+    sys.unraisablehook = lambda _error: None
 
 
 # Characters of the output without an ASCII equivalent in NFKD.
@@ -120,26 +114,22 @@ def _report_error(error: BaseException) -> int:
         return IO_ERROR
     if os.environ.get(_TRACEBACK):
         sys.__excepthook__(type(error), error, error.__traceback__)
-        return INTERNAL_ERROR
+        return InternalError.exit_code
     import platform
     import shlex
+    import traceback
 
     import asperity
 
+    *_, frame = traceback.extract_tb(error.__traceback__)
     print_message(
         f"internal error in {shlex.join(['asperity', *sys.argv[1:]])!r}:"
-        f" {type(error).__name__}: {' '.join(str(error).split())} ({_error_location(error)});"
+        f" {type(error).__name__}: {' '.join(str(error).split())} ({frame.filename},"
+        f" line {frame.lineno});"
         f" asperity {asperity.__version__}, Python {platform.python_version()},"
         f" {platform.system()}. Please report this line; {_TRACEBACK}=1 shows the traceback"
     )
-    return INTERNAL_ERROR
-
-
-def _error_location(error: BaseException) -> str:
-    frame = error.__traceback__
-    while frame is not None and frame.tb_next is not None:
-        frame = frame.tb_next
-    return f"{frame.tb_frame.f_code.co_filename}, line {frame.tb_lineno}" if frame else "nowhere"
+    return InternalError.exit_code
 
 
 def _flush_output(status: int) -> int:

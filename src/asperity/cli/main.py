@@ -55,37 +55,28 @@ class StrictGroup(click.Group):
 BAD_INPUT = AsperityError.exit_code
 
 COMMANDS = {
-    "analyze": ("analysis_commands", "Analyze one law on a surface and a device."),
-    "cache": ("setup_commands", "Show or clear the cache."),
-    "calibrate": (
-        "device_commands",
-        "Calibrate a device: stiffest wall, resolution, delay, damping.",
-    ),
-    "compare": (
-        "analysis_commands",
-        "Compare all laws on a surface and recommend one with its stiffness.",
-    ),
-    "devices": ("device_commands", "List devices and the source of each value."),
-    "export": ("export_commands", "Export a surface and its law as C code."),
-    "init": ("setup_commands", "Write a template scene file."),
-    "lab": ("servo_commands", "Run a texture interactively in a browser."),
-    "limits": ("analysis_commands", "Report which wavelengths are perceptible on a device."),
-    "maps": ("export_commands", "Write a height map or a normal map."),
-    "onset": (
-        "simulation_commands",
-        "Find the stiffness at which limit cycles begin, by simulation.",
-    ),
-    "prepare": ("surface_commands", "Prepare a measured surface and write it to a file."),
-    "recording": ("recording_commands", "Show, plot, export or replay a recording."),
-    "reproduce": ("paper_commands", "Report which claims of the paper hold, with their evidence."),
-    "run": ("servo_commands", "Run a surface in real time on a simulated or real device."),
-    "scan": ("simulation_commands", "Simulate strokes and report their energy by speed and depth."),
-    "show": ("surface_commands", "Report roughness parameters after each preparation step."),
-    "simulate": ("simulation_commands", "Simulate texture, device and hand in a closed loop."),
-    "surfaces": ("surface_commands", "List texture kinds and named surfaces."),
-    "warm": ("setup_commands", "Compile the shipped laws in advance."),
+    "analyze": ("analysis", "Analyze one law on a surface and a device."),
+    "cache": ("setup", "Show or clear the cache."),
+    "calibrate": ("device", "Calibrate a device: stiffest wall, resolution, delay, damping."),
+    "compare": ("analysis", "Compare all laws on a surface and recommend one with its stiffness."),
+    "devices": ("device", "List devices and the source of each value."),
+    "export": ("export", "Export a surface and its law as C code."),
+    "init": ("setup", "Write a template scene file."),
+    "lab": ("servo", "Run a texture interactively in a browser."),
+    "limits": ("analysis", "Report which wavelengths are perceptible on a device."),
+    "maps": ("export", "Write a height map or a normal map."),
+    "onset": ("simulation", "Find the stiffness at which limit cycles begin, by simulation."),
+    "prepare": ("surface", "Prepare a measured surface and write it to a file."),
+    "recording": ("recording", "Show, plot, export or replay a recording."),
+    "reproduce": ("paper", "Report which claims of the paper hold, with their evidence."),
+    "run": ("servo", "Run a surface in real time on a simulated or real device."),
+    "scan": ("simulation", "Simulate strokes and report their energy by speed and depth."),
+    "show": ("surface", "Report roughness parameters after each preparation step."),
+    "simulate": ("simulation", "Simulate texture, device and hand in a closed loop."),
+    "surfaces": ("surface", "List texture kinds and named surfaces."),
+    "warm": ("setup", "Compile the shipped laws in advance."),
 }
-"""Module and summary of each command; the command is ``NAME_command`` in its module."""
+"""Each command's module ``cli/MODULE_commands.py`` and summary; it is ``NAME_command`` there."""
 
 
 class LazyCommands(StrictGroup):
@@ -99,7 +90,7 @@ class LazyCommands(StrictGroup):
         """Return a command by its name."""
         if cmd_name not in COMMANDS:
             return None
-        module = importlib.import_module(f"asperity.cli.{COMMANDS[cmd_name][0]}")
+        module = importlib.import_module(f"asperity.cli.{COMMANDS[cmd_name][0]}_commands")
         command: click.Command = getattr(module, f"{cmd_name}_command")
         return command
 

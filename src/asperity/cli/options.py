@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -20,6 +18,7 @@ from asperity.core.arguments import (
     REQUESTED_STIFFNESS,
     STIFFNESS,
     Argument,
+    read_arguments,
 )
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.memory import limit_memory
@@ -140,13 +139,8 @@ def option_help(argument: Argument) -> str:
 
 def command_arguments(command: str) -> tuple[Argument, ...]:
     """Return the declarations of the options that only one command has."""
-    return tuple(Argument(name, **table) for name, table in _command_tables()[command].items())
-
-
-@lru_cache(maxsize=1)
-def _command_tables() -> dict[str, Any]:
     path = Path(__file__).with_name("command_options.toml")
-    return tomllib.loads(path.read_text("utf-8"))
+    return tuple(read_arguments(path, command).values())
 
 
 def argument_options(

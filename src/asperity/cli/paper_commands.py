@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,56 +69,42 @@ def reproduce_command(
     for name in names:
         find_claims(name)  # an unknown name is refused before the computation
     measured = _load_measured_texture(surface, values)
-    figures = _Figures.from_options(folder, values["format"], names, simulated=not skip_experiments)
-    if figures is not None:
+    figures: tuple[PaperFigure, ...] = ()
+    if folder is not None:
+        from asperity.report.paper.paper_figures import create_folder, find_figures
+
+        figures = find_figures(names, include_simulated=not skip_experiments)
+        create_folder(folder)
         check_outputs(json=outputs.json, html=outputs.html)  # the folder may be one of the files
+    elif values["format"] is not None:
+        raise ParameterError(_FORMAT.name, "applies to figures: give --figures DIR")
     results, experiments = _reproduce(
         names or None, measured, with_experiments=not (names or skip_experiments)
     )
     from asperity.report.paper.claims_report import claims_page, evidence_page
 
-    written = "" if figures is None else figures.write(experiments)
+    written = ""
+    if folder is not None:
+        written = _write_figures(figures, Path(folder), values["format"], experiments)
 
     page = evidence_page(results) if names else claims_page(results, experiments)
     data = {"schema": 1, "claims": results, "experiments": experiments}
     outputs.write(data, page, extra_line=written)
 
 
-@dataclass(frozen=True)
-class _Figures:
-    """Figures to write, and their folder."""
+def _write_figures(
+    figures: Sequence[PaperFigure],
+    folder: Path,
+    file_format: FileFormat | None,
+    experiments: Experiments | None,
+) -> str:
+    """Write figures to a folder and return a message."""
+    from asperity.report.paper.paper_figures import write_figures
 
-    figures: tuple[PaperFigure, ...]
-    folder: Path
-    file_format: FileFormat
-
-    @classmethod
-    def from_options(
-        cls,
-        folder: str | None,
-        file_format: FileFormat | None,
-        names: Sequence[str],
-        *,
-        simulated: bool,
-    ) -> _Figures | None:
-        """Return the figures of the options, checked before the computation."""
-        if folder is None:
-            if file_format is not None:
-                raise ParameterError(_FORMAT.name, "applies to figures: give --figures DIR")
-            return None
-        from asperity.report.paper.paper_figures import create_folder, find_figures
-
-        figures = find_figures(names, include_simulated=simulated)
-        return cls(figures, create_folder(folder), file_format or "svg")
-
-    def write(self, experiments: Experiments | None) -> str:
-        """Write the figures and return a message."""
-        from asperity.report.paper.paper_figures import write_figures
-
-        with step_bar("drawing the figures", len(self.figures)) as step:
-            paths = write_figures(self.figures, self.folder, self.file_format, experiments, step)
-        names = ", ".join(path.name for path in paths)
-        return f"Figures in {escape_unprintable(str(self.folder))}: {names}"
+    with step_bar("drawing the figures", len(figures)) as step:
+        paths = write_figures(figures, folder, file_format or "svg", experiments, step)
+    names = ", ".join(path.name for path in paths)
+    return f"Figures in {escape_unprintable(str(folder))}: {names}"
 
 
 def _load_measured_texture(surface: str | None, values: dict[str, Any]) -> Texture | None:

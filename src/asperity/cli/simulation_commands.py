@@ -66,12 +66,7 @@ _report_options = output_options()
 @options.argument_options([_DURATION])
 @_report_options
 def onset_command(
-    scene: str,
-    outputs: Outputs,
-    laws: tuple[Law, ...] | None,
-    delays: list[int] | None,
-    duration: float | None,
-    **values: Any,
+    scene: str, outputs: Outputs, laws: tuple[Law, ...] | None, **values: Any
 ) -> None:
     """Find the stiffness at which limit cycles begin in SCENE by simulation, by law and delay.
 
@@ -81,10 +76,10 @@ def onset_command(
     if values["stiffness"] is not None:
         raise ParameterError("stiffness", "is the result of onset: leave it out")
     chosen = select_laws(laws, values["law"])
-    setup = load_setup(scene, values, duration, chosen, include_delay=False)
+    setup = load_setup(scene, values, values["duration"], chosen, include_delay=False)
     from asperity.scene.sweeps import sweep_onsets
 
-    delays, letters = delays or list(range(6)), [law.letter for law in chosen]
+    delays, letters = values["delays"] or list(range(6)), [law.letter for law in chosen]
     done, total = count(1), len(letters) * len(delays)
     search = options.provided_values(values, _ONSET_SEARCH)
     with progress_bar("simulating onsets") as update:

@@ -149,6 +149,15 @@ class Argument:
         return attributes_to_dict(self, exclude=excluded)
 
 
+def read_arguments(path: Path, table: str = "") -> dict[str, Argument]:
+    """Return the declarations in a TOML file of this package, or in one of its tables, by name."""
+    import tomllib
+
+    content = tomllib.loads(path.read_text("utf-8"))
+    declarations = content[table] if table else content
+    return {name: Argument(name, **fields) for name, fields in declarations.items()}
+
+
 def check_integer(name: str, value: Any, minimum: int = 0) -> int:
     """Return an integer of at least a minimum; 3.0 is accepted as 3.
 

@@ -2,53 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any, Literal
 
-from asperity.core.arguments import Argument
+from asperity.core.arguments import read_arguments
 from asperity.core.display import Displayable
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, attributes_to_dict
 from asperity.core.units import format_quantity
 
-
-def _positive(name: str, description: str, unit: str) -> Argument:
-    return Argument(name, description, unit, must_be_positive=True)
-
-
-_FIELDS = (
-    _positive("max_force", "peak force", "N"),
-    _positive("continuous_force", "greatest continuous force", "N"),
-    _positive("max_stiffness", "K₀, the stiffest smooth wall without a limit cycle", "N/m"),
-    _positive("position_resolution", "smallest step of the measured position", "m"),
-    _positive("force_resolution", "smallest step of the force", "N"),
-    _positive("update_rate", "updates of the force per second, 1/T", "Hz"),
-    _positive("velocity_rate", "updates of the measured velocity per second", "Hz"),
-    _positive("bandwidth", "frequency up to which force is transmitted, F₀", "Hz"),
-    _positive("damping", "physical damping, σ₀(B): the least over the directions", "N*s/m"),
-    _positive("joint_damping", "physical damping in each joint", "N*m*s"),
-    Argument(
-        "virtual_damping", "damping by the controller, or below 0", "N*s/m", minimum=-math.inf
-    ),
-    _positive("controller_damping", "greatest damping gain of the controller, virtual", "N*s/m"),
-    Argument("delay_samples", "whole samples between measurement and force", form="integer"),
-    Argument("friction", "dry friction felt in motion", "N"),
-    Argument("least_friction", "least dry friction over the workspace", "N"),
-    _positive("apparent_mass", "mass felt in motion", "kg"),
-    _positive("workspace_radius", "radius of a spherical workspace", "m"),
-    _positive("workspace_diameter", "diameter of a cylindrical workspace", "m"),
-    _positive("workspace_length", "length of a cylindrical workspace", "m"),
-    _positive("proximal_link", "length of each link at a motor", "m"),
-    _positive("distal_link", "length of each link at the handle", "m"),
-    Argument("base_distance", "distance of the motors' axes", "m"),
-    Argument("encoder_counts", "encoder steps per turn of its joint", form="integer", minimum=1),
-)
-FIELD_TABLE: dict[str, Argument] = {field.name: field for field in _FIELDS}
+FIELD_TABLE = read_arguments(Path(__file__).with_name("device_fields.toml"))
 """The numbers of a device by name: description, SI unit, bounds."""
 
-FIELD_UNITS: dict[str, str] = {field.name: field.unit or "1" for field in _FIELDS}
+FIELD_UNITS = {name: field.unit or "1" for name, field in FIELD_TABLE.items()}
 """SI unit of each field; "1" for a plain number."""
 
 TEXT_FIELDS = ("id", "name", "axes", "driver", "notes")

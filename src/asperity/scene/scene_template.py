@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 
 from asperity.core.arguments import Argument
 from asperity.devices import device_names
@@ -12,19 +13,10 @@ from asperity.scene.sections import HANDS, MOTIONS, RUN_ARGUMENTS, SectionKind, 
 from asperity.servo import safety
 from asperity.textures.texture import TextureKind
 
-_HEAD = """\
-# A scene: a texture, the law that renders it, the device, the hand and what it does.
-#   asperity compare {name}   which law, at which stiffness
-#   asperity limits {name}    whether it can be felt
-#   asperity simulate {name}  simulate it and report the energy balance
-#   asperity run {name}       run it in real time, in a loop as on a device
-#   asperity onset {name}     the stiffness at which it starts to buzz (motion: still)
-# Remove the "# " in front of a line to use it. Every quantity needs its unit.
-"""
+_TEMPLATE = Path(__file__).with_suffix(".txt")
 # Values of the template, in TOML.
 _TEXTURE = {"amplitude": '"0.1 mm"', "period": '"2 mm"'}
 _SURFACE = {"law": '"C"', "stiffness": '"300 N/m"', "max_depth": '"0.5 mm"'}
-_DEVICE = {"id": '"touch"', "damping": '"0.5 N*s/m"', "update_rate": '"1 kHz"'}
 _HAND = {"stiffness": '["300 N/m", "300 N/m", "0 N/m"]', "damping": '"3 N*s/m"', "mass": '"50 g"',
          "force": '["0 N", "0 N", "-0.3 N"]'}  # fmt: skip
 _MOTION = {"start": '["-10 mm", "0 mm", "0 mm"]', "end": '["10 mm", "0 mm", "0 mm"]',
@@ -45,23 +37,18 @@ def scene_template(name: str = "scene.toml") -> str:
     sinusoid = TEXTURE_KINDS["sinusoid"].arguments
     names = {argument.name for argument in sinusoid}
     others = [argument for argument in SYNTHETIC_ARGUMENTS if argument.name not in names]
-    devices = (
-        f"# One of {', '.join(device_names())}; fields given here override those of\n"
-        "# the catalogue. These two are assumptions: asperity devices touch lists the known ones.\n"
-    )
     texture = _kind_line("sinusoid", TEXTURE_KINDS, "asperity surfaces lists their arguments")
     hand, motion = _kind_line("spring", HANDS), _kind_line("strokes", MOTIONS)
-    sections = {
-        "texture": texture + _argument_lines((*sinusoid, *others), _TEXTURE),
-        "surface": _argument_lines(surface_arguments(), _SURFACE),
-        "device": devices + "".join(f"{key} = {value}\n" for key, value in _DEVICE.items()),
-        "hand": hand + _argument_lines(HANDS["spring"].arguments, _HAND),
-        "motion": motion + _argument_lines(MOTIONS["strokes"].arguments, _MOTION),
-        "run": _argument_lines(RUN_ARGUMENTS, {}),
-        "servo": _argument_lines(safety.ARGUMENTS, {}),
-    }
-    texts = [f"[{name}]\n{lines}" for name, lines in sections.items()]
-    return "\n".join([_HEAD.format(name=name), *texts])
+    return _TEMPLATE.read_text("utf-8").format(
+        name=name,
+        texture=texture + _argument_lines((*sinusoid, *others), _TEXTURE),
+        surface=_argument_lines(surface_arguments(), _SURFACE),
+        devices=", ".join(device_names()),
+        hand=hand + _argument_lines(HANDS["spring"].arguments, _HAND),
+        motion=motion + _argument_lines(MOTIONS["strokes"].arguments, _MOTION),
+        run=_argument_lines(RUN_ARGUMENTS, {}),
+        servo=_argument_lines(safety.ARGUMENTS, {}).rstrip("\n"),
+    )
 
 
 def _kind_line(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial
 from threading import Event
 from typing import Any, TypeVar
 
@@ -79,42 +78,35 @@ def sweep_onsets(
         ParameterError: the hand does not come to rest, see
             :func:`~asperity.simulation.find_onset`.
     """
-    jobs, cancelled = [(law, delay) for law in laws for delay in delays], Event()
-    find = partial(
-        _law_onsets, setup, delays, n_phases, tolerance, min_stiffness, progress, cancelled
-    )
+    cancelled = Event()
+
+    def check_cancelled() -> None:
+        if cancelled.is_set():
+            raise CancelledError
+
+    def find(law: str) -> list[Onset]:
+        loop = setup.with_law(law)
+        start = loop.motion.at(np.zeros(1))[0] if loop.start is None else loop.start
+        nears = [
+            expected_onset(loop.surface, loop.plant, loop.hand, loop.with_delay(delay).servo, start)
+            for delay in delays
+        ]
+        return find_onsets(
+            loop.surface, loop.plant, loop.hand, loop.servo, loop.motion, delays, nears,
+            start=loop.start, velocity=loop.velocity, duration=loop.duration, starts=n_phases,
+            tolerance=tolerance, lowest=min_stiffness, progress=check_cancelled,
+            onset_callback=progress,
+        )  # fmt: skip
+
     by_law = map_threads(find, [(law,) for law in laws], cancelled)
     found = [onset for onsets in by_law for onset in onsets]
+    jobs = [(law, delay) for law in laws for delay in delays]
     return tuple(
         predict(
             setup.with_law(law).surface, setup.plant, setup.hand, setup.with_delay(delay).servo,
             onset, smooth_wall_onset(found, delay),
         )
         for (law, delay), onset in zip(jobs, found, strict=True)
-    )  # fmt: skip
-
-
-def _law_onsets(
-    setup: Setup, delays: Sequence[int], n_phases: int, tolerance: float, min_stiffness: float,
-    progress: Callable[[], None] | None, cancelled: Event, law: str,
-) -> list[Onset]:  # fmt: skip
-    """Return the onsets of a law for every delay; see :func:`sweep_onsets`."""
-
-    def check_cancelled() -> None:
-        if cancelled.is_set():
-            raise CancelledError
-
-    loop = setup.with_law(law)
-    start = loop.motion.at(np.zeros(1))[0] if loop.start is None else loop.start
-    nears = [
-        expected_onset(loop.surface, loop.plant, loop.hand, loop.with_delay(delay).servo, start)
-        for delay in delays
-    ]
-    return find_onsets(
-        loop.surface, loop.plant, loop.hand, loop.servo, loop.motion, delays, nears,
-        start=loop.start, velocity=loop.velocity, duration=loop.duration, starts=n_phases,
-        tolerance=tolerance, lowest=min_stiffness, progress=check_cancelled,
-        onset_callback=progress,
     )  # fmt: skip
 
 
