@@ -48,9 +48,7 @@ def _run() -> int:
         command_line()
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else int(end.code is not None)
-    except KeyboardInterrupt:
-        raise
-    except BaseException as error:  # any error is reported in one line
+    except Exception as error:  # any error is reported in one line
         return _report_error(error)
     return 0
 

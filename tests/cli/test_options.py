@@ -19,9 +19,9 @@ from asperity.cli import analysis_commands as compare
 from asperity.cli import analysis_commands as limits
 from asperity.cli import simulation_commands as onset
 from asperity.cli.main import COMMANDS, cli
-from asperity.cli.options import LAW_OPTIONS, option_help
+from asperity.cli.options import LAW_OPTIONS, SPEED, option_help
 from asperity.cli.output import progress_bar, step_bar
-from asperity.core.arguments import MAX_DEPTH, SPEED, Argument
+from asperity.core.arguments import MAX_DEPTH, Argument
 from asperity.laws import LAWS
 from asperity.measured.file_arguments import FILE_ARGUMENTS
 from asperity.scene.sweeps import sweep_onsets

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from asperity.cli.main import main
-from asperity.core.arguments import MEMORY
+from asperity.cli.options import MEMORY
 from asperity.core.errors import ParameterError
 from asperity.core.memory import estimate_memory, free_memory, limit_memory, require_memory
 from asperity.textures.kinds.noise import Noise

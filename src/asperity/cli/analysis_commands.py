@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli import options
+from asperity.cli.options import REQUESTED_STIFFNESS, SPEED
 from asperity.cli.output import Outputs, output_options, step_bar
-from asperity.core.arguments import MAX_DEPTH, REQUESTED_STIFFNESS, SPEED, Argument
+from asperity.core.arguments import MAX_DEPTH, Argument
 from asperity.core.errors import ParameterError
 from asperity.laws import REGISTERED_LAWS
 

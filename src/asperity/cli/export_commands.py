@@ -12,7 +12,7 @@ import click
 from asperity.clamps import BACKED
 from asperity.cli import options
 from asperity.cli.output import check_output, progress_bar, step_bar
-from asperity.core.arguments import REQUESTED_STIFFNESS, STIFFNESS
+from asperity.core.arguments import STIFFNESS
 from asperity.core.errors import ParameterError, escape_unprintable
 from asperity.core.files import check_not_existing, write_bytes
 
@@ -41,7 +41,7 @@ _FORMER_NAMES = {"largest": "max-data", "looks": "max-evaluations"}
 @options.argument_options((_LANG, *_REQUEST_ARGUMENTS, _CLAMP))
 @options.surface_options(
     "Law, by letter or name.  [default: the scene's, or the recommended law]",
-    replace(REQUESTED_STIFFNESS, description="stiffness of the exported force"),
+    replace(options.REQUESTED_STIFFNESS, description="stiffness of the exported force"),
 )
 def export_command(
     surface: str,

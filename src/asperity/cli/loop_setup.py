@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -229,13 +228,10 @@ def check_stiffness_limit(setup: Setup) -> None:
         raise ParameterError("stiffness", f"is refused: {reason}; --accept-risk accepts it")
 
 
-@contextmanager
-def prestarted_process() -> Iterator[PrestartedProcess]:
-    """Start the process of the loop while the surface is read and analyzed."""
+def prestart_process() -> PrestartedProcess:
+    """Start the process of the loop, while the surface is read; it ends with the command."""
     from asperity.servo.process import PrestartedProcess
 
     process = PrestartedProcess()
-    try:
-        yield process
-    finally:
-        process.terminate()
+    click.get_current_context().call_on_close(process.terminate)
+    return process

@@ -124,8 +124,6 @@ def main() -> None:
     try:
         size_limit()  # an invalid value is reported first
         cli(prog_name="asperity", standalone_mode=False)
-    except click.exceptions.Exit as stop:
-        sys.exit(stop.exit_code)
     except click.Abort:
         raise KeyboardInterrupt from None  # reported by asperity.__main__
     except click.ClickException as error:

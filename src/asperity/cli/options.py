@@ -11,15 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from asperity.cli.plugins import load_plugins
-from asperity.core.arguments import (
-    JOBS,
-    MAX_DEPTH,
-    MEMORY,
-    REQUESTED_STIFFNESS,
-    STIFFNESS,
-    Argument,
-    read_arguments,
-)
+from asperity.core.arguments import MAX_DEPTH, STIFFNESS, Argument, read_arguments
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.core.memory import limit_memory
 from asperity.core.processes import available_cores, limit_processes
@@ -110,6 +102,14 @@ set_option = click.option(
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
+
+def command_arguments(command: str) -> tuple[Argument, ...]:
+    """Return the declarations of a command's own options, or of the ``shared`` ones."""
+    path = Path(__file__).with_name("command_options.toml")
+    return tuple(read_arguments(path, command).values())
+
+
+REQUESTED_STIFFNESS, SPEED, MEMORY, JOBS = command_arguments("shared")
 LAW_OPTIONS = (STIFFNESS, MAX_DEPTH, *SHIPPED_LAW_ARGUMENTS.values())
 
 
@@ -135,12 +135,6 @@ def option_help(argument: Argument) -> str:
     example = f", '{argument.example}'" if argument.example else ""
     default = f"  [default: {argument.default_text}]" if argument.default_text else ""
     return f"{words}{example}.{default}"
-
-
-def command_arguments(command: str) -> tuple[Argument, ...]:
-    """Return the declarations of the options that only one command has."""
-    path = Path(__file__).with_name("command_options.toml")
-    return tuple(read_arguments(path, command).values())
 
 
 def argument_options(

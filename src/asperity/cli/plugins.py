@@ -12,6 +12,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -54,6 +55,11 @@ class PluginRegistry:
             for key, value in self.entries.items()
         }
 
+    def restore(self, entries: dict[Any, Any]) -> None:
+        """Replace the entries by those of a snapshot."""
+        self.entries.clear()
+        self.entries.update(entries)
+
 
 def plugin_registries() -> tuple[PluginRegistry, ...]:
     """Return all registries."""
@@ -95,19 +101,9 @@ def load_plugins(ctx: click.Context, _option: click.Parameter, files: tuple[str,
         return
     registries = plugin_registries()
     for registry in registries:
-        ctx.find_root().with_resource(_restore_on_exit(registry))
+        ctx.find_root().call_on_close(partial(registry.restore, registry.snapshot()))
     for file in files:
         _load_plugin(file, registries)
-
-
-@contextmanager
-def _restore_on_exit(registry: PluginRegistry) -> Iterator[None]:
-    before = registry.snapshot()
-    try:
-        yield
-    finally:
-        registry.entries.clear()
-        registry.entries.update(before)
 
 
 def plugin_files() -> tuple[str, ...]:

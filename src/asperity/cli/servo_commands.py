@@ -26,7 +26,7 @@ from asperity.cli.loop_setup import (
     driver_setup,
     loop_options,
     make_driver,
-    prestarted_process,
+    prestart_process,
     stiffness_option,
 )
 from asperity.cli.options import file_values, surface_values
@@ -78,7 +78,7 @@ def run_command(
     before using a real device.
     """
     check_outputs(json=outputs.json, record=record)
-    process = click.get_current_context().with_resource(prestarted_process())
+    process = prestart_process()
     setup, _servo = driver_setup(scene, values, driver, duration)
     hashes = setup.file_hashes()
     if not accept_risk:
@@ -234,7 +234,7 @@ def lab_command(
     the printed address, and loads nothing from a network. Ctrl-C stops the lab.
     """
     # Started first, since it takes long in another process.
-    process = click.get_current_context().with_resource(prestarted_process())
+    process = prestart_process()
     from asperity.lab.launch import bind_socket, run_lab
     from asperity.lab.scene_state import DEFAULT_SURFACE
     from asperity.lab.server import LabOptions

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from asperity.cli.options import file_options, file_values, plugin_option
 from asperity.cli.output import Outputs, check_outputs, output_options, progress_bar
-
-if TYPE_CHECKING:
-    pass
 
 
 @click.command("surfaces")

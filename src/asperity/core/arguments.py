@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -230,13 +230,6 @@ STIFFNESS = Argument(
     must_be_positive=True,
     example="500N/m",
 )
-REQUESTED_STIFFNESS = replace(
-    STIFFNESS,
-    description="stiffness to analyze",
-    default=None,
-    default_description="the recommended stiffness",
-)
-SPEED = Argument("speed", "scanning speed", "m/s", default_description="0.1 m/s", example="0.1m/s")
 MAX_DEPTH = Argument(
     "max_depth",
     "maximum penetration depth",
@@ -244,23 +237,6 @@ MAX_DEPTH = Argument(
     default_description="peak-to-valley height, at most 1 mm",
     must_be_positive=True,
     example="0.5mm",
-)
-
-MEMORY = Argument(
-    "memory",
-    "refuse work whose estimated memory exceeds this",
-    "B",
-    default_description="the free memory of the machine",
-    form="size",
-    example="4GB",
-)
-
-JOBS = Argument(
-    "jobs",
-    "processes that share the work",
-    default_description="one per core",
-    form="integer",
-    minimum=1,
 )
 
 

@@ -134,30 +134,28 @@ def _parse_with_unit(name: str, text: str, unit: str) -> float:
     if match is None or not unit:
         raise ParameterError(name, _requirement(unit), text)
     words = text.strip()[match.end() :].strip()
-    factor = (
-        _find_unit_factor(words, unit) if len(words) <= _MAX_UNIT_LENGTH else "is not understood"
-    )
-    if isinstance(factor, str):
-        raise ParameterError(name, f"{_requirement(unit)}; the unit {factor}", text)
-    return _scale(match.group(), factor)
+    try:
+        return _scale(match.group(), _find_unit_factor(words, unit))
+    except ValueError as error:
+        raise ParameterError(name, f"{_requirement(unit)}; the unit {error}", text) from None
 
 
 @lru_cache(maxsize=1024)
-def _find_unit_factor(unit_text: str, unit: str) -> float | str:
-    """Return the SI value of a unit, or the reason why it is invalid."""
+def _find_unit_factor(unit_text: str, unit: str) -> float:
+    """Return the SI value of a unit; for an invalid one the message of the error is the reason."""
     if (known := _SI_FACTORS.get(unit, {}).get(unit_text)) is not None:
         return known
-    if _UNIT_PATTERN.fullmatch(unit_text) is None:
-        return "is not understood"
+    if len(unit_text) > _MAX_UNIT_LENGTH or _UNIT_PATTERN.fullmatch(unit_text) is None:
+        raise ValueError("is not understood")
     import pint
 
     try:
         # See _scale: 0.8 mm is 0.0008, not 0.8 * 0.001.
         return float(_unit_registry().Quantity(1.0, unit_text).to(unit).magnitude)
     except pint.DimensionalityError:
-        return "is of another dimension"
+        raise ValueError("is of another dimension") from None
     except Exception:  # pint also raises errors of its tokenizer
-        return "is not understood"
+        raise ValueError("is not understood") from None
 
 
 def _scale(number: str, factor: float) -> float:

@@ -141,13 +141,12 @@ MOTIONS: dict[str, SectionKind] = {
 }
 """Kinds of [motion]."""
 
-_MOTION_START = "start of the motion"
 DURATION = Argument(
     "duration", "duration of the run", "s", None, "the motion's, else 1 s", must_be_positive=True
 )
 RUN_ARGUMENTS: tuple[Argument, ...] = (
     DURATION,
-    Argument("start", "position of the handle", "m", None, _MOTION_START, form="space"),
+    Argument("start", "position of the handle", "m", None, "start of the motion", form="space"),
     Argument("velocity", "velocity of the handle at the start", "m/s", None, "rest", form="space"),
     Argument("every", "write every N-th sample to the trace", default=1, form="integer"),
     Argument("velocity_share", "weight of the last difference in the velocity", maximum=1.0),

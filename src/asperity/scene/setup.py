@@ -101,12 +101,9 @@ class Setup:
         contents = {str(path): file_digest(path) for path in self.files}
         return {name: content for name, content in contents.items() if content is not None}
 
-    def with_law(self, law: str | Law, stiffness: float | None = None) -> Setup:
-        """Return the same loop with another law, and another stiffness [N/m] if one is given."""
-        surface = self.surface.to_law(law)
-        if stiffness is not None:
-            surface = surface.to_stiffness(stiffness)
-        return replace(self, surface=surface)
+    def with_law(self, law: str | Law) -> Setup:
+        """Return the same loop with another law."""
+        return replace(self, surface=self.surface.to_law(law))
 
     def with_delay(self, delay: int) -> Setup:
         """Return the same loop with another delay [samples]."""
