@@ -30,10 +30,7 @@ def _validated_parser(argument: Argument) -> Callable[[str], Any]:
     """Return a parser that validates a value before a surface is read."""
 
     def parse(text: str) -> Any:
-        value = argument.parse(text)
-        if argument.form == "direction":
-            return value
-        value = argument.validate(value)
+        value = argument.validate(argument.parse(text))
         return (value, value) if argument.form == "pair" and isinstance(value, float) else value
 
     return parse

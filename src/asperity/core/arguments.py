@@ -90,7 +90,7 @@ class Argument:
         Raises:
             ParameterError: otherwise.
         """
-        if self.form in {"text", "channel", "switch", "path"}:
+        if self.form in {"text", "channel", "switch", "path", "direction"}:
             return self._validate_choice(value) if self.choices else value
         if self.form == "integer":
             return check_integer(self.name, value, int(self.minimum))
