@@ -265,6 +265,8 @@ def _parse_text_mesh(content: bytes, mesh_format: str) -> FloatArray:
         meshes = [loaded] if isinstance(loaded, trimesh.Trimesh) else loaded.dump()
         parts = [np.asarray(part.triangles, dtype=np.float64) for part in meshes]
         triangles = np.concatenate(parts) if parts else np.empty((0, 3, 3))
+    if triangles.shape[1:] != (3, 3):  # a vertex has two coordinates
+        raise SurfaceFileError(f"damaged {mesh_format} mesh (its faces are no triangles)")
     if mesh_format == "OBJ":
         expected = _count_obj_triangles(content)
     else:
