@@ -107,7 +107,7 @@ def test_statements() -> None:
 )
 def test_a_claim_is_as_good_as_its_weakest_part(parts: tuple[str, ...], whole: str) -> None:
     checks = [
-        Check(verdict, verdict[:1], {str(i): 1.0}, f"c{i}" if "cor" in verdict else "", verdict)
+        Check(verdict[:1], {str(i): 1.0}, f"c{i}" if "cor" in verdict else "", verdict, verdict)
         for i, verdict in enumerate(parts)
     ]
     found = combine_checks(*checks)
@@ -117,7 +117,9 @@ def test_a_claim_is_as_good_as_its_weakest_part(parts: tuple[str, ...], whole: s
 
 
 def test_json_has_no_infinity() -> None:
-    found = Check("holds", "s", {"a": math.inf, "b": [1.0, -math.inf, math.nan], "c": "text"}, "")
+    found = Check(
+        "s", {"a": math.inf, "b": [1.0, -math.inf, math.nan], "c": "text"}, verdict="holds"
+    )
     result = Claim("x-1", ("(1)",), "I", "words", lambda: found).run()
     back = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert list(back) == ["id", "equations", "statement", "verdict", "evidence", "flips_under"]

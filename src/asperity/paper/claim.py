@@ -56,22 +56,14 @@ class Evidence:
 
 
 @dataclass(frozen=True)
-class Check:
-    """The outcome of one comparison or of several combined.
+class Check(Evidence):
+    """Evidence with the verdict that follows from it, of one comparison or of several combined.
 
     Attributes:
         verdict: the verdict of this comparison alone.
-        summary: one line with its numbers.
-        numbers: see :class:`Evidence`.
-        correction: see :class:`Evidence`.
-        fitted: see :class:`Evidence`.
     """
 
-    verdict: Verdict
-    summary: str
-    numbers: Mapping[str, Number] = field(default_factory=dict)
-    correction: str = ""
-    fitted: str = ""
+    verdict: Verdict = "undecided"
 
 
 Computation = Callable[[], Check]
@@ -131,10 +123,9 @@ class Claim:
         try:
             check = self.compute()
         except AsperityError as error:
-            check = Check("undecided", f"could not be computed: {error}")
-        evidence = Evidence(check.summary, check.numbers, check.correction, check.fitted)
+            check = Check(f"could not be computed: {error}")
         about = self.id, self.equations, self.section, self.statement
-        return Result(*about, check.verdict, evidence, self.flips_under)
+        return Result(*about, check.verdict, check, self.flips_under)
 
 
 DECLARED_CLAIMS: list[Claim] = []
@@ -192,12 +183,11 @@ def check_values(
     """
     target = np.asarray(reference, dtype=float)
     if np.isnan(target).any() or target.size == 0:
-        return Check("undecided", f"{quantity}: could not be computed")
+        return Check(f"{quantity}: could not be computed")
     printed_error = relative_error(printed, target)
     corrected_error = relative_error(corrected, target)
-    agrees, is_repaired = printed_error <= tolerance, corrected_error <= tolerance
+    agrees = printed_error <= tolerance
     shown = None if agrees else corrected
-    numbers = _error_numbers(quantity, printed, shown, target)
     if target.ndim == 0:
         errors = _format_values(printed, shown, target)
     elif shown is None:
@@ -206,12 +196,13 @@ def check_values(
         errors = (
             f"as printed {_format_error(printed_error)}, corrected {_format_error(corrected_error)}"
         )
-    summary = f"{quantity}: {errors}"
-    if agrees:
-        return Check("holds", summary, numbers)
-    known = correction if is_repaired or corrected is None else ""
-    verdict: Verdict = "holds with correction" if is_repaired else "does not hold"
-    return Check(verdict, summary, numbers, known)
+    return check_statement(
+        f"{quantity}: {errors}",
+        printed=agrees,
+        corrected=None if corrected is None else corrected_error <= tolerance,
+        correction=correction,
+        numbers=_error_numbers(quantity, printed, shown, target),
+    )
 
 
 def _format_values(
@@ -259,12 +250,13 @@ def check_statement(
     known = {name.replace("_", " "): value for name, value in named_numbers.items()}
     known |= {} if numbers is None else dict(numbers)
     if printed is None:
-        return Check("undecided", summary, known)
+        return Check(summary, known)
     if printed:
-        return Check("holds", summary, known)
+        return Check(summary, known, verdict="holds")
     if corrected:
-        return Check("holds with correction", summary, known, correction)
-    return Check("does not hold", summary, known, correction if corrected is None else "")
+        return Check(summary, known, correction, verdict="holds with correction")
+    known_correction = correction if corrected is None else ""
+    return Check(summary, known, known_correction, verdict="does not hold")
 
 
 def check_observation(summary: str, numbers: Mapping[str, Number] | None = None) -> Check:
@@ -275,15 +267,13 @@ def check_observation(summary: str, numbers: Mapping[str, Number] | None = None)
 def combine_checks(*checks: Check) -> Check:
     """Combine checks: a claim is as good as the weakest of its parts."""
     worst = max(checks, key=lambda check: _SEVERITY.index(check.verdict))
-    numbers: dict[str, Number] = {}
-    for check in checks:
-        numbers.update(check.numbers)
+    numbers = {name: value for check in checks for name, value in check.numbers.items()}
     summary = "; ".join(check.summary for check in checks)
     correction, fitted = (
         "; ".join(dict.fromkeys(text for text in texts if text))
         for texts in zip(*((check.correction, check.fitted) for check in checks), strict=True)
     )
-    return Check(worst.verdict, summary, numbers, correction, fitted)
+    return Check(summary, numbers, correction, fitted, worst.verdict)
 
 
 def relative_error(value: ArrayLike | None, reference: ArrayLike) -> float:

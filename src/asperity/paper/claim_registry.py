@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from difflib import get_close_matches
 
@@ -133,25 +133,15 @@ def reproduce_claims(
     wanted = None if ids is None else {found.id for given in ids for found in find_claims(given)}
     names = [name for name in CLAIMS if wanted is None or name in wanted]
     results = []
-    with nullcontext() if workers is None else limit_processes(int(count)):
-        for result in _compute_results(names):
-            results.append(result)
+    limit = nullcontext() if workers is None else limit_processes(int(count))
+    with limit, precompute(_run_in_worker, names) as precomputed:
+        for name, found in zip(names, precomputed, strict=True):
+            results.append(CLAIMS[name].run() if found is None else found)
             if progress is not None:
-                progress(result, len(results), len(names))
+                progress(results[-1], len(results), len(names))
     return tuple(results)
-
-
-def _run_claim(claim_id: str) -> Result:
-    return CLAIMS[claim_id].run()
-
-
-def _compute_results(claim_ids: list[str]) -> Iterator[Result]:
-    """Yield results in order; other processes may have computed them already."""
-    with precompute(_run_in_worker, claim_ids) as precomputed:
-        for name, found in zip(claim_ids, precomputed, strict=True):
-            yield _run_claim(name) if found is None else found
 
 
 def _run_in_worker(claim_id: str) -> Result | None:
     """Compute a claim of the paper; user-defined claims are unknown to worker processes."""
-    return _run_claim(claim_id) if claim_id in _PAPER_CLAIM_IDS else None
+    return CLAIMS[claim_id].run() if claim_id in _PAPER_CLAIM_IDS else None

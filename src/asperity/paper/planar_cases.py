@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
@@ -153,6 +154,15 @@ class ProbePoint:
         """Return the Jacobian in x and z by the compiled kernel [N/m]."""
         whole = self.surface.jacobian([[self.x, 0.0, self.z]])[0]
         return np.asarray(whole[::2, ::2])
+
+    def references(self, quantity: str) -> tuple[ArrayLike, ArrayLike]:
+        """Return a "force", "jacobian" or "norm" by the definition and by the kernel."""
+        if quantity == "norm":
+            definition, kernel = self.norms()
+            return definition, kernel
+        if quantity == "jacobian":
+            return self.jacobian(), self.compiled_jacobian()
+        return self.force(), self.compiled_force()
 
     def norms(self) -> FloatArray:
         """Return ‖J‖ by the definition and by the kernel [N/m], shape (2,)."""

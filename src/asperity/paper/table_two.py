@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 
 from asperity.analysis.bounds.bound import Bound
 from asperity.analysis.energy.continuity import continuity
@@ -14,8 +16,11 @@ from asperity.core.files import Serializable
 from asperity.paper.claims.friction_law import PAPER_CASE, sticking_norm
 from asperity.paper.planar_cases import PAPER_LAWS, PASSIVITY, SCANNING, TURNING_DEPTH, loop_path
 
-# Relative to k A².
-_ENERGY_TOLERANCE = 1e-9
+_ENERGY_TOLERANCE = 1e-9  # relative to k A²
+TABLE_TWO: dict[str, dict[str, str]] = tomllib.loads(
+    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+)
+"""Rows of ``table_two.toml`` by law, where the entries are explained."""
 
 
 @dataclass(frozen=True)
@@ -181,23 +186,12 @@ def _row(letter: str) -> TableTwoRow:
         printed=printed,
         q=q,
         one_sided=one_sided_number(surface),
-        formula=_FORMULAS[letter],
+        formula=TABLE_TWO[letter].get("formula", ""),
         conservative=surface.facts.conservative,
         continuous=continuity(surface, q).continuous,
         energy=loop_work(looped, loop_path(letter, SCANNING)),
         change=_explain_correction(letter, printed, q),
     )
-
-
-_FORMULAS = {
-    "A": "√(1 + G₁²)",
-    "B": "max(√(1 + G₁²), y)",
-    "C": "greatest of 1, y and feasible roots of λ²(λ - 1 - G₁²) = E²(λ - 1)²/4",
-    "D": "1 if y <= 1/2, y/(1 - y) if y < 1, else infinite",
-    "E": "1",
-    "F": "",
-    "G": "max(1, y)",
-}
 
 
 def _printed_rows() -> dict[str, PrintedRow]:
@@ -209,43 +203,30 @@ def _printed_rows() -> dict[str, PrintedRow]:
     b_energy = half + k * case.period**2 / (4.0 * math.pi**2) * (1.0 - root)
     # (27) with the modulation m = 1/2 of a law without texture, where the paper has m = 0.
     f_energy = 0.5 * k * case.friction * 0.5 * case.deflection * (case.depth - TURNING_DEPTH)
-    if_height, if_slope = "If h continuous", "If h' continuous"
+    values = {"A": math.hypot(1.0, slope), "D": 1.0, "E": 1.0, "F": sticking_norm(PAPER_CASE)}
+    energies = {"A": half, "B": b_energy, "C": 0.0, "D": 0.0, "F": f_energy}
     return {
-        "A": PrintedRow("√(1 + [2πA/l]²)", math.hypot(1.0, slope), "No", if_height, half),
-        "B": PrintedRow("No closed-form", None, "No", if_slope, b_energy),
-        "C": PrintedRow("No closed-form", None, "Yes", if_slope, 0.0),
-        "D": PrintedRow("1", 1.0, "Yes", "No. Even if h continuous", 0.0),
-        "E": PrintedRow("1", 1.0, "No", if_height, None),
-        "F": PrintedRow("Appendix I", sticking_norm(PAPER_CASE), "Almost", if_height, f_energy),
-        "G": PrintedRow("No closed-form", None, "No", if_slope, None),
+        law: PrintedRow(
+            row["number"],
+            values.get(law),
+            row["conservative"],
+            row["continuous"],
+            energies.get(law),
+        )
+        for law, row in TABLE_TWO.items()
     }
 
 
-def _explain_correction(letter: str, printed: PrintedRow, q: Bound) -> str:
+def _explain_correction(law: str, printed: PrintedRow, q: Bound) -> str:
     """Return the explanation of the differences."""
-    case = PASSIVITY
-    y = 4.0 * math.pi**2 * case.amplitude * case.depth / case.period**2
-    radius = _format_mm(case.depth / y)
-    closed = f"There is a closed form, and it grows with the depth: y = {y:.2f} here."
-    if letter == "F":
-        norm = printed.value or 0.0
-        return (
-            f"The paper uses 8.3. Its own formula gives {norm:.2f}, and √2 times that "
-            f"{math.sqrt(2.0) * norm:.2f}: a factor √2/2 was dropped. The formula bounds each "
-            "entry by itself, with a factor 2 that 0 <= h <= 1 rules out; the law as defined has "
-            f"{q.value:.4f}. 'Almost' is no: the loop of (27) gains energy."
-        )
-    return {
-        "A": "Nothing, but that it is attained at x = 0 modulo l/2.",
-        "B": closed,
-        "C": f"{closed} For this law q⁺ is the number that decides.",
-        "D": (
-            "(18) leaves out the curvature of the surface. The crests' radius of curvature is "
-            f"{radius}; from that depth on the force jumps and q is infinite. 1 is q⁺."
-        ),
-        "E": "Nothing; (19) and (20) have the wrong sign.",
-        "G": closed,
-    }[letter]
+    case, number = PASSIVITY, printed.value or 0.0
+    return TABLE_TWO[law]["change"].format(
+        y=4.0 * math.pi**2 * case.amplitude * case.depth / case.period**2,
+        radius=1e3 * case.crest_radius,
+        printed=number,
+        root_two_printed=math.sqrt(2.0) * number,
+        q=q.value,
+    )
 
 
 def _cells(row: TableTwoRow) -> list[str]:

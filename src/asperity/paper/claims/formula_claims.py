@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from asperity.analysis.energy.loop_integral import loop_work
 from asperity.core.checks import FloatArray
 from asperity.paper.claim import (
     DECLARED_CLAIMS,
@@ -21,11 +22,24 @@ from asperity.paper.claim import (
     check_values,
     combine_checks,
 )
-from asperity.paper.formula_checks import check_continuity, check_curl, check_zero_outside
-from asperity.paper.planar_cases import ProbePoint, closest_point_derivatives, generic_probes
+from asperity.paper.formula_checks import (
+    check_continuity,
+    check_curl,
+    check_energy_sign,
+    check_potential,
+    check_zero_outside,
+)
+from asperity.paper.planar_cases import (
+    SCANNING,
+    ProbePoint,
+    closest_point_derivatives,
+    generic_probes,
+    groove_path,
+    random_settings,
+)
 
 _SYMBOLS = "k d z p h1 h2 n rx rz r fx fz Jxx Jxz Jzx Jzz xx xz zx zz"
-_FLIPS_UNDER = {"force": SCALED_FORCES, "jacobian": SCALED_JACOBIANS}
+_FLIPS_UNDER = {"force": SCALED_FORCES, "jacobian": SCALED_JACOBIANS, "norm": SCALED_JACOBIANS}
 
 
 @dataclass(frozen=True)
@@ -46,6 +60,9 @@ class FormulaRow:
     is_zero_outside: bool = False
     conservative: Mapping[str, bool] = field(default_factory=dict)
     continuous: Mapping[str, bool] = field(default_factory=dict)
+    loop_energy: Mapping[str, str] = field(default_factory=dict)
+    potential: str = ""
+    energy: str = ""
     flips_under: str = ""
 
     def to_claim(self) -> Claim:
@@ -58,6 +75,9 @@ class FormulaRow:
     def check(self) -> Check:
         """Compare the formula of each law, and check the laws' properties."""
         checks = [self._compare(law) for law in self.law]
+        checks += [check_potential(law) for law in self.potential]
+        checks += [check_energy_sign(law) for law in self.energy]
+        checks += [_check_loop_energy(law, text) for law, text in self.loop_energy.items()]
         checks += [check_zero_outside(law) for law in self.law if self.is_zero_outside]
         checks += [check_continuity(law, is_continuous=so) for law, so in self.continuous.items()]
         checks += [check_curl(law, is_conservative=so) for law, so in self.conservative.items()]
@@ -66,32 +86,44 @@ class FormulaRow:
     def _compare(self, law: str) -> Check:
         if self.true:
             points = _closest_point_values()
-            references = [_evaluate(self.true, points)]
+            reference = _evaluate(self.true, points)
         else:
             probes = list(generic_probes(law))
             points = [_probe_values(probe) for probe in probes]
-            methods = {
-                "force": (ProbePoint.force, ProbePoint.compiled_force),
-                "jacobian": (ProbePoint.jacobian, ProbePoint.compiled_jacobian),
-            }[self.quantity]
-            references = [np.array([method(probe) for probe in probes]) for method in methods]
-        count, name = len(references), self.quantity.replace("jacobian", "Jacobian")
+            pairs = [probe.references(self.quantity) for probe in probes]
+            reference = np.array(pairs).swapaxes(0, 1)
+        printed, corrected = (
+            np.broadcast_to(_evaluate(formula, points), reference.shape) if formula else None
+            for formula in (self.printed, self.corrected)
+        )
+        name = self.quantity.replace("jacobian", "Jacobian")
         return check_values(
-            f"{self.label or f'{name} of {law}'} at generic probes, by definition and kernel",
-            printed=np.stack([_evaluate(self.printed, points)] * count) if self.printed else None,
-            corrected=np.stack([_evaluate(self.corrected, points)] * count)
-            if self.corrected
-            else None,
-            reference=references,
+            self.label or f"{name} of {law} at generic probes, by definition and kernel",
+            printed=printed,
+            corrected=corrected,
+            reference=reference,
             correction=self.correction,
         )
 
 
-def _evaluate(formula: str, points: Sequence[Sequence[float]]) -> FloatArray:
+def _check_loop_energy(law: str, formula: str) -> Check:
+    """Compare the printed energy around the path of Fig. 3 with quadrature of the force."""
+    cases = [SCANNING, *random_settings()]
+    parameters = [[case.stiffness, case.amplitude, case.period] for case in cases]
+    return check_values(
+        f"energy of {law} around the path for {len(cases)} parameter sets",
+        printed=_evaluate(formula, parameters, "k A l"),
+        reference=[loop_work(case.surface(law), groove_path(case)) for case in cases],
+    )
+
+
+def _evaluate(
+    formula: str, points: Sequence[Sequence[float]], symbol_names: str = _SYMBOLS
+) -> FloatArray:
     """Evaluate a formula at points, each given by the values of the first symbols."""
     import sympy as sp
 
-    symbols = sp.symbols(_SYMBOLS)[: len(points[0])]
+    symbols = sp.symbols(symbol_names)[: len(points[0])]
     expression = sp.sympify(formula, locals={str(symbol): symbol for symbol in symbols})
     function = sp.lambdify(symbols, expression, "math")
     return np.array([function(*point) for point in points], dtype=float)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -19,49 +18,22 @@ from asperity.paper.claim import (
     declare_claim,
 )
 from asperity.paper.claims.formula_claims import FormulaRow
-from asperity.paper.formula_checks import (
-    Potential,
-    check_curl,
-    check_energy_sign,
-    check_potential,
-    compute_q,
-    segment_work,
-)
+from asperity.paper.formula_checks import check_curl, compute_q, max_loop_share, segment_work
 from asperity.paper.planar_cases import (
     BUMP,
     PASSIVITY,
     SCANNING,
     SETTINGS,
     ExperimentCase,
-    ProbePoint,
-    find_closest_point,
     generic_probes,
     groove_path,
     path_points,
     random_settings,
 )
 
+_LABEL = "f_x of D at generic probes, by definition and kernel"
+
 # --- D --------------------------------------------------------------------------------------------
-
-
-@declare_claim("eq-16", "IV.D", "(16)", flips_under=SCALED_FORCES)
-def potential_d() -> Check:
-    """Potential of D."""
-
-    def potential(probe: ProbePoint) -> Potential:
-        def value(x: Any, z: Any) -> Any:
-            closest = find_closest_point(probe.surface, x, z, 60)
-            return -probe.k * ((x - closest[0]) ** 2 + (z - closest[1]) ** 2) / 2
-
-        return value
-
-    return check_potential("D", potential, lambda s: 0.5 * s.distance**2)
-
-
-@declare_claim("eq-35", "App. II", "(35)", flips_under=SCALED_FORCES)
-def energy_function() -> Check:
-    """Energy function of D."""
-    return check_energy_sign("D", lambda s: 0.5 * s.distance**2)
 
 
 @declare_claim("eq-17", "IV.D", "(17)", flips_under=SCALED_FORCES)
@@ -70,11 +42,7 @@ def field_d() -> Check:
 
     Conservative also across the ridges where it jumps.
     """
-    energy = max(
-        abs(loop_work(case.surface("D"), groove_path(case), 1e-10))
-        / (case.stiffness * case.amplitude**2)
-        for case in [SCANNING, *random_settings()]
-    )
+    energy = max_loop_share("D")
     loops = check_statement(
         f"energy around the path {energy:.1e} of κ₀A²", printed=energy < 1e-7, loop=energy
     )
@@ -88,7 +56,7 @@ def force_x_of_d() -> Check:
 
     Including f_x = 0 where h' = 0.
     """
-    row = FormulaRow(law="D", quantity="force", label="f_x of D", true="fx", printed="-k*rx")
+    row = FormulaRow(law="D", quantity="force", true="fx", printed="-k*rx", label=_LABEL)
     share = 0.0
     for case in random_settings():
         for x, height in ((0.25, case.amplitude), (0.75, -case.amplitude)):

@@ -19,13 +19,12 @@ from asperity.paper.claim import (
     combine_checks,
     declare_claim,
 )
+from asperity.paper.claims.formula_claims import FormulaRow
 from asperity.paper.formula_checks import (
-    Potential,
     check_curl,
-    check_loop_energy,
-    check_potential,
     compute_q,
     find_max_norm,
+    max_loop_share,
     segment_work,
 )
 from asperity.paper.planar_cases import (
@@ -33,23 +32,12 @@ from asperity.paper.planar_cases import (
     SCANNING,
     SETTINGS,
     ExperimentCase,
-    ProbePoint,
     crossing_path,
     generic_probes,
-    groove_path,
     random_settings,
 )
 
 # --- A --------------------------------------------------------------------------------------------
-
-
-@declare_claim("eq-8", "IV.A", "(8)", flips_under=SCALED_JACOBIANS)
-def norm_a() -> Check:
-    """Norm of that Jacobian: κ₀ √(1 + h'²)."""
-    probes = list(generic_probes("A"))
-    norms = np.array([probe.norms() for probe in probes])
-    printed = np.array([[probe.k * math.hypot(1.0, probe.slope)] * 2 for probe in probes])
-    return check_values("norm of the Jacobian of A", printed=printed, reference=norms)
 
 
 @declare_claim("eq-9", "IV.A", "(9)", flips_under=SCALED_JACOBIANS)
@@ -133,8 +121,7 @@ def proportional_a() -> Check:
 @declare_claim("sentence-IV.A-energy", "IV.A", flips_under=SCALED_FORCES)
 def energy_a() -> Check:
     """A is not conservative; around a path of Fig. 3 it generates κ₀A²/2."""
-    printed = check_loop_energy("A", lambda c: 0.5 * c.stiffness * c.amplitude**2)
-    return combine_checks(printed, check_curl("A", is_conservative=False))
+    return FormulaRow(loop_energy={"A": "k*A**2/2"}, conservative={"A": False}).check()
 
 
 # --- B --------------------------------------------------------------------------------------------
@@ -172,33 +159,7 @@ def closed_forms() -> Check:
     return combine_checks(*checks)
 
 
-@declare_claim("eq-12", "IV.B", "(12)", flips_under=SCALED_FORCES)
-def energy_b() -> Check:
-    """Energy of B around the path of Fig. 3."""
-
-    def printed(c: ExperimentCase) -> float:
-        a, length = c.amplitude, c.period
-        root = math.sqrt((length**2 + 4.0 * a**2 * math.pi**2) / length**2)
-        return 0.5 * c.stiffness * a**2 + c.stiffness * length**2 / (4.0 * math.pi**2) * (1 - root)
-
-    return check_loop_energy("B", printed)
-
-
 # --- C --------------------------------------------------------------------------------------------
-
-
-@declare_claim("eq-13", "IV.C", "(13)", flips_under=SCALED_FORCES)
-def potential_c() -> Check:
-    """Potential of C.
-
-    Both its gradient and its sign as an energy are checked.
-    """
-
-    def potential(probe: ProbePoint) -> Potential:
-        profile = probe.profile()
-        return lambda x, z: -probe.k * (z - profile(x, 0)) ** 2 / 2
-
-    return check_potential("C", potential, lambda s: 0.5 * s.d**2)
 
 
 @declare_claim("sentence-IV.C-normal", "IV.C", flips_under="law A in the place of C")
@@ -249,11 +210,7 @@ def conservative_c() -> Check:
 
     Checked by its curl and by closed paths.
     """
-    energies = [
-        loop_work(case.surface("C"), groove_path(case)) / (case.stiffness * case.amplitude**2)
-        for case in [SCANNING, *random_settings()]
-    ]
-    greatest = max(abs(energy) for energy in energies)
+    greatest = max_loop_share("C")
     loops = check_statement(
         f"energy around the path {greatest:.1e} of κ₀A²", printed=greatest < 1e-9, greatest=greatest
     )

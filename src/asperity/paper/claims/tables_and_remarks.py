@@ -26,7 +26,7 @@ from asperity.paper.claims.friction_law import PAPER_CASE, max_norm_ratio, stick
 from asperity.paper.figures import loop_energies
 from asperity.paper.formula_checks import compute_q, format_by_name
 from asperity.paper.planar_cases import SCANNING, ExperimentCase, generic_profile, groove_path
-from asperity.paper.table_two import TableTwoRow, table_two
+from asperity.paper.table_two import TABLE_TWO, TableTwoRow, table_two
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid
@@ -266,19 +266,8 @@ def _max_norm_at_depth(law: str, clamp: str, depth_factor: float) -> float:
     return float(max(norms))
 
 
-_ROWS = {
-    "A": ("q = √(1 + (2πA/l)²); not conservative; continuous if h is", "law C in the place of A"),
-    "B": ("no closed form; not conservative; continuous if h' is", "law A in the place of B"),
-    "C": ("no closed form; conservative; continuous if h' is", "law A in the place of C"),
-    "D": ("q = 1; conservative; not continuous even if h is", "∞ printed for q of D"),
-    "E": ("q = 1; not conservative; continuous if h is", "law A in the place of E"),
-    "F": (
-        "q in Appendix I; almost conservative; continuous if h is",
-        "Jacobians of the paper's F times 1.2",
-    ),
-    "G": ("no closed form; not conservative; continuous if h' is", "law A in the place of G"),
-}
-for _law, (_text, _change) in _ROWS.items():
-    _check = partial(check_table_two_row, _law)
-    _id = f"table-2-{_law}"
-    DECLARED_CLAIMS.append(Claim(_id, ("Table II",), "IV.H", f"{_law}: {_text}.", _check, _change))
+for _law, _row in TABLE_TWO.items():
+    _check, _place = partial(check_table_two_row, _law), ("Table II",)
+    DECLARED_CLAIMS.append(
+        Claim(f"table-2-{_law}", _place, "IV.H", _row["statement"], _check, _row["flips_under"])
+    )

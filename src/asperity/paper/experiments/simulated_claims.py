@@ -68,7 +68,7 @@ def check_over_assumptions(
         f"as printed in {sum(by_paper_measure)} of {len(by_paper_measure)} guesses by the paper's "
         f"measure, {sum(by_exact_measure)} by ours"
     )
-    return Check(verdict, f"{tally}: {summary}", numbers, fitted=fitted)
+    return Check(f"{tally}: {summary}", numbers, "", fitted, verdict)
 
 
 @declare_claim(
