@@ -16,9 +16,10 @@ from types import ModuleType
 from typing import Any
 
 import asperity.surface
+from asperity.paper.cases import SCANNING, ExperimentCase
 from asperity.paper.claim import Check, check_statement
 from asperity.paper.claims.design_limits import CORRECTED_LIMITS, Inequality
-from asperity.paper.planar_cases import SCANNING, ExperimentCase, ProbePoint
+from asperity.paper.probes import ProbePoint
 from asperity.surface import Surface
 
 ReplacementFactory = Callable[[Any], Any]
@@ -328,10 +329,13 @@ _ALL = (
     ),
     replace_name(
         "2πA/l for every q",
-        "compute_q",
+        "q",
         lambda _was: lambda case, _law: 2.0 * math.pi * case.amplitude / case.period,
+        ExperimentCase,
     ),
-    replace_name("A's q for every law", "compute_q", lambda was: lambda case, _law: was(case, "A")),
+    replace_name(
+        "A's q for every law", "q", lambda was: lambda case, _law: was(case, "A"), ExperimentCase
+    ),
     replace_name(
         "a lateral clamp that holds the whole force",
         "_max_norm_at_depth",

@@ -26,11 +26,7 @@ from asperity.paper.claims.friction_law import (
     random_friction_cases,
     sticking_entries,
 )
-from asperity.paper.planar_cases import (
-    closest_point_derivatives,
-    find_closest_point,
-    generic_probes,
-)
+from asperity.paper.probes import closest_point_derivatives, find_closest_point, generic_probes
 
 
 def changed_everywhere(monkeypatch: pytest.MonkeyPatch, name: str, changed: object) -> None:

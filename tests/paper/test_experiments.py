@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from asperity.paper import get_claim
+from asperity.paper.cases import SAMPLING_PERIOD
 from asperity.paper.experiments import (
     SIMULATED_CLAIM_IDS,
     cycle_counts,
@@ -27,7 +28,6 @@ from asperity.paper.experiments.device_onsets import (
 )
 from asperity.paper.experiments.experiment_suite import Experiments
 from asperity.paper.experiments.strokes import energy_trace, scanning_experiment, simulate_bump
-from asperity.paper.planar_cases import SAMPLING_PERIOD
 from asperity.simulation import simulate
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid

@@ -8,8 +8,8 @@ import math
 import numpy as np
 import pytest
 
+from asperity.paper.cases import PAPER_LAWS, SCANNING
 from asperity.paper.figures import ForceField, LoopEnergy, force_fields, loop_energies
-from asperity.paper.planar_cases import PAPER_LAWS, SCANNING
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from tests.paper.test_experiments import EXPECTED
 
 from asperity.paper import CLAIMS, Claim, get_claim
 from asperity.paper.claim_registry import register
-from asperity.paper.planar_cases import ProbePoint
+from asperity.paper.probes import ProbePoint
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 

@@ -133,7 +133,7 @@ DECLARED_CLAIMS: list[Claim] = []
 
 
 def declare_claim(
-    claim_id: str, section: str, *equations: str, flips_under: str
+    claim_id: str, section: str, *equations: str, flips_under: str = SCALED_FORCES
 ) -> Callable[[Computation], Computation]:
     """Declare that the decorated function judges a claim of the paper.
 
@@ -144,7 +144,8 @@ def declare_claim(
         section: section of the paper.
         *equations: equation numbers of the paper that the claim covers.
         flips_under: a change under which the verdict is different. Each of these changes is
-            applied by a test in ``tests/paper/perturbations.py``.
+            applied by a test in ``tests/paper/perturbations.py``; by default compiled forces are
+            scaled.
     """
 
     def declare(compute: Computation) -> Computation:

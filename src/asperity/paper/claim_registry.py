@@ -12,7 +12,6 @@ from asperity.core.errors import ParameterError
 from asperity.core.processes import limit_processes, precompute
 from asperity.paper.claim import DECLARED_CLAIMS, Claim, Result
 from asperity.paper.claims import (  # noqa: F401 - each module declares its claims
-    conclusions,
     design_limits,
     experiment_statements,
     formula_claims,

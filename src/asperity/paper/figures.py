@@ -9,7 +9,7 @@ import numpy as np
 from asperity.analysis.energy.loop_integral import loop_work
 from asperity.core.checks import FloatArray
 from asperity.core.files import Serializable
-from asperity.paper.planar_cases import PAPER_LAWS, SCANNING, loop_path
+from asperity.paper.cases import PAPER_LAWS, SCANNING
 from asperity.surface import Surface
 
 _COLUMNS, _ROWS, _PROFILE = 33, 13, 401
@@ -137,7 +137,7 @@ def _loop_energy(law: str) -> LoopEnergy:
         changes = {"modulation_depth": 0.0, "friction": 2.0 * SCANNING.friction}
         height = np.zeros_like(height)
     surface = SCANNING.surface(law, **changes)
-    corners = np.array(loop_path(law, SCANNING))
+    corners = SCANNING.loop_path(law)
     legs = zip(corners, np.roll(corners, -1, axis=0), strict=True)
     share = np.linspace(0.0, 1.0, _STEPS_PER_SEGMENT, endpoint=False)[:, None]
     path = np.concatenate([*(a + share * (b - a) for a, b in legs), corners[:1]])

@@ -14,16 +14,9 @@ from asperity.analysis.energy.loop_integral import integrate, loop_work
 from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.core.checks import FloatArray
 from asperity.laws import find_law
+from asperity.paper.cases import SCANNING, random_settings
 from asperity.paper.claim import Check, check_statement, check_values, combine_checks
-from asperity.paper.planar_cases import (
-    SCANNING,
-    ExperimentCase,
-    ProbePoint,
-    find_closest_point,
-    generic_probes,
-    groove_path,
-    random_settings,
-)
+from asperity.paper.probes import ProbePoint, find_closest_point, generic_probes
 from asperity.surface import Surface
 
 Potential = Callable[[Any, Any], Any]
@@ -71,7 +64,7 @@ def check_continuity(law: str, *, is_continuous: bool) -> Check:
 def max_loop_share(law: str) -> float:
     """Return the greatest energy around the path of Fig. 3 over κ₀A², without its sign."""
     return max(
-        abs(loop_work(case.surface(law), groove_path(case), 1e-10))
+        abs(loop_work(case.surface(law), case.groove_path(), 1e-10))
         / (case.stiffness * case.amplitude**2)
         for case in [SCANNING, *random_settings()]
     )
@@ -152,11 +145,16 @@ def segment_work(surface: Surface, start: FloatArray, end: FloatArray) -> float:
     return integrate(lambda s: surface.force(start + s[:, None] * along) @ along, 8, 1e-10)
 
 
-def max_difference_quotients(seed: int) -> dict[str, float]:
-    """Return the greatest difference quotient of the force over q k, for five laws.
+def check_difference_quotients(seed: int, before: str, after: str) -> Check:
+    """Check that the difference quotients of the force of five laws reach q k and no more.
 
     Taken over 4000 random pairs of probes, both no deeper than ``max_depth``, and 250 pairs close
     to the witness of q.
+
+    Args:
+        seed: of the random pairs.
+        before: text before the range of the greatest quotients over q k.
+        after: text after it.
     """
     rng, case, shares = np.random.default_rng(seed), SCANNING, {}
     for law in "ABCEG":
@@ -165,13 +163,21 @@ def max_difference_quotients(seed: int) -> dict[str, float]:
         start = _random_pairs(law, rng, 4000)
         close = np.array(q.at) - [0.0, 0.0, 1e-8] + 1e-9 * rng.normal(size=(500, 3)) * [1, 0, 1]
         pairs = np.concatenate([start, np.stack([close[:250], close[250:]])], axis=1)
-        forces = [surface.force(points) for points in pairs]
-        distance = np.linalg.norm(pairs[1] - pairs[0], axis=1)
-        ratio = (
-            np.linalg.norm(forces[1] - forces[0], axis=1) / distance / (case.stiffness * q.value)
-        )
-        shares[law] = float(ratio.max())
-    return shares
+        shares[law] = max_difference_quotient(surface, pairs) / (case.stiffness * q.value)
+    best, worst = min(shares.values()), max(shares.values())
+    return check_statement(
+        f"{before} {best:.6f} to {worst:.6f} {after}",
+        printed=worst <= 1.0 + 1e-6 and best > 0.97,
+        numbers={f"greatest share for {law}": share for law, share in shares.items()},
+    )
+
+
+def max_difference_quotient(surface: Surface, pairs: FloatArray) -> float:
+    """Return the greatest |f(b) - f(a)| / |b - a| of pairs of probes, shape (2, n, 3) [N/m]."""
+    forces = [surface.force(points) for points in pairs]
+    changes = np.linalg.norm(forces[1] - forces[0], axis=1)
+    distances = np.linalg.norm(pairs[1] - pairs[0], axis=1)
+    return float((changes / distances).max())
 
 
 def _random_pairs(law: str, rng: np.random.Generator, count: int) -> FloatArray:
@@ -185,8 +191,3 @@ def _random_pairs(law: str, rng: np.random.Generator, count: int) -> FloatArray:
     points = np.column_stack([x, 0 * x, top - depth])
     step = case.depth * 1e-3 * rng.normal(size=(count, 3)) * [1, 0, 1]
     return np.stack([points, points + step])
-
-
-def compute_q(case: ExperimentCase, law: str) -> float:
-    """Return the characteristic number of a law for the parameters of an experiment."""
-    return characteristic_number(case.surface(law)).value

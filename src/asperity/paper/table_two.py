@@ -13,8 +13,8 @@ from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.core.display import Displayable
 from asperity.core.files import Serializable
+from asperity.paper.cases import PAPER_LAWS, PASSIVITY, SCANNING, TURNING_DEPTH
 from asperity.paper.claims.friction_law import PAPER_CASE, sticking_norm
-from asperity.paper.planar_cases import PAPER_LAWS, PASSIVITY, SCANNING, TURNING_DEPTH, loop_path
 
 _ENERGY_TOLERANCE = 1e-9  # relative to k A²
 TABLE_TWO: dict[str, dict[str, str]] = tomllib.loads(
@@ -189,7 +189,7 @@ def _row(letter: str) -> TableTwoRow:
         formula=TABLE_TWO[letter].get("formula", ""),
         conservative=surface.facts.conservative,
         continuous=continuity(surface, q).continuous,
-        energy=loop_work(looped, loop_path(letter, SCANNING)),
+        energy=loop_work(looped, SCANNING.loop_path(letter)),
         change=_explain_correction(letter, printed, q),
     )
 

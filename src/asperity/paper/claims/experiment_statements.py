@@ -1,18 +1,31 @@
-"""Section V, except for the sentences that need a simulation."""
+"""Sections V and VI, except for the sentences that need a simulation."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 
 from asperity.analysis.energy.leak import worst_loop
 from asperity.analysis.energy.loop_integral import loop_work
+from asperity.analysis.gain.characteristic import characteristic_number, one_sided_number
 from asperity.core.checks import FloatArray
 from asperity.devices import load_device
 from asperity.devices.five_bar import FiveBar, handle_damping
+from asperity.paper.cases import (
+    BUMP,
+    PAPER_LAWS,
+    PASSIVITY,
+    SAMPLING_PERIOD,
+    SCANNING,
+    SETTINGS,
+    ExperimentCase,
+    random_settings,
+)
 from asperity.paper.claim import (
-    SCALED_FORCES,
     Check,
     check_observation,
     check_statement,
@@ -23,21 +36,16 @@ from asperity.paper.claim import (
 from asperity.paper.claims.friction_law import (
     PAPER_CASE,
     SCANNING_CASE,
+    FrictionCase,
     max_norm_ratio,
     sticking_norm,
 )
 from asperity.paper.claims.passivity_condition import energy_gained
-from asperity.paper.formula_checks import check_zero_outside, compute_q, format_by_name
-from asperity.paper.planar_cases import (
-    BUMP,
-    PASSIVITY,
-    SAMPLING_PERIOD,
-    SCANNING,
-    SETTINGS,
-    ExperimentCase,
-    friction_path,
-    groove_path,
-    random_settings,
+from asperity.paper.formula_checks import (
+    check_continuity,
+    check_curl,
+    check_zero_outside,
+    format_by_name,
 )
 
 _RESOLUTION = 15e-6  # [m]
@@ -74,7 +82,7 @@ def samples_per_period() -> Check:
     )
 
 
-@declare_claim("eq-30", "V.A", "(30)", flips_under=SCALED_FORCES)
+@declare_claim("eq-30", "V.A", "(30)")
 def force_w() -> Check:
     """Force of the smooth wall W."""
     surface, rng = PASSIVITY.surface("W"), np.random.default_rng(1)
@@ -93,7 +101,7 @@ def force_w() -> Check:
 def number_f() -> Check:
     """q_F = 8.3 for the stated parameters."""
     own, true = sticking_norm(PAPER_CASE), max_norm_ratio(PAPER_CASE)
-    package = compute_q(PASSIVITY, "F")
+    package = PASSIVITY.q("F")
     return check_statement(
         f"(26) gives {own:.4f}, √2 times that is {math.sqrt(2.0) * own:.4f}; the greatest "
         f"‖J‖/κ₀ of the paper's law is {true:.4f}, of the package's {package:.4f}",
@@ -109,7 +117,7 @@ def number_f() -> Check:
 @declare_claim("sentence-V.A-qA", "V.A", flips_under="characteristic numbers times 1.02")
 def number_a() -> Check:
     """q_A = 5.1 for the stated parameters."""
-    q = compute_q(PASSIVITY, "A")
+    q = PASSIVITY.q("A")
     return check_statement(f"q_A = {q:.4f}", printed=round(q, 1) == 5.1, q=q)
 
 
@@ -125,7 +133,7 @@ def _handle_damping(joint_damping: float, x: float) -> float:
 @declare_claim("sentence-V.A-rule", "V.A", flips_under="three times the damping")
 def stability_rule() -> Check:
     """At 2000 N/m W is within (1), A and F are not, and are when divided by their numbers."""
-    q_a, q_f = compute_q(PASSIVITY, "A"), sticking_norm(PAPER_CASE)
+    q_a, q_f = PASSIVITY.q("A"), sticking_norm(PAPER_CASE)
     numbers = {"W": 1.0, "A": q_a, "F": q_f, "A/5.1": q_a / 5.1, "F/8.3": q_f / 8.3}
     loads = {name: PASSIVITY.stiffness * number for name, number in numbers.items()}
     limits = [
@@ -155,7 +163,7 @@ def division_ensures_passivity() -> Check:
     speeds = {}
     for law, number in (("A", 5.1), ("F", 8.3)):
         surface = PASSIVITY.surface(law, stiffness=PASSIVITY.stiffness / number)
-        loop = np.array(groove_path(PASSIVITY) if law == "A" else friction_path(PASSIVITY, 1e-5))
+        loop = PASSIVITY.groove_path() if law == "A" else PASSIVITY.friction_path(1e-5)
         length = float(np.linalg.norm(loop - np.roll(loop, 1, axis=0), axis=1).sum())
         speeds[law] = loop_work(surface, loop) / (damping * length)
     return check_statement(
@@ -208,7 +216,7 @@ def energy_sums() -> Check:
 )
 def passivity_margins() -> Check:
     """The margin of passivity is larger than in section V.A."""
-    numbers = {law: [compute_q(case, law) for case in (PASSIVITY, SCANNING)] for law in "WABCEG"}
+    numbers = {law: [case.q(law) for case in (PASSIVITY, SCANNING)] for law in "WABCEG"}
     numbers["F"] = [sticking_norm(PAPER_CASE), sticking_norm(SCANNING_CASE)]
     gain = SCANNING.joint_damping / SCANNING.stiffness
     gain *= PASSIVITY.stiffness / PASSIVITY.joint_damping
@@ -248,34 +256,39 @@ def nonconservative_feels_alive() -> Check:
     )
 
 
-def growth_exponent(values: list[float], arguments: list[float]) -> float:
-    """Return the exponent of a power law through two values."""
-    return math.log(values[1] / values[0]) / math.log(arguments[1] / arguments[0])
+Case = TypeVar("Case", ExperimentCase, FrictionCase)
+
+
+def growth_exponents(case: Case, compute: Callable[..., float], *arguments: Any) -> list[float]:
+    """Return the exponents with which a quantity grows with A and with l, by changes of 1 %."""
+    taller = replace(case, amplitude=1.01 * case.amplitude)
+    longer = replace(case, period=1.01 * case.period)
+    before = compute(case, *arguments)
+    ratios = [compute(changed, *arguments) / before for changed in (taller, longer)]
+    return [math.log(ratio) / math.log(1.01) for ratio in ratios]
 
 
 @declare_claim("sentence-V.C-scaling", "V.C", flips_under="2πA/l for every q")
 def scaling_with_texture() -> Check:
     """q_A is proportional to A/l, the energy gained on a horizontal path to A²."""
-    exponents = {}
-    amplitudes, periods = [BUMP.amplitude, 1.01 * BUMP.amplitude], [BUMP.period, 1.01 * BUMP.period]
-    variations = {
-        "A": ([ExperimentCase(1000.0, BUMP.period, a) for a in amplitudes], amplitudes),
-        "l": ([ExperimentCase(1000.0, length, BUMP.amplitude) for length in periods], periods),
-    }
-    for name, (cases, values) in variations.items():
-        exponents[f"q by {name}"] = growth_exponent(
-            [compute_q(case, "A") for case in cases], values
-        )
-        energies = [loop_work(case.surface("A"), groove_path(case)) for case in cases]
-        exponents[f"energy by {name}"] = growth_exponent(energies, values)
+    q_by_a, q_by_l = growth_exponents(BUMP, ExperimentCase.q, "A")
+    energy_by_a, energy_by_l = growth_exponents(
+        BUMP, lambda case: loop_work(case.surface("A"), case.groove_path())
+    )
     straight = loop_work(BUMP.surface("A"), [[0.0, 0.0, 0.0], [0.37 * BUMP.period, 0.0, 0.0]])
-    near = [abs(exponents["q by A"] - 1.0), abs(exponents["q by l"] + 1.0)]
-    energy = [abs(exponents["energy by A"] - 2.0), abs(exponents["energy by l"])]
+    exponents = {
+        "q by A": q_by_a,
+        "energy by A": energy_by_a,
+        "q by l": q_by_l,
+        "energy by l": energy_by_l,
+    }
+    q_error = max(abs(q_by_a - 1.0), abs(q_by_l + 1.0))
+    energy_error = max(abs(energy_by_a - 2.0), abs(energy_by_l))
     return check_statement(
         f"exponents in V.C's setting: {format_by_name(exponents, '+.3f')}; along a horizontal path "
         f"forth and back {straight:g} J",
-        printed=max(near) < 1e-6 and max(energy) < 1e-6,
-        corrected=max(near) < 0.05 and max(energy) < 1e-6 and straight == 0.0,
+        printed=q_error < 1e-6 and energy_error < 1e-6,
+        corrected=q_error < 0.05 and energy_error < 1e-6 and straight == 0.0,
         correction="q_A only nearly; the energy around the path of Fig. 3 (a horizontal path "
         "alone gives none)",
         numbers=exponents,
@@ -305,4 +318,105 @@ def passive_along_normal() -> Check:
         "times its amplitude squared",
         printed=max(gains) < 1e-9,
         greatest=max(gains),
+    )
+
+
+# --- VI -------------------------------------------------------------------------------------------
+
+
+@declare_claim("sentence-VI-increase", "VI", flips_under="characteristic numbers times 0.99")
+def stiffness_is_raised() -> Check:
+    """Texturing generally raises the effective stiffness."""
+    cases = [*SETTINGS.values(), *random_settings(5)]
+    numbers = {law: [case.q(law) for case in cases] for law in PAPER_LAWS}
+    least = min(min(values) for values in numbers.values())
+    raised = [law for law, values in numbers.items() if max(values) > 1.0 + 1e-9]
+    return check_statement(
+        f"over {len(cases)} settings q >= {least:.6g}; above 1 for {', '.join(raised)}",
+        printed=least >= 1.0 - 1e-6 and len(raised) >= 4,
+        least=least,
+        laws_above_1=", ".join(raised),
+    )
+
+
+@declare_claim("sentence-VI-proportional", "VI", flips_under="2πA/l for every q")
+def number_is_proportional() -> Check:
+    """The characteristic number is most frequently proportional to A/l."""
+    base = ExperimentCase(1000.0, 1e-3, 0.8e-3)
+    exponents = {law: growth_exponents(base, lambda case, law=law: case.q(law)) for law in "ABCEG"}
+    # The package's law scales the heights; the paper's own bound does not.
+    exponents["F"] = growth_exponents(PAPER_CASE, sticking_norm)
+    proportional = [
+        law for law, (a, length) in exponents.items() if max(abs(a - 1.0), abs(length + 1.0)) < 0.3
+    ]
+    summary = ", ".join(f"{law} {a:+.2f} {length:+.2f}" for law, (a, length) in exponents.items())
+    return check_statement(
+        f"exponents of A and l in V.A's setting: {summary}; D has no finite number",
+        printed=len(proportional) > len(PAPER_LAWS) / 2,
+        correction="A's, and F's where the texture is steep; B's and G's go as A D/l² where it "
+        "is pressed deep, C's in between, and E's is constant",
+        numbers={f"exponents for {law}": pair for law, pair in exponents.items()},
+    )
+
+
+@declare_claim("sentence-VI-always", "VI", flips_under="work around a path times 0")
+def always_passive() -> Check:
+    """Passivity can always be had by less gain, faster sampling or more damping."""
+    length = 2.0 * (0.25 * SCANNING.period + SCANNING.amplitude)
+    speeds: dict[str, list[float]] = {}
+    for law in "AC":
+        speeds[law] = []
+        for stiffness, damping in ((1000.0, 1.0), (10.0, 1.0), (1000.0, 100.0)):
+            work = loop_work(SCANNING.surface(law, stiffness=stiffness), SCANNING.groove_path())
+            speeds[law].append(max(work, 0.0) / (damping * length))
+    greatest = {law: max(values) for law, values in speeds.items()}
+    return check_statement(
+        "A gains energy below "
+        + ", ".join(f"{speed * 1e3:.3g} mm/s" for speed in speeds["A"])
+        + f" with κ₀ = 1000, 10, 1000 N/m and 1, 1, 100 N·s/m, C below {greatest['C']:.1g} m/s, "
+        "whatever the sampling",
+        printed=greatest["A"] <= 1e-12,
+        corrected=min(speeds["A"]) > 1e-6 and greatest["C"] <= 1e-12,
+        correction="for conservative fields; around a loop of any other the hand gains energy if "
+        "it is slow enough",
+        speeds_for_A=speeds["A"],
+        speeds_for_C=speeds["C"],
+    )
+
+
+@declare_claim("sentence-VI-D", "VI", flips_under="law E in the place of D")
+def conclusion_d() -> Check:
+    """D is conservative and leaves the effective stiffness as it is, but jumps."""
+    surface = SCANNING.surface("D")
+    q, plus = characteristic_number(surface).value, one_sided_number(surface).value
+    return combine_checks(
+        check_curl("D", is_conservative=True),
+        check_statement(
+            f"D in V.B's setting: q = {q}, q⁺ = {plus:g}",
+            printed=q == 1.0,
+            corrected=plus == 1.0,
+            correction="D leaves the one-sided number as it is, which decides without delay",
+            q=q,
+            one_sided=plus,
+        ),
+        check_continuity("D", is_continuous=False),
+    )
+
+
+@declare_claim("sentence-VI-F", "VI", flips_under="law W in the place of F")
+def conclusion_f() -> Check:
+    """F has no advantage in effective stiffness, but dissipates (its feel is left out).
+
+    Its number is not small, but a stroke forth and back loses energy.
+    """
+    numbers = {law: SCANNING.q(law) for law in "AEFG"}
+    bound = sticking_norm(SCANNING_CASE)
+    length, depth = 10.0 * SCANNING.deflection, -SCANNING.depth
+    work = loop_work(SCANNING.surface("F"), [[0, 0, depth], [length, 0, depth]])
+    return check_statement(
+        f"q_F = {numbers['F']:.3f} ({bound:.3f} by (26)) against 1 for E and the wall; a "
+        f"stroke of 10 mm forth and back gives {work * 1e3:+.2f} mJ",
+        printed=min(numbers["F"], bound) > 1.1 * numbers["E"] and work < 0.0,
+        numbers={f"q_{law}": q for law, q in numbers.items()},
+        work_of_a_stroke=work,
     )

@@ -13,6 +13,7 @@ import numpy as np
 
 from asperity.analysis.energy.loop_integral import loop_work
 from asperity.core.checks import FloatArray
+from asperity.paper.cases import SCANNING, random_settings
 from asperity.paper.claim import (
     DECLARED_CLAIMS,
     SCALED_FORCES,
@@ -29,14 +30,7 @@ from asperity.paper.formula_checks import (
     check_potential,
     check_zero_outside,
 )
-from asperity.paper.planar_cases import (
-    SCANNING,
-    ProbePoint,
-    closest_point_derivatives,
-    generic_probes,
-    groove_path,
-    random_settings,
-)
+from asperity.paper.probes import ProbePoint, closest_point_derivatives, generic_probes
 
 _SYMBOLS = "k d z p h1 h2 n rx rz r fx fz Jxx Jxz Jzx Jzz xx xz zx zz"
 _FLIPS_UNDER = {"force": SCALED_FORCES, "jacobian": SCALED_JACOBIANS, "norm": SCALED_JACOBIANS}
@@ -113,7 +107,7 @@ def _check_loop_energy(law: str, formula: str) -> Check:
     return check_values(
         f"energy of {law} around the path for {len(cases)} parameter sets",
         printed=_evaluate(formula, parameters, "k A l"),
-        reference=[loop_work(case.surface(law), groove_path(case)) for case in cases],
+        reference=[loop_work(case.surface(law), case.groove_path()) for case in cases],
     )
 
 

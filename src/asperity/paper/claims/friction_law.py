@@ -11,8 +11,8 @@ import numpy as np
 
 from asperity.analysis.energy.loop_integral import loop_work
 from asperity.core.checks import FloatArray
+from asperity.paper.cases import SCANNING, ExperimentCase, random_settings
 from asperity.paper.claim import (
-    SCALED_FORCES,
     SCALED_JACOBIANS,
     Check,
     check_observation,
@@ -22,13 +22,7 @@ from asperity.paper.claim import (
     declare_claim,
 )
 from asperity.paper.formula_checks import Potential, numerical_gradient
-from asperity.paper.planar_cases import (
-    SCANNING,
-    ExperimentCase,
-    friction_path,
-    generic_probes,
-    random_settings,
-)
+from asperity.paper.probes import generic_probes
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
 
@@ -116,7 +110,7 @@ def sticking_norm(case: FrictionCase) -> float:
 # --- field and Jacobian ---------------------------------------------------------------------------
 
 
-@declare_claim("eq-22", "IV.F", "(22)", flips_under=SCALED_FORCES)
+@declare_claim("eq-22", "IV.F", "(22)")
 def field_f() -> Check:
     """Force of F: the wall, and friction that h modulates.
 
@@ -127,7 +121,7 @@ def field_f() -> Check:
     return combine_checks(force, _check_sliding_work(correction))
 
 
-@declare_claim("table-1-F", "IV", "Table I", flips_under=SCALED_FORCES)
+@declare_claim("table-1-F", "IV", "Table I")
 def table_one_f() -> Check:
     """Force of F (Fig. 2): [-κ(x) d, -κ₀ d].
 
@@ -329,7 +323,7 @@ def deflection_range() -> Check:
     return check_observation("a statement on real materials: nothing here can be computed")
 
 
-@declare_claim("eq-27", "IV.F", "(27)", flips_under=SCALED_FORCES)
+@declare_claim("eq-27", "IV.F", "(27)")
 def energy_f() -> Check:
     """Energy of F without texture around its path of Fig. 3.
 
@@ -341,8 +335,8 @@ def energy_f() -> Check:
         surface = _untextured_surface(case)
         whole = 0.5 * case.stiffness * case.friction * case.depth * case.deflection
         printed.append(whole)
-        reference.append(loop_work(surface, friction_path(case, share * case.depth)))
-        shallow = loop_work(surface, friction_path(case, 1e-7 * case.depth))
+        reference.append(loop_work(surface, case.friction_path(share * case.depth)))
+        shallow = loop_work(surface, case.friction_path(1e-7 * case.depth))
         limit = max(limit, abs(shallow / whole - 1.0))
     return combine_checks(
         check_values(
@@ -405,7 +399,7 @@ def compliant_materials() -> Check:
     energies = []
     for deflection in (1e-3, 1e-2):
         case = replace(SCANNING, deflection=deflection)
-        path = friction_path(case, 1e-7 * case.depth)
+        path = case.friction_path(1e-7 * case.depth)
         energies.append(loop_work(_untextured_surface(case), path))
     ratio, energy = energies[1] / energies[0], energies[1] * 1e3
     return check_statement(

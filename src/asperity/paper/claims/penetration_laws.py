@@ -10,8 +10,8 @@ import numpy as np
 from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.closed_forms import q_b, q_c, q_g
 from asperity.laws import Law, find_law
+from asperity.paper.cases import PASSIVITY, SCANNING, SETTINGS, ExperimentCase, random_settings
 from asperity.paper.claim import (
-    SCALED_FORCES,
     SCALED_JACOBIANS,
     Check,
     check_statement,
@@ -20,22 +20,8 @@ from asperity.paper.claim import (
     declare_claim,
 )
 from asperity.paper.claims.formula_claims import FormulaRow
-from asperity.paper.formula_checks import (
-    check_curl,
-    compute_q,
-    find_max_norm,
-    max_loop_share,
-    segment_work,
-)
-from asperity.paper.planar_cases import (
-    PASSIVITY,
-    SCANNING,
-    SETTINGS,
-    ExperimentCase,
-    crossing_path,
-    generic_probes,
-    random_settings,
-)
+from asperity.paper.formula_checks import check_curl, find_max_norm, max_loop_share, segment_work
+from asperity.paper.probes import generic_probes
 
 # --- A --------------------------------------------------------------------------------------------
 
@@ -109,7 +95,7 @@ def proportional_a() -> Check:
     Checked to a tenth for each of the paper's experiments.
     """
     slopes = {name: 2.0 * math.pi * case.amplitude / case.period for name, case in SETTINGS.items()}
-    ratios = {name: compute_q(case, "A") / slopes[name] for name, case in SETTINGS.items()}
+    ratios = {name: case.q("A") / slopes[name] for name, case in SETTINGS.items()}
     summary = ", ".join(f"{name} {slopes[name]:.2f} ({ratios[name]:.3f})" for name in SETTINGS)
     return check_statement(
         f"2πA/l, and q_A over it: {summary}",
@@ -118,7 +104,7 @@ def proportional_a() -> Check:
     )
 
 
-@declare_claim("sentence-IV.A-energy", "IV.A", flips_under=SCALED_FORCES)
+@declare_claim("sentence-IV.A-energy", "IV.A")
 def energy_a() -> Check:
     """A is not conservative; around a path of Fig. 3 it generates κ₀A²/2."""
     return FormulaRow(loop_energy={"A": "k*A**2/2"}, conservative={"A": False}).check()
@@ -242,13 +228,13 @@ def remark_5() -> Check:
 # --- G --------------------------------------------------------------------------------------------
 
 
-@declare_claim("eq-29", "IV.G", "(29)", flips_under=SCALED_FORCES)
+@declare_claim("eq-29", "IV.G", "(29)")
 def energy_g() -> Check:
     """Around its path of Fig. 3 G gains energy on one leg."""
     errors, gains = [], []
     for case in [SCANNING, *random_settings()]:
         a, surface = 0.5 * case.depth, case.surface("G")
-        points = np.array(crossing_path(case, a))
+        points = case.crossing_path(a)
         scale = case.stiffness * a**2
         ends = np.roll(points, -1, axis=0)
         legs = [segment_work(surface, *leg) / scale for leg in zip(points, ends, strict=True)]

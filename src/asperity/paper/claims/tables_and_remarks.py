@@ -11,6 +11,7 @@ import numpy as np
 from asperity.analysis.energy.loop_integral import loop_work
 from asperity.analysis.gain.characteristic import characteristic_number
 from asperity.laws import find_law
+from asperity.paper.cases import SCANNING, ExperimentCase
 from asperity.paper.claim import (
     DECLARED_CLAIMS,
     Check,
@@ -24,8 +25,8 @@ from asperity.paper.claim import (
 )
 from asperity.paper.claims.friction_law import PAPER_CASE, max_norm_ratio, sticking_norm
 from asperity.paper.figures import loop_energies
-from asperity.paper.formula_checks import compute_q, format_by_name
-from asperity.paper.planar_cases import SCANNING, ExperimentCase, generic_profile, groove_path
+from asperity.paper.formula_checks import format_by_name
+from asperity.paper.probes import generic_profile
 from asperity.paper.table_two import TABLE_TWO, TableTwoRow, table_two
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
@@ -149,7 +150,7 @@ def remark_2() -> Check:
     """
     base = ExperimentCase(1000.0, 2e-3, 0.2e-3, depth=0.02e-3)
     cases = [_refine_texture(base, n) for n in (1.0, 100.0)]
-    numbers = {law: [compute_q(case, law) for case in cases] for law in "ABCDEG"}
+    numbers = {law: [case.q(law) for case in cases] for law in "ABCDEG"}
     # The paper's own bound for F, whose h is dimensionless.
     numbers["F"] = [
         sticking_norm(replace(PAPER_CASE, amplitude=0.8 / n, period=1e-3 / n)) for n in (1.0, 100.0)
@@ -203,7 +204,7 @@ def remark_3() -> Check:
     )
     loops = {
         clamp: loop_work(
-            SCANNING.surface("C", clamp=clamp, max_depth=0.1e-3), groove_path(SCANNING)
+            SCANNING.surface("C", clamp=clamp, max_depth=0.1e-3), SCANNING.groove_path()
         )
         for clamp in ("lateral", "whole")
     }

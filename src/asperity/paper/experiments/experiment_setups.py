@@ -7,7 +7,7 @@ parameters are from other sources, fitted or guessed, and are listed in every re
 from __future__ import annotations
 
 from asperity.devices import load_device
-from asperity.paper.planar_cases import BUMP, PASSIVITY, SAMPLING_PERIOD, SCANNING
+from asperity.paper.cases import BUMP, PASSIVITY, SAMPLING_PERIOD, SCANNING
 from asperity.scene.scene_defaults import make_plant
 from asperity.scene.setup import Setup
 from asperity.simulation import BandHand, Motion, Pantograph, Servo, SpringHand, Stationary, Strokes

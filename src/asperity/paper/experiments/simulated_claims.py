@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from asperity.paper.cases import PAPER_LAWS
 from asperity.paper.claim import (
     DECLARED_CLAIMS,
     Check,
@@ -22,7 +23,6 @@ from asperity.paper.experiments.experiment_setups import (
     HANDS_SUMMARY,
 )
 from asperity.paper.experiments.strokes import BumpRun, bump_experiment, scanning_experiment
-from asperity.paper.planar_cases import PAPER_LAWS
 from asperity.simulation.scan import Stroke
 
 TRIED_DELAYS = (0, 4, 5, 6, 7)

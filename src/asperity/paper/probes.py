@@ -1,4 +1,4 @@
-"""The paper's x-z plane: parameter sets, generic probes, and exact forces and closest points."""
+"""Generic probes inside the body, with exact forces and closest points in the x-z plane."""
 
 from __future__ import annotations
 
@@ -13,77 +13,8 @@ from numpy.typing import ArrayLike
 from asperity.core.checks import FloatArray
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
-from asperity.textures.kinds.sinusoid import Sinusoid
 
-PAPER_LAWS = "ABCDEFG"
 _DIGITS = 25
-
-
-@dataclass(frozen=True)
-class ExperimentCase:
-    """Parameters of one of the paper's experiments, SI.
-
-    Attributes:
-        stiffness: κ₀ [N/m].
-        period: l [m].
-        amplitude: A [m].
-        friction: μ.
-        deflection: d_max in x [m].
-        depth: d_max in z [m].
-        joint_damping: [N·m·s].
-    """
-
-    stiffness: float
-    period: float
-    amplitude: float
-    friction: float = 0.8
-    deflection: float = 1e-3
-    depth: float = 1e-3
-    joint_damping: float = 4.0e-3
-
-    @property
-    def texture(self) -> Sinusoid:
-        """A sin(2πx/l)."""
-        return Sinusoid(self.amplitude, self.period)
-
-    @property
-    def crest_radius(self) -> float:
-        """Radius of curvature at the crests [m]."""
-        return self.period**2 / (4.0 * math.pi**2 * self.amplitude)
-
-    def surface(self, law: str, **changes: Any) -> Surface:
-        """Return this texture with a law; ``changes`` are arguments of ``Surface``."""
-        arguments: dict[str, Any] = {"stiffness": self.stiffness, "max_depth": self.depth}
-        if law == "F":
-            arguments |= {"friction": self.friction, "max_deflection": self.deflection}
-        return Surface(self.texture, law, **(arguments | changes))
-
-
-PASSIVITY = ExperimentCase(2000.0, 1e-3, 0.8e-3, joint_damping=4.7e-3)  # section V.A
-SCANNING = ExperimentCase(1000.0, 2e-3, 0.8e-3)  # V.B
-BUMP = ExperimentCase(1000.0, 20e-3, 20e-3)  # V.C
-SETTINGS = {"V.A": PASSIVITY, "V.B": SCANNING, "V.C": BUMP}
-SAMPLING_PERIOD = 1e-4  # [s], section V
-
-
-def random_settings(count: int = 3, seed: int = 11) -> list[ExperimentCase]:
-    """Return random parameter sets; the same ones for the same seed."""
-    draw = np.random.default_rng(seed)
-    result = []
-    for _ in range(count):
-        period = draw.uniform(0.7e-3, 4e-3)
-        amplitude = period * draw.uniform(0.1, 0.7)
-        result.append(
-            ExperimentCase(
-                stiffness=draw.uniform(300.0, 2500.0),
-                period=period,
-                amplitude=amplitude,
-                friction=draw.uniform(0.2, 1.1),
-                deflection=draw.uniform(0.1e-3, 2e-3),
-                depth=amplitude * draw.uniform(0.4, 1.3),
-            )
-        )
-    return result
 
 
 @dataclass(frozen=True)
@@ -280,41 +211,3 @@ def closest_point_derivatives(count: int = 4) -> list[ClosestPointDerivatives]:
         result.append(ClosestPointDerivatives(probe, rates, probe.compiled_force(), kernel))
         result.append(ClosestPointDerivatives(probe, np.eye(2) + kernel / probe.k, *defined))
     return result
-
-
-def path_points(*corners: tuple[float, float]) -> list[tuple[float, float, float]]:
-    """Return vertices (x, z) as points (x, 0, z)."""
-    return [(x, 0.0, z) for x, z in corners]
-
-
-# --- closed paths of the paper's Fig. 3 -----------------------------------------------------------
-
-Points = list[tuple[float, float, float]]
-TURNING_DEPTH = 0.1e-3
-"""Depth at which the paths of (27) and (29) turn [m]; not stated by the paper."""
-
-
-def groove_path(case: ExperimentCase) -> Points:
-    """Return the path for A, B and E: along the wall, up at the crest, and back."""
-    quarter, top = 0.25 * case.period, case.amplitude
-    return path_points((0.0, 0.0), (quarter, 0.0), (quarter, top), (0.0, top))
-
-
-def friction_path(case: ExperimentCase, shallow_depth: float = TURNING_DEPTH) -> Points:
-    """Return the path of (27), for F: out at the shallow depth a, back at the full depth."""
-    x, deep = case.deflection, -case.depth
-    return path_points(
-        (0.0, 1e-3), (0.0, -shallow_depth), (x, -shallow_depth), (x, deep), (0.0, deep)
-    )
-
-
-def crossing_path(case: ExperimentCase, turning_depth: float = TURNING_DEPTH) -> Points:
-    """Return the path of (29), for G: down at the crest, along at depth a, up at the trough."""
-    quarter = 0.25 * case.period
-    a, crest, trough = turning_depth, quarter, 3 * quarter
-    return path_points((crest, a), (crest, -a), (trough, -a), (trough, a))
-
-
-def loop_path(law: str, case: ExperimentCase) -> Points:
-    """Return the path of a law by its letter; C and D, absent from the figure, use that of A."""
-    return {"F": friction_path, "G": crossing_path}.get(law, groove_path)(case)
