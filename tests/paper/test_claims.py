@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 from typing import Any
@@ -10,8 +11,10 @@ import pytest
 
 from asperity.core.errors import ParameterError
 from asperity.paper import CLAIMS, VERDICTS, Result, get_claim, reproduce_claims
+from asperity.paper.claim import CATALOGUE
 from asperity.paper.claim_registry import find_claims
-from asperity.paper.experiments import SIMULATED_CLAIM_IDS, simulated_claims
+from asperity.paper.claims import simulated_claims
+from asperity.paper.claims.simulated_claims import SIMULATED_CLAIM_IDS
 from asperity.paper.experiments.experiment_setups import BUMP_SUMMARY
 
 SIMULATED = set(SIMULATED_CLAIM_IDS)
@@ -124,6 +127,11 @@ def test_what_cannot_be_decided(results: dict[str, Result]) -> None:
     for name in UNDECIDED:
         assert results[name].verdict == "undecided"
         assert "comput" in results[name].evidence.summary
+
+
+def test_every_entry_of_the_catalogue_has_a_function() -> None:
+    declared = {name for name, item in CLAIMS.items() if inspect.isfunction(item.compute)}
+    assert set(CATALOGUE) == declared
 
 
 def test_every_number_of_the_paper_has_a_claim() -> None:

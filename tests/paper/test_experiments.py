@@ -11,13 +11,9 @@ import pytest
 
 from asperity.paper import get_claim
 from asperity.paper.cases import SAMPLING_PERIOD
-from asperity.paper.experiments import (
-    SIMULATED_CLAIM_IDS,
-    cycle_counts,
-    experiment_setups,
-    simulated_claims,
-    strokes,
-)
+from asperity.paper.claims import simulated_claims
+from asperity.paper.claims.simulated_claims import SIMULATED_CLAIM_IDS
+from asperity.paper.experiments import cycle_counts, experiment_setups, strokes
 from asperity.paper.experiments.cycle_counts import count_cycles, passivity_experiment
 from asperity.paper.experiments.device_onsets import (
     PRESSING_HAND,

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -20,8 +22,6 @@ Number = float | str | list[float]
 
 TOLERANCE = 1e-9
 """Relative to the largest entry; the compared values have double precision or better."""
-SCALED_FORCES = "compiled forces times 1.001"
-SCALED_JACOBIANS = "compiled Jacobians times 1.001"
 # By increasing severity: a claim is as good as the weakest of its parts.
 _SEVERITY: tuple[Verdict, ...] = ("holds", "holds with correction", "undecided", "does not hold")
 
@@ -106,6 +106,8 @@ class Claim:
         statement: the statement, paraphrased.
         compute: computes the evidence and derives the verdict.
         flips_under: a change under which the verdict is different; optional for your own claims.
+        correction: the corrected statement, which the evidence carries if it holds and the printed
+            one does not.
     """
 
     id: str
@@ -114,6 +116,7 @@ class Claim:
     statement: str
     compute: Computation
     flips_under: str = ""
+    correction: str = ""
 
     def run(self) -> Result:
         """Compute the evidence and return it with the verdict.
@@ -124,6 +127,8 @@ class Claim:
             check = self.compute()
         except AsperityError as error:
             check = Check(f"could not be computed: {error}")
+        if self.correction and check.verdict == "holds with correction":
+            check = replace(check, correction=self.correction)
         about = self.id, self.equations, self.section, self.statement
         return Result(*about, check.verdict, check, self.flips_under)
 
@@ -131,26 +136,22 @@ class Claim:
 DECLARED_CLAIMS: list[Claim] = []
 """The claims of the paper, in the order of declaration."""
 
+CATALOGUE = tomllib.loads(Path(__file__).with_name("claims.toml").read_text(encoding="utf-8"))
+"""Place, correction and falsifying change of each claim that a function computes, by id."""
 
-def declare_claim(
-    claim_id: str, section: str, *equations: str, flips_under: str = SCALED_FORCES
-) -> Callable[[Computation], Computation]:
+
+def declare_claim(claim_id: str) -> Callable[[Computation], Computation]:
     """Declare that the decorated function judges a claim of the paper.
 
-    The first line of its docstring is the statement.
-
-    Args:
-        claim_id: id of the claim.
-        section: section of the paper.
-        *equations: equation numbers of the paper that the claim covers.
-        flips_under: a change under which the verdict is different. Each of these changes is
-            applied by a test in ``tests/paper/perturbations.py``; by default compiled forces are
-            scaled.
+    The first line of its docstring is the statement; the rest is in ``claims.toml``.
     """
 
     def declare(compute: Computation) -> Computation:
         statement = (compute.__doc__ or "").partition("\n")[0]
-        DECLARED_CLAIMS.append(Claim(claim_id, equations, section, statement, compute, flips_under))
+        row = CATALOGUE[claim_id]
+        place = tuple(row.get("equations", ())), row["section"]
+        change, correction = row["flips_under"], row.get("correction", "")
+        DECLARED_CLAIMS.append(Claim(claim_id, *place, statement, compute, change, correction))
         return compute
 
     return declare

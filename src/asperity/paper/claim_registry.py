@@ -7,21 +7,13 @@ import re
 from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from difflib import get_close_matches
+from importlib import import_module
+from pkgutil import iter_modules
 
 from asperity.core.errors import ParameterError
 from asperity.core.processes import limit_processes, precompute
+from asperity.paper import claims
 from asperity.paper.claim import DECLARED_CLAIMS, Claim, Result
-from asperity.paper.claims import (  # noqa: F401 - each module declares its claims
-    design_limits,
-    experiment_statements,
-    formula_claims,
-    friction_law,
-    god_object_laws,
-    passivity_condition,
-    penetration_laws,
-    tables_and_remarks,
-)
-from asperity.paper.experiments import simulated_claims  # noqa: F401 - declares its claims
 
 Progress = Callable[[Result, int, int], None]
 """Called after each claim with its result, the number of finished claims and their total."""
@@ -34,6 +26,8 @@ def _paper_order(claim: Claim) -> tuple[bool, str, float]:
     return claim.section.startswith("App."), claim.section, position
 
 
+for _module in iter_modules(claims.__path__):  # each declares its claims
+    import_module(f"{claims.__name__}.{_module.name}")
 CLAIMS: dict[str, Claim] = {one.id: one for one in sorted(DECLARED_CLAIMS, key=_paper_order)}
 _PAPER_CLAIM_IDS = frozenset(CLAIMS)
 

@@ -114,7 +114,6 @@ def check_energy_sign(law: str) -> Check:
         f"U against the work that pressing into {law} takes",
         printed=-energies,
         corrected=energies,
-        correction="the stored energy is -U as printed, and the force minus its gradient",
         reference=[_pressing_work(probe) for probe in probes],
         tolerance=1e-8,
     )

@@ -54,9 +54,7 @@ def unit_invariant_share(inequality: Inequality, seed: int) -> float:
     return same / _CASES
 
 
-def _check_dimensions(
-    printed: Inequality, corrected: Inequality | None = None, correction: str = ""
-) -> Check:
+def _check_dimensions(printed: Inequality, corrected: Inequality | None = None) -> Check:
     """Check that both sides of an inequality have the same dimension."""
     share = unit_invariant_share(printed, 1)
     corrected_share = None if corrected is None else unit_invariant_share(corrected, 1)
@@ -65,7 +63,6 @@ def _check_dimensions(
         f"unchanged by other units in {share:.2f} of {_CASES} cases{tail}",
         printed=share == 1.0,
         corrected=None if corrected is None else corrected_share == 1.0,
-        correction=correction,
         share_as_printed=share,
     )
 
@@ -167,7 +164,7 @@ def _check_sample_count(
     )
 
 
-@declare_claim("limit-1", "II.B", "Limit 1", flips_under="½ α v T/l < 1")
+@declare_claim("limit-1")
 def limit_1() -> Check:
     """Scanning velocity: α v T/l < 1.
 
@@ -180,7 +177,7 @@ def limit_1() -> Check:
     return combine_checks(reconstruction, _check_dimensions(limit))
 
 
-@declare_claim("limit-2", "II.B", "Limit 2", flips_under="½ β δ/l < 1")
+@declare_claim("limit-2")
 def limit_2() -> Check:
     """Low speed reconstruction: β δ/l < 1.
 
@@ -193,7 +190,7 @@ def limit_2() -> Check:
     return combine_checks(reconstruction, _check_dimensions(limit))
 
 
-@declare_claim("limit-3", "II.B", "Limit 3", flips_under="α (δ + v T)/l < 1")
+@declare_claim("limit-3")
 def limit_3() -> Check:
     """High speed reconstruction: α δ/l < 1, one more limit.
 
@@ -221,13 +218,12 @@ def limit_3() -> Check:
             f"with α = β it differs from limit 2 in {differing} of {count} random cases",
             printed=differing > 0,
             corrected=merged == count,
-            correction="2 and 3 are one condition: max(α, β) δ < l",
             cases_in_which_they_differ=float(differing),
         ),
     )
 
 
-@declare_claim("limit-4", "II.B", "Limit 4", flips_under="γ b < A")
+@declare_claim("limit-4")
 def limit_4() -> Check:
     """Force reconstruction: γ b/l < A.
 
@@ -241,15 +237,11 @@ def limit_4() -> Check:
             "force",
             6,
         ),
-        _check_dimensions(
-            PRINTED_LIMITS[4],
-            CORRECTED_LIMITS[4],
-            "γ b < A_F, the amplitude of the force: the length has no place in it",
-        ),
+        _check_dimensions(PRINTED_LIMITS[4], CORRECTED_LIMITS[4]),
     )
 
 
-@declare_claim("limit-5", "II.B", "Limit 5")
+@declare_claim("limit-5")
 def limit_5() -> Check:
     """Gain: 2πA/l < A₀.
 
@@ -260,15 +252,11 @@ def limit_5() -> Check:
         "the greatest difference of forces of 4250 pairs of probes is, for A, B, C, E, G,",
         "q k per length",
     )
-    dimensions = _check_dimensions(
-        PRINTED_LIMITS[5],
-        CORRECTED_LIMITS[5],
-        "q k <= K₀, the stiffest smooth wall; for A q is close to 2πA/l",
-    )
+    dimensions = _check_dimensions(PRINTED_LIMITS[5], CORRECTED_LIMITS[5])
     return combine_checks(dimensions, quotients)
 
 
-@declare_claim("limit-6", "II.B", "Limit 6", flips_under="v l < F₀")
+@declare_claim("limit-6")
 def limit_6() -> Check:
     """Structure of the device: v/l < F₀.
 

@@ -14,15 +14,7 @@ import numpy as np
 from asperity.analysis.energy.loop_integral import loop_work
 from asperity.core.checks import FloatArray
 from asperity.paper.cases import SCANNING, random_settings
-from asperity.paper.claim import (
-    DECLARED_CLAIMS,
-    SCALED_FORCES,
-    SCALED_JACOBIANS,
-    Check,
-    Claim,
-    check_values,
-    combine_checks,
-)
+from asperity.paper.claim import DECLARED_CLAIMS, Check, Claim, check_values, combine_checks
 from asperity.paper.formula_checks import (
     check_continuity,
     check_curl,
@@ -33,7 +25,6 @@ from asperity.paper.formula_checks import (
 from asperity.paper.probes import ProbePoint, closest_point_derivatives, generic_probes
 
 _SYMBOLS = "k d z p h1 h2 n rx rz r fx fz Jxx Jxz Jzx Jzz xx xz zx zz"
-_FLIPS_UNDER = {"force": SCALED_FORCES, "jacobian": SCALED_JACOBIANS, "norm": SCALED_JACOBIANS}
 
 
 @dataclass(frozen=True)
@@ -61,10 +52,9 @@ class FormulaRow:
 
     def to_claim(self) -> Claim:
         """Return the claim that compares this row."""
-        change = self.flips_under or _FLIPS_UNDER[self.quantity]
-        return Claim(
-            self.id, tuple(self.equations), self.section, self.statement, self.check, change
-        )
+        place = tuple(self.equations), self.section
+        about = *place, self.statement, self.check, self.flips_under, self.correction
+        return Claim(self.id, *about)
 
     def check(self) -> Check:
         """Compare the formula of each law, and check the laws' properties."""
@@ -96,7 +86,6 @@ class FormulaRow:
             printed=printed,
             corrected=corrected,
             reference=reference,
-            correction=self.correction,
         )
 
 

@@ -13,7 +13,6 @@ from asperity.analysis.energy.loop_integral import loop_work
 from asperity.core.checks import FloatArray
 from asperity.paper.cases import SCANNING, ExperimentCase, random_settings
 from asperity.paper.claim import (
-    SCALED_JACOBIANS,
     Check,
     check_observation,
     check_statement,
@@ -110,38 +109,29 @@ def sticking_norm(case: FrictionCase) -> float:
 # --- field and Jacobian ---------------------------------------------------------------------------
 
 
-@declare_claim("eq-22", "IV.F", "(22)")
+@declare_claim("eq-22")
 def field_f() -> Check:
     """Force of F: the wall, and friction that h modulates.
 
     Compared with the definition, and by the work of friction on a sliding probe.
     """
-    correction = "the x part with a plus sign: friction must oppose the deflection"
-    force = _check_force(9, lambda pull, _share: -pull, lambda pull, _share: pull, correction)
-    return combine_checks(force, _check_sliding_work(correction))
+    force = _check_force(9, lambda pull, _share: -pull)
+    return combine_checks(force, _check_sliding_work())
 
 
-@declare_claim("table-1-F", "IV", "Table I")
+@declare_claim("table-1-F")
 def table_one_f() -> Check:
     """Force of F (Fig. 2): [-κ(x) d, -κ₀ d].
 
     With κ(x) = μκ₀(1 - h), d = p^z.
     """
-    correction = "the x part times -d^x/d_max"
-    return _check_force(
-        19, lambda pull, share: -pull / share, lambda pull, _share: pull, correction
-    )
+    return _check_force(19, lambda pull, share: -pull / share)
 
 
-FrictionFormula = Callable[[float, float], float]
+def _check_force(seed: int, printed: Callable[[float, float], float]) -> Check:
+    """Compare a formula for f_x, and one that opposes the deflection, with definition and kernel.
 
-
-def _check_force(
-    seed: int, printed: FrictionFormula, corrected: FrictionFormula, correction: str
-) -> Check:
-    """Compare formulas for f_x with the definition and the kernel.
-
-    Their arguments are μκ₀(1 - m) p^z d/d_max and d/d_max.
+    Its arguments are μκ₀(1 - m) p^z d/d_max and d/d_max.
     """
     from asperity.reference import exact_force
 
@@ -156,30 +146,28 @@ def _check_force(
         probe, d = [spot.x, 0.0, spot.z], [share * surface.max_deflection, 0.0]
         exact, kernel = exact_force(surface, probe, d), surface.force([probe], [d])[0]
         printed_forces += [[printed(pull, share), -k * spot.z]] * 2
-        corrected_forces += [[corrected(pull, share), -k * spot.z]] * 2
+        corrected_forces += [[pull, -k * spot.z]] * 2
         reference += [[float(exact[0]), float(exact[2])], [kernel[0], kernel[2]]]
     return check_values(
         "force of F at 4 generic probes, by definition and kernel",
         printed=printed_forces,
         corrected=corrected_forces,
         reference=reference,
-        correction=correction,
     )
 
 
-def _check_sliding_work(correction: str) -> Check:
+def _check_sliding_work() -> Check:
     """Check the sign of friction by 1 mm of sliding with d = d_max at 1 mm depth and h = 0."""
     work = SCANNING.stiffness * SCANNING.friction * 1e-3 * 1e-3
     return check_statement(
         f"work of the printed friction over 1 mm of sliding {work * 1e3:+.2f} mJ",
         printed=work < 0.0,
         corrected=-work < 0.0,
-        correction=correction,
         work_as_printed=work,
     )
 
 
-@declare_claim("eq-23", "IV.F", "(23)", flips_under=SCALED_JACOBIANS)
+@declare_claim("eq-23")
 def jacobian_f() -> Check:
     """Jacobian of F.
 
@@ -204,7 +192,6 @@ def jacobian_f() -> Check:
         printed=printed,
         corrected=corrected,
         reference=reference,
-        correction="h' must be h' d^x (as printed it has another dimension)",
     )
 
 
@@ -226,9 +213,7 @@ def _printed_jacobian(
     return [[-first, -r.friction * (1.0 - h) * d / r.deflection], [0.0, -1.0]]
 
 
-@declare_claim(
-    "eq-24", "IV.F", "(24)", flips_under="an anchor that is dragged from twice the deflection on"
-)
+@declare_claim("eq-24")
 def stick_slip_phases() -> Check:
     """d follows the probe while d < d_max and does not change while d = d_max.
 
@@ -253,7 +238,6 @@ def stick_slip_phases() -> Check:
         f"{forward.mean():.3f}, |d| = d_max in {both.mean():.3f}",
         printed=bool(forward.all() and len(pure) - pure.sum() <= 3),
         corrected=bool(both.all() and len(pure) - pure.sum() <= 3),
-        correction="|d^x| in place of d^x: the anchor is dragged both ways",
         share_as_printed=float(forward.mean()),
         share_with_absolute_value=float(both.mean()),
     )
@@ -267,7 +251,7 @@ def _max_entries(r: FrictionCase) -> FloatArray:
     return np.asarray(np.abs(r.compiled_jacobians(40001)[..., 0, :]).max(axis=(1, 2)))
 
 
-@declare_claim("eq-25", "IV.F", "(25)", flips_under=SCALED_JACOBIANS)
+@declare_claim("eq-25")
 def sliding_entries_bound() -> Check:
     """Greatest entries of F's Jacobian while sliding."""
     cases = [PAPER_CASE, *random_friction_cases()]
@@ -279,12 +263,10 @@ def sliding_entries_bound() -> Check:
         corrected=np.column_stack([first, second]),
         reference=np.array([_max_entries(r)[0] for r in cases]),
         tolerance=1e-8,
-        correction="bounds, entry by entry: (1,2) is at most μ(1 + A) for h = A sin, and μ "
-        "where 0 <= h <= 1 as (22) assumes",
     )
 
 
-@declare_claim("eq-26", "IV.F", "(26)", flips_under=SCALED_JACOBIANS)
+@declare_claim("eq-26")
 def sticking_entries_bound() -> Check:
     """Greatest entries of F's Jacobian while sticking."""
     cases = [PAPER_CASE, *random_friction_cases()]
@@ -296,8 +278,6 @@ def sticking_entries_bound() -> Check:
         corrected=[_corrected_sticking_entries(case) for case in cases],
         reference=reference,
         tolerance=1e-8,
-        correction="a bound, entry by entry: the greatest are "
-        "μp/d_max (1 + A √(1 + (2πd_max/l)²)) and μ(1 + A)",
     )
     ratios = printed / reference
     bound = check_statement(
@@ -317,13 +297,13 @@ def _corrected_sticking_entries(r: FrictionCase) -> tuple[float, float]:
 # --- energy ---------------------------------------------------------------------------------------
 
 
-@declare_claim("sentence-IV.F-deflections", "IV.F", flips_under="an observation that confirms it")
+@declare_claim("sentence-IV.F-deflections")
 def deflection_range() -> Check:
     """Realistic d_max go from 1e-2 m (tissue) to 1e-6 m (metal)."""
     return check_observation("a statement on real materials: nothing here can be computed")
 
 
-@declare_claim("eq-27", "IV.F", "(27)")
+@declare_claim("eq-27")
 def energy_f() -> Check:
     """Energy of F without texture around its path of Fig. 3.
 
@@ -344,7 +324,6 @@ def energy_f() -> Check:
             printed=printed,
             corrected=np.array(printed) * (1.0 - share),
             reference=reference,
-            correction="κ₀μ/2 · d_max^x (d_max^z - a): the printed energy is the limit a → 0",
         ),
         check_statement(
             f"with a = 1e-7 d_max^z the printed energy is off by {limit:.1e}",
@@ -359,7 +338,7 @@ def _untextured_surface(case: ExperimentCase) -> Surface:
     return case.surface("F", modulation_depth=0.0, friction=2.0 * case.friction)
 
 
-@declare_claim("sentence-IV.F-stick", "IV.F", flips_under="law W in the place of F")
+@declare_claim("sentence-IV.F-stick")
 def sticking_generates_energy() -> Check:
     """F generates energy while sticking only, which is at most 2 d_max wide."""
     case = SCANNING
@@ -391,9 +370,7 @@ def _anchor_deflection(x: FloatArray, max_deflection: float) -> FloatArray:
     return d
 
 
-@declare_claim(
-    "sentence-IV.F-compliant", "IV.F", flips_under="work around a path times 1 plus 0.001 J"
-)
+@declare_claim("sentence-IV.F-compliant")
 def compliant_materials() -> Check:
     """The energy that is not conserved is proportional to d_max, as with d_max = 1 cm."""
     energies = []
@@ -451,7 +428,7 @@ def max_norm_ratio(r: FrictionCase) -> float:
     return float(np.linalg.norm(r.compiled_jacobians(20001), 2, axis=(-2, -1)).max())
 
 
-@declare_claim("eq-31", "App. I", "(31)", flips_under="compiled Jacobians times 1.2")
+@declare_claim("eq-31")
 def friction_number_bound() -> Check:
     """An upper bound on q_F, and its expression written out."""
     cases = [PAPER_CASE, *random_friction_cases(6)]
@@ -468,7 +445,5 @@ def friction_number_bound() -> Check:
         printed=[expand_bound(case, as_printed=True) for case in cases],
         corrected=[expand_bound(case, as_printed=False) for case in cases],
         reference=norms,
-        correction="16(μp)⁴, 32(μ²d_max p)² and 32(μd_max)⁴(pπA/l)² in the inner bracket, and a "
-        "square root over that bracket (the copy at hand may have lost it)",
     )
     return combine_checks(bound, written_out)

@@ -33,7 +33,7 @@ _LABEL = "f_x of D at generic probes, by definition and kernel"
 # --- D --------------------------------------------------------------------------------------------
 
 
-@declare_claim("eq-17", "IV.D", "(17)")
+@declare_claim("eq-17")
 def field_d() -> Check:
     """Force of D, a spring to the nearest point; conservative.
 
@@ -47,7 +47,7 @@ def field_d() -> Check:
     return combine_checks(row.check(), loops)
 
 
-@declare_claim("eq-38", "App. II", "(38)")
+@declare_claim("eq-38")
 def force_x_of_d() -> Check:
     """f_x of D after (33) is used.
 
@@ -68,7 +68,7 @@ def force_x_of_d() -> Check:
     return combine_checks(row.check(), level)
 
 
-@declare_claim("sentence-IV.D-singular", "IV.D", flips_under="D's Jacobian without curvature, (18)")
+@declare_claim("sentence-IV.D-singular")
 def singular_d() -> Check:
     """Moving at right angles to the penetration leaves D's force as it is."""
     shares = []
@@ -84,7 +84,7 @@ def singular_d() -> Check:
     )
 
 
-@declare_claim("sentence-IV.D-number", "IV.D", flips_under="law E in the place of D")
+@declare_claim("sentence-IV.D-number")
 def number_d() -> Check:
     """‖J_D‖ = κ₀ whatever the surface, and q_D = 1."""
     norms = [float(s.norms().max()) / s.k for s in generic_probes("D", 12)]
@@ -104,7 +104,7 @@ def number_d() -> Check:
     )
 
 
-@declare_claim("remark-6", "IV.D", "Remark 6", flips_under="law E in the place of D")
+@declare_claim("remark-6")
 def remark_6() -> Check:
     """D's force jumps, on a sinusoid below its maxima (Fig. 2); its potential has a kink there."""
     checks = [_check_jumps(name, case) for name, case in SETTINGS.items()]
@@ -151,7 +151,7 @@ def _check_potential_kink() -> Check:
 # --- E --------------------------------------------------------------------------------------------
 
 
-@declare_claim("eq-21", "IV.E", "(21)")
+@declare_claim("eq-21")
 def norm_e() -> Check:
     """‖J_E‖ = κ₀ and q_E = 1."""
     probes = list(generic_probes("E", 6))
@@ -179,7 +179,7 @@ def _check_lipschitz_e() -> Check:
     )
 
 
-@declare_claim("sentence-IV.E-energy", "IV.E", flips_under="law D in the place of E")
+@declare_claim("sentence-IV.E-energy")
 def energy_e() -> Check:
     """Around the path of Fig. 3 E gains energy, on the rising leg only."""
     least, other = math.inf, 0.0
@@ -200,7 +200,7 @@ def energy_e() -> Check:
     )
 
 
-@declare_claim("remark-7", "IV.E", "Remark 7", flips_under="law D in the place of E")
+@declare_claim("remark-7")
 def remark_7() -> Check:
     """E is not conservative, but does not jump."""
     surface = PASSIVITY.surface("E")

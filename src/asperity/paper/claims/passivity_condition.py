@@ -18,22 +18,12 @@ from asperity.paper.cases import (
     path_points,
     random_settings,
 )
-from asperity.paper.claim import (
-    SCALED_JACOBIANS,
-    Check,
-    check_statement,
-    check_values,
-    combine_checks,
-    declare_claim,
-)
+from asperity.paper.claim import Check, check_statement, check_values, combine_checks, declare_claim
 from asperity.paper.formula_checks import check_difference_quotients, find_max_norm, format_by_name
 from asperity.paper.probes import generic_probes
 from asperity.surface import Surface
 
 _SLOW_SPEED = 0.05  # [m/s], a slow stroke
-_CORRECTION = (
-    "sufficient if the field is conservative and continuous, with at most one sample of delay"
-)
 
 
 def energy_gained(surface: Surface, path: FloatArray, loss: float, delay: int = 0) -> float:
@@ -120,7 +110,7 @@ def _delayed_wall_gain(delay: int = 2) -> float:
     return energy_gained(wall, path, 2.0 * wall.stiffness, delay)
 
 
-@declare_claim("eq-1", "III.A", "(1)", flips_under="law C in the place of A")
+@declare_claim("eq-1")
 def corollary() -> Check:
     """‖J‖ <= σ₀(B)/(2T) everywhere is sufficient for passivity (Corollary 1)."""
     net, damping, _path, _surface = _slow_loop_gain("A")
@@ -132,14 +122,13 @@ def corollary() -> Check:
         f"gains {gain:+.1e} κ₀D²; W with d = 2 gains {late * 1e6:+.2f} µJ",
         printed=net <= 0.0,
         corrected=gain <= 1e-12 and late > 0.0,
-        correction=_CORRECTION,
         net_gain_of_A=net,
         greatest_gain_of_C=gain,
         gain_of_W_two_samples_late=late,
     )
 
 
-@declare_claim("eq-2", "III.A", "(2)", flips_under="law C in the place of A")
+@declare_claim("eq-2")
 def increment_condition() -> Check:
     """The force changing by at most σ₀/(2T) per length at every step is sufficient.
 
@@ -155,13 +144,12 @@ def increment_condition() -> Check:
         f"all of its steps; the best of 132 motions on C gains {gain:+.1e} κ₀D²",
         printed=net <= 0.0 or share > 1.0 + 1e-9,
         corrected=gain <= 1e-12,
-        correction=_CORRECTION,
         greatest_left_side=share,
         net_gain_of_A=net,
     )
 
 
-@declare_claim("eq-3", "III.A", "(3)", flips_under=SCALED_JACOBIANS)
+@declare_claim("eq-3")
 def product_bound() -> Check:
     """To first order the force changes by J Δ, and ‖J Δ‖ <= ‖J‖₂ |Δ|.
 
@@ -191,7 +179,7 @@ def product_bound() -> Check:
     )
 
 
-@declare_claim("eq-4", "III.A", "(4)", flips_under="characteristic numbers times 0.999")
+@declare_claim("eq-4")
 def step_bound() -> Check:
     """With (1), the force changes by at most σ₀/(2T) |Δ|.
 
@@ -208,7 +196,7 @@ def step_bound() -> Check:
 # --- the characteristic number --------------------------------------------------------------------
 
 
-@declare_claim("eq-5", "III.B", "(5)", flips_under="characteristic numbers times 0.999")
+@declare_claim("eq-5")
 def number_is_intrinsic() -> Check:
     """q = σ_n(J)/κ₀ belongs to the algorithm, whatever κ₀ is.
 
@@ -237,7 +225,7 @@ def _norm_at_witness(surface: Surface) -> float:
     return float(np.linalg.norm(surface.jacobian(point, *state)[0], 2))
 
 
-@declare_claim("sentence-III.B-doubling", "III.B", flips_under="2πA/l for every q")
+@declare_claim("sentence-III.B-doubling")
 def doubling_halves_stiffness() -> Check:
     """Doubling the spatial frequency requires half the stiffness."""
     ratios: dict[str, list[float]] = {}
@@ -253,8 +241,6 @@ def doubling_halves_stiffness() -> Check:
         # From infinity to infinity the ratio is NaN.
         printed=all(abs(ratio[0] - 2.0) < 0.02 for ratio in ratios.values()),
         corrected=halving == "AF",
-        correction="for A and F, where the texture is steep; q of B, C and G then grows four "
-        "times, E's not at all, and D's is infinite",
         numbers={
             f"ratios for {law}": [r for r in ratio if math.isfinite(r)]
             for law, ratio in ratios.items()
@@ -262,7 +248,7 @@ def doubling_halves_stiffness() -> Check:
     )
 
 
-@declare_claim("sentence-III.B-compare", "III.B", flips_under="A's q for every law")
+@declare_claim("sentence-III.B-compare")
 def number_does_not_rank() -> Check:
     """q does not rank algorithms: its order depends on the parameters."""  # noqa: D403 - a symbol
     orders = set()
@@ -280,7 +266,7 @@ def number_does_not_rank() -> Check:
 # --- conservativity -------------------------------------------------------------------------------
 
 
-@declare_claim("sentence-III.C-curl", "III.C", flips_under="work around a path times 0")
+@declare_claim("sentence-III.C-curl")
 def zero_curl_is_conservative() -> Check:
     """A field with zero curl is conservative.
 
@@ -301,13 +287,12 @@ def zero_curl_is_conservative() -> Check:
         f"gains {work * 1e6:.2f} µJ per loop; W, C, D with curl 0 at most {max(loops):.1e} J",
         printed=not free or work == 0.0,
         corrected=len(smooth) == 3 and max(loops) < 1e-12,
-        correction="if the force also has no tangential jump where contact begins",
         work_with_zero_curl=work,
         work_of_W_C_D=max(loops),
     )
 
 
-@declare_claim("sentence-III.C-case-1", "III.C", flips_under="compiled forces times 0.9")
+@declare_claim("sentence-III.C-case-1")
 def condition_violated() -> Check:
     """Where (1) does not hold unwanted energy may be injected."""
     surface = SCANNING.surface("C")
@@ -323,9 +308,7 @@ def condition_violated() -> Check:
     )
 
 
-@declare_claim(
-    "sentence-III.C-case-2", "III.C", flips_under="law C in the place of A, law W in the place of E"
-)
+@declare_claim("sentence-III.C-case-2")
 def condition_with_generative_law() -> Check:
     """Where (1) holds and the law is generative, some motions may still gain."""
     nets = {law: _slow_loop_gain(law)[0] for law in "ABE"}
@@ -337,7 +320,7 @@ def condition_with_generative_law() -> Check:
     )
 
 
-@declare_claim("sentence-III.C-case-3", "III.C", flips_under="one sample of delay for two")
+@declare_claim("sentence-III.C-case-3")
 def condition_with_conservative_law() -> Check:
     """Where (1) holds and the field is conservative, every motion loses.
 
@@ -352,14 +335,13 @@ def condition_with_conservative_law() -> Check:
         "paper's own sum",
         printed=gain <= 1e-12 and late <= 0.0,
         corrected=gain <= 1e-12,
-        correction="with at most one sample of delay",
         greatest_gain=gain,
         gain_of_W_two_samples_late=late,
         gain_of_W_by_the_papers_sum=wall,
     )
 
 
-@declare_claim("sentence-abstract-texture", "Abstract", flips_under="law W in the place of C")
+@declare_claim("sentence-abstract-texture")
 def smooth_then_textured() -> Check:
     """A smooth surface that is rendered passively may lose this once textured."""
     wall, textured = SCANNING.surface("W"), SCANNING.surface("C")

@@ -44,7 +44,7 @@ def check_table_two_row(letter: str) -> Check:
     return combine_checks(_check_number(row), _check_conservativity(row), _check_continuity(row))
 
 
-@declare_claim("sentence-IV-figure-3", "IV.G", flips_under="law C in the place of A")
+@declare_claim("sentence-IV-figure-3")
 def figure_three_energies() -> Check:
     """Along the paths of Fig. 3 A, B, E, F and G gain energy.
 
@@ -71,7 +71,6 @@ def _check_number(row: TableTwoRow) -> Check:
             f"q = {row.q.value:.4f} ({row.q.method})",
             printed=not exists,
             corrected=exists,
-            correction=f"there is a closed form: q_{row.law} = {row.formula}",
             q=row.q.value,
         )
     return check_values(
@@ -91,7 +90,6 @@ def _check_appendix_bound(row: TableTwoRow) -> Check:
         f"the package's, whose modulation stays between 0 and 1, {row.q.value:.4f}",
         printed=abs(bound / true - 1.0) < 1e-6,
         corrected=bound > max(true, row.q.value),
-        correction="an upper bound, not attained",
         bound=bound,
         number_of_the_papers_law=true,
         number_of_the_packages_law=row.q.value,
@@ -104,7 +102,6 @@ def _check_conservativity(row: TableTwoRow) -> Check:
         f"{property_name}, the loop gives {row.energy * 1e6:+.1f} µJ",
         printed=row.conservativity_agrees,
         corrected=not row.conservative and row.energy > 0.0,
-        correction="conservative: no",
         energy=row.energy,
     )
 
@@ -127,7 +124,7 @@ def _check_continuity(row: TableTwoRow) -> Check:
 # --- Remarks --------------------------------------------------------------------------------------
 
 
-@declare_claim("remark-1", "IV", "Remark 1", flips_under="an observation that confirms it")
+@declare_claim("remark-1")
 def remark_1() -> Check:
     """What a texture feels like depends on more than the algorithm."""
     return check_observation(
@@ -142,7 +139,7 @@ def _refine_texture(case: ExperimentCase, factor: float) -> ExperimentCase:
     )
 
 
-@declare_claim("remark-2", "IV", "Remark 2", flips_under="characteristic numbers times 1.1")
+@declare_claim("remark-2")
 def remark_2() -> Check:
     """The results hold for any texture with a Lipschitz bound M in the place of 2πA/l.
 
@@ -164,8 +161,6 @@ def remark_2() -> Check:
         f"change {growth}; bounds with K >= |h''| are at least {margin:.3f} times q",
         printed=not changed,
         corrected=sorted(unchanged) == ["A", "E", "F"] and margin >= 1.0,
-        correction="M alone decides for A, E and F only; with a bound K on h'' too, "
-        "q_B <= √(1 + M²) + DK, q_C <= 1 + M² + DK, q_G <= max(1, DK), q_D = 1 if DK <= 1/2",
         numbers={f"q_{law}, coarse and fine": pair for law, pair in numbers.items()},
         least_margin=margin,
     )
@@ -190,9 +185,7 @@ def _least_bound_ratio() -> float:
 _CLAMPS = ("none", "lateral", "whole")
 
 
-@declare_claim(
-    "remark-3", "IV", "Remark 3", flips_under="a lateral clamp that holds the whole force"
-)
+@declare_claim("remark-3")
 def remark_3() -> Check:
     """Limiting the depth that the lateral force uses bounds the numbers of B, C, F and G."""
     growth, lateral, whole = (
@@ -221,8 +214,6 @@ def remark_3() -> Check:
             f"{loops['lateral'] * 1e6:.2f} and {abs(loops['whole']) * 1e6:.2f} µJ",
             printed=bounded == "BCFG",
             corrected=max(whole.values()) <= 1.0 + 1e-6 and abs(loops["whole"]) < 1e-12,
-            correction="the depth must be held in the whole force; held in the lateral part alone "
-            "it does not bound B and G, and C is no longer conservative",
             bounded_by_the_lateral_clamp=bounded,
             loop_of_C_lateral=loops["lateral"],
             loop_of_C_whole=loops["whole"],
@@ -230,7 +221,7 @@ def remark_3() -> Check:
     )
 
 
-@declare_claim("sentence-IV.F-clamp", "IV.F", flips_under="a lateral clamp that holds nothing")
+@declare_claim("sentence-IV.F-clamp")
 def unbounded_friction() -> Check:
     """The gain of F grows with the depth without bound; clamping p^z bounds it."""
     free, clamped = (
@@ -268,7 +259,7 @@ def _max_norm_at_depth(law: str, clamp: str, depth_factor: float) -> float:
 
 
 for _law, _row in TABLE_TWO.items():
-    _check, _place = partial(check_table_two_row, _law), ("Table II",)
+    _check, _texts = partial(check_table_two_row, _law), (_row["flips_under"], _row["correction"])
     DECLARED_CLAIMS.append(
-        Claim(f"table-2-{_law}", _place, "IV.H", _row["statement"], _check, _row["flips_under"])
+        Claim(f"table-2-{_law}", ("Table II",), "IV.H", _row["statement"], _check, *_texts)
     )
