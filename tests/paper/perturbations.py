@@ -259,7 +259,7 @@ def _delay_onsets(original: Callable[..., Any]) -> Callable[..., Any]:
             return one
         return replace(one, onset=replace(one.onset, cycling=10.0 * one.onset.cycling))
 
-    return lambda laws, delay, _starts: tuple(delayed(one) for one in original(laws, delay, 1))
+    return lambda laws, delays, _starts: tuple(delayed(one) for one in original(laws, delays, 1))
 
 
 SCALED_FORCES, SCALED_JACOBIANS = scale_forces(1.001), scale_jacobians(1.001)

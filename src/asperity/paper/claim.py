@@ -108,6 +108,7 @@ class Claim:
         flips_under: a change under which the verdict is different; optional for your own claims.
         correction: the corrected statement, which the evidence carries if it holds and the printed
             one does not.
+        fitted: parameters that were fitted or guessed; by default those that the check names.
     """
 
     id: str
@@ -117,6 +118,7 @@ class Claim:
     compute: Computation
     flips_under: str = ""
     correction: str = ""
+    fitted: str = ""
 
     def run(self) -> Result:
         """Compute the evidence and return it with the verdict.
@@ -129,6 +131,8 @@ class Claim:
             check = Check(f"could not be computed: {error}")
         if self.correction and check.verdict == "holds with correction":
             check = replace(check, correction=self.correction)
+        if self.fitted:
+            check = replace(check, fitted=self.fitted)
         about = self.id, self.equations, self.section, self.statement
         return Result(*about, check.verdict, check, self.flips_under)
 
@@ -150,8 +154,8 @@ def declare_claim(claim_id: str) -> Callable[[Computation], Computation]:
         statement = (compute.__doc__ or "").partition("\n")[0]
         row = CATALOGUE[claim_id]
         place = tuple(row.get("equations", ())), row["section"]
-        change, correction = row["flips_under"], row.get("correction", "")
-        DECLARED_CLAIMS.append(Claim(claim_id, *place, statement, compute, change, correction))
+        texts = (row.get(name, "") for name in ("flips_under", "correction", "fitted"))
+        DECLARED_CLAIMS.append(Claim(claim_id, *place, statement, compute, *texts))
         return compute
 
     return declare

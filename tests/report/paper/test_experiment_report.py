@@ -46,7 +46,7 @@ def test_tables_have_as_many_cells_as_headings(found: Experiments) -> None:
 
 def test_an_onset_that_may_be_lower_is_marked() -> None:
     def marked(laws: str) -> list[bool]:
-        figure = onset_figure(passivity_onsets(laws, 2, 1))
+        figure = onset_figure(passivity_onsets(laws, (2,), 1))
         lines = {line.get_label(): line for line in figure.axes[-1].lines}
         return list(np.isfinite(lines["the least tried"].get_ydata())) if len(lines) > 4 else []
 

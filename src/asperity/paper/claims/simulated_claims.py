@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 from asperity.paper.cases import PAPER_LAWS
 from asperity.paper.claim import (
@@ -15,13 +14,7 @@ from asperity.paper.claim import (
     declare_claim,
 )
 from asperity.paper.experiments.cycle_counts import STARTS, count_cycles, passivity_onsets
-from asperity.paper.experiments.experiment_setups import (
-    ALL_LAWS,
-    BUMP_SUMMARY,
-    FITTED_SUMMARY,
-    FITTED_SUMMARY_WITHOUT_DELAY,
-    HANDS_SUMMARY,
-)
+from asperity.paper.experiments.experiment_setups import ALL_LAWS
 from asperity.paper.experiments.strokes import BumpRun, bump_experiment, scanning_experiment
 from asperity.simulation.scan import Stroke
 
@@ -45,7 +38,6 @@ def check_over_assumptions(
     summary: str,
     by_paper_measure: Sequence[bool],
     by_exact_measure: Sequence[bool],
-    fitted: str,
     numbers: Mapping[str, Number],
 ) -> Check:
     """Judge an experiment for all guesses of what the paper leaves open.
@@ -57,7 +49,6 @@ def check_over_assumptions(
         summary: result with numbers.
         by_paper_measure: for each guess, whether the paper's measure confirms the claim.
         by_exact_measure: the same for the exact measure.
-        fitted: what was fitted or guessed.
         numbers: computed values by name.
     """
     outcomes = {*by_paper_measure, *by_exact_measure}
@@ -68,7 +59,7 @@ def check_over_assumptions(
         f"as printed in {sum(by_paper_measure)} of {len(by_paper_measure)} guesses by the paper's "
         f"measure, {sum(by_exact_measure)} by ours"
     )
-    return Check(f"{tally}: {summary}", numbers, "", fitted, verdict)
+    return Check(f"{tally}: {summary}", numbers, verdict=verdict)
 
 
 @declare_claim("sentence-V.A-cycles")
@@ -97,7 +88,6 @@ def textured_walls_cycle() -> Check:
         f"of {starts} starts cycle for good at {summary}",
         [is_confirmed(d, 1.0) for d in TRIED_DELAYS],
         [is_confirmed(d, 0.25 * starts) for d in TRIED_DELAYS],
-        FITTED_SUMMARY,
         numbers,
     )
 
@@ -113,7 +103,7 @@ def divided_walls_settle() -> Check:
     summary = f"A/5.1 and F/8.3 at lags of {delays} samples: {cycling} of {starts} starts cycle"
     numbers = {f"{one.law}/{one.divisor:g}, lag {one.delay}": float(one.cycles) for one in counts}
     settles = [one.cycles == 0 for one in counts]
-    return check_over_assumptions(summary, settles, settles, FITTED_SUMMARY, numbers)
+    return check_over_assumptions(summary, settles, settles, numbers)
 
 
 def _stroke_numbers(strokes: tuple[Stroke, ...]) -> dict[str, float]:
@@ -153,7 +143,6 @@ def _check_strokes(
         f"the paper's sum {_format_ranges(paper)}; exact ledger {_format_ranges(exact)}{suffix}",
         [predicate(*one) for one in paper],
         [predicate(*one) for one in exact],
-        HANDS_SUMMARY,
         _stroke_numbers(strokes),
     )
 
@@ -233,7 +222,7 @@ def law_a_loses_contact() -> Check:
     )
     # The energy of a jump must not be taken back, as it is by a field with a potential.
     confirmed = [0.25 * one.total < one.jump < one.total and one.lost > 1 for one in bumps]
-    return check_over_assumptions(summary, confirmed, confirmed, BUMP_SUMMARY, _bump_numbers(bumps))
+    return check_over_assumptions(summary, confirmed, confirmed, _bump_numbers(bumps))
 
 
 @declare_claim("sentence-V.C-D")
@@ -249,9 +238,7 @@ def law_d_is_balanced() -> Check:
     balanced = [
         abs(one.total) <= MARGINAL_SHARE * gain for one, gain in zip(bumps, gains, strict=True)
     ]
-    return check_over_assumptions(
-        f"{summary} of 20", balanced, balanced, BUMP_SUMMARY, _bump_numbers(bumps)
-    )
+    return check_over_assumptions(f"{summary} of 20", balanced, balanced, _bump_numbers(bumps))
 
 
 def _bump_numbers(bumps: tuple[BumpRun, ...]) -> dict[str, float]:
@@ -271,7 +258,9 @@ def divided_walls_are_passive() -> Check:
 
     κ₀ is the smooth wall's own onset of limit cycles in V.A's loop, q that of the depth reached.
     """
-    onsets = {one.onset.law: one for one in passivity_onsets(ALL_LAWS, 0, STARTS) if one.wall_rule}
+    onsets = {
+        one.onset.law: one for one in passivity_onsets(ALL_LAWS, (0,), STARTS) if one.wall_rule
+    }
     wall = onsets["W"].onset.quiet
     textured = {law: one for law, one in onsets.items() if law in PAPER_LAWS}
     violating = {law: one for law, one in textured.items() if one.violates_wall_rule}
@@ -283,7 +272,7 @@ def divided_walls_are_passive() -> Check:
     for law, one in textured.items():
         numbers[f"{law}: cycles at [N/m]"] = one.onset.cycling
         numbers[f"{law}: κ₀/q [N/m]"] = one.wall_rule or 0.0
-    check = check_statement(
+    return check_statement(
         f"without lag W is quiet to {wall:.0f} N/m; of {', '.join(textured)} cycle below κ₀/q: "
         f"{summary or 'none'}; D has no finite q there",
         printed=not violating,
@@ -291,7 +280,6 @@ def divided_walls_are_passive() -> Check:
         "field is conservative and nothing is late",
         numbers=numbers,
     )
-    return replace(check, fitted=FITTED_SUMMARY_WITHOUT_DELAY)
 
 
 SIMULATED_CLAIM_IDS = tuple(

@@ -111,12 +111,8 @@ def _observe_at(sample_counts: Sequence[int]) -> StopRule:
 
 
 @lru_cache(maxsize=64)
-def passivity_onsets(laws: str, delay: int, starts: int) -> tuple[Prediction, ...]:
-    """Return the onsets of laws at a delay, including W, and the limits by the criteria."""
-    return _onsets(laws, (delay,), starts)
-
-
-def _onsets(laws: str, delays: tuple[int, ...], starts: int) -> tuple[Prediction, ...]:
+def passivity_onsets(laws: str, delays: tuple[int, ...], starts: int) -> tuple[Prediction, ...]:
+    """Return the onsets of laws at delays, including W, and the limits by the criteria."""
     return sweep_onsets(
         band_setup("W"), laws, delays, n_phases=starts, tolerance=0.05, min_stiffness=50.0
     )
@@ -133,4 +129,4 @@ def passivity_experiment(
         starts: starts of the onsets; the counts have 24.
     """
     counts = map_threads(count_cycles, (*FIGURE_5_PANELS, *ADDED_PANELS))
-    return PassivityExperiment(counts, _onsets(laws, delays, starts))
+    return PassivityExperiment(counts, passivity_onsets(laws, delays, starts))

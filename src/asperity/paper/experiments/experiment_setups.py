@@ -29,26 +29,16 @@ FITTED_ASSUMPTIONS = (
 )
 """Parameters that section V.A requires and does not state."""
 
-FITTED_SUMMARY_WITHOUT_DELAY = "fitted: working point; guessed: masses, links, band, release"
-FITTED_SUMMARY = FITTED_SUMMARY_WITHOUT_DELAY.replace("fitted: ", "fitted: lag, ")
-"""One-line summary."""
-
 GUESSED_HANDS = (
     "The hand of section V.B, 300 N/m and 3 N·s/m, 50 g, pressing with 1 N: guessed",
     "Two more hands, softer and stiffer, and three speeds, to show their influence",
 )
 """Parameters that section V.B requires and does not state."""
 
-HANDS_SUMMARY = "guessed: three hands at three speeds each"
-"""One-line summary."""
-
 GUESSED_BUMP = (
     "Hands, entry height and speeds of section V.C: guessed; the paper's subject moved freely",
 )
 """Parameters that section V.C requires and does not state."""
-
-BUMP_SUMMARY = "guessed: two hands with their paths"
-"""One-line summary."""
 
 
 def band_setup(
@@ -57,7 +47,8 @@ def band_setup(
     """Return the loop of section V.A: an elastic band pulls the handle into the wall."""
     plant = Pantograph(joint_damping=PASSIVITY.joint_damping, centre=(0.0375, 0.1))
     surface, motion = PASSIVITY.surface(law, stiffness=stiffness), Stationary((0.0, 0.0, 0.0))
-    return _setup(surface, plant, BandHand(), _servo(delay), motion, 0.5, start=(0.0, 0.0, 4e-3))
+    start = (0.0, 0.0, 4e-3)
+    return _setup(surface, plant, BandHand(), motion, 0.5, delay=delay, start=start)
 
 
 HANDS = {
@@ -71,8 +62,8 @@ SPEEDS = (0.05, 0.1, 0.15)  # m/s
 def stroke_setup(law: str = "A", hand: str = "300 N/m", speed: float = 0.1) -> Setup:
     """Return the loop of section V.B: strokes of 80 mm along the wall, forth and back."""
     motion = Strokes((-0.04, 0.0, -1e-3), (0.04, 0.0, -1e-3), speed, count=5)
-    plant, servo = Pantograph(joint_damping=SCANNING.joint_damping), _servo(0)
-    return _setup(SCANNING.surface(law), plant, HANDS[hand], servo, motion, motion.duration)
+    plant = Pantograph(joint_damping=SCANNING.joint_damping)
+    return _setup(SCANNING.surface(law), plant, HANDS[hand], motion, motion.duration)
 
 
 ENTRIES = {
@@ -86,9 +77,9 @@ def bump_setup(law: str = "A", entry: str = "mid-height") -> Setup:
     """Return the loop of section V.C: one stroke over a bump of 20 mm and back."""
     hand, height, speed, start = ENTRIES[entry]
     motion = Strokes((-0.01, 0.0, height), (0.01, 0.0, height), speed, count=2)
-    plant, servo = Pantograph(joint_damping=BUMP.joint_damping), _servo(0)
+    plant = Pantograph(joint_damping=BUMP.joint_damping)
     surface = BUMP.surface(law, max_depth=0.02)
-    return _setup(surface, plant, hand, servo, motion, motion.duration, start=(-0.01, 0.0, start))
+    return _setup(surface, plant, hand, motion, motion.duration, start=(-0.01, 0.0, start))
 
 
 def device_setup(name: str, surface: Surface, hand: SpringHand) -> Setup:
@@ -106,18 +97,16 @@ def device_setup(name: str, surface: Surface, hand: SpringHand) -> Setup:
     return Setup(*loop, start=(0.0, 0.0, 1e-3), assumptions=(*assumed, *servo_assumptions))
 
 
-def _servo(delay: int) -> Servo:
-    return Servo(SAMPLING_PERIOD, delay, RESOLUTION)
-
-
 def _setup(
     surface: Surface,
     plant: Pantograph,
     hand: Hand,
-    servo: Servo,
     motion: Motion,
     duration: float,
+    *,
+    delay: int = 0,
     start: tuple[float, float, float] | None = None,
 ) -> Setup:
+    servo = Servo(SAMPLING_PERIOD, delay, RESOLUTION)
     loop = surface, load_device("pantograph"), plant, hand, servo, motion, duration
     return Setup(*loop, start=start, assumptions=plant.notes)
