@@ -19,6 +19,7 @@ import asperity.surface
 from asperity.paper.cases import SCANNING, ExperimentCase
 from asperity.paper.claim import Check, check_statement
 from asperity.paper.claims.design_limits import CORRECTED_LIMITS, Inequality
+from asperity.paper.claims.friction_law import FrictionCase
 from asperity.paper.probes import ProbePoint
 from asperity.surface import Surface
 
@@ -303,6 +304,7 @@ _ALL = (
         "√2 times the norm of (26)",
         "sticking_norm",
         lambda was: lambda case: math.sqrt(2.0) * was(case),
+        FrictionCase,
     ),
     replace_name(
         "three times the damping",
@@ -353,6 +355,7 @@ _ALL = (
         "Jacobians of the paper's F times 1.2",
         "max_norm_ratio",
         lambda was: lambda case: 1.2 * was(case),
+        FrictionCase,
     ),
     replace_name(
         "A and F cycling from every start, W from none", "count_cycles", _count_as_printed

@@ -20,12 +20,7 @@ from asperity.paper.claims import design_limits as claims_limits
 from asperity.paper.claims import friction_law as claims_appendix
 from asperity.paper.claims import passivity_condition as claims_passivity
 from asperity.paper.claims.formula_claims import FormulaRow
-from asperity.paper.claims.friction_law import (
-    PAPER_CASE,
-    matrix_norm,
-    random_friction_cases,
-    sticking_entries,
-)
+from asperity.paper.claims.friction_law import PAPER_CASE, matrix_norm, random_friction_cases
 from asperity.paper.probes import closest_point_derivatives, find_closest_point, generic_probes
 
 
@@ -160,7 +155,7 @@ def test_an_appendix_with_all_terms_right_holds(monkeypatch: pytest.MonkeyPatch)
 def test_the_expansion_needs_each_of_its_corrections() -> None:
     """The corrected expression is the norm by its characteristic polynomial."""
     for r in [PAPER_CASE, *random_friction_cases(5, 99)]:
-        a, b = sticking_entries(r)
+        a, b = r.sticking_entries()
         t = 1.0 + a * a + b * b
         eigenvalue = np.roots([1.0, -t, a * a]).real.max()
         assert claims_appendix.expand_bound(r, as_printed=False) ** 2 == pytest.approx(eigenvalue)
@@ -179,8 +174,8 @@ def test_number_of_the_papers_friction_by_brute_force() -> None:
         for rate, d in ((1.0, share), (0.0, np.sign(share))):
             a = r.friction * r.depth * ((1 - h) * rate / r.deflection - slope * d)
             best = max(best, matrix_norm(a, r.friction * (1 - h) * d))
-    assert best <= claims_appendix.max_norm_ratio(r) * (1.0 + 1e-9)
-    assert best == pytest.approx(claims_appendix.max_norm_ratio(r), rel=0.01)
+    assert best <= r.max_norm_ratio() * (1.0 + 1e-9)
+    assert best == pytest.approx(r.max_norm_ratio(), rel=0.01)
 
 
 def test_generic_probes_are_generic() -> None:

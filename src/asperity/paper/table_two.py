@@ -14,7 +14,7 @@ from asperity.analysis.gain.characteristic import characteristic_number, one_sid
 from asperity.core.display import Displayable
 from asperity.core.files import Serializable
 from asperity.paper.cases import PAPER_LAWS, PASSIVITY, SCANNING, TURNING_DEPTH
-from asperity.paper.claims.friction_law import PAPER_CASE, sticking_norm
+from asperity.paper.claims.friction_law import PAPER_CASE
 
 _ENERGY_TOLERANCE = 1e-9  # relative to k A²
 TABLE_TWO: dict[str, dict[str, str]] = tomllib.loads(
@@ -203,7 +203,7 @@ def _printed_rows() -> dict[str, PrintedRow]:
     b_energy = half + k * case.period**2 / (4.0 * math.pi**2) * (1.0 - root)
     # (27) with the modulation m = 1/2 of a law without texture, where the paper has m = 0.
     f_energy = 0.5 * k * case.friction * 0.5 * case.deflection * (case.depth - TURNING_DEPTH)
-    values = {"A": math.hypot(1.0, slope), "D": 1.0, "E": 1.0, "F": sticking_norm(PAPER_CASE)}
+    values = {"A": math.hypot(1.0, slope), "D": 1.0, "E": 1.0, "F": PAPER_CASE.sticking_norm()}
     energies = {"A": half, "B": b_energy, "C": 0.0, "D": 0.0, "F": f_energy}
     return {
         law: PrintedRow(

@@ -37,6 +37,11 @@ _CASES = 400
 _SCANS = 100
 
 
+def _holds(inequality: Inequality, values: Quantities) -> bool:
+    left, right = inequality(values)
+    return left < right
+
+
 def unit_invariant_share(inequality: Inequality, seed: int) -> float:
     """Return the share of random cases in which a change of units leaves an inequality as it is."""
     draw = np.random.default_rng(seed)
@@ -48,15 +53,13 @@ def unit_invariant_share(inequality: Inequality, seed: int) -> float:
             name: value * float(np.prod(scale ** np.array(_DIMENSIONS[name])))
             for name, value in values.items()
         }
-        left, right = inequality(values)
-        other_left, other_right = inequality(other)
-        same += (left < right) == (other_left < other_right)
+        same += _holds(inequality, values) == _holds(inequality, other)
     return same / _CASES
 
 
-def _check_dimensions(printed: Inequality, corrected: Inequality | None = None) -> Check:
-    """Check that both sides of an inequality have the same dimension."""
-    share = unit_invariant_share(printed, 1)
+def _check_dimensions(number: int) -> Check:
+    """Check that both sides of a limit, or of the corrected one, have the same dimension."""
+    share, corrected = unit_invariant_share(PRINTED_LIMITS[number], 1), CORRECTED_LIMITS.get(number)
     corrected_share = None if corrected is None else unit_invariant_share(corrected, 1)
     tail = f", corrected in {corrected_share:.2f}" if corrected and share < 1.0 else ""
     return check_statement(
@@ -107,28 +110,21 @@ def reconstruction_error(step: float, length: float, *, is_quantized: bool) -> f
     return float(np.std(force(at) - force(x)) / np.std(force(x)))
 
 
-def _check_reconstruction(
-    inequality: Inequality,
-    sample_name: str,
-    step: Callable[[Quantities], float],
-    seed: int,
-    *,
-    is_quantized: bool,
-) -> Check:
-    """Check that an inequality holds exactly where the kernel's force is reconstructed well enough.
+def _check_reconstruction(number: int, sample_name: str, *, is_quantized: bool) -> Check:
+    """Check that a limit holds exactly where the kernel's force is reconstructed well enough.
 
     That is, with a smaller error than from the required number of samples per period.
     """
-    draw, wrong = np.random.default_rng(seed), 0
+    draw, wrong = np.random.default_rng(number + 1), 0
     for _ in range(_SCANS):
         wanted = float(draw.uniform(5.0, 10.0))
         values = {name: float(draw.uniform(0.5, 2.0)) for name in _DIMENSIONS}
         values |= {"alpha": wanted, "beta": wanted}
-        values["l"] = step(values) * wanted * float(draw.choice([0.95, 1.05]))
+        step = values["delta"] if is_quantized else values["v"] * values["T"]
+        values["l"] = step * wanted * float(draw.choice([0.95, 1.05]))
         enough = reconstruction_error(1.0 / wanted, 1.0, is_quantized=is_quantized)
-        good = reconstruction_error(step(values), values["l"], is_quantized=is_quantized) < enough
-        left, right = inequality(values)
-        wrong += (left < right) != good
+        good = reconstruction_error(step, values["l"], is_quantized=is_quantized) < enough
+        wrong += _holds(PRINTED_LIMITS[number], values) != good
     return check_statement(
         f"wrong about whether the force of A is known better than from the required number of "
         f"{sample_name} in {wrong} of {_SCANS} random scans",
@@ -138,15 +134,11 @@ def _check_reconstruction(
 
 
 def _check_sample_count(
-    inequality: Inequality,
-    sample_name: str,
-    step: Callable[[Quantities], float],
-    window: str,
-    seed: int,
+    inequality: Inequality, sample_name: str, step: str, window: str, seed: int
 ) -> Check:
     """Check that an inequality holds exactly if every window contains enough samples.
 
-    Samples are ``step`` apart; the window length is the quantity named ``window``.
+    ``step`` and ``window`` are the names of the distance of samples and of the window's length.
     """
     draw = np.random.default_rng(seed)
     wrong = 0
@@ -154,9 +146,9 @@ def _check_sample_count(
         wanted = int(draw.integers(5, 11))
         values = {name: float(draw.uniform(0.5, 2.0)) for name in _DIMENSIONS}
         values |= {"alpha": wanted, "beta": wanted, "gamma": wanted}
-        values[window] = step(values) * float(draw.uniform(3.0, 14.0))
-        left, right = inequality(values)
-        wrong += (left < right) != (_min_sample_count(step(values), values[window]) >= wanted)
+        values[window] = values[step] * float(draw.uniform(3.0, 14.0))
+        is_enough = _min_sample_count(values[step], values[window]) >= wanted
+        wrong += _holds(inequality, values) != is_enough
     return check_statement(
         f"wrong about whether there are enough {sample_name} in {wrong} of 200 random cases",
         printed=wrong == 0,
@@ -170,11 +162,8 @@ def limit_1() -> Check:
 
     Checked with a force that is held from update to update.
     """
-    limit = PRINTED_LIMITS[1]
-    reconstruction = _check_reconstruction(
-        limit, "updates per period", lambda v: v["v"] * v["T"], 2, is_quantized=False
-    )
-    return combine_checks(reconstruction, _check_dimensions(limit))
+    reconstruction = _check_reconstruction(1, "updates per period", is_quantized=False)
+    return combine_checks(reconstruction, _check_dimensions(1))
 
 
 @declare_claim("limit-2")
@@ -183,11 +172,8 @@ def limit_2() -> Check:
 
     Checked with a force computed at the position that an encoder reads.
     """
-    limit = PRINTED_LIMITS[2]
-    reconstruction = _check_reconstruction(
-        limit, "steps of position per period", lambda v: v["delta"], 3, is_quantized=True
-    )
-    return combine_checks(reconstruction, _check_dimensions(limit))
+    reconstruction = _check_reconstruction(2, "steps of position per period", is_quantized=True)
+    return combine_checks(reconstruction, _check_dimensions(2))
 
 
 @declare_claim("limit-3")
@@ -197,30 +183,23 @@ def limit_3() -> Check:
     With α in place of β; checked for cases in which it differs from limit 2.
     """
     rng, differing, merged, count = np.random.default_rng(4), 0, 0, 4000
-
-    def holds(number: int, values: Quantities) -> bool:
-        left, right = PRINTED_LIMITS[number](values)
-        return left < right
-
+    second, third = PRINTED_LIMITS[2], PRINTED_LIMITS[3]
     for _ in range(count):
         values = {name: float(10.0 ** rng.uniform(-2.0, 1.0)) for name in _DIMENSIONS}
         greater = max(values["alpha"], values["beta"])
-        merged += (holds(2, values) and holds(3, values)) == (
+        merged += (_holds(second, values) and _holds(third, values)) == (
             greater * values["delta"] < values["l"]
         )
         values["beta"] = values["alpha"]
-        differing += holds(2, values) != holds(3, values)
-    return combine_checks(
-        _check_sample_count(
-            PRINTED_LIMITS[3], "steps of position per period", lambda v: v["delta"], "l", 5
-        ),
-        check_statement(
-            f"with α = β it differs from limit 2 in {differing} of {count} random cases",
-            printed=differing > 0,
-            corrected=merged == count,
-            cases_in_which_they_differ=float(differing),
-        ),
+        differing += _holds(second, values) != _holds(third, values)
+    samples = _check_sample_count(third, "steps of position per period", "delta", "l", 5)
+    difference = check_statement(
+        f"with α = β it differs from limit 2 in {differing} of {count} random cases",
+        printed=differing > 0,
+        corrected=merged == count,
+        cases_in_which_they_differ=float(differing),
     )
+    return combine_checks(samples, difference)
 
 
 @declare_claim("limit-4")
@@ -229,16 +208,9 @@ def limit_4() -> Check:
 
     Checked with steps of force.
     """
-    return combine_checks(
-        _check_sample_count(
-            CORRECTED_LIMITS[4],
-            "steps of force in an amplitude (corrected)",
-            lambda v: v["b"],
-            "force",
-            6,
-        ),
-        _check_dimensions(PRINTED_LIMITS[4], CORRECTED_LIMITS[4]),
-    )
+    samples = "steps of force in an amplitude (corrected)"
+    count = _check_sample_count(CORRECTED_LIMITS[4], samples, "b", "force", 6)
+    return combine_checks(count, _check_dimensions(4))
 
 
 @declare_claim("limit-5")
@@ -252,8 +224,7 @@ def limit_5() -> Check:
         "the greatest difference of forces of 4250 pairs of probes is, for A, B, C, E, G,",
         "q k per length",
     )
-    dimensions = _check_dimensions(PRINTED_LIMITS[5], CORRECTED_LIMITS[5])
-    return combine_checks(dimensions, quotients)
+    return combine_checks(_check_dimensions(5), quotients)
 
 
 @declare_claim("limit-6")
@@ -278,5 +249,5 @@ def limit_6() -> Check:
             printed=error < 1e-9,
             error=error,
         ),
-        _check_dimensions(PRINTED_LIMITS[6]),
+        _check_dimensions(6),
     )

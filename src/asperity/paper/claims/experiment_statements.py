@@ -33,13 +33,7 @@ from asperity.paper.claim import (
     combine_checks,
     declare_claim,
 )
-from asperity.paper.claims.friction_law import (
-    PAPER_CASE,
-    SCANNING_CASE,
-    FrictionCase,
-    max_norm_ratio,
-    sticking_norm,
-)
+from asperity.paper.claims.friction_law import PAPER_CASE, SCANNING_CASE, FrictionCase
 from asperity.paper.claims.passivity_condition import energy_gained
 from asperity.paper.formula_checks import (
     check_continuity,
@@ -98,7 +92,7 @@ def force_w() -> Check:
 @declare_claim("sentence-V.A-qF")
 def number_f() -> Check:
     """q_F = 8.3 for the stated parameters."""
-    own, true = sticking_norm(PAPER_CASE), max_norm_ratio(PAPER_CASE)
+    own, true = PAPER_CASE.sticking_norm(), PAPER_CASE.max_norm_ratio()
     package = PASSIVITY.q("F")
     return check_statement(
         f"(26) gives {own:.4f}, √2 times that is {math.sqrt(2.0) * own:.4f}; the greatest "
@@ -131,7 +125,7 @@ def _handle_damping(joint_damping: float, x: float) -> float:
 @declare_claim("sentence-V.A-rule")
 def stability_rule() -> Check:
     """At 2000 N/m W is within (1), A and F are not, and are when divided by their numbers."""
-    q_a, q_f = PASSIVITY.q("A"), sticking_norm(PAPER_CASE)
+    q_a, q_f = PASSIVITY.q("A"), PAPER_CASE.sticking_norm()
     numbers = {"W": 1.0, "A": q_a, "F": q_f, "A/5.1": q_a / 5.1, "F/8.3": q_f / 8.3}
     loads = {name: PASSIVITY.stiffness * number for name, number in numbers.items()}
     limits = [
@@ -209,7 +203,7 @@ def energy_sums() -> Check:
 def passivity_margins() -> Check:
     """The margin of passivity is larger than in section V.A."""
     numbers = {law: [case.q(law) for case in (PASSIVITY, SCANNING)] for law in "WABCEG"}
-    numbers["F"] = [sticking_norm(PAPER_CASE), sticking_norm(SCANNING_CASE)]
+    numbers["F"] = [PAPER_CASE.sticking_norm(), SCANNING_CASE.sticking_norm()]
     gain = SCANNING.joint_damping / SCANNING.stiffness
     gain *= PASSIVITY.stiffness / PASSIVITY.joint_damping
     ratios = {law: gain * before / after for law, (before, after) in numbers.items()}
@@ -335,7 +329,7 @@ def number_is_proportional() -> Check:
     base = ExperimentCase(1000.0, 1e-3, 0.8e-3)
     exponents = {law: growth_exponents(base, ExperimentCase.q, law) for law in "ABCEG"}
     # The package's law scales the heights; the paper's own bound does not.
-    exponents["F"] = growth_exponents(PAPER_CASE, sticking_norm)
+    exponents["F"] = growth_exponents(PAPER_CASE, FrictionCase.sticking_norm)
     proportional = [
         law for law, (a, length) in exponents.items() if max(abs(a - 1.0), abs(length + 1.0)) < 0.3
     ]
@@ -397,7 +391,7 @@ def conclusion_f() -> Check:
     Its number is not small, but a stroke forth and back loses energy.
     """
     numbers = {law: SCANNING.q(law) for law in "AEFG"}
-    bound = sticking_norm(SCANNING_CASE)
+    bound = SCANNING_CASE.sticking_norm()
     length, depth = 10.0 * SCANNING.deflection, -SCANNING.depth
     work = loop_work(SCANNING.surface("F"), [[0, 0, depth], [length, 0, depth]])
     return check_statement(

@@ -71,6 +71,35 @@ class FrictionCase:
         ]
         return np.array(phases)[..., ::2, ::2]
 
+    def sticking_entries(self) -> tuple[float, float]:
+        """Return the entries (1, 1) and (1, 2) of the printed (26) over -κ₀."""
+        rate = 1.0 / self.deflection + math.pi * self.amplitude / self.period
+        return 2.0 * self.friction * self.depth * rate, 2.0 * self.friction
+
+    def sticking_norm(self) -> float:
+        """Return the norm of the printed (26) over κ₀."""
+        return matrix_norm(*self.sticking_entries())
+
+    def max_norm_ratio(self) -> float:
+        """Return the greatest ‖J_F‖/κ₀ of the paper's law with h = A sin, by its kernel.
+
+        The maximum is over x and both phases at |d| = d_max and the greatest depth, since the norm
+        is convex in both.
+        """
+        return float(np.linalg.norm(self.compiled_jacobians(20001), 2, axis=(-2, -1)).max())
+
+    def max_entries(self) -> FloatArray:
+        """Return the greatest entries (1, 1) and (1, 2) by the kernel: sliding, then sticking.
+
+        Both are linear in d, so they are greatest at |d| = d_max.
+        """
+        return np.asarray(np.abs(self.compiled_jacobians(40001)[..., 0, :]).max(axis=(1, 2)))
+
+
+def matrix_norm(a: float, b: float) -> float:
+    """Return ‖[[a, b], [0, 1]]‖."""
+    return float(np.linalg.norm(np.array([[a, b], [0.0, 1.0]]), 2))
+
 
 PAPER_CASE = FrictionCase(0.8, 1e-3, 0.8, 1e-3, 1e-3)
 """Section V.A, where the paper uses A = 0.8 mm for the dimensionless A: in millimetres, 0.8."""
@@ -88,22 +117,6 @@ def random_friction_cases(count: int = 4, seed: int = 7) -> Iterator[FrictionCas
             period=draw.uniform(0.5e-3, 4e-3),
             depth=draw.uniform(0.1e-3, 2e-3),
         )
-
-
-def sticking_entries(r: FrictionCase) -> tuple[float, float]:
-    """Return the entries (1, 1) and (1, 2) of the printed (26) over -κ₀."""
-    a = 2.0 * r.friction * r.depth * (1.0 / r.deflection + math.pi * r.amplitude / r.period)
-    return a, 2.0 * r.friction
-
-
-def matrix_norm(a: float, b: float) -> float:
-    """Return ‖[[a, b], [0, 1]]‖."""
-    return float(np.linalg.norm(np.array([[a, b], [0.0, 1.0]]), 2))
-
-
-def sticking_norm(case: FrictionCase) -> float:
-    """Return the norm of the printed (26) over κ₀."""
-    return matrix_norm(*sticking_entries(case))
 
 
 # --- field and Jacobian ---------------------------------------------------------------------------
@@ -243,14 +256,6 @@ def stick_slip_phases() -> Check:
     )
 
 
-def _max_entries(r: FrictionCase) -> FloatArray:
-    """Return the greatest entries (1, 1) and (1, 2) by the kernel: sliding, then sticking.
-
-    Both are linear in d, so they are greatest at |d| = d_max.
-    """
-    return np.asarray(np.abs(r.compiled_jacobians(40001)[..., 0, :]).max(axis=(1, 2)))
-
-
 @declare_claim("eq-25")
 def sliding_entries_bound() -> Check:
     """Greatest entries of F's Jacobian while sliding."""
@@ -261,7 +266,7 @@ def sliding_entries_bound() -> Check:
         "greatest entries while sliding, 5 parameter sets",
         printed=np.column_stack([first, [2.0 * r.friction for r in cases]]),
         corrected=np.column_stack([first, second]),
-        reference=np.array([_max_entries(r)[0] for r in cases]),
+        reference=np.array([r.max_entries()[0] for r in cases]),
         tolerance=1e-8,
     )
 
@@ -270,8 +275,8 @@ def sliding_entries_bound() -> Check:
 def sticking_entries_bound() -> Check:
     """Greatest entries of F's Jacobian while sticking."""
     cases = [PAPER_CASE, *random_friction_cases()]
-    printed = np.array([sticking_entries(case) for case in cases])
-    reference = np.array([_max_entries(case)[1] for case in cases])
+    printed = np.array([case.sticking_entries() for case in cases])
+    reference = np.array([case.max_entries()[1] for case in cases])
     entries = check_values(
         "greatest entries while sticking, 5 parameter sets",
         printed=printed,
@@ -419,21 +424,12 @@ def expand_bound(r: FrictionCase, *, as_printed: bool) -> float:
     return math.sqrt(2.0) / (2.0 * d) * math.sqrt(max(whole, 0.0))
 
 
-def max_norm_ratio(r: FrictionCase) -> float:
-    """Return the greatest ‖J_F‖/κ₀ of the paper's law with h = A sin, by its kernel.
-
-    The maximum is over x and both phases at |d| = d_max and the greatest depth, since the norm is
-    convex in both.
-    """
-    return float(np.linalg.norm(r.compiled_jacobians(20001), 2, axis=(-2, -1)).max())
-
-
 @declare_claim("eq-31")
 def friction_number_bound() -> Check:
     """An upper bound on q_F, and its expression written out."""
     cases = [PAPER_CASE, *random_friction_cases(6)]
-    norms = [sticking_norm(case) for case in cases]
-    ratios = [max_norm_ratio(case) / norm for case, norm in zip(cases, norms, strict=True)]
+    norms = [case.sticking_norm() for case in cases]
+    ratios = [case.max_norm_ratio() / norm for case, norm in zip(cases, norms, strict=True)]
     bound = check_statement(
         f"the greatest ‖J_F‖/κ₀ is {min(ratios):.3f} to {max(ratios):.3f} of the norm of (26)",
         printed=max(ratios) <= 1.0,

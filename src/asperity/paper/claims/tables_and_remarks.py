@@ -23,7 +23,7 @@ from asperity.paper.claim import (
     declare_claim,
     relative_error,
 )
-from asperity.paper.claims.friction_law import PAPER_CASE, max_norm_ratio, sticking_norm
+from asperity.paper.claims.friction_law import PAPER_CASE
 from asperity.paper.figures import loop_energies
 from asperity.paper.formula_checks import format_by_name
 from asperity.paper.probes import generic_profile
@@ -84,7 +84,7 @@ def _check_number(row: TableTwoRow) -> Check:
 
 def _check_appendix_bound(row: TableTwoRow) -> Check:
     """Check the bound of Appendix I on law F; the package's law has a number of its own."""
-    bound, true = sticking_norm(PAPER_CASE), max_norm_ratio(PAPER_CASE)
+    bound, true = PAPER_CASE.sticking_norm(), PAPER_CASE.max_norm_ratio()
     return check_statement(
         f"Appendix I gives {bound:.4f}; the greatest ‖J‖/κ₀ of the paper's law is {true:.4f}, of "
         f"the package's, whose modulation stays between 0 and 1, {row.q.value:.4f}",
@@ -150,7 +150,8 @@ def remark_2() -> Check:
     numbers = {law: [case.q(law) for case in cases] for law in "ABCDEG"}
     # The paper's own bound for F, whose h is dimensionless.
     numbers["F"] = [
-        sticking_norm(replace(PAPER_CASE, amplitude=0.8 / n, period=1e-3 / n)) for n in (1.0, 100.0)
+        replace(PAPER_CASE, amplitude=0.8 / n, period=1e-3 / n).sticking_norm()
+        for n in (1.0, 100.0)
     ]
     unchanged = [law for law, pair in numbers.items() if relative_error(*pair) < 1e-9]
     changed = [law for law in numbers if law not in unchanged]
