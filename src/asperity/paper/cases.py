@@ -62,6 +62,13 @@ class ExperimentCase:
             arguments |= {"friction": self.friction, "max_deflection": self.deflection}
         return Surface(self.texture, law, **(arguments | changes))
 
+    def untextured_friction(self) -> Surface:
+        """Return law F without texture, with twice the friction.
+
+        Its modulation m = 1/2 then equals the paper's h = 0.
+        """
+        return self.surface("F", modulation_depth=0.0, friction=2.0 * self.friction)
+
     def q(self, law: str) -> float:
         """Return the characteristic number of a law."""
         return characteristic_number(self.surface(law)).value

@@ -131,12 +131,9 @@ def loop_energies() -> tuple[LoopEnergy, ...]:
 
 def _loop_energy(law: str) -> LoopEnergy:
     x, height = _profile()
-    changes = {}
+    surface = SCANNING.surface(law)
     if law == "F":
-        # The law's m is 1/2 without texture; twice the friction makes that the paper's h = 0.
-        changes = {"modulation_depth": 0.0, "friction": 2.0 * SCANNING.friction}
-        height = np.zeros_like(height)
-    surface = SCANNING.surface(law, **changes)
+        surface, height = SCANNING.untextured_friction(), np.zeros_like(height)
     corners = SCANNING.loop_path(law)
     legs = zip(corners, np.roll(corners, -1, axis=0), strict=True)
     share = np.linspace(0.0, 1.0, _STEPS_PER_SEGMENT, endpoint=False)[:, None]

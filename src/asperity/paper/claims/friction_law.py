@@ -11,7 +11,7 @@ import numpy as np
 
 from asperity.analysis.energy.loop_integral import loop_work
 from asperity.core.checks import FloatArray
-from asperity.paper.cases import SCANNING, ExperimentCase, random_settings
+from asperity.paper.cases import SCANNING, random_settings
 from asperity.paper.claim import (
     Check,
     check_observation,
@@ -317,7 +317,7 @@ def energy_f() -> Check:
     cases, share = [SCANNING, *random_settings(4)], 0.2
     printed, reference, limit = [], [], 0.0
     for case in cases:
-        surface = _untextured_surface(case)
+        surface = case.untextured_friction()
         whole = 0.5 * case.stiffness * case.friction * case.depth * case.deflection
         printed.append(whole)
         reference.append(loop_work(surface, case.friction_path(share * case.depth)))
@@ -336,11 +336,6 @@ def energy_f() -> Check:
             error_in_the_limit=limit,
         ),
     )
-
-
-def _untextured_surface(case: ExperimentCase) -> Surface:
-    """Return law F without texture, for which m = 1/2, as in the paper for h = 0."""
-    return case.surface("F", modulation_depth=0.0, friction=2.0 * case.friction)
 
 
 @declare_claim("sentence-IV.F-stick")
@@ -382,7 +377,7 @@ def compliant_materials() -> Check:
     for deflection in (1e-3, 1e-2):
         case = replace(SCANNING, deflection=deflection)
         path = case.friction_path(1e-7 * case.depth)
-        energies.append(loop_work(_untextured_surface(case), path))
+        energies.append(loop_work(case.untextured_friction(), path))
     ratio, energy = energies[1] / energies[0], energies[1] * 1e3
     return check_statement(
         f"d_max from 1 mm to 1 cm multiplies the energy by {ratio:.6f}, to {energy:.2f} mJ",
