@@ -24,8 +24,8 @@ from rich.table import Table
 
 from asperity.analysis import characteristic_number
 from asperity.devices.five_bar import handle_damping
-from asperity.paper.experiments.experiment_setups import band_setup
 from asperity.paper.cases import PASSIVITY
+from asperity.paper.experiments.experiment_setups import band_setup
 from asperity.scene.setup import Setup
 from asperity.scene.sweeps import map_threads, sweep_onsets
 from asperity.simulation import Cartesian, Pantograph, Plant, SpringHand
