@@ -14,7 +14,7 @@ from rich.table import Table
 from asperity.core.checks import FloatArray
 from asperity.recording.recording import open_recording
 from asperity.recording.writer import RecordingWriter
-from asperity.simulation.trace import COLUMNS, RecordingTrace, TextTrace
+from asperity.simulation.trace import COLUMNS, TextTrace
 from bench.timing import median_ratio, take_turns
 
 GOAL_CORE = 0.05
@@ -61,14 +61,10 @@ def _share(path: Path, rows: FloatArray, block: int) -> float:
 
 def _per_row(console: Console, folder: Path) -> None:
     rows = _rows(16_384)  # as many as a simulation hands on at once
-    recording, text = RecordingTrace(folder / "a.mcap"), TextTrace(folder / "a.csv")
-
-    def keep(trace: RecordingTrace | TextTrace) -> None:
-        trace.buffer(len(rows))[: len(rows)] = rows
-        trace.commit(len(rows))
-
+    recording = RecordingWriter(folder / "a.mcap", COLUMNS, None, None, "trace")
+    text = TextTrace(folder / "a.csv")
     try:
-        times = take_turns([partial(keep, recording), partial(keep, text)], ROUNDS)
+        times = take_turns([partial(recording.append, rows), partial(text.append, rows)], ROUNDS)
     finally:
         recording.close()
         text.close()

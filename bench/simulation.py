@@ -30,8 +30,8 @@ from asperity.simulation import (
     simulate,
     simulate_many,
 )
-from asperity.simulation.closed_loop import Simulation
 from asperity.simulation.plants import Plant, sampled_plant
+from asperity.simulation.simulate import Simulation
 from asperity.surface import Surface
 from asperity.textures import Sinusoid
 from bench.random_scenes import delay_rule

@@ -24,8 +24,8 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError
 from asperity.report.loop.run_report import search_error_text
 from asperity.simulation import Cartesian, Servo, SpringHand, Stationary, simulate
-from asperity.simulation.closed_loop import Simulation
 from asperity.simulation.plants import sampled_plant
+from asperity.simulation.simulate import Simulation
 from asperity.surface import Surface
 from asperity.textures import Fourier, HeightMap, Profile, Sinusoid
 from asperity.textures.texture import Texture

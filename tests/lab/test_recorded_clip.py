@@ -30,7 +30,7 @@ from asperity.scene.setup import make_setup
 from asperity.servo.driver_loop import DriverLoop, build_program, no_clock
 from asperity.servo.drivers.simulated import simulated_driver
 from asperity.servo.loop_memory import LoopMemory
-from asperity.servo.loop_recorder import LoopRecorder
+from asperity.servo.process import LoopRecorder
 
 WIDTH = len(COLUMNS) + 2 * len(ANCHOR_COLUMNS)
 NAMES = [name for name, _unit in (*COLUMNS, *ANCHOR_COLUMNS)]

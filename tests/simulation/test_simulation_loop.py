@@ -18,9 +18,9 @@ from asperity.simulation import (
     Waypoints,
     simulate,
 )
-from asperity.simulation.closed_loop import Simulation
 from asperity.simulation.discretization import discretize, linear_body
 from asperity.simulation.plants import SampledPlant, sampled_plant
+from asperity.simulation.simulate import Simulation
 from asperity.simulation.trace import COLUMNS
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid

@@ -152,7 +152,7 @@ def record_loop(path: str | None, loop: ServoProcess, setup: Setup) -> Iterator[
     if path is None:
         yield lambda: None
         return
-    from asperity.servo.loop_recorder import LoopRecorder
+    from asperity.servo.process import LoopRecorder
 
     metadata = setup.recording_metadata(loop.driver_name)
     with LoopRecorder(path, loop, setup.surface, setup.servo, metadata) as recorder:

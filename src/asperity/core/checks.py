@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from asperity.core.errors import ParameterError
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 Values = TypeVar("Values", bound=NDArray[Any])
 
 # Beyond these limits products of a few values leave the range of double precision.

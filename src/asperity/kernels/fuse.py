@@ -139,6 +139,7 @@ def fuse_path(law: Law, sampler: Modules, clamp: Clamp) -> ModuleType:
     return fuse_on_texture(law, sampler, clamp, (path_loop,), overrides)
 
 
+@lru_cache(maxsize=256)
 def fuse_on_texture(
     law: Law, sampler: Modules, clamp: Clamp, modules: Modules, overrides: Modules = ()
 ) -> ModuleType:

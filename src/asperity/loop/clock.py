@@ -2,9 +2,7 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from asperity.core.checks import IntArray
 from asperity.core.compiled import Kernels, call_address
 
 KERNELS = Kernels(provides=("clock_now", "clock_wait_until"), native=("call_address",))
@@ -27,7 +25,7 @@ class Clock(NamedTuple):
 
     gettime: int
     nanosleep: int
-    timespec: NDArray[np.int64]
+    timespec: IntArray
 
 
 def clock_now(due: int, clock: Clock) -> int:

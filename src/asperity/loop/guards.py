@@ -130,26 +130,17 @@ def is_finite_vector(x: float, y: float, z: float) -> bool:
     return abs(x) + abs(y) + abs(z) < math.inf
 
 
-def limit_magnitude(x: float, y: float, z: float, max_force: float) -> LimitedForce:
-    """Return a force shortened to a length [N]."""
-    square = x * x + y * y + z * z
-    if square <= max_force * max_force:
-        return LimitedForce(x, y, z, False)
-    # Shorter by a few units in the last place: rounding must not make it longer.
-    share = (1.0 - 1e-15) * max_force / math.sqrt(square)
-    return LimitedForce(share * x, share * y, share * z, True)
-
-
-def limit_slew(
-    force: LimitedForce, hx: float, hy: float, hz: float, max_change: float
+def limit_change(
+    x: float, y: float, z: float, hx: float, hy: float, hz: float, max_change: float
 ) -> LimitedForce:
-    """Return a force at most a distance [N] from the held force (hx, hy, hz)."""
-    dx = force.x - hx
-    dy = force.y - hy
-    dz = force.z - hz
+    """Return a force at most a distance [N] from the force (hx, hy, hz)."""
+    dx = x - hx
+    dy = y - hy
+    dz = z - hz
     square = dx * dx + dy * dy + dz * dz
     if square <= max_change * max_change:
-        return LimitedForce(force.x, force.y, force.z, False)
+        return LimitedForce(x, y, z, False)
+    # Shorter by a few units in the last place: rounding must not make it longer.
     share = (1.0 - 1e-15) * max_change / math.sqrt(square)
     return LimitedForce(hx + share * dx, hy + share * dy, hz + share * dz, True)
 
@@ -250,11 +241,13 @@ def guard_force(
     most = limits.max_damping if ramp > 0.0 else 0.0
     damping = passivity_damping(energy, dx, dy, dz, settings.period, most)
     drag = damping / settings.period
-    wanted = limit_magnitude(
+    wanted = limit_change(
         ramp * servo.fx - drag * dx, ramp * servo.fy - drag * dy, ramp * servo.fz - drag * dz,
-        settings.max_force,
+        0.0, 0.0, 0.0, settings.max_force,
     )  # fmt: skip
-    limited = limit_slew(wanted, force.fx, force.fy, force.fz, limits.max_change)
+    limited = limit_change(
+        wanted.x, wanted.y, wanted.z, force.fx, force.fy, force.fz, limits.max_change
+    )
     status[FORCE_LIMIT_COUNT] += wanted.is_limited
     status[SLEW_LIMIT_COUNT] += limited.is_limited
     return GuardedForce(limited.x, limited.y, limited.z, ramp, energy, damping)

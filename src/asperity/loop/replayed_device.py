@@ -4,10 +4,7 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from asperity.core.checks import FloatArray
+from asperity.core.checks import FloatArray, IntArray
 from asperity.core.compiled import Kernels
 from asperity.loop.interface import OK
 
@@ -23,7 +20,7 @@ class ReplayedDevice(NamedTuple):
     """
 
     points: FloatArray
-    samples_done: NDArray[np.int64]
+    samples_done: IntArray
 
 
 def device_read(position: FloatArray, device: ReplayedDevice) -> int:

@@ -10,10 +10,7 @@ of rows, so a reader that reads the count finds the row; see
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from asperity.core.checks import FloatArray
+from asperity.core.checks import FloatArray, IntArray
 from asperity.core.compiled import Kernels, store_release
 from asperity.kernels.tick import ServoSettings, ServoState
 from asperity.loop.interface import GuardedForce, Reading
@@ -55,10 +52,10 @@ class SharedBlock(NamedTuple):
         swap: nonzero while another surface is ready (1,).
     """
 
-    control: NDArray[np.int64]
-    status: NDArray[np.int64]
+    control: IntArray
+    status: IntArray
     rows: FloatArray
-    swap: NDArray[np.int64]
+    swap: IntArray
 
 
 def trace_sample(

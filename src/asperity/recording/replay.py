@@ -16,11 +16,12 @@ from asperity.core.display import Displayable
 from asperity.core.errors import ParameterError
 from asperity.core.files import Serializable, open_input
 from asperity.core.version import __version__
+from asperity.kernels import tick
+from asperity.kernels.fuse import fuse_on_texture
 from asperity.kernels.tick import ServoSettings
 from asperity.laws import Law
 from asperity.loop import no_guards, replayed_device, servo_loop
 from asperity.loop.interface import LoopState
-from asperity.loop.loop_program import fuse_loop
 from asperity.loop.replayed_device import ReplayedDevice
 from asperity.recording import replay_trace
 from asperity.recording.recorded_field import (
@@ -203,8 +204,8 @@ def _replay_blocks(
             raise ParameterError("recording", f"cannot be replayed: it has no column {name!r}")
     point = [names.index(axis) for axis in "xyz"]
     compared = [0, *(names.index(name) for name in COMPARED_COLUMNS)]
-    parts = servo_loop, no_guards, replayed_device, replay_trace
-    loops = fuse_loop(field.law, field.sampler, field.clamp, *parts)
+    parts = servo_loop, no_guards, replayed_device, replay_trace, tick
+    loops = fuse_on_texture(field.law, field.sampler, field.clamp, parts)
     state, first = LoopState(), 0
     memory = new_warm_start(field.law.contact.max_evaluations)
     for block in recording.blocks():

@@ -1,12 +1,14 @@
-"""A loop in a process of its own, as the program that starts and supervises it sees it."""
+"""A loop in a process of its own, as the program that starts, supervises and records it sees it."""
 
 from __future__ import annotations
 
 import math
+import os
 import pickle
 import sys
 import threading
 import time
+from collections.abc import Mapping
 from contextlib import suppress
 from importlib.util import find_spec
 from multiprocessing.context import SpawnContext
@@ -14,12 +16,22 @@ from typing import Any, Self
 
 from asperity.core.checks import FloatArray
 from asperity.core.errors import AsperityError, ParameterError
+from asperity.core.files import to_plain_data
 from asperity.devices import Device
-from asperity.servo.driver_loop import NO_END, LoopProgram, build_program
+from asperity.loop.shared_trace import COLUMNS
+from asperity.recording.recorded_field import field_attachments, field_metadata
+from asperity.recording.writer import RecordingWriter
+from asperity.servo.driver_loop import (
+    NO_END,
+    LoopJob,
+    LoopProgram,
+    ModuleFiles,
+    build_program,
+    run_loop_process,
+)
 from asperity.servo.drivers.driver import Driver
 from asperity.servo.fault import FAULT_SAMPLES, DeviceFault, EndReason, describe_end_reason
 from asperity.servo.loop_memory import LoopMemory, LoopStatistics
-from asperity.servo.process_main import LoopJob, ModuleFiles, run_loop_process
 from asperity.servo.safety import Safety
 from asperity.simulation.servo import Servo
 from asperity.surface import Surface
@@ -312,3 +324,48 @@ def _is_importable(name: str) -> bool:
         return find_spec(name) is not None
     except ValueError:  # a module without a spec
         return False
+
+
+class LoopRecorder:
+    """Records every sample of a loop, if called often enough; use it in a ``with``.
+
+    Args:
+        path: path of the recording.
+        loop: the loop, or its memory.
+        surface: the surface that it renders.
+        servo: servo of the loop.
+        metadata: further metadata of the recording; plain data.
+
+    Attributes:
+        lost_rows: rows that were overwritten before they were read.
+
+    Raises:
+        ParameterError: for a path that cannot be written.
+    """
+
+    def __init__(
+        self, path: str | os.PathLike[str], loop: ServoProcess | LoopMemory, surface: Surface,
+        servo: Servo, metadata: Mapping[str, Any],
+    ) -> None:  # fmt: skip
+        about: dict[str, Any] = {"made_by": "run", "surface": field_metadata(surface)}
+        about |= {"servo": to_plain_data(servo), "every": 1, **metadata}
+        self._writer = RecordingWriter(path, COLUMNS, about, field_attachments(surface), "record")
+        self._loop, self._next_row, self.lost_rows = loop, 0, 0
+
+    def write_new_rows(self) -> None:
+        """Write the rows that are new.
+
+        Raises:
+            ParameterError: if the disk is full; what is written can be read.
+        """
+        rows, first = self._loop.rows(self._next_row)
+        self.lost_rows += first - self._next_row
+        self._next_row = first + len(rows)
+        self._writer.append(rows)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.write_new_rows()
+        self._writer.close()

@@ -17,20 +17,22 @@ from numpy.typing import ArrayLike
 from asperity.contacts.warm_start import new_warm_start
 from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
-from asperity.loop.loop_program import fuse_loop
-from asperity.simulation.closed_loop import STOP_REASONS, check_delay
+from asperity.kernels import tick
+from asperity.kernels.fuse import fuse_on_texture
 from asperity.simulation.hands import Hand, Motion
-from asperity.simulation.kernels import (
-    batch_loop,
-    pantograph_lanes,
-    sequential_lanes,
-    simulated_device,
-)
+from asperity.simulation.kernels import batch_loop, pantograph_lanes, simulated_device
 from asperity.simulation.kernels.body_interface import LANES, SAMPLES, STOP
 from asperity.simulation.kernels.energy_ledger import FRICTION, LEDGER_SIZE, LOST, SUPPLIED
 from asperity.simulation.plants import Plant, sampled_plant
 from asperity.simulation.servo import Servo
-from asperity.simulation.simulate import CHUNK_SAMPLES, anchor_points, check_parts, initial_motion
+from asperity.simulation.simulate import (
+    CHUNK_SAMPLES,
+    STOP_REASONS,
+    anchor_points,
+    check_delay,
+    check_parts,
+    initial_motion,
+)
 from asperity.simulation.trace import StopReason
 from asperity.surface import Surface
 
@@ -179,10 +181,10 @@ class BatchSimulation:
     @cached_property
     def _compiled(self) -> ModuleType:
         surface = self._surface
-        return fuse_loop(
-            surface.law, surface.texture.sampler, surface.effective_clamp, batch_loop,
-            simulated_device, *self._body.modules, sequential_lanes,
-        )  # fmt: skip
+        modules = *self._body.modules, batch_loop, tick, simulated_device
+        return fuse_on_texture(
+            surface.law, surface.texture.sampler, surface.effective_clamp, modules
+        )
 
     def new_trajectory(
         self, stiffness: float, delay: int, offset: FloatArray, stop_rule: StopRule

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -55,35 +54,7 @@ def is_text_path(path: Path) -> bool:
     return suffix in _TEXT_SUFFIXES
 
 
-class Trace:
-    """Base class of traces: a buffer that the compiled loop fills, chunk by chunk."""
-
-    def __init__(self) -> None:
-        self._buffer = np.empty((0, len(COLUMNS)))
-
-    def buffer(self, rows: int) -> FloatArray:
-        """Return a buffer for a number of rows."""
-        if len(self._buffer) < rows:
-            self._buffer = np.empty((rows, len(COLUMNS)))
-        return self._buffer
-
-    def commit(self, rows: int) -> None:
-        """Store the first rows of the buffer.
-
-        Raises:
-            ParameterError: if a file cannot grow; it then ends with a whole block or line.
-        """
-        raise NotImplementedError
-
-    def table(self) -> FloatArray:
-        """Return the rows in memory; none if they are in a file."""
-        return np.empty((0, len(COLUMNS)))
-
-    def close(self) -> None:
-        """Close the file, if there is one."""
-
-
-class DecimatedTrace(Trace):
+class DecimatedTrace:
     """A trace in memory: all rows, or every n-th so that a number of rows is not exceeded.
 
     Args:
@@ -95,7 +66,6 @@ class DecimatedTrace(Trace):
     """
 
     def __init__(self, rows: int, max_rows: int | None) -> None:
-        super().__init__()
         most = rows if max_rows is None else max_rows
         self._step = max(1, -(-rows // most)) if most else rows + 1
         try:
@@ -105,54 +75,30 @@ class DecimatedTrace(Trace):
             raise ParameterError("trace", limit) from None
         self._rows_seen = self._row_count = 0
 
-    def commit(self, rows: int) -> None:
-        """Store every n-th row of the first rows of the buffer."""
+    def append(self, rows: FloatArray) -> None:
+        """Store every n-th row."""
         if len(self._table):
-            chosen = self._buffer[-self._rows_seen % self._step : rows : self._step]
+            chosen = rows[-self._rows_seen % self._step :: self._step]
             self._table[self._row_count : self._row_count + len(chosen)] = chosen
             self._row_count += len(chosen)
-        self._rows_seen += rows
+        self._rows_seen += len(rows)
 
+    @property
     def table(self) -> FloatArray:
-        """Return the stored rows."""
+        """The stored rows."""
         return self._table[: self._row_count]
 
-
-class RecordingTrace(Trace):
-    """A trace in a recording.
-
-    Args:
-        path: path of the file.
-        metadata: metadata of the recording.
-        attachments: files inside the recording.
-    """
-
-    def __init__(
-        self,
-        path: str | os.PathLike[str],
-        metadata: Mapping[str, Any] | None = None,
-        attachments: Mapping[str, bytes] | None = None,
-    ) -> None:
-        super().__init__()
-        self._writer = RecordingWriter(path, COLUMNS, metadata, attachments, "trace")
-
-    def commit(self, rows: int) -> None:
-        """Append the first rows of the buffer."""
-        self._writer.append(self._buffer[:rows])
-
     def close(self) -> None:
-        """Write pending rows and close the file."""
-        self._writer.close()
+        """Do nothing: there is no file."""
 
 
-class TextTrace(Trace):
+class TextTrace:
     """A trace in a CSV file, written in whole lines.
 
     The first line names the columns with their units, ``time [s],x [m],...``.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        super().__init__()
         self._path = Path(path)
         self.rows = 0
         try:
@@ -162,10 +108,13 @@ class TextTrace(Trace):
         self._size = 0
         self._write((HEADER + "\n").encode())
 
-    def commit(self, rows: int) -> None:
-        """Write the first rows of the buffer."""
-        values = self._buffer[:rows].ravel().tolist()
-        self._write((_ROW_FORMAT * rows % tuple(values)).encode())
+    def append(self, rows: FloatArray) -> None:
+        """Write rows as lines.
+
+        Raises:
+            ParameterError: if the file cannot grow; it then ends with a whole line.
+        """
+        self._write((_ROW_FORMAT * len(rows) % tuple(rows.ravel().tolist())).encode())
 
     def _write(self, text: bytes) -> None:
         left = memoryview(text)
@@ -193,6 +142,8 @@ class TextTrace(Trace):
         self._file.close()
 
 
+TraceWriter = DecimatedTrace | TextTrace | RecordingWriter
+"""What takes the rows of a run, chunk by chunk."""
 _MIN_ROWS = 4
 _NAMES = [name for name, _unit in COLUMNS]
 _VELOCITY = slice(_NAMES.index("vx"), _NAMES.index("vz") + 1)

@@ -5,10 +5,7 @@ this
 function, and the loop exchanges with it through a ring buffer.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
-from asperity.core.checks import FloatArray
+from asperity.core.checks import FloatArray, IntArray
 from asperity.core.compiled import Kernels, call_address, local_array, store_release
 from asperity.servo.kernels.ring_buffer import (
     DRIVER_WORDS,
@@ -36,7 +33,7 @@ _MONOTONIC = 1
 _NANOSECONDS = 1_000_000_000
 
 
-def haptic_frame(words: NDArray[np.int64], numbers: FloatArray) -> int:
+def haptic_frame(words: IntArray, numbers: FloatArray) -> int:
     """Push the position of the handle, and apply the force of the loop.
 
     The force is zero after any failure, and if the loop does not renew it.

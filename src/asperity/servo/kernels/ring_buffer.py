@@ -10,10 +10,7 @@ address: first the words below, then the rows of a time [ns] and three numbers.
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from asperity.core.checks import FloatArray
+from asperity.core.checks import FloatArray, IntArray
 from asperity.core.compiled import Kernels, load_acquire, store_release
 
 KERNELS = Kernels(
@@ -58,18 +55,12 @@ class RingBuffer(NamedTuple):
         numbers: as numbers (WORDS,).
     """
 
-    words: NDArray[np.int64]
+    words: IntArray
     numbers: FloatArray
 
 
 def push_row(
-    words: NDArray[np.int64],
-    numbers: FloatArray,
-    direction: int,
-    x: float,
-    y: float,
-    z: float,
-    time: int,
+    words: IntArray, numbers: FloatArray, direction: int, x: float, y: float, z: float, time: int
 ) -> None:
     """Write the next row of a direction, ``POSITIONS`` or ``FORCES``; for a single writer."""
     count = words[direction]
@@ -81,7 +72,7 @@ def push_row(
     store_release(words, direction, count + 1)
 
 
-def latest_row(words: NDArray[np.int64], numbers: FloatArray, direction: int) -> TimedRow:
+def latest_row(words: IntArray, numbers: FloatArray, direction: int) -> TimedRow:
     """Return the newest row of a direction."""
     count = load_acquire(words, direction)
     if count == 0:
@@ -96,30 +87,30 @@ def latest_row(words: NDArray[np.int64], numbers: FloatArray, direction: int) ->
     return TimedRow(x, y, z, 0 if overtaken else time)
 
 
-def set_failure(words: NDArray[np.int64], code: int) -> None:
+def set_failure(words: IntArray, code: int) -> None:
     """Report a failure by a nonzero code; the first one is kept."""
     if words[FAILURE_CODE] == 0:
         store_release(words, FAILURE_CODE, code)
 
 
-def failure_code(words: NDArray[np.int64]) -> int:
+def failure_code(words: IntArray) -> int:
     """Return the failure code, or 0."""
     return load_acquire(words, FAILURE_CODE)
 
 
 def push_position(
-    words: NDArray[np.int64], numbers: FloatArray, x: float, y: float, z: float, time: int
+    words: IntArray, numbers: FloatArray, x: float, y: float, z: float, time: int
 ) -> None:
     """Push a position, from Python."""
     push_row(words, numbers, POSITIONS, x, y, z, time)
 
 
-def latest_force(words: NDArray[np.int64], numbers: FloatArray) -> tuple[float, float, float, int]:
+def latest_force(words: IntArray, numbers: FloatArray) -> tuple[float, float, float, int]:
     """Return the newest force and its time [ns], for Python."""
     force = latest_row(words, numbers, FORCES)
     return force.x, force.y, force.z, force.time
 
 
-def report_failure(words: NDArray[np.int64], code: int) -> None:
+def report_failure(words: IntArray, code: int) -> None:
     """Report a failure, from Python."""
     set_failure(words, code)

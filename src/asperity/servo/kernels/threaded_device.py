@@ -7,10 +7,7 @@ A position that is too old is a fault in the sample that would have used it.
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from asperity.core.checks import FloatArray
+from asperity.core.checks import FloatArray, IntArray
 from asperity.core.compiled import Kernels, call_address
 from asperity.loop.clock import Clock, clock_now
 from asperity.loop.interface import OK
@@ -38,7 +35,7 @@ class ThreadedDevice(NamedTuple):
         wakeup: file that wakes the thread when a byte is written to it.
     """
 
-    words: NDArray[np.int64]
+    words: IntArray
     numbers: FloatArray
     max_age: int
     clock: Clock

@@ -1,14 +1,12 @@
 """The closed loop of several runs at once: one surface, body and servo from several starts.
 
 Stiffness, delay and progress of the runs may differ. In each sample all runs tick, and then all
-bodies advance together: see ``advance_lanes``. Each run equals its run alone, bit for bit. No trace
-is written: a few sums are enough to detect a limit cycle.
+bodies advance: one after the other, unless the body's module provides ``advance_lanes``. Each run
+equals its run alone, bit for bit. No trace is written: a few sums are enough to detect a limit
+cycle.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
-from asperity.core.checks import FloatArray
+from asperity.core.checks import FloatArray, IntArray
 from asperity.core.compiled import Kernels, local_array
 from asperity.kernels.law_interface import probe_in_contact
 from asperity.kernels.tick import ServoSettings, ServoState, servo_tick, state_before_tick
@@ -18,12 +16,13 @@ from asperity.simulation.kernels.body_interface import (
     RUNNING,
     SAMPLES,
     STOP,
-    advance_lanes,
+    SampleInput,
+    advance_body,
 )
 from asperity.simulation.kernels.energy_ledger import FRICTION, LOST, SUPPLIED
 from asperity.simulation.kernels.simulated_device import flush_subnormals
 
-KERNELS = Kernels(loops=("simulate_lanes",))
+KERNELS = Kernels(provides=("advance_lanes", "lane_input"), loops=("simulate_lanes",))
 
 # Numbers of a servo's state.
 SERVO_STATE_SIZE = 12
@@ -65,7 +64,7 @@ def simulate_lanes(
     x: FloatArray, queues: FloatArray, servo_states: FloatArray, ledger: FloatArray,
     anchor: FloatArray, offset: FloatArray, samples: int, plant: object, settings: ServoSettings,
     memory: FloatArray, texture: object, law: tuple[float, ...], stiffness: FloatArray,
-    statistics: FloatArray, progress: NDArray[np.int64],
+    statistics: FloatArray, progress: IntArray,
 ) -> None:  # fmt: skip
     """Run each of n runs over a number of samples.
 
@@ -147,7 +146,7 @@ def update_lane_statistics(
     statistics[lane, PREVIOUS_ENERGIES + 1] = ledger[lane, LOST] - ledger[lane, FRICTION]
 
 
-def finish_lane_sample(x: FloatArray, progress: NDArray[np.int64], lane: int) -> None:
+def finish_lane_sample(x: FloatArray, progress: IntArray, lane: int) -> None:
     """Count a sample of a run; stop a run that has diverged."""
     if progress[lane, STOP] != RUNNING:
         return
@@ -157,3 +156,30 @@ def finish_lane_sample(x: FloatArray, progress: NDArray[np.int64], lane: int) ->
         size += abs(x[lane, i])
     if not size < 1e6:
         progress[lane, STOP] = DIVERGED
+
+
+def lane_input(inputs: FloatArray, lane: int) -> SampleInput:
+    """Return the row of a run as a record."""
+    return SampleInput(
+        inputs[lane, 0], inputs[lane, 1], inputs[lane, 2],
+        inputs[lane, 3], inputs[lane, 4], inputs[lane, 5],
+        inputs[lane, 6], inputs[lane, 7], inputs[lane, 8],
+        inputs[lane, 9] > 0.0,
+    )  # fmt: skip
+
+
+def advance_lanes(
+    x: FloatArray, ledger: FloatArray, inputs: FloatArray, progress: IntArray, plant: object
+) -> None:
+    """Move the bodies of at most ``LANES`` runs over one sample, as ``advance_body`` moves each.
+
+    Args:
+        x: states, a row for each run; changed.
+        ledger: sums of each run; changed.
+        inputs: the fields of ``SampleInput`` of each run, ``in_contact`` as 1 or 0.
+        progress: stop reason of each run; changed. Runs that have stopped are skipped.
+        plant: record of the body.
+    """
+    for run in range(x.shape[0]):
+        if progress[run, STOP] == RUNNING:
+            progress[run, STOP] = advance_body(x[run], ledger[run], lane_input(inputs, run), plant)

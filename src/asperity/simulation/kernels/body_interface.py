@@ -1,27 +1,23 @@
-"""What the servo loop asks of a body: how it moves over one sample, and what it stores.
+"""The interface between the servo loop and a body: its motion over one sample, its stored energy.
 
-These are the interface alone: each module of a body defines them, and the linker binds the calls
-of the loop to the one that is simulated. ``plant`` is the record (NamedTuple) that the module
-declares.
+The functions are declarations: the module of a body defines them, and the linker binds the calls of
+the loop to it. ``plant`` is the record (NamedTuple) of that module.
 """
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from asperity.core.checks import FloatArray
 
-# What the loop says: it ran to the end, the state left all bounds, the body left its workspace.
+# Why a run stops: it does not, its state diverged, or the body left its workspace.
 RUNNING, DIVERGED, LEFT_WORKSPACE = 0, 1, 2
-# Where it says so of several runs: in the row of each, with the samples behind it.
+# Columns of the progress of several runs: stop reason and samples done.
 STOP, SAMPLES = 0, 1
-# Runs that go side by side: so many numbers are worked on at a time.
+# Largest number of runs that advance together, the width of vectorized loops.
 LANES = 8
 
 
 class SampleInput(NamedTuple):
-    """What does not change over a sample.
+    """The input of a body over one sample.
 
     Attributes:
         fx: held force [N].
@@ -33,7 +29,7 @@ class SampleInput(NamedTuple):
         ux: velocity of the hand's anchor [m/s].
         uy: likewise.
         uz: likewise.
-        in_contact: whether the servo found the probe in contact.
+        in_contact: whether the probe is in contact.
     """
 
     fx: float
@@ -53,31 +49,12 @@ def advance_body(x: FloatArray, ledger: FloatArray, inputs: SampleInput, plant: 
 
     Args:
         x: state: position [m], velocity [m/s], more; changed.
-        ledger: sums, see ``booking``; added to.
-        inputs: what does not change over the sample.
-        plant: what the body is made of.
+        ledger: sums, see ``energy_ledger``; changed.
+        inputs: force and motion of the hand's anchor.
+        plant: record of the body.
 
     Returns:
-        ``RAN``, or ``LEFT`` if the body would leave its workspace: it then stays where it was.
-    """
-    raise NotImplementedError  # the interface alone; the linker binds calls of it
-
-
-def advance_lanes(
-    x: FloatArray,
-    ledger: FloatArray,
-    inputs: FloatArray,
-    progress: NDArray[np.int64],
-    plant: object,
-) -> None:
-    """Move the bodies of at most ``LANES`` runs over one sample, as ``advance_body`` moves each.
-
-    Args:
-        x: states, a row a run; changed.
-        ledger: sums of each; added to.
-        inputs: what does not change, the fields of ``Held`` of each, ``inside`` as 1 or 0.
-        progress: of each what stopped it, see ``STOP``; changed. Those that have stopped stay.
-        plant: what all bodies are made of.
+        ``RUNNING``, or ``LEFT_WORKSPACE`` if the body would leave it: it then stays where it was.
     """
     raise NotImplementedError  # the interface alone; the linker binds calls of it
 

@@ -12,21 +12,13 @@ LEDGER_SIZE = 11
 
 
 def add_energies(
-    ledger: FloatArray,
-    wx: float,
-    wy: float,
-    wz: float,
-    lost: float,
-    hand_work: float,
-    friction_work: float,
+    ledger: FloatArray, wx: float, wy: float, wz: float, lost: float, hand: float, rubbed: float
 ) -> None:
     """Add work of the held force per axis, loss, work of the hand and of dry friction [J]."""
     ledger[SUPPLIED] += wx
     ledger[SUPPLIED + 1] += wy
     ledger[SUPPLIED + 2] += wz
     ledger[LOST] += lost
-    ledger[HAND] += hand_work
-    ledger[FRICTION] += friction_work
-    ledger[EXCHANGED] += (
-        abs(wx) + abs(wy) + abs(wz) + abs(lost) + abs(hand_work) + abs(friction_work)
-    )
+    ledger[HAND] += hand
+    ledger[FRICTION] += rubbed
+    ledger[EXCHANGED] += abs(wx) + abs(wy) + abs(wz) + abs(lost) + abs(hand) + abs(rubbed)

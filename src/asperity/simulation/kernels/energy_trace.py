@@ -4,10 +4,7 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from asperity.core.checks import FloatArray
+from asperity.core.checks import FloatArray, IntArray
 from asperity.core.compiled import Kernels
 from asperity.kernels.tick import ServoSettings, ServoState
 from asperity.loop.interface import GuardedForce, Reading
@@ -28,7 +25,7 @@ class TraceRows(NamedTuple):
     """
 
     rows: FloatArray
-    counters: NDArray[np.int64]
+    counters: IntArray
     every: int
 
 

@@ -5,11 +5,9 @@ What needs more care (several steps, as with dry friction; a band that goes slac
 workspace) is computed again for that body alone, from where it was.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
-from asperity.core.checks import FloatArray
+from asperity.core.checks import FloatArray, IntArray
 from asperity.core.compiled import Kernels, local_array
+from asperity.simulation.kernels.batch_loop import lane_input
 from asperity.simulation.kernels.body_interface import LANES, RUNNING, STOP, advance_body
 from asperity.simulation.kernels.energy_ledger import add_energies
 from asperity.simulation.kernels.pantograph_dynamics import (
@@ -20,7 +18,6 @@ from asperity.simulation.kernels.pantograph_dynamics import (
     linkage_step,
     linkage_step_count,
 )
-from asperity.simulation.kernels.sequential_lanes import lane_input
 
 KERNELS = Kernels(provides=("advance_lanes",), shared=("advance_lanes",))
 
@@ -73,13 +70,10 @@ def pantograph_step_lanes(
 
 
 def advance_lanes(
-    x: FloatArray,
-    ledger: FloatArray,
-    inputs: FloatArray,
-    progress: NDArray[np.int64],
+    x: FloatArray, ledger: FloatArray, inputs: FloatArray, progress: IntArray,
     plant: PantographRecord,
-) -> None:
-    """Move the handles over one sample; see ``body_functions``."""
+) -> None:  # fmt: skip
+    """Move the handles over one sample; see ``batch_loop``."""
     moved = local_array((9, LANES))
     pantograph_step_lanes(x, inputs, moved, plant)
     for run in range(x.shape[0]):

@@ -2,10 +2,7 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from asperity.core.checks import FloatArray
+from asperity.core.checks import FloatArray, IntArray
 from asperity.core.compiled import Kernels
 from asperity.kernels.tick import flush_subnormal, quantize
 from asperity.simulation.kernels.body_interface import DIVERGED, RUNNING, SampleInput, advance_body
@@ -35,7 +32,7 @@ class SimulatedDevice(NamedTuple):
 
     x: FloatArray
     queue: FloatArray
-    counters: NDArray[np.int64]
+    counters: IntArray
     anchor: FloatArray
     ledger: FloatArray
     update_rate: float
