@@ -14,14 +14,13 @@ from asperity.kernels import law_interface as law_functions
 from asperity.kernels.fuse import kernel_source
 from asperity.kernels.law_codegen import LawCode, contact_source, probe_source
 from asperity.laws import LAWS
+from asperity.simulation.kernels import axis_body as axes
 from asperity.simulation.kernels import body_interface as body_functions
 from asperity.simulation.kernels import coupled_body as dense
 from asperity.simulation.kernels import elastic_band as banded
 from asperity.simulation.kernels import pantograph_dynamics as five_bar
 from asperity.simulation.kernels import prescribed_motion as prescribed
-from asperity.simulation.kernels.axes import axis_body as axes
-from asperity.simulation.kernels.axes import resonant_axis as resonant
-from asperity.simulation.kernels.axes import rigid_axis as rigid
+from asperity.simulation.kernels import resonant_axis as resonant
 from asperity.textures.kinds import fourier_line_sampler as fourier_line
 from asperity.textures.kinds import fourier_sampler as fourier
 from asperity.textures.kinds import sinusoid_sampler as sinusoid
@@ -29,7 +28,7 @@ from asperity.textures.spline import heightmap_sampler as heightmap
 from asperity.textures.spline import profile_sampler as profile
 
 SAMPLERS = (sinusoid, fourier, fourier_line, profile, heightmap)
-BODIES = (axes, banded, dense, five_bar, prescribed, resonant, rigid)
+BODIES = (axes, banded, dense, five_bar, prescribed, resonant)
 PAIRS = [(sampler, one) for one in SAMPLERS] + [(body_functions, one) for one in BODIES]
 
 

@@ -18,7 +18,7 @@ from asperity.simulation import (
     Waypoints,
     simulate,
 )
-from asperity.simulation.discretization import discretize, linear_body
+from asperity.simulation.discretization import integrate, linear_body
 from asperity.simulation.plants import SampledPlant, sampled_plant
 from asperity.simulation.simulate import Simulation
 from asperity.simulation.trace import COLUMNS
@@ -33,8 +33,9 @@ PLANT = Cartesian(MASS, DAMPING)
 
 def spectral_radius(stiffness: float, delay: int) -> float:
     """Of one axis z of mass and damping with f = -k z of d samples ago, state (z, v, queue)."""
-    step = discretize(linear_body(PLANT.mass, PLANT.damping, SpringHand()), PERIOD)
-    phi, gamma = step.transition[np.ix_([2, 5], [2, 5])], step.transition[[2, 5], 8]
+    body = linear_body(PLANT.mass, PLANT.damping, SpringHand())
+    change, _loss = integrate(body.dynamics, body.loss, PERIOD)
+    phi, gamma = np.eye(2) + change[np.ix_([2, 5], [2, 5])], change[[2, 5], 14]
     matrix = np.zeros((2 + delay, 2 + delay))
     matrix[:2, :2] = phi
     if delay == 0:

@@ -14,25 +14,20 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.core.checks import FloatArray, check_array
+from asperity.core.checks import FloatArray, check_array, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.files import attributes_to_dict
-from asperity.simulation.discretization import (
-    Resonance,
-    discretize,
-    linear_body,
-    resonant_axis_coefficients,
-    rigid_axis_coefficients,
-)
+from asperity.simulation.discretization import Resonance, integrate, linear_body
 from asperity.simulation.hands import Hand, SpringHand, Triple, nonnegative, per_axis
 from asperity.simulation.kernels import (
+    axis_body,
     coupled_body,
     elastic_band,
     energy_ledger,
     hand_force,
     prescribed_motion,
+    resonant_axis,
 )
-from asperity.simulation.kernels.axes import axis_body, resonant_axis, rigid_axis
 from asperity.simulation.servo import Servo
 
 # Parts of a sample over which dry friction is held constant.
@@ -261,9 +256,8 @@ class Cartesian(Plant):
         """Return the mass held by a hand, over one sample."""
         if not isinstance(hand, SpringHand):
             return _elastic_band_plant(self, hand, period)
-        if np.abs(self.damping - np.diag(np.diag(self.damping))).max() > 0.0:
-            return coupled_plant(self, hand, period)
-        return _axis_plant(self, hand, period)
+        has_coupling = np.abs(self.damping - np.diag(np.diag(self.damping))).max() > 0.0
+        return (coupled_plant if has_coupling else _axis_plant)(self, hand, period)
 
     def min_damping(
         self, low: ArrayLike, high: ArrayLike, hand: Hand | None = None, top: float = 0.0
@@ -284,32 +278,44 @@ class Cartesian(Plant):
 
 def _axis_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPlant:
     """Return a linear body without coupling between its axes."""
-    parts = FRICTION_SUBSTEPS if plant.friction > 0.0 else 1
-    span, mode = float(period / parts), plant.resonance
-    numbers = zip(plant.mass, np.diag(plant.damping).tolist(), range(3), strict=True)
-    if mode is None:
-        table = np.array([rigid_axis_coefficients(*axis, hand, span) for axis in numbers])
-    else:
-        table = np.array([resonant_axis_coefficients(*axis, hand, span, mode) for axis in numbers])
-    speed = table[:, 5 if mode is None else 10]
-    stops = np.diag(span / speed) if plant.friction > 0.0 else np.zeros((3, 3))
+    is_rigid, parts = plant.resonance is None, _substeps(plant)
+    body = linear_body(plant.mass, plant.damping, hand, plant.resonance)
+    span = check_positive("period", period, "s") / parts
+    # Components of z of each axis: e, w and F of a rigid body, else all six.
+    used = np.arange(18).reshape(6, 3).T[:, [0, 1, 4] if is_rigid else slice(None)]
+    axes = used[:, :, None], used[:, None, :]
+    changes, losses = integrate(body.dynamics[axes], body.loss[axes], span)
+    states = 2 if is_rigid else 4
+    rows, columns = np.triu_indices(used.shape[1])
+    loss = losses[:, rows, columns] * np.where(rows == columns, 1.0, 2.0)
+    masses = [body.mass] if is_rigid else [body.mass, body.carrier_mass, body.coupling]
+    force = np.array(hand.force)
+    numbers = [np.diag(plant.damping), *masses, body.stiffness, force, np.full(3, span)]
+    table = np.hstack([changes[:, :states].reshape(3, -1), loss, np.array(numbers).T])
+    stops = np.diag(span / changes[:, 1, states]) if plant.friction > 0.0 else np.zeros((3, 3))
     record = axis_body.AxisBodyRecord(table, plant.friction, stops, parts, span)
-    modules = (axis_body, rigid_axis if mode is None else resonant_axis, coupled_body)
-    return SampledPlant((*modules, energy_ledger), record, 6 if mode is None else 12)
+    modules = (axis_body, coupled_body, energy_ledger)
+    if is_rigid:
+        return SampledPlant(modules, record, 6)
+    return SampledPlant((resonant_axis, *modules), record, 12)
 
 
 def coupled_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPlant:
-    """Return a linear body moved by whole matrices, with any coupling."""
-    parts = FRICTION_SUBSTEPS if plant.friction > 0.0 else 1
-    body = linear_body(plant.mass, plant.damping, hand, plant.resonance)
-    step = discretize(body, period / parts)
-    n = body.order
-    stops = np.asarray(step.period * np.linalg.inv(step.transition[3:6, n : n + 3]))
+    """Return a linear body with any coupling, moved by whole matrices."""
+    parts, body = _substeps(plant), linear_body(plant.mass, plant.damping, hand, plant.resonance)
+    span = check_positive("period", period, "s") / parts
+    change, loss = integrate(body.dynamics, body.loss, span)
+    stops = np.asarray(span * np.linalg.inv(change[3:6, 12:15]))
     record = coupled_body.CoupledBodyRecord(
-        step.transition, step.loss, step.anchor_work, step.storage, np.zeros(n + 12),
-        np.array(hand.force), plant.friction, stops, parts, period / parts,
+        np.ascontiguousarray(change[:12].T), loss, plant.damping, body.mass, body.carrier_mass,
+        body.coupling, body.stiffness, np.array(hand.force), plant.friction, stops, parts, span,
     )  # fmt: skip
-    return SampledPlant((coupled_body, energy_ledger), record, n)
+    order = 6 if plant.resonance is None else 12
+    return SampledPlant((coupled_body, energy_ledger), record, order)
+
+
+def _substeps(plant: Cartesian) -> int:
+    return FRICTION_SUBSTEPS if plant.friction > 0.0 else 1
 
 
 def _elastic_band_plant(plant: Cartesian, hand: Hand, period: float) -> SampledPlant:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
+from dataclasses import replace
 from functools import cache
 from pathlib import Path as FilePath
 from typing import Any
@@ -30,6 +31,8 @@ from asperity.simulation import (
     simulate,
 )
 from asperity.simulation.kernels.pantograph_dynamics import (
+    PantographRecord,
+    StepInput,
     linkage_dynamics,
     linkage_friction,
     linkage_rates,
@@ -268,11 +271,14 @@ def test_brakes_of_a_textured_law_begin_at_the_texture() -> None:
 
 def test_friction_of_no_limit_is_what_stops_the_handle() -> None:
     """With it v + a t = 0 by the equations, damping, hand and speeds in both directions counted."""
-    bar, hand, span = linkage_record(HEAVY), SPRING.record(), 1e-3
+    span = 1e-3
+    plant = plants.sampled_plant(replace(HEAVY, friction=1e9), SPRING, Servo(span)).record
+    assert isinstance(plant, PantographRecord)
     x = np.array([0.004, 0.0, -0.005, 0.3, 0.0, -0.4])
     given = (0.003, 0.006, 0.2, 0.25, 5.0)  # anchor, its speed, damping of the joints
-    fx, fz = linkage_friction(x, 0.4, 1.1, *given, 1e9, span, bar, hand)
-    rates = linkage_rates(x[0], x[2], x[3], x[5], 0.4 + fx, 1.1 + fz, *given, bar, hand)
+    fx, fz = linkage_friction(x, StepInput(0.4, 1.1, *given), span, plant)
+    pushed = StepInput(0.4 + fx, 1.1 + fz, *given)
+    rates = linkage_rates(x[0], x[2], x[3], x[5], 0.0, pushed, plant)
     np.testing.assert_allclose(np.array(rates[:2]) * span, -x[[3, 5]], rtol=1e-9)
 
 

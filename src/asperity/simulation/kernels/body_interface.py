@@ -62,17 +62,3 @@ def advance_body(x: FloatArray, ledger: FloatArray, inputs: SampleInput, plant: 
 def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: object) -> float:
     """Return the stored energy [J] with the hand's anchor at a [m]."""
     raise NotImplementedError  # the interface alone; the linker binds calls of it
-
-
-def advance_axis(
-    x: FloatArray, i: int, f: float, a: float, u: float, coefficients: FloatArray
-) -> tuple[float, float, float]:
-    """Move along one axis; returns the displacement [m], loss and work of the hand [J]."""
-    raise NotImplementedError  # the interface alone; the linker binds calls of it
-
-
-def final_velocity(
-    x: FloatArray, i: int, f: float, a: float, u: float, coefficients: FloatArray
-) -> float:
-    """Velocity along one axis at the end of the part, without friction [m/s]."""
-    raise NotImplementedError  # the interface alone; the linker binds calls of it

@@ -1,39 +1,51 @@
-"""One sample of a coupled linear body: matrices of ``exact.py``, dry friction in parts."""
+"""One sample of a linear body with any coupling: matrices of ``discretization``, dry friction.
+
+Relative to the anchor, with e = p - a, w = p' - u, the same (r, s) for a second mass that carries
+the hand, F = f - B u and the constant force g of the hand, the changes of (e, w, r, s) over a part
+of a sample are linear in z = (e, w, r, s, F, g), and the loss without the anchor's motion is a
+quadratic form. With the anchor's motion it is larger by u · B (2 Δe + u T), and the impulse of the
+anchor's spring and damper is M Δw + M_r Δs - (F + g) T + B Δe.
+"""
 
 import math
 from typing import NamedTuple
 
 from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import Kernels, local_array
 from asperity.simulation.kernels.body_interface import RUNNING, SampleInput
 from asperity.simulation.kernels.energy_ledger import add_energies
 
 KERNELS = Kernels(provides=("advance_body", "friction_force", "stored_energy"))
 
+# First components of forces in z, and the number of all.
+FORCE, HAND_PUSH, SIZE = 12, 15, 18
+
 
 class CoupledBodyRecord(NamedTuple):
     """A coupled linear body over a part of a sample.
 
-    See :class:`asperity.simulation.discretization.LinearStep`.
-
     Attributes:
-        transition: of the step (n, n + 12).
-        loss: likewise (n + 12, n + 12).
-        anchor_work: likewise (3, n + 12).
-        storage: likewise (n + 12, n + 12).
-        workspace: for state, forces and anchor (n + 12,).
+        changes: change of (e, w, r, s) for each component of z (18, 12); 0 without a second mass.
+        loss: the energy lost is zᵀ loss z, symmetric (18, 18).
+        damping: B (3, 3) [N s/m].
+        mass: of the handle, per axis (3,) [kg].
+        carrier_mass: of the second mass, likewise; 0 if there is none.
+        coupling: stiffness between the masses, likewise [N/m].
+        stiffness: of the hand, likewise [N/m].
         hand_force: constant force of the hand (3,) [N].
         friction: dry friction [N].
-        stopping_mass: that friction stops (3, 3) [kg].
-        substeps: of a sample.
+        stopping_mass: mass that friction stops (3, 3) [kg].
+        substeps: number of parts of a sample.
         substep: duration of a part [s].
     """
 
-    transition: FloatArray
+    changes: FloatArray
     loss: FloatArray
-    anchor_work: FloatArray
-    storage: FloatArray
-    workspace: FloatArray
+    damping: FloatArray
+    mass: FloatArray
+    carrier_mass: FloatArray
+    coupling: FloatArray
+    stiffness: FloatArray
     hand_force: FloatArray
     friction: float
     stopping_mass: FloatArray
@@ -44,77 +56,92 @@ class CoupledBodyRecord(NamedTuple):
 def advance_body(
     x: FloatArray, ledger: FloatArray, inputs: SampleInput, plant: CoupledBodyRecord
 ) -> int:
-    """Move the body over one sample; see ``body_functions``."""
-    fx, fy, fz, ax, ay, az, ux, uy, uz, _inside = inputs
-    z = plant.workspace
-    n = x.shape[0]
-    z[n + 3] = ax
-    z[n + 4] = ay
-    z[n + 5] = az
-    z[n + 6] = ux
-    z[n + 7] = uy
-    z[n + 8] = uz
-    for i in range(3):
-        z[n + 9 + i] = plant.hand_force[i]
-    for _part in range(plant.substeps):
-        coupled_substep(x, ledger, fx, fy, fz, plant)
-        for i in range(3):
-            z[n + 3 + i] += z[n + 6 + i] * plant.substep
+    """Move the body over one sample; see ``body_interface``."""
+    z = local_array((18,))
+    for i in range(SIZE):
+        z[i] = 0.0
+    for part in range(plant.substeps):
+        relative_state(x, inputs, part * plant.substep, plant, z)
+        coupled_substep(x, ledger, inputs, plant, z)
     return RUNNING
 
 
-def coupled_substep(
-    x: FloatArray, ledger: FloatArray, fx: float, fy: float, fz: float, plant: CoupledBodyRecord
+def relative_state(
+    x: FloatArray, inputs: SampleInput, time: float, plant: CoupledBodyRecord, z: FloatArray
 ) -> None:
-    """Move the body by one part of a sample; z holds anchor and hand."""
-    z = plant.workspace
-    n = x.shape[0]
-    for i in range(n):
-        z[i] = x[i]
-    z[n] = fx
-    z[n + 1] = fy
-    z[n + 2] = fz
-    coupled_transition(x, z, plant.transition)
+    """Write z, a time after the start of the sample."""
+    fx, fy, fz, ax, ay, az, ux, uy, uz, _in_contact = inputs
+    force = (fx, fy, fz)
+    anchor = (ax + time * ux, ay + time * uy, az + time * uz)
+    velocity = (ux, uy, uz)
+    damping = plant.damping
+    for i in range(3):
+        for mass in range(0, x.shape[0], 6):
+            z[mass + i] = x[mass + i] - anchor[i]
+            z[mass + 3 + i] = x[mass + 3 + i] - velocity[i]
+        drag = damping[i, 0] * ux + damping[i, 1] * uy + damping[i, 2] * uz
+        z[FORCE + i] = force[i] - drag
+        z[HAND_PUSH + i] = plant.hand_force[i]
+
+
+def coupled_substep(
+    x: FloatArray, ledger: FloatArray, inputs: SampleInput, plant: CoupledBodyRecord, z: FloatArray
+) -> None:
+    """Move the body by one part of a sample from z on, and add its energies to the ledger."""
+    change = local_array((12,))
+    weights = local_array((18,))
+    fx, fy, fz, _ax, _ay, _az, ux, uy, uz, _in_contact = inputs
+    velocity = (ux, uy, uz)
+    damping, span, hand_mass = plant.damping, plant.substep, x.shape[0] - 6
     gx = gy = gz = 0.0
+    multiply_columns(plant.changes, z, change)
     if plant.friction > 0.0:
         gx, gy, gz = friction_force(
-            x[3], x[4], x[5], plant.friction, plant.stopping_mass, plant.substep
-        )
-        z[n] = fx + gx
-        z[n + 1] = fy + gy
-        z[n + 2] = fz + gz
-        coupled_transition(x, z, plant.transition)
-    dx = x[0] - z[0]
-    dy = x[1] - z[1]
-    dz = x[2] - z[2]
-    h = n - 6  # the part that carries the hand
-    lost = quadratic_form(z, plant.loss)
-    hand = z[n + 9] * (x[h] - z[h]) + z[n + 10] * (x[h + 1] - z[h + 1])
-    hand += z[n + 11] * (x[h + 2] - z[h + 2])
+            x[3] + change[3], x[4] + change[4], x[5] + change[5], plant.friction,
+            plant.stopping_mass, span,
+        )  # fmt: skip
+        z[FORCE] += gx
+        z[FORCE + 1] += gy
+        z[FORCE + 2] += gz
+        multiply_columns(plant.changes, z, change)
+    multiply_columns(plant.loss, z, weights)
+    lost = hand = 0.0
+    for i in range(SIZE):
+        lost += weights[i] * z[i]
     for i in range(3):
-        row = 0.0
-        for j in range(z.shape[0]):
-            row += plant.anchor_work[i, j] * z[j]
-        hand += z[n + 6 + i] * row
-    rubbed = gx * dx + gy * dy + gz * dz
-    add_energies(ledger, fx * dx, fy * dy, fz * dz, lost, hand, rubbed)
+        braked = damping[i, 0] * change[0] + damping[i, 1] * change[1] + damping[i, 2] * change[2]
+        drag = damping[i, 0] * ux + damping[i, 1] * uy + damping[i, 2] * uz
+        impulse = plant.mass[i] * change[3 + i] + plant.carrier_mass[i] * change[9 + i]
+        impulse += braked - (z[FORCE + i] + z[HAND_PUSH + i]) * span
+        lost += velocity[i] * (2.0 * braked + drag * span)
+        hand += velocity[i] * impulse
+        hand += plant.hand_force[i] * (change[hand_mass + i] + velocity[i] * span)
+        for mass in range(0, x.shape[0], 6):
+            x[mass + i] += change[mass + i] + velocity[i] * span
+            x[mass + 3 + i] += change[mass + 3 + i]
+    dx = change[0] + ux * span
+    dy = change[1] + uy * span
+    dz = change[2] + uz * span
+    add_energies(
+        ledger, fx * dx, fy * dy, fz * dz, lost, hand, gx * dx + gy * dy + gz * dz
+    )  # fmt: skip
 
 
-def coupled_transition(x: FloatArray, z: FloatArray, transition: FloatArray) -> None:
-    """Let x be that at the end of the part, from z at its beginning."""
-    for i in range(x.shape[0]):
-        row = 0.0
-        for j in range(z.shape[0]):
-            row += transition[i, j] * z[j]
-        x[i] = row
+def multiply_columns(columns: FloatArray, z: FloatArray, result: FloatArray) -> None:
+    """Write the sum of the rows ``columns[j]``, each times z[j]: a loop that is vectorized."""
+    for i in range(result.shape[0]):
+        result[i] = 0.0
+    for j in range(z.shape[0]):
+        for i in range(result.shape[0]):
+            result[i] += columns[j, i] * z[j]
 
 
 def friction_force(
     vx: float, vy: float, vz: float, friction: float, stopping_mass: FloatArray, substep: float
 ) -> tuple[float, float, float]:
-    """Dry friction [N] that stops the velocity at the end of a part, or its limit against it.
+    """Return the dry friction [N] that stops the velocity within a part, or its limit against it.
 
-    ``stopping_mass`` (3, 3) is what it has to stop in the part's duration.
+    ``stopping_mass`` (3, 3) is the mass that it stops in the part's duration.
     """
     gx = -(stopping_mass[0, 0] * vx + stopping_mass[0, 1] * vy + stopping_mass[0, 2] * vz) / substep
     gy = -(stopping_mass[1, 0] * vx + stopping_mass[1, 1] * vy + stopping_mass[1, 2] * vz) / substep
@@ -126,26 +153,16 @@ def friction_force(
     return share * vx, share * vy, share * vz
 
 
-def quadratic_form(z: FloatArray, matrix: FloatArray) -> float:
-    """zᵀ matrix z for a symmetric matrix."""
-    total = 0.0
-    for i in range(z.shape[0]):
-        row = 0.0
-        for j in range(i):
-            row += matrix[i, j] * z[j]
-        total += z[i] * (2.0 * row + matrix[i, i] * z[i])
-    return total
-
-
 def stored_energy(
     x: FloatArray, ax: float, ay: float, az: float, plant: CoupledBodyRecord
 ) -> float:
-    """½ zᵀ storage z [J]; forces and the anchor's velocity store nothing."""
-    z = plant.workspace
-    n = x.shape[0]
-    for i in range(n):
-        z[i] = x[i]
-    z[n + 3] = ax
-    z[n + 4] = ay
-    z[n + 5] = az
-    return 0.5 * quadratic_form(z, plant.storage)
+    """Return the energy of both masses, of the spring between them, and of the hand [J]."""
+    anchor = (ax, ay, az)
+    last = x.shape[0] - 6
+    total = 0.0
+    for i in range(3):
+        coupling_strain = x[last + i] - x[i]
+        hand_strain = anchor[i] - x[last + i]
+        total += plant.mass[i] * x[3 + i] ** 2 + plant.carrier_mass[i] * x[last + 3 + i] ** 2
+        total += plant.coupling[i] * coupling_strain**2 + plant.stiffness[i] * hand_strain**2
+    return 0.5 * total

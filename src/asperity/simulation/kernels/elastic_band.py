@@ -25,7 +25,7 @@ class ElasticBandRecord(NamedTuple):
         damping: (3, 3) [N s/m].
         hand: the band.
         friction: dry friction [N].
-        substeps: of a sample.
+        substeps: number of parts of a sample.
         substep: duration of a part [s].
     """
 
@@ -38,14 +38,23 @@ class ElasticBandRecord(NamedTuple):
 
 
 def elastic_band_rates(
-    y: FloatArray, k: FloatArray, fx: float, fy: float, fz: float, ax: float, ay: float, az: float,
-    ux: float, uy: float, uz: float, plant: ElasticBandRecord,
-) -> None:  # fmt: skip
-    """Let k become the rate of y = (p, p', loss, work of the hand)."""
+    y: FloatArray, k: FloatArray, t: float, inputs: SampleInput, plant: ElasticBandRecord
+) -> None:
+    """Write the rate of y = (p, p', loss, work of the hand) into k.
+
+    Args:
+        y: position [m] and velocity [m/s].
+        k: rate of change (8,); written.
+        t: time since the start of the step [s].
+        inputs: input of the step.
+        plant: the body.
+    """
+    fx, fy, fz, ax, ay, az, ux, uy, uz, _in_contact = inputs
     hand = plant.hand
     hx, hy, hz, lost = hand_force(
-        ax - y[0], ay - y[1], az - y[2], ux - y[3], uy - y[4], uz - y[5], hand
-    )
+        ax + t * ux - y[0], ay + t * uy - y[1], az + t * uz - y[2],
+        ux - y[3], uy - y[4], uz - y[5], hand,
+    )  # fmt: skip
     k[6] = lost
     k[7] = ux * hx + uy * hy + uz * hz
     for i in range(3):
@@ -59,58 +68,60 @@ def elastic_band_rates(
 
 
 def elastic_band_step(
-    x: FloatArray, fx: float, fy: float, fz: float, ax: float, ay: float, az: float,
-    ux: float, uy: float, uz: float, substep: float, plant: ElasticBandRecord,
-    change: FloatArray, stage: FloatArray, rate: FloatArray,
-) -> None:  # fmt: skip
-    """One step of the classical Runge-Kutta method; ``change`` becomes that of (p, p', ...)."""
+    x: FloatArray, change: FloatArray, inputs: SampleInput, h: float, plant: ElasticBandRecord
+) -> None:
+    """Add the change of one step h of the classical Runge-Kutta method to x."""
+    stage = local_array((6,))
+    rate = local_array((8,))
     for i in range(8):
         change[i] = 0.0
         rate[i] = 0.0
-    for turn in range(4):
-        late = 0.0 if turn == 0 else 1.0 if turn == 3 else 0.5
-        weight = 1.0 / 6.0 if turn in (0, 3) else 1.0 / 3.0
+    for number in range(4):
+        late = 0.0 if number == 0 else 1.0 if number == 3 else 0.5
+        weight = 1.0 / 6.0 if number in (0, 3) else 1.0 / 3.0
         for i in range(6):
-            stage[i] = x[i] + late * substep * rate[i]
-        elastic_band_rates(
-            stage, rate, fx, fy, fz,
-            ax + late * substep * ux, ay + late * substep * uy, az + late * substep * uz,
-            ux, uy, uz, plant,
-        )  # fmt: skip
+            stage[i] = x[i] + late * h * rate[i]
+        elastic_band_rates(stage, rate, late * h, inputs, plant)
         for i in range(8):
-            change[i] += weight * substep * rate[i]
+            change[i] += weight * h * rate[i]
     for i in range(6):
         x[i] += change[i]
+
+
+def elastic_band_friction(
+    x: FloatArray, inputs: SampleInput, h: float, plant: ElasticBandRecord
+) -> tuple[float, float, float]:
+    """Return the dry friction [N] that stops the body in a step h, or its limit."""
+    if plant.friction == 0.0:
+        return 0.0, 0.0, 0.0
+    rate = local_array((8,))
+    elastic_band_rates(x, rate, 0.0, inputs, plant)
+    return friction_force(
+        x[3] + h * rate[3], x[4] + h * rate[4], x[5] + h * rate[5], plant.friction, plant.mass, h
+    )
 
 
 def advance_body(
     x: FloatArray, ledger: FloatArray, inputs: SampleInput, plant: ElasticBandRecord
 ) -> int:
-    """Move the body over one sample; see ``body_functions``."""
-    fx, fy, fz, ax, ay, az, ux, uy, uz, _inside = inputs
+    """Move the body over one sample; see ``body_interface``."""
+    fx, fy, fz, ax, ay, az, ux, uy, uz, touches = inputs
     change = local_array((8,))
-    stage = local_array((8,))
-    rate = local_array((8,))
-    gx = gy = gz = time = 0.0
+    time = 0.0
     part = fine = 0
     h = plant.substep
     while part < plant.substeps:
         bx = ax + time * ux
         by = ay + time * uy
         bz = az + time * uz
-        if plant.friction > 0.0:
-            elastic_band_rates(x, rate, fx, fy, fz, bx, by, bz, ux, uy, uz, plant)
-            for i in range(3):
-                stage[i] = x[3 + i] + h * rate[3 + i]
-            gx, gy, gz = friction_force(stage[0], stage[1], stage[2], plant.friction, plant.mass, h)
-        elastic_band_step(
-            x, fx + gx, fy + gy, fz + gz, bx, by, bz, ux, uy, uz, h, plant,
-            change, stage, rate,
-        )  # fmt: skip
-        if fine == 0 and elastic_band_changes_state(x, change, time, h, inputs, plant.hand):
+        free = SampleInput(fx, fy, fz, bx, by, bz, ux, uy, uz, touches)
+        gx, gy, gz = elastic_band_friction(x, free, h, plant)
+        pull = SampleInput(fx + gx, fy + gy, fz + gz, bx, by, bz, ux, uy, uz, touches)
+        elastic_band_step(x, change, pull, h, plant)
+        if fine == 0 and elastic_band_changes_state(x, change, h, pull, plant.hand):
             for i in range(6):
                 x[i] -= change[i]
-            fine = 256
+            fine = 256  # the force has a kink there: again, in small steps
             h = plant.substep / 256.0
             continue
         time += h
@@ -126,12 +137,12 @@ def advance_body(
 
 
 def elastic_band_changes_state(
-    x: FloatArray, change: FloatArray, time: float, h: float, inputs: SampleInput, hand: HandRecord
+    x: FloatArray, change: FloatArray, h: float, inputs: SampleInput, hand: HandRecord
 ) -> bool:
-    """Whether the band turned slack or taut in a step h from a time on: its force has a kink."""
-    ex = inputs.ax + time * inputs.ux - x[0]
-    ey = inputs.ay + time * inputs.uy - x[1]
-    ez = inputs.az + time * inputs.uz - x[2]
+    """Return whether the band turned slack or taut in a step h of the body, by a change to x."""
+    ex = inputs.ax - x[0]
+    ey = inputs.ay - x[1]
+    ez = inputs.az - x[2]
     return band_changes_state(
         ex + change[0], ey + change[1], ez + change[2],
         ex + h * inputs.ux, ey + h * inputs.uy, ez + h * inputs.uz, hand,
@@ -141,7 +152,7 @@ def elastic_band_changes_state(
 def stored_energy(
     x: FloatArray, ax: float, ay: float, az: float, plant: ElasticBandRecord
 ) -> float:
-    """½ m v² of every axis and the energy of the hand [J]."""
+    """Return ½ m v² of every axis and the energy of the hand [J]."""
     total = hand_energy(ax - x[0], ay - x[1], az - x[2], plant.hand)
     for i in range(3):
         total += 0.5 * plant.mass[i, i] * x[3 + i] * x[3 + i]

@@ -32,11 +32,9 @@ class HandRecord(NamedTuple):
 
 
 def hand_force(
-    sx: float, sy: float, sz: float,
-    rx: float, ry: float, rz: float,
-    hand: HandRecord,
-) -> tuple[float, float, float, float]:  # fmt: skip
-    """Force of spring and damper, or band, on the handle [N], and its loss [W].
+    sx: float, sy: float, sz: float, rx: float, ry: float, rz: float, hand: HandRecord
+) -> tuple[float, float, float, float]:
+    """Return the force of spring and damper, or band, on the handle [N], and its loss [W].
 
     s = a - p and r = u - p' (anchor less handle).
     """
@@ -53,18 +51,16 @@ def hand_force(
             fy += pull * sy
             fz += pull * sz
         return fx, fy, fz, lost
-    return (
-        fx + hand.stiffness[0] * sx,
-        fy + hand.stiffness[1] * sy,
-        fz + hand.stiffness[2] * sz,
-        lost,
-    )
+    fx += hand.stiffness[0] * sx
+    fy += hand.stiffness[1] * sy
+    fz += hand.stiffness[2] * sz
+    return fx, fy, fz, lost
 
 
 def band_changes_state(
     sx: float, sy: float, sz: float, tx: float, ty: float, tz: float, hand: HandRecord
-) -> bool:  # fmt: skip
-    """Whether a band is slack at one of two places s = a - p and t, and taut at the other."""
+) -> bool:
+    """Return whether a band is slack at one of two places s = a - p and t, taut at the other."""
     if not hand.is_band:
         return False
     sz -= hand.length
@@ -74,13 +70,11 @@ def band_changes_state(
 
 
 def hand_energy(sx: float, sy: float, sz: float, hand: HandRecord) -> float:
-    """Energy of the spring or the band [J], for s = a - p."""
+    """Return the energy of the spring or the band [J], for s = a - p."""
     if hand.is_band:
         sz -= hand.length
         length = math.sqrt(sx * sx + sy * sy + sz * sz)
         over = max(length - hand.rest_length, 0.0)
         return float(0.5 * hand.stiffness[0] * over * over)
-    return float(
-        0.5
-        * (hand.stiffness[0] * sx * sx + hand.stiffness[1] * sy * sy + hand.stiffness[2] * sz * sz)
-    )
+    x, y, z = hand.stiffness
+    return float(0.5 * (x * sx * sx + y * sy * sy + z * sz * sz))

@@ -27,14 +27,10 @@ from asperity.simulation.kernels.hand_force import (
 
 KERNELS = Kernels(
     provides=(
-        "advance_body",
-        "linkage_band_changes_state",
-        "linkage_step_count",
-        "linkage_reaches",
-        "linkage_step",
-        "stored_energy",
+        "advance_body", "linkage_band_changes_state", "linkage_step_count", "linkage_reaches",
+        "linkage_step", "stored_energy",
     )
-)
+)  # fmt: skip
 
 
 class LinkageRecord(NamedTuple):
@@ -64,16 +60,16 @@ class LinkageRecord(NamedTuple):
 
 
 class StepInput(NamedTuple):
-    """What pulls at the handle over a step.
+    """The input of a handle over a step.
 
     Attributes:
         fx: force [N].
         fz: likewise.
-        ax: position of the hand's anchor at the beginning [m].
+        ax: position of the hand's anchor at the start of the step [m].
         az: likewise.
-        ux: its velocity [m/s].
+        ux: velocity of the anchor [m/s].
         uz: likewise.
-        damping: of the joints [N m s].
+        damping: damping of the joints [N m s].
     """
 
     fx: float
@@ -92,12 +88,12 @@ class PantographRecord(NamedTuple):
         linkage: the linkage.
         hand: the hand.
         friction: dry friction at the handle [N].
-        max_rate: the fastest, at rest [1/s].
-        min_steps: parts of a sample.
+        max_rate: fastest rate at rest [1/s].
+        min_steps: least number of steps of a sample.
         period: T [s].
-        step_fraction: of a time constant that one step covers.
+        step_fraction: share of a time constant that one step covers.
         inside_only: whether the brakes act only in contact.
-        min_sine: sine of the angles at the elbows: nearer to stretched or folded it stops.
+        min_sine: least sine of the angles at the elbows: nearer to stretched or folded it stops.
     """
 
     linkage: LinkageRecord
@@ -112,21 +108,19 @@ class PantographRecord(NamedTuple):
 
 
 def linkage_arm(
-    x: float,
-    z: float,
-    dx: float,
-    dz: float,
-    side: float,
-    proximal: float,
-    distal: float,
-    inertia: float,
-    mass: float,
+    x: float, z: float, dx: float, dz: float, side: float, linkage: LinkageRecord
 ) -> tuple[float, float, float, float, float, float, float]:
-    """One arm, with (x, z) from motor to handle and (dx, dz) the handle's velocity.
+    """Return g, and the parts of one arm in M (xx, xz, zz) and in c (x, z).
 
-    Returns g, its part of M (xx, xz, zz) and of c (x, z). ``side`` is 1 for the elbow to the right
-    of the line from motor to handle, -1 to the left; ``inertia`` is I₁ + m₂ l₁²/3.
+    Args:
+        x: position of the handle relative to the motor [m].
+        z: likewise.
+        dx: velocity of the handle [m/s].
+        dz: likewise.
+        side: 1 for the elbow to the right of the line from motor to handle, -1 to the left.
+        linkage: the linkage.
     """
+    proximal, distal, inertia = linkage.proximal, linkage.distal, linkage.inertia
     square = x * x + z * z
     twice = square + proximal * proximal - distal * distal
     root = math.sqrt(4.0 * proximal * proximal * square - twice * twice)  # 2 |D|² across
@@ -143,7 +137,7 @@ def linkage_arm(
     wz = dz - turn * lx
     square_turn = turn * turn
     gain = (wx * wx + wz * wz + square_turn * (0.5 * twice - proximal * proximal)) * over
-    sixth = mass * (1.0 / 6.0)
+    sixth = linkage.distal_mass * (1.0 / 6.0)
     mxx = inertia * gx * gx + 2.0 * sixth * (1.0 - lz * gx)
     mxz = inertia * gx * gz + sixth * (lx * gx - lz * gz)
     mzz = inertia * gz * gz + 2.0 * sixth * (1.0 + lx * gz)
@@ -155,23 +149,11 @@ def linkage_arm(
 def linkage_dynamics(
     x: float, z: float, dx: float, dz: float, linkage: LinkageRecord
 ) -> tuple[float, float, float, float, float, float, float, float]:
-    """Mass matrix (xx, xz, zz), c (x, z) and J⁻ᵀJ⁻¹ (xx, xz, zz)."""
+    """Return the mass matrix (xx, xz, zz), c (x, z) and J⁻ᵀJ⁻¹ (xx, xz, zz)."""
     px = linkage.centre_x + x
     pz = linkage.centre_z + z
-    gx, gz, mxx, mxz, mzz, cx, cz = linkage_arm(
-        px, pz, dx, dz, 1.0, linkage.proximal, linkage.distal, linkage.inertia, linkage.distal_mass
-    )
-    kx, kz, nxx, nxz, nzz, ex, ez = linkage_arm(
-        px + linkage.base,
-        pz,
-        dx,
-        dz,
-        -1.0,
-        linkage.proximal,
-        linkage.distal,
-        linkage.inertia,
-        linkage.distal_mass,
-    )
+    gx, gz, mxx, mxz, mzz, cx, cz = linkage_arm(px, pz, dx, dz, 1.0, linkage)
+    kx, kz, nxx, nxz, nzz, ex, ez = linkage_arm(px + linkage.base, pz, dx, dz, -1.0, linkage)
     return (
         mxx + nxx + linkage.handle_mass,
         mxz + nxz,
@@ -185,13 +167,25 @@ def linkage_dynamics(
 
 
 def linkage_rates(
-    x: float, z: float, dx: float, dz: float,
-    fx: float, fz: float, ax: float, az: float, ux: float, uz: float,
-    damping: float, linkage: LinkageRecord, hand: HandRecord,
-) -> tuple[float, float, float, float]:  # fmt: skip
-    """Acceleration [m/s²] in x and z, loss and power of the hand [W]."""
-    mxx, mxz, mzz, cx, cz, bxx, bxz, bzz = linkage_dynamics(x, z, dx, dz, linkage)
-    hx, _hy, hz, lost = hand_force(ax - x, 0.0, az - z, ux - dx, 0.0, uz - dz, hand)
+    x: float, z: float, dx: float, dz: float, t: float, inputs: StepInput, plant: PantographRecord
+) -> tuple[float, float, float, float]:
+    """Return the acceleration [m/s²] in x and z, the loss and the power of the hand [W].
+
+    Args:
+        x: position of the handle [m].
+        z: likewise.
+        dx: velocity of the handle [m/s].
+        dz: likewise.
+        t: time since the start of the step [s].
+        inputs: input of the step.
+        plant: the pantograph.
+    """
+    fx, fz, ax, az, ux, uz, damping = inputs
+    hand = plant.hand
+    mxx, mxz, mzz, cx, cz, bxx, bxz, bzz = linkage_dynamics(x, z, dx, dz, plant.linkage)
+    hx, _hy, hz, lost = hand_force(
+        ax + t * ux - x, 0.0, az + t * uz - z, ux - dx, 0.0, uz - dz, hand
+    )
     qx = damping * (bxx * dx + bxz * dz)
     qz = damping * (bxz * dx + bzz * dz)
     power = ux * hx + uz * hz + hand.force[0] * dx + hand.force[2] * dz
@@ -202,53 +196,24 @@ def linkage_rates(
     return (mzz * rx - mxz * rz) * over, (mxx * rz - mxz * rx) * over, lost, power
 
 
-def linkage_stage(
-    x: float,
-    z: float,
-    dx: float,
-    dz: float,
-    time_offset: float,
-    inputs: StepInput,
-    linkage: LinkageRecord,
-    hand: HandRecord,
-) -> tuple[float, float, float, float]:
-    """Rates as :func:`linkage_rates`, a time after the beginning of the step [s]."""
-    fx, fz, ax, az, ux, uz, damping = inputs
-    return linkage_rates(
-        x,
-        z,
-        dx,
-        dz,
-        fx,
-        fz,
-        ax + time_offset * ux,
-        az + time_offset * uz,
-        ux,
-        uz,
-        damping,
-        linkage,
-        hand,
-    )
-
-
 def runge_kutta_sum(
     rate1: float, rate3: float, rate4: float, rate5: float, rate6: float, h: float
 ) -> float:
-    """Integral over a step h of a rate, of its values at the stages of :func:`linkage_step`."""
+    """Return the integral of a rate over a step h, from the stages of :func:`linkage_step`."""
     return h / 90.0 * (7.0 * (rate1 + rate6) + 32.0 * (rate3 + rate5) + 12.0 * rate4)
 
 
 def linkage_friction(
-    x: FloatArray, fx: float, fz: float, ax: float, az: float, ux: float, uz: float,
-    damping: float, friction: float, substep: float, linkage: LinkageRecord, hand: HandRecord,
-) -> tuple[float, float]:  # fmt: skip
-    """Dry friction [N] that stops the handle in a part of a sample, or its limit."""
+    x: FloatArray, inputs: StepInput, substep: float, plant: PantographRecord
+) -> tuple[float, float]:
+    """Return the dry friction [N] that stops the handle in a part of a sample, or its limit."""
+    friction = plant.friction
     if friction == 0.0:
         return 0.0, 0.0
-    rx, rz, _lost, _hand = linkage_rates(
-        x[0], x[2], x[3], x[5], fx, fz, ax, az, ux, uz, damping, linkage, hand
+    rx, rz, _lost, _power = linkage_rates(x[0], x[2], x[3], x[5], 0.0, inputs, plant)
+    mxx, mxz, mzz, _cx, _cz, _bxx, _bxz, _bzz = linkage_dynamics(
+        x[0], x[2], x[3], x[5], plant.linkage
     )
-    mxx, mxz, mzz, _cx, _cz, _bxx, _bxz, _bzz = linkage_dynamics(x[0], x[2], x[3], x[5], linkage)
     vx = x[3] + substep * rx
     vz = x[5] + substep * rz
     gx = -(mxx * vx + mxz * vz) / substep
@@ -260,41 +225,34 @@ def linkage_friction(
 
 
 def linkage_step(
-    x1: float,
-    z1: float,
-    vx1: float,
-    vz1: float,
-    inputs: StepInput,
-    h: float,
-    linkage: LinkageRecord,
-    hand: HandRecord,
-) -> tuple[float, float, float, float, float, float]:
-    """One step h of Butcher's Runge-Kutta method of order five, its loss and work along with it.
+    x1: float, z1: float, vx1: float, vz1: float, inputs: StepInput, h: float,
+    plant: PantographRecord,
+) -> tuple[float, float, float, float, float, float]:  # fmt: skip
+    """Return the changes over one step h of Butcher's Runge-Kutta method of order five.
 
-    Returns displacement [m] and change of velocity [m/s], in x and z, loss and work of the hand
-    [J].
+    Displacement [m] and change of velocity [m/s] in x and z, loss and work of the hand [J].
     """
-    ax1, az1, lost1, hand1 = linkage_stage(x1, z1, vx1, vz1, 0.0, inputs, linkage, hand)
+    ax1, az1, lost1, hand1 = linkage_rates(x1, z1, vx1, vz1, 0.0, inputs, plant)
     q = 0.25 * h
     vx2, vz2 = vx1 + q * ax1, vz1 + q * az1
-    ax2, az2, _, _ = linkage_stage(x1 + q * vx1, z1 + q * vz1, vx2, vz2, q, inputs, linkage, hand)
+    ax2, az2, _, _ = linkage_rates(x1 + q * vx1, z1 + q * vz1, vx2, vz2, q, inputs, plant)
     e = 0.125 * h
     vx3, vz3 = vx1 + e * (ax1 + ax2), vz1 + e * (az1 + az2)
     x3, z3 = x1 + e * (vx1 + vx2), z1 + e * (vz1 + vz2)
-    ax3, az3, lost3, hand3 = linkage_stage(x3, z3, vx3, vz3, q, inputs, linkage, hand)
+    ax3, az3, lost3, hand3 = linkage_rates(x3, z3, vx3, vz3, q, inputs, plant)
     vx4, vz4 = vx1 + h * (ax3 - 0.5 * ax2), vz1 + h * (az3 - 0.5 * az2)
     x4, z4 = x1 + h * (vx3 - 0.5 * vx2), z1 + h * (vz3 - 0.5 * vz2)
-    ax4, az4, lost4, hand4 = linkage_stage(x4, z4, vx4, vz4, 2.0 * q, inputs, linkage, hand)
+    ax4, az4, lost4, hand4 = linkage_rates(x4, z4, vx4, vz4, 2.0 * q, inputs, plant)
     s = h / 16.0
     vx5, vz5 = vx1 + s * (3.0 * ax1 + 9.0 * ax4), vz1 + s * (3.0 * az1 + 9.0 * az4)
     x5, z5 = x1 + s * (3.0 * vx1 + 9.0 * vx4), z1 + s * (3.0 * vz1 + 9.0 * vz4)
-    ax5, az5, lost5, hand5 = linkage_stage(x5, z5, vx5, vz5, 3.0 * q, inputs, linkage, hand)
+    ax5, az5, lost5, hand5 = linkage_rates(x5, z5, vx5, vz5, 3.0 * q, inputs, plant)
     s = h / 7.0
     vx6 = vx1 + s * (2.0 * ax2 - 3.0 * ax1 + 12.0 * (ax3 - ax4) + 8.0 * ax5)
     vz6 = vz1 + s * (2.0 * az2 - 3.0 * az1 + 12.0 * (az3 - az4) + 8.0 * az5)
     x6 = x1 + s * (2.0 * vx2 - 3.0 * vx1 + 12.0 * (vx3 - vx4) + 8.0 * vx5)
     z6 = z1 + s * (2.0 * vz2 - 3.0 * vz1 + 12.0 * (vz3 - vz4) + 8.0 * vz5)
-    ax6, az6, lost6, hand6 = linkage_stage(x6, z6, vx6, vz6, h, inputs, linkage, hand)
+    ax6, az6, lost6, hand6 = linkage_rates(x6, z6, vx6, vz6, h, inputs, plant)
     return (
         runge_kutta_sum(vx1, vx3, vx4, vx5, vx6, h),
         runge_kutta_sum(vz1, vz3, vz4, vz5, vz6, h),
@@ -306,7 +264,7 @@ def linkage_step(
 
 
 def linkage_reaches(x: float, z: float, min_sine: float, linkage: LinkageRecord) -> bool:
-    """Whether both arms reach a point, with room: |cos| of the angle at the elbow below a limit."""
+    """Return whether both arms reach a point, and |cos| of the angles at the elbows is allowed."""
     px = linkage.centre_x + x
     pz = linkage.centre_z + z
     sides = linkage.proximal * linkage.proximal + linkage.distal * linkage.distal
@@ -319,25 +277,18 @@ def linkage_reaches(x: float, z: float, min_sine: float, linkage: LinkageRecord)
 def linkage_step_count(
     vx: float, vz: float, max_rate: float, span: float, linkage: LinkageRecord
 ) -> int:
-    """Steps for a sample: one for each ``share`` of a time constant, shorter ones at speed."""
+    """Return the number of steps of a sample, one for each ``step_fraction`` of a time constant."""
     parts = (max_rate + 4.0 * math.sqrt(vx * vx + vz * vz) / linkage.proximal) * span
     # At such speeds the handle leaves the workspace with the first of them.
     return 1 + int(parts) if parts < 1e6 else 1000000
 
 
 def linkage_band_changes_state(
-    x: float,
-    z: float,
-    dx: float,
-    dz: float,
-    time: float,
-    h: float,
-    inputs: SampleInput | StepInput,
-    hand: HandRecord,
+    x: float, z: float, dx: float, dz: float, h: float, inputs: StepInput, hand: HandRecord
 ) -> bool:
-    """Whether the band turned slack or taut in a step h of the handle, by d to (x, z)."""
-    sx = inputs.ax + time * inputs.ux - x
-    sz = inputs.az + time * inputs.uz - z
+    """Return whether the band turned slack or taut in a step h of the handle, by d to (x, z)."""
+    sx = inputs.ax - x
+    sz = inputs.az - z
     return band_changes_state(
         sx + dx, 0.0, sz + dz, sx + h * inputs.ux, 0.0, sz + h * inputs.uz, hand
     )
@@ -346,10 +297,10 @@ def linkage_band_changes_state(
 def advance_body(
     x: FloatArray, ledger: FloatArray, inputs: SampleInput, plant: PantographRecord
 ) -> int:
-    """Move the handle over one sample; see ``body_functions``."""
-    fx, _fy, fz, ax, _ay, az, ux, _uy, uz, inside = inputs
-    bar, hand, friction, rate, fewest, period, share, inside_only, least = plant
-    damping = bar.joint_damping if inside or not inside_only else 0.0
+    """Move the handle over one sample; see ``body_interface``."""
+    fx, _fy, fz, ax, _ay, az, ux, _uy, uz, in_contact = inputs
+    bar, hand, _friction, rate, fewest, period, share, inside_only, least = plant
+    damping = bar.joint_damping if in_contact or not inside_only else 0.0
     px, pz, vx, vz = x[0], x[2], x[3], x[5]
     parts = max(fewest, linkage_step_count(vx, vz, rate, period / share, bar))
     wx = wz = lost = work = rubbed = time = 0.0
@@ -359,9 +310,9 @@ def advance_body(
         bx = ax + time * ux
         bz = az + time * uz
         sx, sz, tx, tz = x[0], x[2], x[3], x[5]
-        gx, gz = linkage_friction(x, fx, fz, bx, bz, ux, uz, damping, friction, h, bar, hand)
+        gx, gz = linkage_friction(x, StepInput(fx, fz, bx, bz, ux, uz, damping), h, plant)
         pull = StepInput(fx + gx, fz + gz, bx, bz, ux, uz, damping)
-        dx, dz, dvx, dvz, loss, pulled = linkage_step(sx, sz, tx, tz, pull, h, bar, hand)
+        dx, dz, dvx, dvz, loss, pulled = linkage_step(sx, sz, tx, tz, pull, h, plant)
         x[0] = sx + dx
         x[2] = sz + dz
         x[3] = tx + dvx
@@ -369,7 +320,7 @@ def advance_body(
         if not linkage_reaches(x[0], x[2], least, bar):
             x[0], x[2], x[3], x[5] = px, pz, vx, vz
             return LEFT_WORKSPACE
-        if fine == 0 and linkage_band_changes_state(x[0], x[2], dx, dz, time, h, inputs, hand):
+        if fine == 0 and linkage_band_changes_state(x[0], x[2], dx, dz, h, pull, hand):
             x[0], x[2], x[3], x[5] = sx, sz, tx, tz
             fine = 256  # the force has a kink there: again, in small steps
             h = period / parts / 256.0
@@ -389,7 +340,7 @@ def advance_body(
 
 
 def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: PantographRecord) -> float:
-    """½ p'ᵀ M p' and the energy of the hand [J]."""
+    """Return ½ p'ᵀ M p' and the energy of the hand [J]."""
     bar = plant.linkage
     mxx, mxz, mzz, _cx, _cz, _bxx, _bxz, _bzz = linkage_dynamics(x[0], x[2], x[3], x[5], bar)
     kinetic = 0.5 * (mxx * x[3] * x[3] + 2.0 * mxz * x[3] * x[5] + mzz * x[5] * x[5])

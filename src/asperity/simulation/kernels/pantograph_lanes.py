@@ -25,15 +25,15 @@ KERNELS = Kernels(provides=("advance_lanes",), shared=("advance_lanes",))
 def pantograph_step_lanes(
     x: FloatArray, inputs: FloatArray, steps: FloatArray, plant: PantographRecord
 ) -> None:
-    """Write what :func:`linkage_step` returns for each run over a whole sample, a column a run.
+    """Write one step of :func:`linkage_step` over a whole sample, in a column for each run.
 
-    And the place where it ends, and 1 where that is all there is to it, 0 where not.
+    Rows: the results of that function, the position at the end, and 1 if one step is enough, or 0.
     """
     given = local_array((11, LANES))
     bar, hand, _friction, rate, fewest, period, share, _inside_only, least = plant
     joint = bar.joint_damping
     for lane in range(LANES):
-        # A lane without a run does the last one again.
+        # A lane without a run repeats the last run.
         run = min(lane, x.shape[0] - 1)
         given[0, lane] = x[run, 0]
         given[1, lane] = x[run, 2]
@@ -52,12 +52,12 @@ def pantograph_step_lanes(
             given[9, lane], given[10, lane],
         )  # fmt: skip
         x0, z0, vx, vz = given[0, lane], given[1, lane], given[2, lane], given[3, lane]
-        dx, dz, dvx, dvz, lost, work = linkage_step(x0, z0, vx, vz, pull, period, bar, hand)
+        dx, dz, dvx, dvz, lost, work = linkage_step(x0, z0, vx, vz, pull, period, plant)
         px = x0 + dx
         pz = z0 + dz
         parts = max(fewest, linkage_step_count(vx, vz, rate, period / share, bar))
         plain = parts == 1 and linkage_reaches(px, pz, least, bar)
-        plain = plain and not linkage_band_changes_state(px, pz, dx, dz, 0.0, period, pull, hand)
+        plain = plain and not linkage_band_changes_state(px, pz, dx, dz, period, pull, hand)
         steps[0, lane] = dx
         steps[1, lane] = dz
         steps[2, lane] = dvx

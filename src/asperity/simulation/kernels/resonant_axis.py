@@ -1,35 +1,27 @@
-"""One axis of a body with a resonance.
+"""One axis of a body with a resonance, in the place of the rigid one of ``axis_body``.
 
-As in ``rigid.py`` but for two masses: with e = p - a, w = p' - u and the same for the part r that
-hangs on a spring and carries the hand, (e, w, e_r, w_r) changes linearly in itself, F = f - b u and
-the hand's constant force g.
+There are two masses: with e = p - a, w = p' - u and the same (r, s) for the mass that hangs on a
+spring and carries the hand, the changes of (e, w, r, s) are linear in themselves, F = f - b u and
+the constant force g of the hand.
 """
 
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import Kernels, local_array
-from asperity.simulation.kernels.axes.axis_body import AxisBodyRecord
+from asperity.simulation.kernels.axis_body import AxisBodyRecord
 
 KERNELS = Kernels(provides=("advance_axis", "final_velocity", "stored_energy"))
 
 
-# Where the numbers of an axis stand in its row of the table, after 24 numbers of the changes and 21
-# of the loss: damping of the device, masses near and far, the spring between them, stiffness and
-# constant force of the hand, and the period.
-DEVICE_DAMPING, NEAR_MASS, FAR_MASS, COUPLING_STIFFNESS, HAND_STIFFNESS, HAND_FORCE, SUBSTEP = (
-    45,
-    46,
-    47,
-    48,
-    49,
-    50,
-    51,
-)
+# Columns of an axis after 24 of the changes and 21 of the loss: damping of the device, both masses,
+# the stiffness between them, stiffness and constant force of the hand, and the duration of a part.
+DEVICE_DAMPING, NEAR_MASS, FAR_MASS, COUPLING_STIFFNESS = 45, 46, 47, 48
+HAND_STIFFNESS, HAND_FORCE, SUBSTEP = 49, 50, 51
 
 
 def resonant_state(
     x: FloatArray, i: int, f: float, a: float, u: float, coefficients: FloatArray, z: FloatArray
 ) -> float:  # fmt: skip
-    """Let z become (e, w, e_r, w_r, F, g) of one axis; returns p' at the end of the part [m/s]."""
+    """Write z = (e, w, r, s, F, g) of one axis; return p' at the end of the part [m/s]."""
     z[0] = x[i] - a
     z[1] = x[3 + i] - u
     z[2] = x[6 + i] - a
@@ -45,10 +37,9 @@ def resonant_state(
 def advance_axis(
     x: FloatArray, i: int, f: float, a: float, u: float, coefficients: FloatArray
 ) -> tuple[float, float, float]:
-    """Move along one axis; returns the displacement [m], loss and work of the hand [J].
+    """Move along one axis; return the displacement [m], loss and work of the hand [J].
 
-    Row i of the table: 0-23 the changes, 24-44 the loss, upper triangle by rows, and the numbers
-    named above.
+    Columns: 0-23 the changes, 24-44 the upper triangle of the loss by rows, then those named above.
     """
     z = local_array((6,))
     v = x[3 + i]
@@ -85,23 +76,19 @@ def advance_axis(
 def final_velocity(
     x: FloatArray, i: int, f: float, a: float, u: float, coefficients: FloatArray
 ) -> float:
-    """Velocity along one axis at the end of the part, without friction [m/s]."""
+    """Return the velocity along one axis at the end of the part, without friction [m/s]."""
     return resonant_state(x, i, f, a, u, coefficients, local_array((6,)))
 
 
 def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: AxisBodyRecord) -> float:
-    """Of both masses, the spring between them and that of the hand [J]."""
+    """Return the energy of both masses, of the spring between them and of the hand [J]."""
     table = plant.coefficients
     total = 0.0
     for i in range(3):
         anchor = ax if i == 0 else ay if i == 1 else az
         hand_strain = anchor - x[6 + i]
         coupling_strain = x[6 + i] - x[i]
-        total += (
-            0.5 * table[i, NEAR_MASS] * x[3 + i] ** 2 + 0.5 * table[i, FAR_MASS] * x[9 + i] ** 2
-        )
-        total += (
-            0.5 * table[i, COUPLING_STIFFNESS] * coupling_strain * coupling_strain
-            + 0.5 * table[i, HAND_STIFFNESS] * hand_strain * hand_strain
-        )
-    return total
+        total += table[i, NEAR_MASS] * x[3 + i] ** 2 + table[i, FAR_MASS] * x[9 + i] ** 2
+        total += table[i, COUPLING_STIFFNESS] * coupling_strain * coupling_strain
+        total += table[i, HAND_STIFFNESS] * hand_strain * hand_strain
+    return 0.5 * total

@@ -1,1 +1,0 @@
-"""Kernels of bodies that move along each axis independently."""
