@@ -157,7 +157,7 @@ def kill_processes(rig: DriverRig, count: int, seed: int = 0) -> tuple[Counter[s
             ):
                 with LoopRecorder(path, loop, SURFACE, SERVO, {}) as recorder:
                     time.sleep(draw.uniform(0.02, 0.2))
-                    os.kill(loop.pid, draw.choice((9, 11, 15, 19)))
+                    os.kill(int(loop.process.pid or 0), draw.choice((9, 11, 15, 19)))
                     ends[_end(loop)] += 1
                 rows = loop.memory.row_count - recorder.lost_rows
             if open_recording(path).rows != rows:

@@ -70,7 +70,7 @@ def test_it_renders_changes_and_stops_without_force(loop: ServoProcess) -> None:
     assert jumps <= SERVO.max_force / 5e-3 * SERVO.period
     assert until(lambda: loop.rows(loop.memory.row_count - 1)[0][-1, 3] < pressed - 0.3e-3)
     loop.stop()
-    assert (loop.poll(), loop.is_alive) == (EndReason.STOPPED, False)
+    assert (loop.poll(), loop.process.is_alive()) == (EndReason.STOPPED, False)
     assert (applied(loop) == 0.0).all()
 
 
@@ -109,7 +109,7 @@ def test_a_fault_carries_the_last_samples() -> None:
 
 def test_a_loop_that_dies_is_a_fault(loop: ServoProcess) -> None:
     assert until(lambda: loop.memory.row_count > 20)
-    os.kill(loop.pid, signal.SIGKILL)
+    os.kill(int(loop.process.pid or 0), signal.SIGKILL)
     with pytest.raises(DeviceFault, match="process of the loop ended") as raised:
         until(lambda: loop.poll() is not EndReason.RUNNING)
     assert raised.value.cause is EndReason.DIED
@@ -118,11 +118,11 @@ def test_a_loop_that_dies_is_a_fault(loop: ServoProcess) -> None:
 def test_a_device_that_does_not_answer_is_a_fault() -> None:
     with process(Safety(ramp=0.02, lateness=60.0, misses=10**6, silence=2.0)) as loop:
         assert until(lambda: loop.memory.row_count > 20)
-        os.kill(loop.pid, signal.SIGSTOP)  # as a driver that hangs
+        os.kill(int(loop.process.pid or 0), signal.SIGSTOP)  # as a driver that hangs
         with pytest.raises(DeviceFault, match="does not answer") as raised:
             until(lambda: loop.poll() is not EndReason.RUNNING)
     assert raised.value.cause is EndReason.UNRESPONSIVE
-    assert not loop.is_alive
+    assert not loop.process.is_alive()
 
 
 def test_a_loop_without_a_watcher_lets_go() -> None:
@@ -147,7 +147,7 @@ def test_a_process_that_stands_ready_is_used_and_one_without_a_job_ends() -> Non
     spare, idle = PrestartedProcess(), PrestartedProcess()
     pid = spare.process.pid
     with process(spare=spare) as loop:
-        assert loop.pid == pid
+        assert int(loop.process.pid or 0) == pid
         assert until(lambda: spare.memory.row_count > 10)
     assert not spare.process.is_alive()
     idle.connection.close()  # as when whoever made it has died

@@ -154,7 +154,7 @@ def record_loop(path: str | None, loop: ServoProcess, setup: Setup) -> Iterator[
         return
     from asperity.servo.process import LoopRecorder
 
-    metadata = setup.recording_metadata(loop.driver_name)
+    metadata = setup.recording_metadata(loop.driver.name)
     with LoopRecorder(path, loop, setup.surface, setup.servo, metadata) as recorder:
         yield recorder.write_new_rows
     if lost := recorder.lost_rows:

@@ -249,7 +249,7 @@ class Session:
             function(*arguments)
         except AsperityError as error:
             fault = error if isinstance(error, DeviceFault) else None
-            runs = self._loop is not None and fault is None and self._loop.is_alive
+            runs = self._loop is not None and fault is None and self._loop.process.is_alive()
             if not runs:
                 self._stop()
             stops = any(isinstance(request, _StopRequest) for request in self._requests.queue)

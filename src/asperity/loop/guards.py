@@ -51,8 +51,8 @@ from asperity.loop.shared_trace import (
 
 KERNELS = Kernels(
     provides=(
-        "check_sample", "check_timing", "guard_force", "read_position", "release_device",
-        "release_force", "requested_end", "schedule_next", "write_force",
+        "check_sample", "finish_timing", "guard_force", "read_position", "release_device",
+        "release_force", "requested_end", "write_force",
     ),
     native=("load_acquire",),
 )  # fmt: skip
@@ -277,31 +277,30 @@ def release_device(force: GuardedForce, guards: Guards, device: object) -> Guard
     return release_force(force)
 
 
-def check_timing(timing: LoopTiming, start_time: int, end_time: int, guards: Guards) -> int:
-    """Count the lateness of a sample; return a timing fault, or ``RUNNING``.
+def finish_timing(
+    timing: LoopTiming, start_time: int, end_time: int, guards: Guards
+) -> tuple[int, LoopTiming]:
+    """Count the lateness of a sample; return a timing fault, or ``RUNNING``, and the next timing.
 
-    The end of the sample counts: a device that answers slowly is late as well.
+    The end of the sample counts: a device that answers slowly is late as well. The next sample is
+    the first one that is not over yet.
     """
     limits = guards.limits
     late = end_time - timing.due
     count_timing(guards.block, timing.due, start_time, end_time, limits.period)
+    fault = RUNNING
     if late > limits.max_lateness:
-        return LATE_SAMPLE
-    if timing.misses > limits.max_misses:
-        return MISSED_SAMPLES
-    return NO_HEARTBEAT if 0 < limits.max_silence < end_time - timing.heartbeat_time else RUNNING
-
-
-def schedule_next(timing: LoopTiming, start_time: int, end_time: int, guards: Guards) -> LoopTiming:
-    """Return the timing of the next sample that is not over yet."""
-    period = guards.limits.period
-    over = max((end_time - timing.due) // period - 1, 0)
-    missed = end_time > timing.due + period
+        fault = LATE_SAMPLE
+    elif timing.misses > limits.max_misses:
+        fault = MISSED_SAMPLES
+    elif 0 < limits.max_silence < end_time - timing.heartbeat_time:
+        fault = NO_HEARTBEAT
+    over = max(late // limits.period - 1, 0)
     beat = load_acquire(guards.block.control, HEARTBEAT_WORD)
-    return LoopTiming(
+    return fault, LoopTiming(
         timing.sample + 1 + over,
-        timing.due + (1 + over) * period,
-        timing.misses + 1 if missed else 0,
+        timing.due + (1 + over) * limits.period,
+        timing.misses + 1 if late > limits.period else 0,
         beat,
         start_time if beat != timing.heartbeat else timing.heartbeat_time,
     )

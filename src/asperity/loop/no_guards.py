@@ -19,9 +19,8 @@ from asperity.loop.interface import (
 
 KERNELS = Kernels(
     provides=(
-        "check_sample", "check_timing", "clock_now", "clock_wait_until", "guard_force",
-        "read_position", "release_device", "release_force", "requested_end", "schedule_next",
-        "write_force",
+        "check_sample", "clock_now", "clock_wait_until", "finish_timing", "guard_force",
+        "read_position", "release_device", "release_force", "requested_end", "write_force",
     ),
 )  # fmt: skip
 
@@ -80,11 +79,8 @@ def release_device(force: GuardedForce, guards: object, device: object) -> Guard
     return force
 
 
-def check_timing(timing: LoopTiming, start_time: int, end_time: int, guards: object) -> int:
-    """Return that no sample is late."""
-    return RUNNING
-
-
-def schedule_next(timing: LoopTiming, start_time: int, end_time: int, guards: object) -> LoopTiming:
-    """Return the timing of the next sample."""
-    return LoopTiming(timing.sample + 1, timing.due, 0, 0, 0)
+def finish_timing(
+    timing: LoopTiming, start_time: int, end_time: int, guards: object
+) -> tuple[int, LoopTiming]:
+    """Return that no sample is late, and the timing of the next sample."""
+    return RUNNING, LoopTiming(timing.sample + 1, timing.due, 0, 0, 0)

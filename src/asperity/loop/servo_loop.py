@@ -13,13 +13,12 @@ from asperity.loop.clock import Clock, clock_now, clock_wait_until
 from asperity.loop.guards import (
     Guards,
     check_sample,
-    check_timing,
+    finish_timing,
     guard_force,
     read_position,
     release_device,
     release_force,
     requested_end,
-    schedule_next,
     write_force,
 )
 from asperity.loop.interface import (
@@ -96,8 +95,7 @@ def servo_loop(
             cause, code = DEVICE, answer
         now = clock_now(timing.due, clock)
         trace_timing(trace, start - timing.due, now - start)
-        timing_fault = check_timing(timing, start, now, guards)
-        timing = schedule_next(timing, start, now, guards)
+        timing_fault, timing = finish_timing(timing, start, now, guards)
         if cause == RUNNING:
             cause = timing_fault
     # Release the force once more, even after a failed write.

@@ -92,7 +92,7 @@ def build_program(surface: Surface, driver: Driver) -> LoopProgram:
 
 def loop_limits(
     servo: Servo, safety: Safety, reach: float, centre: FloatArray, program: LoopProgram
-) -> LoopLimits:  # fmt: skip
+) -> LoopLimits:
     """Return the limits of a loop."""
     period = servo.period
     share = 1.0 if safety.ramp < period else period / safety.ramp
@@ -262,7 +262,7 @@ class _LoopServer:
         self._connection, self._job, self._block = connection, job, memory.block()
         self._loop = DriverLoop(
             job.driver, job.servo, job.safety, job.reach, self._block, system_clock()
-        )  # fmt: skip
+        )
         self._program = self._next_program = job.program
 
     def serve(self) -> None:

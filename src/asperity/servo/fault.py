@@ -49,7 +49,7 @@ class EndReason(Enum):
         return self.value > EndReason.FINISHED.value
 
 
-_DESCRIPTIONS = {
+FAULT_DESCRIPTIONS = {
     EndReason.NOT_FINITE: "a position or a force is not a number",
     EndReason.WORKSPACE: "the handle was read outside its workspace",
     EndReason.DEPTH: "the probe is deeper than max_depth, for which the surface was analysed",
@@ -59,11 +59,7 @@ _DESCRIPTIONS = {
     EndReason.UNRESPONSIVE: "the device does not answer",
     EndReason.DIED: "the process of the loop ended",
 }
-
-
-def describe_end_reason(cause: EndReason) -> str:
-    """Return a fault in words; errors of a driver are described by the driver."""
-    return _DESCRIPTIONS[cause]
+"""Faults in words; errors of a driver are described by the driver."""
 
 
 class DeviceFault(AsperityError):  # noqa: N818 - the field's word for it

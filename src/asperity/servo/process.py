@@ -30,7 +30,7 @@ from asperity.servo.driver_loop import (
     run_loop_process,
 )
 from asperity.servo.drivers.driver import Driver
-from asperity.servo.fault import FAULT_SAMPLES, DeviceFault, EndReason, describe_end_reason
+from asperity.servo.fault import FAULT_DESCRIPTIONS, FAULT_SAMPLES, DeviceFault, EndReason
 from asperity.servo.loop_memory import LoopMemory, LoopStatistics
 from asperity.servo.safety import Safety
 from asperity.simulation.servo import Servo
@@ -83,6 +83,12 @@ class ServoProcess:
         device: device whose limit applies to the surfaces of :meth:`change_surface`.
         prestarted: process to use, which ends with this loop; ``None`` for a new one.
 
+    Attributes:
+        driver: the device.
+        memory: rows and counts of the loop.
+        notes: what the system did not permit, in sentences.
+        process: process of the loop, once started.
+
     Raises:
         ParameterError: for a surface that cannot be rendered, or a moving device without a known
             maximum force.
@@ -102,7 +108,7 @@ class ServoProcess:
         device: Device | None = None, prestarted: PrestartedProcess | None = None,
     ) -> None:  # fmt: skip
         require_max_force(driver, servo)
-        self._driver, self._safety, self._device = driver, safety or Safety(), device
+        self.driver, self._safety, self._device = driver, safety or Safety(), device
         last = NO_END if duration is None else round(duration / servo.period)
         program = surface if isinstance(surface, LoopProgram) else build_program(surface, driver)
         self._job = LoopJob(program, driver, servo, self._safety, reach, last)
@@ -125,7 +131,7 @@ class ServoProcess:
             DeviceFault: if the process ends or hangs.
         """
         self._prestarted = self._prestarted or PrestartedProcess(self.memory)
-        self._connection, self._process = self._prestarted.connection, self._prestarted.process
+        self._connection, self.process = self._prestarted.connection, self._prestarted.process
         threading.Thread(target=self._send_heartbeats, daemon=True).start()
         try:
             self._connection.send(_pickle(self._job))
@@ -143,26 +149,6 @@ class ServoProcess:
         """Counts of the loop."""
         return LoopStatistics.from_status(self.memory.status)
 
-    @property
-    def has_moving_handle(self) -> bool:
-        """Whether a real handle moves."""
-        return self._driver.has_moving_handle
-
-    @property
-    def driver_name(self) -> str:
-        """Name of the driver."""
-        return self._driver.name
-
-    @property
-    def is_alive(self) -> bool:
-        """Whether the process of the loop is alive."""
-        return bool(self._process.is_alive())
-
-    @property
-    def pid(self) -> int:
-        """Id of the process of the loop."""
-        return int(self._process.pid or 0)
-
     def poll(self) -> EndReason:
         """Return why the loop has ended, or ``EndReason.RUNNING``.
 
@@ -179,12 +165,12 @@ class ServoProcess:
         """Return the fault that ended the loop."""
         reason = self._end_reason
         by_driver = reason is EndReason.DEVICE
-        words = self._driver_message if by_driver else describe_end_reason(reason)
+        words = self._driver_message if by_driver else FAULT_DESCRIPTIONS[reason]
         rows, _first = self.memory.rows(self.memory.row_count - FAULT_SAMPLES)
         at = f" at {rows[-1, 0]:.4g} s" if len(rows) else ""
         end = f"{words}{at}; the force was made zero"
         if reason in {EndReason.UNRESPONSIVE, EndReason.DIED}:
-            end = f"{words}{at}. {self._driver.loss_notice}"
+            end = f"{words}{at}. {self.driver.loss_notice}"
         return DeviceFault(reason, end, rows)
 
     def change_surface(self, surface: Surface, *, accept_risk: bool = False) -> None:
@@ -205,7 +191,7 @@ class ServoProcess:
         """
         if not accept_risk:
             self._check_stiffness(surface)
-        self.change_program(build_program(surface, self._driver))
+        self.change_program(build_program(surface, self.driver))
 
     def _check_stiffness(self, surface: Surface) -> None:
         from asperity.servo.safety import excess_stiffness_reason
@@ -269,7 +255,7 @@ class ServoProcess:
             and now - self._last_progress > self._safety.silence
         ):
             self._end_reason = EndReason.UNRESPONSIVE
-            self._process.kill()
+            self.process.kill()
 
     def _handle_message(self, kind: str, content: Any) -> None:
         if kind == "ended":

@@ -131,9 +131,8 @@ class Trajectory:
         before = self.statistics[batch_loop.PREVIOUS_ENERGIES :].tolist()
         spread = float(np.sqrt(np.maximum(variance, 0.0)).sum())
         segment = SegmentStatistics(
-            self.samples, stop, spread, (float(supplied), float(taken)),
-            (before[0], before[1]),
-        )  # fmt: skip
+            self.samples, stop, spread, (float(supplied), float(taken)), (before[0], before[1])
+        )
         self.statistics[batch_loop.SAMPLE_COUNT] = 0.0
         try:
             self.next_evaluation = self._stop_rule.send(segment)

@@ -1,5 +1,7 @@
 """Models of the hand, and the motions of its anchor."""
 
+# ruff: noqa: ARG002 - one signature for all hands
+
 from __future__ import annotations
 
 import math
@@ -18,7 +20,7 @@ from asperity.simulation.kernels.hand_force import HandRecord
 
 @runtime_checkable
 class Motion(Protocol):
-    """Anything that says where the hand's anchor is."""
+    """A motion of the hand's anchor."""
 
     def at(self, times: FloatArray) -> FloatArray:
         """Return the positions [m], shape (n, 3), at the times [s], shape (n,)."""
@@ -27,13 +29,27 @@ class Motion(Protocol):
         """Return plain data, SI units."""
 
 
+class NamedPart:
+    """Mixin for the dataclasses of a closed loop that a scene names by their kind.
+
+    Attributes:
+        kind: name of the kind.
+    """
+
+    kind: ClassVar[str]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, SI units."""
+        return {"kind": self.kind} | attributes_to_dict(self)
+
+
 def _check_point(name: str, value: ArrayLike) -> tuple[float, float, float]:
     x, y, z = check_array(name, value, (3,), "m")
     return float(x), float(y), float(z)
 
 
 @dataclass(frozen=True)
-class Stationary:
+class Stationary(NamedPart):
     """An anchor that stays where it is.
 
     Attributes:
@@ -48,6 +64,8 @@ class Stationary:
                [ 0.   ,  0.   , -0.001]])
     """
 
+    kind: ClassVar[str] = "still"
+
     point: tuple[float, float, float]
 
     def __post_init__(self) -> None:
@@ -57,13 +75,9 @@ class Stationary:
         """Return the positions [m], shape (n, 3), at the times [s], shape (n,)."""
         return np.tile(np.array(self.point), (len(check_array("times", times, (None,), "s")), 1))
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return {"kind": "still"} | attributes_to_dict(self)
-
 
 @dataclass(frozen=True)
-class Strokes:
+class Strokes(NamedPart):
     """Back and forth between two points at constant speed, ending where the last stroke ends.
 
     Attributes:
@@ -83,6 +97,8 @@ class Strokes:
         >>> there.at([0.25, 0.75, 2.0])[:, 0]
         array([0.05, 0.05, 0.  ])
     """
+
+    kind: ClassVar[str] = "strokes"
 
     start: tuple[float, float, float]
     end: tuple[float, float, float]
@@ -122,13 +138,9 @@ class Strokes:
         begin, way = np.array(self.start), np.subtract(self.end, self.start)
         return np.asarray(begin + share[:, None] * way)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return {"kind": "strokes"} | attributes_to_dict(self)
-
 
 @dataclass(frozen=True, eq=False)
-class Waypoints:
+class Waypoints(NamedPart):
     """Through given points at given times, straight and at constant speed in between.
 
     Before the first time and after the last one it rests there.
@@ -144,6 +156,8 @@ class Waypoints:
         >>> Waypoints([0.0, 1.0], [[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]).at([0.25, 3.0])[:, 2]
         array([0.5, 2. ])
     """
+
+    kind: ClassVar[str] = "path"
 
     times: FloatArray
     points: FloatArray
@@ -168,10 +182,6 @@ class Waypoints:
         wanted = check_array("times", times, (None,), "s")
         columns = [np.interp(wanted, self.times, self.points[:, i]) for i in range(3)]
         return np.stack(columns, axis=-1)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return {"kind": "path"} | attributes_to_dict(self)
 
 
 Triple = tuple[float, float, float]
@@ -203,7 +213,7 @@ def nonnegative(name: str, value: object, unit: str) -> float:
     return number
 
 
-class Hand(ABC):
+class Hand(NamedPart, ABC):
     """A model of the hand that holds the handle; a subclass is a dataclass of its numbers.
 
     Attributes:
@@ -212,7 +222,6 @@ class Hand(ABC):
         holds_height: whether the hand holds the handle at a height.
     """
 
-    kind: ClassVar[str]
     is_prescribed: ClassVar[bool] = False
 
     @property
@@ -235,7 +244,7 @@ class Hand(ABC):
         """Stiffness [N/m] and damping [N s/m] of a spring along x; ``None`` for other hands."""
         return {"hand_stiffness": None, "hand_damping": None}
 
-    def with_values(self, **values: Any) -> Hand:  # noqa: ARG002 - a spring uses them
+    def with_values(self, **values: Any) -> Hand:
         """Return a spring with other numbers.
 
         Raises:
@@ -244,11 +253,7 @@ class Hand(ABC):
         raise ParameterError("hand", "is an elastic band without these parameters")
 
     def initial_motion(
-        self,
-        motion: Motion,
-        start: FloatArray | None,
-        velocity: FloatArray | None,
-        period: float,  # noqa: ARG002 - prescribed motions use it
+        self, motion: Motion, start: FloatArray | None, velocity: FloatArray | None, period: float
     ) -> tuple[FloatArray, FloatArray]:
         """Return the initial position [m] and velocity [m/s] of the handle.
 
@@ -270,10 +275,6 @@ class Hand(ABC):
         force = self.record()
         rates = [("stiffness", max(force.stiffness)), ("damping", max(force.damping))]
         return [*rates, ("mass", self.moving_mass)]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return {"kind": self.kind} | attributes_to_dict(self)
 
 
 @dataclass(frozen=True)

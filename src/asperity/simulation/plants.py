@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-# ruff: noqa: ARG002 - one signature for all plants
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -14,11 +13,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from asperity.core.checks import FloatArray, check_array, check_positive
+from asperity.core.checks import FloatArray, check_array
 from asperity.core.errors import ParameterError
-from asperity.core.files import attributes_to_dict
 from asperity.simulation.discretization import Resonance, integrate, linear_body
-from asperity.simulation.hands import Hand, SpringHand, Triple, nonnegative, per_axis
+from asperity.simulation.hands import Hand, NamedPart, SpringHand, Triple, nonnegative, per_axis
 from asperity.simulation.kernels import (
     axis_body,
     coupled_body,
@@ -62,7 +60,7 @@ class SampledPlant:
         return np.concatenate([position, velocity] * (self.order // 6))
 
 
-class Plant(ABC):
+class Plant(NamedPart, ABC):
     """A device whose handle moves; a subclass is a dataclass of its numbers.
 
     Attributes:
@@ -70,7 +68,6 @@ class Plant(ABC):
         is_planar: whether the handle stays in the plane y = 0.
     """
 
-    kind: ClassVar[str]
     is_planar: ClassVar[bool] = False
 
     @property
@@ -121,10 +118,6 @@ class Plant(ABC):
     def rates(self) -> list[tuple[str, float]]:
         """Return the numbers that make the plant fast, by name."""
         return []
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain data, SI units."""
-        return {"kind": self.kind} | attributes_to_dict(self)
 
 
 def sampled_plant(plant: Plant, hand: Hand, servo: Servo) -> SampledPlant:
@@ -280,7 +273,7 @@ def _axis_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPla
     """Return a linear body without coupling between its axes."""
     is_rigid, parts = plant.resonance is None, _substeps(plant)
     body = linear_body(plant.mass, plant.damping, hand, plant.resonance)
-    span = check_positive("period", period, "s") / parts
+    span = period / parts
     # Components of z of each axis: e, w and F of a rigid body, else all six.
     used = np.arange(18).reshape(6, 3).T[:, [0, 1, 4] if is_rigid else slice(None)]
     axes = used[:, :, None], used[:, None, :]
@@ -303,12 +296,13 @@ def _axis_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPla
 def coupled_plant(plant: Cartesian, hand: SpringHand, period: float) -> SampledPlant:
     """Return a linear body with any coupling, moved by whole matrices."""
     parts, body = _substeps(plant), linear_body(plant.mass, plant.damping, hand, plant.resonance)
-    span = check_positive("period", period, "s") / parts
+    span = period / parts
     change, loss = integrate(body.dynamics, body.loss, span)
     stops = np.asarray(span * np.linalg.inv(change[3:6, 12:15]))
     record = coupled_body.CoupledBodyRecord(
-        np.ascontiguousarray(change[:12].T), loss, plant.damping, body.mass, body.carrier_mass,
-        body.coupling, body.stiffness, np.array(hand.force), plant.friction, stops, parts, span,
+        np.ascontiguousarray(change[:12].T), np.ascontiguousarray(loss), plant.damping, body.mass,
+        body.carrier_mass, body.coupling, body.stiffness, np.array(hand.force), plant.friction,
+        stops, parts, span,
     )  # fmt: skip
     order = 6 if plant.resonance is None else 12
     return SampledPlant((coupled_body, energy_ledger), record, order)

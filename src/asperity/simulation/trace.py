@@ -181,7 +181,9 @@ class TailStatistics:
     @property
     def gains_energy(self) -> bool:
         """Whether the texture supplies at least a fifth of what damping and friction take."""
-        return gains_energy(self._first_row, self._last_row)
+        change = self._last_row - self._first_row
+        taken = change[_LOST] - change[_FRICTION]
+        return bool(change[_SUPPLIED].sum() > SUPPLY_SHARE * taken)
 
     def update(self, rows: FloatArray) -> None:
         """Update the statistics with the next rows of the trace, shape (n, columns)."""
@@ -200,13 +202,6 @@ class TailStatistics:
         self._squares += change**2 * (self._count_in_tail * len(part) / total)
         self._mean = self._mean + change * (len(part) / total)
         self._count_in_tail = total
-
-
-def gains_energy(first: FloatArray, last: FloatArray) -> bool:
-    """Return whether the texture feeds the handle between two rows of the trace."""
-    supplied = (last[_SUPPLIED] - first[_SUPPLIED]).sum()
-    taken = (last[_LOST] - first[_LOST]) - (last[_FRICTION] - first[_FRICTION])
-    return bool(supplied > SUPPLY_SHARE * taken)
 
 
 MAX_ROWS = 20_000

@@ -115,7 +115,7 @@ def device_run_page(setup: Setup, loop: ServoProcess, cause: EndReason, path: st
     """Return timing, limits and energy of a loop that has ended, for a terminal."""
     statistics, rows = loop.statistics, loop.rows(loop.memory.row_count - 1)[0]
     surface, period = setup.surface, setup.servo.period
-    driver = "" if loop.has_moving_handle else f", {loop.driver_name}"
+    driver = "" if loop.driver.has_moving_handle else f", {loop.driver.name}"
     span = format_quantity(period * statistics.samples, "s", digits=3)
     limited = (
         (statistics.force_limited, "Force limit active in {} samples: not the force of the law"),

@@ -23,7 +23,8 @@ from asperity.servo.calibration.identification import (
     find_wall_onset,
     fit_dynamics,
     fresh_fraction,
-    measure_oscillation,
+    is_limit_cycle,
+    oscillation_amplitudes,
     position_step,
     rest_noise,
 )
@@ -243,7 +244,8 @@ class Calibrator:
             return True
         after = rows[:, EXCITATION_COLUMN + 1] >= self._samples(wait) + self._samples(0.5 * wave)
         way = rows[after, 1 + axis]
-        return measure_oscillation(way, self._period, 1.0 / wave).is_limit_cycle(self._noise_floor)
+        amplitudes = oscillation_amplitudes(way, self._period, 1.0 / wave)
+        return is_limit_cycle(*amplitudes, self._noise_floor)
 
 
 def _largest_step(steps: Iterable[Estimate | None]) -> Estimate | None:

@@ -309,28 +309,10 @@ class WallOnset(Serializable):
     trials: int
 
 
-@dataclass(frozen=True)
-class Oscillation:
-    """The oscillation after a step of a wall.
-
-    Attributes:
-        first_amplitude: amplitude in the first half of the time [m].
-        last_amplitude: amplitude in the second half [m].
-    """
-
-    first_amplitude: float
-    last_amplitude: float
-
-    def is_limit_cycle(self, floor: float) -> bool:
-        """Return whether the oscillation persists, above the floor of steps and noise [m]."""
-        return (
-            self.last_amplitude > floor
-            and self.last_amplitude >= STEADY_RATIO * self.first_amplitude
-        )
-
-
-def measure_oscillation(positions: FloatArray, period: float, frequency: float) -> Oscillation:
-    """Return the amplitudes of an oscillation in the two halves of a record.
+def oscillation_amplitudes(
+    positions: FloatArray, period: float, frequency: float
+) -> tuple[float, float]:
+    """Return the amplitudes of an oscillation in the two halves of a record [m].
 
     Each is the product with a wave at the frequency of the highest peak of the spectrum, between a
     third and three times the expected one, in a Hann window, which suppresses steps and noise.
@@ -353,7 +335,18 @@ def measure_oscillation(positions: FloatArray, period: float, frequency: float) 
         2.0 * abs(np.dot(part - part.mean(), wave)) / window.sum()
         for part in (centred[:half], centred[-half:])
     )
-    return Oscillation(float(first), float(last))
+    return float(first), float(last)
+
+
+def is_limit_cycle(first: float, last: float, floor: float) -> bool:
+    """Return whether an oscillation persists, above the floor of steps and noise [m].
+
+    Args:
+        first: amplitude in the first half of the time [m].
+        last: amplitude in the second half [m].
+        floor: least amplitude [m].
+    """
+    return last > floor and last >= STEADY_RATIO * first
 
 
 def find_wall_onset(

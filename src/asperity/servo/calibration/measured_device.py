@@ -26,7 +26,7 @@ def effective_resolution(calibration: Calibration) -> Estimate:
 
 def measured_device(
     base: Device, calibration: Calibration, identity: str, date: str, *, simulated: bool
-) -> Device:  # fmt: skip
+) -> Device:
     """Return a device with its measured numbers, in place of those of its entry.
 
     Args:

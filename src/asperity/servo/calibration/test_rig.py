@@ -17,7 +17,7 @@ from asperity.loop import servo_loop
 from asperity.loop.shared_trace import COLUMNS
 from asperity.servo.driver_loop import DriverLoop, LoopProgram, loop_parts, no_clock
 from asperity.servo.drivers.driver import Driver, Frame
-from asperity.servo.fault import FAULT_SAMPLES, DeviceFault, EndReason, describe_end_reason
+from asperity.servo.fault import FAULT_DESCRIPTIONS, FAULT_SAMPLES, DeviceFault, EndReason
 from asperity.servo.kernels import excitation as exciter
 from asperity.servo.kernels.excitation import Excitation
 from asperity.servo.loop_memory import LoopMemory
@@ -107,7 +107,7 @@ class UnclockedRig:
         rows, _first = self._loop_memory.rows(first)
         if cause.is_fault:
             by_driver = cause is EndReason.DEVICE
-            words = self._driver.describe_error(code) if by_driver else describe_end_reason(cause)
+            words = self._driver.describe_error(code) if by_driver else FAULT_DESCRIPTIONS[cause]
             raise DeviceFault(cause, f"{words}; the force was made zero", rows[-FAULT_SAMPLES:])
         return excitation_rows(rows, excitation)
 

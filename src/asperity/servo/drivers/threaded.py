@@ -15,14 +15,7 @@ from asperity.kernels.fuse import fuse_module
 from asperity.servo.driver_loop import function_address, no_clock, system_clock
 from asperity.servo.drivers.driver import IDENTITY_FRAME, Driver, Frame
 from asperity.servo.kernels import ring_buffer, threaded_device
-from asperity.servo.kernels.ring_buffer import (
-    BUFFER_WORDS,
-    FORCE_TIMEOUT,
-    LOOP_SILENT,
-    POSITIONS,
-    STALE,
-    RingBuffer,
-)
+from asperity.servo.kernels.ring_buffer import RingBuffer
 from asperity.servo.kernels.threaded_device import ThreadedDevice
 
 OPEN_TIMEOUT = 2.0
@@ -35,8 +28,8 @@ def new_ring_buffer(force_timeout: float = 0.0) -> RingBuffer:
     Args:
         force_timeout: time after which the thread releases a force that is not renewed [s].
     """
-    words = np.zeros(BUFFER_WORDS, np.int64)
-    words[FORCE_TIMEOUT] = round(1e9 * force_timeout)
+    words = np.zeros(ring_buffer.BUFFER_WORDS, np.int64)
+    words[ring_buffer.FORCE_TIMEOUT] = round(1e9 * force_timeout)
     return RingBuffer(words, words.view(np.float64))
 
 
@@ -56,7 +49,7 @@ class ThreadBuffer:
         scratch = new_ring_buffer()  # compiled now: no message waits for it later
         self._functions.push_position(*scratch, 0.0, 0.0, 0.0, 0)
         self._functions.latest_force(*scratch)
-        self._functions.report_failure(scratch.words, LOOP_SILENT)
+        self._functions.report_failure(scratch.words, ring_buffer.LOOP_SILENT)
 
     def push_position(self, x: float, y: float, z: float, time: int) -> None:
         """Hand a position, in the device's unit, and its time [ns] to the loop."""
@@ -111,8 +104,8 @@ class ThreadedDriver(Driver):
         """Return what went wrong between loop and thread."""
         age, held = 1e3 * self.max_reading_age, 1e3 * self.force_timeout
         words = {
-            STALE: f"the newest reading of the device is older than {age:g} ms",
-            LOOP_SILENT: f"the loop held a force for {held:g} ms without renewing it",
+            ring_buffer.STALE: f"the newest reading of the device is older than {age:g} ms",
+            ring_buffer.LOOP_SILENT: f"the loop held a force for {held:g} ms without renewing it",
         }
         return words.get(code, f"error {code}")
 
@@ -128,7 +121,7 @@ def wait_for_position(buffer: RingBuffer, reason: Callable[[], str]) -> None:
         ParameterError: on a failure, or after ``OPEN_TIMEOUT``.
     """
     end = time.monotonic() + OPEN_TIMEOUT
-    while not buffer.words[POSITIONS]:
+    while not buffer.words[ring_buffer.POSITIONS]:
         if failure := reason():
             raise ParameterError("driver", f"cannot use the device: {failure}")
         if time.monotonic() > end:

@@ -29,19 +29,17 @@ class ForceDimensionDevice(NamedTuple):
 
 
 def device_read(position: FloatArray, device: ForceDimensionDevice) -> int:
-    """Read the position by libdhd; see ``device_functions``."""
+    """Read the position by libdhd; see ``interface``."""
     x = local_array((1,))
     y = local_array((1,))
     z = local_array((1,))
     answer = call_address(device.get_position, x, y, z, device.number)
-    position[0] = x[0]
-    position[1] = y[0]
-    position[2] = z[0]
+    position[0], position[1], position[2] = x[0], y[0], z[0]
     return min(answer, 0)
 
 
 def device_write(
     fx: float, fy: float, fz: float, in_contact: bool, device: ForceDimensionDevice
 ) -> int:
-    """Command a force by libdhd; see ``device_functions``."""
+    """Command a force by libdhd; see ``interface``."""
     return min(call_address(device.set_force, fx, fy, fz, device.number), 0)

@@ -21,14 +21,12 @@ class LibraryDevice(NamedTuple):
 
 
 def device_read(position: FloatArray, device: LibraryDevice) -> int:
-    """Read the position by the library; see ``device_functions``."""
+    """Read the position by the library; see ``interface``."""
     return call_address(device.read, position)
 
 
 def device_write(fx: float, fy: float, fz: float, in_contact: bool, device: LibraryDevice) -> int:
-    """Command a force by the library; see ``device_functions``."""
+    """Command a force by the library; see ``interface``."""
     force = local_array((3,))
-    force[0] = fx
-    force[1] = fy
-    force[2] = fz
+    force[0], force[1], force[2] = fx, fy, fz
     return call_address(device.write, force, in_contact)

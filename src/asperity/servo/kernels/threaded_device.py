@@ -44,14 +44,12 @@ class ThreadedDevice(NamedTuple):
 
 
 def device_read(position: FloatArray, device: ThreadedDevice) -> int:
-    """Read the newest position; see ``device_functions``."""
+    """Read the newest position; see ``interface``."""
     wrong = failure_code(device.words)
     if wrong != OK:
         return wrong
     newest = latest_row(device.words, device.numbers, POSITIONS)
-    position[0] = newest.x
-    position[1] = newest.y
-    position[2] = newest.z
+    position[0], position[1], position[2] = newest.x, newest.y, newest.z
     return STALE if clock_now(0, device.clock) - newest.time > device.max_age else OK
 
 

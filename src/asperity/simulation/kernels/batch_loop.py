@@ -46,18 +46,12 @@ def load_servo_state(states: FloatArray, lane: int) -> ServoState:
 
 def store_servo_state(states: FloatArray, lane: int, servo: ServoState) -> None:
     """Write the state of a servo into its row."""
-    states[lane, 0] = servo.x
-    states[lane, 1] = servo.y
-    states[lane, 2] = servo.z
-    states[lane, 3] = servo.vx
-    states[lane, 4] = servo.vy
-    states[lane, 5] = servo.vz
+    states[lane, 0], states[lane, 1], states[lane, 2] = servo.x, servo.y, servo.z
+    states[lane, 3], states[lane, 4], states[lane, 5] = servo.vx, servo.vy, servo.vz
     states[lane, 6] = servo.anchor_x
     states[lane, 7] = servo.anchor_y
     states[lane, 8] = 1.0 if servo.held else 0.0
-    states[lane, 9] = servo.fx
-    states[lane, 10] = servo.fy
-    states[lane, 11] = servo.fz
+    states[lane, 9], states[lane, 10], states[lane, 11] = servo.fx, servo.fy, servo.fz
 
 
 def simulate_lanes(

@@ -122,9 +122,7 @@ def coupled_substep(
     dx = change[0] + ux * span
     dy = change[1] + uy * span
     dz = change[2] + uz * span
-    add_energies(
-        ledger, fx * dx, fy * dy, fz * dz, lost, hand, gx * dx + gy * dy + gz * dz
-    )  # fmt: skip
+    add_energies(ledger, fx * dx, fy * dy, fz * dz, lost, hand, gx * dx + gy * dy + gz * dz)
 
 
 def multiply_columns(columns: FloatArray, z: FloatArray, result: FloatArray) -> None:

@@ -25,7 +25,7 @@ class PrescribedMotionRecord(NamedTuple):
 def advance_body(
     x: FloatArray, ledger: FloatArray, inputs: SampleInput, plant: PrescribedMotionRecord
 ) -> int:
-    """Move the handle over one sample; see ``body_functions``."""
+    """Move the handle over one sample; see ``body_interface``."""
     fx, fy, fz, ax, ay, az, ux, uy, uz, _inside = inputs
     period = plant.period
     dx = ux * period

@@ -20,7 +20,7 @@ HAND_STIFFNESS, HAND_FORCE, SUBSTEP = 49, 50, 51
 
 def resonant_state(
     x: FloatArray, i: int, f: float, a: float, u: float, coefficients: FloatArray, z: FloatArray
-) -> float:  # fmt: skip
+) -> float:
     """Write z = (e, w, r, s, F, g) of one axis; return p' at the end of the part [m/s]."""
     z[0] = x[i] - a
     z[1] = x[3 + i] - u

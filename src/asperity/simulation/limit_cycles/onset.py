@@ -91,13 +91,12 @@ def is_at_rest(motion: Motion, duration: float) -> bool:
 
 
 def run_starts(
-    batch: BatchSimulation, stiffness: float, servo: Servo, offsets: FloatArray, duration: float,
-    threshold: float = CYCLE_SPEED,
-) -> list[Trajectory]:  # fmt: skip
+    batch: BatchSimulation, stiffness: float, servo: Servo, offsets: FloatArray, duration: float
+) -> list[Trajectory]:
     """Return the trajectories for each shift of the start [m], (n, 3), with their verdicts."""
     samples = _samples_for(duration, servo)
     runs = [
-        batch.new_trajectory(stiffness, servo.delay, shift, limit_cycle_rule(samples, threshold))
+        batch.new_trajectory(stiffness, servo.delay, shift, limit_cycle_rule(samples))
         for shift in offsets
     ]
     while active := [run for run in runs if run.verdict is None][:LANES]:
@@ -223,11 +222,9 @@ def find_onsets(
 
         searches = {number: search(number) for number in numbers}
         for number in run_searches(batch, searches):
-            found = searches[number].result()
             yield number, Onset(
-                surface.law.letter, delays[number], found.quiet, found.cycling, len(offsets),
-                found.cycles, _to_point(found.low), _to_point(found.high),
-                is_smooth_wall=surface.law is SMOOTH_WALL,
+                surface.law.letter, delays[number], starts=len(offsets),
+                is_smooth_wall=surface.law is SMOOTH_WALL, **searches[number].result()._asdict(),
             )  # fmt: skip
             if onset_callback is not None:
                 onset_callback()
@@ -246,11 +243,6 @@ def _cache_key(surface: Surface, parts: Sequence[Any], numbers: Sequence[Any]) -
         return None
     values = [None if number is None else np.asarray(number).tolist() for number in numbers]
     return surface_content(surface, json_text([*parts, values]))
-
-
-def _to_point(row: FloatArray) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in row)
-    return x, y, z
 
 
 def _check_arguments(

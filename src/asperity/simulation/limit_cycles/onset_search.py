@@ -100,8 +100,8 @@ class OnsetBracket(NamedTuple):
     quiet: float
     cycling: float
     cycles: int
-    low: FloatArray
-    high: FloatArray
+    low: tuple[float, ...]
+    high: tuple[float, ...]
 
 
 def run_searches(batch: BatchSimulation, searches: Mapping[int, OnsetSearch]) -> Iterator[int]:
@@ -202,9 +202,10 @@ class OnsetSearch:
         """Return the bracket, with the positions reached."""
         assert self._bracket is not None
         ends = self._results_at_stiffness().values()
-        low = np.fmin.reduce([bounds[0] for _, bounds in ends])
-        high = np.fmax.reduce([bounds[1] for _, bounds in ends])
-        return OnsetBracket(*self._bracket, sum(cycles for cycles, _ in ends), low, high)
+        low = np.fmin.reduce([bounds[0] for _, bounds in ends]).tolist()
+        high = np.fmax.reduce([bounds[1] for _, bounds in ends]).tolist()
+        count = sum(cycles for cycles, _ in ends)
+        return OnsetBracket(*self._bracket, count, tuple(low), tuple(high))
 
     def _results_at_stiffness(self) -> dict[tuple[float, int], tuple[bool, FloatArray]]:
         """Return the results of the starts at the current stiffness."""
