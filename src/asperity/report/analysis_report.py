@@ -17,7 +17,7 @@ from asperity.laws import LAWS, SHIPPED_LAW_ARGUMENTS
 from asperity.report import page
 from asperity.report.device_report import device_numbers_table
 from asperity.report.page import HEADED, Cell, Media, Row, Section, Table, TableLayout
-from asperity.report.sentences.alt_text import analysis_alt_text, analysis_figure_names
+from asperity.report.sentences.alt_text import analysis_figure_names
 from asperity.report.sentences.number_text import (
     NOT_AVAILABLE,
     format_in_one_unit,
@@ -31,7 +31,7 @@ from asperity.report.sentences.number_text import (
     upper_bound_text,
     witness_text,
 )
-from asperity.report.sentences.texts import figure_text, glossary
+from asperity.report.sentences.texts import glossary
 from asperity.surface import Surface
 
 _BOUND_HEADINGS = ("number", "lower", "upper", "method", "attained at")
@@ -278,15 +278,20 @@ def _continuity_section(analysis: Analysis) -> Section:
 
 def _figure_sections(analysis: Analysis, *names: str) -> list[Section]:
     """Return the figures of these names that the analysis has."""
-    sections = []
+    sections, leak = [], analysis.leak
+    gained = range_text(leak.energy, leak.upper_per_period, "J")
+    values: dict[str, object] = {
+        "letter": analysis.surface.law.letter,
+        "q": interval_text(analysis.q),
+        "loop": f"; the worst loop gains {gained}" if len(leak.vertices) else "",
+        "jumps": len(analysis.continuity.jumps),
+    }
     for name in names:
         if name in analysis_figure_names(analysis):
-            title, caption = figure_text(f"analysis.{name}")
-            picture = page.Picture(
-                page.plot_later(analysis, name), analysis_alt_text(analysis, name)
-            )
+            figure = page.plot_later(analysis, name)
             media = Media.HTML | Media.NOTEBOOK if name == "gain" else Media.HTML
-            sections.append(Section(title, [picture], caption, level=3, media=media))
+            text = f"analysis.{name}"
+            sections.append(page.figure_section(text, figure, (), 3, media, **values))
     return sections
 
 

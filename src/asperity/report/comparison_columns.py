@@ -218,7 +218,7 @@ def laws_table(comparison: Comparison, columns: Sequence[LawColumn]) -> Table:
     """Return one row per law with these columns."""
     rows = law_rows(comparison, lambda row: [one.cell(row, comparison) for one in columns])
     names = [single_line(one.heading) for one in columns]
-    meanings = column_meanings()
+    meanings = dict(column_meanings("laws"))
     if not any("v*" in row.verdict for row in comparison.rows):
         del meanings["verdict"]
     layout = TableLayout(

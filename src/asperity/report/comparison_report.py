@@ -29,7 +29,7 @@ from asperity.report.sentences.number_text import (
     limit_text,
     position_text,
 )
-from asperity.report.sentences.texts import figure_text, glossary
+from asperity.report.sentences.texts import column_meanings, figure_text, glossary
 
 _FOOTER = f"{page.PAPER_CITATION}. {page.NO_PERCEPTUAL_TEST}"
 
@@ -90,7 +90,7 @@ def _figure_sections(comparison: Comparison) -> list[Section]:
         text = partial(comparison_alt_text, comparison, name)
         picture = page.Picture(page.plot_later(comparison, name), text, name, digest)
         media = Media.HTML | Media.NOTEBOOK if name == "merit" else Media.HTML
-        title, caption = figure_text(f"comparison.{name}", depth=depth, stiffness=stiffness)
+        title, caption, _ = figure_text(f"comparison.{name}", depth=depth, stiffness=stiffness)
         sections.append(Section(title, [picture], caption, media=media))
     return sections
 
@@ -127,13 +127,6 @@ def _provenance_section(comparison: Comparison) -> Section:
 # --- several devices and depths -------------------------------------------------------------------
 
 _CASE_HEADINGS = ("device", "depth", "law", "start at", "texture", "felt?")
-_CASE_MEANINGS = {
-    1: ("depth", "to which the surface is pressed"),
-    2: ("law", "the recommended one; in brackets the nearest, where nothing is felt"),
-    3: ("start at", "recommended stiffness"),
-    4: ("texture", "RMS of the texture force that the device resolves, at that stiffness"),
-}
-_CASES_LAYOUT = TableLayout(wrap=(0,), drop_order=(3, 4), legend=_CASE_MEANINGS)
 
 
 def _case_row(comparison: Comparison) -> Row:
@@ -159,7 +152,9 @@ def cases_table(comparisons: DeviceComparisons) -> Table:
     rows = [_case_row(one) for one in comparisons.comparisons]
     for missing in comparisons.missing_data:
         rows.append(Row([missing.device, NOT_AVAILABLE, "K₀ missing", *[NOT_AVAILABLE] * 3]))
-    return Table(_CASE_HEADINGS, rows, (1, 3, 4), _CASES_LAYOUT)
+    legend = dict(enumerate(column_meanings("cases"), start=1))
+    layout = TableLayout(wrap=(0,), drop_order=(3, 4), legend=legend)
+    return Table(_CASE_HEADINGS, rows, (1, 3, 4), layout)
 
 
 def comparisons_page(comparisons: DeviceComparisons) -> Page:
@@ -185,7 +180,7 @@ def comparisons_page(comparisons: DeviceComparisons) -> Page:
             *[page.terminal_section(page.Paragraph(text)) for text in (*answers, *missing)],
             *assumed,
             Section("", [table, *map(page.Paragraph, missing)], media=Media.NOTEBOOK),
-            Section("Summary", [table, page.DefinitionList(list(_CASE_MEANINGS.values()))]),
+            Section("Summary", [table, page.DefinitionList(column_meanings("cases"))]),
             *[_case_section(one) for one in cases],
             *([Section("Missing", [page.BulletList(missing)])] if missing else ()),
             *measured_sections(texture),

@@ -115,20 +115,17 @@ def render_page(page: Page, origin: Origin | None = None) -> str:
     script = _read_template("page.js")
     sections = [one for one in page.sections if Media.HTML in one.media]
     pictures = _render_pictures(sections)
-    return (
-        template_environment()
-        .get_template("page.html.j2")
-        .render(
-            page=page,
-            sections=sections,
-            picture_of=lambda picture: pictures[id(picture)],
-            style=style,
-            script=script,
-            script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-            version=__version__,
-            date=_build_date(),
-            origin=origin or Origin(),
-        )
+    template = template_environment().get_template("page.html.j2")
+    return template.render(
+        page=page,
+        sections=sections,
+        picture_of=lambda picture: pictures[id(picture)],
+        style=style,
+        script=script,
+        script_digest=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
+        version=__version__,
+        date=_build_date(),
+        origin=origin or Origin(),
     )
 
 
@@ -141,16 +138,13 @@ def render_notebook(page: Page) -> str:
         for block in section.blocks
     ]
     picture = next((block for block in blocks if isinstance(block, Picture)), None)
-    return (
-        template_environment()
-        .get_template("notebook.html.j2")
-        .render(
-            page=page,
-            paragraphs=[block.text for block in blocks if isinstance(block, Paragraph)],
-            tables=[block for block in blocks if isinstance(block, Table)],
-            picture=picture,
-            png="" if picture is None else _encode_png(picture),
-        )
+    template = template_environment().get_template("notebook.html.j2")
+    return template.render(
+        page=page,
+        paragraphs=[block.text for block in blocks if isinstance(block, Paragraph)],
+        tables=[block for block in blocks if isinstance(block, Table)],
+        picture=picture,
+        png="" if picture is None else _encode_png(picture),
     )
 
 

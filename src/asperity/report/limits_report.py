@@ -168,9 +168,9 @@ def _facts(result: Limits) -> list[tuple[str, str]]:
 
 def _figure_section(result: Limits) -> Section:
     met = sum(all(wave.holds.values()) for wave in result.waves)
-    description = f"{len(result.waves)} waves, of which {met} meet every limit."
     figure, media = page.plot_later(result), Media.HTML | Media.NOTEBOOK
-    return page.figure_section("limits.waves", figure, description, media=media)
+    count = len(result.waves)
+    return page.figure_section("limits.waves", figure, media=media, count=count, met=met)
 
 
 def _waves_sections(result: Limits) -> list[Section]:

@@ -293,23 +293,23 @@ def picture_section(
 def figure_section(
     name: str,
     figure: Figure | Callable[[], Figure],
-    description: str,
     notes: Sequence[str] = (),
+    level: int = 2,
     media: Media = Media.HTML,
     **values: object,
 ) -> Section:
-    """Return a section that shows a figure with its title and caption.
+    """Return a section that shows a figure with its texts.
 
     Args:
-        name: of the text; see :func:`asperity.report.sentences.texts.figure_text`.
+        name: of the texts; see :func:`asperity.report.sentences.texts.figure_text`.
         figure: see :class:`Picture`.
-        description: see :class:`Picture`.
         notes: below the figure.
+        level: see :class:`Section`.
         media: where it is shown.
-        values: that replace the names in braces in the caption.
+        values: that replace the names in braces in the texts.
     """
-    title, caption = figure_text(name, **values)
-    return picture_section(title, figure, description, caption, notes, media=media)
+    title, caption, description = figure_text(name, **values)
+    return picture_section(title, figure, description, caption, notes, level, media)
 
 
 def facts_section(facts: Sequence[tuple[str, str]]) -> Section:

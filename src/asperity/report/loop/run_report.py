@@ -208,8 +208,7 @@ def _motion_section(
 ) -> Section:
     """Return the figure of a loop with its description, which ends in a text."""
     span = format_quantity(duration, "s")
-    text = f"Height, force and energy over {span}, the path, and two phase portraits{end}."
-    return page.figure_section("loop.run", figure, text, media=media)
+    return page.figure_section("loop.run", figure, media=media, span=span, end=end)
 
 
 # --- recordings -----------------------------------------------------------------------------------

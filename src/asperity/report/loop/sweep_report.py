@@ -125,10 +125,9 @@ def onset_page(setup: Setup, predictions: Sequence[Prediction]) -> Page:
 
 
 def onset_figure_section(name: str, predictions: Sequence[Prediction]) -> Section:
-    """Return the figure of the onsets, with the title and caption of a name."""
+    """Return the figure of the onsets with the texts of a name."""
     laws = ", ".join(dict.fromkeys(one.onset.law for one in predictions))
-    text = f"Onset of limit cycles and the limits of the criteria, over delay: laws {laws}."
-    return page.figure_section(name, partial(_draw_onsets, predictions), text)
+    return page.figure_section(name, partial(_draw_onsets, predictions), laws=laws)
 
 
 def _draw_onsets(predictions: Sequence[Prediction]) -> Figure:
@@ -195,7 +194,6 @@ def _group_laws(strokes: Sequence[Stroke], gains_energy: Callable[[Stroke], bool
 def strokes_page(setup: Setup, strokes: Sequence[Stroke]) -> Page:
     """Return the report of the strokes."""
     laws = ", ".join(dict.fromkeys(stroke.law for stroke in strokes))
-    text = f"Energy of a stroke over its speed, a panel for each of the laws {laws}."
     stops = sorted({stroke.stop_message for stroke in strokes if stroke.stop_message})
     (note,) = table_notes("strokes")
     notes = [f"{note} The y axis: --html, --json.", *(f"Stopped: it {one}" for one in stops)]
@@ -206,7 +204,7 @@ def strokes_page(setup: Setup, strokes: Sequence[Stroke]) -> Page:
         facts=loop_facts(setup),
         sections=[
             page.terminal_section(table, notes=notes),
-            page.figure_section("loop.strokes", partial(_draw_strokes, strokes), text),
+            page.figure_section("loop.strokes", partial(_draw_strokes, strokes), laws=laws),
             Section("In numbers", [table], notes=[note]),
             *page.user_sections(Stroke, setup, strokes),
             *page.assumption_sections(setup.assumptions),

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import groupby
+from typing import Any
 
 from asperity.paper import VERDICTS, Result, Verdict
 from asperity.paper.claim import Number
@@ -162,17 +163,12 @@ def _claim_row(result: Result) -> Row:
 
 def paper_sections() -> list[Section]:
     """Return figures 2 and 3 of the paper."""
-    fields_text = (
-        "Arrows of force below a sinusoid of 0.8 mm by 2 mm, a panel for each law, and larger ones "
-        "at a handle on either flank of the crest."
-    )
     panels = loop_energies()
     gained = "; ".join(f"{panel.law} {loop_energy_text(panel)}" for panel in panels)
-    loops_text = f"A closed path and the work along it for each of {len(panels)} laws: {gained}."
-    loops = partial(paper_pictures.figure_three, panels)
+    loops, count = partial(paper_pictures.figure_three, panels), len(panels)
     return [
-        page.figure_section("paper.forces", paper_pictures.figure_two, fields_text),
-        page.figure_section("paper.loops", loops, loops_text),
+        page.figure_section("paper.forces", paper_pictures.figure_two),
+        page.figure_section("paper.loops", loops, count=count, gained=gained),
     ]
 
 
@@ -191,12 +187,11 @@ def experiment_sections(experiments: Experiments) -> list[Section]:
 
 
 def _cycle_section(experiment: PassivityExperiment) -> Section:
-    lag, starts = experiment.counts[0].delay, experiment.counts[0].starts
+    first, notes = experiment.counts[0], _fitted_notes(experiment.fitted)
     figure = partial(paper_pictures.cycles_figure, experiment)
     counts = ", ".join(f"{one.cycles} with {_wall_text(one)}" for one in experiment.counts)
-    text = f"Height of the handle over time. Of {starts} starts cycle: {counts}."
-    notes = _fitted_notes(experiment.fitted)
-    return page.figure_section("paper.cycles", figure, text, notes, lag=lag, starts=starts)
+    values: dict[str, Any] = {"lag": first.delay, "starts": first.starts, "counts": counts}
+    return page.figure_section("paper.cycles", figure, notes, **values)
 
 
 def _wall_text(wall: CycleCount) -> str:
@@ -210,10 +205,8 @@ def _fitted_notes(sentences: Sequence[str]) -> list[str]:
 
 def _energy_section(experiment: ScanningExperiment) -> Section:
     figure = partial(paper_pictures.energies_figure, experiment)
-    count = len(experiment.traces)
-    text = f"Energy along x and z over one stroke, a panel for each of {count} laws."
     notes = _fitted_notes(experiment.guessed)
-    return page.figure_section("paper.energies", figure, text, notes)
+    return page.figure_section("paper.energies", figure, notes, count=len(experiment.traces))
 
 
 def _stroke_section(experiment: ScanningExperiment) -> Section:
@@ -233,9 +226,8 @@ def _bump_section(experiment: BumpExperiment) -> Section:
         f"{one.law} {energy_text(float(one.supplied[-1]))} ({one.entry})"
         for one in experiment.bumps
     )
-    text = f"Path of the handle over the bump, and energy supplied at the end: {gains}."
     notes = _fitted_notes(experiment.guessed)
-    return page.figure_section("paper.bumps", figure, text, notes)
+    return page.figure_section("paper.bumps", figure, notes, gains=gains)
 
 
 def _device_section(experiments: Experiments) -> Section:
@@ -244,13 +236,9 @@ def _device_section(experiments: Experiments) -> Section:
     if devices.wall_summary:
         notes.append(f"Few misses on the left are weak evidence: {devices.wall_summary}.")
     notes.append(f"Not simulated for lack of an apparent mass: {', '.join(devices.skipped)}.")
-    missed = sum(one.is_limit_violated for one in devices.onsets)
-    text = (
-        f"Onset against the stiffness that two rules allow. On other devices K₀/q was too much in "
-        f"{missed} of {len(devices.onsets)} cases."
-    )
+    count, missed = len(devices.onsets), sum(one.is_limit_violated for one in devices.onsets)
     figure = partial(paper_pictures.devices_figure, experiments)
-    return page.figure_section("paper.devices", figure, text, notes)
+    return page.figure_section("paper.devices", figure, notes, missed=missed, count=count)
 
 
 def _device_table_section(experiment: DeviceExperiment) -> Section:

@@ -363,16 +363,10 @@ def merit_figure(comparison: Comparison) -> Figure:
         colour = style.GREEN if sound else style.ORANGE
         name = f"_{row.law.letter}"
         (point,) = axes.plot(x, y, "o", ms=8, color=colour, clip_on=False, label=name)
-        letter = axes.annotate(
-            row.law.letter,
-            (x, y),
-            xytext=(0, 7),
-            textcoords="offset points",
-            ha="center",
-            fontsize=style.TITLE,
-            color=style.INK,
-            fontweight="bold" if row is comparison.recommended_row else "normal",
-        )
+        weight = "bold" if row is comparison.recommended_row else "normal"
+        font: dict[str, Any] = {"fontsize": style.TITLE, "color": style.INK, "fontweight": weight}
+        place: dict[str, Any] = {"textcoords": "offset points", "ha": "center"}
+        letter = axes.annotate(row.law.letter, (x, y), (0, 7), **place, **font)
         for artist in (point, letter):
             style.mark_law(artist, row.law.letter)
     axes.set(xlim=(0.0, 1.15 * widest), ylim=(0.0, 1.15))

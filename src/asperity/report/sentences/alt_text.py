@@ -1,4 +1,4 @@
-"""Text alternatives of the figures of a comparison and of an analysis.
+"""Text alternatives of the figures of a comparison, and the figures of an analysis.
 
 :func:`asperity.report.html.render_picture` appends the ranges of lines and colours.
 """
@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from asperity.analysis.analyze import Analysis
 from asperity.analysis.compare import Comparison
 from asperity.core.units import format_quantity
-from asperity.report.sentences.number_text import bound_text, interval_text, range_text
+from asperity.report.sentences.number_text import bound_text
 from asperity.textures.texture import Texture
 
 
@@ -114,20 +114,3 @@ def analysis_figure_names(analysis: Analysis) -> list[str]:
     top = [] if analysis.surface.texture.is_profile else ["top"]
     jumps = ["jumps"] if analysis.continuity.jumps else []
     return ["field", "gain", *top, "depth", *jumps]
-
-
-def analysis_alt_text(analysis: Analysis, name: str) -> str:
-    """Return the text alternative of a figure by its name."""
-    law, leak = f"Law {analysis.surface.law.letter}", analysis.leak
-    q = f"q = {interval_text(analysis.q)}"
-    if name == "field":
-        gained = range_text(leak.energy, leak.upper_per_period, "J")
-        loop = f"; the worst loop gains {gained}" if len(leak.vertices) else ""
-        return f"{law}: arrows of force over curl in a vertical plane{loop}."
-    jumps = f"{len(analysis.continuity.jumps)} depths at which the force jumps, and by how much"
-    return {
-        "gain": f"{law}: loop gain in the vertical plane through the witness of q, {q}.",
-        "top": f"{law}: the greatest loop gain over depth, seen from above, {q}.",
-        "depth": f"{law}: singular values over depth down to the witness of q, {q}.",
-        "jumps": f"{law}: {jumps}.",
-    }[name]

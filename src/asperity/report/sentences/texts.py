@@ -20,9 +20,9 @@ def glossary(result: str) -> list[tuple[str, str]]:
     return list(_load_texts()["glossary"][result].items())
 
 
-def column_meanings() -> dict[str, str]:
-    """Return the meanings of the columns of the table of laws, by heading."""
-    return dict(_load_texts()["columns"])
+def column_meanings(table: str) -> list[tuple[str, str]]:
+    """Return headings and meanings of the columns of a table, "laws" or "cases"."""
+    return list(_load_texts()["columns"][table].items())
 
 
 def table_notes(table: str) -> list[str]:
@@ -30,13 +30,17 @@ def table_notes(table: str) -> list[str]:
     return list(_load_texts()["notes"][table])
 
 
-def figure_text(name: str, **values: object) -> tuple[str, str]:
-    """Return title and caption of a figure.
+def figure_text(name: str, **values: object) -> tuple[str, str, str]:
+    """Return title, caption and description of a figure.
 
     Args:
         name: of its report and of the figure, "comparison.force".
-        values: that replace the names in braces in the caption.
+        values: that replace the names in braces.
+
+    Returns:
+        The texts; the description is empty where it is more than a sentence with values.
     """
     report, figure = name.split(".")
     text = _load_texts()["figures"][report][figure]
-    return text["title"], text["caption"].format(**values)
+    description = text.get("description", "")
+    return text["title"], text["caption"].format(**values), description.format(**values)
