@@ -171,6 +171,8 @@ def _apply_periodic_tip(
     return np.ascontiguousarray(scanned[inner]), sentence
 
 
+Patch = tuple[FloatArray, tuple[float, float]]
+"""Heights [m], (ny, nx), of one period of a synthetic surface, and the pitch (p_x, p_y) [m]."""
 MIN_NODES_PER_WAVE = 4.0
 """Nodes per shortest wave below which the spline no longer represents it.
 
@@ -253,6 +255,17 @@ def _half_shell(shell: int) -> tuple[np.ndarray, np.ndarray]:
 def scale_to_rms(field: FloatArray, rms: float) -> FloatArray:
     """Return the field scaled to a root mean square over its nodes; the field is not zero."""
     return np.asarray(field * (rms / math.sqrt(float(np.mean(field**2)))))
+
+
+def rough_field(
+    shape: tuple[int, int],
+    size: tuple[float, float],
+    band: SelfAffineSpectrum,
+    rms: float,
+    seed: int,
+) -> FloatArray:
+    """Return a :func:`random_field` scaled to a root mean square."""
+    return scale_to_rms(random_field(shape, size, band, seed), rms)
 
 
 def low_pass(heights: FloatArray, nodes: float = MIN_NODES_PER_WAVE) -> FloatArray:

@@ -13,7 +13,7 @@ from asperity.core.errors import ParameterError
 from asperity.textures import HeightMap
 from asperity.textures.catalogue import CATALOGUE
 from asperity.textures.library import LIBRARY, NamedSurface, named_surface, surface_names
-from asperity.textures.library.sandpaper import GRAIN_SIZES
+from asperity.textures.library.random_surfaces import GRAIN_SIZES
 from asperity.textures.synthetic import low_pass
 
 NAMES = ("cloth", "brushed-metal", "sandpaper", "wood", "knurl", "tile")

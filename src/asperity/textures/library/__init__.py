@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from asperity.textures.library.named import NamedSurface
-from asperity.textures.library.surface_library import LIBRARY, named_surface, surface_names
+from asperity.textures.library.surface_library import (
+    LIBRARY,
+    NamedSurface,
+    named_surface,
+    surface_names,
+)
 
 __all__ = ["LIBRARY", "NamedSurface", "named_surface", "surface_names"]
