@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.enclosures.taylor import TaylorMath, TaylorModel, TaylorNumber
@@ -69,6 +70,14 @@ class Cells(ABC):
     def clip_to_region(self, coordinates: FloatArray) -> FloatArray:
         """Return the coordinates clipped to the region if it has a border."""
         return coordinates
+
+
+def grid_index_chunks(counts: Sequence[int], size: int = CHUNK_SIZE) -> Iterator[NDArray[np.intp]]:
+    """Return the indices (n, d) of the cells of a grid, in chunks of at most ``size``."""
+    total = math.prod(counts)
+    for first in range(0, total, size):
+        flat = np.arange(first, min(first + size, total))
+        yield np.stack(np.unravel_index(flat, counts), axis=-1)
 
 
 def low_discrepancy_points(count: int, dimensions: int) -> FloatArray:

@@ -11,12 +11,12 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.core.errors import InternalError
 from asperity.enclosures.cells import (
-    CHUNK_SIZE,
     DERIVATIVE_NAMES,
     DERIVATIVE_ORDERS,
     EPS,
     SAMPLE_COUNT,
     Cells,
+    grid_index_chunks,
     low_discrepancy_points,
 )
 from asperity.enclosures.taylor import TaylorModel, TaylorNumber
@@ -94,11 +94,8 @@ class BoundedCells(Cells):
     def initial_cells(self) -> tuple[Iterator[FloatArray], FloatArray]:
         """See :class:`Cells`."""
         count = _INITIAL_COUNTS[self.dimensions]
-        ticks = (np.arange(count) + 0.5) / count
-        centres = np.stack(np.meshgrid(*[ticks] * self.dimensions, indexing="ij"), axis=-1)
-        flat = centres.reshape(-1, self.dimensions)
-        parts = (flat[first : first + CHUNK_SIZE] for first in range(0, len(flat), CHUNK_SIZE))
-        return parts, np.full(self.dimensions, 0.5 / count)
+        chunks = grid_index_chunks([count] * self.dimensions)
+        return ((index + 0.5) / count for index in chunks), np.full(self.dimensions, 0.5 / count)
 
     def sample_coordinates(self, count: int = SAMPLE_COUNT) -> FloatArray:
         """See :class:`Cells`."""

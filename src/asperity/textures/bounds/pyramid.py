@@ -39,9 +39,9 @@ def line_pyramid(c: FloatArray, pitch: float) -> Pyramid:
         index of its first box and its number of boxes, shape (levels, 2).
     """
     middle, spread = _midrange(c)
-    second = _max_abs(np.diff(c, 2), (1,), 1)
-    third = _max_abs(np.diff(c, 3), (0,), 1)
-    crest = _max_negative(np.diff(c, 2), (1,), 1)
+    second = _upper_bounds(np.abs, np.diff(c, 2), (1,), 1)
+    third = _upper_bounds(np.abs, np.diff(c, 3), (0,), 1)
+    crest = _upper_bounds(np.negative, np.diff(c, 2), (1,), 1)
     low, high = _height_bounds(c - middle, (3,), 1, spread)
     return _build_levels(
         _round_outward(middle, [low, high, second / pitch, third / pitch, crest / pitch])
@@ -77,16 +77,25 @@ def _plane_bounds(c: FloatArray, pitch: tuple[float, float], spread: float) -> l
     """Return the five bounds of every two by two cells, the lower one negated."""
     xx, yy, xy = np.diff(c, 2, axis=1), np.diff(c, 2, axis=0), np.diff(np.diff(c, axis=0), axis=1)
     aspect = pitch[0] / pitch[1]
-    fxx, fyy = _max_abs(xx, (3, 1), 2), aspect**2 * _max_abs(yy, (1, 3), 2)
-    fxy = aspect * _max_abs(xy, (2, 2), 2)
+    fxx, fyy = (
+        _upper_bounds(np.abs, xx, (3, 1), 2),
+        aspect**2 * _upper_bounds(np.abs, yy, (1, 3), 2),
+    )
+    fxy = aspect * _upper_bounds(np.abs, xy, (2, 2), 2)
     second = np.minimum(np.maximum(fxx, fyy) + fxy, np.sqrt(fxx**2 + 2.0 * fxy**2 + fyy**2))
     # ‖D³h‖ is at most the root of the sum of the squares of all eight derivatives.
-    third = _max_abs(np.diff(xx, axis=1), (3, 0), 2) ** 2
-    third += 3.0 * (aspect * _max_abs(np.diff(xx, axis=0), (2, 1), 2)) ** 2
-    third += 3.0 * (aspect**2 * _max_abs(np.diff(yy, axis=1), (1, 2), 2)) ** 2
-    third += (aspect**3 * _max_abs(np.diff(yy, axis=0), (0, 3), 2)) ** 2
+    third = _upper_bounds(np.abs, np.diff(xx, axis=1), (3, 0), 2) ** 2
+    third += 3.0 * (aspect * _upper_bounds(np.abs, np.diff(xx, axis=0), (2, 1), 2)) ** 2
+    third += 3.0 * (aspect**2 * _upper_bounds(np.abs, np.diff(yy, axis=1), (1, 2), 2)) ** 2
+    third += (aspect**3 * _upper_bounds(np.abs, np.diff(yy, axis=0), (0, 3), 2)) ** 2
     # Gershgorin's discs of -Hess h.
-    crest = np.maximum(_max_negative(xx, (3, 1), 2), aspect**2 * _max_negative(yy, (1, 3), 2)) + fxy
+    crest = (
+        np.maximum(
+            _upper_bounds(np.negative, xx, (3, 1), 2),
+            aspect**2 * _upper_bounds(np.negative, yy, (1, 3), 2),
+        )
+        + fxy
+    )
     low, high = _height_bounds(c, (3, 3), 2, spread)
     derivatives = second, np.sqrt(third), np.minimum(crest, second)
     return [low, high, *(bound / pitch[0] for bound in derivatives)]
@@ -99,26 +108,19 @@ def _midrange(c: FloatArray) -> tuple[float, float]:
     return middle, max(high - middle, middle - low)
 
 
-def _max_abs(c: FloatArray, degrees: tuple[int, ...], cells: int) -> FloatArray:
-    """Return bounds of the absolute value of a spline over boxes.
+def _upper_bounds(
+    function: np.ufunc, c: FloatArray, degrees: tuple[int, ...], cells: int
+) -> FloatArray:
+    """Return upper bounds, at least 0, of the absolute or the negated value of a spline over boxes.
 
     Args:
+        function: ``np.abs`` or ``np.negative``.
         c: B-spline coefficients.
         degrees: degrees of the spline along each axis.
         cells: cells along the side of a box.
     """
     single = c.astype(np.float32)
-    parts = _bernstein_coefficients(single, degrees, cells)
-    found = _max_over_boxes([(np.abs(part), widths) for part, widths in parts], cells)
-    return found + _ROUNDING_ALLOWANCE * float(np.abs(single).max())
-
-
-def _max_negative(c: FloatArray, degrees: tuple[int, ...], cells: int) -> FloatArray:
-    """Return upper bounds of a negated spline over boxes, at least 0."""
-    single = c.astype(np.float32)
-    found = _max_over_boxes(
-        [(-part, widths) for part, widths in _bernstein_coefficients(single, degrees, cells)], cells
-    )
+    found = _max_over_boxes(function, _bernstein_coefficients(single, degrees, cells), cells)
     return np.maximum(found, 0.0) + _ROUNDING_ALLOWANCE * float(np.abs(single).max())
 
 
@@ -128,8 +130,8 @@ def _height_bounds(
     """Return the lower bounds of a spline over boxes, negated, and the upper ones."""
     parts = _bernstein_coefficients(c.astype(np.float32), degrees, cells)
     allowance = _ROUNDING_ALLOWANCE * spread
-    below = _max_over_boxes([(-part, widths) for part, widths in parts], cells)
-    return below + allowance, _max_over_boxes(parts, cells) + allowance
+    low, high = (_max_over_boxes(sign, parts, cells) for sign in (np.negative, np.positive))
+    return low + allowance, high + allowance
 
 
 def _bernstein_coefficients(
@@ -161,11 +163,11 @@ def _bernstein_along_axis(c: Float32Array, degree: int) -> list[tuple[Float32Arr
     return [(c, degree)]
 
 
-def _max_over_boxes(parts: list[BernsteinPart], step: int) -> FloatArray:
-    """Return the maximum over each box and over all parts."""
+def _max_over_boxes(function: np.ufunc, parts: list[BernsteinPart], step: int) -> FloatArray:
+    """Return the maximum of a function over each box and over all parts."""
     result: Float32Array | None = None
     for values, widths in parts:
-        boxes = values
+        boxes = function(values)
         for axis, width in enumerate(widths):
             boxes = _window_max(boxes, axis, width, step)
         result = boxes if result is None else np.maximum(result, boxes, out=result)

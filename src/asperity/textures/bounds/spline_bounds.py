@@ -6,7 +6,6 @@ several cells of a map it is enclosed by its B-spline coefficients.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -14,11 +13,11 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.enclosures.cells import (
-    CHUNK_SIZE,
     DERIVATIVE_ORDERS,
     EPS,
     SAMPLE_COUNT,
     Cells,
+    grid_index_chunks,
     low_discrepancy_points,
 )
 from asperity.enclosures.taylor import TaylorModel, TaylorNumber
@@ -119,12 +118,10 @@ class SplineCells(Cells):
         # The last blocks overlap others if the number of cells is no multiple of the side.
         firsts = [np.append(np.arange(0, n - side, side), n - side) for n in self._counts]
         shape = [len(first) for first in firsts[::-1]]
-        total = math.prod(shape)
 
         def chunks() -> Iterator[FloatArray]:
-            for first in range(0, total, CHUNK_SIZE):
-                index = np.unravel_index(np.arange(first, min(first + CHUNK_SIZE, total)), shape)
-                places = zip(firsts, index[::-1], strict=True)
+            for index in grid_index_chunks(shape):
+                places = zip(firsts, index.T[::-1], strict=True)
                 yield np.stack([starts[k] for starts, k in places], axis=-1) + 0.5 * side
 
         return chunks(), np.full(self.dimensions, 0.5 * side)
@@ -242,11 +239,8 @@ def _fit_linear(bernstein: FloatArray, scale: float, slack: FloatArray) -> Taylo
         gy = 0.25 * (left[-1] + right[-1] - left[0] - right[0])
         slopes.append(gy)
         rest -= gy * np.linspace(-1.0, 1.0, rows)[:, None, None]
-    low, high = rest.min(axis=(0, 1)), rest.max(axis=(0, 1))
-    c = 0.5 * (low + high)
     # The conversion sums at most 16 coefficients with weights of at most one.
-    e = 0.5 * (high - low) * (1.0 + 8.0 * EPS) + slack
-    return TaylorModel(scale * c, scale * np.stack(slopes), scale * e * (1.0 + 8.0 * EPS))
+    return _enclose_remainder(slopes, rest, scale, slack)
 
 
 def _fit_block(part: FloatArray, side: int, scale: float, slack: FloatArray) -> TaylorModel:
@@ -266,6 +260,13 @@ def _fit_block(part: FloatArray, side: int, scale: float, slack: FloatArray) -> 
     gy = y @ part.mean(axis=1) / (y @ y)
     rest = part - gx * x[:, None]
     rest -= gy * y[:, None, None]
+    return _enclose_remainder([gx, gy], rest, scale, slack)
+
+
+def _enclose_remainder(
+    slopes: list[FloatArray], rest: FloatArray, scale: float, slack: FloatArray
+) -> TaylorModel:
+    """Return ``scale`` times a linear function plus the hull of the remainder's coefficients."""
     low, high = rest.min(axis=(0, 1)), rest.max(axis=(0, 1))
     c, e = 0.5 * (low + high), 0.5 * (high - low) * (1.0 + 8.0 * EPS) + slack
-    return TaylorModel(scale * c, scale * np.stack([gx, gy]), scale * e * (1.0 + 8.0 * EPS))
+    return TaylorModel(scale * c, scale * np.stack(slopes), scale * e * (1.0 + 8.0 * EPS))

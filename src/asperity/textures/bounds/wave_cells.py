@@ -20,6 +20,7 @@ from asperity.enclosures.cells import (
     REFINED_GAPS,
     SAMPLE_COUNT,
     Cells,
+    grid_index_chunks,
     low_discrepancy_points,
 )
 from asperity.enclosures.taylor import TaylorModel, TaylorNumber
@@ -74,15 +75,8 @@ class WaveCells(Cells):
         limit = 4_000_000 ** (1.0 / self.dimensions)
         counts = [int(min(max(math.ceil(turn / 0.7), least), limit)) for turn in turns]
         half = 0.5 * np.asarray(sizes) / counts
-        total = math.prod(counts)
-
-        def chunks() -> Iterator[FloatArray]:
-            for first in range(0, total, self.chunk_size()):
-                flat = np.arange(first, min(first + self.chunk_size(), total))
-                index = np.stack(np.unravel_index(flat, counts), axis=-1)
-                yield half * (2.0 * index + 1.0)
-
-        return chunks(), half
+        chunks = grid_index_chunks(counts, self.chunk_size())
+        return (half * (2.0 * index + 1.0) for index in chunks), half
 
     def sample_coordinates(self, count: int = SAMPLE_COUNT) -> FloatArray:
         """See :class:`Cells`."""
