@@ -10,7 +10,6 @@ import pytest
 
 from asperity.contacts import Contact
 from asperity.contacts.closest import closest_warm as again
-from asperity.contacts.closest import line_budget as line_within
 from asperity.contacts.closest import line_search, plane_search
 from asperity.contacts.closest import plane_budget as plane_within
 from asperity.contacts.warm_start import (
@@ -322,14 +321,14 @@ def test_a_search_out_of_looks_asks_for_less_each_time(monkeypatch: pytest.Monke
         return (0.0, 4.0, 0.0, 0.0), [0.0, 20.0, 10.0, 0.0][len(kept) - 1]
 
     monkeypatch.setattr(
-        line_within, "descend_within_budget", lambda *_given: ((0.0, 4.0, 0.0, 0.0), 50.0)
+        line_search, "descend_within_budget", lambda *_given: ((0.0, 4.0, 0.0, 0.0), 50.0)
     )
-    monkeypatch.setattr(line_within, "search_line", search_line)
-    best, gap, looks = line_within.search_line_within_budget(0.0, 2.0, 0.0, 100.0, None)
+    monkeypatch.setattr(line_search, "search_line", search_line)
+    best, gap, looks = line_search.search_line_within_budget(0.0, 2.0, 0.0, 100.0, None)
     np.testing.assert_allclose(kept[1:], [(1.0 - 0.25**n) ** 2 for n in (1, 2, 3)], rtol=1e-15)
     assert (best[1], gap, looks) == (4.0, 2.0 / 16.0, 100.0)
-    monkeypatch.setattr(line_within, "search_line", lambda *_given: ((0.0, 4.0, 0.0, 0.0), 7.0))
-    assert line_within.search_line_within_budget(0.0, 2.0, 0.0, 100.0, None)[1:] == (0.0, 43.0)
+    monkeypatch.setattr(line_search, "search_line", lambda *_given: ((0.0, 4.0, 0.0, 0.0), 7.0))
+    assert line_search.search_line_within_budget(0.0, 2.0, 0.0, 100.0, None)[1:] == (0.0, 43.0)
 
 
 def test_a_search_of_the_plane_asks_for_less_in_the_same_way(
@@ -358,17 +357,14 @@ def test_a_search_of_the_plane_asks_for_less_in_the_same_way(
 
 
 @pytest.mark.parametrize("u", [0.1, 3.3, 4.0, 7.9])
-def test_every_part_of_an_interval_is_looked_at_once(u: float) -> None:
+def test_next_interval_visits_every_part_once(u: float) -> None:
     """Three levels down from the whole: 8 parts, the nearest first, of halves the nearer."""
     level, side, i = 3, 8.0, 0
     seen = []
     while level <= 3:
         if level == 0:
             seen.append(i)
-            level, side, i = line_search.next_interval(0, 1.0, i, 3, u)
-        else:
-            level, side = level - 1, 0.5 * side
-            i = 2 * i + int(u >= (2 * i + 1) * side)
+        level, side, i = line_search.next_interval(level > 0, level, side, i, 3, u)
     assert sorted(seen) == list(range(8))
     assert seen[0] == int(u)
     for first in (0, 2, 4, 6):

@@ -14,7 +14,7 @@ from asperity.cli.options import MEMORY
 from asperity.core.errors import ParameterError
 from asperity.core.memory import estimate_memory, free_memory, limit_memory, require_memory
 from asperity.textures.kinds.noise import Noise
-from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.spline.spline_texture import HeightMap
 
 _PEAK = """
 import sys

@@ -13,6 +13,7 @@ from asperity.contacts import sampler_interface as sampler
 from asperity.kernels import law_interface as law_functions
 from asperity.kernels.fuse import kernel_source
 from asperity.kernels.law_codegen import LawCode, contact_source, probe_source
+from asperity.kernels.link import unit_from_module
 from asperity.laws import LAWS
 from asperity.simulation.kernels import axis_body as axes
 from asperity.simulation.kernels import body_interface as body_functions
@@ -43,7 +44,7 @@ def test_a_module_defines_what_its_interface_says(
     interface: ModuleType, module: ModuleType
 ) -> None:
     said, found = arguments(interface), arguments(module)
-    shared = said.keys() & set(module.KERNELS.provides)
+    shared = said.keys() & set(unit_from_module(module).kernels.provides)
     assert shared
     assert {name: found[name] for name in shared} == {name: said[name] for name in shared}
 

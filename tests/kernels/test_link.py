@@ -65,7 +65,7 @@ def written(module: ModuleType) -> tuple[set[str], set[str], set[str]]:
 
 def disagreements(module: ModuleType) -> list[str]:
     """What a module says of itself and its text does not."""
-    kernels: Kernels = module.KERNELS
+    kernels = unit_from_module(module).kernels
     defined, own, others = written(module)
     offered = {*kernels.provides, *kernels.loops}
     faults = [f"calls {name}" for name in others - vars(module).keys()]

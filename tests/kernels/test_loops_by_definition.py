@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from asperity.contacts.warm_start import ERROR_BOUND, EVALUATIONS
-from asperity.kernels import friction_anchor as anchor
-from asperity.kernels import point_access as storing
+from asperity.kernels import loop_functions as storing
 from asperity.kernels import tick
 from asperity.kernels.loops import block_loops, contact_loop, sampler_loops
 from asperity.kernels.loops import path_loop as path_loops
@@ -89,7 +88,7 @@ def test_a_law_with_state_is_told_its_deflection(monkeypatch: pytest.MonkeyPatch
     anchored_loops.jacobian_batch(POINTS, deflection, sliding, again, jacobian, TEXTURE, LAW)
     for k, (point, d) in enumerate(zip(POINTS, deflection, strict=True)):
         np.testing.assert_array_equal(force[k], answer(3, *point, *d))
-        moves = anchor.sliding_derivative(*d, bool(sliding[k]))
+        moves = storing.sliding_derivative(*d, bool(sliding[k]))
         expected = answer(12, *point, *d, *moves)
         np.testing.assert_array_equal(again[k], expected[:3])
         np.testing.assert_array_equal(jacobian[k].ravel(), expected[3:])
@@ -128,7 +127,7 @@ def test_contacts_that_are_given_are_told_in_order(monkeypatch: pytest.MonkeyPat
     force, jacobian = np.full((5, 3), np.nan), np.full((5, 3, 3), np.nan)
     contact_loop.contact_batch(POINTS, depths, derivatives, held, sliding, force, jacobian, LAW)
     for k in range(5):
-        moves = anchor.sliding_derivative(*held[k], bool(sliding[k]))
+        moves = storing.sliding_derivative(*held[k], bool(sliding[k]))
         expected = answer(12, *POINTS[k], depths[k], *derivatives[k], *held[k], *moves)
         np.testing.assert_array_equal(force[k], expected[:3])
         np.testing.assert_array_equal(jacobian[k].ravel(), expected[3:])
@@ -170,13 +169,13 @@ def test_results_stand_in_the_row_of_their_point() -> None:
 
 
 def test_an_anchor_sticks_until_its_deflection_is_too_long() -> None:
-    assert anchor.drag_anchor(3.0, 4.0, False, 9.0, 9.0, 5.0) == (3.0, 4.0, 0.0, 0.0)
-    assert anchor.drag_anchor(4.0, 6.0, True, 1.0, 2.0, 5.0) == (1.0, 2.0, 3.0, 4.0)
-    dragged = anchor.drag_anchor(4.0, 6.0, True, 1.0, 2.0, 2.5)
+    assert storing.drag_anchor(3.0, 4.0, False, 9.0, 9.0, 5.0) == (3.0, 4.0, 0.0, 0.0)
+    assert storing.drag_anchor(4.0, 6.0, True, 1.0, 2.0, 5.0) == (1.0, 2.0, 3.0, 4.0)
+    dragged = storing.drag_anchor(4.0, 6.0, True, 1.0, 2.0, 2.5)
     assert dragged == pytest.approx((2.5, 4.0, 1.5, 2.0), rel=1e-15)
-    assert anchor.sliding_derivative(3.0, 4.0, False) == (1.0, 0.0, 1.0)
-    assert anchor.sliding_derivative(0.0, 0.0, True) == (1.0, 0.0, 1.0)
-    assert anchor.sliding_derivative(3.0, 4.0, True) == pytest.approx(
+    assert storing.sliding_derivative(3.0, 4.0, False) == (1.0, 0.0, 1.0)
+    assert storing.sliding_derivative(0.0, 0.0, True) == (1.0, 0.0, 1.0)
+    assert storing.sliding_derivative(3.0, 4.0, True) == pytest.approx(
         (0.64, -0.48, 0.36), rel=1e-15
     )
 

@@ -28,12 +28,17 @@ SQRT_EPS = 2.0**-26
 """Its square root: the accuracy of a minimum that is located by function values."""
 
 
+EVERY_FUNCTION = ("*",)
+"""Value of ``Kernels.provides`` for a module that provides all its functions except the loops."""
+
+
 @dataclass(frozen=True)
 class Kernels:
     """Declaration of a compiled module: what it provides, and compiler hints.
 
     Attributes:
-        provides: functions for other modules; the first module that provides a name is used.
+        provides: functions for other modules, or ``EVERY_FUNCTION``; the first module that
+            provides a name is used.
         loops: functions called from Python.
         not_inlined: functions that are too large to be inlined in every caller.
         shared: large functions compiled once for all modules that call them, together with the

@@ -82,15 +82,14 @@ def kernel_source(law: Law) -> str:
 @lru_cache(maxsize=256)
 def law_units(law: Law, clamp: Clamp) -> tuple[SourceUnit, ...]:
     """Return the functions of a law, those of a probe on it, and those that its loops may call."""
-    from asperity.kernels import friction_anchor, point_access
+    from asperity.kernels import loop_functions
 
     code = LawCode(law, kernel_source(law), clamp)
     title, probe = f"law {law}", f"law {law} at a probe"
     return (
         generated_unit(title, code.source, merged=("law_force", "law_jacobian")),
         generated_unit(probe, probe_source(code), merged=("probe_force", "probe_jacobian")),
-        unit_from_module(friction_anchor),
-        unit_from_module(point_access),
+        unit_from_module(loop_functions),
     )
 
 

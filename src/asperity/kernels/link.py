@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from threading import Lock
 from types import MappingProxyType, ModuleType
 
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import EVERY_FUNCTION, Kernels
 from asperity.core.errors import ParameterError
 
 # Python 3.11 counts the depth of a tree for all threads together: two that parse at once may fail
@@ -93,16 +93,19 @@ def unit_from_source(
     name: str, source: str, kernels: Kernels, namespace: Mapping[str, object] = MappingProxyType({})
 ) -> SourceUnit:
     """Return the unit of a source text; the namespace holds its records and numbers."""
+    functions = [node for node in parse_source(source).body if isinstance(node, ast.FunctionDef)]
+    if kernels.provides == EVERY_FUNCTION:
+        every = tuple(node.name for node in functions if node.name not in kernels.loops)
+        kernels = replace(kernels, provides=every)
     unit = SourceUnit(name, kernels, {}, {}, {})
     rows = source.split("\n")  # once; ast.get_source_segment would split it for every function
-    for node in parse_source(source).body:
-        if isinstance(node, ast.FunctionDef):
-            lines = _used_definitions(node, namespace, kernels.native)
-            text = rows[node.lineno - 1 : node.end_lineno]
-            text[-1] = text[-1].encode()[: node.end_col_offset].decode()
-            unit.sources[node.name] = "\n".join(text)
-            unit.definitions[node.name] = lines
-            unit.calls[node.name] = tuple(sorted(_called_functions(node) - lines.keys()))
+    for node in functions:
+        lines = _used_definitions(node, namespace, kernels.native)
+        text = rows[node.lineno - 1 : node.end_lineno]
+        text[-1] = text[-1].encode()[: node.end_col_offset].decode()
+        unit.sources[node.name] = "\n".join(text)
+        unit.definitions[node.name] = lines
+        unit.calls[node.name] = tuple(sorted(_called_functions(node) - lines.keys()))
     return unit
 
 
@@ -132,12 +135,9 @@ def _used_definitions(
     return lines
 
 
-def generated_unit(
-    name: str, source: str, *, loops: tuple[str, ...] = (), merged: tuple[str, ...] = ()
-) -> SourceUnit:
+def generated_unit(name: str, source: str, merged: tuple[str, ...] = ()) -> SourceUnit:
     """Return the unit of a generated source text, which provides all of its functions."""
-    unit = unit_from_source(name, source, Kernels())
-    return replace(unit, kernels=Kernels(tuple(unit.sources), loops, merged=merged))
+    return unit_from_source(name, source, Kernels(EVERY_FUNCTION, merged=merged))
 
 
 _UNITS: dict[ModuleType, SourceUnit] = {}

@@ -9,15 +9,10 @@ import math
 from typing import NamedTuple
 
 from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import EVERY_FUNCTION, Kernels
 from asperity.kernels.law_interface import probe_tick
 
-KERNELS = Kernels(
-    provides=(
-        "initial_servo_state", "flush_subnormal", "flush_subnormal_state", "quantize", "servo_tick",
-        "state_before_tick",
-    )
-)  # fmt: skip
+KERNELS = Kernels(provides=EVERY_FUNCTION)
 
 
 class ServoSettings(NamedTuple):

@@ -35,7 +35,7 @@ from asperity.recording.recorded_field import (
 from asperity.recording.recording import Recording
 from asperity.recording.replay_trace import ReplayTrace
 from asperity.surface import Surface
-from asperity.textures.rebuild import rebuild_texture
+from asperity.textures.catalogue import rebuild_texture
 from asperity.textures.texture import Texture
 
 COMPARED_COLUMNS = (

@@ -8,8 +8,7 @@ from asperity.textures.kinds.grating import Grating
 from asperity.textures.kinds.noise import Noise, NoiseProfile
 from asperity.textures.kinds.sinusoid import Sinusoid
 from asperity.textures.library import LIBRARY, NamedSurface, named_surface, surface_names
-from asperity.textures.spline.heightmap import HeightMap
-from asperity.textures.spline.profile import Profile
+from asperity.textures.spline.spline_texture import HeightMap, Profile
 from asperity.textures.texture import Texture
 from asperity.textures.texture_loading import load_texture
 

@@ -1,4 +1,4 @@
-"""Catalogue of texture kinds, and textures from a specification or a measured file."""
+"""Catalogue of texture kinds, and textures from a specification, a measured file or a recording."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ import re
 from collections import ChainMap
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import Any, cast
 
 from asperity.core.arguments import Argument, parse_arguments
+from asperity.core.checks import FloatArray
+from asperity.core.digests import content_digest
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.measured.file_arguments import FILE_ARGUMENTS, SYNTHETIC_ARGUMENTS
 from asperity.textures.kinds.fourier import FOURIER
@@ -17,6 +20,9 @@ from asperity.textures.kinds.grating import GRATING
 from asperity.textures.kinds.noise import NOISE, NOISE_PROFILE
 from asperity.textures.kinds.sinusoid import SINUSOID
 from asperity.textures.library.surface_library import LIBRARY
+from asperity.textures.spline.heightmap_sampler import HeightMapArguments
+from asperity.textures.spline.profile_sampler import ProfileArguments
+from asperity.textures.spline.spline_texture import fit_spline
 from asperity.textures.synthetic import prepare_texture
 from asperity.textures.texture import Texture, TextureKind
 from asperity.textures.texture_loading import load_texture
@@ -176,3 +182,71 @@ def _require_all(kind: TextureKind, arguments: dict[str, Any]) -> dict[str, Any]
         if name not in arguments:
             raise ParameterError(name, f"is missing: a {kind.name} needs {', '.join(required)}")
     return arguments
+
+
+def rebuild_texture(
+    arguments: tuple[Any, ...], sampler: tuple[ModuleType, ...], description: Mapping[str, Any]
+) -> Texture | None:
+    """Return the texture with this sampler record.
+
+    Splines are rebuilt from the record, other kinds from their description, which must contain the
+    arguments declared by their :class:`~asperity.textures.texture.TextureKind`.
+
+    Args:
+        arguments: the record that the sampler functions receive.
+        sampler: modules of the sampler functions.
+        description: description of the texture, see :meth:`Texture.describe`.
+
+    Returns:
+        The texture; ``None`` if it cannot be rebuilt.
+
+    Example:
+        >>> from asperity.textures.kinds.sinusoid import Sinusoid
+        >>> wave = Sinusoid(amplitude=0.2e-3, period=2e-3)
+        >>> rebuilt = rebuild_texture(wave.arguments, wave.sampler, wave.describe())
+        >>> rebuilt, rebuilt.arguments == wave.arguments
+        (Sinusoid(amplitude=0.0002, period=0.002, phase=0.0, direction=(1.0, 0.0)), True)
+    """
+    texture = None
+    if isinstance(arguments, (ProfileArguments, HeightMapArguments)):
+        texture = _rebuild_spline(arguments)
+    if texture is None or texture.sampler != sampler:
+        texture = _rebuild_from_description(description)
+    if texture is None or texture.sampler != sampler:
+        return None
+    # The record itself: computed again, its numbers could differ in their last bits.
+    vars(texture)["arguments"] = arguments
+    texture.preparation = tuple(map(str, description.get("preparation", ())))
+    return texture
+
+
+def _rebuild_spline(record: ProfileArguments | HeightMapArguments) -> Texture:
+    heights, origin = record.c, cast(Any, record.x0)
+    pitch: tuple[float, ...] = (1.0 / record.ix,)
+    if isinstance(record, HeightMapArguments):
+        pitch, origin = (*pitch, 1.0 / record.iy), (record.x0, record.y0)
+    for _axis in pitch:
+        heights = _node_heights(heights, record.periodic).T
+    texture = fit_spline(heights, pitch, periodic=record.periodic, origin=origin)
+    digest = content_digest("rebuilt", type(record).__name__, *record)
+    vars(texture).update(coefficients=record.c, digest=digest)
+    return texture
+
+
+def _node_heights(c: FloatArray, periodic: bool) -> FloatArray:
+    """Return the heights at the nodes along the first axis, (c₋ + 4 c + c₊)/6."""
+    count = len(c) - (3 if periodic else 2)
+    heights: FloatArray = (c[:count] + 4.0 * c[1 : count + 1] + c[2 : count + 2]) / 6.0
+    return heights
+
+
+def _rebuild_from_description(description: Mapping[str, Any]) -> Texture | None:
+    """Return a texture of a registered kind from the arguments in its description."""
+    kind = CATALOGUE.get(str(description.get("kind")))
+    if kind is None:
+        return None
+    names = [argument.name for argument in kind.arguments if argument.name in description]
+    try:
+        return kind.factory(**{name: description[name] for name in names})
+    except (TypeError, ValueError, ParameterError):
+        return None

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -29,8 +28,7 @@ from asperity.measured.preparation import describe_magnification, magnification_
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid
 from asperity.textures.plane_waves import PlaneWaves
-from asperity.textures.spline.heightmap import HeightMap
-from asperity.textures.spline.profile import Profile
+from asperity.textures.spline.spline_texture import fit_spline
 from asperity.textures.texture import Texture
 
 
@@ -83,11 +81,8 @@ def prepare_texture(  # noqa: D417 - the others are described where they are dec
             heights, sentence = _apply_periodic_tip(heights, pitch, tip_radius, periodic=periodic)
             steps.append(sentence)
         grown, spacing = heights * vertical, tuple(step * lateral for step in pitch)
-        options: Any = {"periodic": periodic, "filled_mask": texture.filled_mask}
-        if heights.ndim == 1:
-            prepared = Profile(grown, spacing[0], **options)
-        else:
-            prepared = HeightMap(grown, spacing, **options)
+        mask = texture.filled_mask
+        prepared = fit_spline(grown, spacing, periodic=periodic, filled_mask=mask)
     if not lateral == vertical == 1.0:
         steps.append(describe_magnification(lateral, vertical))
     prepared.preparation = tuple(steps)

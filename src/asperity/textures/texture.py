@@ -355,6 +355,11 @@ class TextureKind:
     example: Mapping[str, Any] = field(default_factory=dict)
     source: str = ""
 
+    @classmethod
+    def of_class(cls, kind: type[Texture], summary: str, **example: Any) -> TextureKind:
+        """Return the record of a texture class with example arguments."""
+        return cls(kind.kind, summary, kind, kind.constructor_arguments, example)
+
     @property
     def required_arguments(self) -> tuple[Argument, ...]:
         """The arguments without a default."""

@@ -5,31 +5,29 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from asperity.core.arguments import document_arguments
 from asperity.core.cache import get_or_compute
-from asperity.core.digests import content_digest
-from asperity.core.errors import ParameterError
-from asperity.core.files import open_input
-from asperity.measured.file_arguments import FILE_ARGUMENTS, READING_ARGUMENTS
-from asperity.textures.spline.heightmap import HeightMap
-from asperity.textures.spline.profile import Profile
-
-if TYPE_CHECKING:
-    from asperity.measured.prepared import PreparedSurface, StageCallback
-
-
-from dataclasses import dataclass, field
-
 from asperity.core.checks import FloatArray
+from asperity.core.digests import content_digest
 from asperity.core.display import Reportable
-from asperity.core.files import to_plain_data
+from asperity.core.errors import ParameterError
+from asperity.core.files import open_input, to_plain_data
+from asperity.measured.file_arguments import FILE_ARGUMENTS, READING_ARGUMENTS
 from asperity.measured.form import SurfaceDecomposition, decompose_surface
 from asperity.measured.parameters import correlation_parameters
-from asperity.measured.prepared import PreparationStage, PreparedSurface
+from asperity.measured.prepared import (
+    PreparationStage,
+    PreparedSurface,
+    StageCallback,
+    is_prepared,
+    load_prepared,
+)
+from asperity.textures.spline.spline_texture import HeightMap, Profile, fit_spline
 
 
 @document_arguments(FILE_ARGUMENTS)
@@ -95,7 +93,6 @@ def prepare_file(
             surface.
     """
     from asperity.measured.preparation import magnify_surface, prepare
-    from asperity.measured.prepared import is_prepared, load_prepared
     from asperity.measured.reading import read_surface
 
     given = {k: v for k, v in arguments.items() if v is not None and v is not False}
@@ -139,12 +136,9 @@ def _source_digest(path: str | os.PathLike[str], options: Mapping[str, Any]) -> 
 
 def texture_from_prepared(prepared: PreparedSurface) -> HeightMap | Profile:
     """Return the spline through a prepared surface."""
-    spline, pitch = (
-        (Profile, prepared.pitch[0]) if prepared.heights.ndim == 1 else (HeightMap, prepared.pitch)
-    )
-    texture = spline(
+    texture = fit_spline(
         prepared.heights,
-        pitch,
+        prepared.pitch,
         periodic=prepared.periodic,
         preparation=prepared.steps,
         filled_mask=prepared.filled_mask,
@@ -193,7 +187,7 @@ class MeasurementSummary(Reportable):
     prepared: PreparedSurface
     parts: SurfaceDecomposition
     correlation: tuple[float | None, float | None] = (None, None)
-    changes: tuple[StepChange, ...] = field(default=())
+    changes: tuple[StepChange, ...] = ()
 
     def __repr__(self) -> str:
         return f"<MeasurementSummary {self.source}, {self.prepared.heights.size} points>"

@@ -18,7 +18,7 @@ from asperity.analysis.energy.continuity import Continuity, continuity, find_jum
 from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.spline.spline_texture import HeightMap
 from asperity.textures.texture import Texture
 
 WAVE = Sinusoid(0.1e-3, 2e-3)

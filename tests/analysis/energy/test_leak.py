@@ -19,7 +19,7 @@ from asperity.core.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.spline.spline_texture import HeightMap
 
 K, A, L, D = 1000.0, 0.1e-3, 2e-3, 0.3e-3
 TEXTURE = Sinusoid(A, L, direction=(3.0, 4.0))

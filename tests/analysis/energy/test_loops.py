@@ -13,7 +13,7 @@ from asperity.analysis.energy.loop_integral import initial_panels
 from asperity.core.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.spline.spline_texture import HeightMap
 
 K, PERIOD, AMPLITUDE = 1000.0, 2e-3, 0.8e-3
 TEXTURE = Sinusoid(amplitude=AMPLITUDE, period=PERIOD)

@@ -12,7 +12,7 @@ from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures.domain import ScanLine
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.spline.spline_texture import HeightMap
 from asperity.textures.texture import Texture
 
 PERIOD = 2e-3

@@ -13,8 +13,7 @@ from asperity.analysis.gain.medial_axis import crest_curvature, sharpest_crest
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.heightmap import HeightMap
-from asperity.textures.spline.profile import Profile
+from asperity.textures.spline.spline_texture import HeightMap, Profile
 
 WAVE = Sinusoid(0.1e-3, 2e-3)
 RADIUS = 2e-3**2 / (4 * math.pi**2 * 0.1e-3)

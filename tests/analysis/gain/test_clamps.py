@@ -22,7 +22,7 @@ from asperity.laws import LAWS, Law
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.spline.spline_texture import HeightMap
 from asperity.textures.texture import Texture
 
 K, D, L = 500.0, 0.4e-3, 1e-3

@@ -27,7 +27,7 @@ from asperity.devices import Datum, Device, parse_device
 from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.spline.spline_texture import HeightMap
 
 WAVE = Sinusoid(0.1e-3, 2e-3, phase=0.4, direction=(3.0, 1.0))
 STEEP = Sinusoid(0.8e-3, 1e-3)

@@ -15,7 +15,7 @@ from asperity.core.units import round_up
 from asperity.kernels import fuse
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.spline.spline_texture import HeightMap
 
 WAVE = Sinusoid(0.1e-3, 1e-3)
 

@@ -20,7 +20,7 @@ from asperity.core.errors import ParameterError
 from asperity.laws import Law
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.profile import Profile
+from asperity.textures.spline.spline_texture import Profile
 from asperity.textures.texture import Texture
 
 K, PERIOD = 800.0, 1e-3

@@ -13,7 +13,7 @@ from asperity.analysis.split.split_state import pop_through, split_state
 from asperity.core.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.profile import Profile
+from asperity.textures.spline.spline_texture import Profile
 from asperity.textures.texture import Texture
 
 PERIOD = 1e-3

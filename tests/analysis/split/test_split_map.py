@@ -14,7 +14,7 @@ import asperity as asp
 from asperity.analysis.split.split_state import split_state
 from asperity.contacts.split import optimality, solver, split_evaluation
 from asperity.surface import Surface
-from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.spline.spline_texture import HeightMap
 from asperity.textures.texture import Texture
 
 DATA = Path(__file__).parents[4] / "shared" / "data"

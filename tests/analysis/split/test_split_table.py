@@ -16,8 +16,7 @@ from asperity.core.errors import ParameterError
 from asperity.surface import Surface
 from asperity.textures.kinds.fourier import Fourier
 from asperity.textures.kinds.sinusoid import Sinusoid
-from asperity.textures.spline.heightmap import HeightMap
-from asperity.textures.spline.profile import Profile
+from asperity.textures.spline.spline_texture import HeightMap, Profile
 from asperity.textures.texture import Texture
 
 K = 700.0

@@ -407,10 +407,6 @@ def test_next_box_visits_every_box_once():
         while level <= 3:
             if level == 0:
                 seen.append((i, j))
-                level, side, i, j = search.next_box(level, side, i, j, 3, u, v)
-            else:
-                level, side = level - 1, 0.5 * side
-                i = 2 * i + int(v >= (2 * i + 1) * side)
-                j = 2 * j + int(u >= (2 * j + 1) * side)
+            level, side, i, j = search.next_box(level > 0, level, side, i, j, 3, u, v)
         assert sorted(seen) == [(i, j) for i in range(8) for j in range(8)]
         assert seen[0] == (int(v), int(u))

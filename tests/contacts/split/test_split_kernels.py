@@ -14,7 +14,6 @@ from asperity.contacts.split import potential_hull as hull
 from asperity.contacts.split import potential_spline as table
 from asperity.contacts.split import solver
 from asperity.contacts.split import split_evaluation as answers
-from asperity.contacts.split import split_warm as again
 from asperity.contacts.warm_start import (
     BUDGET,
     ERROR_BOUND,
@@ -356,11 +355,11 @@ def test_a_tick_goes_on_from_the_atoms_of_the_last(
     known: int, count: int, short: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     split_atoms, found, pull, told = solved(count, 0.02, short=short)
-    monkeypatch.setattr(again, "split_compute_atoms", split_atoms)
+    monkeypatch.setattr(answers, "split_compute_atoms", split_atoms)
     memory = np.arange(100.0, 100.0 + WARM_START_SIZE)
     memory[[BUDGET, POINT_COUNT, TRUNCATED_TICKS]] = 55.0, known, 3.0
     before = memory.copy()
-    assert again.split_contact_warm(0.1, 0.2, 0.3, 1.5, memory, "texture") == tuple(pull)
+    assert answers.split_contact_warm(0.1, 0.2, 0.3, 1.5, memory, "texture") == tuple(pull)
     ((*numbers, atoms, texture),) = told
     assert (numbers, texture) == ([0.1, 0.2, 0.3, 1.5, known, 55.0], "texture")
     np.testing.assert_array_equal(

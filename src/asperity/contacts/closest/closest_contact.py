@@ -52,10 +52,10 @@ class NearestContact(Contact):
         return -unit_normal()
 
     def kernels(self) -> tuple[ModuleType, ...]:
-        """Return the warm-started search and the fallback for a search without a budget."""
-        from asperity.contacts.closest import closest_warm, unlimited_search
+        """Return the warm-started search, with a fallback for a search without a budget."""
+        from asperity.contacts.closest import closest_warm
 
-        return closest_warm, unlimited_search
+        return (closest_warm,)
 
     def detection_code(self, needed: frozenset[str]) -> tuple[list[str], str]:
         """Return the comparison with the height at the probe: no search out of contact."""

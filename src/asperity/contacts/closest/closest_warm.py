@@ -2,9 +2,11 @@
 
 The start is the only state. Close to the closest point it saves the descent, and the search then
 evaluates only what can be closer than the local minimum downhill from the start.
+
+The functions at the end are for a texture kind whose search has no evaluation budget.
 """
 
-from asperity.contacts.sampler_interface import closest_point_within_budget, sample_height
+from asperity.contacts.sampler_interface import closest_point, sample_height
 from asperity.contacts.warm_start import (
     BUDGET,
     ERROR_BOUND,
@@ -15,11 +17,9 @@ from asperity.contacts.warm_start import (
     TRUNCATED_TICKS,
 )
 from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import EVERY_FUNCTION, Kernels
 
-KERNELS = Kernels(
-    provides=("closest_point_warm", "record_error_bound"), not_inlined=("closest_point_warm",)
-)
+KERNELS = Kernels(provides=EVERY_FUNCTION, not_inlined=("closest_point_warm",))
 
 
 def record_error_bound(warm_start: FloatArray, error_bound: float, evaluations: float) -> None:
@@ -54,3 +54,16 @@ def closest_point_warm(
     warm_start[FIRST_POINT + 2] = h
     record_error_bound(warm_start, error_bound, evaluations)
     return fx, fy, h, hx, hy
+
+
+def closest_point_within_budget(
+    x: float, y: float, z: float, start_x: float, start_y: float, budget: float, texture: object
+) -> tuple[float, float, float, float, float, float, float]:
+    """Return the exact closest point; see ``sampler_interface``."""
+    fx, fy, h, hx, hy = closest_point(x, y, z, texture)
+    return fx, fy, h, hx, hy, 0.0, 1.0
+
+
+def evaluation_cost(texture: object) -> float:
+    """Return 1; a texture kind that takes longer provides its own cost."""
+    return 1.0

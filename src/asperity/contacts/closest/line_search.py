@@ -5,21 +5,17 @@ an interval of half-width r in which |h''| <= K and |h'''| <= T, Q changes by at
 value at the centre, L = 3 K max|h'| + T max|h - z|.
 """
 
+import math
+
 import numpy as np
 
+from asperity.contacts.sampler_interface import ROUNDING_SLACK, sample_profile, search_line
 from asperity.contacts.sampler_interface import LinePoint as Point
-from asperity.contacts.sampler_interface import sample_profile
-from asperity.core.compiled import EPS, SQRT_EPS, Kernels
+from asperity.core.compiled import EPS, EVERY_FUNCTION, SQRT_EPS, Kernels
 
 KERNELS = Kernels(
-    provides=(
-        "descend",
-        "descend_within_budget",
-        "evaluate_box",
-        "evaluation_cost",
-        "next_interval",
-    ),
-    not_inlined=("evaluate_box",),
+    provides=EVERY_FUNCTION,
+    not_inlined=("evaluate_box", "search_line_within_budget"),
     shared=("descend_within_budget",),
 )
 
@@ -117,12 +113,18 @@ def evaluate_box(
     return (found if found[1] < best[1] else best), outside, evaluations_left
 
 
-def next_interval(level: int, side: float, i: int, top: int, u: float) -> tuple[int, float, int]:
-    """Return the interval after interval i of a level and its parts; above top at the end.
+def next_interval(
+    deeper: bool, level: int, side: float, i: int, top: int, u: float
+) -> tuple[int, float, int]:
+    """Return the interval to visit after interval i of a level; a level above top at the end.
 
-    Intervals of a level are twice as long as those of the level below. Of two halves the one
-    closer to u comes first.
+    That is its first half if ``deeper``, else the interval after it and its parts. Intervals of a
+    level are twice as long as those of the level below. Of two halves the one closer to u comes
+    first.
     """
+    if deeper:
+        side *= 0.5
+        return level - 1, side, 2 * i + (1 if u >= (2 * i + 1) * side else 0)
     while level < top:
         half = i >> 1
         near = 1 if u >= (2 * half + 1) * side else 0
@@ -132,3 +134,23 @@ def next_interval(level: int, side: float, i: int, top: int, u: float) -> tuple[
         side *= 2.0
         i = half
     return top + 1, side, i
+
+
+def search_line_within_budget(
+    x: float, z: float, start: float, budget: float, texture: object
+) -> tuple[Point, float, float]:
+    """Return the closest point found, its error bound [m] and the evaluations used.
+
+    See ``plane_budget``.
+    """
+    best, left = descend_within_budget(x, z, start, 0.5 * budget, texture)
+    best, left = search_line(x, z, best, 1.0 - ROUNDING_SLACK * EPS, left, texture)
+    share = 0.0 if left > 0.0 else 1.0
+    left += 0.5 * budget
+    # At most as many passes as there are digits; none after a complete search.
+    while left > 0.0 and share > 4.0 * EPS:
+        factor = 1.0 - 0.25 * share
+        best, left = search_line(x, z, best, factor * factor, left, texture)
+        if left > 0.0:
+            share *= 0.25
+    return best, share * math.sqrt(best[1]), budget - left

@@ -1,6 +1,6 @@
-"""Search for the closest surface point within an evaluation budget, with an error bound.
+"""The closest surface point, exactly or within an evaluation budget, with an error bound.
 
-Half of the budget is for the closest point itself. If it does not suffice, the rest is for passes
+Half of a budget is for the closest point itself. If it does not suffice, the rest is for passes
 over everything that can be closer; each pass prunes what is closer than the best point by less
 than a fraction of its distance. The first fraction is a quarter, so that the pass ends after few
 evaluations; each further pass prunes a quarter of what the one before did. The last completed pass
@@ -10,13 +10,25 @@ needed.
 
 import math
 
-from asperity.contacts.closest.plane_search import descend_within_budget
-from asperity.contacts.sampler_interface import ROUNDING_SLACK, search_plane
-from asperity.core.compiled import EPS, Kernels
+import numpy as np
+
+from asperity.contacts.closest.plane_search import descend, descend_within_budget
+from asperity.contacts.sampler_interface import ROUNDING_SLACK, ClosestPoint, search_plane
+from asperity.core.compiled import EPS, EVERY_FUNCTION, Kernels
 
 KERNELS = Kernels(
-    provides=("closest_point_within_budget",), not_inlined=("closest_point_within_budget",)
+    provides=EVERY_FUNCTION, not_inlined=("closest_point", "closest_point_within_budget")
 )
+
+
+def closest_point(x: float, y: float, z: float, texture: object) -> ClosestPoint:
+    """Return X, Y of the globally closest surface point, and h, h_x, h_y there.
+
+    Descend from the probe, then search everything that may be closer.
+    """
+    best = descend(x, y, z, x, y, texture)
+    best, _budget = search_plane(x, y, z, best, 1.0 - ROUNDING_SLACK * EPS, np.inf, texture)
+    return best[0], best[1], best[3], best[4], best[5]
 
 
 def closest_point_within_budget(

@@ -20,17 +20,10 @@ import numpy as np
 
 from asperity.contacts.sampler_interface import PlanePoint as Point
 from asperity.contacts.sampler_interface import sample_hessian
-from asperity.core.compiled import EPS, SQRT_EPS, Kernels
+from asperity.core.compiled import EPS, EVERY_FUNCTION, SQRT_EPS, Kernels
 
 KERNELS = Kernels(
-    provides=(
-        "descend",
-        "symmetric_eigenvalues",
-        "descend_within_budget",
-        "evaluate_box",
-        "evaluation_cost",
-        "next_box",
-    ),
+    provides=EVERY_FUNCTION,
     not_inlined=("evaluate_box", "newton_step"),
     shared=("descend_within_budget",),
 )
@@ -236,13 +229,19 @@ def evaluate_box(
 
 
 def next_box(
-    level: int, side: float, i: int, j: int, top: int, u: float, v: float
+    deeper: bool, level: int, side: float, i: int, j: int, top: int, u: float, v: float
 ) -> tuple[int, float, int, int]:
-    """Return the box after box (i, j) of a level and its parts; a level above top at the end.
+    """Return the box to visit after box (i, j) of a level; a level above top at the end.
 
-    Boxes of a level have equal sides, twice as long as those of the level below. Of the four
-    parts of a box the one closest to (u, v) comes first.
+    That is its first part if ``deeper``, else the box after it and its parts. Boxes of a level have
+    equal sides, twice as long as those of the level below. Of the four parts of a box the one
+    closest to (u, v) comes first.
     """
+    if deeper:
+        side *= 0.5
+        i = 2 * i + (1 if v >= (2 * i + 1) * side else 0)
+        j = 2 * j + (1 if u >= (2 * j + 1) * side else 0)
+        return level - 1, side, i, j
     while level < top:
         half_i = i >> 1
         half_j = j >> 1

@@ -8,21 +8,9 @@ import numpy as np
 
 from asperity.contacts.sampler_interface import evaluation_cost, sample_height, sample_hessian
 from asperity.core.checks import FloatArray
-from asperity.core.compiled import EPS, Kernels, local_array
+from asperity.core.compiled import EPS, EVERY_FUNCTION, Kernels, local_array
 
-KERNELS = Kernels(
-    provides=(
-        "split_copy_atoms",
-        "split_distance_difference",
-        "split_track_point",
-        "split_add_atom_motion",
-        "split_closest_derivative",
-        "split_solve_linear",
-        "split_assemble_system",
-        "split_evaluate_energy",
-    ),
-    iterates=True,
-)
+KERNELS = Kernels(provides=EVERY_FUNCTION, iterates=True)
 
 
 def split_distance_difference(atoms: FloatArray, i: int, j: int, y: FloatArray) -> float:

@@ -26,9 +26,9 @@ class SplitContact(NearestContact):
 
     def kernels(self) -> tuple[ModuleType, ...]:
         """Return the general solver; a texture kind may provide ``split_contact`` etc. itself."""
-        from asperity.contacts.split import optimality, solver, split_evaluation, split_warm
+        from asperity.contacts.split import optimality, solver, split_evaluation
 
-        return split_warm, split_evaluation, solver, optimality, *super().kernels()
+        return split_evaluation, solver, optimality, *super().kernels()
 
     def exact_contact(
         self, texture: HeightField, h: ExactHeight, p: list[Any]

@@ -11,7 +11,7 @@ import numpy as np
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import Kernels, local_array
 from asperity.kernels.law_interface import probe_force, probe_jacobian
-from asperity.kernels.point_access import load_point
+from asperity.kernels.loop_functions import load_point
 
 KERNELS = Kernels(loops=("force_batch", "jacobian_batch"))
 

@@ -5,9 +5,8 @@ from numpy.typing import NDArray
 
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import Kernels
-from asperity.kernels.friction_anchor import sliding_derivative
 from asperity.kernels.law_interface import contact_jacobian
-from asperity.kernels.point_access import store_jacobian
+from asperity.kernels.loop_functions import sliding_derivative, store_jacobian
 
 KERNELS = Kernels(loops=("contact_batch",))
 

@@ -4,7 +4,7 @@ from asperity.contacts.warm_start import ERROR_BOUND, EVALUATIONS
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import Kernels
 from asperity.kernels.law_interface import probe_tick
-from asperity.kernels.point_access import store_force
+from asperity.kernels.loop_functions import store_force
 
 KERNELS = Kernels(loops=("path_batch",))
 

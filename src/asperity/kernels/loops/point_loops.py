@@ -3,7 +3,7 @@
 from asperity.core.checks import FloatArray
 from asperity.core.compiled import Kernels
 from asperity.kernels.law_interface import probe_force, probe_jacobian
-from asperity.kernels.point_access import load_point, store_force, store_jacobian
+from asperity.kernels.loop_functions import load_point, store_force, store_jacobian
 
 KERNELS = Kernels(loops=("force_batch", "jacobian_batch"))
 

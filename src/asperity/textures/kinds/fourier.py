@@ -86,11 +86,11 @@ class Fourier(Texture):
     @property
     def sampler(self) -> tuple[ModuleType, ...]:
         """See :class:`Texture`."""
-        from asperity.contacts.closest import line_budget, line_search, plane_budget, plane_search
+        from asperity.contacts.closest import line_search, plane_budget, plane_search
         from asperity.textures.kinds import fourier_line_sampler, fourier_sampler, sine
 
         if self._is_parallel:
-            return fourier_line_sampler, fourier_sampler, line_search, line_budget, sine
+            return fourier_line_sampler, fourier_sampler, line_search, sine
         return fourier_sampler, plane_search, plane_budget, sine
 
     @cached_property
@@ -225,10 +225,7 @@ class Fourier(Texture):
                 return outer  # an upper bound: too many cells are equally high
 
 
-FOURIER = TextureKind(
-    "fourier",
-    "sum of plane waves",
-    Fourier,
-    Fourier.constructor_arguments,
-    example={"amplitudes": [2e-4, 1e-4], "wavevectors": [[3000.0, 0.0], [0.0, 6000.0]]},
+_VECTORS = [[3000.0, 0.0], [0.0, 6000.0]]
+FOURIER = TextureKind.of_class(
+    Fourier, "sum of plane waves", amplitudes=[2e-4, 1e-4], wavevectors=_VECTORS
 )

@@ -7,18 +7,18 @@ import math
 
 import numpy as np
 
-from asperity.contacts.closest.line_budget import search_line_within_budget
-from asperity.contacts.closest.line_search import descend, evaluate_box, next_interval
+from asperity.contacts.closest.line_search import (
+    descend,
+    evaluate_box,
+    next_interval,
+    search_line_within_budget,
+)
 from asperity.contacts.sampler_interface import PRUNED_BOX_COST, ROUNDING_SLACK, ClosestPoint
 from asperity.contacts.sampler_interface import LinePoint as Point
-from asperity.core.compiled import EPS, Kernels
+from asperity.core.compiled import EPS, EVERY_FUNCTION, Kernels
 from asperity.textures.kinds.fourier_sampler import FourierArguments
 
-KERNELS = Kernels(
-    provides=("sample_profile", "closest_point", "closest_point_within_budget", "search_line"),
-    not_inlined=("closest_point",),
-    shared=("search_line",),
-)
+KERNELS = Kernels(provides=EVERY_FUNCTION, not_inlined=("closest_point",), shared=("search_line",))
 
 
 def sample_profile(t: float, texture: FourierArguments) -> tuple[float, float, float]:
@@ -91,10 +91,5 @@ def search_line(
                 best, pruning_factor, budget, texture,
             )  # fmt: skip
             deeper = deeper and level > -48
-        if deeper:
-            level -= 1
-            side *= 0.5
-            i = 2 * i + (1 if u >= (2 * i + 1) * side else 0)
-        else:
-            level, side, i = next_interval(level, side, i, 0, u)
+        level, side, i = next_interval(deeper, level, side, i, 0, u)
     return best, budget

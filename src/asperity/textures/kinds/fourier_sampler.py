@@ -3,32 +3,14 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-
-from asperity.contacts.closest.plane_search import descend, evaluate_box, next_box
-from asperity.contacts.sampler_interface import (
-    PRUNED_BOX_COST,
-    ROUNDING_SLACK,
-    ClosestPoint,
-    Derivatives,
-)
+from asperity.contacts.closest.plane_search import evaluate_box, next_box
+from asperity.contacts.sampler_interface import PRUNED_BOX_COST, Derivatives
 from asperity.contacts.sampler_interface import PlanePoint as Point
 from asperity.core.checks import FloatArray
-from asperity.core.compiled import EPS, Kernels
+from asperity.core.compiled import EVERY_FUNCTION, Kernels
 from asperity.textures.kinds.sine import cosine, sine
 
-KERNELS = Kernels(
-    provides=(
-        "sample_hessian",
-        "closest_point",
-        "sample_height",
-        "evaluation_cost",
-        "search_plane",
-        "sample_gradient",
-    ),
-    not_inlined=("closest_point",),
-    shared=("search_plane",),
-)
+KERNELS = Kernels(provides=EVERY_FUNCTION, shared=("search_plane",))
 
 
 # Cost of a wave, in evaluations.
@@ -107,16 +89,6 @@ def sample_hessian(x: float, y: float, texture: FourierArguments) -> Derivatives
     return h, hx, hy, hxx, hxy, hyy
 
 
-def closest_point(x: float, y: float, z: float, texture: FourierArguments) -> ClosestPoint:
-    """Return X, Y of the globally closest surface point, and h, h_x, h_y there.
-
-    Descend from the probe, then search everything that may be closer.
-    """
-    best = descend(x, y, z, x, y, texture)
-    best, _budget = search_plane(x, y, z, best, 1.0 - ROUNDING_SLACK * EPS, np.inf, texture)
-    return best[0], best[1], best[3], best[4], best[5]
-
-
 def search_plane(
     x: float, y: float, z: float, best: Point, pruning_factor: float, budget: float,
     texture: FourierArguments,
@@ -149,11 +121,5 @@ def search_plane(
                 best, pruning_factor, budget, texture,
             )  # fmt: skip
             deeper = deeper and level > -48
-        if deeper:
-            level -= 1
-            side *= 0.5
-            i = 2 * i + (1 if v >= (2 * i + 1) * side else 0)
-            j = 2 * j + (1 if u >= (2 * j + 1) * side else 0)
-        else:
-            level, side, i, j = next_box(level, side, i, j, 0, u, v)
+        level, side, i, j = next_box(deeper, level, side, i, j, 0, u, v)
     return best, budget

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from asperity.core.arguments import Argument
 from asperity.core.checks import FloatArray, check_positive, check_real
 from asperity.core.errors import ParameterError
-from asperity.textures.spline.profile import Profile
+from asperity.textures.spline.spline_texture import Profile
 from asperity.textures.texture import TextureKind
 
 # The spline then follows the closed form to 2e-5 of the height (tested).
@@ -96,10 +96,5 @@ class Grating(Profile):
         return super().constructor_values() | {"height": self.ridge_height}
 
 
-GRATING = TextureKind(
-    "grating",
-    "straight ridges with rounded edges, along y",
-    Grating,
-    Grating.constructor_arguments,
-    example={"height": 0.2e-3, "period": 2e-3},
-)
+_SUMMARY = "straight ridges with rounded edges, along y"
+GRATING = TextureKind.of_class(Grating, _SUMMARY, height=0.2e-3, period=2e-3)

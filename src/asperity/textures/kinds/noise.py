@@ -12,9 +12,7 @@ from asperity.core.arguments import SEED, Argument, check_integer
 from asperity.core.checks import FloatArray, check_fraction, check_positive
 from asperity.core.errors import ParameterError
 from asperity.core.memory import require_memory
-from asperity.textures.spline.heightmap import HeightMap
-from asperity.textures.spline.profile import Profile
-from asperity.textures.spline.spline_texture import MIN_NODES, Spline
+from asperity.textures.spline.spline_texture import MIN_NODES, HeightMap, Profile, Spline
 from asperity.textures.synthetic import (
     MIN_NODES_PER_WAVE,
     SelfAffineSpectrum,
@@ -200,17 +198,8 @@ class NoiseProfile(_SelfAffine, Profile):
         return random_profile(counts[0], self.size, spectrum, self.seed)
 
 
-NOISE = TextureKind(
-    "noise",
-    "rough surface: self-affine, isotropic, band-limited",
-    Noise,
-    Noise.constructor_arguments,
-    example={"rms": 20e-6, "size": 10e-3},
-)
-NOISE_PROFILE = TextureKind(
-    "noise-profile",
-    "rough profile: the same along x only",
-    NoiseProfile,
-    NoiseProfile.constructor_arguments,
-    example={"rms": 20e-6, "size": 10e-3},
+_SUMMARY = "rough surface: self-affine, isotropic, band-limited"
+NOISE = TextureKind.of_class(Noise, _SUMMARY, rms=20e-6, size=10e-3)
+NOISE_PROFILE = TextureKind.of_class(
+    NoiseProfile, "rough profile: the same along x only", rms=20e-6, size=10e-3
 )

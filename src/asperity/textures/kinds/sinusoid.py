@@ -127,10 +127,5 @@ class Sinusoid(Texture):
         return ScanLine(np.zeros(2), np.array(self.direction), self.period, periodic=True)
 
 
-SINUSOID = TextureKind(
-    "sinusoid",
-    "one sinusoid, the classic of haptic texture",
-    Sinusoid,
-    Sinusoid.constructor_arguments,
-    example={"amplitude": 0.4e-3, "period": 1.5e-3},
-)
+_SUMMARY = "one sinusoid, the classic of haptic texture"
+SINUSOID = TextureKind.of_class(Sinusoid, _SUMMARY, amplitude=0.4e-3, period=1.5e-3)

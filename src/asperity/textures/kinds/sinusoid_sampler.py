@@ -18,22 +18,10 @@ from typing import NamedTuple
 
 from asperity.contacts.sampler_interface import ClosestPoint, Derivatives
 from asperity.core.checks import FloatArray
-from asperity.core.compiled import EPS, Kernels
+from asperity.core.compiled import EPS, EVERY_FUNCTION, Kernels
 from asperity.textures.kinds.sine import cosine, sine
 
-KERNELS = Kernels(
-    provides=(
-        "sample_height",
-        "sample_gradient",
-        "sample_hessian",
-        "closest_point",
-        "split_contact",
-        "split_contact_warm",
-        "split_derivative",
-        "split_energy",
-    ),
-    not_inlined=("closest_point",),
-)
+KERNELS = Kernels(provides=EVERY_FUNCTION, not_inlined=("closest_point",))
 
 
 class SinusoidArguments(NamedTuple):

@@ -12,7 +12,7 @@ from asperity.core.arguments import SEED, Argument
 from asperity.core.errors import ParameterError, suggest_names
 from asperity.textures.library.random_surfaces import brush_metal, glue_sandpaper, plane_wood
 from asperity.textures.library.regular_surfaces import lay_tiles, press_knurl, weave_cloth
-from asperity.textures.spline.heightmap import HeightMap
+from asperity.textures.spline.spline_texture import HeightMap
 from asperity.textures.synthetic import MIN_NODES_PER_WAVE, Patch, low_pass
 from asperity.textures.texture import TextureKind
 

@@ -5,22 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.core.compiled import SQRT_EPS, Kernels
+from asperity.core.compiled import EVERY_FUNCTION, SQRT_EPS, Kernels
 
-KERNELS = Kernels(
-    provides=(
-        "box_bounds",
-        "find_cell",
-        "dot4",
-        "is_taylor_conclusive",
-        "max_copy_distance",
-        "lateral_reach",
-        "tile_transform",
-        "bspline_weights",
-        "bspline_first_weights",
-        "bspline_second_weights",
-    )
-)
+KERNELS = Kernels(provides=EVERY_FUNCTION)
 
 
 SIXTH = 1.0 / 6.0

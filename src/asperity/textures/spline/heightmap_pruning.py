@@ -36,19 +36,12 @@ from asperity.contacts.closest.plane_search import symmetric_eigenvalues
 from asperity.contacts.sampler_interface import PRUNED_BOX_COST
 from asperity.contacts.sampler_interface import PlanePoint as Point
 from asperity.core.checks import FloatArray
-from asperity.core.compiled import EPS, Kernels, local_array
+from asperity.core.compiled import EPS, EVERY_FUNCTION, Kernels, local_array
 from asperity.textures.spline.bspline_kernels import Vector4, box_bounds
 from asperity.textures.spline.heightmap_sampler import HeightMapArguments, sample_hessian
 
 KERNELS = Kernels(
-    provides=(
-        "is_empty",
-        "narrow_window",
-        "certified_minimum_at",
-        "is_within",
-        "min_coefficients_in_row",
-        "can_prune_cell",
-    ),
+    provides=EVERY_FUNCTION,
     merged=("shrink_to_boxes", "narrow_window", "is_unique_minimum"),
     not_inlined=("min_coefficients_in_row", "can_prune_cell"),
 )

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from asperity.contacts.sampler_interface import Derivatives
 from asperity.core.checks import FloatArray
-from asperity.core.compiled import Kernels
+from asperity.core.compiled import EVERY_FUNCTION, Kernels
 from asperity.textures.spline.bspline_kernels import (
     Vector4,
     bspline_first_weights,
@@ -17,9 +17,7 @@ from asperity.textures.spline.bspline_kernels import (
     find_cell,
 )
 
-KERNELS = Kernels(
-    provides=("cell_counts", "row_sums", "sample_hessian", "sample_height", "sample_gradient")
-)
+KERNELS = Kernels(provides=EVERY_FUNCTION)
 
 
 class HeightMapArguments(NamedTuple):

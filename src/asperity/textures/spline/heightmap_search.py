@@ -2,17 +2,10 @@
 
 import math
 
-import numpy as np
-
-from asperity.contacts.closest.plane_search import (
-    descend,
-    descend_within_budget,
-    evaluate_box,
-    next_box,
-)
-from asperity.contacts.sampler_interface import PRUNED_BOX_COST, ROUNDING_SLACK, ClosestPoint
+from asperity.contacts.closest.plane_search import descend_within_budget, evaluate_box, next_box
+from asperity.contacts.sampler_interface import PRUNED_BOX_COST
 from asperity.contacts.sampler_interface import PlanePoint as Point
-from asperity.core.compiled import EPS, Kernels, local_array
+from asperity.core.compiled import EVERY_FUNCTION, Kernels, local_array
 from asperity.textures.spline.bspline_kernels import (
     box_bounds,
     is_taylor_conclusive,
@@ -33,8 +26,8 @@ from asperity.textures.spline.heightmap_pruning import (
 from asperity.textures.spline.heightmap_sampler import HeightMapArguments, cell_counts
 
 KERNELS = Kernels(
-    provides=("closest_point", "search_plane"),
-    not_inlined=("closest_point", "search_cell", "search_tile", "search_tree"),
+    provides=EVERY_FUNCTION,
+    not_inlined=("search_cell", "search_tile", "search_tree"),
     shared=("search_plane",),
     merged=("search_rows", "search_window"),
     iterates=True,
@@ -54,16 +47,6 @@ ADJACENT_DISTANCE = 1.0
 
 # The probe x, y, z, and the pruning factor of ``plane_search``.
 Query = tuple[float, float, float, float]
-
-
-def closest_point(x: float, y: float, z: float, texture: HeightMapArguments) -> ClosestPoint:
-    """Return X, Y of the globally closest surface point, and h, h_x, h_y there.
-
-    Descend from the probe, then search everything that may be closer.
-    """
-    best = descend(x, y, z, x, y, texture)
-    best, _budget = search_plane(x, y, z, best, 1.0 - ROUNDING_SLACK * EPS, np.inf, texture)
-    return best[0], best[1], best[3], best[4], best[5]
 
 
 def search_plane(
@@ -263,11 +246,5 @@ def search_tree(
                 hessian * ix, third * ix * ix, best, pruning_factor, budget, texture,
             )  # fmt: skip
             deeper = deeper and level > -20
-        if deeper:
-            level -= 1
-            side *= 0.5
-            i = 2 * i + (1 if v >= (2 * i + 1) * side else 0)
-            j = 2 * j + (1 if u >= (2 * j + 1) * side else 0)
-        else:
-            level, side, i, j = next_box(level, side, i, j, top, u, v)
+        level, side, i, j = next_box(deeper, level, side, i, j, top, u, v)
     return best, budget

@@ -6,8 +6,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.contacts.closest.line_budget import search_line_within_budget
-from asperity.contacts.closest.line_search import descend, evaluate_box, next_interval
+from asperity.contacts.closest.line_search import (
+    descend,
+    evaluate_box,
+    next_interval,
+    search_line_within_budget,
+)
 from asperity.contacts.sampler_interface import (
     PRUNED_BOX_COST,
     ROUNDING_SLACK,
@@ -16,7 +20,7 @@ from asperity.contacts.sampler_interface import (
 )
 from asperity.contacts.sampler_interface import LinePoint as Point
 from asperity.core.checks import FloatArray
-from asperity.core.compiled import EPS, Kernels
+from asperity.core.compiled import EPS, EVERY_FUNCTION, Kernels
 from asperity.textures.spline.bspline_kernels import (
     Vector4,
     box_bounds,
@@ -32,15 +36,7 @@ from asperity.textures.spline.bspline_kernels import (
 )
 
 KERNELS = Kernels(
-    provides=(
-        "sample_profile",
-        "sample_hessian",
-        "closest_point",
-        "closest_point_within_budget",
-        "sample_height",
-        "search_line",
-        "sample_gradient",
-    ),
+    provides=EVERY_FUNCTION,
     not_inlined=("closest_point", "search_tile", "search_tree"),
     shared=("search_line",),
 )
@@ -208,10 +204,5 @@ def search_tree(
                 hessian * ix, third * ix * ix, best, pruning_factor, budget, texture,
             )  # fmt: skip
             deeper = deeper and level > -20
-        if deeper:
-            level -= 1
-            side *= 0.5
-            i = 2 * i + (1 if u >= (2 * i + 1) * side else 0)
-        else:
-            level, side, i = next_interval(level, side, i, top, u)
+        level, side, i = next_interval(deeper, level, side, i, top, u)
     return best, budget

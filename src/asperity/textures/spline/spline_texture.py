@@ -1,22 +1,26 @@
-"""Base class of profiles and height maps: a cubic B-spline through heights at grid nodes."""
+"""Cubic B-splines through heights at grid nodes: profiles and height maps."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
+from types import ModuleType
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from asperity.core.cache import get_or_compute
-from asperity.core.checks import FloatArray, check_array
+from asperity.core.checks import FloatArray, check_array, check_positive, check_real
 from asperity.core.errors import ParameterError
 from asperity.core.memory import require_memory
 from asperity.textures.bounds.bounded_cells import LineSegments, spline_segments
-from asperity.textures.bounds.spline_bounds import SplineCells
+from asperity.textures.bounds.pyramid import line_pyramid, plane_pyramid
+from asperity.textures.bounds.spline_bounds import SplineCells, max_height
 from asperity.textures.domain import Domain, GridValues, ScanLine
+from asperity.textures.spline.heightmap_sampler import HeightMapArguments
+from asperity.textures.spline.profile_sampler import ProfileArguments
 from asperity.textures.texture import ExactHeight, Texture, TexturePart
 
 MIN_NODES = 4
@@ -63,9 +67,9 @@ class Spline(Texture):
     def _set_grid(self, pitch: Any, origin: Any) -> None:
         """Check and set the pitch and the origin."""
 
-    @abstractmethod
     def with_heights(self, heights: ArrayLike) -> Spline:
         """Return the spline through other heights at the same nodes."""
+        return fit_spline(heights, self._pitches, periodic=self.periodic, origin=self.origin)
 
     @abstractmethod
     def _compute_extremes(self) -> tuple[float, float]: ...
@@ -218,3 +222,178 @@ def _flush_small_values(values: FloatArray) -> None:
     least = _FLUSH_THRESHOLD * max(float(values.max()), -float(values.min()))
     for row in np.atleast_2d(values):
         row[np.abs(row) < least] = 0.0
+
+
+# Least number of samples of a dense search.
+_MIN_SAMPLES = 4096
+
+
+class Profile(Spline):
+    """The C² cubic B-spline through heights[j] at x = origin + j pitch; constant along y.
+
+    A finite profile is mirrored at its border nodes; a periodic one repeats after n pitch.
+
+    Args:
+        heights: [m], shape (n,), at least 4.
+        pitch: distance of the nodes [m].
+        periodic: whether the profile repeats.
+        origin: position of heights[0] [m].
+        preparation: steps of the preparation of the heights, for reports.
+        filled_mask: where missing heights have been interpolated, shape (n,).
+
+    Raises:
+        ParameterError: for fewer than 4 heights, heights that are not finite, or a pitch that
+            is not positive.
+
+    Example:
+        >>> ridge = Profile([0.0, 0.0, 1e-3, 0.0, 0.0], pitch=1e-3)
+        >>> ridge.height([[2e-3, 7.0], [2e-3, 9.0]]).round(9)
+        array([0.001, 0.001])
+    """
+
+    kind: ClassVar[str] = "profile"
+    noun: ClassVar[str] = "profile"
+    axes: ClassVar[int] = 1
+    pitch: float
+    origin: float
+
+    def _set_grid(self, pitch: Any, origin: Any) -> None:
+        self.pitch = check_positive("pitch", pitch, "m")
+        self.origin = check_real("origin", 0.0 if origin is None else origin, "m")
+
+    @property
+    def sampler(self) -> tuple[ModuleType, ...]:
+        """See :class:`Texture`."""
+        from asperity.contacts.closest import line_search
+        from asperity.textures.spline import bspline_kernels, profile_sampler
+
+        return profile_sampler, bspline_kernels, line_search
+
+    @cached_property
+    def arguments(self) -> ProfileArguments:
+        """See :class:`Texture`."""
+        c = self.coefficients
+        pyramid = line_pyramid(c, self.pitch)
+        return ProfileArguments(c, 1.0 / self.pitch, self.origin, self.periodic, *pyramid)
+
+    def _compute_extremes(self) -> tuple[float, float]:
+        c = np.lib.stride_tricks.sliding_window_view(self.coefficients, 4)
+        c0, c1, c2, c3 = c.T
+        # h'(t) = a t² + b t + d on the cell, t in [0, 1].
+        a, b, d = 0.5 * (c3 - 3 * c2 + 3 * c1 - c0), c0 - 2 * c1 + c2, 0.5 * (c2 - c0)
+        root = np.sqrt(np.maximum(b * b - 4 * a * d, 0.0))
+        half = -0.5 * (b + np.copysign(root, b))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            candidates = np.stack([half / a, d / half, np.zeros_like(a), np.ones_like(a)])
+        t = np.clip(np.nan_to_num(candidates, nan=0.0), 0.0, 1.0)
+        h = (c0 + 4 * c1 + c2) / 6 + t * (d + t * (b / 2 + t * a / 3))
+        return float(h.min()), float(h.max())
+
+    def _compute_bounds(self) -> tuple[float, float]:
+        inflate = 1.0 + 1e-12
+        slope = float(np.abs(np.diff(self.coefficients)).max()) / self.pitch
+        second = float(np.abs(np.diff(self.coefficients, 2)).max()) / self.pitch**2
+        return inflate * slope, inflate * second
+
+    def sample_counts(self) -> list[int]:
+        """See :class:`Texture`; a whole number per cell."""
+        cells = len(self.heights) - self.is_mirrored
+        return [cells * max(1, -(-_MIN_SAMPLES // cells))]
+
+
+# Greatest number of samples of a dense search; cells are subdivided up to it.
+_MAX_SAMPLES = 1_200_000
+
+
+class HeightMap(Spline):
+    """The C² bicubic B-spline through heights[i, j] at (x, y) = origin + (j p_x, i p_y).
+
+    A finite map is mirrored at its border nodes, so that the surface is unbounded; a periodic one
+    repeats after nx p_x and ny p_y.
+
+    Args:
+        heights: [m], shape (ny, nx), at least 4 × 4.
+        pitch: distance of the nodes [m], one number or (p_x, p_y).
+        periodic: whether the map repeats.
+        origin: position of heights[0, 0] [m].
+        preparation: steps of the preparation of the heights, for reports.
+        filled_mask: where missing heights have been interpolated, shape (ny, nx), to be masked in
+            pictures.
+
+    Raises:
+        ParameterError: for fewer than 4 × 4 heights, heights that are not finite, or a pitch
+            that is not positive.
+
+    Example:
+        >>> bumps = HeightMap(np.eye(4) * 1e-3, pitch=1e-3)
+        >>> bumps.height([[1e-3, 1e-3], [2e-3, 1e-3]]).round(9).tolist()[0]
+        0.001
+    """
+
+    kind: ClassVar[str] = "heightmap"
+    noun: ClassVar[str] = "map"
+    axes: ClassVar[int] = 2
+    pitch: tuple[float, float]
+    origin: FloatArray
+
+    def _set_grid(self, pitch: Any, origin: Any) -> None:
+        pair = (pitch, pitch) if np.ndim(pitch) == 0 else tuple(pitch)
+        if len(pair) != 2:
+            raise ParameterError("pitch", "must be one number or (p_x, p_y) [m]", pitch)
+        self.pitch = (check_positive("pitch", pair[0], "m"), check_positive("pitch", pair[1], "m"))
+        self.origin = check_array("origin", (0.0, 0.0) if origin is None else origin, (2,), "m")
+
+    @property
+    def sampler(self) -> tuple[ModuleType, ...]:
+        """See :class:`Texture`."""
+        from asperity.contacts.closest import plane_budget, plane_search
+        from asperity.textures.spline import (
+            bspline_kernels,
+            heightmap_block_sampler,
+            heightmap_pruning,
+            heightmap_sampler,
+            heightmap_search,
+        )
+
+        search = heightmap_search, heightmap_pruning, plane_search, plane_budget
+        return heightmap_sampler, bspline_kernels, *search, heightmap_block_sampler
+
+    @cached_property
+    def arguments(self) -> HeightMapArguments:
+        """See :class:`Texture`."""
+        x0, y0 = (float(value) for value in self.origin)
+        c, (px, py) = self.coefficients, self.pitch
+        pyramid = plane_pyramid(c, self.pitch)
+        return HeightMapArguments(c, 1.0 / px, 1.0 / py, x0, y0, self.periodic, *pyramid)
+
+    def _compute_extremes(self) -> tuple[float, float]:
+        return -max_height(-self.coefficients), max_height(self.coefficients)
+
+    def _compute_bounds(self) -> tuple[float, float]:
+        c, (px, py) = self.coefficients, self.pitch
+
+        def greatest(values: FloatArray) -> float:
+            return max(float(values.max()), -float(values.min()))
+
+        gx, gy = greatest(np.diff(c, axis=1)) / px, greatest(np.diff(c, axis=0)) / py
+        hxx = greatest(np.diff(c, 2, axis=1)) / px**2
+        hyy = greatest(np.diff(c, 2, axis=0)) / py**2
+        hxy = greatest(np.diff(np.diff(c, axis=0), axis=1)) / (px * py)
+        inflate = 1.0 + 1e-12  # the rounding of the differences
+        return inflate * float(np.hypot(gx, gy)), inflate * (max(hxx, hyy) + hxy)
+
+    def sample_counts(self) -> list[int]:
+        """See :class:`Texture`; whole cells, or equal parts of them."""
+        counts = [n - self.is_mirrored for n in self.heights.shape[::-1]]
+        while counts[0] * counts[1] * 4 <= _MAX_SAMPLES // 4:
+            counts = [2 * n for n in counts]
+        while counts[0] * counts[1] > _MAX_SAMPLES:
+            counts = [-(-n // 2) for n in counts]
+        return counts
+
+
+def fit_spline(heights: ArrayLike, pitch: Sequence[float], **options: Any) -> Profile | HeightMap:
+    """Return the profile or the height map through heights, whose pitch is given for each axis."""
+    if np.ndim(heights) == 1:
+        return Profile(heights, pitch[0], **options)
+    return HeightMap(heights, pitch, **options)
