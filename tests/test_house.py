@@ -310,7 +310,7 @@ def test_other_questions_are_not_counted(text: str) -> None:
 
 # --- size, annotations, documentation ------------------------------------------------------------
 
-LINES_AT_MOST = 42_000
+LINES_AT_MOST = 39_500
 """Lines of code without docstrings, comments, blank lines and generated files."""
 
 
@@ -377,7 +377,9 @@ def written() -> dict[str, str]:
 
 
 def test_the_code_does_not_grow_unnoticed() -> None:
-    assert sum(len(lines_of_code(text)) for text in written().values()) < LINES_AT_MOST
+    stub = (SOURCE / "asperity" / "__init__.pyi").read_text(encoding="utf-8")
+    lines = sum(len(lines_of_code(text)) for text in [stub, *written().values()])
+    assert lines <= LINES_AT_MOST
 
 
 def test_functions_are_short() -> None:
