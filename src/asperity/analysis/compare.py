@@ -17,7 +17,8 @@ from asperity.analysis.limits.limit_rules import DEFAULT_SPEED
 from asperity.analysis.limits.perceptibility import assess_perceptibility, texture_amount_text
 from asperity.analysis.passivity.assess_passivity import passivity
 from asperity.analysis.passivity.verdict import at_recommended_stiffness, recommend_stiffness
-from asperity.analysis.results import LawRow, comparison_assumptions, recommend, recommendation_text
+from asperity.analysis.recommendation import comparison_assumptions, recommend, recommendation_text
+from asperity.analysis.results import LawRow
 from asperity.core.arguments import DEFAULT_STIFFNESS
 from asperity.core.checks import check_positive
 from asperity.core.display import Plottable, Reportable

@@ -14,7 +14,7 @@ from asperity.core.checks import FloatArray
 from asperity.core.errors import ParameterError, SurfaceFileError
 from asperity.measured.reading import resampling
 from asperity.measured.reading.plain_text import text_header
-from asperity.measured.reading.plain_text.text_header import TextTable, find_table
+from asperity.measured.reading.plain_text.text_table import TextTable, find_table
 from asperity.measured.reading.reader import (
     RawSurface,
     ReadingOptions,

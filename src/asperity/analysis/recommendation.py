@@ -1,0 +1,348 @@
+"""The recommended law of a comparison, the sentences that give the reasons, and the assumptions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from asperity.analysis.limits.limit_rules import DEFAULT_SAMPLES, DEFAULT_SPEED
+from asperity.analysis.limits.perceptibility import (
+    CLEAR_RATIO,
+    HAND_THRESHOLD,
+    Perceptibility,
+    force_magnitude_text,
+    form_removal_sentences,
+    masking_text,
+    remedies_text,
+    speed_text,
+    texture_amount_text,
+)
+from asperity.analysis.passivity.assess_passivity import (
+    buzz_text,
+    critical_speed_text,
+    delay_clause,
+    stiffness_limit_text,
+)
+from asperity.analysis.passivity.criteria import damping_assumption
+from asperity.analysis.results import LawRow
+from asperity.analysis.surface_sentences import (
+    SCOPE_SENTENCE,
+    default_depth_text,
+    law_parameter_sentences,
+)
+from asperity.core.units import format_quantity
+from asperity.devices import Device
+from asperity.textures.texture import TexturePart
+
+EQUAL_STRENGTH_RATIO = 0.8
+"""Laws whose texture forces differ by less than a fifth count as equally strong."""
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """The recommended law, and the laws it was chosen from.
+
+    Attributes:
+        row: row of the recommended law; ``None`` if no law has a texture that is felt.
+        rows: rows of all laws compared.
+        is_sound: whether the recommended law is conservative and continuous; else it leaks least.
+        textured_rows: rows of the laws with a texture and a known stable stiffness.
+        nearest: where no texture is felt, row of the law that comes nearest; else ``None``.
+    """
+
+    row: LawRow | None
+    rows: tuple[LawRow, ...]
+    is_sound: bool
+    textured_rows: tuple[LawRow, ...]
+    nearest: LawRow | None = None
+
+
+def recommend(rows: Sequence[LawRow]) -> Recommendation:
+    """Return the recommended law.
+
+    A conservative and continuous law gains no energy on any closed path, and its force does not
+    jump. Of such laws whose texture is felt (else: borderline), the one with the strongest texture
+    at its recommended stiffness is chosen; of nearly equal ones the stiffest. Without such a law,
+    the continuous law that is felt (else: borderline) and leaks least for its texture force is
+    chosen. A law that is not felt, or without a known stable stiffness, is never recommended.
+    """
+    textured = tuple(
+        row for row in rows if row.perceptibility is not None and not row.is_textureless
+    )
+    by_tier = [[row for row in textured if row.tier == tier] for tier in ("felt", "borderline")]
+    for candidates in by_tier:
+        if sound := _sound_rows(candidates):
+            return Recommendation(_strongest(sound), tuple(rows), True, textured)
+    for candidates in filter(None, by_tier):
+        smooth = [row for row in candidates if row.continuous]
+        best = min(smooth or candidates, key=_relative_leak)
+        return Recommendation(best, tuple(rows), False, textured)
+    return Recommendation(None, tuple(rows), False, textured, _nearest_to_perceptible(textured))
+
+
+def _sound_rows(rows: Sequence[LawRow]) -> list[LawRow]:
+    """Return the rows of conservative and continuous laws."""
+    return [row for row in rows if row.conservative and row.continuous]
+
+
+def _nearest_to_perceptible(rows: Sequence[LawRow]) -> LawRow | None:
+    """Return the row whose texture comes nearest to being felt, of sound laws if there are any."""
+    return max(_sound_rows(rows) or rows, key=lambda row: row.resolved_force, default=None)
+
+
+def _strongest(rows: Sequence[LawRow]) -> LawRow:
+    """Return the strongest law; of nearly equal ones the stiffest with a single-valued contact."""
+    strongest = max(row.resolved_force for row in rows)
+    equal = [row for row in rows if row.resolved_force >= EQUAL_STRENGTH_RATIO * strongest]
+    return max(equal, key=lambda row: (row.law.contact.single_valued, row.recommended_stiffness))
+
+
+def _relative_leak(row: LawRow) -> float:
+    """Return the leak over texture force times length [1], at the recommended stiffness."""
+    return row.recommended_leak / (row.texture_force * row.leak.line.length)
+
+
+def recommendation_text(recommended: Recommendation, device: Device) -> str:
+    """Return the recommended law and stiffness, its perceptibility, and the reason."""
+    best = recommended.row
+    if best is None or best.perceptibility is None:
+        return _no_recommendation_text(recommended, device)
+    texture, start = best.perceptibility, stiffness_limit_text(best.recommended_stiffness)
+    felt = f"{best.tier}, {texture_amount_text(texture)}"
+    if best.tier != "felt":
+        felt += f"; {masking_text(texture, device)}"
+    sentences = [
+        f"Use law {_law_title(best)} on the {device.name} and start at {start}: {felt}.",
+        "" if best.tier == "felt" else remedies_text(texture),
+        _form_advice(texture),
+        _contact_loss_text(best),
+        _SOUND_REASON if recommended.is_sound else _least_leak_reason(best, recommended),
+        _limit_basis_text(best, device),
+        _trade_off_text(best, recommended.textured_rows),
+        _saturation_warning(best, device),
+    ]
+    return " ".join(filter(None, sentences))
+
+
+def _law_title(row: LawRow) -> str:
+    return f"{row.law.letter} ({row.law.name.replace('-', ' ')})"
+
+
+def _form_advice(texture: Perceptibility) -> str:
+    """Return how to remove form and waviness, where they make up most of the force."""
+    if not texture.is_mostly_form:
+        return ""
+    return "Most of it is form and waviness, felt as a shape: --form 2 and --l-cutoff remove it."
+
+
+def _contact_loss_text(row: LawRow) -> str:
+    if not row.loses_contact:
+        return ""
+    depth = format_quantity(row.surface.max_depth, "m")
+    return f"Pressed to {depth} it loses contact on {100.0 * row.contact_lost:.0f} % of the scan."
+
+
+def _no_recommendation_text(recommended: Recommendation, device: Device) -> str:
+    """Return why no law is recommended."""
+    if all(row.is_textureless for row in recommended.rows):
+        return "None of the laws compared renders a texture on this surface."
+    row = recommended.nearest
+    if row is None or row.perceptibility is None:
+        return (
+            f"No stable stiffness is known on the {device.name} for any of the laws compared: "
+            "they need a known delay, or have no bound at this depth."
+        )
+    texture, start = row.perceptibility, stiffness_limit_text(row.recommended_stiffness)
+    return (
+        f"Nothing of this texture will be felt on the {device.name}: law {_law_title(row)}, which "
+        f"comes nearest, gives at {start} {texture_amount_text(texture)}; "
+        f"{masking_text(texture, device)}. {remedies_text(texture)} {_form_advice(texture)}"
+    ).rstrip()
+
+
+def _limit_basis_text(row: LawRow, device: Device) -> str:
+    """Return the basis of the recommended stiffness, in a sentence."""
+    limit, at_most = row.stability_limit, stiffness_limit_text(row.safe_stiffness)
+    passivity = row.passivity
+    if limit.basis == "proved":
+        delay = device.value("delay_samples") or 0.0
+        most = passivity.greatest_delay
+        reach = f"{delay:.0f}" if most is None or most < delay else f"up to {most}"
+        return f"It is proved passive up to {at_most}, at the start with {reach} samples of delay."
+    if limit.basis == "bounded":
+        buzz = "" if passivity.buzz is None else f": {buzz_text(passivity.buzz)}"
+        return f"It is passive there but for the steps of positions and forces{buzz}."
+    if limit.basis == "quiet against buzz":
+        speed = critical_speed_text(passivity.critical_speed)
+        delivers = f"below the speed {speed} its field delivers energy"
+        return f"No buzz is expected up to {at_most}; {delivers}. {_margin_text(row)}"
+    proved = "not proved"
+    if limit.proved_stiffness:
+        proved = f"proved only up to {stiffness_limit_text(limit.proved_stiffness)}"
+    plausible = f"is therefore plausible{delay_clause(limit.delay)}, but {proved}"
+    return (
+        f"{_wall_text(device)} A limit of {at_most} for law {row.law.letter} {plausible}. "
+        f"{_margin_text(row)}"
+    )
+
+
+def _wall_text(device: Device) -> str:
+    """Return the stiffest wall known of the device, in a sentence."""
+    test = device.wall_test
+    if test is None:
+        return "The stiffest stable wall of this device is unknown."
+    stiffness = stiffness_limit_text(test.value)
+    if test.pedigree == "measured":
+        return f"A smooth wall of {stiffness} was stable on this device."
+    return f"The stiffest wall known to be stable on this device is {stiffness}."
+
+
+def _margin_text(row: LawRow) -> str:
+    """Return the safety margin below the stability limit and its reason, in a sentence."""
+    margin = row.margin
+    if not margin.cases:
+        return "The recommended stiffness equals it."
+    stable = f"law {margin.law} was stable in all {margin.cases} simulated loops"
+    if margin.factor == 1.0:
+        return f"The recommended stiffness equals it; up to there {stable}."
+    return f"The recommended stiffness is {margin.factor:g} of it; at this ratio {stable}."
+
+
+_SOUND_REASON = "No closed path of its field gives net energy, and its force does not jump."
+
+
+def _least_leak_reason(best: LawRow, recommended: Recommendation) -> str:
+    gain = format_quantity(best.recommended_leak, "J")
+    faint = [row for row in recommended.textured_rows if row.conservative and row.continuous]
+    reason = "None of the laws compared is conservative, continuous and known to work here"
+    if faint:
+        rival = max(faint, key=lambda row: row.resolved_force)
+        force = force_magnitude_text(rival.resolved_force)
+        reason = (
+            f"Law {rival.law.letter}, conservative and continuous, gives only {force} RMS at its "
+            f"{stiffness_limit_text(rival.recommended_stiffness)}, which is not felt"
+        )
+    return (
+        f"{reason}; of the continuous laws this one leaks least for its texture force, "
+        f"up to {gain} per loop, so it can feel alive."
+    )
+
+
+def _trade_off_text(best: LawRow, rows: Sequence[LawRow]) -> str:
+    """Return the stiffness that the recommended law gives up against a stiffer one."""
+    stiffer = [row for row in rows if row.recommended_stiffness > 1.5 * best.recommended_stiffness]
+    if not stiffer:
+        return ""
+    rival = max(stiffer, key=lambda row: row.recommended_stiffness)
+    drawbacks = []
+    if not rival.conservative:
+        gain = format_quantity(rival.recommended_leak, "J")
+        drawbacks.append(f"gains up to {gain} per loop there")
+    if not rival.continuous:
+        drawbacks.append("its force jumps")
+    start = stiffness_limit_text(rival.recommended_stiffness)
+    drawback = " and ".join(drawbacks) or "has less texture"
+    return f"The price is stiffness: law {rival.law.letter} can start at {start}, but {drawback}."
+
+
+def _saturation_warning(best: LawRow, device: Device) -> str:
+    """Return a warning if the force at full depth exceeds the device's maximum force."""
+    limit = device.value("max_force")
+    force = best.recommended_stiffness * best.surface.max_depth
+    if limit is None or force <= limit:
+        return ""
+    depth = format_quantity(best.surface.max_depth, "m")
+    needed, available = format_quantity(force, "N"), format_quantity(limit, "N")
+    return f"Pressed to {depth} it needs {needed}; the device gives {available}."
+
+
+def comparison_assumptions(
+    rows: Sequence[LawRow], part: TexturePart, device: Device, defaults: Mapping[str, bool]
+) -> tuple[str, ...]:
+    """Return the assumptions of a comparison, in sentences.
+
+    Args:
+        rows: the laws compared.
+        part: the part of the surface that is texture.
+        device: the device.
+        defaults: whether max_depth and speed are defaults.
+    """
+    first = rows[0].surface
+    texture = next((row.perceptibility for row in rows if row.perceptibility is not None), None)
+    sentences = [*first.texture.preparation, *_default_sentences(rows, defaults)]
+    sentences += form_removal_sentences(texture, part.form, part.waviness)
+    sentences += _wall_assumptions(rows, device)
+    sentences += _margin_assumptions(rows)
+    unverified = [
+        field.replace("_", " ")
+        for field, datum in device.data.items()
+        if not datum.verified and field != "max_stiffness"
+    ]
+    if unverified:
+        sentences.append(f"Not verified for the {device.name}: {', '.join(unverified)}")
+    if texture is not None:
+        sentences.append(_perceptibility_assumption(texture))
+    if any("sampled" in (row.q.method, row.one_sided.method) for row in rows):
+        sentences.append(
+            "Numbers marked sampled are the greatest found over "
+            f"{first.texture.domain.description} and depths to "
+            f"{format_quantity(first.max_depth, 'm')}, not bounds"
+        )
+    sentences.append(
+        "The leak is the work of the field on one slow turn of its worst loop, without delay, "
+        "quantisation and friction of the device"
+    )
+    return (*sentences, SCOPE_SENTENCE)
+
+
+def _perceptibility_assumption(texture: Perceptibility) -> str:
+    unknown = ", ".join(field.replace("_", " ") for field in texture.missing_data)
+    hand, speed = force_magnitude_text(HAND_THRESHOLD), speed_text(texture.speed)
+    return (
+        f"Felt: an amplitude of {CLEAR_RATIO:g} times the {hand} that a hand is assumed to "
+        f"notice, {CLEAR_RATIO:g} times the dry friction and {DEFAULT_SAMPLES:g} steps of force, "
+        f"in waves that the device resolves at {speed}"
+        + (f"; assumed to mask nothing, being unknown: {unknown}" if unknown else "")
+    )
+
+
+def _margin_assumptions(rows: Sequence[LawRow]) -> list[str]:
+    """Return the basis of the safety margins."""
+    margins = [row.margin for row in rows if row.margin.cases]
+    if not margins:
+        return []
+    # A user-defined law borrows the margin of a shipped one, which may be compared too.
+    factors = dict.fromkeys(f"{one.law} {one.factor:g}" for one in margins if one.factor < 1.0)
+    listed = ", ".join(factors) or "no law below 1"
+    return [
+        f"Safety margins from simulation ({listed}): "
+        "pantograph and point mass, the paper's brakes, two hands, delays of 0 to 6 samples, "
+        "three sinusoids; other devices may need lower values"
+    ]
+
+
+def _wall_assumptions(rows: Sequence[LawRow], device: Device) -> list[str]:
+    """Return the source of K₀, and the assumptions of using it as a limit."""
+    test = device.wall_test
+    if test is None:
+        return []
+    sentences = [f"K₀ = {test.value:g} N/m for the {device.name} ({test.pedigree}): {test.source}"]
+    if any(row.stability_limit.basis == "plausible" for row in rows):
+        sentences.append(
+            "Plausible, not proved. Assumed: the wall of stiffness K₀ was close to its stability "
+            f"limit (heavy handle, loose grip); {damping_assumption(test)}"
+        )
+    return sentences
+
+
+def _default_sentences(rows: Sequence[LawRow], defaults: Mapping[str, bool]) -> list[str]:
+    sentences = []
+    if defaults["speed"]:
+        sentences.append(f"Default scanning speed {speed_text(DEFAULT_SPEED)}")
+    if defaults["max_depth"]:
+        sentences.append(default_depth_text(rows[0].surface))
+    return sentences + [
+        f"{parameter} for law {row.law.letter}"
+        for row in rows
+        for parameter in law_parameter_sentences(row.surface)
+    ]
