@@ -1,4 +1,4 @@
-"""Recordings of version 1 whose metadata name modules that have moved since."""
+"""Recordings of version 1, whose metadata name modules that have been moved since."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DATA = Path(__file__).parent / "data"
     ("name", "kind"),
     [("sinusoid", asp.Sinusoid), ("fourier_profile", asp.Fourier), ("map", asp.HeightMap)],
 )
-def test_an_earlier_recording_opens_and_replays(name: str, kind: type) -> None:
+def test_version_1_recording_opens_and_replays(name: str, kind: type) -> None:
     recording = open_recording(DATA / f"{name}.mcap")
     modules = recording.metadata["surface"]["sampler"]
     assert all(module.startswith("asperity.") for module in modules)

@@ -1,4 +1,4 @@
-"""The texture of a recording is made again from its numbers, bit for bit, and serves a scene."""
+"""Textures rebuilt from recordings: bit-identical to the original, and usable in scenes."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ TEXTURES: dict[str, Texture | str] = {
 }
 
 
-def held(path: Path, surface: asp.Surface, **said: object) -> Recording:
-    """Return a recording of two rows on a surface."""
-    about = {"surface": {**field_metadata(surface), **said}}
+def recording_of(path: Path, surface: asp.Surface, **metadata: object) -> Recording:
+    """Return a recording with two rows, made on a surface."""
+    about = {"surface": {**field_metadata(surface), **metadata}}
     with RecordingWriter(
         path, (("time", "s"), ("x", "m")), about, field_attachments(surface)
     ) as writer:
@@ -42,26 +42,26 @@ def held(path: Path, surface: asp.Surface, **said: object) -> Recording:
 
 
 @pytest.mark.parametrize("name", TEXTURES)
-@pytest.mark.parametrize("law", ["C", "F"])  # F asks for the extremes
-def test_the_surface_is_the_same_bit_for_bit(tmp_path: Path, name: str, law: str) -> None:
+@pytest.mark.parametrize("law", ["C", "F"])  # F needs the extremes
+def test_rebuilt_surface_is_bit_identical(tmp_path: Path, name: str, law: str) -> None:
     surface = asp.Surface(as_texture(TEXTURES[name]), law, stiffness=700.0, clamp="backed")
-    recording = held(tmp_path / "run.mcap", surface)
-    again = recorded_surface_on(recording, recorded_texture(recording))
+    recording = recording_of(tmp_path / "run.mcap", surface)
+    rebuilt = recorded_surface_on(recording, recorded_texture(recording))
     force = surface.force(POINTS)
-    assert (again.force(POINTS) == force).all()
+    assert (rebuilt.force(POINTS) == force).all()
     assert np.abs(force).max() > 0.01
-    assert again.digest == surface.digest
-    assert again.texture.extremes == surface.texture.extremes
-    assert again.texture.bounds == pytest.approx(surface.texture.bounds, rel=1e-12)
-    assert again.texture.domain.spans == pytest.approx(surface.texture.domain.spans, rel=1e-12)
-    assert again.texture.preparation == surface.texture.preparation
-    # What is made of it rests on its nodes, which are as near as numbers are.
-    heights = [one.texture.samples()[0] for one in (again, surface)]
+    assert rebuilt.digest == surface.digest
+    assert rebuilt.texture.extremes == surface.texture.extremes
+    assert rebuilt.texture.bounds == pytest.approx(surface.texture.bounds, rel=1e-12)
+    assert rebuilt.texture.domain.spans == pytest.approx(surface.texture.domain.spans, rel=1e-12)
+    assert rebuilt.texture.preparation == surface.texture.preparation
+    # Nodes are recomputed, so they agree only up to rounding.
+    heights = [one.texture.samples()[0] for one in (rebuilt, surface)]
     assert np.abs(np.subtract(*heights)).max() < 1e-18
 
 
-def test_a_scene_names_a_recording_as_its_surface(tmp_path: Path) -> None:
-    held(tmp_path / "run.mcap", asp.Surface(MAP, "C"))
+def test_scene_with_a_recording_as_texture(tmp_path: Path) -> None:
+    recording_of(tmp_path / "run.mcap", asp.Surface(MAP, "C"))
     scene = tmp_path / "scene.toml"
     scene.write_text('[texture]\nkind = "recording"\npath = "run.mcap"\n')
     assert (load_scene(str(scene)).texture.height(POINTS[:, :2]) == MAP.height(POINTS[:, :2])).all()
@@ -76,27 +76,27 @@ def test_a_scene_names_a_recording_as_its_surface(tmp_path: Path) -> None:
         load_scene(str(scene))
 
 
-def test_a_kind_of_ones_own_is_made_from_what_it_says(
+def test_user_defined_texture_is_rebuilt_from_its_description(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "my_eggs.py").write_text((EXAMPLES / "own_texture.py").read_text())
-    with imported(tmp_path, "my_eggs") as own:
-        surface = asp.Surface(own.EggBox(1e-4, 2e-3), "C")
-        recording = held(tmp_path / "run.mcap", surface)
+    with imported(tmp_path, "my_eggs") as module:
+        surface = asp.Surface(module.EggBox(1e-4, 2e-3), "C")
+        recording = recording_of(tmp_path / "run.mcap", surface)
         with pytest.raises(ParameterError, match="a kind of your own, egg-box, that cannot be"):
-            recorded_texture(recording)  # it is known by no name
-        monkeypatch.setitem(catalogue.CATALOGUE, "egg-box", own.EGG_BOX)
-        again = recorded_surface_on(recording, recorded_texture(recording))
-        assert (again.force(POINTS) == surface.force(POINTS)).all()
-        # What it says of itself is not what its sampler was given.
+            recorded_texture(recording)  # its kind is not registered
+        monkeypatch.setitem(catalogue.CATALOGUE, "egg-box", module.EGG_BOX)
+        rebuilt = recorded_surface_on(recording, recorded_texture(recording))
+        assert (rebuilt.force(POINTS) == surface.force(POINTS)).all()
+        # The description does not match the parameters of the sampler.
         wrong = {"kind": "egg-box", "amplitude": 2e-4, "period": 2e-3}
         with pytest.raises(ParameterError, match=r"describe\(\) must name its arguments"):
-            recorded_texture(held(tmp_path / "other.mcap", surface, texture=wrong))
+            recorded_texture(recording_of(tmp_path / "other.mcap", surface, texture=wrong))
 
 
-def test_a_sampler_of_another_kind_is_not_taken_for_a_spline(tmp_path: Path) -> None:
-    said = {"sampler": ["asperity.textures.spline.heightmap_sampler"]}
-    recording = held(tmp_path / "run.mcap", asp.Surface(MAP, "C"), **said)
+def test_sampler_of_another_kind_is_not_rebuilt_as_a_spline(tmp_path: Path) -> None:
+    metadata = {"sampler": ["asperity.textures.spline.heightmap_sampler"]}
+    recording = recording_of(tmp_path / "run.mcap", asp.Surface(MAP, "C"), **metadata)
     with pytest.raises(ParameterError, match="that cannot be made again"):
         recorded_texture(recording)
     assert recording.attachment(TEXTURE_FILE) is not None

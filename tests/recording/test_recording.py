@@ -1,4 +1,4 @@
-"""Recordings on disk: every bit comes back, wherever the file ends, and others read it, too."""
+"""Recordings on disk: lossless, readable when truncated, and readable by other MCAP libraries."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ COLUMNS = (("time", "s"), ("x", "m"), ("applied x", "N"), ("law held", "1"))
 ROW = row_type(len(COLUMNS)).itemsize
 
 
-def rows_of(count: int, seed: int = 0) -> np.ndarray:
-    """Return rows of any bits, and of times that go on."""
+def random_rows(count: int, seed: int = 0) -> np.ndarray:
+    """Return rows with random bit patterns and increasing times."""
     bits = np.random.default_rng(seed).integers(0, 2**63, (count, len(COLUMNS)), dtype=np.uint64)
     table = bits.view(np.float64)
     table[::7, 1], table[1::7, 1], table[2::7, 1] = np.nan, -np.inf, -0.0
@@ -46,7 +46,7 @@ def rows_of(count: int, seed: int = 0) -> np.ndarray:
     return table
 
 
-def written(path: Path, table: np.ndarray, block: int = 100, close: bool = True) -> Path:
+def write_recording(path: Path, table: np.ndarray, block: int = 100, close: bool = True) -> Path:
     out = RecordingWriter(path, COLUMNS, {"law": "B"}, {"a.bin": b"abc"})
     for first in range(0, len(table), block):
         out.append(table[first : first + block])
@@ -56,46 +56,46 @@ def written(path: Path, table: np.ndarray, block: int = 100, close: bool = True)
 
 
 def abandon(out: RecordingWriter) -> None:
-    """Leave a recording as a process does that is killed."""
+    """Leave a recording unfinished, as a killed process does."""
     out._file.close()
 
 
-def assert_same(found: np.ndarray, wanted: np.ndarray) -> None:
-    assert found.shape == wanted.shape
-    np.testing.assert_array_equal(found.view(np.uint64), wanted.view(np.uint64))
+def assert_same(actual: np.ndarray, expected: np.ndarray) -> None:
+    assert actual.shape == expected.shape
+    np.testing.assert_array_equal(actual.view(np.uint64), expected.view(np.uint64))
 
 
 @pytest.mark.parametrize("block", [1, 100, 4096, 20_000])
-def test_every_bit_comes_back(tmp_path: Path, block: int) -> None:
-    table = rows_of(9001 if block > 1 else 301)
-    found = open_recording(written(tmp_path / "run.mcap", table, block))
-    assert_same(found.table(), table)
-    assert (found.rows, found.columns, found.is_complete, found.unread_bytes) == (
+def test_round_trip_is_bit_identical(tmp_path: Path, block: int) -> None:
+    table = random_rows(9001 if block > 1 else 301)
+    recording = open_recording(write_recording(tmp_path / "run.mcap", table, block))
+    assert_same(recording.table(), table)
+    assert (recording.rows, recording.columns, recording.is_complete, recording.unread_bytes) == (
         len(table),
         COLUMNS,
         True,
         0,
     )
-    assert found.metadata == {"law": "B"}
-    assert found.attachment("a.bin") == b"abc"
-    assert found.attachment("b.bin") is None
-    assert found.duration == pytest.approx(table[-1, 0])
-    assert_same(found["applied x"], np.ascontiguousarray(table[:, 2]))
-    assert sum(map(len, found.blocks())) == found.rows
+    assert recording.metadata == {"law": "B"}
+    assert recording.attachment("a.bin") == b"abc"
+    assert recording.attachment("b.bin") is None
+    assert recording.duration == pytest.approx(table[-1, 0])
+    assert_same(recording["applied x"], np.ascontiguousarray(table[:, 2]))
+    assert sum(map(len, recording.blocks())) == recording.rows
 
 
-@pytest.mark.parametrize("most", [10_000, 4097, 100, 7, 1])
-def test_rows_are_thinned_out_evenly(tmp_path: Path, most: int) -> None:
-    table = rows_of(9001)
-    found = open_recording(written(tmp_path / "run.mcap", table)).table(most)
-    assert len(found) <= most
-    assert_same(found, table[:: -(-9001 // most)])
+@pytest.mark.parametrize("max_rows", [10_000, 4097, 100, 7, 1])
+def test_table_is_decimated_evenly(tmp_path: Path, max_rows: int) -> None:
+    rows = random_rows(9001)
+    table = open_recording(write_recording(tmp_path / "run.mcap", rows)).table(max_rows)
+    assert len(table) <= max_rows
+    assert_same(table, rows[:: -(-9001 // max_rows)])
 
 
-def test_the_library_of_others_reads_the_same(tmp_path: Path) -> None:
-    table = rows_of(9001)
+def test_mcap_library_reads_the_same_rows(tmp_path: Path) -> None:
+    table = random_rows(9001)
     table[:, 1:] = np.random.default_rng(1).normal(size=(9001, 3))
-    with written(tmp_path / "run.mcap", table).open("rb") as stream:
+    with write_recording(tmp_path / "run.mcap", table).open("rb") as stream:
         reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
         summary = reader.get_summary()
         assert summary is not None
@@ -104,19 +104,19 @@ def test_the_library_of_others_reads_the_same(tmp_path: Path) -> None:
         assert summary.statistics.message_end_time == 900_000_000
         assert [one.name for one in reader.iter_metadata()] == ["asperity"]
         assert [(one.name, one.data) for one in reader.iter_attachments()] == [("a.bin", b"abc")]
-        read = [
+        rows = [
             (message.sequence, row.time, row.x, row.applied_x, row.law_held)
             for _schema, _channel, message, row in reader.iter_decoded_messages()
         ]
-        # From the end: by the index of the rows.
-        late = next(iter(reader.iter_messages(reverse=True)))[2]
-    assert_same(np.array(read)[:, 1:], table)
-    assert [row[0] for row in read] == list(range(9001))
-    assert late.sequence == 9000
+        # Reading in reverse uses the index of the rows.
+        last = next(iter(reader.iter_messages(reverse=True)))[2]
+    assert_same(np.array(rows)[:, 1:], table)
+    assert [row[0] for row in rows] == list(range(9001))
+    assert last.sequence == 9000
 
 
-def test_the_index_leads_where_it_says(tmp_path: Path) -> None:
-    data = written(tmp_path / "run.mcap", rows_of(9001)).read_bytes()
+def test_index_and_footer_offsets_are_right(tmp_path: Path) -> None:
+    data = write_recording(tmp_path / "run.mcap", random_rows(9001)).read_bytes()
     chunks, indices = [], []
     for record in StreamReader(io.BytesIO(data), emit_chunks=True, validate_crcs=True).records:
         if isinstance(record, Chunk):
@@ -130,52 +130,52 @@ def test_the_index_leads_where_it_says(tmp_path: Path) -> None:
         logged = np.frombuffer(chunk.data, row_type(len(COLUMNS)))["logged"]
         assert list(times) == logged.tolist()
         assert (chunk.message_start_time, chunk.message_end_time) == (times[0], times[-1])
-    # The footer: where the summary begins, and its checksum.
+    # The footer holds the start of the summary and its checksum.
     start, _offsets, checksum = struct.unpack_from("<QQI", data, len(data) - 28)
     assert data[start] == mcap.Opcode.SCHEMA
     assert checksum == zlib.crc32(data[start:-12])
 
 
-def test_cut_anywhere_it_opens(tmp_path: Path) -> None:
-    """At any byte from the first row on; before it the file never is without its beginning."""
-    table = rows_of(40)
-    single = RecordingWriter(tmp_path / "blocks.mcap", COLUMNS, {})
-    begin = (tmp_path / "blocks.mcap").stat().st_size
+def test_truncated_file_opens_with_its_complete_blocks(tmp_path: Path) -> None:
+    """Truncation inside the header is an error; the writer never leaves such a file."""
+    table = random_rows(40)
+    writer = RecordingWriter(tmp_path / "blocks.mcap", COLUMNS, {})
+    header_size = (tmp_path / "blocks.mcap").stat().st_size
     for first in range(0, 40, 10):
-        single.append(table[first : first + 10])
-        single.flush()
-    single.close()
+        writer.append(table[first : first + 10])
+        writer.flush()
+    writer.close()
     data = (tmp_path / "blocks.mcap").read_bytes()
-    cut, seen = tmp_path / "cut.mcap", set()
-    for size in range(begin, len(data), 3):
+    cut, row_counts = tmp_path / "cut.mcap", set()
+    for size in range(header_size, len(data), 3):
         cut.write_bytes(data[:size])
-        found = open_recording(cut)
-        assert_same(found.table(), table[: found.rows])
-        assert found.rows >= 10 * ((size - begin) // (10 * (ROW + 16) + 200))
-        assert found.is_complete or found.rows in {0, 10, 20, 30, 40}
-        assert "not closed" in repr(found) or found.is_complete
-        seen.add(found.rows)
-    assert seen == {0, 10, 20, 30, 40}
-    for size in range(1, begin, 3):
+        recording = open_recording(cut)
+        assert_same(recording.table(), table[: recording.rows])
+        assert recording.rows >= 10 * ((size - header_size) // (10 * (ROW + 16) + 200))
+        assert recording.is_complete or recording.rows in {0, 10, 20, 30, 40}
+        assert "not closed" in repr(recording) or recording.is_complete
+        row_counts.add(recording.rows)
+    assert row_counts == {0, 10, 20, 30, 40}
+    for size in range(1, header_size, 3):
         cut.write_bytes(data[:size])
         with pytest.raises(ParameterError, match="cannot be read: it"):
             open_recording(cut)
 
 
-def test_a_block_that_power_has_spoiled_is_left_out(tmp_path: Path) -> None:
+def test_last_block_overwritten_with_zeros_is_dropped(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    table = rows_of(9001)
-    data = bytearray(written(path, table, close=False).read_bytes())
+    table = random_rows(9001)
+    data = bytearray(write_recording(path, table, close=False).read_bytes())
     data[-20_000:] = bytes(20_000)  # the index of the last block, and the end of its rows
     path.write_bytes(data)
-    found = open_recording(path)
-    assert (found.rows, found.is_complete) == (8192, False)
-    assert found.unread_bytes > 20_000
-    assert_same(found.table(), table[:8192])
+    recording = open_recording(path)
+    assert (recording.rows, recording.is_complete) == (8192, False)
+    assert recording.unread_bytes > 20_000
+    assert_same(recording.table(), table[:8192])
 
 
-def test_a_block_that_is_damaged_inside_is_said(tmp_path: Path) -> None:
-    path = written(tmp_path / "run.mcap", rows_of(9001))
+def test_damaged_block_is_an_error(tmp_path: Path) -> None:
+    path = write_recording(tmp_path / "run.mcap", random_rows(9001))
     data = bytearray(path.read_bytes())
     data[(ROW + 16) * 4096 + 50 * ROW] ^= 1
     path.write_bytes(data)
@@ -183,25 +183,25 @@ def test_a_block_that_is_damaged_inside_is_said(tmp_path: Path) -> None:
         open_recording(path).table()
 
 
-def test_rows_are_on_disk_after_half_a_second(
+def test_rows_are_flushed_after_half_a_second(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     path = tmp_path / "run.mcap"
     out = RecordingWriter(path, COLUMNS)
-    for wait, seen in ((0.1, 0), (0.3, 0), (0.2, 3), (0.3, 3), (0.3, 5)):
+    for wait, rows in ((0.1, 0), (0.3, 0), (0.2, 3), (0.3, 3), (0.3, 5)):
         now[0] += wait
-        out.append(rows_of(1))
-        assert open_recording(path).rows == seen
+        out.append(random_rows(1))
+        assert open_recording(path).rows == rows
     assert repr(out) == "<RecordingWriter of run.mcap, 5 rows written>"
-    out.append(rows_of(1))
+    out.append(random_rows(1))
     out.close()
     out.close()  # again: nothing to do
     assert open_recording(path).rows == 6
 
 
-def test_what_was_there_stays_until_the_beginning_is_whole(tmp_path: Path) -> None:
+def test_existing_file_is_replaced_only_by_a_complete_header(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     write_text(path, "precious")
     with pytest.raises(ParameterError, match="columns must begin"):
@@ -213,14 +213,14 @@ def test_what_was_there_stays_until_the_beginning_is_whole(tmp_path: Path) -> No
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
-def test_a_disk_without_room_is_said(tmp_path: Path) -> None:
+def test_full_disk_and_missing_folder_are_errors(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"path cannot be written: .*No space left"):
         RecordingWriter("/dev/full", COLUMNS)
     with pytest.raises(ParameterError, match=r"trace cannot be written: .*No such file"):
         RecordingWriter(tmp_path / "no" / "run.mcap", COLUMNS, argument="trace")
 
 
-_FULL = """
+_LIMITED_RECORDER = """
 import resource, signal, sys
 import numpy as np
 from asperity.core.errors import ParameterError
@@ -235,35 +235,36 @@ except ParameterError as error:
 """
 
 
-def on_disk_of(size: int, path: Path) -> str:
-    """Return what a process says that records where files have at most so many bytes.
+def record_with_file_size_limit(size: int, path: Path) -> str:
+    """Return the output of a process that records with a limit on the file size.
 
-    The limit stands for a full disk: writes come back short, then fail.
+    The limit stands for a full disk: writes are short at first, then fail.
     """
-    script = [sys.executable, "-c", _FULL, str(path), str(size)]
+    script = [sys.executable, "-c", _LIMITED_RECORDER, str(path), str(size)]
     done = subprocess.run(script, capture_output=True, text=True, check=True, timeout=60)
     return done.stdout
 
 
-def test_a_disk_that_fills_up_leaves_whole_blocks(tmp_path: Path) -> None:
+def test_disk_that_fills_up_leaves_whole_blocks(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    said = on_disk_of(400_000, path)
-    found = open_recording(path)
-    words = "path cannot be written any further (File too large): 4096 rows are in"
-    assert said.startswith(words)
-    assert (found.rows, found.unread_bytes) == (4096, 0)
-    assert_same(found.table(), np.arange(40_000.0).reshape(-1, 2)[:4096])
+    output = record_with_file_size_limit(400_000, path)
+    recording = open_recording(path)
+    message = "path cannot be written any further (File too large): 4096 rows are in"
+    assert output.startswith(message)
+    assert (recording.rows, recording.unread_bytes) == (4096, 0)
+    assert_same(recording.table(), np.arange(40_000.0).reshape(-1, 2)[:4096])
 
 
-def test_a_full_disk_takes_nothing_that_was_there(tmp_path: Path) -> None:
+def test_full_disk_leaves_an_existing_file_unchanged(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     path.write_text("precious")
-    assert on_disk_of(100, path).startswith("path cannot be written: [Errno 27] File too large")
+    output = record_with_file_size_limit(100, path)
+    assert output.startswith("path cannot be written: [Errno 27] File too large")
     assert path.read_text() == "precious"
     assert [one.name for one in tmp_path.iterdir()] == ["run.mcap"]
 
 
-def of_others(path: Path) -> None:
+def write_foreign_mcap(path: Path) -> None:
     with path.open("wb") as stream:
         peer = PeerWriter(stream)
         peer.start()
@@ -273,13 +274,13 @@ def of_others(path: Path) -> None:
         peer.finish()
 
 
-def later(path: Path) -> None:
-    data = written(path, rows_of(3)).read_bytes()
+def write_later_version(path: Path) -> None:
+    data = write_recording(path, random_rows(3)).read_bytes()
     path.write_bytes(data.replace(b"\x01\0\0\x001", b"\x01\0\0\x002", 1))
 
 
-def compressed(path: Path) -> None:
-    data = bytearray(written(path, rows_of(3)).read_bytes())
+def write_compressed(path: Path) -> None:
+    data = bytearray(write_recording(path, random_rows(3)).read_bytes())
     at = data.index(struct.pack("<Q", 3 * ROW)) + 8 + 4
     assert struct.unpack_from("<I", data, at - 4)[0] == zlib.crc32(
         data[at + 12 : at + 12 + 3 * ROW]
@@ -288,56 +289,56 @@ def compressed(path: Path) -> None:
     path.write_bytes(data)
 
 
-def a_folder(path: Path) -> None:
+def make_folder(path: Path) -> None:
     path.mkdir()
 
 
 BAD: dict[str, tuple[Callable[[Path], object], str]] = {
     "missing": (lambda path: path.exists(), "No such file"),
     "empty": (lambda path: path.write_bytes(b""), "it is empty"),
-    "a folder": (a_folder, "not a regular file"),
+    "a folder": (make_folder, "not a regular file"),
     "a picture": (
         lambda path: path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(99)),
         "not an MCAP recording",
     ),
     "magic alone": (lambda path: path.write_bytes(mcap.MAGIC), "ends before its first row"),
-    "of others": (of_others, "it was not written by asperity"),
-    "later": (later, "of format 2, of asperity .*; this asperity reads format 1"),
-    "compressed": (compressed, "blocks are compressed"),
+    "of others": (write_foreign_mcap, "it was not written by asperity"),
+    "later": (write_later_version, "of format 2, of asperity .*; this asperity reads format 1"),
+    "compressed": (write_compressed, "blocks are compressed"),
 }
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_what_cannot_be_read_is_said(tmp_path: Path, name: str) -> None:
-    make, words = BAD[name]
+def test_unreadable_files_are_errors(tmp_path: Path, name: str) -> None:
+    make, message = BAD[name]
     path = tmp_path / "run.mcap"
     make(path)
-    with pytest.raises(ParameterError, match=f"recording .*run.mcap cannot be read: .*{words}"):
+    with pytest.raises(ParameterError, match=f"recording .*run.mcap cannot be read: .*{message}"):
         open_recording(path)
 
 
-def test_any_bit_that_is_changed_is_no_fault_of_the_program(tmp_path: Path) -> None:
+def test_flipped_bits_raise_only_parameter_errors(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    data = written(path, rows_of(40), block=40).read_bytes()
-    draw = np.random.default_rng(5)
+    data = write_recording(path, random_rows(40), block=40).read_bytes()
+    rng = np.random.default_rng(5)
     for _ in range(500):
-        spoiled = bytearray(data)
-        for at in draw.integers(len(mcap.MAGIC), len(data), 3):
-            spoiled[at] ^= 1 << draw.integers(8)
-        path.write_bytes(spoiled)
+        damaged = bytearray(data)
+        for at in rng.integers(len(mcap.MAGIC), len(data), 3):
+            damaged[at] ^= 1 << rng.integers(8)
+        path.write_bytes(damaged)
         with suppress(ParameterError):
             open_recording(path).table()
 
 
-def test_a_recording_is_known_by_its_first_bytes(tmp_path: Path) -> None:
-    path = written(tmp_path / "anything", rows_of(3))
+def test_recordings_are_recognised_by_their_first_bytes(tmp_path: Path) -> None:
+    path = write_recording(tmp_path / "anything", random_rows(3))
     assert is_recording(path)
     path.write_bytes(b"time [s]\n")
     assert not is_recording(path)
     assert not is_recording(tmp_path)
 
 
-def test_columns_and_schema_are_one(tmp_path: Path) -> None:
+def test_columns_round_trip_through_the_schema(tmp_path: Path) -> None:
     assert schema_columns(schema_text(COLUMNS)) == COLUMNS
     for bad in ("X", "x_y", "1x", "x ", "", "x y"):
         columns = (("time", "s"), (bad, "m"), ("x y", "m"))
@@ -353,18 +354,18 @@ def test_columns_and_schema_are_one(tmp_path: Path) -> None:
         open_recording(tmp_path / "run.mcap")["applied"]
 
 
-def test_killed_at_any_moment_it_loses_less_than_a_second() -> None:
-    """Processes that record and are killed: a small number of what the benchmark does."""
+def test_killed_process_loses_less_than_a_second() -> None:
+    """Kill a few recording processes; the benchmark kills many more."""
     assert writer.MAX_WAIT <= 0.5
     assert recording_kills.run(8, Console(quiet=True)) == {}
 
 
-def test_recordings_are_public(tmp_path: Path) -> None:
-    path = written(tmp_path / "run.mcap", rows_of(3))
-    found = asp.open_recording(path)
-    assert type(found) is asp.Recording is Recording
-    assert repr(found) == "<Recording run.mcap, 3 rows, 0.0002 s>"
-    data = found.to_dict()
+def test_public_interface_of_recordings(tmp_path: Path) -> None:
+    path = write_recording(tmp_path / "run.mcap", random_rows(3))
+    recording = asp.open_recording(path)
+    assert type(recording) is asp.Recording is Recording
+    assert repr(recording) == "<Recording run.mcap, 3 rows, 0.0002 s>"
+    data = recording.to_dict()
     assert (data["rows"], data["whole"], data["columns"][2]) == (
         3, True, {"name": "applied x", "unit": "N"},
     )  # fmt: skip
@@ -375,4 +376,4 @@ def test_recordings_are_public(tmp_path: Path) -> None:
     assert open_recording(path).rows == 0
     shutil.rmtree(tmp_path)
     with pytest.raises(ParameterError, match="No such file"):
-        found.table()
+        recording.table()

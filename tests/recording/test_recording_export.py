@@ -1,4 +1,4 @@
-"""Rows for other tools: the same numbers to the last bit."""
+"""Export of recordings to CSV, MATLAB and Parquet, without loss of precision."""
 
 from __future__ import annotations
 
@@ -26,35 +26,35 @@ def recording(tmp_path: Path) -> Recording:
     return open_recording(tmp_path / "run.mcap")
 
 
-def test_csv_keeps_every_digit(recording: Recording, tmp_path: Path) -> None:
-    told: list[float] = []
-    export_recording(recording, tmp_path / "run.csv", told.append)
+def test_csv_export_is_lossless(recording: Recording, tmp_path: Path) -> None:
+    fractions: list[float] = []
+    export_recording(recording, tmp_path / "run.csv", fractions.append)
     assert (tmp_path / "run.csv").read_text().startswith("time [s],x [m],applied x [N]\n")
-    read = np.loadtxt(tmp_path / "run.csv", delimiter=",", skiprows=1)
-    np.testing.assert_array_equal(read, recording.table())
-    assert told == sorted(told)
-    assert told[-1] == 1.0
+    table = np.loadtxt(tmp_path / "run.csv", delimiter=",", skiprows=1)
+    np.testing.assert_array_equal(table, recording.table())
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
 
 
 def test_matlab_has_columns_by_name(recording: Recording, tmp_path: Path) -> None:
     export_recording(recording, tmp_path / "run.mat")
-    found = loadmat(tmp_path / "run.mat")
-    np.testing.assert_array_equal(found["applied_x"][:, 0], recording["applied x"])
-    np.testing.assert_array_equal(found["time"][:, 0], recording["time"])
-    assert found["units"]["applied_x"][0, 0][0] == "N"
-    assert '"law": "B"' in found["about"][0]
+    contents = loadmat(tmp_path / "run.mat")
+    np.testing.assert_array_equal(contents["applied_x"][:, 0], recording["applied x"])
+    np.testing.assert_array_equal(contents["time"][:, 0], recording["time"])
+    assert contents["units"]["applied_x"][0, 0][0] == "N"
+    assert '"law": "B"' in contents["about"][0]
 
 
 def test_parquet_has_columns_with_units(recording: Recording, tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet", reason="not run: no pyarrow here")
     export_recording(recording, tmp_path / "run.parquet")
-    found = parquet.read_table(tmp_path / "run.parquet")
-    np.testing.assert_array_equal(found["applied_x"].to_numpy(), recording["applied x"])
-    assert found.schema.field("applied_x").metadata == {b"unit": b"N"}
-    assert b'"law": "B"' in found.schema.metadata[b"asperity"]
+    table = parquet.read_table(tmp_path / "run.parquet")
+    np.testing.assert_array_equal(table["applied_x"].to_numpy(), recording["applied x"])
+    assert table.schema.field("applied_x").metadata == {b"unit": b"N"}
+    assert b'"law": "B"' in table.schema.metadata[b"asperity"]
 
 
-def test_what_cannot_be_exported_is_said(
+def test_failed_export_is_an_error_and_leaves_no_file(
     recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(ParameterError, match=r"output must end in .csv, .mat, .parquet"):
@@ -67,7 +67,9 @@ def test_what_cannot_be_exported_is_said(
     assert {path.name for path in tmp_path.iterdir()} == {"run.mcap"}
 
 
-def test_a_file_is_whole_or_not_there(recording: Recording, tmp_path: Path) -> None:
+def test_failed_export_leaves_an_existing_file_unchanged(
+    recording: Recording, tmp_path: Path
+) -> None:
     data = bytearray(recording.path.read_bytes())
     data[recording._chunks[1].rows_start + 100] ^= 1
     recording.path.write_bytes(data)

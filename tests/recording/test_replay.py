@@ -1,4 +1,4 @@
-"""A recording replays by itself: bit by bit, and what differs is named."""
+"""Replay of recordings: forces are recomputed bit for bit, and differences are reported."""
 
 from __future__ import annotations
 
@@ -29,45 +29,45 @@ SERVO = Servo(
     virtual_damping=0.2, velocity_share=0.3,
 )  # fmt: skip
 HAND = SpringHand(stiffness=(300.0, 300.0, 0.0), damping=2.0, mass=0.05, force=(0.0, 0.0, -1.0))
-WAY = Strokes((-0.005, 0.0, -1e-3), (0.005, 0.002, -1e-3), speed=0.05, count=5)
+STROKES = Strokes((-0.005, 0.0, -1e-3), (0.005, 0.002, -1e-3), speed=0.05, count=5)
 
 
-def recorded(
+def make_recording(
     path: Path, texture: asp.Sinusoid | asp.HeightMap = WAVE, law: str = "F", **options: Any
 ) -> asp.Recording:
     surface = asp.Surface(texture, law, stiffness=700.0, max_depth=0.4e-3, clamp="whole")
-    simulate(surface, Cartesian(0.02, 1.0), HAND, SERVO, WAY, 2.0, trace=path, **options)
+    simulate(surface, Cartesian(0.02, 1.0), HAND, SERVO, STROKES, 2.0, trace=path, **options)
     return open_recording(path)
 
 
 @pytest.mark.parametrize(("texture", "law"), [(WAVE, "F"), (MAP, "B")])
-def test_the_law_gives_the_same_bits(
+def test_replayed_forces_are_bit_identical(
     tmp_path: Path, texture: asp.Sinusoid | asp.HeightMap, law: str
 ) -> None:
-    recording = recorded(tmp_path / "run.mcap", texture, law)
-    found = asp.replay(recording)
-    assert (found.is_identical, found.rows, found.first_difference, found.notes) == (
+    recording = make_recording(tmp_path / "run.mcap", texture, law)
+    result = asp.replay(recording)
+    assert (result.is_identical, result.rows, result.first_difference, result.notes) == (
         True,
         20_000,
         None,
         (),
     )
-    assert repr(found) == "<Replay of 20000 rows, the same bit for bit>"
+    assert repr(result) == "<Replay of 20000 rows, the same bit for bit>"
     assert np.abs(recording["commanded x"]).max() > 0.1
     assert bool(recording["law held"].any()) is (law == "F")
 
 
-def test_a_file_that_is_cut_replays_to_its_end(tmp_path: Path) -> None:
+def test_truncated_file_replays_to_its_end(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    recorded(path)
+    make_recording(path)
     path.write_bytes(path.read_bytes()[:-2_000_000])
-    found = asp.replay(open_recording(path))
-    assert found.is_identical
-    assert 4096 <= found.rows < 20_000
+    result = asp.replay(open_recording(path))
+    assert result.is_identical
+    assert 4096 <= result.rows < 20_000
 
 
-def spoilt(path: Path, row: int, column: int, value: float) -> None:
-    """Change one number of a recording, and the checksum of its block with it."""
+def change_value(path: Path, row: int, column: int, value: float) -> None:
+    """Change one value of a recording and update the checksum of its block."""
     recording = open_recording(path)
     block, at = recording._chunks[row // 4096], row % 4096
     kind = row_type(len(COLUMNS))
@@ -79,65 +79,67 @@ def spoilt(path: Path, row: int, column: int, value: float) -> None:
     path.write_bytes(data)
 
 
-def test_the_first_row_that_differs_is_named(tmp_path: Path) -> None:
+def test_first_difference_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    recording = recorded(path)
+    recording = make_recording(path)
     names = recording.names
     column, row = names.index("commanded y"), 9000
     value = float(recording["commanded y"][row])
-    spoilt(path, row, column, value + 0.25)
-    found = asp.replay(open_recording(path))
-    assert (found.is_identical, found.differing_rows) == (False, 1)
-    assert found.first_difference is not None
-    assert (found.first_difference.row, found.first_difference.column) == (row, "commanded y")
-    assert (found.first_difference.recorded_value, found.first_difference.replayed_value) == (
+    change_value(path, row, column, value + 0.25)
+    result = asp.replay(open_recording(path))
+    assert (result.is_identical, result.differing_rows) == (False, 1)
+    assert result.first_difference is not None
+    assert (result.first_difference.row, result.first_difference.column) == (row, "commanded y")
+    assert (result.first_difference.recorded_value, result.first_difference.replayed_value) == (
         value + 0.25,
         value,
     )
-    assert found.max_force_difference == pytest.approx(0.25)
-    # The last bit counts.
-    spoilt(path, row, column, float(np.nextafter(value, 9.0)))
+    assert result.max_force_difference == pytest.approx(0.25)
+    # A difference in the last bit is reported as well.
+    change_value(path, row, column, float(np.nextafter(value, 9.0)))
     assert asp.replay(open_recording(path)).differing_rows == 1
 
 
-def test_the_sign_of_zero_counts_and_what_is_no_number() -> None:
+def test_sign_of_zero_is_a_difference_and_equal_nans_are_not() -> None:
     block = np.zeros((4, 1 + len(COMPARED_COLUMNS)))
     block[:, 0] = np.arange(4)
     replayed = np.zeros((4, len(COMPARED_COLUMNS)))
     block[1, 2], block[2, 3], replayed[2, 2] = -0.0, np.nan, np.nan
-    found = replay._compare(replay.Replay("", 0, 0, None, 0.0), 100, block, replayed)
-    assert (found.rows, found.differing_rows, found.max_force_difference) == (4, 1, 0.0)
-    assert found.first_difference is not None
-    assert (found.first_difference.row, found.first_difference.column) == (101, "commanded y")
+    result = replay._compare(replay.Replay("", 0, 0, None, 0.0), 100, block, replayed)
+    assert (result.rows, result.differing_rows, result.max_force_difference) == (4, 1, 0.0)
+    assert result.first_difference is not None
+    assert (result.first_difference.row, result.first_difference.column) == (101, "commanded y")
 
 
-def test_the_state_goes_from_row_to_row(tmp_path: Path) -> None:
-    """Another position changes the rows after it, too: the anchor, and the filtered velocity."""
+def test_state_is_carried_from_row_to_row(tmp_path: Path) -> None:
+    """A changed position also changes later rows, through the anchor and the filtered velocity."""
     path = tmp_path / "run.mcap"
-    recording = recorded(path)
-    spoilt(path, 9000, 1, float(recording["x"][9000]) + 1e-3)
-    found = asp.replay(open_recording(path))
-    assert found.differing_rows > 10
-    assert found.first_difference is not None
-    assert found.first_difference.row == 9000
+    recording = make_recording(path)
+    change_value(path, 9000, 1, float(recording["x"][9000]) + 1e-3)
+    result = asp.replay(open_recording(path))
+    assert result.differing_rows > 10
+    assert result.first_difference is not None
+    assert result.first_difference.row == 9000
 
 
-def test_another_surface_is_said(tmp_path: Path) -> None:
-    recording = recorded(tmp_path / "run.mcap")
+def test_another_surface_is_noted(tmp_path: Path) -> None:
+    recording = make_recording(tmp_path / "run.mcap")
     other = asp.Sinusoid(amplitude=0.3e-3, period=2.1e-3, direction=(1.0, 0.3))
-    found = asp.replay(recording, recorded_surface_on(recording, other))
-    assert not found.is_identical
-    assert found.max_force_difference > 1e-3
-    (note,) = found.notes
+    result = asp.replay(recording, recorded_surface_on(recording, other))
+    assert not result.is_identical
+    assert result.max_force_difference > 1e-3
+    (note,) = result.notes
     assert note.startswith("Recorded on another surface: content ")
     assert asp.replay(recording, recorded_surface_on(recording, WAVE)).notes == ()
 
 
-def test_what_has_changed_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changed_version_formula_and_files_are_noted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text("before")
     about = {"files": {str(scene): replay.file_digest(scene), "gone.x3p": "0" * 16}}
-    recording = recorded(tmp_path / "run.mcap", metadata=about)
+    recording = make_recording(tmp_path / "run.mcap", metadata=about)
     assert asp.replay(recording).notes == ()
     scene.write_text("after")
     monkeypatch.setattr(replay, "__version__", "9.9")
@@ -149,24 +151,26 @@ def test_what_has_changed_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert len(notes) == 3
 
 
-def test_what_cannot_be_replayed_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refused(words: str, recording: asp.Recording) -> None:
-        with pytest.raises(ParameterError, match=words):
+def test_recordings_that_cannot_be_replayed_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def assert_refused(message: str, recording: asp.Recording) -> None:
+        with pytest.raises(ParameterError, match=message):
             asp.replay(recording)
 
     path = tmp_path / "run.mcap"
-    refused("each 2th|holds every", recorded(path, every=2))
+    assert_refused("each 2th|holds every", make_recording(path, every=2))
     monkeypatch.setattr(field, "MAX_BYTES", 8)
-    refused("does not hold its surface", recorded(path))
+    assert_refused("does not hold its surface", make_recording(path))
     monkeypatch.undo()
     columns = (("time", "s"), ("x", "m"))
     with asp.RecordingWriter(path, columns) as writer:
         writer.append(np.zeros((1, 2)))
-    refused("does not say which surface", open_recording(path))
-    whole = recorded(path)
+    assert_refused("does not say which surface", open_recording(path))
+    whole = make_recording(path)
     with asp.RecordingWriter(path, columns, whole.metadata) as writer:
         pass
-    refused("has no rows", open_recording(path))
+    assert_refused("has no rows", open_recording(path))
 
 
 @pytest.mark.parametrize(
@@ -181,21 +185,21 @@ def test_what_cannot_be_replayed_is_said(tmp_path: Path, monkeypatch: pytest.Mon
         ({"law_arguments": ["no number"]}, "its surface cannot be read"),
     ],
 )
-def test_a_recording_runs_no_code_and_believes_nothing(
+def test_manipulated_metadata_is_refused(
     tmp_path: Path, changes: dict[str, Any], words: str
 ) -> None:
     surface = asp.Surface(WAVE, "B")
     data = field.field_attachments(surface)
-    said = field.field_metadata(surface)
+    metadata = field.field_metadata(surface)
     path = tmp_path / "run.mcap"
-    with asp.RecordingWriter(path, COLUMNS, {"surface": said | changes}, data) as writer:
+    with asp.RecordingWriter(path, COLUMNS, {"surface": metadata | changes}, data) as writer:
         writer.append(np.zeros((2, len(COLUMNS))))
     with pytest.raises(ParameterError, match=words):
         recorded_field(open_recording(path))
 
 
-def test_the_recorded_field_is_the_surface(tmp_path: Path) -> None:
-    recording = recorded(tmp_path / "run.mcap", MAP, "B")
+def test_recorded_field_equals_the_surface(tmp_path: Path) -> None:
+    recording = make_recording(tmp_path / "run.mcap", MAP, "B")
     points: FloatArray = np.random.default_rng(2).uniform(0.0, 2e-3, (50, 2))
     np.testing.assert_array_equal(recorded_field(recording).height(points), MAP.height(points))
     assert set(COMPARED_COLUMNS) <= set(recording.names)

@@ -74,7 +74,7 @@ def test_scene_with_a_measured_file_beside_it(tmp_path: Path) -> None:
         ("nothing.x3p", "path", "nothing.x3p"),
     ],
 )
-def test_bad_specifications(source: str, argument: str, message: str) -> None:
+def test_invalid_specifications_are_refused(source: str, argument: str, message: str) -> None:
     with pytest.raises(ParameterError, match=message) as caught:
         load_scene(source)
     assert caught.value.argument == argument
@@ -99,13 +99,13 @@ def test_bad_specifications(source: str, argument: str, message: str) -> None:
         ("a = " + "[" * 3000, "nested too deeply"),
     ],
 )  # fmt: skip
-def test_bad_scenes(tmp_path: Path, content: str, message: str) -> None:
+def test_invalid_scenes_are_refused(tmp_path: Path, content: str, message: str) -> None:
     (tmp_path / "scene.toml").write_text(content)
     with pytest.raises(ParameterError, match=message):
         load_scene(str(tmp_path / "scene.toml"))
 
 
-def test_a_device_in_a_scene_needs_units(tmp_path: Path) -> None:
+def test_device_quantities_in_a_scene_need_units(tmp_path: Path) -> None:
     text = '[texture]\nkind = "sinusoid"\namplitude = "1 mm"\nperiod = "1 mm"\n[device]\n'
     for lines in ("max_stiffness = 700\n", 'id = "touch"\nmax_stiffness = 700\n'):
         (tmp_path / "scene.toml").write_text(text + lines)
@@ -113,7 +113,7 @@ def test_a_device_in_a_scene_needs_units(tmp_path: Path) -> None:
             load_scene(str(tmp_path / "scene.toml"))
 
 
-def test_what_was_read_comes_before_the_scene(tmp_path: Path) -> None:
+def test_load_options_override_the_scene(tmp_path: Path) -> None:
     np.save(tmp_path / "map.npy", 1e-5 * np.random.default_rng(0).normal(size=(12, 16)))
     (tmp_path / "scene.toml").write_text(
         '[texture]\nkind = "file"\npath = "map.npy"\npitch = "10 µm"\n'
@@ -123,6 +123,6 @@ def test_what_was_read_comes_before_the_scene(tmp_path: Path) -> None:
     assert texture.pitch == (3e-5, 3e-5)
 
 
-def test_file_options_belong_to_files() -> None:
+def test_file_options_are_refused_for_synthetic_textures() -> None:
     with pytest.raises(ParameterError, match="measured surfaces only"):
         load_scene("sinusoid:amplitude=1mm,period=1mm", {"outliers": 2.0})

@@ -1,4 +1,4 @@
-"""The scene of a recording: as it was made, and with what is missing replaced."""
+"""The scene of a recording: recorded values are restored, missing ones replaced by defaults."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def setup(tmp_path_factory: pytest.TempPathFactory) -> Setup:
     return make_setup(load_scene(str(path)))
 
 
-def test_a_recorded_scene_has_the_surface_and_the_device(setup: Setup, tmp_path: Path) -> None:
+def test_surface_and_device_are_restored(setup: Setup, tmp_path: Path) -> None:
     setup.simulate(trace=tmp_path / "run.mcap")
     scene, notes = load_recorded_scene(open_recording(tmp_path / "run.mcap"))
     assert scene.surface["law"].letter == "C"
@@ -58,11 +58,11 @@ def test_a_recorded_scene_has_the_surface_and_the_device(setup: Setup, tmp_path:
     assert scene.device.value("damping") == 0.5
     assert scene.device.value("update_rate") == 2000.0
     assert scene.loop["run"]["velocity_share"] == 0.4
-    assert "motion" not in scene.loop  # the rows hold it
+    assert "motion" not in scene.loop  # given by the recorded rows
     assert not any("device" in note for note in notes)
 
 
-def test_the_hand_of_a_simulated_loop_is_restored(setup: Setup, tmp_path: Path) -> None:
+def test_hand_of_a_simulated_loop_is_restored(setup: Setup, tmp_path: Path) -> None:
     setup.simulate(trace=tmp_path / "run.mcap")
     scene, notes = load_recorded_scene(open_recording(tmp_path / "run.mcap"))
     assert scene.loop["hand"]["kind"] == "spring"

@@ -18,7 +18,7 @@ SINUSOID = "sinusoid:amplitude=0.4mm,period=1.5mm"
 SURFACE = {"law": "C", "stiffness": 800.0, "max_depth": 0.5e-3}
 
 
-def test_the_default_hand_presses_within_the_analysed_depth() -> None:
+def test_default_hand_presses_within_the_analysed_depth() -> None:
     setup = make_setup(load_scene(SINUSOID), surface=SURFACE, use_defaults=True)
     assert isinstance(setup.hand, SpringHand)
     assert isinstance(setup.motion, Strokes)
@@ -31,13 +31,13 @@ def test_the_default_hand_presses_within_the_analysed_depth() -> None:
     assert "pulled 400 µm deep by a spring of 800 N/m" in setup.assumptions[0]
 
 
-def test_the_default_hand_pulls_with_at_most_half_of_the_greatest_force() -> None:
+def test_default_hand_force_is_at_most_half_of_the_device_maximum() -> None:
     device = parse_device({"max_force": 0.4, "apparent_mass": 0.05}, "weak")
     setup = make_setup(load_scene(SINUSOID), surface=SURFACE, device=device, use_defaults=True)
     assert setup.hand.stiffness[2] == pytest.approx(0.5 * 0.4 / (0.8 * 0.5e-3))
 
 
-def test_the_default_stroke_stays_within_a_finite_surface(tmp_path: Path) -> None:
+def test_default_stroke_stays_within_a_finite_surface(tmp_path: Path) -> None:
     heights = 1e-5 * np.random.default_rng(1).normal(size=(40, 60))
     np.save(tmp_path / "map.npy", heights)
     scene = load_scene(str(tmp_path / "map.npy"), {"pitch": 1e-4})
@@ -49,16 +49,19 @@ def test_the_default_stroke_stays_within_a_finite_surface(tmp_path: Path) -> Non
     assert not any("leaves the surface" in sentence for sentence in setup.assumptions)
 
 
-def test_an_unknown_mass_is_assumed_and_reported() -> None:
+def test_unknown_mass_is_assumed_and_reported() -> None:
     device, assumed = with_assumed_mass(parse_device({"max_force": 3.0}, "mine"))
     assert device.value("apparent_mass") == 0.1
     assert device.data["apparent_mass"].source == "assumed"
     assert assumed == ("The apparent mass of mine is not known; 100 g are simulated",)
-    for known in (parse_device({"apparent_mass": 0.05}, "mine"), load_device("pantograph")):
-        assert with_assumed_mass(known)[1] == ()
+    for device_with_mass in (
+        parse_device({"apparent_mass": 0.05}, "mine"),
+        load_device("pantograph"),
+    ):
+        assert with_assumed_mass(device_with_mass)[1] == ()
 
 
-def test_plants_follow_from_the_known_numbers() -> None:
+def test_plant_is_chosen_by_the_device_data() -> None:
     plant, _ = make_plant(load_device("pantograph"))
     assert isinstance(plant, Pantograph)
     plant, notes = make_plant(parse_device({"apparent_mass": 0.05, "friction": 0.2}, "mine"))
@@ -78,14 +81,14 @@ def test_plants_follow_from_the_known_numbers() -> None:
         ({}, {"needs_dynamics": False, "brakes": "always"}, "whose motion is prescribed"),
     ],
 )
-def test_arguments_that_do_not_apply_are_refused(
+def test_inapplicable_arguments_are_refused(
     device: dict[str, float], arguments: dict[str, object], message: str
 ) -> None:
     with pytest.raises(ParameterError, match=message):
         make_plant(parse_device(device, "mine"), **arguments)  # type: ignore[arg-type]
 
 
-def test_the_servo_has_the_numbers_of_the_device() -> None:
+def test_servo_uses_the_device_data() -> None:
     device = parse_device(
         {"update_rate": 4000, "delay_samples": 3, "force_resolution": 1e-3, "max_force": 5}, "mine"
     )

@@ -26,17 +26,19 @@ SPRING = '[hand]\nkind = "spring"\nstiffness = "300 N/m"\n'
 STILL = '[motion]\nkind = "still"\npoint = ["0 mm", "0 mm", "-1 mm"]\n'
 
 
-def scene(tmp_path: Path, *parts: str) -> Setup:
+def make_scene_setup(tmp_path: Path, *parts: str) -> Setup:
     (tmp_path / "scene.toml").write_text(HEAD + "".join(parts), encoding="utf-8")
     return make_setup(load_scene(str(tmp_path / "scene.toml")))
 
 
-def test_a_mass_in_space_on_a_spring(tmp_path: Path) -> None:
+def test_cartesian_plant_with_a_spring_hand(tmp_path: Path) -> None:
     device = (
         MASS + 'damping = "2 N*s/m"\nfriction = "0.1 N"\ndelay_samples = 2\nmax_force = "8 N"\n'
     )
     hand = SPRING + 'damping = ["1 N*s/m", "2 N*s/m", "3 N*s/m"]\nforce = "0 N; 0 N; -1 N"\n'
-    setup = scene(tmp_path, device, hand, STILL, '[run]\nduration = "0.2 s"\nevery = 4\n')
+    setup = make_scene_setup(
+        tmp_path, device, hand, STILL, '[run]\nduration = "0.2 s"\nevery = 4\n'
+    )
     assert isinstance(setup.plant, Cartesian)
     assert setup.plant.mass == (0.045, 0.045, 0.045)
     np.testing.assert_array_equal(setup.plant.damping, 2.0 * np.eye(3))
@@ -49,20 +51,20 @@ def test_a_mass_in_space_on_a_spring(tmp_path: Path) -> None:
     assert (run.samples, len(run.time)) == (400, 100)
 
 
-def test_what_a_device_lacks_is_assumed_aloud(tmp_path: Path) -> None:
-    setup = scene(tmp_path, '[device]\nid = "touch"\n', SPRING, STILL)
-    said = " ".join(setup.assumptions)
+def test_missing_device_data_are_reported_as_assumptions(tmp_path: Path) -> None:
+    setup = make_scene_setup(tmp_path, '[device]\nid = "touch"\n', SPRING, STILL)
+    assumptions = " ".join(setup.assumptions)
     for words in ("physical damping", "update rate", "1000 Hz", "delay", "Default duration 1 s"):
-        assert words in said
+        assert words in assumptions
     assert setup.servo.period == 1e-3
     assert setup.plant.friction == 0.26
 
 
-def test_a_scene_changes_numbers_of_a_device_of_the_catalogue(tmp_path: Path) -> None:
+def test_scene_overrides_values_of_a_catalogue_device(tmp_path: Path) -> None:
     device = '[device]\nid = "pantograph"\njoint_damping = "4 mN*m*s"\ndelay_samples = 5\n'
     run = '[run]\ncentre = ["37.5 mm", "100 mm"]\nbrakes = "always"\nstart = "0 mm; 0 mm; 4 mm"\n'
     band = '[hand]\nkind = "band"\ntension = "3 N"\nstiffness = "200 N/m"\nlength = "80 mm"\n'
-    setup = scene(tmp_path, device, band, STILL, run)
+    setup = make_scene_setup(tmp_path, device, band, STILL, run)
     assert isinstance(setup.plant, Pantograph)
     assert (setup.plant.joint_damping, setup.plant.centre) == (4e-3, (0.0375, 0.1))
     assert not setup.plant.inside_only
@@ -75,12 +77,14 @@ def test_a_scene_changes_numbers_of_a_device_of_the_catalogue(tmp_path: Path) ->
     assert setup.device.name.startswith("Pantograph")
 
 
-def test_a_moved_hand_needs_no_mass(tmp_path: Path) -> None:
+def test_prescribed_motion_needs_no_mass(tmp_path: Path) -> None:
     strokes = (
         '[motion]\nkind = "strokes"\nstart = ["0 mm", "0 mm", "-0.2 mm"]\n'
         'end = ["3 mm", "0 mm", "-0.2 mm"]\nspeed = "30 mm/s"\ncount = 2\n'
     )
-    setup = scene(tmp_path, '[device]\nid = "omega.3"\n', '[hand]\nkind = "moved"\n', strokes)
+    setup = make_scene_setup(
+        tmp_path, '[device]\nid = "omega.3"\n', '[hand]\nkind = "moved"\n', strokes
+    )
     assert setup.hand == PrescribedHand()
     assert isinstance(setup.motion, Strokes)
     assert setup.duration == pytest.approx(0.2)
@@ -90,18 +94,18 @@ def test_a_moved_hand_needs_no_mass(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["trace.csv", "trace.mcap"])
-def test_a_trace_is_a_path_for_another_scene(tmp_path: Path, name: str) -> None:
-    first = scene(tmp_path, MASS, SPRING, STILL, '[run]\nduration = "0.05 s"\n')
+def test_trace_of_one_scene_is_the_path_of_another(tmp_path: Path, name: str) -> None:
+    first = make_scene_setup(tmp_path, MASS, SPRING, STILL, '[run]\nduration = "0.05 s"\n')
     run = first.simulate(trace=str(tmp_path / name))
     assert run.path
-    again = scene(tmp_path, MASS, '[hand]\nkind = "moved"\n[motion]\nkind = "path"\n'
+    second = make_scene_setup(tmp_path, MASS, '[hand]\nkind = "moved"\n[motion]\nkind = "path"\n'
                   f'file = "{name}"\n')  # fmt: skip
-    shown = first.simulate()
-    at = again.motion.at(shown.time)
-    np.testing.assert_allclose(at, shown.position, rtol=1e-9, atol=1e-15)
+    trace = first.simulate()
+    at = second.motion.at(trace.time)
+    np.testing.assert_allclose(at, trace.position, rtol=1e-9, atol=1e-15)
 
 
-def test_a_way_that_leaves_a_finite_surface_is_said(tmp_path: Path) -> None:
+def test_path_that_leaves_a_finite_surface_is_reported(tmp_path: Path) -> None:
     np.save(tmp_path / "map.npy", 1e-5 * np.random.default_rng(0).normal(size=(32, 64)))
     text = (
         '[texture]\nkind = "file"\npath = "map.npy"\npitch = "20 um"\n[surface]\nlaw = "A"\n'
@@ -110,12 +114,12 @@ def test_a_way_that_leaves_a_finite_surface_is_said(tmp_path: Path) -> None:
     )
     for end, leaves in (("1.2 mm", False), ("1.4 mm", True)):
         (tmp_path / "map.toml").write_text(text.replace("END", end))
-        said = make_setup(load_scene(str(tmp_path / "map.toml"))).assumptions
-        assert any("leaves the surface" in sentence for sentence in said) == leaves
+        assumptions = make_setup(load_scene(str(tmp_path / "map.toml"))).assumptions
+        assert any("leaves the surface" in sentence for sentence in assumptions) == leaves
 
 
-def test_another_law_keeps_the_loop(tmp_path: Path) -> None:
-    setup = scene(tmp_path, MASS, SPRING, STILL)
+def test_changing_the_law_keeps_the_loop(tmp_path: Path) -> None:
+    setup = make_scene_setup(tmp_path, MASS, SPRING, STILL)
     other = setup.with_law("H").with_delay(3)
     assert (other.surface.law.letter, other.servo.delay) == ("H", 3)
     assert other.surface.stiffness == setup.surface.stiffness
@@ -151,14 +155,12 @@ BAD = [
 
 
 @pytest.mark.parametrize(("parts", "message"), BAD, ids=[message for _parts, message in BAD])
-def test_wrong_scenes_say_what_is_wrong(
-    tmp_path: Path, parts: tuple[str, ...], message: str
-) -> None:
+def test_invalid_scenes_are_refused(tmp_path: Path, parts: tuple[str, ...], message: str) -> None:
     with pytest.raises(ParameterError, match=message):
-        scene(tmp_path, *parts)
+        make_scene_setup(tmp_path, *parts)
 
 
-def test_no_law_is_no_loop(tmp_path: Path) -> None:
+def test_missing_law_is_an_error(tmp_path: Path) -> None:
     text = HEAD.replace('law = "C"\n', "") + MASS + SPRING + STILL
     (tmp_path / "scene.toml").write_text(text)
     with pytest.raises(ParameterError, match="law is missing"):
@@ -169,14 +171,14 @@ def test_paths_with_wrong_columns_are_refused(tmp_path: Path) -> None:
     path = '[motion]\nkind = "path"\nfile = "way.csv"\n'
     (tmp_path / "way.csv").write_text("time [s],x [m],y [m]\n0,0,0\n")
     with pytest.raises(ParameterError, match=r"no column 'z \[m\]'"):
-        scene(tmp_path, MASS, SPRING, path)
+        make_scene_setup(tmp_path, MASS, SPRING, path)
     (tmp_path / "way.csv").write_text("time [s],x [m],y [m],z [m]\n0,0,zero,0\n")
     with pytest.raises(ParameterError, match="not a table of numbers"):
-        scene(tmp_path, MASS, SPRING, path)
+        make_scene_setup(tmp_path, MASS, SPRING, path)
     for nothing in ("", "\n\n", "# 1,2,3,4\n"):
         (tmp_path / "way.csv").write_text("time [s],x [m],y [m],z [m]\n" + nothing)
         with pytest.raises(ParameterError, match="has no rows"):
-            scene(tmp_path, MASS, SPRING, path)
+            make_scene_setup(tmp_path, MASS, SPRING, path)
     (tmp_path / "way.csv").write_text("time [s],x [m],y [m],z [m]\n1,0,0,0\n0,0,0,0\n")
     with pytest.raises(ParameterError, match="times must increase"):
-        scene(tmp_path, MASS, SPRING, path)
+        make_scene_setup(tmp_path, MASS, SPRING, path)

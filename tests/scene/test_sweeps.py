@@ -53,19 +53,19 @@ def test_strokes_are_listed_by_law_then_speed_then_depth(tmp_path: Path) -> None
         strokes=2,
         progress=fractions.append,
     )
-    found = [(stroke.law, stroke.speed, stroke.depth) for stroke in strokes]
-    assert found == [
+    order = [(stroke.law, stroke.speed, stroke.depth) for stroke in strokes]
+    assert order == [
         (law, speed, depth) for law in "AC" for speed in (0.2, 0.4) for depth in (0.2e-3, 0.3e-3)
     ]
     assert sorted(fractions) == [k / 8 for k in range(1, 9)]
 
 
-def test_the_depth_of_the_motion_is_the_default(tmp_path: Path) -> None:
+def test_default_depth_is_that_of_the_motion(tmp_path: Path) -> None:
     (stroke,) = sweep_strokes(load_setup(tmp_path), ["C"], speeds=[0.4], strokes=2)
     assert stroke.depth == pytest.approx(0.3e-3)
 
 
-def test_sweeps_that_are_refused(tmp_path: Path) -> None:
+def test_invalid_sweeps_are_refused(tmp_path: Path) -> None:
     setup = load_setup(tmp_path)
     with pytest.raises(ParameterError, match='must be kind = "strokes" to be scanned'):
         sweep_strokes(replace(setup, motion=Stationary((0.0, 0.0, -1e-3))), ["C"])
@@ -76,7 +76,7 @@ def test_sweeps_that_are_refused(tmp_path: Path) -> None:
     assert isinstance(setup.motion, Strokes)
 
 
-def test_threads_return_results_in_order_and_announce_the_end() -> None:
+def test_map_threads_keeps_order_and_sets_the_event_at_the_end() -> None:
     ended = Event()
     assert map_threads(pow, [(2, 3), (3, 2), (5, 1)], ended) == (8, 9, 5)
     assert ended.is_set()
