@@ -1,4 +1,4 @@
-"""What several tests of reports look at."""
+"""Fixtures shared by the tests of reports."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from asperity.textures import Sinusoid
 
 
 @pytest.fixture(scope="session")
-def found() -> Experiments:
-    """Every experiment, smaller than the paper's."""
+def experiments() -> Experiments:
+    """Return all experiments of the paper in reduced size."""
     surface = Surface(Sinusoid(0.1e-3, 1e-3), "A", max_depth=1e-3)
     return Experiments(
         passivity_experiment("WH", (0,), starts=2),

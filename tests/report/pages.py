@@ -1,4 +1,4 @@
-"""What the tests of reports share: a page taken apart, and a result as a terminal shows it."""
+"""Helpers for the tests of reports: an HTML page parser and terminal output."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from asperity.report.terminal import print_page
 
 
 class Reader(HTMLParser):
-    """Collects the tags of a page, what it loads, its text, and the cells of its tables.
+    """Collects the tags of a page, its external resources, its text and its table cells.
 
-    ``alts`` are the words for its pictures, ``numbers`` what their numbers are, ``scripts`` what is
-    run.
+    ``alts`` holds the alternative texts of the pictures, ``numbers`` their embedded data, and
+    ``scripts`` the executable scripts.
     """
 
     def __init__(self, page: str) -> None:
@@ -40,17 +40,17 @@ class Reader(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
         self._open.append(tag)
-        given = {name: str(value) for name, value in attrs}
-        links = [given[name] for name in ("src", "href", "xlink:href") if name in given]
+        attributes = {name: str(value) for name, value in attrs}
+        links = [attributes[name] for name in ("src", "href", "xlink:href") if name in attributes]
         self.loaded += [link for link in links if not link.startswith("#")]
-        assert not [name for name in given if name.startswith("on")]
+        assert not [name for name in attributes if name.startswith("on")]
         if tag == "script":
-            self._script = given.get("type", "")
+            self._script = attributes.get("type", "")
         if tag == "svg":
-            assert given["role"] == "img"
-            self.alts.append(given["aria-label"])
-        if given.get("http-equiv") == "Content-Security-Policy":
-            self.policy = given["content"]
+            assert attributes["role"] == "img"
+            self.alts.append(attributes["aria-label"])
+        if attributes.get("http-equiv") == "Content-Security-Policy":
+            self.policy = attributes["content"]
 
     def handle_data(self, data: str) -> None:
         if self._script is not None:
@@ -71,7 +71,7 @@ class Reader(HTMLParser):
 
 
 def check_alone(page: str) -> Reader:
-    """Assert that a page is one file that loads nothing and suits light, dark and print."""
+    """Assert that a page is self-contained and has styles for light, dark and print."""
     reader = Reader(page)
     assert all(source.startswith("data:image/png;base64,") for source in reader.loaded)
     assert page.count("url(") == page.count('"url(#')
@@ -87,7 +87,7 @@ def check_alone(page: str) -> Reader:
 
 
 def check_script(reader: Reader) -> None:
-    """Assert that one script may run, the page's own, and that pictures have words and numbers."""
+    """Assert that only the page's own script may run and that all pictures have embedded data."""
     assert len(reader.scripts) == 1
     digest = base64.b64encode(hashlib.sha256(reader.scripts[0].encode()).digest()).decode()
     assert "default-src 'none'" in reader.policy
@@ -96,9 +96,9 @@ def check_script(reader: Reader) -> None:
 
 
 def check_alts(reader: Reader, page: str) -> None:
-    """Assert that the words for pictures say what is seen, with numbers, and are no titles.
+    """Assert that alternative texts contain numbers and differ from the titles of the page.
 
-    The axes of their numbers have units, or none is due.
+    The axes of the embedded data have units, except dimensionless ones.
     """
     titles = set(re.findall(r"<h[1-3]>([^<]*)</h[1-3]>", page))
     assert reader.alts
@@ -113,7 +113,7 @@ def check_alts(reader: Reader, page: str) -> None:
 
 
 def terminal(page: Page, width: int) -> str:
-    """Return a page as printed on a console of a width."""
+    """Return a page as printed on a console of the given width."""
     file = io.StringIO()
     print_page(page, Console(width=width, file=file, force_terminal=False, highlight=False))
     return file.getvalue()

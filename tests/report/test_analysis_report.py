@@ -1,4 +1,4 @@
-"""The analysis in a terminal and as a page."""
+"""The report of an analysis in a terminal and as a page."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def page(groove: Analysis) -> str:
     return html_text(groove)
 
 
-def test_page_loads_nothing_and_has_every_section(page: str, groove: Analysis) -> None:
+def test_page_is_self_contained_and_has_every_section(page: str, groove: Analysis) -> None:
     reader = check_alone(page)
     assert len(reader.alts) == 3
     check_alts(reader, page)
@@ -40,7 +40,7 @@ def test_page_loads_nothing_and_has_every_section(page: str, groove: Analysis) -
     assert "np.linalg.norm(s.jacobian(" in text
 
 
-def test_the_page_is_reproducible(groove: Analysis, page: str) -> None:
+def test_page_is_reproducible(groove: Analysis, page: str) -> None:
     assert html_text(groove) == page
 
 
@@ -54,10 +54,10 @@ def test_hostile_names_are_escaped() -> None:
 
 
 @pytest.mark.parametrize("width", [80, 100])
-def test_the_terminal_shows_verdict_numbers_and_assumptions(groove: Analysis, width: int) -> None:
-    said = " ".join(terminal(analysis_page(groove), width).split())
-    assert said.startswith(groove.answer)
+def test_terminal_shows_verdict_numbers_and_assumptions(groove: Analysis, width: int) -> None:
+    text = " ".join(terminal(analysis_page(groove), width).split())
+    assert text.startswith(groove.answer)
     for sentence in groove.assumptions:
-        assert f"- {sentence}" in said
-    assert groove.leak.description in said
-    assert groove.continuity.reason in said
+        assert f"- {sentence}" in text
+    assert groove.leak.description in text
+    assert groove.continuity.reason in text

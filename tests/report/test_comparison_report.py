@@ -1,4 +1,4 @@
-"""The comparison in a terminal, as a page, and in a notebook."""
+"""The report of a comparison in a terminal, as a page and in a notebook."""
 
 from __future__ import annotations
 
@@ -30,26 +30,26 @@ def page(result: asp.Comparison) -> str:
 
 @pytest.mark.parametrize("full", [False, True])
 @pytest.mark.parametrize("width", [40, 60, 80, 100, 120, 200])
-def test_the_answer_fits_the_terminal(result: asp.Comparison, width: int, full: bool) -> None:
+def test_report_fits_the_terminal_width(result: asp.Comparison, width: int, full: bool) -> None:
     text = terminal(comparison_page(result, full), width)
     assert max(len(line) for line in text.splitlines()) <= width
     for row in result.rows:
-        found = [line for line in text.splitlines() if re.match(rf"{row.law.letter} +\S", line)]
-        # The table's row; on a narrow terminal, or where all numbers are shown, the verdict too.
-        assert len(found) >= (2 if width < 72 or full else 1)
+        lines = [line for line in text.splitlines() if re.match(rf"{row.law.letter} +\S", line)]
+        # The row of the table; in narrow or full output also the verdict below it.
+        assert len(lines) >= (2 if width < 72 or full else 1)
     assert "…" not in text
     assert "K₀" in text
 
 
-def test_a_narrow_table_has_fewer_columns_and_whole_numbers(result: asp.Comparison) -> None:
+def test_narrow_table_has_fewer_columns_and_rounded_numbers(result: asp.Comparison) -> None:
     counts = [len(comparison_table(result, width).columns) for width in (30, 40, 60, 80, 120)]
     assert counts == [3, 4, 6, 7, 8]
-    starts = [str(cell) for cell in comparison_table(result, 40).columns[1].cells]
-    assert starts[:2] == ["5000 N/m", limit_text(result.row("A").recommended_stiffness)]
+    stiffnesses = [str(cell) for cell in comparison_table(result, 40).columns[1].cells]
+    assert stiffnesses[:2] == ["5000 N/m", limit_text(result.row("A").recommended_stiffness)]
 
 
-def test_a_newcomer_finds_the_answer_in_the_first_lines(result: asp.Comparison) -> None:
-    """Which law, which stiffness, whether it is felt, why: a checklist for the page's answer."""
+def test_recommendation_answers_the_questions_of_a_new_user(result: asp.Comparison) -> None:
+    """The recommendation names the law, the stiffness, whether it is felt, and the reason."""
     text = result.recommendation
     best = result.recommended_row
     assert best is not None
@@ -69,12 +69,12 @@ def test_a_newcomer_finds_the_answer_in_the_first_lines(result: asp.Comparison) 
         assert words in faint
 
 
-def test_sampled_numbers_carry_a_mark() -> None:
-    found = asp.compare(asp.Sinusoid(amplitude=0.1e-3, period=2e-3), laws="ACF")
-    leaks = [str(cell) for cell in comparison_table(found, 120).columns[5].cells]
+def test_sampled_numbers_are_marked_with_a_tilde() -> None:
+    comparison = asp.compare(asp.Sinusoid(amplitude=0.1e-3, period=2e-3), laws="ACF")
+    leaks = [str(cell) for cell in comparison_table(comparison, 120).columns[5].cells]
     assert leaks[0][0].isdigit()  # A's leak is certified
     assert leaks[1] == "0"  # C's is zero by theorem
-    assert leaks[2].startswith("~")  # F's is the worst loop that was tried
+    assert leaks[2].startswith("~")  # F's is the worst of the sampled loops
 
 
 def test_page_has_a_row_per_law_with_the_letter_alone(page: str) -> None:
@@ -82,13 +82,13 @@ def test_page_has_a_row_per_law_with_the_letter_alone(page: str) -> None:
     assert rows[:4] == ["W", "A", "C", "D"]
 
 
-def test_page_loads_nothing(page: str) -> None:
+def test_page_is_self_contained(page: str) -> None:
     reader = check_alone(page)
     assert len(reader.alts) == 6
     check_alts(reader, page)
 
 
-def test_page_says_what_was_assumed(result: asp.Comparison, page: str) -> None:
+def test_page_lists_the_assumptions(result: asp.Comparison, page: str) -> None:
     assert "Assumptions</h2>" in page
     for sentence in result.assumptions:
         assert sentence.split(":")[0][:40].replace("'", "&#39;") in page
@@ -112,19 +112,19 @@ def test_notebook_table_has_a_row_per_law(result: asp.Comparison) -> None:
     assert result.recommendation[:20] in text
 
 
-def described_of(name: str, **arguments: float) -> dict[str, object]:
+def description_of(name: str, **arguments: float) -> dict[str, object]:
     return CATALOGUE[name].factory(**arguments).describe()
 
 
-def test_arguments_are_read_as_their_kind_declares_them() -> None:
-    said = describe_texture(described_of("cloth", yarn_thickness=0.2e-3))
-    assert said.startswith("cloth: points 448 × 448, pitch 7.5 µm × 7.5 µm, periodic yes")
-    assert "yarn thickness 200 µm, irregularity 0.05, seed 0" in said
-    assert "groove angle 30°" in describe_texture(described_of("knurl"))
+def test_texture_arguments_are_described_with_units() -> None:
+    text = describe_texture(description_of("cloth", yarn_thickness=0.2e-3))
+    assert text.startswith("cloth: points 448 × 448, pitch 7.5 µm × 7.5 µm, periodic yes")
+    assert "yarn thickness 200 µm, irregularity 0.05, seed 0" in text
+    assert "groove angle 30°" in describe_texture(description_of("knurl"))
 
 
-def test_a_kind_that_nobody_declared_is_said_as_it_is() -> None:
-    found = describe_texture(
+def test_undeclared_texture_kind_is_described_generically() -> None:
+    text = describe_texture(
         {"kind": "moon", "craters": 3, "cutoff": 1e-3, "heights": [1, 2, 3, 4, 5]}
     )
-    assert found == "moon: craters 3, cutoff 1 mm, 5 heights"
+    assert text == "moon: craters 3, cutoff 1 mm, 5 heights"

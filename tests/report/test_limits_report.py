@@ -1,4 +1,4 @@
-"""The six limits in a terminal and as a page."""
+"""The report of the six limits in a terminal and as a page."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def result() -> Limits:
 
 
 @pytest.mark.parametrize("width", [80, 100, 120])
-def test_the_answer_fits_the_terminal(result: Limits, width: int) -> None:
+def test_report_fits_the_terminal_width(result: Limits, width: int) -> None:
     text = terminal(limits_page(result), width=width)
     assert max(len(line) for line in text.splitlines()) <= width
     assert "…" not in text
@@ -36,7 +36,7 @@ def test_the_answer_fits_the_terminal(result: Limits, width: int) -> None:
         assert sentence.split()[0] in text
 
 
-def test_waves_are_marked(result: Limits) -> None:
+def test_waves_are_marked_per_limit(result: Limits) -> None:
     lines = [line.split() for line in terminal(limits_page(result), width=100).splitlines()]
     long = next(words for words in lines if words[:2] == ["1", "mm"])
     short = next(words for words in lines if words[:2] == ["200", "µm"])
@@ -44,20 +44,20 @@ def test_waves_are_marked(result: Limits) -> None:
     assert short[-8:] == ["y", "y", "y", "y", "n", "below", "0.08", "m/s"]
 
 
-def test_a_long_list_of_waves_is_cut_and_that_is_said() -> None:
+def test_long_list_of_waves_is_shortened_with_a_note() -> None:
     result = limits(MANY, parse_device(BENCH, "bench"), law="A")
-    shown = listed_waves(result)
-    assert len(shown) == MAX_WAVES
-    assert [wave.wavelength for wave in shown] == sorted(
-        (wave.wavelength for wave in shown), reverse=True
+    listed = listed_waves(result)
+    assert len(listed) == MAX_WAVES
+    assert [wave.wavelength for wave in listed] == sorted(
+        (wave.wavelength for wave in listed), reverse=True
     )
-    least = min(wave.share for wave in shown)
+    least = min(wave.share for wave in listed)
     assert sum(wave.share > least for wave in result.waves) == MAX_WAVES - 1
     assert "And 4 more with less" in terminal(limits_page(result), width=100)
     assert "And 4 more with less" in html_text(result)
 
 
-def test_the_page_loads_nothing_and_says_everything(result: Limits) -> None:
+def test_page_is_self_contained_and_complete(result: Limits) -> None:
     page = html_text(result)
     reader = check_alone(page)
     assert len(reader.alts) == 1
@@ -79,11 +79,11 @@ def test_hostile_names_are_escaped() -> None:
     assert hostile not in result._repr_html_()
 
 
-def test_the_page_is_reproducible(result: Limits) -> None:
+def test_page_is_reproducible(result: Limits) -> None:
     assert html_text(result) == html_text(result)
 
 
-def test_a_flat_surface_has_a_page_without_waves() -> None:
+def test_page_of_a_flat_surface_has_no_waves() -> None:
     flat = limits(HeightMap(np.full((6, 6), 1e-3), 1e-4), parse_device(BENCH, "bench"), law="A")
     page = html_text(flat)
     assert "there is no texture to feel" in page

@@ -1,4 +1,4 @@
-"""The script of a page, run in a browser; not run where there is none."""
+"""The script of a page, run in a headless browser if one is installed."""
 
 from __future__ import annotations
 
@@ -29,34 +29,34 @@ BROWSER = next((found for found in map(shutil.which, NAMES) if found), None)
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="not run: no browser (chromium) here")
 
 
-def in_browser(page: str, path: Path) -> str:
-    """Return the page as it is once its scripts have run."""
+def dump_dom(page: str, path: Path) -> str:
+    """Return the DOM of a page after its scripts have run."""
     path.write_text(page, "utf-8")
-    home = f"--user-data-dir={path.parent / 'browser'}"
-    how = (
+    profile = f"--user-data-dir={path.parent / 'browser'}"
+    options = (
         "--headless",
         "--no-sandbox",
         "--disable-gpu",
         "--virtual-time-budget=3000",
         "--dump-dom",
     )
-    command = [str(BROWSER), *how, home, "--window-size=1100,900", path.as_uri()]
+    command = [str(BROWSER), *options, profile, "--window-size=1100,900", path.as_uri()]
     done = subprocess.run(command, capture_output=True, check=True, timeout=120)
     return done.stdout.decode("utf-8")
 
 
-def asked(page: str, path: Path, script: str) -> Any:
-    """Return what a script, run after the page's own, returns: the policy would not let it run."""
-    without = re.sub(r"<meta http-equiv[^>]*>", "", page)
-    asks = (
-        "<script>const told = (() => {" + script + "})();"
+def evaluate_script(page: str, path: Path, script: str) -> Any:
+    """Return the result of a script run after the page's own, without the security policy."""
+    unrestricted = re.sub(r"<meta http-equiv[^>]*>", "", page)
+    injected = (
+        "<script>const result = (() => {" + script + "})();"
         "document.body.append(Object.assign(document.createElement('pre'),"
-        "{id: 'told', textContent: JSON.stringify(told)}))</script></body>"
+        "{id: 'result', textContent: JSON.stringify(result)}))</script></body>"
     )
-    dom = in_browser(without.replace("</body>", asks), path)
-    found = re.search(r'<pre id="told">(.*?)</pre>', dom, re.DOTALL)
-    assert found is not None, "the script stopped"
-    return json.loads(html.unescape(found[1]))
+    dom = dump_dom(unrestricted.replace("</body>", injected), path)
+    match = re.search(r'<pre id="result">(.*?)</pre>', dom, re.DOTALL)
+    assert match is not None, "the script stopped"
+    return json.loads(html.unescape(match[1]))
 
 
 @pytest.fixture(scope="module")
@@ -65,9 +65,9 @@ def page() -> str:
 
 
 @needs_browser
-def test_it_runs_under_the_policy_and_nothing_else_does(page: str, tmp_path: Path) -> None:
+def test_content_security_policy_allows_only_the_own_script(page: str, tmp_path: Path) -> None:
     injected = page.replace("</body>", "<script>document.title = 'taken'</script></body>")
-    dom = in_browser(injected, tmp_path / "page.html")
+    dom = dump_dom(injected, tmp_path / "page.html")
     assert dom.count('class="tools"') == 6
     assert dom.count('type="checkbox"') == 3
     assert "<title>taken" not in dom
@@ -81,21 +81,21 @@ const [x, y] = place(panel, values(panel.series[0].x)[100], panel.series[0].y[10
 const at = new DOMPoint(x, y).matrixTransform(svg.getScreenCTM());
 svg.dispatchEvent(new PointerEvent("pointermove", { clientX: at.x, clientY: at.y }));
 const box = figure.querySelector(".reading");
-const said = [...box.children].map((line) => line.textContent);
+const reading = [...box.children].map((line) => line.textContent);
 const marks = svg.querySelectorAll(".marks circle").length;
 svg.dispatchEvent(new PointerEvent("pointerleave"));
-return [said, marks, box.hidden, panel];
+return [reading, marks, box.hidden, panel];
 """
 
 
 @needs_browser
-def test_the_pointer_reads_the_nearest_points(page: str, tmp_path: Path) -> None:
-    said, marks, hidden, panel = asked(page, tmp_path / "page.html", POINTER)
-    assert said[0] == panel["name"] == "A, groove wall normal"
-    assert said[1].startswith("along the scan line: ")
-    for line, series in zip(said[2:], panel["series"], strict=True):
-        words, value = line.replace("−", "-").split(": ")
-        assert words == series["name"]
+def test_pointer_shows_values_of_the_nearest_points(page: str, tmp_path: Path) -> None:
+    reading, marks, hidden, panel = evaluate_script(page, tmp_path / "page.html", POINTER)
+    assert reading[0] == panel["name"] == "A, groove wall normal"
+    assert reading[1].startswith("along the scan line: ")
+    for line, series in zip(reading[2:], panel["series"], strict=True):
+        name, value = line.replace("−", "-").split(": ")
+        assert name == series["name"]
         assert float(value.split()[0]) == pytest.approx(series["y"][100], rel=1e-3)
         assert value.split()[1] in ("N", "mN")
     assert marks == 2
@@ -123,18 +123,18 @@ return [trapped, seen, press("ArrowDown")];
 
 
 @needs_browser
-def test_a_picture_is_enlarged_and_scrolling_is_left_alone(page: str, tmp_path: Path) -> None:
-    trapped, seen, free = asked(page, tmp_path / "page.html", ZOOM)
+def test_ctrl_wheel_zooms_and_plain_wheel_scrolls(page: str, tmp_path: Path) -> None:
+    trapped, view_boxes, is_default = evaluate_script(page, tmp_path / "page.html", ZOOM)
     assert trapped == [False, True]
-    boxes = [[float(part) for part in one.split()] for one in seen]
-    first, plain, near, moved, less, more, whole = boxes
+    boxes = [[float(part) for part in one.split()] for one in view_boxes]
+    first, plain, zoomed, moved, less, more, whole = boxes
     assert plain == first == whole
-    assert near[2] == pytest.approx(first[2] / np.e)
-    assert near[2] / near[3] == pytest.approx(first[2] / first[3])
-    assert moved[0] == pytest.approx(near[0] + 0.1 * near[2])
-    assert less[2] == pytest.approx(1.5 * near[2])
-    assert more[2] == pytest.approx(near[2])
-    assert free is True  # the whole picture leaves arrows to the page
+    assert zoomed[2] == pytest.approx(first[2] / np.e)
+    assert zoomed[2] / zoomed[3] == pytest.approx(first[2] / first[3])
+    assert moved[0] == pytest.approx(zoomed[0] + 0.1 * zoomed[2])
+    assert less[2] == pytest.approx(1.5 * zoomed[2])
+    assert more[2] == pytest.approx(zoomed[2])
+    assert is_default is True  # the full view leaves arrow keys to the page
 
 
 LAWS = """
@@ -156,13 +156,13 @@ return { hidden, axes, others, csv, svg, again: csvFile(of(figures[2])) };
 
 
 @needs_browser
-def test_laws_are_hidden_and_what_is_seen_is_saved(page: str, tmp_path: Path) -> None:
-    told = asked(page, tmp_path / "page.html", LAWS)
-    assert len(told["hidden"]) >= 8  # rows of four tables, three panels, a point with its letter
-    assert all(told["hidden"])
-    assert not any(told["others"])
-    assert set(told["axes"]) == {"visible"}
-    forces = [*csv.reader(io.StringIO(told["csv"][2]))]
+def test_hidden_laws_are_left_out_of_saved_files(page: str, tmp_path: Path) -> None:
+    result = evaluate_script(page, tmp_path / "page.html", LAWS)
+    assert len(result["hidden"]) >= 8  # rows of four tables, three panels, one labelled point
+    assert all(result["hidden"])
+    assert not any(result["others"])
+    assert set(result["axes"]) == {"visible"}
+    forces = [*csv.reader(io.StringIO(result["csv"][2]))]
     assert not [name for name in forces[0] if name.startswith("A")]
     unit = forces[0][1].split()[-1]
     assert forces[0][3:] == [
@@ -170,20 +170,20 @@ def test_laws_are_hidden_and_what_is_seen_is_saved(page: str, tmp_path: Path) ->
         f"C, change of height: normal {unit}",
         f"C, change of height: tangential {unit}",
     ]
-    shown = Reader(page).numbers[2][2]["series"]
-    assert [float(row[4]) for row in forces[1:]] == shown[0]["y"]
+    series = Reader(page).numbers[2][2]["series"]
+    assert [float(row[4]) for row in forces[1:]] == series[0]["y"]
     digits = [len(row[3].replace(".", "").lstrip("0")) for row in forces[1:]]
-    assert max(digits) <= 8  # no noise of rounding
-    assert "A, groove" in told["again"]
-    fields = [*csv.reader(io.StringIO(told["csv"][3]))]
+    assert max(digits) <= 8  # no rounding noise
+    assert "A, groove" in result["again"]
+    fields = [*csv.reader(io.StringIO(result["csv"][3]))]
     assert fields[0][2].endswith("curl [N/m]")
     assert all(np.isfinite([float(cell) for cell in fields[1][:3]]))
-    for text in told["svg"]:
+    for text in result["svg"]:
         root = ET.fromstring(text)
         assert root.tag == "{http://www.w3.org/2000/svg}svg"
         assert (root.get("width"), root.get("height")) == ("72pt", "36pt")
         assert "var(" not in text
-        assert root[0].text  # its title: what is seen
+        assert root[0].text  # the title describes the picture
         assert "#1d2733" in text
 
 
@@ -197,7 +197,7 @@ def three_scales() -> Figure:
 
 
 @needs_browser
-def test_points_lie_where_they_are_drawn_on_every_scale(tmp_path: Path) -> None:
+def test_script_and_svg_positions_agree_on_every_scale(tmp_path: Path) -> None:
     figure = three_scales()
     text = render_page(
         Page("title", "answer", [], [picture_section("One", figure, "Three lines.")])
@@ -206,8 +206,8 @@ def test_points_lie_where_they_are_drawn_on_every_scale(tmp_path: Path) -> None:
     const panels = JSON.parse(document.querySelector("figure script").textContent);
     return panels.map((one) => one.series[0].x.map((x, i) => place(one, x, one.series[0].y[i])));
     """
-    told = asked(text, tmp_path / "page.html", script)
-    drawn = re.findall(r'<path d="M ([^"]*)" clip-path', text)
-    for points, path in zip(told, drawn, strict=True):
+    positions = evaluate_script(text, tmp_path / "page.html", script)
+    paths = re.findall(r'<path d="M ([^"]*)" clip-path', text)
+    for points, path in zip(positions, paths, strict=True):
         numbers = np.array(re.findall(r"-?\d+\.?\d*", path), dtype=float).reshape(-1, 2)
         assert np.abs(np.array(points) - numbers).max() < 0.01

@@ -1,4 +1,4 @@
-"""What notebooks and Rich show of results, by the methods that they call."""
+"""The display methods of results that notebooks and Rich call."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def run(trace: bool | Path = True) -> Run:
     return simulate(asp.Surface(WAVE, "C"), Cartesian(0.05), hand, servo, still, 0.1, trace=trace)
 
 
-def shown_file() -> MeasurementSummary:
+def make_file_summary() -> MeasurementSummary:
     x = np.arange(200) * 1e-5
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "ridge.txt")
@@ -51,13 +51,13 @@ def shown_file() -> MeasurementSummary:
         return summarize_file(path)
 
 
-def recorded() -> Path:
+def make_recording() -> Path:
     path = Path(tempfile.mkdtemp(), "run.mcap")
     run(trace=path)
     return path
 
 
-MAKERS: dict[str, Any] = {
+FACTORIES: dict[str, Any] = {
     "texture": lambda: WAVE,
     "map": lambda: asp.named_surface("tile"),
     "surface": lambda: asp.Surface(WAVE, "F"),
@@ -70,22 +70,22 @@ MAKERS: dict[str, Any] = {
     "device": lambda: asp.load_device("touch"),
     "run": run,
     "run without a trace": lambda: run(trace=False),
-    "recording": lambda: asp.open_recording(recorded()),
+    "recording": lambda: asp.open_recording(make_recording()),
     "replay": lambda: asp.replay(result("recording")),
-    "file": shown_file,
+    "file": make_file_summary,
     "table": lambda: TableTwo((), "nothing"),
 }
-PICTURED = {"texture", "map", "surface", "comparison", "analysis", "limits", "run", "recording"}
-REPORTED = {"comparison", "several", "analysis", "limits", "file"}
+WITH_PICTURE = {"texture", "map", "surface", "comparison", "analysis", "limits", "run", "recording"}
+WITH_REPORT = {"comparison", "several", "analysis", "limits", "file"}
 
 
 @cache
 def result(name: str) -> Any:
-    return MAKERS[name]()
+    return FACTORIES[name]()
 
 
 class Tags(HTMLParser):
-    """Every tag that is opened and, unless it is void, closed again."""
+    """Collects tags and asserts that each non-void tag is closed in order."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -106,63 +106,63 @@ class Tags(HTMLParser):
 # --- notebooks ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", MAKERS)
-def test_a_notebook_shows_words_tables_and_a_picture(name: str) -> None:
+@pytest.mark.parametrize("name", FACTORIES)
+def test_notebook_view_is_well_formed_and_self_contained(name: str) -> None:
     text = result(name)._repr_html_()
     tags = Tags(text)
     assert tags.open == []
     assert tags.seen <= {"div", "p", "strong", "small", "img", "br"} | {
         "table", "thead", "tbody", "tr", "th", "td",
     }  # fmt: skip
-    assert ("img" in tags.seen) == (name in PICTURED)
+    assert ("img" in tags.seen) == (name in WITH_PICTURE)
     assert 60 < len(text) < 400_000
     assert "http" not in re.sub(r'base64,[^"]+', "", text)
 
 
-def test_tags_that_are_not_closed_are_noticed() -> None:
+def test_tag_parser_detects_unclosed_tags() -> None:
     with pytest.raises(AssertionError):
         Tags("<div><p></div>")
 
 
-def test_the_answer_is_that_of_the_command_line() -> None:
-    found = result("comparison")
-    text = found._repr_html_()
-    assert f"<strong>{found.recommendation[:40]}" in text
-    assert text.count("<tr") == 1 + len(found.rows)
+def test_notebook_view_has_the_answer_of_the_report() -> None:
+    comparison = result("comparison")
+    text = comparison._repr_html_()
+    assert f"<strong>{comparison.recommendation[:40]}" in text
+    assert text.count("<tr") == 1 + len(comparison.rows)
     assert text.count('<tr style="font-weight: bold"') == 1
     assert "closed form" in result("bound")._repr_html_()
     assert "law F, friction modulation, at 1000 N/m" in result("surface")._repr_html_()
 
 
-def test_words_of_others_are_escaped() -> None:
+def test_foreign_texts_are_escaped() -> None:
     device = parse_device({"name": HOSTILE, "notes": [HOSTILE], "max_stiffness": 1000.0}, "mine")
-    for shown in (asp.compare(WAVE, device, "C"), device):
-        text = shown._repr_html_()
+    for value in (asp.compare(WAVE, device, "C"), device):
+        text = value._repr_html_()
         assert HOSTILE not in text
         assert "&lt;script&gt;" in text
 
 
-def test_what_cannot_be_shown_is_its_repr(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(_result: Any) -> str:
+def test_failing_picture_falls_back_to_the_repr(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing_plot(_result: Any) -> str:
         raise RuntimeError("no fonts")
 
-    monkeypatch.setattr("asperity.report.pictures.plotting.plot", fails)
+    monkeypatch.setattr("asperity.report.pictures.plotting.plot", failing_plot)
     assert result("limits")._repr_html_() is None
-    assert result("bound")._repr_html_() is not None  # it has no picture
+    assert result("bound")._repr_html_() is not None  # has no picture, so the plot does not matter
     assert Displayable()._repr_html_() is None
 
 
-def test_pictures_look_alike_whatever_the_settings_are_and_leave_them() -> None:
-    wanted = WAVE._repr_html_()
+def test_notebook_pictures_ignore_and_keep_rc_settings() -> None:
+    expected = WAVE._repr_html_()
     with mpl.rc_context({"lines.linewidth": 9.0, "font.size": 30.0, "font.family": "serif"}):
         before = dict(mpl.rcParams)
-        assert WAVE._repr_html_() == wanted
+        assert WAVE._repr_html_() == expected
         assert dict(mpl.rcParams) == before
-        drawn = WAVE.plot()._repr_png_()
-    assert drawn != WAVE.plot()._repr_png_()  # a figure of the user's has the user's settings
+        user_figure = WAVE.plot()._repr_png_()
+    assert user_figure != WAVE.plot()._repr_png_()  # figures of ``plot`` use the user's settings
 
 
-def test_nothing_of_pyplot_is_loaded_and_nothing_of_matplotlib_before_a_picture() -> None:
+def test_matplotlib_is_imported_lazily_and_without_pyplot() -> None:
     code = """
 import sys, asperity as asp
 wave = asp.Sinusoid(2e-4, 2e-3)
@@ -175,17 +175,19 @@ assert "matplotlib" in sys.modules and "matplotlib.pyplot" not in sys.modules
     assert done.returncode == 0, done.stderr
 
 
-def test_a_notebook_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("IPYTHONDIR", str(tmp_path))  # where it keeps what was typed
+def test_views_in_an_ipython_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path))  # folder of the history
     shell = pytest.importorskip("IPython.core.interactiveshell", reason="not run: no IPython here")
     session = shell.InteractiveShell.instance()
     try:
         session.run_cell("import asperity as asp")
-        done = session.run_cell('asp.compare("sinusoid:amplitude=0.2mm,period=2mm", laws="WC")')
-        shown, _metadata = session.display_formatter.format(done.result)
-        assert shown["text/html"].startswith("<div>")
-        assert shown["text/plain"].startswith("<Comparison of 2 laws")
-        figure, _metadata = session.display_formatter.format(done.result.plot())
+        execution = session.run_cell(
+            'asp.compare("sinusoid:amplitude=0.2mm,period=2mm", laws="WC")'
+        )
+        formats, _metadata = session.display_formatter.format(execution.result)
+        assert formats["text/html"].startswith("<div>")
+        assert formats["text/plain"].startswith("<Comparison of 2 laws")
+        figure, _metadata = session.display_formatter.format(execution.result.plot())
         assert figure["image/png"]
     finally:
         shell.InteractiveShell.clear_instance()
@@ -194,49 +196,49 @@ def test_a_notebook_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 # --- figures and pages ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", sorted(PICTURED))
-def test_plot_is_the_picture_of_the_report(name: str) -> None:
-    shown = result(name)
-    assert isinstance(shown, Plottable)
-    figure = shown.plot()
+@pytest.mark.parametrize("name", sorted(WITH_PICTURE))
+def test_plot_method_returns_the_picture_of_the_report(name: str) -> None:
+    value = result(name)
+    assert isinstance(value, Plottable)
+    figure = value.plot()
     assert isinstance(figure, Figure)
     assert [axes.get_title() for axes in figure.axes] == [
-        axes.get_title() for axes in report.plot(shown).axes
+        axes.get_title() for axes in report.plot(value).axes
     ]
     assert figure._repr_png_().startswith(b"\x89PNG")
     with pytest.raises(asp.ParameterError, match="picture must be"):
-        shown.plot("nonsense")
+        value.plot("nonsense")
 
 
-def test_several_begin_with_their_answer() -> None:
-    said = html.unescape(result("several")._repr_html_())
-    assert said.index(result("several").recommendation) < said.index("<table")
-    assert result("several").missing_data[0].sentence in said
+def test_view_of_several_devices_begins_with_the_recommendation() -> None:
+    text = html.unescape(result("several")._repr_html_())
+    assert text.index(result("several").recommendation) < text.index("<table")
+    assert result("several").missing_data[0].sentence in text
 
 
-def test_one_picture_of_several() -> None:
+def test_plot_selects_one_picture_by_name() -> None:
     assert len(result("comparison").plot("merit").axes) == 1
     assert len(result("comparison").plot().axes) > 1
 
 
-def test_a_run_without_a_trace_has_no_picture() -> None:
+def test_plot_of_a_run_without_trace_is_an_error() -> None:
     with pytest.raises(asp.ParameterError, match="trace must be kept in memory"):
         result("run without a trace").plot()
 
 
-@pytest.mark.parametrize("name", sorted(REPORTED))
-def test_to_html_is_the_report(name: str, tmp_path: Path) -> None:
-    shown = result(name)
-    assert isinstance(shown, Reportable)
-    text = shown.to_html()
-    assert text == report.html_text(shown)
+@pytest.mark.parametrize("name", sorted(WITH_REPORT))
+def test_to_html_returns_or_writes_the_report(name: str, tmp_path: Path) -> None:
+    value = result(name)
+    assert isinstance(value, Reportable)
+    text = value.to_html()
+    assert text == report.html_text(value)
     assert text.lstrip().startswith("<!DOCTYPE html>")
     path = tmp_path / "report.html"
-    assert shown.to_html(path) is None
+    assert value.to_html(path) is None
     assert path.read_text(encoding="utf-8") == text
 
 
-def test_a_page_that_cannot_be_written_is_said(tmp_path: Path) -> None:
+def test_to_html_reports_an_unwritable_path(tmp_path: Path) -> None:
     with pytest.raises(asp.ParameterError, match=r"path cannot be written: .*got .*nowhere"):
         result("several").to_html(tmp_path / "nowhere" / "report.html")
     assert not hasattr(result("bound"), "to_html")
@@ -245,41 +247,41 @@ def test_a_page_that_cannot_be_written_is_said(tmp_path: Path) -> None:
 # --- Rich -----------------------------------------------------------------------------------------
 
 
-def on_console(width: int, say: Any) -> str:
+def on_console(width: int, print_to: Any) -> str:
     console = Console(width=width, record=True, file=io.StringIO(), highlight=False)
-    say(console)
+    print_to(console)
     return console.export_text()
 
 
-@pytest.mark.parametrize("name", sorted(REPORTED))
+@pytest.mark.parametrize("name", sorted(WITH_REPORT))
 @pytest.mark.parametrize("width", [50, 100, 160])
-def test_rich_prints_what_the_command_line_does(name: str, width: int) -> None:
-    shown = result(name)
-    text = on_console(width, lambda console: console.print(shown))
-    wanted = on_console(width, lambda console: print_page(find_page(shown), console))
-    assert text.split() == wanted.split()
+def test_rich_prints_the_report_of_the_command_line(name: str, width: int) -> None:
+    value = result(name)
+    text = on_console(width, lambda console: console.print(value))
+    expected = on_console(width, lambda console: print_page(find_page(value), console))
+    assert text.split() == expected.split()
     assert len(text.splitlines()) > 4
     assert max(len(line.rstrip()) for line in text.splitlines()) <= width
-    if name != "analysis":  # its lines of code go on beyond the width of a terminal
-        lines = zip(text.splitlines(), wanted.splitlines(), strict=True)
+    if name != "analysis":  # its code lines are wider than the terminal
+        lines = zip(text.splitlines(), expected.splitlines(), strict=True)
         assert all(line.rstrip() == other.rstrip() for line, other in lines)
 
 
-def test_rich_prints_the_rest_as_it_did() -> None:
+def test_rich_prints_other_results_as_their_repr() -> None:
     text = on_console(100, lambda console: console.print(WAVE))
     assert text.strip() == repr(WAVE)
 
 
-# --- results are what they were -------------------------------------------------------------------
+# --- value semantics ------------------------------------------------------------------------------
 
 
-def test_values_are_equal_and_hashed_and_copied_as_before() -> None:
+def test_display_mixins_keep_equality_hash_copy_and_pickle() -> None:
     bound, device = result("bound"), result("device")
     assert pickle.loads(pickle.dumps(bound)) == bound
     assert hash(copy.deepcopy(bound)) == hash(bound)
     assert copy.copy(device) == device == pickle.loads(pickle.dumps(device))
     assert bound != result("analysis").one_sided
-    assert asp.Surface(WAVE, "C") != asp.Surface(WAVE, "C")  # surfaces are themselves alone
+    assert asp.Surface(WAVE, "C") != asp.Surface(WAVE, "C")  # surfaces compare by identity
     new = asp.Sinusoid(2e-4, 2e-3)
     assert pickle.loads(pickle.dumps(new)).describe() == WAVE.describe()
     assert not vars(Displayable()) | vars(Plottable()) | vars(Reportable())

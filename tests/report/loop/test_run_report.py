@@ -1,4 +1,4 @@
-"""A simulated run in words, table and page."""
+"""The report of a simulated run: sentences, table and page."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ def run(setup: Setup) -> Run:
     return setup.simulate()
 
 
-def test_energies_have_signs() -> None:
+def test_energies_are_printed_with_signs() -> None:
     assert energy_text(2.97e-3) == "+2.97 mJ"
     assert energy_text(-4e-7) == "-400 nJ"
     assert energy_text(0.0) == "0 J"
     assert energy_text(math.nan) == "not finite"
 
 
-def test_rows_add_up(run: Run) -> None:
+def test_ledger_rows_add_up(run: Run) -> None:
     rows = dict(ledger_rows(run))
     assert rows["texture, exact"][3] == energy_text(run.ledger.total)
     assert rows["stored energy, after minus before"][3] == energy_text(
@@ -51,7 +51,7 @@ def test_rows_add_up(run: Run) -> None:
     assert run.is_energy_balanced
 
 
-def test_a_run_that_does_not_close_is_not_believed(setup: Setup, run: Run) -> None:
+def test_energy_balance_that_does_not_close_is_reported(setup: Setup, run: Run) -> None:
     assert "does not close" not in run_answer(setup, run)
     wrong = replace(
         run, ledger=replace(run.ledger, dissipated=run.ledger.dissipated * (1.0 + 1e-6))
@@ -59,7 +59,7 @@ def test_a_run_that_does_not_close_is_not_believed(setup: Setup, run: Run) -> No
     assert "does not close" in run_answer(setup, wrong)
 
 
-def test_numbers_beyond_all_bounds_are_words(setup: Setup, run: Run) -> None:
+def test_infinite_and_nan_energies_are_reported_as_not_finite(setup: Setup, run: Run) -> None:
     nan = (math.nan, 0.0, math.nan)
     wrong = replace(run, ledger=replace(run.ledger, supplied=nan, exchanged=math.inf))
     wrong = replace(wrong, stop=StopReason.DIVERGED)
@@ -69,13 +69,13 @@ def test_numbers_beyond_all_bounds_are_words(setup: Setup, run: Run) -> None:
     assert dict(ledger_rows(wrong))["texture, exact"][0] == "not finite"
 
 
-def test_table_and_page_say_the_same(setup: Setup, run: Run) -> None:
-    shown = terminal(run_page(setup, run), 80)
+def test_terminal_and_page_have_the_same_content(setup: Setup, run: Run) -> None:
+    text = terminal(run_page(setup, run), 80)
     page = render_page(run_page(setup, run))
     for name, cells in ledger_rows(run):
         assert name.replace("'", "&#39;") in page
         assert cells[3] in page
-        assert cells[3] in shown
+        assert cells[3] in text
     for sentence in setup.assumptions:
         assert sentence.replace("'", "&#39;") in page
-        assert sentence in " ".join(shown.split())
+        assert sentence in " ".join(text.split())

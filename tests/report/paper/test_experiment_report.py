@@ -14,27 +14,27 @@ from asperity.report.pictures.loop_pictures import onset_figure
 from asperity.report.pictures.paper_pictures import cycles_figure, devices_figure
 
 
-def test_sections_in_order(found: Experiments) -> None:
-    sections = experiment_sections(found)
+def test_sections_are_in_the_order_of_the_paper(experiments: Experiments) -> None:
+    sections = experiment_sections(experiments)
     assert [section.title.split(",")[0] for section in sections] == [
         "V.A", "V.A", "V.A", "V.B", "V.B", "V.C", "Predicted and simulated", "Devices in numbers",
     ]  # fmt: skip
-    drawn = [section for section in sections if isinstance(section.blocks[0], Picture)]
-    for section in drawn:
+    with_picture = [section for section in sections if isinstance(section.blocks[0], Picture)]
+    for section in with_picture:
         assert isinstance(section.blocks[0], Picture)
         picture = render_picture(section.blocks[0])
         assert picture.svg.startswith("<svg ")
         assert len(picture.alt_text) < 1000
-    assert "Not stated by the paper" in drawn[0].notes[0]
-    assert "falcon" in drawn[-1].notes[1]
+    assert "Not stated by the paper" in with_picture[0].notes[0]
+    assert "falcon" in with_picture[-1].notes[1]
     html = render_page(Page("title", "answer", [], sections))
     check_alts(check_alone(html), html)
-    assert html.count("<figure>") == len(drawn) == 5
+    assert html.count("<figure>") == len(with_picture) == 5
 
 
-def test_tables_have_as_many_cells_as_headings(found: Experiments) -> None:
+def test_every_table_row_has_one_cell_per_heading(experiments: Experiments) -> None:
     tables = [
-        block for section in experiment_sections(found) for block in section.blocks
+        block for section in experiment_sections(experiments) for block in section.blocks
         if isinstance(block, Table)
     ]  # fmt: skip
     assert len(tables) == 3
@@ -44,22 +44,22 @@ def test_tables_have_as_many_cells_as_headings(found: Experiments) -> None:
             assert len(row.cells) == len(table.headings)
 
 
-def test_an_onset_that_may_be_lower_is_marked() -> None:
-    def marked(laws: str) -> list[bool]:
+def test_onset_at_the_lowest_tested_stiffness_is_marked() -> None:
+    def find_marks(laws: str) -> list[bool]:
         figure = onset_figure(passivity_onsets(laws, (2,), 1))
         lines = {line.get_label(): line for line in figure.axes[-1].lines}
         return list(np.isfinite(lines["the least tried"].get_ydata())) if len(lines) > 4 else []
 
-    assert marked("WC") == [True]  # C cycles at 50 N/m, where the search begins
-    assert marked("WH") == []
+    assert find_marks("WC") == [True]  # C cycles at 50 N/m, the start of the search
+    assert find_marks("WH") == []
 
 
-def test_figures_show_what_was_found(found: Experiments) -> None:
-    figure = cycles_figure(found.passivity)
+def test_figures_show_the_experiment_results(experiments: Experiments) -> None:
+    figure = cycles_figure(experiments.passivity)
     titles = [text.get_text() for axes in figure.axes for text in axes.texts]
     assert "F/8.3" in titles
     assert "2000 N/m" in titles
-    rules = devices_figure(found)
+    rules = devices_figure(experiments)
     assert [axes.get_xlabel() for axes in rules.axes] == [
         "allowed by K₀/q [N/m]", "allowed by delay rule [N/m]",
     ]  # fmt: skip

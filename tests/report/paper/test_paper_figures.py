@@ -1,4 +1,4 @@
-"""The figures of the reproduction as files: which, where, the same bytes twice, nothing cut."""
+"""The figure files of the reproduction: selection, reproducibility and margins."""
 
 from __future__ import annotations
 
@@ -21,47 +21,49 @@ NAMES = ["fig-2", "fig-3", "fig-5", "onsets", "fig-6", "fig-7", "devices"]
 
 
 @pytest.fixture(scope="module")
-def pictures(found: Experiments, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
+def pictures(
+    experiments: Experiments, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, ...]:
     """All figures as PNG, written once."""
-    return write_figures(PAPER_FIGURES, tmp_path_factory.mktemp("figures"), "png", found)
+    return write_figures(PAPER_FIGURES, tmp_path_factory.mktemp("figures"), "png", experiments)
 
 
-def test_every_figure_is_a_file(pictures: tuple[Path, ...]) -> None:
+def test_every_figure_is_written_to_a_file(pictures: tuple[Path, ...]) -> None:
     assert [path.name for path in pictures] == [f"{name}.png" for name in NAMES]
     assert sorted(pictures) == sorted(pictures[0].parent.iterdir())
 
 
 @pytest.mark.parametrize("ending", ["svg", "png"])
-def test_the_same_bytes_twice(
-    found: Experiments, tmp_path: Path, ending: paper_figures.FileFormat
+def test_figure_files_are_reproducible(
+    experiments: Experiments, tmp_path: Path, ending: paper_figures.FileFormat
 ) -> None:
-    drawings, told, texts = find_figures(["fig-5", "fig-7"]), list[str](), []
+    drawings, progress, texts = find_figures(["fig-5", "fig-7"]), list[str](), []
     for _ in range(2):
-        paths = write_figures(drawings, tmp_path, ending, found, told.append)
+        paths = write_figures(drawings, tmp_path, ending, experiments, progress.append)
         texts.append([path.read_bytes() for path in paths])
     assert texts[0] == texts[1]
-    assert told == ["fig-5", "fig-7"] * 2
+    assert progress == ["fig-5", "fig-7"] * 2
 
 
-def test_bytes_differ_without_the_salt(
-    found: Experiments, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_svg_differs_without_the_hash_salt(
+    experiments: Experiments, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(paper_figures, "_HASH_SALT", None)
     texts = []
     for _ in range(2):
-        (path,) = write_figures(find_figures(["fig-5"]), tmp_path, "svg", found)
+        (path,) = write_figures(find_figures(["fig-5"]), tmp_path, "svg", experiments)
         texts.append(path.read_bytes())
     assert texts[0] != texts[1]
 
 
 def _margin(image: Image.Image) -> int:
-    """Return how many pixels along every border are white."""
-    drawn = np.argwhere((np.asarray(image.convert("RGB")) < 250).any(axis=-1))
-    below = np.array(image.size[::-1]) - 1 - drawn.max(axis=0)
-    return int(min(*drawn.min(axis=0), *below))
+    """Return the width in pixels of the smallest white border."""
+    inked = np.argwhere((np.asarray(image.convert("RGB")) < 250).any(axis=-1))
+    below = np.array(image.size[::-1]) - 1 - inked.max(axis=0)
+    return int(min(*inked.min(axis=0), *below))
 
 
-def test_nothing_is_cut_and_a_slide_holds_it(pictures: tuple[Path, ...]) -> None:
+def test_figures_have_margins_and_fit_a_slide(pictures: tuple[Path, ...]) -> None:
     for path in pictures:
         with Image.open(path) as image:
             assert _margin(image) >= 5, path.name
@@ -69,7 +71,7 @@ def test_nothing_is_cut_and_a_slide_holds_it(pictures: tuple[Path, ...]) -> None
             assert image.height <= image.width
 
 
-def test_what_is_cut_is_noticed() -> None:
+def test_margin_of_a_clipped_figure_is_zero() -> None:
     figure = Figure(figsize=(2.0, 1.0))
     figure.text(0.5, 1.0, "cut", va="center")
     stream = io.BytesIO()
@@ -78,20 +80,20 @@ def test_what_is_cut_is_noticed() -> None:
         assert _margin(image) == 0
 
 
-def test_the_settings_of_the_user_change_nothing(found: Experiments, tmp_path: Path) -> None:
+def test_user_rc_settings_do_not_change_figures(experiments: Experiments, tmp_path: Path) -> None:
     import matplotlib as mpl
 
     drawings = find_figures(["fig-5"])
-    (path,) = write_figures(drawings, tmp_path, "svg", found)
+    (path,) = write_figures(drawings, tmp_path, "svg", experiments)
     usual = path.read_bytes()
     with mpl.rc_context({"font.size": 30.0, "axes.facecolor": "black"}):
-        write_figures(drawings, tmp_path, "svg", found)
-        assert mpl.rcParams["font.size"] == 30.0  # and are left as they were
+        write_figures(drawings, tmp_path, "svg", experiments)
+        assert mpl.rcParams["font.size"] == 30.0  # settings are restored
     assert path.read_bytes() == usual
 
 
-def test_an_svg_is_a_file_of_its_own(found: Experiments, tmp_path: Path) -> None:
-    (path,) = write_figures(find_figures(["fig-5"]), tmp_path, "svg", found)
+def test_svg_is_standalone_and_without_date(experiments: Experiments, tmp_path: Path) -> None:
+    (path,) = write_figures(find_figures(["fig-5"]), tmp_path, "svg", experiments)
     text = path.read_text("utf-8")
     assert text.startswith("<?xml")
     assert re.search(r"<dc:date>|Matplotlib v", text) is None
@@ -107,39 +109,41 @@ def test_an_svg_is_a_file_of_its_own(found: Experiments, tmp_path: Path) -> None
         ([], NAMES),
     ],
 )
-def test_only_the_figures_of_the_claims(claims: list[str], names: list[str]) -> None:
+def test_claims_select_their_figures(claims: list[str], names: list[str]) -> None:
     assert [one.name for one in find_figures(claims)] == names
 
 
-def test_without_experiments_there_are_two() -> None:
+def test_without_experiments_only_analytic_figures_are_available() -> None:
     assert [one.name for one in find_figures(include_simulated=False)] == ["fig-2", "fig-3"]
     with pytest.raises(ParameterError, match="are not available for eq-44"):
         find_figures(["eq-44"])
 
 
-def test_a_figure_alone_computes_what_it_needs(
+def test_single_figure_runs_only_its_own_experiment(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    asked: list[dict[str, object]] = []
+    calls: list[dict[str, object]] = []
 
-    def small(**arguments: object) -> object:
-        asked.append(arguments)
+    def run_small_experiment(**arguments: object) -> object:
+        calls.append(arguments)
         return passivity_experiment("W", (0,), starts=1)
 
-    monkeypatch.setattr(paper_figures, "passivity_experiment", small)
+    monkeypatch.setattr(paper_figures, "passivity_experiment", run_small_experiment)
     write_figures(find_figures(["fig-5"]), tmp_path, "svg")
-    assert asked == [{"delays": ()}]  # not the onsets, which take minutes
+    assert calls == [{"delays": ()}]  # without the onsets, which take minutes
 
 
-def test_a_file_that_cannot_be_written_is_named(found: Experiments, tmp_path: Path) -> None:
+def test_error_names_the_file_that_cannot_be_written(
+    experiments: Experiments, tmp_path: Path
+) -> None:
     (tmp_path / "fig-5.svg").mkdir()
     with pytest.raises(ParameterError, match=r"figures cannot be written.*fig-5\.svg"):
-        write_figures(find_figures(["fig-5"]), tmp_path, "svg", found)
+        write_figures(find_figures(["fig-5"]), tmp_path, "svg", experiments)
 
 
-def test_the_way_over_the_bump_is_shown_whole(found: Experiments) -> None:
+def test_path_over_the_bump_is_inside_the_axes(experiments: Experiments) -> None:
     from asperity.report.pictures.paper_pictures import bumps_figure
 
-    highest = max(1e3 * one.z.max() for one in found.bump.bumps)
+    highest = max(1e3 * one.z.max() for one in experiments.bump.bumps)
     assert highest > 25.0  # A throws the handle up
-    assert max(axes.get_ylim()[1] for axes in bumps_figure(found.bump).axes[::2]) > highest
+    assert max(axes.get_ylim()[1] for axes in bumps_figure(experiments.bump).axes[::2]) > highest

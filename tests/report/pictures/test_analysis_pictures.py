@@ -1,4 +1,4 @@
-"""The pictures of an analysis, and the data behind them."""
+"""The pictures of an analysis and their data."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def hills() -> Analysis:
     return analysis("A", HILLS, max_depth=0.1e-3)
 
 
-def test_every_picture_can_be_had_alone(
+def test_every_picture_can_be_plotted_alone(
     groove: Analysis, god_object: Analysis, hills: Analysis, tmp_path: Path
 ) -> None:
     expected = {
@@ -70,13 +70,13 @@ def test_every_picture_can_be_had_alone(
         plot(groove, picture="jumps")
 
 
-def test_the_worst_loop_is_drawn_where_it_is(groove: Analysis) -> None:
-    """The drawn line is the polygon: its area times curl is its energy, for a field like A's."""
+def test_worst_loop_is_drawn_at_its_vertices(groove: Analysis) -> None:
+    """The line in the picture is the polygon of the leak, inside the axes."""
     axes = plot(groove, "field").axes[0]
     vertices, window = groove.leak.vertices, loop_window(groove)
-    drawn = [line for line in axes.lines if len(line.get_xdata()) == len(vertices) + 1]
-    assert len(drawn) == 1
-    x, z = (np.asarray(values)[:-1] * 1e-3 for values in drawn[0].get_data())
+    polygons = [line for line in axes.lines if len(line.get_xdata()) == len(vertices) + 1]
+    assert len(polygons) == 1
+    x, z = (np.asarray(values)[:-1] * 1e-3 for values in polygons[0].get_data())
     start = window.segment.xy(np.zeros(1))[0]
     np.testing.assert_allclose(start[0] + x, vertices[:, 0], atol=1e-12)
     np.testing.assert_allclose(z, vertices[:, 2], atol=1e-12)
@@ -88,7 +88,7 @@ def test_the_worst_loop_is_drawn_where_it_is(groove: Analysis) -> None:
     assert z.max() <= high
 
 
-def test_a_conservative_field_has_no_loop_in_its_picture() -> None:
+def test_picture_of_a_conservative_field_has_no_loop() -> None:
     axes = plot(analysis("C"), "field").axes[0]
     assert axes.get_title(loc="left") == "conservative: no loop gains energy"
     mesh = next(item for item in axes.collections if isinstance(item, QuadMesh))
@@ -96,7 +96,7 @@ def test_a_conservative_field_has_no_loop_in_its_picture() -> None:
 
 
 @pytest.mark.parametrize("law", ["A", "B", "C", "G"])
-def test_the_cross_is_on_the_witness_and_nothing_is_above_q(law: str) -> None:
+def test_cross_marks_the_witness_of_q(law: str) -> None:
     result = analysis(law, max_depth=0.25e-3)
     axes = plot(result, "gain").axes[0]
     crosses = [line for line in axes.lines if line.get_marker() == "x"]
@@ -114,13 +114,13 @@ def test_the_cross_is_on_the_witness_and_nothing_is_above_q(law: str) -> None:
     assert working_depth(result.surface, point[None])[0] <= 0.25e-3 * (1 + 1e-9)
 
 
-def test_the_working_depth_of_every_contact() -> None:
+def test_working_depth_of_every_contact() -> None:
     texture = Sinusoid(1e-4, 1e-3)
     probe = np.array([[0.25e-3, 0.0, -0.3e-3], [0.75e-3, 0.0, 0.2e-3]])
     expected = {"G": [0.3e-3, -0.2e-3], "C": [0.4e-3, -0.3e-3]}
     for law, depth in expected.items():
-        found = working_depth(Surface(texture, law), probe)
-        np.testing.assert_allclose(found, depth, rtol=1e-12)
+        actual = working_depth(Surface(texture, law), probe)
+        np.testing.assert_allclose(actual, depth, rtol=1e-12)
     nearest = working_depth(Surface(texture, "E"), probe)
     x = np.linspace(-1e-3, 2e-3, 300_001)
     for depth, point in zip(np.abs(nearest), probe, strict=True):
@@ -130,7 +130,7 @@ def test_the_working_depth_of_every_contact() -> None:
 
 
 @pytest.mark.parametrize("law", ["A", "B", "C", "F", "G"])
-def test_the_column_reaches_q_at_the_witness(law: str) -> None:
+def test_witness_profile_reaches_q_at_the_witness(law: str) -> None:
     result = analysis(law, max_depth=0.25e-3)
     column = witness_profile(result)
     at = np.interp(column.witness_depth, column.depth, column.values[:, 0])
@@ -141,7 +141,7 @@ def test_the_column_reaches_q_at_the_witness(law: str) -> None:
     )
 
 
-def test_the_column_of_d_grows_as_the_paper_of_the_medial_axis_says(god_object: Analysis) -> None:
+def test_witness_profile_of_law_d_matches_the_closed_form(god_object: Analysis) -> None:
     """Below the crest σ₁ = y/(1 - y), y = δ/onset, from y = 1/2 up to the onset."""
     column = witness_profile(god_object)
     y = column.depth / column.witness_depth
@@ -150,7 +150,7 @@ def test_the_column_of_d_grows_as_the_paper_of_the_medial_axis_says(god_object: 
     np.testing.assert_allclose(column.values[part, 0], y[part] / (1 - y[part]), rtol=1e-6)
 
 
-def test_from_above_a_is_its_slope(hills: Analysis) -> None:
+def test_top_view_of_law_a_shows_the_slope(hills: Analysis) -> None:
     """‖J_A‖/k = √(1 + |∇h|²), whatever the depth."""
     view, gain = top_view(hills)
     rows, columns = gain.shape
@@ -162,7 +162,7 @@ def test_from_above_a_is_its_slope(hills: Analysis) -> None:
     assert gain.max() <= hills.q.upper
 
 
-def test_the_jumps_are_drawn(god_object: Analysis) -> None:
+def test_jumps_are_plotted_against_depth(god_object: Analysis) -> None:
     axes = plot(god_object, "jumps").axes[0]
     depth, size = axes.lines[0].get_data()
     jumps = god_object.continuity.jumps

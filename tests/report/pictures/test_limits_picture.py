@@ -29,8 +29,8 @@ def shortest_of(result: Limits) -> list[tuple[float, int, str]]:
     )
 
 
-def test_the_shortest_waves_by_hand(result: Limits) -> None:
-    """α v T, β δ and v/F₀; α δ is drawn only where it differs."""
+def test_shortest_wavelengths_match_hand_calculation(result: Limits) -> None:
+    """Limits are α v T, β δ and v/F₀; α δ is listed only where it differs from β δ."""
     assert [(number, round(least, 9)) for least, number, _words in shortest_of(result)] == [
         (1, 50e-6), (2, 75e-6), (6, 250e-6),
     ]  # fmt: skip
@@ -40,20 +40,20 @@ def test_the_shortest_waves_by_hand(result: Limits) -> None:
     ]  # fmt: skip
 
 
-def test_the_picture_shows_waves_forces_and_limits(result: Limits) -> None:
+def test_picture_shows_waves_forces_and_limits(result: Limits) -> None:
     upper, lower = limits_figure(result).axes
     assert lower.get_xlabel() == "wavelength [mm]"
     assert upper.get_ylabel() == "amplitude [µm]"
     assert lower.get_ylabel() in {"force [N]", "force [mN]"}
     for axes, values in ((upper, [50.0, 20.0]), (lower, [wave.force for wave in result.waves])):
         scale = 1e3 if axes.get_ylabel() == "force [mN]" else 1.0
-        drawn = {
+        points = {
             (round(float(x), 9), round(float(y), 9))
             for line in axes.lines if line.get_marker() == "o"
             for x, y in zip(*line.get_data(), strict=True)
         }  # fmt: skip
         expected = zip([1.0, 0.2], values, strict=True)
-        assert drawn == {(x, round(y * scale, 9)) for x, y in expected}
+        assert points == {(x, round(y * scale, 9)) for x, y in expected}
     dashed = {
         round(float(line.get_xdata()[0]), 9) for line in upper.lines if line.get_linestyle() == "--"
     }
@@ -63,15 +63,15 @@ def test_the_picture_shows_waves_forces_and_limits(result: Limits) -> None:
     assert "dry friction of the device, 30 mN" in words
 
 
-def test_waves_that_meet_every_limit_are_filled(result: Limits) -> None:
+def test_waves_that_meet_every_limit_have_filled_markers(result: Limits) -> None:
     marks = [line for line in limits_figure(result).axes[0].lines if line.get_marker() == "o"]
     filled = [line for line in marks if line.get_markerfacecolor() == line.get_markeredgecolor()]
-    empty = [line for line in marks if line not in filled]
+    open_marks = [line for line in marks if line not in filled]
     assert [list(line.get_xdata()) for line in filled] == [[1.0]]
-    assert [list(np.round(line.get_xdata(), 9)) for line in empty] == [[0.2]]
+    assert [list(np.round(line.get_xdata(), 9)) for line in open_marks] == [[0.2]]
 
 
-def test_pictures_of_what_is_not_known_and_of_what_is_flat() -> None:
+def test_pictures_for_missing_device_data_and_flat_surfaces() -> None:
     unknown = limits(Sinusoid(5e-5, 1e-3), parse_device({}, "none"), law="A")
     words = " ".join(text.get_text() for text in limits_figure(unknown).axes[1].texts)
     assert "no data" in words
@@ -80,8 +80,8 @@ def test_pictures_of_what_is_not_known_and_of_what_is_flat() -> None:
 
 
 @pytest.mark.parametrize("law", ["W", "D", "G"])
-def test_pictures_of_other_laws_can_be_drawn(law: str) -> None:
-    """W pushes with nothing, which a logarithmic axis must bear."""
+def test_force_axis_of_other_laws_is_positive(law: str) -> None:
+    """Law W renders no texture force, and a logarithmic axis cannot show zero."""
     figure = limits_figure(limits(Sinusoid(5e-5, 1e-3), parse_device(BENCH, "bench"), law=law))
     figure.canvas.draw()
     low, high = figure.axes[1].get_ylim()

@@ -1,4 +1,4 @@
-"""What pictures show as numbers and in words, and how they stand in a page."""
+"""The data and descriptions extracted from pictures, and their SVG for a page."""
 
 from __future__ import annotations
 
@@ -40,34 +40,34 @@ def two_panels() -> Figure:
 
 
 @pytest.fixture(scope="module")
-def drawn() -> tuple[str, Figure]:
+def rendered() -> tuple[str, Figure]:
     figure = two_panels()
     return svg_text(figure), figure
 
 
-def test_labelled_lines_are_read_and_axes_named(drawn: tuple[str, Figure]) -> None:
-    left, right = extract_panels(drawn[1])
+def test_labelled_lines_and_axis_names_are_extracted(rendered: tuple[str, Figure]) -> None:
+    left, right = extract_panels(rendered[1])
     assert (left.name, left.law, left.x, left.y) == ("A, first", "A", "x [mm]", "z [µm]")
     assert [one.name for one in left.series] == ["rise", HOSTILE]
-    assert right.y == "z [µm]"  # its neighbour's, which carries the words for both
+    assert right.y == "z [µm]"  # taken from the neighbour, which labels the shared axis
     assert right.series == []
 
 
-def test_a_field_is_read_where_it_is(drawn: tuple[str, Figure]) -> None:
-    field = extract_panels(drawn[1])[1].field
+def test_field_values_are_extracted_at_their_positions(rendered: tuple[str, Figure]) -> None:
+    field = extract_panels(rendered[1])[1].field
     assert field is not None
     assert field.name == "curl [N/m]"
     rows, columns = field.values.shape
     x = (np.arange(columns) + 0.5) * 2.0 / columns
     z = -1.0 + (np.arange(rows) + 0.5) * 2.0 / rows
-    # A cell's edges are straight between its corners, and half a cell is 25 µm.
+    # Cell edges are straight between corners; half a cell is 25 µm.
     inside = z[:, None] < 0.5 * x - 0.03
     assert np.nanmax(np.abs(field.values - x)[inside]) <= 0.026
     assert np.isnan(field.values[z[:, None] > 0.5 * x + 0.03]).all()
     assert not np.isnan(field.values[inside]).any()
 
 
-def test_an_image_is_read_with_its_first_row_lowest() -> None:
+def test_image_with_lower_origin_is_extracted_bottom_row_first() -> None:
     figure = style.new_figure(4.0, 3.0)
     axes = style.single_axes(figure)
     axes.imshow(np.array([[1.0, 2.0], [3.0, math.nan]]), origin="lower", extent=(0, 4, 0, 2))
@@ -78,8 +78,8 @@ def test_an_image_is_read_with_its_first_row_lowest() -> None:
     assert math.isnan(field.values[-1, -1])
 
 
-def test_numbers_are_json_that_closes_no_script(drawn: tuple[str, Figure]) -> None:
-    text = panels_to_json(extract_panels(drawn[1]))
+def test_json_of_panels_cannot_close_a_script_element(rendered: tuple[str, Figure]) -> None:
+    text = panels_to_json(extract_panels(rendered[1]))
     assert "<" not in text
     left, right = json.loads(text)
     assert left["series"][0]["x"] == {"from": 0, "to": 2, "count": 9}
@@ -90,13 +90,13 @@ def test_numbers_are_json_that_closes_no_script(drawn: tuple[str, Figure]) -> No
     assert len(right["field"]["values"]) % right["field"]["columns"] == 0
 
 
-def test_words_say_from_where_to_where(drawn: tuple[str, Figure]) -> None:
-    words = ranges_text(extract_panels(drawn[1]))
+def test_description_states_the_ranges(rendered: tuple[str, Figure]) -> None:
+    words = ranges_text(extract_panels(rendered[1]))
     assert "Rise, z [µm]: −1 to 1 in A, first." in words
     assert "Curl [N/m]: 0.025 to 1.98." in words
 
 
-def test_of_many_panels_the_widest_and_the_narrowest_are_told() -> None:
+def test_description_of_many_panels_names_the_extremes() -> None:
     figure, panels = style.law_panels(4, 2.0, 0.5, x="x", y="force [N]")
     for axes, letter, size in zip(panels, "ABCD", (2.0, 1.0, 9.0, 3.0), strict=True):
         axes.plot([0.0, 1.0], [-size, size], label="f")
@@ -105,7 +105,7 @@ def test_of_many_panels_the_widest_and_the_narrowest_are_told() -> None:
     assert words == " F, force [N]: varies most in C, −9 to 9, and least in B, −1 to 1."
 
 
-def test_lone_points_are_told_while_they_are_few() -> None:
+def test_description_lists_single_points_up_to_a_limit() -> None:
     figure = style.new_figure(4.0, 3.0)
     axes = style.single_axes(figure)
     style.label_axes(axes, "T", "S")
@@ -120,28 +120,26 @@ def test_lone_points_are_told_while_they_are_few() -> None:
 # --- as SVG ---------------------------------------------------------------------------------------
 
 
-def test_the_same_figure_is_the_same_text(drawn: tuple[str, Figure]) -> None:
-    assert svg_text(two_panels()) == drawn[0]
+def test_svg_text_is_reproducible(rendered: tuple[str, Figure]) -> None:
+    assert svg_text(two_panels()) == rendered[0]
 
 
-def test_identifiers_are_those_that_are_referred_to(drawn: tuple[str, Figure]) -> None:
-    text = drawn[0]
-    used = set(re.findall(r'(?:url\(|href=")#([^")]+)', text))
-    there = re.findall(r' id="([^"]+)"', text)
-    assert used == set(there)
-    assert len(used) == len(there) > 5
+def test_svg_has_only_referenced_and_unique_identifiers(rendered: tuple[str, Figure]) -> None:
+    text = rendered[0]
+    references = set(re.findall(r'(?:url\(|href=")#([^")]+)', text))
+    identifiers = re.findall(r' id="([^"]+)"', text)
+    assert references == set(identifiers)
+    assert len(references) == len(identifiers) > 5
     assert 'data-law="A"' in text
     assert text.count('class="shared"') >= 4  # two axes of each panel
     other = svg_text(Figure())
-    assert not used & set(re.findall(r' id="([^"]+)"', other))
+    assert not references & set(re.findall(r' id="([^"]+)"', other))
 
 
-def test_no_colour_of_the_palette_is_left_and_a_field_keeps_its_own(
-    drawn: tuple[str, Figure],
-) -> None:
+def test_palette_colours_become_theme_variables(rendered: tuple[str, Figure]) -> None:
     for colour in style.THEME_VARIABLES:
-        assert f": {colour}" not in drawn[0]
-    assert f"var(--p-ink, {style.INK})" in drawn[0]
+        assert f": {colour}" not in rendered[0]
+    assert f"var(--p-ink, {style.INK})" in rendered[0]
     figure = style.new_figure(2.0, 2.0)
     figure.subplots().plot([0, 1], [0, 1], color=style.unthemed_colour(style.INK))
     assert f"stroke: {style.unthemed_colour(style.INK)}" in svg_text(figure)
@@ -153,12 +151,12 @@ def luminance(colour: str) -> float:
 
 
 def contrast(one: str, other: str) -> float:
-    """Return the contrast of WCAG 2.2: 21 of black on white."""
+    """Return the contrast ratio of WCAG 2.2: 21 for black on white."""
     low, high = sorted((luminance(one), luminance(other)))
     return (high + 0.05) / (low + 0.05)
 
 
-def test_what_is_drawn_is_seen_in_both_themes() -> None:
+def test_theme_colours_have_enough_contrast() -> None:
     css = resources.files("asperity.report").joinpath("templates", "style.css").read_text("utf-8")
     dark = dict(re.findall(r"--p-(\w+): (#[0-9a-f]{6})", css))
     light = {name: colour for colour, name in style.THEME_VARIABLES.items() if colour != "#000000"}

@@ -1,4 +1,4 @@
-"""The pictures that ``plot`` gives of each result."""
+"""The pictures that ``plot`` draws of each result."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_every_picture_has_axes_with_units(result: asp.Comparison) -> None:
         assert any("[" in label or "strength" in label for label in labels)
 
 
-def test_every_picture_of_the_report_can_be_had_alone(
+def test_every_picture_of_the_report_can_be_plotted_alone(
     result: asp.Comparison, tmp_path: Path
 ) -> None:
     for name in ("surface", "spectrum", "force", "field", "gain", "merit"):
@@ -45,12 +45,12 @@ def test_every_picture_of_the_report_can_be_had_alone(
         plot(result, picture="curl")
 
 
-def test_no_picture_for_anything_else() -> None:
+def test_plot_of_an_unsupported_object_is_a_type_error() -> None:
     with pytest.raises(TypeError, match="has no figure"):
         plot(3)
 
 
-def test_filled_places_are_pale_in_the_picture() -> None:
+def test_filled_points_are_pale_in_the_picture() -> None:
     heights = 1e-4 * np.random.default_rng(0).normal(size=(40, 60))
     filled = np.zeros((40, 60), dtype=bool)
     filled[:, 30:] = True

@@ -1,4 +1,4 @@
-"""The data behind the pictures of a vertical cut."""
+"""The data of the pictures of a vertical section."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from asperity.surface import Surface
 TEXTURE = asp.Sinusoid(amplitude=0.2e-3, period=2e-3)
 
 
-def test_drawn_curl_is_zero_for_c_and_not_for_a() -> None:
-    stretch = choose_segment(TEXTURE, 2e-3, 4e-3)
+def test_curl_is_zero_for_law_c_and_not_for_law_a() -> None:
+    segment = choose_segment(TEXTURE, 2e-3, 4e-3)
     fields = {
-        letter: curl_field(Surface(TEXTURE, letter, 1000.0, 0.3e-3), stretch, -0.4e-3, 20, 30)
+        letter: curl_field(Surface(TEXTURE, letter, 1000.0, 0.3e-3), segment, -0.4e-3, 20, 30)
         for letter in "AC"
     }
     assert np.nanmax(np.abs(fields["C"].curl)) < 1e-9
-    # k h' at its greatest, up to the cells' size.
+    # The maximum of k h', up to the cell size.
     assert np.nanmax(np.abs(fields["A"].curl)) == pytest.approx(
         1000.0 * 2 * np.pi * 0.2 / 2, rel=0.05
     )
 
 
-def test_drawn_gain_of_a_is_its_norm() -> None:
+def test_gain_of_law_a_is_the_norm_of_its_jacobian() -> None:
     """‖J_A‖ = k √(1 + h'²), at every depth."""
-    stretch = choose_segment(TEXTURE, 2e-3, 4e-3)
-    field = curl_field(Surface(TEXTURE, "A", 700.0, 0.3e-3), stretch, -0.4e-3, 20, 3)
+    segment = choose_segment(TEXTURE, 2e-3, 4e-3)
+    field = curl_field(Surface(TEXTURE, "A", 700.0, 0.3e-3), segment, -0.4e-3, 20, 3)
     middles = 0.5 * (field.along[1:, 0] + field.along[:-1, 0])
-    slope = TEXTURE.gradient(stretch.xy(middles))[:, 0]
+    slope = TEXTURE.gradient(segment.xy(middles))[:, 0]
     expected = np.tile(np.hypot(1.0, slope)[:, None], (1, 3))
     np.testing.assert_allclose(field.gain, expected, rtol=1e-12)

@@ -1,4 +1,4 @@
-"""Numbers as text."""
+"""Formatting of numbers, bounds and intervals as text."""
 
 from __future__ import annotations
 
