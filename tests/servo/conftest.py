@@ -1,4 +1,4 @@
-"""What the tests of the loop share."""
+"""Fixtures shared by the tests of the servo loop."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.servo.python_device import SURFACE, PythonClock, PythonDevice, shown_of
+from tests.servo.python_device import SURFACE, PythonClock, PythonDevice, program_for
 
 from asperity.servo.driver_loop import DriverLoop, no_clock
 from asperity.servo.loop_memory import LoopMemory
@@ -17,8 +17,8 @@ from asperity.surface import Surface
 
 
 @pytest.fixture
-def go() -> Callable[..., SimpleNamespace]:
-    """``go(device, samples, ...)``: a loop on it, run; cause, code, forces and rows."""
+def run_loop() -> Callable[..., SimpleNamespace]:
+    """``run_loop(device, samples, ...)``: run a loop; return its cause, code, forces and rows."""
 
     def run(
         device: PythonDevice,
@@ -36,7 +36,7 @@ def go() -> Callable[..., SimpleNamespace]:
         ticks = no_clock() if clock is None else clock.record
         loop = DriverLoop(device, settings, safety or Safety(), reach, shared.block(), ticks)
         control(shared)
-        cause, code = loop.run(shown_of(surface), device.open(), samples)
+        cause, code = loop.run(program_for(surface), device.open(), samples)
         rows, first = shared.rows(0)
         return SimpleNamespace(
             cause=cause, code=code, forces=np.array(device.forces), rows=rows, first=first,

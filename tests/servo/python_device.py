@@ -1,4 +1,4 @@
-"""A device and a clock that are Python functions."""
+"""A device and a clock implemented by Python functions."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _SLEEP = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_int, ctypes.c_int, _WORDS, ctyp
 
 @dataclass(eq=False)
 class PythonDevice(Driver):
-    """A device whose handle is where ``path(k)`` says at the k-th reading.
+    """A device whose handle is at ``path(k)`` at the k-th reading.
 
-    ``codes`` is what the k-th reading or writing returns, by ("read" or "write", k).
+    ``codes`` maps ("read" or "write", k) to the return code of the k-th reading or writing.
     """
 
     name: ClassVar[str] = "python"
@@ -59,20 +59,20 @@ class PythonDevice(Driver):
         return LibraryDevice(0, 0)
 
     def open(self) -> LibraryDevice:
-        self._kept = _READ(self._read), _WRITE(self._write)
-        return LibraryDevice(*map(function_address, self._kept))
+        self._callbacks = _READ(self._read), _WRITE(self._write)
+        return LibraryDevice(*map(function_address, self._callbacks))
 
 
 class PythonClock:
-    """A clock whose k-th wait ends ``lateness(k)`` [ns] after it should."""
+    """A clock whose k-th wait ends ``lateness(k)`` [ns] late."""
 
     def __init__(self, lateness: Callable[[int], int]) -> None:
         self._lateness, self._now, self._waits = lateness, 10**9, 0
-        self._kept = _GETTIME(self._gettime), _SLEEP(self._sleep)
-        self.record = Clock(*map(function_address, self._kept), np.zeros(2, np.int64))
+        self._callbacks = _GETTIME(self._gettime), _SLEEP(self._sleep)
+        self.record = Clock(*map(function_address, self._callbacks), np.zeros(2, np.int64))
 
     def passes(self, time: int) -> None:
-        """Let time pass [ns]."""
+        """Advance the time [ns]."""
         self._now += time
 
     def _gettime(self, _clock: int, words: Any) -> int:
@@ -92,6 +92,6 @@ SURFACE = Surface(
 
 
 @cache
-def shown_of(surface: Surface) -> LoopProgram:
-    """Return a surface as the loop of a :class:`PythonDevice` takes it."""
+def program_for(surface: Surface) -> LoopProgram:
+    """Return the loop program of a surface on a :class:`PythonDevice`."""
     return build_program(surface, PythonDevice(lambda _k: (0.0, 0.0, 0.0)))

@@ -1,4 +1,4 @@
-"""What of a user's own files goes to the loop's process."""
+"""User-defined modules are sent to the loop's process with the objects that need them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from asperity.cli.plugins import _execute
 from asperity.servo.process import _pickle
 
 BESIDE = "FACTOR = 3.0\n"
-OWN = """
+PLUGIN = """
 from dataclasses import dataclass
 
 from beside_it import FACTOR
@@ -35,15 +35,15 @@ print(thing.times(), sys.path == before)
 """
 
 
-def test_a_thing_arrives_with_its_file_and_no_other(
+def test_pickled_object_carries_only_its_own_plugin_module(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name, source in (("beside_it", BESIDE), ("thing", OWN), ("unneeded", "")):
+    for name, source in (("beside_it", BESIDE), ("thing", PLUGIN), ("unneeded", "")):
         (tmp_path / f"{name}.py").write_text(source)
-        monkeypatch.setitem(sys.modules, f"plugin_{name}", None)  # forgotten afterwards
+        monkeypatch.setitem(sys.modules, f"plugin_{name}", None)  # removed again at teardown
     monkeypatch.delitem(sys.modules, "beside_it", raising=False)
     thing, _ = (_execute(str(tmp_path / f"{name}.py"), source.encode())
-                for name, source in (("thing", OWN), ("unneeded", "")))  # fmt: skip
+                for name, source in (("thing", PLUGIN), ("unneeded", "")))  # fmt: skip
     packed = _pickle(thing.Thing(2.0))
     assert packed[0] == (("plugin_thing", str(tmp_path / "thing.py")),)
     child = subprocess.run(

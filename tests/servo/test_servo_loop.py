@@ -1,4 +1,4 @@
-"""The loop of a device: the same as a simulation, guarded, and without force when it ends."""
+"""The servo loop: agreement with a simulation, safety limits, and zero force when it ends."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.servo.python_device import SURFACE, PythonClock, PythonDevice, shown_of
+from tests.servo.python_device import SURFACE, PythonClock, PythonDevice, program_for
 
 from asperity.servo.driver_loop import DriverLoop, build_program, no_clock
 from asperity.servo.drivers.simulated import simulated_driver
@@ -32,7 +32,7 @@ from asperity.simulation import (
 )
 from asperity.surface import Surface
 
-Go = Callable[..., SimpleNamespace]
+RunLoop = Callable[..., SimpleNamespace]
 PRESSED = SpringHand(stiffness=300.0, damping=3.0, mass=0.05, force=(0.0, 0.0, -0.6))
 STROKES = Strokes((-2e-3, 0.3e-3, 0.0), (2e-3, 0.3e-3, 0.0), 0.05, 2)
 SERVO = Servo(
@@ -52,12 +52,12 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_trace_of_the_loop_is_that_of_a_simulation(case: str) -> None:
+def test_loop_trace_equals_simulation(case: str) -> None:
     law, plant, hand, servo, motion = CASES[case]
     surface = SURFACE.to_law(law)
-    duration = 700 * servo.period  # more than the 256 samples between two flushes
+    duration = 700 * servo.period  # more than the 256 samples between flushes of subnormals
     run = simulate(surface, plant, hand, servo, motion, duration)
-    rows = looped(surface, plant, hand, servo, motion, duration)
+    rows = run_simulated_device(surface, plant, hand, servo, motion, duration)
     assert np.abs(run.commanded).max() > 0.0
     np.testing.assert_array_equal(rows[:700, 0], run.time)
     np.testing.assert_array_equal(rows[:700, 1:4], run.position)
@@ -65,9 +65,9 @@ def test_the_trace_of_the_loop_is_that_of_a_simulation(case: str) -> None:
     np.testing.assert_array_equal(rows[:700, 7:10], run.commanded)
 
 
-def looped(surface: Surface, plant: Any, hand: Any, servo: Servo, motion: Any,
+def run_simulated_device(surface: Surface, plant: Any, hand: Any, servo: Servo, motion: Any,
            duration: float) -> np.ndarray:  # fmt: skip
-    """Return the rows of a loop on a simulated device, without a clock."""
+    """Return the rows of an unclocked loop on a simulated device."""
     driver = simulated_driver(plant, hand, servo, motion, duration)
     shared = LoopMemory()
     loop = DriverLoop(driver, servo, OPEN, math.inf, shared.block(), no_clock())
@@ -78,7 +78,7 @@ def looped(surface: Surface, plant: Any, hand: Any, servo: Servo, motion: Any,
     return shared.rows(0)[0]
 
 
-def test_a_simulated_device_starts_the_same_again() -> None:
+def test_opening_a_simulated_device_resets_its_state() -> None:
     driver = simulated_driver(
         Cartesian(0.05), PRESSED, Servo(1e-3), Stationary((0.0, 0.0, -1e-3)), 0.1
     )
@@ -87,70 +87,70 @@ def test_a_simulated_device_starts_the_same_again() -> None:
     assert driver.open().x[0] == 0.0
 
 
-def pushing(depth: float) -> Callable[[int], Any]:
-    """A handle that is pushed to a depth and slides."""
+def slide_at_depth(depth: float) -> Callable[[int], Any]:
+    """Return a path that slides along x at a constant depth."""
     return lambda k: (1e-5 * k, 0.2e-3, -depth)
 
 
-def test_the_force_comes_in_and_goes_by_the_ramp(go: Go) -> None:
-    device = PythonDevice(pushing(1e-3))
-    done = go(device, 100, safety=Safety(ramp=0.02))
-    assert done.cause is EndReason.FINISHED
-    shares = done.rows[:, 10]
+def test_force_ramps_up_at_start_and_down_at_stop(run_loop: RunLoop) -> None:
+    device = PythonDevice(slide_at_depth(1e-3))
+    result = run_loop(device, 100, safety=Safety(ramp=0.02))
+    assert result.cause is EndReason.FINISHED
+    shares = result.rows[:, 10]
     np.testing.assert_allclose(shares[:20], np.arange(1, 21) / 20)
     np.testing.assert_allclose(
         shares[99:], np.append(np.arange(20, -1, -1) / 20, [])[:21], atol=1e-12
     )
-    assert (done.forces[-1] == 0.0).all()
-    asked = done.rows[:, 4:7] * shares[:, None]
-    np.testing.assert_allclose(done.rows[:, 7:10], asked, atol=1e-15)
+    assert (result.forces[-1] == 0.0).all()
+    expected = result.rows[:, 4:7] * shares[:, None]
+    np.testing.assert_allclose(result.rows[:, 7:10], expected, atol=1e-15)
 
 
 def nan_at(sample: int, value: float = math.nan) -> Callable[[int], Any]:
     return lambda k: (value if k == sample else 1e-5 * k, 0.0, -1e-3)
 
 
-def sinking(k: int) -> Any:
+def sink_too_deep(k: int) -> Any:
     return 1e-5 * k, 0.0, -1e-3 - (9e-3 if k >= 57 else 0.0)
 
 
-def leaving(k: int) -> Any:
+def leave_workspace(k: int) -> Any:
     return 2.0 if k == 57 else 1e-5 * k, 0.0, -1e-3
 
 
-PUSHED = pushing(1e-3)
+PUSHED = slide_at_depth(1e-3)
 STOPS: dict[str, tuple[EndReason, Callable[[int], Any], dict[tuple[str, int], int]]] = {
     "no number": (EndReason.NOT_FINITE, nan_at(57), {}),
     "infinity": (EndReason.NOT_FINITE, nan_at(57, math.inf), {}),
     "reading fails": (EndReason.DEVICE, PUSHED, {("read", 57): -4}),
     "writing fails": (EndReason.DEVICE, PUSHED, {("write", 57): 9}),
-    "out of reach": (EndReason.WORKSPACE, leaving, {}),
-    "too deep": (EndReason.DEPTH, sinking, {}),
+    "out of reach": (EndReason.WORKSPACE, leave_workspace, {}),
+    "too deep": (EndReason.DEPTH, sink_too_deep, {}),
 }
 
 
 @pytest.mark.parametrize("name", STOPS)
-def test_a_fault_makes_the_force_zero_in_its_sample(go: Go, name: str) -> None:
+def test_fault_zeroes_the_force_in_the_same_sample(run_loop: RunLoop, name: str) -> None:
     cause, path, codes = STOPS[name]
-    done = go(PythonDevice(path, codes), 200)
-    assert done.cause is cause
-    assert done.shared.row_count == 58
-    assert np.abs(done.forces[50:57]).max() > 0.0
-    assert (done.forces[-1] == 0.0).all()
-    assert len(done.forces) == 59  # that of the sample and the last one
-    failing = ("write", 57) in codes
-    assert failing or (done.forces[57] == 0.0).all()
-    assert done.code == codes.get(("write" if failing else "read", 57), 0)
+    result = run_loop(PythonDevice(path, codes), 200)
+    assert result.cause is cause
+    assert result.shared.row_count == 58
+    assert np.abs(result.forces[50:57]).max() > 0.0
+    assert (result.forces[-1] == 0.0).all()
+    assert len(result.forces) == 59  # including the force of the faulty sample and the final one
+    write_fails = ("write", 57) in codes
+    assert write_fails or (result.forces[57] == 0.0).all()
+    assert result.code == codes.get(("write" if write_fails else "read", 57), 0)
 
 
-def test_what_is_too_deep_can_be_told_only(go: Go) -> None:
-    device = PythonDevice(sinking)
-    done = go(device, 200, safety=Safety(beyond_depth="warn"))
-    assert done.cause is EndReason.FINISHED
-    assert LoopStatistics.from_status(done.shared.status).too_deep > 100
+def test_excess_depth_can_be_reported_without_stopping(run_loop: RunLoop) -> None:
+    device = PythonDevice(sink_too_deep)
+    result = run_loop(device, 200, safety=Safety(beyond_depth="warn"))
+    assert result.cause is EndReason.FINISHED
+    assert LoopStatistics.from_status(result.shared.status).too_deep > 100
     backed = Surface(SURFACE.texture, "C", 900.0, 5e-3, clamp="backed")
-    done = go(PythonDevice(sinking), 200, surface=backed)
-    assert (done.cause, LoopStatistics.from_status(done.shared.status).too_deep) == (
+    result = run_loop(PythonDevice(sink_too_deep), 200, surface=backed)
+    assert (result.cause, LoopStatistics.from_status(result.shared.status).too_deep) == (
         EndReason.FINISHED,
         0,
     )
@@ -158,14 +158,14 @@ def test_what_is_too_deep_can_be_told_only(go: Go) -> None:
 
 @pytest.mark.parametrize(("law", "cause"), [("H", EndReason.FINISHED), ("W", EndReason.FINISHED),
                                            ("D", EndReason.DEPTH)])  # fmt: skip
-def test_only_what_is_proved_at_any_depth_may_be_felt_there(
-    go: Go, law: str, cause: EndReason
+def test_only_laws_certified_at_any_depth_run_beyond_max_depth(
+    run_loop: RunLoop, law: str, cause: EndReason
 ) -> None:
     shallow = Surface(SURFACE.texture, law, 300.0, 2e-3)
-    assert go(PythonDevice(sinking), 80, surface=shallow).cause is cause
-    if law == "H":  # with more than 1 its number grows where the god-object splits
+    assert run_loop(PythonDevice(sink_too_deep), 80, surface=shallow).cause is cause
+    if law == "H":  # continuity > 1: q is not bounded where the god-object splits
         steep = Surface(SURFACE.texture, law, 300.0, 2e-3, continuity=2.0)
-        assert go(PythonDevice(sinking), 80, surface=steep).cause is EndReason.DEPTH
+        assert run_loop(PythonDevice(sink_too_deep), 80, surface=steep).cause is EndReason.DEPTH
 
 
 @given(
@@ -176,72 +176,78 @@ def test_only_what_is_proved_at_any_depth_may_be_felt_there(
     ramp=st.floats(0.0, 0.05), damping=st.floats(0.0, 5.0), virtual=st.floats(-1.0, 5.0),
 )  # fmt: skip
 @settings(max_examples=100, deadline=None)
-def test_no_force_is_above_its_limits(
+def test_force_and_slew_rate_never_exceed_their_limits(
     seed: int, changes: list[tuple[str, float]], max_force: float, slew: float, ramp: float,
     damping: float, virtual: float,
 ) -> None:  # fmt: skip
     rng = np.random.default_rng(seed)
-    way = np.cumsum(rng.normal(scale=10.0 ** rng.uniform(-6, -3), size=(80, 3)), axis=0)
-    device = PythonDevice(lambda k: way[min(k, 79)])
+    positions = np.cumsum(rng.normal(scale=10.0 ** rng.uniform(-6, -3), size=(80, 3)), axis=0)
+    device = PythonDevice(lambda k: positions[min(k, 79)])
     servo = Servo(1e-3, max_force=max_force, virtual_damping=virtual, velocity_share=0.5)
     safety = Safety(ramp=ramp, max_slew=slew, beyond_depth="warn", passivity_damping=damping)
     shared = LoopMemory()
     loop = DriverLoop(device, servo, safety, 1e3, shared.block(), no_clock())
     record = device.open()
     for index, (law, stiffness) in enumerate(changes, 1):
-        shown = shown_of(SURFACE.to_law(law))
+        program = program_for(SURFACE.to_law(law))
         arguments = SURFACE.to_law(law).to_stiffness(stiffness).law_arguments
-        loop.run(replace(shown, law=arguments), record, 80 * index // len(changes))
+        loop.run(replace(program, law=arguments), record, 80 * index // len(changes))
         loop.reset_contact()
     forces = np.array(device.forces)
     assert np.linalg.norm(forces, axis=1).max() <= max_force
     steps = np.linalg.norm(np.diff(forces, axis=0, prepend=np.zeros((1, 3))), axis=1)
-    # A force is rounded to its last bit, and so is the difference of two.
+    # Forces and their differences are each rounded to the last bit.
     assert steps.max() <= slew * servo.period + 4.0 * np.spacing(max_force)
 
 
-def test_the_observer_counts_what_the_hand_is_given(go: Go) -> None:
-    done = go(PythonDevice(circling), 200, safety=Safety(ramp=0.0, max_slew=1e9))
-    held, place = done.rows[:-1, 7:10], done.rows[:, 1:4]
-    given = np.cumsum((held * np.diff(place, axis=0)).sum(axis=1))
-    np.testing.assert_allclose(done.rows[1:, 11], given, rtol=1e-12, atol=1e-18)
+def test_passivity_observer_sums_the_work_on_the_hand(run_loop: RunLoop) -> None:
+    result = run_loop(PythonDevice(move_on_circle), 200, safety=Safety(ramp=0.0, max_slew=1e9))
+    held, place = result.rows[:-1, 7:10], result.rows[:, 1:4]
+    energy = np.cumsum((held * np.diff(place, axis=0)).sum(axis=1))
+    np.testing.assert_allclose(result.rows[1:, 11], energy, rtol=1e-12, atol=1e-18)
 
 
-def circling(k: int) -> Any:
+def move_on_circle(k: int) -> Any:
     return 0.3e-3 * math.cos(0.2 * k), 0.0, -1e-3 + 0.3e-3 * math.sin(0.2 * k)
 
 
 @pytest.mark.parametrize("damping", [0.0, 50.0])
-def test_the_controller_takes_the_energy_back(go: Go, damping: float) -> None:
-    """Along a circle law B feeds the hand at each turn; with damping what it has stays below."""
+def test_passivity_controller_dissipates_the_gained_energy(
+    run_loop: RunLoop, damping: float
+) -> None:
+    """On a circle law A gains energy each turn; passivity damping keeps the total below 10 µJ."""
     surface = Surface(SURFACE.texture, "A", 900.0, 5e-3)
     safety = Safety(ramp=0.0, max_slew=1e9, passivity_damping=damping)
-    other_way = PythonDevice(lambda k: circling(-k))
-    ends = [go(device, 2000, safety=safety, surface=surface).rows[-2, 11]
-            for device in (PythonDevice(circling), other_way)]  # fmt: skip
-    gained = max(ends)
+    reverse = PythonDevice(lambda k: move_on_circle(-k))
+    energies = [run_loop(device, 2000, safety=safety, surface=surface).rows[-2, 11]
+            for device in (PythonDevice(move_on_circle), reverse)]  # fmt: skip
+    gained = max(energies)
     assert gained > 1e-4 if damping == 0.0 else gained < 1e-5
 
 
-def test_lateness_is_counted_and_judged(go: Go) -> None:
-    def once(k: int) -> int:
+def test_late_ticks_and_jitter_are_counted(run_loop: RunLoop) -> None:
+    def late_once(k: int) -> int:
         return 3_400_000 if k == 20 else 1_000
 
-    done = go(PythonDevice(pushing(1e-3)), 60, clock=PythonClock(once))
-    counted = LoopStatistics.from_status(done.shared.status)
-    assert done.cause is EndReason.FINISHED
-    assert (counted.late, counted.skipped, counted.max_lateness) == (1, 2, pytest.approx(3.4e-3))
-    # The samples that were left out are missing in the times, too.
-    assert np.flatnonzero(np.diff(done.rows[:, 0]) > 1.5e-3).tolist() == [20]
-    assert sum(counted.lateness_histogram) == counted.samples
-    # One period was long and the two after it short; the others were as they should be.
-    assert sum(counted.period_histogram) == counted.samples - 1
-    assert (counted.period_histogram[0], sum(counted.period_histogram[19:])) == (
-        counted.samples - 4,
+    result = run_loop(PythonDevice(slide_at_depth(1e-3)), 60, clock=PythonClock(late_once))
+    statistics = LoopStatistics.from_status(result.shared.status)
+    assert result.cause is EndReason.FINISHED
+    assert (statistics.late, statistics.skipped, statistics.max_lateness) == (
+        1,
+        2,
+        pytest.approx(3.4e-3),
+    )
+    # The times have a gap where samples were skipped.
+    assert np.flatnonzero(np.diff(result.rows[:, 0]) > 1.5e-3).tolist() == [20]
+    assert sum(statistics.lateness_histogram) == statistics.samples
+    # One period was long and the two after it short; the others were nominal.
+    assert sum(statistics.period_histogram) == statistics.samples - 1
+    assert (statistics.period_histogram[0], sum(statistics.period_histogram[19:])) == (
+        statistics.samples - 4,
         3,
     )
-    assert counted.jitter_quantile(0.9) == 1e-9
-    assert counted.jitter_quantile(1.0) == pytest.approx(2.0**22 * 1e-9)
+    assert statistics.jitter_quantile(0.9) == 1e-9
+    assert statistics.jitter_quantile(1.0) == pytest.approx(2.0**22 * 1e-9)
 
 
 @pytest.mark.parametrize(
@@ -251,52 +257,58 @@ def test_lateness_is_counted_and_judged(go: Go) -> None:
         (lambda k: 1_100_000 if k >= 30 else 0, EndReason.MISSED_SAMPLES, 30 + 8),
     ],
 )
-def test_too_late_is_a_fault(go: Go, lateness: Any, cause: EndReason, rows: int) -> None:
+def test_excessive_lateness_is_a_fault(
+    run_loop: RunLoop, lateness: Any, cause: EndReason, rows: int
+) -> None:
     safety = Safety(misses=6)
-    done = go(PythonDevice(pushing(1e-3)), 500, safety=safety, clock=PythonClock(lateness))
-    assert (done.cause, done.shared.row_count) == (cause, rows)
-    assert (done.forces[-1] == 0.0).all()
+    result = run_loop(
+        PythonDevice(slide_at_depth(1e-3)), 500, safety=safety, clock=PythonClock(lateness)
+    )
+    assert (result.cause, result.shared.row_count) == (cause, rows)
+    assert (result.forces[-1] == 0.0).all()
 
 
-def test_a_device_that_takes_too_long_is_a_fault(go: Go) -> None:
+def test_slow_device_reading_is_a_fault(run_loop: RunLoop) -> None:
     clock = PythonClock(lambda _k: 0)
 
     def path(k: int) -> tuple[float, float, float]:
         clock.passes(60_000_000 if k == 30 else 100_000)
         return 0.0, 0.0, -1e-3
 
-    done = go(PythonDevice(path), 500, clock=clock)
-    assert (done.cause, done.shared.row_count) == (EndReason.LATE_SAMPLE, 31)
-    assert (done.forces[-1] == 0.0).all()
+    result = run_loop(PythonDevice(path), 500, clock=clock)
+    assert (result.cause, result.shared.row_count) == (EndReason.LATE_SAMPLE, 31)
+    assert (result.forces[-1] == 0.0).all()
 
 
-def test_a_watcher_that_is_silent_is_a_fault(go: Go) -> None:
-    device, safety = PythonDevice(pushing(1e-3)), Safety(silence=0.1)
-    done = go(device, 500, safety=safety, clock=PythonClock(lambda _k: 0))
-    assert done.cause is EndReason.NO_HEARTBEAT
-    assert 100 <= done.shared.row_count <= 102
-    assert (done.forces[-1] == 0.0).all()
+def test_missing_heartbeat_is_a_fault(run_loop: RunLoop) -> None:
+    device, safety = PythonDevice(slide_at_depth(1e-3)), Safety(silence=0.1)
+    result = run_loop(device, 500, safety=safety, clock=PythonClock(lambda _k: 0))
+    assert result.cause is EndReason.NO_HEARTBEAT
+    assert 100 <= result.shared.row_count <= 102
+    assert (result.forces[-1] == 0.0).all()
 
 
-def test_a_stop_is_no_fault(go: Go) -> None:
-    done = go(PythonDevice(pushing(1e-3)), 500, control=lambda shared: shared.request_stop())
-    assert done.cause is EndReason.STOPPED
-    assert (done.forces == 0.0).all()
+def test_requested_stop_is_not_a_fault(run_loop: RunLoop) -> None:
+    result = run_loop(
+        PythonDevice(slide_at_depth(1e-3)), 500, control=lambda shared: shared.request_stop()
+    )
+    assert result.cause is EndReason.STOPPED
+    assert (result.forces == 0.0).all()
 
 
-def test_a_thousand_random_faults_leave_no_force(go: Go) -> None:
+def test_random_faults_end_with_zero_force(run_loop: RunLoop) -> None:
     rng = np.random.default_rng(20261122)
     for _ in range(1000):
         sample, kind = int(rng.integers(0, 12)), int(rng.integers(0, 4))
-        device = PythonDevice(pushing(1e-3))
+        device = PythonDevice(slide_at_depth(1e-3))
         if kind == 0:
             device.path = nan_at(sample, rng.choice([math.nan, math.inf, -math.inf]))
         elif kind == 1:
             device.path = lambda k, at=sample: (9.0 if k == at else 0.0, 0.0, -1e-3)
         else:
             device.codes[("read", "write")[kind - 2], sample] = int(rng.integers(-9, 0))
-        done = go(device, 40, safety=Safety(ramp=0.0))
-        assert done.cause.is_fault
-        assert done.shared.row_count == sample + 1
-        assert (done.forces[-1] == 0.0).all()
-        assert np.array_equal(done.rows[-1, 7:10], done.forces[sample]) or kind == 3
+        result = run_loop(device, 40, safety=Safety(ramp=0.0))
+        assert result.cause.is_fault
+        assert result.shared.row_count == sample + 1
+        assert (result.forces[-1] == 0.0).all()
+        assert np.array_equal(result.rows[-1, 7:10], result.forces[sample]) or kind == 3

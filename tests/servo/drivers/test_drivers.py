@@ -1,4 +1,4 @@
-"""Drivers of real devices, against libraries that the tests compile."""
+"""Drivers of real devices, tested against fake libraries compiled here."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ ROOT = Path(__file__).parents[3]
 EXAMPLE = ROOT / "examples" / "own_device.c"
 FAKES = ROOT / "bench" / "c"
 NOTHING, READ_ONCE, _READ_EVER, WRITE_ONCE = range(4)
-# A busy machine is late, and that is not what is tested here.
-AT_ONCE = Safety(ramp=0.0, max_slew=1e9, silence=60.0, lateness=60.0, misses=10**6)
+# Generous limits: lateness on a busy machine is not under test here.
+NO_RAMP = Safety(ramp=0.0, max_slew=1e9, silence=60.0, lateness=60.0, misses=10**6)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def dhd_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def dhd(dhd_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """The fake libdhd, reset."""
+    """The fake libdhd, reset to its initial state."""
     monkeypatch.setenv(LIBRARY, str(dhd_path))
     library = ctypes.CDLL(str(dhd_path))
     library.fake_force.restype = ctypes.c_double
@@ -52,28 +52,28 @@ def dhd(dhd_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 @cache
-def shown_by(kind: type[Driver]) -> LoopProgram:
-    """Return the surface as the loop of a driver takes it."""
+def program_for(kind: type[Driver]) -> LoopProgram:
+    """Return the compiled program of the surface for a kind of driver."""
     return build_program(SURFACE, kind.__new__(kind))
 
 
 def run(
     driver: Driver, samples: int, clock: Callable[[], Clock] = no_clock
 ) -> tuple[EndReason, int, np.ndarray]:
-    """Open, run, close as the loop's process does."""
+    """Open, run and close a driver as the servo process does."""
     shared = LoopMemory()
-    loop = DriverLoop(driver, Servo(1e-3, max_force=3.0), AT_ONCE, 1.0, shared.block(), clock())
-    loop.compile(shown_by(type(driver)))
+    loop = DriverLoop(driver, Servo(1e-3, max_force=3.0), NO_RAMP, 1.0, shared.block(), clock())
+    loop.compile(program_for(type(driver)))
     record = driver.open()
     try:
-        cause, code = loop.run(shown_by(type(driver)), record, samples)
+        cause, code = loop.run(program_for(type(driver)), record, samples)
     finally:
         driver.close()
     return cause, code, shared.rows(0)[0]
 
 
-def test_force_dimension_turns_positions_and_forces(dhd: Any) -> None:
-    """Its x points towards the user, its y to his right: the surface's are right and away."""
+def test_force_dimension_rotates_positions_and_forces(dhd: Any) -> None:
+    """The device's x points to the user and y right; the surface's x right and y away."""
     driver = hardware_driver("forcedimension", "lying", (0.01, 0.02, 0.03))
     dhd.fake_place(0.01 - 0.4e-3, 0.02 + 0.7e-3, 0.03 - 1e-3)
     cause, _code, rows = run(driver, 5)
@@ -85,11 +85,11 @@ def test_force_dimension_turns_positions_and_forces(dhd: Any) -> None:
     assert [dhd.fake_state(0), dhd.fake_state(1)] == [-1, 0]
 
 
-def test_force_dimension_receives_the_force_of_its_frame(dhd: Any) -> None:
+def test_force_dimension_receives_forces_in_its_own_frame(dhd: Any) -> None:
     driver = hardware_driver("forcedimension", "lying", (0.0, 0.0, 0.0))
     dhd.fake_place(-0.4e-3, 0.7e-3, -1e-3)
     record = driver.open()
-    loop = DriverLoop(driver, Servo(1e-3), AT_ONCE, 1.0, LoopMemory().block(), no_clock())
+    loop = DriverLoop(driver, Servo(1e-3), NO_RAMP, 1.0, LoopMemory().block(), no_clock())
     sent = []
     write = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_double] * 3, ctypes.c_byte)(
         lambda x, y, z, _number: sent.append((x, y, z)) or 0
@@ -102,7 +102,7 @@ def test_force_dimension_receives_the_force_of_its_frame(dhd: Any) -> None:
 
 
 @pytest.mark.parametrize("fault", [READ_ONCE, WRITE_ONCE])
-def test_an_error_of_libdhd_ends_the_loop_without_force(dhd: Any, fault: int) -> None:
+def test_libdhd_error_ends_the_loop_with_zero_force(dhd: Any, fault: int) -> None:
     dhd.fake_reset(fault, 7)
     dhd.fake_place(0.0, 0.0, -1e-3)
     driver = ForceDimensionDriver()
@@ -111,26 +111,26 @@ def test_an_error_of_libdhd_ends_the_loop_without_force(dhd: Any, fault: int) ->
     assert [dhd.fake_force(axis) for axis in range(3)] == [0.0, 0.0, 0.0]
     assert driver.describe_error(code) == "libdhd: communication error (-1)"
     dhd.fake_reset(NOTHING, 0)
-    assert run(driver, 5)[0] is EndReason.FINISHED  # the next start works
+    assert run(driver, 5)[0] is EndReason.FINISHED  # a restart works
 
 
-def test_a_thousand_random_failures_of_libdhd_leave_no_force(dhd: Any) -> None:
+def test_random_libdhd_failures_leave_zero_force(dhd: Any) -> None:
     rng = np.random.default_rng(15)
-    driver, shown = ForceDimensionDriver(), build_program(SURFACE, ForceDimensionDriver())
+    driver, program = ForceDimensionDriver(), build_program(SURFACE, ForceDimensionDriver())
     for _ in range(1000):
         sample, fault = int(rng.integers(0, 10)), (READ_ONCE, WRITE_ONCE)[rng.integers(0, 2)]
         dhd.fake_reset(fault, sample)
         dhd.fake_place(0.0, 0.0, -rng.uniform(0.5e-3, 3e-3))
-        loop = DriverLoop(driver, Servo(1e-3, max_force=3.0), AT_ONCE, 1.0, LoopMemory().block(),
+        loop = DriverLoop(driver, Servo(1e-3, max_force=3.0), NO_RAMP, 1.0, LoopMemory().block(),
                     no_clock())  # fmt: skip
-        cause, _code = loop.run(shown, driver.open(), 40)
+        cause, _code = loop.run(program, driver.open(), 40)
         assert cause is EndReason.DEVICE
         assert [dhd.fake_force(axis) for axis in range(3)] == [0.0, 0.0, 0.0]
         assert dhd.fake_state(2) == sample + 1
         driver.close()
 
 
-def test_several_devices_are_asked_about(dhd: Any) -> None:
+def test_ambiguous_or_absent_device_is_an_error(dhd: Any) -> None:
     dhd.fake_devices(2)
     with pytest.raises(ParameterError, match="2 devices: choose one, forcedimension:0, "):
         ForceDimensionDriver().open()
@@ -143,14 +143,14 @@ def test_several_devices_are_asked_about(dhd: Any) -> None:
         ForceDimensionDriver().open()
 
 
-def test_a_library_that_is_missing_or_wrong_says_what_to_do(
+def test_missing_or_unusable_library_has_a_helpful_error(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.delenv(LIBRARY, raising=False)
     with pytest.raises(ParameterError, match=r"the SDK of Force Dimension.*ASPERITY_LIBDHD"):
         ForceDimensionDriver().open()
     foreign = tmp_path / "foreign.so"
-    # The head of a library for another processor, a 32-bit one.
+    # The ELF header of a library for another, 32-bit processor.
     foreign.write_bytes(b"\x7fELF\x01\x01\x01" + bytes(9) + b"\x03\x00\x28\x00" + bytes(60))
     with pytest.raises(ParameterError, match="another kind of machine"):
         LibraryDriver(str(foreign)).open()
@@ -160,17 +160,17 @@ def test_a_library_that_is_missing_or_wrong_says_what_to_do(
         LibraryDriver(str(compile_library(source, tmp_path))).open()
 
 
-def test_the_example_of_a_device_of_one_s_own_runs(tmp_path: Path) -> None:
+def test_example_of_a_user_defined_device_runs(tmp_path: Path) -> None:
     library = compile_library(EXAMPLE, tmp_path)
     driver = hardware_driver(str(library), "lying", (0.0, 0.0, 0.0))
     cause, _code, rows = run(driver, 1500)
     assert cause is EndReason.FINISHED
     assert (rows[0, 3], rows[0, 9]) == (2e-3, 0.0)
-    # At rest the surface returns what the spring gives.
+    # At rest the surface force balances the spring.
     assert rows[1450, 9] == pytest.approx(100.0 * (rows[1450, 3] + 5e-3), rel=1e-3)
 
 
-def test_what_one_s_own_device_returns_is_said(tmp_path: Path) -> None:
+def test_error_code_of_a_user_defined_device_is_reported(tmp_path: Path) -> None:
     text = EXAMPLE.read_text()
     failing = tmp_path / "failing.c"
     failing.write_text(text.replace("(void)contact;", "(void)contact;\n    return 17;"))
@@ -185,7 +185,7 @@ def test_what_one_s_own_device_returns_is_said(tmp_path: Path) -> None:
         LibraryDriver(str(compile_library(closed, tmp_path))).open()
 
 
-def test_a_frame_goes_there_and_back() -> None:
+def test_frame_transforms_positions_and_its_inverse_forces() -> None:
     frame = surface_frame((RIGHT, UP, TOWARDS), "standing", (0.0, 0.01, 0.0), 1e-3)
     table = frame.matrix
     probe = table[:3, :3] @ np.array([3.0, 12.0, -5.0]) + table[:3, 3]
@@ -197,15 +197,15 @@ def test_a_frame_goes_there_and_back() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"), [("falcon9", "is unknown"), ("forcedimension:x", "a number after")]
+    ("text", "message"), [("falcon9", "is unknown"), ("forcedimension:x", "a number after")]
 )
-def test_an_unknown_driver_is_named(text: str, said: str) -> None:
-    with pytest.raises(ParameterError, match=said):
+def test_unknown_driver_is_an_error(text: str, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
         hardware_driver(text, "lying", (0.0, 0.0, 0.0))
 
 
-def test_a_recording_is_a_device(tmp_path: Path) -> None:
-    """The loop along a recording answers with the forces of the recording."""
+def test_replay_driver_reproduces_recorded_forces(tmp_path: Path) -> None:
+    """The loop driven along a recording commands the recorded forces."""
     place, path = Stationary((0.0, 0.0, -1e-3)), tmp_path / "run.mcap"
     hand = SpringHand(stiffness=300.0, damping=3.0, mass=0.05)
     simulate(SURFACE, Cartesian(0.05), hand, Servo(1e-3), place, 0.3, trace=path)
@@ -214,7 +214,7 @@ def test_a_recording_is_a_device(tmp_path: Path) -> None:
     assert cause is EndReason.FINISHED
     for name, column in (("x", 1), ("z", 3), ("commanded x", 4), ("commanded z", 6)):
         np.testing.assert_array_equal(rows[:300, column], recording[name])
-    assert rows[300, 3] == recording["z"][-1]  # it stays
+    assert rows[300, 3] == recording["z"][-1]  # the handle stays at the last position
     with pytest.raises(ParameterError, match=r"not sampled evenly at 4 kHz.*update_rate=1kHz"):
         replay_driver(str(path), 2.5e-4)
     with pytest.raises(ParameterError):

@@ -1,4 +1,4 @@
-"""The Inverse3, against a service that is none and its failures."""
+"""The Inverse3 driver against a fake Haply service and its failures."""
 
 from __future__ import annotations
 
@@ -38,25 +38,25 @@ Start = Callable[..., FakeHaply]
 
 @pytest.fixture
 def start(monkeypatch: pytest.MonkeyPatch) -> Start:
-    """``start(...)``: a service that the driver finds, and has time for on a busy machine."""
+    """``start(...)`` starts a fake service for the driver, with timeouts for a busy machine."""
     for module in (exchanged, haply):
         monkeypatch.setattr(module, "OPEN_TIMEOUT", 30.0)
 
-    def started(**order: Any) -> FakeHaply:
-        service = FakeHaply(**order)
+    def start_service(**options: Any) -> FakeHaply:
+        service = FakeHaply(**options)
         monkeypatch.setenv(SERVICE, service.address)
         return service
 
-    return started
+    return start_service
 
 
-def patient(**said: Any) -> HaplyDriver:
-    """Return a driver that a busy machine does not disturb."""
-    return HaplyDriver(**{"max_reading_age": 60.0, "force_timeout": 60.0, **said})
+def tolerant_driver(**options: Any) -> HaplyDriver:
+    """Return a driver with timeouts that a busy machine does not exceed."""
+    return HaplyDriver(**{"max_reading_age": 60.0, "force_timeout": 60.0, **options})
 
 
-def test_positions_come_and_forces_go(start: Start) -> None:
-    """The axes are those of a lying surface; what is missing in a state is 0."""
+def test_positions_and_forces_are_exchanged_in_the_surface_frame(start: Start) -> None:
+    """For a horizontal surface; coordinates missing in a state message are 0."""
     with start(place=lambda _k: (0.7e-3, 0.0, -1e-3)) as service:
         driver = hardware_driver("haply:049d", "lying", (0.0, -0.4e-3, 0.0))
         assert isinstance(driver, HaplyDriver)
@@ -70,10 +70,8 @@ def test_positions_come_and_forces_go(start: Start) -> None:
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_whatever_fails_the_force_is_zero_and_the_next_start_works(
-    start: Start, fault: str
-) -> None:
-    driver = patient(max_reading_age=0.2 if fault in {"mute", "half a frame"} else 60.0)
+def test_failure_zeroes_the_force_and_a_restart_works(start: Start, fault: str) -> None:
+    driver = tolerant_driver(max_reading_age=0.2 if fault in {"mute", "half a frame"} else 60.0)
     with start(fault=fault, at=30) as service:
         cause, code, rows = run(driver, 100_000, system_clock)
         assert cause is {"nan": EndReason.NOT_FINITE, "far": EndReason.WORKSPACE}.get(
@@ -81,71 +79,71 @@ def test_whatever_fails_the_force_is_zero_and_the_next_start_works(
         )
         assert (rows[-1, 7:10] == 0.0).all()
         assert np.abs(rows[:-1, 7:10]).max(axis=1).all()
-        if fault != "closed":  # then nobody hears it
+        if fault != "closed":  # a closed service receives no last force
             assert service.last_force() == ZERO
-    said = {"mute": "older than 200 ms", "unplugged": "unplugged?", "closed": "is lost",
+    messages = {"mute": "older than 200 ms", "unplugged": "unplugged?", "closed": "is lost",
             "twice": "without a request", "no JSON": "another format"}  # fmt: skip
-    assert said.get(fault, "") in driver.describe_error(code)
+    assert messages.get(fault, "") in driver.describe_error(code)
     with start():
-        assert run(patient(), 5, system_clock)[0] is EndReason.FINISHED
+        assert run(tolerant_driver(), 5, system_clock)[0] is EndReason.FINISHED
 
 
-def test_the_last_word_reaches_a_service_that_is_slow(start: Start) -> None:
+def test_final_zero_force_reaches_a_slow_service(start: Start) -> None:
     with start(fault="no JSON", at=10, late=0.03) as service:
-        assert run(patient(), 100_000, system_clock)[0] is EndReason.DEVICE
+        assert run(tolerant_driver(), 100_000, system_clock)[0] is EndReason.DEVICE
         assert service.last_force() == ZERO
 
 
-def test_a_state_is_as_old_as_the_question_that_it_answers(start: Start) -> None:
-    """A service that answers in time, but questions of long ago, is stale."""
+def test_age_of_a_state_counts_from_its_request(start: Start) -> None:
+    """A service that answers regularly but with old states is stale."""
     with start(late=0.05):
         driver = HaplyDriver(max_reading_age=0.02, force_timeout=60.0)
         cause, code, _rows = run(driver, 100_000, system_clock)
     assert (cause, code) == (EndReason.DEVICE, STALE)
     with start(late=0.05):
-        assert run(patient(), 20, system_clock)[0] is EndReason.FINISHED
+        assert run(tolerant_driver(), 20, system_clock)[0] is EndReason.FINISHED
 
 
-def test_a_loop_that_hangs_loses_its_force(start: Start) -> None:
+def test_force_of_a_hanging_loop_times_out(start: Start) -> None:
     with start() as service:
-        driver = patient(force_timeout=0.05)
+        driver = tolerant_driver(force_timeout=0.05)
         record = driver.open()
-        hold(record, (0.0, 0.0, 1.5))
-        assert until(lambda: (0.0, 0.0, 1.5) in [force for _when, force in service.forces])
-        assert until(lambda: bool(record.words[FAILURE_CODE]))
+        write_force(record, (0.0, 0.0, 1.5))
+        assert wait_until(lambda: (0.0, 0.0, 1.5) in [force for _when, force in service.forces])
+        assert wait_until(lambda: bool(record.words[FAILURE_CODE]))
         assert service.last_force() == ZERO
         assert "held a force for 50 ms without renewing it" in driver.describe_error(LOOP_SILENT)
         driver.close()
 
 
-def test_a_force_goes_even_where_nobody_answers(start: Start) -> None:
-    """Messages do not pile up before a service that is mute; that there is no force is said."""
+def test_zero_force_is_sent_to_a_mute_service(start: Start) -> None:
+    """Requests do not pile up at a mute service, but the final zero force is still sent."""
     with start() as service:
-        driver = patient()
+        driver = tolerant_driver()
         record = driver.open()
-        hold(record, (0.0, 0.0, 1.5))
-        assert until(lambda: service.forces[-1][1] == (0.0, 0.0, 1.5))
+        write_force(record, (0.0, 0.0, 1.5))
+        assert wait_until(lambda: service.forces[-1][1] == (0.0, 0.0, 1.5))
         service.at = len(service.forces) + 10
         service.fault = "mute"
-        assert until(lambda: len(service.forces) >= service.at + MAX_PENDING)
-        heard = len(service.forces)
+        assert wait_until(lambda: len(service.forces) >= service.at + MAX_PENDING)
+        sent_count = len(service.forces)
         time.sleep(0.02)
-        assert len(service.forces) == heard
-        hold(record, ZERO)
+        assert len(service.forces) == sent_count
+        write_force(record, ZERO)
         assert service.last_force() == ZERO
         driver.close()
 
 
-def hold(record: ThreadedDevice, force: tuple[float, float, float]) -> None:
-    """Be a loop that gives a force once."""
+def write_force(record: ThreadedDevice, force: tuple[float, float, float]) -> None:
+    """Write one force to the ring buffer as the loop does."""
     row = HEADER_WORDS + ROW_WORDS * (RING_ROWS + record.words[FORCES])
     record.words[row] = time.monotonic_ns()
     record.numbers[row + 1 : row + 4] = force
     record.words[FORCES] += 1
 
 
-def until(reached: Callable[[], bool], patience: float = 30.0) -> bool:
-    """Wait for something; whether it came."""
+def wait_until(reached: Callable[[], bool], patience: float = 30.0) -> bool:
+    """Wait for a condition and return whether it was met in time."""
     end = time.monotonic() + patience
     while not reached() and time.monotonic() < end:
         time.sleep(1e-3)
@@ -153,7 +151,7 @@ def until(reached: Callable[[], bool], patience: float = 30.0) -> bool:
 
 
 @pytest.mark.parametrize(
-    ("order", "device", "said"),
+    ("options", "device", "message"),
     [
         ({"devices": ()}, "", "finds no Inverse3: is it plugged in"),
         ({"devices": ("049D", "1A2B")}, "", "2 devices: choose one, haply:049D, haply:1A2B"),
@@ -164,52 +162,54 @@ def until(reached: Callable[[], bool], patience: float = 30.0) -> bool:
         ({"fault": "mute"}, "", "has no reading of the device for 0.2 s"),
     ],
 )
-def test_a_start_that_cannot_be_says_what_to_do(
-    start: Start, monkeypatch: pytest.MonkeyPatch, order: Any, device: str, said: str
+def test_failed_open_has_a_helpful_error(
+    start: Start, monkeypatch: pytest.MonkeyPatch, options: Any, device: str, message: str
 ) -> None:
-    if order.get("fault") == "mute":
+    if options.get("fault") == "mute":
         monkeypatch.setattr(exchanged, "OPEN_TIMEOUT", 0.2)
-    with start(**order), pytest.raises(ParameterError, match=said):
+    with start(**options), pytest.raises(ParameterError, match=message):
         HaplyDriver(device=device).open()
 
 
-def test_one_of_several_is_opened(start: Start) -> None:
+def test_selected_device_of_several_is_opened(start: Start) -> None:
     with start(devices=("1A2B", "049D")):
-        assert run(patient(device="049d"), 5, system_clock)[0] is EndReason.FINISHED
+        assert run(tolerant_driver(device="049d"), 5, system_clock)[0] is EndReason.FINISHED
 
 
 @pytest.mark.parametrize(
-    ("answer", "said"),
+    ("answer", "message"),
     [
         (b"HTTP/1.1 404 Not Found\r\n\r\n", "finds no Inverse Service at .*404"),
         (b"HTTP/1.1 101 Yes\r\nSec-WebSocket-Accept: no\r\n\r\n", "not a WebSocket's"),
         (b"", "does not answer at .*Haply Hub"),
     ],
 )
-def test_what_is_no_service_is_said(
-    monkeypatch: pytest.MonkeyPatch, answer: bytes, said: str
+def test_server_that_is_not_the_inverse_service_is_an_error(
+    monkeypatch: pytest.MonkeyPatch, answer: bytes, message: str
 ) -> None:
     monkeypatch.setattr(haply, "OPEN_TIMEOUT", 2.0)
     with socket.create_server(("127.0.0.1", 0)) as server:
         monkeypatch.setenv(SERVICE, f"127.0.0.1:{server.getsockname()[1]}")
 
         def serve() -> None:
-            line, _who = server.accept()
-            with line:
-                line.recv(4096)
-                line.sendall(answer)
+            connection, _address = server.accept()
+            with connection:
+                connection.recv(4096)
+                connection.sendall(answer)
 
         thread = threading.Thread(target=serve)
         thread.start()
-        with pytest.raises(ParameterError, match=said):
+        with pytest.raises(ParameterError, match=message):
             HaplyDriver().open()
         thread.join()
 
 
-def test_a_service_that_is_not_there_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unreachable_service_or_invalid_address_is_an_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
-        free = server.getsockname()[1]
-    monkeypatch.setenv(SERVICE, f"127.0.0.1:{free}")
+        port = server.getsockname()[1]
+    monkeypatch.setenv(SERVICE, f"127.0.0.1:{port}")
     with pytest.raises(ParameterError, match=r"install and start the Haply Hub.*ASPERITY_HAPLY"):
         HaplyDriver().open()
     monkeypatch.setenv(SERVICE, "localhost")

@@ -1,4 +1,4 @@
-"""Devices of OpenHaptics, against a libHD that the tests compile, with scheduler and failures."""
+"""The OpenHaptics driver against a fake libHD compiled here, with its scheduler and failures."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from bench.fakes import compile_library
 from tests.servo.drivers.test_drivers import FAKES, run
-from tests.servo.drivers.test_haply import hold, until
+from tests.servo.drivers.test_haply import wait_until, write_force
 from tests.servo.python_device import SURFACE
 
 from asperity.core.errors import ParameterError
@@ -32,9 +32,9 @@ def hd_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def hd(hd_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """The fake libHD, reset, the handle in the wall."""
+    """The fake libHD, reset, with the handle inside the wall."""
     monkeypatch.setenv(LIBRARY, str(hd_path))
-    monkeypatch.setattr(exchanged, "OPEN_TIMEOUT", 30.0)  # a busy machine takes its time
+    monkeypatch.setattr(exchanged, "OPEN_TIMEOUT", 30.0)  # enough for a busy machine
     library = ctypes.CDLL(str(hd_path))
     library.fake_force.restype = ctypes.c_double
     library.fake_place.argtypes = [ctypes.c_double] * 3
@@ -43,17 +43,17 @@ def hd(hd_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     return library
 
 
-def patient(**said: Any) -> OpenHapticsDriver:
-    """Return a driver that a busy machine does not disturb."""
-    return OpenHapticsDriver(**{"max_reading_age": 60.0, "force_timeout": 60.0, **said})
+def tolerant_driver(**options: Any) -> OpenHapticsDriver:
+    """Return a driver with timeouts that a busy machine does not exceed."""
+    return OpenHapticsDriver(**{"max_reading_age": 60.0, "force_timeout": 60.0, **options})
 
 
-def held(hd: Any) -> list[float]:
+def held_force(hd: Any) -> list[float]:
     return [hd.fake_force(axis) for axis in range(3)]
 
 
-def test_millimetres_become_metres_and_forces_turn(hd: Any) -> None:
-    """Its y points up, its z towards the user: the surface's are away and up."""
+def test_units_and_axes_are_converted(hd: Any) -> None:
+    """The device's y points up and its z to the user; the surface's y points away and z up."""
     driver = hardware_driver("openhaptics:Left Device", "lying", (0.0, 0.0, 0.0))
     assert isinstance(driver, OpenHapticsDriver)
     driver.max_reading_age = driver.force_timeout = 60.0
@@ -61,17 +61,17 @@ def test_millimetres_become_metres_and_forces_turn(hd: Any) -> None:
     assert cause is EndReason.FINISHED
     np.testing.assert_allclose(rows[0, 1:4], [0.7e-3, 0.4e-3, -1e-3], atol=1e-15)
     np.testing.assert_allclose(rows[0, 7:10], SURFACE.force(rows[0, 1:4]), rtol=1e-12)
-    # Every frame was in the scheduler's thread, or libHD had said so; all is closed.
-    assert [hd.fake_state(what) for what in (OPENED, ENABLED, RUNNING)] == [0, 0, 0]
+    # libHD reports calls outside the scheduler's thread; everything is closed at the end.
+    assert [hd.fake_state(index) for index in (OPENED, ENABLED, RUNNING)] == [0, 0, 0]
 
 
-def test_the_device_holds_the_force_of_its_frame(hd: Any) -> None:
-    driver = patient()
+def test_device_holds_the_force_until_closed(hd: Any) -> None:
+    driver = tolerant_driver()
     record = driver.open()
-    hold(record, (0.25, -0.5, 1.5))
-    assert until(lambda: held(hd) == [0.25, -0.5, 1.5])
+    write_force(record, (0.25, -0.5, 1.5))
+    assert wait_until(lambda: held_force(hd) == [0.25, -0.5, 1.5])
     driver.close()
-    assert held(hd) == [0.0, 0.0, 0.0]
+    assert held_force(hd) == [0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize(
@@ -83,46 +83,46 @@ def test_the_device_holds_the_force_of_its_frame(hd: Any) -> None:
         (FAR, EndReason.WORKSPACE, 0),
     ],
 )
-def test_whatever_fails_the_force_is_zero_and_the_next_start_works(
+def test_failure_zeroes_the_force_and_a_restart_works(
     hd: Any, fault: int, cause: EndReason, code: int
 ) -> None:
     hd.fake_reset(fault, 30)
     hd.fake_place(0.7, -1.0, -0.4)
-    driver = patient(max_reading_age=0.2 if fault == HANGS else 60.0)
-    ended, said, rows = run(driver, 100_000, system_clock)
-    assert (ended, said) == (cause, code)
+    driver = tolerant_driver(max_reading_age=0.2 if fault == HANGS else 60.0)
+    end_reason, error_code, rows = run(driver, 100_000, system_clock)
+    assert (end_reason, error_code) == (cause, code)
     assert hd.fake_state(FORCED) == 1
     assert (rows[-1, 7:10] == 0.0).all()
-    assert held(hd) == [0.0, 0.0, 0.0]
+    assert held_force(hd) == [0.0, 0.0, 0.0]
     hd.fake_reset(NOTHING, 0)
-    assert run(patient(), 5, system_clock)[0] is EndReason.FINISHED
+    assert run(tolerant_driver(), 5, system_clock)[0] is EndReason.FINISHED
 
 
-def test_an_error_takes_the_force_away_before_the_loop_does(hd: Any) -> None:
+def test_error_in_the_scheduler_zeroes_the_force_at_once(hd: Any) -> None:
     hd.fake_reset(ERROR, 30)
-    driver = patient()
+    driver = tolerant_driver()
     record = driver.open()
-    hold(record, (0.0, 0.0, 1.5))
-    assert until(lambda: hd.fake_state(FRAMES) > 33)
+    write_force(record, (0.0, 0.0, 1.5))
+    assert wait_until(lambda: hd.fake_state(FRAMES) > 33)
     assert (record.words[FAILURE_CODE], hd.fake_state(FORCED)) == (0x0302, 1)
-    assert held(hd) == [0.0, 0.0, 0.0]
+    assert held_force(hd) == [0.0, 0.0, 0.0]
     assert driver.describe_error(0x0302) == "libHD: communication error (0x0302)"
     driver.close()
 
 
-def test_a_loop_that_hangs_loses_its_force(hd: Any) -> None:
-    driver = patient(force_timeout=0.05)
+def test_force_of_a_hanging_loop_times_out(hd: Any) -> None:
+    driver = tolerant_driver(force_timeout=0.05)
     record = driver.open()
-    hold(record, (0.0, 0.0, 1.5))
-    assert until(lambda: held(hd) == [0.0, 0.0, 1.5])
-    assert until(lambda: record.words[FAILURE_CODE] == LOOP_SILENT)
-    assert until(lambda: held(hd) == [0.0, 0.0, 0.0])
+    write_force(record, (0.0, 0.0, 1.5))
+    assert wait_until(lambda: held_force(hd) == [0.0, 0.0, 1.5])
+    assert wait_until(lambda: record.words[FAILURE_CODE] == LOOP_SILENT)
+    assert wait_until(lambda: held_force(hd) == [0.0, 0.0, 0.0])
     assert "held a force for 50 ms" in driver.describe_error(LOOP_SILENT)
     driver.close()
 
 
 @pytest.mark.parametrize(
-    ("fault", "device", "said"),
+    ("fault", "device", "message"),
     [
         (NOT_OPENED, "", "cannot open the default device: communication error"),
         (NOTHING, "Right Device", "cannot open Right Device: communication error"),
@@ -131,18 +131,18 @@ def test_a_loop_that_hangs_loses_its_force(hd: Any) -> None:
         (ERROR, "", "cannot use the device: communication error"),
     ],
 )
-def test_a_start_that_cannot_be_says_what_to_do(
-    hd: Any, monkeypatch: pytest.MonkeyPatch, fault: int, device: str, said: str
+def test_failed_open_has_a_helpful_error(
+    hd: Any, monkeypatch: pytest.MonkeyPatch, fault: int, device: str, message: str
 ) -> None:
     if fault == HANGS:
         monkeypatch.setattr(exchanged, "OPEN_TIMEOUT", 0.2)
     hd.fake_reset(fault, 0)
-    with pytest.raises(ParameterError, match=said):
-        patient(device=device).open()
-    assert [hd.fake_state(what) for what in (OPENED, ENABLED, RUNNING)] == [0, 0, 0]
+    with pytest.raises(ParameterError, match=message):
+        tolerant_driver(device=device).open()
+    assert [hd.fake_state(index) for index in (OPENED, ENABLED, RUNNING)] == [0, 0, 0]
 
 
-def test_a_library_that_is_missing_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_library_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(LIBRARY, raising=False)
     with pytest.raises(ParameterError, match=r"the Touch driver and OpenHaptics.*ASPERITY_LIBHD"):
         OpenHapticsDriver().open()
