@@ -1,4 +1,4 @@
-"""The public call: motions, hands, trace in memory and in files, many runs, bad input."""
+"""The public functions: motions, hands, traces in memory and files, many runs, invalid input."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.helpers.allocations import traced_peak
-from tests.simulation.onset.limit_cycle_definition import cycles, restlessness
+from tests.simulation.onset.limit_cycle_definition import is_cycling, velocity_spread
 
 from asperity.core.errors import ParameterError
 from asperity.simulation import (
@@ -40,117 +40,123 @@ from asperity.textures.kinds.sinusoid import Sinusoid
 WAVE = Sinusoid(amplitude=0.3e-3, period=2e-3, phase=0.3)
 WALL = Surface(WAVE, "W", 500.0)
 HAND = SpringHand(300.0, 3.0, mass=0.03, force=(0.0, 0.0, -0.5))
-WAY = Strokes((0.0, 0.0, -1e-3), (8e-3, 0.0, -1e-3), speed=0.08, count=3)
+STROKES = Strokes((0.0, 0.0, -1e-3), (8e-3, 0.0, -1e-3), speed=0.08, count=3)
 JOB: dict[str, Any] = {
     "surface": WALL, "plant": Cartesian(0.05, 1.0), "hand": HAND, "servo": Servo(1e-3, delay=1),
-    "motion": WAY, "duration": 0.4,
+    "motion": STROKES, "duration": 0.4,
 }  # fmt: skip
 
 
-def run_of(**changed: Any) -> Run:
-    return simulate(**{**JOB, **changed})
+def run_of(**changes: Any) -> Run:
+    return simulate(**{**JOB, **changes})
 
 
-def test_strokes_go_there_and_back_and_stop() -> None:
-    assert WAY.period == pytest.approx(0.1)
-    assert WAY.duration == pytest.approx(0.3)
+def test_strokes_alternate_and_stop() -> None:
+    assert STROKES.period == pytest.approx(0.1)
+    assert STROKES.duration == pytest.approx(0.3)
     times = np.array([0.0, 0.025, 0.1, 0.125, 0.2, 0.225, 0.3, 9.0])
     x = np.array([0.0, 2e-3, 8e-3, 6e-3, 0.0, 2e-3, 8e-3, 8e-3])
-    np.testing.assert_allclose(WAY.at(times)[:, 0], x, atol=1e-15)
+    np.testing.assert_allclose(STROKES.at(times)[:, 0], x, atol=1e-15)
     back = Strokes((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0, 2)
     assert back.at(np.array([7.0]))[0, 0] == 1.0
 
 
-def test_the_hand_is_where_the_motion_says() -> None:
+def test_anchor_follows_the_motion() -> None:
     run = run_of()
-    np.testing.assert_allclose(run.anchor, WAY.at(run.time), atol=1e-15)
+    np.testing.assert_allclose(run.anchor, STROKES.at(run.time), atol=1e-15)
     assert run.samples == 400
     assert run.duration == pytest.approx(0.4)
-    np.testing.assert_array_equal(run.position[0], WAY.start)
+    np.testing.assert_array_equal(run.position[0], STROKES.start)
     assert run.velocity[0].max() == 0.0
 
 
-def test_every_thins_the_trace_and_nothing_else() -> None:
-    whole, thin, none = run_of(), run_of(every=7), run_of(trace=False)
-    np.testing.assert_array_equal(thin.table, whole.table[::7])
-    assert none.table.shape == (0, 30)
-    assert whole.ledger == thin.ledger == none.ledger
+def test_every_decimates_only_the_trace() -> None:
+    whole, decimated, untraced = run_of(), run_of(every=7), run_of(trace=False)
+    np.testing.assert_array_equal(decimated.table, whole.table[::7])
+    assert untraced.table.shape == (0, 30)
+    assert whole.ledger == decimated.ledger == untraced.ledger
     sparse = run_of(every=10**30)
     np.testing.assert_array_equal(sparse.table, whole.table[:1])
     assert sparse.ledger == whole.ledger
 
 
-@pytest.mark.parametrize("most", [0, 1, 10, 57, 400, 1000])
+@pytest.mark.parametrize("max_rows", [0, 1, 10, 57, 400, 1000])
 @pytest.mark.parametrize("chunk", [17, 16_384])
-def test_rows_are_thinned_out_evenly(
-    monkeypatch: pytest.MonkeyPatch, most: int, chunk: int
+def test_max_rows_decimates_evenly(
+    monkeypatch: pytest.MonkeyPatch, max_rows: int, chunk: int
 ) -> None:
-    module = importlib.import_module("asperity.simulation.simulate")  # the name is the function's
+    module = importlib.import_module(
+        "asperity.simulation.simulate"
+    )  # the package exports a function of that name
     monkeypatch.setattr(module, "CHUNK_SAMPLES", chunk)
-    whole, thin = run_of(), run_of(max_rows=most)
-    rows = whole.table[:: -(-400 // most)] if most else whole.table[:0]
-    assert len(thin.table) == len(rows) <= most
-    assert thin.ledger == whole.ledger
-    np.testing.assert_array_equal(thin.table, rows)
+    whole, decimated = run_of(), run_of(max_rows=max_rows)
+    rows = whole.table[:: -(-400 // max_rows)] if max_rows else whole.table[:0]
+    assert len(decimated.table) == len(rows) <= max_rows
+    assert decimated.ledger == whole.ledger
+    np.testing.assert_array_equal(decimated.table, rows)
 
 
 @pytest.mark.parametrize("every", [1, 3, 20])
-def test_the_ending_is_that_of_all_rows(every: int) -> None:
+def test_tail_statistics_do_not_depend_on_decimation(every: int) -> None:
     rest: dict[str, Any] = {"motion": Stationary((0.0, 0.0, -1e-3)), "velocity": (0.3, 0.0, 0.0)}
-    whole, none = run_of(**rest, every=every), run_of(**rest, every=every, max_rows=0)
+    whole, untraced = run_of(**rest, every=every), run_of(**rest, every=every, max_rows=0)
     assert whole.tail is not None
-    assert none.tail is not None
-    assert none.tail.is_complete
-    assert none.tail.velocity_spread == whole.tail.velocity_spread
-    assert whole.tail.velocity_spread == pytest.approx(restlessness(whole), rel=1e-12)
+    assert untraced.tail is not None
+    assert untraced.tail.is_complete
+    assert untraced.tail.velocity_spread == whole.tail.velocity_spread
+    assert whole.tail.velocity_spread == pytest.approx(velocity_spread(whole), rel=1e-12)
     assert whole.tail.velocity_spread > 1e-9  # the handle swings
-    assert (whole.tail.velocity_spread > CYCLE_SPEED and whole.tail.gains_energy) == cycles(whole)
+    assert (whole.tail.velocity_spread > CYCLE_SPEED and whole.tail.gains_energy) == is_cycling(
+        whole
+    )
 
 
-def test_a_run_without_enough_rows_has_no_known_ending() -> None:
-    few = run_of(every=200, max_rows=0).tail
-    assert few is not None
-    assert not few.is_complete
+def test_tail_statistics_need_enough_rows() -> None:
+    tail = run_of(every=200, max_rows=0).tail
+    assert tail is not None
+    assert not tail.is_complete
     assert run_of(trace=False).tail is None
     with pytest.raises(ParameterError, match="max_rows must be a whole number"):
         run_of(max_rows=-1)
 
 
-def test_memory_without_rows_is_flat_in_the_duration() -> None:
+def test_memory_without_trace_does_not_grow_with_duration() -> None:
     def peak(duration: float) -> int:
         still = Stationary((0.0, 0.0, -1e-3))
         return traced_peak(lambda: run_of(duration=duration, motion=still, max_rows=0))
 
     peak(20.0)
-    assert peak(400.0) < 1.05 * peak(40.0)  # 86 MB if it kept the rows
+    assert peak(400.0) < 1.05 * peak(40.0)  # 86 MB with all rows in memory
 
 
-def test_chunks_leave_no_seam(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chunked_run_equals_whole_run(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = run_of(every=3)
-    module = importlib.import_module("asperity.simulation.simulate")  # the name is the function's
+    module = importlib.import_module(
+        "asperity.simulation.simulate"
+    )  # the package exports a function of that name
     monkeypatch.setattr(module, "CHUNK_SAMPLES", 17)
-    told: list[float] = []
-    pieces = run_of(every=3, progress=told.append)
-    # The sums are added to in another order.
-    np.testing.assert_allclose(pieces.table, whole.table, rtol=1e-12, atol=1e-18)
-    assert told == sorted(told)
-    assert told[-1] == 1.0
-    assert len(told) == 24
+    progress: list[float] = []
+    chunked = run_of(every=3, progress=progress.append)
+    # Sums are accumulated in a different order.
+    np.testing.assert_allclose(chunked.table, whole.table, rtol=1e-12, atol=1e-18)
+    assert progress == sorted(progress)
+    assert progress[-1] == 1.0
+    assert len(progress) == 24
 
 
-def test_the_file_holds_the_trace(tmp_path: FilePath) -> None:
+def test_trace_file_contains_the_trace(tmp_path: FilePath) -> None:
     path = tmp_path / "run.csv"
     run, whole = run_of(trace=path), run_of()
     assert path.read_text().splitlines()[0] == HEADER
     assert HEADER.startswith("time [s],x [m],y [m],z [m],vx [m/s]")
-    read = np.loadtxt(path, delimiter=",", skiprows=1)
-    np.testing.assert_allclose(read, whole.table, rtol=1e-11, atol=1e-20)
+    loaded = np.loadtxt(path, delimiter=",", skiprows=1)
+    np.testing.assert_allclose(loaded, whole.table, rtol=1e-11, atol=1e-20)
     assert run.ledger == whole.ledger
     assert run.path == str(path)
     assert run.to_dict()["trace"] == str(path)
 
 
-def test_a_file_that_cannot_be_written_is_named(tmp_path: FilePath) -> None:
+def test_unwritable_trace_is_an_error_with_its_name(tmp_path: FilePath) -> None:
     with pytest.raises(ParameterError, match="trace cannot be written"):
         run_of(trace=tmp_path / "missing" / "run.csv")
     with pytest.raises(ParameterError, match="trace cannot be written"):
@@ -185,30 +191,30 @@ job = dict(
 """
 
 
-def test_a_full_disk_ends_the_run_and_leaves_whole_lines(tmp_path: FilePath) -> None:
-    """A limit on the size of files stands for a full disk: writes come back short, then fail."""
+def test_full_disk_ends_the_run_with_complete_lines(tmp_path: FilePath) -> None:
+    """A limit on file size simulates a full disk: a short write, then an error."""
     (tmp_path / "tests_job.py").write_text(_JOB)
     path, size = tmp_path / "run.csv", 5_000_000
-    # Compiled here, so that the limit meets the trace alone.
+    # Compile first, so that the size limit affects only the trace.
     script = "from tests_job import job\nfrom asperity.simulation import simulate\nsimulate(**job)"
     subprocess.run([sys.executable, "-c", script], cwd=tmp_path, check=True, timeout=60)
     script = _FULL_DISK.format(paths=[str(tmp_path)], size=size, trace=str(path))
-    answer = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True
     )
     text = path.read_text()
     rows = text.count("\n") - 1
-    assert "trace cannot be written any further (File too large)" in answer.stdout
-    assert f"{rows} rows are in {path}" in answer.stdout
+    assert "trace cannot be written any further (File too large)" in process.stdout
+    assert f"{rows} rows are in {path}" in process.stdout
     assert text.endswith("\n")
     assert size - 1000 < len(text) <= size
-    read = np.loadtxt(path, delimiter=",", skiprows=1)
-    assert read.shape == (rows, 30)
-    np.testing.assert_allclose(read[:, 0], 1e-4 * np.arange(rows), atol=1e-12)
+    loaded = np.loadtxt(path, delimiter=",", skiprows=1)
+    assert loaded.shape == (rows, 30)
+    np.testing.assert_allclose(loaded[:, 0], 1e-4 * np.arange(rows), atol=1e-12)
 
 
 @pytest.mark.skipif(not FilePath("/dev/full").exists(), reason="this system has no /dev/full")
-def test_a_disk_without_any_room_is_reported(tmp_path: FilePath) -> None:
+def test_disk_without_space_is_an_error(tmp_path: FilePath) -> None:
     full = tmp_path / "run.csv"
     full.symlink_to("/dev/full")
     with pytest.raises(ParameterError, match=r"No space left on device.*0 rows"):
@@ -216,73 +222,81 @@ def test_a_disk_without_any_room_is_reported(tmp_path: FilePath) -> None:
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.mcap"])
-def test_memory_does_not_depend_on_the_duration(tmp_path: FilePath, name: str) -> None:
-    """Ten times as long, no more memory: Python's own allocations, and those of NumPy."""
+def test_memory_with_trace_file_does_not_grow_with_duration(tmp_path: FilePath, name: str) -> None:
+    """Peak of the allocations by Python and NumPy at ten times the duration."""
     peaks = []
     options: dict[str, Any] = {"servo": Servo(1e-4), "every": 5}
     for duration in (4.0, 40.0):
-        traced = partial(run_of, trace=tmp_path / name, duration=duration, **options)
+        run = partial(run_of, trace=tmp_path / name, duration=duration, **options)
         run_of(trace=tmp_path / name, every=5)
-        peaks.append(traced_peak(traced))
+        peaks.append(traced_peak(run))
     assert peaks[1] < 1.1 * peaks[0]
-    # Negative control: in memory it does depend.
+    # Negative control: a trace in memory grows.
     assert traced_peak(partial(run_of, duration=40.0, **options)) > 2.0 * peaks[1]
 
 
-def test_many_runs_are_the_same_as_one_after_the_other() -> None:
+def test_parallel_runs_equal_sequential_runs() -> None:
     jobs = [
         {**JOB, "surface": Surface(WAVE, letter, 300.0), "plant": plant}
         for letter in "WF"
         for plant in (Cartesian(0.05, 1.0), Pantograph())
     ]
     for run, job in zip(simulate_many(jobs, workers=3), jobs, strict=True):
-        alone = simulate(**job)
-        np.testing.assert_array_equal(run.table, alone.table)
-        assert run.ledger == alone.ledger
+        expected = simulate(**job)
+        np.testing.assert_array_equal(run.table, expected.table)
+        assert run.ledger == expected.ledger
 
 
-def test_a_run_is_plain_data() -> None:
+def test_run_is_serializable_as_json() -> None:
     run = run_of(plant=Pantograph(), duration=0.01)
     plain = json.loads(json.dumps(run.to_dict()))
     assert plain["notes"][0].startswith("Link masses of the pantograph are a guess")
     assert plain["samples"] == 10
-    for part in (JOB["plant"], Pantograph(), HAND, BandHand(), PrescribedHand(), WAY, Servo(1e-3)):
+    for part in (
+        JOB["plant"],
+        Pantograph(),
+        HAND,
+        BandHand(),
+        PrescribedHand(),
+        STROKES,
+        Servo(1e-3),
+    ):
         json.dumps(part.to_dict(), allow_nan=False)
     json.dumps(Waypoints([0.0], [[0.0, 0.0, 0.0]]).to_dict())
     json.dumps(Cartesian(resonance=Resonance(400.0)).to_dict())
 
 
-def test_at_rest_nothing_becomes_subnormal() -> None:
-    """Long after the last stroke velocities have decayed to nothing, not to 1e-310."""
+def test_velocities_at_rest_become_exactly_zero() -> None:
+    """Long after the last stroke they are zero, not subnormal numbers such as 1e-310."""
     run = run_of(
         motion=Stationary((0.0, 0.0, 0.05)), start=(1e-3, 0.0, 0.05), duration=40.0, every=100
     )
-    tiny = np.abs(run.table[:, 1:7])
-    assert not ((tiny > 0.0) & (tiny < 1e-150)).any()
+    magnitudes = np.abs(run.table[:, 1:7])
+    assert not ((magnitudes > 0.0) & (magnitudes < 1e-150)).any()
 
 
-def test_a_ledger_that_does_not_close_is_said() -> None:
+def test_unbalanced_energy_ledger_is_detected() -> None:
     assert run_of().is_energy_balanced
-    # Friction holds the handle: all that is exchanged is the last bits of what a band stores.
-    held = run_of(
+    # Friction holds the handle: the exchanged energy is rounding of the band's stored energy.
+    sticking = run_of(
         plant=Cartesian(0.05, 1.0, friction=5.0), hand=BandHand(),
         motion=Stationary((0.0, 0.0, 0.01)), start=(0.0, 0.0, 1e-3),
     )  # fmt: skip
-    assert abs(held.ledger.closure) > 1e-9 * held.ledger.exchanged
-    assert held.ledger.exchanged < 1e-15 * held.ledger.stored_before
-    assert held.is_energy_balanced
-    stiff = run_of(hand=SpringHand(1e12))  # thousands of its radians to a sample
+    assert abs(sticking.ledger.closure) > 1e-9 * sticking.ledger.exchanged
+    assert sticking.ledger.exchanged < 1e-15 * sticking.ledger.stored_before
+    assert sticking.is_energy_balanced
+    stiff = run_of(hand=SpringHand(1e12))  # thousands of radians per sample
     assert abs(stiff.ledger.closure) > 1e-9 * stiff.ledger.exchanged
     assert not stiff.is_energy_balanced
 
 
 @pytest.mark.parametrize("rows", [10**15, 10**18])
-def test_a_trace_beyond_all_memory_is_refused(rows: int) -> None:
+def test_trace_larger_than_memory_is_an_error(rows: int) -> None:
     with pytest.raises(ParameterError, match=f"trace needs memory for {rows} rows"):
         DecimatedTrace(rows, None)
 
 
-BAD: list[tuple[dict[str, Any], str]] = [
+INVALID_ARGUMENTS: list[tuple[dict[str, Any], str]] = [
     ({"surface": WAVE}, "surface must be a Surface"),
     ({"plant": 0.05}, "plant must be"),
     ({"hand": 3}, "hand must be"),
@@ -306,13 +320,15 @@ BAD: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("changed", "words"), BAD, ids=[words for _, words in BAD])
-def test_bad_input_is_named(changed: dict[str, Any], words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
-        run_of(**changed)
+@pytest.mark.parametrize(
+    ("changes", "message"), INVALID_ARGUMENTS, ids=[message for _, message in INVALID_ARGUMENTS]
+)
+def test_invalid_arguments_are_named_in_the_error(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        run_of(**changes)
 
 
-WRONG: list[tuple[Any, tuple[Any, ...], dict[str, Any], str]] = [
+INVALID_PARTS: list[tuple[Any, tuple[Any, ...], dict[str, Any], str]] = [
     (Cartesian, (0.0,), {}, "mass"),
     (Cartesian, ((0.1, 0.2),), {}, "mass"),
     (Cartesian, (0.1, -1.0), {}, "damping"),
@@ -348,30 +364,28 @@ WRONG: list[tuple[Any, tuple[Any, ...], dict[str, Any], str]] = [
 ]
 
 
-@pytest.mark.parametrize(("kind", "given", "named", "words"), WRONG)
-def test_wrong_parts_are_named(
-    kind: Any, given: tuple[Any, ...], named: dict[str, Any], words: str
+@pytest.mark.parametrize(("kind", "arguments", "keywords", "message"), INVALID_PARTS)
+def test_invalid_parameters_of_parts_are_named_in_the_error(
+    kind: Any, arguments: tuple[Any, ...], keywords: dict[str, Any], message: str
 ) -> None:
-    with pytest.raises(ParameterError, match=words):
-        kind(*given, **named)
+    with pytest.raises(ParameterError, match=message):
+        kind(*arguments, **keywords)
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.mcap", "run"])
-@pytest.mark.parametrize("most", [1000, 40, 7, 1])
-def test_a_written_trace_is_read_back_thinned_out_evenly(
-    tmp_path: FilePath, most: int, name: str
-) -> None:
-    surface_to_end = (WALL, Cartesian(0.1, 1.0), SpringHand(100.0, 2.0), Servo(1e-3))
-    ask = partial(simulate, *surface_to_end, Stationary((0.0, 0.0, -1e-3)), 0.04)
-    whole, read = ask().table, load_trace(ask(trace=tmp_path / name), most).table
-    step = -(-len(whole) // most)
-    assert len(read) <= most
-    np.testing.assert_allclose(read, whole[::step], rtol=1e-11)
+@pytest.mark.parametrize("max_rows", [1000, 40, 7, 1])
+def test_loaded_trace_is_decimated_evenly(tmp_path: FilePath, max_rows: int, name: str) -> None:
+    parts = (WALL, Cartesian(0.1, 1.0), SpringHand(100.0, 2.0), Servo(1e-3))
+    run = partial(simulate, *parts, Stationary((0.0, 0.0, -1e-3)), 0.04)
+    whole, loaded = run().table, load_trace(run(trace=tmp_path / name), max_rows).table
+    step = -(-len(whole) // max_rows)
+    assert len(loaded) <= max_rows
+    np.testing.assert_allclose(loaded, whole[::step], rtol=1e-11)
 
 
-def test_the_parts_of_a_trace_are_its_columns_by_name() -> None:
+def test_trace_attributes_are_the_columns_of_that_name() -> None:
     run = run_of()
     names = [name.split(" [")[0] for name in HEADER.split(",")]
-    for part, head in (("velocity", "v"), ("applied", "applied "), ("anchor", "anchor ")):
-        columns = [names.index(head + axis) for axis in "xyz"]
+    for part, prefix in (("velocity", "v"), ("applied", "applied "), ("anchor", "anchor ")):
+        columns = [names.index(prefix + axis) for axis in "xyz"]
         np.testing.assert_array_equal(getattr(run, part), run.table[:, columns])

@@ -1,4 +1,4 @@
-"""The closed loop: stability thresholds, energies and convergence that theory predicts."""
+"""The closed loop: stability thresholds, energies and convergence orders predicted by theory."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PLANT = Cartesian(MASS, DAMPING)
 
 
 def spectral_radius(stiffness: float, delay: int) -> float:
-    """Of one axis z of mass and damping with f = -k z of d samples ago, state (z, v, queue)."""
+    """Return that of a mass with damping and f = -k z delayed by d samples, state (z, v, queue)."""
     body = linear_body(PLANT.mass, PLANT.damping, SpringHand())
     change, _loss = integrate(body.dynamics, body.loss, PERIOD)
     phi, gamma = np.eye(2) + change[np.ix_([2, 5], [2, 5])], change[[2, 5], 14]
@@ -47,7 +47,7 @@ def spectral_radius(stiffness: float, delay: int) -> float:
     return float(np.abs(np.linalg.eigvals(matrix)).max())
 
 
-def threshold(delay: int) -> float:
+def stability_threshold(delay: int) -> float:
     low, high = 1.0, 1e5
     for _ in range(80):
         middle = 0.5 * (low + high)
@@ -57,18 +57,21 @@ def threshold(delay: int) -> float:
 
 @pytest.mark.parametrize("delay", range(6))
 def test_wall_is_stable_up_to_the_exact_threshold(delay: int) -> None:
-    """The sampled loop's own eigenvalues say where W begins to oscillate, to 1e-6."""
-    limit = threshold(delay)
-    # About DAMPING/((d + 1/2) T), MATH section 4, exact as the mass grows.
+    """The simulated W becomes unstable at the threshold of the eigenvalues, to 1e-6."""
+    limit = stability_threshold(delay)
+    # About DAMPING/((d + 1/2) T), exact in the limit of a large mass (MATH section 4).
     assert limit == pytest.approx(DAMPING / ((delay + 0.5) * PERIOD), rel=0.25)
-    assert oscillates(limit * (1 - 1e-6), delay) < 1.0 < oscillates(limit * (1 + 1e-6), delay)
+    assert (
+        simulated_spectral_radius(limit * (1 - 1e-6), delay)
+        < 1.0
+        < simulated_spectral_radius(limit * (1 + 1e-6), delay)
+    )
 
 
-def oscillates(stiffness: float, delay: int) -> float:
-    """Ratio of the swing after many samples to that before, by the simulation itself.
+def simulated_spectral_radius(stiffness: float, delay: int) -> float:
+    """Return the spectral radius of one sample of the simulation itself.
 
-    The motion is inside the wall throughout: about a rest at -1 m where a spring of the hand, of
-    next to no stiffness, balances the wall.
+    The motion stays inside the wall, around a rest position at -1 m.
     """
     surface = Surface(WAVE, "W", stiffness)
     matrix = np.zeros((2 + delay, 2 + delay))
@@ -79,23 +82,23 @@ def oscillates(stiffness: float, delay: int) -> float:
 
 
 def _response(surface: Surface, delay: int, rest: FloatArray, column: int) -> FloatArray:
-    """Change of (z, v, waiting forces) in one sample for a unit change of one of them."""
+    """Return the change of (z, v, delayed forces) in one sample per unit change of one of them."""
     results = []
-    for size in (0.0, 1.0):
+    for perturbation in (0.0, 1.0):
         servo = Servo(PERIOD, delay)
         simulation = Simulation(surface, sampled_plant(PLANT, SpringHand(), servo), servo, rest)
         queue = np.zeros(delay)  # oldest last
         if column < 2:
-            simulation.state[(2, 5)[column]] += size
+            simulation.state[(2, 5)[column]] += perturbation
         else:
-            queue[column - 2] += size
-        # The slot after the head is applied next, so the oldest force waits there.
+            queue[column - 2] += perturbation
+        # The slot after the head is applied next; it holds the oldest force.
         for i in range(delay):
             simulation.queue[delay - i, 2] = queue[i]
         simulation.run(np.zeros((2, 3)))
-        waiting = [simulation.queue[(-i) % (delay + 1), 2] for i in range(delay)]
+        delayed = [simulation.queue[(-i) % (delay + 1), 2] for i in range(delay)]
         state = simulation.state
-        results.append(np.array([state[2], state[5], *waiting]))
+        results.append(np.array([state[2], state[5], *delayed]))
     return np.asarray(results[1] - results[0])
 
 
@@ -104,18 +107,18 @@ FULL = Servo(
     virtual_damping=0.2, velocity_share=0.3,
 )  # fmt: skip
 HAND = SpringHand([300.0, 200.0, 250.0], 2.0, mass=0.02, force=(0.1, -0.2, -0.3))
-WAY = Strokes((0.0, 0.0, -1e-3), (7e-3, 3e-3, -1e-3), speed=0.05, count=9)
+STROKES = Strokes((0.0, 0.0, -1e-3), (7e-3, 3e-3, -1e-3), speed=0.05, count=9)
 BODY = Cartesian((0.05, 0.04, 0.03), (0.5, 0.3, 0.4))
 
 
-def explored(letter: str, plant: Cartesian, duration: float = 0.3) -> Run:
+def simulate_strokes(letter: str, plant: Cartesian, duration: float = 0.3) -> Run:
     surface = Surface(WAVE, letter, 800.0, max_depth=0.4e-3)
-    return simulate(surface, plant, HAND, FULL, WAY, duration, start=(0.0, 0.0, 1e-3))
+    return simulate(surface, plant, HAND, FULL, STROKES, duration, start=(0.0, 0.0, 1e-3))
 
 
 @pytest.mark.parametrize("letter", "WACDEFGH")
-def test_every_joule_is_accounted_for(letter: str) -> None:
-    run = explored(letter, BODY)
+def test_energy_ledger_closes(letter: str) -> None:
+    run = simulate_strokes(letter, BODY)
     assert abs(run.ledger.closure) < 1e-9 * run.ledger.exchanged
     assert run.ledger.exchanged > 1e-5
     assert not run.stop_message
@@ -123,35 +126,35 @@ def test_every_joule_is_accounted_for(letter: str) -> None:
 
 
 def test_sampling_adds_half_k_times_the_squared_steps() -> None:
-    """The sampling leak of a wall: ½ K Σ|Δp|²; the paper's sum turns it around."""
+    """The sampling leak of a wall is ½ K Σ|Δp|²; the paper's same-sample sum has it negated."""
     surface, rest = Surface(WAVE, "W", 1000.0), Stationary((0.0, 0.0, -1e-3))
     run = simulate(surface, Cartesian(0.05), SpringHand(), Servo(1e-4), rest, 51e-4)
     assert run.position[:, 2].max() < 0.0
     leak = 0.5 * 1000.0 * float((np.diff(run.position[:, 2]) ** 2).sum())
     first, last = run.position[[0, -1], 2]
-    # Up to the last sample, as the trace is.
+    # Up to the last sample, like the trace.
     energies = run.energies
     assert energies["sampling"][-1] == pytest.approx(leak, rel=1e-9)
     field = 0.5 * 1000.0 * (first**2 - last**2)
     assert energies["supplied"][-1].sum() == pytest.approx(field + leak, rel=1e-9)
     assert run.ledger.sampling == pytest.approx(leak, rel=1e-9)
-    # Same-sample sum: work of the field less the leak.
+    # Same-sample sum: work of the field minus the leak.
     assert sum(run.ledger.same_sample) == pytest.approx(field - leak, rel=1e-9)
 
 
 @pytest.mark.parametrize("letter", ["W", "C"])
-def test_undamped_energy_drifts_with_the_first_order_of_the_period(letter: str) -> None:
-    """A conservative law without losses keeps its energy as T -> 0, with order 1."""
+def test_energy_drift_is_of_first_order_in_the_period(letter: str) -> None:
+    """A conservative law without losses conserves energy as T -> 0, with order 1."""
     surface = Surface(WAVE, letter, 1000.0, max_depth=0.4e-3)
-    begin = np.array([0.1e-3, 0.05e-3, -0.5e-3])
+    start = np.array([0.1e-3, 0.05e-3, -0.5e-3])
 
     def drift(period: float) -> float:
         run = simulate(
             surface, Cartesian(0.05), SpringHand(), Servo(period), Stationary((0.0, 0.0, 0.0)),
-            4e-3, start=begin, trace=False,
+            4e-3, start=start, trace=False,
         )  # fmt: skip
         kinetic = 0.5 * 0.05 * float(run.state[3:6] @ run.state[3:6])
-        return kinetic + _potential(surface, run.state[:3]) - _potential(surface, begin)
+        return kinetic + _potential(surface, run.state[:3]) - _potential(surface, start)
 
     periods = [4e-5, 2e-5, 1e-5, 5e-6]
     errors = [abs(drift(period)) for period in periods]
@@ -165,25 +168,25 @@ def _potential(surface: Surface, p: FloatArray) -> float:
 
 
 @pytest.mark.parametrize("letter", "CF")
-def test_a_run_goes_on_where_the_last_one_stopped(letter: str) -> None:
-    """In two pieces or in one: state, waiting forces, filter and the law's anchor are carried."""
+def test_split_run_equals_whole_run(letter: str) -> None:
+    """State, delayed forces, filter and the law's anchor are carried over."""
     surface, servo = Surface(WAVE, letter, 500.0), Servo(1e-3, 2, 1e-5, virtual_damping=0.1)
-    moved: SampledPlant = sampled_plant(BODY, HAND, servo)
-    way = WAY.at(np.arange(201) * 1e-3)
-    whole = Simulation(surface, moved, servo, np.zeros(3))
+    plant: SampledPlant = sampled_plant(BODY, HAND, servo)
+    anchors = STROKES.at(np.arange(201) * 1e-3)
+    whole = Simulation(surface, plant, servo, np.zeros(3))
     table = np.empty((200, len(COLUMNS)))
-    whole.run(way, table)
-    parts, pieces = Simulation(surface, moved, servo, np.zeros(3)), np.empty_like(table)
-    parts.run(way[:91], pieces[:90])
-    parts.run(way[90:], pieces[90:])
-    # Energies are summed in another order where a run is cut: not the trace up to the ledger.
-    np.testing.assert_array_equal(pieces, table)
-    assert parts.ledger() == whole.ledger()
+    whole.run(anchors, table)
+    split, split_table = Simulation(surface, plant, servo, np.zeros(3)), np.empty_like(table)
+    split.run(anchors[:91], split_table[:90])
+    split.run(anchors[90:], split_table[90:])
+    # The trace and the ledger are equal to the bit.
+    np.testing.assert_array_equal(split_table, table)
+    assert split.ledger() == whole.ledger()
     with pytest.raises(ParameterError, match="trace must have rows of 30 numbers"):
-        whole.run(way, table[:, :27])
+        whole.run(anchors, table[:, :27])
 
 
-def test_divergence_is_reported_and_the_trace_kept() -> None:
+def test_divergence_is_reported_with_its_trace() -> None:
     surface, hand = Surface(WAVE, "W", 1e9), SpringHand(1e5)
     run = simulate(
         surface, Cartesian(1e-3), hand, Servo(1e-2, delay=3), Stationary((0.0, 0.0, -1e-3)), 200.0
@@ -195,28 +198,28 @@ def test_divergence_is_reported_and_the_trace_kept() -> None:
 
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_what_is_out_of_all_bounds_has_diverged(axis: int, sign: float) -> None:
-    """A handle that flies on at 6e5 m/s along an axis: with its distance 1e6 after 2/3 s."""
-    outside = Surface(WAVE, "W", 1e-9)
+def test_handle_beyond_all_bounds_has_diverged(axis: int, sign: float) -> None:
+    """At 6e5 m/s along an axis, distance and speed sum to the bound of 1e6 after 2/3 s."""
+    soft_wall = Surface(WAVE, "W", 1e-9)
     run = simulate(
-        outside, Cartesian(1.0), SpringHand(1e-9), Servo(1e-2), Stationary((0.0, 0.0, 1.0)), 2.0,
+        soft_wall, Cartesian(1.0), SpringHand(1e-9), Servo(1e-2), Stationary((0.0, 0.0, 1.0)), 2.0,
         velocity=sign * 6e5 * np.eye(3)[axis],
     )  # fmt: skip
     assert run.stop_message == "diverged"
     assert run.samples == pytest.approx(67, abs=1)
 
 
-def test_the_longest_delay_is_taken() -> None:
+def test_longest_delay_is_accepted() -> None:
     start = np.zeros(3)
     plant = sampled_plant(PLANT, SpringHand(100.0), Servo(1e-3))
-    longest = Servo(1e-3, delay=1_000_000)
-    assert len(Simulation(Surface(WAVE, "W"), plant, longest, start).queue) == 1_000_001
+    servo = Servo(1e-3, delay=1_000_000)
+    assert len(Simulation(Surface(WAVE, "W"), plant, servo, start).queue) == 1_000_001
     with pytest.raises(ParameterError, match="delay"):
         Simulation(Surface(WAVE, "W"), plant, Servo(1e-3, delay=1_000_001), start)
 
 
-def commanded(force: tuple[float, float, float], step: float, limit: float) -> FloatArray:
-    """What the servo makes of a force: virtual damping of a handle that is moved at -force."""
+def commanded_force(force: tuple[float, float, float], step: float, limit: float) -> FloatArray:
+    """Return the servo's command for a force, made by virtual damping of a prescribed motion."""
     start, period = np.array([0.0, 0.0, 1.0]), 0.25
     end = start - period * np.array(force)
     run = simulate(
@@ -230,46 +233,44 @@ def commanded(force: tuple[float, float, float], step: float, limit: float) -> F
 @pytest.mark.parametrize(
     ("force", "limit", "expected"),
     [
-        ((0.0, 0.0, 2.0), 0.609375, (0.0, 0.0, 0.59375)),  # 19.5 steps: down, not to 20
+        ((0.0, 0.0, 2.0), 0.609375, (0.0, 0.0, 0.59375)),  # 19.5 steps: rounded down, not to 20
         ((0.0, 0.0, -2.0), 0.609375, (0.0, 0.0, -0.59375)),  # towards zero, not down
         ((0.0, 0.0, 0.609375), 0.609375, (0.0, 0.0, 0.59375)),  # at its limit before rounding
-        ((3.0, 0.0, -4.0), 1.0, (0.59375, 0.0, -0.78125)),  # of (0.6, 0, -0.8): 19.2 and 25.6 steps
-        ((0.0, 0.0, 2.0), 0.625, (0.0, 0.0, 0.625)),  # 20 steps: none is lost
-        ((0.0, 0.0, 2.0), 0.623, (0.0, 0.0, 0.59375)),  # 20 would be a third of a percent too long
-        ((0.0, 0.0, 0.609375), 9.0, (0.0, 0.0, 0.625)),  # nowhere near a limit: the nearest
+        ((3.0, 0.0, -4.0), 1.0, (0.59375, 0.0, -0.78125)),  # of (0.6, 0, -0.8): 19.2, 25.6 steps
+        ((0.0, 0.0, 2.0), 0.625, (0.0, 0.0, 0.625)),  # exactly 20 steps
+        ((0.0, 0.0, 2.0), 0.623, (0.0, 0.0, 0.59375)),  # 20 steps would exceed it by 0.3 %
+        ((0.0, 0.0, 0.609375), 9.0, (0.0, 0.0, 0.625)),  # far from the limit: nearest step
         ((-0.609375, 0.0, 0.0), 9.0, (-0.59375, 0.0, 0.0)),
     ],
 )
-def test_a_limited_force_is_rounded_towards_zero(
+def test_limited_force_is_rounded_towards_zero(
     force: tuple[float, float, float], limit: float, expected: tuple[float, float, float]
 ) -> None:
-    np.testing.assert_array_equal(commanded(force, 1.0 / 32.0, limit), expected)
+    np.testing.assert_array_equal(commanded_force(force, 1.0 / 32.0, limit), expected)
 
 
-def test_a_limit_of_whole_steps_loses_none_to_the_last_bits() -> None:
-    """Three steps of 0.1 are more than 0.3 in binary, and 0.3 over 0.1 is less than three."""
-    assert commanded((0.0, 0.0, 2.0), 0.1, 0.3)[2] == pytest.approx(0.3, rel=1e-12)
+def test_limit_of_whole_steps_loses_no_step_to_rounding() -> None:
+    """In binary, three steps of 0.1 exceed 0.3, and 0.3/0.1 is less than three."""
+    assert commanded_force((0.0, 0.0, 2.0), 0.1, 0.3)[2] == pytest.approx(0.3, rel=1e-12)
 
 
 @pytest.mark.parametrize(
     "direction", [(1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.5, 0.0, 0.25), (-3.0, 0.0, 4.0)]
 )
-def test_a_force_is_cut_to_its_limit_to_the_last_bits(
-    direction: tuple[float, float, float],
-) -> None:
-    """Above the limit it is as long as the limit, along the same line; up to it, as it was."""
+def test_force_is_scaled_to_its_limit_to_rounding(direction: tuple[float, float, float]) -> None:
+    """Above the limit its length is the limit, in the same direction; below it is unchanged."""
     limit, unit = 0.625, np.array(direction) / np.linalg.norm(direction)
     for length in (0.626, 0.63, 3.5):
         np.testing.assert_allclose(
-            commanded(tuple(length * unit), 0.0, limit), limit * unit, rtol=1e-13, atol=1e-16
+            commanded_force(tuple(length * unit), 0.0, limit), limit * unit, rtol=1e-13, atol=1e-16
         )
     for length in (0.5, 0.624, 0.6249):
         np.testing.assert_allclose(
-            commanded(tuple(length * unit), 0.0, limit), length * unit, rtol=1e-13, atol=1e-16
+            commanded_force(tuple(length * unit), 0.0, limit), length * unit, rtol=1e-13, atol=1e-16
         )
 
 
-def test_the_force_never_exceeds_its_limit() -> None:
+def test_applied_force_never_exceeds_its_limit() -> None:
     run = simulate(
         Surface(Sinusoid(0.4e-3, 1e-3), "A", 900.0),
         Cartesian(0.05, 1.0),
@@ -283,7 +284,7 @@ def test_the_force_never_exceeds_its_limit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "named"),
+    ("arguments", "name"),
     [
         ({"period": 0.0}, "period"),
         ({"period": 1e-3, "delay": 1.5}, "delay"),
@@ -296,6 +297,8 @@ def test_the_force_never_exceeds_its_limit() -> None:
         ({"period": 1e-3, "position_resolution": np.nan}, "position_resolution"),
     ],
 )
-def test_bad_servo_is_named(arguments: dict[str, float], named: str) -> None:
-    with pytest.raises(ParameterError, match=named):
+def test_invalid_servo_argument_is_named_in_the_error(
+    arguments: dict[str, float], name: str
+) -> None:
+    with pytest.raises(ParameterError, match=name):
         Servo(**arguments)

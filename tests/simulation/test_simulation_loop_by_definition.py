@@ -1,4 +1,4 @@
-"""The closed loop as plain functions: who is told what in a sample, and what is written down."""
+"""The closed loop as plain Python functions: the data flow of a sample and the written rows."""
 
 from __future__ import annotations
 
@@ -34,42 +34,42 @@ from asperity.simulation.trace import COLUMNS
 RNG = np.random.default_rng(61)
 NAMES = [name for name, _unit in COLUMNS]
 SERVO = ServoState(*RNG.normal(size=8), True, *RNG.normal(size=3))
-HELD = SampleInput(*RNG.normal(size=9), True)
+SAMPLE_INPUT = SampleInput(*RNG.normal(size=9), True)
 
 
-def test_a_force_waits_for_its_delay() -> None:
+def test_force_is_delayed_by_its_number_of_samples() -> None:
     for delay in (0, 1, 3):
-        queue, head, seen = np.zeros((delay + 1, 3)), 0, []
+        queue, head, applied = np.zeros((delay + 1, 3)), 0, []
         for i in range(1, 9):
             head, *due = simulated_device.delay_force(queue, head, i, 10.0 * i, 100.0 * i)
-            seen.append(due)
+            applied.append(due)
             assert 0 <= head <= delay
         expected = [[max(i - delay, 0) * part for part in (1.0, 10.0, 100.0)] for i in range(1, 9)]
-        assert seen == expected
+        assert applied == expected
 
 
-def test_readings_and_commands_are_booked() -> None:
-    """The new force over the way since the last reading; half the change of force over it."""
+def test_command_energies_are_added_to_the_ledger() -> None:
+    """New force times displacement since the last reading, and half the force change times it."""
     ledger = np.arange(float(LEDGER_SIZE))
     before = ServoState(1.0, 2.0, 3.0, fx=5.0, fy=7.0, fz=11.0)
     after = ServoState(1.5, 2.25, 2.0, fx=-1.0, fy=4.0, fz=2.0)
     energy_trace.add_command_energies(ledger, before, after)
-    way, force = np.array([0.5, 0.25, -1.0]), np.array([-1.0, 4.0, 2.0])
+    displacement, force = np.array([0.5, 0.25, -1.0]), np.array([-1.0, 4.0, 2.0])
     expected = np.arange(float(LEDGER_SIZE))
-    expected[SAME_SAMPLE : SAME_SAMPLE + 3] += force * way
-    expected[SAMPLING] += 0.5 * float((np.array([5.0, 7.0, 11.0]) - force) @ way)
+    expected[SAME_SAMPLE : SAME_SAMPLE + 3] += force * displacement
+    expected[SAMPLING] += 0.5 * float((np.array([5.0, 7.0, 11.0]) - force) @ displacement)
     np.testing.assert_allclose(ledger, expected, rtol=1e-15)
 
 
 def device(x: FloatArray, delay: int = 1, **values: Any) -> SimulatedDevice:
-    """Return a simulated device; 2 Hz, a row of its anchor per sample."""
+    """Return a simulated device at 2 Hz with an anchor row per sample."""
     counters, ledger = np.zeros(3, np.int64), np.zeros(LEDGER_SIZE)
     queue, anchor = np.zeros((delay + 1, 3)), RNG.normal(size=(9, 3))
-    made = SimulatedDevice(x, queue, counters, anchor, ledger, 2.0, "plant")
-    return made._replace(**values)
+    result = SimulatedDevice(x, queue, counters, anchor, ledger, 2.0, "plant")
+    return result._replace(**values)
 
 
-def test_a_row_is_what_its_columns_are_called(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_row_values_match_their_column_names(monkeypatch: pytest.MonkeyPatch) -> None:
     def stored_energy(x: FloatArray, ax: float, ay: float, az: float, plant: object) -> float:
         assert plant == "plant"
         return float(x[0] + 2.0 * ax + 3.0 * ay + 4.0 * az)
@@ -100,31 +100,35 @@ def test_a_row_is_what_its_columns_are_called(monkeypatch: pytest.MonkeyPatch) -
     assert undelayed == (1.0, 2.0, 3.0)
 
 
-def test_what_is_seen_of_a_run() -> None:
-    """Where it got from the beginning on, and how the velocity varies since it was last seen."""
+def test_lane_statistics_are_bounds_and_velocity_sums() -> None:
+    """Position bounds since the start, velocity sums since the last segment."""
     rows, ledgers = RNG.normal(size=(12, 6)), RNG.normal(size=(12, LEDGER_SIZE))
-    seen = np.full((2, batch_loop.STATISTICS_SIZE), np.nan)
-    seen[1, batch_loop.LOW : batch_loop.SAMPLE_COUNT] = [np.inf] * 3 + [-np.inf] * 3
+    statistics = np.full((2, batch_loop.STATISTICS_SIZE), np.nan)
+    statistics[1, batch_loop.LOW : batch_loop.SAMPLE_COUNT] = [np.inf] * 3 + [-np.inf] * 3
     for x, ledger in zip(rows[:5], ledgers, strict=False):
-        batch_loop.update_lane_statistics(seen, 1, np.stack([-x, x]), np.stack([-ledger, ledger]))
-    seen[1, batch_loop.SAMPLE_COUNT] = 0.0
+        batch_loop.update_lane_statistics(
+            statistics, 1, np.stack([-x, x]), np.stack([-ledger, ledger])
+        )
+    statistics[1, batch_loop.SAMPLE_COUNT] = 0.0
     for x, ledger in zip(rows[5:], ledgers[5:], strict=True):
-        batch_loop.update_lane_statistics(seen, 1, np.stack([-x, x]), np.stack([-ledger, ledger]))
-    assert np.isnan(seen[0]).all()
-    low, high, (count,), base, total, squares, last = np.split(seen[1], [3, 6, 7, 10, 13, 16])
+        batch_loop.update_lane_statistics(
+            statistics, 1, np.stack([-x, x]), np.stack([-ledger, ledger])
+        )
+    assert np.isnan(statistics[0]).all()
+    low, high, (count,), base, total, squares, last = np.split(statistics[1], [3, 6, 7, 10, 13, 16])
     np.testing.assert_array_equal(low, rows[:, :3].min(axis=0))
     np.testing.assert_array_equal(high, rows[:, :3].max(axis=0))
-    apart = rows[5:, 3:] - rows[5, 3:]
+    deviations = rows[5:, 3:] - rows[5, 3:]
     assert count == 7.0
     np.testing.assert_array_equal(base, rows[5, 3:])
-    np.testing.assert_allclose(total, apart.sum(axis=0), rtol=1e-14)
-    np.testing.assert_allclose(squares, (apart**2).sum(axis=0), rtol=1e-14)
+    np.testing.assert_allclose(total, deviations.sum(axis=0), rtol=1e-14)
+    np.testing.assert_allclose(squares, (deviations**2).sum(axis=0), rtol=1e-14)
     expected = [ledgers[-1, :3].sum(), ledgers[-1, LOST] - ledgers[-1, FRICTION]]
     np.testing.assert_allclose(last, expected, rtol=1e-14)
 
 
 class Recorder:
-    """A servo and a body that record their arguments; the body moves by 1 m along each axis."""
+    """A stand-in servo and body that record arguments; the body moves 1 m along each axis."""
 
     def __init__(
         self, monkeypatch: pytest.MonkeyPatch, stops: Any = lambda _x, _sample: RUNNING
@@ -155,10 +159,10 @@ class Recorder:
         self.flushed.append(len(self.ticks))
         return state
 
-    def servo_tick(self, state: ServoState, _settings: Any, *given: Any) -> ServoState:
-        self.ticks.append((state, *given))
+    def servo_tick(self, state: ServoState, _settings: Any, *arguments: Any) -> ServoState:
+        self.ticks.append((state, *arguments))
         n = len(self.ticks)
-        return ServoState(*given[:3], fx=n, fy=2.0 * n, fz=3.0 * n)
+        return ServoState(*arguments[:3], fx=n, fy=2.0 * n, fz=3.0 * n)
 
     def write_row(self, row: int, time: float, servo: ServoState, *_rest: Any) -> None:
         self.rows.append((row, time, servo.fx))
@@ -173,7 +177,7 @@ class Recorder:
 
 
 def run(samples: int, *, every: int = 1, done: int = 1, rows: int = 99, x: Any = None) -> Any:
-    """Return stop, rows, state, samples, head of the queue and the anchor's motion."""
+    """Return stop, rows, state, samples, head of the queue and the anchor positions."""
     anchor = np.arange(3.0 * (samples + 1)).reshape(-1, 3) ** 2
     body = device(np.zeros(8) if x is None else x, anchor=anchor)
     body.counters[1:] = done
@@ -188,30 +192,30 @@ def run(samples: int, *, every: int = 1, done: int = 1, rows: int = 99, x: Any =
     return stop, trace.counters[0], state, finished, body.counters[0], anchor
 
 
-def test_a_sample_tells_servo_and_body_what_they_need(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The servo what is read, the body the force of a sample ago and where the anchor goes."""
-    told, x = Recorder(monkeypatch), np.array([0.0, -1.0, -2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+def test_sample_passes_reading_to_servo_and_force_to_body(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The servo gets the reading; the body the force of one sample ago and the anchor's motion."""
+    recorder, x = Recorder(monkeypatch), np.array([0.0, -1.0, -2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     stop, rows, state, samples, head, anchor = run(4, x=x)
     assert (stop, rows, samples, head) == (RUNNING, 4, 5, 0)
-    assert told.ticks[0][0] == SERVO
-    for i, (before, *given) in enumerate(told.ticks):
-        np.testing.assert_array_equal(given[:3], [i, i - 1.0, i - 2.0])
-        assert given[4:] == ["texture", "law"]
-        assert i == 0 or before == ServoState(i - 1, i - 2, i - 3, fx=i, fy=2 * i, fz=3 * i)
+    assert recorder.ticks[0][0] == SERVO
+    for i, (previous, *arguments) in enumerate(recorder.ticks):
+        np.testing.assert_array_equal(arguments[:3], [i, i - 1.0, i - 2.0])
+        assert arguments[4:] == ["texture", "law"]
+        assert i == 0 or previous == ServoState(i - 1, i - 2, i - 3, fx=i, fy=2 * i, fz=3 * i)
     assert state.servo == ServoState(3.0, 2.0, 1.0, fx=4.0, fy=8.0, fz=12.0)
-    for i, held in enumerate(told.inputs):
-        assert held[:3] == (i, 2.0 * i, 3.0 * i)
-        assert held[3:6] == tuple(anchor[i])
-        assert held[6:9] == tuple((anchor[i + 1] - anchor[i]) / 0.5)
-        assert bool(held[9]) is (i < 3)
+    for i, inputs in enumerate(recorder.inputs):
+        assert inputs[:3] == (i, 2.0 * i, 3.0 * i)
+        assert inputs[3:6] == tuple(anchor[i])
+        assert inputs[6:9] == tuple((anchor[i + 1] - anchor[i]) / 0.5)
+        assert bool(inputs[9]) is (i < 3)
 
 
-def test_the_first_sample_of_all_reads_where_the_body_is(monkeypatch: pytest.MonkeyPatch) -> None:
-    told = Recorder(monkeypatch)
+def test_first_sample_reads_the_initial_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    recorder = Recorder(monkeypatch)
     run(1, done=0, x=np.array([0.5, 1.5, 2.5, 0.0, 0.0, 0.0]))
-    # Before it what is next to nothing was made nothing, here a quarter more.
-    assert told.ticks[0][:4] == (ServoState(0.75, 1.75, 2.75), 0.75, 1.75, 2.75)
-    assert told.flushed == [0]
+    # After the flush of subnormals, whose stand-in adds 0.25.
+    assert recorder.ticks[0][:4] == (ServoState(0.75, 1.75, 2.75), 0.75, 1.75, 2.75)
+    assert recorder.flushed == [0]
 
 
 @pytest.mark.parametrize(
@@ -219,31 +223,31 @@ def test_the_first_sample_of_all_reads_where_the_body_is(monkeypatch: pytest.Mon
     [(1, 0, [0, 1, 2, 3, 4, 5, 6]), (3, 0, [0, 3, 6]), (3, 1, [3, 6]), (3, 2, [3, 6]),
      (3, 3, [3, 6, 9]), (10, 1, [])],
 )  # fmt: skip
-def test_rows_are_those_of_multiples(
+def test_rows_are_written_at_multiples_of_every(
     every: int, done: int, expected: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told = Recorder(monkeypatch)
-    found = run(7, every=every, done=done)
-    assert found[1] == len(expected)
-    assert [row for row, _time, _force in told.rows] == list(range(len(expected)))
-    assert [time for _row, time, _force in told.rows] == [0.5 * sample for sample in expected]
-    assert [force for _row, _time, force in told.rows] == [s - done + 1 for s in expected]
-    told.rows.clear()
+    recorder = Recorder(monkeypatch)
+    result = run(7, every=every, done=done)
+    assert result[1] == len(expected)
+    assert [row for row, _time, _force in recorder.rows] == list(range(len(expected)))
+    assert [time for _row, time, _force in recorder.rows] == [0.5 * sample for sample in expected]
+    assert [force for _row, _time, force in recorder.rows] == [s - done + 1 for s in expected]
+    recorder.rows.clear()
     assert run(7, every=every, done=done, rows=0)[1] == 0
-    assert told.rows == []
+    assert recorder.rows == []
 
 
-def test_what_is_next_to_nothing_goes_every_256_samples(monkeypatch: pytest.MonkeyPatch) -> None:
-    told = Recorder(monkeypatch)
+def test_subnormals_are_flushed_every_256_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    recorder = Recorder(monkeypatch)
     run(600, done=200)
-    assert told.flushed == [56, 312, 568]
+    assert recorder.flushed == [56, 312, 568]
 
 
-def test_what_stops_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The body itself before its sample is done, or a place or speed of a million after it."""
-    told = Recorder(monkeypatch, lambda _x, sample: LEFT_WORKSPACE if sample == 3 else RUNNING)
+def test_run_stops_at_workspace_limit_or_divergence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The body stops it during a sample; a coordinate or speed of 1e6 after the sample."""
+    recorder = Recorder(monkeypatch, lambda _x, sample: LEFT_WORKSPACE if sample == 3 else RUNNING)
     stop, _rows, _state, samples, *_rest = run(9, done=5)
-    assert (stop, samples, len(told.ticks)) == (LEFT_WORKSPACE, 7, 3)
+    assert (stop, samples, len(recorder.ticks)) == (LEFT_WORKSPACE, 7, 3)
     for axis in range(6):
         for value, sample in (
             (999_990.0, None),
@@ -258,14 +262,14 @@ def test_what_stops_a_run(monkeypatch: pytest.MonkeyPatch) -> None:
                 x[axis] = value if at == 3 else 0.0
                 return RUNNING
 
-            told = Recorder(monkeypatch, push)
+            recorder = Recorder(monkeypatch, push)
             stop, _rows, _state, samples, *_rest = run(4, done=5)
             assert stop == (RUNNING if sample is None else DIVERGED)
             assert samples == 5 + (4 if sample is None else sample)
 
 
-def test_stored_energy_is_that_at_the_anchor(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(energy_trace, "stored_energy", lambda *given: given)
+def test_stored_energy_is_computed_with_the_anchor(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(energy_trace, "stored_energy", lambda *arguments: arguments)
     point: Any = np.array([1.0, 2.0, 3.0])
     stored: Any = energy_trace.stored_energy_at(point, 2.0 * point, "plant")
     assert stored == (point, 2.0, 4.0, 6.0, "plant")

@@ -1,4 +1,4 @@
-"""What a limit cycle is, from whole traces of runs: what the sums of the search must come to."""
+"""The definition of a limit cycle on full traces: the reference for the sums of the search."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from asperity.simulation.trace import StopReason
 
 
 @dataclass(frozen=True)
-class Shifted:
-    """A motion that is carried along: the same way from another place."""
+class ShiftedMotion:
+    """A motion displaced by a constant offset."""
 
     motion: Motion
     offset: FloatArray
@@ -29,32 +29,32 @@ class Shifted:
         return {}
 
 
-def restlessness(run: Run, quarter: int = 3) -> float:
+def velocity_spread(run: Run, quarter: int = 3) -> float:
     """Return the standard deviations of the velocity, summed over the axes [m/s]."""
     part = np.array_split(run.velocity, 4)[quarter]
     return float(part.std(axis=0).sum())
 
 
-def cycles(run: Run, threshold: float = CYCLE_SPEED) -> bool:
-    """Return whether a run ends restless, and fed by the texture, or diverged."""
+def is_cycling(run: Run, threshold: float = CYCLE_SPEED) -> bool:
+    """Return whether a run ends in motion that the texture feeds, or diverged."""
     if run.stop is StopReason.DIVERGED:
         return True
-    return restlessness(run) > threshold and run.tail is not None and run.tail.gains_energy
+    return velocity_spread(run) > threshold and run.tail is not None and run.tail.gains_energy
 
 
-def calms_down(run: Run) -> bool:
-    """Return whether what is left of the motion is still getting less, by a tenth or more."""
-    return not run.stop and restlessness(run) < 0.9 * restlessness(run, quarter=2)
+def is_settling(run: Run) -> bool:
+    """Return whether the remaining motion still decreases, by a tenth or more per quarter."""
+    return not run.stop and velocity_spread(run) < 0.9 * velocity_spread(run, quarter=2)
 
 
 def ends_in_cycle(
     run_for: Callable[[float], Run], duration: float, threshold: float = CYCLE_SPEED
 ) -> tuple[bool, Run]:
-    """Return whether a loop ends in a limit cycle, and the longest run of it."""
-    for patience in DURATION_FACTORS:
-        run = run_for(patience * duration)
-        if run.stop or restlessness(run) <= threshold:
+    """Return whether a loop ends in a limit cycle, and its longest run."""
+    for factor in DURATION_FACTORS:
+        run = run_for(factor * duration)
+        if run.stop or velocity_spread(run) <= threshold:
             break
-        if patience > 1.0 and not calms_down(run):
+        if factor > 1.0 and not is_settling(run):
             break
-    return cycles(run, threshold), run
+    return is_cycling(run, threshold), run

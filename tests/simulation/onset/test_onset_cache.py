@@ -1,4 +1,4 @@
-"""Onsets are kept between runs, under all that they depend on."""
+"""Onsets are cached between runs under a key of everything that they depend on."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ LOOP: dict[str, Any] = {
 
 
 @pytest.fixture(autouse=True)
-def room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """An empty room of answers; compiled code is shared with other tests."""
+def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """An empty namespace of results; compiled code is shared with other tests."""
     monkeypatch.setattr(kept, "RESULTS_NAMESPACE", f"results-{tmp_path.name}")
     yield
     for entry in cache.list_entries():
@@ -45,29 +45,29 @@ def room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.fixture
 def runs(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """The stiffnesses that are run."""
-    seen: list[float] = []
-    start = BatchSimulation.new_trajectory
+    """The list of simulated stiffnesses, filled as they are run."""
+    stiffnesses: list[float] = []
+    new_trajectory = BatchSimulation.new_trajectory
 
-    def noted(loop: BatchSimulation, stiffness: float, *rest: Any) -> Any:
-        seen.append(stiffness)
-        return start(loop, stiffness, *rest)
+    def record(loop: BatchSimulation, stiffness: float, *rest: Any) -> Any:
+        stiffnesses.append(stiffness)
+        return new_trajectory(loop, stiffness, *rest)
 
-    monkeypatch.setattr(BatchSimulation, "new_trajectory", noted)
-    return seen
-
-
-def found(**changed: Any) -> Onset:
-    return find_onset(**LOOP | changed)
+    monkeypatch.setattr(BatchSimulation, "new_trajectory", record)
+    return stiffnesses
 
 
-def test_an_onset_is_found_once(runs: list[float]) -> None:
-    first = found()
+def cached_onset(**changes: Any) -> Onset:
+    return find_onset(**LOOP | changes)
+
+
+def test_onset_is_computed_once_and_then_cached(runs: list[float]) -> None:
+    onset = cached_onset()
     assert runs
     runs.clear()
-    assert found() == first
-    # Its stiffness does not count, and where the handle starts by default is where it starts.
-    assert found(surface=LOOP["surface"].to_stiffness(3.0), start=np.zeros(3)) == first
+    assert cached_onset() == onset
+    # The surface's stiffness is not part of the key; an explicit default start equals the default.
+    assert cached_onset(surface=LOOP["surface"].to_stiffness(3.0), start=np.zeros(3)) == onset
     assert not runs
 
 
@@ -90,27 +90,27 @@ CHANGES: dict[str, Callable[[], Any]] = {
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_whatever_is_changed_is_found_anew(name: str, runs: list[float]) -> None:
-    found()
+def test_changed_argument_is_computed_again(name: str, runs: list[float]) -> None:
+    cached_onset()
     runs.clear()
-    found(**{name: CHANGES[name]()})
+    cached_onset(**{name: CHANGES[name]()})
     assert runs
 
 
-class Mine(Stationary):
-    """A motion of one's own: what it does is not known."""
+class UserMotion(Stationary):
+    """A user-defined motion, whose behaviour the cache key cannot capture."""
 
 
 def test_the_onset_of_a_user_defined_motion_is_not_cached(runs: list[float]) -> None:
     for _ in range(2):
         runs.clear()
-        found(motion=Mine((0.0, 0.0, 0.0)))
+        cached_onset(motion=UserMotion((0.0, 0.0, 0.0)))
         assert runs
 
 
 def test_the_onset_of_a_user_defined_law_is_cached_by_its_formula(runs: list[float]) -> None:
     for power in (1, 2):
-        own = Law("U", "own", "vertical", lambda c, n=power: c.k * c.depth**n * c.e_z)
+        law = Law("U", "own", "vertical", lambda c, n=power: c.k * c.depth**n * c.e_z)
         runs.clear()
-        found(surface=Surface(Sinusoid(1e-4, 1e-3), own))
+        cached_onset(surface=Surface(Sinusoid(1e-4, 1e-3), law))
         assert runs
