@@ -1,4 +1,4 @@
-"""Blended borders: the map repeats, and the stated changes are those of a slow loop."""
+"""Blended borders make surfaces periodic; results are compared with a reference loop."""
 
 from __future__ import annotations
 
@@ -27,66 +27,68 @@ def smooth_step(s: float) -> float:
 
 @pytest.mark.parametrize("band", [4, 7, 12])
 @pytest.mark.parametrize("seed", range(8))
-def test_profile_against_a_slow_loop(band: int, seed: int) -> None:
+def test_profile_matches_a_reference_loop(band: int, seed: int) -> None:
     n, step = 40, 2e-6
     heights = np.random.default_rng(seed).standard_normal(n)
-    got, seam = blend_borders(heights, (band,), (step,))
+    blended, seam = blend_borders(heights, (band,), (step,))
     expected, changes, pieces = heights[: n - band].copy(), [], []
     for i in range(band):
         t = smooth_step((i + 1) / (band + 1))
         expected[i] = t * heights[i] + (1 - t) * heights[n - band + i]
         pieces.append("end" if i < band // 2 else "start")
         changes.append(expected[i] - heights[n - band + i if pieces[-1] == "end" else i])
-    np.testing.assert_allclose(got, expected, atol=1e-14)
+    np.testing.assert_allclose(blended, expected, atol=1e-14)
     assert seam.rms == pytest.approx(np.sqrt(np.mean(np.square(changes))), rel=1e-12)
     assert seam.jump == pytest.approx(abs(heights[0] - heights[-1]))
     slopes = []
-    for i in range(-1, band):  # the step from i to i + 1, against that of the piece(s) it is in
-        after = expected[(i + 1) % (n - band)] - expected[i % (n - band)]
+    for i in range(-1, band):  # the step from i to i + 1, compared with the original step(s)
+        step_change = expected[(i + 1) % (n - band)] - expected[i % (n - band)]
         if i < band // 2:
-            slopes.append(after - (heights[n - band + i + 1] - heights[n - band + i]))
+            slopes.append(step_change - (heights[n - band + i + 1] - heights[n - band + i]))
         if i >= band // 2:
-            slopes.append(after - (heights[i + 1] - heights[i]))
+            slopes.append(step_change - (heights[i + 1] - heights[i]))
     assert seam.slope == pytest.approx(np.abs(slopes).max() / step, rel=1e-12)
 
 
-def test_a_surface_that_repeats_already_is_only_shortened() -> None:
+def test_periodic_surface_is_only_shortened() -> None:
     y, x = np.mgrid[:48, :66]
-    repeats = np.sin(2 * np.pi * x / 60) + np.cos(2 * np.pi * y / 20)
-    got, seam = blend_borders(repeats, (6, 8), (1.0, 1.0))
-    np.testing.assert_allclose(got, repeats[:40, :60], atol=1e-14)
+    periodic = np.sin(2 * np.pi * x / 60) + np.cos(2 * np.pi * y / 20)
+    blended, seam = blend_borders(periodic, (6, 8), (1.0, 1.0))
+    np.testing.assert_allclose(blended, periodic[:40, :60], atol=1e-14)
     assert seam.rms < 1e-14
     assert seam.slope < 1e-14
 
 
-def test_the_seam_is_as_smooth_as_the_surface() -> None:
+def test_seam_is_as_smooth_as_the_surface() -> None:
     heights = bumpy()
-    got, seam = blend_borders(heights, (10, 12), (1.0, 1.0))
-    assert got.shape == (48, 40)
+    blended, seam = blend_borders(heights, (10, 12), (1.0, 1.0))
+    assert blended.shape == (48, 40)
     steps_inside = np.abs(np.diff(heights, axis=1)).max()
-    across = np.abs(got[:, 0] - got[:, -1]).max()
+    across = np.abs(blended[:, 0] - blended[:, -1]).max()
     assert across < steps_inside + seam.slope
-    assert np.abs(heights[:, 0] - heights[:, 39]).max() > 3 * steps_inside  # cutting alone is not
-    assert got.min() >= heights.min()
-    assert got.max() <= heights.max()
+    assert (
+        np.abs(heights[:, 0] - heights[:, 39]).max() > 3 * steps_inside
+    )  # shortening alone is not smooth
+    assert blended.min() >= heights.min()
+    assert blended.max() <= heights.max()
 
 
-def test_untouched_beyond_the_bands() -> None:
+def test_heights_beyond_the_bands_are_unchanged() -> None:
     heights = bumpy()
-    got, _ = blend_borders(heights, (10, 12), (1.0, 1.0))
-    np.testing.assert_array_equal(got[12:, 10:], heights[12:48, 10:40])
+    blended, _ = blend_borders(heights, (10, 12), (1.0, 1.0))
+    np.testing.assert_array_equal(blended[12:, 10:], heights[12:48, 10:40])
 
 
-def test_prepared_surface_is_periodic_and_says_so(tmp_path: Any) -> None:
+def test_prepared_surface_and_texture_are_periodic(tmp_path: Any) -> None:
     raw = RawSurface(bumpy(), PITCH, "test", ())
     prepared = prepare(raw, periodic=True)
     assert prepared.periodic
     assert prepared.heights.shape == (54, 45)
     assert "opposite borders blended over 10 µm x 18 µm (a tenth of each side)" in prepared.steps[3]
     assert "which leaves 45 x 54 points" in prepared.steps[3]
-    given = prepare(raw, periodic=True, blend=30e-6)
-    assert given.heights.shape == (50, 35)
-    assert "blended over 30 µm, which" in given.steps[3]
+    with_width = prepare(raw, periodic=True, blend=30e-6)
+    assert with_width.heights.shape == (50, 35)
+    assert "blended over 30 µm, which" in with_width.steps[3]
     np.save(tmp_path / "map.npy", bumpy())
     texture = load_texture(tmp_path / "map.npy", pitch=PITCH, periodic=True)
     assert texture.periodic
@@ -96,7 +98,7 @@ def test_prepared_surface_is_periodic_and_says_so(tmp_path: Any) -> None:
     assert not load_texture(tmp_path / "map.npy", pitch=PITCH).periodic
 
 
-def test_mask_follows() -> None:
+def test_filled_mask_follows_the_blending() -> None:
     heights = bumpy()
     holes = [(1, 30), (50, 20), (59, 49), (30, 47)]
     for index in holes:
@@ -108,7 +110,7 @@ def test_mask_follows() -> None:
     assert set(map(tuple, np.argwhere(prepared.filled_mask).tolist())) == expected
 
 
-def test_small_profile_and_map() -> None:
+def test_minimum_size_of_periodic_surfaces() -> None:
     assert len(prepare(RawSurface(bumpy()[0, :8], (1e-6,), "t", ()), periodic=True).heights) == 4
     for small in (bumpy()[0, :7], bumpy()[:7, :20]):
         raw = RawSurface(small, PITCH[: small.ndim], "test", ())
@@ -127,15 +129,15 @@ def test_small_profile_and_map() -> None:
         (1.0, "must be at most half the shorter side"),
     ],
 )
-def test_widths_that_are_refused(blend: float, match: str) -> None:
+def test_invalid_widths_are_refused(blend: float, match: str) -> None:
     with pytest.raises(ParameterError, match=f"blend {match}") as caught:
         prepare(RawSurface(bumpy(), PITCH, "test", ()), periodic=True, blend=blend)
     assert caught.value.argument == "blend"
 
 
-def test_width_without_periodic_and_periodic_that_is_no_answer() -> None:
+def test_width_needs_periodic_and_periodic_must_be_boolean() -> None:
     raw = RawSurface(bumpy(), PITCH, "test", ())
     with pytest.raises(ParameterError, match=r"blend is the width .* needs periodic"):
         prepare(raw, blend=20e-6)
     with pytest.raises(ParameterError, match="periodic must be true or false"):
-        prepare(raw, periodic="no")  # the mistake under test
+        prepare(raw, periodic="no")  # wrong type on purpose

@@ -1,4 +1,4 @@
-"""Holes are filled by the harmonic function of their surroundings, whatever their size."""
+"""Holes of any size are filled by harmonic interpolation of their surroundings."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ def bumpy(ny: int = 40, nx: int = 50) -> NDArray[np.float64]:
     return np.asarray(1e-6 * rng.standard_normal((ny, nx)) + plane(ny, nx))
 
 
-def holed(heights: NDArray[np.float64]) -> NDArray[np.float64]:
+def with_holes(heights: NDArray[np.float64]) -> NDArray[np.float64]:
     ny, nx = heights.shape
-    with_holes = heights.copy()
-    with_holes[ny // 4 : 5 * ny // 8, nx // 5 : 4 * nx // 5] = np.nan
-    with_holes[2, 3] = np.nan
-    return with_holes
+    result = heights.copy()
+    result[ny // 4 : 5 * ny // 8, nx // 5 : 4 * nx // 5] = np.nan
+    result[2, 3] = np.nan
+    return result
 
 
 @pytest.fixture(params=["direct", "multigrid"])
 def solver(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Send every hole to one of the two solvers, with many levels of multigrid."""
+    """Use one of the two solvers for every hole, multigrid with many levels."""
     if request.param == "multigrid":
         monkeypatch.setattr(filling, "_DIRECT_LIMIT", 0)
         monkeypatch.setattr(filling, "_COARSEST_SIZE", 4)
@@ -52,13 +52,13 @@ def solver(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.parametrize("ratio", [0.05, 1.0, 2.0, 20.0])
 def test_filling_continues_a_plane(ratio: float) -> None:
     exact = plane(61, 80)
-    filled = fill_harmonic(holed(exact), (P, ratio * P))
+    filled = fill_harmonic(with_holes(exact), (P, ratio * P))
     assert np.max(np.abs(filled - exact)) < 1e-8 * np.ptp(exact)
 
 
 @pytest.mark.usefixtures("solver")
 def test_filling_is_harmonic_and_keeps_valid_points() -> None:
-    heights = holed(bumpy())
+    heights = with_holes(bumpy())
     heights[0, :5] = heights[-3:, -1] = np.nan  # holes at the outer border, too
     missing = np.isnan(heights)
     filled = fill_harmonic(heights, (P, 2 * P))
@@ -68,7 +68,7 @@ def test_filling_is_harmonic_and_keeps_valid_points() -> None:
     laplacian = (mirrored[1:-1, 2:] - 2 * centre + mirrored[1:-1, :-2]) / 1.0
     laplacian += (mirrored[2:, 1:-1] - 2 * centre + mirrored[:-2, 1:-1]) / 4.0
     assert np.max(np.abs(laplacian[missing])) < 1e-7 * np.ptp(filled)
-    assert np.max(np.abs(laplacian[~missing])) > 0.1 * np.ptp(filled)  # the check can fail
+    assert np.max(np.abs(laplacian[~missing])) > 0.1 * np.ptp(filled)  # negative control
     assert filled[missing].max() < np.nanmax(heights)
     assert filled[missing].min() > np.nanmin(heights)
 
@@ -79,7 +79,7 @@ def test_filling_of_a_profile_is_linear() -> None:
     np.testing.assert_allclose(filled, [1, 1, 2, 3, 4, 0, 0])
 
 
-def test_filling_of_a_quarter_of_a_million_points() -> None:
+def test_filling_of_a_large_hole() -> None:
     y, x = np.mgrid[:1000, :1000] / 100.0
     exact = x**2 - y**2 + 3 * x  # harmonic, also for the five-point equation
     heights = exact.copy()
@@ -88,14 +88,14 @@ def test_filling_of_a_quarter_of_a_million_points() -> None:
     assert np.max(np.abs(fill_harmonic(heights) - exact)) < 1e-7 * np.ptp(exact)
 
 
-def test_multigrid_needs_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The preconditioner works: without it conjugate gradients take hundreds of steps."""
+def test_multigrid_converges_in_few_iterations(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the multigrid preconditioner, conjugate gradients take hundreds of iterations."""
     import scipy.sparse.linalg
 
     counts: list[int] = []
     solve = scipy.sparse.linalg.cg
 
-    def counting(matrix: Any, right: Any, **options: Any) -> Any:
+    def counting_solve(matrix: Any, right: Any, **options: Any) -> Any:
         counts.append(0)
 
         def count(_x: Any) -> None:
@@ -103,7 +103,7 @@ def test_multigrid_needs_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
 
         return solve(matrix, right, callback=count, **options)
 
-    monkeypatch.setattr(scipy.sparse.linalg, "cg", counting)
+    monkeypatch.setattr(scipy.sparse.linalg, "cg", counting_solve)
     monkeypatch.setattr(filling, "_DIRECT_LIMIT", 0)
     heights = np.random.default_rng(5).standard_normal((300, 301))
     ragged = np.hypot(*np.meshgrid(np.arange(301) - 120, np.arange(300) - 170)) < 90
@@ -116,8 +116,8 @@ def test_multigrid_needs_few_steps(monkeypatch: pytest.MonkeyPatch) -> None:
         assert 2 < max(counts) < 20
 
 
-def test_interpolation_keeps_a_constant() -> None:
-    """Where everything is unknown, as at the outer border, of even and odd counts."""
+def test_interpolation_reproduces_constants() -> None:
+    """Interpolation weights sum to 1 for even and odd sizes with all points unknown."""
     for shape in ((9, 12), (8, 7), (5, 5)):
         points = np.arange(shape[0] * shape[1])
         matrix, _ = filling._laplace_system(np.full(shape, np.nan), points, (1.0, 2.0), 0.0)
@@ -129,13 +129,13 @@ def test_interpolation_keeps_a_constant() -> None:
             np.testing.assert_allclose(spread @ np.ones(len(coarse[0])), 1.0)
 
 
-def test_groups_are_whole_holes_and_all_of_them() -> None:
+def test_hole_groups_cover_all_missing_points_once() -> None:
     missing = np.random.default_rng(8).random((200, 210)) < 0.4
     groups = list(filling._hole_groups(missing))
     np.testing.assert_array_equal(np.sort(np.concatenate(groups)), np.flatnonzero(missing))
 
 
-def test_holes_are_independent_of_their_grouping(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_result_is_independent_of_the_grouping_of_holes(monkeypatch: pytest.MonkeyPatch) -> None:
     heights = bumpy(60, 70)
     heights[np.random.default_rng(9).random(heights.shape) < 0.2] = np.nan
     together = fill_harmonic(heights, (P, 2 * P))

@@ -1,4 +1,4 @@
-"""S- and L-filter against the transmission that the standard defines: 2^-(λc/λ)²."""
+"""S- and L-filter against the transmission of the standard, 2^-(λc/λ)²."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from asperity.measured.reading import RawSurface
 
 P = 1e-6
 N = 401
-# Waves that end in a crest or trough at both borders: an even number of quarter turns.
+# Half waves per profile: each wave ends in a crest or trough at both borders.
 WAVES = [2, 5, 16, 40, 81, 150]
 
 
-def passed(wavelength: float, cutoff: float) -> float:
+def transmission(wavelength: float, cutoff: float) -> float:
     """Return the transmission of the Gaussian low-pass: one half at the cut-off."""
     return float(2.0 ** -((cutoff / wavelength) ** 2))
 
@@ -28,13 +28,13 @@ def wave(waves: int, n: int = N) -> Any:
     return 1e-6 * np.cos(np.pi * waves * np.arange(n) / (n - 1))
 
 
-def run(heights: Any, **arguments: Any) -> Any:
-    """Filter only: the mean stays with form 0, and cosines of whole waves have nearly none."""
+def filter_only(heights: Any, **arguments: Any) -> Any:
+    """Prepare with form 0, which subtracts only the mean, so that only the filters act."""
     raw = RawSurface(heights, (P,) * heights.ndim, "test", ())
     return prepare(raw, form=0, **arguments)
 
 
-def test_the_constant_of_the_standard() -> None:
+def test_alpha_is_the_constant_of_the_standard() -> None:
     assert pytest.approx(0.4697186393498257, rel=1e-15) == ALPHA
     assert np.exp(-np.pi * ALPHA**2) == pytest.approx(0.5, rel=1e-15)
 
@@ -44,10 +44,10 @@ def test_the_constant_of_the_standard() -> None:
 def test_s_filter_of_a_profile(waves: int, cutoff: float) -> None:
     before = wave(waves)
     length = 2 * (N - 1) * P / waves
-    got = run(before, cutoff=cutoff).heights
+    filtered = filter_only(before, cutoff=cutoff).heights
     mean = before.mean()  # form 0 subtracts it, and the filter keeps a constant
-    expected = passed(length, cutoff) * before - mean
-    assert np.max(np.abs(got - expected)) < 1e-12 * 1e-6
+    expected = transmission(length, cutoff) * before - mean
+    assert np.max(np.abs(filtered - expected)) < 1e-12 * 1e-6
 
 
 @pytest.mark.parametrize("waves", WAVES)
@@ -55,12 +55,12 @@ def test_s_and_l_filter_of_a_profile(waves: int) -> None:
     short, long = 4e-6, 5e-5
     before = wave(waves)
     length = 2 * (N - 1) * P / waves
-    got = run(before, cutoff=short, l_cutoff=long).heights
-    expected = passed(length, short) * (1 - passed(length, long)) * before
-    assert np.max(np.abs(got - expected)) < 1e-12 * 1e-6
-    wrong = passed(length, short) * (1 - passed(length, 1.001 * long)) * before
-    if 0.01 < passed(length, long) < 0.99:  # the check can fail
-        assert np.max(np.abs(got - wrong)) > 1e-6 * 1e-6
+    filtered = filter_only(before, cutoff=short, l_cutoff=long).heights
+    expected = transmission(length, short) * (1 - transmission(length, long)) * before
+    assert np.max(np.abs(filtered - expected)) < 1e-12 * 1e-6
+    wrong = transmission(length, short) * (1 - transmission(length, 1.001 * long)) * before
+    if 0.01 < transmission(length, long) < 0.99:  # negative control
+        assert np.max(np.abs(filtered - wrong)) > 1e-6 * 1e-6
 
 
 def test_l_filter_of_a_map_with_unequal_pitch() -> None:
@@ -69,37 +69,41 @@ def test_l_filter_of_a_map_with_unequal_pitch() -> None:
     kx, ky = 7 / (2 * (nx - 1) * px), 9 / (2 * (ny - 1) * py)  # waves per metre
     before = 1e-6 * np.cos(2 * np.pi * kx * px * x) * np.cos(2 * np.pi * ky * py * y)
     raw = RawSurface(before, (px, py), "test", ())
-    got = prepare(raw, form=0, cutoff=short, l_cutoff=long).heights
+    filtered = prepare(raw, form=0, cutoff=short, l_cutoff=long).heights
     square = kx**2 + ky**2
     expected = 2.0 ** -(short**2 * square) * (1 - 2.0 ** -(long**2 * square)) * before
-    assert np.max(np.abs(got - expected)) < 1e-12 * 1e-6
+    assert np.max(np.abs(filtered - expected)) < 1e-12 * 1e-6
 
 
-def test_half_passes_both_filters_at_their_cutoffs() -> None:
-    at = wave(20)  # wavelength 40 µm
-    np.testing.assert_allclose(gaussian_filter(at, (P,), 4e-5), at / 2, atol=1e-18)
-    rough = at.copy()
+def test_transmission_at_the_cutoff_is_one_half() -> None:
+    wave_at_cutoff = wave(20)  # wavelength 40 µm
+    np.testing.assert_allclose(
+        gaussian_filter(wave_at_cutoff, (P,), 4e-5), wave_at_cutoff / 2, atol=1e-18
+    )
+    rough = wave_at_cutoff.copy()
     filters.highpass_in_place(rough, (P,), 4e-5)
-    np.testing.assert_allclose(rough, at / 2, atol=1e-18)
+    np.testing.assert_allclose(rough, wave_at_cutoff / 2, atol=1e-18)
 
 
 @pytest.mark.parametrize("block", [1, 100, 700])
-def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch, block: int) -> None:
+def test_result_is_independent_of_the_block_size(
+    monkeypatch: pytest.MonkeyPatch, block: int
+) -> None:
     heights = np.random.default_rng(2).standard_normal((31, 23))
     whole = gaussian_filter(heights, (1.0, 2.0), 7.0)
     monkeypatch.setattr(filters, "_BLOCK", block)
     np.testing.assert_allclose(gaussian_filter(heights, (1.0, 2.0), 7.0), whole, atol=1e-14)
 
 
-def test_the_input_is_kept() -> None:
+def test_input_is_not_changed() -> None:
     heights = np.random.default_rng(2).standard_normal((9, 8))
     before = heights.copy()
     gaussian_filter(heights, (1.0, 1.0), 3.0)
     np.testing.assert_array_equal(heights, before)
 
 
-def test_steps_say_both() -> None:
-    steps = run(wave(5), cutoff=4e-6, l_cutoff=8e-5).steps
+def test_steps_state_both_filters() -> None:
+    steps = filter_only(wave(5), cutoff=4e-6, l_cutoff=8e-5).steps
     assert steps[2] == "filtered: Gaussian ISO 16610-21, cut-off 4 µm"
     assert steps[3] == "waviness removed: Gaussian L-filter ISO 16610-21, cut-off 80 µm"
 
@@ -117,12 +121,12 @@ def test_steps_say_both() -> None:
         ("1e-4", "must be a number"),
     ],
 )
-def test_l_cutoffs_that_are_refused(l_cutoff: Any, match: str) -> None:
+def test_invalid_l_cutoffs_are_refused(l_cutoff: Any, match: str) -> None:
     with pytest.raises(ParameterError, match=match) as caught:
-        run(wave(5), cutoff=4e-6, l_cutoff=l_cutoff)
+        filter_only(wave(5), cutoff=4e-6, l_cutoff=l_cutoff)
     assert caught.value.argument == "l_cutoff"
 
 
-def test_l_cutoff_is_compared_with_the_default_cutoff_too() -> None:
+def test_l_cutoff_must_exceed_the_default_cutoff() -> None:
     with pytest.raises(ParameterError, match="l_cutoff must be longer than cutoff, 4 µm"):
-        run(wave(5), l_cutoff=3e-6)
+        filter_only(wave(5), l_cutoff=3e-6)

@@ -1,4 +1,4 @@
-"""Polynomial form against monomials that are fitted by another solver."""
+"""Polynomial form against a least-squares fit of monomials by another solver."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ def rough(shape: tuple[int, ...], seed: int = 3) -> Any:
 
 @pytest.mark.parametrize("degree", [0, 1, 2, 3, 5])
 @pytest.mark.parametrize("holes", [False, True])
-def test_fit_is_that_of_least_squares(degree: int, holes: bool) -> None:
+def test_fit_is_the_least_squares_polynomial(degree: int, holes: bool) -> None:
     heights = rough((37, 52)) + monomials((37, 52), 6) @ rough((28,), 4)
     if holes:
-        heights[5:19, 30:] = np.nan  # at the border: the basis is not orthogonal any more
+        heights[5:19, 30:] = np.nan  # at the border, so that the basis is not orthogonal
         heights[rough(heights.shape, 6) > 1.8] = np.nan
     valid = ~np.isnan(heights)
     basis = monomials(heights.shape, degree)
-    best, *_ = np.linalg.lstsq(basis[valid], heights[valid], rcond=None)
-    got = fit_form(heights, degree).evaluate_rows(slice(None))
-    np.testing.assert_allclose(got, basis @ best, atol=1e-10)
+    coefficients, *_ = np.linalg.lstsq(basis[valid], heights[valid], rcond=None)
+    fitted = fit_form(heights, degree).evaluate_rows(slice(None))
+    np.testing.assert_allclose(fitted, basis @ coefficients, atol=1e-10)
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2, 4, 7, 10])
-def test_polynomials_of_the_degree_vanish_and_those_above_do_not(degree: int) -> None:
+def test_form_removes_polynomials_up_to_its_degree_only(degree: int) -> None:
     shape = (40, 61)
     y, x = np.mgrid[-1:1:40j, -1:1:61j]
     inside = monomials(shape, degree) @ rough((monomials((2, 2), degree).shape[-1],), degree)
@@ -52,7 +52,7 @@ def test_polynomials_of_the_degree_vanish_and_those_above_do_not(degree: int) ->
 
 
 @pytest.mark.parametrize("degree", [1, 2, 6])
-def test_profile(degree: int) -> None:
+def test_form_of_a_profile(degree: int) -> None:
     x = np.linspace(-1, 1, 200)
     heights = rough((200,)) + np.polyval(rough((9,), 1), x)
     heights[20:50] = np.nan
@@ -63,27 +63,27 @@ def test_profile(degree: int) -> None:
     )
 
 
-def test_fit_is_good_to_rounding_where_the_basis_is_far_from_orthogonal() -> None:
-    """Two fifths of a profile missing: one solution of the normal equations is not enough."""
+def test_fit_is_accurate_for_an_ill_conditioned_basis() -> None:
+    """With two fifths of a profile missing, the normal equations need iterative refinement."""
     heights = np.random.default_rng(1).standard_normal(300)
     heights[180:] = np.nan
     x = np.linspace(-1, 1, 300)
-    fitted = np.polynomial.Chebyshev.fit(x[:180], heights[:180], 6)  # by singular values
-    got = fit_form(heights, 6).evaluate_rows(slice(None))[:180]
-    assert np.max(np.abs(got - fitted(x[:180]))) < 1e-13
+    fitted = np.polynomial.Chebyshev.fit(x[:180], heights[:180], 6)  # uses singular values
+    form = fit_form(heights, 6).evaluate_rows(slice(None))[:180]
+    assert np.max(np.abs(form - fitted(x[:180]))) < 1e-13
 
 
-def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_result_is_independent_of_the_block_size(monkeypatch: pytest.MonkeyPatch) -> None:
     heights = rough((33, 20))
     whole = heights.copy()
-    sentence = subtract_form(whole, fit_form(whole, 3), (1e-6, 2e-6))
+    step = subtract_form(whole, fit_form(whole, 3), (1e-6, 2e-6))
     monkeypatch.setattr(module, "_BLOCK", 50)
-    parts = heights.copy()
-    assert subtract_form(parts, fit_form(parts, 3), (1e-6, 2e-6)) == sentence
-    np.testing.assert_allclose(parts, whole, atol=1e-13)
+    blockwise = heights.copy()
+    assert subtract_form(blockwise, fit_form(blockwise, 3), (1e-6, 2e-6)) == step
+    np.testing.assert_allclose(blockwise, whole, atol=1e-13)
 
 
-def test_sentence_has_the_size_and_slopes_of_the_form() -> None:
+def test_step_states_size_and_slopes_of_the_form() -> None:
     y, x = np.mgrid[:41, :61]
     px, py = 1e-6, 3e-6
     u, v = (x - 30) * px, (y - 20) * py
@@ -98,7 +98,7 @@ def test_sentence_has_the_size_and_slopes_of_the_form() -> None:
     )
 
 
-def test_degree_nought_keeps_the_tilt() -> None:
+def test_degree_zero_keeps_the_tilt() -> None:
     ramp = np.linspace(0.0, 1e-4, 50)
     prepared = prepare(RawSurface(ramp, (1e-5,), "ramp", ()), form=0, cutoff=2e-5)
     assert np.ptp(prepared.heights) > 0.9e-4
@@ -107,12 +107,12 @@ def test_degree_nought_keeps_the_tilt() -> None:
 
 
 @pytest.mark.parametrize("degree", [-1, 11, 1.5, np.nan, np.inf, True, "2"])
-def test_degrees_that_are_none(degree: Any) -> None:
+def test_invalid_degrees_are_refused(degree: Any) -> None:
     with pytest.raises(ParameterError, match="form must be a whole number from 0 to 10"):
         prepare(RawSurface(rough((60, 60)), (1e-6, 1e-6), "test", ()), form=degree)
 
 
-def test_degree_above_what_the_points_support() -> None:
+def test_degree_is_limited_by_the_number_of_points() -> None:
     with pytest.raises(ParameterError, match="form must be at most 4 for 10 points along"):
         fit_form(rough((10, 300)), 5)
     fit_form(rough((10, 300)), 4)

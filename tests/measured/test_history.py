@@ -1,4 +1,4 @@
-"""What a preparation writes down of a surface after each of its steps."""
+"""The history of a preparation: parameters of the surface after each step."""
 
 from __future__ import annotations
 
@@ -31,28 +31,27 @@ def surface(hole: bool = True) -> RawSurface:
     return RawSurface(heights, (5e-6, 5e-6), "made", ())
 
 
-def names(stages: tuple[PreparationStage, ...]) -> list[str]:
+def stage_names(stages: tuple[PreparationStage, ...]) -> list[str]:
     return [stage.name for stage in stages]
 
 
-def test_every_step_is_written_down() -> None:
+def test_every_step_is_recorded() -> None:
     arguments: dict[str, Any] = {"cutoff": 2e-5, "l_cutoff": 1e-4, "tip_radius": 1e-5}
     ready = prepare(surface(), outliers=9.0, periodic=True, blend=5e-5, magnify=3.0, **arguments)
-    assert names(ready.history) == [
+    assert stage_names(ready.history) == [
         "as read", "without outliers", "levelled", "holes filled", "S-filter 20 µm",
         "L-filter 100 µm", "tip 10 µm", "periodic", "magnified",
     ]  # fmt: skip
-    assert names(prepare(surface(hole=False)).history) == [
+    assert stage_names(prepare(surface(hole=False)).history) == [
         "as read", "levelled", "S-filter 20 µm",
     ]  # fmt: skip
-    assert names(prepare(surface(), height_range=1e-3, form=2, max_missing=0.5).history)[:2] == [
-        "as read", "form removed",
-    ]  # fmt: skip
+    with_form = prepare(surface(), height_range=1e-3, form=2, max_missing=0.5)
+    assert stage_names(with_form.history)[:2] == ["as read", "form removed"]
     assert texture_from_prepared(ready).history == ready.history
 
 
-def test_what_each_filter_took() -> None:
-    """Cosines without a break at the mirrored border: the filters take their known shares."""
+def test_stages_state_the_removed_heights_of_each_filter() -> None:
+    """Cosines are smooth at the mirrored border, so the filters remove known shares."""
     ready = prepare(surface(hole=False), form=0, cutoff=2e-5, l_cutoff=1e-4)
     by_name = {stage.name: stage for stage in ready.history}
     tilt = 0.01 * np.arange(401) * 5e-6
@@ -62,18 +61,18 @@ def test_what_each_filter_took() -> None:
     long = by_name["L-filter 100 µm"].removed
     assert short is not None
     assert long is not None
-    # The S-filter takes half of the shortest wave, 4 % of the middle one's half ...
-    took = [(1 - 2.0 ** -((2e-5 / length) ** 2)) * h * MICRO for h, length in
+    # The S-filter removes half of the shortest wave and 3 % of the middle one ...
+    removed = [(1 - 2.0 ** -((2e-5 / length) ** 2)) * h * MICRO for h, length in
             ((4, 1e-3), (2, 1e-4), (1, 2e-5))]  # fmt: skip
-    assert short.rms == pytest.approx(math.hypot(*took) / math.sqrt(2), rel=0.01)
+    assert short.rms == pytest.approx(math.hypot(*removed) / math.sqrt(2), rel=0.01)
     # ... the L-filter nearly all of the longest, half of the middle one, and the tilt.
-    kept = math.hypot(4 * MICRO * 2.0 ** -(0.1**2), MICRO * 2.0 ** -(0.2**2)) / math.sqrt(2)
-    assert long.rms == pytest.approx(math.hypot(kept, tilt.std()), rel=0.02)
+    passed = math.hypot(4 * MICRO * 2.0 ** -(0.1**2), MICRO * 2.0 ** -(0.2**2)) / math.sqrt(2)
+    assert long.rms == pytest.approx(math.hypot(passed, tilt.std()), rel=0.02)
     left = by_name["L-filter 100 µm"].values["Sq"]
     assert left == pytest.approx(np.std(ready.heights), rel=1e-12)
 
 
-def test_parameters_of_the_measured_points_alone_until_they_are_filled() -> None:
+def test_parameters_use_measured_points_until_holes_are_filled() -> None:
     raw = surface()
     ready = prepare(raw)
     first, level, filled = ready.history[:3]
@@ -84,7 +83,7 @@ def test_parameters_of_the_measured_points_alone_until_they_are_filled() -> None
     assert filled.values["Sq"] != level.values["Sq"]
 
 
-def test_a_profile_is_primary_until_its_waviness_is_gone() -> None:
+def test_profile_parameters_change_from_p_to_r_after_the_l_filter() -> None:
     raw = surface(hole=False)
     line = RawSurface(raw.heights[0], raw.pitch[:1], "made", ())  # type: ignore[index]  # it has one
     history = prepare(line, l_cutoff=2e-4, tip_radius=1e-5, magnify=2.0).history
@@ -97,44 +96,44 @@ def test_a_profile_is_primary_until_its_waviness_is_gone() -> None:
         assert history[-1].values[symbol] == pytest.approx(factor * before, rel=1e-9)
 
 
-def test_a_watcher_sees_before_and_after() -> None:
-    seen: list[tuple[str, float | None]] = []
+def test_stage_callback_receives_heights_before_and_after() -> None:
+    calls: list[tuple[str, float | None]] = []
 
     def watch(stage: PreparationStage, pitch: Any, after: Any, before: Any) -> None:
         assert pitch == (5e-6, 5e-6)
-        seen.append((stage.name, None if before is None else float(np.nanstd(before - after))))
+        calls.append((stage.name, None if before is None else float(np.nanstd(before - after))))
 
     ready = prepare(surface(), on_stage=watch)
-    assert seen == [
+    assert calls == [
         (stage.name, None if stage.removed is None else pytest.approx(stage.removed.rms, rel=1e-9))
         for stage in ready.history
     ]
 
 
-def test_the_history_is_saved(tmp_path: Path) -> None:
+def test_history_is_saved_and_loaded(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.write_bytes(b"x")
-    flat = RawSurface(np.zeros((5, 6)), (1e-6, 1e-6), "flat", ())  # has no skewness
+    flat = RawSurface(np.zeros((5, 6)), (1e-6, 1e-6), "flat", ())  # its skewness is undefined
     for raw in (surface(), flat):
         ready = prepare(raw)
         save_prepared(tmp_path / "ready.npz", ready, source)
-        again = load_prepared(tmp_path / "ready.npz")
-        assert again.history == ready.history
-    assert names(magnify_surface(again, 2.0).history)[-1] == "magnified"
+        loaded = load_prepared(tmp_path / "ready.npz")
+        assert loaded.history == ready.history
+    assert stage_names(magnify_surface(loaded, 2.0).history)[-1] == "magnified"
 
 
-def test_a_file_of_old_has_no_history(tmp_path: Path) -> None:
+def test_file_without_history_loads_and_damaged_history_is_refused(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.write_bytes(b"x")
     save_prepared(tmp_path / "ready.npz", prepare(surface()), source)
     with np.load(tmp_path / "ready.npz") as members:
-        old = {name: members[name] for name in members if name != "history"}
-    np.savez(tmp_path / "old.npz", **old)
-    again = load_prepared(tmp_path / "old.npz")
-    assert again.history == ()
-    assert magnify_surface(again, 2.0).history == ()
+        members_without_history = {name: members[name] for name in members if name != "history"}
+    np.savez(tmp_path / "old.npz", **members_without_history)
+    loaded = load_prepared(tmp_path / "old.npz")
+    assert loaded.history == ()
+    assert magnify_surface(loaded, 2.0).history == ()
     for wrong in ("[", "{}", '[{"name": "x"}]', '[{"name": "x", "values": {"Q": 1}}]', "[1]"):
-        np.savez(tmp_path / "bad.npz", **old, history=np.array(wrong))
+        np.savez(tmp_path / "bad.npz", **members_without_history, history=np.array(wrong))
         if wrong == "{}":
             assert load_prepared(tmp_path / "bad.npz").history == ()
             continue
@@ -142,6 +141,6 @@ def test_a_file_of_old_has_no_history(tmp_path: Path) -> None:
             load_prepared(tmp_path / "bad.npz")
 
 
-def test_stages_survive_json() -> None:
+def test_stages_round_trip_through_json() -> None:
     stages = prepare(surface(), l_cutoff=1e-4).history
     assert parse_stages([stage.to_dict() for stage in stages]) == stages

@@ -1,4 +1,4 @@
-"""Spikes are found, and only they; medians against a slow loop."""
+"""Outlier detection, with local medians compared to a reference loop."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ def wavy(ny: int = 60, nx: int = 80) -> Any:
     return 1e-6 * np.sin(x / 40.0) * np.cos(y / 30.0) + noise
 
 
-def continued(line: Any, reach: int) -> Any:
+def extend_by_reflection(line: Any, reach: int) -> Any:
     """Continue a line by reflection through the median of its last three points."""
 
-    def middle(three: Any) -> float:
-        valid = [v for v in three if not np.isnan(v)]
+    def median_of_valid(last_points: Any) -> float:
+        valid = [v for v in last_points if not np.isnan(v)]
         return float(np.median(valid)) if valid else float("nan")
 
-    before = [2 * middle(line[:3]) - line[2 + i] for i in range(reach, 0, -1)]
-    after = [2 * middle(line[-3:]) - line[-3 - i] for i in range(1, reach + 1)]
+    before = [2 * median_of_valid(line[:3]) - line[2 + i] for i in range(reach, 0, -1)]
+    after = [2 * median_of_valid(line[-3:]) - line[-3 - i] for i in range(1, reach + 1)]
     return np.concatenate([before, line, after])
 
 
@@ -45,7 +45,7 @@ def local_median(heights: FloatArray) -> FloatArray:
 @pytest.mark.parametrize("shape", [(14, 17), (40,)])
 @pytest.mark.parametrize("share", [0.0, 0.2, 0.7])
 @pytest.mark.parametrize("block", [3, 2**18])
-def test_local_median(
+def test_local_median_matches_a_reference_loop(
     monkeypatch: pytest.MonkeyPatch, shape: tuple[int, ...], share: float, block: int
 ) -> None:
     monkeypatch.setattr(outliers, "_BLOCK", block)
@@ -55,38 +55,40 @@ def test_local_median(
     reach = {1: 4, 2: 2}[len(shape)]
     padded = heights
     for axis in range(len(shape)):
-        padded = np.apply_along_axis(continued, axis, padded, reach)
-    got = local_median(heights)
+        padded = np.apply_along_axis(extend_by_reflection, axis, padded, reach)
+    medians = local_median(heights)
     for index in np.ndindex(shape):
         window = padded[tuple(slice(i, i + 2 * reach + 1) for i in index)]
         expected = np.nan if np.isnan(heights[index]) else np.nanmedian(window)
-        np.testing.assert_equal(got[index], expected)
+        np.testing.assert_equal(medians[index], expected)
 
 
-def test_planted_spikes_are_found_and_nothing_else() -> None:
+def test_exactly_the_planted_spikes_are_detected() -> None:
     heights = wavy()
     heights[20:24, 30:50] = np.nan
     planted = [(5, 5), (0, 0), (59, 40), (24, 33), (19, 49), (40, 41), (40, 42), (41, 41)]
     for k, index in enumerate(planted):
-        heights[index] += (-1) ** k * 4e-7  # well below the waves: no global limit finds them
+        heights[index] += (
+            -1
+        ) ** k * 4e-7  # smaller than the waves, so a global limit cannot find them
     assert np.abs(wavy()).max() > 4e-7
     before = np.isnan(heights)
-    sentence = remove_outliers(heights, 6.0)
-    found = np.argwhere(np.isnan(heights) & ~before)
-    assert sorted(map(tuple, found.tolist())) == sorted(planted)
-    assert sentence.startswith("outliers: 8 points beyond 6 robust standard deviations, ")
+    step = remove_outliers(heights, 6.0)
+    detected = np.argwhere(np.isnan(heights) & ~before)
+    assert sorted(map(tuple, detected.tolist())) == sorted(planted)
+    assert step.startswith("outliers: 8 points beyond 6 robust standard deviations, ")
 
 
-def test_threshold_counts_in_standard_deviations() -> None:
-    """Of normal noise, whose medians are nearly zero, the known share lies beyond."""
+def test_threshold_is_in_standard_deviations() -> None:
+    """For normal noise the share of outliers is that of the normal distribution."""
     noise = np.random.default_rng(5).standard_normal((600, 600))
     remove_outliers(noise, 2.0)
     share = float(np.isnan(noise).mean())
-    # 0.0455 of a normal distribution; without the factor 1.4826 it would be 0.18.
+    # 0.0455 for a normal distribution; without the factor 1.4826 it would be 0.18.
     assert 0.035 < share < 0.050
 
 
-def test_stepped_heights_with_one_spike() -> None:
+def test_spike_on_quantised_heights_is_detected() -> None:
     heights = np.zeros((20, 20))
     heights[7, 8] = 1e-6
     assert "mean absolute deviation" in remove_outliers(heights, 6.0)
@@ -100,7 +102,7 @@ def test_flat_and_constant_surfaces_have_no_outliers() -> None:
         assert np.isfinite(heights).all()
 
 
-def test_a_tilted_surface_has_no_outliers_at_its_border() -> None:
+def test_tilt_causes_no_outliers_at_the_border() -> None:
     y, x = np.mgrid[:30, :40]
     tilted = 3e-6 * x - 2e-6 * y + np.random.default_rng(3).uniform(-1e-9, 1e-9, (30, 40))
     assert remove_outliers(tilted, 8.0).startswith("outliers: 0 points")
@@ -114,23 +116,23 @@ def test_a_tilted_surface_has_no_outliers_at_its_border() -> None:
 
 @pytest.mark.parametrize("threshold", [3.0, 6.0])
 def test_smooth_waves_have_no_outliers(threshold: float) -> None:
-    """Crests stand above their medians: a limit from the whole surface alone would cut them."""
+    """Crests exceed their local medians; a global limit alone would remove them."""
     y, x = np.mgrid[:90, :100]
     bumps = 1e-6 * np.sin(x / 5.0) * np.sin(y / 6.0) ** 3
     assert remove_outliers(bumps, threshold).startswith("outliers: 0 points")
     assert remove_outliers(bumps[30].copy(), threshold).startswith("outliers: 0 points")
     residual = np.abs(bumps - local_median(bumps))
-    assert residual.max() > 3.0 * 1.4826 * np.median(residual)  # the second limit was needed
+    assert residual.max() > 3.0 * 1.4826 * np.median(residual)  # a global limit would fail
 
 
-def test_small_surfaces() -> None:
+def test_small_surfaces_have_no_outliers() -> None:
     for shape in ((4, 4), (4,), (4, 30)):
         heights = np.random.default_rng(1).standard_normal(shape)
         remove_outliers(heights, 50.0)
         assert np.isfinite(heights).all()
 
 
-def test_outliers_are_filled_and_do_not_count_in_the_height_range() -> None:
+def test_outliers_are_filled_and_excluded_from_the_height_range() -> None:
     heights = wavy()
     clean = prepare(RawSurface(heights, (1e-6, 1e-6), "test", ()), height_range=1e-5)
     spiked = heights.copy()
@@ -141,12 +143,12 @@ def test_outliers_are_filled_and_do_not_count_in_the_height_range() -> None:
     assert prepared.filled_mask is not None
     assert np.argwhere(prepared.filled_mask).tolist() == [[30, 30]]
     np.testing.assert_allclose(prepared.heights, clean.heights, atol=1e-7)
-    spoilt = prepare(with_spike, height_range=1e-5)
-    assert np.std(spoilt.heights) < 0.1 * np.std(clean.heights)  # a spike left in would be noticed
+    uncorrected = prepare(with_spike, height_range=1e-5)
+    assert np.std(uncorrected.heights) < 0.1 * np.std(clean.heights)  # negative control
 
 
 @pytest.mark.parametrize("threshold", [0.0, -3.0, np.nan, np.inf, "6"])
-def test_thresholds_that_are_refused(threshold: Any) -> None:
+def test_invalid_thresholds_are_refused(threshold: Any) -> None:
     with pytest.raises(
         ParameterError, match=r"outliers must be (positive|finite|a number)"
     ) as caught:
@@ -154,6 +156,6 @@ def test_thresholds_that_are_refused(threshold: Any) -> None:
     assert caught.value.argument == "outliers"
 
 
-def test_a_threshold_that_leaves_too_little() -> None:
+def test_threshold_that_removes_too_many_points_is_refused() -> None:
     with pytest.raises(ParameterError, match="at most a quarter can be filled"):
         prepare(RawSurface(wavy(), (1e-6, 1e-6), "test", ()), outliers=0.1)

@@ -1,4 +1,4 @@
-"""Fill, level, filter, magnify: each against a value computed in another way."""
+"""Fill, level, filter and magnify, each against an independent computation."""
 
 from __future__ import annotations
 
@@ -40,18 +40,18 @@ def bumpy(ny: int = 40, nx: int = 50) -> NDArray[np.float64]:
     return np.asarray(1e-6 * rng.standard_normal((ny, nx)) + plane(ny, nx))
 
 
-def holed(heights: NDArray[np.float64]) -> NDArray[np.float64]:
+def with_holes(heights: NDArray[np.float64]) -> NDArray[np.float64]:
     ny, nx = heights.shape
-    with_holes = heights.copy()
-    with_holes[ny // 4 : 5 * ny // 8, nx // 5 : 4 * nx // 5] = np.nan
-    with_holes[2, 3] = np.nan
-    return with_holes
+    result = heights.copy()
+    result[ny // 4 : 5 * ny // 8, nx // 5 : 4 * nx // 5] = np.nan
+    result[2, 3] = np.nan
+    return result
 
 
 # --- steps ---------------------------------------------------------------------------------------
 
 
-def test_step_names_the_missing_points() -> None:
+def test_step_states_the_number_of_missing_points() -> None:
     heights = bumpy(20, 30)
     heights.ravel()[[33, 34, 70, 71, 72, 73, 74, 200, 300, 400, 500, 501]] = np.nan
     steps = prepare(surface(heights)).steps
@@ -65,7 +65,7 @@ def test_step_names_the_missing_points() -> None:
 # --- levelling -------------------------------------------------------------------------------
 
 
-def test_levelling_removes_a_plane_exactly_and_states_its_slopes() -> None:
+def test_levelling_removes_a_plane_and_states_its_slopes() -> None:
     prepared = prepare(surface(plane(30, 40)))
     assert np.max(np.abs(prepared.heights)) < 1e-14 * 3e-6 * 1e3
     assert "least-squares plane, slopes 0.02 and -0.005" in prepared.steps[1]
@@ -83,13 +83,13 @@ def test_levelling_fits_the_valid_points_only() -> None:
     fill_in_place(flat, (P, 2 * P))
     flat -= fit[0] + fit[1] * columns + fit[2] * rows
     expected = gaussian_filter(flat, (P, 2 * P), 8 * P)
-    got = prepare(surface(heights), cutoff=8 * P).heights
-    np.testing.assert_allclose(got, expected, atol=1e-17)
+    filtered = prepare(surface(heights), cutoff=8 * P).heights
+    np.testing.assert_allclose(filtered, expected, atol=1e-17)
 
 
 @pytest.mark.parametrize("form", [1, 2])
-def test_a_hole_at_the_border_continues_the_form(form: int) -> None:
-    """Filling before the form was known would leave a hill as high as the form in the hole."""
+def test_hole_at_the_border_continues_the_form(form: int) -> None:
+    """Filling before removing the form would leave a hill in the hole, as high as the form."""
     y, x = np.mgrid[:50, :60] * 1.0
     shape = 0.02 * P * x + (form - 1) * 1e-2 * P * ((x - 30) ** 2 + y**2)
     wave = 1e-3 * P * np.cos(np.pi * x / 5)
@@ -114,13 +114,13 @@ def test_levelling_of_a_profile() -> None:
 
 @pytest.mark.parametrize("cutoff", [2.0, 3.7, 11.0, 40.0])
 @pytest.mark.parametrize("waves", [1, 5, 17, 40])
-def test_transmission_of_a_profile(cutoff: float, waves: int) -> None:
+def test_filter_transmission_for_a_profile(cutoff: float, waves: int) -> None:
     n, step = 81, 0.5
     wave = np.cos(np.pi * waves * np.arange(n) / (n - 1))  # crests or troughs at the border
     length = 2 * (n - 1) * step / waves
     expected = np.exp(-np.pi * (ALPHA * cutoff / length) ** 2)
-    got = gaussian_filter(wave, (step,), cutoff)
-    np.testing.assert_allclose(got, expected * wave, atol=1e-12)
+    filtered = gaussian_filter(wave, (step,), cutoff)
+    np.testing.assert_allclose(filtered, expected * wave, atol=1e-12)
 
 
 def test_transmission_at_the_cutoff_is_one_half() -> None:
@@ -138,7 +138,7 @@ def test_transmission_of_a_map_with_unequal_pitch() -> None:
     np.testing.assert_allclose(gaussian_filter(wave, (px, py), cutoff), expected * wave, atol=1e-12)
 
 
-def test_filter_is_the_weighting_function_of_the_standard() -> None:
+def test_filter_equals_convolution_with_the_standard_weights() -> None:
     """Convolve with the sampled weighting function, mirrored at the border nodes."""
     rng = np.random.default_rng(3)
     heights = rng.standard_normal(200)
@@ -149,7 +149,7 @@ def test_filter_is_the_weighting_function_of_the_standard() -> None:
     expected = np.convolve(np.pad(heights, reach, mode="reflect"), weights, mode="valid")
     np.testing.assert_allclose(gaussian_filter(heights, (1.0,), cutoff), expected, atol=1e-9)
     half_sample = np.convolve(np.pad(heights, reach, mode="symmetric"), weights, mode="valid")
-    assert np.max(np.abs(half_sample - expected)) > 1e-3  # another border would be noticed
+    assert np.max(np.abs(half_sample - expected)) > 1e-3  # negative control: another border differs
 
 
 def test_default_cutoff_is_stated() -> None:
@@ -179,19 +179,19 @@ def test_magnification() -> None:
     assert tall.steps[-1] == "magnified 20 times laterally and 5 times in height"
 
 
-def test_pitch_is_needed_or_replaced() -> None:
+def test_missing_pitch_is_required_and_file_pitch_can_be_replaced() -> None:
     with pytest.raises(ParameterError, match="pitch must be given"):
         prepare(surface(bumpy(), pitch=None))
-    given = prepare(surface(bumpy(), pitch=None), pitch=3e-6)
-    assert given.pitch == (3e-6, 3e-6)
-    assert given.steps[0] == "pitch 3 µm as given"
+    with_pitch = prepare(surface(bumpy(), pitch=None), pitch=3e-6)
+    assert with_pitch.pitch == (3e-6, 3e-6)
+    assert with_pitch.steps[0] == "pitch 3 µm as given"
     replaced = prepare(surface(bumpy()), pitch=(3e-6, 4e-6))
     assert replaced.pitch == (3e-6, 4e-6)
     assert replaced.steps[0] == "pitch 3 µm x 4 µm as given instead of the file's 1 µm x 2 µm"
     assert prepare(surface(bumpy()[0]), pitch=[2e-6]).pitch == (2e-6,)
 
 
-def test_height_range() -> None:
+def test_height_range_scales_relative_heights() -> None:
     counts = np.round(bumpy() * 1e8) + 100.0
     counts[4, 4] = np.nan
     raw = surface(counts, has_units=False, notes=("counts",))
@@ -205,7 +205,7 @@ def test_height_range() -> None:
     assert scaled.steps[1].endswith("to 5 µm peak to valley")
 
 
-def test_flat_surface_is_fine() -> None:
+def test_flat_surface_is_accepted_without_a_height_range() -> None:
     prepared = prepare(surface(np.full((5, 6), 2e-6)))
     np.testing.assert_allclose(prepared.heights, 0, atol=1e-20)
     with pytest.raises(ParameterError, match=r"height_range .* flat"):
@@ -213,7 +213,7 @@ def test_flat_surface_is_fine() -> None:
 
 
 def test_input_is_not_changed() -> None:
-    heights = holed(bumpy())
+    heights = with_holes(bumpy())
     before = heights.copy()
     prepare(surface(heights), magnify=3, height_range=1e-6)
     np.testing.assert_array_equal(heights, before)
@@ -239,13 +239,13 @@ def test_input_is_not_changed() -> None:
         ({"height_range": -1.0}, "height_range must be positive"),
     ],
 )
-def test_arguments_that_are_refused(arguments: dict[str, Any], match: str) -> None:
+def test_invalid_arguments_are_refused(arguments: dict[str, Any], match: str) -> None:
     with pytest.raises(ParameterError, match=match) as caught:
         prepare(surface(bumpy()), **arguments)
     assert caught.value.argument == next(iter(arguments))
 
 
-def test_magnification_beyond_all_bounds() -> None:
+def test_magnification_that_overflows_is_refused() -> None:
     with pytest.raises(ParameterError, match="magnify makes the surface too large"):
         magnify_surface(PreparedSurface(np.full((4, 4), 1e300), (1.0, 1.0), ()), 1e10)
 
@@ -267,7 +267,7 @@ def test_limits_of_the_cutoff_are_accepted() -> None:
         (np.array([0, 1e308, -1e308, 3, 4]), "too large"),
     ],
 )
-def test_surfaces_that_are_refused(heights: NDArray[np.float64], match: str) -> None:
+def test_invalid_surfaces_are_refused(heights: NDArray[np.float64], match: str) -> None:
     with pytest.raises(ParameterError, match=match):
         prepare(surface(heights))
 
@@ -278,24 +278,24 @@ def test_a_quarter_missing_is_accepted() -> None:
     assert np.isfinite(prepare(surface(heights)).heights).all()
 
 
-def test_more_than_a_quarter_missing_needs_consent() -> None:
+def test_more_than_a_quarter_missing_needs_max_missing() -> None:
     heights = bumpy(20, 20)
     heights.ravel()[:109] = np.nan
     with pytest.raises(ParameterError, match=r"misses 27.3% .* a quarter .* max_missing=0.28 "):
         prepare(surface(heights))
     with pytest.raises(ParameterError, match=r"misses 27.3% .* at most 27.0% can be filled"):
         prepare(surface(heights), max_missing=0.27)
-    allowed = prepare(surface(heights), max_missing=0.28)
-    assert allowed.filled_mask is not None
-    assert allowed.filled_mask.sum() == 109
+    prepared = prepare(surface(heights), max_missing=0.28)
+    assert prepared.filled_mask is not None
+    assert prepared.filled_mask.sum() == 109
     for wrong in (0.0, 1.0, -0.1, 28.0, np.nan, "0.3"):
         with pytest.raises(ParameterError, match="max_missing must lie between 0 and 1"):
-            prepare(surface(heights), max_missing=wrong)  # partly text
+            prepare(surface(heights), max_missing=wrong)  # partly of wrong type
 
 
 @needs_data
 @pytest.mark.parametrize(
-    ("name", "shape", "allowed"),
+    ("name", "shape", "max_missing"),
     [
         ("sample-land.x3p", (256, 918), None),
         ("testing.x3p", (20, 30), None),
@@ -303,12 +303,14 @@ def test_more_than_a_quarter_missing_needs_consent() -> None:
         ("frt-2.frt", (300, 150), 0.28),
     ],
 )
-def test_real_surfaces(name: str, shape: tuple[int, ...], allowed: float | None) -> None:
+def test_real_surfaces_are_prepared(
+    name: str, shape: tuple[int, ...], max_missing: float | None
+) -> None:
     if name.endswith("frt"):
         pytest.importorskip("SurfaceTopography", reason="the extra 'formats' is not installed")
-    texture = load_texture(DATA / name, max_missing=allowed, outliers=10.0, form=2)
+    texture = load_texture(DATA / name, max_missing=max_missing, outliers=10.0, form=2)
     assert texture.heights.shape == shape
     assert np.isfinite(texture.heights).all()
-    if allowed is not None:
+    if max_missing is not None:
         with pytest.raises(ParameterError, match=r"misses 27.4% .* max_missing=0.28"):
             load_texture(DATA / name)

@@ -38,7 +38,7 @@ def saved(source: Path) -> Path:
     return path
 
 
-def same(a: PreparedSurface, b: PreparedSurface) -> None:
+def assert_same(a: PreparedSurface, b: PreparedSurface) -> None:
     np.testing.assert_array_equal(a.heights, b.heights)
     assert (a.pitch, a.steps, a.periodic) == (b.pitch, b.steps, b.periodic)
     assert (a.filled_mask is None) == (b.filled_mask is None)
@@ -54,7 +54,7 @@ def test_round_trip(source: Path, arguments: dict[str, Any]) -> None:
     path = source.with_name("surface.npz")
     save_prepared(path, prepared, source)
     assert is_prepared(path)
-    same(load_prepared(path), prepared)
+    assert_same(load_prepared(path), prepared)
     assert prepared.filled_mask is not None
     assert prepared.filled_mask.sum() == (
         15 if "periodic" not in arguments else prepared.filled_mask.sum()
@@ -66,11 +66,11 @@ def test_round_trip_of_a_profile_without_holes(tmp_path: Path) -> None:
     prepared = prepare_file(tmp_path / "line.npy", pitch=1e-6)
     assert prepared.filled_mask is None
     save_prepared(tmp_path / "line.npz", prepared, tmp_path / "line.npy")
-    same(load_prepared(tmp_path / "line.npz"), prepared)
+    assert_same(load_prepared(tmp_path / "line.npz"), prepared)
     assert isinstance(load_texture(tmp_path / "line.npz"), Profile)
 
 
-def test_file_says_where_it_comes_from(saved: Path, source: Path) -> None:
+def test_file_states_its_source(saved: Path, source: Path) -> None:
     with np.load(saved, allow_pickle=False) as members:
         assert int(members["asperity_schema"]) == 1
         assert str(members["source"]) == "map.npy"
@@ -78,23 +78,23 @@ def test_file_says_where_it_comes_from(saved: Path, source: Path) -> None:
         assert [str(s) for s in members["steps"]] == list(load_prepared(saved).steps)
 
 
-def test_texture_is_the_same_from_both(saved: Path, source: Path) -> None:
+def test_textures_of_source_and_prepared_file_are_equal(saved: Path, source: Path) -> None:
     direct = load_texture(source, pitch=PITCH, form=2)
-    kept = load_texture(saved)
-    assert isinstance(kept, HeightMap)
-    np.testing.assert_array_equal(kept.coefficients, direct.coefficients)
-    assert kept.preparation == direct.preparation
-    assert kept.pitch == direct.pitch
-    assert kept.filled_mask is not None
-    np.testing.assert_array_equal(kept.filled_mask, np.isnan(bumpy()))
+    loaded = load_texture(saved)
+    assert isinstance(loaded, HeightMap)
+    np.testing.assert_array_equal(loaded.coefficients, direct.coefficients)
+    assert loaded.preparation == direct.preparation
+    assert loaded.pitch == direct.pitch
+    assert loaded.filled_mask is not None
+    np.testing.assert_array_equal(loaded.filled_mask, np.isnan(bumpy()))
 
 
-def test_content_counts_and_not_the_name(saved: Path) -> None:
-    lying = saved.rename(saved.with_name("surface.x3p"))
-    assert load_texture(lying).preparation == load_prepared(lying).steps
+def test_prepared_file_is_recognised_by_content(saved: Path) -> None:
+    renamed = saved.rename(saved.with_name("surface.x3p"))
+    assert load_texture(renamed).preparation == load_prepared(renamed).steps
 
 
-def test_a_prepared_surface_is_only_magnified(saved: Path) -> None:
+def test_prepared_surface_can_be_magnified(saved: Path) -> None:
     plain, large = load_prepared(saved), prepare_file(saved, magnify=5.0, magnify_height=2.0)
     np.testing.assert_allclose(large.heights, 2 * plain.heights, rtol=1e-15)
     assert large.pitch == pytest.approx((1e-5, 1.5e-5))
@@ -120,7 +120,9 @@ def test_a_prepared_surface_is_only_magnified(saved: Path) -> None:
         {"integrate_normals": True},
     ],
 )
-def test_a_prepared_surface_is_not_prepared_again(saved: Path, argument: dict[str, Any]) -> None:
+def test_preparation_arguments_are_refused_for_a_prepared_surface(
+    saved: Path, argument: dict[str, Any]
+) -> None:
     with pytest.raises(ParameterError, match="was prepared already") as caught:
         load_texture(saved, **argument)
     assert caught.value.argument == next(iter(argument))
@@ -130,7 +132,7 @@ def test_a_prepared_surface_is_not_prepared_again(saved: Path, argument: dict[st
     "error", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt(), MemoryError()]
 )
 @pytest.mark.parametrize("exists", [False, True])
-def test_a_failure_leaves_what_was_there(
+def test_failed_saving_leaves_an_existing_file_unchanged(
     monkeypatch: pytest.MonkeyPatch, source: Path, error: BaseException, exists: bool
 ) -> None:
     target = source.with_name("surface.npz")
@@ -139,11 +141,11 @@ def test_a_failure_leaves_what_was_there(
     prepared = prepare_file(source, pitch=PITCH)
     whole = np.savez
 
-    def half(file: Any, **members: Any) -> None:
+    def failing_savez(file: Any, **members: Any) -> None:
         whole(file, heights=members["heights"])
         raise error
 
-    monkeypatch.setattr(np, "savez", half)
+    monkeypatch.setattr(np, "savez", failing_savez)
     expected = ParameterError if isinstance(error, OSError) else type(error)
     with pytest.raises(expected) as caught:
         save_prepared(target, prepared, source)
@@ -155,7 +157,7 @@ def test_a_failure_leaves_what_was_there(
         assert target.read_text() == "the old one"
 
 
-def test_targets_that_are_refused(source: Path) -> None:
+def test_invalid_output_paths_are_refused(source: Path) -> None:
     prepared = prepare_file(source, pitch=PITCH)
     content = source.read_bytes()
     link = source.with_name("link.npz")
@@ -172,8 +174,8 @@ def test_targets_that_are_refused(source: Path) -> None:
     assert source.read_bytes() == content
 
 
-def rewritten(saved: Path, compression: int = zipfile.ZIP_STORED, **changes: Any) -> Path:
-    """Write the file again with some members changed, or left out where the change is None."""
+def rewrite_file(saved: Path, compression: int = zipfile.ZIP_STORED, **changes: Any) -> Path:
+    """Rewrite a file with some members changed, or omitted where the change is None."""
     with np.load(saved) as file:
         members = {name: file[name] for name in file.files} | changes
     path = saved.with_name("changed.npz")
@@ -187,7 +189,7 @@ def rewritten(saved: Path, compression: int = zipfile.ZIP_STORED, **changes: Any
     return path
 
 
-LYING = b"\x93NUMPY\x01\x00v\x00" + (
+FALSE_HEADER = b"\x93NUMPY\x01\x00v\x00" + (
     b"{'descr': '<f8', 'fortran_order': False, 'shape': (900000, 900000), }".ljust(117) + b"\n"
 )
 
@@ -205,7 +207,7 @@ LYING = b"\x93NUMPY\x01\x00v\x00" + (
         ({"heights": np.zeros((3, 40)), "filled": np.zeros((3, 40), bool)}, "must be float64"),
         ({"heights": np.zeros(())}, "must be float64"),
         ({"heights": np.zeros((30, 40), complex)}, "heights is damaged"),
-        ({"heights": LYING}, "damaged prepared surface"),
+        ({"heights": FALSE_HEADER}, "damaged prepared surface"),
         ({"heights": b"no array"}, "damaged prepared surface"),
         ({"pitch": np.array([1e-6])}, "pitch must be 2 positive lengths"),
         ({"pitch": np.array([1e-6, -1e-6])}, "pitch must be 2 positive lengths"),
@@ -216,9 +218,9 @@ LYING = b"\x93NUMPY\x01\x00v\x00" + (
         ({"steps": b""}, "damaged prepared surface"),
     ],
 )
-def test_damaged_files(saved: Path, changes: dict[str, Any], match: str) -> None:
+def test_damaged_files_are_refused(saved: Path, changes: dict[str, Any], match: str) -> None:
     with pytest.raises(SurfaceFileError, match=f"changed.npz: .*{match}"):
-        load_texture(rewritten(saved, **changes))
+        load_texture(rewrite_file(saved, **changes))
 
 
 def test_python_objects_are_never_loaded(saved: Path) -> None:
@@ -231,28 +233,26 @@ def test_python_objects_are_never_loaded(saved: Path) -> None:
 
 
 def test_compressed_files_are_read(saved: Path) -> None:
-    same(load_prepared(rewritten(saved, zipfile.ZIP_DEFLATED)), load_prepared(saved))
+    assert_same(load_prepared(rewrite_file(saved, zipfile.ZIP_DEFLATED)), load_prepared(saved))
 
 
-def test_archives_that_unpack_to_too_much_are_refused(
-    saved: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_oversized_archives_are_refused(saved: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("asperity.measured.prepared._MAX_BYTES", 1000)
     with pytest.raises(SurfaceFileError, match=r"unpacks to .* bytes; at most 1000 are read"):
         load_prepared(saved)
 
 
-def test_an_unchanged_copy_is_accepted(saved: Path) -> None:
-    same(load_prepared(rewritten(saved)), load_prepared(saved))
+def test_rewritten_copy_is_accepted(saved: Path) -> None:
+    assert_same(load_prepared(rewrite_file(saved)), load_prepared(saved))
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_mutated_files(saved: Path, seed: int) -> None:
-    """A right answer or a clear error: heights are protected by the archive's checksums."""
+def test_mutated_files_are_equal_or_refused(saved: Path, seed: int) -> None:
+    """The archive's checksums protect the heights: mutated files are read unchanged or refused."""
     rng = np.random.default_rng(seed)
     good, content = load_prepared(saved), saved.read_bytes()
     path = saved.with_name("mutated.npz")
-    read = 0
+    read_count = 0
     for _ in range(120):
         damaged = bytearray(content)
         if rng.random() < 0.3:
@@ -265,12 +265,12 @@ def test_mutated_files(saved: Path, seed: int) -> None:
             loaded = load_prepared(path)
         except SurfaceFileError:
             continue
-        same(loaded, good)
-        read += 1
-    assert read < 60
+        assert_same(loaded, good)
+        read_count += 1
+    assert read_count < 60
 
 
-def test_files_that_are_no_prepared_surface(tmp_path: Path, source: Path) -> None:
+def test_other_files_are_not_prepared_surfaces(tmp_path: Path, source: Path) -> None:
     np.savez(tmp_path / "other.npz", heights=np.zeros((5, 5)))
     (tmp_path / "short.npz").write_bytes(b"PK\x03\x04")
     for path in (tmp_path / "other.npz", tmp_path / "short.npz", source, tmp_path / "missing"):
@@ -282,7 +282,7 @@ def test_files_that_are_no_prepared_surface(tmp_path: Path, source: Path) -> Non
         load_prepared(tmp_path / "missing")
 
 
-def test_masks_of_textures() -> None:
+def test_filled_mask_of_textures() -> None:
     mask = np.zeros((5, 6), bool)
     mask[1, 2] = True
     texture = HeightMap(np.zeros((5, 6)), 1e-3, filled_mask=mask)

@@ -1,4 +1,4 @@
-"""The ball against closed forms, a slow loop, and the rules of morphology."""
+"""Dilation by a ball against closed forms, a reference loop and morphological identities."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PITCH = (1e-6, 1.5e-6)
 
 
 def erode(heights: FloatArray, pitch: tuple[float, ...], radius: float) -> FloatArray:
-    """Return the path of a ball along the underside."""
+    """Return the erosion by a ball: the dilation of the underside."""
     return -dilate(-heights, pitch, radius)
 
 
@@ -31,38 +31,40 @@ def rough(shape: tuple[int, ...] = (24, 31)) -> Any:
     return 1e-6 * np.random.default_rng(2).standard_normal(shape)
 
 
-def slow_dilation(heights: Any, pitch: tuple[float, ...], radius: float) -> Any:
-    """Every point of the mirrored surface against every other."""
+def reference_dilation(heights: Any, pitch: tuple[float, ...], radius: float) -> Any:
+    """Return the dilation by a loop over all pairs of points of the mirrored surface."""
     shape = heights.shape
-    wide = np.pad(heights, [(n - 1, n - 1) for n in shape], mode="reflect")
-    places = np.stack(np.indices(wide.shape), -1).reshape(-1, len(shape)) * pitch[::-1]
+    mirrored = np.pad(heights, [(n - 1, n - 1) for n in shape], mode="reflect")
+    positions = np.stack(np.indices(mirrored.shape), -1).reshape(-1, len(shape)) * pitch[::-1]
     result = np.empty(shape)
     for index in np.ndindex(shape):
-        here = (np.array(index) + np.array(shape) - 1) * pitch[::-1]
-        squares = ((places - here) ** 2).sum(axis=1)
+        centre = (np.array(index) + np.array(shape) - 1) * pitch[::-1]
+        squares = ((positions - centre) ** 2).sum(axis=1)
         inside = squares <= radius**2
         ball = np.sqrt(radius**2 - squares[inside]) - radius
-        result[index] = (wide.ravel()[inside] + ball).max()
+        result[index] = (mirrored.ravel()[inside] + ball).max()
     return result
 
 
 @pytest.mark.parametrize("radius", [2.1e-6, 7.2e-6, 3e-5])
 @pytest.mark.parametrize("tile", [256, 7])
-def test_map_against_a_slow_loop(monkeypatch: pytest.MonkeyPatch, radius: float, tile: int) -> None:
+def test_map_matches_a_reference_loop(
+    monkeypatch: pytest.MonkeyPatch, radius: float, tile: int
+) -> None:
     monkeypatch.setattr(filters, "_TILE", tile)
     heights = rough()
-    expected = slow_dilation(heights, PITCH, radius)
+    expected = reference_dilation(heights, PITCH, radius)
     np.testing.assert_allclose(dilate(heights, PITCH, radius), expected, atol=1e-18)
 
 
 @pytest.mark.parametrize("radius", [2.1e-6, 7.2e-6, 3e-5])
-def test_profile_against_a_slow_loop(radius: float) -> None:
+def test_profile_matches_a_reference_loop(radius: float) -> None:
     heights = rough((60,))
-    expected = slow_dilation(heights, (1e-6,), radius)
+    expected = reference_dilation(heights, (1e-6,), radius)
     np.testing.assert_allclose(dilate(heights, (1e-6,), radius), expected, atol=1e-18)
 
 
-def test_a_spike_becomes_a_cap() -> None:
+def test_dilated_spike_is_a_spherical_cap() -> None:
     radius, high = 9e-6, 5e-6
     spike = np.zeros((41, 45))
     spike[20, 22] = high
@@ -76,34 +78,34 @@ def test_a_spike_becomes_a_cap() -> None:
 
 
 @pytest.mark.parametrize("height", [0.0, 3e-6])
-def test_flat_stays_flat(height: float) -> None:
+def test_flat_surface_is_unchanged(height: float) -> None:
     flat = np.full((12, 15), height)
     np.testing.assert_array_equal(dilate(flat, PITCH, 5e-6), flat)
     np.testing.assert_array_equal(close_envelope(flat, PITCH, 5e-6), flat)
 
 
-def test_round_ridge_gets_rounder_by_the_radius() -> None:
-    """The centre runs on the parallel curve of a circle: a circle of the sum of the radii."""
-    own, tip, n = 50e-6, 20e-6, 2001
+def test_dilation_adds_the_tip_radius_to_a_round_ridge() -> None:
+    """The centre of the ball follows a circle whose radius is the sum of both radii."""
+    radius, tip, n = 50e-6, 20e-6, 2001
     pitch = 60e-6 / (n - 1)
     x = (np.arange(n) - n // 2) * pitch
-    ridge = np.sqrt(own**2 - x**2) - own
-    felt = dilate(ridge, (pitch,), tip)
-    parallel = np.sqrt((own + tip) ** 2 - x**2) - own - tip
+    ridge = np.sqrt(radius**2 - x**2) - radius
+    dilated = dilate(ridge, (pitch,), tip)
+    parallel = np.sqrt((radius + tip) ** 2 - x**2) - radius - tip
     # The point of contact must lie on the profile, not on its mirror image: |x| < 30·(70/50) µm.
     inner = np.abs(x) < 0.9 * 30e-6
-    assert np.max(np.abs(felt - parallel)[inner]) < 2 * pitch**2 / tip
-    assert np.max(np.abs(felt - ridge)[inner]) > 1e-6
+    assert np.max(np.abs(dilated - parallel)[inner]) < 2 * pitch**2 / tip
+    assert np.max(np.abs(dilated - ridge)[inner]) > 1e-6
 
 
-def test_groove_that_is_too_narrow_is_bridged() -> None:
-    """A slot of width 2 a in a plane: the ball sinks by R - √(R² - a²) and no more."""
+def test_narrow_groove_is_bridged() -> None:
+    """In a slot of width 2 a the ball sinks by R - √(R² - a²)."""
     radius, half = 40e-6, 10
     slot = np.zeros(201)
     slot[100 - half + 1 : 100 + half] = -1e-4
-    felt = dilate(slot, (1e-6,), radius)
+    dilated = dilate(slot, (1e-6,), radius)
     a = half * 1e-6
-    assert felt.min() == pytest.approx(-(radius - np.sqrt(radius**2 - a**2)), rel=1e-9)
+    assert dilated.min() == pytest.approx(-(radius - np.sqrt(radius**2 - a**2)), rel=1e-9)
     closed = close_envelope(slot, (1e-6,), radius)
     u = (np.arange(201) - 100) * 1e-6
     inside = np.abs(u) < a
@@ -113,27 +115,27 @@ def test_groove_that_is_too_narrow_is_bridged() -> None:
 
 
 @pytest.mark.parametrize("shape", [(24, 31), (70,)])
-def test_closing_is_idempotent_and_only_raises(shape: tuple[int, ...]) -> None:
+def test_closing_is_idempotent_and_never_lowers(shape: tuple[int, ...]) -> None:
     heights, pitch = rough(shape), PITCH[: len(shape)]
     once = close_envelope(heights, pitch, 6e-6)
     twice = close_envelope(once, pitch, 6e-6)
     np.testing.assert_allclose(twice, once, atol=1e-18)
     assert (once >= heights - 1e-18).all()
-    assert np.max(np.abs(once - heights)) > 1e-7  # it is not nothing
+    assert np.max(np.abs(once - heights)) > 1e-7  # closing has an effect
     assert np.max(np.abs(dilate(once, pitch, 6e-6) - once)) > 1e-7  # dilation is not idempotent
 
 
-def test_a_tip_below_the_pitch_feels_the_points() -> None:
+def test_tip_smaller_than_the_pitch_changes_nothing() -> None:
     np.testing.assert_array_equal(dilate(rough(), PITCH, 0.9e-6), rough())
 
 
-def test_preparation_says_what_the_tip_did() -> None:
+def test_preparation_step_states_the_effect_of_the_tip() -> None:
     raw = RawSurface(rough(), PITCH, "test", ())
     plain = prepare(raw)
-    felt = prepare(raw, tip_radius=4e-6, magnify=2.0)
-    np.testing.assert_allclose(felt.heights, 2 * dilate(plain.heights, PITCH, 4e-6), rtol=1e-12)
+    scanned = prepare(raw, tip_radius=4e-6, magnify=2.0)
+    np.testing.assert_allclose(scanned.heights, 2 * dilate(plain.heights, PITCH, 4e-6), rtol=1e-12)
     change = dilate(plain.heights, PITCH, 4e-6) - plain.heights
-    assert felt.steps[3] == (
+    assert scanned.steps[3] == (
         "felt with a tip of radius 4 µm: dilation by a ball (as in ISO 16610-41) lowered by the"
         f" radius, heights raised at {np.mean(change > 0):.3g} of the points, by"
         f" {np.sqrt(np.mean(change**2)) * 1e9:.4g} nm RMS and at most {change.max() * 1e9:.4g} nm"
@@ -150,13 +152,13 @@ def test_preparation_says_what_the_tip_did() -> None:
         (4e-5, "must be at most the surface's shorter side, 30 µm"),
     ],
 )
-def test_radii_that_are_refused(radius: float, match: str) -> None:
+def test_invalid_radii_are_refused(radius: float, match: str) -> None:
     with pytest.raises(ParameterError, match=f"tip_radius {match}") as caught:
         prepare(RawSurface(rough(), PITCH, "test", ()), tip_radius=radius)
     assert caught.value.argument == "tip_radius"
 
 
-def test_too_much_work_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_excessive_number_of_comparisons_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(filters, "_MAX_COMPARISONS", 1e4)
     with pytest.raises(ParameterError, match=r"tip_radius needs .* comparisons at each of 744"):
         dilate(rough(), PITCH, 1e-5)

@@ -1,4 +1,4 @@
-"""Text with columns that are no lengths, uneven profiles, and ESRI ASCII grids."""
+"""Text files with non-length columns, unevenly sampled profiles, and ESRI ASCII grids."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ PROFILE = "X;Y;valid\n[mm];[mm];[1/0]\n"
 ROWS = "8.6722;106.25;1\n8.6727;-999;0\n8.6732;106.5;1\n8.6737;106.75;1\n"
 
 
-def read(folder: Path, text: str, encoding: str = "utf-8", **arguments: Any) -> RawSurface:
+def read_text(folder: Path, text: str, encoding: str = "utf-8", **arguments: Any) -> RawSurface:
     path = folder / "a.txt"
     path.write_bytes(text.encode(encoding))
     return read_surface(path, **arguments)
 
 
-def test_a_profile_with_a_validity_column(tmp_path: Path) -> None:
-    raw = read(tmp_path, PROFILE + ROWS)
+def test_profile_with_a_validity_column(tmp_path: Path) -> None:
+    raw = read_text(tmp_path, PROFILE + ROWS)
     assert raw.pitch == pytest.approx((5e-7,), rel=1e-9)
     np.testing.assert_allclose(raw.heights, [0.10625, np.nan, 0.1065, 0.10675], rtol=1e-12)
     assert raw.has_units
     assert raw.notes == ("1 of 4 points are marked as not valid: missing",)
-    assert read(tmp_path, (PROFILE + ROWS).replace(";", "\t")).heights.shape == (4,)
+    assert read_text(tmp_path, (PROFILE + ROWS).replace(";", "\t")).heights.shape == (4,)
 
 
 @pytest.mark.parametrize(
@@ -44,49 +44,49 @@ def test_points_with_a_validity_column(tmp_path: Path, header: str) -> None:
     rows = []
     for y in range(3):
         for x in range(4):
-            bad = (x, y) == (2, 1)
-            cells = [f"{2 * x}", f"{3 * y}", "1e9" if bad else f"{x + 10 * y}"]
-            flag = "0" if bad else "1"
+            is_invalid = (x, y) == (2, 1)
+            cells = [f"{2 * x}", f"{3 * y}", "1e9" if is_invalid else f"{x + 10 * y}"]
+            flag = "0" if is_invalid else "1"
             rows.append([flag, *cells] if first else [*cells, flag])
-    sign = ";" if ";" in header else " "
-    raw = read(tmp_path, header + "".join(sign.join(row) + "\n" for row in rows))
+    separator = ";" if ";" in header else " "
+    raw = read_text(tmp_path, header + "".join(separator.join(row) + "\n" for row in rows))
     expected = 1e-9 * (np.arange(4.0) + 10 * np.arange(3.0)[:, None])
     expected[1, 2] = np.nan
     np.testing.assert_allclose(raw.heights, expected, rtol=1e-12)
     assert raw.pitch == pytest.approx((2e-6, 3e-6), rel=1e-12)
 
 
-def test_without_a_name_it_is_a_height(tmp_path: Path) -> None:
-    """Three columns of which the last is 0 or 1 are points x, y, z unless the header says more."""
-    raw = read(tmp_path, "0 0 1\n1 0 0\n0 1 1\n1 1 1\n")
+def test_unnamed_third_column_is_a_height(tmp_path: Path) -> None:
+    """Three columns ending in 0 or 1 are points x, y, z unless the header names a validity."""
+    raw = read_text(tmp_path, "0 0 1\n1 0 0\n0 1 1\n1 1 1\n")
     np.testing.assert_array_equal(raw.heights, [[1, 0], [1, 1]])
 
 
-def test_a_validity_that_is_none(tmp_path: Path) -> None:
+def test_validity_other_than_0_or_1_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SurfaceFileError, match="line 4: validity must be 0 or 1"):
-        read(tmp_path, PROFILE + ROWS.replace("-999;0", "-999;7"))
+        read_text(tmp_path, PROFILE + ROWS.replace("-999;0", "-999;7"))
 
 
-def test_a_column_that_numbers_the_points(tmp_path: Path) -> None:
+def test_index_column_is_dropped(tmp_path: Path) -> None:
     rows = "".join(f"{k},{-9 + 0.5 * k},{k % 3}\n" for k in range(6))
-    raw = read(tmp_path, "index,x in µm,y in µm\n" + rows, "utf-16")
+    raw = read_text(tmp_path, "index,x in µm,y in µm\n" + rows, "utf-16")
     assert raw.pitch == pytest.approx((5e-7,), rel=1e-9)
     np.testing.assert_allclose(raw.heights, 1e-6 * np.array([0, 1, 2, 0, 1, 2]), rtol=1e-12)
     assert raw.notes == ("the first column numbers the points: left out",)
     later = "".join(f"{k + 5},{-9 + 0.5 * k},{k % 3}\n" for k in range(6))
-    for other in (rows.replace("3,", "8,", 1), later):  # it does not count the points: x, y, z
+    for other in (rows.replace("3,", "8,", 1), later):  # not consecutive from 0: columns x, y, z
         with pytest.raises(SurfaceFileError, match="unit of all 3 columns or of none"):
-            read(tmp_path, "index,x in µm,y in µm\n" + other, "utf-16")
+            read_text(tmp_path, "index,x in µm,y in µm\n" + other, "utf-16")
 
 
 # --- uneven profiles ------------------------------------------------------------------------------
 
 
-def test_an_uneven_profile_is_interpolated_if_told(tmp_path: Path) -> None:
+def test_uneven_profile_is_interpolated_only_with_resample(tmp_path: Path) -> None:
     text = "x [um] z [nm]\n0 0\n1 2\n4 8\n5 10\n6.5 13\n8 16\n"
     with pytest.raises(SurfaceFileError, match=r"resample=1.6e-06 \(--resample 1.6um\)"):
-        read(tmp_path, text)
-    raw = read(tmp_path, text, resample=1e-6)
+        read_text(tmp_path, text)
+    raw = read_text(tmp_path, text, resample=1e-6)
     assert raw.pitch == (1e-6,)
     np.testing.assert_allclose(raw.heights, 2e-9 * np.arange(9), atol=1e-20)
     assert (
@@ -99,20 +99,20 @@ def test_an_uneven_profile_is_interpolated_if_told(tmp_path: Path) -> None:
     )
 
 
-def test_the_error_of_an_uneven_profile_is_that_of_half_its_points() -> None:
+def test_stated_error_is_that_of_interpolating_every_other_point() -> None:
     x = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
-    heights, said = resample_profile(x, np.array([0.0, 5.0, 0.0, 3.0, np.nan]), 0.5)
+    heights, note = resample_profile(x, np.array([0.0, 5.0, 0.0, 3.0, np.nan]), 0.5)
     np.testing.assert_allclose(heights, [0, 2.5, 5, 2.5, 0, 1.5, 3])
-    rms = (0.5 * (5.0**2 + 3.0**2)) ** 0.5  # from 0, 2: the point at 3 is continued flatly
-    assert f"missed by {rms:.4g} m rms" in said
+    rms = (0.5 * (5.0**2 + 3.0**2)) ** 0.5  # constant continuation from 2 to the point at 3
+    assert f"missed by {rms:.4g} m rms" in note
     with pytest.raises(ParameterError, match="too fine for 4 points"):
         resample_profile(x, np.array([0.0, 5.0, 0.0, 3.0, np.nan]), 1e-9)
     with pytest.raises(SurfaceFileError, match="two points"):
         resample_profile(x, np.array([0.0, np.nan, np.nan, np.nan, np.nan]), 0.5)
 
 
-def test_an_uneven_profile_of_an_instrument(tmp_path: Path) -> None:
-    """By the library: a profile in NetCDF with positions of its own."""
+def test_uneven_profile_of_an_instrument_file(tmp_path: Path) -> None:
+    """SurfaceTopography reads a NetCDF profile with nonuniform positions."""
     pytest.importorskip("SurfaceTopography", reason="SurfaceTopography is not installed")
     from SurfaceTopography import NonuniformLineScan
 
@@ -133,29 +133,29 @@ NUMBERS = "1 2 3 4\n5 -32768 7 8\n9 10 11 12.5\n"
 EXPECTED = np.array([[9, 10, 11, 12.5], [5, np.nan, 7, 8], [1, 2, 3, 4]])
 
 
-def test_an_esri_grid(tmp_path: Path) -> None:
-    raw = read(tmp_path, GRID + NUMBERS)
+def test_esri_grid_is_read_southern_row_first(tmp_path: Path) -> None:
+    raw = read_text(tmp_path, GRID + NUMBERS)
     np.testing.assert_array_equal(raw.heights, EXPECTED)  # the first row is the northern one
     assert (raw.pitch, raw.has_units) == ((30.0, 30.0), False)
     assert raw.notes == (
         "no unit in the file: taken as metres",
         "1 points hold -32768, which marks a missing point",
     )
-    micro = read(tmp_path, GRID + NUMBERS, unit="um")
+    micro = read_text(tmp_path, GRID + NUMBERS, unit="um")
     np.testing.assert_allclose(micro.heights, 1e-6 * EXPECTED, rtol=1e-15)
     assert micro.pitch == pytest.approx((3e-5, 3e-5), rel=1e-12)
     assert micro.has_units
 
 
-def test_variants_of_an_esri_grid(tmp_path: Path) -> None:
-    wrapped = GRID.upper() + " ".join(NUMBERS.split())  # the count ends a row, not the line
-    np.testing.assert_array_equal(read(tmp_path, wrapped).heights, EXPECTED)
+def test_header_variants_of_esri_grids(tmp_path: Path) -> None:
+    wrapped = GRID.upper() + " ".join(NUMBERS.split())  # rows end by count, not by line
+    np.testing.assert_array_equal(read_text(tmp_path, wrapped).heights, EXPECTED)
     centre = "nrows 3\r\nncols 4\r\nxllcenter 0\r\nyllcenter 0\r\ndx 2\r\ndy 3\r\n"
-    raw = read(tmp_path, centre + NUMBERS.replace("-32768", "-9999").replace("\n", "\r\n"))
+    raw = read_text(tmp_path, centre + NUMBERS.replace("-32768", "-9999").replace("\n", "\r\n"))
     np.testing.assert_array_equal(raw.heights, EXPECTED)
     assert raw.pitch == (2.0, 3.0)
     commas = GRID.replace("30", "0,5") + NUMBERS.replace("12.5", "12,5")
-    np.testing.assert_array_equal(read(tmp_path, commas).heights, EXPECTED)
+    np.testing.assert_array_equal(read_text(tmp_path, commas).heights, EXPECTED)
 
 
 @pytest.mark.parametrize(
@@ -177,6 +177,6 @@ def test_variants_of_an_esri_grid(tmp_path: Path) -> None:
         (GRID + NUMBERS.replace("11", "inf"), "infinite height"),
     ],
 )  # fmt: skip
-def test_grids_that_are_refused(tmp_path: Path, text: str, match: str) -> None:
+def test_invalid_esri_grids_are_refused(tmp_path: Path, text: str, match: str) -> None:
     with pytest.raises(SurfaceFileError, match=match):
-        read(tmp_path, text)
+        read_text(tmp_path, text)

@@ -1,4 +1,4 @@
-"""Files of instruments through SurfaceTopography, and what happens without it."""
+"""Instrument files read by SurfaceTopography, and the errors when it is not installed."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ needs_library = pytest.mark.skipif(
 
 
 @dataclass
-class Kind:
-    """What SurfaceTopography says a channel's data are."""
+class DataKind:
+    """The kind of a channel's data as SurfaceTopography reports it."""
 
     value: str
 
@@ -46,11 +46,11 @@ class Topography:
 
 @dataclass
 class Channel:
-    """A channel as SurfaceTopography describes it: x is the first index."""
+    """A channel as SurfaceTopography describes it, with x as the first index."""
 
     index: int
     name: str
-    data_kind: Kind = field(default_factory=lambda: Kind("height"))
+    data_kind: DataKind = field(default_factory=lambda: DataKind("height"))
     dim: int = 2
     nb_grid_pts: tuple[int, ...] = (3, 2)
     physical_sizes: tuple[float, ...] | None = (6.0, 8.0)
@@ -65,7 +65,7 @@ class Channel:
 
 
 class Library:
-    """Stands for SurfaceTopography.IO with one reader, which takes every file."""
+    """Stand-in for SurfaceTopography.IO with one reader."""
 
     def __init__(self, *channels: Channel, fault: Exception | None = None) -> None:
         self.readers = [self]
@@ -78,8 +78,8 @@ class Library:
     def name(self) -> str:
         return "Made-up scanner"
 
-    def can_read(self, head: bytes) -> Kind:
-        return Kind("yes" if head.startswith(b"MADE UP") else "no")
+    def can_read(self, head: bytes) -> DataKind:
+        return DataKind("yes" if head.startswith(b"MADE UP") else "no")
 
     def __call__(self, _: object) -> Library:
         if self.fault is not None:
@@ -91,13 +91,13 @@ class Library:
 
 
 def install(monkeypatch: pytest.MonkeyPatch, library: Library) -> None:
-    """Put a library in place, which is known to this process only: files are read here."""
+    """Install a stand-in library and read files in this process, the only one that has it."""
     monkeypatch.setattr(instruments, "_import_library", lambda: library)
     monkeypatch.setattr(instruments, "has_library", lambda: True)
     monkeypatch.setattr(registry, "read_isolated", lambda read, file, options: read(file, options))
 
 
-def file(tmp_path: Path) -> Path:
+def write_scan(tmp_path: Path) -> Path:
     path = tmp_path / "scan.bin"
     path.write_bytes(b"MADE UP\0" + bytes(200))
     return path
@@ -107,32 +107,32 @@ def read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *channels: Channel, **options: Any
 ) -> RawSurface:
     install(monkeypatch, Library(*channels))
-    return read_surface(file(tmp_path), **options)
+    return read_surface(write_scan(tmp_path), **options)
 
 
 @needs_data
 @needs_library
-def test_a_real_file_of_an_frt_instrument() -> None:
+def test_real_file_of_an_frt_instrument() -> None:
     raw = read_surface(DATA / "frt-2.frt")
-    # 30 x 60 mm at 0.2 mm, says the folder's README.
+    # The README of the folder states 30 x 60 mm at 0.2 mm.
     assert raw.heights.shape == (300, 150)
     assert raw.pitch == pytest.approx((2e-4, 2e-4), rel=1e-12)
     assert int(np.isnan(raw.heights).sum()) == 12314
     assert raw.has_units
     assert "FRT" in raw.notes[0]
-    # Independently: somewhere in the file lie 16-bit counts, x fastest, 1 where missing, the
-    # bottom row first (SurfaceTopography puts the top row first, as in a picture).
+    # Independent check: the file contains 16-bit counts, x fastest, 1 where missing, bottom row
+    # first (SurfaceTopography puts the top row first, as in an image).
     upright = raw.heights[::-1]
     counts = _block(DATA / "frt-2.frt", ~np.isnan(upright))
     ratio = (upright / counts)[~np.isnan(upright)]
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-12)
 
 
-def _block(path: Path, known: np.ndarray[Any, np.dtype[np.bool_]]) -> np.ndarray[Any, Any]:
+def _block(path: Path, measured: np.ndarray[Any, np.dtype[np.bool_]]) -> np.ndarray[Any, Any]:
     content = path.read_bytes()
-    for start in range(len(content) - 2 * known.size + 1):
-        block = np.frombuffer(content, "<u2", known.size, start).reshape(known.shape)
-        if np.array_equal(block != 1, known):
+    for start in range(len(content) - 2 * measured.size + 1):
+        block = np.frombuffer(content, "<u2", measured.size, start).reshape(measured.shape)
+        if np.array_equal(block != 1, measured):
             return block
     pytest.fail("the pattern of missing points is nowhere in the file")
 
@@ -145,7 +145,7 @@ def test_x_runs_along_the_last_axis(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert raw.pitch == pytest.approx((2e-6, 4e-6), rel=1e-15)
 
 
-def test_profiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_profile_channel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     channel = Channel(
         0, "P", dim=1, nb_grid_pts=(4,), physical_sizes=(8.0,), unit="nm", stored=np.arange(4.0)
     )
@@ -155,42 +155,44 @@ def test_profiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     np.testing.assert_allclose(raw.heights, np.arange(4) * 1e-9, rtol=1e-15)
 
 
-def test_channels_are_chosen_by_name_or_number(
+def test_channel_is_selected_by_name_or_number(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    phase = Channel(0, "Phase", data_kind=Kind("phase"))
-    one = Channel(1, "Height")
-    two = Channel(2, "ZSensor", stored=10 + np.arange(6.0).reshape(3, 2))
-    raw = read(tmp_path, monkeypatch, phase, one)
+    phase = Channel(0, "Phase", data_kind=DataKind("phase"))
+    height = Channel(1, "Height")
+    sensor = Channel(2, "ZSensor", stored=10 + np.arange(6.0).reshape(3, 2))
+    raw = read(tmp_path, monkeypatch, phase, height)
     assert raw.heights[0, 0] == 0.0
     assert "channel 'Height' of 2" in raw.notes
-    with pytest.raises(ParameterError, match="2 height channels: 1: 'Height', 2: 'ZSensor'") as got:
-        read(tmp_path, monkeypatch, phase, one, two)
-    assert got.value.argument == "channel"
+    with pytest.raises(
+        ParameterError, match="2 height channels: 1: 'Height', 2: 'ZSensor'"
+    ) as caught:
+        read(tmp_path, monkeypatch, phase, height, sensor)
+    assert caught.value.argument == "channel"
     for channel in ("ZSensor", "2", 2):
-        raw = read(tmp_path, monkeypatch, phase, one, two, channel=channel)
+        raw = read(tmp_path, monkeypatch, phase, height, sensor, channel=channel)
         assert raw.heights[0, 0] == pytest.approx(10e-6, rel=1e-15)
     for channel in ("Phase", 0, 7, "zsensor", ""):
         with pytest.raises(ParameterError, match="must be one of the height channels 1: 'Height'"):
-            read(tmp_path, monkeypatch, phase, one, two, channel=channel)
+            read(tmp_path, monkeypatch, phase, height, sensor, channel=channel)
     with pytest.raises(SurfaceFileError, match="no height channel; the file has: 'Phase'"):
         read(tmp_path, monkeypatch, phase)
 
 
-def test_a_file_without_a_height_channel_is_left_to_the_next_reader(
+def test_file_without_a_height_channel_is_tried_by_the_next_reader(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    phase = Channel(0, "Phase", data_kind=Kind("phase"))
+    phase = Channel(0, "Phase", data_kind=DataKind("phase"))
     library = Library(phase)
     library.readers = [library, Library(Channel(0, "Height"))]
     install(monkeypatch, library)
-    assert read_surface(file(tmp_path)).heights.shape == (2, 3)
+    assert read_surface(write_scan(tmp_path)).heights.shape == (2, 3)
     library.readers = [library, Library(fault=ValueError("not mine"))]
     with pytest.raises(SurfaceFileError, match="damaged"):
-        read_surface(file(tmp_path))
+        read_surface(write_scan(tmp_path))
 
 
-def test_units_and_sizes_that_the_file_lacks(
+def test_missing_unit_is_required_and_missing_size_gives_no_pitch(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bare = Channel(0, "Height", unit=None)
@@ -206,7 +208,7 @@ def test_units_and_sizes_that_the_file_lacks(
         read(tmp_path, monkeypatch, Channel(0, "Height"), integrate_normals=True)
 
 
-def test_what_cannot_be_a_surface(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unusable_channels_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(SurfaceFileError, match="sampling is not uniform"):
         read(tmp_path, monkeypatch, Channel(0, "H", is_uniform=False))
     with pytest.raises(SurfaceFileError, match="more than are read or the file can hold"):
@@ -220,22 +222,24 @@ def test_what_cannot_be_a_surface(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize("fault", [ValueError("a\nb"), KeyError(), RecursionError("deep")])
-def test_a_reader_that_fails_is_reported_in_one_line(
+def test_failing_reader_gives_a_one_line_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fault: Exception
 ) -> None:
     install(monkeypatch, Library(fault=fault))
-    with pytest.raises(SurfaceFileError, match=r"scan\.bin: Made-up scanner file, damaged") as got:
-        read_surface(file(tmp_path))
-    assert "\n" not in str(got.value)
+    with pytest.raises(
+        SurfaceFileError, match=r"scan\.bin: Made-up scanner file, damaged"
+    ) as caught:
+        read_surface(write_scan(tmp_path))
+    assert "\n" not in str(caught.value)
 
 
-def test_without_the_extra_one_sentence_says_what_to_install(
+def test_without_the_extra_the_error_names_the_install_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
     monkeypatch.setitem(sys.modules, "SurfaceTopography.IO", None)
     with pytest.raises(SurfaceFileError, match=r"pip install 'asperity\[formats\]'"):
-        read_surface(file(tmp_path))
+        read_surface(write_scan(tmp_path))
     park = write_tiff(tmp_path / "park.tiff", np.eye(4), tags={50432: (4, struct.pack("<I", 1))})
     with pytest.raises(SurfaceFileError, match=r"instrument's TIFF.*asperity\[formats\]"):
         read_surface(park)
@@ -244,18 +248,18 @@ def test_without_the_extra_one_sentence_says_what_to_install(
         archive.writestr("index.xml", "<xml/>")
     with pytest.raises(SurfaceFileError, match=r"asperity\[formats\]"):
         read_surface(plux)
-    # Not where the content is ours: text with a fault is a text with a fault.
+    # Faulty text is reported as text, without the hint.
     text = tmp_path / "a.txt"
     text.write_text("1 2 3 4\n5 6\n")
-    with pytest.raises(SurfaceFileError, match="every row must have the same number") as got:
+    with pytest.raises(SurfaceFileError, match="every row must have the same number") as caught:
         read_surface(text)
-    assert "formats" not in str(got.value)
+    assert "formats" not in str(caught.value)
 
 
 @needs_library
 @pytest.mark.parametrize("size", [300, 2 * 60 * 60, 2 * 1201 * 1201])
-def test_garbage_is_not_claimed(tmp_path: Path, size: int) -> None:
-    """A square number of 16-bit values is not a tile of terrain, as one reader would have it."""
+def test_random_bytes_are_not_read_as_a_surface(tmp_path: Path, size: int) -> None:
+    """One reader of the library takes any square number of 16-bit values for a terrain tile."""
     path = tmp_path / "garbage.bin"
     path.write_bytes(np.random.default_rng(size).bytes(size))
     with pytest.raises(SurfaceFileError, match="looks like a binary file"):
@@ -263,7 +267,7 @@ def test_garbage_is_not_claimed(tmp_path: Path, size: int) -> None:
 
 
 @needs_library
-def test_text_stays_ours(tmp_path: Path) -> None:
+def test_text_is_not_passed_to_the_library(tmp_path: Path) -> None:
     path = tmp_path / "points.txt"
     path.write_text("".join(f"{x + y / 100} {y} {x * y}\n" for x in range(5) for y in range(5)))
     with pytest.raises(SurfaceFileError, match="three columns"):
@@ -271,13 +275,13 @@ def test_text_stays_ours(tmp_path: Path) -> None:
 
 
 @needs_library
-def test_an_instruments_tiff_is_recognised(tmp_path: Path) -> None:
+def test_instrument_tiff_is_recognised(tmp_path: Path) -> None:
     path = write_tiff(tmp_path / "park.tiff", np.eye(4), tags={50432: (4, struct.pack("<I", 1))})
     with pytest.raises(SurfaceFileError, match="no height channel"):
         read_surface(path)
 
 
-def test_the_library_is_imported_only_where_it_is_needed() -> None:
+def test_optional_libraries_are_imported_lazily() -> None:
     code = (
         "import sys, asperity.measured.reading;"
         "heavy = {'SurfaceTopography', 'trimesh', 'PIL', 'tifffile', 'scipy'};"

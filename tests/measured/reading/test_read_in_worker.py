@@ -1,4 +1,4 @@
-"""Isolated readers: their results are returned, and their limits hold."""
+"""Readers in a subprocess: results and errors are returned, and resource limits hold."""
 
 from __future__ import annotations
 
@@ -108,10 +108,10 @@ def file(tmp_path: Path) -> SurfaceFile:
     return SurfaceFile(path, b"head")
 
 
-def test_a_result_is_returned_unchanged(readers: Any, file: SurfaceFile) -> None:
+def test_result_is_returned_unchanged(readers: Any, file: SurfaceFile) -> None:
     raw = isolation.read_isolated(
         readers.sound, file, ReadingOptions(unit="mm", channel=np.int64(2))
-    )  # as users have it
+    )  # NumPy integers are accepted
     assert isinstance(raw, RawSurface)
     np.testing.assert_array_equal(raw.heights, readers.HEIGHTS)
     assert (raw.pitch, raw.source) == ((1e-6, 2e-6), file.name)
@@ -141,21 +141,21 @@ def test_errors_are_raised_unchanged(readers: Any, file: SurfaceFile) -> None:
         ("crashing", r"^ä file\.dat ends its reader with signal SIGSEGV: damaged"),
     ],
 )
-def test_a_hostile_reader_is_stopped(
+def test_misbehaving_reader_is_stopped(
     readers: Any, file: SurfaceFile, monkeypatch: pytest.MonkeyPatch, name: str, match: str
 ) -> None:
     monkeypatch.setattr(isolation, "TIME_LIMIT", 3.0 if name in {"looping", "sleeping"} else 20.0)
     monkeypatch.setattr(isolation, "MEMORY_LIMIT", 3 * 10**8)
-    # A loop is ended by the limit of processor time, sleep by the wall-clock limit.
+    # The processor-time limit ends a loop, the wall-clock limit ends a sleep.
     monkeypatch.setattr(isolation, "_WALL_CLOCK_FACTOR", 100 if name == "looping" else 1)
     with pytest.raises(SurfaceFileError, match=match):
         isolation.read_isolated(getattr(readers, name), file, ReadingOptions())
 
 
-def test_a_fork_for_many_files_applies_the_limits_to_each(
+def test_reading_worker_applies_the_limits_to_each_file(
     readers: Any, file: SurfaceFile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The fork of the long fuzz run."""
+    """The reading worker of the long fuzz run forks for each file."""
     monkeypatch.setattr(isolation, "TIME_LIMIT", 2.0)
     monkeypatch.setattr(isolation, "MEMORY_LIMIT", 3 * 10**8)
     with ReadingWorker() as reading:
@@ -166,10 +166,10 @@ def test_a_fork_for_many_files_applies_the_limits_to_each(
             assert isolation.read_isolated(readers.nothing, file, ReadingOptions()) is None
 
 
-def test_only_processor_time_is_limited_to_the_limit(
+def test_time_limit_counts_processor_time(
     readers: Any, file: SurfaceFile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Three seconds of processor time may take much longer on a busy machine."""
+    """On a busy machine, 3 s of processor time may take much longer."""
     monkeypatch.setattr(isolation, "TIME_LIMIT", 3.0)
     raw = isolation.read_isolated(readers.waiting, file, ReadingOptions())
     assert raw.heights.size == 6
@@ -178,7 +178,7 @@ def test_only_processor_time_is_limited_to_the_limit(
         isolation.read_isolated(readers.waiting, file, ReadingOptions())
 
 
-def until(condition: Callable[[], bool]) -> bool:
+def wait_until(condition: Callable[[], bool]) -> bool:
     end = time.monotonic() + 20.0
     while not condition():
         if time.monotonic() > end:
@@ -187,7 +187,7 @@ def until(condition: Callable[[], bool]) -> bool:
     return True
 
 
-def running(process: int) -> bool:
+def is_running(process: int) -> bool:
     try:
         state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
     except FileNotFoundError:
@@ -198,11 +198,11 @@ def running(process: int) -> bool:
 @pytest.mark.usefixtures("readers")
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_the_subprocess_ends_with_its_parent(file: SurfaceFile, end: signal.Signals) -> None:
+def test_subprocess_ends_with_its_parent(file: SurfaceFile, end: signal.Signals) -> None:
     program = (
         f"import sys, pathlib; sys.path[:] = {sys.path!r}; import hostile_readers as r;"
         "from asperity.measured.reading import ReadingOptions, SurfaceFile;"
-        # What a shell starts in the background ignores interrupts.
+        # Processes that a shell starts in the background ignore interrupts.
         "import signal; signal.signal(signal.SIGINT, signal.default_int_handler);"
         "from asperity.measured.reading.isolation import read_isolated;"
         f"file = SurfaceFile(pathlib.Path({str(file.path)!r}), b'');"
@@ -210,9 +210,9 @@ def test_the_subprocess_ends_with_its_parent(file: SurfaceFile, end: signal.Sign
     )
     parent = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.DEVNULL)
     pid = file.path.with_name("pid")
-    assert until(lambda: pid.exists() and pid.read_text() != "")
+    assert wait_until(lambda: pid.exists() and pid.read_text() != "")
     process = int(pid.read_text())
-    assert running(process)
+    assert is_running(process)
     os.kill(parent.pid, end)
     parent.wait(20)
-    assert until(lambda: not running(process))
+    assert wait_until(lambda: not is_running(process))

@@ -1,4 +1,4 @@
-"""Normal maps: recognised, refused, and integrated with the error stated."""
+"""Normal maps: recognition, refusal, and integration with a stated error."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ROW, COLUMN = np.mgrid[0.0 : SHAPE[0], 0.0 : SHAPE[1]]
 
 
 def waves(tilt: float = 0.0) -> tuple[Floats, Floats, Floats]:
-    """Height, slope along x and slope down the picture, in pixels: closed forms, not symmetric."""
+    """Return height, slope along x and slope down the image, in pixels; not symmetric."""
     a, b, k, m = 2.0, 1.3, 2 * np.pi / 31, 2 * np.pi / 23
     u = 0.21 * ROW + 0.11 * COLUMN
     height = a * np.sin(k * COLUMN + 0.4) * np.cos(m * ROW + 0.2) + b * np.sin(u) + tilt * COLUMN
@@ -33,47 +33,49 @@ def waves(tilt: float = 0.0) -> tuple[Floats, Floats, Floats]:
     return height, along_x, down
 
 
-def encoded(along_x: Floats, down: Floats, bits: int = 16, *, up: bool = True) -> NDArray[Any]:
-    """Draw a normal map; green points up the picture (OpenGL) or down (Direct3D)."""
+def encode_normals(
+    along_x: Floats, down: Floats, bits: int = 16, *, up: bool = True
+) -> NDArray[Any]:
+    """Return a normal map whose green channel points up (OpenGL) or down (Direct3D)."""
     normals = np.stack((-along_x, down if up else -down, np.ones(SHAPE)), axis=-1)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     full = 2**bits - 1
     return np.rint((normals + 1) / 2 * full).astype(np.uint16 if bits == 16 else np.uint8)
 
 
-def integrated(tmp_path: Path, image: NDArray[Any]) -> RawSurface:
+def integrate(tmp_path: Path, image: NDArray[Any]) -> RawSurface:
     return read_surface(write_png(tmp_path / "n.png", image), integrate_normals=True)
 
 
-def error(raw: RawSurface, height: Floats) -> float:
-    """RMS difference of the heights without their means, relative to the RMS height."""
-    wanted = height - height.mean()
-    return float(np.sqrt(np.mean((raw.heights - wanted) ** 2) / np.mean(wanted**2)))
+def relative_error(raw: RawSurface, height: Floats) -> float:
+    """Return the RMS error of the heights without means, relative to the RMS height."""
+    expected = height - height.mean()
+    return float(np.sqrt(np.mean((raw.heights - expected) ** 2) / np.mean(expected**2)))
 
 
-def mismatch(raw: RawSurface) -> tuple[float, float]:
-    """The mismatch that the notes state, absolute and relative."""
+def stated_mismatch(raw: RawSurface) -> tuple[float, float]:
+    """Return the mismatch stated in the notes, absolute and relative."""
     pattern = r"RMS mismatch of the slopes (\S+) \((\S+) of their RMS"
-    found = next(filter(None, (re.search(pattern, note) for note in raw.notes)))
-    return float(found[1]), float(found[2])
+    match = next(filter(None, (re.search(pattern, note) for note in raw.notes)))
+    return float(match[1]), float(match[2])
 
 
 @pytest.mark.parametrize("bits", [8, 16])
-def test_a_normal_map_is_refused_with_what_to_do(tmp_path: Path, bits: int) -> None:
+def test_normal_map_is_refused_with_advice(tmp_path: Path, bits: int) -> None:
     _, along_x, down = waves()
-    path = write_png(tmp_path / "n.png", encoded(along_x, down, bits))
+    path = write_png(tmp_path / "n.png", encode_normals(along_x, down, bits))
     with pytest.raises(SurfaceFileError, match=r"looks like a normal map.*integrate_normals=True"):
         read_surface(path)
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.3])
 @pytest.mark.parametrize(("bits", "tolerance"), [(16, 2e-3), (8, 2e-2)])
-def test_integration_finds_the_heights(
+def test_integration_recovers_the_heights(
     tmp_path: Path, bits: int, tolerance: float, tilt: float
 ) -> None:
     height, along_x, down = waves(tilt)
-    raw = integrated(tmp_path, encoded(along_x, down, bits))
-    if bits == 8:  # an error of half a step in every normal is a tilt, which levelling removes
+    raw = integrate(tmp_path, encode_normals(along_x, down, bits))
+    if bits == 8:  # a constant rounding error is a tilt, which levelling removes
         fit = np.linalg.lstsq(
             np.stack((COLUMN.ravel(), ROW.ravel(), np.ones(ROW.size)), axis=1),
             (raw.heights - height).ravel(),
@@ -81,34 +83,34 @@ def test_integration_finds_the_heights(
         )[0]
         assert np.abs(fit[:2]).max() < 2 / 255
         height = height + fit[0] * COLUMN + fit[1] * ROW
-    assert error(raw, height) < tolerance
+    assert relative_error(raw, height) < tolerance
     assert raw.per_pitch
     assert raw.relative
     assert raw.pitch is None
 
 
 @pytest.mark.parametrize("up", [True, False])
-def test_the_direction_of_green_is_found(tmp_path: Path, up: bool) -> None:
+def test_direction_of_the_green_channel_is_detected(tmp_path: Path, up: bool) -> None:
     height, along_x, down = waves()
-    raw = integrated(tmp_path, encoded(along_x, down, up=up))
-    assert error(raw, height) < 2e-3
+    raw = integrate(tmp_path, encode_normals(along_x, down, up=up))
+    assert relative_error(raw, height) < 2e-3
     assert any(("up (OpenGL)" if up else "down (Direct3D)") in note for note in raw.notes)
     assert any("fits better" in note for note in raw.notes)
 
 
-def test_a_direction_that_cannot_be_told_is_said(tmp_path: Path) -> None:
+def test_ambiguous_direction_of_green_is_noted(tmp_path: Path) -> None:
     _, along_x, _ = waves()
     along_x = np.broadcast_to(along_x[:1], SHAPE)
-    raw = integrated(tmp_path, encoded(along_x, np.zeros(SHAPE)))
+    raw = integrate(tmp_path, encode_normals(along_x, np.zeros(SHAPE)))
     assert any("check which one your program writes" in note for note in raw.notes)
 
 
-def test_error_is_of_fourth_order_in_the_pixel(tmp_path: Path) -> None:
+def test_integration_error_is_of_fourth_order_in_the_pixel(tmp_path: Path) -> None:
     errors = []
     for length in (8.0, 16.0):
         k = 2 * np.pi / length  # whole periods: no border
         slope = 0.5 * np.cos(k * (COLUMN + 0.5))
-        image = encoded(slope, np.zeros(SHAPE)).astype(np.float64)
+        image = encode_normals(slope, np.zeros(SHAPE)).astype(np.float64)
         normals = image / 65535 * 2 - 1
         exact = np.stack((-slope, np.zeros(SHAPE), np.ones(SHAPE)), axis=-1)
         assert np.abs(normals - exact / np.linalg.norm(exact, axis=-1, keepdims=True)).max() < 2e-5
@@ -125,38 +127,38 @@ def test_error_is_of_fourth_order_in_the_pixel(tmp_path: Path) -> None:
 
 def test_stated_mismatch_is_small_for_slopes_and_large_for_noise(tmp_path: Path) -> None:
     _, along_x, down = waves()
-    absolute, relative = mismatch(integrated(tmp_path, encoded(along_x, down)))
+    absolute, relative = stated_mismatch(integrate(tmp_path, encode_normals(along_x, down)))
     total = np.sqrt((np.mean(along_x**2) + np.mean(down**2)) / 2)
     assert relative < 2e-3
     assert absolute == pytest.approx(relative * total, rel=0.05)
-    # Negative control: swirling slopes, the gradient of nothing.
-    swirl = integrated(tmp_path, encoded(down, -along_x))
-    assert mismatch(swirl)[1] > 0.3
+    # Negative control: slopes that are no gradient.
+    swirl = integrate(tmp_path, encode_normals(down, -along_x))
+    assert stated_mismatch(swirl)[1] > 0.3
 
 
-def test_mismatch_is_the_curl_of_the_noise(tmp_path: Path) -> None:
-    """White noise on the slopes: the least squares keep its gradient and leave its curl."""
+def test_stated_mismatch_is_the_curl_of_the_noise(tmp_path: Path) -> None:
+    """Least squares integrates the gradient part of white noise; its curl is the mismatch."""
     height, along_x, down = waves()
     sigma = 0.05
     noise = sigma * np.random.default_rng(3).normal(size=(2, *SHAPE))
-    raw = integrated(tmp_path, encoded(along_x + noise[0], down + noise[1]))
+    raw = integrate(tmp_path, encode_normals(along_x + noise[0], down + noise[1]))
     kx, ky = np.meshgrid(*(np.pi * (np.arange(400) + 0.5) / 400 for _ in "xy"))
 
-    def kept(k: Floats) -> Floats:  # what the integral over one pixel leaves of a wave
+    def transfer(k: Floats) -> Floats:  # transfer function of the integral over one pixel
         return np.asarray((13 * np.cos(k / 2) - np.cos(3 * k / 2)) / 12)
 
     sx, sy = np.sin(kx / 2), np.sin(ky / 2)
-    curl = ((kept(kx) * sy) ** 2 + (kept(ky) * sx) ** 2) / (sx**2 + sy**2)
-    assert mismatch(raw)[0] == pytest.approx(sigma * np.sqrt(curl.mean() / 2), rel=0.03)
-    assert error(raw, height) < 0.1
+    curl = ((transfer(kx) * sy) ** 2 + (transfer(ky) * sx) ** 2) / (sx**2 + sy**2)
+    assert stated_mismatch(raw)[0] == pytest.approx(sigma * np.sqrt(curl.mean() / 2), rel=0.03)
+    assert relative_error(raw, height) < 0.1
 
 
-def test_in_metres_multiplies_by_the_pitch(tmp_path: Path) -> None:
+def test_in_metres_multiplies_heights_by_the_pitch(tmp_path: Path) -> None:
     height, along_x, down = waves()
-    raw = integrated(tmp_path, encoded(along_x, down))
+    raw = integrate(tmp_path, encode_normals(along_x, down))
     metres = raw.in_metres(2e-5)
     np.testing.assert_allclose(metres.heights, raw.heights * 2e-5, rtol=1e-15)
-    assert error(RawSurface(metres.heights / 2e-5, None, "", ()), height) < 2e-3
+    assert relative_error(RawSurface(metres.heights / 2e-5, None, "", ()), height) < 2e-3
     assert not metres.relative
     assert not metres.per_pitch
     assert metres.has_units
@@ -173,14 +175,14 @@ def test_in_metres_multiplies_by_the_pitch(tmp_path: Path) -> None:
 
 def test_steep_normals_are_bounded_and_counted(tmp_path: Path) -> None:
     _, along_x, down = waves()
-    image = encoded(along_x, down)
+    image = encode_normals(along_x, down)
     image[4:8, 5] = (65535, 32768, 32768)
-    raw = integrated(tmp_path, image)
+    raw = integrate(tmp_path, image)
     assert np.isfinite(raw.heights).all()
     assert any("4 normals near or below the horizon" in note for note in raw.notes)
 
 
-def test_what_is_no_normal_map() -> None:
+def test_normal_maps_are_distinguished_from_other_images() -> None:
     rng = np.random.default_rng(4)
     noise = rng.integers(0, 256, (64, 64, 3), dtype=np.uint8)
     assert not is_normal_map(noise)
@@ -189,20 +191,20 @@ def test_what_is_no_normal_map() -> None:
     for colour in ((70, 130, 180), (200, 160, 120), (255, 255, 255), (0, 0, 255)):
         assert not is_normal_map(np.full((8, 8, 3), colour, dtype=np.uint8)), colour
     _, along_x, down = waves()
-    true = encoded(along_x, down, 8)
-    assert is_normal_map(true)
-    assert not is_normal_map(255 - true)
-    assert not is_normal_map(true[..., [2, 0, 1]])
-    mostly = true.copy()
+    normal_map = encode_normals(along_x, down, 8)
+    assert is_normal_map(normal_map)
+    assert not is_normal_map(255 - normal_map)
+    assert not is_normal_map(normal_map[..., [2, 0, 1]])
+    mostly = normal_map.copy()
     mostly[:10] = (40, 90, 60)
-    assert not is_normal_map(mostly)  # one pixel in ten is no normal
-    mostly = true.copy()
+    assert not is_normal_map(mostly)  # one pixel in ten is not a normal
+    mostly = normal_map.copy()
     mostly[:3] = (40, 90, 60)
     assert is_normal_map(mostly)
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf, 1e200, -7.0])
-def test_pixels_that_are_no_normals(tmp_path: Path, wrong: float) -> None:
+def test_pixels_that_are_no_normals_are_refused(tmp_path: Path, wrong: float) -> None:
     _, along_x, down = waves()
     normals = np.stack((-along_x, down, np.ones(SHAPE)), axis=-1)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
@@ -212,6 +214,6 @@ def test_pixels_that_are_no_normals(tmp_path: Path, wrong: float) -> None:
         read_surface(path, integrate_normals=True)
 
 
-def test_too_small(tmp_path: Path) -> None:
+def test_normal_map_below_4_by_4_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SurfaceFileError, match="less than 4 x 4"):
-        integrated(tmp_path, np.full((3, 9, 3), (128, 128, 255), dtype=np.uint8))
+        integrate(tmp_path, np.full((3, 9, 3), (128, 128, 255), dtype=np.uint8))

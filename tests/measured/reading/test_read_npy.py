@@ -1,4 +1,4 @@
-"""NPY files, and what is common to all formats: missing, empty and foreign files."""
+"""NPY files, and cases common to all formats: missing, empty and foreign files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from asperity.measured.reading import RawSurface, read_surface
 MAP = np.array([[1.0, 2.0, np.nan, 4.0, 5.0], [-6.0, 7.0, 8.0, 9.0, 0.25]])
 
 
-def saved(tmp_path: Path, array: object, name: str = "test.npy") -> Path:
+def save_array(tmp_path: Path, array: object, name: str = "test.npy") -> Path:
     path = tmp_path / name
     with path.open("wb") as stream:
         np.save(stream, np.asanyarray(array), allow_pickle=True)
@@ -24,9 +24,9 @@ def saved(tmp_path: Path, array: object, name: str = "test.npy") -> Path:
 
 
 @pytest.mark.parametrize("kind", ["<f8", ">f8", "<f4", "<f2", "<i2", ">i4", "u1", "<u8"])
-def test_real_types(tmp_path: Path, kind: str) -> None:
+def test_real_array_types(tmp_path: Path, kind: str) -> None:
     array = np.arange(20).reshape(4, 5).astype(kind)
-    raw = read_surface(saved(tmp_path, array))
+    raw = read_surface(save_array(tmp_path, array))
     np.testing.assert_array_equal(raw.heights, np.arange(20.0).reshape(4, 5))
     assert raw.heights.dtype == np.float64
     assert raw.pitch is None
@@ -35,18 +35,18 @@ def test_real_types(tmp_path: Path, kind: str) -> None:
     assert raw.source == "test.npy"
 
 
-def test_missing_points_order_and_profile(tmp_path: Path) -> None:
-    np.testing.assert_array_equal(read_surface(saved(tmp_path, MAP)).heights, MAP)
-    fortran = read_surface(saved(tmp_path, np.asfortranarray(MAP))).heights
+def test_missing_points_memory_order_and_profile(tmp_path: Path) -> None:
+    np.testing.assert_array_equal(read_surface(save_array(tmp_path, MAP)).heights, MAP)
+    fortran = read_surface(save_array(tmp_path, np.asfortranarray(MAP))).heights
     np.testing.assert_array_equal(fortran, MAP)
     assert fortran.flags.c_contiguous
-    profile = read_surface(saved(tmp_path, MAP[1]))
+    profile = read_surface(save_array(tmp_path, MAP[1]))
     assert profile.is_profile
     np.testing.assert_array_equal(profile.heights, MAP[1])
 
 
 def test_format_is_recognised_by_content(tmp_path: Path) -> None:
-    raw = read_surface(saved(tmp_path, MAP, "named-wrongly.x3p"))
+    raw = read_surface(save_array(tmp_path, MAP, "named-wrongly.x3p"))
     np.testing.assert_array_equal(raw.heights, MAP)
 
 
@@ -67,11 +67,11 @@ def test_format_is_recognised_by_content(tmp_path: Path) -> None:
 )
 def test_other_arrays_are_refused(tmp_path: Path, array: object, match: str) -> None:
     with pytest.raises(SurfaceFileError, match=match):
-        read_surface(saved(tmp_path, array))
+        read_surface(save_array(tmp_path, array))
 
 
-def test_truncated(tmp_path: Path) -> None:
-    path = saved(tmp_path, MAP)
+def test_truncated_file_is_refused(tmp_path: Path) -> None:
+    path = save_array(tmp_path, MAP)
     whole = path.read_bytes()
     for length in (6, 8, 40, 128, len(whole) - 1):
         path.write_bytes(whole[:length])
@@ -79,7 +79,7 @@ def test_truncated(tmp_path: Path) -> None:
             read_surface(path)
 
 
-def test_lying_header_asks_for_no_memory(tmp_path: Path) -> None:
+def test_false_shape_in_a_header_allocates_no_memory(tmp_path: Path) -> None:
     header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000, 1000000000), }"
     header = header.ljust(117) + "\n"
     path = tmp_path / "lie.npy"
@@ -88,17 +88,17 @@ def test_lying_header_asks_for_no_memory(tmp_path: Path) -> None:
         read_surface(path)
 
 
-def test_mutated_files_fail_only_as_surface_files(tmp_path: Path) -> None:
+def test_mutated_files_raise_only_asperity_errors(tmp_path: Path) -> None:
     rng = random.Random(93)
     stream = io.BytesIO()
     np.save(stream, MAP)
     whole = stream.getvalue()
     path = tmp_path / "mutated.npy"
-    read = 0
+    read_count = 0
     for trial in range(300):
         data = bytearray(whole)
         for _ in range(rng.randint(1, 3)):
-            # Half of the trials damage the header, where the parser can stumble.
+            # Half of the trials damage the header.
             at = rng.randrange(6, 80 if trial % 2 else len(data))
             data[at] = rng.choice(b"(){}[]'\",:<>|0123456789fFiucO \\#\n\x00\xff")
         path.write_bytes(data)
@@ -106,10 +106,10 @@ def test_mutated_files_fail_only_as_surface_files(tmp_path: Path) -> None:
             raw = read_surface(path)
         except AsperityError:
             continue
-        read += 1
+        read_count += 1
         assert isinstance(raw, RawSurface)
         assert not np.isinf(raw.heights).any()
-    assert 10 < read < 290
+    assert 10 < read_count < 290
 
 
 @pytest.mark.parametrize(
@@ -128,22 +128,22 @@ def test_mutated_files_fail_only_as_surface_files(tmp_path: Path) -> None:
         (b"\x01\x02\x03\x04", "a binary file"),
     ],
 )
-def test_foreign_files(tmp_path: Path, content: bytes, match: str) -> None:
+def test_foreign_files_are_refused_by_name(tmp_path: Path, content: bytes, match: str) -> None:
     path = tmp_path / "strange.dat"
     path.write_bytes(content)
     with pytest.raises(SurfaceFileError, match=match):
         read_surface(path)
 
 
-def test_a_unit_scales_the_heights_of_an_npy_file(tmp_path: Path) -> None:
-    raw = read_surface(saved(tmp_path, MAP), unit="um")
+def test_unit_scales_the_heights(tmp_path: Path) -> None:
+    raw = read_surface(save_array(tmp_path, MAP), unit="um")
     np.testing.assert_allclose(raw.heights, MAP * 1e-6, rtol=1e-15)
     assert raw.has_units
     assert raw.notes == ("no unit in the file: 1e-06 m as given",)
 
 
 @pytest.mark.parametrize(
-    ("argument", "given", "match"),
+    ("argument", "value", "match"),
     [
         ("channel", "Height", "must not be given.*an NPY file.*no channels"),
         ("channel", 0, "must not be given.*no channels"),
@@ -153,15 +153,15 @@ def test_a_unit_scales_the_heights_of_an_npy_file(tmp_path: Path) -> None:
         ("unit", "MM", "must be a unit of length"),
     ],
 )
-def test_arguments_that_say_nothing_about_the_file(
-    tmp_path: Path, argument: str, given: object, match: str
+def test_inapplicable_and_invalid_arguments_are_refused(
+    tmp_path: Path, argument: str, value: object, match: str
 ) -> None:
     with pytest.raises(ParameterError, match=match) as caught:
-        read_surface(saved(tmp_path, MAP), **{argument: given})
+        read_surface(save_array(tmp_path, MAP), **{argument: value})
     assert caught.value.argument == argument
 
 
-def test_no_file_and_directory(tmp_path: Path) -> None:
+def test_missing_file_directory_and_invalid_name_are_refused(tmp_path: Path) -> None:
     with pytest.raises(SurfaceFileError, match="no such file"):
         read_surface(tmp_path / "absent.x3p")
     with pytest.raises(SurfaceFileError, match="is a directory"):
@@ -170,7 +170,7 @@ def test_no_file_and_directory(tmp_path: Path) -> None:
         read_surface("nul\0.x3p")
 
 
-def test_too_large_a_file_is_refused_unread(tmp_path: Path) -> None:
+def test_oversized_file_is_refused_before_reading(tmp_path: Path) -> None:
     path = tmp_path / "large.txt"
     with path.open("wb") as stream:
         stream.truncate(2_100_000_000)  # sparse: takes no disk space

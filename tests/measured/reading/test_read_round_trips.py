@@ -1,4 +1,4 @@
-"""A surface written in each format and read again agrees to the format's resolution."""
+"""Surfaces written in each format and read back agree within the format's resolution."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Writer = Callable[[Path, Floats], float]
 
 
 def surface() -> Floats:
-    """Heights [m], a generic map of 40 x 56 points."""
+    """Return heights [m] of a generic map of 40 x 56 points."""
     i, j = np.mgrid[0.0:40, 0.0:56]
     rough = np.random.default_rng(25).normal(scale=3e-7, size=i.shape)
     return np.asarray(4e-6 * np.sin(0.31 * j + 0.17 * i) + 1e-7 * j + rough)
@@ -81,7 +81,7 @@ class Case:
     pitch: tuple[float, float] | None
 
 
-LENGTHS = [
+LENGTH_FORMATS = [
     Case(x3p, (2e-6, 3e-6)),
     Case(x3p_integers, (2e-6, 3e-6)),
     Case(npy, None),
@@ -93,8 +93,8 @@ LENGTHS = [
 ]
 
 
-@pytest.mark.parametrize("case", LENGTHS, ids=lambda case: case.write.__name__)
-def test_lengths(tmp_path: Path, case: Case) -> None:
+@pytest.mark.parametrize("case", LENGTH_FORMATS, ids=lambda case: case.write.__name__)
+def test_formats_with_lengths_round_trip_within_resolution(tmp_path: Path, case: Case) -> None:
     heights = surface()
     path = tmp_path / "surface.dat"
     resolution = case.write(path, heights)
@@ -137,8 +137,8 @@ def tiff_double(path: Path, heights: Floats) -> float:
 @pytest.mark.parametrize(
     "write", [png8, png16, tiff16, tiff_single, tiff_double], ids=lambda write: write.__name__
 )
-def test_relative_heights(tmp_path: Path, write: Writer) -> None:
-    """Images hold no lengths: what comes back is the shape, of which a height range makes one."""
+def test_image_formats_round_trip_up_to_scale(tmp_path: Path, write: Writer) -> None:
+    """Images store no lengths, so heights are compared after scaling to their range."""
     heights = surface()
     path = tmp_path / "surface.dat"
     resolution = write(path, heights)
@@ -146,7 +146,7 @@ def test_relative_heights(tmp_path: Path, write: Writer) -> None:
     assert raw.relative
     assert raw.pitch is None
     scaled = (raw.heights - raw.heights.min()) / np.ptp(raw.heights)
-    wanted = (heights - heights.min()) / np.ptp(heights)
-    error = np.abs(scaled - wanted).max()
+    expected = (heights - heights.min()) / np.ptp(heights)
+    error = np.abs(scaled - expected).max()
     assert error <= resolution * (1 + 1e-6) + 1e-15
     assert error >= 0.3 * resolution

@@ -1,4 +1,4 @@
-"""Points on no regular grid: refused with what helps, interpolated where it is asked for."""
+"""Scattered points: refused with advice, and interpolated with ``resample``."""
 
 from __future__ import annotations
 
@@ -22,46 +22,48 @@ from asperity.measured.reading.resampling import (
 
 MAIN = "from asperity.cli.main import main; main()"
 RNG = np.random.default_rng(11)
-PLACES = RNG.uniform(0.0, 1e-3, (1500, 2))
+POSITIONS = RNG.uniform(0.0, 1e-3, (1500, 2))
 
 
-def wave(places: np.ndarray) -> np.ndarray:
-    x, y = places[..., 0], places[..., 1]
+def wave(positions: np.ndarray) -> np.ndarray:
+    x, y = positions[..., 0], positions[..., 1]
     return 5e-6 * np.sin(2 * np.pi * (x + 0.4 * y) / 4e-4)
 
 
-def write(folder: Path, places: np.ndarray, heights: np.ndarray) -> Path:
+def write(folder: Path, positions: np.ndarray, heights: np.ndarray) -> Path:
     path = folder / "points.xyz"
-    rows = (f"{x:.9e} {y:.9e} {z:.9e}" for (x, y), z in zip(places, heights, strict=True))
+    rows = (f"{x:.9e} {y:.9e} {z:.9e}" for (x, y), z in zip(positions, heights, strict=True))
     path.write_text("x [m] y [m] z [m]\n" + "\n".join(rows) + "\n")
     return path
 
 
-def test_the_refusal_names_a_pitch_that_works(tmp_path: Path) -> None:
-    path = write(tmp_path, PLACES, wave(PLACES))
+def test_refusal_suggests_a_working_pitch(tmp_path: Path) -> None:
+    path = write(tmp_path, POSITIONS, wave(POSITIONS))
     with pytest.raises(SurfaceFileError, match=r"no regular grid.*--resample") as refusal:
         read_surface(path)
-    found = re.search(r"resample=([0-9.e-]+) ", str(refusal.value))
-    assert found is not None
-    pitch = float(found.group(1))
+    match = re.search(r"resample=([0-9.e-]+) ", str(refusal.value))
+    assert match is not None
+    pitch = float(match.group(1))
     raw = read_surface(path, resample=pitch)
     assert raw.pitch == (pitch, pitch)
     assert raw.has_units
-    assert 0.8 < raw.heights.size / len(PLACES) < 1.25  # the density of the points
+    assert 0.8 < raw.heights.size / len(POSITIONS) < 1.25  # as dense as the points
     rows, columns = raw.heights.shape
-    y, x = np.mgrid[:rows, :columns] * pitch + PLACES.min(axis=0)[::-1, None, None]
-    missed = raw.heights - wave(np.stack((x, y), axis=-1))
-    known = ~np.isnan(missed)
-    assert known.mean() > 0.9
-    rms = float(np.sqrt(np.mean(missed[known] ** 2)))
-    said = re.search(r"missed by ([0-9.]+) nm rms, ([0-9.]+) (nm|µm) at most", raw.notes[-1])
-    assert said is not None, raw.notes
-    # What cross-validation says of points farther apart is true of these, and not much more.
-    assert rms < 1e-9 * float(said.group(1)) < 4 * rms
+    y, x = np.mgrid[:rows, :columns] * pitch + POSITIONS.min(axis=0)[::-1, None, None]
+    deviation = raw.heights - wave(np.stack((x, y), axis=-1))
+    measured = ~np.isnan(deviation)
+    assert measured.mean() > 0.9
+    rms = float(np.sqrt(np.mean(deviation[measured] ** 2)))
+    stated = re.search(r"missed by ([0-9.]+) nm rms, ([0-9.]+) (nm|µm) at most", raw.notes[-1])
+    assert stated is not None, raw.notes
+    # Cross-validation uses points farther apart, so it bounds this error, within a factor of 4.
+    assert rms < 1e-9 * float(stated.group(1)) < 4 * rms
 
 
-def test_a_plane_is_exact_and_the_outside_is_missing(tmp_path: Path) -> None:
-    inside = PLACES[PLACES.sum(axis=1) < 1e-3]  # a triangle: the far corner is outside
+def test_plane_is_interpolated_exactly_inside_the_hull(tmp_path: Path) -> None:
+    inside = POSITIONS[
+        POSITIONS.sum(axis=1) < 1e-3
+    ]  # a triangle; the far corner of the grid is outside
     raw = read_surface(
         write(tmp_path, inside, 0.1 * inside[:, 0] - 0.3 * inside[:, 1]), resample=5e-5
     )
@@ -74,20 +76,20 @@ def test_a_plane_is_exact_and_the_outside_is_missing(tmp_path: Path) -> None:
     np.testing.assert_allclose(raw.heights[~outside], (0.1 * x - 0.3 * y)[~outside], atol=1e-12)
 
 
-def test_what_cannot_be_interpolated(tmp_path: Path) -> None:
-    line = np.stack((PLACES[:, 0], 2 * PLACES[:, 0]), axis=-1)
+def test_invalid_points_and_pitches_are_refused(tmp_path: Path) -> None:
+    line = np.stack((POSITIONS[:, 0], 2 * POSITIONS[:, 0]), axis=-1)
     with pytest.raises(SurfaceFileError, match=r"points\.xyz: the points lie on one line"):
         read_surface(write(tmp_path, line, wave(line)), resample=1e-5)
-    twice = np.concatenate((PLACES, PLACES[:1]))
+    duplicated = np.concatenate((POSITIONS, POSITIONS[:1]))
     with pytest.raises(SurfaceFileError, match="same position"):
-        read_surface(write(tmp_path, twice, wave(twice)), resample=1e-5)
-    path = write(tmp_path, PLACES, wave(PLACES))
+        read_surface(write(tmp_path, duplicated, wave(duplicated)), resample=1e-5)
+    path = write(tmp_path, POSITIONS, wave(POSITIONS))
     for pitch in (1e-12, 1e-29, 2e-6):
         with pytest.raises(ParameterError, match="resample is too fine for 1500 points"):
             read_surface(path, resample=pitch)
     for wrong in (0.0, -1e-5, np.nan, "5um"):
         with pytest.raises(ParameterError, match=r"resample must be (positive|finite|a number)"):
-            read_surface(path, resample=wrong)  # what is refused
+            read_surface(path, resample=wrong)  # wrong type on purpose
     other = tmp_path / "a.txt"
     other.write_text("1 2 3 4\n5 6 7 8\n")
     np.save(tmp_path / "a.npy", np.eye(4))
@@ -96,36 +98,36 @@ def test_what_cannot_be_interpolated(tmp_path: Path) -> None:
             read_surface(file, resample=1e-5)
 
 
-def test_few_points_say_so() -> None:
-    heights, said = resample_points(
+def test_few_points_have_no_error_estimate() -> None:
+    heights, note = resample_points(
         np.array([[0, 0, 1.0], [1, 0, 1], [0, 1, 1], [np.nan] * 3]), 0.5
     )
     assert heights[0].tolist() == [1.0, 1.0, 1.0]
-    assert "too few points to know its error" in said
+    assert "too few points to know its error" in note
 
 
-def test_library_scene_and_command_line_have_it(tmp_path: Path) -> None:
-    path = write(tmp_path, PLACES, wave(PLACES))
+def test_resample_works_in_library_scene_and_command_line(tmp_path: Path) -> None:
+    path = write(tmp_path, POSITIONS, wave(POSITIONS))
     texture = load_texture(path, resample=2.5e-5)
     assert any("interpolated linearly" in step for step in texture.preparation)
     scene = tmp_path / "scene.toml"
     scene.write_text('[texture]\nkind = "file"\npath = "points.xyz"\nresample = "25 µm"\n')
-    for given in ([str(path), "--resample", "25um"], [str(scene)]):
-        done = subprocess.run(
-            [sys.executable, "-c", MAIN, "compare", *given, "--laws", "W"],
+    for arguments in ([str(path), "--resample", "25um"], [str(scene)]):
+        process = subprocess.run(
+            [sys.executable, "-c", MAIN, "compare", *arguments, "--laws", "W"],
             capture_output=True, text=True, check=False,
         )  # fmt: skip
-        assert done.returncode == 0, done.stderr
-        assert "interpolated" in done.stdout
+        assert process.returncode == 0, process.stderr
+        assert "interpolated" in process.stdout
 
 
-def test_what_a_line_misses_may_be_huge() -> None:
-    """The square of 1e308 is infinite: its mean was said, with a warning of NumPy's."""
-    _, said = resample_profile(np.arange(4.0), np.array([0.0, 1e308, 0.0, 0.0]), 1.0)
-    assert "inf" not in said
+def test_error_of_a_huge_profile_does_not_overflow() -> None:
+    """The square of 1e308 overflows, so the RMS error must be computed with scaling."""
+    _, note = resample_profile(np.arange(4.0), np.array([0.0, 1e308, 0.0, 0.0]), 1.0)
+    assert "inf" not in note
 
 
-def test_what_a_plane_misses_may_be_huge() -> None:
+def test_error_of_a_huge_map_does_not_overflow() -> None:
     x, y = (axis.ravel().astype(float) for axis in np.meshgrid(np.arange(20), np.arange(20)))
     heights = 1e300 * RNG.normal(size=400)
     with warnings.catch_warnings():

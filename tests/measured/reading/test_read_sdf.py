@@ -20,20 +20,20 @@ SPEC = SdfSpec(STORED)
 EXPECTED = STORED * 1e-9
 
 
-def ascii_of(tmp_path: Path, spec: SdfSpec, name: str = "test.sdf") -> RawSurface:
+def read_ascii(tmp_path: Path, spec: SdfSpec, name: str = "test.sdf") -> RawSurface:
     return read_surface(write_ascii(tmp_path / name, spec))
 
 
-def binary_of(tmp_path: Path, spec: SdfSpec, extra: bytes = b"") -> RawSurface:
+def read_binary(tmp_path: Path, spec: SdfSpec, extra: bytes = b"") -> RawSurface:
     return read_surface(write_binary(tmp_path / "test.sdf", spec, extra))
 
 
 @pytest.mark.parametrize("kind", range(8))
 @pytest.mark.parametrize("version", ["ISO-1.0", "ISO-2.0", "BCR-1.0"])
-def test_every_data_type(tmp_path: Path, version: str, kind: int) -> None:
+def test_every_data_type_and_version(tmp_path: Path, version: str, kind: int) -> None:
     stored = np.abs(STORED) if kind < 3 else STORED
     spec = SdfSpec(stored, version=version, kind=kind)
-    for raw in (ascii_of(tmp_path, spec), binary_of(tmp_path, spec)):
+    for raw in (read_ascii(tmp_path, spec), read_binary(tmp_path, spec)):
         np.testing.assert_allclose(raw.heights, stored * 1e-9, rtol=1e-15)
         assert raw.pitch == (2.5e-6, 3e-6)
         assert raw.notes == ()
@@ -47,30 +47,30 @@ def test_versions_and_line_ends(tmp_path: Path, version: str, end: str) -> None:
     trailers = ("", f"{end}*{end}", f"{end}*{end}*{end}", f"{end}*{end}Note = 5 * 3{end}*{end}")
     for trailer in trailers:
         spec = replace(SPEC, version=version, end=end, trailer=trailer)
-        raw = ascii_of(tmp_path, spec, "named-wrongly.x3p")
+        raw = read_ascii(tmp_path, spec, "named-wrongly.x3p")
         np.testing.assert_allclose(raw.heights, EXPECTED, rtol=1e-15)
 
 
-def test_comments_case_and_fields_beyond_the_standard(tmp_path: Path) -> None:
+def test_comments_case_and_unknown_fields_are_accepted(tmp_path: Path) -> None:
     path = write_ascii(tmp_path / "test.sdf", replace(SPEC, fields={"NumDataSet": "1"}))
     text = path.read_bytes().replace(b"NumPoints ", b"; a comment = 7\r\nnumpoints ")
     path.write_bytes(text)
     np.testing.assert_allclose(read_surface(path).heights, EXPECTED, rtol=1e-15)
 
 
-def test_a_profile_needs_no_distance_between_profiles(tmp_path: Path) -> None:
+def test_single_profile_needs_no_y_scale(tmp_path: Path) -> None:
     spec = replace(SPEC, stored=STORED.reshape(1, -1), scale=("0.5e-6", "0", "1E-06"))
-    for raw in (ascii_of(tmp_path, spec), binary_of(tmp_path, spec)):
+    for raw in (read_ascii(tmp_path, spec), read_binary(tmp_path, spec)):
         assert raw.is_profile
         assert raw.pitch == (0.5e-6,)
         np.testing.assert_allclose(raw.heights, STORED.ravel() * 1e-6, rtol=1e-15)
 
 
-def test_missing_points_of_a_text(tmp_path: Path) -> None:
+def test_missing_points_of_a_text_file(tmp_path: Path) -> None:
     stored = STORED.copy()
     stored[0, 1] = stored[2, 3] = np.nan
     np.testing.assert_allclose(
-        ascii_of(tmp_path, replace(SPEC, stored=stored)).heights, stored * 1e-9, rtol=1e-15
+        read_ascii(tmp_path, replace(SPEC, stored=stored)).heights, stored * 1e-9, rtol=1e-15
     )
 
 
@@ -78,27 +78,27 @@ def test_missing_points_of_a_text(tmp_path: Path) -> None:
     ("kind", "marker"),
     [(1, 65535.0), (2, 4294967295.0), (4, -128.0), (5, -32768.0), (6, -2147483648.0)],
 )
-def test_numbers_that_mark_missing_points(tmp_path: Path, kind: int, marker: float) -> None:
+def test_integer_markers_of_missing_points(tmp_path: Path, kind: int, marker: float) -> None:
     stored = np.abs(STORED)
     stored[1, 2] = marker
-    raw = binary_of(tmp_path, SdfSpec(stored, kind=kind))
+    raw = read_binary(tmp_path, SdfSpec(stored, kind=kind))
     assert np.argwhere(np.isnan(raw.heights)).tolist() == [[1, 2]]
     assert any("1 points hold" in note for note in raw.notes)
 
 
 @pytest.mark.parametrize(("kind", "type_"), [(3, np.float32), (7, np.float64)])
-def test_floats_mark_missing_points_by_the_least_number(
+def test_lowest_float_and_nan_mark_missing_points(
     tmp_path: Path, kind: int, type_: type[np.floating]
 ) -> None:
     stored = STORED.copy()
     stored[1, 2] = np.finfo(type_).min
     stored[0, 0] = np.nan
-    raw = binary_of(tmp_path, SdfSpec(stored, kind=kind))
+    raw = read_binary(tmp_path, SdfSpec(stored, kind=kind))
     assert np.argwhere(np.isnan(raw.heights)).tolist() == [[0, 0], [1, 2]]
 
 
-def test_olympus_adds_eight_bytes_to_the_header(tmp_path: Path) -> None:
-    raw = binary_of(tmp_path, SPEC, extra=b"\x05\0\0\0\x01\0\0\0")
+def test_olympus_header_with_eight_extra_bytes(tmp_path: Path) -> None:
+    raw = read_binary(tmp_path, SPEC, extra=b"\x05\0\0\0\x01\0\0\0")
     np.testing.assert_allclose(raw.heights, EXPECTED, rtol=1e-15)
 
 
@@ -127,14 +127,16 @@ def test_olympus_adds_eight_bytes_to_the_header(tmp_path: Path) -> None:
         ({"trailer": "e400\r\n*"}, "infinite height"),
     ],
 )
-def test_faults_of_a_text(tmp_path: Path, changes: dict[str, object], match: str) -> None:
+def test_invalid_text_files_are_refused(
+    tmp_path: Path, changes: dict[str, object], match: str
+) -> None:
     with pytest.raises(SurfaceFileError, match=match) as caught:
-        ascii_of(tmp_path, replace(SPEC, **changes))
+        read_ascii(tmp_path, replace(SPEC, **changes))
     assert str(caught.value).startswith("test.sdf: ")
 
 
 @pytest.mark.parametrize("area", ["", "   \r\n  ", "BAD", "-", "0x10"])
-def test_white_space_is_no_number(tmp_path: Path, area: str) -> None:
+def test_empty_or_invalid_data_area_is_refused(tmp_path: Path, area: str) -> None:
     path = write_ascii(tmp_path / "test.sdf", replace(SPEC, stored=np.zeros((1, 1))))
     head = path.read_bytes().partition(b"*")[0]
     path.write_bytes(head + b"*\r\n" + area.encode() + b"\r\n*\r\n")
@@ -145,7 +147,7 @@ def test_white_space_is_no_number(tmp_path: Path, area: str) -> None:
         read_surface(path)
 
 
-def test_faults_of_a_binary_file(tmp_path: Path) -> None:
+def test_invalid_binary_files_are_refused(tmp_path: Path) -> None:
     path = write_binary(tmp_path / "test.sdf", SPEC)
     whole = path.read_bytes()
     for length in (20, 80, 81, len(whole) - 1):
@@ -153,10 +155,10 @@ def test_faults_of_a_binary_file(tmp_path: Path) -> None:
         with pytest.raises(SurfaceFileError, match=r"test\.sdf: truncated"):
             read_surface(path)
     with pytest.raises(SurfaceFileError, match="Compression is 3"):
-        binary_of(tmp_path, replace(SPEC, fields={"Compression": "3"}))
+        read_binary(tmp_path, replace(SPEC, fields={"Compression": "3"}))
 
 
-def test_arguments_of_other_formats(tmp_path: Path) -> None:
+def test_arguments_of_other_formats_are_refused(tmp_path: Path) -> None:
     path = write_ascii(tmp_path / "test.sdf", SPEC)
     with pytest.raises(ParameterError, match=r"unit must not be given: test\.sdf \(an SDF file\)"):
         read_surface(path, unit="mm")

@@ -1,4 +1,4 @@
-"""Text matrices and two-column profiles."""
+"""Text matrices, profiles and lists of points."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ HEIGHTS = np.array([[0.5, -1.25, 2.0, 1.0], [3.0, 4.5, -5e-3, 1e2], [7.0, 8.0, 9
 
 
 @pytest.fixture(autouse=True)
-def here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Ask the readers of instruments in this process: hundreds of texts are refused."""
+def read_in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run instrument readers in this process, since hundreds of texts are tried."""
     monkeypatch.setattr(registry, "read_isolated", lambda read, file, options: read(file, options))
 
 
-def read(tmp_path: Path, text: str | bytes) -> RawSurface:
+def read_text(tmp_path: Path, text: str | bytes) -> RawSurface:
     path = tmp_path / "test.txt"
     path.write_bytes(text.encode() if isinstance(text, str) else text)
     return read_surface(path)
 
 
-def fails(tmp_path: Path, text: str | bytes, match: str) -> None:
+def assert_refused(tmp_path: Path, text: str | bytes, match: str) -> None:
     with pytest.raises(SurfaceFileError, match=match) as caught:
-        read(tmp_path, text)
+        read_text(tmp_path, text)
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith("test.txt")
 
 
-def lines(separator: str, decimal: str = ".", end: str = "\n") -> str:
+def matrix_text(separator: str, decimal: str = ".", end: str = "\n") -> str:
     rows = (separator.join(f"{v!r}" for v in row.tolist()) for row in HEIGHTS)
     return end.join(row.replace(".", decimal) if decimal != "." else row for row in rows) + end
 
@@ -59,9 +59,9 @@ def test_real_profile_of_a_stylus() -> None:
     assert raw.has_units
 
 
-def test_a_unit_for_a_file_that_names_none(tmp_path: Path) -> None:
+def test_unit_for_a_file_without_units(tmp_path: Path) -> None:
     path = tmp_path / "test.txt"
-    path.write_text(lines(","))
+    path.write_text(matrix_text(","))
     raw = read_surface(path, unit="nm")
     np.testing.assert_allclose(raw.heights, HEIGHTS * 1e-9, rtol=1e-15)
     assert raw.has_units
@@ -77,16 +77,16 @@ def test_a_unit_for_a_file_that_names_none(tmp_path: Path) -> None:
         read_surface(path, unit="um")
 
 
-def test_gigabytes_of_text_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_oversized_text_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "_MAX_TEXT_BYTES", 20)
     with pytest.raises(SurfaceFileError, match=r"of text; at most 2e-08 GB are read: cut out"):
-        read(tmp_path, lines(","))
+        read_text(tmp_path, matrix_text(","))
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r", "\r\r\n"])
 @pytest.mark.parametrize("separator", ["\t", ";", ",", " ", "   ", ", ", " ; "])
-def test_separators(tmp_path: Path, separator: str, end: str) -> None:
-    raw = read(tmp_path, lines(separator, end=end))
+def test_separators_and_line_ends(tmp_path: Path, separator: str, end: str) -> None:
+    raw = read_text(tmp_path, matrix_text(separator, end=end))
     np.testing.assert_array_equal(raw.heights, HEIGHTS)
     assert raw.pitch is None
     assert raw.notes == ("no unit in the file: taken as metres",)
@@ -95,33 +95,35 @@ def test_separators(tmp_path: Path, separator: str, end: str) -> None:
 
 @pytest.mark.parametrize("separator", ["\t", ";", " ", "; "])
 def test_decimal_comma(tmp_path: Path, separator: str) -> None:
-    raw = read(tmp_path, lines(separator, decimal=","))
+    raw = read_text(tmp_path, matrix_text(separator, decimal=","))
     np.testing.assert_array_equal(raw.heights, HEIGHTS)
     assert any("comma" in note for note in raw.notes)
-    fails(tmp_path, "1.234,5;2\n2;3\n3;4\n4;5\n5;6\n", "line 1 .* is not a row of numbers")
+    assert_refused(tmp_path, "1.234,5;2\n2;3\n3;4\n4;5\n5;6\n", "line 1 .* is not a row of numbers")
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
 def test_encodings_and_micro_signs(tmp_path: Path, encoding: str) -> None:
-    raw = read(tmp_path, f"# Höhe [µm]\n{lines(' ')}".encode(encoding))
+    raw = read_text(tmp_path, f"# Höhe [µm]\n{matrix_text(' ')}".encode(encoding))
     np.testing.assert_allclose(raw.heights, HEIGHTS * 1e-6, rtol=1e-14)
     assert raw.notes == ()
 
 
 def test_comments_blank_lines_and_missing_points(tmp_path: Path) -> None:
-    raw = read(tmp_path, "# by hand\n\n1,,3,4\n% aside\n5,nan,7,8 # end\n\n9,10,---,NaN\n,2,3,4\n")
+    raw = read_text(
+        tmp_path, "# by hand\n\n1,,3,4\n% aside\n5,nan,7,8 # end\n\n9,10,---,NaN\n,2,3,4\n"
+    )
     n = np.nan
     expected = [[1, n, 3, 4], [5, n, 7, 8], [9, 10, n, n], [n, 2, 3, 4]]
     np.testing.assert_array_equal(raw.heights, expected)
 
 
-def test_separators_at_the_end_of_each_line(tmp_path: Path) -> None:
-    raw = read(tmp_path, lines(",").replace("\n", ",,\n") + ",,,,,\n")
+def test_trailing_separators_are_ignored(tmp_path: Path) -> None:
+    raw = read_text(tmp_path, matrix_text(",").replace("\n", ",,\n") + ",,,,,\n")
     np.testing.assert_array_equal(raw.heights, HEIGHTS)
 
 
 def test_column_of_heights_is_a_profile(tmp_path: Path) -> None:
-    raw = read(tmp_path, "z [nm]\n1\n2\n4\n8\n")
+    raw = read_text(tmp_path, "z [nm]\n1\n2\n4\n8\n")
     np.testing.assert_allclose(raw.heights, np.array([1, 2, 4, 8]) * 1e-9, rtol=1e-14)
     assert raw.pitch is None
 
@@ -141,7 +143,7 @@ def test_column_of_heights_is_a_profile(tmp_path: Path) -> None:
     ],
 )
 def test_units_of_a_profile(tmp_path: Path, header: str, x: float, z: float) -> None:
-    raw = read(tmp_path, f"{header}\n0.0,1\n0.5,2\n1.0,4\n1.5,7\n")
+    raw = read_text(tmp_path, f"{header}\n0.0,1\n0.5,2\n1.0,4\n1.5,7\n")
     assert raw.pitch == pytest.approx((0.5 * x,), rel=1e-14)
     np.testing.assert_allclose(raw.heights, np.array([1, 2, 4, 7]) * z, rtol=1e-14)
     assert raw.has_units
@@ -157,49 +159,51 @@ def test_units_of_a_profile(tmp_path: Path, header: str, x: float, z: float) -> 
         ("x [um] or [nm],z [nm]", "unit of all 2 columns"),
     ],
 )
-def test_units_that_are_no_use(tmp_path: Path, header: str, match: str) -> None:
-    fails(tmp_path, f"{header}\n0.0,1\n0.5,2\n1.0,4\n1.5,7\n", match)
+def test_unusable_units_are_refused(tmp_path: Path, header: str, match: str) -> None:
+    assert_refused(tmp_path, f"{header}\n0.0,1\n0.5,2\n1.0,4\n1.5,7\n", match)
 
 
-def test_no_unit_is_metres_unless_absurd(tmp_path: Path) -> None:
-    raw = read(tmp_path, "0.0 1e-6\n1e-6 2e-6\n2e-6 3e-6\n3e-6 2e-6\n")
+def test_missing_unit_means_metres_unless_implausible(tmp_path: Path) -> None:
+    raw = read_text(tmp_path, "0.0 1e-6\n1e-6 2e-6\n2e-6 3e-6\n3e-6 2e-6\n")
     assert raw.pitch == pytest.approx((1e-6,))
     assert not raw.has_units
     assert "metres" in raw.notes[0]
-    fails(tmp_path, "0 1\n5 2\n10 3\n15 4\n", "span 15 and look not to be in metres")
+    assert_refused(tmp_path, "0 1\n5 2\n10 3\n15 4\n", "span 15 and look not to be in metres")
 
 
-def test_profile_or_matrix_of_two_columns(tmp_path: Path) -> None:
-    assert read(tmp_path, "1 5\n2 6\n3 7\n4 8\n").is_profile
-    assert read(tmp_path, "1 5\n0 6\n3 7\n2 8\n").heights.shape == (4, 2)
-    reverse = read(tmp_path, "4 5\n3 6\n2 7\n1 8\n")
+def test_two_columns_are_a_profile_or_a_matrix(tmp_path: Path) -> None:
+    assert read_text(tmp_path, "1 5\n2 6\n3 7\n4 8\n").is_profile
+    assert read_text(tmp_path, "1 5\n0 6\n3 7\n2 8\n").heights.shape == (4, 2)
+    reverse = read_text(tmp_path, "4 5\n3 6\n2 7\n1 8\n")
     assert reverse.heights.tolist() == [8, 7, 6, 5]
     assert any("reversed" in note for note in reverse.notes)
     many = [f"{k} 1" for k in range(9)] + ["7 1"] + [f"{k} 1" for k in range(10, 30)]
-    fails(tmp_path, "\n".join(many), "line 10: the positions .* must increase")
+    assert_refused(tmp_path, "\n".join(many), "line 10: the positions .* must increase")
 
 
-def test_positions_rounded_by_printing(tmp_path: Path) -> None:
+def test_rounded_positions_are_a_uniform_grid(tmp_path: Path) -> None:
     true = 0.15625 * np.arange(200)
     text = "x [mm],z [um]\n" + "".join(f"{x:.1f},{k}\n" for k, x in enumerate(true))
-    raw = read(tmp_path, text)
+    raw = read_text(tmp_path, text)
     assert raw.pitch == pytest.approx((1e-3 * round(true[-1], 1) / 199,), rel=1e-12)
     text = "x [mm],z [um]\n" + "".join(f"{x + 123:.6g},{k}\n" for k, x in enumerate(true))
-    assert read(tmp_path, text).pitch == pytest.approx((0.15625e-3,), rel=1e-3)
+    assert read_text(tmp_path, text).pitch == pytest.approx((0.15625e-3,), rel=1e-3)
 
 
-def test_sampling_that_is_not_uniform(tmp_path: Path) -> None:
+def test_nonuniform_sampling_is_refused(tmp_path: Path) -> None:
     true = 0.15625 * np.arange(200)
     true[150:] += 0.3  # a gap of three digits
     text = "x [mm],z [um]\n" + "".join(f"{x:.1f},{k}\n" for k, x in enumerate(true))
-    fails(tmp_path, text, r"not uniform: line 1[45]. is .* m from a grid")
-    fails(tmp_path, "0.000 1\n0.100 1\n0.203 1\n0.300 1\n", "not uniform: line 3 is 0.003 m")
-    # A lost sample among positions printed as coarsely as the step is no rounding.
-    kept = [k for k in range(8) if k != 4]
-    fails(tmp_path, "\n".join(f"{k} 1" for k in kept), "not uniform")
+    assert_refused(tmp_path, text, r"not uniform: line 1[45]. is .* m from a grid")
+    assert_refused(
+        tmp_path, "0.000 1\n0.100 1\n0.203 1\n0.300 1\n", "not uniform: line 3 is 0.003 m"
+    )
+    # A lost sample is not rounding, even if positions are printed as coarsely as the step.
+    indices = [k for k in range(8) if k != 4]
+    assert_refused(tmp_path, "\n".join(f"{k} 1" for k in indices), "not uniform")
 
 
-def test_spacing_accepts_every_rounded_grid_and_refuses_every_gap() -> None:
+def test_spacing_accepts_rounded_grids_and_refuses_gaps() -> None:
     rng = np.random.default_rng(1)
     for _ in range(200):
         n = int(rng.integers(9, 400))
@@ -232,44 +236,48 @@ def test_spacing_accepts_every_rounded_grid_and_refuses_every_gap() -> None:
         ("1_0 2 3 4\n1_0 2 3 4\n", "no row of numbers"),
     ],
 )
-def test_faults(tmp_path: Path, text: str, match: str) -> None:
-    fails(tmp_path, text, match)
+def test_invalid_texts_are_refused(tmp_path: Path, text: str, match: str) -> None:
+    assert_refused(tmp_path, text, match)
 
 
-def test_header_and_footer(tmp_path: Path) -> None:
-    raw = read(tmp_path, f"Report 7\nOperator: A. B.\n12 March 2020\n\n{lines(' ')}\nEnd of data\n")
+def test_header_and_footer_are_skipped(tmp_path: Path) -> None:
+    raw = read_text(
+        tmp_path, f"Report 7\nOperator: A. B.\n12 March 2020\n\n{matrix_text(' ')}\nEnd of data\n"
+    )
     np.testing.assert_array_equal(raw.heights, HEIGHTS)
     assert "1 lines of text after the numbers ignored" in raw.notes
 
 
 def test_header_of_gwyddion(tmp_path: Path) -> None:
     header = "# Channel: Height\n# Width: 8.0 µm\n# Height: 9.0 µm\n# Value units: nm\n"
-    raw = read(tmp_path, header + lines("\t"))
+    raw = read_text(tmp_path, header + matrix_text("\t"))
     np.testing.assert_allclose(raw.heights, HEIGHTS * 1e-9, rtol=1e-14)
     assert raw.pitch == pytest.approx((2e-6, 3e-6), rel=1e-14)
 
 
-def test_maps_one_after_the_other_are_not_one_map(tmp_path: Path) -> None:
+def test_several_maps_in_one_file_are_refused(tmp_path: Path) -> None:
     header = "# Channel: Height\n# Width: 8.0 µm\n# Height: 9.0 µm\n# Value units: nm\n"
-    fails(tmp_path, 2 * (header + lines("\t")), "several maps in one file")
-    one = header + lines("\t").replace("\n", "\n# Width: by hand\n")  # a remark is no header
-    np.testing.assert_allclose(read(tmp_path, one).heights, HEIGHTS * 1e-9, rtol=1e-14)
+    assert_refused(tmp_path, 2 * (header + matrix_text("\t")), "several maps in one file")
+    one = header + matrix_text("\t").replace(
+        "\n", "\n# Width: by hand\n"
+    )  # a comment is not a header
+    np.testing.assert_allclose(read_text(tmp_path, one).heights, HEIGHTS * 1e-9, rtol=1e-14)
 
 
 def test_declared_value_of_missing_points(tmp_path: Path) -> None:
-    raw = read(tmp_path, "ncols 4\nNODATA_value -9999\n1 2 3 -9999\n5 6 7 8\n-9999 2 3 4\n")
+    raw = read_text(tmp_path, "ncols 4\nNODATA_value -9999\n1 2 3 -9999\n5 6 7 8\n-9999 2 3 4\n")
     n = np.nan
     np.testing.assert_array_equal(raw.heights, [[1, 2, 3, n], [5, 6, 7, 8], [n, 2, 3, 4]])
     assert any("points hold -9999, which marks a missing point" in note for note in raw.notes)
 
 
-def test_mutated_files_fail_only_as_surface_files(tmp_path: Path) -> None:
+def test_mutated_files_raise_only_asperity_errors(tmp_path: Path) -> None:
     rng = random.Random(16610)
     seeds = [
         "Scan\nx [um],z [nm]\n0.0,1.5\n0.2,2.5\n0.3,4.0\n0.5,7.0\n0.6,1\n",
-        lines("\t"),
-        lines(";", ","),
-        "# z in um\n" + lines(" "),
+        matrix_text("\t"),
+        matrix_text(";", ","),
+        "# z in um\n" + matrix_text(" "),
     ]
     tokens = [
         ",",
@@ -296,7 +304,9 @@ def test_mutated_files_fail_only_as_surface_files(tmp_path: Path) -> None:
             at = rng.randrange(len(text))
             text[at : at + rng.randint(0, 2)] = rng.choice(tokens)
         try:
-            raw = read(tmp_path, "".join(text).encode(rng.choice(["utf-8", "latin-1", "utf-16"])))
+            raw = read_text(
+                tmp_path, "".join(text).encode(rng.choice(["utf-8", "latin-1", "utf-16"]))
+            )
         except AsperityError:
             outcomes["refused"] += 1
             continue
@@ -312,9 +322,9 @@ def test_mutated_files_fail_only_as_surface_files(tmp_path: Path) -> None:
 MAP = "1 -2 3 4\n5 6 7 8\n9 10 11 12\n"
 
 
-def test_a_conversion_factor_of_the_header_is_applied(tmp_path: Path) -> None:
+def test_conversion_factor_of_the_header_is_applied(tmp_path: Path) -> None:
     head = "h=3 w=4\npixel size=3.69862e-007 m\ndata unit=rad\n"
-    raw = read(tmp_path, head + "height conversion factor (-> m)=6.3e-008\n" + MAP)
+    raw = read_text(tmp_path, head + "height conversion factor (-> m)=6.3e-008\n" + MAP)
     assert raw.heights[2, 3] == 12 * 6.3e-8
     assert raw.pitch == (3.69862e-7, 3.69862e-7)
     assert raw.has_units
@@ -330,84 +340,84 @@ def test_a_conversion_factor_of_the_header_is_applied(tmp_path: Path) -> None:
         ("z factor (-> m)=many", "a number and a unit of length"),
     ],
 )
-def test_a_header_that_cannot_be_applied_is_refused(
-    tmp_path: Path, header: str, match: str
-) -> None:
-    fails(tmp_path, f"{header}\n{MAP}", match)
+def test_unusable_header_values_are_refused(tmp_path: Path, header: str, match: str) -> None:
+    assert_refused(tmp_path, f"{header}\n{MAP}", match)
 
 
-def test_a_unit_of_the_values_anywhere_in_the_header(tmp_path: Path) -> None:
-    raw = read(tmp_path, "# Value units: nm\n# Width: 8 um\n# Height: 3 um\n# made today\n" + MAP)
+def test_value_unit_is_found_anywhere_in_the_header(tmp_path: Path) -> None:
+    raw = read_text(
+        tmp_path, "# Value units: nm\n# Width: 8 um\n# Height: 3 um\n# made today\n" + MAP
+    )
     assert raw.heights[0, 1] == -2e-9
     assert raw.pitch == pytest.approx((2e-6, 1e-6), rel=1e-15)
 
 
 @pytest.mark.parametrize("names", [("Width", "Height"), ("Breite", "Höhe")])
-def test_a_map_of_three_columns_as_gwyddion_exports_it(
+def test_gwyddion_map_of_three_columns_is_not_a_point_list(
     tmp_path: Path, names: tuple[str, str]
 ) -> None:
     head = f"# Channel: Z\n# {names[0]}: 12 µm\n# {names[1]}: 8 µm\n# Value units: m\n"
-    raw = read(tmp_path, head + "1 1.5 3\n-2 -3 -6\n0 0 0\n9 9 9\n")
+    raw = read_text(tmp_path, head + "1 1.5 3\n-2 -3 -6\n0 0 0\n9 9 9\n")
     assert raw.heights.shape == (4, 3)
     assert raw.pitch == pytest.approx((4e-6, 2e-6), rel=1e-15)
 
 
-@pytest.mark.parametrize("sign", [".", ","])
+@pytest.mark.parametrize("decimal", [".", ","])
 @pytest.mark.parametrize("columns", [3, 5])
-def test_a_map_as_gwyddion_writes_it(tmp_path: Path, sign: str, columns: int) -> None:
-    """As asciiexport.c prints it: sizes as "# %s %.*f %s", values as "%.*g" apart by tabs."""
+def test_map_exported_by_gwyddion(tmp_path: Path, decimal: str, columns: int) -> None:
+    """Format of asciiexport.c: sizes as "# %s %.*f %s", values as "%.*g", separated by tabs."""
     heights = np.random.default_rng(5).normal(0.0, 3e-9, (6, columns))
     rows = "\n".join("\t".join(f"{z:.5g}" for z in row) for row in heights)
     head = "# Channel: Z (Retrace)\n# Width: 10.00 µm\n# Height: 4.00 µm\n"
-    raw = read(tmp_path, f"{head}# Value units: m\n{rows}\n".replace(".", sign))
+    raw = read_text(tmp_path, f"{head}# Value units: m\n{rows}\n".replace(".", decimal))
     np.testing.assert_allclose(raw.heights, heights, rtol=1e-4)
     assert raw.pitch == pytest.approx((10e-6 / columns, 4e-6 / 6), rel=1e-14)
     assert raw.has_units
-    raw = read(tmp_path, f"{head}{rows}\n")
+    raw = read_text(tmp_path, f"{head}{rows}\n")
     assert raw.notes == ("no unit in the file: taken as metres",)  # of the heights
-    fails(tmp_path, f"{head}# Value units: V\n{rows}\n", "no unit of length")
+    assert_refused(tmp_path, f"{head}# Value units: V\n{rows}\n", "no unit of length")
 
 
-def test_points_as_gwyddion_writes_them(tmp_path: Path) -> None:
-    """As xyzexport.c prints them: the last line before the numbers is not the only unit."""
+def test_points_exported_by_gwyddion(tmp_path: Path) -> None:
+    """Format of xyzexport.c: units of x, y and of z are on separate header lines."""
     head = "# XYZ data: Z\n# Lateral units: µm\n# Value units: nm\n"
     rows = "\n".join(f"{x / 2:.9g}\t{y:.9g}\t{x * y:.9g}" for y in range(4) for x in range(5))
-    raw = read(tmp_path, head + rows)
+    raw = read_text(tmp_path, head + rows)
     assert raw.pitch == pytest.approx((0.5e-6, 1e-6), rel=1e-14)
     assert raw.heights[3, 4] == pytest.approx(12e-9, rel=1e-14)
-    fails(tmp_path, head.replace("nm", "V") + rows, "no unit of length")
-    fails(tmp_path, head.replace("µm", "deg") + rows, "no unit of length")
+    assert_refused(tmp_path, head.replace("nm", "V") + rows, "no unit of length")
+    assert_refused(tmp_path, head.replace("µm", "deg") + rows, "no unit of length")
 
 
 # --- lists of points ------------------------------------------------------------------------------
 
 
-def points(order: list[int] | None = None, left_out: tuple[int, ...] = ()) -> list[str]:
+def point_lines(order: list[int] | None = None, left_out: tuple[int, ...] = ()) -> list[str]:
     rows = [(0.5 * i, 2.0 + j, 10.0 * i + j) for j in range(4) for i in range(5)]
-    chosen = [rows[k] for k in order or range(20) if k not in left_out]
-    return [f"{x} {y} {z}" for x, y, z in chosen]
+    selected = [rows[k] for k in order or range(20) if k not in left_out]
+    return [f"{x} {y} {z}" for x, y, z in selected]
 
 
 @pytest.mark.parametrize("seed", [None, 1, 2])
-def test_points_of_a_grid_in_any_order_are_a_map(tmp_path: Path, seed: int | None) -> None:
+def test_grid_points_in_any_order_are_a_map(tmp_path: Path, seed: int | None) -> None:
     order = list(range(20))
     if seed is not None:
         random.Random(seed).shuffle(order)
-    raw = read(tmp_path, "x [um] y [um] z [nm]\n" + "\n".join(points(order)))
+    raw = read_text(tmp_path, "x [um] y [um] z [nm]\n" + "\n".join(point_lines(order)))
     assert raw.pitch == pytest.approx((0.5e-6, 1e-6), rel=1e-12)
     expected = [[(10.0 * i + j) * 1e-9 for i in range(5)] for j in range(4)]
     np.testing.assert_allclose(raw.heights, expected, rtol=1e-15)
     assert raw.has_units
 
 
-def test_a_point_that_a_grid_lacks_is_missing(tmp_path: Path) -> None:
-    raw = read(tmp_path, "\n".join(points(left_out=(7,))))
+def test_absent_grid_point_is_missing(tmp_path: Path) -> None:
+    raw = read_text(tmp_path, "\n".join(point_lines(left_out=(7,))))
     assert np.argwhere(np.isnan(raw.heights)).tolist() == [[1, 2]]
     assert raw.notes == ("no unit in the file: taken as metres",)
 
 
 def test_points_on_one_line_are_a_profile(tmp_path: Path) -> None:
-    raw = read(tmp_path, "0 3 1\n0 1 2\n0 2 5\n0 4 7\n")
+    raw = read_text(tmp_path, "0 3 1\n0 1 2\n0 2 5\n0 4 7\n")
     assert raw.heights.tolist() == [2.0, 5.0, 1.0, 7.0]
     assert raw.pitch == (1.0,)
 
@@ -416,21 +426,21 @@ def test_points_on_one_line_are_a_profile(tmp_path: Path) -> None:
     ("rows", "match"),
     [
         (["0 0 1", "1 0.3 2", "2 0.7 3", "3.5 0.9 4", "4 1 5"], "no regular grid"),
-        ([*points(), "0.5 2 77"], "same position"),
-        ([*points(), "2.7 2 1", "2.7 3 1", "2.7 4 1", "2.7 5 1"], "positions are not uniform"),
-        (["nan 0 1", *points()], "position is missing"),
+        ([*point_lines(), "0.5 2 77"], "same position"),
+        ([*point_lines(), "2.7 2 1", "2.7 3 1", "2.7 4 1", "2.7 5 1"], "positions are not uniform"),
+        (["nan 0 1", *point_lines()], "position is missing"),
     ],
 )
-def test_points_that_are_no_grid_are_refused(tmp_path: Path, rows: list[str], match: str) -> None:
-    fails(tmp_path, "\n".join(rows) + "\n", match)
+def test_points_off_a_grid_are_refused(tmp_path: Path, rows: list[str], match: str) -> None:
+    assert_refused(tmp_path, "\n".join(rows) + "\n", match)
 
 
 @pytest.mark.parametrize(
     "header", ["[(" * 16_000, " " * 50_000, "no data" + " " * 50_000, "um (" * 12_000, "=" * 50_000]
 )
-def test_a_long_header_is_read_in_no_time(tmp_path: Path, header: str) -> None:
-    """Quadratic searches took 17 s and more than 100 s; this has room for a busy machine."""
+def test_long_header_is_read_in_linear_time(tmp_path: Path, header: str) -> None:
+    """Quadratic searches took 17 s and more; the limit leaves room for a busy machine."""
     before = time.process_time()
-    raw = read(tmp_path, f"x{header}x\n{MAP}")
+    raw = read_text(tmp_path, f"x{header}x\n{MAP}")
     assert time.process_time() - before < 5.0
     assert raw.heights.shape == (3, 4)

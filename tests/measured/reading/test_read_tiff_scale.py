@@ -1,4 +1,4 @@
-"""Lengths in TIFF images: a given unit, the metadata of ImageJ and of OME."""
+"""Lengths of TIFF images: the ``unit`` argument, and the metadata of ImageJ and OME."""
 
 from __future__ import annotations
 
@@ -31,8 +31,10 @@ def rational(value: float) -> bytes:
     return struct.pack("<II", round(value * 10**6), 10**6)
 
 
-def imagej(path: Path, *lines: str, per_unit: float = 4.0, values: Any = HEIGHTS) -> Path:
-    """Write a TIFF as ImageJ does: its keys in the description, its pixels in the resolution."""
+def write_imagej_tiff(
+    path: Path, *lines: str, per_unit: float = 4.0, values: Any = HEIGHTS
+) -> Path:
+    """Write a TIFF with ImageJ's keys in the description and pixels per unit as resolution."""
     text = "\n".join(("ImageJ=1.54f", "images=1", *lines, "")).encode("latin-1") + b"\0"
     tags = {270: (2, text), 282: (5, rational(per_unit)), 283: (5, rational(per_unit / 2))}
     return write_tiff(path, values, tags=tags)
@@ -44,13 +46,16 @@ def test_float_heights_in_a_given_unit(tmp_path: Path) -> None:
     assert (raw.has_units, raw.relative, raw.pitch) == (True, False, None)
     assert raw.notes == ("no unit in the file: 1e-06 m as given", "y runs down the image")
     assert prepare(raw, pitch=1e-6).heights.shape == HEIGHTS.shape
-    words = read_surface(write_tiff(tmp_path / "w.tif", np.arange(54, dtype="<u2").reshape(6, 9)),
-                         unit="nm")  # fmt: skip
-    assert words.heights[5, 8] == pytest.approx(53e-9, rel=1e-15)
+    integers = read_surface(
+        write_tiff(tmp_path / "w.tif", np.arange(54, dtype="<u2").reshape(6, 9)), unit="nm"
+    )
+    assert integers.heights[5, 8] == pytest.approx(53e-9, rel=1e-15)
 
 
-def test_imagej_says_the_pixel_and_the_unit_of_heights(tmp_path: Path) -> None:
-    path = imagej(tmp_path / "a.tif", "unit=micron", "cf=0", "c0=1.5", "c1=2.0", "vunit=nm")
+def test_imagej_metadata_give_pitch_and_unit_of_heights(tmp_path: Path) -> None:
+    path = write_imagej_tiff(
+        tmp_path / "a.tif", "unit=micron", "cf=0", "c0=1.5", "c1=2.0", "vunit=nm"
+    )
     raw = read_surface(path)
     assert raw.pitch == pytest.approx((0.25e-6, 0.5e-6), rel=1e-12)
     np.testing.assert_allclose(raw.heights, 1e-9 * (1.5 + 2.0 * HEIGHTS.astype(float)), rtol=1e-14)
@@ -66,26 +71,28 @@ def test_imagej_says_the_pixel_and_the_unit_of_heights(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("unit", ["\\u00B5m", "µm", "um", "micron", "microns"])
-def test_imagej_writes_micrometres_in_many_ways(tmp_path: Path, unit: str) -> None:
-    raw = read_surface(imagej(tmp_path / "a.tif", f"unit={unit}"))
+def test_spellings_of_micrometres_in_imagej_metadata(tmp_path: Path, unit: str) -> None:
+    raw = read_surface(write_imagej_tiff(tmp_path / "a.tif", f"unit={unit}"))
     assert raw.pitch == pytest.approx((0.25e-6, 0.5e-6), rel=1e-12)
-    assert raw.relative  # the pixel has a size, the heights have none
+    assert raw.relative  # the pixels have a size, the heights have no unit
 
 
 @pytest.mark.parametrize("line", ["unit=pixel", "unit=inch-ish", "loop=false", "unit=sec"])
-def test_imagej_without_a_length(tmp_path: Path, line: str) -> None:
-    raw = read_surface(imagej(tmp_path / "a.tif", line))
+def test_imagej_without_a_length_unit_gives_no_pitch(tmp_path: Path, line: str) -> None:
+    raw = read_surface(write_imagej_tiff(tmp_path / "a.tif", line))
     assert (raw.pitch, raw.relative) == (None, True)
     assert raw.notes == (RELATIVE,)
 
 
-def test_a_given_unit_and_the_pixel_of_imagej(tmp_path: Path) -> None:
-    raw = read_surface(imagej(tmp_path / "a.tif", "unit=mm", "vunit=Gray Value"), unit="um")
+def test_unit_argument_with_the_pitch_of_write_imagej_tiff(tmp_path: Path) -> None:
+    raw = read_surface(
+        write_imagej_tiff(tmp_path / "a.tif", "unit=mm", "vunit=Gray Value"), unit="um"
+    )
     assert raw.pitch == pytest.approx((0.25e-3, 0.5e-3), rel=1e-12)
     np.testing.assert_allclose(raw.heights, 1e-6 * HEIGHTS.astype(float), rtol=1e-15)
 
 
-def test_as_tifffile_writes_for_imagej_and_ome(tmp_path: Path) -> None:
+def test_imagej_and_ome_files_of_tifffile(tmp_path: Path) -> None:
     import tifffile
 
     path = tmp_path / "a.tif"
@@ -106,7 +113,7 @@ def test_as_tifffile_writes_for_imagej_and_ome(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("sizes", "pitch"),
     [
-        (' PhysicalSizeX="2" PhysicalSizeY="3"', (2e-6, 3e-6)),  # micrometres unless said
+        (' PhysicalSizeX="2" PhysicalSizeY="3"', (2e-6, 3e-6)),  # micrometres by default
         (" PhysicalSizeX='2' PhysicalSizeY='3' PhysicalSizeYUnit='nm'", (2e-6, 3e-9)),
         (' PhysicalSizeX="2"', None),
         ("", None),
@@ -116,7 +123,7 @@ def test_as_tifffile_writes_for_imagej_and_ome(tmp_path: Path) -> None:
         (' PhysicalSizeX="x" PhysicalSizeY="3"', None),
     ],
 )
-def test_the_pixel_of_an_ome_tiff(
+def test_pitch_of_an_ome_tiff(
     tmp_path: Path, sizes: str, pitch: tuple[float, float] | None
 ) -> None:
     text = OME.format(sizes=sizes).encode() + b"\0"
@@ -136,9 +143,9 @@ def test_the_pixel_of_an_ome_tiff(
         {"cf": 0, "c0": 1.0, "c1": 0.0},
     ],
 )
-def test_metadata_that_cannot_be_used_is_left(metadata: dict[str, Any]) -> None:
-    found = imagej_scale(metadata, (0.0, float("nan")))
-    assert (found.pitch, found.metres_per_value, found.factor, found.offset) == (
+def test_unusable_imagej_metadata_are_ignored(metadata: dict[str, Any]) -> None:
+    scale = imagej_scale(metadata, (0.0, float("nan")))
+    assert (scale.pitch, scale.metres_per_value, scale.factor, scale.offset) == (
         None,
         None,
         1.0,
@@ -146,12 +153,12 @@ def test_metadata_that_cannot_be_used_is_left(metadata: dict[str, Any]) -> None:
     )
 
 
-def test_the_size_of_a_printed_picture_is_no_pitch(tmp_path: Path) -> None:
+def test_print_resolution_is_not_a_pitch(tmp_path: Path) -> None:
     tags = {282: (5, rational(300)), 283: (5, rational(300)), 296: (3, struct.pack("<H", 2))}
     assert read_surface(write_tiff(tmp_path / "a.tif", HEIGHTS, tags=tags)).pitch is None
 
 
-def test_an_image_of_slopes_takes_no_unit(tmp_path: Path) -> None:
+def test_unit_is_refused_for_a_normal_map(tmp_path: Path) -> None:
     normals = np.zeros((8, 8, 3), np.uint8)
     normals[..., :2], normals[..., 2] = 128, 255
     normals[2:5, 2:5, 0] = 140

@@ -1,4 +1,4 @@
-"""X3P files: the real ones, every data type, and every way to be wrong."""
+"""X3P files: real files, every data type, and invalid files."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ HEIGHTS = np.array([[1.5, -2.0, 3.25, 7.0, 0.5], [0.0, 4.0, -5.5, 6.0, 8.0], [9,
 SPEC = X3pSpec(HEIGHTS * 1e-6)
 
 
-def read(tmp_path: Path, spec: X3pSpec) -> RawSurface:
+def read_spec(tmp_path: Path, spec: X3pSpec) -> RawSurface:
     return read_surface(write_x3p(tmp_path / "test.x3p", spec))
 
 
-def fails(tmp_path: Path, spec: X3pSpec, match: str) -> None:
+def assert_refused(tmp_path: Path, spec: X3pSpec, match: str) -> None:
     with pytest.raises(SurfaceFileError, match=match) as caught:
-        read(tmp_path, spec)
+        read_spec(tmp_path, spec)
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith("test.x3p: ")
 
@@ -66,7 +66,7 @@ def test_real_files(
 
 
 @needs_data
-def test_real_files_say_what_is_odd() -> None:
+def test_notes_of_real_files() -> None:
     assert any("mask.png" in note for note in read_surface(DATA / "sample-land.x3p").notes)
     assert not any("MD5" in note for note in read_surface(DATA / "sample-land.x3p").notes)
     assert not any("MD5" in note for note in read_surface(DATA / "testing.x3p").notes)
@@ -75,7 +75,7 @@ def test_real_files_say_what_is_odd() -> None:
 @pytest.mark.parametrize("code", "ILFD")
 def test_data_types(tmp_path: Path, code: str) -> None:
     stored = np.array([[1, -2, 300, 4], [5, 6, -32768, 8], [9, 10, 11, 32767.0]])
-    raw = read(tmp_path, X3pSpec(stored, code=code))
+    raw = read_spec(tmp_path, X3pSpec(stored, code=code))
     np.testing.assert_array_equal(raw.heights, stored)
     assert raw.pitch == (2e-6, 3e-6)
     assert raw.notes == ()
@@ -88,24 +88,24 @@ def test_incremental_integer_heights_are_offset_plus_increment_times_stored(
 ) -> None:
     stored = np.arange(-6.0, 6.0).reshape(3, 4)
     spec = X3pSpec(stored, code=code, z_type="I", z_increment="1e-9", z_offset="2e-6")
-    np.testing.assert_allclose(read(tmp_path, spec).heights, 2e-6 + 1e-9 * stored, rtol=1e-14)
+    np.testing.assert_allclose(read_spec(tmp_path, spec).heights, 2e-6 + 1e-9 * stored, rtol=1e-14)
 
 
 @pytest.mark.parametrize("code", "ILFD")
 def test_absolute_heights_ignore_the_increment(tmp_path: Path, code: str) -> None:
     stored = np.rint(HEIGHTS)
     spec = X3pSpec(stored, code=code, z_type="A", z_increment="0.5", z_offset="100")
-    raw = read(tmp_path, spec)
+    raw = read_spec(tmp_path, spec)
     np.testing.assert_array_equal(raw.heights, stored + 100)
     assert any("CZ Increment 0.5 ignored" in note for note in raw.notes)
-    raw = read(tmp_path, replace(spec, z_type="I"))
+    raw = read_spec(tmp_path, replace(spec, z_type="I"))
     np.testing.assert_array_equal(raw.heights, 0.5 * stored + 100)
 
 
-def test_missing_points_are_nan(tmp_path: Path) -> None:
+def test_stored_nans_are_missing_points(tmp_path: Path) -> None:
     stored = HEIGHTS.copy()
     stored[1, 2] = np.nan
-    raw = read(tmp_path, X3pSpec(stored))
+    raw = read_spec(tmp_path, X3pSpec(stored))
     np.testing.assert_array_equal(raw.heights, stored)
 
 
@@ -116,7 +116,7 @@ def test_validity_bits_run_from_the_least_significant(tmp_path: Path, code: str)
     stored = np.arange(15.0).reshape(3, 5)
     if code == "D":
         stored[1, 1] = np.nan  # a set bit does not revive a missing height
-    raw = read(tmp_path, X3pSpec(stored, code=code, valid=valid))
+    raw = read_spec(tmp_path, X3pSpec(stored, code=code, valid=valid))
     np.testing.assert_array_equal(raw.heights, np.where(valid, stored, np.nan))
 
 
@@ -133,68 +133,74 @@ def test_validity_bits_of_a_known_byte(tmp_path: Path) -> None:
     assert missing.tolist() == [1, 3, 5, 6, 9]
 
 
-def test_sub_folder_and_clutter(tmp_path: Path) -> None:
+def test_subfolder_and_unrelated_members(tmp_path: Path) -> None:
     extra = {
         "__MACOSX/scan/._main.xml": b"junk",
         "__MACOSX/main.xml": b"junk",
         "bindata/.DS_Store": b"\0\0",
         "bindata/mask.png": b"\x89PNG",
     }
-    raw = read(tmp_path, replace(SPEC, folder="scan/", extra=extra))
+    raw = read_spec(tmp_path, replace(SPEC, folder="scan/", extra=extra))
     np.testing.assert_array_equal(raw.heights, SPEC.stored)
     assert raw.notes == ("bindata/mask.png is an annotation: not applied",)
 
 
 def test_other_root_name_of_x3ptools(tmp_path: Path) -> None:
     np.testing.assert_array_equal(
-        read(tmp_path, replace(SPEC, root="ISO5436")).heights, SPEC.stored
+        read_spec(tmp_path, replace(SPEC, root="ISO5436")).heights, SPEC.stored
     )
 
 
 @pytest.mark.parametrize("md5_file", ["{md5} *main.xml", "{md5}", "{md5}\n"])
 def test_md5_of_main(tmp_path: Path, md5_file: str) -> None:
     spec = replace(SPEC, md5_file=md5_file)
-    assert read(tmp_path, spec).notes == ()
-    wrong = read(tmp_path, replace(spec, main_md5="0" * 32))
+    assert read_spec(tmp_path, spec).notes == ()
+    wrong = read_spec(tmp_path, replace(spec, main_md5="0" * 32))
     assert wrong.notes == ("main.xml does not match its MD5",)
     np.testing.assert_array_equal(wrong.heights, SPEC.stored)
 
 
 def test_md5_of_main_missing(tmp_path: Path) -> None:
-    assert "not verified" in read(tmp_path, replace(SPEC, md5_file=None)).notes[0]
-    assert "not verified" in read(tmp_path, replace(SPEC, md5_file="N/A")).notes[0]
+    assert "not verified" in read_spec(tmp_path, replace(SPEC, md5_file=None)).notes[0]
+    assert "not verified" in read_spec(tmp_path, replace(SPEC, md5_file="N/A")).notes[0]
 
 
 def test_md5_of_data(tmp_path: Path) -> None:
-    fails(tmp_path, replace(SPEC, point_md5="0" * 32), "data.bin does not match its MD5")
-    fails(
+    assert_refused(tmp_path, replace(SPEC, point_md5="0" * 32), "data.bin does not match its MD5")
+    assert_refused(
         tmp_path,
         replace(SPEC, valid=np.ones((3, 5), bool), valid_md5="0" * 32),
         "valid.bin does not match its MD5",
     )
-    assert "no MD5" in read(tmp_path, replace(SPEC, point_md5="")).notes[0]
+    assert "no MD5" in read_spec(tmp_path, replace(SPEC, point_md5="")).notes[0]
 
 
 def test_inline_data(tmp_path: Path) -> None:
     texts = [f"{j};{i};{float(HEIGHTS[i, j])!r}" for i in range(3) for j in range(5)]
     expected = HEIGHTS.copy()
     texts[6], expected[1, 1] = "", np.nan
-    np.testing.assert_array_equal(read(tmp_path, replace(SPEC, inline=texts)).heights, expected)
+    np.testing.assert_array_equal(
+        read_spec(tmp_path, replace(SPEC, inline=texts)).heights, expected
+    )
     alone = [text.rpartition(";")[2] for text in texts]
-    np.testing.assert_array_equal(read(tmp_path, replace(SPEC, inline=alone)).heights, expected)
+    np.testing.assert_array_equal(
+        read_spec(tmp_path, replace(SPEC, inline=alone)).heights, expected
+    )
     swapped = [texts[1], texts[0], *texts[2:]]
-    fails(tmp_path, replace(SPEC, inline=swapped), "CX of a Datum contradicts")
-    fails(tmp_path, replace(SPEC, inline=texts[:-1]), "14 Datum elements; the matrix has 15")
-    fails(tmp_path, replace(SPEC, inline=["1_0", *alone[1:]]), "Datum 1 is '1_0'")
-    fails(tmp_path, replace(SPEC, inline=["1;2", *alone[1:]]), "a Datum has 2 numbers")
+    assert_refused(tmp_path, replace(SPEC, inline=swapped), "CX of a Datum contradicts")
+    assert_refused(
+        tmp_path, replace(SPEC, inline=texts[:-1]), "14 Datum elements; the matrix has 15"
+    )
+    assert_refused(tmp_path, replace(SPEC, inline=["1_0", *alone[1:]]), "Datum 1 is '1_0'")
+    assert_refused(tmp_path, replace(SPEC, inline=["1;2", *alone[1:]]), "a Datum has 2 numbers")
 
 
 def test_profile(tmp_path: Path) -> None:
     spec = X3pSpec(HEIGHTS[:1] * 1e-6, feature="PRF")
-    raw = read(tmp_path, spec)
+    raw = read_spec(tmp_path, spec)
     np.testing.assert_array_equal(raw.heights, HEIGHTS[0] * 1e-6)
     assert raw.pitch == (2e-6,)
-    fails(tmp_path, replace(SPEC, feature="PRF"), "SizeY 1, got 3")
+    assert_refused(tmp_path, replace(SPEC, feature="PRF"), "SizeY 1, got 3")
 
 
 def test_absolute_lateral_axes(tmp_path: Path) -> None:
@@ -203,15 +209,15 @@ def test_absolute_lateral_axes(tmp_path: Path) -> None:
         SPEC, x_type="A", y_type="A", x_positions=0.1 + 4e-6 * x, y_positions=5e-6 * y,
         x_increment="1", y_increment="1",
     )  # fmt: skip
-    raw = read(tmp_path, spec)
+    raw = read_spec(tmp_path, spec)
     np.testing.assert_array_equal(raw.heights, SPEC.stored)
     assert raw.pitch == pytest.approx((4e-6, 5e-6), rel=1e-9)
     crooked = 4e-6 * x
     crooked[:, 2] += 1e-6
-    fails(tmp_path, replace(spec, x_positions=crooked), "CX is absolute.*no uniform grid")
+    assert_refused(tmp_path, replace(spec, x_positions=crooked), "CX is absolute.*no uniform grid")
     sheared = 4e-6 * x + 1e-6 * y
-    fails(tmp_path, replace(spec, x_positions=sheared), "CX is absolute.*no uniform grid")
-    fails(tmp_path, replace(spec, x_positions=-x), "do not increase")
+    assert_refused(tmp_path, replace(spec, x_positions=sheared), "CX is absolute.*no uniform grid")
+    assert_refused(tmp_path, replace(spec, x_positions=-x), "do not increase")
 
 
 @pytest.mark.parametrize(
@@ -243,34 +249,34 @@ def test_absolute_lateral_axes(tmp_path: Path) -> None:
         ({"prolog": "<oops>"}, "not valid XML"),
     ],
 )
-def test_faults(tmp_path: Path, changes: dict[str, object], match: str) -> None:
-    fails(tmp_path, replace(SPEC, **changes), match)
+def test_invalid_files_are_refused(tmp_path: Path, changes: dict[str, object], match: str) -> None:
+    assert_refused(tmp_path, replace(SPEC, **changes), match)
 
 
 def test_doctype_is_refused_in_utf_16(tmp_path: Path) -> None:
     prolog = '<?xml version="1.0" encoding="UTF-16"?><!DOCTYPE a [<!ENTITY b "c">]>'
-    fails(tmp_path, replace(SPEC, prolog=prolog, encoding="utf-16"), "DOCTYPE")
+    assert_refused(tmp_path, replace(SPEC, prolog=prolog, encoding="utf-16"), "DOCTYPE")
 
 
 def test_main_in_another_encoding(tmp_path: Path) -> None:
-    raw = read(tmp_path, replace(SPEC, encoding="latin-1", revision="µ", date="März"))
+    raw = read_spec(tmp_path, replace(SPEC, encoding="latin-1", revision="µ", date="März"))
     np.testing.assert_array_equal(raw.heights, SPEC.stored)
     assert any("Latin-1" in note for note in raw.notes)
 
 
-def test_infinite_height(tmp_path: Path) -> None:
+def test_infinite_height_is_refused(tmp_path: Path) -> None:
     stored = HEIGHTS.copy()
     stored[2, 1] = np.inf
     with pytest.raises(SurfaceFileError, match=r"infinite height at index \(2, 1\)"):
-        read(tmp_path, X3pSpec(stored))
+        read_spec(tmp_path, X3pSpec(stored))
 
 
 def test_rotation_is_noted(tmp_path: Path) -> None:
-    raw = read(tmp_path, replace(SPEC, rotation="<Rotation><r11>1</r11></Rotation>"))
+    raw = read_spec(tmp_path, replace(SPEC, rotation="<Rotation><r11>1</r11></Rotation>"))
     assert any("rotation" in note for note in raw.notes)
 
 
-def test_damaged_archives(tmp_path: Path) -> None:
+def test_damaged_archives_are_refused(tmp_path: Path) -> None:
     whole = write_x3p(tmp_path / "whole.x3p", SPEC).read_bytes()
     for length in (4, 30, len(whole) // 2, len(whole) - 1):
         path = tmp_path / "cut.x3p"
@@ -279,7 +285,7 @@ def test_damaged_archives(tmp_path: Path) -> None:
             read_surface(path)
 
 
-def test_crc_error(tmp_path: Path) -> None:
+def test_crc_error_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "crc.x3p"
     write_x3p(path, replace(SPEC, point_md5=""))
     with zipfile.ZipFile(path) as archive:
@@ -294,7 +300,7 @@ def test_crc_error(tmp_path: Path) -> None:
         read_surface(path)
 
 
-def test_zip_that_is_no_x3p(tmp_path: Path) -> None:
+def test_other_zip_archives_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "arrays.npz"
     np.savez(path, a=HEIGHTS)
     with pytest.raises(SurfaceFileError, match="an NPZ archive that asperity did not prepare"):
@@ -305,7 +311,7 @@ def test_zip_that_is_no_x3p(tmp_path: Path) -> None:
         read_surface(path)
 
 
-def test_bomb_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
+def test_decompression_bomb_is_refused_before_unpacking(tmp_path: Path) -> None:
     path = tmp_path / "bomb.x3p"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("main.xml", b" " * (65 * 2**20))
@@ -313,7 +319,7 @@ def test_bomb_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
         read_surface(path)
 
 
-def test_a_packed_size_that_lies_asks_for_no_memory(tmp_path: Path) -> None:
+def test_false_compressed_size_allocates_no_memory(tmp_path: Path) -> None:
     path = write_x3p(tmp_path / "lie.x3p", SPEC)
     data = path.read_bytes()
     at = data.index(b"PK\x01\x02")  # the central directory: packed size at byte 20
@@ -322,7 +328,7 @@ def test_a_packed_size_that_lies_asks_for_no_memory(tmp_path: Path) -> None:
         read_surface(path)
 
 
-def test_a_member_without_a_name(tmp_path: Path) -> None:
+def test_member_without_a_name_is_ignored(tmp_path: Path) -> None:
     path = write_x3p(tmp_path / "nameless.x3p", SPEC)
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr("x", b"")
@@ -337,7 +343,7 @@ def test_a_member_without_a_name(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_surface(path).heights, SPEC.stored)
 
 
-def test_mutated_files_fail_only_as_surface_files(tmp_path: Path) -> None:
+def test_mutated_files_raise_only_asperity_errors(tmp_path: Path) -> None:
     rng = random.Random(5436)
     whole = write_x3p(tmp_path / "whole.x3p", replace(SPEC, valid=np.ones((3, 5), bool)))
     with zipfile.ZipFile(whole) as archive:

@@ -23,13 +23,13 @@ COUNT = 200
 
 @pytest.fixture(scope="module")
 def results() -> dict[str, dict[str, Any]]:
-    """Fuzz all readers in one worker with 1 GB of memory, as the long run does it."""
+    """Fuzz all readers in one worker with 1 GB of memory, as the long run does."""
     readers = seeds.available_readers()
     return dict(zip(readers, fuzz.results(readers, COUNT), strict=True))
 
 
 @pytest.fixture(scope="module")
-def reading() -> Iterator[Any]:
+def worker() -> Iterator[Any]:
     """One process for many files, as in the long run."""
     with importlib.import_module("bench.fuzz_child").ReadingWorker() as started:
         yield started
@@ -41,25 +41,25 @@ def test_every_mutated_file_is_read_or_refused(
 ) -> None:
     if reader not in results:
         pytest.skip("real surfaces (../shared/data) or the extra asperity[formats] missing")
-    result = results[reader]
-    assert result["faults"] == []
-    assert result["other"] == 0
-    assert result["read"] + result["refused"] == COUNT
-    assert result["peak"] < 1024
-    # The run is worth something only if the damage is neither harmless nor always fatal.
-    assert result["refused"] > COUNT // 20
-    if reader not in {"archive", "marks"}:  # none of which is a surface
-        assert result["read"] > 2
+    counts = results[reader]
+    assert counts["faults"] == []
+    assert counts["other"] == 0
+    assert counts["read"] + counts["refused"] == COUNT
+    assert counts["peak"] < 1024
+    # The run is useful only if the damage is neither harmless nor always fatal.
+    assert counts["refused"] > COUNT // 20
+    if reader not in {"archive", "marks"}:  # whose seeds are not surfaces
+        assert counts["read"] > 2
 
 
 @pytest.mark.parametrize("reader", seeds.SEEDS)
-def test_the_sound_files_are_read(
-    reader: str, tmp_path: Path, reading: Any, monkeypatch: pytest.MonkeyPatch
+def test_seed_files_are_read(
+    reader: str, tmp_path: Path, worker: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from asperity.core.errors import SurfaceFileError
     from asperity.measured.reading import isolation, read_surface
 
-    monkeypatch.setattr(isolation, "run_subprocess", reading.start)
+    monkeypatch.setattr(isolation, "run_subprocess", worker.start)
 
     if reader not in seeds.available_readers():
         pytest.skip("real surfaces (../shared/data) or the extra asperity[formats] missing")
@@ -73,12 +73,12 @@ def test_the_sound_files_are_read(
             refused.append(str(error))
         else:
             assert raw.heights.size > 0
-    known = {"archive": "archive", "png": "normal map", "tiff": "normal map", "marks": ""}
-    expected = known.get(reader)
+    reasons = {"archive": "archive", "png": "normal map", "tiff": "normal map", "marks": ""}
+    expected = reasons.get(reader)
     assert all(expected is not None and expected in message for message in refused)
 
 
-def test_mutations_are_the_same_in_every_run() -> None:
+def test_mutations_are_reproducible() -> None:
     content = bytes(range(256)) * 4
     first = [fuzz.mutate(content, random.Random(f"x {k}")) for k in range(50)]
     assert first == [fuzz.mutate(content, random.Random(f"x {k}")) for k in range(50)]
@@ -86,8 +86,8 @@ def test_mutations_are_the_same_in_every_run() -> None:
     assert len(set(first)) > 40
 
 
-def test_the_worker_sees_faults(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Negative control: readers that raise, ask for too much, or return nonsense."""
+def test_fuzz_run_reports_faulty_readers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Negative control: readers that raise, run out of memory, or return infinite heights."""
     import numpy as np
 
     from asperity.core.errors import SurfaceFileError
@@ -104,11 +104,11 @@ def test_the_worker_sees_faults(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
 
     for reader in (raising, hungry, wrong):
         monkeypatch.setattr(reading, "read_surface", reader)
-        found = [outcome for outcome, _ in fuzz.outcomes("npy", 3, tmp_path)]
-        assert found == ["other"] * 3
+        observed = [outcome for outcome, _ in fuzz.outcomes("npy", 3, tmp_path)]
+        assert observed == ["other"] * 3
 
 
-def test_the_memory_of_a_worker_is_limited() -> None:
+def test_memory_limit_of_a_worker_is_effective() -> None:
     code = (
         "import resource, numpy; from bench import fuzz;"
         "resource.setrlimit(resource.RLIMIT_DATA, (fuzz.MEMORY, fuzz.MEMORY));"
@@ -127,10 +127,10 @@ def test_the_memory_of_a_worker_is_limited() -> None:
     assert "MemoryError" in done.stderr
 
 
-def test_the_table_and_the_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_prints_a_table_and_sets_the_exit_code(capsys: pytest.CaptureFixture[str]) -> None:
     assert fuzz.main(["20", "npy"]) == 0
-    printed = capsys.readouterr().out
-    assert "npy" in printed
-    assert "peak [MB]" in printed
+    output = capsys.readouterr().out
+    assert "npy" in output
+    assert "peak [MB]" in output
     assert fuzz.main(["20", "mpy"]) == 2
     assert "unknown reader 'mpy'" in capsys.readouterr().err

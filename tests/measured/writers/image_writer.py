@@ -1,4 +1,4 @@
-"""Write PNG and TIFF images for tests byte by byte, so that no reader's library is trusted."""
+"""Write PNG and TIFF images for tests byte by byte, independently of the readers' libraries."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Write surface data files (SDF) for tests, right ones and wrong ones."""
+"""Write valid and invalid surface data files (SDF) for tests."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FORMATS = {0: "<B", 1: "<H", 2: "<I", 3: "<f", 4: "<b", 5: "<h", 6: "<i", 7: "<d
 
 @dataclass
 class SdfSpec:
-    """What goes into the file; every default is a right one. Stored numbers, not metres."""
+    """The content of a file in stored numbers, not metres; all defaults are valid."""
 
     stored: NDArray[np.float64]  # shape (profiles, points); NaN is written as BAD
     version: str = "ISO-1.0"

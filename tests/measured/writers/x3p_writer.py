@@ -1,4 +1,4 @@
-"""Write X3P files for tests, right ones and wrong ones."""
+"""Write valid and invalid X3P files for tests."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ STORED = {"I": "<i2", "L": "<i4", "F": "<f4", "D": "<f8"}
 
 @dataclass
 class X3pSpec:
-    """What goes into the file; every default is a right one."""
+    """The content of a file; all defaults are valid."""
 
     stored: NDArray[np.float64]  # shape (ny, nx), in stored units
     code: str = "D"
