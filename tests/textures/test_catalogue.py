@@ -1,4 +1,4 @@
-"""Texture specifications mean the same in Python as on the command line."""
+"""Texture specifications have the same meaning in Python and on the command line."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from asperity.scene import load_scene
 from asperity.textures.catalogue import as_texture
 
 WAVE = "sinusoid:amplitude=0.2mm,period=2mm"
-SAME = asp.Sinusoid(2e-4, 2e-3)
+SINUSOID = asp.Sinusoid(2e-4, 2e-3)
 
 
 @pytest.fixture
@@ -28,25 +28,25 @@ def measured(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_texture_is_returned_unchanged() -> None:
-    assert as_texture(SAME) is SAME
+def test_texture_is_returned_unchanged() -> None:
+    assert as_texture(SINUSOID) is SINUSOID
 
 
-def test_a_specification_with_or_without_arguments() -> None:
-    assert as_texture(WAVE).describe() == SAME.describe()
+def test_specification_with_and_without_arguments() -> None:
+    assert as_texture(WAVE).describe() == SINUSOID.describe()
     assert as_texture("Sandpaper:grit=P240").describe()["grit"] == "P240"
     plain = as_texture("sandpaper")
     assert plain.describe() == asp.named_surface("sandpaper").describe()
 
 
-def test_a_file_from_a_text_or_a_path(measured: Path) -> None:
-    wanted = asp.load_texture(measured).describe()
-    assert as_texture(measured).describe() == wanted
-    assert as_texture(str(measured)).describe() == wanted
-    assert as_texture(measured, {"magnify": 2.0}).describe() != wanted
+def test_file_is_given_by_text_or_path(measured: Path) -> None:
+    expected = asp.load_texture(measured).describe()
+    assert as_texture(measured).describe() == expected
+    assert as_texture(str(measured)).describe() == expected
+    assert as_texture(measured, {"magnify": 2.0}).describe() != expected
 
 
-def test_a_file_comes_before_a_kind_of_its_name_and_a_path_is_always_a_file(
+def test_existing_file_precedes_a_kind_and_a_path_is_always_a_file(
     measured: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(measured.parent)
@@ -69,67 +69,70 @@ def test_a_file_comes_before_a_kind_of_its_name_and_a_path_is_always_a_file(
         ("file", "surface is neither a file"),
     ],
 )
-def test_errors_are_those_of_the_command_line(source: str, message: str) -> None:
+def test_errors_are_the_same_as_on_the_command_line(source: str, message: str) -> None:
     with pytest.raises(asp.ParameterError, match=message) as caught:
         asp.compare(source)
-    with pytest.raises(asp.ParameterError) as at_the_prompt:
+    with pytest.raises(asp.ParameterError) as from_scene:
         load_scene(source)
-    assert str(caught.value) == str(at_the_prompt.value)
+    assert str(caught.value) == str(from_scene.value)
 
 
 @pytest.mark.parametrize("scene", ["scene.toml", Path("other.TOML")])
-def test_a_scene_is_not_a_texture(scene: Any) -> None:
+def test_scene_file_is_refused_as_a_texture(scene: Any) -> None:
     with pytest.raises(asp.ParameterError, match=r"is a scene, .*asperity\.scene\.load_scene"):
         asp.Surface(scene)
 
 
-@pytest.mark.parametrize("wrong", [None, 3.0, b"sandpaper", ["cloth"], asp.Surface(SAME)])
-@pytest.mark.parametrize("takes", [asp.Surface, asp.compare, asp.limits])
-def test_another_type_is_refused(takes: Any, wrong: Any) -> None:
+@pytest.mark.parametrize("texture", [None, 3.0, b"sandpaper", ["cloth"], asp.Surface(SINUSOID)])
+@pytest.mark.parametrize("function", [asp.Surface, asp.compare, asp.limits])
+def test_other_types_are_refused(function: Any, texture: Any) -> None:
     with pytest.raises(asp.ParameterError, match="texture must be a texture, a text such as"):
-        takes(wrong)
+        function(texture)
 
 
-def test_a_surface_from_a_specification() -> None:
+def test_surface_is_made_from_a_specification() -> None:
     point = (0.3e-3, 0.0, 0.0)
-    wanted = asp.Surface(SAME, "A").force(point)
-    assert np.array_equal(asp.Surface(WAVE, "A").force(point), wanted)
+    expected = asp.Surface(SINUSOID, "A").force(point)
+    assert np.array_equal(asp.Surface(WAVE, "A").force(point), expected)
     other = asp.Surface("sinusoid:amplitude=1mm,period=1mm", "A")
-    assert not np.array_equal(other.force(point), wanted)
-    assert np.array_equal(other.to_texture(WAVE).force(point), wanted)
+    assert not np.array_equal(other.force(point), expected)
+    assert np.array_equal(other.to_texture(WAVE).force(point), expected)
 
 
-def test_results_of_a_specification_are_those_of_the_texture() -> None:
-    for made in (
+def test_specification_and_texture_give_the_same_results() -> None:
+    for compute in (
         lambda texture: asp.compare(texture, laws="WA"),
         lambda texture: compare_devices(texture, ["omega.3"], laws="W"),
         lambda texture: asp.limits(texture, law="C"),
         lambda texture: asp.analyze(texture, law="A", stiffness=300.0),
     ):
-        assert made(WAVE).to_dict() == made(SAME).to_dict()
+        assert compute(WAVE).to_dict() == compute(SINUSOID).to_dict()
 
 
 COMMANDS = {"compare": compare_command, "limits": limits_command, "analyze": analyze_command}
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_the_command_line_has_the_same_result(name: str) -> None:
-    shown = CliRunner().invoke(COMMANDS[name], [WAVE, "--json", "-", "--device", "touch"])
-    assert shown.exit_code == 0, shown.output
-    wanted = json.loads(shown.stdout)
-    own = json.loads(json.dumps(getattr(asp, name)(WAVE, "touch").to_dict()))
-    assert own == wanted
+def test_command_line_gives_the_same_result(name: str) -> None:
+    invocation = CliRunner().invoke(COMMANDS[name], [WAVE, "--json", "-", "--device", "touch"])
+    assert invocation.exit_code == 0, invocation.output
+    expected = json.loads(invocation.stdout)
+    result = json.loads(json.dumps(getattr(asp, name)(WAVE, "touch").to_dict()))
+    assert result == expected
 
 
-def test_a_texture_is_analyzed_with_the_recommended_law_and_stiffness() -> None:
-    found = asp.analyze(SAME, "omega.3")
-    row = asp.compare(SAME, "omega.3").recommended_row
+def test_texture_is_analyzed_with_the_recommended_law_and_stiffness() -> None:
+    analysis = asp.analyze(SINUSOID, "omega.3")
+    row = asp.compare(SINUSOID, "omega.3").recommended_row
     assert row is not None
-    assert (found.surface.law, found.surface.stiffness) == (row.law, row.recommended_stiffness)
-    assert asp.analyze(SAME, law="A", stiffness=300.0).surface.stiffness == 300.0
+    assert (analysis.surface.law, analysis.surface.stiffness) == (
+        row.law,
+        row.recommended_stiffness,
+    )
+    assert asp.analyze(SINUSOID, law="A", stiffness=300.0).surface.stiffness == 300.0
 
 
-def test_a_law_cannot_be_given_for_a_surface() -> None:
+def test_law_is_refused_for_a_surface() -> None:
     with pytest.raises(asp.ParameterError, match="law belongs to the surface"):
-        asp.analyze(asp.Surface(SAME, "A"), law="C")
-    assert asp.analyze(asp.Surface(SAME, "A"), law=None).surface.law.letter == "A"
+        asp.analyze(asp.Surface(SINUSOID, "A"), law="C")
+    assert asp.analyze(asp.Surface(SINUSOID, "A"), law=None).surface.law.letter == "A"

@@ -1,4 +1,4 @@
-"""The integer relations of wave vectors."""
+"""Integer relations of wave vectors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PROFILES = {
     "opposite": ([[2.0, 1.0], [-2.0, -1.0]], [math.sqrt(5.0)]),
     "repeated": ([[2.0, 1.0], [2.0, 1.0]], [math.sqrt(5.0)]),
 }
-# Waves, and the area of the cell of all their integer combinations.
+# Waves and the area of the cell of their integer lattice.
 PLANES = {
     "square": ([[3.0, 0.0], [0.0, 3.0]], 9.0),
     "centred": ([[2.0, 0.0], [0.0, 2.0], [1.0, 1.0]], 2.0),
@@ -45,30 +45,30 @@ FREE = {
 
 
 @pytest.mark.parametrize(("waves", "length"), PROFILES.values(), ids=list(PROFILES))
-def test_the_basis_of_a_profile(waves: list[list[float]], length: list[float]):
+def test_basis_of_waves_on_a_line(waves: list[list[float]], length: list[float]):
     basis, _multiples = integer_lattice(np.array(waves))
     np.testing.assert_allclose(np.hypot(*basis.T), length, rtol=1e-12)
 
 
 @pytest.mark.parametrize(("waves", "area"), PLANES.values(), ids=list(PLANES))
-def test_the_basis_of_a_map(waves: list[list[float]], area: float):
+def test_basis_of_waves_in_the_plane(waves: list[list[float]], area: float):
     basis, _multiples = integer_lattice(np.array(waves))
     assert basis.shape == (2, 2)
     assert abs(np.linalg.det(basis)) == pytest.approx(area, rel=1e-9)
-    a, b = basis  # short: no combination is shorter
+    a, b = basis  # reduced basis: no combination is shorter
     assert abs(a @ b) <= 0.5 * min(a @ a, b @ b) * (1 + 1e-12)
 
 
 @pytest.mark.parametrize(("waves", "rank"), FREE.values(), ids=list(FREE))
-def test_the_number_of_free_phases(waves: list[list[float]], rank: int):
+def test_number_of_free_phases(waves: list[list[float]], rank: int):
     basis, _multiples = integer_lattice(np.array(waves))
     assert len(basis) == rank
 
 
-EVERY = [waves for group in (PROFILES, PLANES, FREE) for waves, _ in group.values()]
+ALL_WAVES = [waves for group in (PROFILES, PLANES, FREE) for waves, _ in group.values()]
 
 
-@pytest.mark.parametrize("waves", EVERY, ids=[*PROFILES, *PLANES, *FREE])
+@pytest.mark.parametrize("waves", ALL_WAVES, ids=[*PROFILES, *PLANES, *FREE])
 def test_every_wave_is_an_integer_combination(waves: list[list[float]]):
     vectors = np.array(waves)
     basis, multiples = integer_lattice(vectors)
@@ -77,7 +77,7 @@ def test_every_wave_is_an_integer_combination(waves: list[list[float]]):
     np.testing.assert_allclose(multiples @ basis, vectors, rtol=0, atol=1e-8)
 
 
-def test_waves_of_length_zero_do_not_count():
+def test_zero_wave_vectors_are_ignored():
     basis, multiples = integer_lattice(np.array([[0.0, 0.0], [2.0, 0.0]]))
     np.testing.assert_array_equal(basis, [[2.0, 0.0]])
     np.testing.assert_array_equal(multiples, [[0.0], [1.0]])
@@ -85,13 +85,13 @@ def test_waves_of_length_zero_do_not_count():
 
 
 @pytest.fixture
-def patience() -> Iterator[None]:
-    """Stop a test that would run for hours."""
+def time_limit() -> Iterator[None]:
+    """Stop a test after 20 s that would run for hours."""
 
-    def give_up(*_: object) -> None:
+    def raise_timeout(*_: object) -> None:
         raise TimeoutError("this would run for hours")
 
-    before = signal.signal(signal.SIGALRM, give_up)
+    before = signal.signal(signal.SIGALRM, raise_timeout)
     signal.alarm(20)
     yield
     signal.alarm(0)
@@ -99,8 +99,8 @@ def patience() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("patience")
-def test_many_unrelated_waves_are_all_free():
-    """Noise may have dozens of waves: the search must not grow as 17 to that power."""
+def test_many_unrelated_waves_have_free_phases():
+    """Noise may have dozens of waves, so the search must not be exponential in their number."""
     waves = np.random.default_rng(7).normal(size=(12, 2)) * 1000.0
     basis, multiples = integer_lattice(waves)
     assert len(basis) == 12
@@ -109,7 +109,7 @@ def test_many_unrelated_waves_are_all_free():
 
 @pytest.mark.usefixtures("patience")
 def test_rotated_hexagonal_lattices_are_periodic():
-    """Their shortest vectors are equally long, up to rounding: the reduction must end."""
+    """The reduction must end although the shortest vectors are equally long up to rounding."""
     rng = np.random.default_rng(0)
     for _ in range(100):
         angles = rng.uniform(0.0, 4.0) + np.arange(3) * math.pi / 3
@@ -130,11 +130,11 @@ def test_waves_from_wavelengths_are_related_despite_rounding():
         assert len(integer_lattice(waves)[0]) == 1
 
 
-@pytest.mark.parametrize("off", [1e-15, 1e-14, 1e-12, 1e-9])
-def test_a_nearly_rational_ratio_is_irrational(off: float):
-    """Five units of rounding exceed the error of a wave number from a wavelength."""
+@pytest.mark.parametrize("deviation", [1e-15, 1e-14, 1e-12, 1e-9])
+def test_nearly_rational_ratio_is_irrational(deviation: float):
+    """A deviation of five roundings exceeds the error of a wavenumber from a wavelength."""
     for factor in (1.0, 2.0, 1.5, 63 / 64):
-        waves = 6283.185307179586 * np.array([[1.0, 0.0], [factor * (1.0 + off), 0.0]])
+        waves = 6283.185307179586 * np.array([[1.0, 0.0], [factor * (1.0 + deviation), 0.0]])
         assert len(integer_lattice(waves)[0]) == 2
-    tilted = np.array([[1.0, 0.0], [0.5, 0.8], [1.5 + 40 * off, 0.8]])
+    tilted = np.array([[1.0, 0.0], [0.5, 0.8], [1.5 + 40 * deviation, 0.8]])
     assert len(integer_lattice(tilted)[0]) == 3

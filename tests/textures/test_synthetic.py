@@ -1,4 +1,4 @@
-"""Magnify, scale and filter textures that were not measured."""
+"""Preparation of synthetic textures: magnify, scale, filter and scan with a tip."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def example(name: str) -> Texture:
 
 @pytest.mark.parametrize("name", [*CATALOGUE])
 def test_every_kind_is_magnified(name: str) -> None:
-    """h'(x) = b h(x/a), from the parameters of the kind, not from samples."""
+    """h'(x) = b h(x/a), computed from the parameters of the kind, not from samples."""
     texture = example(name)
     larger = prepare_texture(texture, magnify=3.0, magnify_height=2.0)
     np.testing.assert_allclose(
@@ -46,7 +46,7 @@ def test_heights_are_scaled_to_a_range(name: str) -> None:
 
 
 def transfer(cutoff: float, length: float) -> float:
-    """One half at the cut-off, ISO 16610-21."""
+    """Return the transmission of ISO 16610-21, one half at the cut-off."""
     return float(0.5 ** ((cutoff / length) ** 2))
 
 
@@ -54,63 +54,63 @@ def test_amplitudes_are_multiplied_by_the_filter_transfer() -> None:
     texture = Fourier(
         [3e-4, -2e-4], 2 * np.pi / 1e-3 * np.array([[0.6, 0.8], [0.0, 3.0]]), [0.3, 1]
     )
-    found = prepare_texture(texture, cutoff=0.5e-3, l_cutoff=2e-3, magnify=2.0)
-    assert isinstance(found, Fourier)
+    filtered = prepare_texture(texture, cutoff=0.5e-3, l_cutoff=2e-3, magnify=2.0)
+    assert isinstance(filtered, Fourier)
     lengths = np.array([1e-3, 1e-3 / 3.0])
     expected = [transfer(0.5e-3, length) * (1 - transfer(2e-3, length)) for length in lengths]
-    np.testing.assert_allclose(found.amplitudes, 2 * texture.amplitudes * expected, rtol=1e-12)
-    np.testing.assert_allclose(found.wavevectors, texture.wavevectors / 2.0)
-    np.testing.assert_array_equal(found.phases, texture.phases)
+    np.testing.assert_allclose(filtered.amplitudes, 2 * texture.amplitudes * expected, rtol=1e-12)
+    np.testing.assert_allclose(filtered.wavevectors, texture.wavevectors / 2.0)
+    np.testing.assert_array_equal(filtered.phases, texture.phases)
 
 
-def test_a_sinusoid_remains_a_sinusoid() -> None:
+def test_filtered_sinusoid_is_a_sinusoid() -> None:
     texture = Sinusoid(1e-3, 2e-3, 0.7, (3.0, 4.0))
-    found = prepare_texture(texture, cutoff=2e-3, magnify=1.5)
-    assert isinstance(found, Sinusoid)
-    assert found.amplitude == pytest.approx(0.75e-3, rel=1e-12)
-    assert (found.period, found.phase, found.direction) == (3e-3, 0.7, (0.6, 0.8))
+    filtered = prepare_texture(texture, cutoff=2e-3, magnify=1.5)
+    assert isinstance(filtered, Sinusoid)
+    assert filtered.amplitude == pytest.approx(0.75e-3, rel=1e-12)
+    assert (filtered.period, filtered.phase, filtered.direction) == (3e-3, 0.7, (0.6, 0.8))
     assert texture.amplitude == 1e-3
     assert texture.preparation == ()
 
 
-def test_a_periodic_map_is_filtered_across_its_border() -> None:
+def test_periodic_map_is_filtered_across_its_border() -> None:
     wave = 1e-4 * np.cos(2 * np.pi * (np.arange(64) + 3) / 64)
     texture = HeightMap(np.tile(wave, (8, 1)), 1e-5, periodic=True)
-    found = prepare_texture(texture, cutoff=0.64e-3 * 0.9)
-    assert isinstance(found, HeightMap)
-    np.testing.assert_allclose(found.heights, transfer(0.9, 1.0) * texture.heights, atol=1e-16)
+    filtered = prepare_texture(texture, cutoff=0.64e-3 * 0.9)
+    assert isinstance(filtered, HeightMap)
+    np.testing.assert_allclose(filtered.heights, transfer(0.9, 1.0) * texture.heights, atol=1e-16)
     finite = HeightMap(texture.heights, 1e-5)
     mirrored = prepare_texture(finite, cutoff=0.64e-3 * 0.9)
     assert isinstance(mirrored, HeightMap)
-    assert not np.allclose(mirrored.heights, found.heights, atol=1e-6)
+    assert not np.allclose(mirrored.heights, filtered.heights, atol=1e-6)
 
 
 @pytest.mark.parametrize("shift", [0, 5, 23])
-def test_a_tip_scans_across_the_border(shift: int) -> None:
+def test_tip_scans_a_periodic_profile_across_its_border(shift: int) -> None:
     heights = 2e-5 * RNG.standard_normal(48)
 
-    def felt(values: np.ndarray) -> np.ndarray:
-        found = prepare_texture(Profile(values, 1e-5, periodic=True), tip_radius=4e-5)
-        assert isinstance(found, Profile)
-        return np.asarray(found.heights)
+    def scan(values: np.ndarray) -> np.ndarray:
+        scanned = prepare_texture(Profile(values, 1e-5, periodic=True), tip_radius=4e-5)
+        assert isinstance(scanned, Profile)
+        return np.asarray(scanned.heights)
 
-    np.testing.assert_allclose(felt(np.roll(heights, shift)), np.roll(felt(heights), shift))
-    assert (felt(heights) >= heights).all()
-    assert (felt(heights) > heights).any()
+    np.testing.assert_allclose(scan(np.roll(heights, shift)), np.roll(scan(heights), shift))
+    assert (scan(heights) >= heights).all()
+    assert (scan(heights) > heights).any()
 
 
-def test_a_tip_scans_waves_as_their_spline() -> None:
-    found = prepare_texture(Sinusoid(1e-4, 1e-3), tip_radius=0.9e-3)
-    assert isinstance(found, Profile)
-    assert found.preparation[0].startswith("made from Sinusoid(amplitude=0.0001")
-    assert found.height([[0.25e-3, 0.0]])[0] == pytest.approx(1e-4, rel=1e-3)
-    assert found.height([[0.75e-3, 0.0]])[0] > -0.9e-4  # the valley is too narrow
+def test_scanned_sinusoid_is_a_spline_profile() -> None:
+    scanned = prepare_texture(Sinusoid(1e-4, 1e-3), tip_radius=0.9e-3)
+    assert isinstance(scanned, Profile)
+    assert scanned.preparation[0].startswith("made from Sinusoid(amplitude=0.0001")
+    assert scanned.height([[0.25e-3, 0.0]])[0] == pytest.approx(1e-4, rel=1e-3)
+    assert scanned.height([[0.75e-3, 0.0]])[0] > -0.9e-4  # the valley is too narrow
     with pytest.raises(ParameterError, match="needs a texture whose waves run along x"):
         prepare_texture(Sinusoid(1e-4, 1e-3, direction=(1, 1)), tip_radius=0.9e-3)
 
 
 class Hill(Texture):
-    """A user-defined kind with the abstract members only; its sampler is that of a sinusoid."""
+    """A user-defined texture with only the abstract members and the sampler of a sinusoid."""
 
     kind = "hill"
     wave = Sinusoid(1e-4, 2e-3)
@@ -127,10 +127,10 @@ class Hill(Texture):
         return {"kind": self.kind}
 
 
-def test_a_kind_without_optional_members_is_sampled() -> None:
-    found = prepare_texture(Hill(), magnify=2.0, cutoff=2e-3)
+def test_texture_without_optional_members_is_sampled() -> None:
+    prepared = prepare_texture(Hill(), magnify=2.0, cutoff=2e-3)
     np.testing.assert_allclose(
-        found.height(2.0 * POINTS), Hill.wave.height(POINTS), atol=1e-9, rtol=1e-6
+        prepared.height(2.0 * POINTS), Hill.wave.height(POINTS), atol=1e-9, rtol=1e-6
     )
 
 
@@ -146,32 +146,34 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("source", "values", "words"), BAD)
-def test_invalid_preparations_are_errors(source: str, values: dict[str, float], words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
+@pytest.mark.parametrize(("source", "values", "message"), BAD)
+def test_invalid_preparations_are_errors(
+    source: str, values: dict[str, float], message: str
+) -> None:
+    with pytest.raises(ParameterError, match=message):
         load_scene(source, values)
 
 
 def test_specifications_scenes_and_options_agree(tmp_path: Path) -> None:
-    wanted = load_scene("knurl").texture.peak_to_valley * 2.5
+    expected = load_scene("knurl").texture.peak_to_valley * 2.5
     scene = tmp_path / "scene.toml"
     scene.write_text('[texture]\nkind = "knurl"\nmagnify = 2.5\nl_cutoff = "3 mm"\n')
-    found = [
+    scenes = [
         load_scene("knurl:magnify=2.5,l_cutoff=3mm"),
         load_scene("knurl:l_cutoff=3mm", {"magnify": 2.5}),
         load_scene(str(scene)),
         load_scene(str(scene), {"l_cutoff": 3e-3}),
     ]
-    heights = [one.texture.height(POINTS) for one in found]
+    heights = [one.texture.height(POINTS) for one in scenes]
     for other in heights[1:]:
         np.testing.assert_array_equal(other, heights[0])
-    assert load_scene("knurl", {"magnify": 2.5}).texture.peak_to_valley == pytest.approx(wanted)
+    assert load_scene("knurl", {"magnify": 2.5}).texture.peak_to_valley == pytest.approx(expected)
 
 
-def test_an_argument_of_the_kind_precedes_the_preparation() -> None:
-    """The cut-off of noise is its shortest wave; that of an option is the filter's."""
-    own = load_scene("noise:rms=20um,size=5mm,cutoff=0.5mm").texture
-    assert not any("filtered" in step for step in own.preparation)
+def test_texture_argument_precedes_a_preparation_of_the_same_name() -> None:
+    """``cutoff`` in a noise specification is its shortest wave; as an option it is a filter."""
+    unfiltered = load_scene("noise:rms=20um,size=5mm,cutoff=0.5mm").texture
+    assert not any("filtered" in step for step in unfiltered.preparation)
     filtered = load_scene("noise:rms=20um,size=5mm", {"cutoff": 0.5e-3}).texture
     assert any("filtered" in step for step in filtered.preparation)
 

@@ -1,4 +1,4 @@
-"""The bounds of boxes, on which the search for closest points relies."""
+"""The bounds of heights and derivatives over boxes, used by the closest-point search."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Boxes = list[tuple[np.ndarray, slice, slice]]
 
 
 def boxes_of_map(texture: HeightMap) -> Boxes:
-    """Return the five numbers of every box, with the rows and columns of its cells."""
+    """Return the five bounds of every box with the rows and columns of its cells."""
     values, levels = texture.arguments.boxes, texture.arguments.levels
     boxes = []
     for level, (start, rows, columns) in enumerate(levels):
@@ -26,7 +26,7 @@ def boxes_of_map(texture: HeightMap) -> Boxes:
 
 
 def sampled_cells(texture: HeightMap, per_side: int) -> dict[str, np.ndarray]:
-    """Return extremes of every cell: height, ‖Hess h‖, ‖D³h‖ from samples in it."""
+    """Return sampled extremes of height, ‖Hess h‖ and ‖D³h‖ in every cell."""
     px, py = texture.pitch
     ny, nx = (size - 3 for size in texture.coefficients.shape)
     ticks = np.linspace(1e-9, 1.0 - 1e-9, per_side)
@@ -40,7 +40,7 @@ def sampled_cells(texture: HeightMap, per_side: int) -> dict[str, np.ndarray]:
 
     third = []
     for axis in np.eye(2):
-        # Towards the middle of the cell: across its border the third derivatives jump.
+        # Towards the middle of the cell, since third derivatives jump at its border.
         middle = np.floor((xy - texture.origin) / (px, py)) + 0.5
         side = np.sign(middle - (xy - texture.origin) / (px, py)) @ axis
         ahead = texture.hessian(xy + step * side[:, None] * axis)
@@ -49,16 +49,16 @@ def sampled_cells(texture: HeightMap, per_side: int) -> dict[str, np.ndarray]:
     # The norm of a symmetric tensor is attained along one direction.
     angles = np.linspace(0.0, np.pi, 25)
     units = np.column_stack([np.cos(angles), np.sin(angles)])
-    along = np.abs(np.einsum("nijk,ai,aj,ak->na", tensor, units, units, units)).max(axis=1)
-    curved = np.linalg.eigvalsh(texture.hessian(xy))
-    second_bound = np.abs(curved).max(axis=1)
+    third_norm = np.abs(np.einsum("nijk,ai,aj,ak->na", tensor, units, units, units)).max(axis=1)
+    eigenvalues = np.linalg.eigvalsh(texture.hessian(xy))
+    second_bound = np.abs(eigenvalues).max(axis=1)
     height = cells(texture.height(xy))
     return {
         "low": height.min(axis=2),
         "high": height.max(axis=2),
         "second": cells(second_bound).max(axis=2),
-        "third": cells(along).max(axis=2),
-        "crest": cells(-curved[:, 0]).max(axis=2),
+        "third": cells(third_norm).max(axis=2),
+        "crest": cells(-eigenvalues[:, 0]).max(axis=2),
     }
 
 
@@ -71,7 +71,7 @@ MAPS = {
 
 
 @pytest.mark.parametrize("name", MAPS)
-def test_samples_of_a_map_are_within_the_bounds_of_their_boxes(name: str):
+def test_samples_of_a_map_are_within_box_bounds(name: str):
     texture = MAPS[name]
     cells = sampled_cells(texture, 9)
     px = texture.pitch[0]
@@ -92,39 +92,44 @@ def test_samples_of_a_map_are_within_the_bounds_of_their_boxes(name: str):
 
 
 @pytest.mark.parametrize("name", ["finite", "periodic", "steep"])
-def test_the_bounds_of_a_map_are_tight(name: str):
-    """The median box: bounds that are too wide cost evaluations."""
+def test_box_bounds_of_a_map_are_tight(name: str):
+    """The median ratio of sampled value and bound is limited; loose bounds cost evaluations."""
     texture = MAPS[name]
     cells, px = sampled_cells(texture, 9), texture.pitch[0]
-    used: list[list[float]] = []
+    ratios: list[list[float]] = []
     for (low, high, second_bound, third_bound, _crest), rows, columns in boxes_of_map(texture)[:12]:
         inner = np.ptp([cells["low"][rows, columns].min(), cells["high"][rows, columns].max()])
-        used.append([inner / (high - low), cells["second"][rows, columns].max() * px / second_bound,
-                     cells["third"][rows, columns].max() * px**2 / third_bound])  # fmt: skip
-    assert (np.median(used, axis=0) > [0.7, 0.4, 0.3]).all()
+        ratios.append(
+            [
+                inner / (high - low),
+                cells["second"][rows, columns].max() * px / second_bound,
+                cells["third"][rows, columns].max() * px**2 / third_bound,
+            ]
+        )
+    assert (np.median(ratios, axis=0) > [0.7, 0.4, 0.3]).all()
 
 
-def finest(texture: HeightMap) -> np.ndarray:
-    """Return the numbers of the finest boxes, shape (rows, columns, 5)."""
+def finest_boxes(texture: HeightMap) -> np.ndarray:
+    """Return the bounds of the finest boxes, shape (rows, columns, 5)."""
     values, levels = texture.arguments.boxes, texture.arguments.levels
     _start, rows, columns = levels[0]
     return np.asarray(values[: rows * columns].reshape(rows, columns, 5), dtype=np.float64)
 
 
-def just_above(bound: np.ndarray, exact: np.ndarray | float, greatest: float) -> bool:
-    """Return whether bounds are exact up to rounding: a few millionths of the greatest."""
-    return bool(((bound >= exact) & (bound <= exact + 3e-6 * greatest)).all())
+def is_tight_upper_bound(bound: np.ndarray, exact: np.ndarray | float, scale: float) -> bool:
+    """Return whether upper bounds are exact up to rounding, 3e-6 of a scale."""
+    return bool(((bound >= exact) & (bound <= exact + 3e-6 * scale)).all())
 
 
-def test_bounds_of_a_paraboloid_are_exact():
-    """Of 3 x² - 2 y² far from the border, where mirroring would change it."""
+def test_box_bounds_of_a_paraboloid_are_exact():
+    """The surface is 3 x² - 2 y², away from the border, where mirroring changes it."""
     y, x = np.mgrid[0:80, 0:80] * 1e-4
     texture = HeightMap(3.0 * x**2 - 2.0 * y**2, 1e-4)
-    boxes = finest(texture)
+    boxes = finest_boxes(texture)
     inner = boxes[18:22, 18:22]
-    assert just_above(inner[..., 2], 6.0 * 1e-4, boxes[..., 2].max())
-    # As a crest it is bent along y alone.
-    assert just_above(inner[..., 4], 4.0 * 1e-4, boxes[..., 2].max())
+    assert is_tight_upper_bound(inner[..., 2], 6.0 * 1e-4, boxes[..., 2].max())
+    # Negative curvature is along y only.
+    assert is_tight_upper_bound(inner[..., 4], 4.0 * 1e-4, boxes[..., 2].max())
     # Bernstein coefficients of a parabola over a cell: at its ends, and a third above or below.
     corner = 3.0 * x[36, 38] ** 2 - 2.0 * y[36, 38] ** 2
     assert corner <= inner[0, 0, 1] <= corner + 1e-8
@@ -132,11 +137,11 @@ def test_bounds_of_a_paraboloid_are_exact():
 
 @pytest.mark.parametrize("power", [3, 2, 1, 0])
 def test_bounds_of_third_derivatives_are_exact(power: int):
-    """Of x^n y^(3 - n): the root of the sum of the squares of all eight third derivatives."""
+    """For x^n y^(3 - n) the bound is the Frobenius norm of the eight third derivatives."""
     y, x = np.mgrid[0:80, 0:80] * np.array([2e-4, 1e-4])[:, None, None]
-    boxes = finest(HeightMap(1e3 * x**power * y ** (3 - power), (1e-4, 2e-4)))
+    boxes = finest_boxes(HeightMap(1e3 * x**power * y ** (3 - power), (1e-4, 2e-4)))
     exact = 1e3 * np.sqrt([36.0, 12.0, 12.0, 36.0][power]) * 1e-8
-    assert just_above(boxes[18:22, 18:22, 3], exact * (1 - 1e-9), boxes[..., 3].max())
+    assert is_tight_upper_bound(boxes[18:22, 18:22, 3], exact * (1 - 1e-9), boxes[..., 3].max())
 
 
 def test_bounds_do_not_depend_on_tiles(monkeypatch: pytest.MonkeyPatch):
@@ -147,13 +152,13 @@ def test_bounds_do_not_depend_on_tiles(monkeypatch: pytest.MonkeyPatch):
     for part, other in zip(
         pyramid.plane_pyramid(texture.coefficients, texture.pitch), whole, strict=True
     ):
-        # Only the room for rounding may differ: it follows the greatest value of a tile.
+        # Only the rounding margin may differ, as it scales with the maximum of a tile.
         np.testing.assert_allclose(part, other, rtol=0, atol=2e-6 * np.abs(other).max())
 
 
 @pytest.mark.parametrize("periodic", [False, True])
 @pytest.mark.parametrize("count", [4, 9, 37])
-def test_a_profile_is_within_its_boxes(count: int, periodic: bool):
+def test_samples_of_a_profile_are_within_box_bounds(count: int, periodic: bool):
     texture = Profile(1e-4 * RNG.normal(size=count), 2e-4, periodic=periodic, origin=3e-4)
     values, levels = texture.arguments.boxes, texture.arguments.levels
     cells = texture.coefficients.size - 3
@@ -174,7 +179,7 @@ def test_a_profile_is_within_its_boxes(count: int, periodic: bool):
             assert second_bound >= second[part].max() * texture.pitch * (1 - 1e-12)
             assert third_bound >= third[part].max() * texture.pitch**2 * (1 - 1e-9)
             assert crest_bound >= max(crest[part].max() * texture.pitch * (1 - 1e-12), 0.0)
-    # Of one cell they are exact: h'' is linear there, h''' constant.
+    # Bounds of single cells are exact, as h'' is linear there and h''' constant.
     for column, exact in ((2, second * texture.pitch), (3, third * texture.pitch**2)):
-        found = values[:cells, column].astype(np.float64)
-        assert just_above(found, exact * (1 - 1e-9), found.max())
+        bounds = values[:cells, column].astype(np.float64)
+        assert is_tight_upper_bound(bounds, exact * (1 - 1e-9), bounds.max())

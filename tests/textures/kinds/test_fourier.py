@@ -1,4 +1,4 @@
-"""Sums of waves: formula, period, certified extremes."""
+"""Fourier textures: formula, period and certified extremes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ KINDS = ["fourier", "fourier profile"]
 
 
 @pytest.mark.parametrize("texture", KINDS, indirect=True)
-def test_the_height_is_the_sum(texture: Fourier, scatter: Check):
+def test_height_is_the_sum_of_waves(texture: Fourier, scatter: Check):
     xy = scatter(texture, 30, seed=1, stretch=3.0)
     expected = np.zeros(30)
     for a, wave, phase in zip(texture.amplitudes, texture.wavevectors, texture.phases, strict=True):
@@ -35,7 +35,7 @@ def test_slopes_and_hessian_are_derivatives(
     check_derivatives(texture, scatter(texture, 50, seed=2), step=1e-7)
 
 
-def test_one_wave_is_a_sinusoid(scatter: Check):
+def test_one_wave_equals_a_sinusoid(scatter: Check):
     wave = Sinusoid(0.4e-3, 1.5e-3, phase=0.7, direction=(2.0, 1.0))
     k = 2 * math.pi / 1.5e-3 * np.array([2.0, 1.0]) / math.sqrt(5.0)
     sum_of_one = Fourier([0.4e-3], [k], [0.7])
@@ -46,7 +46,7 @@ def test_one_wave_is_a_sinusoid(scatter: Check):
     np.testing.assert_allclose(sum_of_one.domain.spans, wave.domain.spans, rtol=1e-12)
 
 
-def test_wavenumbers_alone_make_a_profile_along_x():
+def test_scalar_wavenumbers_give_a_profile_along_x():
     profile = Fourier([1e-4, 2e-4], [2000.0, 3000.0])
     np.testing.assert_array_equal(profile.wavevectors, [[2000.0, 0.0], [3000.0, 0.0]])
     assert profile.is_profile
@@ -71,7 +71,7 @@ def waves(vectors: list[list[float]]) -> Fourier:
 
 
 @pytest.mark.parametrize("vectors", REPEATING.values(), ids=list(REPEATING))
-def test_the_domain_is_a_period(vectors: list[list[float]], scatter: Check):
+def test_domain_is_a_period(vectors: list[list[float]], scatter: Check):
     texture = waves(vectors)
     assert texture.domain.periodic
     xy = scatter(texture, 20, seed=4)
@@ -82,8 +82,8 @@ def test_the_domain_is_a_period(vectors: list[list[float]], scatter: Check):
 
 
 @pytest.mark.parametrize("vectors", REPEATING.values(), ids=list(REPEATING))
-def test_the_domain_is_no_larger_than_the_least_period(vectors: list[list[float]]):
-    """The area (length) of the cell is that of the lattice of all integer combinations."""
+def test_domain_is_the_smallest_period(vectors: list[list[float]]):
+    """The cell has the area (length) of the lattice of all integer combinations."""
     texture = waves(vectors)
     sums = [
         np.array(m) @ np.array(vectors)
@@ -92,7 +92,7 @@ def test_the_domain_is_no_larger_than_the_least_period(vectors: list[list[float]
     ]
     if texture.is_profile:
         lengths = np.hypot(*np.array(sums).T)
-        if "6400" not in str(vectors):  # there the least sum needs larger integers
+        if "6400" not in str(vectors):  # the smallest combination needs larger integers
             least = lengths[lengths > 1.0].min()
             assert np.hypot(*texture.domain.spans[0]) == pytest.approx(2 * math.pi / least)
         return
@@ -103,7 +103,7 @@ def test_the_domain_is_no_larger_than_the_least_period(vectors: list[list[float]
 
 
 @pytest.mark.parametrize("vectors", REPEATING.values(), ids=list(REPEATING))
-def test_the_scan_line_is_a_period(vectors: list[list[float]]):
+def test_scan_line_is_a_period(vectors: list[list[float]]):
     texture = waves(vectors)
     line = texture.scan_line()
     assert line.periodic
@@ -112,7 +112,7 @@ def test_the_scan_line_is_a_period(vectors: list[list[float]]):
     np.testing.assert_allclose(ahead, texture.height(points), rtol=0, atol=1e-11 * 2e-4)
 
 
-def test_the_scan_line_runs_along_x_where_the_sum_repeats_there():
+def test_scan_line_is_along_x_if_the_sum_is_periodic_along_x():
     np.testing.assert_allclose(waves(REPEATING["hexagonal"]).scan_line().direction, [1.0, 0.0])
 
 
@@ -123,7 +123,7 @@ APERIODIC = {
 
 
 @pytest.mark.parametrize("vectors", APERIODIC.values(), ids=list(APERIODIC))
-def test_the_domain_of_an_aperiodic_sum(vectors: list[list[float]]):
+def test_domain_of_an_aperiodic_sum(vectors: list[list[float]]):
     texture = waves(vectors)
     assert not texture.domain.periodic
     assert not texture.scan_line().periodic
@@ -142,15 +142,15 @@ def test_extremes_of_a_period_are_certified_and_attained(
 ):
     texture = waves(vectors)
     low, high = texture.extremes
-    found_low, found_high = sampled_extremes(texture, 6000 if texture.is_profile else 150)
+    sampled_low, sampled_high = sampled_extremes(texture, 6000 if texture.is_profile else 150)
     rounding = 1e-12 * (high - low)
-    assert low - rounding <= found_low <= low + rounding
-    assert high - rounding <= found_high <= high + rounding
+    assert low - rounding <= sampled_low <= low + rounding
+    assert high - rounding <= sampled_high <= high + rounding
 
 
 @pytest.mark.parametrize("seed", range(12))
 def test_extremes_of_random_harmonics(seed: int):
-    """Several crests of nearly the same height: the search must not settle on one too early."""
+    """Several crests have nearly the same height, so the search must compare them all."""
     rng = np.random.default_rng(seed)
     orders, count = np.arange(1, 8), 200_000
     texture = Fourier(rng.normal(size=7), orders.astype(float), rng.uniform(0.0, 7.0, 7))
@@ -159,13 +159,15 @@ def test_extremes_of_random_harmonics(seed: int):
     for a, order, phase in zip(texture.amplitudes, orders, texture.phases, strict=True):
         heights += a * np.sin(order * angles + phase)
     low, high = texture.extremes
-    missed = 0.5 * texture.bounds[1] * (np.pi / count) ** 2  # between two samples
-    assert heights.max() <= high <= heights.max() + missed
-    assert heights.min() - missed <= low <= heights.min()
+    sampling_error = (
+        0.5 * texture.bounds[1] * (np.pi / count) ** 2
+    )  # of the maximum between two samples
+    assert heights.max() <= high <= heights.max() + sampling_error
+    assert heights.min() - sampling_error <= low <= heights.min()
 
 
-def test_free_phases_reach_the_sum_of_the_amplitudes():
-    """Three waves in the plane without a relation: all crests meet arbitrarily closely."""
+def test_extremes_with_free_phases_are_the_sum_of_amplitudes():
+    """Crests of three unrelated waves in the plane coincide arbitrarily closely."""
     texture = waves(APERIODIC["plane"])
     total = texture.amplitudes.sum()
     np.testing.assert_allclose(texture.extremes, (-total, total), rtol=1e-15)
@@ -175,8 +177,8 @@ def test_free_phases_reach_the_sum_of_the_amplitudes():
     assert -total <= heights.min() < -0.98 * total
 
 
-def test_an_aperiodic_profile_is_certified_on_the_torus():
-    """Waves 1, √2 and 1 + √2: two free phases, the third follows from them."""
+def test_extremes_of_an_aperiodic_profile_are_certified():
+    """Wavenumbers 1, √2 and 1 + √2 have two free phases, which determine the third."""
     amplitudes, phases = np.array([1.0, 0.8, 0.7]) * 1e-4, np.array([0.3, 1.0, 2.9])
     texture = Fourier(amplitudes, 2000.0 * np.array([1.0, ROOT2, 1.0 + ROOT2]), phases)
 
@@ -192,7 +194,7 @@ def test_an_aperiodic_profile_is_certified_on_the_torus():
 
 
 def test_extremes_with_many_equal_crests():
-    """An egg box: sin x + sin y, doubled by waves that agree with it."""
+    """An egg box, sin x + sin y, with its third harmonics."""
     box = Fourier([1e-4, 1e-4, 2e-5, 2e-5], [[1e3, 0], [0, 1e3], [3e3, 0], [0, 3e3]])
     # sin t + 0.2 sin 3t = 1.6 s - 0.8 s³, s = sin t, is greatest at s² = 2/3.
     peak = 2e-4 * math.sqrt(2 / 3) * (1.6 - 0.8 * 2 / 3)
@@ -209,7 +211,7 @@ def test_bounds_are_never_exceeded_and_within_a_factor_of_two(
 
 
 def test_bounds_are_attained_where_all_phases_are_free():
-    """The sum sin x + sin √2 x has a slope arbitrarily close to the bound."""
+    """The slope of sin x + sin √2 x comes arbitrarily close to the bound."""
     texture = Fourier([1e-4, 1e-4], [1000.0, 1000.0 * ROOT2])
     x = np.linspace(0.0, 20.0, 400_001)
     slope = np.abs(texture.gradient(np.column_stack([x, 0 * x]))[:, 0]).max()
@@ -236,7 +238,7 @@ def test_bounds_are_attained_where_all_phases_are_free():
         ("phases", [1e-3], [[1e3, 0]], [math.nan]),
     ],
 )
-def test_arguments_that_cannot_be_used(
+def test_invalid_arguments_are_refused(
     argument: str, amplitudes: Any, wavevectors: Any, phases: Any
 ):
     with pytest.raises(ParameterError, match=f"^{argument} ") as caught:
@@ -244,7 +246,7 @@ def test_arguments_that_cannot_be_used(
     assert caught.value.argument == argument
 
 
-def test_the_description_gives_the_same_texture():
+def test_description_and_repr_give_the_same_texture():
     texture = waves(REPEATING["oblique"])
     description = texture.describe()
     assert description.pop("kind") == "fourier"

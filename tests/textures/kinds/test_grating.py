@@ -1,4 +1,4 @@
-"""Gratings: levels, duty, edges, and the spline against the closed form."""
+"""Gratings: levels, duty, edges, and the spline against the closed form of the profile."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def on_line(x: Any) -> np.ndarray:
     return np.column_stack([x, np.cos(7e3 * x)])  # y does not matter
 
 
-def by_hand(x: float, height: float, period: float, duty: float, edge: float) -> float:
-    """Return the height by cases: top, edge, groove; the edge by integrating its slope."""
+def reference_height(x: float, height: float, period: float, duty: float, edge: float) -> float:
+    """Return the height by cases: top, edge (by integrating its slope) and groove."""
     u = abs((x + period / 2) % period - period / 2)
     inner, outer = duty * period / 2 - edge / 2, duty * period / 2 + edge / 2
     if u <= inner:
@@ -46,16 +46,20 @@ def by_hand(x: float, height: float, period: float, duty: float, edge: float) ->
 
 
 @every_shape
-def test_the_profile_is_flat_edge_flat(height: float, period: float, duty: float, edge: Any):
+def test_height_matches_the_reference_by_cases(
+    height: float, period: float, duty: float, edge: Any
+):
     grating = Grating(height, period, duty, edge)
     x = np.random.default_rng(1).uniform(-2, 3, 400) * period
-    expected = [by_hand(one, height, period, duty, grating.edge) for one in x]
+    expected = [reference_height(one, height, period, duty, grating.edge) for one in x]
     np.testing.assert_allclose(grating.height(on_line(x)), expected, rtol=0, atol=2e-5 * height)
     np.testing.assert_allclose(grating.closed_form(x), expected, rtol=0, atol=1e-9 * height)
 
 
 @every_shape
-def test_levels(height: float, period: float, duty: float, edge: Any):
+def test_levels_are_plus_and_minus_half_the_height(
+    height: float, period: float, duty: float, edge: Any
+):
     grating = Grating(height, period, duty, edge)
     low, high = grating.extremes
     assert (low, high) == pytest.approx((-height / 2, height / 2), rel=5e-5)
@@ -64,7 +68,7 @@ def test_levels(height: float, period: float, duty: float, edge: Any):
 
 
 @every_shape
-def test_the_duty_is_measured_at_half_height(height: float, period: float, duty: float, edge: Any):
+def test_duty_is_measured_at_half_height(height: float, period: float, duty: float, edge: Any):
     grating = Grating(height, period, duty, edge)
 
     def crossing(a: float, b: float) -> float:
@@ -78,10 +82,10 @@ def test_the_duty_is_measured_at_half_height(height: float, period: float, duty:
 
 
 @every_shape
-def test_the_edge_has_the_stated_width(height: float, period: float, duty: float, edge: Any):
+def test_edge_has_the_stated_width(height: float, period: float, duty: float, edge: Any):
     grating = Grating(height, period, duty, edge)
     begin = duty * period / 2 - grating.edge / 2
-    # An edge climbs by e(t): 0.2 of its width is 0.2 - sin(0.4 π)/(2π) = 4.86 % of the height.
+    # At 0.2 of its width an edge has risen by 0.2 - sin(0.4 π)/(2π) = 4.86 % of the height.
     share = 0.2 - math.sin(0.4 * math.pi) / (2 * math.pi)
     t = np.array([-0.1, 0.0, 0.2, 0.5, 0.8, 1.0, 1.1])
     fallen = 0.5 - grating.height(on_line(begin + t * grating.edge)) / height
@@ -104,8 +108,8 @@ def test_slope_and_curvature_of_the_edge(height: float, period: float, duty: flo
     assert grating.bounds[1] == pytest.approx(greatest, rel=0.03)
 
 
-def test_the_closed_form_is_twice_differentiable():
-    """A raised cosine would jump in its second derivative at both ends of the edge."""
+def test_closed_form_is_twice_differentiable():
+    """The second derivative is continuous at both ends of an edge, unlike a raised cosine's."""
     grating = Grating(0.2e-3, 2e-3, 0.4, 0.3e-3)
     step = 1e-3 * grating.edge
     ends = 0.4e-3 + np.array([-0.5, 0.5]) * grating.edge
@@ -119,7 +123,7 @@ def test_the_closed_form_is_twice_differentiable():
 
 @settings(max_examples=30, deadline=None)
 @given(duty=st.floats(0.05, 0.95), share=st.floats(0.05, 1.0))
-def test_the_spline_error_is_below_the_stated_fraction(duty: float, share: float):
+def test_spline_error_is_below_the_stated_fraction(duty: float, share: float):
     period = 1e-3
     grating = Grating(1e-4, period, duty, share * min(duty, 1 - duty) * period)
     assert grating.pitch <= grating.edge / 40 * (1 + 1e-9)
@@ -127,27 +131,27 @@ def test_the_spline_error_is_below_the_stated_fraction(duty: float, share: float
     assert np.abs(grating.height(on_line(x)) - grating.closed_form(x)).max() < 2e-5 * 1e-4
 
 
-def test_the_default_edge_is_a_quarter_of_the_narrower():
+def test_default_edge_is_a_quarter_of_the_narrower_level():
     assert Grating(1e-4, 1e-3, 0.2).edge == pytest.approx(0.05e-3)
     assert Grating(1e-4, 1e-3, 0.8).edge == pytest.approx(0.05e-3)
 
 
-def test_an_edge_as_wide_as_the_ridge_leaves_a_rounded_top():
+def test_edge_as_wide_as_the_ridge_reaches_full_height():
     grating = Grating(1e-4, 1e-3, 0.5, 0.5e-3)
     assert grating.peak_to_valley == pytest.approx(1e-4, rel=1e-4)
 
 
-def test_it_is_a_periodic_profile_that_names_its_parameters():
+def test_grating_is_a_periodic_profile_with_a_description():
     grating = Grating(1e-4, 1e-3, 0.3, 0.1e-3)
     assert isinstance(grating, Profile)
     assert grating.is_profile
     assert grating.domain.periodic
     assert grating.domain.spans[0, 0] == pytest.approx(1e-3, rel=1e-14)
-    described = grating.describe()
-    wanted = {"kind": "grating", "height": 1e-4, "period": 1e-3, "duty": 0.3, "edge": 0.1e-3}
-    assert {name: described[name] for name in wanted} == wanted
-    again = eval(repr(grating), {"Grating": Grating})
-    np.testing.assert_array_equal(again.heights, grating.heights)
+    description = grating.describe()
+    expected = {"kind": "grating", "height": 1e-4, "period": 1e-3, "duty": 0.3, "edge": 0.1e-3}
+    assert {name: description[name] for name in expected} == expected
+    rebuilt = eval(repr(grating), {"Grating": Grating})
+    np.testing.assert_array_equal(rebuilt.heights, grating.heights)
 
 
 @pytest.mark.parametrize(
@@ -167,7 +171,7 @@ def test_it_is_a_periodic_profile_that_names_its_parameters():
         ("edge", {"edge": 1e-7}),
     ],
 )
-def test_arguments_that_cannot_be_used(argument: str, changed: dict[str, Any]):
+def test_invalid_arguments_are_refused(argument: str, changed: dict[str, Any]):
     with pytest.raises(ParameterError, match=f"^{argument} ") as caught:
         Grating(**({"height": 1e-4, "period": 1e-3} | changed))
     assert caught.value.argument == argument

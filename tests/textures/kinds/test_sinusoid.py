@@ -1,4 +1,4 @@
-"""The sinusoid, all of whose properties have closed forms."""
+"""The sinusoid, against closed forms of its properties."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def wave() -> Sinusoid:
     return Sinusoid(0.4e-3, 1.5e-3, phase=0.7, direction=(3.0, -4.0))
 
 
-def test_the_height_is_the_formula(wave: Sinusoid, scatter: Check):
+def test_height_is_the_formula(wave: Sinusoid, scatter: Check):
     xy = scatter(wave, 50, seed=1, stretch=5.0)
     along = xy @ np.array([0.6, -0.8])
     expected = 0.4e-3 * np.sin(2 * np.pi * along / 1.5e-3 + 0.7)
@@ -38,7 +38,7 @@ def test_slopes_and_hessian_are_derivatives(
     check_derivatives(texture, scatter(texture, 50, seed=2), step=texture.period * 1e-4)
 
 
-def test_a_sinusoid_is_a_profile_constant_across_its_direction(wave: Sinusoid, scatter: Check):
+def test_sinusoid_is_constant_across_its_direction(wave: Sinusoid, scatter: Check):
     xy = scatter(wave, 20, seed=3)
     across = np.array([0.8, 0.6]) * 7e-3
     np.testing.assert_allclose(wave.height(xy + across), wave.height(xy), rtol=0, atol=1e-17)
@@ -46,7 +46,7 @@ def test_a_sinusoid_is_a_profile_constant_across_its_direction(wave: Sinusoid, s
     assert wave.is_profile
 
 
-def test_it_repeats_after_its_period(wave: Sinusoid, scatter: Check):
+def test_domain_is_one_period(wave: Sinusoid, scatter: Check):
     xy = scatter(wave, 20, seed=4)
     span = wave.domain.spans[0]
     assert np.hypot(*span) == pytest.approx(1.5e-3, rel=1e-15)
@@ -54,7 +54,7 @@ def test_it_repeats_after_its_period(wave: Sinusoid, scatter: Check):
     assert np.abs(wave.height(xy + 0.5 * span) + wave.height(xy)).max() < 1e-17
 
 
-def test_the_scan_line_is_one_period(wave: Sinusoid):
+def test_scan_line_is_one_period(wave: Sinusoid):
     line = wave.scan_line()
     end = line.start + line.length * line.direction
     assert line.periodic
@@ -76,7 +76,7 @@ def test_extremes_and_bounds_are_exact(
     np.testing.assert_allclose(sampled_bounds(wave, 5000), wave.bounds, rtol=1e-6)
 
 
-def test_the_description_gives_the_same_texture(wave: Sinusoid):
+def test_description_and_repr_give_the_same_texture(wave: Sinusoid):
     description = wave.describe()
     assert description.pop("kind") == "sinusoid"
     xy = [[1e-4, 2e-4]]
@@ -104,7 +104,7 @@ def test_the_description_gives_the_same_texture(wave: Sinusoid):
         ("direction", 1.0),
     ],
 )
-def test_arguments_that_cannot_be_used(argument: str, value: object):
+def test_invalid_arguments_are_refused(argument: str, value: object):
     arguments: dict[str, Any] = {"amplitude": 1e-3, "period": 1e-3, argument: value}
     with pytest.raises(ParameterError, match=f"^{argument} ") as caught:
         Sinusoid(**arguments)
@@ -112,10 +112,10 @@ def test_arguments_that_cannot_be_used(argument: str, value: object):
 
 
 @pytest.mark.parametrize("method", ["height", "gradient", "hessian", "derivatives", "nearest"])
-def test_positions_that_cannot_be_used(wave: Sinusoid, method: str):
+def test_invalid_positions_are_refused(wave: Sinusoid, method: str):
     width = 3 if method == "nearest" else 2
     argument = "points" if method == "nearest" else "xy"
-    wrong: list[Any] = [
+    invalid: list[Any] = [
         np.zeros(width + 1),
         np.zeros((4, width + 1)),
         np.full((2, width), np.nan),
@@ -124,7 +124,7 @@ def test_positions_that_cannot_be_used(wave: Sinusoid, method: str):
         [[None] * width],
         5.0,
     ]
-    for positions in wrong:
+    for positions in invalid:
         with pytest.raises(ParameterError) as caught:
             getattr(wave, method)(positions)
         assert caught.value.argument == argument
@@ -138,7 +138,9 @@ def test_shapes_of_the_results(wave: Sinusoid):
     assert wave.height(np.zeros((0, 2))).shape == (0,)
 
 
-def missed(psi: float, u: float, z: float, amplitude: float, peak_curvature: float) -> float:
+def residual_in_roundings(
+    psi: float, u: float, z: float, amplitude: float, peak_curvature: float
+) -> float:
     """Return the residual of a closest point at ψ, in units of its rounding error."""
     with mp.workdps(60):
         p, steep, high = mp.mpf(psi), mp.sin(psi), amplitude * mp.cos(psi)
@@ -150,32 +152,36 @@ def missed(psi: float, u: float, z: float, amplitude: float, peak_curvature: flo
         )
 
 
-def test_the_root_on_a_flank_takes_few_evaluations(monkeypatch: pytest.MonkeyPatch):
-    """Probes at, below and far below flat and steep sinusoids, at crests, flanks and troughs."""
+def test_flank_root_is_accurate_in_few_evaluations(monkeypatch: pytest.MonkeyPatch):
+    """Probes are at, below and far below crests, flanks and troughs of flat and steep waves."""
     evaluations = [0]
 
-    def sine(angle: float) -> float:
+    def counting_sine(angle: float) -> float:
         evaluations[0] += 1
         return math.sin(angle)
 
-    counted = SimpleNamespace(**vars(math) | {"sin": sine})
-    monkeypatch.setattr(sinusoid, "math", counted)
-    draw, counts, off = random.Random(5), [], []
+    counting_math = SimpleNamespace(**vars(math) | {"sin": counting_sine})
+    monkeypatch.setattr(sinusoid, "math", counting_math)
+    rng, counts, perturbed_residuals = random.Random(5), [], []
     for _ in range(4000):
-        amplitude = 10.0 ** draw.uniform(-6.0, -2.5)
-        k = 2.0 * math.pi / 10.0 ** draw.uniform(-4.0, -2.0)
-        u = draw.choice([draw.uniform(0.0, math.pi), 10.0 ** draw.uniform(-16.0, 0.0)])
-        below = draw.choice([10.0 ** draw.uniform(-16.0, 0.0), 5.0 * draw.random(), 1e3])
+        amplitude = 10.0 ** rng.uniform(-6.0, -2.5)
+        k = 2.0 * math.pi / 10.0 ** rng.uniform(-4.0, -2.0)
+        u = rng.choice([rng.uniform(0.0, math.pi), 10.0 ** rng.uniform(-16.0, 0.0)])
+        below = rng.choice([10.0 ** rng.uniform(-16.0, 0.0), 5.0 * rng.random(), 1e3])
         depth, peak_curvature = below * amplitude, k * k * amplitude
         z, high = amplitude * math.cos(u) - depth, min(math.pi, u + k * depth)
         evaluations[0] = 0
         psi, c, s = sinusoid.flank_root(1.0, u, high, z, amplitude, peak_curvature)
         counts.append(evaluations[0])
         assert u <= psi <= math.pi
-        assert missed(psi, u, z, amplitude, peak_curvature) < 1.0
+        assert residual_in_roundings(psi, u, z, amplitude, peak_curvature) < 1.0
         assert abs(c - math.cos(psi)) <= 2.0**-51
         assert abs(s - math.sin(psi)) <= 2.0**-51
-        off.append(missed(psi * (1.0 + 2.0**-48), u, z, amplitude, peak_curvature))
-    assert np.median(off) > 2.0  # so a root that is wrong by 16 roundings is seen
+        perturbed_residuals.append(
+            residual_in_roundings(psi * (1.0 + 2.0**-48), u, z, amplitude, peak_curvature)
+        )
+    assert (
+        np.median(perturbed_residuals) > 2.0
+    )  # negative control: an error of 16 roundings is detected
     assert np.mean(counts) < 2.5
     assert max(counts) < 16

@@ -1,4 +1,4 @@
-"""Named surfaces: what they promise together, and that each is what it is called."""
+"""Named surfaces: properties common to all, and the characteristic features of each."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SEEDED = [name for name in NAMES if name != "knurl"]
 
 
 def spectrum(surface: HeightMap) -> np.ndarray:
-    """Return the power of every wave (n, m), from the heights alone."""
+    """Return the power of every wave (n, m), computed from the heights."""
     return np.abs(np.fft.fft2(surface.heights)) ** 2
 
 
@@ -44,31 +44,31 @@ def rms_slopes(surface: HeightMap) -> tuple[float, float]:
     )
 
 
-# --- what all promise -----------------------------------------------------------------------------
+# --- common properties ----------------------------------------------------------------------------
 
 
-def test_names_of_the_library():
+def test_surface_names_and_catalogue():
     assert surface_names() == NAMES
     assert tuple(LIBRARY) == NAMES
-    drawn = {"sinusoid", "fourier", "grating", "noise", "noise-profile"}
-    assert set(CATALOGUE) == set(NAMES) | drawn
+    synthetic = {"sinusoid", "fourier", "grating", "noise", "noise-profile"}
+    assert set(CATALOGUE) == set(NAMES) | synthetic
 
 
 @every_surface
-def test_it_is_the_same_each_time(name: str):
+def test_heights_are_reproducible(name: str):
     np.testing.assert_array_equal(named_surface(name).heights, named_surface(name).heights)
 
 
 @pytest.mark.parametrize("name", SEEDED)
 def test_another_seed_has_the_same_statistics(name: str):
-    one, other = named_surface(name), named_surface(name, seed=1)
-    scale = one.heights.std()
-    assert np.abs(one.heights - other.heights).max() > 0.1 * scale
-    assert other.heights.std() == pytest.approx(scale, rel=0.2)
+    first, second = named_surface(name), named_surface(name, seed=1)
+    scale = first.heights.std()
+    assert np.abs(first.heights - second.heights).max() > 0.1 * scale
+    assert second.heights.std() == pytest.approx(scale, rel=0.2)
 
 
 @every_surface
-def test_there_is_no_power_beyond_the_cut_off(name: str):
+def test_spectrum_is_zero_beyond_the_cut_off(name: str):
     surface = named_surface(name)
     power = spectrum(surface)
     ny, nx = power.shape
@@ -81,8 +81,8 @@ def test_there_is_no_power_beyond_the_cut_off(name: str):
 
 
 @every_surface
-def test_it_repeats_without_a_seam(name: str):
-    """Over eight nodes, which exceed the low-pass: no greater change at the border."""
+def test_surface_is_periodic_without_a_seam(name: str):
+    """Changes over eight nodes, more than the low-pass, are not greater at the border."""
     surface = named_surface(name)
     assert surface.domain.periodic
     for axis in (0, 1):
@@ -92,7 +92,7 @@ def test_it_repeats_without_a_seam(name: str):
 
 
 @every_surface
-def test_size_and_mean(name: str):
+def test_number_of_nodes_and_zero_mean(name: str):
     surface = named_surface(name)
     assert min(surface.heights.shape) >= 256
     assert max(surface.heights.shape) <= 512
@@ -100,26 +100,26 @@ def test_size_and_mean(name: str):
 
 
 @every_surface
-def test_the_description_names_every_parameter(name: str):
+def test_description_has_every_parameter(name: str):
     surface = named_surface(name)
-    described = surface.describe()
-    assert described["kind"] == name
+    description = surface.describe()
+    assert description["kind"] == name
     for argument in LIBRARY[name].arguments:
-        assert described[argument.name] == argument.default
-    assert described["points"] == list(surface.heights.shape[::-1])
-    assert "not measured" in described["preparation"][0]
+        assert description[argument.name] == argument.default
+    assert description["points"] == list(surface.heights.shape[::-1])
+    assert "not measured" in description["preparation"][0]
 
 
 @every_surface
-def test_the_representation_gives_the_same_texture(name: str):
+def test_repr_gives_the_same_texture(name: str):
     changed = {} if name == "knurl" else {"seed": 3}
     surface = named_surface(name, **changed)
-    again = eval(repr(surface), {"named_surface": named_surface})
-    np.testing.assert_array_equal(again.heights, surface.heights)
+    rebuilt = eval(repr(surface), {"named_surface": named_surface})
+    np.testing.assert_array_equal(rebuilt.heights, surface.heights)
 
 
 @every_surface
-def test_every_argument_is_documented_and_takes_effect(name: str):
+def test_every_argument_is_documented_and_has_an_effect(name: str):
     kind = LIBRARY[name]
     assert kind.summary
     assert kind.source
@@ -145,7 +145,7 @@ def test_every_argument_is_documented_and_takes_effect(name: str):
         ("tile", ["tile_size", "joint_width", "joint_depth", "lippage"]),
     ],
 )
-def test_all_lengths_together_scale_the_surface(name: str, lengths: list[str]):
+def test_scaling_all_lengths_scales_the_surface(name: str, lengths: list[str]):
     plain = named_surface(name)
     doubled = named_surface(name, **{one: 2.0 * plain.parameters[one] for one in lengths})
     np.testing.assert_allclose(doubled.pitch, 2.0 * np.array(plain.pitch))
@@ -155,7 +155,7 @@ def test_all_lengths_together_scale_the_surface(name: str, lengths: list[str]):
 
 
 @pytest.mark.parametrize("name", ["brushed-metal", "knurl"])
-def test_the_laws_can_be_compared(name: str):
+def test_laws_can_be_compared_on_a_named_surface(name: str):
     result = asperity.compare(named_surface(name), laws="WAC")
     numbers = [
         (row.q.value, row.one_sided.value, row.safe_stiffness, row.leak.energy, row.strength)
@@ -167,12 +167,12 @@ def test_the_laws_can_be_compared(name: str):
     assert any("not measured" in line for line in result.assumptions)
 
 
-# --- each is what it is called --------------------------------------------------------------------
+# --- features of each surface ---------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("spacing", [0.42e-3, 0.6e-3])
 def test_cloth_is_a_plain_weave(spacing: float):
-    """At each crossing the upper yarn curves more across than along: a chequerboard."""
+    """At each crossing the upper yarn curves more across than along, in a chequerboard pattern."""
     cloth = named_surface(
         "cloth", spacing=spacing, cover=0.5, yarn_thickness=0.3 * spacing, irregularity=0.0
     )
@@ -185,7 +185,7 @@ def test_cloth_is_a_plain_weave(spacing: float):
     chequerboard = (i + j) % 2 == 0
     np.testing.assert_array_equal(upper_along_y, chequerboard == upper_along_y[0, 0])
     np.testing.assert_array_equal(upper_along_x, ~upper_along_y)
-    # A crossing stands one thickness above the middle of the cloth, the floor half of one below.
+    # A crossing is one thickness above the mid-plane, the floor half a thickness below.
     assert 0.85 < cloth.peak_to_valley / (1.5 * 0.3 * spacing) < 1.1
 
 
@@ -195,7 +195,7 @@ def test_brushed_metal_has_long_scratches_of_the_stated_rms():
     across, along = rms_slopes(metal)
     assert across > 15 * along
     assert 2e-6 < np.ptp(metal.heights) < 12e-6
-    # More and deeper valleys than peaks: scratches are cut.
+    # Scratches are cut, so the skewness is negative.
     assert np.mean(metal.heights**3) < -0.2e-18
 
 
@@ -214,13 +214,13 @@ def test_sandpaper_has_the_grain_size_of_its_grade(grit: str, size: float):
     assert 0.3 < half / (size * 1e-6) < 0.6
 
 
-def test_grades_ignore_case():
+def test_grit_ignores_case():
     assert named_surface("sandpaper", grit="p80").parameters["grit"] == "P80"
 
 
 def test_coverage_and_embedding_of_sandpaper():
     dense, sparse = (named_surface("sandpaper", coverage=c).heights for c in (1.2, 0.2))
-    # Glue is level: its share of the surface is what grains do not cover.
+    # The glue is level and visible where no grain covers it.
     level = [float((np.abs(h - h.min()) < 0.05 * np.ptp(h)).mean()) for h in (dense, sparse)]
     assert level[0] < 0.35
     assert level[1] > 0.6
@@ -239,7 +239,7 @@ def test_wood_has_rings_and_pores_along_the_grain():
     mean = np.abs(np.fft.rfft(smooth.heights.mean(axis=0)))
     assert mean[4] > 3.0 * max(mean[3], mean[5])
     assert np.ptp(smooth.heights) < 0.4 * np.ptp(wood.heights)
-    # Pores are cut: valleys deeper than peaks are high.
+    # Pores are cut, so valleys are deeper than peaks are high.
     assert -wood.heights.min() > 1.5 * wood.heights.max()
 
 
@@ -250,7 +250,7 @@ def test_knurl_has_grooves_of_the_stated_spacing_and_angle(spacing: float, degre
     angle = math.radians(degrees)
     assert along_x == pytest.approx(spacing / math.cos(angle), rel=1e-9)
     assert along_y == pytest.approx(spacing / math.sin(angle), rel=1e-9)
-    # Wave vector (1/along_x, 1/along_y): the distance of the grooves, measured across them.
+    # The distance across the grooves follows from the wave vector (1/along_x, 1/along_y).
     assert 1.0 / math.hypot(1 / along_x, 1 / along_y) == pytest.approx(spacing, rel=1e-9)
 
 
@@ -273,10 +273,10 @@ def test_tile_has_joints_of_the_stated_width_and_depth():
     line = tile.scan_line()
     x = np.linspace(0.0, 50e-3, 5001)
     heights = tile.height(np.column_stack([x, np.full_like(x, line.start[1])]))
-    sunk = heights < heights.max() - 0.5 * 0.8e-3
-    assert np.diff(sunk.astype(int)).clip(0).sum() == 2  # two joints across
-    # At half depth a joint is wider by the rounding of both tiles' edges, 0.13 widths each.
-    assert sunk.mean() * 50e-3 / 2 == pytest.approx(2e-3 * (1 + 2 * 0.9 * 0.134), rel=0.1)
+    is_joint = heights < heights.max() - 0.5 * 0.8e-3
+    assert np.diff(is_joint.astype(int)).clip(0).sum() == 2  # two joints across
+    # At half depth, the rounded edges of both tiles widen a joint by 0.13 widths each.
+    assert is_joint.mean() * 50e-3 / 2 == pytest.approx(2e-3 * (1 + 2 * 0.9 * 0.134), rel=0.1)
 
 
 def test_lippage_shifts_whole_tiles():
@@ -290,7 +290,7 @@ def test_lippage_shifts_whole_tiles():
 # --- the low-pass ---------------------------------------------------------------------------------
 
 
-def test_the_low_pass_halves_at_twice_its_cut_off():
+def test_low_pass_transmission_at_multiples_of_the_cut_off():
     i = np.arange(64)
     for nodes, expected in ((4.0, 0.0), (8.0, 0.5), (16.0, math.cos(math.pi / 8) ** 2)):
         wave = np.cos(2 * np.pi * i / nodes)[None, :] * np.ones((8, 1))
@@ -298,27 +298,27 @@ def test_the_low_pass_halves_at_twice_its_cut_off():
         np.testing.assert_allclose(low_pass(wave.T), expected * wave.T, atol=1e-14)
 
 
-def test_the_low_pass_overshoots_a_step_by_less_than_one_percent():
+def test_low_pass_overshoots_a_step_by_less_than_one_percent():
     step = np.where(np.arange(512) < 256, 1.0, 0.0)[None, :] * np.ones((8, 1))
     smooth = low_pass(step)
     assert 1.0 + 1e-4 < smooth.max() < 1.01
     assert smooth.min() == pytest.approx(1.0 - smooth.max(), abs=1e-12)
 
 
-# --- what cannot be used --------------------------------------------------------------------------
+# --- invalid arguments ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("given", "offered"), [("clot", "cloth"), ("sand paper", "sandpaper")])
-def test_an_unknown_name_suggests_the_nearest(given: str, offered: str):
-    with pytest.raises(ParameterError, match=f"did you mean '{offered}'"):
-        named_surface(given)
+@pytest.mark.parametrize(("name", "suggestion"), [("clot", "cloth"), ("sand paper", "sandpaper")])
+def test_unknown_name_suggests_the_nearest(name: str, suggestion: str):
+    with pytest.raises(ParameterError, match=f"did you mean '{suggestion}'"):
+        named_surface(name)
 
 
 def test_names_ignore_case_and_hyphens():
     assert isinstance(named_surface("Brushed_Metal"), NamedSurface)
 
 
-def test_an_unknown_parameter_suggests_the_nearest():
+def test_unknown_parameter_suggests_the_nearest():
     with pytest.raises(
         ParameterError, match=r"yarn_thicknes is unknown.*did you mean 'yarn_thickness'"
     ):
@@ -346,7 +346,7 @@ def test_an_unknown_parameter_suggests_the_nearest():
         ("brushed-metal", "rms", 0.0),
     ],
 )
-def test_values_that_cannot_be_used(name: str, argument: str, value: Any):
+def test_invalid_values_are_refused(name: str, argument: str, value: Any):
     with pytest.raises(ParameterError, match=f"^{argument} ") as caught:
         named_surface(name, **{argument: value})
     assert caught.value.argument == argument
@@ -354,8 +354,8 @@ def test_values_that_cannot_be_used(name: str, argument: str, value: Any):
 
 
 @every_surface
-def test_limits_of_every_argument_give_a_surface(name: str):
-    """At either end of what is allowed: finite heights, or an error that names an argument."""
+def test_limits_of_every_argument_give_finite_heights(name: str):
+    """At the limits of an argument, heights are finite or a ``ParameterError`` is raised."""
     for argument in LIBRARY[name].arguments:
         if argument.form != "quantity":
             continue

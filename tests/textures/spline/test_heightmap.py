@@ -1,4 +1,4 @@
-"""Height maps: a C² spline through the nodes, mirrored or periodic, with certified bounds."""
+"""Height maps: C² splines through the nodes, mirrored or periodic, with certified bounds."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ every_map = pytest.mark.parametrize("texture", MAPS, indirect=True)
 
 
 def away_from_nodes(texture: HeightMap, count: int, seed: int) -> np.ndarray:
-    """Return points (n, 2) inside cells, also of the repetitions around the map."""
+    """Return points (n, 2) inside cells of the map and of its repetitions."""
     rng = np.random.default_rng(seed)
     cells = rng.integers(-12, 20, (count, 2)) + rng.uniform(0.1, 0.9, (count, 2))
     return texture.origin + cells * texture.pitch
@@ -31,14 +31,14 @@ def node_positions(texture: HeightMap) -> np.ndarray:
 
 
 @every_map
-def test_the_spline_goes_through_the_nodes(texture: HeightMap):
+def test_spline_interpolates_the_nodes(texture: HeightMap):
     heights = texture.height(node_positions(texture))
     rounding = 1e-14 * np.abs(texture.heights).max()
     np.testing.assert_allclose(heights, texture.heights.ravel(), rtol=0, atol=10 * rounding)
 
 
 @every_map
-def test_the_height_is_the_spline_of_scipy(texture: HeightMap, scatter: Check):
+def test_height_matches_scipy_splines(texture: HeightMap, scatter: Check):
     xy = scatter(texture, 200, seed=1, stretch=3.0)
     u = (xy - texture.origin) / texture.pitch
     mode = "grid-wrap" if texture.periodic else "mirror"
@@ -53,11 +53,11 @@ def test_slopes_and_hessian_are_derivatives(texture: HeightMap, check_derivative
 
 
 @every_map
-def test_everything_to_the_second_derivative_is_continuous_across_cells(texture: HeightMap):
+def test_second_derivatives_are_continuous_across_cells(texture: HeightMap):
     ny, nx = texture.heights.shape
     rng = np.random.default_rng(3)
     along = rng.uniform(-3, 20, 60)
-    lines = np.arange(60) - 15  # beyond the borders on both sides
+    lines = np.arange(60) - 15  # includes positions beyond both borders
     step = 1e-9
     for axis in (0, 1):
         cells = np.stack([lines, along] if axis == 0 else [along, lines], -1)
@@ -69,7 +69,7 @@ def test_everything_to_the_second_derivative_is_continuous_across_cells(texture:
         assert np.abs((after - before) * scale).max() < 1e-6, (axis, nx, ny)
 
 
-def test_a_finite_map_is_mirrored_at_its_border_nodes(make_texture: Check):
+def test_finite_map_is_mirrored_at_its_border_nodes(make_texture: Check):
     texture = make_texture("map")
     rng = np.random.default_rng(4)
     size = np.array(texture.domain.spans).diagonal()
@@ -83,13 +83,13 @@ def test_a_finite_map_is_mirrored_at_its_border_nodes(make_texture: Check):
     signs = np.array([1, -1, -1, 1, 1, 1])
     straight = texture.derivatives(texture.origin + inner) * signs
     np.testing.assert_allclose(flipped, straight, rtol=1e-8, atol=1e-9)
-    one_way = texture.derivatives(texture.origin + inner * [-1, 1])
+    mirrored_along_x = texture.derivatives(texture.origin + inner * [-1, 1])
     signs = np.array([1, -1, 1, 1, -1, 1])
     straight = texture.derivatives(texture.origin + inner) * signs
-    np.testing.assert_allclose(one_way, straight, rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(mirrored_along_x, straight, rtol=1e-8, atol=1e-9)
 
 
-def test_the_slope_across_the_border_vanishes(make_texture: Check):
+def test_normal_slope_at_the_border_is_zero(make_texture: Check):
     texture = make_texture("map")
     along = np.linspace(0.0, 1.0, 11)[:, None]
     width, depth = texture.domain.spans.diagonal()
@@ -101,7 +101,7 @@ def test_the_slope_across_the_border_vanishes(make_texture: Check):
         assert np.abs(texture.gradient(edge)[:, 1]).max() < 1e-13
 
 
-def test_a_periodic_map_repeats_after_all_its_nodes(make_texture: Check):
+def test_period_of_a_periodic_map_is_its_number_of_nodes(make_texture: Check):
     texture = make_texture("periodic map")
     ny, nx = texture.heights.shape
     np.testing.assert_allclose(texture.domain.spans, np.diag([nx * 3e-4, ny * 4e-4]))
@@ -113,7 +113,7 @@ def test_a_periodic_map_repeats_after_all_its_nodes(make_texture: Check):
     assert texture.scan_line().periodic
 
 
-def test_a_finite_map_ends_at_its_last_nodes(make_texture: Check):
+def test_domain_of_a_finite_map_ends_at_its_last_nodes(make_texture: Check):
     texture = make_texture("map")
     ny, nx = texture.heights.shape
     np.testing.assert_allclose(texture.domain.spans, np.diag([(nx - 1) * 3e-4, (ny - 1) * 4e-4]))
@@ -123,7 +123,7 @@ def test_a_finite_map_ends_at_its_last_nodes(make_texture: Check):
 
 
 @every_map
-def test_the_scan_line_crosses_the_middle(texture: HeightMap):
+def test_scan_line_crosses_the_middle(texture: HeightMap):
     line = texture.scan_line()
     width, depth = texture.domain.spans.diagonal()
     middle = np.array([0.0, depth / 2])
@@ -136,16 +136,16 @@ def test_the_scan_line_crosses_the_middle(texture: HeightMap):
 @every_map
 def test_extremes_are_certified_and_attained(texture: HeightMap, sampled_extremes: Check):
     low, high = texture.extremes
-    found_low, found_high = sampled_extremes(texture, 240)
+    sampled_low, sampled_high = sampled_extremes(texture, 240)
     rounding = 1e-12 * (high - low)
-    assert low - rounding <= found_low <= low + rounding
-    assert high - rounding <= found_high <= high + rounding
+    assert low - rounding <= sampled_low <= low + rounding
+    assert high - rounding <= sampled_high <= high + rounding
     assert high > texture.heights.max()  # the spline overshoots the nodes
 
 
 @every_map
 def test_bounds_of_rough_maps_are_never_exceeded(texture: HeightMap, sampled_bounds: Check):
-    """White noise from node to node is the worst case for the hull of the coefficients."""
+    """White noise is the worst case for bounds from the convex hull of the coefficients."""
     slope, second = sampled_bounds(texture, 400)
     assert texture.bounds[0] / 4.5 < slope <= texture.bounds[0]
     assert texture.bounds[1] / 3.5 < second <= texture.bounds[1]
@@ -160,8 +160,8 @@ def test_bounds_of_smooth_maps_are_tight(sampled_bounds: Check):
     assert texture.bounds[1] / 1.25 < second <= texture.bounds[1]
 
 
-def test_bounds_are_attained_by_a_plane_and_a_parabola():
-    """In the middle of a large map the mirrored border is far away."""
+def test_derivatives_of_a_plane_and_a_parabola():
+    """Derivatives are exact in the middle of a large map, far from the mirrored border."""
     i, j = np.mgrid[0:41, 0:41] - 20
     parabola = HeightMap(1e-6 * j**2, 1e-4)
     middle = np.array([[2e-3, 2e-3]])
@@ -171,7 +171,7 @@ def test_bounds_are_attained_by_a_plane_and_a_parabola():
     assert tilted.bounds[0] >= 0.05
 
 
-def test_two_pitches_and_an_origin():
+def test_pitches_and_origin_transform_positions():
     heights = np.random.default_rng(6).normal(size=(5, 6)) * 1e-4
     plain = HeightMap(heights, 1.0)
     stretched = HeightMap(heights, (2e-3, 5e-4), origin=(0.1, -0.2))
@@ -183,27 +183,27 @@ def test_two_pitches_and_an_origin():
 
 @pytest.mark.parametrize("shape", [(1200,), (1200, 9), (9, 1200)])
 @pytest.mark.parametrize("height", [-1.0, 1e-9])
-def test_no_coefficient_has_a_subnormal_square(shape: tuple[int, ...], height: float):
-    """They fall off beside a spike, and arithmetic with subnormal numbers takes ten times as long.
+def test_coefficients_with_subnormal_squares_are_zero(shape: tuple[int, ...], height: float):
+    """Coefficients decay beside a spike; arithmetic with subnormal numbers is ten times slower.
 
-    What is dropped moves no height: beside those of SciPy it is nothing.
+    The others are equal to those of SciPy.
     """
     from scipy.ndimage import spline_filter
 
     heights = np.zeros(shape)
     heights[tuple(n // 2 for n in shape)] = height
     texture = Profile(heights, 1e-4) if len(shape) == 1 else HeightMap(heights, 1e-4)
-    found = texture.coefficients
-    size = np.abs(found[found != 0.0])
+    coefficients = texture.coefficients
+    size = np.abs(coefficients[coefficients != 0.0])
     assert size.min() > 1e-91 * abs(height)
     exact = spline_filter(heights, order=3, mode="mirror")
-    inner = found[(slice(1, -1),) * len(shape)]
+    inner = coefficients[(slice(1, -1),) * len(shape)]
     large = np.abs(exact) > 1e-90 * np.abs(exact).max()
     assert not large.all()
     np.testing.assert_array_equal(inner, np.where(large, exact, 0.0))
 
 
-def test_a_flat_map_is_flat():
+def test_flat_map_has_constant_height():
     flat = HeightMap(np.full((5, 5), 1e-4), 1e-3)
     np.testing.assert_allclose(flat.extremes, (1e-4, 1e-4), rtol=1e-14)
     assert flat.bounds[0] < 1e-15
@@ -229,13 +229,13 @@ def test_a_flat_map_is_flat():
         ("origin", np.zeros((4, 4)), {"origin": (0.0, math.inf)}),
     ],
 )
-def test_arguments_that_cannot_be_used(argument: str, heights: Any, options: dict[str, Any]):
+def test_invalid_arguments_are_refused(argument: str, heights: Any, options: dict[str, Any]):
     with pytest.raises(ParameterError, match=f"^{argument} ") as caught:
         HeightMap(heights, **({"pitch": 1e-3} | options))
     assert caught.value.argument == argument
 
 
-def test_the_description_names_size_and_preparation():
+def test_description_has_size_and_preparation():
     texture = HeightMap(np.zeros((4, 6)), (1e-3, 2e-3), preparation=["levelled"])
     assert texture.describe() == {
         "kind": "heightmap",

@@ -1,4 +1,4 @@
-"""Windows of cells: what is dropped holds no closer point, and hardly more could be dropped."""
+"""Shrinking of windows: dropped cells contain no closer point, and the bounds are tight."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ PITCH = (50e-6, 70e-6)
 Point = tuple[float, float, float, float, float, float]
 
 
-def rough(seed: int, height: float = 60e-6) -> HeightMap:
-    """Return a map of 25 x 38 nodes that is correlated over a few of them."""
+def rough_map(seed: int, height: float = 60e-6) -> HeightMap:
+    """Return a random map of 25 x 38 nodes, correlated over a few nodes."""
     from scipy.ndimage import gaussian_filter
 
     noise = gaussian_filter(np.random.default_rng(seed).standard_normal((25, 38)), 2.0)
@@ -31,8 +31,8 @@ def cells(texture: HeightMap) -> tuple[int, int]:
     return heightmap.cell_counts(texture.arguments.c)
 
 
-def squares(texture: HeightMap, probe: FloatArray, finer: int = 8) -> FloatArray:
-    """Return the least φ on a grid in each cell (ny, nx)."""
+def min_squared_distances(texture: HeightMap, probe: FloatArray, finer: int = 8) -> FloatArray:
+    """Return the minimum of φ on a grid in each cell, shape (ny, nx)."""
     nx, ny = cells(texture)
     share = (np.arange(finer) + 0.5) / finer
     x = texture.origin[0] + PITCH[0] * (np.arange(nx)[:, None] + share).ravel()
@@ -42,8 +42,8 @@ def squares(texture: HeightMap, probe: FloatArray, finer: int = 8) -> FloatArray
     return phi.reshape(ny, finer, nx, finer).min(axis=(1, 3))
 
 
-def outside(phi: FloatArray, left: pruning.Window) -> float:
-    """Return the least φ of the cells that are not in a pruning."""
+def min_outside(phi: FloatArray, left: pruning.Window) -> float:
+    """Return the minimum of φ over the cells outside a window."""
     west, east, south, north = left
     rest = phi.copy()
     if not pruning.is_empty(left):
@@ -51,34 +51,34 @@ def outside(phi: FloatArray, left: pruning.Window) -> float:
     return float(rest.min())
 
 
-def probes(texture: HeightMap, rng: np.random.Generator, count: int) -> FloatArray:
+def random_probes(texture: HeightMap, rng: np.random.Generator, count: int) -> FloatArray:
     nx, ny = cells(texture)
     xy = texture.origin + rng.uniform(-0.1, 1.1, (count, 2)) * np.array([nx, ny]) * PITCH
     below = rng.uniform(-0.1e-3, 0.7e-3, count)
     return np.column_stack([xy, texture.height(xy) - below])
 
 
-@pytest.mark.parametrize("by", ["cells", "boxes"])
-def test_narrowing_loses_no_closer_point(by: str) -> None:
-    """For any g and best point; the negative control drops more."""
+@pytest.mark.parametrize("method", ["cells", "boxes"])
+def test_dropped_cells_contain_no_closer_point(method: str) -> None:
+    """For any g and best point; the negative control uses a smaller threshold."""
     rng = np.random.default_rng(51)
     dropped, lost = 0, 0
     for seed in range(4):
-        texture = rough(seed)
+        texture = rough_map(seed)
         nx, ny = cells(texture)
         whole = (0, nx - 1, 0, ny - 1)
-        for probe in probes(texture, rng, 25):
-            phi = squares(texture, probe)
+        for probe in random_probes(texture, rng, 25):
+            phi = min_squared_distances(texture, probe)
             threshold = float(phi.min()) * rng.uniform(0.9, 1.3)
             g = rng.choice([1.0, 0.9, -0.3]) * float(texture.height(probe[None, :2])[0] - probe[2])
             level = int(rng.integers(1, 4))
             for share in (1.0, 0.8):
                 ball = (*map(float, probe), share * threshold)
-                if by == "cells":
+                if method == "cells":
                     left = pruning.shrink_to_cells(ball, g, whole, texture.arguments)
                 else:
                     left = pruning.shrink_to_boxes(ball, level, whole, texture.arguments)
-                least = outside(phi, left)
+                least = min_outside(phi, left)
                 if share == 1.0:
                     assert least >= threshold
                     dropped += least < np.inf
@@ -88,8 +88,8 @@ def test_narrowing_loses_no_closer_point(by: str) -> None:
     assert lost > 5
 
 
-def minimum(probe: FloatArray, start: FloatArray, texture: HeightMapArguments) -> Point:
-    """Return the local minimum of φ found by descent from a start."""
+def find_minimum(probe: FloatArray, start: FloatArray, texture: HeightMapArguments) -> Point:
+    """Return the local minimum of φ reached by descent from a start."""
     return plane_search.descend(*map(float, probe), *map(float, start), texture)
 
 
@@ -99,32 +99,32 @@ def linked_sampler(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(plane_search, "sample_hessian", heightmap.sample_hessian)
 
 
-def test_a_unique_minimum_is_the_closest_point() -> None:
-    """The negative control ignores crests and third derivatives."""
+def test_unique_minimum_is_the_closest_point() -> None:
+    """A certified unique minimum has no closer point; the control ignores third derivatives."""
     rng = np.random.default_rng(52)
     claims, wrong = [], 0
     for seed in range(4):
-        texture = rough(seed)
-        given = texture.arguments
-        blind = given._replace(boxes=given.boxes * np.array([1, 1, 1, 0, 1], np.float32))
+        texture = rough_map(seed)
+        record = texture.arguments
+        weakened = record._replace(boxes=record.boxes * np.array([1, 1, 1, 0, 1], np.float32))
         nx, ny = cells(texture)
-        for probe in probes(texture, rng, 40):
-            best = minimum(probe, probe[:2] + rng.normal(0.0, 2e-4, 2), given)
-            j = math.floor((best[0] - given.x0) * given.ix)
-            i = math.floor((best[1] - given.y0) * given.iy)
+        for probe in random_probes(texture, rng, 40):
+            best = find_minimum(probe, probe[:2] + rng.normal(0.0, 2e-4, 2), record)
+            j = math.floor((best[0] - record.x0) * record.ix)
+            i = math.floor((best[1] - record.y0) * record.iy)
             wide = rng.integers(1, 9, 4)
             part = (
                 max(j - wide[0], 0), min(j + wide[1], nx - 1),
                 max(i - wide[2], 0), min(i + wide[3], ny - 1),
             )  # fmt: skip
             west, east, south, north = part
-            phi = squares(texture, probe)[south : north + 1, west : east + 1]
+            phi = min_squared_distances(texture, probe)[south : north + 1, west : east + 1]
             inside = west <= j <= east and south <= i <= north
             closer = inside and phi.min() < best[2] * (1.0 - 1e-12)
-            claims.append(pruning.is_unique_minimum(*map(float, probe), best, part, given))
+            claims.append(pruning.is_unique_minimum(*map(float, probe), best, part, record))
             assert not (claims[-1] and closer)
             assert inside or not claims[-1]
-            wrong += closer and pruning.is_unique_minimum(*map(float, probe), best, part, blind)
+            wrong += closer and pruning.is_unique_minimum(*map(float, probe), best, part, weakened)
     assert 0.1 < np.mean(claims) < 0.9
     assert wrong > 3
 
@@ -135,20 +135,20 @@ CENTRE = (10.3, 9.6)  # in cells
 
 
 def record_of(c: FloatArray) -> HeightMapArguments:
-    """Return the sampler record of a map with these coefficients [m], pitch 1 m."""
+    """Return the sampler record of a map with given coefficients [m] and a pitch of 1 m."""
     nodes, levels = plane_pyramid(c, (1.0, 1.0))
     return HeightMapArguments(c, 1.0, 1.0, 0.0, 0.0, False, nodes, levels)
 
 
-def cubic(turned: bool, second: float, third: float) -> HeightMapArguments:
-    """Return h = second t²/2 + third t³/6 along x or y, t = 0 at the centre; exact as a spline."""
+def cubic_map(turned: bool, second: float, third: float) -> HeightMapArguments:
+    """Return h = second t²/2 + third t³/6 along x or y with t = 0 at the centre, as a spline."""
     t = np.arange(-1, 22) - CENTRE[turned]
     line = second * (t**2 / 2 - 1 / 6) + third * (t**3 - t) / 6
     return record_of(np.add.outer(line, 0 * t) if turned else np.add.outer(0 * t, line))
 
 
-def test_the_cell_above_a_probe_stays_in_the_window() -> None:
-    """Between four nodes, each half a cell² farther: their coefficients are a third less."""
+def test_cell_above_the_probe_stays_in_the_window() -> None:
+    """The probe is between four nodes, half a cell² farther away than the closest point."""
     left = pruning.shrink_to_cells(
         (10.5, 9.5, -3.0, 9.0 + 0.01), 3.0, (0, 19, 0, 19), record_of(np.zeros((23, 23)))
     )
@@ -160,7 +160,7 @@ def test_the_cell_above_a_probe_stays_in_the_window() -> None:
 def test_one_coefficient_keeps_sixteen_cells() -> None:
     c = np.zeros((23, 23))
     c[9, 12] = -0.1
-    threshold = 9.0 - 0.67  # a little less than the coefficient of a flat map above the probe
+    threshold = 9.0 - 0.67  # slightly less than the coefficient of a flat map above the probe
     left = pruning.shrink_to_cells((11.0, 8.0, -3.0, threshold), 3.0, (0, 19, 0, 19), record_of(c))
     assert left == (9, 12, 6, 9)
 
@@ -168,12 +168,12 @@ def test_one_coefficient_keeps_sixteen_cells() -> None:
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("back", [False, True])
-def test_the_increase_is_proved_about_as_far_as_it_lasts(
+def test_unique_minimum_is_certified_close_to_the_exact_range(
     turned: bool, sign: float, back: bool
 ) -> None:
-    """Below crests and above troughs: ψ = (1 - g b) t² - g c t³/3, 0 again at 3 (1 - g b)/g c."""
+    """ψ = (1 - g b) t² - g c t³/3 increases up to a limit; it is 0 again at 3 (1 - g b)/g c."""
     g, b, c = 5.0, 0.08, 0.06
-    given = cubic(turned, -sign * b, -sign * c * (-1.0 if back else 1.0))
+    record = cubic_map(turned, -sign * b, -sign * c * (-1.0 if back else 1.0))
     best = (*CENTRE, g * g, 0.0, 0.0, 0.0)
     exact = 3.0 * (1.0 - g * b) / (g * c)
     claimed = []
@@ -181,7 +181,7 @@ def test_the_increase_is_proved_about_as_far_as_it_lasts(
         j, i = 10, 9
         part = [j, j, i, i]
         part[(2 if turned else 0) + (0 if back else 1)] += -cells_ if back else cells_
-        claimed.append(pruning.is_unique_minimum(*CENTRE, -sign * g, best, tuple(part), given))
+        claimed.append(pruning.is_unique_minimum(*CENTRE, -sign * g, best, tuple(part), record))
     end = (CENTRE[turned] - (9 if turned else 10)) if back else 1 - CENTRE[turned] % 1
     reach = end + np.arange(1, 9)
     assert not any(claim for claim, r in zip(claimed, reach, strict=True) if r > exact)
@@ -189,19 +189,20 @@ def test_the_increase_is_proved_about_as_far_as_it_lasts(
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_saddle_is_no_minimum(sign: float) -> None:
+def test_saddle_is_not_a_unique_minimum(sign: float) -> None:
     for share, expected in ((0.95, True), (1.05, False)):
-        given = cubic(False, -sign * share / 5.0, 0.0)
+        record = cubic_map(False, -sign * share / 5.0, 0.0)
         best = (*CENTRE, 25.0, 0.0, 0.0, 0.0)
         assert (
-            pruning.is_unique_minimum(*CENTRE, -sign * 5.0, best, (9, 11, 8, 10), given) == expected
+            pruning.is_unique_minimum(*CENTRE, -sign * 5.0, best, (9, 11, 8, 10), record)
+            == expected
         )
 
 
-def test_a_point_with_a_gradient_is_no_minimum() -> None:
-    texture = rough(5, 10e-6)
+def test_point_with_a_gradient_is_not_a_unique_minimum() -> None:
+    texture = rough_map(5, 10e-6)
     probe = np.array([1.9e-3, -1.2e-3, -0.1e-3])
-    best = minimum(probe, probe[:2], texture.arguments)
+    best = find_minimum(probe, probe[:2], texture.arguments)
     j = math.floor((best[0] - 1e-3) / PITCH[0])
     i = math.floor((best[1] + 2e-3) / PITCH[1])
     part = (j - 3, j + 3, i - 3, i + 3)
@@ -213,7 +214,7 @@ def test_a_point_with_a_gradient_is_no_minimum() -> None:
     assert not pruning.is_unique_minimum(*probe, beside, part, texture.arguments)
 
 
-def test_the_least_increase_is_that_of_the_least_second_derivative() -> None:
+def test_min_increase_is_the_double_integral_of_the_second_derivative() -> None:
     rng = np.random.default_rng(53)
     for _ in range(30):
         start, rate, r = rng.uniform(0.1, 2.0), rng.uniform(0.1, 3.0), rng.uniform(0.1, 3.0)
@@ -225,13 +226,13 @@ def test_the_least_increase_is_that_of_the_least_second_derivative() -> None:
     assert pruning.min_increase(1.0, -3.0, 0.0, 2.0) == 2.0
 
 
-def test_a_shallow_probe_needs_no_search_and_one_below_a_crest_does() -> None:
-    """A crest across the map: deep below it both flanks are equally close."""
+def test_window_is_empty_for_a_shallow_probe_only() -> None:
+    """Deep below a crest across the map, both flanks are equally close."""
     x = PITCH[0] * (np.arange(38) - 18.5)
     texture = HeightMap(np.tile(-2.0 * np.abs(x), (25, 1)), PITCH)
     for depth, shallow in ((0.05e-3, True), (0.6e-3, False)):
         probe = np.array([18.5 * PITCH[0] + 1e-8, 12.3 * PITCH[1], -depth])
-        best = minimum(probe, probe[:2] + np.array([2e-4, 0.0]), texture.arguments)
+        best = find_minimum(probe, probe[:2] + np.array([2e-4, 0.0]), texture.arguments)
         left, budget = pruning.narrow_window(
             (*map(float, probe), 1.0 - 1e-13), best, (0, 36, 0, 23), 600.0, texture.arguments
         )

@@ -1,4 +1,4 @@
-"""Profiles: the spline of one dimension."""
+"""Profiles: one-dimensional splines."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from asperity.core.errors import ParameterError
 from asperity.textures import HeightMap, Profile
 
 Check = Callable[..., Any]
-both = pytest.mark.parametrize("texture", ["profile", "periodic profile"], indirect=True)
+both_kinds = pytest.mark.parametrize("texture", ["profile", "periodic profile"], indirect=True)
 
 
 def on_line(x: np.ndarray) -> np.ndarray:
     return np.column_stack([x, np.sin(1e4 * x)])  # y does not matter
 
 
-@both
-def test_the_height_is_the_spline_of_scipy(texture: Profile):
+@both_kinds
+def test_height_matches_scipy_splines(texture: Profile):
     nodes = np.concatenate([np.arange(9), np.random.default_rng(1).uniform(-12, 20, 100)])
     mode = "grid-wrap" if texture.periodic else "mirror"
     expected = map_coordinates(texture.heights, [nodes], order=3, mode=mode)
@@ -32,15 +32,15 @@ def test_the_height_is_the_spline_of_scipy(texture: Profile):
     np.testing.assert_allclose(heights[:9], texture.heights, rtol=0, atol=1e-13 * largest)
 
 
-@both
+@both_kinds
 def test_slopes_and_hessian_are_derivatives(texture: Profile, check_derivatives: Check):
     rng = np.random.default_rng(2)
     nodes = rng.integers(-12, 20, 60) + rng.uniform(0.1, 0.9, 60)
     check_derivatives(texture, on_line(texture.origin + nodes * texture.pitch), step=3e-6)
 
 
-@both
-def test_everything_to_the_second_derivative_is_continuous_across_nodes(texture: Profile):
+@both_kinds
+def test_second_derivatives_are_continuous_across_nodes(texture: Profile):
     nodes = np.arange(40) - 15.0
     size = np.abs(texture.heights).max()
     scale = np.array([1, 3e-4, 1, 9e-8, 1, 1]) / size
@@ -49,9 +49,9 @@ def test_everything_to_the_second_derivative_is_continuous_across_nodes(texture:
     assert np.abs((after - before) * scale).max() < 1e-6
 
 
-@both
-def test_a_profile_is_a_map_without_an_extent(texture: Profile):
-    """A map of equal rows has the same derivatives: two independent samplers."""
+@both_kinds
+def test_profile_equals_a_map_of_equal_rows(texture: Profile):
+    """Two independent samplers give the same derivatives."""
     rows = HeightMap(
         np.tile(texture.heights, (5, 1)),
         texture.pitch,
@@ -65,7 +65,7 @@ def test_a_profile_is_a_map_without_an_extent(texture: Profile):
     assert np.abs((rows.derivatives(xy) - expected) / scale).max() < 1e-11
 
 
-def test_a_finite_profile_is_mirrored_and_level_at_its_ends(make_texture: Check):
+def test_finite_profile_is_mirrored_with_zero_slope_at_its_ends(make_texture: Check):
     texture = make_texture("profile")
     length = texture.domain.spans[0, 0]
     assert length == pytest.approx(8 * 3e-4)
@@ -78,7 +78,7 @@ def test_a_finite_profile_is_mirrored_and_level_at_its_ends(make_texture: Check)
     assert np.abs(texture.gradient(ends)).max() < 1e-13
 
 
-def test_a_periodic_profile_repeats(make_texture: Check):
+def test_periodic_profile_repeats(make_texture: Check):
     texture = make_texture("periodic profile")
     span = texture.domain.spans[0]
     assert span[0] == pytest.approx(9 * 3e-4)
@@ -88,8 +88,8 @@ def test_a_periodic_profile_repeats(make_texture: Check):
         np.testing.assert_allclose(ahead, texture.height(xy), rtol=0, atol=1e-15)
 
 
-@both
-def test_the_scan_line_is_the_profile(texture: Profile):
+@both_kinds
+def test_scan_line_is_the_profile(texture: Profile):
     line = texture.scan_line()
     np.testing.assert_array_equal(line.start, [texture.origin, 0.0])
     np.testing.assert_array_equal(line.direction, [1.0, 0.0])
@@ -98,16 +98,16 @@ def test_the_scan_line_is_the_profile(texture: Profile):
     assert texture.is_profile
 
 
-@both
+@both_kinds
 @pytest.mark.parametrize("seed", range(3))
 def test_extremes_are_certified_and_attained(texture: Profile, seed: int, sampled_extremes: Check):
     heights = np.random.default_rng(seed).normal(size=4 + 5 * seed) * 1e-4
     random = Profile(heights, 3e-4, periodic=texture.periodic, origin=0.1e-3)
     low, high = random.extremes
-    found_low, found_high = sampled_extremes(random, 4000)
+    sampled_low, sampled_high = sampled_extremes(random, 4000)
     rounding = 1e-12 * (high - low)
-    assert low - rounding <= found_low <= low + rounding
-    assert high - rounding <= found_high <= high + rounding
+    assert low - rounding <= sampled_low <= low + rounding
+    assert high - rounding <= sampled_high <= high + rounding
 
 
 @pytest.mark.parametrize(
@@ -130,8 +130,8 @@ def test_extremes_where_a_coefficient_of_the_slope_vanishes(heights: list[float]
     assert (sampled.min() - low, high - sampled.max()) == pytest.approx((0.0, 0.0), abs=1e-11)
 
 
-@both
-def test_bounds_are_never_exceeded_and_within_a_factor(texture: Profile, sampled_bounds: Check):
+@both_kinds
+def test_bounds_are_never_exceeded_and_tight(texture: Profile, sampled_bounds: Check):
     slope, second = sampled_bounds(texture, 9000)
     assert texture.bounds[0] / 2.0 < slope <= texture.bounds[0]
     assert texture.bounds[1] / 1.01 < second <= texture.bounds[1]  # attained at a node
@@ -151,7 +151,7 @@ def test_bounds_are_never_exceeded_and_within_a_factor(texture: Profile, sampled
         ("origin", {"origin": (0.0, 0.0)}),
     ],
 )
-def test_arguments_that_cannot_be_used(argument: str, arguments: dict[str, Any]):
+def test_invalid_arguments_are_refused(argument: str, arguments: dict[str, Any]):
     with pytest.raises(ParameterError, match=f"^{argument} ") as caught:
         Profile(**({"heights": [0.0, 1.0, 0.0, 1.0], "pitch": 1e-3} | arguments))
     assert caught.value.argument == argument
