@@ -57,6 +57,11 @@ class SingleWave(Protocol):
     direction: tuple[float, float]
 
 
+def point_at_phase(wave: SingleWave, phase: float) -> FloatArray:
+    """Return the point (2,) [m] on the line through the origin at which a wave has a phase."""
+    return (phase - wave.phase) * wave.period / (2.0 * math.pi) * np.array(wave.direction)
+
+
 _LARGEST_DENOMINATOR = 64
 _LARGEST_MULTIPLE = 8
 # Relations between more independent waves than this are not searched.

@@ -21,6 +21,7 @@ from asperity.core.errors import ParameterError
 from asperity.enclosures.cells import Cells
 from asperity.kernels.fuse import fuse_contact, uses_position
 from asperity.surface import Surface
+from asperity.textures.plane_waves import point_at_phase
 from asperity.textures.texture import Texture
 
 _ZOOM_CANDIDATES = 12
@@ -212,6 +213,8 @@ class HeightProblem(Problem):
 @lru_cache(maxsize=16)
 def highest_point(texture: Texture) -> FloatArray:
     """Return a point of the plane (2,) [m] at a local maximum of the height."""
+    if texture.single_wave is not None:
+        return point_at_phase(texture.single_wave, 0.5 * math.pi)
     cells = texture.sampling_cells()
     found = sample_supremum(HeightProblem(cells))
     assert found.at is not None

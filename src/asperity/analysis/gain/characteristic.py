@@ -6,12 +6,9 @@ section 4). Both are taken over the working region: depths up to the surface's m
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import astuple
 from typing import Any, TypeVar
-
-import numpy as np
 
 from asperity.analysis.bounds.bound import (
     CURL,
@@ -33,6 +30,7 @@ from asperity.core.errors import ParameterError
 from asperity.kernels.fuse import kernel_source
 from asperity.laws import LAWS, Law
 from asperity.surface import Surface
+from asperity.textures.plane_waves import point_at_phase
 
 
 def characteristic_number(
@@ -198,7 +196,7 @@ def _bound_without_search(
     if form is None or wave is None or options.extent is not None:
         return None
     value, phase = form.value(wave, surface.max_depth), form.phase(wave, surface.max_depth)
-    xy = (phase - wave.phase) * wave.period / (2.0 * math.pi) * np.array(wave.direction)
+    xy = point_at_phase(wave, phase)
     # At full depth; on the nearest contact wherever the closest point is unique.
     depth = surface.max_depth if surface.law.contact.single_valued else 0.0
     note = "formula on a sinusoid"

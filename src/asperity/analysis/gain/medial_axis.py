@@ -36,7 +36,7 @@ from asperity.analysis.gain import closed_forms
 from asperity.core.checks import FloatArray
 from asperity.enclosures.cells import Cells
 from asperity.surface import Surface
-from asperity.textures.plane_waves import SingleWave
+from asperity.textures.plane_waves import SingleWave, point_at_phase
 from asperity.textures.texture import Texture
 
 _CURVATURE_TOLERANCE = 1e-4
@@ -101,9 +101,8 @@ def sharpest_crest(
 
 
 def _crest_of_wave(texture: Texture, wave: SingleWave) -> Crest:
-    along = wave.period * (0.25 - wave.phase / (2.0 * math.pi))
     curvature = (2.0 * math.pi / wave.period) ** 2 * wave.amplitude
-    crest = _make_crest(texture, along * np.array(wave.direction), curvature)
+    crest = _make_crest(texture, point_at_phase(wave, 0.5 * math.pi), curvature)
     assert crest is not None
     return crest
 
