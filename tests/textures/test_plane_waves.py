@@ -98,7 +98,7 @@ def time_limit() -> Iterator[None]:
     signal.signal(signal.SIGALRM, before)
 
 
-@pytest.mark.usefixtures("patience")
+@pytest.mark.usefixtures("time_limit")
 def test_many_unrelated_waves_have_free_phases():
     """Noise may have dozens of waves, so the search must not be exponential in their number."""
     waves = np.random.default_rng(7).normal(size=(12, 2)) * 1000.0
@@ -107,7 +107,7 @@ def test_many_unrelated_waves_have_free_phases():
     np.testing.assert_array_equal(multiples @ basis, waves)
 
 
-@pytest.mark.usefixtures("patience")
+@pytest.mark.usefixtures("time_limit")
 def test_rotated_hexagonal_lattices_are_periodic():
     """The reduction must end although the shortest vectors are equally long up to rounding."""
     rng = np.random.default_rng(0)
