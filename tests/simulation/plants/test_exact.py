@@ -1,4 +1,4 @@
-"""One sample of a linear body against an independent integration, and its energies."""
+"""One sample of a linear body against an independent integration, and its energy balance."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ BODIES = [
 ]
 
 
-def integrated(body: LinearBody, z: FloatArray, span: float) -> FloatArray:
+def integrate_numerically(body: LinearBody, z: FloatArray, span: float) -> FloatArray:
     """Return state and loss by an adaptive Runge-Kutta method."""
 
     def rate(_t: float, y: FloatArray) -> FloatArray:
@@ -37,16 +37,16 @@ def integrated(body: LinearBody, z: FloatArray, span: float) -> FloatArray:
 
 @pytest.mark.parametrize("body", BODIES)
 @pytest.mark.parametrize("period", [1e-4, 2e-3])
-def test_one_sample_is_exact(body: LinearBody, period: float) -> None:
+def test_sample_agrees_with_runge_kutta(body: LinearBody, period: float) -> None:
     change, loss = integrate(body.dynamics, body.loss, period)
     z = np.random.default_rng(1).normal(size=18)
-    expected = integrated(body, z, period)
+    expected = integrate_numerically(body, z, period)
     np.testing.assert_allclose(z + change @ z, expected[:18], rtol=1e-9, atol=1e-10)
     assert z @ loss @ z == pytest.approx(expected[18], rel=1e-8, abs=1e-12)
 
 
 @pytest.mark.parametrize("body", BODIES)
-def test_energy_closes(body: LinearBody) -> None:
+def test_energy_balance_closes(body: LinearBody) -> None:
     """In the frame of the anchor, where only the force and the hand's constant force do work."""
     change, loss = integrate(body.dynamics, body.loss, 1e-3)
     z = np.random.default_rng(2).normal(size=18)
@@ -68,22 +68,21 @@ def test_energy_closes(body: LinearBody) -> None:
 
 
 @pytest.mark.parametrize("body", BODIES)
-def test_a_stack_is_integrated_matrix_by_matrix(body: LinearBody) -> None:
-    both = integrate(np.stack([body.dynamics] * 2), np.stack([body.loss] * 2), 1e-3)
-    for found, expected in zip(both, integrate(body.dynamics, body.loss, 1e-3), strict=True):
-        np.testing.assert_allclose(found, np.stack([expected] * 2), rtol=1e-12, atol=1e-18)
+def test_stacked_matrices_are_integrated_one_by_one(body: LinearBody) -> None:
+    results = integrate(np.stack([body.dynamics] * 2), np.stack([body.loss] * 2), 1e-3)
+    for result, expected in zip(results, integrate(body.dynamics, body.loss, 1e-3), strict=True):
+        np.testing.assert_allclose(result, np.stack([expected] * 2), rtol=1e-12, atol=1e-18)
 
 
-def test_the_mode_rings_at_its_frequency() -> None:
-    """Undamped, the two masses swing against each other at the frequency given."""
-    moved = linear_body([0.04] * 3, np.zeros((3, 3)), SpringHand(), Resonance(400.0, 0.0, 0.3))
-    frequencies = np.abs(np.linalg.eigvals(moved.dynamics).imag) / (2 * np.pi)
+def test_undamped_mode_has_the_specified_frequency() -> None:
+    body = linear_body([0.04] * 3, np.zeros((3, 3)), SpringHand(), Resonance(400.0, 0.0, 0.3))
+    frequencies = np.abs(np.linalg.eigvals(body.dynamics).imag) / (2 * np.pi)
     assert frequencies.max() == pytest.approx(400.0, rel=1e-9)
 
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 40.0])
-def test_exponential(size: float) -> None:
-    """Against SciPy's Padé approximation, another algorithm."""
+def test_matrix_exponential_agrees_with_scipy(size: float) -> None:
+    """SciPy uses a Padé approximation, a different algorithm."""
     from scipy.linalg import expm
 
     matrix = size * np.random.default_rng(3).normal(size=(2, 7, 7))

@@ -1,4 +1,4 @@
-"""Hands: a handle that is moved, and an elastic band on a mass in space."""
+"""Hands: prescribed motion of the handle, and an elastic band on a mass in space."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ JOB: dict[str, Any] = {
 }  # fmt: skip
 
 
-def run_of(**changed: Any) -> Run:
-    return simulate(**{**JOB, **changed})
+def run_of(**changes: Any) -> Run:
+    return simulate(**{**JOB, **changes})
 
 
-def test_a_moved_handle_meets_the_field_alone() -> None:
-    """The work of a straight stroke through law A's field, by hand: k ∫ (h - z)⁺ e_z · dp."""
-    way = Waypoints([0.0, 0.2], [[0.0, 0.0, 0.0], [0.3e-3, 0.0, -2e-3]])
+def test_prescribed_handle_does_the_work_of_the_field() -> None:
+    """On a straight stroke through law A's field the work is k ∫ (h - z)⁺ e_z · dp."""
+    motion = Waypoints([0.0, 0.2], [[0.0, 0.0, 0.0], [0.3e-3, 0.0, -2e-3]])
     surface = Surface(WAVE, "A", 800.0)
     run = run_of(
-        surface=surface, hand=PrescribedHand(), motion=way, servo=Servo(1e-5), duration=0.2
+        surface=surface, hand=PrescribedHand(), motion=motion, servo=Servo(1e-5), duration=0.2
     )
     t = np.linspace(0.0, 1.0, 200_001)
     depth = np.maximum(0.3e-3 * np.sin(np.pi * 1e3 * 0.3e-3 * t + 0.3) + 2e-3 * t, 0.0)
@@ -49,23 +49,23 @@ def test_a_moved_handle_meets_the_field_alone() -> None:
     assert run.ledger.supplied[0] == 0.0
     assert run.ledger.hand == pytest.approx(-run.ledger.total, rel=1e-12)
     assert (run.ledger.dissipated, run.ledger.friction) == (0.0, 0.0)
-    np.testing.assert_allclose(run.position, way.at(run.time), atol=1e-15)
+    np.testing.assert_allclose(run.position, motion.at(run.time), atol=1e-15)
 
 
 @pytest.mark.parametrize("letter", ["B", "F"])
-def test_the_law_and_its_state_are_those_of_the_surface(letter: str) -> None:
-    """Along a way that leaves the surface and comes back, forces are those of Surface.trace."""
+def test_forces_along_a_path_agree_with_surface_trace(letter: str) -> None:
+    """The path leaves the surface and returns, so that the law's state is reset."""
     surface = Surface(WAVE, letter, 700.0, friction=0.7, max_deflection=0.4e-3)
     points = [[0.0, 0.0, -1e-3], [3e-3, 1e-3, -1e-3], [3e-3, 1e-3, 1e-3], [4e-3, 2e-3, -1e-3]]
-    way = Waypoints([0.0, 0.1, 0.15, 0.2], points)
-    run = run_of(surface=surface, hand=PrescribedHand(), motion=way, duration=0.2)
+    motion = Waypoints([0.0, 0.1, 0.15, 0.2], points)
+    run = run_of(surface=surface, hand=PrescribedHand(), motion=motion, duration=0.2)
     expected = surface.trace(run.position)
     assert 10 < np.count_nonzero(expected[:, 2] == 0.0) < 150
     np.testing.assert_allclose(run.commanded, expected, rtol=1e-12, atol=1e-15)
 
 
-def test_a_band_pulls_with_its_tension_and_returns_its_energy() -> None:
-    """Statics by hand: at rest in the wall, k depth = pull of the band at that length."""
+def test_band_is_in_static_equilibrium_with_the_wall() -> None:
+    """At rest k depth equals the band's pull at that length; the ledger holds its energy."""
     band = BandHand(stiffness=200.0, tension=3.0, length=0.08, damping=3.0)
     rest = Stationary((0.0, 0.0, 0.0))
     run = run_of(hand=band, motion=rest, plant=Cartesian(0.02), duration=3.0, servo=Servo(1e-4))
@@ -78,14 +78,14 @@ def test_a_band_pulls_with_its_tension_and_returns_its_energy() -> None:
     assert ledger.stored_after == pytest.approx(0.5 * 200.0 * (stretch - depth) ** 2, rel=1e-6)
 
 
-def test_a_band_is_not_linearised() -> None:
-    """Aside by as much as it is long, its direction turns: the force by the triangle's sides."""
+def test_band_force_is_nonlinear_in_direction() -> None:
+    """Displaced sideways by a similar length, the force follows the sides of the triangle."""
     run = run_of(
         hand=BandHand(damping=0.0), motion=Stationary((0.0, 0.0, 0.0)), plant=Cartesian(1.0),
         start=(0.06, 0.0, 0.0), duration=1e-3, surface=Surface(WAVE, "W", 1e-6),
         servo=Servo(1e-3),
     )  # fmt: skip
-    pull = 200.0 * (0.1 - 0.065)  # 0.06, 0.08 and 0.1 m
+    pull = 200.0 * (0.1 - 0.065)  # sides of 0.06, 0.08 and 0.1 m
     np.testing.assert_allclose(
         run.state[3:6], 1e-3 * pull * np.array([-0.6, 0.0, -0.8]), rtol=1e-4, atol=1e-12
     )
@@ -94,7 +94,9 @@ def test_a_band_is_not_linearised() -> None:
 @pytest.mark.parametrize("period", [1e-4, 1e-3])
 @pytest.mark.parametrize("band", [BandHand(), BandHand(400.0, 0.2)], ids=["taut", "slack"])
 @pytest.mark.parametrize("friction", [0.0, 0.02])
-def test_a_mass_on_a_band_closes(period: float, band: BandHand, friction: float) -> None:
+def test_energy_ledger_of_a_mass_on_a_band_closes(
+    period: float, band: BandHand, friction: float
+) -> None:
     coupled = [[0.5, 0.1, 0.0], [0.1, 0.4, 0.0], [0.0, 0.0, 0.3]]
     run = run_of(
         hand=band, plant=Cartesian((0.05, 0.04, 0.06), coupled, friction=friction),

@@ -1,4 +1,4 @@
-"""The pantograph: inertia against SymPy's own derivation, energies, brakes, workspace."""
+"""The pantograph: inertia against a SymPy derivation, energies, brakes, workspace."""
 
 from __future__ import annotations
 
@@ -45,40 +45,43 @@ WAVE = Sinusoid(amplitude=0.3e-3, period=2e-3, phase=0.3)
 HEAVY = Pantograph(masses=LinkMasses(0.011, 0.007, 0.009, rotor=2e-6), centre=(0.02, 0.09))
 PLACES = [(0.0, 0.0), (0.013, -0.021), (-0.034, 0.012), (0.009, 0.017)]
 SPRING = SpringHand(300.0, 3.0, mass=0.03, force=(0.1, 0.0, -0.5))
-LINEAR_WAY = Strokes((0.0, 0.0, -1e-3), (8e-3, 0.0, -1e-3), speed=0.08, count=9)
+STROKES = Strokes((0.0, 0.0, -1e-3), (8e-3, 0.0, -1e-3), speed=0.08, count=9)
 
 
 @cache
 def lagrangian() -> tuple[Any, Any]:
-    """Kinetic energy of rods and handle by SymPy, and the forces of Lagrange's equations.
+    """Return the kinetic energy by SymPy, and the generalized forces of Lagrange's equations.
 
-    Coordinates are the handle's; the angles follow from triangles. Nothing of the code is used but
-    the lengths and masses. Returns functions of (x, z, x', z', x'', z'').
+    The coordinates are the handle's; only lengths and masses come from the package. Both results
+    are functions of (x, z, x', z', x'', z'').
     """
     import sympy as sp
 
     x, z, dx, dz, ax, az = names = sp.symbols("x z dx dz ax az")
-    bars, masses = HEAVY.linkage, HEAVY.masses
-    place, speed, gain = sp.Matrix([x, z]), sp.Matrix([dx, dz]), sp.Matrix([ax, az])
+    links, masses = HEAVY.linkage, HEAVY.masses
+    place, speed, acceleration = sp.Matrix([x, z]), sp.Matrix([dx, dz]), sp.Matrix([ax, az])
     energy = masses.handle * speed.dot(speed) / 2
-    for motor, side in ((0.0, -1), (-bars.base, 1)):
+    for motor, side in ((0.0, -1), (-links.base, 1)):
         reach = sp.sqrt((x - motor) ** 2 + z**2)
-        squares = bars.proximal**2 + reach**2 - bars.distal**2
-        opening = sp.acos(squares / (2 * bars.proximal * reach))
+        squares = links.proximal**2 + reach**2 - links.distal**2
+        opening = sp.acos(squares / (2 * links.proximal * reach))
         angle = sp.atan2(z, x - motor) + side * opening
-        elbow = sp.Matrix([motor + bars.proximal * sp.cos(angle), bars.proximal * sp.sin(angle)])
-        turn = (sp.Matrix([angle]).jacobian(place) * speed)[0]
-        knee = elbow.jacobian(place) * speed
-        energy += masses.rotor * turn**2 / 2
-        for mass, first, last in (
-            (masses.proximal, sp.zeros(2, 1), knee),
-            (masses.distal, knee, speed),
+        elbow = sp.Matrix([motor + links.proximal * sp.cos(angle), links.proximal * sp.sin(angle)])
+        angular_speed = (sp.Matrix([angle]).jacobian(place) * speed)[0]
+        elbow_velocity = elbow.jacobian(place) * speed
+        energy += masses.rotor * angular_speed**2 / 2
+        for mass, start_velocity, end_velocity in (
+            (masses.proximal, sp.zeros(2, 1), elbow_velocity),
+            (masses.distal, elbow_velocity, speed),
         ):
-            # Simpson's rule is exact for the square of a velocity that is linear along the rod.
-            ends, middle = first.dot(first) + last.dot(last), (first + last) / 2
+            # Simpson's rule is exact: the velocity is linear along the rod.
+            ends, middle = (
+                start_velocity.dot(start_velocity) + end_velocity.dot(end_velocity),
+                (start_velocity + end_velocity) / 2,
+            )
             energy += mass / 2 * (ends + 4 * middle.dot(middle)) / 6
     momentum = sp.Matrix([energy]).jacobian(speed).T
-    force = momentum.jacobian(speed) * gain + momentum.jacobian(place) * speed
+    force = momentum.jacobian(speed) * acceleration + momentum.jacobian(place) * speed
     force -= sp.Matrix([energy]).jacobian(place).T
     return (
         sp.lambdify(names, energy, "math", cse=True),
@@ -87,7 +90,7 @@ def lagrangian() -> tuple[Any, Any]:
 
 
 def inertia(x: float, z: float, dx: float, dz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Mass matrix, c and JᵀJ of the code under test."""
+    """Return the package's mass matrix, c and JᵀJ."""
     mxx, mxz, mzz, cx, cz, bxx, bxz, bzz = linkage_dynamics(x, z, dx, dz, linkage_record(HEAVY))
     return (
         np.array([[mxx, mxz], [mxz, mzz]]),
@@ -97,22 +100,24 @@ def inertia(x: float, z: float, dx: float, dz: float) -> tuple[FloatArray, Float
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_inertia_and_own_forces_are_lagranges(place: tuple[float, float]) -> None:
+def test_inertia_and_velocity_forces_agree_with_lagrange(place: tuple[float, float]) -> None:
     energy, forces = lagrangian()
     rng = np.random.default_rng(4)
     for _ in range(5):
         v, a = rng.normal(size=2), 30.0 * rng.normal(size=2)
-        mass, own, _ = inertia(*place, *v)
+        mass, velocity_forces, _ = inertia(*place, *v)
         absolute = (HEAVY.centre[0] + place[0], HEAVY.centre[1] + place[1])
         assert 0.5 * v @ mass @ v == pytest.approx(energy(*absolute, *v, *a), rel=1e-11)
         expected = np.array(forces(*absolute, *v, *a))
-        np.testing.assert_allclose(mass @ a + own, expected, atol=1e-11 * np.abs(expected).max())
-        # Negative control: the masses' own forces are not small.
-        assert np.abs(own).max() > 1e-4 * np.abs(expected).max()
+        np.testing.assert_allclose(
+            mass @ a + velocity_forces, expected, atol=1e-11 * np.abs(expected).max()
+        )
+        # Negative control: the velocity-dependent forces are not small.
+        assert np.abs(velocity_forces).max() > 1e-4 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_rates_are_the_derivative_of_the_angles(place: tuple[float, float]) -> None:
+def test_joint_rates_are_derivatives_of_the_joint_angles(place: tuple[float, float]) -> None:
     p = np.add(HEAVY.centre, place)
     step = 1e-6 * np.eye(2)
     finite = [
@@ -124,16 +129,16 @@ def test_rates_are_the_derivative_of_the_angles(place: tuple[float, float]) -> N
     np.testing.assert_allclose(inertia(*place, 0.0, 0.0)[2], rates.T @ rates, rtol=1e-12)
 
 
-def test_the_guess_is_about_twenty_grams_and_is_labelled() -> None:
+def test_default_inertia_is_about_20_grams_and_labelled_a_guess() -> None:
     plant = Pantograph()
-    numbers = linkage_dynamics(0.0, 0.0, 0.0, 0.0, linkage_record(plant))
-    assert numbers[0] == pytest.approx(0.020, abs=1.5e-3)
-    assert numbers[2] == pytest.approx(0.020, abs=1.5e-3)
+    dynamics = linkage_dynamics(0.0, 0.0, 0.0, 0.0, linkage_record(plant))
+    assert dynamics[0] == pytest.approx(0.020, abs=1.5e-3)
+    assert dynamics[2] == pytest.approx(0.020, abs=1.5e-3)
     assert "guess" in plant.notes[0]
     assert not any("guess" in note for note in HEAVY.notes)
     damping = handle_damping(plant.linkage, plant.joint_damping, plant.centre)
     np.testing.assert_allclose(
-        plant.joint_damping * np.array([numbers[5], numbers[7]]), np.diag(damping), rtol=1e-12
+        plant.joint_damping * np.array([dynamics[5], dynamics[7]]), np.diag(damping), rtol=1e-12
     )
 
 
@@ -143,7 +148,7 @@ def run_of(
     surface = Surface(WAVE, letter, 600.0, max_depth=0.3e-3)
     servo = Servo(period, delay=1, position_resolution=15e-6)
     return simulate(
-        surface, plant, hand, servo, LINEAR_WAY, duration, start=(0.0, 0.0, 2e-3),
+        surface, plant, hand, servo, STROKES, duration, start=(0.0, 0.0, 2e-3),
         velocity=(0.1, 0.0, -0.1),
     )  # fmt: skip
 
@@ -154,7 +159,7 @@ SLACK = BandHand(stiffness=400.0, tension=0.2)
 @pytest.mark.parametrize("hand", [SPRING, BandHand(), SLACK], ids=["spring", "band", "slack"])
 @pytest.mark.parametrize("friction", [0.0, 0.02])
 @pytest.mark.parametrize("period", [1e-4, 3e-4])
-def test_energy_closes(hand: Hand, friction: float, period: float) -> None:
+def test_energy_ledger_closes(hand: Hand, friction: float, period: float) -> None:
     plant = Pantograph(friction=friction, joint_damping=3e-3, centre=(0.01, 0.1))
     run = run_of(plant, hand, period)
     ledger, energies = run.ledger, run.energies
@@ -162,8 +167,8 @@ def test_energy_closes(hand: Hand, friction: float, period: float) -> None:
     assert abs(ledger.closure) < 1e-9 * ledger.exchanged
     assert ledger.exchanged > 1e-4
     assert (ledger.friction < 0.0) == (friction > 0.0)
-    flow = energies["supplied"].sum(axis=1) + energies["hand"] + energies["friction"]
-    gap = energies["stored"] - energies["stored"][0] - flow + energies["lost"]
+    inflow = energies["supplied"].sum(axis=1) + energies["hand"] + energies["friction"]
+    gap = energies["stored"] - energies["stored"][0] - inflow + energies["lost"]
     assert np.abs(gap).max() < 1e-9 * ledger.exchanged
     steps = np.diff(run.position, axis=0)
     np.testing.assert_allclose(
@@ -171,8 +176,8 @@ def test_energy_closes(hand: Hand, friction: float, period: float) -> None:
     )
 
 
-def test_long_steps_do_not_close(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Negative control: one step where many are needed; and the order of closing is five."""
+def test_energy_error_grows_with_the_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Negative control: the ledger does not close with long steps; the order is at least 4."""
     gaps = []
     for share in (4.0, 1.0, 0.25):
         monkeypatch.setattr("asperity.simulation.pantograph._MAX_STEP_FRACTION", share)
@@ -182,12 +187,14 @@ def test_long_steps_do_not_close(monkeypatch: pytest.MonkeyPatch) -> None:
     assert gaps[1] / gaps[2] > 2.0**8
 
 
-def test_a_slack_band_needs_the_kink(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Negative control: without small steps where the band turns slack, energy does not close."""
+def test_slack_band_needs_small_steps_at_the_kink(
+    tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Negative control: without them, where the band turns slack, the ledger does not close."""
     plant = Pantograph(joint_damping=0.0)
     run = run_of(plant, SLACK)
-    ends = run.anchor - [0.0, 0.0, SLACK.length]
-    taut = np.linalg.norm(ends - run.position, axis=1) > SLACK.rest_length
+    band_vectors = run.anchor - [0.0, 0.0, SLACK.length]
+    taut = np.linalg.norm(band_vectors - run.position, axis=1) > SLACK.rest_length
     assert np.count_nonzero(np.diff(taut)) > 3
     assert abs(run.ledger.closure) < 1e-9 * run.ledger.exchanged
 
@@ -196,51 +203,55 @@ def test_a_slack_band_needs_the_kink(tmp_path: FilePath, monkeypatch: pytest.Mon
     source = f"from asperity.core.compiled import Kernels\n{declared}\n{source}"
     (tmp_path / "blind_band.py").write_text(source)
     monkeypatch.syspath_prepend(tmp_path)
-    blind, build = importlib.import_module("blind_band"), Pantograph.sample
+    module, sample = importlib.import_module("blind_band"), Pantograph.sample
 
-    def built(*arguments: Any) -> plants.SampledPlant:
-        own = build(*arguments)
-        return plants.SampledPlant((own.modules[0], blind, *own.modules[1:]), own.record, own.order)
+    def sample_without_kink(*arguments: Any) -> plants.SampledPlant:
+        plant_record = sample(*arguments)
+        return plants.SampledPlant(
+            (plant_record.modules[0], module, *plant_record.modules[1:]),
+            plant_record.record,
+            plant_record.order,
+        )
 
-    monkeypatch.setattr(Pantograph, "sample", built)
+    monkeypatch.setattr(Pantograph, "sample", sample_without_kink)
     ledger = run_of(plant, SLACK).ledger
     assert abs(ledger.closure) > 1e-9 * ledger.exchanged
 
 
-def test_free_motion_follows_lagrange() -> None:
-    """Undamped and alone the handle moves as an independent integration of SymPy's equations."""
+def test_free_motion_agrees_with_lagrange_equations() -> None:
+    """Undamped and free, it follows an independent integration of SymPy's equations."""
     from scipy.integrate import solve_ivp
 
     _, forces = lagrangian()
     free = Pantograph(HEAVY.linkage, HEAVY.masses, 0.0, HEAVY.centre)
-    begin, speed = (0.005, 0.0, 0.004), (0.4, 0.0, 0.3)
+    initial_position, speed = (0.005, 0.0, 0.004), (0.4, 0.0, 0.3)
     surface = Surface(WAVE, "W", 1.0)
     run = simulate(
-        surface, free, SpringHand(), Servo(1e-3), Stationary(begin), 0.05, velocity=speed
+        surface, free, SpringHand(), Servo(1e-3), Stationary(initial_position), 0.05, velocity=speed
     )
     assert run.applied.max() == 0.0
 
     def rate(_t: float, y: FloatArray) -> list[float]:
         place = (y[0] + free.centre[0], y[1] + free.centre[1])
-        rest = np.array(forces(*place, *y[2:], 0.0, 0.0))
-        columns = [np.array(forces(*place, *y[2:], *unit)) - rest for unit in np.eye(2)]
-        return [*y[2:], *np.linalg.solve(np.array(columns).T, -rest)]
+        bias = np.array(forces(*place, *y[2:], 0.0, 0.0))
+        columns = [np.array(forces(*place, *y[2:], *unit)) - bias for unit in np.eye(2)]
+        return [*y[2:], *np.linalg.solve(np.array(columns).T, -bias)]
 
-    start = [begin[0], begin[2], speed[0], speed[2]]
+    start = [initial_position[0], initial_position[2], speed[0], speed[2]]
     end = solve_ivp(rate, (0.0, 0.05), start, "DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
     np.testing.assert_allclose(run.state[[0, 2, 3, 5]], end, rtol=1e-8)
-    # Negative control: it does not move straight on.
+    # Negative control: the velocity is not constant.
     assert abs(run.state[3] - speed[0]) > 1e-3
 
 
-def test_brakes_act_inside_only() -> None:
-    """Above the wall nothing is lost, in it something is; without the switch it is everywhere."""
-    surface, way = Surface(WAVE, "W", 600.0), Stationary((0.0, 0.0, 0.0))
+def test_inside_only_brakes_act_in_contact_only() -> None:
+    """With the option energy is lost inside the wall only; without it, everywhere."""
+    surface, motion = Surface(WAVE, "W", 600.0), Stationary((0.0, 0.0, 0.0))
     losses = {}
     for inside_only in (True, False):
         plant = Pantograph(inside_only=inside_only)
         run = simulate(
-            surface, plant, SpringHand(), Servo(1e-4), way, 0.05, start=(0.0, 0.0, 0.5e-3),
+            surface, plant, SpringHand(), Servo(1e-4), motion, 0.05, start=(0.0, 0.0, 0.5e-3),
             velocity=(0.0, 0.0, -0.1),
         )  # fmt: skip
         lost = run.energies["lost"]
@@ -253,38 +264,38 @@ def test_brakes_act_inside_only() -> None:
     assert losses[False][0] > 0.0
 
 
-def test_brakes_of_a_textured_law_begin_at_the_texture() -> None:
-    """Law C's body begins at h, not at z = 0: above z = 0 and below h the brakes are on."""
+def test_brakes_of_a_textured_law_act_below_the_texture() -> None:
+    """Contact of law C starts at h: between z = 0 and a crest the brakes are on."""
     crest = float(WAVE.height([[0.42e-3, 0.0]])[0])
     assert crest > 0.2e-3
-    lost = {}
+    losses = {}
     for letter in "WC":
         run = simulate(
             Surface(WAVE, letter, 600.0), Pantograph(), SpringHand(), Servo(1e-4),
             Stationary((0.42e-3, 0.0, 0.5 * crest)), 1e-3, velocity=(0.0, 0.0, -0.01),
         )  # fmt: skip
         assert run.position[:, 2].min() > 0.0
-        lost[letter] = run.ledger.dissipated
-    assert lost["W"] == 0.0
-    assert lost["C"] > 0.0
+        losses[letter] = run.ledger.dissipated
+    assert losses["W"] == 0.0
+    assert losses["C"] > 0.0
 
 
-def test_friction_of_no_limit_is_what_stops_the_handle() -> None:
-    """With it v + a t = 0 by the equations, damping, hand and speeds in both directions counted."""
+def test_unlimited_friction_stops_the_handle_in_one_step() -> None:
+    """With it v + a t = 0 in the equations of motion, including damping, hand and coupling."""
     span = 1e-3
     plant = plants.sampled_plant(replace(HEAVY, friction=1e9), SPRING, Servo(span)).record
     assert isinstance(plant, PantographRecord)
     x = np.array([0.004, 0.0, -0.005, 0.3, 0.0, -0.4])
-    given = (0.003, 0.006, 0.2, 0.25, 5.0)  # anchor, its speed, damping of the joints
-    fx, fz = linkage_friction(x, StepInput(0.4, 1.1, *given), span, plant)
-    pushed = StepInput(0.4 + fx, 1.1 + fz, *given)
-    rates = linkage_rates(x[0], x[2], x[3], x[5], 0.0, pushed, plant)
+    anchor_and_damping = (0.003, 0.006, 0.2, 0.25, 5.0)  # anchor, its velocity, joint damping
+    fx, fz = linkage_friction(x, StepInput(0.4, 1.1, *anchor_and_damping), span, plant)
+    inputs = StepInput(0.4 + fx, 1.1 + fz, *anchor_and_damping)
+    rates = linkage_rates(x[0], x[2], x[3], x[5], 0.0, inputs, plant)
     np.testing.assert_allclose(np.array(rates[:2]) * span, -x[[3, 5]], rtol=1e-9)
 
 
-def test_it_stops_where_the_workspace_ends() -> None:
-    way = Waypoints([0.0, 1.0], [[0.0, 0.0, 0.02], [0.0, 0.0, 0.12]])
-    run = simulate(Surface(WAVE, "W", 500.0), Pantograph(), SPRING, Servo(1e-3), way, 1.0)
+def test_run_stops_at_the_edge_of_the_workspace() -> None:
+    motion = Waypoints([0.0, 1.0], [[0.0, 0.0, 0.02], [0.0, 0.0, 0.12]])
+    run = simulate(Surface(WAVE, "W", 500.0), Pantograph(), SPRING, Servo(1e-3), motion, 1.0)
     assert run.stop_message.startswith("left the workspace: at (")
     assert 0 < run.samples < 1000
     np.testing.assert_array_equal(run.position[-1], run.state[:3])
@@ -295,7 +306,7 @@ def test_it_stops_where_the_workspace_ends() -> None:
 
 
 @pytest.mark.parametrize(
-    ("place", "words"),
+    ("point", "message"),
     [
         ((0.0, 0.0, 0.1), "stretched"),
         ((0.0, 0.0, -0.11), "behind the motors"),
@@ -303,15 +314,17 @@ def test_it_stops_where_the_workspace_ends() -> None:
         ((0.0, 1e-3, 0.0), "y = 0"),
     ],
 )
-def test_a_start_outside_is_refused(place: tuple[float, float, float], words: str) -> None:
-    with pytest.raises(ParameterError, match=words):
-        simulate(Surface(WAVE, "W"), Pantograph(), SPRING, Servo(1e-3), Stationary(place), 0.1)
+def test_start_outside_the_workspace_is_an_error(
+    point: tuple[float, float, float], message: str
+) -> None:
+    with pytest.raises(ParameterError, match=message):
+        simulate(Surface(WAVE, "W"), Pantograph(), SPRING, Servo(1e-3), Stationary(point), 0.1)
 
 
-def test_the_plane_is_kept() -> None:
-    way = Strokes((0.0, 0.0, 0.0), (0.01, 0.01, 0.0), 0.1)
+def test_motion_must_stay_in_the_plane_of_the_linkage() -> None:
+    strokes = Strokes((0.0, 0.0, 0.0), (0.01, 0.01, 0.0), 0.1)
     with pytest.raises(ParameterError, match="y = 0"):
-        simulate(Surface(WAVE, "W"), Pantograph(), SPRING, Servo(1e-3), way, 0.1)
-    run = simulate(Surface(WAVE, "A"), Pantograph(), PrescribedHand(), Servo(1e-3), LINEAR_WAY, 0.1)
+        simulate(Surface(WAVE, "W"), Pantograph(), SPRING, Servo(1e-3), strokes, 0.1)
+    run = simulate(Surface(WAVE, "A"), Pantograph(), PrescribedHand(), Servo(1e-3), STROKES, 0.1)
     np.testing.assert_allclose(run.position, run.anchor, atol=1e-15)
     assert run.ledger.closure == 0.0

@@ -1,4 +1,4 @@
-"""Parts of a simulation of which little is said, and the borders of what may be said of them."""
+"""Default arguments of plants, hands and servo, and the limits of the valid ranges."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from asperity.simulation.pantograph import MK_TWO
 TINY, BELOW, ABOVE = 5e-324, math.nextafter(1.0, 0.0), math.nextafter(1.0, 2.0)
 
 
-def test_what_nobody_says_is_as_documented() -> None:
-    """Guesses and choices that a user rests on without saying so."""
+def test_defaults_are_as_documented() -> None:
+    """Users rely on these defaults, some of which are estimates."""
     body = Cartesian()
     assert (body.mass, body.resonance, body.friction) == ((0.05, 0.05, 0.05), None, 0.0)
     assert not body.damping.any()
@@ -86,33 +86,35 @@ def test_what_nobody_says_is_as_documented() -> None:
         (lambda v: Strokes((0, 0, 0), (1e30, 0, 0), v), 1.0, 0.0, "speed"),
     ],
 )
-def test_borders(make: Callable[[Any], Any], good: Any, bad: Any, name: str) -> None:
+def test_values_at_and_beyond_the_limit_of_a_range(
+    make: Callable[[Any], Any], good: Any, bad: Any, name: str
+) -> None:
     make(good)
     with pytest.raises(ParameterError) as caught:
         make(bad)
     assert caught.value.argument == name
 
 
-def test_a_damping_is_symmetric_and_takes_energy_but_for_rounding() -> None:
-    """1e-12 of the greatest entry; what is left of an asymmetry is shared out."""
-    for off, good in ((0.9e-12, True), (1.1e-12, False)):
+def test_damping_must_be_symmetric_and_semidefinite_up_to_rounding() -> None:
+    """Up to 1e-12 of the largest entry; a smaller asymmetry is averaged."""
+    for off, is_valid in ((0.9e-12, True), (1.1e-12, False)):
         matrix = np.diag([4.0, 1.0, 1.0])
         matrix[0, 1] = 4.0 * off
-        slack = np.diag([4.0, 1.0, -4.0 * off])
-        for given in (matrix, slack):
-            if good:
-                damping = Cartesian(damping=given).damping
-                np.testing.assert_allclose(damping, 0.5 * (given + given.T), atol=1e-20)
+        indefinite = np.diag([4.0, 1.0, -4.0 * off])
+        for candidate in (matrix, indefinite):
+            if is_valid:
+                damping = Cartesian(damping=candidate).damping
+                np.testing.assert_allclose(damping, 0.5 * (candidate + candidate.T), atol=1e-20)
                 continue
             with pytest.raises(ParameterError, match=r"symmetric|semidefinite"):
-                Cartesian(damping=given)
+                Cartesian(damping=candidate)
     np.testing.assert_array_equal(Cartesian(damping=(1.0, 2.0, 3.0)).damping, np.diag([1, 2, 3]))
 
 
-def test_strokes_go_there_and_back_at_their_speed() -> None:
-    way = Strokes((1.0, 0.0, 0.0), (1.0, 3.0, 4.0), 2.5, 3)
-    assert (way.period, way.duration) == (2.0, 6.0)
+def test_strokes_alternate_at_their_speed() -> None:
+    strokes = Strokes((1.0, 0.0, 0.0), (1.0, 3.0, 4.0), 2.5, 3)
+    assert (strokes.period, strokes.duration) == (2.0, 6.0)
     times = np.array([-1.0, 0.0, 0.5, 2.0, 3.0, 4.0, 5.0, 6.0, 9.0])
-    share = np.array([0.0, 0.0, 0.25, 1.0, 0.5, 0.0, 0.5, 1.0, 1.0])
-    expected = np.array([1.0, 0.0, 0.0]) + share[:, None] * [0.0, 3.0, 4.0]
-    np.testing.assert_allclose(way.at(times), expected, rtol=1e-15, atol=1e-15)
+    fraction = np.array([0.0, 0.0, 0.25, 1.0, 0.5, 0.0, 0.5, 1.0, 1.0])
+    expected = np.array([1.0, 0.0, 0.0]) + fraction[:, None] * [0.0, 3.0, 4.0]
+    np.testing.assert_allclose(strokes.at(times), expected, rtol=1e-15, atol=1e-15)

@@ -1,4 +1,4 @@
-"""Bodies that are too fast for their period are refused, and what makes them so is named."""
+"""Bodies that are too fast for the sample period are rejected, naming the argument at fault."""
 
 from __future__ import annotations
 
@@ -51,22 +51,24 @@ TOO_FAST: list[tuple[Plant, Hand, Servo, str]] = [
 
 
 @pytest.mark.parametrize(("plant", "hand", "servo", "name"), TOO_FAST)
-def test_what_is_too_fast_is_refused(plant: Plant, hand: Hand, servo: Servo, name: str) -> None:
+def test_too_fast_body_is_an_error_naming_the_argument(
+    plant: Plant, hand: Hand, servo: Servo, name: str
+) -> None:
     with pytest.raises(ParameterError, match="too fast") as caught:
         sampled_plant(plant, hand, servo)
     assert caught.value.argument == name
 
 
-def rate_on_a_band(damping: float) -> float:
+def band_rate(damping: float) -> float:
     return float(sampled_plant(Pantograph(), BandHand(damping=damping), MILLISECOND).record[3])
 
 
-def test_ten_thousand_parts_are_the_most() -> None:
-    """A hundred parts to a time constant: so a rate of 1e5 1/s at 1 ms, damping over mass."""
-    slope = (rate_on_a_band(200.0) - rate_on_a_band(100.0)) / 100.0
+def test_at_most_ten_thousand_substeps_are_allowed() -> None:
+    """At 100 substeps per time constant this is a rate, damping over mass, of 1e5 1/s at 1 ms."""
+    slope = (band_rate(200.0) - band_rate(100.0)) / 100.0
     for plant, limit in (
         (Cartesian(0.1), 1e5 * 0.1),
-        (Pantograph(), 200.0 + (1e5 - rate_on_a_band(200.0)) / slope),
+        (Pantograph(), 200.0 + (1e5 - band_rate(200.0)) / slope),
     ):
         sampled_plant(plant, BandHand(damping=0.999 * limit), MILLISECOND)
         with pytest.raises(ParameterError, match="damping makes the body too fast"):
@@ -74,7 +76,7 @@ def test_ten_thousand_parts_are_the_most() -> None:
 
 
 @pytest.mark.parametrize("speed", [1e9, 1e30])
-def test_a_pantograph_at_any_speed_comes_to_an_end(speed: float) -> None:
+def test_pantograph_at_extreme_speed_ends_the_run(speed: float) -> None:
     run = simulate(
         Surface(Sinusoid(0.4e-3, 1e-3), "W", 800.0), Pantograph(), SpringHand(100.0), MILLISECOND,
         Stationary((0.0, 0.0, 0.0)), 0.1, velocity=(speed, 0.0, 0.0),
