@@ -1,4 +1,4 @@
-"""The line through a probe along which depth grows, and what a contact costs."""
+"""The axis through a probe along which the depth grows, and the relative cost of a contact."""
 
 from __future__ import annotations
 
@@ -15,26 +15,28 @@ PROBES = np.array([[0.11e-3, 0.23e-3, -0.12e-3], [0.71e-3, -0.34e-3, -0.09e-3]])
 
 @pytest.mark.parametrize("name", ["nominal", "vertical", "nearest", "split"])
 @pytest.mark.parametrize("probe", PROBES)
-def test_depth_grows_along_it_by_the_way_gone(name: str, probe: np.ndarray) -> None:
+def test_depth_equals_the_distance_along_the_axis(name: str, probe: np.ndarray) -> None:
     contact = CONTACTS[name]
-    place, below = contact.depth_axis(HILLS, probe)
+    surface_point, direction = contact.depth_axis(HILLS, probe)
     depth = contact.depth(HILLS, probe[None])[0]
     assert depth > 0.0
-    assert np.linalg.norm(below) == pytest.approx(1.0, abs=1e-12)
-    np.testing.assert_allclose(place + depth * below, probe, atol=1e-12)
-    ways = np.array([0.0, 0.3, 0.8]) * depth
+    assert np.linalg.norm(direction) == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_allclose(surface_point + depth * direction, probe, atol=1e-12)
+    distances = np.array([0.0, 0.3, 0.8]) * depth
     np.testing.assert_allclose(
-        contact.depth(HILLS, place + ways[:, None] * below), ways, atol=1e-10
+        contact.depth(HILLS, surface_point + distances[:, None] * direction), distances, atol=1e-10
     )
 
 
-def test_the_columns_of_contacts_are_told_apart() -> None:
-    below = {name: contact.depth_axis(HILLS, PROBES[0])[1] for name, contact in CONTACTS.items()}
-    assert below["vertical"][2] == -1.0
-    assert abs(below["nearest"][2]) < 0.999
+def test_axes_of_vertical_and_nearest_contact_differ() -> None:
+    directions = {
+        name: contact.depth_axis(HILLS, PROBES[0])[1] for name, contact in CONTACTS.items()
+    }
+    assert directions["vertical"][2] == -1.0
+    assert abs(directions["nearest"][2]) < 0.999
 
 
-def test_what_takes_a_search_costs_more_than_a_height() -> None:
+def test_contacts_with_a_search_cost_more() -> None:
     costs = {
         name: CONTACTS[name].relative_cost for name in ("nominal", "vertical", "nearest", "split")
     }

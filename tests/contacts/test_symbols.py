@@ -1,4 +1,4 @@
-"""The symbols in which laws are written stand for real numbers."""
+"""The symbols of laws stand for real numbers."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from asperity.contacts.symbols import ARGUMENT_ORDER, ContactSymbols
 
 
 def test_every_symbol_is_real() -> None:
-    """Or the root of a square would not simplify in a law; a symbol of its own is the control."""
+    """Square roots simplify only for real symbols; a plain symbol is the negative control."""
     parameter = ContactSymbols(("size",)).parameter("size")
     for symbol in (*ARGUMENT_ORDER, parameter):
         assert sp.sqrt(symbol**2) == sp.Abs(symbol)

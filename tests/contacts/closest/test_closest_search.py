@@ -1,7 +1,7 @@
-"""The certificates of the search: what a look at the centre of a box says about the box.
+"""The certificates of the search: what an evaluation at its centre proves about a box.
 
-On cubic polynomials, whose bounds K and T are known exactly. Each certificate holds on random
-boxes, and on a box made for it nothing less would do.
+They are tested on cubic polynomials, whose bounds K and T are known exactly: each certificate holds
+on random boxes and is sharp on a constructed one.
 """
 
 from __future__ import annotations
@@ -18,58 +18,58 @@ from asperity.core.compiled import EPS
 
 Cubic = np.ndarray  # coefficients of x^i y^j, i + j <= 3, shape (4, 4)
 LEVEL = (0.0, 0.0, 0.0)  # a probe below the origin
-LOOKS = (1.0 - ROUNDING_SLACK * EPS, 1e9)  # nothing that is nearer is dropped, and looks enough
+UNLIMITED = (1.0 - ROUNDING_SLACK * EPS, 1e9)  # keep everything nearer, unlimited budget
 
 
-def value(c: Cubic, x: np.ndarray, y: np.ndarray, dx: int = 0, dy: int = 0) -> np.ndarray:
+def derivative(c: Cubic, x: np.ndarray, y: np.ndarray, dx: int = 0, dy: int = 0) -> np.ndarray:
     """Return a derivative of the polynomial."""
     poly = np.polynomial.polynomial
-    derivative = poly.polyder(poly.polyder(c, dx, axis=0), dy, axis=1)
-    return np.asarray(poly.polyval2d(x, y, derivative))
+    coefficients = poly.polyder(poly.polyder(c, dx, axis=0), dy, axis=1)
+    return np.asarray(poly.polyval2d(x, y, coefficients))
 
 
 def curvature(x: float, y: float, c: Cubic) -> tuple[float, ...]:
-    """Return what a sampler would."""
+    """Return height and derivatives like a sampler."""
     orders = [(0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)]
     at = np.array(x), np.array(y)
-    return tuple(float(value(c, *at, *order)) for order in orders)
+    return tuple(float(derivative(c, *at, *order)) for order in orders)
 
 
 def cubic(rng: np.random.Generator, scale: float) -> Cubic:
-    """Return a random polynomial with the height of its tangent plane about 1."""
+    """Return a random polynomial whose tangent plane has a height of about 1."""
     c = rng.normal(size=(4, 4)) * scale
     c[0, 0], c[1, 0], c[0, 1] = rng.normal(size=3)
     c[np.add.outer(range(4), range(4)) > 3] = 0.0
     return c
 
 
-def below(c: Cubic, x: float, y: float, depth: float) -> np.ndarray:
-    """Return the probe whose distance is level at the surface point over x, y."""
+def stationary_probe(c: Cubic, x: float, y: float, depth: float) -> np.ndarray:
+    """Return a probe whose distance is stationary at the surface point over x, y."""
     h, hx, hy, *_second = curvature(x, y, c)
     down = np.array([hx, hy, -1.0]) / np.sqrt(1.0 + hx**2 + hy**2)
     return np.array([x, y, h]) + depth * down
 
 
 def bounds(c: Cubic, a: float, b: float) -> tuple[float, float]:
-    """Return K and T on the box |x| <= a, |y| <= b around the origin: convex, so at its corners."""
+    """Return K and T on the box |x| <= a, |y| <= b: convex, so attained at its corners."""
     corners = np.array(list(itertools.product((-a, a), (-b, b))))
-    xx, xy, yy = (value(c, *corners.T, *order) for order in ((2, 0), (1, 1), (0, 2)))
+    xx, xy, yy = (derivative(c, *corners.T, *order) for order in ((2, 0), (1, 1), (0, 2)))
     matrices = np.stack([xx, xy, xy, yy], axis=-1).reshape(-1, 2, 2)
-    t = np.array([value(c, *np.zeros((2, 1)), 3 - n, n)[0] for n in range(4)])
-    twist = np.sqrt((t**2) @ [1.0, 3.0, 3.0, 1.0])
-    return float(np.linalg.norm(matrices, 2, axis=(1, 2)).max()), float(twist)
+    t = np.array([derivative(c, *np.zeros((2, 1)), 3 - n, n)[0] for n in range(4)])
+    third_bound = np.sqrt((t**2) @ [1.0, 3.0, 3.0, 1.0])
+    return float(np.linalg.norm(matrices, 2, axis=(1, 2)).max()), float(third_bound)
 
 
 def expansion(c: Cubic, probe: np.ndarray, xy: np.ndarray) -> tuple[np.ndarray, ...]:
     """Return φ, ∇φ/2 and Q at points (n, 2)."""
     h, hx, hy, hxx, hxy, hyy = (
-        value(c, *xy.T, *order) for order in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+        derivative(c, *xy.T, *order) for order in ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
     )
-    gap, away = h - probe[2], xy - probe[:2]
+    gap, offset = h - probe[2], xy - probe[:2]
     slope = np.stack([hx, hy], axis=-1)
     hessian = np.stack([hxx, hxy, hxy, hyy], axis=-1).reshape(-1, 2, 2)
     q = np.eye(2) + slope[:, :, None] * slope[:, None, :] + gap[:, None, None] * hessian
-    return (away**2).sum(axis=1) + gap**2, away + gap[:, None] * slope, q
+    return (offset**2).sum(axis=1) + gap**2, offset + gap[:, None] * slope, q
 
 
 def box_points(a: float, b: float, count: int) -> np.ndarray:
@@ -79,17 +79,17 @@ def box_points(a: float, b: float, count: int) -> np.ndarray:
 
 def remainders(c: Cubic, probe: np.ndarray, a: float, b: float) -> tuple[float, float]:
     h, hx, hy, hxx, hxy, hyy = curvature(0.0, 0.0, c)
-    bent = float(np.sqrt(hxx**2 + 2.0 * hxy**2 + hyy**2))
+    hessian_norm = float(np.sqrt(hxx**2 + 2.0 * hxy**2 + hyy**2))
     return search.taylor_remainders(
-        float(np.hypot(a, b)), h - probe[2], float(np.hypot(hx, hy)), bent, *bounds(c, a, b)
+        float(np.hypot(a, b)), h - probe[2], float(np.hypot(hx, hy)), hessian_norm, *bounds(c, a, b)
     )
 
 
-# --- how far Taylor's formula can be off ----------------------------------------------------------
+# --- remainders of Taylor's formula ---------------------------------------------------------------
 
 
 @pytest.mark.parametrize("scale", [0.1, 1.0, 10.0])
-def test_nothing_changes_faster_than_the_remainders_say(scale: float):
+def test_taylor_remainders_bound_all_changes(scale: float):
     rng = np.random.default_rng(41)
     for _ in range(150):
         c, probe = cubic(rng, scale), np.append(rng.normal(size=2), -rng.exponential(2.0))
@@ -100,51 +100,52 @@ def test_nothing_changes_faster_than_the_remainders_say(scale: float):
         centre = expansion(c, probe, np.zeros((1, 2)))[2]
         assert np.linalg.norm(q - centre, 2, axis=(1, 2)).max() <= change * (1 + 1e-12)
         plane = c[0, 0] + xy @ [c[1, 0], c[0, 1]]
-        assert np.abs(value(c, *xy.T) - plane).max() <= lift * (1 + 1e-12)
+        assert np.abs(derivative(c, *xy.T) - plane).max() <= lift * (1 + 1e-12)
 
 
 @pytest.mark.parametrize(
-    ("slope", "bend", "twist"), [(1.0, 1.0, 0.0), (0.0, 0.0, 1.0), (2.0, 0.5, 3.0), (0.0, 1.0, 1.0)]
+    ("slope", "hessian", "third"),
+    [(1.0, 1.0, 0.0), (0.0, 0.0, 1.0), (2.0, 0.5, 3.0), (0.0, 1.0, 1.0)],
 )
-def test_the_remainders_are_attained(slope: float, bend: float, twist: float):
-    """Along x, in a small box: the change is 3 h_x h_xx + (h - z) h_xxx, the lift h_xx r²/2."""
+def test_taylor_remainders_are_sharp(slope: float, hessian: float, third: float):
+    """Along x in a small box: the change is 3 h_x h_xx + (h - z) h_xxx, the lift h_xx r²/2."""
     c = np.zeros((4, 4))
-    c[:, 0] = [0.5, slope, bend / 2.0, twist / 6.0]
+    c[:, 0] = [0.5, slope, hessian / 2.0, third / 6.0]
     probe, r = np.array([0.3, 0.0, -1.5]), 1e-5
     change, lift = remainders(c, probe, r, 0.0)
     end = np.array([[r, 0.0]])
     q = expansion(c, probe, np.array([[0.0, 0.0], end[0]]))[2]
     assert change * (1 - 1e-3) <= q[1, 0, 0] - q[0, 0, 0] <= change
-    raised = value(c, *end.T)[0] - 0.5 - slope * r
+    raised = derivative(c, *end.T)[0] - 0.5 - slope * r
     assert lift * (1 - 1e-3) <= raised + 1e-16 <= lift + 2e-16
 
 
-def test_the_lift_includes_the_third_derivative():
+def test_lift_includes_the_third_derivative():
     c = np.zeros((4, 4))
     c[3, 0] = 1.0 / 6.0
     _change, lift = remainders(c, np.array([0.0, 0.0, -1.0]), 1e-2, 0.0)
     assert lift == pytest.approx(1e-6 / 6.0, rel=1e-12)
 
 
-# --- when a box is dropped ------------------------------------------------------------------------
+# --- pruning a box --------------------------------------------------------------------------------
 
 
-def hopeless(c: Cubic, probe: np.ndarray, a: float, b: float, enough: float) -> bool:
+def is_pruned(c: Cubic, probe: np.ndarray, a: float, b: float, enough: float) -> bool:
     h, hx, hy, _hxx, _hxy, _hyy = curvature(0.0, 0.0, c)
     _phi, _slope, q = expansion(c, probe, np.zeros((1, 2)))
     entries = (float(q[0, 0, 0]), float(q[0, 0, 1]), float(q[0, 1, 1]))
     low, _high = search.symmetric_eigenvalues(*entries)
-    away = (-probe[0], -probe[1], h - probe[2])
+    offset = (-probe[0], -probe[1], h - probe[2])
     change, lift = remainders(c, probe, a, b)
-    return search.can_prune(away, hx, hy, entries, low, change, lift, a, b, enough)
+    return search.can_prune(offset, hx, hy, entries, low, change, lift, a, b, enough)
 
 
-def greatest_dropped(c: Cubic, probe: np.ndarray, a: float, b: float) -> float:
-    """Return the least φ below which a box is not dropped, by bisection: its lower bound."""
+def distance_lower_bound(c: Cubic, probe: np.ndarray, a: float, b: float) -> float:
+    """Return the least φ at which a box is not pruned, by bisection: its lower bound."""
     low, high = 0.0, 2.0 * float(expansion(c, probe, np.zeros((1, 2)))[0][0])
     for _ in range(30):
         middle = 0.5 * (low + high)
-        if hopeless(c, probe, a, b, middle):
+        if is_pruned(c, probe, a, b, middle):
             low = middle
         else:
             high = middle
@@ -152,96 +153,96 @@ def greatest_dropped(c: Cubic, probe: np.ndarray, a: float, b: float) -> float:
 
 
 @pytest.mark.parametrize("scale", [0.1, 1.0, 3.0])
-def test_no_minimum_is_lost_with_a_dropped_box(scale: float):
+def test_pruned_box_contains_no_minimum(scale: float):
     rng = np.random.default_rng(42)
-    dropped = 0
+    pruned_count = 0
     for _ in range(120):
         c, (a, b) = cubic(rng, scale), rng.uniform(0.02, 0.3, 2) / max(scale, 1.0)
-        # The level point lies in the box, or not far from it.
+        # The stationary point lies in the box or near it.
         wide = rng.choice([1.0, 4.0]) * rng.uniform(-1.0, 1.0, 2)
-        probe = below(c, *(np.array([a, b]) * wide), rng.exponential())
+        probe = stationary_probe(c, *(np.array([a, b]) * wide), rng.exponential())
         xy = box_points(a, b, 21)
         phi, slope, q = expansion(c, probe, xy)
-        if not hopeless(c, probe, a, b, np.inf):
-            # Not for lack of a minimum: then φ must be great all over.
-            assert phi.min() >= greatest_dropped(c, probe, a, b) * (1 - 1e-6)
+        if not is_pruned(c, probe, a, b, np.inf):
+            # Pruned by distance: then φ is greater everywhere in the box.
+            assert phi.min() >= distance_lower_bound(c, probe, a, b) * (1 - 1e-6)
             continue
-        dropped += 1
-        # Where φ is nearly level it is not convex: the step to a level point leaves the box.
+        pruned_count += 1
+        # Where φ is nearly level and convex, the Newton step leaves the box.
         step = np.linalg.solve(q, slope[:, :, None])[:, :, 0]
         convex = np.linalg.eigvalsh(q)[:, 0] > 0.0
         assert not (convex & (np.abs(step) < 0.01 * np.array([a, b])).all(axis=1)).any()
-    assert 12 < dropped < 108
+    assert 12 < pruned_count < 108
 
 
-def test_the_bound_by_taylors_formula_is_attained():
-    """Q is a little negative at the centre, and L r makes up for it: φ falls by both along x."""
+def test_taylor_bound_is_sharp():
+    """Q is slightly negative at the centre, and L r compensates: φ decreases by both along x."""
     c = np.zeros((4, 4))
     c[:, 0] = [0.0, 0.0, -1.05 / 2.0, -1.5 / 6.0]
     probe, r = np.array([0.0, 0.0, -1.0]), 0.05
     exact = expansion(c, probe, box_points(r, 0.0, 201))[0].min()
-    bound = greatest_dropped(c, probe, r, 0.0)
+    bound = distance_lower_bound(c, probe, r, 0.0)
     assert 1.25 * (exact - 1.0) <= bound - 1.0 <= exact - 1.0 < 0.0
 
 
-def test_the_bound_by_the_tangent_plane_is_attained():
-    """The surface bends down to the probe, which lies below the edge of the box."""
+def test_tangent_plane_bound_is_sharp():
+    """The surface curves down towards the probe, which is below the edge of the box."""
     c = np.zeros((4, 4))
     c[:, 0] = [0.0, 0.0, -1.0 / 2.0, 4.0 / 6.0]
     r = 0.2
     probe = np.array([-r, 0.0, -3.0])
     exact = expansion(c, probe, box_points(r, 0.0, 201))[0].min()
     assert exact == pytest.approx((3.0 - 0.5 * r**2 - 4.0 * r**3 / 6.0) ** 2, rel=1e-9)
-    assert exact * (1 - 1e-6) <= greatest_dropped(c, probe, r, 0.0) <= exact * (1 + 1e-8)
+    assert exact * (1 - 1e-6) <= distance_lower_bound(c, probe, r, 0.0) <= exact * (1 + 1e-8)
 
 
-@pytest.mark.parametrize(("share", "dropped"), [(0.99, False), (1.04, True)])
-def test_a_box_is_kept_exactly_if_it_can_be_level(share: float, dropped: bool):
-    """The slope q r + L r²/2 is the greatest that the box can take away."""
-    gap, twist, r = 1.0, 0.4, 0.3
+@pytest.mark.parametrize(("share", "pruned"), [(0.99, False), (1.04, True)])
+def test_box_is_pruned_iff_it_has_no_level_point(share: float, pruned: bool):
+    """The slope changes by at most q r + L r²/2 within the box."""
+    gap, third, r = 1.0, 0.4, 0.3
     c = np.zeros((4, 4))
-    c[3, 0] = -twist / 6.0
-    # Q = 1 and L = T (h - z), nearly; the slope at the centre is where the probe stands.
-    probe = np.array([-share * (r + 0.5 * twist * gap * r * r), 0.0, -gap])
+    c[3, 0] = -third / 6.0
+    # Q = 1 and L = T (h - z), approximately; the probe's x sets the slope at the centre.
+    probe = np.array([-share * (r + 0.5 * third * gap * r * r), 0.0, -gap])
     slopes = expansion(c, probe, box_points(r, 0.0, 401))[1][:, 0]
-    assert (slopes.min() < 0.0) != dropped
-    assert hopeless(c, probe, r, 0.0, np.inf) == dropped
+    assert (slopes.min() < 0.0) != pruned
+    assert is_pruned(c, probe, r, 0.0, np.inf) == pruned
 
 
-# --- what a look at a box answers -----------------------------------------------------------------
+# --- evaluating a box -----------------------------------------------------------------------------
 
 
-def test_a_box_is_closed_only_when_its_minima_are_known(monkeypatch: pytest.MonkeyPatch):
-    """Random boxes of surfaces in two dimensions, minima in them by a dense grid."""
+def test_closed_box_contains_no_better_minimum(monkeypatch: pytest.MonkeyPatch):
+    """Random boxes of surfaces in two dimensions; minima by a dense grid."""
     monkeypatch.setattr(search, "sample_hessian", curvature)
     rng = np.random.default_rng(43)
-    closed = found = 0
+    closed = with_minima = 0
     for _ in range(600):
         c, (a, b) = cubic(rng, 0.6), rng.uniform(0.02, 0.2, 2)
-        wide = rng.choice([1.0, 4.0]) * rng.uniform(-1.0, 1.0, 2)
-        probe = below(c, *(np.array([a, b]) * wide), rng.exponential())
+        position = rng.choice([1.0, 4.0]) * rng.uniform(-1.0, 1.0, 2)
+        probe = stationary_probe(c, *(np.array([a, b]) * position), rng.exponential())
         best = (9.0, 9.0, 1e9, 0.0, 0.0, 0.0)
-        after, open_, _left = search.evaluate_box(
-            *probe, 0.0, 0.0, a, b, *bounds(c, a, b), best, *LOOKS, c
+        result, is_open, _left = search.evaluate_box(
+            *probe, 0.0, 0.0, a, b, *bounds(c, a, b), best, *UNLIMITED, c
         )
-        if open_:
+        if is_open:
             continue
         closed += 1
         xy = box_points(a, b, 41)
         phi, slope, q = expansion(c, probe, xy)
         step = -np.linalg.solve(q, slope[:, :, None])[:, :, 0]
-        # Newton's method leads from here to a minimum well inside the box.
+        # From here Newton's method leads to a minimum well inside the box.
         inside = (np.abs(xy + step) < 0.95 * np.array([a, b])).all(axis=1)
         level = (np.linalg.eigvalsh(q)[:, 0] > 0.0) & inside & (np.abs(step) < 0.03 * a).all(axis=1)
         if level.any():
-            found += 1
-            assert after[2] <= phi[level].min() * (1 + 1e-12)
+            with_minima += 1
+            assert result[2] <= phi[level].min() * (1 + 1e-12)
     assert closed > 80
-    assert found > 20
+    assert with_minima > 20
 
 
 def profile(x: float, c: np.ndarray) -> tuple[float, ...]:
-    """Return what a profile's sampler would of a polynomial."""
+    """Return the polynomial's derivatives like the sampler of a profile."""
     return tuple(float(np.polynomial.Polynomial(c).deriv(n)(x)) for n in range(3))
 
 
@@ -251,28 +252,31 @@ def profile_as_map(x: float, _y: float, c: np.ndarray) -> tuple[float, ...]:
 
 
 @pytest.mark.parametrize("as_map", [False, True])
-def test_an_interval_is_closed_only_when_its_minima_are_known(
-    as_map: bool, monkeypatch: pytest.MonkeyPatch
-):
-    """In one dimension all minima are roots of a quintic, several of them in an interval."""
+def test_closed_interval_contains_no_better_minimum(as_map: bool, monkeypatch: pytest.MonkeyPatch):
+    """In one dimension all minima are roots of a quintic; an interval may contain several."""
     monkeypatch.setattr(line, "sample_profile", profile)
     monkeypatch.setattr(search, "sample_hessian", profile_as_map)
     rng = np.random.default_rng(44)
-    closed = found = 0
+    closed = with_minima = 0
     for _ in range(6000):
         c = rng.normal(size=4) * [1.0, 1.0, 0.8, 0.6]
         x, z, r = 0.3 * rng.normal(), -rng.exponential(1.0), rng.uniform(0.02, 0.5)
-        bend, twist = max(abs(2 * c[2] + 6 * c[3] * r), abs(2 * c[2] - 6 * c[3] * r)), 6 * abs(c[3])
+        hessian_bound, third_bound = (
+            max(abs(2 * c[2] + 6 * c[3] * r), abs(2 * c[2] - 6 * c[3] * r)),
+            6 * abs(c[3]),
+        )
         if as_map:
             start = (9.0, 9.0, 1e9, 0.0, 0.0, 0.0)
-            box = (0.0, 0.0, r, 1e-3, bend, twist)
-            after, open_, _left = search.evaluate_box(x, 0.0, z, *box, start, *LOOKS, c)
-            value = after[2]
+            box = (0.0, 0.0, r, 1e-3, hessian_bound, third_bound)
+            result, is_open, _left = search.evaluate_box(x, 0.0, z, *box, start, *UNLIMITED, c)
+            best = result[2]
         else:
-            unknown = (9.0, 1e9, 0.0, 0.0)
-            answer, open_, _left = line.evaluate_box(x, z, 0.0, r, bend, twist, unknown, *LOOKS, c)
-            value = answer[1]
-        if open_:
+            line_start = (9.0, 1e9, 0.0, 0.0)
+            line_result, is_open, _left = line.evaluate_box(
+                x, z, 0.0, r, hessian_bound, third_bound, line_start, *UNLIMITED, c
+            )
+            best = line_result[1]
+        if is_open:
             continue
         closed += 1
         h = np.polynomial.Polynomial(c)
@@ -281,88 +285,88 @@ def test_an_interval_is_closed_only_when_its_minima_are_known(
         real = roots[np.abs(roots.imag) < 1e-9].real
         minima = real[(np.abs(real) < 0.999 * r) & (phi.deriv(2)(real) > 1e-6)]
         if len(minima):
-            found += 1
-            assert value <= phi(minima).min() * (1 + 1e-9)
+            with_minima += 1
+            assert best <= phi(minima).min() * (1 + 1e-9)
     assert closed > 2000
-    assert found > 200
+    assert with_minima > 200
 
 
-def test_a_box_stays_open_when_the_minimum_lies_outside(monkeypatch: pytest.MonkeyPatch):
-    """Newton's method was expected to end in the box and did not: its parts decide."""
+def test_box_stays_open_when_the_descent_leaves_it(monkeypatch: pytest.MonkeyPatch):
+    """Newton's method was expected to end in the box and did not, so the box is divided."""
     monkeypatch.setattr(search, "sample_hessian", profile_as_map)
     monkeypatch.setattr(line, "sample_profile", profile)
-    flat, at = np.zeros(4), (0.0, 0.0)
+    flat, end = np.zeros(4), (0.0, 0.0)
     monkeypatch.setattr(
-        search, "descend_within_budget", lambda *_: ((*at, 0.5, 0.0, 0.0, 0.0), 1.0)
+        search, "descend_within_budget", lambda *_: ((*end, 0.5, 0.0, 0.0, 0.0), 1.0)
     )
-    monkeypatch.setattr(line, "descend_within_budget", lambda *_: ((at[0], 0.5, 0.0, 0.0), 1.0))
-    unknown = ((9.0, 9.0, 1e9, 0.0, 0.0, 0.0), *LOOKS)
-    unknown_line = ((9.0, 1e9, 0.0, 0.0), *LOOKS)
+    monkeypatch.setattr(line, "descend_within_budget", lambda *_: ((end[0], 0.5, 0.0, 0.0), 1.0))
+    start = ((9.0, 9.0, 1e9, 0.0, 0.0, 0.0), *UNLIMITED)
+    line_start = ((9.0, 1e9, 0.0, 0.0), *UNLIMITED)
     for x, y in ((0.3, 0.0), (0.101, 0.0), (-0.101, 0.0), (0.0, 0.101), (0.0, -0.101), (0.1, 0.1)):
-        at = x, y
+        end = x, y
         box = (0.0, 0.0, 0.1, 0.1, 0.0, 0.0)
-        best, open_, _left = search.evaluate_box(0.05, 0.0, -1.0, *box, *unknown, flat)
-        assert (best[:2], open_) == (at, max(abs(x), abs(y)) > 0.1)
-        best, open_, _left = line.evaluate_box(0.05, -1.0, 0.0, 0.1, 0.0, 0.0, *unknown_line, flat)
-        assert (best[0], open_) == (x, abs(x) > 0.1)
+        best, is_open, _left = search.evaluate_box(0.05, 0.0, -1.0, *box, *start, flat)
+        assert (best[:2], is_open) == (end, max(abs(x), abs(y)) > 0.1)
+        best, is_open, _left = line.evaluate_box(0.05, -1.0, 0.0, 0.1, 0.0, 0.0, *line_start, flat)
+        assert (best[0], is_open) == (x, abs(x) > 0.1)
 
 
-def test_a_descent_begins_at_the_best_point_in_the_box_or_by_newton(
-    monkeypatch: pytest.MonkeyPatch,
-):
-    """Below a plane Newton's method leads straight above the probe; a mirror image is elsewhere."""
+def test_descent_starts_at_the_best_point_or_a_newton_step(monkeypatch: pytest.MonkeyPatch):
+    """At the best point if it lies in the box; above a plane Newton's step ends over the probe."""
     monkeypatch.setattr(search, "sample_hessian", profile_as_map)
     monkeypatch.setattr(line, "sample_profile", profile)
     starts: list[tuple[float, ...]] = []
 
-    def from_here(*arguments: float) -> tuple[tuple[float, ...], float]:
+    def record_start(*arguments: float) -> tuple[tuple[float, ...], float]:
         start = arguments[3:5] if len(arguments) == 7 else arguments[2:3]
         starts.append(start)
         return (*start, *[0.0] * (len(arguments) - 3)), 1.0
 
-    monkeypatch.setattr(search, "descend_within_budget", from_here)
-    monkeypatch.setattr(line, "descend_within_budget", from_here)
-    flat, above = np.zeros(4), (0.52, 0.31)
+    monkeypatch.setattr(search, "descend_within_budget", record_start)
+    monkeypatch.setattr(line, "descend_within_budget", record_start)
+    flat, newton_point = np.zeros(4), (0.52, 0.31)
     for x, y in itertools.product((0.45, -0.45, 0.61), (0.35, -0.35, 0.41)):
-        known = (x, y) == (0.45, 0.35)
+        is_inside = (x, y) == (0.45, 0.35)
         best = (x, y, 1e9, 0.0, 0.0, 0.0)
-        search.evaluate_box(*above, -1.0, 0.5, 0.3, 0.1, 0.1, 0.0, 0.0, best, *LOOKS, flat)
-        assert starts.pop() == pytest.approx((x, y) if known else above, abs=1e-15)
-        line.evaluate_box(0.52, -1.0, 0.5, 0.1, 0.0, 0.0, (x, 1e9, 0.0, 0.0), *LOOKS, flat)
+        search.evaluate_box(
+            *newton_point, -1.0, 0.5, 0.3, 0.1, 0.1, 0.0, 0.0, best, *UNLIMITED, flat
+        )
+        assert starts.pop() == pytest.approx((x, y) if is_inside else newton_point, abs=1e-15)
+        line.evaluate_box(0.52, -1.0, 0.5, 0.1, 0.0, 0.0, (x, 1e9, 0.0, 0.0), *UNLIMITED, flat)
         assert starts.pop() == pytest.approx((0.45 if x == 0.45 else 0.52,), abs=1e-15)
 
 
-def test_rounding_drops_no_level_point_on_the_border(monkeypatch: pytest.MonkeyPatch):
-    """Planes however steep: the room for rounding grows with Q, a level point in a corner stays."""
+def test_level_point_on_the_border_is_not_pruned_by_rounding(monkeypatch: pytest.MonkeyPatch):
+    """On planes of any slope: the slack for rounding grows with Q."""
     monkeypatch.setattr(line, "sample_profile", profile)
     rng = np.random.default_rng(46)
-    for steep in np.geomspace(1.0, 1e5, 100):
+    for slope in np.geomspace(1.0, 1e5, 100):
         c, (a, b) = np.zeros((4, 4)), rng.uniform(0.01, 0.3, 2)
-        c[1, 0] = steep
-        probe = below(c, a, b, rng.exponential())
-        assert not hopeless(c, probe, a, b, np.inf)
-        unknown = ((9.0, 1e99, 0.0, 0.0), *LOOKS)
-        best, *_open = line.evaluate_box(probe[0], probe[2], 0.0, a, 0.0, 0.0, *unknown, c[:, 0])
+        c[1, 0] = slope
+        probe = stationary_probe(c, a, b, rng.exponential())
+        assert not is_pruned(c, probe, a, b, np.inf)
+        start = ((9.0, 1e99, 0.0, 0.0), *UNLIMITED)
+        best, *_rest = line.evaluate_box(probe[0], probe[2], 0.0, a, 0.0, 0.0, *start, c[:, 0])
         assert best[0] == pytest.approx(a, rel=1e-9)
 
 
-def test_a_profile_interval_is_kept_if_it_can_be_level(monkeypatch: pytest.MonkeyPatch):
-    """The slope at the centre just below and just above what the interval can take away."""
+def test_interval_is_pruned_iff_it_has_no_level_point(monkeypatch: pytest.MonkeyPatch):
+    """The slope at the centre is just below and just above the greatest change in the interval."""
     monkeypatch.setattr(line, "sample_profile", profile)
-    gap, twist, r = 1.0, 0.4, 0.3
-    c = np.array([0.0, 0.0, 0.0, -twist / 6.0])
-    limit = r + 0.5 * twist * gap * r * r
-    for share, dropped in ((0.99, False), (1.04, True)):
+    gap, third, r = 1.0, 0.4, 0.3
+    c = np.array([0.0, 0.0, 0.0, -third / 6.0])
+    limit = r + 0.5 * third * gap * r * r
+    for share, pruned in ((0.99, False), (1.04, True)):
         start = (9.0, 1e9, 0.0, 0.0)
-        bounds_of = (twist * r, twist)
-        best, open_, _left = line.evaluate_box(
-            -share * limit, -gap, 0.0, r, *bounds_of, start, *LOOKS, c
+        derivative_bounds = (third * r, third)
+        best, is_open, _left = line.evaluate_box(
+            -share * limit, -gap, 0.0, r, *derivative_bounds, start, *UNLIMITED, c
         )
-        assert (best == start and not open_) == dropped
+        assert (best == start and not is_open) == pruned
 
 
-def test_a_descent_ends_at_a_local_minimum(monkeypatch: pytest.MonkeyPatch):
-    """Far from a cubic Newton's steps are too long, and are halved until they lead down."""
+def test_descent_ends_at_a_local_minimum(monkeypatch: pytest.MonkeyPatch):
+    """Far away the Newton steps are too long and are halved until φ decreases."""
     monkeypatch.setattr(search, "sample_hessian", curvature)
     monkeypatch.setattr(line, "sample_profile", profile)
     rng = np.random.default_rng(47)
@@ -375,38 +379,38 @@ def test_a_descent_ends_at_a_local_minimum(monkeypatch: pytest.MonkeyPatch):
         assert np.linalg.eigvalsh(q[0])[0] > 0.0
         assert phi <= expansion(c, probe, start[None])[0][0]
         h = np.polynomial.Polynomial(c[:, 0])
-        own = np.polynomial.Polynomial([-probe[0], 1.0]) ** 2 + (h - probe[2]) ** 2
+        squared_distance = np.polynomial.Polynomial([-probe[0], 1.0]) ** 2 + (h - probe[2]) ** 2
         x, phi, *_profile = line.descend(probe[0], probe[2], start[0], c[:, 0])
-        assert abs(own.deriv()(x)) <= 1e-6 * own.deriv(2)(x)
-        assert phi <= own(start[0])
+        assert abs(squared_distance.deriv()(x)) <= 1e-6 * squared_distance.deriv(2)(x)
+        assert phi <= squared_distance(start[0])
 
 
-def test_a_descent_takes_no_more_looks_than_are_left(monkeypatch: pytest.MonkeyPatch):
-    """It counts them, and ends with the lowest point that it has seen."""
+def test_descent_respects_its_budget(monkeypatch: pytest.MonkeyPatch):
+    """A truncated descent returns the lowest point evaluated."""
     monkeypatch.setattr(search, "sample_hessian", curvature)
     monkeypatch.setattr(line, "sample_profile", profile)
     c, probe = cubic(np.random.default_rng(48), 1.0), (0.3, -0.2, -1.0)
     last = np.inf
-    for looks in range(1, 40):
-        best, left = search.descend_within_budget(*probe, 3.0, -2.0, float(looks), c)
+    for budget in range(1, 40):
+        best, left = search.descend_within_budget(*probe, 3.0, -2.0, float(budget), c)
         assert left >= 0.0
         assert best[2] <= last
         last = best[2]
-        short, rest = line.descend_within_budget(0.3, -1.0, 3.0, float(looks), c[:, 0])
-        assert rest >= 0.0
-        assert short[1] >= line.descend(0.3, -1.0, 3.0, c[:, 0])[1]
+        line_result, line_left = line.descend_within_budget(0.3, -1.0, 3.0, float(budget), c[:, 0])
+        assert line_left >= 0.0
+        assert line_result[1] >= line.descend(0.3, -1.0, 3.0, c[:, 0])[1]
     assert left > 0.0
     assert best == search.descend(*probe, 3.0, -2.0, c)
 
 
 def test_next_box_visits_every_box_once():
-    """Three levels down from the whole, from every side: 64 boxes, the nearest first."""
+    """Three levels deep, from every side: 64 boxes, the nearest first."""
     for u, v in itertools.product((0.1, 3.3, 7.9), repeat=2):
-        seen = []
+        visited = []
         level, side, i, j = 3, 8.0, 0, 0
         while level <= 3:
             if level == 0:
-                seen.append((i, j))
+                visited.append((i, j))
             level, side, i, j = search.next_box(level > 0, level, side, i, j, 3, u, v)
-        assert sorted(seen) == [(i, j) for i in range(8) for j in range(8)]
-        assert seen[0] == (int(v), int(u))
+        assert sorted(visited) == [(i, j) for i in range(8) for j in range(8)]
+        assert visited[0] == (int(v), int(u))

@@ -1,4 +1,4 @@
-"""Bounds of the second derivatives of a table, against hulls that are made of its values."""
+"""Bounds of the second derivatives of a tabulated potential, against hulls of its values."""
 
 from __future__ import annotations
 
@@ -12,39 +12,41 @@ from asperity.core.checks import FloatArray
 RNG = np.random.default_rng(32)
 
 
-def hull_of(c: FloatArray, cell: tuple[int, int, int], rates: FloatArray) -> FloatArray:
-    """Return the Bernstein coefficients (3, 3, 3, 3, 3) of Hess U on a cell, by values of U."""
+def bernstein_hull(c: FloatArray, cell: tuple[int, int, int], rates: FloatArray) -> FloatArray:
+    """Return the Bernstein coefficients (3, 3, 3, 3, 3) of Hess U on a cell, from values of U."""
     i, j, m = cell
-    t = np.array([-0.5, 0.0, 0.5])  # values there to coefficients: ends, and what is between
+    t = np.array([-0.5, 0.0, 0.5])  # converts values at these points to coefficients
     bernstein = np.array([[1.0, 0.0, 0.0], [-0.5, 2.0, -0.5], [0.0, 0.0, 1.0]])
     weights = [
         np.stack([0.5 * (0.5 - t) ** 2, 0.75 - t * t, 0.5 * (0.5 + t) ** 2]),
         np.stack([t - 0.5, -2.0 * t, t + 0.5]),
         np.outer([1.0, -2.0, 1.0], np.ones(3)),
     ]
-    flat = len(c) == 1
-    block = c[i : i + 1 if flat else i + 3, j : j + 3, m - 1 : m + 2]
-    across = [np.ones((1, 3)), np.zeros((1, 3)), np.zeros((1, 3))] if flat else weights
+    is_profile = len(c) == 1
+    block = c[i : i + 1 if is_profile else i + 3, j : j + 3, m - 1 : m + 2]
+    across_weights = (
+        [np.ones((1, 3)), np.zeros((1, 3)), np.zeros((1, 3))] if is_profile else weights
+    )
     hess = np.zeros((3, 3, 3, 3, 3))
     for r in range(3):
         for s in range(3):
             orders = [(r == axis) + (s == axis) for axis in range(3)]  # along u, v, w
-            parts = across[orders[1]], weights[orders[0]], weights[orders[2]]
+            parts = across_weights[orders[1]], weights[orders[0]], weights[orders[2]]
             values = np.einsum("ijk,ie,jf,kg->efg", block, *parts)
             hess[..., r, s] = np.einsum("efg,Ee,Ff,Gg->EFG", values, *[bernstein] * 3)
     return np.asarray(np.einsum("ra,efgrs,sb->efgab", rates, hess, rates))
 
 
 @pytest.mark.parametrize("rows", [1, 5])
-def test_bounds_of_a_hull_are_the_greatest_of_its_coefficients(rows: int) -> None:
-    """Of every cell that is not all outside, both signs; attained ones in the corners alone."""
-    c = -np.sort(-np.maximum(RNG.normal(size=(rows, 6, 5)), 0.0), axis=2)  # U falls along z
+def test_hull_bounds_are_the_greatest_bernstein_coefficients(rows: int) -> None:
+    """For both signs and every cell with contact; attained values only at the corners."""
+    c = -np.sort(-np.maximum(RNG.normal(size=(rows, 6, 5)), 0.0), axis=2)  # U decreases along z
     c[:, :, 3:] = 0.0
     c[:, :3, :] = 0.0
     rates = np.array([[2.0, 0.5, 0.0], [-0.3, 1.5, 0.0], [0.0, 0.0, 3.0]])
-    place = (c, 0.0, 0.0, 0.0, 2.0, 0.5, -0.3, 1.5, 3.0, True)
+    spline = (c, 0.0, 0.0, 0.0, 2.0, 0.5, -0.3, 1.5, 3.0, True)
     out = np.full((2, 5), np.nan)
-    hull.hull_batch(0, 4, out, table.PotentialSpline(*place))
+    hull.hull_batch(0, 4, out, table.PotentialSpline(*spline))
     lower: list[tuple[float, tuple[float, ...]]] = []
     upper = []
     for sign in (1.0, -1.0):
@@ -52,28 +54,30 @@ def test_bounds_of_a_hull_are_the_greatest_of_its_coefficients(rows: int) -> Non
         for i in range(max(rows - 2, 1)):
             for j in range(4):
                 for m in (1, 2, 3):
-                    tops = np.linalg.eigvalsh(sign * hull_of(c, (i, j, m), rates))[..., -1]
-                    best = max(best, float(tops.max()))
-                    ends = tops[:: 1 if rows == 1 else 2, ::2, ::2]
-                    e, f, g = np.unravel_index(int(ends.argmax()), ends.shape)
-                    at = (j + f - 0.5, 0.0 if rows == 1 else i + e - 0.5, m + g - 0.5)
-                    attained = max(attained, (float(ends.max()), at))
+                    eigenvalues = np.linalg.eigvalsh(sign * bernstein_hull(c, (i, j, m), rates))[
+                        ..., -1
+                    ]
+                    best = max(best, float(eigenvalues.max()))
+                    corners = eigenvalues[:: 1 if rows == 1 else 2, ::2, ::2]
+                    e, f, g = np.unravel_index(int(corners.argmax()), corners.shape)
+                    position = (j + f - 0.5, 0.0 if rows == 1 else i + e - 0.5, m + g - 0.5)
+                    attained = max(attained, (float(corners.max()), position))
         upper.append(best)
         lower.append(attained)
     np.testing.assert_allclose(out[:, 0], upper, rtol=3e-7)
     assert (out[:, 0] >= upper).all()
-    np.testing.assert_allclose(out[:, 1], [value for value, _at in lower], rtol=3e-7)
-    for found, (_value, at) in zip(out, lower, strict=True):
-        np.testing.assert_array_equal(found[2:], at)
+    np.testing.assert_allclose(out[:, 1], [value for value, _position in lower], rtol=3e-7)
+    for result, (_value, position) in zip(out, lower, strict=True):
+        np.testing.assert_array_equal(result[2:], position)
     assert (out[:, 0] > out[:, 1] * 1.001).any()
-    # Cells all of whose lowest nodes are outside, and those of other columns, are not looked at.
-    nothing = np.full((2, 5), np.nan)
-    hull.hull_batch(0, 1, nothing, table.PotentialSpline(*place))
-    assert not nothing[:, :2].any()
+    # Cells outside of contact and those of other columns are skipped.
+    empty = np.full((2, 5), np.nan)
+    hull.hull_batch(0, 1, empty, table.PotentialSpline(*spline))
+    assert not empty[:, :2].any()
 
 
-def test_a_bound_is_raised_and_never_lowered() -> None:
-    """By the matrix of a corner too, when what is attained is less than what bounds."""
+def test_raise_bound_never_lowers_a_bound() -> None:
+    """The matrix of a corner also raises the attained value and its position."""
     bound = np.array([5.0, 1.0, 7.0, 8.0, 9.0])
     matrix = (3.0, 0.0, 0.0, 2.0, 0.0, -1.0)
     hull.raise_bound(bound, False, matrix, (0.5, 1.5, 2.5))

@@ -1,4 +1,4 @@
-"""The parts of law H's solver as plain functions, each against linear algebra of its own."""
+"""The parts of law H's solver as plain functions, each against independent linear algebra."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from asperity.core.checks import FloatArray
 
 RNG = np.random.default_rng(31)
 MU = 0.4
-# A quadratic surface h = ax²/2 + bxy + cy²/2 + dx + ey, and where its height is asked.
+# Coefficients of a quadratic surface h = ax²/2 + bxy + cy²/2 + dx + ey.
 QUADRIC = (-0.3, 0.2, 0.15, 0.4, -0.25)
 
 
@@ -50,7 +50,7 @@ def surface(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(solver, "evaluation_cost", lambda _texture: 1.0)
 
 
-def some_atoms(count: int) -> FloatArray:
+def random_atoms(count: int) -> FloatArray:
     atoms = np.zeros((5, 4))
     atoms[:count, :3] = RNG.normal(size=(count, 3))
     weights = RNG.uniform(0.1, 1.0, count)
@@ -58,31 +58,31 @@ def some_atoms(count: int) -> FloatArray:
     return atoms
 
 
-def foot_of(y: FloatArray) -> FloatArray:
-    """Return the point with (w - y) along the normal, by Newton's method with differences."""
+def closest_point(y: FloatArray) -> FloatArray:
+    """Return the surface point whose normal passes through y, by Newton's method."""
 
-    def slope(at: FloatArray) -> FloatArray:
-        h, hx, hy = curvature(*at, None)[:3]
-        return np.array([at[0] - y[0] + (h - y[2]) * hx, at[1] - y[1] + (h - y[2]) * hy])
+    def slope(xy: FloatArray) -> FloatArray:
+        h, hx, hy = curvature(*xy, None)[:3]
+        return np.array([xy[0] - y[0] + (h - y[2]) * hx, xy[1] - y[1] + (h - y[2]) * hy])
 
-    at, step = y[:2].copy(), 1e-6
+    xy, step = y[:2].copy(), 1e-6
     for _ in range(60):
-        columns = [(slope(at + d) - slope(at - d)) / (2.0 * step) for d in step * np.eye(2)]
-        at = at - np.linalg.solve(np.column_stack(columns), slope(at))
-    return np.array([*at, height(*at, None)])
+        columns = [(slope(xy + d) - slope(xy - d)) / (2.0 * step) for d in step * np.eye(2)]
+        xy = xy - np.linalg.solve(np.column_stack(columns), slope(xy))
+    return np.array([*xy, height(*xy, None)])
 
 
 # --- conditions of optimality ---------------------------------------------------------------------
 
 
-def test_distances_and_energy_are_those_of_the_atoms() -> None:
+def test_distances_and_energy_of_atoms() -> None:
     for count in (1, 2, 4):
-        atoms, y, p = some_atoms(count), RNG.normal(size=3), RNG.normal(size=3)
+        atoms, y, p = random_atoms(count), RNG.normal(size=3), RNG.normal(size=3)
         w, weights = atoms[:count, :3], atoms[:count, 3]
         squares = ((w - y) ** 2).sum(axis=1)
         for i, j in combinations(range(count), 2):
-            found = conditions.split_distance_difference(atoms, i, j, y)
-            assert found == pytest.approx(0.5 * (squares[i] - squares[j]), rel=1e-12)
+            result = conditions.split_distance_difference(atoms, i, j, y)
+            assert result == pytest.approx(0.5 * (squares[i] - squares[j]), rel=1e-12)
         pull, mean = np.full(3, np.nan), weights @ w
         value = conditions.split_evaluate_energy(atoms, count, p, MU, pull)
         np.testing.assert_allclose(pull, mean - p, rtol=1e-12)
@@ -96,11 +96,11 @@ def test_distances_and_energy_are_those_of_the_atoms() -> None:
 
 
 @pytest.mark.parametrize("columns", [1, 3])
-def test_equations_are_solved_in_place(columns: int) -> None:
+def test_linear_equations_are_solved_in_place(columns: int) -> None:
     for n in (1, 3, 7):
         matrix, right = RNG.normal(size=(n, n)), RNG.normal(size=(n, columns))
         if n > 1:
-            matrix[0, 0] = 0.0  # a row has to be exchanged
+            matrix[0, 0] = 0.0  # requires a row exchange
         a = np.hstack([matrix, right, np.full((n, 1), 9.0)])
         assert conditions.split_solve_linear(a, n, n + columns)
         np.testing.assert_allclose(a[:, n:-1], np.linalg.solve(matrix, right), rtol=1e-9)
@@ -111,129 +111,139 @@ def test_equations_are_solved_in_place(columns: int) -> None:
 
 
 def residual(y: FloatArray, weights: FloatArray, w: FloatArray, p: FloatArray) -> FloatArray:
-    """The conditions of optimality, from the module's first lines."""
+    """Return the residual of the conditions of optimality, as in the module's docstring."""
     pull = (1.0 - MU) * (y - p) + MU * weights @ (w - p)
     squares = 0.5 * ((w - y) ** 2).sum(axis=1)
     return np.array([*pull, weights.sum() - 1.0, *(squares[1:] - squares[0])])
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])
-def test_the_system_is_the_conditions_linearised(count: int) -> None:
-    """Its columns are their differences, its right-hand side minus their residual."""
+def test_system_is_the_linearised_optimality_conditions(count: int) -> None:
+    """Its columns are differences of the residual, its right-hand side minus the residual."""
     n, a = 3 + count, np.full((7, 10), 9.0)
-    atoms, y, p = some_atoms(count), RNG.normal(size=3), RNG.normal(size=3)
-    atoms[:count, 3] *= 1.3  # not a mean yet
+    atoms, y, p = random_atoms(count), RNG.normal(size=3), RNG.normal(size=3)
+    atoms[:count, 3] *= 1.3  # not normalised yet
     conditions.split_assemble_system(atoms, count, p, y, MU, a)
     w, weights = atoms[:count, :3], atoms[:count, 3]
-    here = residual(y, weights, w, p)
-    np.testing.assert_allclose(a[:n, n], -here, rtol=1e-12, atol=1e-14)
+    residual_at_point = residual(y, weights, w, p)
+    np.testing.assert_allclose(a[:n, n], -residual_at_point, rtol=1e-12, atol=1e-14)
     for column in range(n):
         moved = np.zeros(n)
         moved[column] = 1.0
-        there = residual(y + moved[:3], weights + moved[3:], w, p)
-        # Affine but for |y|², which both squares of a difference have.
-        np.testing.assert_allclose(a[:n, column], there - here, rtol=1e-9, atol=1e-12)
+        moved_residual = residual(y + moved[:3], weights + moved[3:], w, p)
+        # Affine: the |y|² of both squared distances cancel.
+        np.testing.assert_allclose(
+            a[:n, column], moved_residual - residual_at_point, rtol=1e-9, atol=1e-12
+        )
 
 
-def test_feet_move_as_differences_say() -> None:
+def test_closest_derivative_agrees_with_differences() -> None:
     atoms, y = np.zeros((5, 4)), np.array([0.2, -0.1, -0.5])
-    atoms[0, :3], atoms[1, :3], atoms[:2, 3] = foot_of(y), foot_of(y), (0.3, 0.7)
-    out = np.full((3, 3), np.nan)
-    assert conditions.split_closest_derivative(y, atoms, 0, out, None)
+    atoms[0, :3], atoms[1, :3], atoms[:2, 3] = closest_point(y), closest_point(y), (0.3, 0.7)
+    derivative = np.full((3, 3), np.nan)
+    assert conditions.split_closest_derivative(y, atoms, 0, derivative, None)
     step = 1e-5
-    columns = [(foot_of(y + d) - foot_of(y - d)) / (2.0 * step) for d in step * np.eye(3)]
-    np.testing.assert_allclose(out, np.column_stack(columns), rtol=1e-6, atol=1e-9)
+    columns = [
+        (closest_point(y + d) - closest_point(y - d)) / (2.0 * step) for d in step * np.eye(3)
+    ]
+    np.testing.assert_allclose(derivative, np.column_stack(columns), rtol=1e-6, atol=1e-9)
     a = np.full((7, 10), 2.0)
     assert conditions.split_add_atom_motion(atoms, 2, y, MU, a, None)
-    np.testing.assert_allclose(a[:3, :3], 2.0 + MU * out, rtol=1e-12)
+    np.testing.assert_allclose(a[:3, :3], 2.0 + MU * derivative, rtol=1e-12)
     assert (a[3:] == 2.0).all()
     assert (a[:, 3:] == 2.0).all()
-    # Below the centre of curvature a stationary point is no minimum.
-    for depth, minimum in ((0.5, True), (30.0, False)):
+    # Below the centre of curvature a stationary point is not a minimum.
+    for depth, is_minimum in ((0.5, True), (30.0, False)):
         h, hx, hy = curvature(0.1, 0.1, None)[:3]
-        below = np.array([0.1 + depth * hx, 0.1 + depth * hy, h - depth])
+        deep_point = np.array([0.1 + depth * hx, 0.1 + depth * hy, h - depth])
         atoms[0, :3] = 0.1, 0.1, h
-        assert conditions.split_closest_derivative(below, atoms, 0, out, None) is minimum
-        assert solver.split_is_local_minimum(atoms, below, None) is minimum
+        assert (
+            conditions.split_closest_derivative(deep_point, atoms, 0, derivative, None)
+            is is_minimum
+        )
+        assert solver.split_is_local_minimum(atoms, deep_point, None) is is_minimum
 
 
-def test_a_foot_follows_its_point() -> None:
+def test_tracked_point_follows_its_probe() -> None:
     for shift in (0.0, 0.01, 0.2):
         y = np.array([0.2, -0.1, -0.5])
         atoms = np.zeros((5, 4))
-        atoms[1, :3] = foot_of(y)
+        atoms[1, :3] = closest_point(y)
         y = y + shift * np.array([1.0, -1.0, 0.5])
-        found, looks = conditions.split_track_point(y, atoms, 1, 25, None)
-        assert found
-        assert 1.0 <= looks <= (2.0 if shift == 0.0 else 8.0)
-        np.testing.assert_allclose(atoms[1, :3], foot_of(y), rtol=1e-10)
+        is_found, evaluations = conditions.split_track_point(y, atoms, 1, 25, None)
+        assert is_found
+        assert 1.0 <= evaluations <= (2.0 if shift == 0.0 else 8.0)
+        np.testing.assert_allclose(atoms[1, :3], closest_point(y), rtol=1e-10)
         assert not atoms[0].any()
-    away = []
-    for most in (1, 2, 3):
-        atoms[1, :3] = foot_of(np.array([0.2, -0.1, -0.5]))
-        assert conditions.split_track_point(y, atoms, 1, most, None) == (True, float(most))
-        away.append(float(np.linalg.norm(atoms[1, :3] - foot_of(y))))
-    assert 0.03 > away[0] > 3.0 * away[1] > 9.0 * away[2] > 0.0
+    errors = []
+    for max_steps in (1, 2, 3):
+        atoms[1, :3] = closest_point(np.array([0.2, -0.1, -0.5]))
+        assert conditions.split_track_point(y, atoms, 1, max_steps, None) == (
+            True,
+            float(max_steps),
+        )
+        errors.append(float(np.linalg.norm(atoms[1, :3] - closest_point(y))))
+    assert 0.03 > errors[0] > 3.0 * errors[1] > 9.0 * errors[2] > 0.0
     atoms[0, :2] = 0.1, 0.1
     h, hx, hy = curvature(0.1, 0.1, None)[:3]
-    below = np.array([0.1 + 30.0 * hx, 0.1 + 30.0 * hy, h - 30.0])
-    assert conditions.split_track_point(below, atoms, 0, 25, None) == (False, 1.0)
+    deep_point = np.array([0.1 + 30.0 * hx, 0.1 + 30.0 * hy, h - 30.0])
+    assert conditions.split_track_point(deep_point, atoms, 0, 25, None) == (False, 1.0)
     # Convex just above the first focal point, a saddle just below it.
     a, b, c = QUADRIC[:3]
     for depth in np.linspace(2.0, 4.0, 41):
         q = np.eye(2) + np.outer((hx, hy), (hx, hy)) + depth * np.array([[a, b], [b, c]])
-        below = np.array([0.1 + depth * hx, 0.1 + depth * hy, h - depth])
+        deep_point = np.array([0.1 + depth * hx, 0.1 + depth * hy, h - depth])
         atoms[0, :2] = 0.1, 0.1
-        minimum = bool(np.linalg.det(q) > 0.0)
-        assert conditions.split_track_point(below, atoms, 0, 25, None)[0] is minimum
+        is_minimum = bool(np.linalg.det(q) > 0.0)
+        assert conditions.split_track_point(deep_point, atoms, 0, 25, None)[0] is is_minimum
 
 
 # --- weights --------------------------------------------------------------------------------------
 
 
-def primal(weights: FloatArray, w: FloatArray, p: FloatArray) -> float:
+def primal_energy(weights: FloatArray, w: FloatArray, p: FloatArray) -> float:
     mean = weights @ w
     spread = (weights * ((w - mean) ** 2).sum(axis=1)).sum()
     return 0.5 * float(((mean - p) ** 2).sum() + (1.0 - MU) * spread)
 
 
-def optimum(w: FloatArray, p: FloatArray) -> FloatArray:
-    """Return the best weights: of every subset those where the energy does not change."""
-    best, least = np.zeros(len(w)), math.inf
+def optimal_weights(w: FloatArray, p: FloatArray) -> FloatArray:
+    """Return the best weights: over all subsets, those where the energy is stationary."""
+    best, lowest_energy = np.zeros(len(w)), math.inf
     subsets = [c for n in range(1, 5) for c in combinations(range(len(w)), n)]
     for rows in map(list, subsets):
-        away = w[rows] - p
+        offsets = w[rows] - p
         n = len(rows)
         equations = np.ones((n + 1, n + 1))
-        equations[:n, :n], equations[n, n] = MU * away @ away.T, 0.0
-        right = np.append(-0.5 * (1.0 - MU) * (away**2).sum(axis=1), 1.0)
+        equations[:n, :n], equations[n, n] = MU * offsets @ offsets.T, 0.0
+        right = np.append(-0.5 * (1.0 - MU) * (offsets**2).sum(axis=1), 1.0)
         weights = np.zeros(len(w))
         weights[rows] = np.linalg.lstsq(equations, right, rcond=None)[0][:n]
-        if weights.min() >= 0.0 and primal(weights, w, p) < least:
-            best, least = weights, primal(weights, w, p)
+        if weights.min() >= 0.0 and primal_energy(weights, w, p) < lowest_energy:
+            best, lowest_energy = weights, primal_energy(weights, w, p)
     return best
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5])
-def test_the_weights_are_the_best_there_are(count: int) -> None:
-    """Where the last atom has weight, as one that is nearer to y than the others has."""
-    tried = 0
+def test_weights_are_optimal(count: int) -> None:
+    """For cases in which the last atom has weight, as one nearer to y than the others does."""
+    case_count = 0
     for _ in range(40):
-        atoms, p, a = some_atoms(count), 0.7 * RNG.normal(size=3), np.zeros((7, 10))
+        atoms, p, a = random_atoms(count), 0.7 * RNG.normal(size=3), np.zeros((7, 10))
         w = atoms[:count, :3].copy()
-        expected = optimum(w, p)
+        expected = optimal_weights(w, p)
         if expected[-1] < 1e-3:
             continue
-        tried += 1
-        left = solver.split_solve_weights(atoms, count, p, MU, a)
+        case_count += 1
+        remaining = solver.split_solve_weights(atoms, count, p, MU, a)
         rows = np.flatnonzero(expected > 1e-9)
-        np.testing.assert_array_equal(atoms[:left, :3], w[rows])
-        np.testing.assert_allclose(atoms[:left, 3], expected[rows], rtol=1e-6)
-    assert tried >= 4
+        np.testing.assert_array_equal(atoms[:remaining, :3], w[rows])
+        np.testing.assert_allclose(atoms[:remaining, 3], expected[rows], rtol=1e-6)
+    assert case_count >= 4
 
 
-def test_a_subset_names_the_atoms_of_its_mask() -> None:
-    """Bit by bit, and always the last; nothing where a weight is not positive."""
+def test_subset_mask_selects_atoms() -> None:
+    """One bit per atom, the last one always; no result where a weight is not positive."""
     atoms, a = np.zeros((5, 4)), np.zeros((7, 10))
     atoms[:3, :3] = [[1.0, 0.0, 0.0], [-0.5, 0.8, 0.0], [-0.5, -0.8, 0.0]]
     p, trial, y = np.array([0.0, 0.0, -1.0]), np.zeros((4, 4)), np.zeros(3)
@@ -246,21 +256,21 @@ def test_a_subset_names_the_atoms_of_its_mask() -> None:
     assert solver.split_solve_subset(atoms, 3, 0b11, outside, MU, a, trial, y) == 0
 
 
-def test_a_step_drops_what_has_no_weight() -> None:
-    atoms, a, y = some_atoms(3), np.zeros((7, 10)), np.array([1.0, 2.0, 3.0])
+def test_step_drops_atoms_without_weight() -> None:
+    atoms, a, y = random_atoms(3), np.zeros((7, 10)), np.array([1.0, 2.0, 3.0])
     atoms[:3, 3] = 0.2, 0.3, 0.5
     before = atoms.copy()
     a[:6, 6] = 0.1, -0.2, 0.3, 0.05, -0.3, 0.1
-    left, size = solver.split_apply_step(atoms, 3, y, a)
-    assert (left, size) == (2, pytest.approx(0.14, rel=1e-12))
+    remaining, size = solver.split_apply_step(atoms, 3, y, a)
+    assert (remaining, size) == (2, pytest.approx(0.14, rel=1e-12))
     np.testing.assert_allclose(y, [1.1, 1.8, 3.3], rtol=1e-12)
     np.testing.assert_array_equal(atoms[:2, :3], before[[0, 2], :3])
     np.testing.assert_allclose(atoms[:2, 3], [0.25, 0.6], rtol=1e-12)
 
 
-def test_gaps_between_primal_and_dual() -> None:
-    """(1 - μ) Σ λ_i (|w_i - y|² - |w - y|²)/2, and (1 - μ) (d² - (d - g)²)/2 for a doubt."""
-    atoms, y = some_atoms(3), RNG.normal(size=3)
+def test_duality_gap_and_query_error() -> None:
+    """(1 - μ) Σ λ_i (|w_i - y|² - |w - y|²)/2, and (1 - μ) (d² - (d - g)²)/2 for an error g."""
+    atoms, y = random_atoms(3), RNG.normal(size=3)
     for scale in (1.0, -1.0):
         atoms[3, :3] = y + scale * np.array([0.01, 0.02, -0.02])
         squares = ((atoms[:4, :3] - y) ** 2).sum(axis=1)
@@ -271,29 +281,29 @@ def test_gaps_between_primal_and_dual() -> None:
     atoms[3, :3] = y + 100.0
     assert solver.split_duality_gap(atoms, 3, y, MU, 0.0)[0] == 0.0
     distance = 100.0 * math.sqrt(3.0)
-    doubt = solver.split_query_error(atoms, 3, y, MU, 5.0)
-    assert doubt == pytest.approx(0.5 * (1.0 - MU) * (distance**2 - (distance - 5.0) ** 2))
+    error = solver.split_query_error(atoms, 3, y, MU, 5.0)
+    assert error == pytest.approx(0.5 * (1.0 - MU) * (distance**2 - (distance - 5.0) ** 2))
 
 
-# --- hulls of tables ------------------------------------------------------------------------------
+# --- hulls of tabulated potentials ----------------------------------------------------------------
 
 
-def test_bernstein_coefficients_are_those_of_the_spline() -> None:
-    """Of c0 (½ - t)²/2·… on the middle cell: Σ b_i B_i(u) is the spline and its derivatives."""
+def test_bernstein_coefficients_reproduce_the_spline() -> None:
+    """On the middle cell Σ b_i B_i(u) is the quadratic spline, and for its derivatives."""
     c0, c1, c2 = RNG.normal(size=3)
     u = np.linspace(0.0, 1.0, 7)
     basis = np.stack([(1 - u) ** 2, 2 * u * (1 - u), u * u])
     spline = 0.5 * (c0 * (1 - u) ** 2 + c1 * (1 + 2 * u - 2 * u * u) + c2 * u * u)
     slope = c0 * (u - 1) + c1 * (1 - 2 * u) + c2 * u
     for order, expected in enumerate((spline, slope, np.full(7, c0 - 2 * c1 + c2))):
-        found = (
+        result = (
             np.array([hull.bernstein_coefficient(c0, c1, c2, order, i) for i in range(3)]) @ basis
         )
-        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14)
+        np.testing.assert_allclose(result, expected, rtol=1e-12, atol=1e-14)
 
 
-def test_the_weights_of_a_table_are_those_of_the_spline() -> None:
-    """Of the middle node and its neighbours, and their derivatives; a straight line below."""
+def test_spline_weights_and_their_derivatives() -> None:
+    """For the middle node and its neighbours; below the table the potential is linear."""
     for t in (-0.5, -0.2, 0.0, 0.37, 0.5):
         weights, slopes = (
             np.array(table.quadratic_weights(t)),
@@ -306,15 +316,15 @@ def test_the_weights_of_a_table_are_those_of_the_spline() -> None:
         assert slopes @ [-1.0, 0.0, 1.0] == pytest.approx(1.0, rel=1e-15)
         assert slopes @ [1.0, 0.0, 1.0] == pytest.approx(2.0 * t, abs=1e-15)
     for w, node in ((0.5, 1), (1.49, 1), (1.51, 2), (7.2, 7)):
-        m, below, weights, slopes = table.potential_z_weights(w)
-        assert (m, below) == (node, 0.0)
+        m, distance_below, weights, slopes = table.potential_z_weights(w)
+        assert (m, distance_below) == (node, 0.0)
         assert (weights, slopes) == (
             table.quadratic_weights(w - node),
             table.quadratic_weight_slopes(w - node),
         )
     for w in (0.4, -3.0):
-        m, below, weights, slopes = table.potential_z_weights(w)
-        assert (m, below) == (1, w - 0.5)
+        m, distance_below, weights, slopes = table.potential_z_weights(w)
+        assert (m, distance_below) == (1, w - 0.5)
         assert np.array(weights) @ [0.0, 1.0, 2.0] == pytest.approx(w, rel=1e-14)
         assert slopes == (-1.0, 1.0, 0.0)
 
@@ -326,41 +336,43 @@ def test_eigenvalues_and_pivots_agree_with_lapack() -> None:
         entries = m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]
         top = float(np.linalg.eigvalsh(m)[-1])
         assert hull.largest_eigenvalue_3x3(*entries) == pytest.approx(top, rel=1e-7)
-        for part, below in ((1e-6, True), (-1e-6, False), (-2.0, False), (5.0, True)):
-            assert hull.eigenvalues_below(top + part * (1.0 + abs(top)), *entries) == below
+        for margin, is_below in ((1e-6, True), (-1e-6, False), (-2.0, False), (5.0, True)):
+            assert hull.eigenvalues_below(top + margin * (1.0 + abs(top)), *entries) == is_below
     assert hull.largest_eigenvalue_3x3(2.0, 0.0, 0.0, 2.0, 0.0, 2.0) == 2.0
     diagonal: Any = (1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
     assert not hull.eigenvalues_below(1.0, *diagonal)
     assert not hull.eigenvalues_below(1.5, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0)
 
 
-# --- what is asked of the solver ------------------------------------------------------------------
+# --- calls of the solver --------------------------------------------------------------------------
 
 
-def solved(count: int, gap: float, *, short: bool) -> Any:
-    """Return a solver that finds random atoms, and notes what it was told."""
-    found, pull, told = some_atoms(max(count, 1)), RNG.normal(size=3), []
+def stand_in_solver(count: int, gap: float, *, truncated: bool) -> Any:
+    """Return a solver that finds random atoms, and the list of its calls."""
+    atoms_found, pull, calls = random_atoms(max(count, 1)), RNG.normal(size=3), []
 
-    def split_atoms(x: float, y: float, z: float, *given: Any) -> Any:
-        continuity, known, budget, p, atoms, out, texture = given
-        told.append((x, y, z, continuity, int(known), budget, atoms[:known].copy(), texture))
-        p[:], atoms[:], out[:] = (x, y, z), found, pull
-        return count, gap, 17.0, short
+    def split_atoms(x: float, y: float, z: float, *arguments: Any) -> Any:
+        continuity, known, budget, p, atoms, out, texture = arguments
+        calls.append((x, y, z, continuity, int(known), budget, atoms[:known].copy(), texture))
+        p[:], atoms[:], out[:] = (x, y, z), atoms_found, pull
+        return count, gap, 17.0, truncated
 
-    return split_atoms, found, pull, told
+    return split_atoms, atoms_found, pull, calls
 
 
-@pytest.mark.parametrize(("known", "count", "short"), [(0, 1, False), (2, 4, True), (4, 3, True)])
-def test_a_tick_goes_on_from_the_atoms_of_the_last(
-    known: int, count: int, short: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("known", "count", "truncated"), [(0, 1, False), (2, 4, True), (4, 3, True)]
+)
+def test_warm_start_uses_and_stores_atoms(
+    known: int, count: int, truncated: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    split_atoms, found, pull, told = solved(count, 0.02, short=short)
+    split_atoms, atoms_found, pull, calls = stand_in_solver(count, 0.02, truncated=truncated)
     monkeypatch.setattr(answers, "split_compute_atoms", split_atoms)
     memory = np.arange(100.0, 100.0 + WARM_START_SIZE)
     memory[[BUDGET, POINT_COUNT, TRUNCATED_TICKS]] = 55.0, known, 3.0
     before = memory.copy()
     assert answers.split_contact_warm(0.1, 0.2, 0.3, 1.5, memory, "texture") == tuple(pull)
-    ((*numbers, atoms, texture),) = told
+    ((*numbers, atoms, texture),) = calls
     assert (numbers, texture) == ([0.1, 0.2, 0.3, 1.5, known, 55.0], "texture")
     np.testing.assert_array_equal(
         atoms, before[FIRST_POINT : FIRST_POINT + 4 * known].reshape(known, 4)
@@ -368,66 +380,72 @@ def test_a_tick_goes_on_from_the_atoms_of_the_last(
     assert (memory[POINT_COUNT], memory[EVALUATIONS], memory[TRUNCATED_TICKS]) == (
         count,
         17.0,
-        4.0 if short else 3.0,
+        4.0 if truncated else 3.0,
     )
-    kept = memory[FIRST_POINT : FIRST_POINT + 4 * count].reshape(count, 4)
-    np.testing.assert_array_equal(kept, found[:count])
+    stored = memory[FIRST_POINT : FIRST_POINT + 4 * count].reshape(count, 4)
+    np.testing.assert_array_equal(stored, atoms_found[:count])
     np.testing.assert_array_equal(
         memory[FIRST_POINT + 4 * count :], before[FIRST_POINT + 4 * count :]
     )
-    expected = math.sqrt(2.0 * 2.5 * 0.02) if short else 0.0
+    expected = math.sqrt(2.0 * 2.5 * 0.02) if truncated else 0.0
     assert memory[ERROR_BOUND] == pytest.approx(expected, rel=1e-15)
 
 
 @pytest.mark.parametrize("count", [1, 3])
-def test_answers_are_those_of_the_atoms(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """From nothing and without a budget; U of the atoms, and points outside have none."""
-    split_atoms, found, pull, told = solved(count, 0.02, short=False)
+def test_contact_and_energy_follow_from_the_atoms(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without warm start and budget; U is zero for points outside."""
+    split_atoms, atoms_found, pull, calls = stand_in_solver(count, 0.02, truncated=False)
     monkeypatch.setattr(answers, "split_compute_atoms", split_atoms)
     monkeypatch.setattr(answers, "sample_height", height)
     assert answers.split_contact(0.1, 0.2, -0.3, 1.5, None) == tuple(pull)
     value, atoms, gap = answers.split_energy(0.1, 0.2, -0.3, 1.5, None)
-    weights = found[:count, 3]
-    away = found[:count, :3] - [0.1, 0.2, -0.3]
-    mean = weights @ away
-    spread = float((weights * ((away - mean) ** 2).sum(axis=1)).sum())
+    weights = atoms_found[:count, 3]
+    offsets = atoms_found[:count, :3] - [0.1, 0.2, -0.3]
+    mean = weights @ offsets
+    spread = float((weights * ((offsets - mean) ** 2).sum(axis=1)).sum())
     assert value == pytest.approx(0.5 * (float(mean @ mean) + 0.6 * spread), rel=1e-12)
     assert (atoms, gap) == (count, 0.02)
-    assert all(one[:6] == (0.1, 0.2, -0.3, 1.5, 0, UNLIMITED) for one in told)
+    assert all(call[:6] == (0.1, 0.2, -0.3, 1.5, 0, UNLIMITED) for call in calls)
     points = np.array([[0.1, 0.2, -0.3], [0.1, 0.2, 0.9], [0.1, 0.2, height(0.1, 0.2, None)]])
     out = np.full((3, 3), np.nan)
     answers.split_batch(points, out, 1.5, None)
     np.testing.assert_allclose(out, [[value, count, gap], [0.0] * 3, [0.0] * 3], rtol=1e-12)
 
 
-def test_one_atom_moves_as_a_foot_does() -> None:
-    """∂(z̄ - p)/∂p is that of the foot less the probe's own; nothing where it is no minimum."""
+def test_derivative_with_one_atom_is_that_of_the_closest_point() -> None:
+    """∂(z̄ - p)/∂p is the closest point's derivative minus identity; zero at a non-minimum."""
     y = np.array([0.2, -0.1, -0.5])
-    atoms, m = np.zeros((5, 4)), np.full((3, 3), np.nan)
-    atoms[0] = [*foot_of(y), 1.0]
+    atoms, derivative = np.zeros((5, 4)), np.full((3, 3), np.nan)
+    atoms[0] = [*closest_point(y), 1.0]
     pull = atoms[0, :3] - y
     step = 1e-5
-    moved = [(foot_of(y + d) - foot_of(y - d)) / (2.0 * step) for d in step * np.eye(3)]
-    answers.split_contact_derivative(y, 1.5, atoms, 1, pull, m, None)
-    np.testing.assert_allclose(m, np.column_stack(moved) - np.eye(3), rtol=1e-6, atol=1e-9)
+    columns = [
+        (closest_point(y + d) - closest_point(y - d)) / (2.0 * step) for d in step * np.eye(3)
+    ]
+    answers.split_contact_derivative(y, 1.5, atoms, 1, pull, derivative, None)
+    np.testing.assert_allclose(
+        derivative, np.column_stack(columns) - np.eye(3), rtol=1e-6, atol=1e-9
+    )
     h, hx, hy = curvature(0.1, 0.1, None)[:3]
-    below = np.array([0.1 + 30.0 * hx, 0.1 + 30.0 * hy, h - 30.0])
+    deep_point = np.array([0.1 + 30.0 * hx, 0.1 + 30.0 * hy, h - 30.0])
     atoms[0] = [0.1, 0.1, h, 1.0]
-    answers.split_contact_derivative(below, 1.5, atoms, 1, pull, m, None)
-    assert not m.any()
+    answers.split_contact_derivative(deep_point, 1.5, atoms, 1, pull, derivative, None)
+    assert not derivative.any()
 
 
-def test_polishing_ends_with_its_looks_or_with_a_foot_that_is_lost() -> None:
-    """Two feet that are far from theirs: each follows in several looks, then both are moved."""
+def test_newton_ends_with_its_budget_or_a_lost_point() -> None:
+    """Two atoms far from their closest points take several evaluations each."""
     y, p, a = np.array([0.2, -0.1, -0.5]), np.array([0.2, -0.1, -0.9]), np.zeros((7, 10))
     for budget in (0.0, 3.0, 5.0):
-        atoms = some_atoms(2)
+        atoms = random_atoms(2)
         atoms[:2, :2] = [[0.6, 0.3], [-0.4, -0.3]]
-        left, looks = solver.split_newton(atoms, 2, p, y.copy(), MU, a, budget, None)
-        assert left == 0
-        assert budget < looks <= budget + 8.0
+        count, evaluations = solver.split_newton(atoms, 2, p, y.copy(), MU, a, budget, None)
+        assert count == 0
+        assert budget < evaluations <= budget + 8.0
     h, hx, hy = curvature(0.1, 0.1, None)[:3]
-    below = np.array([0.1 + 30.0 * hx, 0.1 + 30.0 * hy, h - 30.0])
-    atoms = some_atoms(2)
+    deep_point = np.array([0.1 + 30.0 * hx, 0.1 + 30.0 * hy, h - 30.0])
+    atoms = random_atoms(2)
     atoms[0, :2] = 0.1, 0.1
-    assert solver.split_newton(atoms, 2, p, below, MU, a, UNLIMITED, None) == (0, 1.0)
+    assert solver.split_newton(atoms, 2, p, deep_point, MU, a, UNLIMITED, None) == (0, 1.0)

@@ -1,4 +1,4 @@
-"""What the parts of law H's solver ask of each other, and what they make of the answers."""
+"""The solver of law H: what its parts request from each other and do with the results."""
 
 from __future__ import annotations
 
@@ -16,114 +16,114 @@ P, Y = np.array([0.1, 0.2, -0.9]), np.array([0.3, -0.2, -0.5])
 C = 1.5
 
 
-def some_atoms(count: int) -> FloatArray:
+def random_atoms(count: int) -> FloatArray:
     atoms = np.zeros((5, 4))
     atoms[:count, :3] = RNG.normal(size=(count, 3))
     atoms[:count, 3] = RNG.dirichlet(np.ones(count))
     return atoms
 
 
-def value_of(atoms: FloatArray, count: int) -> tuple[float, FloatArray]:
-    """Return the energy of atoms at P, and the vector to their mean."""
-    mu, weights, away = 1.0 / (1.0 + C), atoms[:count, 3], atoms[:count, :3] - P
-    mean = weights @ away
-    spread = float((weights * ((away - mean) ** 2).sum(axis=1)).sum())
+def energy_and_pull(atoms: FloatArray, count: int) -> tuple[float, FloatArray]:
+    """Return the energy of atoms at P, and the vector from P to their mean."""
+    mu, weights, offsets = 1.0 / (1.0 + C), atoms[:count, 3], atoms[:count, :3] - P
+    mean = weights @ offsets
+    spread = float((weights * ((offsets - mean) ** 2).sum(axis=1)).sum())
     return 0.5 * (float(mean @ mean) + (1.0 - mu) * spread), mean
 
 
 @pytest.mark.parametrize("row", [0, 2])
-def test_a_query_writes_the_nearest_free_point(row: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The point itself where it is free; else a foot, searched from the first atom or above it."""
-    told: list[Any] = []
+def test_query_writes_the_closest_free_point(row: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A free point itself; otherwise the closest point, searched from the first atom or above."""
+    calls: list[Any] = []
 
-    def foot_within(*given: Any) -> Any:
-        told.append(given)
+    def search(*arguments: Any) -> Any:
+        calls.append(arguments)
         return 0.7, 0.8, 9.0, 9.0, 9.0, 0.05, 21.0
 
-    monkeypatch.setattr(solver, "closest_point_within_budget", foot_within)
+    monkeypatch.setattr(solver, "closest_point_within_budget", search)
     monkeypatch.setattr(solver, "evaluation_cost", lambda _texture: 1.0)
-    for height, free in ((-0.5, True), (-0.4, False)):
+    for height, is_free in ((-0.5, True), (-0.4, False)):
         monkeypatch.setattr(
             solver, "sample_height", lambda x, y, _t, h=height: h + (x - 0.3) - (y + 0.2)
         )
-        atoms = some_atoms(4)
+        atoms = random_atoms(4)
         before = atoms.copy()
-        gap, looks = solver.split_query(Y, atoms, row, 40.0, "texture")
-        if free:
-            assert (gap, looks, told) == (0.0, 1.0, [])
+        error, evaluations = solver.split_query(Y, atoms, row, 40.0, "texture")
+        if is_free:
+            assert (error, evaluations, calls) == (0.0, 1.0, [])
             np.testing.assert_array_equal(atoms[row], [*Y, 0.0])
         else:
             start = tuple(before[0, :2]) if row else tuple(Y[:2])
-            assert (gap, looks) == (0.05, 21.0)
-            assert told == [(*Y, *start, 40.0, "texture")]
+            assert (error, evaluations) == (0.05, 21.0)
+            assert calls == [(*Y, *start, 40.0, "texture")]
             np.testing.assert_allclose(atoms[row], [0.7, 0.8, -0.4 + 0.4 - 1.0, 0.0], rtol=1e-15)
         others = [i for i in range(5) if i != row]
         np.testing.assert_array_equal(atoms[others], before[others])
 
 
 @pytest.mark.parametrize(
-    ("left", "nearer", "kept"),
+    ("count_left", "progress", "accepted"),
     [(2, 0.1, True), (2, 0.0, True), (2, -0.1, False), (1, 0.1, True), (0, 0.1, False)],
 )
-def test_a_polish_that_does_not_help_is_taken_back(
-    left: int, nearer: float, kept: bool, monkeypatch: pytest.MonkeyPatch
+def test_newton_step_is_accepted_unless_the_energy_rises(
+    count_left: int, progress: float, accepted: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Equal energies are kept; where it is not kept atoms and y are as they were."""
+    """Equal energies are accepted; a rejected step restores the atoms and y."""
 
-    def split_polish(
+    def split_newton(
         atoms: FloatArray, count: int, p: FloatArray, y: FloatArray, *rest: Any
     ) -> Any:
         assert (count, rest[2:]) == (2, (40.0, "texture"))
         np.testing.assert_array_equal(p, P)
-        atoms[:2, :3] += nearer * (P - atoms[:2, :3])
-        atoms[0, 3] += 1.0 if left == 1 else 0.0
+        atoms[:2, :3] += progress * (P - atoms[:2, :3])
+        atoms[0, 3] += 1.0 if count_left == 1 else 0.0
         y += 1.0
-        return left, 13.0
+        return count_left, 13.0
 
-    monkeypatch.setattr(solver, "split_newton", split_polish)
-    atoms, y = some_atoms(2), Y.copy()
-    if left == 1:
+    monkeypatch.setattr(solver, "split_newton", split_newton)
+    atoms, y = random_atoms(2), Y.copy()
+    if count_left == 1:
         atoms[:2] = [[*(P + 0.2), 0.0], [*(P + 0.9), 1.0]]
     before = atoms.copy()
     mu, a = 1.0 / (1.0 + C), np.zeros((7, 10))
-    found = solver.split_try_newton(atoms, 2, P, y, mu, a, 40.0, "texture")
-    assert found == (left if kept else 0, 13.0)
-    np.testing.assert_array_equal(y, Y + 1.0 if kept else Y)
-    if not kept:
+    result = solver.split_try_newton(atoms, 2, P, y, mu, a, 40.0, "texture")
+    assert result == (count_left if accepted else 0, 13.0)
+    np.testing.assert_array_equal(y, Y + 1.0 if accepted else Y)
+    if not accepted:
         np.testing.assert_array_equal(atoms, before)
 
 
-def test_a_polish_may_raise_the_energy_by_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
-    for units, kept in ((40.0, 3), (45.0, 3), (50.0, 0)):
+def test_newton_step_may_raise_the_energy_by_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
+    for units, count in ((40.0, 3), (45.0, 3), (50.0, 0)):
         values = iter([2.0, 2.0 * (1.0 + units * EPS)])
         monkeypatch.setattr(
-            solver, "split_evaluate_energy", lambda *_given, values=values: next(values)
+            solver, "split_evaluate_energy", lambda *_arguments, values=values: next(values)
         )
-        monkeypatch.setattr(solver, "split_newton", lambda *_given: (3, 5.0))
-        args: Any = (some_atoms(3), 3, P, Y.copy(), 0.4, np.zeros((7, 10)), 40.0, None)
-        assert solver.split_try_newton(*args)[0] == kept
+        monkeypatch.setattr(solver, "split_newton", lambda *_arguments: (3, 5.0))
+        args: Any = (random_atoms(3), 3, P, Y.copy(), 0.4, np.zeros((7, 10)), 40.0, None)
+        assert solver.split_try_newton(*args)[0] == count
 
 
 @pytest.mark.parametrize(("count", "solved"), [(1, 0), (3, 0), (3, 2)])
-def test_y_follows_from_the_mean_or_the_mean_from_y(
+def test_dual_point_and_mean_follow_from_each_other(
     count: int, solved: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told: list[Any] = []
+    calls: list[Any] = []
 
-    def split_try_polish(*given: Any) -> Any:
-        told.append(given[1:2] + given[4:5] + given[6:])
+    def split_try_newton(*arguments: Any) -> Any:
+        calls.append(arguments[1:2] + arguments[4:5] + arguments[6:])
         if solved:
-            given[3][:] = Y
+            arguments[3][:] = Y
         return solved, 7.0
 
-    monkeypatch.setattr(solver, "split_try_newton", split_try_polish)
-    atoms, y, pull = some_atoms(count), np.full(3, np.nan), np.full(3, np.nan)
-    mean = value_of(atoms, count)[1]
-    found = solver.split_update_dual(
+    monkeypatch.setattr(solver, "split_try_newton", split_try_newton)
+    atoms, y, pull = random_atoms(count), np.full(3, np.nan), np.full(3, np.nan)
+    mean = energy_and_pull(atoms, count)[1]
+    result = solver.split_update_dual(
         atoms, count, P, y, pull, C, np.zeros((7, 10)), 40.0, "texture"
     )
-    assert found == (solved, 7.0 if count > 1 else 0.0)
-    assert told == ([(count, pytest.approx(0.4), 40.0, "texture")] if count > 1 else [])
+    assert result == (solved, 7.0 if count > 1 else 0.0)
+    assert calls == ([(count, pytest.approx(0.4), 40.0, "texture")] if count > 1 else [])
     if solved:
         np.testing.assert_array_equal(y, Y)
         np.testing.assert_allclose(pull, C * (P - Y), rtol=1e-15)
@@ -133,7 +133,7 @@ def test_y_follows_from_the_mean_or_the_mean_from_y(
 
 
 @pytest.mark.parametrize(
-    ("known", "works", "asked", "answer"),
+    ("known", "succeeds", "expected_calls", "expected"),
     [
         (0, True, ["query", "settle 1"], (1, 0, 9.0)),
         (1, True, ["follow", "settle 1"], (1, 0, 4.0)),
@@ -143,49 +143,51 @@ def test_y_follows_from_the_mean_or_the_mean_from_y(
         (2, True, ["weights 2", "settle 2"], (2, 2, 6.0)),
     ],
 )
-def test_a_search_begins_with_what_is_known(
-    known: int, works: bool, asked: list[str], answer: tuple[float, ...],
+def test_initialization_from_known_atoms(
+    known: int, succeeds: bool, expected_calls: list[str], expected: tuple[float, ...],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    """Atoms of a probe nearby, moved; one foot that follows; else the nearest point.
+    """Moved atoms of a nearby probe; one tracked point; otherwise the closest point.
 
-    Several have the weights that are best where they are, if all are positive: here, those of two.
+    Several atoms get optimal weights if all of these are positive, which here holds for two.
     """
-    told: list[str] = []
+    calls: list[str] = []
 
-    def subset(given: Any, count: int, mask: int, p: Any, mu: float, *rest: Any) -> int:
-        told.append(f"weights {count}")
+    def solve_subset(candidates: Any, count: int, mask: int, p: Any, mu: float, *rest: Any) -> int:
+        calls.append(f"weights {count}")
         assert (mask, mu, tuple(p)) == (2**count - 1, 1.0 / (1.0 + C), tuple(P))
-        rest[1][:] = given[:4]
+        rest[1][:] = candidates[:4]
         rest[1][:count, 3] = 0.5
         return count if count == 2 else 0
 
-    def settle(_atoms: Any, count: int, p: Any, _y: Any, _pull: Any, c: float, *rest: Any) -> Any:
-        told.append(f"settle {int(count)}")
+    def update_dual(
+        _atoms: Any, count: int, p: Any, _y: Any, _pull: Any, c: float, *rest: Any
+    ) -> Any:
+        calls.append(f"settle {int(count)}")
         assert (tuple(p), c) == (tuple(P), C)
         assert rest[1:] == (10.0 if count > 1 else 0.0, "texture")
-        return (2 if works else 0, 6.0) if count > 1 else (0, 50.0)
+        return (2 if succeeds else 0, 6.0) if count > 1 else (0, 50.0)
 
-    def follow(p: Any, _atoms: Any, row: int, most: int, _texture: Any) -> Any:
-        told.append("follow")
+    def track_point(p: Any, _atoms: Any, row: int, most: int, _texture: Any) -> Any:
+        calls.append("follow")
         assert (tuple(p), row, most) == (tuple(P), 0, 25)
-        return works, 4.0
+        return succeeds, 4.0
 
     def query(p: Any, _atoms: Any, row: int, budget: float, _texture: Any) -> Any:
-        told.append("query")
+        calls.append("query")
         assert (tuple(p), row, budget) == (tuple(P), 0, 40.0)
         return 0.0, 9.0
 
-    asking = (
-        ("update_dual", settle), ("track_point", follow), ("query", query),
-        ("solve_subset", subset),
+    stand_ins = (
+        ("update_dual", update_dual), ("track_point", track_point), ("query", query),
+        ("solve_subset", solve_subset),
     )  # fmt: skip
-    for name, function in asking:
+    for name, function in stand_ins:
         monkeypatch.setattr(solver, f"split_{name}", function)
-    atoms, y, pull = some_atoms(4), np.zeros(3), np.zeros(3)
+    atoms, y, pull = random_atoms(4), np.zeros(3), np.zeros(3)
     weight = 0.5 if known == 2 else atoms[0, 3]
     a = np.zeros((7, 10))
-    found = solver.split_initialize(atoms, known, P, y, pull, C, a, 40.0, "texture")
-    assert found == answer
-    assert told == asked
-    assert atoms[0, 3] == (1.0 if asked[-1] == "settle 1" else weight)
+    result = solver.split_initialize(atoms, known, P, y, pull, C, a, 40.0, "texture")
+    assert result == expected
+    assert calls == expected_calls
+    assert atoms[0, 3] == (1.0 if expected_calls[-1] == "settle 1" else weight)
