@@ -1,4 +1,4 @@
-"""What the tests of commands share: the program as it is called, in this process."""
+"""Fixtures of the command-line tests: the program, run in the test process."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ def call(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> Call:
-    """Return a function that runs the program and returns exit code, output and errors.
+    """Return a function that runs the program and returns exit code, stdout and stderr.
 
-    A module whose tests are all of one command names it, COMMAND = "limits", and one whose tests
-    need a terminal of another width than usual says so: WIDTH = 120.
+    A test module may set COMMAND = "limits" to run one command in every call, and WIDTH = 120
+    to set the width of the terminal.
     """
-    usual = getattr(request.module, "WIDTH", None)
+    default_width = getattr(request.module, "WIDTH", None)
     command = [request.module.COMMAND] if hasattr(request.module, "COMMAND") else []
 
-    def run(*arguments: str, width: int | None = usual) -> tuple[int, str, str]:
+    def run(*arguments: str, width: int | None = default_width) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["asperity", *command, *arguments])
         if width is not None:
             monkeypatch.setenv("COLUMNS", str(width))

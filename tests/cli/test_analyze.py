@@ -1,4 +1,4 @@
-"""``asperity analyze`` as its users see it."""
+"""Output, options and errors of ``asperity analyze``."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def code_of(out: str) -> list[str]:
 
 @pytest.mark.parametrize("width", [80, 100, 120])
 @pytest.mark.parametrize("law", ["B", "D", "F"])
-def test_the_answer_fits_the_terminal(call: Call, width: int, law: str) -> None:
+def test_output_fits_the_terminal_width(call: Call, width: int, law: str) -> None:
     code, out, err = call(SPEC, "--law", law, "--device", "pantograph", width=width)
     assert (code, err) == (0, "")
     body = out.replace("\n".join(code_of(out)), "")
@@ -48,7 +48,7 @@ def test_the_answer_fits_the_terminal(call: Call, width: int, law: str) -> None:
     assert "…" not in out
 
 
-def test_every_number_has_both_ends_a_method_and_a_place(call: Call) -> None:
+def test_q_has_both_bounds_a_method_and_a_location(call: Call) -> None:
     """For A q is √(1 + (2πA/l)²) = 1.60597, attained where the height is steepest."""
     _code, out, _err = call(SPEC, "--law", "A", "--device", "pantograph")
     row = next(line for line in out.splitlines() if re.match(r"q +\d", line))
@@ -59,18 +59,18 @@ def test_every_number_has_both_ends_a_method_and_a_place(call: Call) -> None:
     assert re.search(r"\(-?0\.?5?, 0, .*\) mm", row)
 
 
-def test_the_deciding_criterion_is_marked_and_the_open_ones_say_why(call: Call) -> None:
+def test_deciding_criterion_is_marked_and_undecided_ones_give_a_reason(call: Call) -> None:
     _code, out, _err = call(SPEC, "--law", "A", "--device", "omega.3")
     marked = [line for line in out.splitlines() if line.startswith("→")]
     assert len(marked) == 1
     assert marked[0].split()[1] == "leak"
-    said = " ".join(out.split())
-    assert "paper (1) not decidable: needs damping" in said
-    assert "not applicable: the law is not conservative" in said
-    assert "v* not decidable: needs damping" in said
+    text = " ".join(out.split())
+    assert "paper (1) not decidable: needs damping" in text
+    assert "not applicable: the law is not conservative" in text
+    assert "v* not decidable: needs damping" in text
 
 
-def test_the_loop_of_a_is_stated_between_bounds(call: Call) -> None:
+def test_energy_of_the_worst_loop_has_bounds_for_law_a(call: Call) -> None:
     """W = k D 2A = 1000 · 0.1 mm · 0.4 mm = 40 µJ."""
     _code, out, _err = call(SPEC, "--law", "A", "--max-depth", "0.1mm", "--stiffness", "1000N/m")
     energy = next(line for line in section(out, "Worst loop") if line.startswith("energy"))
@@ -79,7 +79,7 @@ def test_the_loop_of_a_is_stated_between_bounds(call: Call) -> None:
     assert "µJ per turn (certified)" in energy
 
 
-def test_jumps_are_listed(call: Call) -> None:
+def test_force_jumps_are_listed(call: Call) -> None:
     _code, out, _err = call(SPEC, "--law", "god-object", "--max-depth", "0.4mm")
     rows = [line for line in section(out, "Continuity") if re.match(r" *[\d.]+ µm", line)]
     assert len(rows) == 8
@@ -89,7 +89,7 @@ def test_jumps_are_listed(call: Call) -> None:
 
 
 @pytest.mark.parametrize("law", ["W", "A", "B", "C", "E", "F", "G", "H"])
-def test_the_three_lines_reproduce_q(call: Call, law: str) -> None:
+def test_printed_python_code_reproduces_q(call: Call, law: str) -> None:
     options = ["--law", law, "--max-depth", "0.2mm", "--stiffness", "700N/m"]
     options += ["--friction", "0.3"] if law == "F" else []
     _code, out, _err = call(SPEC, *options)
@@ -104,7 +104,7 @@ def test_the_three_lines_reproduce_q(call: Call, law: str) -> None:
     assert float(lines[-1].split("#")[1]) == pytest.approx(lower, rel=1e-11)
 
 
-def test_a_measured_surface_is_reproduced_from_its_file(call: Call, tmp_path: Path) -> None:
+def test_printed_python_code_reproduces_q_of_a_measured_surface(call: Call, tmp_path: Path) -> None:
     x, y = np.meshgrid(np.arange(20.0), np.arange(16.0))
     np.save(tmp_path / "map.npy", 3e-5 * np.sin(x + 0.4 * y))
     options = ["--pitch", "50um", "--magnify", "2", "--law", "C", "--tolerance", "0.01"]
@@ -120,13 +120,13 @@ def test_a_measured_surface_is_reproduced_from_its_file(call: Call, tmp_path: Pa
         '[surface]\nlaw = "C"\n'
     )
     _code, out, _err = call(str(tmp_path / "scene.toml"), "--tolerance", "0.01")
-    again = io.StringIO()
-    with contextlib.redirect_stdout(again):
+    printed_for_scene = io.StringIO()
+    with contextlib.redirect_stdout(printed_for_scene):
         exec("\n".join(code_of(out)), {})
-    assert again.getvalue() == printed.getvalue()
+    assert printed_for_scene.getvalue() == printed.getvalue()
 
 
-def test_json_on_standard_output_is_alone(call: Call) -> None:
+def test_json_is_the_only_output_on_stdout(call: Call) -> None:
     code, out, err = call(SPEC, "--law", "D", "--json", "-")
     data = json.loads(out)
     assert (code, err) == (0, "")
@@ -134,14 +134,14 @@ def test_json_on_standard_output_is_alone(call: Call) -> None:
     assert data["q"]["upper"] == "inf"
 
 
-def test_html_on_standard_output_is_alone(call: Call) -> None:
+def test_html_is_the_only_output_on_stdout(call: Call) -> None:
     code, out, err = call(SPEC, "--law", "W", "--html", "-")
     assert (code, err) == (0, "")
     assert out.lstrip().lower().startswith("<!doctype html>")
     assert out.rstrip().endswith("</html>")
 
 
-def test_files_are_written_whole(call: Call, tmp_path: Path) -> None:
+def test_json_and_html_files_are_complete(call: Call, tmp_path: Path) -> None:
     json_path, html_path = tmp_path / "a.json", tmp_path / "a.html"
     code, out, _err = call(SPEC, "--law", "A", "--json", str(json_path), "--html", str(html_path))
     assert code == 0
@@ -166,28 +166,31 @@ def test_options_reach_the_result(call: Call) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "expected"), [("y", [0, 1]), ("X", [1, 0]), ("0 -3", [0, -1]), ("3,4", [0.6, 0.8])]
+    ("direction", "expected"),
+    [("y", [0, 1]), ("X", [1, 0]), ("0 -3", [0, -1]), ("3,4", [0.6, 0.8])],
 )
-def test_the_direction_of_the_plane(call: Call, given: str, expected: list[float]) -> None:
-    _code, out, _err = call("tile:", "--law", "A", "--direction", given, "--json", "-",
+def test_direction_option_sets_the_direction_of_the_leak(
+    call: Call, direction: str, expected: list[float]
+) -> None:
+    _code, out, _err = call("tile:", "--law", "A", "--direction", direction, "--json", "-",
                             "--tolerance", "0.5")  # fmt: skip
     line = json.loads(out)["leak"]["line"]
     assert line["direction"] == pytest.approx(expected, abs=1e-12)
 
 
-def test_tolerance_and_work_limit(call: Call, tmp_path: Path) -> None:
+def test_tolerance_and_work_limit_set_the_relative_gap_of_q(call: Call, tmp_path: Path) -> None:
     x, y = np.meshgrid(np.arange(20.0), np.arange(16.0))
     np.save(tmp_path / "map.npy", 3e-5 * np.sin(x + 0.4 * y))
     options = [str(tmp_path / "map.npy"), "--pitch", "50um", "--law", "C", "--json", "-"]
     gaps = {}
-    for given in (["--tolerance", "1e-5"], ["--tolerance", "0.3"], ["--work-limit", "1"]):
-        q = json.loads(call(*options, *given)[1])["q"]
-        gaps[given[1]] = q["upper"] / q["lower"] - 1.0
-        assert ("work limit" in q["note"]) == (given[0] == "--work-limit")
+    for accuracy in (["--tolerance", "1e-5"], ["--tolerance", "0.3"], ["--work-limit", "1"]):
+        q = json.loads(call(*options, *accuracy)[1])["q"]
+        gaps[accuracy[1]] = q["upper"] / q["lower"] - 1.0
+        assert ("work limit" in q["note"]) == (accuracy[0] == "--work-limit")
     assert gaps["1e-5"] <= 1e-5 < gaps["0.3"] <= 0.3
 
 
-def test_scene_file_names_the_law_and_options_override_it(call: Call, tmp_path: Path) -> None:
+def test_options_override_the_scene_file(call: Call, tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(
         '[texture]\nkind = "sinusoid"\namplitude = "0.1 mm"\nperiod = "1.5 mm"\n'
@@ -197,24 +200,24 @@ def test_scene_file_names_the_law_and_options_override_it(call: Call, tmp_path: 
     data = json.loads(call(str(scene), "--json", "-")[1])
     assert (data["law"], data["stiffness"], data["device"]["id"]) == ("G", 800.0, "pantograph")
     assert data["clamp"] == "whole"
-    given = ["--law", "A", "--stiffness", "300N/m", "--device", "touch"]
-    data = json.loads(call(str(scene), *given, "--json", "-")[1])
+    overrides = ["--law", "A", "--stiffness", "300N/m", "--device", "touch"]
+    data = json.loads(call(str(scene), *overrides, "--json", "-")[1])
     assert (data["law"], data["stiffness"], data["device"]["id"]) == ("A", 300.0, "touch")
 
 
-def test_a_device_that_says_nothing_is_an_answer(call: Call, tmp_path: Path) -> None:
+def test_device_without_data_leaves_criteria_undecided(call: Call, tmp_path: Path) -> None:
     (tmp_path / "bare.toml").write_text('name = "Bare"\nmax_force = "3 N"\n')
     code, out, err = call(SPEC, "--law", "C", "--device", str(tmp_path / "bare.toml"))
     assert (code, err) == (0, "")
-    said = " ".join(out.split())
-    assert "is passive is undecided" in said
-    assert "not decidable: needs max_stiffness" in said
-    assert "not decidable: needs update_rate, damping" in said
+    text = " ".join(out.split())
+    assert "is passive is undecided" in text
+    assert "not decidable: needs max_stiffness" in text
+    assert "not decidable: needs update_rate, damping" in text
 
 
 @needs_data
 @pytest.mark.parametrize("law", ["D", "E"])
-def test_a_real_surface(call: Call, law: str) -> None:
+def test_measured_surface_is_analyzed(call: Call, law: str) -> None:
     code, out, _err = call(
         str(DATA / "sample-land.x3p"), "--magnify", "20", "--law", law, "--json", "-"
     )
@@ -262,7 +265,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("arguments", "message"), BAD, ids=lambda value: str(value)[-40:])
-def test_bad_input_is_one_line_and_writes_nothing(
+def test_invalid_input_gives_a_one_line_error_and_writes_no_file(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -275,7 +278,7 @@ def test_bad_input_is_one_line_and_writes_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_flat_map_is_an_answer(call: Call, tmp_path: Path) -> None:
+def test_flat_map_is_analyzed_without_nan(call: Call, tmp_path: Path) -> None:
     np.save(tmp_path / "flat.npy", np.full((8, 8), 1e-3))
     options = ["--pitch", "10um", "--form", "0"]
     for law in "ADG":

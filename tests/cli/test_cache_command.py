@@ -1,4 +1,4 @@
-"""``asperity cache``, --no-cache, and a folder that is damaged."""
+"""``asperity cache``, ``--no-cache``, and damaged cache folders."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
-def test_it_lists_and_deletes_the_entries(call: Call, folder: Path) -> None:
+def test_command_lists_and_deletes_entries(call: Call, folder: Path) -> None:
     cache.put_entry("results", "a", bytes(10**6))
     cache.put_entry("older", "b", b"")
     code, out, err = call("cache", width=200)
     assert (code, err) == (0, "")
-    first, *rooms = out.splitlines()
+    first, *namespaces = out.splitlines()
     assert first == f"{folder}: 1.0 MB of at most 500.0 MB"
-    assert [line.split()[:3] for line in rooms] == [
+    assert [line.split()[:3] for line in namespaces] == [
         ["code", "0", "0.0"],
         ["older", "1", "0.0"],
         ["results", "1", "1.0"],
@@ -40,15 +40,18 @@ def test_it_lists_and_deletes_the_entries(call: Call, folder: Path) -> None:
     assert cache.list_entries() == []
 
 
-def test_the_list_as_json(call: Call, folder: Path) -> None:
+def test_json_has_the_entries_of_each_namespace(call: Call, folder: Path) -> None:
     cache.put_entry("results", "a", b"content")
     code, out, _err = call("cache", "--json", "-")
-    said = json.loads(out)
-    assert (code, said["folder"], said["limit"]) == (0, str(folder), 500_000_000)
-    assert {room["name"]: room["entries"] for room in said["rooms"]} == {"code": 0, "results": 1}
+    result = json.loads(out)
+    assert (code, result["folder"], result["limit"]) == (0, str(folder), 500_000_000)
+    assert {namespace["name"]: namespace["entries"] for namespace in result["rooms"]} == {
+        "code": 0,
+        "results": 1,
+    }
 
 
-def test_a_wrong_size_is_bad_input(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_invalid_size_limit_is_a_usage_error(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ASPERITY_CACHE_SIZE", "much")
     code, out, err = call(*DEMO)
     assert (code, out) == (2, "")
@@ -56,31 +59,31 @@ def test_a_wrong_size_is_bad_input(call: Call, monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.keeps_answers
-def test_without_the_cache_the_answer_is_the_same(call: Call, folder: Path) -> None:
+def test_no_cache_gives_the_same_output_and_leaves_entries_unused(call: Call, folder: Path) -> None:
     code, out, _err = call(*DEMO)
-    kept = {entry.path: entry.last_used for entry in cache.list_entries()}
-    assert (code, any(path.parent.name == "results" for path in kept)) == (0, True)
+    entries = {entry.path: entry.last_used for entry in cache.list_entries()}
+    assert (code, any(path.parent.name == "results" for path in entries)) == (0, True)
     assert call(*DEMO, "--no-cache") == (0, out, "")
-    assert {entry.path: entry.last_used for entry in cache.list_entries()} == kept
+    assert {entry.path: entry.last_used for entry in cache.list_entries()} == entries
     assert cache.cache_folder() == folder
 
 
 @pytest.mark.keeps_answers
 @pytest.mark.filterwarnings("default::asperity.core.cache.CacheWarning")
-def test_damaged_answers_are_made_again_once_with_a_note(call: Call) -> None:
+def test_damaged_entries_are_recomputed_with_one_warning(call: Call) -> None:
     _code, out, _err = call(*DEMO)
     for entry in cache.list_entries():
         if entry.namespace == "results":
             entry.path.write_bytes(entry.path.read_bytes()[:-1])
-    code, again, err = call(*DEMO)
-    assert (code, again) == (0, out)
+    code, recomputed, err = call(*DEMO)
+    assert (code, recomputed) == (0, out)
     assert err.count("damaged entries") == 1
     assert call(*DEMO) == (0, out, "")
 
 
 @pytest.mark.keeps_answers
 @pytest.mark.filterwarnings("default::asperity.core.cache.CacheWarning")
-def test_a_folder_that_is_a_file_costs_time_only(call: Call, folder: Path) -> None:
+def test_cache_path_that_is_a_file_gives_one_warning(call: Call, folder: Path) -> None:
     folder.write_text("no folder")
     code, out, err = call(*DEMO)
     assert (code, out != "") == (0, True)

@@ -1,4 +1,4 @@
-"""``asperity calibrate``: what is asked, what is refused, what is written."""
+"""``asperity calibrate``: options, errors and the device file that it writes."""
 
 from __future__ import annotations
 
@@ -17,42 +17,42 @@ COMMAND = "calibrate"
 Call = Callable[..., tuple[int, str, str]]
 
 
-def test_a_simulated_device_is_measured_and_written(call: Call, tmp_path: Path) -> None:
-    mine, said = tmp_path / "mine.toml", tmp_path / "said.json"
-    known = ["--set", "damping=0.5N*s/m", "--set", "delay_samples=1"]
-    options = ["--device", "touch", *known, "-o", str(mine), "--json", str(said)]
+def test_simulated_device_is_measured_and_written(call: Call, tmp_path: Path) -> None:
+    device_path, json_path = tmp_path / "mine.toml", tmp_path / "said.json"
+    parameters = ["--set", "damping=0.5N*s/m", "--set", "delay_samples=1"]
+    options = ["--device", "touch", *parameters, "-o", str(device_path), "--json", str(json_path)]
     code, out, err = call(*options)
     assert code == 0, err
     assert "axis  wall held" in out
-    assert f"Written: {mine}\n" in out
+    assert f"Written: {device_path}\n" in out
     assert "1000 Hz is simulated" in err
-    device = load_device(mine)
+    device = load_device(device_path)
     assert (device.id, device.value("delay_samples")) == ("mine", 1.0)
     assert device.value("position_resolution") == pytest.approx(5.5e-5, rel=1e-3)
-    measured = json.loads(said.read_text())
+    measured = json.loads(json_path.read_text())
     assert len(measured["measured"]["axes"]) == 3
     assert measured["device"]["data"]["max_stiffness"]["value"] == device.max_stiffness
 
 
-def test_what_cannot_be_measured_is_refused(call: Call, tmp_path: Path) -> None:
-    library, mine = compile_library(EXAMPLE, tmp_path), str(tmp_path / "mine.toml")
-    for options, words in (
+def test_devices_that_cannot_be_measured_are_refused(call: Call, tmp_path: Path) -> None:
+    library, device_path = compile_library(EXAMPLE, tmp_path), str(tmp_path / "mine.toml")
+    for options, message in (
         (["--device", "touch", "-o", "mine.json"], "output must be a device file"),
-        (["-o", mine], "device is missing"),
-        (["--device", "touch", "-o", mine, "--force", "9N"], "force must be at most"),
-        (["--device", "touch", "--driver", str(library), "-o", mine], "--yes starts it"),
-        (["--device", "pantograph", "--driver", str(library), "-o", mine, "--yes"],
+        (["-o", device_path], "device is missing"),
+        (["--device", "touch", "-o", device_path, "--force", "9N"], "force must be at most"),
+        (["--device", "touch", "--driver", str(library), "-o", device_path], "--yes starts it"),
+        (["--device", "pantograph", "--driver", str(library), "-o", device_path, "--yes"],
          "max_force is unknown"),
-        (["--device", "touch", "--driver", "forcedimension", "-o", mine, "--yes"],
+        (["--device", "touch", "--driver", "forcedimension", "-o", device_path, "--yes"],
          "install the SDK"),
     ):  # fmt: skip
         code, out, err = call(*options)
         assert (code, out) == (2, "")
-        assert words in err
-    assert not Path(mine).exists()
+        assert message in err
+    assert not Path(device_path).exists()
 
 
-def test_the_usual_force_is_a_part_of_what_the_device_can() -> None:
+def test_default_force_is_a_fraction_of_the_maximum_force() -> None:
     assert default_force(load_device("omega.3"), real=True) == 3.0
     assert default_force(load_device("touch"), real=True) == 0.88
     assert default_force(load_device("falcon"), real=True) == pytest.approx(8.0 / 3.0)

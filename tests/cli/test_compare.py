@@ -1,4 +1,4 @@
-"""The command line as its users see it."""
+"""Output, options and errors of ``asperity compare``."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_table_has_one_row_per_law_with_the_letter_first(call: Call) -> None:
     assert "Default scanning speed 0.1 m/s" in out
 
 
-def test_json_on_standard_output_is_alone(call: Call) -> None:
+def test_json_is_the_only_output_on_stdout(call: Call) -> None:
     code, out, err = call("compare", SPEC, "--laws", "AD", "--json", "-")
     data = json.loads(out)
     assert (code, err) == (0, "")
@@ -44,14 +44,14 @@ def test_json_on_standard_output_is_alone(call: Call) -> None:
     assert data["laws"][1]["q"]["value"] == "inf"
 
 
-def test_html_on_standard_output_is_alone(call: Call) -> None:
+def test_html_is_the_only_output_on_stdout(call: Call) -> None:
     code, out, err = call("compare", SPEC, "--laws", "WA", "--html", "-")
     assert (code, err) == (0, "")
     assert out.lstrip().lower().startswith("<!doctype html>")
     assert out.rstrip().endswith("</html>")
 
 
-def test_files_are_written_whole(call: Call, tmp_path: Path) -> None:
+def test_json_and_html_files_are_complete(call: Call, tmp_path: Path) -> None:
     json_path, html_path = tmp_path / "a.json", tmp_path / "a.html"
     code, out, _err = call(
         "compare", SPEC, "--laws", "WC", "--json", str(json_path), "--html", str(html_path)
@@ -64,19 +64,19 @@ def test_files_are_written_whole(call: Call, tmp_path: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.html", "a.json"]
 
 
-def test_the_page_says_which_command_made_it_of_which_result(call: Call, tmp_path: Path) -> None:
+def test_html_page_shows_its_command_and_the_hash_of_the_result(call: Call, tmp_path: Path) -> None:
     data, path = tmp_path / "a.json", tmp_path / "it's <b>\x1b[31m.html"
     call("compare", SPEC, "--laws", "W", "--json", str(data), "--html", str(path))
     text = path.read_text("utf-8")
     assert hashlib.sha256(data.read_bytes()).hexdigest()[:12] in check_alone(text).text
-    said = check_alone(text).text
-    assert f"asperity compare {SPEC} --laws W --json {data} --html '" in said
-    assert "it'\"'\"'s <b>\\x1b[31m.html'" in said
+    page_text = check_alone(text).text
+    assert f"asperity compare {SPEC} --laws W --json {data} --html '" in page_text
+    assert "it'\"'\"'s <b>\\x1b[31m.html'" in page_text
     assert "\x1b" not in text
 
 
 @needs_data
-def test_the_page_of_a_measured_surface_is_small(call: Call, tmp_path: Path) -> None:
+def test_html_page_of_a_measured_surface_is_below_3_mb(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "land.html"
     options = ["--magnify", "20", "--device", "touch", "--html", str(path)]
     assert call("compare", str(DATA / "sample-land.x3p"), *options)[0] == 0
@@ -85,15 +85,15 @@ def test_the_page_of_a_measured_surface_is_small(call: Call, tmp_path: Path) -> 
     assert path.stat().st_size < 3_000_000
 
 
-def test_a_stiffness_above_the_limit_is_a_verdict(call: Call) -> None:
+def test_stiffness_above_the_limit_is_reported_and_not_an_error(call: Call) -> None:
     code, out, _err = call("compare", SPEC, "--laws", "A", "--stiffness", "9000N/m")
     assert code == 0
     assert "may buzz" in out
 
 
 def test_options_reach_the_result(call: Call) -> None:
-    given = "--stiffness=500 N/m;--max-depth=0.2mm;--friction=0.3;--max-deflection=0.5mm"
-    options = [*given.split(";"), "--modulation-depth=0.5", "--device=TOUCH"]
+    parameters = "--stiffness=500 N/m;--max-depth=0.2mm;--friction=0.3;--max-deflection=0.5mm"
+    options = [*parameters.split(";"), "--modulation-depth=0.5", "--device=TOUCH"]
     _code, out, _err = call("compare", SPEC, "--laws", "F", *options, "--json", "-")
     data = json.loads(out)
     assert (data["stiffness"], data["max_depth"], data["device"]["id"]) == (500.0, 0.0002, "touch")
@@ -107,7 +107,7 @@ def test_options_reach_the_result(call: Call) -> None:
     assert data["laws"][0]["q"]["value"] == pytest.approx(expected, rel=1e-8)
 
 
-def test_scene_file_with_an_option_that_overrides_it(call: Call, tmp_path: Path) -> None:
+def test_options_override_the_scene_file(call: Call, tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(
         '[texture]\nkind = "sinusoid"\namplitude = "0.4 mm"\nperiod = "1.5 mm"\n'
@@ -132,7 +132,7 @@ def test_scene_file_with_an_option_that_overrides_it(call: Call, tmp_path: Path)
         ("dektak-1.csv", ["--magnify", "20", "--magnify-height", "500"]),
     ],
 )
-def test_real_surfaces(call: Call, name: str, options: list[str]) -> None:
+def test_measured_surfaces_are_compared(call: Call, name: str, options: list[str]) -> None:
     code, out, _err = call("compare", str(DATA / name), *options, "--laws", "WACG", "--json", "-")
     data = json.loads(out)
     assert code == 0
@@ -142,7 +142,7 @@ def test_real_surfaces(call: Call, name: str, options: list[str]) -> None:
 
 
 @needs_data
-def test_a_real_file_that_misses_too_much_is_refused(call: Call) -> None:
+def test_measured_file_with_too_many_missing_points_is_refused(call: Call) -> None:
     pytest.importorskip("SurfaceTopography", reason="SurfaceTopography is not installed")
     code, out, err = call("compare", str(DATA / "frt-2.frt"))
     assert (code, out) == (2, "")
@@ -177,7 +177,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("arguments", "message"), BAD, ids=lambda v: str(v)[-40:])
-def test_bad_input_is_one_line_and_writes_nothing(
+def test_invalid_input_gives_a_one_line_error_and_writes_no_file(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -191,8 +191,8 @@ def test_bad_input_is_one_line_and_writes_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def _bad_maps(folder: Path) -> dict[str, list[str]]:
-    """Write surfaces that must be refused; return the options to read each with."""
+def _write_invalid_maps(folder: Path) -> dict[str, list[str]]:
+    """Write surfaces that must be refused; return the options to read each of them."""
     rng = np.random.default_rng(0)
     good = rng.normal(size=(8, 8)) * 1e-5
     holes = good.copy()
@@ -208,13 +208,13 @@ def _bad_maps(folder: Path) -> dict[str, list[str]]:
     (folder / "picture.png").write_bytes(b"\x89PNG\r\n\x1a\n" + hashlib.sha256(b"x").digest())
     pitch = ["--pitch", "10um"]
     names = [path.name for path in folder.iterdir() if path.name != "good.npy"]
-    bad = dict.fromkeys(names, pitch)
-    bad["good.npy"] = []  # the pitch is missing
-    return bad
+    options = dict.fromkeys(names, pitch)
+    options["good.npy"] = []  # the pitch is missing
+    return options
 
 
-def test_bad_files_are_one_line(call: Call, tmp_path: Path) -> None:
-    for name, options in _bad_maps(tmp_path).items():
+def test_invalid_files_give_a_one_line_error(call: Call, tmp_path: Path) -> None:
+    for name, options in _write_invalid_maps(tmp_path).items():
         code, out, err = call("compare", str(tmp_path / name), *options)
         assert (code, out) == (2, ""), name
         assert len(err.strip().splitlines()) == 1, (name, err)
@@ -225,7 +225,9 @@ def test_bad_files_are_one_line(call: Call, tmp_path: Path) -> None:
     [["--magnify", "0"], ["--magnify", "-2"], ["--magnify", "nan"], ["--cutoff", "5um"],
      ["--cutoff", "-1mm"], ["--pitch", "0"], ["--height-range", "-1mm"], ["--magnify-height", "0"]],
 )  # fmt: skip
-def test_bad_preparation_is_one_line(call: Call, tmp_path: Path, options: list[str]) -> None:
+def test_invalid_preparation_options_name_the_option(
+    call: Call, tmp_path: Path, options: list[str]
+) -> None:
     path = tmp_path / "map.npy"
     np.save(path, np.random.default_rng(0).normal(size=(8, 8)) * 1e-5)
     code, out, err = call("compare", str(path), "--pitch", "10um", *options)
@@ -233,7 +235,7 @@ def test_bad_preparation_is_one_line(call: Call, tmp_path: Path, options: list[s
     assert options[0].removeprefix("--").replace("-", "_") in err
 
 
-def test_help_and_version(call: Call) -> None:
+def test_help_and_version_are_printed(call: Call) -> None:
     code, out, _err = call("--help")
     assert code == 0
     assert "compare" in out
@@ -242,8 +244,8 @@ def test_help_and_version(call: Call) -> None:
 
 
 @pytest.mark.parametrize("arguments", [[], *([command] for command in COMMANDS)])
-def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
-    """Start-up is a feature: no --help imports a numerical library, options and all."""
+def test_help_imports_no_heavy_package(arguments: list[str]) -> None:
+    """Start-up stays fast: ``--help`` of no command imports a numerical library."""
     code = (
         f"import sys; sys.argv = {['asperity', *arguments, '--help']}\n"
         "from asperity.cli.main import main\n"
@@ -251,19 +253,19 @@ def test_help_loads_nothing_heavy(arguments: list[str]) -> None:
         "heavy = {'numpy', 'scipy', 'sympy', 'numba', 'matplotlib', 'pint', 'rich', 'jinja2'}\n"
         "sys.exit(str(sorted(heavy & set(sys.modules))) if heavy & set(sys.modules) else 0)"
     )
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, env=os.environ
     )
-    assert done.returncode == 0, done.stderr
+    assert process.returncode == 0, process.stderr
 
 
-def test_comparing_shipped_laws_does_not_load_sympy() -> None:
+def test_comparing_shipped_laws_does_not_import_sympy() -> None:
     code = (
         "import sys, asperity as asp\n"
         "asp.compare(asp.Sinusoid(amplitude=1e-4, period=1e-3))\n"
         "sys.exit('sympy was loaded' if 'sympy' in sys.modules else 0)"
     )
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, env=os.environ
     )
-    assert done.returncode == 0, done.stderr
+    assert process.returncode == 0, process.stderr

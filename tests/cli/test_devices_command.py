@@ -1,4 +1,4 @@
-"""``asperity devices``: the catalogue and one device, as its users see them."""
+"""``asperity devices``: the catalogue and the details of one device."""
 
 from __future__ import annotations
 
@@ -18,23 +18,21 @@ WIDTH = 100
 
 
 @pytest.mark.parametrize("width", [80, 100, 120])
-def test_the_list_fits_with_the_id_alone_in_front(call: Call, width: int) -> None:
+def test_list_fits_the_terminal_and_starts_rows_with_the_id(call: Call, width: int) -> None:
     code, out, err = call(width=width)
     assert (code, err) == (0, "")
     lines = out.splitlines()
     assert max(len(line) for line in lines) <= width
     assert "…" not in out
-    first = [
-        line.split()[0] for line in lines if line.split() and line.split()[0] in device_names()
-    ]
-    assert first == device_names()
+    ids = [line.split()[0] for line in lines if line.split() and line.split()[0] in device_names()]
+    assert ids == device_names()
 
 
 def row(out: str, name: str) -> list[str]:
     return next(line.split() for line in out.splitlines() if line.split()[:1] == [name])
 
 
-def test_unverified_numbers_are_marked_and_verified_ones_are_not(call: Call) -> None:
+def test_only_unverified_numbers_are_marked(call: Call) -> None:
     _code, out, _err = call(width=80)
     assert " ".join(row(out, "omega.3")) == "omega.3 12 N 5000 N/m 10 µm ? – 4 kHz ? –"
     assert " ".join(row(out, "inverse3")) == "inverse3 10 N 1000 N/m 10 µm 14 mN 4 kHz –"
@@ -43,7 +41,7 @@ def test_unverified_numbers_are_marked_and_verified_ones_are_not(call: Call) -> 
 
 @pytest.mark.parametrize("width", [80, 100])
 @pytest.mark.parametrize("name", device_names())
-def test_one_device_shows_every_number_with_its_source(call: Call, name: str, width: int) -> None:
+def test_details_show_every_number_with_its_source(call: Call, name: str, width: int) -> None:
     code, out, err = call(name.upper(), width=width)
     assert (code, err) == (0, "")
     assert max(len(line) for line in out.splitlines()) <= width
@@ -59,22 +57,22 @@ def test_one_device_shows_every_number_with_its_source(call: Call, name: str, wi
 
 def test_missing_data_is_listed(call: Call) -> None:
     _code, out, _err = call("touch")
-    unknown = out[out.index("Missing data") :]
-    assert "update_rate [Hz]" in unknown
-    assert "damping [N*s/m]" in unknown
-    assert "friction" not in unknown  # known, so not listed
+    missing = out[out.index("Missing data") :]
+    assert "update_rate [Hz]" in missing
+    assert "damping [N*s/m]" in missing
+    assert "friction" not in missing  # known, so not listed
 
 
-def test_other_values_are_shown_below_theirs(call: Call) -> None:
+def test_alternative_values_follow_the_value_in_use(call: Call) -> None:
     _code, out, _err = call("omega.3")
     lines = [line.split() for line in out.splitlines()]
-    at = next(i for i, words in enumerate(lines) if words[:2] == ["max", "stiffness"])
-    assert lines[at][2:5] == ["5000", "N/m", "read"]
-    also = next(words for words in lines[at + 1 :] if words[:1] == ["also"])
+    index = next(i for i, words in enumerate(lines) if words[:2] == ["max", "stiffness"])
+    assert lines[index][2:5] == ["5000", "N/m", "read"]
+    also = next(words for words in lines[index + 1 :] if words[:1] == ["also"])
     assert also[:4] == ["also", "14500", "N/m", "no"]
 
 
-def test_a_device_of_one_s_own(call: Call, tmp_path: Path) -> None:
+def test_user_defined_device_is_shown(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "bench.toml"
     path.write_text('name = "[bold]Bench[/bold]"\ndamping = "0.8 N*s/m"\nupdate_rate = "2 kHz"\n')
     code, out, _err = call(str(path))
@@ -84,7 +82,7 @@ def test_a_device_of_one_s_own(call: Call, tmp_path: Path) -> None:
     assert "given by the user" in out
 
 
-def test_json_says_everything_and_is_alone(call: Call) -> None:
+def test_json_has_all_data_and_is_the_only_output(call: Call) -> None:
     code, out, err = call("--json", "-")
     assert (code, err) == (0, "")
     content = json.loads(out)
@@ -94,15 +92,15 @@ def test_json_says_everything_and_is_alone(call: Call) -> None:
         for field, datum in device["data"].items():
             assert datum["unit"] == FIELD_UNITS[field]
             keys = {"value", "unit", "source", "verified", "also"}
-            known = {"update_rate", "positions"} if device["id"] == "pantograph" else set()
-            assert set(datum) == keys | (known if field == "max_stiffness" else set())
-            if known and field == "max_stiffness":
+            measured_keys = {"update_rate", "positions"} if device["id"] == "pantograph" else set()
+            assert set(datum) == keys | (measured_keys if field == "max_stiffness" else set())
+            if measured_keys and field == "max_stiffness":
                 assert (datum["verified"], datum["positions"]) == ("measured", "stepped")
     code, out, _err = call("touch", "omni", "--json", "-")
     assert [device["id"] for device in json.loads(out)["devices"]] == ["touch", "omni"]
 
 
-def test_json_to_a_file(call: Call, tmp_path: Path) -> None:
+def test_json_is_written_to_a_file(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "devices.json"
     code, out, _err = call("falcon", "--json", str(path))
     assert code == 0
@@ -131,7 +129,7 @@ BAD_FILES = {
 
 
 @pytest.mark.parametrize("name", list(BAD_FILES))
-def test_bad_devices_are_one_line(call: Call, tmp_path: Path, name: str) -> None:
+def test_invalid_device_files_give_a_one_line_error(call: Call, tmp_path: Path, name: str) -> None:
     content, message = BAD_FILES[name]
     (tmp_path / name).write_text(content)
     code, out, err = call(str(tmp_path / name), "--json", str(tmp_path / "out.json"))
@@ -152,7 +150,7 @@ def test_bad_devices_are_one_line(call: Call, tmp_path: Path, name: str) -> None
         (["--no-such-option"], "--no-such-option"),
     ],
 )
-def test_bad_input_has_exit_code_2(call: Call, arguments: list[str], message: str) -> None:
+def test_invalid_input_has_exit_code_2(call: Call, arguments: list[str], message: str) -> None:
     code, out, err = call(*arguments)
     assert (code, out) == (2, "")
     assert message in err

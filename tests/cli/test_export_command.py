@@ -1,4 +1,4 @@
-"""``asperity export``: a C program from the command line, and what it refuses."""
+"""``asperity export``: the C files that it writes, its options and its errors."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ WAVE = "sinusoid:amplitude=0.2mm,period=2mm"
 MAIN = '#include <stdio.h>\n#include "{stem}.h"\nint main(void)\n{{\n{body}\n    return 0;\n}}\n'
 
 
-def printed(folder: Path, stem: str, name: str, *sources: str) -> list[str]:
-    """Return what a program that includes an exported header prints."""
+def run_exported(folder: Path, stem: str, name: str, *sources: str) -> list[str]:
+    """Compile a program that includes an exported header; return the words that it prints."""
     body = f"""    {name}_state state;
     const double at[3] = {{1e-4, 2e-4, -5e-5}};
     double f[3];
@@ -35,13 +35,13 @@ def printed(folder: Path, stem: str, name: str, *sources: str) -> list[str]:
     return run_command(folder / "main").split()
 
 
-def test_one_header_gives_the_force(call: Call, tmp_path: Path) -> None:
+def test_exported_header_gives_the_force_of_the_surface(call: Call, tmp_path: Path) -> None:
     target = tmp_path / "wall.h"
     code, out, err = call("export", WAVE, "--law", "B", "--stiffness", "500N/m", "-o", str(target))
     assert (code, err) == (0, "")
     assert out.startswith(f"Written: {target}\n")
     surface = asp.Surface(asp.Sinusoid(2e-4, 2e-3), "B", 500.0, clamp="backed")
-    *force, content = printed(tmp_path, "wall", "texture")
+    *force, content = run_exported(tmp_path, "wall", "texture")
     expected = surface.force([1e-4, 2e-4, -5e-5])
     assert [float.fromhex(part) for part in force] == pytest.approx(expected, rel=1e-14)
     text = target.read_text()
@@ -53,22 +53,22 @@ def test_one_header_gives_the_force(call: Call, tmp_path: Path) -> None:
     assert float(q[1]) == asp.characteristic_number(surface).upper
 
 
-def test_the_comment_says_what_it_is(call: Call, tmp_path: Path) -> None:
+def test_header_comment_describes_the_law_and_the_device(call: Call, tmp_path: Path) -> None:
     call("export", WAVE, "--law", "C", "--device", "touch", "-o", str(tmp_path / "t.h"))
-    said = (tmp_path / "t.h").read_text().split("#ifndef")[0]
+    comment = (tmp_path / "t.h").read_text().split("#ifndef")[0]
     for words in ("f = k δ w", "closed form", "backed", "Touch", asp.__version__, "0 J per period",
                   "every depth", "period = 0.002", "heights -200 µm to 200 µm"):  # fmt: skip
-        assert words in said, words
+        assert words in comment, words
 
 
-def test_the_content_knows_the_force_and_not_the_name(call: Call, tmp_path: Path) -> None:
+def test_content_digest_depends_on_the_law_and_not_on_the_name(call: Call, tmp_path: Path) -> None:
     contents = {}
     for name, law in (("texture", "B"), ("wall", "B"), ("texture", "A")):
         target = tmp_path / f"{name}_{law}.h"
         call("export", WAVE, "--law", law, "--name", name, "-o", str(target))
-        found = re.search(r'_CONTENT "(\w+)"', target.read_text())
-        assert found is not None
-        contents[name, law] = found[1]
+        match = re.search(r'_CONTENT "(\w+)"', target.read_text())
+        assert match is not None
+        contents[name, law] = match[1]
     assert contents["texture", "B"] == contents["wall", "B"] != contents["texture", "A"]
 
 
@@ -81,7 +81,7 @@ def test_the_content_knows_the_force_and_not_the_name(call: Call, tmp_path: Path
         (("--exact",), "HUGE_VAL"),
     ],
 )
-def test_the_budget_of_a_search(
+def test_evaluation_budget_is_written_to_the_header(
     options: tuple[str, ...], budget: str, call: Call, tmp_path: Path
 ) -> None:
     target = tmp_path / "t.h"
@@ -89,7 +89,7 @@ def test_the_budget_of_a_search(
     assert f"#define TEXTURE_MAX_EVALUATIONS {budget} " in target.read_text()
 
 
-def test_a_scene_with_its_law_and_clamp(call: Call, tmp_path: Path) -> None:
+def test_scene_sets_law_and_clamp_and_options_override_them(call: Call, tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(
         '[texture]\nkind = "sinusoid"\namplitude = "0.2 mm"\nperiod = "2 mm"\n'
@@ -102,8 +102,8 @@ def test_a_scene_with_its_law_and_clamp(call: Call, tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A measured map whose data are too many for a header."""
+def large_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the path of a measured map whose data exceed the limit of a header."""
     monkeypatch.setattr(c99, "MAX_HEADER_DATA", 5_000)
     rng = np.random.default_rng(3)
     path = tmp_path / "large.npy"
@@ -111,66 +111,72 @@ def large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return path
 
 
-def test_large_data_stand_beside_the_header(call: Call, large: Path, tmp_path: Path) -> None:
+def test_large_data_are_written_to_a_separate_source(
+    call: Call, large_map: Path, tmp_path: Path
+) -> None:
     target = tmp_path / "m.h"
     options = ("--pitch", "0.2mm", "--law", "D", "--max-depth", "0.2mm")
-    assert call("export", str(large), *options, "-o", str(target))[0] == 0
+    assert call("export", str(large_map), *options, "-o", str(target))[0] == 0
     source = tmp_path / "m_data.c"
     assert "_data_c[32][42] = {" in source.read_text()
     assert "_data_c[32][42] = {" not in target.read_text()
-    *force, _content = printed(tmp_path, "m", "texture", str(source))
-    texture = asp.load_texture(large, pitch=2e-4)
+    *force, _content = run_exported(tmp_path, "m", "texture", str(source))
+    texture = asp.load_texture(large_map, pitch=2e-4)
     expected = asp.Surface(texture, "D").force([1e-4, 2e-4, -5e-5])
     assert [float.fromhex(part) / 1.0 for part in force] != [0.0, 0.0, 0.0]
     ratio = np.array([float.fromhex(part) for part in force]) / expected
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-14)  # the stiffness is the device's
     run_command(tool("gcc"), *STRICT, "-c", source, "-o", tmp_path / "m_data.o")
-    # A second time: both files are in the way.
+    # The second export finds both files.
     target.unlink()
-    code, _out, err = call("export", str(large), *options, "-o", str(target))
+    code, _out, err = call("export", str(large_map), *options, "-o", str(target))
     assert code == 2
     assert err == f"asperity: output exists: {source}; --force replaces it\n"
     assert not target.exists()
 
 
-def test_a_full_disk_leaves_nothing(
-    call: Call, large: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_full_disk_leaves_no_partial_export(
+    call: Call, large_map: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The header alone would be there, and not compile."""
+    """A header without its data file would not compile."""
     folder = tmp_path / "full"
     folder.mkdir()
-    whole = writing.open_atomic
+    open_atomic = writing.open_atomic
 
     @contextmanager
-    def short(path: Path) -> Iterator[IO[bytes]]:
-        with whole(path) as stream:
+    def open_on_full_disk(path: Path) -> Iterator[IO[bytes]]:
+        with open_atomic(path) as stream:
             if path.suffix == ".c":
                 raise OSError(errno.ENOSPC, "No space left on device")
             yield stream
 
-    monkeypatch.setattr(writing, "open_atomic", short)
+    monkeypatch.setattr(writing, "open_atomic", open_on_full_disk)
     options = ("--pitch", "0.2mm", "--law", "B", "-o", str(folder / "m.h"))
-    code, _out, err = call("export", str(large), *options)
+    code, _out, err = call("export", str(large_map), *options)
     assert code == 2
     assert err.startswith("asperity: output cannot be written: No space left on device")
     assert not list(folder.iterdir())
 
 
-def test_too_much_data_says_what_fits(call: Call, large: Path, tmp_path: Path) -> None:
+def test_error_for_too_much_data_names_the_size_that_fits(
+    call: Call, large_map: Path, tmp_path: Path
+) -> None:
     target = str(tmp_path / "m.h")
     options = ("--pitch", "0.2mm", "--law", "B", "-o", target, "--max-data")
-    code, _out, err = call("export", str(large), *options, "8kB")
+    code, _out, err = call("export", str(large_map), *options, "8kB")
     assert code == 2
-    found = re.search(r"max_data must be at least (\d+) bytes.* at most (\d+) x (\d+) points", err)
-    assert found is not None
-    assert int(found[1]) == 32 * 42 * 8
-    assert 8 * int(found[2]) * int(found[3]) <= 8_000 * 1.1
-    assert call("export", str(large), *options, found[1] + "B")[0] == 0
-    # With the tree of a search beside the heights it is still the map that is told.
-    code, _out, err = call("export", str(large), "--force", *options[:3], "D", *options[4:], "8kB")
-    found = re.search(r"at most (\d+) x (\d+) points", err)
-    assert found is not None
-    assert int(found[1]) / int(found[2]) == pytest.approx(32 / 42, rel=0.1)
+    match = re.search(r"max_data must be at least (\d+) bytes.* at most (\d+) x (\d+) points", err)
+    assert match is not None
+    assert int(match[1]) == 32 * 42 * 8
+    assert 8 * int(match[2]) * int(match[3]) <= 8_000 * 1.1
+    assert call("export", str(large_map), *options, match[1] + "B")[0] == 0
+    # With the tree of a search beside the heights the message still gives the size of the map.
+    code, _out, err = call(
+        "export", str(large_map), "--force", *options[:3], "D", *options[4:], "8kB"
+    )
+    match = re.search(r"at most (\d+) x (\d+) points", err)
+    assert match is not None
+    assert int(match[1]) / int(match[2]) == pytest.approx(32 / 42, rel=0.1)
 
 
 BAD = {
@@ -196,19 +202,19 @@ BAD = {
 
 
 @pytest.mark.parametrize("options", BAD, ids=" ".join)
-def test_bad_input_is_one_line(
+def test_invalid_input_gives_a_one_line_error_and_writes_no_file(
     options: tuple[str, ...], call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    where = () if options[0] == "-o" else ("-o", "wall.h")
-    code, out, err = call("export", WAVE, *where, *options)
+    output = () if options[0] == "-o" else ("-o", "wall.h")
+    code, out, err = call("export", WAVE, *output, *options)
     assert (code, out) == (2, "")
     assert err.startswith(f"asperity: {BAD[options]}")
     assert err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_exists_is_kept_without_force(call: Call, tmp_path: Path) -> None:
+def test_existing_file_is_replaced_only_with_force(call: Call, tmp_path: Path) -> None:
     target = tmp_path / "t.h"
     target.write_text("mine")
     code, _out, err = call("export", WAVE, "--law", "C", "-o", str(target))
@@ -218,7 +224,7 @@ def test_what_exists_is_kept_without_force(call: Call, tmp_path: Path) -> None:
     assert "texture_force" in target.read_text()
 
 
-def test_a_law_that_c_does_not_know(call: Call, tmp_path: Path) -> None:
+def test_law_without_a_c_equivalent_is_refused(call: Call, tmp_path: Path) -> None:
     module = tmp_path / "mine.py"
     module.write_text(
         "import sympy as sp\nimport asperity as asp\n"

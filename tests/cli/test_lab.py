@@ -1,4 +1,4 @@
-"""lab on the command line: what cannot be is said before anything starts."""
+"""``asperity lab``: invalid input is refused before the server starts."""
 
 from __future__ import annotations
 
@@ -20,35 +20,35 @@ from asperity.core.errors import ParameterError, SurfaceFileError
         (["--stiffness=-1N/m"], "stiffness"), (["--port", "70000"], "port"),
     ],
 )  # fmt: skip
-def test_bad_input_is_named(arguments: list[str], words: str) -> None:
-    done = CliRunner().invoke(cli, ["lab", "--no-browser", *arguments])
-    assert isinstance(done.exception, ParameterError | SurfaceFileError)
-    assert words in str(done.exception)
+def test_invalid_input_is_named_in_the_error(arguments: list[str], words: str) -> None:
+    result = CliRunner().invoke(cli, ["lab", "--no-browser", *arguments])
+    assert isinstance(result.exception, ParameterError | SurfaceFileError)
+    assert words in str(result.exception)
 
 
 @pytest.mark.parametrize("name", ["real", "replay:other.mcap"])
-def test_a_recording_is_shown_on_the_simulated_device_alone(name: str) -> None:
-    done = CliRunner().invoke(cli, ["lab", "--no-browser", "run.mcap", "--driver", name])
-    assert isinstance(done.exception, ParameterError)
-    assert "driver cannot play back the recording run.mcap: leave it out" in str(done.exception)
+def test_recording_cannot_be_played_back_on_another_driver(name: str) -> None:
+    result = CliRunner().invoke(cli, ["lab", "--no-browser", "run.mcap", "--driver", name])
+    assert isinstance(result.exception, ParameterError)
+    assert "driver cannot play back the recording run.mcap: leave it out" in str(result.exception)
 
 
-def test_without_a_browser_the_address_is_said(
+def test_address_is_printed_when_no_browser_is_found(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     def run_lab(
         _stage: object,
-        bound: socket,
+        server_socket: socket,
         ready: Callable[[str], None],
         *_others: object,
         **_more: object,
     ) -> None:
-        bound.close()
+        server_socket.close()
         ready("http://127.0.0.1:1/token/")
 
     monkeypatch.setattr("asperity.lab.launch.run_lab", run_lab)
     monkeypatch.setattr("webbrowser.open", lambda _address: False)
-    done = CliRunner().invoke(cli, ["lab", "--port", "0"])
-    assert done.exit_code == 0
-    assert "the lab is at http://127.0.0.1:1/token/" in done.output + capfd.readouterr().err
-    assert "no browser was found: open the address in a browser of this machine" in done.output
+    result = CliRunner().invoke(cli, ["lab", "--port", "0"])
+    assert result.exit_code == 0
+    assert "the lab is at http://127.0.0.1:1/token/" in result.output + capfd.readouterr().err
+    assert "no browser was found: open the address in a browser of this machine" in result.output

@@ -1,4 +1,4 @@
-"""``asperity limits`` as its users see it."""
+"""Output, options and errors of ``asperity limits``."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ WIDTH = 100
 
 
 @pytest.fixture
-def bench(tmp_path: Path) -> str:
+def device_path(tmp_path: Path) -> str:
     (tmp_path / "bench.toml").write_text(BENCH)
     return str(tmp_path / "bench.toml")
 
@@ -44,7 +44,7 @@ def row(out: str, number: int) -> str:
 
 
 @pytest.mark.parametrize("width", [80, 100, 120])
-def test_one_row_per_limit_with_the_number_alone_in_front(call: Call, width: int) -> None:
+def test_each_limit_is_one_row_that_starts_with_its_number(call: Call, width: int) -> None:
     code, out, err = call(SPEC, "--device", "pantograph", "--law", "A", width=width)
     assert (code, err) == (0, "")
     assert max(len(line) for line in out.splitlines()) <= width
@@ -58,11 +58,11 @@ def test_one_row_per_limit_with_the_number_alone_in_front(call: Call, width: int
     assert "Default speed 0.1 m/s" in out
 
 
-def test_speed_and_samples_reach_the_result(call: Call, bench: str) -> None:
+def test_options_reach_the_result(call: Call, device_path: str) -> None:
     options = ["--speed", "0.3 m/s", "--law", "groove-wall-normal", "--time-samples", "8"]
     options += ["--position-samples=7", "--force-steps", "6", "--stiffness=400N/m"]
     options += ["--max-depth", "0.3mm"]
-    _code, out, _err = call(SPEC, "--device", bench, *options, "--json", "-")
+    _code, out, _err = call(SPEC, "--device", device_path, *options, "--json", "-")
     data = json.loads(out)
     assert (data["speed"], data["law"], data["stiffness"]) == (0.3, "A", 400.0)
     assert data["max_depth"] == pytest.approx(0.3e-3)
@@ -76,15 +76,15 @@ def test_speed_and_samples_reach_the_result(call: Call, bench: str) -> None:
         assert sides[number] == (pytest.approx(pair[0]), pytest.approx(pair[1], rel=1e-6))
 
 
-def test_a_limit_that_fails_is_a_verdict(call: Call, bench: str) -> None:
-    code, out, _err = call(SPEC, "--device", bench, "--speed", "0.5m/s", "--law", "A")
+def test_limit_that_fails_is_reported_and_not_an_error(call: Call, device_path: str) -> None:
+    code, out, _err = call(SPEC, "--device", device_path, "--speed", "0.5m/s", "--law", "A")
     assert code == 0
     assert re.search(r"500 Hz +400 Hz +no", row(out, 6))
     assert "limit 6 (device structure) fails" in " ".join(out.split())
     assert "Below 0.4 m/s they hold" in " ".join(out.split())
 
 
-def test_every_option_of_the_law_is_taken(call: Call) -> None:
+def test_law_parameters_reach_the_result(call: Call) -> None:
     options = ["--law", "F", "--friction", "0.3", "--max-deflection", "0.5mm"]
     options += ["--modulation-depth", "0.5", "--stiffness", "600N/m"]
     _code, out, _err = call(SPEC, *options, "--max-depth", "0.2mm", "--json", "-")
@@ -92,20 +92,20 @@ def test_every_option_of_the_law_is_taken(call: Call) -> None:
     assert force == pytest.approx(600.0 * 0.2e-3 * 0.3 * 0.5 / 2, rel=1e-6)
 
 
-def test_json_on_standard_output_is_alone(call: Call) -> None:
+def test_json_is_the_only_output_on_stdout(call: Call) -> None:
     code, out, err = call(SPEC, "--json", "-")
     assert (code, err) == (0, "")
     assert json.loads(out)["device"]["id"] == "omega.3"
 
 
-def test_html_on_standard_output_is_alone(call: Call) -> None:
+def test_html_is_the_only_output_on_stdout(call: Call) -> None:
     code, out, err = call(SPEC, "--html", "-")
     assert (code, err) == (0, "")
     assert out.lower().startswith("<!doctype html>")
     assert out.rstrip().endswith("</html>")
 
 
-def test_files_are_written_whole(call: Call, tmp_path: Path) -> None:
+def test_json_and_html_files_are_complete(call: Call, tmp_path: Path) -> None:
     json_path, html_path = tmp_path / "a.json", tmp_path / "a.html"
     code, out, _err = call(SPEC, "--json", str(json_path), "--html", str(html_path))
     assert code == 0
@@ -116,7 +116,7 @@ def test_files_are_written_whole(call: Call, tmp_path: Path) -> None:
     assert sorted(item.name for item in tmp_path.iterdir()) == ["a.html", "a.json"]
 
 
-def test_scene_file_with_options_that_override_it(call: Call, tmp_path: Path) -> None:
+def test_options_override_the_scene_file(call: Call, tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(
         '[texture]\nkind = "sinusoid"\namplitude = "0.1 mm"\nperiod = "1.5 mm"\n'
@@ -140,9 +140,11 @@ def test_scene_file_with_options_that_override_it(call: Call, tmp_path: Path) ->
         ("dektak-1.csv", ["--magnify", "20", "--magnify-height", "500"]),
     ],
 )
-def test_real_surfaces(call: Call, bench: str, name: str, options: list[str]) -> None:
+def test_measured_surfaces_have_all_limits(
+    call: Call, device_path: str, name: str, options: list[str]
+) -> None:
     code, out, _err = call(
-        str(DATA / name), *options, "--device", bench, "--law", "A", "--json", "-"
+        str(DATA / name), *options, "--device", device_path, "--law", "A", "--json", "-"
     )
     data = json.loads(out)
     assert code == 0
@@ -174,7 +176,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("arguments", "message"), BAD, ids=lambda value: str(value)[-40:])
-def test_bad_input_is_one_line_and_writes_nothing(
+def test_invalid_input_gives_a_one_line_error_and_writes_no_file(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -187,7 +189,7 @@ def test_bad_input_is_one_line_and_writes_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_device_with_a_unit_in_the_value_and_beside_it(call: Call, tmp_path: Path) -> None:
+def test_device_value_with_two_units_is_refused(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "wrong.toml"
     path.write_text('[max_stiffness]\nvalue = "5 N/mm"\nunit = "N/m"\n')
     code, out, err = call(SPEC, "--device", str(path))
@@ -195,7 +197,7 @@ def test_a_device_with_a_unit_in_the_value_and_beside_it(call: Call, tmp_path: P
     assert "device.max_stiffness must be a number, got '5 N/mm'" in err
 
 
-def test_a_flat_map_is_a_verdict(call: Call, tmp_path: Path) -> None:
+def test_flat_map_is_reported_as_having_no_texture(call: Call, tmp_path: Path) -> None:
     np.save(tmp_path / "flat.npy", np.full((8, 8), 1e-3))
     code, out, _err = call(
         str(tmp_path / "flat.npy"), "--pitch", "10um", "--form", "0", "--law", "A"

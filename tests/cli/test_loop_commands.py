@@ -1,4 +1,4 @@
-"""simulate, onset and scan on the command line."""
+"""``asperity simulate``, ``onset``, ``scan`` and ``recording``."""
 
 from __future__ import annotations
 
@@ -61,28 +61,30 @@ def strokes(tmp_path: Path) -> str:
     return str(path)
 
 
-def test_simulate_prints_the_ledger(call: Call, still: str) -> None:
+def test_simulate_prints_the_energy_ledger(call: Call, still: str) -> None:
     code, out, err = call("simulate", still)
     assert (code, err) == (0, "")
     assert "Law A at 400 N/m" in out
     assert "comes to rest" in out
     assert "texture, exact" in out
-    closes = re.search(r"Residual: (\S+) of", " ".join(out.split()))
-    assert closes is not None
-    assert float(closes[1]) < 1e-9
+    residual = re.search(r"Residual: (\S+) of", " ".join(out.split()))
+    assert residual is not None
+    assert float(residual[1]) < 1e-9
     assert max(map(len, out.splitlines())) <= 80
 
 
-def test_what_is_said_of_the_ending_needs_no_rows(call: Call, still: str, tmp_path: Path) -> None:
+def test_final_velocity_is_the_same_with_and_without_a_trace(
+    call: Call, still: str, tmp_path: Path
+) -> None:
     path, page = tmp_path / "trace.csv", tmp_path / "run.html"
     _code, plain, _err = call("simulate", still)
     _code, traced, _err = call("simulate", still, "--trace", str(path))
     assert traced.startswith(plain)
     call("simulate", still, "--html", str(page))
-    said = " ".join(plain.split())
-    words = re.search(r"velocity varies by \S+ \S+ in", said)
-    assert words is not None
-    assert words[0] in " ".join(page.read_text(encoding="utf-8").split())
+    text = " ".join(plain.split())
+    match = re.search(r"velocity varies by \S+ \S+ in", text)
+    assert match is not None
+    assert match[0] in " ".join(page.read_text(encoding="utf-8").split())
 
 
 def test_simulate_writes_json_and_html(call: Call, strokes: str, tmp_path: Path) -> None:
@@ -105,7 +107,7 @@ def test_simulate_writes_json_and_html(call: Call, strokes: str, tmp_path: Path)
     assert "Energy ledger" in text
 
 
-def test_the_trace_has_columns_with_units(call: Call, still: str, tmp_path: Path) -> None:
+def test_trace_columns_have_units(call: Call, still: str, tmp_path: Path) -> None:
     path, page = str(tmp_path / "trace.csv"), str(tmp_path / "run.html")
     code, out, _err = call("simulate", still, "--trace", path, "--every", "2", "--html", page)
     assert code == 0
@@ -119,7 +121,9 @@ def test_the_trace_has_columns_with_units(call: Call, still: str, tmp_path: Path
     assert "<svg" in Path(page).read_text(encoding="utf-8")
 
 
-def test_a_run_is_recorded_and_replayed(call: Call, still: str, tmp_path: Path) -> None:
+def test_recorded_run_is_replayed_bit_for_bit_and_exported(
+    call: Call, still: str, tmp_path: Path
+) -> None:
     path, page = str(tmp_path / "run.mcap"), tmp_path / "run.html"
     code, out, _err = call("simulate", still, "--trace", path, "--html", str(page))
     assert (code, f"Trace: {path}" in out) == (0, True)
@@ -136,10 +140,10 @@ def test_a_run_is_recorded_and_replayed(call: Call, still: str, tmp_path: Path) 
         "recording", "replay", path, "--surface", "sinusoid:amplitude=0.3mm,period=2mm,phase=30deg"
     )
     assert code == 0
-    said = " ".join(out.split())
-    assert re.match(r"\d+ of 800 rows differ; the first is row \d+, at .*: commanded", said)
-    assert f"The file {still} has changed since".replace(" ", "") in said.replace(" ", "")
-    assert "Recorded on another surface" in said
+    replay_text = " ".join(out.split())
+    assert re.match(r"\d+ of 800 rows differ; the first is row \d+, at .*: commanded", replay_text)
+    assert f"The file {still} has changed since".replace(" ", "") in replay_text.replace(" ", "")
+    assert "Recorded on another surface" in replay_text
     for name in ("run.csv", "run.mat", "page.html", "run.png", "run.svg"):
         verb = "export" if name[:3] == "run" and name[-3:] in {"csv", "mat"} else "plot"
         code, out, _err = call("recording", verb, path, "-o", str(tmp_path / name))
@@ -158,7 +162,7 @@ def test_a_run_is_recorded_and_replayed(call: Call, still: str, tmp_path: Path) 
         {"surface": 3, "servo": {"period": "often"}, "every": "other", "hand": {}},
     ],
 )
-def test_what_others_record_is_shown_as_far_as_it_goes(
+def test_recording_with_other_metadata_is_shown_and_cannot_be_replayed(
     call: Call, tmp_path: Path, about: dict[str, Any]
 ) -> None:
     path = tmp_path / "run.mcap"
@@ -172,12 +176,14 @@ def test_what_others_record_is_shown_as_far_as_it_goes(
         assert (code, out, err.count("\n")) == (2, "", 1)
 
 
-def test_a_recording_without_a_whole_block_shows_no_numbers(call: Call, tmp_path: Path) -> None:
+def test_truncated_recording_without_a_complete_block_has_no_rows(
+    call: Call, tmp_path: Path
+) -> None:
     path = tmp_path / "run.mcap"
     with asp.RecordingWriter(path, (("time", "s"), ("x", "m"))) as writer:
         writer.append(np.zeros((2, 2)))
-    begin = asp.open_recording(path)._chunks[0].start
-    path.write_bytes(path.read_bytes()[: begin + 20])
+    start = asp.open_recording(path)._chunks[0].start
+    path.write_bytes(path.read_bytes()[: start + 20])
     code, out, err = call("recording", "info", str(path))
     assert (code, err) == (0, "")
     assert out.startswith(
@@ -191,17 +197,17 @@ def test_a_recording_without_a_whole_block_shows_no_numbers(call: Call, tmp_path
     assert call("recording", "info", str(path))[1].startswith("0 rows, 0 s. Nothing was recorded.")
 
 
-def test_a_recording_of_a_later_format_is_refused(call: Call, tmp_path: Path) -> None:
+def test_recording_of_a_later_format_is_refused(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with asp.RecordingWriter(path, (("time", "s"), ("x", "m"))) as writer:
         writer.append(np.zeros((2, 2)))
     path.write_bytes(path.read_bytes().replace(b"\x01\0\0\x001", b"\x01\0\0\x002", 1))
     picture, table = str(tmp_path / "a.png"), str(tmp_path / "a.csv")
-    for verb, *to in (["info"], ["replay"], ["plot", "-o", picture], ["export", "-o", table]):
-        code, out, err = call("recording", verb, str(path), *to)
+    for verb, *output in (["info"], ["replay"], ["plot", "-o", picture], ["export", "-o", table]):
+        code, out, err = call("recording", verb, str(path), *output)
         assert (code, out, err.count("\n")) == (2, "", 1)
         assert "it is of format 2" in err
-    assert [one.name for one in tmp_path.iterdir()] == ["run.mcap"]
+    assert [item.name for item in tmp_path.iterdir()] == ["run.mcap"]
 
 
 @pytest.mark.parametrize(
@@ -218,20 +224,20 @@ def test_a_recording_of_a_later_format_is_refused(call: Call, tmp_path: Path) ->
         (["replay", "{run}", "--surface", "no:thing=1"], "surface"),
     ],
 )
-def test_bad_input_of_recordings_is_one_line(
+def test_invalid_recording_input_gives_a_one_line_error(
     call: Call, still: str, tmp_path: Path, arguments: list[str], words: str
 ) -> None:
     run = tmp_path / "run.mcap"
     call("simulate", still, "--trace", str(run), "--duration", "10ms")
-    given = [one.format(still=still, run=run) for one in arguments]
-    code, out, err = call("recording", *given)
+    filled = [argument.format(still=still, run=run) for argument in arguments]
+    code, out, err = call("recording", *filled)
     assert (code, out) == (2, "")
     assert words in err
     assert err.count("\n") == 1
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is always full")
-def test_a_full_disk_is_said(call: Call, still: str, tmp_path: Path) -> None:
+def test_full_disk_is_reported(call: Call, still: str, tmp_path: Path) -> None:
     full = tmp_path / "full.csv"
     os.symlink("/dev/full", full)
     code, out, err = call("simulate", still, "--trace", str(full))
@@ -240,7 +246,7 @@ def test_a_full_disk_is_said(call: Call, still: str, tmp_path: Path) -> None:
     assert "Traceback" not in err
 
 
-def test_onset_finds_brackets(call: Call, still: str, tmp_path: Path) -> None:
+def test_onset_brackets_the_critical_stiffness(call: Call, still: str, tmp_path: Path) -> None:
     options = ["--delays", "0; 2", "--starts", "2", "--tolerance", "0.2", "--laws", "WC"]
     code, out, err = call("onset", still, *options, "--lowest", "100N/m")
     assert (code, err) == (0, "")
@@ -249,35 +255,35 @@ def test_onset_finds_brackets(call: Call, still: str, tmp_path: Path) -> None:
     assert max(map(len, out.splitlines())) <= 80
     code, out, _err = call("onset", still, *options, "--lowest", "100N/m", "--json", "-")
     onsets = json.loads(out)["onsets"]
-    assert [(one["law"], one["delay"]) for one in onsets] == [
+    assert [(onset["law"], onset["delay"]) for onset in onsets] == [
         ("W", 0),
         ("W", 2),
         ("C", 0),
         ("C", 2),
     ]
-    for one in onsets:
-        assert one["quiet"] < one["cycling"] <= 1.2 * one["quiet"] * (1 + 1e-9)
-        assert one["cycling"] > one["delay_rule"]
+    for onset in onsets:
+        assert onset["quiet"] < onset["cycling"] <= 1.2 * onset["quiet"] * (1 + 1e-9)
+        assert onset["cycling"] > onset["delay_rule"]
     code, _out, _err = call("onset", still, *options, "--html", str(tmp_path / "o.html"))
     text = (tmp_path / "o.html").read_text(encoding="utf-8")
     assert "Onset against delay" in text
     check_alts(check_alone(text), text)
 
 
-def test_scan_tells_gain_from_loss(call: Call, strokes: str, tmp_path: Path) -> None:
+def test_scan_separates_energy_gain_from_loss(call: Call, strokes: str, tmp_path: Path) -> None:
     options = ["--laws", "AF", "--speeds", "0.05m/s; 0.1m/s", "--strokes", "3"]
     code, out, err = call("scan", strokes, *options)
     assert (code, err) == (0, "")
-    said = " ".join(out.split())
-    assert "A stroke feeds the hand: A always, F never." in said
-    assert "The law's field itself feeds it: A always, F never." in said
+    summary = " ".join(out.split())
+    assert "A stroke feeds the hand: A always, F never." in summary
+    assert "The law's field itself feeds it: A always, F never." in summary
     assert max(map(len, out.splitlines())) <= 80
     code, out, _err = call("scan", strokes, *options, "--depths", "0.2mm;0.4mm", "--json", "-")
-    found = json.loads(out)["strokes"]
-    assert [(one["law"], one["speed"], one["depth"]) for one in found[:3]] == [
+    results = json.loads(out)["strokes"]
+    assert [(stroke["law"], stroke["speed"], stroke["depth"]) for stroke in results[:3]] == [
         ("A", 0.05, 2e-4), ("A", 0.05, 4e-4), ("A", 0.1, 2e-4),
     ]  # fmt: skip
-    assert len(found) == 8
+    assert len(results) == 8
     code, _out, _err = call("scan", strokes, *options, "--html", str(tmp_path / "s.html"))
     text = (tmp_path / "s.html").read_text(encoding="utf-8")
     assert "Energy per stroke" in text
@@ -320,7 +326,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("arguments", "message"), BAD, ids=[" ".join(a)[:60] for a, _m in BAD])
-def test_bad_input_is_one_line(
+def test_invalid_input_gives_a_one_line_error_and_writes_no_file(
     call: Call, still: str, strokes: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     arguments: list[str], message: str,
 ) -> None:  # fmt: skip
@@ -335,13 +341,13 @@ def test_bad_input_is_one_line(
 
 
 @pytest.mark.parametrize("command", ["simulate", "onset", "scan"])
-def test_help(command: str) -> None:
+def test_help_names_the_scene_argument(command: str) -> None:
     result = CliRunner().invoke(cli, [command, "--help"])
     assert result.exit_code == 0
     assert "SCENE" in result.output
 
 
-def test_a_run_that_overflows_is_written_as_json(call: Call, still: str) -> None:
+def test_diverged_run_is_written_as_strict_json(call: Call, still: str) -> None:
     scene = Path(still)
     scene.write_text(scene.read_text() + 'velocity = ["1e300 m/s", 0, 0]\n')
     code, out, err = call("simulate", still, "--json", "-")
@@ -352,7 +358,7 @@ def test_a_run_that_overflows_is_written_as_json(call: Call, still: str) -> None
     assert run["state"][1] == 0.0
 
 
-def test_a_body_that_overflows_is_refused(call: Call, still: str) -> None:
+def test_stiffness_that_makes_the_body_too_fast_is_refused(call: Call, still: str) -> None:
     scene = Path(still)
     scene.write_text(scene.read_text().replace("300 N/m", "1e300 N/m"))
     code, out, err = call("simulate", still, "--json", "-")
@@ -360,7 +366,7 @@ def test_a_body_that_overflows_is_refused(call: Call, still: str) -> None:
     assert "stiffness makes the body too fast" in err
 
 
-def test_a_plant_that_leaves_its_workspace_stops_there(call: Call, tmp_path: Path) -> None:
+def test_run_stops_when_the_plant_leaves_its_workspace(call: Call, tmp_path: Path) -> None:
     text = SCENE.replace('apparent_mass = "50 g"\n', "").replace(
         '[device]\ndamping = "1 N*s/m"\nupdate_rate = "4 kHz"\ndelay_samples = 1\n',
         '[device]\nid = "pantograph"\n',

@@ -1,4 +1,4 @@
-"""asperity maps."""
+"""``asperity maps``: height and normal maps as files."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ COMMAND = "maps"
 WAVE = "sinusoid:amplitude=0.1mm,period=2mm"
 
 
-def test_heights_are_written_and_read(call: Call, tmp_path: Path) -> None:
+def test_height_map_is_written_and_read_back(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "map.png"
     code, out, err = call(WAVE, "-o", str(path), "--spacing", "50um")
     assert (code, err) == (0, "")
@@ -26,7 +26,7 @@ def test_heights_are_written_and_read(call: Call, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("convention", ["gltf", "chai3d"])
-def test_normals_say_what_they_cost(call: Call, tmp_path: Path, convention: str) -> None:
+def test_normal_map_reports_its_force_error(call: Call, tmp_path: Path, convention: str) -> None:
     path = str(tmp_path / "map.png")
     code, out, err = call(WAVE, "-o", path, "--normals", convention, "--stiffness", "500N/m")
     assert (code, err) == (0, "")
@@ -50,7 +50,7 @@ def test_normals_say_what_they_cost(call: Call, tmp_path: Path, convention: str)
         (["-o", "map.png", "--extent", "5"], "extent"),
     ],
 )
-def test_bad_input_is_one_line(
+def test_invalid_input_gives_a_one_line_error_and_writes_no_file(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -59,10 +59,10 @@ def test_bad_input_is_one_line(
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert words in err
     assert (tmp_path / "there.png").read_text() == "precious"
-    assert [one.name for one in tmp_path.iterdir()] == ["there.png"]
+    assert [item.name for item in tmp_path.iterdir()] == ["there.png"]
 
 
-def test_force_replaces_what_is_there(call: Call, tmp_path: Path) -> None:
+def test_force_replaces_an_existing_file(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "map.x3p"
     path.write_text("old")
     assert call(WAVE, "-o", str(path), "--force")[0] == 0

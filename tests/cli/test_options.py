@@ -1,4 +1,4 @@
-"""Options follow from declarations, commands are imported when they are asked for."""
+"""Options follow from the declared arguments; commands are imported on demand."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ READ_A_SURFACE = ["analyze", "compare", "limits", "onset", "scan", "simulate"]
 def test_every_declared_argument_is_an_option_with_its_help(command: str) -> None:
     result = CliRunner().invoke(cli, [command, "--help"], env={"COLUMNS": "100"})
     assert result.exit_code == 0
-    said = " ".join(result.output.split())
+    text = " ".join(result.output.split())
     depths = [compare._MAX_DEPTHS] if command == "compare" else [MAX_DEPTH]  # several there
     for argument in (*depths, *LAW_OPTIONS[2:], *FILE_ARGUMENTS):
-        assert f"--{argument.name.replace('_', '-')} " in said
+        assert f"--{argument.name.replace('_', '-')} " in text
         # Lines are broken at hyphens, too.
-        assert "".join(option_help(argument).split()) in said.replace(" ", "")
+        assert "".join(option_help(argument).split()) in text.replace(" ", "")
     for option in ("--set", "--plugin, --law-module", "--device"):
-        assert f"{option} " in said
-    assert ("--stiffness " in said) is (command != "onset")  # which finds it
-    assert ("--law " in said) is (command not in {"compare", "onset", "scan"})  # several there
+        assert f"{option} " in text
+    assert ("--stiffness " in text) is (command != "onset")  # which finds it
+    assert ("--law " in text) is (command not in {"compare", "onset", "scan"})  # several there
 
 
 def test_every_parameter_of_a_shipped_law_is_an_option() -> None:
@@ -50,21 +50,21 @@ def test_every_parameter_of_a_shipped_law_is_an_option() -> None:
     assert {argument.name for argument in LAW_OPTIONS} == declared | {"stiffness", "max_depth"}
 
 
-def test_defaults_in_the_help_are_those_of_the_functions() -> None:
+def test_default_values_in_help_equal_those_of_the_functions() -> None:
     for command, function in ((limits, asp.limits), (onset, sweep_onsets), (analyze, asp.analyze)):
-        known = inspect.signature(function).parameters
-        options = [one for one in vars(command).values() if isinstance(one, tuple) and one]
-        arguments = [one for group in options for one in group if isinstance(one, Argument)]
+        parameters = inspect.signature(function).parameters
+        options = [item for item in vars(command).values() if isinstance(item, tuple) and item]
+        arguments = [item for group in options for item in group if isinstance(item, Argument)]
         assert arguments
         for argument in arguments:
-            default = known[argument.name].default if argument.name in known else None
+            default = parameters[argument.name].default if argument.name in parameters else None
             if argument.default is not None and default is not None:
                 assert argument.default == default, argument.name
-    assert {one.default for one in limits._SAMPLING} == {DEFAULT_SAMPLES}
+    assert {item.default for item in limits._SAMPLING} == {DEFAULT_SAMPLES}
     assert SPEED.default_description == f"{DEFAULT_SPEED:g} m/s"
 
 
-def test_help_loads_nothing_heavy() -> None:
+def test_help_of_all_commands_in_one_process_imports_no_heavy_package() -> None:
     code = (
         "import sys\n"
         "from click.testing import CliRunner\n"
@@ -75,13 +75,13 @@ def test_help_loads_nothing_heavy() -> None:
         "heavy = {'scipy', 'sympy', 'numba', 'matplotlib', 'pint', 'rich', 'jinja2'}\n"
         "sys.exit(str(sorted(heavy & set(sys.modules))) if heavy & set(sys.modules) else 0)"
     )
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, env=os.environ
     )
-    assert done.returncode == 0, done.stderr
+    assert process.returncode == 0, process.stderr
 
 
-def test_the_help_lists_every_command_with_its_summary() -> None:
+def test_help_lists_every_command_with_its_summary() -> None:
     text = CliRunner().invoke(cli, ["--help"], env={"COLUMNS": "100"}).output
     for name, (_module, summary) in COMMANDS.items():
         assert f"  {name} " in text
@@ -98,25 +98,25 @@ class _Terminal(io.StringIO):
         return True
 
 
-def test_progress_is_shown_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    for stream, shown in ((_Terminal(), True), (io.StringIO(), False)):
+def test_progress_is_shown_only_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    for stream, is_terminal in ((_Terminal(), True), (io.StringIO(), False)):
         monkeypatch.setattr(sys, "stderr", stream)
         with step_bar("reading", 2) as step:
             step("first part")
             step("second part")
-        with progress_bar("stroking") as told:
-            told(0.5)
-            told(1.0, "writing")
-        assert ("stroking" in stream.getvalue()) == shown
-        assert ("left:" in stream.getvalue()) == shown
-        assert ("second part" in stream.getvalue()) == shown
+        with progress_bar("stroking") as report:
+            report(0.5)
+            report(1.0, "writing")
+        assert ("stroking" in stream.getvalue()) == is_terminal
+        assert ("left:" in stream.getvalue()) == is_terminal
+        assert ("second part" in stream.getvalue()) == is_terminal
 
 
-@pytest.mark.parametrize("kept_before", [False, True])
-def test_a_first_run_says_that_it_compiles(
-    kept_before: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("is_cached", [False, True])
+def test_progress_reports_compilation_only_when_code_is_not_cached(
+    is_cached: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """How many loops, as they come, then what was being done; what is kept is not compiled."""
+    """The bar counts the loops as they are compiled; loops in the cache are not compiled."""
     from asperity.core.compiled import COMPILE_CALLBACKS
     from asperity.kernels.fuse import _HEADER, _load_module, load_fused
 
@@ -128,13 +128,13 @@ def test_a_first_run_says_that_it_compiles(
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
     _load_module.cache_clear()
-    if kept_before:
+    if is_cached:
         assert load_fused(source).first(1.0) + load_fused(source).other(1.0) == 4.0
     _load_module.cache_clear()
-    with progress_bar("comparing") as told:
+    with progress_bar("comparing") as report:
         assert (load_fused(source).first(1.0), load_fused(source).other(1.0)) == (2.0, 2.0)
         assert len(COMPILE_CALLBACKS) == 1
-        shown = stream.getvalue()
-        told(0.5)
-    assert ("comparing: compiling loop 2, cached" in shown) != kept_before
+        output = stream.getvalue()
+        report(0.5)
+    assert ("comparing: compiling loop 2, cached" in output) != is_cached
     assert COMPILE_CALLBACKS == []

@@ -1,4 +1,4 @@
-"""Where results go: files, links, pipes, and what cannot be written."""
+"""Output paths: files, links, pipes, and paths that cannot be written."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from asperity.cli.output import check_output, check_outputs, write_output
 from asperity.core.errors import ParameterError
 
 
-def test_a_file_is_replaced_and_nothing_else_is_left(tmp_path: Path) -> None:
+def test_existing_file_is_replaced_without_temporary_files(tmp_path: Path) -> None:
     target = tmp_path / "real.html"
     target.write_text("old")
     check_output("html", str(target))
@@ -21,12 +21,12 @@ def test_a_file_is_replaced_and_nothing_else_is_left(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes here")
-@pytest.mark.parametrize("linked", [False, True], ids=["pipe", "link to a pipe"])
-def test_what_is_no_file_is_written_to_and_not_replaced(tmp_path: Path, linked: bool) -> None:
-    """As root, a file was put in the place of a device."""
+@pytest.mark.parametrize("is_link", [False, True], ids=["pipe", "link to a pipe"])
+def test_pipe_is_written_to_and_not_replaced(tmp_path: Path, is_link: bool) -> None:
+    """An atomic replacement would put a file in the place of a device."""
     pipe = path = tmp_path / "pipe.html"
     os.mkfifo(pipe)
-    if linked:
+    if is_link:
         path = tmp_path / "link.html"
         path.symlink_to(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
@@ -37,11 +37,11 @@ def test_what_is_no_file_is_written_to_and_not_replaced(tmp_path: Path, linked: 
     finally:
         os.close(reader)
     assert pipe.is_fifo()
-    assert path.is_symlink() == linked
+    assert path.is_symlink() == is_link
 
 
 @pytest.mark.parametrize("exists", [True, False])
-def test_a_link_is_followed(tmp_path: Path, exists: bool) -> None:
+def test_link_to_a_file_is_followed(tmp_path: Path, exists: bool) -> None:
     (tmp_path / "far").mkdir()
     real, link = tmp_path / "far" / "real.html", tmp_path / "link.html"
     if exists:
@@ -54,7 +54,7 @@ def test_a_link_is_followed(tmp_path: Path, exists: bool) -> None:
     assert sorted(tmp_path.iterdir()) == [tmp_path / "far", link]
 
 
-def test_the_folder_is_that_of_the_linked_file(tmp_path: Path) -> None:
+def test_link_into_a_missing_folder_is_refused(tmp_path: Path) -> None:
     link = tmp_path / "link.html"
     link.symlink_to(tmp_path / "none" / "real.html")
     with pytest.raises(ParameterError, match=r"folder that exists, .*none does not"):
@@ -63,7 +63,7 @@ def test_the_folder_is_that_of_the_linked_file(tmp_path: Path) -> None:
         write_output("html", str(link), "new")
 
 
-def test_links_to_themselves_and_folders_are_refused(tmp_path: Path) -> None:
+def test_folders_and_links_to_themselves_are_refused(tmp_path: Path) -> None:
     loop = tmp_path / "loop.html"
     loop.symlink_to(loop)
     with pytest.raises(ParameterError, match="html must be a file, not a link to itself"):
@@ -72,7 +72,7 @@ def test_links_to_themselves_and_folders_are_refused(tmp_path: Path) -> None:
         check_output("html", str(tmp_path))
 
 
-def test_two_outputs_cannot_be_one_file(tmp_path: Path) -> None:
+def test_two_outputs_cannot_be_the_same_file(tmp_path: Path) -> None:
     file, link = tmp_path / "a.csv", tmp_path / "link"
     link.symlink_to(tmp_path)
     check_outputs(json=str(file), html=str(tmp_path / "b.html"), trace=None)

@@ -1,4 +1,4 @@
-"""``asperity prepare`` as its users see it."""
+"""``asperity prepare``: the preparation that it reports and the file that it writes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,9 @@ def flat(text: str) -> str:
     return " ".join(text.split())
 
 
-def test_saves_and_says_what_was_done(call: Call, source: str, tmp_path: Path) -> None:
+def test_prepared_file_is_saved_and_each_step_reported(
+    call: Call, source: str, tmp_path: Path
+) -> None:
     target = tmp_path / "surface.npz"
     code, out, err = call("prepare", source, "-o", str(target), "--pitch", "2um; 3 µm")
     assert (code, err) == (0, "")
@@ -69,8 +71,8 @@ def test_every_option_reaches_the_preparation(call: Call, source: str, tmp_path:
         "--magnify": "20",
         "--magnify-height": "10",
     }
-    listed = [part for pair in options.items() for part in pair]
-    code, out, _err = call("prepare", source, "--output", str(target), "--periodic", *listed)
+    flat_options = [part for pair in options.items() for part in pair]
+    code, out, _err = call("prepare", source, "--output", str(target), "--periodic", *flat_options)
     assert code == 0
     for words in (
         "outliers: 1 point beyond 6 robust",
@@ -98,13 +100,15 @@ def test_every_option_reaches_the_preparation(call: Call, source: str, tmp_path:
         magnify=20,
         magnify_height=10,
     )
-    kept = load_texture(target)
-    np.testing.assert_array_equal(kept.heights, expected.heights)
-    assert kept.pitch == expected.pitch
-    assert kept.periodic
+    texture = load_texture(target)
+    np.testing.assert_array_equal(texture.heights, expected.heights)
+    assert texture.pitch == expected.pitch
+    assert texture.periodic
 
 
-def test_compare_and_scenes_take_it(call: Call, source: str, tmp_path: Path) -> None:
+def test_prepared_file_is_used_by_compare_and_scenes(
+    call: Call, source: str, tmp_path: Path
+) -> None:
     target = tmp_path / "surface.npz"
     assert call("prepare", source, "-o", str(target), "--pitch", "20um", "--outliers", "6")[0] == 0
     code, out, err = call("compare", str(target), "--laws", "W", "--magnify-height", "2")
@@ -121,7 +125,7 @@ def test_compare_and_scenes_take_it(call: Call, source: str, tmp_path: Path) -> 
     assert texture.filled_mask is not None
 
 
-def test_scenes_prepare(source: str, tmp_path: Path) -> None:
+def test_scene_options_prepare_the_surface(source: str, tmp_path: Path) -> None:
     (tmp_path / "scene.toml").write_text(
         '[texture]\nkind = "file"\npath = "map.npy"\npitch = "2 µm"\nperiodic = true\nform = 2\n'
         'outliers = 6\nblend = "12 µm"\ntip_radius = "3 µm"\nl_cutoff = "50 µm"\n'
@@ -161,7 +165,7 @@ def test_scenes_prepare(source: str, tmp_path: Path) -> None:
         ([], "pitch must be given"),
     ],
 )
-def test_bad_arguments(
+def test_invalid_arguments_give_a_one_line_error(
     call: Call, source: str, tmp_path: Path, arguments: list[str], message: str
 ) -> None:
     code, out, err = call("prepare", source, "-o", str(tmp_path / "surface.npz"), *arguments)
@@ -171,7 +175,7 @@ def test_bad_arguments(
     assert [p.name for p in tmp_path.iterdir()] == ["map.npy"]
 
 
-def test_bad_outputs(call: Call, source: str, tmp_path: Path) -> None:
+def test_invalid_output_paths_are_refused(call: Call, source: str, tmp_path: Path) -> None:
     before = Path(source).read_bytes()
     for target, message in (
         (source, "output must be another file than the surface"),
@@ -189,19 +193,19 @@ def test_bad_outputs(call: Call, source: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("place", [(np, "savez"), (loading, "prepare_file")])
-def test_interrupted(
+def test_interrupt_leaves_no_file(
     call: Call, source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: tuple[Any, str]
 ) -> None:
     def stop(*_arguments: Any, **_options: Any) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(*place, stop)
-    with pytest.raises(KeyboardInterrupt):  # tests/cli/test_program.py has what is said then
+    with pytest.raises(KeyboardInterrupt):  # for the message see tests/cli/test_program.py
         call("prepare", source, "-o", str(tmp_path / "a.npz"), "--pitch", "2um")
     assert [p.name for p in tmp_path.iterdir()] == ["map.npy"]
 
 
-def test_prepared_again_only_to_magnify(call: Call, source: str, tmp_path: Path) -> None:
+def test_prepared_file_can_only_be_magnified(call: Call, source: str, tmp_path: Path) -> None:
     first, second = str(tmp_path / "a.npz"), str(tmp_path / "b.npz")
     assert call("prepare", source, "-o", first, "--pitch", "2um", "--periodic")[0] == 0
     assert call("prepare", first, "-o", second, "--magnify", "3")[0] == 0
@@ -213,7 +217,7 @@ def test_prepared_again_only_to_magnify(call: Call, source: str, tmp_path: Path)
 
 
 @needs_data
-def test_a_real_surface(call: Call, tmp_path: Path) -> None:
+def test_measured_surface_is_prepared(call: Call, tmp_path: Path) -> None:
     target = tmp_path / "land.npz"
     code, out, err = call(
         *("prepare", str(DATA / "sample-land.x3p"), "-o", str(target)),

@@ -1,4 +1,4 @@
-"""The program as the system sees it: exit codes, streams, interrupts, and never a traceback."""
+"""The program as a process: exit codes, streams and interrupts, without tracebacks."""
 
 from __future__ import annotations
 
@@ -30,55 +30,55 @@ def one_line(text: str) -> str:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no full device")
-def test_a_full_standard_output_is_said_in_one_line() -> None:
-    done = run("asperity devices > /dev/full")
-    assert done.returncode == 74
-    assert one_line(done.stderr) == "asperity: output cannot be written: No space left on device"
+def test_full_stdout_gives_a_one_line_error() -> None:
+    process = run("asperity devices > /dev/full")
+    assert process.returncode == 74
+    assert one_line(process.stderr) == "asperity: output cannot be written: No space left on device"
 
 
-def test_a_reader_that_has_enough_is_no_error() -> None:
-    done = run("asperity devices --json - | true; echo ${PIPESTATUS[0]}")
-    assert int(done.stdout) in {0, 1, 141}  # before or after the reader left
-    assert not done.stderr
+def test_closed_pipe_is_not_an_error() -> None:
+    process = run("asperity devices --json - | true; echo ${PIPESTATUS[0]}")
+    assert int(process.stdout) in {0, 1, 141}  # before or after the reader left
+    assert not process.stderr
 
 
 @pytest.mark.parametrize("closed", ["0<&-", "1>&-", "2>&-", "1>&- 2>&-", "0<&- 1>&- 2>&-"])
-def test_closed_streams_do_no_harm(closed: str, tmp_path: Path) -> None:
+def test_closed_standard_streams_are_accepted(closed: str, tmp_path: Path) -> None:
     path = tmp_path / "devices.json"
-    done = run(f"asperity devices --json {path} {closed}")
-    assert (done.returncode, done.stderr) == (0, "")
+    process = run(f"asperity devices --json {path} {closed}")
+    assert (process.returncode, process.stderr) == (0, "")
     assert path.read_text().rstrip().endswith("}") or path.read_text().rstrip().endswith("]")
 
 
-def test_signs_that_an_encoding_lacks_are_written_plainly() -> None:
-    done = run("PYTHONIOENCODING=ascii asperity devices")
-    assert done.returncode == 0
-    assert done.stdout.isascii()
-    assert "sigma0(B)" in done.stdout
-    assert "30 um" in done.stdout
-    assert "10 um ?" in done.stdout  # "not verified", not a sign that was lost
-    assert "???" not in done.stdout
+def test_characters_outside_the_encoding_are_transliterated() -> None:
+    process = run("PYTHONIOENCODING=ascii asperity devices")
+    assert process.returncode == 0
+    assert process.stdout.isascii()
+    assert "sigma0(B)" in process.stdout
+    assert "30 um" in process.stdout
+    assert "10 um ?" in process.stdout  # "not verified", not a replaced character
+    assert "???" not in process.stdout
 
 
-def test_bad_input_is_said_in_such_an_encoding_too() -> None:
-    done = run("PYTHONIOENCODING=ascii asperity compare sinusoid:amplitude=0.8µs,period=1mm")
-    assert done.returncode == 2
-    assert one_line(done.stderr).isascii()
+def test_error_messages_are_ascii_in_an_ascii_encoding() -> None:
+    process = run("PYTHONIOENCODING=ascii asperity compare sinusoid:amplitude=0.8µs,period=1mm")
+    assert process.returncode == 2
+    assert one_line(process.stderr).isascii()
 
 
-def test_a_foreign_backend_of_matplotlib_does_not_matter(tmp_path: Path) -> None:
+def test_matplotlib_backend_of_the_environment_is_ignored(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     surface = "sinusoid:amplitude=0.8mm,period=1mm"
-    done = run(f"MPLBACKEND=nonsense asperity analyze {surface} --law C --html {page}")
-    assert (done.returncode, done.stderr) == (0, "")
+    process = run(f"MPLBACKEND=nonsense asperity analyze {surface} --law C --html {page}")
+    assert (process.returncode, process.stderr) == (0, "")
     assert "<svg" in page.read_text()
 
 
-def test_foreign_settings_of_matplotlib_do_not_matter(tmp_path: Path) -> None:
+def test_matplotlibrc_of_the_user_is_ignored(tmp_path: Path) -> None:
     (tmp_path / "matplotlibrc").write_text("text.usetex: True\naxes.facecolor: purple\n")
     surface = "sinusoid:amplitude=0.8mm,period=1mm"
-    done = run(f"asperity analyze {surface} --law C --html page.html", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+    process = run(f"asperity analyze {surface} --law C --html page.html", cwd=tmp_path)
+    assert (process.returncode, process.stderr) == (0, "")
 
 
 _FAULT = """
@@ -91,26 +91,26 @@ main()
 """
 
 
-def test_a_fault_is_one_line_that_says_what_was_done_and_where() -> None:
-    done = subprocess.run(
+def test_internal_error_is_one_line_with_command_exception_and_line() -> None:
+    process = subprocess.run(
         [sys.executable, "-c", _FAULT, "compare", "a b"],
         capture_output=True,
         text=True,
         check=False,
     )
-    assert done.returncode == 70
-    line = one_line(done.stderr)
+    assert process.returncode == 70
+    line = one_line(process.stderr)
     for part in ("asperity compare 'a b'", "ZeroDivisionError: float division by zero", "line 4"):
         assert part in line.replace('"', "")
 
 
-def test_a_fault_shows_its_traceback_when_asked() -> None:
-    done = subprocess.run(
+def test_internal_error_shows_its_traceback_on_request() -> None:
+    process = subprocess.run(
         [sys.executable, "-c", _FAULT], capture_output=True, text=True, check=False,
         env=os.environ | {"ASPERITY_TRACEBACK": "1"},
     )  # fmt: skip
-    assert done.returncode == 70
-    assert "Traceback" in done.stderr
+    assert process.returncode == 70
+    assert "Traceback" in process.stderr
 
 
 _SWALLOWS = """
@@ -136,24 +136,22 @@ main()
     "work", ["return", "time.sleep(30); print('to the end')"], ids=["no longer", "and works on"]
 )
 @pytest.mark.parametrize("swallowed_by", ["try", "finalizer"])
-def test_an_interrupt_that_was_swallowed_is_told_and_ends_the_work(
-    work: str, swallowed_by: str
-) -> None:
+def test_swallowed_interrupt_is_reported_and_ends_the_program(work: str, swallowed_by: str) -> None:
     script = _SWALLOWS.replace("{work}", work)
     if swallowed_by == "finalizer":
         script = script.replace(
             "        os.kill(os.getpid(), signal.SIGINT)\n    except",
             ("        Finalized()\n        print('went on', flush=True)\n    except"),
         )
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=False, timeout=60
     )
-    assert (done.returncode, done.stdout) == (130, "went on\n")
-    assert done.stderr == "asperity: interrupted\n"
+    assert (process.returncode, process.stdout) == (130, "went on\n")
+    assert process.stderr == "asperity: interrupted\n"
 
 
-def test_an_interrupt_after_the_work_does_not_end_by_the_signal() -> None:
-    """Python hands signals back to the system while it ends: none may come then."""
+def test_interrupt_during_interpreter_shutdown_is_ignored() -> None:
+    """Python restores the default handlers while it exits, so signals must be blocked then."""
     script = (
         "import atexit, os, signal\n"
         "atexit.register(lambda: os.kill(os.getpid(), signal.SIGINT))\n"
@@ -162,14 +160,14 @@ def test_an_interrupt_after_the_work_does_not_end_by_the_signal() -> None:
         "from asperity.__main__ import main\n"
         "main()\n"
     )
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=False
     )
-    assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
+    assert (process.returncode, process.stdout, process.stderr) == (0, "done\n", "")
 
 
-def test_an_interrupt_inside_exec_ends_with_its_exit_code(tmp_path: Path) -> None:
-    """Run by -m, Python would end by the signal: a dataclass is made by exec(), for one."""
+def test_interrupt_inside_exec_ends_with_exit_code_130(tmp_path: Path) -> None:
+    """With ``-m`` Python would end by the signal; dataclasses, for one, are created by exec()."""
     interrupted = "exec('import os, signal; os.kill(os.getpid(), signal.SIGINT)')"
     (tmp_path / "own.py").write_text(
         "import sys, types\n"
@@ -179,15 +177,15 @@ def test_an_interrupt_inside_exec_ends_with_its_exit_code(tmp_path: Path) -> Non
         "from asperity.__main__ import main\n"
         "main()\n"
     )
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-m", "own"], cwd=tmp_path, capture_output=True, text=True, check=False
     )
-    assert (done.returncode, done.stderr) == (130, "asperity: interrupted\n")
+    assert (process.returncode, process.stderr) == (130, "asperity: interrupted\n")
 
 
 @pytest.mark.parametrize("module", ["click", "asperity.cli.analysis_commands", "numba", "numpy"])
-def test_an_interrupt_during_imports_ends_with_its_exit_code(module: str, tmp_path: Path) -> None:
-    """The interrupt comes while a module is being imported, wherever that is; nothing is kept."""
+def test_interrupt_during_imports_ends_with_exit_code_130(module: str, tmp_path: Path) -> None:
+    """An empty cache makes the program import every module, wherever the import stands."""
     script = f"""
 import os, signal, sys
 class Interrupting:
@@ -198,35 +196,35 @@ sys.meta_path.insert(0, Interrupting())
 from asperity.__main__ import main
 main()
 """
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", script, "compare", "sinusoid:amplitude=0.8mm,period=1mm"],
         capture_output=True, text=True, check=False, timeout=120,
         env=os.environ | {"ASPERITY_CACHE_DIR": str(tmp_path)},
     )  # fmt: skip
-    assert done.returncode == 130
-    assert one_line(done.stderr.strip()) == "asperity: interrupted"
-    assert not done.stdout
+    assert process.returncode == 130
+    assert one_line(process.stderr.strip()) == "asperity: interrupted"
+    assert not process.stdout
 
 
-def test_an_interrupt_at_work_leaves_no_file(tmp_path: Path) -> None:
+def test_interrupt_of_a_comparison_leaves_no_file(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     command = [*PROGRAM, "compare", "sandpaper:grit=P60", "--html", str(page)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         with pytest.raises(subprocess.TimeoutExpired):
             process.wait(1.5)
         process.send_signal(signal.SIGINT)
-        _, said = process.communicate(timeout=60)
+        _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert said.decode().strip() == "asperity: interrupted"
+    assert errors.decode().strip() == "asperity: interrupted"
     assert list(tmp_path.iterdir()) == []
 
 
-def test_control_characters_of_a_name_never_reach_the_terminal(tmp_path: Path) -> None:
+def test_control_characters_of_a_path_are_not_printed(tmp_path: Path) -> None:
     path = tmp_path / "a\x1b[31mred\x07\nline.x3p"
     path.write_bytes(b"no surface")
     for command in (["compare"], ["prepare", "-o", str(tmp_path / "out.npz")]):
-        done = subprocess.run(
+        process = subprocess.run(
             [*PROGRAM, *command, str(path)], capture_output=True, text=True, check=False
         )
-        assert done.returncode == 2
-        assert one_line(done.stderr).isprintable()
+        assert process.returncode == 2
+        assert one_line(process.stderr).isprintable()

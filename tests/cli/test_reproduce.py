@@ -1,4 +1,4 @@
-"""``asperity reproduce`` as its users see it."""
+"""``asperity reproduce``: claims, figures, options and errors."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FEW = ("eq-12", "eq-44", "table-1-A", "remark-3", "limit-4", "sentence-V.A-qF")
 COMMAND = "reproduce"  # what the fixture "call" runs
 
 
-def only(*names: str) -> list[str]:
+def claim_options(*names: str) -> list[str]:
     return [text for name in names for text in ("--claim", name)]
 
 
@@ -36,35 +36,35 @@ def test_one_claim_shows_its_evidence(call: Call) -> None:
         assert name in text
 
 
-def test_json_has_the_schema(call: Call) -> None:
-    code, out, _err = call(*only(*FEW), "--json", "-")
+def test_json_follows_the_schema(call: Call) -> None:
+    code, out, _err = call(*claim_options(*FEW), "--json", "-")
     assert code == 0
     data = json.loads(out)
     assert set(data) == {"schema", "claims", "experiments"}
     assert data["experiments"] is None
-    assert {one["id"] for one in data["claims"]} == set(FEW)
-    for one in data["claims"]:
-        assert set(one) == {"id", "equations", "statement", "verdict", "evidence", "flips_under"}
-        assert one["verdict"] in VERDICTS
-        assert one["evidence"]["summary"]
+    assert {claim["id"] for claim in data["claims"]} == set(FEW)
+    for claim in data["claims"]:
+        assert set(claim) == {"id", "equations", "statement", "verdict", "evidence", "flips_under"}
+        assert claim["verdict"] in VERDICTS
+        assert claim["evidence"]["summary"]
 
 
-def test_a_claim_alone_is_what_it_is_among_others(call: Call) -> None:
-    _code, among, _err = call(*only(*FEW), "--json", "-")
+def test_claim_has_the_same_result_alone_and_with_others(call: Call) -> None:
+    _code, several, _err = call(*claim_options(*FEW), "--json", "-")
     _code, alone, _err = call("--claim", "limit-4", "--json", "-")
-    rows = {one["id"]: one for one in json.loads(among)["claims"]}
+    rows = {claim["id"]: claim for claim in json.loads(several)["claims"]}
     assert json.loads(alone)["claims"] == [rows["limit-4"]]
 
 
 def test_every_equation_has_a_claim() -> None:
-    covered = {number for one in CLAIMS.values() for number in one.equations}
-    wanted = {f"({n})" for n in range(1, 45)} | {"Table I", "Table II"}
-    wanted |= {f"Remark {n}" for n in range(1, 8)} | {f"Limit {n}" for n in range(1, 7)}
-    assert wanted <= covered
+    covered = {number for claim in CLAIMS.values() for number in claim.equations}
+    expected = {f"({n})" for n in range(1, 45)} | {"Table I", "Table II"}
+    expected |= {f"Remark {n}" for n in range(1, 8)} | {f"Limit {n}" for n in range(1, 7)}
+    assert expected <= covered
 
 
 class _Tags(HTMLParser):
-    """Checks that tags are closed in order."""
+    """Parser that checks that tags are closed in order."""
 
     VOID = frozenset({"meta", "img", "br"})
 
@@ -82,9 +82,9 @@ class _Tags(HTMLParser):
         assert self.open.pop() == tag
 
 
-def test_the_page_needs_no_network_and_links_to_rows(call: Call, tmp_path: Path) -> None:
+def test_html_page_is_self_contained_and_links_to_every_claim(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "claims.html"
-    code, _out, _err = call(*only(*FEW), "--html", str(path))
+    code, _out, _err = call(*claim_options(*FEW), "--html", str(path))
     text = path.read_text(encoding="utf-8")
     assert code == 0
     tags = _Tags()
@@ -98,7 +98,7 @@ def test_the_page_needs_no_network_and_links_to_rows(call: Call, tmp_path: Path)
         assert f"asperity reproduce --claim {name}" in text
 
 
-def test_figures_are_files_in_a_folder_that_is_made(call: Call, tmp_path: Path) -> None:
+def test_figures_are_written_to_a_new_folder(call: Call, tmp_path: Path) -> None:
     folder = tmp_path / "new" / "figures"
     code, out, err = call("--claim", "eq-12", "--figures", str(folder), "--format", "PNG")
     assert (code, err) == (0, "")
@@ -110,7 +110,7 @@ def test_figures_are_files_in_a_folder_that_is_made(call: Call, tmp_path: Path) 
     assert {path.name for path in folder.iterdir()} == {"fig-3.png", "fig-2.svg"}
 
 
-def test_a_report_in_the_folders_place_is_refused_at_once(call: Call, tmp_path: Path) -> None:
+def test_report_path_equal_to_the_figures_folder_is_refused(call: Call, tmp_path: Path) -> None:
     path = str(tmp_path / "same")
     code, _out, err = call("--claim", "eq-12", "--figures", path, "--html", path)
     assert code == 2
@@ -138,7 +138,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("arguments", "message"), BAD, ids=[" ".join(a) for a, _m in BAD])
-def test_bad_input_is_one_line(
+def test_invalid_input_gives_a_one_line_error_and_writes_no_file(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -149,25 +149,27 @@ def test_bad_input_is_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_whole_table_fits_a_terminal(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its experiments are small stand-ins; the whole is run by hand and takes minutes."""
-    import asperity.paper.experiments as home
-    from asperity.paper.experiments import experiment_suite as runner
+def test_table_of_all_claims_fits_80_columns(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small experiments replace those of the paper, which take minutes."""
+    import asperity.paper.experiments as package
+    from asperity.paper.experiments import experiment_suite as suite
     from asperity.paper.experiments.cycle_counts import passivity_experiment
     from asperity.paper.experiments.device_onsets import DeviceExperiment
     from asperity.paper.experiments.strokes import bump_experiment, scanning_experiment
 
-    def small(measured: object = None, progress: object = None) -> runner.Experiments:
+    def run_small_experiments(
+        measured: object = None, progress: object = None
+    ) -> suite.Experiments:
         assert measured is None
         assert progress is not None
-        return runner.Experiments(
+        return suite.Experiments(
             passivity_experiment("W", (0,), starts=1),
             scanning_experiment("A"),
             bump_experiment("AD"),
             DeviceExperiment((), ("falcon",)),
         )
 
-    monkeypatch.setattr(home, "run_experiments", small)
+    monkeypatch.setattr(package, "run_experiments", run_small_experiments)
     code, out, err = call()
     assert (code, err) == (0, "")
     assert max(map(cell_len, out.splitlines())) <= 80

@@ -1,4 +1,4 @@
-"""``--set``, options that are given twice, and names without a colon."""
+"""``--set``, repeated options, and surface names without a colon."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ Call = Callable[..., tuple[int, str, str]]
 SPEC = "sinusoid:amplitude=0.2mm,period=2mm"
 
 
-def test_a_field_of_the_device_is_set(call: Call) -> None:
-    given = ["--device", "touch", "--set", "max_stiffness=1.5N/mm", "--set", "delay-samples=3"]
-    code, out, err = call("compare", SPEC, "--laws", "W", *given, "--json", "-")
+def test_set_changes_fields_of_the_device(call: Call) -> None:
+    options = ["--device", "touch", "--set", "max_stiffness=1.5N/mm", "--set", "delay-samples=3"]
+    code, out, err = call("compare", SPEC, "--laws", "W", *options, "--json", "-")
     assert (code, err) == (0, "")
     device = json.loads(out)["device"]
     assert device["id"] == "touch"
@@ -27,22 +27,33 @@ def test_a_field_of_the_device_is_set(call: Call) -> None:
     assert device["data"]["max_force"]["value"] == 3.3  # of the catalogue
 
 
-def test_the_default_device_and_that_of_a_scene_are_set(call: Call, tmp_path: Path) -> None:
+def test_set_applies_to_the_default_device_and_to_that_of_a_scene(
+    call: Call, tmp_path: Path
+) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text('[texture]\nkind = "tile"\n[device]\nid = "touch"\nmax_force = "2 N"\n')
     for source, device, force in ((SPEC, "omega.3", 12.0), (str(scene), "touch", 2.0)):
-        given = ["--law", "W", "--set", "update_rate=2kHz", "--json", "-"]
-        found = json.loads(call("limits", source, *given)[1])["device"]
-        assert found["id"] == device
-        assert found["data"]["update_rate"]["value"] == 2000.0
-        assert found["data"]["max_force"]["value"] == force
+        options = ["--law", "W", "--set", "update_rate=2kHz", "--json", "-"]
+        result = json.loads(call("limits", source, *options)[1])["device"]
+        assert result["id"] == device
+        assert result["data"]["update_rate"]["value"] == 2000.0
+        assert result["data"]["max_force"]["value"] == force
 
 
-def test_a_name_that_law_and_device_share_is_the_laws(call: Call) -> None:
-    given = ["--law", "F", "--set", "friction=0.5", "--set", "device.friction=80mN", "--json", "-"]
-    found = json.loads(call("analyze", SPEC, *given)[1])
-    assert found["law_parameters"]["friction"] == 0.5
-    assert found["device"]["data"]["friction"]["value"] == 0.08
+def test_set_prefers_the_law_for_a_name_shared_with_the_device(call: Call) -> None:
+    options = [
+        "--law",
+        "F",
+        "--set",
+        "friction=0.5",
+        "--set",
+        "device.friction=80mN",
+        "--json",
+        "-",
+    ]
+    result = json.loads(call("analyze", SPEC, *options)[1])
+    assert result["law_parameters"]["friction"] == 0.5
+    assert result["device"]["data"]["friction"]["value"] == 0.08
 
 
 WRONG = [
@@ -65,16 +76,18 @@ WRONG = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("given", "words"), WRONG, ids=lambda value: " ".join(value)[:50])
-def test_contradictions_are_one_line(call: Call, given: list[str], words: str) -> None:
-    law = [] if "--law" in given else ["--law", "F"]
-    code, out, err = call("analyze", SPEC, *law, *given)
+@pytest.mark.parametrize(("options", "message"), WRONG, ids=lambda value: " ".join(value)[:50])
+def test_contradictory_options_give_a_one_line_error(
+    call: Call, options: list[str], message: str
+) -> None:
+    law = [] if "--law" in options else ["--law", "F"]
+    code, out, err = call("analyze", SPEC, *law, *options)
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert words in err
+    assert message in err
 
 
-def test_no_option_of_any_command_is_silently_the_last() -> None:
-    """Whatever options there are: twice is refused unless they are made to be repeated."""
+def test_repeated_option_is_refused_unless_it_may_be_repeated() -> None:
+    """Every option of every command is checked."""
     context = click.Context(cli)
     checked = 0
     for name in COMMANDS:
@@ -83,30 +96,30 @@ def test_no_option_of_any_command_is_silently_the_last() -> None:
         for option in command.params:
             if not isinstance(option, click.Option):
                 continue
-            twice = [option.opts[-1], "1"][: 1 if option.is_flag else 2] * 2
+            repeated = [option.opts[-1], "1"][: 1 if option.is_flag else 2] * 2
             if option.multiple:
-                check_not_repeated(command, twice)
+                check_not_repeated(command, repeated)
                 continue
             with pytest.raises(ValueError, match="is given twice"):
-                check_not_repeated(command, twice)
-            check_not_repeated(command, twice[: len(twice) // 2])
+                check_not_repeated(command, repeated)
+            check_not_repeated(command, repeated[: len(repeated) // 2])
             checked += 1
     assert checked > 100
 
 
-def test_lists_say_how_they_are_written(call: Call) -> None:
+def test_error_for_a_repeated_list_option_shows_how_to_write_it(call: Call) -> None:
     _code, _out, err = call("scan", "x.toml", "--speeds", "1m/s", "--speeds", "2m/s")
     assert "give --speeds once; several values are one text, 'a; b'" in err
 
 
-def test_a_surface_by_its_name_alone(
+def test_surface_name_needs_no_colon_and_files_come_first(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    alone, colon = (
+    without_colon, with_colon = (
         call("limits", source, "--law", "W", "--json", "-")[1] for source in ("Knurl", "knurl:")
     )
-    assert alone == colon != ""
+    assert without_colon == with_colon != ""
     (tmp_path / "knurl").write_text("no heights")  # a file comes first
     code, _out, err = call("limits", "knurl", "--law", "W")
     assert code == 2
@@ -121,7 +134,7 @@ def test_a_surface_by_its_name_alone(
         ("sinusoid", "amplitude is missing: a sinusoid needs amplitude, period"),
     ],
 )
-def test_names_that_are_none(call: Call, name: str, words: str) -> None:
+def test_unknown_surface_names_give_a_one_line_error(call: Call, name: str, words: str) -> None:
     code, _out, err = call("limits", name)
     assert (code, err.count("\n")) == (2, 1)
     assert words in err

@@ -29,65 +29,65 @@ COMMAND = "compare"  # what the fixture "call" runs
 WIDTH = 100
 
 
-def test_devices_and_depths_are_one_table(call: Call) -> None:
-    given = ["--device", "touch,inverse3", "--max-depth", "0.1mm; 0.3mm", "--laws", "WC"]
-    code, out, err = call(SPEC, *given)
+def test_devices_and_depths_give_one_table(call: Call) -> None:
+    options = ["--device", "touch,inverse3", "--max-depth", "0.1mm; 0.3mm", "--laws", "WC"]
+    code, out, err = call(SPEC, *options)
     assert (code, err) == (0, "")
     rows = [line.split("  ") for line in out.splitlines() if re.search(r"\d N/m", line[:60])]
     cells = [[cell.strip() for cell in row if cell.strip()] for row in rows]
-    # In brackets where nothing is felt.
+    # Cases in which nothing is felt are in brackets.
     assert [[*row[:2], row[2].strip("()")] for row in cells[:4]] == [
         [device, depth, "C"]
         for device in ("3D Systems Touch", "Haply Inverse3")
         for depth in ("100 µm", "300 µm")
     ]
-    code, out, err = call(SPEC, *given, "--json", "-")
+    code, out, err = call(SPEC, *options, "--json", "-")
     assert (code, err) == (0, "")
-    found = json.loads(out)
-    cases = [(one["device"]["id"], one["max_depth"]) for one in found["comparisons"]]
+    result = json.loads(out)
+    cases = [(case["device"]["id"], case["max_depth"]) for case in result["comparisons"]]
     assert cases == [("touch", 1e-4), ("touch", 3e-4), ("inverse3", 1e-4), ("inverse3", 3e-4)]
-    assert found["missing_data"] == []
+    assert result["missing_data"] == []
 
 
-def test_each_case_is_what_it_is_alone(call: Call) -> None:
-    among = json.loads(call(SPEC, "--device", "omega.3; touch", "--laws", "WA", "--json", "-")[1])
-    for one in among["comparisons"]:
-        device = one["device"]["id"]
-        alone = json.loads(call(SPEC, "--device", device, "--laws", "WA", "--json", "-")[1])
-        assert alone == one
+def test_each_case_equals_a_comparison_of_its_own(call: Call) -> None:
+    several = json.loads(call(SPEC, "--device", "omega.3; touch", "--laws", "WA", "--json", "-")[1])
+    for case in several["comparisons"]:
+        device = case["device"]["id"]
+        single = json.loads(call(SPEC, "--device", device, "--laws", "WA", "--json", "-")[1])
+        assert single == case
 
 
-def test_one_device_and_depth_stay_one_comparison(call: Call) -> None:
-    found = json.loads(call(SPEC, "--max-depth", "0.1mm", "--laws", "W", "--json", "-")[1])
-    assert (found["max_depth"], found["device"]["id"]) == (1e-4, "omega.3")
+def test_one_device_and_depth_give_a_single_comparison(call: Call) -> None:
+    result = json.loads(call(SPEC, "--max-depth", "0.1mm", "--laws", "W", "--json", "-")[1])
+    assert (result["max_depth"], result["device"]["id"]) == (1e-4, "omega.3")
 
 
-def test_a_scene_gives_what_the_options_leave(call: Call, tmp_path: Path) -> None:
+def test_scene_provides_values_that_options_omit(call: Call, tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(
         '[texture]\nkind = "sinusoid"\namplitude = "0.2 mm"\nperiod = "2 mm"\n'
         '[surface]\nmax_depth = "0.2 mm"\n[device]\nid = "touch"\n'
     )
     depths = ["--max-depth", "0.1mm;0.3mm"]
-    found = json.loads(call(str(scene), "--laws", "W", *depths, "--json", "-")[1])["comparisons"]
-    assert [(one["device"]["id"], one["max_depth"]) for one in found] == [
+    cases = json.loads(call(str(scene), "--laws", "W", *depths, "--json", "-")[1])["comparisons"]
+    assert [(case["device"]["id"], case["max_depth"]) for case in cases] == [
         ("touch", 1e-4),
         ("touch", 3e-4),
     ]
     devices = ["--device", "touch,inverse3"]
-    found = json.loads(call(str(scene), "--laws", "W", *devices, "--json", "-")[1])["comparisons"]
-    assert [one["max_depth"] for one in found] == [2e-4, 2e-4]
+    cases = json.loads(call(str(scene), "--laws", "W", *devices, "--json", "-")[1])["comparisons"]
+    assert [case["max_depth"] for case in cases] == [2e-4, 2e-4]
 
 
-def test_what_is_set_is_set_on_each_device(call: Call) -> None:
-    given = ["--device", "touch,inverse3", "--set", "max_stiffness=700N/m", "--laws", "W"]
-    found = json.loads(call(SPEC, *given, "--json", "-")[1])["comparisons"]
-    assert [one["device"]["data"]["max_stiffness"]["value"] for one in found] == [700.0, 700.0]
+def test_set_applies_to_each_device(call: Call) -> None:
+    options = ["--device", "touch,inverse3", "--set", "max_stiffness=700N/m", "--laws", "W"]
+    cases = json.loads(call(SPEC, *options, "--json", "-")[1])["comparisons"]
+    assert [case["device"]["data"]["max_stiffness"]["value"] for case in cases] == [700.0, 700.0]
 
 
-def test_the_page_has_every_case(call: Call) -> None:
-    given = ["--device", "touch,2diy", "--max-depth", "0.1mm;0.2mm", "--laws", "WC"]
-    code, page, err = call(SPEC, *given, "--html", "-")
+def test_html_page_has_every_case(call: Call) -> None:
+    options = ["--device", "touch,2diy", "--max-depth", "0.1mm;0.2mm", "--laws", "WC"]
+    code, page, err = call(SPEC, *options, "--html", "-")
     assert (code, err) == (0, "")
     for words in ("3D Systems Touch, 100 µm deep", "3D Systems Touch, 200 µm deep", "2diy"):
         assert words in page
@@ -95,16 +95,16 @@ def test_the_page_has_every_case(call: Call) -> None:
     assert len(page) < 3_000_000
 
 
-def test_a_device_without_a_wall_says_what_to_add(call: Call) -> None:
+def test_device_without_max_stiffness_shows_a_hint(call: Call) -> None:
     code, out, err = call(SPEC, "--device", "touch,2diy", "--laws", "W")
     assert (code, err) == (0, "")
     assert re.search(r"2diy +– +K₀ missing", out)
-    said = " ".join(out.split())
-    assert 'add max_stiffness = "... N/m" to its file, or give --set max_stiffness=...N/m' in said
+    text = " ".join(out.split())
+    assert 'add max_stiffness = "... N/m" to its file, or give --set max_stiffness=...N/m' in text
 
 
-def test_devices_of_which_none_has_a_wall(call: Call, tmp_path: Path) -> None:
-    """The table says what is missing, and the exit code that there is no answer."""
+def test_error_when_no_device_has_max_stiffness(call: Call, tmp_path: Path) -> None:
+    """The table shows the missing data, and the exit code is 2."""
     for name in ("a", "b"):
         (tmp_path / f"{name}.toml").write_text(BARE)
     both = f"{tmp_path / 'a.toml'},{tmp_path / 'b.toml'}"
@@ -119,21 +119,21 @@ def test_devices_of_which_none_has_a_wall(call: Call, tmp_path: Path) -> None:
     assert (code, out, err.count("\n")) == (2, "", 1)
     code, out, _err = call(SPEC, "--device", both, "--json", "-")
     assert code == 2
-    assert [one["device"] for one in json.loads(out)["missing_data"]] == ["a", "b"]
+    assert [item["device"] for item in json.loads(out)["missing_data"]] == ["a", "b"]
 
 
-def test_the_line_to_add_is_enough(tmp_path: Path) -> None:
+def test_hint_completes_the_device_file(tmp_path: Path) -> None:
     texture = asp.Sinusoid(2e-4, 2e-3)
     path = tmp_path / "bare.toml"
     path.write_text(BARE)
     (missing,) = compare_devices(texture, [path], laws="W").missing_data
     path.write_text(BARE + missing.hint.replace("...", "900") + "\n")
-    found = compare_devices(texture, [path], laws="W")
-    assert found.missing_data == ()
-    assert found.comparisons[0].device.max_stiffness == 900.0
+    result = compare_devices(texture, [path], laws="W")
+    assert result.missing_data == ()
+    assert result.comparisons[0].device.max_stiffness == 900.0
 
 
-def test_a_file_may_have_a_comma_in_its_name(call: Call, tmp_path: Path) -> None:
+def test_device_path_may_contain_a_comma(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "mine, old.toml"
     path.write_text(BARE + 'max_stiffness = "900 N/m"\n')
     code, out, _err = call(SPEC, "--device", str(path), "--laws", "W", "--json", "-")
@@ -153,14 +153,14 @@ WRONG = [
 ]
 
 
-@pytest.mark.parametrize(("given", "words"), WRONG, ids=lambda value: " ".join(value)[:40])
-def test_bad_input_is_one_line(call: Call, given: list[str], words: str) -> None:
-    code, out, err = call(SPEC, *given, "--laws", "W")
+@pytest.mark.parametrize(("options", "message"), WRONG, ids=lambda value: " ".join(value)[:40])
+def test_invalid_input_gives_a_one_line_error(call: Call, options: list[str], message: str) -> None:
+    code, out, err = call(SPEC, *options, "--laws", "W")
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert words in err
+    assert message in err
 
 
-def test_other_commands_take_one_device(
+def test_other_commands_refuse_several_devices(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["asperity", "limits", SPEC, "--device", "touch,inverse3"])
@@ -170,38 +170,38 @@ def test_other_commands_take_one_device(
 
 
 @pytest.mark.parametrize("width", [40, 60, 200])
-def test_a_narrow_table_leaves_out_columns_and_cuts_nothing(width: int) -> None:
-    found = compare_devices(asp.Sinusoid(2e-4, 2e-3), ["touch", "2diy"], [1e-4, 2e-4], "WC")
-    text = io.StringIO()
-    print_page(comparisons_page(found), Console(file=text, width=width, highlight=False))
-    said = text.getvalue()
-    assert "…" not in said
-    assert max(map(len, said.splitlines())) <= width
-    headings = next(line for line in said.splitlines() if re.match(" *device  ", line))
+def test_narrow_table_drops_columns_and_truncates_nothing(width: int) -> None:
+    result = compare_devices(asp.Sinusoid(2e-4, 2e-3), ["touch", "2diy"], [1e-4, 2e-4], "WC")
+    stream = io.StringIO()
+    print_page(comparisons_page(result), Console(file=stream, width=width, highlight=False))
+    output = stream.getvalue()
+    assert "…" not in output
+    assert max(map(len, output.splitlines())) <= width
+    headings = next(line for line in output.splitlines() if re.match(" *device  ", line))
     assert ("texture" in headings) == (width > 60)
-    assert re.search(r"3D Systems( Touch)? +200 µm +\(?C", said)
+    assert re.search(r"3D Systems( Touch)? +200 µm +\(?C", output)
 
 
-def test_the_answer_names_the_best_case_and_counts_the_others() -> None:
+def test_recommendation_names_the_best_case_and_counts_the_others() -> None:
     coarse, fine = asp.Sinusoid(2e-4, 2e-3), asp.Sinusoid(1e-7, 2e-3)
-    found = compare_devices(coarse, ["touch", "omega.3", "2diy"], [1e-4, 4e-4], "WC")
-    felt = [one for one in found.comparisons if one.recommended]
-    best = max(felt, key=lambda one: one.recommended_row.resolved_force)
-    start = format_quantity(best.recommended_row.recommended_stiffness, "N/m")
+    result = compare_devices(coarse, ["touch", "omega.3", "2diy"], [1e-4, 4e-4], "WC")
+    recommended = [case for case in result.comparisons if case.recommended]
+    best = max(recommended, key=lambda case: case.recommended_row.resolved_force)
+    stiffness = format_quantity(best.recommended_row.recommended_stiffness, "N/m")
     assert best.max_depth == 4e-4
-    assert found.recommendation.startswith(
-        f"Best on the Force Dimension omega.3, pressed to 400 µm: law C from {start}, felt, "
+    assert result.recommendation.startswith(
+        f"Best on the Force Dimension omega.3, pressed to 400 µm: law C from {stiffness}, felt, "
     )
-    assert found.recommendation.endswith(
+    assert result.recommendation.endswith(
         "Of 4 cases: felt in 2, not felt in 2. No smooth wall is known to have held on 2diy."
     )
-    assert found.to_dict()["recommendation"] == found.recommendation
+    assert result.to_dict()["recommendation"] == result.recommendation
     (none,) = compare_devices(fine, ["touch"], laws="C").comparisons
     assert not none.recommended
     assert compare_devices(fine, ["touch"], laws="C").recommendation == "Of 1 case: not felt in 1."
     assert compare_devices(fine, ["2diy"], laws="C").recommendation.startswith("No smooth wall")
 
 
-def test_no_device_is_an_error() -> None:
+def test_empty_list_of_devices_is_an_error() -> None:
     with pytest.raises(ParameterError, match="device must be one or several"):
         compare_devices(asp.Sinusoid(2e-4, 2e-3), [])

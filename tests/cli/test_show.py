@@ -1,4 +1,4 @@
-"""``asperity show`` as its users see it."""
+"""``asperity show``: the table, the JSON and the page of a measured surface."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def source(tmp_path: Path) -> str:
     return str(tmp_path / "map.npy")
 
 
-def table_of(out: str) -> list[list[str]]:
-    """Return the cells of the first table, apart by two blanks; its name first in each row."""
+def first_table(out: str) -> list[list[str]]:
+    """Return the cells of the first table, which are separated by two blanks, row by row."""
     lines = out.splitlines()
     rule = next(i for i, line in enumerate(lines) if set(line.strip()) == {"─"})
     rows = []
@@ -47,10 +47,10 @@ def table_of(out: str) -> list[list[str]]:
     return rows
 
 
-def test_says_each_step_in_parameters(call: Call, source: str) -> None:
+def test_surface_parameters_are_listed_after_each_step(call: Call, source: str) -> None:
     code, out, err = call("show", source, *PLAIN, "--l-cutoff", "80um")
     assert (code, err) == (0, "")
-    rows = table_of(out)
+    rows = first_table(out)
     assert [row[0] for row in rows] == [
         "as read", "levelled", "holes filled", "S-filter 8 µm", "L-filter 80 µm",
     ]  # fmt: skip
@@ -65,20 +65,23 @@ def test_says_each_step_in_parameters(call: Call, source: str) -> None:
 
 
 @pytest.mark.parametrize("width", [30, 40, 60, 80, 200])
-def test_columns_are_dropped_and_no_number_is_cut(call: Call, source: str, width: int) -> None:
+def test_narrow_table_drops_columns_and_truncates_no_number(
+    call: Call, source: str, width: int
+) -> None:
     code, out, _ = call("show", source, *PLAIN, "--l-cutoff", "80um", width=width)
     assert code == 0
     assert "…" not in out
     assert max(len(line) for line in out.splitlines()) <= width
     wide = {
-        row[0]: row[1:] for row in table_of(call("show", source, *PLAIN, "--l-cutoff", "80um")[1])
+        row[0]: row[1:]
+        for row in first_table(call("show", source, *PLAIN, "--l-cutoff", "80um")[1])
     }
-    for row in table_of(out):
+    for row in first_table(out):
         assert set(row[1:]) <= set(wide[row[0]])
     assert ("More in a wider terminal" in out) == (width < 100)
 
 
-def test_the_json_holds_all_of_it(call: Call, source: str) -> None:
+def test_json_has_stages_and_parts(call: Call, source: str) -> None:
     code, out, _ = call("show", source, *PLAIN, "--json", "-")
     assert code == 0
     data = json.loads(out)
@@ -92,7 +95,7 @@ def test_the_json_holds_all_of_it(call: Call, source: str) -> None:
     assert data["Sal"] < 20e-6
 
 
-def test_the_page_shows_before_after_and_taken_away(
+def test_html_page_shows_each_step_and_what_it_removed(
     call: Call, source: str, tmp_path: Path
 ) -> None:
     page = tmp_path / "page.html"
@@ -110,28 +113,28 @@ def test_the_page_shows_before_after_and_taken_away(
     check_alts(check_alone(text), text)
 
 
-def test_a_profile_and_a_prepared_file(call: Call, tmp_path: Path) -> None:
+def test_profile_and_prepared_file_are_shown(call: Call, tmp_path: Path) -> None:
     x = np.arange(600) * 1e-6
     np.save(tmp_path / "line.npy", 1e-6 * np.sin(2 * np.pi * x / 50e-6))
-    ready = str(tmp_path / "line.npz")
+    prepared = str(tmp_path / "line.npz")
     line = str(tmp_path / "line.npy")
     code, out, _ = call("show", line, "--pitch", "1um", "--unit", "m", "--l-cutoff", "100um")
     assert code == 0
     assert "P/RSm" in out
     assert "Sal" not in out
-    assert call("prepare", line, "--pitch", "1um", "--unit", "m", "-o", ready)[0] == 0
+    assert call("prepare", line, "--pitch", "1um", "--unit", "m", "-o", prepared)[0] == 0
     page = tmp_path / "page.html"
-    code, again, _ = call("show", ready, "--html", str(page))
+    code, shown, _ = call("show", prepared, "--html", str(page))
     assert code == 0
-    assert [row[0] for row in table_of(again)] == ["as read", "levelled", "S-filter 4 µm"]
+    assert [row[0] for row in first_table(shown)] == ["as read", "levelled", "S-filter 4 µm"]
     assert page.read_text(encoding="utf-8").count("<svg") == 1
 
 
-def test_prepare_says_it_too(call: Call, source: str, tmp_path: Path) -> None:
+def test_prepare_prints_the_same_table_and_json(call: Call, source: str, tmp_path: Path) -> None:
     target = str(tmp_path / "ready.npz")
     code, out, _ = call("prepare", source, *PLAIN, "-o", target)
     assert code == 0
-    assert [row[0] for row in table_of(out)] == [
+    assert [row[0] for row in first_table(out)] == [
         "as read",
         "levelled",
         "holes filled",
@@ -144,13 +147,13 @@ def test_prepare_says_it_too(call: Call, source: str, tmp_path: Path) -> None:
     assert "cannot both be written to" in err
 
 
-def test_a_texture_is_no_file(call: Call) -> None:
+def test_texture_specification_is_refused(call: Call) -> None:
     code, out, err = call("show", "sinusoid:amplitude=1mm,period=2mm")
     assert (code, out) == (2, "")
     assert len(err.strip().splitlines()) == 1
 
 
-def test_reports_of_measured_surfaces_have_the_section(source: str) -> None:
+def test_comparison_reports_of_measured_surfaces_have_the_section(source: str) -> None:
     texture = asp.load_texture(source, pitch=2e-6, unit="m", magnify=20)
     (section,) = measured_sections(texture)
     table = section.blocks[0]
@@ -160,10 +163,10 @@ def test_reports_of_measured_surfaces_have_the_section(source: str) -> None:
     assert "Surface parameters" in text
 
 
-def test_a_section_of_ones_own(call: Call, source: str, tmp_path: Path) -> None:
-    def own(shown: MeasurementSummary) -> Section:
-        return Section("Mine", [Paragraph(f"of {shown.source}")])
+def test_user_defined_section_is_on_the_page(call: Call, source: str, tmp_path: Path) -> None:
+    def build_section(summary: MeasurementSummary) -> Section:
+        return Section("Mine", [Paragraph(f"of {summary.source}")])
 
-    add_section(MeasurementSummary, own)
+    add_section(MeasurementSummary, build_section)
     call("show", source, *PLAIN, "--html", str(tmp_path / "page.html"))
     assert "of map.npy" in (tmp_path / "page.html").read_text(encoding="utf-8")

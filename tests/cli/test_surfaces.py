@@ -31,34 +31,34 @@ def call(*arguments: str) -> Result:
     return CliRunner().invoke(surfaces_command, arguments, env={"COLUMNS": "80"})
 
 
-def content_of(*arguments: str) -> dict[str, dict]:
+def load_json(*arguments: str) -> dict[str, dict]:
     result = call(*arguments, "--json", "-")
     assert result.exit_code == 0
     data = json.loads(result.output)
     assert data["schema"] == 2
-    return {one["name"]: one for one in data["surfaces"]}
+    return {surface["name"]: surface for surface in data["surfaces"]}
 
 
-def test_the_table_lists_everything_in_80_columns_with_the_name_alone_in_front():
+def test_table_lists_the_catalogue_in_80_columns():
     result = call()
     assert result.exit_code == 0
     lines = result.stdout.splitlines()
     assert max(len(line.rstrip()) for line in lines) <= 80
     # A name starts its row; the further lines of a row are indented.
-    first = [line[:16].strip() for line in lines if re.match(r" ?[a-z]", line)]
-    assert first[1 : 1 + len(CATALOGUE)] == list(CATALOGUE)
+    names = [line[:16].strip() for line in lines if re.match(r" ?[a-z]", line)]
+    assert names[1 : 1 + len(CATALOGUE)] == list(CATALOGUE)
     for word in ("grit=P120", "spacing=420µm", "rms [m]", "duty=0.5", "3.5 mm"):
         assert word in result.stdout
 
 
-def test_the_table_shows_size_and_height():
+def test_table_shows_size_and_height():
     text = call("tile", "sinusoid").stdout
     assert "0.8 mm" in text
     assert "1.5 mm" in text
     assert "50 mm x" in text
 
 
-def test_a_name_is_told_about_in_detail():
+def test_single_name_shows_its_details():
     text = call("sandpaper").stdout
     assert "FEPA 43-1" in text
     assert "P60, P80, P120" in text
@@ -67,14 +67,14 @@ def test_a_name_is_told_about_in_detail():
 
 
 @pytest.mark.parametrize("name", ["Cloth", "cloth:", "CLOTH"])
-def test_names_are_taken_as_they_are_written_elsewhere(name: str):
-    assert list(content_of(name)) == ["cloth"]
+def test_names_accept_any_case_and_a_colon(name: str):
+    assert list(load_json(name)) == ["cloth"]
 
 
-def test_the_json_says_everything():
-    content = content_of()
+def test_json_has_all_data_of_the_catalogue():
+    content = load_json()
     assert list(content) == list(CATALOGUE)
-    assert [name for name, one in content.items() if one["named"]] == list(LIBRARY)
+    assert [name for name, entry in content.items() if entry["named"]] == list(LIBRARY)
     paper = content["sandpaper"]
     assert paper["size"] == pytest.approx([3.5e-3, 3.5e-3])
     assert paper["texture"]["kind"] == "sandpaper"
@@ -87,41 +87,41 @@ def test_the_json_says_everything():
     }  # fmt: skip
 
 
-def test_the_specification_makes_the_texture():
-    for listed in find_surfaces():
-        kind, _, rest = listed.specification.partition(":")
-        assert kind == listed.kind.name
-        given = dict(part.split("=") for part in rest.split(",") if part)
-        assert set(given) == set(listed.kind.example)
-        arguments = {one.name: one for one in listed.kind.arguments}
-        for name, text in given.items():
+def test_specification_matches_the_example_arguments():
+    for surface in find_surfaces():
+        kind, _, rest = surface.specification.partition(":")
+        assert kind == surface.kind.name
+        values = dict(part.split("=") for part in rest.split(",") if part)
+        assert set(values) == set(surface.kind.example)
+        arguments = {argument.name: argument for argument in surface.kind.arguments}
+        for name, text in values.items():
             if arguments[name].form == "quantity":
                 value = parse_quantity(name, text, arguments[name].unit)
-                assert value == pytest.approx(listed.kind.example[name], rel=1e-12)
+                assert value == pytest.approx(surface.kind.example[name], rel=1e-12)
 
 
-def test_scenes_read_the_whole_catalogue():
+def test_scenes_accept_the_whole_catalogue():
     assert set(CATALOGUE) <= set(TEXTURE_KINDS)
 
 
 @pytest.mark.parametrize("name", list(CATALOGUE))
-def test_other_commands_take_the_specification(name: str):
-    listed = find_surfaces([name])[0]
-    assert load_scene(listed.specification).texture.describe() == listed.texture.describe()
+def test_specification_gives_the_same_texture_in_a_scene(name: str):
+    surface = find_surfaces([name])[0]
+    assert load_scene(surface.specification).texture.describe() == surface.texture.describe()
 
 
-def test_every_required_argument_is_in_the_example():
+def test_example_has_every_required_argument():
     for kind in CATALOGUE.values():
-        assert {one.name for one in kind.required_arguments} <= set(kind.example)
-        assert set(kind.example) <= {one.name for one in kind.arguments}
+        assert {argument.name for argument in kind.required_arguments} <= set(kind.example)
+        assert set(kind.example) <= {argument.name for argument in kind.arguments}
 
 
-def test_the_page_is_whole_and_needs_no_network(tmp_path: Path):
+def test_html_page_is_complete_and_self_contained(tmp_path: Path):
     path = tmp_path / "surfaces.html"
     result = call("--html", str(path))
     assert result.exit_code == 0
     assert "Figures:" in result.stdout
-    assert [one.name for one in tmp_path.iterdir()] == ["surfaces.html"]
+    assert [item.name for item in tmp_path.iterdir()] == ["surfaces.html"]
     page = path.read_text("utf-8")
     assert page.lower().startswith("<!doctype html>")
     assert page.rstrip().endswith("</html>")
@@ -144,19 +144,21 @@ def test_the_page_is_whole_and_needs_no_network(tmp_path: Path):
             assert argument.name in page
 
 
-def test_pictures_of_different_surfaces_differ_and_of_the_same_do_not():
-    one, again, other = (svg_text(gallery_figure(Sinusoid(a, 1e-3))) for a in (1e-4, 1e-4, 4e-4))
-    assert one == again
-    assert one != other
+def test_pictures_differ_exactly_when_the_surfaces_differ():
+    first, repeated, other = (
+        svg_text(gallery_figure(Sinusoid(a, 1e-3))) for a in (1e-4, 1e-4, 4e-4)
+    )
+    assert first == repeated
+    assert first != other
 
 
-def test_a_page_of_few():
+def test_page_of_selected_surfaces_has_only_these():
     page = render_page(surfaces_page(find_surfaces(["knurl"])))
     assert page.count("<svg") == 1
     assert "Kinds of textures" not in page
 
 
-def test_html_on_standard_output_is_alone():
+def test_html_is_the_only_output_on_stdout():
     result = call("knurl", "--html", "-")
     assert result.stdout.startswith("<!DOCTYPE html>")
     assert result.stdout.rstrip().endswith("</html>")
@@ -171,7 +173,7 @@ def test_html_on_standard_output_is_alone():
         (["--html", "."], "must be a file"),
     ],
 )
-def test_bad_input_is_one_sentence(arguments: list[str], words: str):
+def test_invalid_input_is_refused_without_output(arguments: list[str], words: str):
     result = call(*arguments)
     assert isinstance(result.exception, ParameterError)
     assert words in str(result.exception)

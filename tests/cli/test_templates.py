@@ -1,4 +1,4 @@
-"""Files to begin with: they are read as they stand, and so is every line of their comments."""
+"""Templates of device files and scenes are valid, and so is every commented line in them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Call = Callable[..., tuple[int, str, str]]
 COMMENT = re.compile(r"# (?=[a-z_]+ = )")
 
 
-def test_the_device_template_is_read_as_it_stands(call: Call, tmp_path: Path) -> None:
+def test_device_template_is_a_valid_device_file(call: Call, tmp_path: Path) -> None:
     code, out, err = call("devices", "--template")
     assert (code, err) == (0, "")
     path = tmp_path / "mine.toml"
@@ -31,7 +31,7 @@ def test_the_device_template_is_read_as_it_stands(call: Call, tmp_path: Path) ->
     assert call("devices", str(path))[0] == 0
 
 
-def test_every_line_of_the_device_template_is_read(tmp_path: Path) -> None:
+def test_every_commented_line_of_the_device_template_is_valid(tmp_path: Path) -> None:
     fields, table = device_template().split("\n# A number may have")
     path = tmp_path / "mine.toml"
     path.write_text("".join(COMMENT.sub("", line) for line in fields.splitlines(keepends=True)))
@@ -46,20 +46,20 @@ def test_every_line_of_the_device_template_is_read(tmp_path: Path) -> None:
     assert (test.directions, test.update_rate, test.positions) == (("x", "z"), 1000.0, "stepped")
 
 
-def test_the_device_template_names_every_unit() -> None:
+def test_device_template_names_every_unit() -> None:
     for name, unit in FIELD_UNITS.items():
         line = next(line for line in device_template().splitlines() if f"# {name} = " in line)
         assert unit == "1" or line.endswith(f"[{unit}]")
 
 
-def test_the_device_template_stands_alone(call: Call) -> None:
-    for more in (["touch"], ["--json", "-"]):
-        code, out, err = call("devices", "--template", *more)
+def test_template_option_accepts_no_other_arguments(call: Call) -> None:
+    for arguments in (["touch"], ["--json", "-"]):
+        code, out, err = call("devices", "--template", *arguments)
         assert (code, out) == (2, "")
         assert "accepts no other arguments" in err
 
 
-def test_the_scene_that_is_written_runs(call: Call, tmp_path: Path) -> None:
+def test_scene_template_can_be_simulated(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     code, out, err = call("init", str(path))
     assert (code, err) == (0, "")
@@ -71,7 +71,7 @@ def test_the_scene_that_is_written_runs(call: Call, tmp_path: Path) -> None:
     assert (code, json.loads(out)["device"]["id"]) == (0, "touch")
 
 
-def test_a_file_is_replaced_only_by_force(call: Call, tmp_path: Path) -> None:
+def test_existing_file_is_replaced_only_with_force(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text("mine")
     code, _out, err = call("init", str(path))
@@ -84,7 +84,7 @@ def test_a_file_is_replaced_only_by_force(call: Call, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["scene.txt", "none/scene.toml", "folder.toml"])
-def test_where_no_scene_can_be_written(call: Call, tmp_path: Path, name: str) -> None:
+def test_invalid_scene_paths_give_a_one_line_error(call: Call, tmp_path: Path, name: str) -> None:
     (tmp_path / "folder.toml").mkdir()
     code, out, err = call("init", str(tmp_path / name), "--force")
     assert (code, out, err.count("\n")) == (2, "", 1)
@@ -94,19 +94,19 @@ LINES = [line for line in scene_template().splitlines() if COMMENT.match(line)]
 
 
 @pytest.mark.parametrize("line", LINES, ids=lambda line: line[2:20])
-def test_every_comment_of_the_scene_is_read(tmp_path: Path, line: str) -> None:
+def test_every_commented_line_of_the_scene_template_is_valid(tmp_path: Path, line: str) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(scene_template().replace(line, COMMENT.sub("", line)), encoding="utf-8")
     scene = load_scene(str(path))
     assert parse_arguments("run", scene.loop["run"], RUN_ARGUMENTS) is not None
-    # A mass has no five-bar's plane, and no mode of a bandwidth that is not known.
+    # A mass has no plane of a five-bar, and no mode without a bandwidth.
     if not line.startswith(("# centre", "# resonance", "# brakes")):
         assert make_setup(scene).device.id == "touch"
 
 
-def test_the_scene_says_all_that_scenes_may_say() -> None:
+def test_scene_template_has_every_section() -> None:
     sections = tomllib.loads(
-        "".join(COMMENT.sub("", one + "\n") for one in scene_template().split("\n"))
+        "".join(COMMENT.sub("", line + "\n") for line in scene_template().split("\n"))
     )
     assert list(sections) == ["texture", "surface", "device", "hand", "motion", "run", "servo"]
     assert {argument.name for argument in RUN_ARGUMENTS} == set(sections["run"])

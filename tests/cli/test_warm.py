@@ -1,4 +1,4 @@
-"""``asperity warm``: what is compiled ahead is what a comparison loads."""
+"""``asperity warm`` compiles the code that a comparison loads."""
 
 from __future__ import annotations
 
@@ -12,33 +12,37 @@ from asperity.kernels import fuse
 from asperity.laws import LAWS
 
 
-def compiled() -> tuple[dict[Path, bytes], list[str]]:
-    """Return what is kept after a run in which nothing is loaded yet, and what was said."""
-    for loaded in (fuse._load_module, fuse.fuse_surface, fuse.fuse_sampler, fuse.fuse_contact):
-        loaded.cache_clear()
-    said: list[str] = []
+def precompiled_code() -> tuple[dict[Path, bytes], list[str]]:
+    """Return the cached code after a precompilation without loaded code, and its messages."""
+    for function in (fuse._load_module, fuse.fuse_surface, fuse.fuse_sampler, fuse.fuse_contact):
+        function.cache_clear()
+    messages: list[str] = []
     name = "sinusoids"
-    warm.precompile((LAWS["W"],), {name: warm.sample_textures()[name]}, said.append)
+    warm.precompile((LAWS["W"],), {name: warm.sample_textures()[name]}, messages.append)
     code = {
-        one.path: one.path.read_bytes() for one in cache.list_entries() if one.namespace == "code"
+        entry.path: entry.path.read_bytes()
+        for entry in cache.list_entries()
+        if entry.namespace == "code"
     }
-    return code, said
+    return code, messages
 
 
 @pytest.mark.keeps_answers
-def test_what_is_compiled_is_kept_and_not_compiled_again(
+def test_compiled_code_is_cached_and_reused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ASPERITY_CACHE_DIR", str(tmp_path))
-    first, said = compiled()
+    first, messages = precompiled_code()
     assert len(first) >= 3
-    assert said == ["law W on sinusoids"]
-    assert compiled()[0] == first
+    assert messages == ["law W on sinusoids"]
+    assert precompiled_code()[0] == first
     for path in first:
         path.unlink()
-    assert compiled()[0].keys() == first.keys()
-    assert {one.namespace for one in cache.list_entries()} == {"code"}  # no answer is taken or kept
+    assert precompiled_code()[0].keys() == first.keys()
+    assert {entry.namespace for entry in cache.list_entries()} == {
+        "code"
+    }  # no result is read or stored
 
 
-def test_there_is_a_texture_for_each_way_to_compute_heights() -> None:
+def test_sample_textures_cover_every_sampler() -> None:
     assert len({texture.sampler for texture in warm.sample_textures().values()}) == 5
