@@ -1,4 +1,4 @@
-"""What the seam tests share: the command as its users call it."""
+"""Fixtures of the tests of user-defined extensions: the program, run in the test process."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Call = Callable[..., tuple[int, str, str]]
 
 @pytest.fixture
 def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Call:
-    """``call("compare", ...)``: exit code, standard output and standard error."""
+    """Return a function: ``call("compare", ...)`` gives exit code, stdout and stderr."""
 
     def run(*arguments: str) -> tuple[int, str, str]:
         monkeypatch.setattr("sys.argv", ["asperity", *arguments])
@@ -31,8 +31,8 @@ def call(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.fixture
-def answer(call: Call) -> Callable[..., Any]:
-    """``answer("compare", ...)``: what the command writes as JSON."""
+def read_json(call: Call) -> Callable[..., Any]:
+    """Return a function: ``read_json("compare", ...)`` gives the JSON that the command writes."""
 
     def run(*arguments: str) -> Any:
         code, out, err = call(*arguments, "--json", "-")

@@ -27,20 +27,20 @@ def module(tmp_path: Path) -> str:
 
 
 @pytest.fixture
-def own() -> Iterator[Claim]:
+def claim() -> Iterator[Claim]:
     names: dict[str, Any] = {}
     exec(MODULE, names)
     yield register(names["WALL"])
     del CLAIMS["own-wall"]
 
 
-def test_the_command_reports_it(call: Call, answer: Answer, module: str) -> None:
+def test_command_line_reports_it(call: Call, read_json: Answer, module: str) -> None:
     options = ["--plugin", module, "--claim", "own-wall", "--claim", "eq-12"]
-    data = answer("reproduce", *options)
-    assert [one["id"] for one in data["claims"]] == ["eq-12", "own-wall"]
-    mine = data["claims"][1]
-    assert mine["verdict"] == "holds"
-    assert mine["evidence"]["numbers"]["force"] == pytest.approx(0.7)
+    data = read_json("reproduce", *options)
+    assert [item["id"] for item in data["claims"]] == ["eq-12", "own-wall"]
+    result = data["claims"][1]
+    assert result["verdict"] == "holds"
+    assert result["evidence"]["numbers"]["force"] == pytest.approx(0.7)
     code, out, err = call("reproduce", *options)
     assert (code, err) == (0, "")
     assert "0.7 N at 1 mm" in out
@@ -49,19 +49,19 @@ def test_the_command_reports_it(call: Call, answer: Answer, module: str) -> None
     assert "own-wall" not in CLAIMS
 
 
-def test_python_computes_it(own: Claim) -> None:
-    assert get_claim("own-wall") is own
+def test_reproduce_claims_computes_it(claim: Claim) -> None:
+    assert get_claim("own-wall") is claim
     (result,) = reproduce_claims(["own-wall"])
     assert (result.verdict, result.evidence.summary) == ("holds", "0.7 N at 1 mm")
 
 
-@pytest.mark.usefixtures("own")
-def test_other_processes_leave_it_to_this_one() -> None:
+@pytest.mark.usefixtures("claim")
+def test_it_is_computed_with_worker_processes() -> None:
     results = reproduce_claims(["own-wall", "eq-12", "eq-10"], workers=2)
-    assert [one.id for one in results] == ["eq-10", "eq-12", "own-wall"]
+    assert [result.id for result in results] == ["eq-10", "eq-12", "own-wall"]
     assert results[-1].verdict == "holds"
 
 
-def test_an_id_that_is_taken_is_refused(own: Claim) -> None:
+def test_registering_an_existing_id_is_refused(claim: Claim) -> None:
     with pytest.raises(ParameterError, match="'own-wall' is taken"):
-        register(own)
+        register(claim)

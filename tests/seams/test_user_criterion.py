@@ -1,4 +1,4 @@
-"""A criterion of a user's own: it stands in every analysis, and decides nothing."""
+"""A user-defined criterion appears in every analysis and does not change the verdict."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from asperity.report import html_text
 
 Call = Callable[..., tuple[int, str, str]]
 
-OWN = page_example("howto/extend.md", "A passivity criterion")
+MODULE = page_example("howto/extend.md", "A passivity criterion")
 RIG = {
     "damping": "2 N*s/m", "update_rate": "4 kHz", "delay_samples": 0, "max_force": "0.5 N",
 }  # fmt: skip
@@ -30,15 +30,15 @@ NAMES = ("half the loss", "clipping")
 
 
 @pytest.fixture
-def own() -> Iterator[None]:
-    """The criteria of a user's module, registered as it does that; taken out again after."""
-    exec(compile(OWN, "own", "exec"), ModuleType("own").__dict__)
+def criteria() -> Iterator[None]:
+    """Register the criteria of a user-defined module during a test."""
+    exec(compile(MODULE, "own", "exec"), ModuleType("own").__dict__)
     yield
     for name in NAMES:
         del CRITERIA[name]
 
 
-@pytest.mark.usefixtures("own")
+@pytest.mark.usefixtures("criteria")
 def test_it_is_evaluated_and_reported() -> None:
     result = asp.analyze(SURFACE, parse_device(RIG, "mine"))
     half, clips = (result.passivity.criterion(name) for name in NAMES)
@@ -49,20 +49,20 @@ def test_it_is_evaluated_and_reported() -> None:
     assert half.assumptions.startswith("the amplifier is linear; no deeper than 200 µm; ")
     assert (clips.holds, clips.conclusion) == (True, "holds: the limit is 2500 N/m")
     assert clips.assumptions == "static; no deeper than 200 µm; max_force 500 mN (not verified)"
-    written = result.to_dict()["passivity"]["criteria"]
-    assert [one["name"] for one in written][-2:] == list(NAMES)
-    assert set(written[-1]) == set(written[0])
-    json.dumps(written, allow_nan=False)
+    rows = result.to_dict()["passivity"]["criteria"]
+    assert [row["name"] for row in rows][-2:] == list(NAMES)
+    assert set(rows[-1]) == set(rows[0])
+    json.dumps(rows, allow_nan=False)
     page = html_text(result)
     for text in (*NAMES, clips.conclusion, "the amplifier is linear"):
         assert text in page
 
 
-@pytest.mark.usefixtures("own")
-def test_missing_fields_are_listed() -> None:
+@pytest.mark.usefixtures("criteria")
+def test_missing_device_data_are_listed() -> None:
     device = parse_device({"max_stiffness": "2 N/mm"}, "bare")
-    found = asp.analyze(SURFACE, device).passivity
-    half, clips = (found.criterion(name) for name in NAMES)
+    passivity = asp.analyze(SURFACE, device).passivity
+    half, clips = (passivity.criterion(name) for name in NAMES)
     assert half.conclusion == "not decidable: needs update_rate, damping"
     assert (half.holds, half.limit, clips.missing) == (None, None, ("max_force",))
     assert clips.conclusion == "not decidable: needs max_force"
@@ -70,15 +70,15 @@ def test_missing_fields_are_listed() -> None:
     assert stiff.criterion("clipping").conclusion == "does not hold: the limit is 2500 N/m"
 
 
-def test_it_decides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not even one that calls itself the leak."""
+def test_it_does_not_change_the_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Even a criterion with the name of the leak criterion does not."""
     device = parse_device(RIG, "mine")
     before = asp.analyze(SURFACE, device).passivity
 
-    def liar(_loop: Any) -> Criterion:
+    def imitation(_loop: Any) -> Criterion:
         return Criterion(LEAK, "nothing is allowed", holds=False, limit=0.0, margin=0.0)
 
-    monkeypatch.setitem(CRITERIA, "liar", liar)
+    monkeypatch.setitem(CRITERIA, "liar", imitation)
     after = asp.analyze(SURFACE, device).passivity
     assert after.criteria[:-1] == before.criteria
     assert after.criteria[-1].name == "liar"
@@ -86,14 +86,14 @@ def test_it_decides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         assert getattr(after, name) == getattr(before, name)
 
 
-def test_a_name_that_is_taken_is_refused() -> None:
+def test_registering_an_existing_name_is_refused() -> None:
     with pytest.raises(ParameterError, match="name is the name of another criterion"):
         register_criterion(LEAK, lambda _loop: Criterion("mine", "0 < 1", holds=True))
 
 
-def test_the_command_line_takes_it_from_a_file(call: Call, tmp_path: Path) -> None:
+def test_command_line_loads_it_as_a_plugin(call: Call, tmp_path: Path) -> None:
     module, page = tmp_path / "own.py", tmp_path / "page.html"
-    module.write_text(OWN, encoding="utf-8")
+    module.write_text(MODULE, encoding="utf-8")
     arguments = (
         "analyze",
         "sinusoid:amplitude=0.1mm,period=2mm",
@@ -102,13 +102,13 @@ def test_the_command_line_takes_it_from_a_file(call: Call, tmp_path: Path) -> No
         "--device",
         "touch",
     )
-    summary = ("--plugin", str(module), "--html", str(page))
-    code, out, err = call(*arguments, *summary)
+    outputs = ("--plugin", str(module), "--html", str(page))
+    code, out, err = call(*arguments, *outputs)
     assert (code, err) == (0, "")
     for name in NAMES:
         assert name in out
         assert name in page.read_text("utf-8")
     code, out, _err = call(*arguments, "--plugin", str(module), "--json", "-")
-    names = [one["name"] for one in json.loads(out)["passivity"]["criteria"]]
+    names = [criterion["name"] for criterion in json.loads(out)["passivity"]["criteria"]]
     assert names[-2:] == list(NAMES)
     assert not set(NAMES) & set(CRITERIA)  # until the command ends

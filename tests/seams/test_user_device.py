@@ -1,4 +1,4 @@
-"""A device of a user's own, a TOML file: every command takes it, and says what it used."""
+"""A user-defined device, a TOML file: every command accepts it and reports its data."""
 
 from __future__ import annotations
 
@@ -51,57 +51,59 @@ SPEC = "sinusoid:amplitude=0.1mm,period=2mm"
 
 
 @pytest.fixture
-def device(tmp_path: Path) -> str:
+def device_path(tmp_path: Path) -> str:
     (tmp_path / "rig.toml").write_text(DEVICE, encoding="utf-8")
     return str(tmp_path / "rig.toml")
 
 
 @pytest.mark.parametrize("command", ["compare", "analyze", "limits"])
-def test_every_answer_is_for_the_device(
-    call: Call, answer: Answer, device: str, command: str
+def test_every_command_accepts_the_device_file(
+    call: Call, read_json: Answer, device_path: str, command: str
 ) -> None:
     law = ["--laws" if command == "compare" else "--law", "C"]
-    data = answer(command, SPEC, *law, "--device", device)
+    data = read_json(command, SPEC, *law, "--device", device_path)
     assert data["device"]["id"] == "bench-rig"
-    code, page, _err = call(command, SPEC, *law, "--device", device, "--html", "-")
+    code, page, _err = call(command, SPEC, *law, "--device", device_path, "--html", "-")
     assert (code, "Two-motor bench" in page) == (0, True)
     if command == "compare":
         (row,) = data["laws"]
-        # k (q⁺/2 + d q) <= σ₀/T, which admits less than the wall; steps keep it from a proof.
+        # k (q⁺/2 + d q) <= σ₀/T admits less than the wall; quantisation prevents a proof.
         share = 0.5 * row["one_sided"]["value"] + row["q"]["value"]
         assert row["safe_stiffness"] == pytest.approx(0.6 * 4000.0 / share)
         limit = row["stability_limit"]
         assert (limit["basis"], limit["proved_stiffness"]) == ("plausible", 0.0)
 
 
-def test_the_list_of_devices_shows_its_sources(call: Call, device: str) -> None:
-    code, out, err = call("devices", device)
+def test_devices_command_shows_its_sources(call: Call, device_path: str) -> None:
+    code, out, err = call("devices", device_path)
     assert (code, err) == (0, "")
     assert "smooth wall, raised until it buzzed" in " ".join(out.split())
     assert "given by the user" in " ".join(out.split())
 
 
-def test_a_loop_is_simulated_on_it(answer: Answer, device: str, tmp_path: Path) -> None:
+def test_simulation_uses_its_rate_delay_and_mass(
+    read_json: Answer, device_path: str, tmp_path: Path
+) -> None:
     (tmp_path / "loop.toml").write_text(LOOP, encoding="utf-8")
-    scene = answer("simulate", str(tmp_path / "loop.toml"), "--device", device)["scene"]
+    scene = read_json("simulate", str(tmp_path / "loop.toml"), "--device", device_path)["scene"]
     assert scene["device"] == "bench-rig"
     assert (scene["servo"]["period"], scene["servo"]["delay"]) == (2.5e-4, 1)
     assert scene["plant"]["mass"] == [0.06, 0.06, 0.06]
 
 
-def test_a_scene_can_say_the_same(answer: Answer, tmp_path: Path) -> None:
-    own = DEVICE.replace("[max_stiffness]", "[device.max_stiffness]").replace(
+def test_device_can_be_defined_in_a_scene(read_json: Answer, tmp_path: Path) -> None:
+    section = DEVICE.replace("[max_stiffness]", "[device.max_stiffness]").replace(
         'id = "b', 'name = "b'
     )
-    own = own.replace('name = "Two-motor bench"\n', "")
-    (tmp_path / "loop.toml").write_text(f"{LOOP}[device]\n{own}", encoding="utf-8")
-    data = answer("compare", str(tmp_path / "loop.toml"), "--laws", "C")
+    section = section.replace('name = "Two-motor bench"\n', "")
+    (tmp_path / "loop.toml").write_text(f"{LOOP}[device]\n{section}", encoding="utf-8")
+    data = read_json("compare", str(tmp_path / "loop.toml"), "--laws", "C")
     assert data["device"]["name"] == "bench-rig"
     assert data["laws"][0]["safe_stiffness"] < 1800.0 / data["laws"][0]["one_sided"]["lower"] * 1.01
 
 
-def test_python_takes_the_file(device: str) -> None:
+def test_compare_accepts_the_device_file(device_path: str) -> None:
     texture = asp.Sinusoid(amplitude=0.1e-3, period=2e-3)
-    row = asp.compare(texture, device, laws="W").row("W")
+    row = asp.compare(texture, device_path, laws="W").row("W")
     assert row.safe_stiffness == pytest.approx(0.6 * 4000.0 / 1.5, rel=1e-15)
-    assert asp.load_device(device).value("force_resolution") == 8e-3
+    assert asp.load_device(device_path).value("force_resolution") == 8e-3

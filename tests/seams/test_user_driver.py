@@ -1,4 +1,4 @@
-"""A driver of a user's own, in a file: by its name, and by the device file that names it."""
+"""A user-defined driver in a file, selected by its name or by a device file that names it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.helpers.pages import page_example
 from asperity.core.errors import ParameterError
 from asperity.devices import load_device
 from asperity.recording.recording import open_recording
-from asperity.servo.drivers import driver_registry as choice
+from asperity.servo.drivers import driver_registry
 from asperity.servo.drivers.driver import Frame
 from asperity.servo.drivers.driver_registry import hardware_driver, register_driver
 from asperity.servo.drivers.force_dimension import ForceDimensionDriver
@@ -32,16 +32,16 @@ DEVICE = 'max_force = "3 N"\nmax_stiffness = "500 N/m"\nupdate_rate = "1 kHz"\nd
 SERVO = '[servo]\nramp = "0 s"\nlateness = "60 s"\nmisses = 1000000\nsilence = "30 s"\n'
 
 
-def test_a_driver_of_one_s_own_is_one_file(call: Call, tmp_path: Path) -> None:
+def test_user_defined_driver_in_one_file(call: Call, tmp_path: Path) -> None:
     (tmp_path / "rig.py").write_text(DRIVER)
     (tmp_path / "rig.toml").write_text(DEVICE)
     scene = tmp_path / "scene.toml"
     scene.write_text(f'[texture]\nkind = "sinusoid"\namplitude = "0.1mm"\nperiod = "2mm"\n{SERVO}')
-    said = ["--plugin", str(tmp_path / "rig.py"), "--device", str(tmp_path / "rig.toml"),
+    arguments = ["--plugin", str(tmp_path / "rig.py"), "--device", str(tmp_path / "rig.toml"),
             "--law", "W", "--stiffness", "100 N/m", "--max-depth", "2mm"]  # fmt: skip
     path = str(tmp_path / "run.mcap")
-    more = ["--duration", "0.05s", "--record", path, "--accept-risk"]
-    code, out, err = call("run", str(scene), *said, "--driver", "real", *more)
+    outputs = ["--duration", "0.05s", "--record", path, "--accept-risk"]
+    code, out, err = call("run", str(scene), *arguments, "--driver", "real", *outputs)
     assert code == 0, err
     assert "If the loop dies: Nothing moves." in err
     assert "rig: done" in out
@@ -59,35 +59,35 @@ def test_a_driver_of_one_s_own_is_one_file(call: Call, tmp_path: Path) -> None:
         ("inverse3", HaplyDriver),
     ],
 )
-def test_the_entry_of_a_device_names_its_driver(device: str, kind: type) -> None:
+def test_catalogue_entry_selects_the_driver(device: str, kind: type) -> None:
     driver = hardware_driver("real", "lying", (0.0, 0.0, 0.0), load_device(device))
     assert isinstance(driver, kind)
 
 
-def test_a_device_without_a_driver_asks_for_one() -> None:
+def test_device_without_a_driver_gives_an_error_with_the_choices() -> None:
     with pytest.raises(ParameterError, match=r"2diy names none: choose from haply:049D, "):
         hardware_driver("real", "lying", (0.0, 0.0, 0.0), load_device("2diy"))
     with pytest.raises(ParameterError, match="no device is given"):
         hardware_driver("real", "lying", (0.0, 0.0, 0.0))
 
 
-def test_a_library_is_a_driver_by_its_path() -> None:
+def test_path_of_a_library_selects_the_library_driver() -> None:
     for text in ("./Device.so", "own:./Device.so"):
         driver = hardware_driver(text, "lying", (0.0, 0.0, 0.0))
         assert isinstance(driver, LibraryDriver)
         assert (driver.path, driver.surface_frame) == ("./Device.so", Frame())
 
 
-def test_a_name_is_given_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(choice, "DRIVER_KINDS", dict(choice.DRIVER_KINDS))
-    known = choice.DRIVER_KINDS["haply"]
-    assert register_driver(known) is known
+def test_registering_an_existing_name_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(driver_registry, "DRIVER_KINDS", dict(driver_registry.DRIVER_KINDS))
+    haply = driver_registry.DRIVER_KINDS["haply"]
+    assert register_driver(haply) is haply
     with pytest.raises(ParameterError, match="is registered already, got 'own'"):
-        register_driver(known.__class__("own", known.axes, 1.0, known.create, "own"))
+        register_driver(haply.__class__("own", haply.axes, 1.0, haply.create, "own"))
 
 
 def serve_board(board: socket.socket, is_over: threading.Event) -> list[float]:
-    """Answer every force with a position 0.5 mm in the surface; return the forces along z."""
+    """Reply to every force with a position 0.5 mm in the surface; return the forces along z."""
     forces = []
     board.settimeout(0.1)
     while not is_over.is_set():
@@ -99,12 +99,16 @@ def serve_board(board: socket.socket, is_over: threading.Event) -> list[float]:
 
 
 @pytest.mark.parametrize("is_silent", [False, True])
-def test_a_driver_with_a_thread(call: Call, tmp_path: Path, is_silent: bool) -> None:
-    """The example of the page renders a wall on a board that answers over UDP, or does not."""
+def test_documented_driver_with_a_thread_renders_over_udp(
+    call: Call, tmp_path: Path, is_silent: bool
+) -> None:
+    """The example renders a wall on a board that replies over UDP; a silent board is an error."""
     text = page_example("howto/extend.md", "A driver with a thread")
-    patient = "port: int = 9000\n    max_reading_age: float = 20.0\n    force_timeout: float = 20.0"
+    long_timeouts = (
+        "port: int = 9000\n    max_reading_age: float = 20.0\n    force_timeout: float = 20.0"
+    )
     assert text.count("port: int = 9000") == 1
-    text = text.replace("port: int = 9000", patient)  # a busy machine delays board and thread
+    text = text.replace("port: int = 9000", long_timeouts)  # a busy machine delays board and thread
     (tmp_path / "board.py").write_text(text)
     (tmp_path / "rig.toml").write_text(DEVICE)
     (tmp_path / "scene.toml").write_text(
@@ -115,7 +119,7 @@ def test_a_driver_with_a_thread(call: Call, tmp_path: Path, is_silent: bool) -> 
         board.bind(("127.0.0.1", 0))
         if is_silent:
             is_over.set()
-        answers = pool.submit(serve_board, board, is_over)
+        pending_forces = pool.submit(serve_board, board, is_over)
         code, out, err = call(
             *("run", str(tmp_path / "scene.toml"), "--plugin", str(tmp_path / "board.py")),
             *("--device", str(tmp_path / "rig.toml"), "--law", "W", "--stiffness", "100 N/m"),
@@ -123,7 +127,7 @@ def test_a_driver_with_a_thread(call: Call, tmp_path: Path, is_silent: bool) -> 
             *("--duration", "0.2s", "--record", path, "--accept-risk"),
         )
         is_over.set()
-        forces = answers.result()
+        forces = pending_forces.result()
     if is_silent:
         assert code == 2
         assert "cannot use the device: the board does not answer" in err

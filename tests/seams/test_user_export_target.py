@@ -29,7 +29,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def page_example() -> tuple[str, list[str]]:
-    """Return the file and the command of the documented example."""
+    """Return the code and the command of the documented example."""
     page = (Path(__file__).parents[2] / "docs/howto/export.md").read_text("utf-8")
     section = page[page.index("## Another language") :]
     code = re.search(r"```python\n(.*?)```", section, re.DOTALL)
@@ -39,7 +39,7 @@ def page_example() -> tuple[str, list[str]]:
     return code[1], command[1].split()
 
 
-def test_the_documented_example(
+def test_documented_example_writes_its_file(
     call: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     code, command = page_example()
@@ -52,7 +52,7 @@ def test_the_documented_example(
     assert set(targets.TARGETS) == {"c99"}  # registered until the command ends
 
 
-def test_a_target_at_the_top_level_writes_several_files(call: Call, tmp_path: Path) -> None:
+def test_target_of_a_plugin_writes_several_files(call: Call, tmp_path: Path) -> None:
     (tmp_path / "notes.py").write_text(
         "from asperity.export.targets import ExportTarget\n"
         "def files(request, stem):\n"
@@ -72,17 +72,17 @@ def test_a_target_at_the_top_level_writes_several_files(call: Call, tmp_path: Pa
     assert (code, err) == (2, "asperity: output must be a file that ends in .txt, got 'wall.h'\n")
 
 
-def test_a_name_is_registered_once() -> None:
+def test_registering_an_existing_name_is_refused() -> None:
     target = targets.ExportTarget("c99", "", ".h", lambda _request, _stem: {})
     with pytest.raises(asp.ParameterError, match="lang is registered already"):
         targets.register(target)
 
 
-def test_a_user_defined_law_and_texture(tmp_path: Path) -> None:
+def test_user_defined_law_and_texture_give_the_force_of_the_kernel(tmp_path: Path) -> None:
     for name in ("own_law.py", "own_texture.py"):
         shutil.copy(EXAMPLES / name, tmp_path / f"my_{name}")
-    with imported(tmp_path, "my_own_law") as laws, imported(tmp_path, "my_own_texture") as kinds:
-        texture = kinds.EggBox(amplitude=0.1e-3, period=2e-3)
+    with imported(tmp_path, "my_own_law") as laws, imported(tmp_path, "my_own_texture") as textures:
+        texture = textures.EggBox(amplitude=0.1e-3, period=2e-3)
         surfaces = {
             name: asp.Surface(texture, law, max_depth=0.3e-3)
             for name, law in (("own", laws.STIFFENING), ("c", "C"), ("d", "D"), ("h", "H"))
@@ -91,14 +91,16 @@ def test_a_user_defined_law_and_texture(tmp_path: Path) -> None:
         for compiler in COMPILERS:
             program = library(tmp_path, compiler, headers, "-O1")
             for name, surface in surfaces.items():
-                at = probes(texture, 0.3e-3, 400 if name == "h" else 4000, 9)
-                forces = ticks(program, name, at)
-                assert same_bits(forces, kernel_ticks(surface, at)).all(), (compiler, name)
+                points = probes(texture, 0.3e-3, 400 if name == "h" else 4000, 9)
+                forces = ticks(program, name, points)
+                assert same_bits(forces, kernel_ticks(surface, points)).all(), (compiler, name)
     assert re.search(r"reference_depth = |double reference_depth", headers["own"])
 
 
-def test_the_exported_source_is_the_compiled_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A change of the linked source changes the C code."""
+def test_exported_code_is_generated_from_the_compiled_source(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A change of the linked source must change the C code."""
     surface = asp.Surface(asp.Sinusoid(2e-4, 2e-3), "C")
     before = header(surface)
     original = LinkedSource.__init__
@@ -110,7 +112,7 @@ def test_the_exported_source_is_the_compiled_one(monkeypatch: pytest.MonkeyPatch
     assert "2.0 * depth * k" in header(surface)
 
 
-def test_forces_are_not_zero() -> None:
+def test_probes_are_in_contact() -> None:
     surface = asp.Surface(asp.Sinusoid(2e-4, 2e-3), "C")
-    at = probes(surface.texture, 3e-4, 4000, 9)
-    assert np.count_nonzero(surface.force(at)[:, 2]) > 2000
+    points = probes(surface.texture, 3e-4, 4000, 9)
+    assert np.count_nonzero(surface.force(points)[:, 2]) > 2000

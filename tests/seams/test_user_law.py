@@ -1,7 +1,7 @@
-"""A law of a user's own, in a file outside the package: everything else follows.
+"""A user-defined law, in a file outside the package, works everywhere.
 
-The law has a parameter with a unit and bounds. It is reached through ``--plugin``, a scene and
-Python, and every answer carries the parameter.
+The law has a parameter with a unit and bounds. It is used through ``--plugin``, a scene and
+Python, and every result contains the parameter.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ point = ["0 mm", "0 mm", "-0.3 mm"]
 duration = "0.05 s"
 """
 SPEC = "sinusoid:amplitude=0.1mm,period=2mm"
-OWN, SAID = {"soft_depth": 2e-4}, "Given soft depth 200 µm"
+PARAMETERS, ASSUMPTION = {"soft_depth": 2e-4}, "Given soft depth 200 µm"
 
 
 @pytest.fixture
@@ -64,69 +64,85 @@ def scene(tmp_path: Path) -> str:
     return str(tmp_path / "loop.toml")
 
 
-def test_compare_gives_the_parameter_to_the_law_that_has_it(
-    call: Call, answer: Answer, module: str
+def test_compare_passes_the_parameter_only_to_the_law_that_has_it(
+    call: Call, read_json: Answer, module: str
 ) -> None:
     options = ["--plugin", module, "--laws", "WQ", "--set", "soft-depth=0.2 mm"]
-    data = answer("compare", SPEC, *options)
-    assert [(row["law"], row["law_parameters"]) for row in data["laws"]] == [("W", {}), ("Q", OWN)]
+    data = read_json("compare", SPEC, *options)
+    assert [(row["law"], row["law_parameters"]) for row in data["laws"]] == [
+        ("W", {}),
+        ("Q", PARAMETERS),
+    ]
     assert data["laws"][1]["conservative"]
     assert "Given soft depth 200 µm for law Q" in data["assumptions"]
-    softer = answer("compare", SPEC, *options[:4])["laws"][1]
+    softer = read_json("compare", SPEC, *options[:4])["laws"][1]
     assert softer["law_parameters"] == {"soft_depth": 0.5e-3}
     assert softer["support"] > data["laws"][1]["support"]
     code, page, _err = call("compare", SPEC, *options, "--html", "-")
-    assert (code, SAID in page) == (0, True)
+    assert (code, ASSUMPTION in page) == (0, True)
     code, out, _err = call("compare", SPEC, *options)
     assert (code, "Q" in [line.split(" ")[0] for line in out.splitlines()]) == (0, True)
 
 
-def test_without_laws_all_are_compared_the_own_one_too(answer: Answer, module: str) -> None:
-    data = answer("compare", SPEC, "--plugin", module)
+def test_compare_without_laws_includes_it(read_json: Answer, module: str) -> None:
+    data = read_json("compare", SPEC, "--plugin", module)
     assert "".join(row["law"] for row in data["laws"]) == "WABCDEFGHQ"
 
 
 @pytest.mark.parametrize("command", ["analyze", "limits"])
-def test_one_law_at_a_time(call: Call, answer: Answer, module: str, command: str) -> None:
+def test_analyze_and_limits_use_the_parameter(
+    call: Call, read_json: Answer, module: str, command: str
+) -> None:
     options = ["--plugin", module, "--law", "saturating change of height"]
-    data = answer(command, SPEC, *options, "--set", "soft_depth=200um")
-    assert (data["law"], data["law_parameters"]) == ("Q", OWN)
+    data = read_json(command, SPEC, *options, "--set", "soft_depth=200um")
+    assert (data["law"], data["law_parameters"]) == ("Q", PARAMETERS)
     code, page, _err = call(command, SPEC, *options, "--set", "soft_depth=200um", "--html", "-")
-    assert (code, SAID in page) == (0, True)
+    assert (code, ASSUMPTION in page) == (0, True)
 
 
-def test_a_scene_says_the_parameter(call: Call, answer: Answer, module: str, scene: str) -> None:
-    data = answer("simulate", scene, "--plugin", module)
-    assert (data["scene"]["surface"]["law"], data["scene"]["surface"]["parameters"]) == ("Q", OWN)
+def test_scene_sets_the_parameter_and_set_overrides_it(
+    call: Call, read_json: Answer, module: str, scene: str
+) -> None:
+    data = read_json("simulate", scene, "--plugin", module)
+    assert (data["scene"]["surface"]["law"], data["scene"]["surface"]["parameters"]) == (
+        "Q",
+        PARAMETERS,
+    )
     code, page, _err = call("simulate", scene, "--plugin", module, "--html", "-")
-    assert (code, SAID in page) == (0, True)
-    data = answer("analyze", scene, "--plugin", module)
-    assert data["law_parameters"] == OWN
-    data = answer("simulate", scene, "--plugin", module, "--set", "soft_depth=0.3 mm")
+    assert (code, ASSUMPTION in page) == (0, True)
+    data = read_json("analyze", scene, "--plugin", module)
+    assert data["law_parameters"] == PARAMETERS
+    data = read_json("simulate", scene, "--plugin", module, "--set", "soft_depth=0.3 mm")
     assert data["scene"]["surface"]["parameters"] == {"soft_depth": 3e-4}
-    data = answer("compare", scene, "--plugin", module, "--laws", "CQ")
-    assert [row["law_parameters"] for row in data["laws"]] == [{}, OWN]
+    data = read_json("compare", scene, "--plugin", module, "--laws", "CQ")
+    assert [row["law_parameters"] for row in data["laws"]] == [{}, PARAMETERS]
 
 
-def test_loops_over_laws_take_it_along(answer: Answer, module: str, scene: str) -> None:
-    way = 'kind = "strokes"\nstart = "0mm;0mm;-0.3mm"\nend = "4mm;0mm;-0.3mm"\nspeed = "0.1 m/s"\n'
-    Path(scene).write_text(LOOP.replace('kind = "still"\n', way).replace("point = ", "# "), "utf-8")
+def test_scan_passes_the_parameter_only_to_the_law_that_has_it(
+    read_json: Answer, module: str, scene: str
+) -> None:
+    motion = (
+        'kind = "strokes"\nstart = "0mm;0mm;-0.3mm"\nend = "4mm;0mm;-0.3mm"\nspeed = "0.1 m/s"\n'
+    )
+    Path(scene).write_text(
+        LOOP.replace('kind = "still"\n', motion).replace("point = ", "# "), "utf-8"
+    )
     options = ["--plugin", module, "--laws", "WQ", "--speeds", "0.1m/s", "--strokes", "1"]
-    soft = answer("scan", scene, *options)
-    hard = answer("scan", scene, *options, "--set", "soft_depth=10 mm")
-    assert [one["law"] for one in soft["strokes"]] == ["W", "Q"]
-    assert f"{SAID} for law Q" in soft["scene"]["assumptions"]
+    soft = read_json("scan", scene, *options)
+    hard = read_json("scan", scene, *options, "--set", "soft_depth=10 mm")
+    assert [stroke["law"] for stroke in soft["strokes"]] == ["W", "Q"]
+    assert f"{ASSUMPTION} for law Q" in soft["scene"]["assumptions"]
     assert soft["strokes"][0] == hard["strokes"][0]
     assert soft["strokes"][1] != hard["strokes"][1]
 
 
-def test_python_reaches_the_same(scene: str) -> None:
+def test_python_functions_use_the_law_and_its_parameter(scene: str) -> None:
     names: dict[str, Any] = {}
     exec(MODULE, names)
     law = names["SATURATING"]
     texture = asp.Sinusoid(amplitude=0.1e-3, period=2e-3)
-    result = asp.compare(texture, laws=["C", law], max_depth=4e-4, law_parameters=OWN)
-    assert [dict(row.surface.law_parameters) for row in result.rows] == [{}, OWN]
+    result = asp.compare(texture, laws=["C", law], max_depth=4e-4, law_parameters=PARAMETERS)
+    assert [dict(row.surface.law_parameters) for row in result.rows] == [{}, PARAMETERS]
     with pytest.raises(
         asp.ParameterError, match="'soft_dept', which is no parameter of the laws C, Q; did you"
     ):
@@ -136,8 +152,8 @@ def test_python_reaches_the_same(scene: str) -> None:
     try:
         register(law)
         setup = make_setup(load_scene(scene))
-        assert dict(setup.surface.law_parameters) == OWN
-        assert asp.limits(texture, law="Q", law_parameters=OWN).surface.law is law
+        assert dict(setup.surface.law_parameters) == PARAMETERS
+        assert asp.limits(texture, law="Q", law_parameters=PARAMETERS).surface.law is law
     finally:
         REGISTERED_LAWS.pop("Q", None)
 
@@ -156,7 +172,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("options", "message"), BAD, ids=lambda value: str(value)[:50])
-def test_what_cannot_be_is_one_line(
+def test_invalid_options_give_a_one_line_error(
     call: Call, module: str, options: list[str], message: str
 ) -> None:
     code, out, err = call("compare", SPEC, "--plugin", module, *options)
@@ -190,7 +206,7 @@ FILES = {
 
 
 @pytest.mark.parametrize("source", FILES)
-def test_errors_of_the_file_have_a_line_and_a_reason(
+def test_errors_in_the_plugin_are_reported_with_line_and_reason(
     call: Call, tmp_path: Path, source: str
 ) -> None:
     path = tmp_path / "broken.py"
@@ -202,7 +218,7 @@ def test_errors_of_the_file_have_a_line_and_a_reason(
     assert len(err.strip().splitlines()) == 1
 
 
-def test_what_fails_only_when_it_is_used(call: Call, tmp_path: Path) -> None:
+def test_error_at_the_first_use_is_reported_with_its_line(call: Call, tmp_path: Path) -> None:
     path = tmp_path / "late.py"
     path.write_text(
         "from asperity.textures.texture import TextureKind\n\n\n"
@@ -214,13 +230,15 @@ def test_what_fails_only_when_it_is_used(call: Call, tmp_path: Path) -> None:
     assert err == f"asperity: {path}, line 5: ValueError: not today\n"
 
 
-def test_a_file_that_is_not_there(call: Call) -> None:
+def test_missing_plugin_file_is_reported(call: Call) -> None:
     code, _out, err = call("analyze", SPEC, "--law", "C", "--plugin", "no/file.py")
     assert code == 2
     assert "plugin no/file.py cannot be read: No such file" in err
 
 
-def test_two_files_can_import_each_other(answer: Answer, tmp_path: Path) -> None:
+def test_several_plugins_may_import_modules_of_their_folder(
+    read_json: Answer, tmp_path: Path
+) -> None:
     (tmp_path / "parts_of_mine.py").write_text("LETTER = 'Q'\n")
     first = MODULE.replace('letter="Q"', "letter=LETTER")
     (tmp_path / "first.py").write_text("from parts_of_mine import LETTER\n" + first, "utf-8")
@@ -228,11 +246,11 @@ def test_two_files_can_import_each_other(answer: Answer, tmp_path: Path) -> None
     second = "from asperity.laws import Law\n" + second
     (tmp_path / "second.py").write_text(second, encoding="utf-8")
     files = ["--plugin", str(tmp_path / "first.py"), "--plugin", str(tmp_path / "second.py")]
-    data = answer("compare", SPEC, *files, "--laws", "YQ")
+    data = read_json("compare", SPEC, *files, "--laws", "YQ")
     assert [row["law"] for row in data["laws"]] == ["Y", "Q"]
 
 
-def test_the_file_may_define_a_texture_kind_too(call: Call, answer: Answer, tmp_path: Path) -> None:
+def test_plugin_may_define_a_texture_kind(call: Call, read_json: Answer, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(
         "import asperity as asp\n"
         "from asperity.core.arguments import Argument\n"
@@ -242,13 +260,13 @@ def test_the_file_may_define_a_texture_kind_too(call: Call, answer: Answer, tmp_
         "MINE = TextureKind('my-wave', 'mine', made, (HEIGHT,))\n"
     )
     module = ["--plugin", str(tmp_path / "mine.py")]
-    data = answer("compare", "my-wave:height=0.1mm", "--laws", "A", *module)
+    data = read_json("compare", "my-wave:height=0.1mm", "--laws", "A", *module)
     assert data["texture"]["amplitude"] == 5e-5
     code, _out, err = call("compare", "my-wave:height=0.1mm", "--laws", "A")
     assert (code, "'my-wave'" in err) == (2, True)
 
 
-def test_the_file_may_define_a_reader_too(call: Call, answer: Answer, tmp_path: Path) -> None:
+def test_plugin_may_define_a_reader(call: Call, read_json: Answer, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(
         "import numpy as np\n"
         "from asperity.measured.reading import RawSurface, Reader\n"
@@ -259,10 +277,10 @@ def test_the_file_may_define_a_reader_too(call: Call, answer: Answer, tmp_path: 
     )
     heights = 1e-5 * np.sin(np.arange(64.0))
     (tmp_path / "land.waffle").write_bytes(b"WAFFLE__" + heights.tobytes())
-    asked = ["limits", str(tmp_path / "land.waffle"), "--law", "A"]
-    data = answer(*asked, "--plugin", str(tmp_path / "mine.py"))
+    arguments = ["limits", str(tmp_path / "land.waffle"), "--law", "A"]
+    data = read_json(*arguments, "--plugin", str(tmp_path / "mine.py"))
     assert data["texture"]["pitch"] == pytest.approx(1e-5)
-    assert call(*asked)[0] == 2
+    assert call(*arguments)[0] == 2
 
 
 @pytest.mark.parametrize(
@@ -272,7 +290,7 @@ def test_the_file_may_define_a_reader_too(call: Call, answer: Answer, tmp_path: 
      '[surface]\nlaw-module = "mine.py"\n'],
     ids=["at the top", "in a section"],
 )  # fmt: skip
-def test_a_scene_never_runs_code(call: Call, tmp_path: Path, text: str) -> None:
+def test_scene_never_runs_code(call: Call, tmp_path: Path, text: str) -> None:
     (tmp_path / "mine.py").write_text("raise SystemExit('it was run')\n")
     (tmp_path / "scene.toml").write_text(text)
     code, out, err = call("compare", str(tmp_path / "scene.toml"))

@@ -1,4 +1,4 @@
-"""A file reader by entry point, as another package brings it: nothing of asperity is touched."""
+"""User-defined file readers: from the entry point of another package, and registered."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ POINTS = "[asperity.readers]\nwaffle = waffles:WAFFLE\n"
 HEIGHTS = np.random.default_rng(7).normal(size=(6, 8)).round(3)
 
 
-def waffle(folder: Path) -> Path:
+def write_waffle(folder: Path) -> Path:
     path = folder / "map.waffle"
     shape = np.array(HEIGHTS.shape, "<u4").tobytes() + np.array([2e-4], "<f8").tobytes()
     path.write_bytes(b"WAFFLE\x00\x01" + shape + HEIGHTS.astype("<f8").tobytes())
@@ -31,7 +31,7 @@ def waffle(folder: Path) -> Path:
 
 @pytest.fixture
 def package(tmp_path: Path) -> Path:
-    """An installed distribution: a module, and beside it what says that it brings a reader."""
+    """Return a folder with an installed distribution: a module and the entry point of a reader."""
     folder = tmp_path / "site"
     info = folder / "waffles-1.0.dist-info"
     info.mkdir(parents=True)
@@ -41,43 +41,47 @@ def package(tmp_path: Path) -> Path:
     return folder
 
 
-def asperity(package: Path | None, *arguments: str) -> subprocess.CompletedProcess[str]:
-    own = [] if package is None else [str(package)]
-    given = os.environ.get("PYTHONPATH", "")
-    path = os.pathsep.join([*own, *([given] if given else [])])
+def run_asperity(package: Path | None, *arguments: str) -> subprocess.CompletedProcess[str]:
+    package_paths = [] if package is None else [str(package)]
+    inherited = os.environ.get("PYTHONPATH", "")
+    path = os.pathsep.join([*package_paths, *([inherited] if inherited else [])])
     return subprocess.run(
         [sys.executable, "-c", "from asperity.cli.main import main; main()", *arguments],
         env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, check=False,
     )  # fmt: skip
 
 
-def test_every_command_takes_the_file(package: Path, tmp_path: Path) -> None:
-    path, page = waffle(tmp_path), tmp_path / "page.html"
-    done = asperity(package, "compare", str(path), "--laws", "WA", "--json", "-")
-    assert done.returncode == 0, done.stderr
-    texture = json.loads(done.stdout)["texture"]
+def test_every_command_reads_the_file(package: Path, tmp_path: Path) -> None:
+    path, page = write_waffle(tmp_path), tmp_path / "page.html"
+    process = run_asperity(package, "compare", str(path), "--laws", "WA", "--json", "-")
+    assert process.returncode == 0, process.stderr
+    texture = json.loads(process.stdout)["texture"]
     assert texture["preparation"][0] == "a waffle"
 
     scene = tmp_path / "scene.toml"
     scene.write_text(f'[texture]\nkind = "file"\npath = "{path.name}"\n[surface]\nlaw = "A"\n')
-    found = tmp_path / "found.json"
-    done = asperity(package, "analyze", str(scene), "--json", str(found), "--html", str(page))
-    assert done.returncode == 0, done.stderr
+    json_path = tmp_path / "found.json"
+    process = run_asperity(
+        package, "analyze", str(scene), "--json", str(json_path), "--html", str(page)
+    )
+    assert process.returncode == 0, process.stderr
     assert "a waffle" in page.read_text()
-    assert json.loads(found.read_text())["texture"] == texture
+    assert json.loads(json_path.read_text())["texture"] == texture
 
-    kept = tmp_path / "kept.npz"
-    done = asperity(package, "prepare", str(path), "--unit", "mm", "-o", str(kept))
-    assert done.returncode == 0, done.stderr
-    heights = np.load(kept)["heights"]
+    prepared_path = tmp_path / "kept.npz"
+    process = run_asperity(package, "prepare", str(path), "--unit", "mm", "-o", str(prepared_path))
+    assert process.returncode == 0, process.stderr
+    heights = np.load(prepared_path)["heights"]
     assert heights.shape == HEIGHTS.shape
     assert np.std(heights) > 1e-4  # millimetres now
 
 
-def test_without_the_package_the_file_is_refused(tmp_path: Path) -> None:
-    done = asperity(None, "prepare", str(waffle(tmp_path)), "-o", str(tmp_path / "kept.npz"))
-    assert (done.returncode, done.stdout) == (2, "")
-    assert "map.waffle looks like a binary file" in done.stderr
+def test_file_is_refused_without_the_package(tmp_path: Path) -> None:
+    process = run_asperity(
+        None, "prepare", str(write_waffle(tmp_path)), "-o", str(tmp_path / "kept.npz")
+    )
+    assert (process.returncode, process.stdout) == (2, "")
+    assert "map.waffle looks like a binary file" in process.stderr
     assert not (tmp_path / "kept.npz").exists()
 
 
@@ -93,22 +97,22 @@ def test_without_the_package_the_file_is_refused(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_broken_package_is_named_and_stops_nobody(
+def test_broken_package_is_named_and_other_readers_work(
     package: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str, reason: str
 ) -> None:
     (package / "broken.py").write_text(module)
-    points = package / "waffles-1.0.dist-info" / "entry_points.txt"
-    points.write_text(POINTS + "a-broken-one = broken:BROKEN\n")
+    entry_points = package / "waffles-1.0.dist-info" / "entry_points.txt"
+    entry_points.write_text(POINTS + "a-broken-one = broken:BROKEN\n")
     monkeypatch.syspath_prepend(str(package))
     try:
-        raw = read_surface(waffle(tmp_path))
+        raw = read_surface(write_waffle(tmp_path))
         np.testing.assert_array_equal(raw.heights, 1e-6 * HEIGHTS)
         assert any("broken" in note and reason in note for note in raw.notes)
         unknown = tmp_path / "unknown"
         unknown.write_bytes(bytes(range(256)))
         with pytest.raises(SurfaceFileError, match=f"looks like a binary file.*broken.*{reason}"):
             read_surface(unknown)
-        np.save(tmp_path / "a.npy", HEIGHTS)  # known by its mark: no package is asked
+        np.save(tmp_path / "a.npy", HEIGHTS)  # recognised by its signature, without packages
         assert len(read_surface(tmp_path / "a.npy").notes) == 1
     finally:
         for name in ("broken", "waffles"):
@@ -116,12 +120,12 @@ def test_a_broken_package_is_named_and_stops_nobody(
 
 
 @pytest.fixture
-def empty(monkeypatch: pytest.MonkeyPatch) -> None:
+def no_user_readers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(registry, "USER_READERS", {})
 
 
-def groove(result: object) -> Reader:
-    """Return a reader of text that begins with a word; any text is taken by a reader of ours."""
+def make_reader(result: object) -> Reader:
+    """Return a reader of text that begins with "groove"; the built-in text reader accepts any."""
 
     def read(*_: object) -> Any:
         if isinstance(result, Exception):
@@ -132,40 +136,40 @@ def groove(result: object) -> Reader:
 
 
 @pytest.fixture
-def text(tmp_path: Path) -> Path:
+def text_file(tmp_path: Path) -> Path:
     path = tmp_path / "a.txt"
     path.write_text("groove\n1 2 3\n4 5 6\n7 8 10\n")
     return path
 
 
-@pytest.mark.usefixtures("empty")
-def test_a_registered_reader_is_asked_before_text_is_guessed(text: Path) -> None:
-    assert read_surface(text).heights[2, 2] == 10.0
-    register(groove(RawSurface(np.ones(5), (1e-3,), "a.txt", ())))
-    assert read_surface(text).pitch == (1e-3,)
+@pytest.mark.usefixtures("no_user_readers")
+def test_registered_reader_precedes_the_text_reader(text_file: Path) -> None:
+    assert read_surface(text_file).heights[2, 2] == 10.0
+    register(make_reader(RawSurface(np.ones(5), (1e-3,), "a.txt", ())))
+    assert read_surface(text_file).pitch == (1e-3,)
     with pytest.raises(ParameterError, match=r"unit must not be given: a\.txt \(a groove\)"):
-        read_surface(text, unit="mm")
+        read_surface(text_file, unit="mm")
     with pytest.raises(ParameterError, match="a name that no other reader has"):
-        register(groove(None))
+        register(make_reader(None))
 
 
-@pytest.mark.usefixtures("empty")
-def test_a_unit_that_a_reader_leaves_open_is_said_to_be_the_metre(text: Path) -> None:
-    said = "no unit in the file: taken as metres"
-    register(groove(RawSurface(np.ones(5), None, "a.txt", ("odd",), has_units=False)))
-    assert read_surface(text).notes == (said, "odd")
+@pytest.mark.usefixtures("no_user_readers")
+def test_heights_without_a_unit_are_noted_as_metres(text_file: Path) -> None:
+    note = "no unit in the file: taken as metres"
+    register(make_reader(RawSurface(np.ones(5), None, "a.txt", ("odd",), has_units=False)))
+    assert read_surface(text_file).notes == (note, "odd")
     registry.USER_READERS.clear()
-    register(groove(RawSurface(np.ones(5), None, "a.txt", (), has_units=False, relative=True)))
-    assert read_surface(text).notes == ()
+    register(make_reader(RawSurface(np.ones(5), None, "a.txt", (), has_units=False, relative=True)))
+    assert read_surface(text_file).notes == ()
 
 
-@pytest.mark.usefixtures("empty")
-def test_a_reader_that_finds_nothing_leaves_the_file_to_the_next(text: Path) -> None:
-    register(groove(None))
-    assert read_surface(text).heights[2, 2] == 10.0
+@pytest.mark.usefixtures("no_user_readers")
+def test_reader_that_returns_none_leaves_the_file_to_the_next(text_file: Path) -> None:
+    register(make_reader(None))
+    assert read_surface(text_file).heights[2, 2] == 10.0
 
 
-@pytest.mark.usefixtures("empty")
+@pytest.mark.usefixtures("no_user_readers")
 @pytest.mark.parametrize(
     ("result", "match"),
     [
@@ -178,9 +182,11 @@ def test_a_reader_that_finds_nothing_leaves_the_file_to_the_next(text: Path) -> 
         (SurfaceFileError("a groove of a later version"), r"^a\.txt: a groove of a later version$"),
     ],
 )
-def test_a_careless_reader_is_a_refusal_in_one_line(text: Path, result: object, match: str) -> None:
-    """A file that a reader knows for its own is not guessed at by the others."""
-    register(groove(result))
-    with pytest.raises(SurfaceFileError, match=match) as caught:
-        read_surface(text)
-    assert "\n" not in str(caught.value)
+def test_invalid_result_of_a_reader_gives_a_one_line_error(
+    text_file: Path, result: object, match: str
+) -> None:
+    """A file that a reader recognises is not tried with the other readers."""
+    register(make_reader(result))
+    with pytest.raises(SurfaceFileError, match=match) as error:
+        read_surface(text_file)
+    assert "\n" not in str(error.value)

@@ -1,4 +1,4 @@
-"""A section of one's own on the page of a result, through public means only."""
+"""A user-defined section on the page of a result, through the public interface only."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from asperity.report import add_section, html_text, page
 from asperity.report.page import Cell, Row, Section, Table
 
 
-def paint(comparison: asp.Comparison) -> Section | None:
-    """Say how much paint the surface takes; nothing of one that is almost flat."""
+def paint_section(comparison: asp.Comparison) -> Section | None:
+    """Return a section with the thickness of a coat of paint; none for an almost flat surface."""
     height = comparison.texture.peak_to_valley
     if height < 1e-5:
         return None
@@ -23,12 +23,12 @@ def paint(comparison: asp.Comparison) -> Section | None:
 
 
 @pytest.fixture(autouse=True)
-def _added(monkeypatch: pytest.MonkeyPatch) -> None:
+def _register_section(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(page, "_USER_SECTIONS", {})
-    add_section(asp.Comparison, paint)
+    add_section(asp.Comparison, paint_section)
 
 
-def test_it_is_on_the_page_that_the_command_line_writes(
+def test_section_is_on_the_page_of_the_command_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "report.html"
@@ -41,22 +41,20 @@ def test_it_is_on_the_page_that_the_command_line_writes(
     assert text.index("Strength and support") < text.index("Paint") < text.index("<h2>Assumptions")
 
 
-def test_it_may_have_nothing_to_say() -> None:
+def test_section_may_be_none() -> None:
     text = html_text(asp.compare(asp.Sinusoid(1e-6, 1e-3), laws="W"))
     assert "Paint" not in text
 
 
-def test_it_is_added_once_and_to_its_result_only() -> None:
-    add_section(asp.Comparison, paint)
+def test_section_is_added_once_and_only_to_its_result() -> None:
+    add_section(asp.Comparison, paint_section)
     text = html_text(asp.compare(asp.Sinusoid(1e-4, 1e-3), laws="W"))
     assert text.count("<h2>Paint</h2>") == 1
     other = html_text(asp.analyze(asp.Surface(asp.Sinusoid(1e-4, 1e-3), "W")))
     assert "Paint" not in other
 
 
-def test_the_documented_example_as_a_plugin(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_documented_example_as_a_plugin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = (Path(__file__).parents[2] / "docs/howto/reports.md").read_text("utf-8")
     code = re.search(r"```python\n(.*?)```", text[text.index("## Add a section") :], re.DOTALL)
     command = re.search(r"`asperity (compare knurl .*?)`", text)

@@ -1,6 +1,6 @@
 """A user-defined texture kind with its own sampler works everywhere, without further code.
 
-The kind is that of the example, as a file outside the package.
+The kind is that of the documented example, as a file outside the package.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ Answer = Callable[..., Any]
 
 
 @pytest.fixture(scope="module")
-def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
-    """The user's module, imported from a directory outside the package."""
+def plugin(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
+    """Return the user-defined module, imported from a directory outside the package."""
     folder = tmp_path_factory.mktemp("own")
     shutil.copy(EXAMPLE, folder / "my_eggs.py")
     with imported(folder, "my_eggs") as module:
@@ -50,15 +50,15 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ModuleType]:
 
 
 @pytest.fixture
-def texture(own: ModuleType) -> Any:
-    return own.EggBox(amplitude=A, period=PERIOD)
+def texture(plugin: ModuleType) -> Any:
+    return plugin.EggBox(amplitude=A, period=PERIOD)
 
 
 @pytest.fixture
-def plain(own: ModuleType) -> Any:
-    """The same kind without optional members."""
+def plain(plugin: ModuleType) -> Any:
+    """Return a texture of the same kind without its optional members."""
 
-    class Plain(own.EggBox):
+    class Plain(plugin.EggBox):
         third_derivative_bound = Texture.third_derivative_bound
 
     return Plain(A, PERIOD)
@@ -66,41 +66,41 @@ def plain(own: ModuleType) -> Any:
 
 @pytest.fixture
 def finite(plain: Any) -> Any:
-    """A part of it that is not periodic: suprema lie on its border."""
+    """Return a part of the texture that is not periodic: suprema lie on its border."""
     part = Domain(np.zeros(2), 0.2 * PERIOD * np.eye(2), periodic=False, description="a part")
     return type("Finite", (type(plain),), {"domain": part})(A, PERIOD)
 
 
 @pytest.fixture
-def registered(own: ModuleType, monkeypatch: pytest.MonkeyPatch) -> TextureKind:
+def registered(plugin: ModuleType, monkeypatch: pytest.MonkeyPatch) -> TextureKind:
     # Change the catalogue in place: other modules hold a reference to it.
-    monkeypatch.setitem(catalogue.CATALOGUE, "egg-box", own.EGG_BOX)
+    monkeypatch.setitem(catalogue.CATALOGUE, "egg-box", plugin.EGG_BOX)
     monkeypatch.delitem(catalogue.CATALOGUE, "egg-box")
-    return catalogue.register(own.EGG_BOX)
+    return catalogue.register(plugin.EGG_BOX)
 
 
-def kinds_of(base: type) -> set[str]:
-    return {base.__name__}.union(*(kinds_of(kind) for kind in base.__subclasses__()))
+def class_names(base: type) -> set[str]:
+    return {base.__name__}.union(*(class_names(kind) for kind in base.__subclasses__()))
 
 
-def type_checks(path: Path, known: set[str]) -> list[str]:
-    """Return the calls of isinstance or issubclass on one of the known classes in a module."""
-    found = []
+def type_checks(path: Path, classes: set[str]) -> list[str]:
+    """Return the calls of isinstance or issubclass on one of these classes in a module."""
+    checks = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Call) and ast.unparse(node.func) in {"isinstance", "issubclass"}:
-            named = {n.id for n in ast.walk(node.args[1]) if isinstance(n, ast.Name)}
-            if named & known:
-                found.append(f"{path.name}: {ast.unparse(node)}")
-    return found
+            names = {n.id for n in ast.walk(node.args[1]) if isinstance(n, ast.Name)}
+            if names & classes:
+                checks.append(f"{path.name}: {ast.unparse(node)}")
+    return checks
 
 
 def test_no_code_outside_textures_checks_the_class_of_a_texture() -> None:
-    package, known = Path(asp.__file__).parent, kinds_of(Texture)
-    assert {"Sinusoid", "HeightMap", "Grating"} <= known
-    room = package / "textures"
-    others = [path for path in package.rglob("*.py") if not path.is_relative_to(room)]
-    assert [found for path in others for found in type_checks(path, known)] == []
-    assert type_checks(room / "catalogue.py", known) == [
+    package, textures = Path(asp.__file__).parent, class_names(Texture)
+    assert {"Sinusoid", "HeightMap", "Grating"} <= textures
+    folder = package / "textures"
+    others = [path for path in package.rglob("*.py") if not path.is_relative_to(folder)]
+    assert [check for path in others for check in type_checks(path, textures)] == []
+    assert type_checks(folder / "catalogue.py", textures) == [
         "catalogue.py: isinstance(texture, Texture)"
     ]
 
@@ -148,38 +148,38 @@ def dense_numbers(law: str, count: int = 401) -> tuple[float, float]:
     return float(max(norms)), float(max(sides))
 
 
-def test_the_sampler_evaluates_the_formulas(texture: Any) -> None:
+def test_sampler_equals_the_formulas(texture: Any) -> None:
     xy = grid(7)
     scale = np.array([A, *[A * WAVE] * 2, *[A * WAVE**2] * 3])
     assert (np.abs(texture.derivatives(xy) - formulas(xy)) < 1e-13 * scale).all()
     points = np.column_stack([xy, np.full(len(xy), -0.3e-3)])
     closest = texture.nearest(points)
-    near = grid(201)
-    around = near[None] + PERIOD * np.array([[[i, j]] for i in (-1, 0, 1) for j in (-1, 0, 1)])
-    surface = np.column_stack([around.reshape(-1, 2), np.tile(formulas(near)[:, 0], 9)])
-    for point, found in zip(points, closest, strict=True):
-        best = np.linalg.norm(surface - point, axis=1).min()
-        assert np.linalg.norm(found - point) <= best * (1.0 + 1e-12)
+    nodes = grid(201)
+    around = nodes[None] + PERIOD * np.array([[[i, j]] for i in (-1, 0, 1) for j in (-1, 0, 1)])
+    surface = np.column_stack([around.reshape(-1, 2), np.tile(formulas(nodes)[:, 0], 9)])
+    for point, closest_point in zip(points, closest, strict=True):
+        distance = np.linalg.norm(surface - point, axis=1).min()
+        assert np.linalg.norm(closest_point - point) <= distance * (1.0 + 1e-12)
 
 
 @pytest.mark.parametrize("law", ["A", "C"])
 @pytest.mark.parametrize("kind", ["texture", "plain"])
-def test_numbers_are_within_their_bounds(
+def test_bounds_contain_densely_sampled_numbers(
     law: str, kind: str, request: pytest.FixtureRequest
 ) -> None:
-    """A dense evaluation stays below the proved bound; the attained value is above the grid's."""
+    """The upper bound is above the values on a grid, and the attained value close to them."""
     surface = asp.Surface(request.getfixturevalue(kind), law, max_depth=DEPTH)
-    found = (asp.characteristic_number(surface), one_sided_number(surface))
-    for bound, dense in zip(found, dense_numbers(law), strict=True):
+    bounds = (asp.characteristic_number(surface), one_sided_number(surface))
+    for bound, dense in zip(bounds, dense_numbers(law), strict=True):
         assert bound.method == "certified"
         assert dense * (1.0 - 1e-9) <= bound.upper
         assert bound.lower >= dense * (1.0 - 1e-4)
         # Without enclosures of second derivatives each entry may be as large as their bound.
-        loose = 2.0 * DEPTH * (A * WAVE**2) if law == "C" and kind == "plain" else 0.0
-        assert bound.upper <= (dense + loose) * (1.01 if loose else 1.0011)
+        slack = 2.0 * DEPTH * (A * WAVE**2) if law == "C" and kind == "plain" else 0.0
+        assert bound.upper <= (dense + slack) * (1.01 if slack else 1.0011)
 
 
-def test_numbers_of_all_shipped_laws_are_bounds(plain: Any, finite: Any) -> None:
+def test_bounds_hold_for_all_shipped_laws(plain: Any, finite: Any) -> None:
     rng = np.random.default_rng(3)
     for texture, law in itertools.product((plain, finite), "WABCDEFG"):
         surface = asp.Surface(texture, law, max_depth=DEPTH)
@@ -192,7 +192,7 @@ def test_numbers_of_all_shipped_laws_are_bounds(plain: Any, finite: Any) -> None
 
 
 @pytest.mark.parametrize("law", ["A", "C", "D"])
-def test_the_multi_precision_reference_follows(texture: Any, law: str) -> None:
+def test_force_and_jacobian_equal_the_multi_precision_reference(texture: Any, law: str) -> None:
     surface = asp.Surface(texture, law, max_depth=DEPTH)
     point = [0.31e-3, -0.17e-3, -0.05e-3]
     force = np.array(exact_force(surface, point).tolist(), dtype=float)[:, 0]
@@ -201,13 +201,13 @@ def test_the_multi_precision_reference_follows(texture: Any, law: str) -> None:
     np.testing.assert_allclose(surface.jacobian([point])[0], jacobian, atol=1e-11 * 1000.0)
 
 
-def test_segments_of_a_line_enclose_the_heights(texture: Any) -> None:
+def test_line_segments_enclose_the_derivatives(texture: Any) -> None:
     line = texture.scan_line()
-    pieces = texture.line_segments(line, 64)
-    models = pieces.models(DERIVATIVE_NAMES)
+    segments = texture.line_segments(line, 64)
+    models = segments.models(DERIVATIVE_NAMES)
     for xi in (-1.0, 0.3, 1.0):
-        along = (np.arange(64) + 0.5 + 0.5 * xi) * pieces.length
-        exact = formulas(line.start + along[:, None] * line.direction)
+        positions = (np.arange(64) + 0.5 + 0.5 * xi) * segments.length
+        exact = formulas(line.start + positions[:, None] * line.direction)
         for i, name in enumerate(DERIVATIVE_NAMES):
             model = models[name]
             assert (np.abs(exact[:, i] - model.c - xi * model.g[0]) <= model.e).all()
@@ -226,90 +226,90 @@ def test_segments_of_a_line_enclose_the_heights(texture: Any) -> None:
         ("bounds", (A * WAVE, 0.9 * A * WAVE**2)),
     ],
 )
-def test_bounds_that_are_too_small_are_an_error(
-    own: ModuleType, law: str, name: str, value: tuple[float, float]
+def test_too_small_bounds_are_detected(
+    plugin: ModuleType, law: str, name: str, value: tuple[float, float]
 ) -> None:
-    wrong = type("Wrong", (own.EggBox,), {name: value})(A, PERIOD)
+    wrong = type("Wrong", (plugin.EggBox,), {name: value})(A, PERIOD)
     with pytest.raises(InternalError):
         asp.characteristic_number(asp.Surface(wrong, law, max_depth=DEPTH))
 
 
-def test_a_third_derivative_bound_that_is_too_small_is_an_error(own: ModuleType) -> None:
-    wrong = type("Wrong", (own.EggBox,), {"third_derivative_bound": A * WAVE**3})(A, PERIOD)
+def test_too_small_third_derivative_bound_is_detected(plugin: ModuleType) -> None:
+    wrong = type("Wrong", (plugin.EggBox,), {"third_derivative_bound": A * WAVE**3})(A, PERIOD)
     with pytest.raises(InternalError):
         asp.characteristic_number(asp.Surface(wrong, "C", max_depth=DEPTH))
 
 
-def test_a_bound_that_is_attained_ends_the_search_for_the_sharpest_crest(texture: Any) -> None:
-    """The tops have the greatest curvature that the kind states: smaller cells add nothing."""
+def test_attained_hessian_bound_ends_the_search_for_the_sharpest_crest(texture: Any) -> None:
+    """The crests attain the curvature that the kind states, so smaller cells are not needed."""
     cells = texture.cells()
-    found = supremum(CrestProblem(cells), 1e-4)
-    assert found.converged
-    assert found.lower == pytest.approx(A * WAVE**2, rel=1e-9)
-    assert found.lower <= found.upper <= A * WAVE**2 * (1.0 + 1e-8)
-    unaware = texture.cells()
-    unaware.hessian_bound = math.inf
-    rough = supremum(CrestProblem(unaware), 1e-2)
-    assert found.cell_count < 4096 < 50 * 4096 < rough.cell_count
-    assert rough.lower == pytest.approx(found.lower, rel=1e-9)
-    assert rough.upper > found.upper
+    result = supremum(CrestProblem(cells), 1e-4)
+    assert result.converged
+    assert result.lower == pytest.approx(A * WAVE**2, rel=1e-9)
+    assert result.lower <= result.upper <= A * WAVE**2 * (1.0 + 1e-8)
+    unbounded_cells = texture.cells()
+    unbounded_cells.hessian_bound = math.inf
+    unbounded_result = supremum(CrestProblem(unbounded_cells), 1e-2)
+    assert result.cell_count < 4096 < 50 * 4096 < unbounded_result.cell_count
+    assert unbounded_result.lower == pytest.approx(result.lower, rel=1e-9)
+    assert unbounded_result.upper > result.upper
 
 
 def test_certificates_of_a_user_defined_kind_are_not_cached(texture: Any) -> None:
-    """Its file may change, and so may what the file reads."""
+    """The file of the kind may change, and so may the data that it reads."""
     surface = asp.Surface(texture, "A", max_depth=DEPTH)
     assert surface_content(surface) is None
     assert surface_content(surface.to_texture(asp.Sinusoid(A, PERIOD))) is not None
 
 
-# --- everything else follows ----------------------------------------------------------------------
+# --- analyses and reports -------------------------------------------------------------------------
 
 
-def test_it_works_in_python(texture: Any) -> None:
+def test_comparison_analysis_and_limits_in_python(texture: Any) -> None:
     result = asp.compare(texture, device="omega.3", laws="WABCDEFG", max_depth=DEPTH)
     assert [row.law.letter for row in result.rows] == list("WABCDEFG")
     data = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert data["texture"]["kind"] == "egg-box"
     assert "egg-box" in html_text(result)
     surface = asp.Surface(texture, "A", max_depth=DEPTH)
-    found = asp.analyze(surface, device="omega.3")
-    json.dumps(found.to_dict(), allow_nan=False)
-    assert "<svg" in html_text(found)
+    analysis = asp.analyze(surface, device="omega.3")
+    json.dumps(analysis.to_dict(), allow_nan=False)
+    assert "<svg" in html_text(analysis)
     json.dumps(asp.limits(texture, device="omega.3", law="C").to_dict(), allow_nan=False)
 
 
-def test_the_energy_of_a_loop_is_the_stated_one(plain: Any) -> None:
+def test_energy_of_the_worst_loop_equals_its_work_integral(plain: Any) -> None:
     surface = asp.Surface(plain, "A", max_depth=DEPTH)
     worst = asp.worst_loop(surface)
     assert asp.loop_work(surface, worst.vertices) == pytest.approx(worst.energy, rel=1e-3)
     assert worst.energy <= worst.upper_per_period
 
 
-def test_its_spectrum_is_sampled(texture: Any) -> None:
-    """Two waves along the diagonals: all the variance at l/√2, of a²/2 with a = A/√2."""
+def test_spectrum_is_sampled_and_has_the_diagonal_wave(texture: Any) -> None:
+    """Two diagonal waves have all the variance, a²/2 with a = A/√2, at the wavelength l/√2."""
     from asperity.analysis.limits.spectrum import compute_spectrum
 
-    found = compute_spectrum(texture)
-    assert not found.exact
-    strongest = max(found.waves, key=lambda wave: wave.share)
+    spectrum = compute_spectrum(texture)
+    assert not spectrum.exact
+    strongest = max(spectrum.waves, key=lambda wave: wave.share)
     assert strongest.share > 0.99
     assert strongest.wavelength == pytest.approx(PERIOD / math.sqrt(2.0), rel=1e-3)
     assert strongest.amplitude == pytest.approx(A / math.sqrt(2.0), rel=1e-2)
 
 
-# --- by name ------------------------------------------------------------------------------------
+# --- names --------------------------------------------------------------------------------------
 
 
-def test_a_name_is_registered_once(registered: TextureKind) -> None:
+def test_registering_an_existing_name_is_refused(registered: TextureKind) -> None:
     with pytest.raises(ParameterError, match="'egg-box' is taken: bumps and dimples"):
         catalogue.register(registered)
 
 
 @pytest.mark.parametrize("name", ["sinusoid", "cloth", "file", "Egg", "egg box", "", "e"])
-def test_invalid_names_are_refused(name: str, own: ModuleType) -> None:
+def test_invalid_names_are_refused(name: str, plugin: ModuleType) -> None:
     before = dict(catalogue.CATALOGUE)
     with pytest.raises(ParameterError, match="kind"):
-        catalogue.register(TextureKind(name, "a kind", own.EggBox, ()))
+        catalogue.register(TextureKind(name, "a kind", plugin.EggBox, ()))
     assert before == catalogue.CATALOGUE
 
 
@@ -317,21 +317,25 @@ SPECIFICATION = "egg-box:amplitude=0.1mm,period=2mm"
 MODULE = ("--plugin", str(EXAMPLE))
 
 
-def test_it_works_on_the_command_line(answer: Answer, call: Call, tmp_path: Path) -> None:
+def test_every_command_accepts_the_kind(read_json: Answer, call: Call, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
-    given = ("compare", SPECIFICATION, "--laws", "AC", "--html", str(page))
-    assert answer(*given, *MODULE)["texture"]["kind"] == "egg-box"
+    arguments = ("compare", SPECIFICATION, "--laws", "AC", "--html", str(page))
+    assert read_json(*arguments, *MODULE)["texture"]["kind"] == "egg-box"
     assert "egg-box" in page.read_text(encoding="utf-8")
-    listed = answer("surfaces", "egg-box", *MODULE)["surfaces"]
-    assert [one["specification"] for one in listed] == ["egg-box:amplitude=100um,period=2mm"]
-    assert answer("analyze", SPECIFICATION, "--law", "C", *MODULE)["texture"]["kind"] == "egg-box"
-    assert answer("limits", SPECIFICATION, "--law", "C", *MODULE)["texture"]["kind"] == "egg-box"
+    surfaces = read_json("surfaces", "egg-box", *MODULE)["surfaces"]
+    assert [surface["specification"] for surface in surfaces] == [
+        "egg-box:amplitude=100um,period=2mm"
+    ]
+    assert (
+        read_json("analyze", SPECIFICATION, "--law", "C", *MODULE)["texture"]["kind"] == "egg-box"
+    )
+    assert read_json("limits", SPECIFICATION, "--law", "C", *MODULE)["texture"]["kind"] == "egg-box"
     code, _out, err = call("compare", "egg-box:amplitude=0.1mm", *MODULE)
     assert code == 2
     assert "period is missing: a egg-box needs amplitude, period" in err
 
 
-def test_a_kind_is_registered_until_the_command_ends(call: Call) -> None:
+def test_kind_is_registered_until_the_command_ends(call: Call) -> None:
     assert call("surfaces", "egg-box", *MODULE)[0] == 0
     assert "egg-box" not in catalogue.CATALOGUE
     code, _out, err = call("surfaces", "egg-box")
@@ -339,7 +343,7 @@ def test_a_kind_is_registered_until_the_command_ends(call: Call) -> None:
     assert "is unknown: 'egg-box'" in err
 
 
-def test_it_works_in_a_scene(answer: Answer, tmp_path: Path) -> None:
+def test_scene_accepts_the_kind(read_json: Answer, tmp_path: Path) -> None:
     scene = tmp_path / "eggs.toml"
     scene.write_text(
         '[texture]\nkind = "egg-box"\namplitude = "0.1 mm"\nperiod = "2 mm"\n'
@@ -351,21 +355,23 @@ def test_it_works_in_a_scene(answer: Answer, tmp_path: Path) -> None:
         '[run]\nduration = "20 ms"\n',
         encoding="utf-8",
     )
-    assert answer("analyze", str(scene), *MODULE)["texture"]["kind"] == "egg-box"
-    answer("simulate", str(scene), *MODULE)
+    assert read_json("analyze", str(scene), *MODULE)["texture"]["kind"] == "egg-box"
+    read_json("simulate", str(scene), *MODULE)
 
 
-def test_the_example_runs(own: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
+def test_documented_example_runs(
+    plugin: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
     monkeypatch.setattr(catalogue, "CATALOGUE", dict(catalogue.CATALOGUE))
-    own.main()
+    plugin.main()
     assert "C: q = 1.1006 (certified)" in capsys.readouterr().out
 
 
-def test_the_reference_height_is_good_to_double_precision(texture: Any) -> None:
-    """The default of a kind without a formula in multi-precision arithmetic."""
+def test_default_reference_height_has_double_precision(texture: Any) -> None:
+    """This is the default of a kind without a formula in multi-precision arithmetic."""
     h = texture.exact_height()
     with mpmath.workdps(40):
         k, x, y = mpmath.mpf(WAVE), mpmath.mpf("0.123e-3"), mpmath.mpf("0.321e-3")
         exact = mpmath.mpf(A) * mpmath.cos(k * x) * mpmath.cos(k * y)
-        off = abs(h(x, y, 0, 0) - exact)
-    assert off < 1e-15 * A
+        error = abs(h(x, y, 0, 0) - exact)
+    assert error < 1e-15 * A
